@@ -1,0 +1,136 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The motion file: the one interface between capture, solver, scene and other people's tools.
+
+Plain arrays in a compressed .npz, AMASS-style keys, one row per source frame. Frames: world is z up with the floor
+at z = 0; camera is OpenCV's (x right, y down, z forward). ``poses`` holds axis-angle vectors, the root's in the
+world frame and the others relative to their parents; ``trans`` is SMPL's: pelvis = J_0(betas) + trans.
+"""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from dataclasses import dataclass, fields
+from pathlib import Path
+
+import numpy as np
+
+from ..solver.errors import MotionFileError, OutputError
+
+
+@dataclass
+class Motion:
+    """One person's motion over T frames; K joints, P shape coefficients, J keypoints. Keys as in the file."""
+
+    poses: np.ndarray  # (T, 3(K+1)) f32
+    trans: np.ndarray  # (T, 3) f32
+    poses_raw: np.ndarray  # (T, 3(K+1)) f32, before smoothing and contact
+    trans_raw: np.ndarray  # (T, 3) f32
+    betas: np.ndarray  # (P,) f32
+    body_model: str
+    gender: str
+    mocap_framerate: float
+    frames: np.ndarray  # (T,) i64 source frame index
+    timestamps: np.ndarray  # (T,) f64 seconds
+    valid: np.ndarray  # (T,) bool
+    joints_cam: np.ndarray  # (T, K+1, 3) f32 metres, camera frame
+    keypoints2d: np.ndarray  # (T, J, 3) f32 pixels and confidence
+    keypoints2d_names: np.ndarray  # (J,) str
+    intrinsics: np.ndarray  # (3, 3) f64
+    dist: np.ndarray  # (5,) f64
+    joint_confidence: np.ndarray  # (T, K+1) f32
+    world_from_camera: np.ndarray  # (T, 4, 4) f64
+    foot_contact: np.ndarray  # (T, 4) f32 left heel, left toe, right heel, right toe
+    residual_px: np.ndarray  # (T,) f32
+    image_size: np.ndarray  # (2,) i64 width, height of the decoded, upright frame
+    source: str = ""  # file name of the footage
+
+    def __post_init__(self) -> None:
+        for name, (_, dtype) in _SCHEMA.items():
+            value = getattr(self, name)
+            setattr(self, name, np.asarray(value, dtype) if dtype is not str else str(value))
+        self.mocap_framerate = float(self.mocap_framerate)
+        self.validate()
+
+    @property
+    def joint_count(self) -> int:
+        """K + 1."""
+        return self.joints_cam.shape[1]
+
+    def __len__(self) -> int:
+        return len(self.frames)
+
+    def validate(self, where: str = "motion") -> None:
+        """Raise ``MotionFileError`` naming the first array whose shape does not fit the others."""
+        T = len(self.frames)
+        if self.joints_cam.ndim != 3 or self.keypoints2d.ndim != 3:
+            raise MotionFileError(f"{where}: joints_cam and keypoints2d must have three dimensions")
+        sizes = {"T": T, "K1": self.joints_cam.shape[1], "J": self.keypoints2d.shape[1], "P": self.betas.size}
+        sizes["3K1"] = 3 * sizes["K1"]
+        for name, (shape, dtype) in _SCHEMA.items():
+            if dtype is str:
+                continue
+            expected = tuple(sizes.get(s, s) for s in shape)
+            got = getattr(self, name).shape
+            if got != expected:
+                raise MotionFileError(f"{where}: {name} must have shape {expected}, but has {got}")
+
+    def save(self, path: str | Path) -> None:
+        """Write the .npz beside its final place and rename it there, so that a failure never leaves half a file."""
+        path = Path(path)
+        arrays = {f.name: np.asarray(getattr(self, f.name)) for f in fields(self)}
+        try:
+            handle, name = tempfile.mkstemp(prefix=f".{path.stem}.", suffix=".npz", dir=path.parent)
+        except OSError as error:
+            raise OutputError(f"cannot write {path}: {error.strerror}; choose a folder you can write to") from error
+        try:
+            with os.fdopen(handle, "wb") as file:
+                np.savez_compressed(file, **arrays)
+            os.chmod(name, 0o644)
+            os.replace(name, path)
+        except OSError as error:
+            Path(name).unlink(missing_ok=True)
+            raise OutputError(f"cannot write {path}: {error.strerror}") from error
+
+    @classmethod
+    def load(cls, path: str | Path) -> Motion:
+        """Read and check a motion file. Never unpickles."""
+        path = Path(path)
+        try:
+            with np.load(path, allow_pickle=False) as file:
+                data = {k: file[k] for k in file.files}
+        except FileNotFoundError as error:
+            raise MotionFileError(f"{path} does not exist; capture a video first") from error
+        except (OSError, ValueError, KeyError, EOFError) as error:
+            raise MotionFileError(f"{path} is not a motion file ({error})") from error
+        known = {f.name for f in fields(cls)}
+        missing = sorted(known - set(data) - {"source"})
+        if missing:
+            raise MotionFileError(f"{path} lacks {', '.join(missing)}: it is not a motion file of this version")
+        values = {k: v.item() if v.ndim == 0 else v for k, v in data.items() if k in known}
+        return cls(**values)
+
+
+_SCHEMA: dict[str, tuple[tuple, type]] = {
+    "poses": (("T", "3K1"), np.float32),
+    "trans": (("T", 3), np.float32),
+    "poses_raw": (("T", "3K1"), np.float32),
+    "trans_raw": (("T", 3), np.float32),
+    "betas": (("P",), np.float32),
+    "body_model": ((), str),
+    "gender": ((), str),
+    "frames": (("T",), np.int64),
+    "timestamps": (("T",), np.float64),
+    "valid": (("T",), np.bool_),
+    "joints_cam": (("T", "K1", 3), np.float32),
+    "keypoints2d": (("T", "J", 3), np.float32),
+    "keypoints2d_names": (("J",), np.str_),
+    "intrinsics": ((3, 3), np.float64),
+    "dist": ((5,), np.float64),
+    "joint_confidence": (("T", "K1"), np.float32),
+    "world_from_camera": (("T", 4, 4), np.float64),
+    "foot_contact": (("T", 4), np.float32),
+    "residual_px": (("T",), np.float32),
+    "image_size": ((2,), np.int64),
+    "source": ((), str),
+}

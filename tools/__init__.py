@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What makes the assets: body builder, network converter, sample clip. Needed to build Scope, not to use it."""
