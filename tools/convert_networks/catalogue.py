@@ -1,0 +1,65 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What is fetched, from where, and what each network's outputs are called."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Package:
+    """One pinned archive: ``file_name`` in the download cache, ``sha256`` of its bytes, ``source`` for messages."""
+
+    file_name: str
+    sha256: str
+    source: str
+
+
+@dataclass(frozen=True)
+class Network:
+    """One TFLite file and the graph outputs to keep, as (position in the TFLite outputs, new name, NHWC shape)."""
+
+    name: str
+    package: Package
+    member: str
+    input_shape: tuple[int, ...]
+    outputs: tuple[tuple[int, str, tuple[int, ...]], ...]
+
+
+WHEEL = Package(
+    "mediapipe-0.10.14-cp311-cp311-manylinux_2_17_x86_64.manylinux2014_x86_64.whl",
+    "a807328339e7356fda0bb14df12fedbf1d33bdf81649c5f8666b0026b1cc30b4",
+    "mediapipe==0.10.14 on PyPI",
+)
+TARBALL = Package(
+    "mediapipe-pose-0.5.1675469404.tgz",
+    "8bb349a7b3a3ba699df23be804ddd3b3eab810b50b15406894be257859388a84",
+    "@mediapipe/pose@0.5.1675469404 on npm",
+)
+LICENSE_MEMBER = "mediapipe-0.10.14.dist-info/LICENSE"
+
+# The segmentation mask (position 2 of the TFLite outputs) is left out: everything that only feeds it is pruned.
+_LANDMARK_OUTPUTS = (
+    (0, "landmarks", (1, 195)),
+    (1, "presence", (1, 1)),
+    (3, "heatmap", (1, 64, 64, 39)),
+    (4, "world", (1, 117)),
+)
+
+NETWORKS = (
+    Network(
+        "pose_detection",
+        WHEEL,
+        "mediapipe/modules/pose_detection/pose_detection.tflite",
+        (1, 224, 224, 3),
+        ((0, "boxes", (1, 2254, 12)), (1, "scores", (1, 2254, 1))),
+    ),
+    *(
+        Network(
+            f"pose_landmark_{size}",
+            TARBALL,
+            f"package/pose_landmark_{size}.tflite",
+            (1, 256, 256, 3),
+            _LANDMARK_OUTPUTS,
+        )
+        for size in ("lite", "full", "heavy")
+    ),
+)

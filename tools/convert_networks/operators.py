@@ -1,0 +1,211 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""One function per TFLite operator, each appending the ONNX nodes that compute the same."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from .graph import Graph, SpatialPad
+from .tflite import PADDINGS, Operator
+
+_NCHW_AXIS = (0, 2, 3, 1)  # TFLite axis -> ONNX axis of a rank-4 activation
+
+
+def _axis(graph: Graph, tensor: int, axis: int, operator: Operator) -> int:
+    rank = len(graph.shape(tensor))
+    if not -rank <= axis < rank:
+        raise graph.fail(operator, f"axis {axis} of a rank-{rank} tensor")
+    axis %= rank
+    return _NCHW_AXIS[axis] if rank == 4 else axis
+
+
+def _window_pads(graph: Graph, operator: Operator, size: tuple[int, ...], kernel: tuple[int, ...]) -> list[int]:
+    """ONNX pads [top, left, bottom, right] of a sliding window over an input of ``size`` (height, width).
+
+    SAME: the output has ceil(n / stride) rows; what is missing, max((out − 1)·stride + reach − n, 0), is split in two
+    with the odd row at the end. VALID: none.
+    """
+    options = operator.options
+    if PADDINGS.get(options["padding"]) is None or min(options["stride_h"], options["stride_w"]) < 1:
+        raise graph.fail(
+            operator, f"padding {options['padding']}, stride {options['stride_h']} x {options['stride_w']}"
+        )
+    if PADDINGS[options["padding"]] == "VALID":
+        return [0, 0, 0, 0]
+    before, after = [], []
+    for n, k, axis in zip(size, kernel, "hw", strict=True):
+        stride = options[f"stride_{axis}"]
+        reach = (k - 1) * options.get(f"dilation_{axis}", 1) + 1
+        missing = max((-(-n // stride) - 1) * stride + reach - n, 0)
+        before.append(missing // 2)
+        after.append(missing - missing // 2)
+    return before + after
+
+
+def _convolution(graph: Graph, operator: Operator, weights: np.ndarray, groups: int) -> None:
+    """``weights``: (out, in / groups, height, width). Takes over a pending spatial padding of the input."""
+    source = operator.inputs[0]
+    kernel = weights.shape[2:]
+    if len(graph.shape(source)) != 4 or weights.shape[1] * groups != graph.shape(source)[3]:
+        raise graph.fail(operator, f"weights {weights.shape} do not fit the input {graph.shape(source)}")
+    pads = _window_pads(graph, operator, graph.shape(source)[1:3], kernel)
+    if source in graph.pads and source not in graph.names:
+        pending = graph.pads[source]
+        source = pending.source
+        extra = (pending.top, pending.left, pending.bottom, pending.right)
+        pads = [a + b for a, b in zip(pads, extra, strict=True)]
+    inputs = [graph.value(source), graph.initializer(weights)]
+    if len(operator.inputs) > 2 and operator.inputs[2] >= 0:
+        inputs.append(graph.initializer(graph.constant(operator, 2)))
+    options = operator.options
+    name = graph.node(
+        "Conv",
+        inputs,
+        kernel_shape=list(kernel),
+        strides=[options["stride_h"], options["stride_w"]],
+        dilations=[options["dilation_h"], options["dilation_w"]],
+        pads=pads,
+        group=groups,
+    )
+    graph.finish(operator, name)
+
+
+def conv_2d(graph: Graph, operator: Operator) -> None:
+    """Weights (out, height, width, in)."""
+    weights = graph.constant(operator, 1)
+    if weights.ndim != 4:
+        raise graph.fail(operator, f"weights of shape {weights.shape}")
+    _convolution(graph, operator, weights.transpose(0, 3, 1, 2), 1)
+
+
+def depthwise_conv_2d(graph: Graph, operator: Operator) -> None:
+    """Weights (1, height, width, channels · multiplier)."""
+    weights = graph.constant(operator, 1)
+    if weights.ndim != 4 or weights.shape[0] != 1:
+        raise graph.fail(operator, f"weights of shape {weights.shape}")
+    _convolution(graph, operator, weights.transpose(3, 0, 1, 2), graph.shape(operator.inputs[0])[-1])
+
+
+def add(graph: Graph, operator: Operator) -> None:
+    """Sum of two activations of the same shape."""
+    a, b = operator.inputs
+    if graph.shape(a) != graph.shape(b):
+        raise graph.fail(operator, f"shapes {graph.shape(a)} and {graph.shape(b)} differ")
+    graph.finish(operator, graph.node("Add", [graph.value(a), graph.value(b)]))
+
+
+def pad(graph: Graph, operator: Operator) -> None:
+    """Zero padding; rows and columns alone are left to the convolutions that follow."""
+    amounts = graph.constant(operator, 1)
+    if amounts.shape != (4, 2) or (amounts < 0).any():
+        raise graph.fail(operator, f"paddings {amounts.tolist()}")
+    (n0, n1), (top, bottom), (left, right), (c0, c1) = amounts.tolist()
+    if n0 == n1 == c0 == c1 == 0:
+        graph.pads[operator.outputs[0]] = SpatialPad(operator.inputs[0], top, left, bottom, right)
+        return
+    onnx_order = np.array([n0, c0, top, left, n1, c1, bottom, right], np.int64)
+    graph.finish(operator, graph.node("Pad", [graph.value(operator.inputs[0]), graph.initializer(onnx_order)]))
+
+
+def max_pool_2d(graph: Graph, operator: Operator) -> None:
+    """Padding never wins the maximum in either format."""
+    options = operator.options
+    kernel = (options["filter_h"], options["filter_w"])
+    pads = _window_pads(graph, operator, graph.shape(operator.inputs[0])[1:3], kernel)
+    strides = [options["stride_h"], options["stride_w"]]
+    name = graph.node(
+        "MaxPool", [graph.value(operator.inputs[0])], kernel_shape=list(kernel), strides=strides, pads=pads
+    )
+    graph.finish(operator, name)
+
+
+def resize_bilinear(graph: Graph, operator: Operator) -> None:
+    """Bilinear resize with the sampling grid that the options ask for."""
+    (_, h_in, w_in, _), (_, h_out, w_out, _) = graph.shape(operator.inputs[0]), graph.shape(operator.outputs[0])
+    if operator.options["align_corners"]:
+        grid = "align_corners"
+    else:
+        grid = "half_pixel" if operator.options["half_pixel_centers"] else "asymmetric"
+    scales = graph.initializer(np.array([1, 1, h_out / h_in, w_out / w_in], np.float32))
+    inputs = [graph.value(operator.inputs[0]), "", scales]
+    graph.finish(operator, graph.node("Resize", inputs, mode="linear", coordinate_transformation_mode=grid))
+
+
+def reshape(graph: Graph, operator: Operator) -> None:
+    """The shape comes from the output tensor; the first dimension stays free for the batch."""
+    source, target = operator.inputs[0], graph.shape(operator.outputs[0])
+    if not target or target[0] != graph.shape(source)[0]:
+        raise graph.fail(operator, f"reshape of {graph.shape(source)} to {target} changes the batch")
+    name = graph.node(
+        "Reshape", [graph.channels_last(source), graph.initializer(np.array([-1, *target[1:]], np.int64))]
+    )
+    if len(target) == 4:
+        name = graph.node("Transpose", [name], perm=[0, 3, 1, 2])
+    graph.finish(operator, name)
+
+
+def concatenation(graph: Graph, operator: Operator) -> None:
+    """Along the same axis, renumbered for rank 4."""
+    axis = _axis(graph, operator.outputs[0], operator.options["axis"], operator)
+    graph.finish(operator, graph.node("Concat", [graph.value(i) for i in operator.inputs], axis=axis))
+
+
+def logistic(graph: Graph, operator: Operator) -> None:
+    """1 / (1 + exp(−x))."""
+    graph.finish(operator, graph.node("Sigmoid", [graph.value(operator.inputs[0])]))
+
+
+def depth_to_space(graph: Graph, operator: Operator) -> None:
+    """TFLite takes block row, block column, channel from the depth, in this order: ONNX calls it DCR."""
+    block = operator.options["block_size"]
+    name = graph.node("DepthToSpace", [graph.value(operator.inputs[0])], blocksize=block, mode="DCR")
+    graph.finish(operator, name)
+
+
+def prelu(graph: Graph, operator: Operator) -> None:
+    """x where positive, slope · x elsewhere; slopes (1, 1, channels)."""
+    slope = graph.constant(operator, 1)
+    if slope.ndim != 3:
+        raise graph.fail(operator, f"slopes of shape {slope.shape}")
+    graph.finish(
+        operator, graph.node("PRelu", [graph.value(operator.inputs[0]), graph.initializer(slope.transpose(2, 0, 1))])
+    )
+
+
+def mean(graph: Graph, operator: Operator) -> None:
+    """Mean over rows and columns; other axes have not been needed."""
+    source = operator.inputs[0]
+    axes = sorted(_axis(graph, source, int(a), operator) for a in np.atleast_1d(graph.constant(operator, 1)))
+    if len(graph.shape(source)) != 4 or axes != [2, 3]:
+        raise graph.fail(operator, f"mean over axes {axes} of a rank-{len(graph.shape(source))} tensor")
+    keep = bool(operator.options["keep_dims"])
+    graph.finish(operator, graph.node("ReduceMean", [graph.value(source)], axes=axes, keepdims=int(keep)))
+
+
+def fully_connected(graph: Graph, operator: Operator) -> None:
+    """x Wᵀ + b with W (out, in); the input is flattened in TFLite order."""
+    weights = graph.constant(operator, 1)
+    if weights.ndim != 2 or operator.options["weights_format"] or operator.options["keep_num_dims"]:
+        raise graph.fail(operator, f"weights of shape {weights.shape} or a layout that is not supported")
+    flat = graph.node("Flatten", [graph.channels_last(operator.inputs[0])])
+    inputs = [flat, graph.initializer(weights)]
+    if len(operator.inputs) > 2 and operator.inputs[2] >= 0:
+        inputs.append(graph.initializer(graph.constant(operator, 2)))
+    graph.finish(operator, graph.node("Gemm", inputs, transB=1))
+
+
+CONVERTERS: dict[str, Callable[[Graph, Operator], None]] = {
+    "ADD": add,
+    "CONCATENATION": concatenation,
+    "CONV_2D": conv_2d,
+    "DEPTHWISE_CONV_2D": depthwise_conv_2d,
+    "DEPTH_TO_SPACE": depth_to_space,
+    "FULLY_CONNECTED": fully_connected,
+    "LOGISTIC": logistic,
+    "MAX_POOL_2D": max_pool_2d,
+    "MEAN": mean,
+    "PAD": pad,
+    "PRELU": prelu,
+    "RESHAPE": reshape,
+    "RESIZE_BILINEAR": resize_bilinear,
+}

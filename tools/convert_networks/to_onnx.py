@@ -1,0 +1,69 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A parsed TFLite model to an ONNX model with named outputs, without the operators that no kept output needs."""
+
+import onnx
+from onnx import TensorProto, helper
+
+from ...solver.errors import ModelFileError
+from .constants import fold_constants
+from .graph import Graph
+from .operators import CONVERTERS
+from .tflite import Model, Operator
+
+OPSET = 17
+IR_VERSION = 8  # the lowest that goes with the opset: also old releases of onnxruntime read it
+
+
+def convert_model(
+    model: Model, input_shape: tuple[int, ...], outputs: tuple[tuple[int, str, tuple[int, ...]], ...]
+) -> onnx.ModelProto:
+    """ONNX model with one input ``input`` (batch, channels, height, width) and the outputs asked for.
+
+    ``input_shape`` and the shapes in ``outputs``, (position, name, shape), are TFLite's (NHWC) and are checked. Rank-4
+    outputs come out as NCHW. Raises ModelFileError when the file is not what was expected.
+    """
+    input_shapes = [model.tensors[i].shape for i in model.inputs]
+    if input_shapes != [input_shape]:
+        raise ModelFileError(f"{model.name}: inputs {input_shapes}, expected {input_shape}.")
+    for position, name, shape in outputs:
+        found = model.tensors[model.outputs[position]].shape if position < len(model.outputs) else None
+        if found != shape:
+            raise ModelFileError(f"{model.name}: output {position} ({name}) has shape {found}, expected {shape}.")
+    graph = Graph(model, fold_constants(model))
+    graph.names[model.inputs[0]] = "input"
+    kept = [model.outputs[position] for position, _, _ in outputs]
+    for operator in _needed(model, kept):
+        if operator.outputs[0] in graph.constants:
+            continue
+        if not operator.inputs or operator.inputs[0] < 0:
+            raise graph.fail(operator, "it has no input")
+        CONVERTERS[operator.kind](graph, operator)
+    described = []
+    for tensor, (_, name, shape) in zip(kept, outputs, strict=True):
+        graph.nodes.append(helper.make_node("Identity", [graph.value(tensor)], [name], name=f"output_{name}"))
+        described.append(helper.make_tensor_value_info(name, TensorProto.FLOAT, _batched(shape)))
+    source = helper.make_tensor_value_info("input", TensorProto.FLOAT, _batched(input_shape))
+    body = helper.make_graph(graph.nodes, model.name.rsplit("/", 1)[-1], [source], described, graph.initializers)
+    result = helper.make_model(body, opset_imports=[helper.make_opsetid("", OPSET)], producer_name="scope")
+    result.ir_version = IR_VERSION
+    try:
+        onnx.checker.check_model(result, full_check=True)
+    except (onnx.checker.ValidationError, onnx.shape_inference.InferenceError) as error:
+        raise ModelFileError(f"{model.name}: the converted graph is not valid ONNX: {error}") from error
+    return result
+
+
+def _batched(shape: tuple[int, ...]) -> list[int | str]:
+    order = (0, 3, 1, 2) if len(shape) == 4 else range(len(shape))
+    return ["batch", *(shape[i] for i in list(order)[1:])]
+
+
+def _needed(model: Model, outputs: list[int]) -> list[Operator]:
+    """The operators that the outputs depend on, in file order (which is execution order)."""
+    wanted = set(outputs)
+    kept = []
+    for operator in reversed(model.operators):
+        if wanted.intersection(operator.outputs):
+            kept.append(operator)
+            wanted.update(operator.inputs)
+    return kept[::-1]
