@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from ..solver.errors import MotionFileError, OutputError
+from ..solver.npz import read_npz
 
 
 @dataclass
@@ -96,13 +97,7 @@ class Motion:
     def load(cls, path: str | Path) -> Motion:
         """Read and check a motion file. Never unpickles."""
         path = Path(path)
-        try:
-            with np.load(path, allow_pickle=False) as file:
-                data = {k: file[k] for k in file.files}
-        except FileNotFoundError as error:
-            raise MotionFileError(f"{path} does not exist; capture a video first") from error
-        except (OSError, ValueError, KeyError, EOFError) as error:
-            raise MotionFileError(f"{path} is not a motion file ({error})") from error
+        data = read_npz(path, MotionFileError, "motion file")
         known = {f.name for f in fields(cls)}
         missing = sorted(known - set(data) - {"source"})
         if missing:

@@ -19,6 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from .errors import ModelFileError, ShapeError
+from .npz import read_npz
 
 ASSETS = Path(__file__).resolve().parent.parent / "assets"
 BUILT_IN = {"scope": ASSETS / "body" / "scope.npz", "scope_h": ASSETS / "body" / "scope_h.npz"}
@@ -175,11 +176,7 @@ def load_body(which: str | Path = "scope") -> Body:
     if not path.is_file():
         names = ", ".join(BUILT_IN)
         raise ModelFileError(f"body '{which}' was not found: give one of {names}, or the path of a body .npz file")
-    try:
-        with np.load(path, allow_pickle=False) as file:
-            data = {k: file[k] for k in file.files}
-    except (OSError, ValueError, KeyError, EOFError) as error:
-        raise ModelFileError(f"{path} is not a readable body file ({error}); choose a .npz body") from error
+    data = read_npz(path, ModelFileError, "body file")
     missing = [k for k in _REQUIRED if k not in data]
     if missing:
         raise ModelFileError(f"{path} lacks {', '.join(missing)}: it is not a Scope body file")

@@ -1,0 +1,101 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The camera's intrinsics: from the user, from the file, or the most likely ones for a phone or a camera."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ...solver.errors import InputError, UsageError
+
+# Without any better knowledge: a field of view of 60 degrees along the longer side, between a phone's main camera
+# (65-70 degrees, less the crop of its video stabilization) and a camera's standard lens (40-54 degrees).
+DEFAULT_FOV_DEG = 60.0
+FILM_WIDTH_MM = 36.0  # "35 mm equivalent" focal lengths refer to this width along the longer side
+
+
+@dataclass(frozen=True)
+class Camera:
+    """Pinhole intrinsics (pixels of the decoded, upright frame) and OpenCV distortion, with where they came from."""
+
+    intrinsics: np.ndarray  # (3, 3)
+    dist: np.ndarray  # (5,)
+    source: str  # said in the report
+
+    def undistort(self, points_px: np.ndarray) -> np.ndarray:
+        """Pixels (..., 2) as an ideal pinhole with the same intrinsics would see them."""
+        if not self.dist.any():
+            return points_px
+        import cv2
+
+        flat = np.ascontiguousarray(points_px, float).reshape(-1, 1, 2)
+        return cv2.undistortPoints(flat, self.intrinsics, self.dist, P=self.intrinsics).reshape(points_px.shape)
+
+
+def pinhole(width: int, height: int, focal_px: float) -> np.ndarray:
+    """(3, 3) intrinsics with square pixels and the principal point in the middle."""
+    return np.array([[focal_px, 0.0, width / 2], [0.0, focal_px, height / 2], [0.0, 0.0, 1.0]])
+
+
+def choose_camera(
+    width: int,
+    height: int,
+    *,
+    focal_mm: float | None = None,
+    fov_deg: float | None = None,
+    calibration: str | Path | None = None,
+    metadata_focal_mm: float | None = None,
+) -> Camera:
+    """The best known camera for footage of this size: the user's word first, then the file's, then the default.
+
+    :param focal_mm: 35 mm equivalent focal length along the longer side, f_px = f_mm / 36 · max(width, height).
+    :param fov_deg: field of view along the longer side, f_px = max(width, height) / (2 tan(fov / 2)).
+    :param calibration: JSON with ``intrinsics`` (3, 3), optional ``dist`` (5,) and ``size`` (width, height).
+    :param metadata_focal_mm: as ``focal_mm``, from the file's own metadata.
+    :raises UsageError: more than one of the user's ways at once, or an impossible value.
+    """
+    given = [n for n, v in (("--focal-mm", focal_mm), ("--fov", fov_deg), ("--calibration", calibration)) if v is not None]
+    if len(given) > 1:
+        raise UsageError(f"{' and '.join(given)} contradict each other: give one of them")
+    longer = max(width, height)
+    if calibration is not None:
+        return _read_calibration(Path(calibration), width, height)
+    if focal_mm is not None:
+        if not 1.0 <= focal_mm <= 2000.0:
+            raise UsageError(f"--focal-mm {focal_mm:g} is not a focal length: give 35 mm equivalent millimetres, such as 26")
+        return Camera(pinhole(width, height, focal_mm / FILM_WIDTH_MM * longer), np.zeros(5), f"given, {focal_mm:g} mm")
+    if fov_deg is not None:
+        if not 1.0 <= fov_deg <= 175.0:
+            raise UsageError(f"--fov {fov_deg:g} is not a field of view: give degrees along the longer side, such as 60")
+        return Camera(pinhole(width, height, _focal_from_fov(longer, fov_deg)), np.zeros(5), f"given, {fov_deg:g} degrees")
+    if metadata_focal_mm:
+        focal_px = metadata_focal_mm / FILM_WIDTH_MM * longer
+        return Camera(pinhole(width, height, focal_px), np.zeros(5), f"the file's metadata, {metadata_focal_mm:g} mm")
+    focal_px = _focal_from_fov(longer, DEFAULT_FOV_DEG)
+    return Camera(pinhole(width, height, focal_px), np.zeros(5), f"assumed, {DEFAULT_FOV_DEG:g} degrees")
+
+
+def _focal_from_fov(longer: int, fov_deg: float) -> float:
+    return longer / (2 * math.tan(math.radians(fov_deg) / 2))
+
+
+def _read_calibration(path: Path, width: int, height: int) -> Camera:
+    try:
+        data = json.loads(path.read_text())
+        K = np.asarray(data["intrinsics"], float)
+        dist = np.asarray(data.get("dist", np.zeros(5)), float).ravel()
+        size = data.get("size", [width, height])
+        known_width, known_height = float(size[0]), float(size[1])
+    except OSError as error:
+        raise InputError(f"cannot read the calibration {path}: {error.strerror}") from error
+    except (ValueError, KeyError, TypeError, IndexError) as error:
+        raise InputError(f'{path} is not a calibration: it needs "intrinsics" (3x3), optionally "dist" and "size"') from error
+    good = K.shape == (3, 3) and dist.size <= 5 and np.isfinite(K).all() and np.isfinite(dist).all()
+    if not good or K[0, 0] <= 0 or K[1, 1] <= 0 or known_width <= 0 or known_height <= 0:
+        raise InputError(f"{path}: intrinsics must be 3x3 with positive focal lengths, dist at most 5 finite numbers")
+    scale = np.diag([width / known_width, height / known_height, 1.0])
+    return Camera(scale @ K, np.concatenate([dist, np.zeros(5 - dist.size)]), f"calibration {path.name}")

@@ -1,0 +1,214 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The command line: one argparse tree, used by the shell and by Blender's ``--command scope``.
+
+Exit status: 0 done, 1 failed, 2 bad arguments, 3 no person found. Progress and the one sentence about a failure go to
+stderr; with ``--json`` stdout carries the report alone.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import NoReturn, TextIO
+
+from ..solver.body import ASSETS, BUILT_IN
+from ..solver.errors import OutputError, ScopeError, UsageError
+
+SAMPLE = ASSETS / "sample" / "sample.mp4"
+MOTION_SUFFIXES = (".npz",)
+SCENE_SUFFIXES = (".glb", ".fbx", ".blend", ".bvh", ".usdc")
+OVERLAY_SUFFIXES = (".mp4", ".png", ".jpg")
+QUALITIES = ("fast", "balanced", "best")
+
+
+class _Parser(argparse.ArgumentParser):
+    def error(self, message: str) -> NoReturn:
+        """One sentence instead of the whole usage."""
+        raise UsageError(f"{message} (see {self.prog} --help)")
+
+
+def build_parser() -> argparse.ArgumentParser:
+    """The whole argparse tree."""
+    parser = _Parser(prog="scope", description="Markerless motion capture: video in, animated body out.")
+    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND", parser_class=_Parser)
+    capture = commands.add_parser("capture", help="capture the person in a video or picture")
+    capture.add_argument("video", nargs="?", type=Path, metavar="VIDEO", help="video or picture; the sample clip without")
+    capture.add_argument(
+        "-o",
+        "--output",
+        action="append",
+        type=Path,
+        default=[],
+        metavar="OUT",
+        help=f"result file, may be repeated; the suffix says what: {', '.join(MOTION_SUFFIXES + SCENE_SUFFIXES)}"
+        " (default: .npz and .glb beside the video)",
+    )
+    capture.add_argument("--overlay", type=Path, metavar="FILE", help="draw the body over the footage (.mp4, .png, .jpg)")
+    capture.add_argument("--quality", choices=QUALITIES, default="best", help="speed against accuracy (default: best)")
+    capture.add_argument("--body", default="scope", help=f"{', '.join(BUILT_IN)} or a body .npz (default: scope)")
+    capture.add_argument("--focal-mm", type=float, metavar="MM", help="35 mm equivalent focal length of the camera")
+    capture.add_argument("--fov", type=float, metavar="DEGREES", help="field of view along the longer side")
+    capture.add_argument("--calibration", type=Path, metavar="FILE", help="JSON with intrinsics, dist and size")
+    capture.add_argument("--no-smoothing", action="store_true", help="keep every frame as it was solved")
+    capture.add_argument("--shape-keys-per-frame", action="store_true", help="key the shape on every frame")
+    capture.add_argument("--bake-shape", action="store_true", help="apply the shape to the mesh, without shape keys")
+    capture.add_argument("--threads", type=int, default=0, metavar="N", help="threads for the networks (default: all)")
+    capture.add_argument("--json", action="store_true", help="print a machine-readable report on stdout")
+    capture.add_argument("--quiet", action="store_true", help="no progress bar")
+    return parser
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command line; returns the exit status."""
+    try:
+        args = build_parser().parse_args(argv)
+        with _stdout_for_report() as stdout:
+            report = run_capture(args)
+            if args.json:
+                print(json.dumps(report), file=stdout, flush=True)
+        return 0
+    except ScopeError as error:
+        print(f"scope: {error}", file=sys.stderr)
+        return error.exit_status
+    except KeyboardInterrupt:
+        print("scope: stopped; nothing was written", file=sys.stderr)
+        return 130
+    except (OSError, MemoryError) as error:
+        print(f"scope: the system refused: {error}; free space or memory and try again", file=sys.stderr)
+        return 1
+
+
+def run_capture(args: argparse.Namespace) -> dict:
+    """``scope capture``: check the arguments, capture, write every output; returns the report."""
+    video = args.video or SAMPLE
+    outputs = args.output or [video.with_suffix(".npz"), video.with_suffix(".glb")]
+    _check_outputs(outputs, args.overlay, video)
+
+    # Imported here, so that --help and a wrong argument answer at once.
+    from ..solver.body import load_body
+    from .capture.overlay import write_overlay
+    from .capture.pipeline import CaptureOptions, capture
+
+    body = load_body(args.body)
+    options = CaptureOptions(
+        quality=args.quality,
+        focal_mm=args.focal_mm,
+        fov_deg=args.fov,
+        calibration=args.calibration,
+        smoothing=not args.no_smoothing,
+        threads=max(0, args.threads),
+    )
+    with _ProgressBar(sys.stderr, show=sys.stderr.isatty() and not args.quiet) as progress:
+        result = capture(video, body, options, progress)
+        written: list[Path] = []
+        for path in outputs:
+            progress(f"writing {path.name}", 0, 0)
+            written += _write(path, result.motions, body, video, args)
+        if args.overlay:
+            write_overlay(args.overlay, video, result.motions, body, progress=lambda i, n: progress("overlay", i, n))
+            written.append(args.overlay)
+    report = dict(result.report, outputs=[str(p) for p in written])
+    for warning in report["warnings"]:
+        print(f"scope: warning: {warning}", file=sys.stderr)
+    if not args.json:
+        print(_summary(report), file=sys.stderr)
+    return report
+
+
+def _write(path: Path, motions: list, body, video: Path, args: argparse.Namespace) -> list[Path]:
+    if path.suffix.lower() in MOTION_SUFFIXES:
+        if len(motions) == 1:
+            motions[0].save(path)
+            return [path]
+        names = [path.with_name(f"{path.stem}.person{k}{path.suffix}") for k in range(1, len(motions) + 1)]
+        for motion, name in zip(motions, names, strict=True):
+            motion.save(name)
+        return names
+    from .scene.export import export_motions
+
+    export_motions(
+        motions, body, path, footage=video, shape_keys_per_frame=args.shape_keys_per_frame, bake_shape=args.bake_shape
+    )
+    return [path]
+
+
+def _check_outputs(outputs: list[Path], overlay: Path | None, video: Path) -> None:
+    """Everything that can be known to fail is said before the work, not after it."""
+    wanted = [(p, MOTION_SUFFIXES + SCENE_SUFFIXES) for p in outputs]
+    wanted += [(overlay, OVERLAY_SUFFIXES)] if overlay else []
+    for path, suffixes in wanted:
+        if path.suffix.lower() not in suffixes:
+            raise UsageError(f"{path}: the suffix '{path.suffix}' is not known; use one of {', '.join(suffixes)}")
+        if path.is_dir():
+            raise OutputError(f"{path} is a folder; give a file name")
+        if not path.parent.is_dir():
+            raise OutputError(f"the folder {path.parent} does not exist; make it first or choose another")
+        if not os.access(path.parent, os.W_OK):
+            raise OutputError(f"the folder {path.parent} cannot be written to; choose another with -o")
+        if path.exists() and video.exists() and path.samefile(video):
+            raise UsageError(f"{path} is the footage itself; choose another name")
+    names = [str(p) for p, _ in wanted]
+    if len(set(names)) < len(names):
+        raise UsageError("two outputs have the same name; give each its own")
+
+
+def _summary(report: dict) -> str:
+    people = "1 person" if report["people"] == 1 else f"{report['people']} people"
+    return (
+        f"{people}, {report['frames']} frames, {report['fps']['total']:.1f} frames/s, "
+        f"reprojection error {report['reprojection_px']:.1f} px; wrote {', '.join(report['outputs'])}"
+    )
+
+
+class _ProgressBar:
+    """A one-line bar on a terminal; silent elsewhere."""
+
+    def __init__(self, stream: TextIO, *, show: bool) -> None:
+        self.stream, self.show = stream, show
+
+    def __call__(self, stage: str, done: int, total: int) -> None:
+        """Show ``done`` of ``total`` (0: unknown) of a stage."""
+        if not self.show:
+            return
+        if total:
+            filled = min(30, 30 * done // total)
+            text = f"{stage:<18} [{'#' * filled}{'.' * (30 - filled)}] {done}/{total}"
+        else:
+            text = f"{stage:<18} {done or ''}"
+        self.stream.write(f"\r\x1b[K{text[:100]}")
+        self.stream.flush()
+
+    def __enter__(self) -> _ProgressBar:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self.show:
+            self.stream.write("\r\x1b[K")
+
+
+@contextmanager
+def _stdout_for_report() -> Iterator[TextIO]:
+    """Everything that libraries print to stdout, also from C, goes to stderr; the report gets the real stdout."""
+    sys.stdout.flush()
+    try:
+        real = os.dup(1)
+    except OSError:  # a shell without any stdout
+        yield sys.stdout
+        return
+    os.dup2(2, 1)
+    try:
+        with os.fdopen(os.dup(real), "w", encoding="utf-8") as stream:
+            yield stream
+    finally:
+        sys.stdout.flush()
+        os.dup2(real, 1)
+        os.close(real)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,96 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The motion file: what goes in comes out, and broken files are named."""
+
+import pickle
+
+import numpy as np
+import pytest
+from scope.scope_addon.motion import Motion
+from scope.solver.errors import MotionFileError, OutputError
+
+
+def make_motion(T=4, K1=24, J=33, P=10):
+    rng = np.random.default_rng(0)
+    return Motion(
+        poses=rng.normal(size=(T, 3 * K1)),
+        trans=rng.normal(size=(T, 3)),
+        poses_raw=rng.normal(size=(T, 3 * K1)),
+        trans_raw=rng.normal(size=(T, 3)),
+        betas=rng.normal(size=P),
+        body_model="scope",
+        gender="neutral",
+        mocap_framerate=30000 / 1001,
+        frames=np.arange(T),
+        timestamps=np.arange(T) * 1001 / 30000,
+        valid=np.ones(T, bool),
+        joints_cam=rng.normal(size=(T, K1, 3)),
+        keypoints2d=rng.normal(size=(T, J, 3)),
+        keypoints2d_names=np.array([f"k{j}" for j in range(J)]),
+        intrinsics=np.eye(3),
+        dist=np.zeros(5),
+        joint_confidence=np.ones((T, K1)),
+        world_from_camera=np.tile(np.eye(4), (T, 1, 1)),
+        foot_contact=np.zeros((T, 4)),
+        residual_px=np.ones(T),
+        image_size=np.array([640, 480]),
+        source="clip.mp4",
+    )
+
+
+def test_a_saved_motion_loads_the_same(tmp_path):
+    motion = make_motion()
+    motion.save(tmp_path / "a.npz")
+    back = Motion.load(tmp_path / "a.npz")
+    for name, value in vars(motion).items():
+        got = getattr(back, name)
+        assert np.array_equal(got, value), name
+        assert getattr(got, "dtype", None) == getattr(value, "dtype", None), name
+    assert [p.name for p in tmp_path.iterdir()] == ["a.npz"]
+
+
+def test_the_file_holds_plain_arrays_under_the_documented_names_and_types(tmp_path):
+    make_motion().save(tmp_path / "a.npz")
+    with np.load(tmp_path / "a.npz", allow_pickle=False) as file:
+        types = {k: file[k].dtype.kind + str(file[k].dtype.itemsize) for k in file.files if file[k].dtype.kind != "U"}
+    assert types["poses"] == types["trans"] == types["betas"] == types["joints_cam"] == "f4"
+    assert types["frames"] == "i8" and types["timestamps"] == "f8" and types["mocap_framerate"] == "f8"
+    assert types["valid"] == "b1" and types["world_from_camera"] == types["intrinsics"] == "f8"
+
+
+def test_a_wrong_shape_is_named():
+    with pytest.raises(MotionFileError, match=r"trans must have shape \(4, 3\), but has \(5, 3\)"):
+        motion = make_motion()
+        motion.trans = np.zeros((5, 3), np.float32)
+        motion.validate()
+
+
+@pytest.mark.parametrize("content", [b"", b"not a zip", b"PK\x03\x04broken"])
+def test_a_broken_file_is_refused_by_name(tmp_path, content):
+    path = tmp_path / "bad.npz"
+    path.write_bytes(content)
+    with pytest.raises(MotionFileError, match="bad.npz"):
+        Motion.load(path)
+
+
+def test_pickles_are_never_loaded(tmp_path):
+    class Bomb:
+        def __reduce__(self):
+            return (open, (str(tmp_path / "boom"), "w"))
+
+    np.savez(tmp_path / "evil.npz", poses=np.array([Bomb()], dtype=object))
+    (tmp_path / "evil2.npz").write_bytes(pickle.dumps(Bomb()))
+    for name in ("evil.npz", "evil2.npz"):
+        with pytest.raises(MotionFileError):
+            Motion.load(tmp_path / name)
+    assert not (tmp_path / "boom").exists()
+
+
+def test_a_missing_key_is_named(tmp_path):
+    np.savez(tmp_path / "thin.npz", poses=np.zeros((1, 72)))
+    with pytest.raises(MotionFileError, match="lacks .*trans"):
+        Motion.load(tmp_path / "thin.npz")
+
+
+def test_an_unwritable_folder_is_an_output_error_and_keeps_the_earlier_file(tmp_path):
+    with pytest.raises(OutputError, match="nowhere"):
+        make_motion().save(tmp_path / "nowhere" / "a.npz")
