@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What capture needs from a picture's EXIF data: which way is up, and the focal length.
+
+EXIF is a TIFF directory wherever it lies: the whole of a .tif, the APP1 segment of a JPEG, the eXIf chunk of a PNG,
+the EXIF chunk of a WebP. Anything damaged counts as absent: a picture without EXIF is still a picture.
+"""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass
+
+_ORIENTATION, _EXIF_DIRECTORY, _FOCAL_35MM = 0x0112, 0x8769, 0xA405  # tag numbers of the EXIF 2.3 standard
+_INTEGER = {3: "H", 4: "I"}  # TIFF field types SHORT and LONG
+
+
+@dataclass(frozen=True)
+class Exif:
+    """``orientation`` 1..8 as EXIF numbers them (1: upright); ``focal_35mm`` in mm on a 36 × 24 mm frame, or None."""
+
+    orientation: int = 1
+    focal_35mm: float | None = None
+
+
+def read_exif(data: bytes) -> Exif:
+    """Orientation and focal length of an encoded picture (the bytes of the file)."""
+    try:
+        tiff = _find_tiff(data)
+        return _parse(tiff) if tiff else Exif()
+    except (struct.error, IndexError):
+        return Exif()
+
+
+def _find_tiff(data: bytes) -> bytes:
+    if data[:2] == b"\xff\xd8":
+        return _jpeg_app1(data)
+    if data[:8] == b"\x89PNG\r\n\x1a\n":
+        return _chunk(data, 8, b"eXIf", ">", name_first=False, trailer=4)
+    if data[:4] == b"RIFF" and data[8:12] == b"WEBP":
+        found = _chunk(data, 12, b"EXIF", "<", name_first=True, trailer=0)
+        return found[6:] if found[:6] == b"Exif\0\0" else found
+    return data if data[:4] in (b"II*\0", b"MM\0*") else b""
+
+
+def _jpeg_app1(data: bytes) -> bytes:
+    at = 2
+    while at + 4 <= len(data) and data[at] == 0xFF and data[at + 1] != 0xDA:  # 0xDA: the picture itself begins
+        length = struct.unpack_from(">H", data, at + 2)[0]
+        if data[at + 1] == 0xE1 and data[at + 4 : at + 10] == b"Exif\0\0":
+            return data[at + 10 : at + 2 + length]
+        at += 2 + length
+    return b""
+
+
+def _chunk(data: bytes, at: int, name: bytes, endian: str, name_first: bool, trailer: int) -> bytes:
+    """First chunk called ``name``: PNG writes (size, name, data, checksum), RIFF (name, size, data, pad to even)."""
+    name_at, size_at = (0, 4) if name_first else (4, 0)
+    while at + 8 <= len(data):
+        size = struct.unpack_from(endian + "I", data, at + size_at)[0]
+        if data[at + name_at : at + name_at + 4] == name:
+            return data[at + 8 : at + 8 + size]
+        at += 8 + size + trailer + (size % 2 if name_first else 0)
+    return b""
+
+
+def _parse(tiff: bytes) -> Exif:
+    endian = {b"II": "<", b"MM": ">"}[tiff[:2]] if tiff[:2] in (b"II", b"MM") else ""
+    if not endian:
+        return Exif()
+    tags = _directory(tiff, struct.unpack_from(endian + "I", tiff, 4)[0], endian)
+    if _EXIF_DIRECTORY in tags:
+        tags |= _directory(tiff, tags[_EXIF_DIRECTORY], endian)
+    orientation, focal = tags.get(_ORIENTATION, 1), tags.get(_FOCAL_35MM, 0)
+    return Exif(orientation if 1 <= orientation <= 8 else 1, float(focal) if focal > 0 else None)
+
+
+def _directory(tiff: bytes, at: int, endian: str) -> dict[int, int]:
+    """Integer tags of one TIFF directory; each entry is 12 bytes: tag, type, count, value."""
+    tags = {}
+    for i in range(struct.unpack_from(endian + "H", tiff, at)[0]):
+        tag, kind, count = struct.unpack_from(endian + "HHI", tiff, at + 2 + 12 * i)
+        if kind in _INTEGER and count == 1:
+            tags[tag] = struct.unpack_from(endian + _INTEGER[kind], tiff, at + 2 + 12 * i + 8)[0]
+    return tags

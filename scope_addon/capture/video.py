@@ -1,0 +1,292 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Videos and pictures as a sequence of upright RGB frames with square pixels and presentation timestamps.
+
+    with open_video("dance.mp4") as video:
+        for frame in video:            # decoded ahead in a thread, a few frames at most in memory
+            frame.index, frame.timestamp_s, frame.image_rgb
+    video.warnings                     # what the user should hear: stopped early, changed size, ...
+
+OpenCV says the frame rate as a float; ``video.fps`` is the rational the container meant (30000/1001, not 29.97003).
+"""
+
+from __future__ import annotations
+
+import os
+import queue
+import threading
+from collections.abc import Iterator
+from contextlib import closing
+from dataclasses import dataclass, field
+from fractions import Fraction
+from pathlib import Path
+
+# Read by OpenCV when it first opens a video. -8 silences ffmpeg's own notes: what matters is said in our words. A
+# playlist that calls itself .mp4 may not reach for the network: footage is read from files and from nowhere else.
+os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
+os.environ.setdefault("OPENCV_FFMPEG_CAPTURE_OPTIONS", "protocol_whitelist;file")
+
+import cv2
+import numpy as np
+
+from ...solver.errors import VideoError
+from .exif import read_exif
+
+cv2.setLogLevel(0)  # silent: failures are reported by exception, in one sentence
+
+STILL_FPS = Fraction(30)  # a picture has no rate; one frame of the commonest does no harm in a scene
+_JPEG_STREAMS = (".mjpeg", ".mjpg")  # begin like a picture, but are many
+_AHEAD = 4  # decoded frames waiting: a 4K frame takes 25 MB
+_TURN = {90: cv2.ROTATE_90_CLOCKWISE, 180: cv2.ROTATE_180, 270: cv2.ROTATE_90_COUNTERCLOCKWISE}
+_STANDARD_RATES = [Fraction(n) for n in (24, 25, 30, 48, 50, 60, 120, 240)]
+_STANDARD_RATES += [Fraction(n * 1000, 1001) for n in (24, 30, 48, 60, 120, 240)]
+
+
+@dataclass(frozen=True)
+class Frame:
+    """One frame: source index, presentation time in seconds, and the upright picture (H, W, 3) uint8 RGB."""
+
+    index: int
+    timestamp_s: float
+    image_rgb: np.ndarray
+
+
+@dataclass
+class Video:
+    """Footage that was opened and whose first frame was decoded. Each iteration starts at the first frame.
+
+    ``frame_count`` is what the container claims and may be wrong. ``focal_35mm`` is in mm on a 36 × 24 mm frame.
+    """
+
+    path: Path
+    width: int
+    height: int
+    fps: Fraction
+    frame_count: int
+    focal_35mm: float | None = None
+    is_still: bool = False
+    warnings: list[str] = field(default_factory=list)
+    _still: np.ndarray | None = field(default=None, repr=False)
+    _decoders: list[_Decoder] = field(default_factory=list, repr=False)
+
+    def __iter__(self) -> Iterator[Frame]:
+        if self._still is not None:
+            yield Frame(0, 0.0, self._still)
+            return
+        decoder = _Decoder(self)
+        self._decoders.append(decoder)
+        with closing(decoder):
+            yield from decoder
+
+    def close(self) -> None:
+        """Stop every decoding thread of this video; an iteration under way ends."""
+        while self._decoders:
+            self._decoders.pop().close()
+
+    def __enter__(self) -> Video:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+def open_video(path: str | Path) -> Video:
+    """Open a video or a picture (JPEG, PNG, WebP, TIFF, BMP, ...; 16-bit and alpha too) and decode its first frame.
+
+    :raises VideoError: it does not exist, is not a file, or holds nothing that can be decoded.
+    """
+    path = Path(path)
+    if path.is_dir():
+        raise VideoError(f"{path} is a folder; give one video or picture file")
+    try:
+        size = path.stat().st_size
+        with path.open("rb"):
+            pass
+    except FileNotFoundError as error:
+        raise VideoError(f"{path} does not exist; check the path") from error
+    except OSError as error:
+        raise VideoError(f"{path} cannot be read ({error.strerror}); check its permissions") from error
+    if size == 0:
+        raise VideoError(f"{path} is empty (0 bytes); export or download it again")
+    picture = cv2.haveImageReader(str(path)) and path.suffix.lower() not in _JPEG_STREAMS
+    return _open_still(path) if picture else _open_moving(path)
+
+
+def _open_still(path: Path) -> Video:
+    data = path.read_bytes()
+    try:
+        image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
+    except cv2.error:
+        image = None
+    if image is None:
+        raise VideoError(f"{path} is a picture that cannot be decoded; it may be damaged, so export it again")
+    exif = read_exif(data)
+    rgb = _as_rgb8(image)
+    if data[:4] not in (b"II*\0", b"MM\0*"):  # OpenCV turns a TIFF upright even when told not to
+        rgb = _upright(rgb, exif.orientation)
+    height, width = rgb.shape[:2]
+    return Video(path, width, height, STILL_FPS, 1, exif.focal_35mm, is_still=True, _still=rgb)
+
+
+def _as_rgb8(image: np.ndarray) -> np.ndarray:
+    """Grey, BGR or BGRA of any depth -> RGB uint8; what is transparent shows white."""
+    if image.dtype == np.uint16:
+        image = cv2.convertScaleAbs(image, alpha=1 / 257)
+    elif image.dtype != np.uint8:
+        image = (np.clip(np.nan_to_num(image), 0, 1) * 255 + 0.5).astype(np.uint8)
+    if image.ndim == 2:
+        return cv2.cvtColor(image, cv2.COLOR_GRAY2RGB)
+    if image.shape[2] == 4:
+        alpha = image[:, :, 3:].astype(np.float32) / 255
+        image = (image[:, :, :3] * alpha + 255 * (1 - alpha) + 0.5).astype(np.uint8)
+    return cv2.cvtColor(image, cv2.COLOR_BGR2RGB)
+
+
+def _upright(image: np.ndarray, orientation: int) -> np.ndarray:
+    """Undo an EXIF orientation (1..8)."""
+    if orientation in (5, 6, 7, 8):
+        image = image.transpose(1, 0, 2)
+    vertical, horizontal = orientation in (3, 4, 7, 8), orientation in (2, 3, 6, 7)
+    return np.ascontiguousarray(image[:: -1 if vertical else 1, :: -1 if horizontal else 1])
+
+
+def _open_moving(path: Path) -> Video:
+    with closing(_Reader(path)) as reader:
+        first = reader.read()
+        if first is None:
+            raise VideoError(f"{path} opens but no frame of it can be decoded; convert it to H.264 .mp4 and try again")
+        fps = exact_fps(reader.get(cv2.CAP_PROP_FPS)) or _fps_from_timestamps(reader)
+        count = reader.get(cv2.CAP_PROP_FRAME_COUNT)
+    height, width = first[1].shape[:2]
+    return Video(path, width, height, fps, max(1, int(count)) if 0 < count < 1e9 else 1)
+
+
+def exact_fps(fps: float) -> Fraction | None:
+    """The rational behind a float frame rate; None if it is no frame rate (0, NaN, a clock's 90000).
+
+    A ratio of small numbers comes through a float unharmed and is taken as it is (30000/1001, 2997/100). A rate
+    averaged over a file's duration is not such a ratio: it becomes the standard rate within 0.001 % if there is one.
+    """
+    if not 0.01 < fps <= 1000:  # also False for NaN
+        return None
+    simple = Fraction(fps).limit_denominator(1001)
+    if abs(simple - Fraction(fps)) < Fraction(fps) / 10**11:
+        return simple
+    nearest = min(_STANDARD_RATES, key=lambda rate: abs(rate - Fraction(fps)))
+    if abs(nearest - Fraction(fps)) < nearest / 10**5:
+        return nearest
+    return Fraction(fps).limit_denominator(100_000)
+
+
+def _fps_from_timestamps(reader: _Reader) -> Fraction:
+    """Rate from the first second or so of frames, for a container that does not say."""
+    times: list[float] = []
+    while len(times) < 30 and (got := reader.read()) is not None:
+        times.append(got[0])
+    steps = np.diff(times)
+    steps = steps[steps > 0]
+    return (exact_fps(round(1 / float(np.median(steps)), 2)) if len(steps) else None) or STILL_FPS
+
+
+class _Reader:
+    """cv2.VideoCapture with rotation and pixel aspect applied here: which backends do it varies between versions."""
+
+    def __init__(self, path: Path) -> None:
+        self._capture = cv2.VideoCapture(str(path.absolute()), cv2.CAP_FFMPEG)
+        if not self._capture.isOpened():
+            raise VideoError(f"{path} is not a video or picture that can be decoded; convert it to an H.264 .mp4")
+        self._capture.set(cv2.CAP_PROP_ORIENTATION_AUTO, 0)
+        self._turn = _TURN.get(round(self.get(cv2.CAP_PROP_ORIENTATION_META)) % 360)
+        num, den = self.get(cv2.CAP_PROP_SAR_NUM), self.get(cv2.CAP_PROP_SAR_DEN)
+        self._aspect = num / den if num > 0 and den > 0 else 1.0
+
+    def get(self, prop: int) -> float:
+        return self._capture.get(prop)
+
+    def read(self) -> tuple[float, np.ndarray] | None:
+        """Next frame: seconds and upright RGB; None at the end, or where decoding stops."""
+        ok, image = self._capture.read()
+        if not ok or image is None:
+            return None
+        if abs(self._aspect - 1) > 1e-3:  # stretch the shorter side, so that no detail is lost
+            height, width = image.shape[:2]
+            wide = self._aspect > 1
+            size = (round(width * self._aspect), height) if wide else (width, round(height / self._aspect))
+            image = cv2.resize(image, size, interpolation=cv2.INTER_LINEAR)
+        if self._turn is not None:
+            image = cv2.rotate(image, self._turn)
+        return self.get(cv2.CAP_PROP_POS_MSEC) / 1000, cv2.cvtColor(image, cv2.COLOR_BGR2RGB)
+
+    def close(self) -> None:
+        self._capture.release()
+
+
+class _Decoder:
+    """Decodes a video in a thread of its own into a bounded queue, so that decoding overlaps with inference."""
+
+    def __init__(self, video: Video) -> None:
+        self._video = video
+        self._queue: queue.Queue[Frame | BaseException | None] = queue.Queue(_AHEAD)
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="scope-decode", daemon=True)
+        self._thread.start()
+
+    def __iter__(self) -> Iterator[Frame]:
+        while not self._stop.is_set():
+            try:
+                item = self._queue.get(timeout=0.1)
+            except queue.Empty:
+                continue
+            if item is None:
+                return
+            if isinstance(item, BaseException):
+                raise item
+            yield item
+
+    def close(self) -> None:
+        self._stop.set()
+        self._thread.join()
+        if self in self._video._decoders:
+            self._video._decoders.remove(self)
+
+    def _put(self, item: Frame | BaseException | None) -> None:
+        while not self._stop.is_set():
+            try:
+                self._queue.put(item, timeout=0.1)
+                return
+            except queue.Full:
+                continue
+
+    def _run(self) -> None:
+        try:
+            with closing(_Reader(self._video.path)) as reader:
+                self._decode(reader)
+            self._put(None)
+        except Exception as error:  # carried to the thread that iterates, which raises it
+            self._put(error)
+
+    def _decode(self, reader: _Reader) -> None:
+        video, index, time = self._video, 0, 0.0
+        resized = False
+        while not self._stop.is_set() and (got := reader.read()) is not None:
+            # Some containers have no timestamps, others repeat one: time then goes on at the frame rate.
+            time = got[0] if index == 0 or got[0] > time else time + float(1 / video.fps)
+            image = got[1]
+            if image.shape[:2] != (video.height, video.width):
+                image, resized = cv2.resize(image, (video.width, video.height)), True
+            self._put(Frame(index, time, image))
+            index += 1
+        if self._stop.is_set():
+            return
+        if resized:
+            self._warn(f"the picture size changes within {video.path.name}; all frames were scaled to the first")
+        # Both tests: a container that counts frames from its duration is wrong for a variable frame rate.
+        missing = video.frame_count - index
+        if missing > max(1, video.frame_count // 50) and time < 0.95 * float((video.frame_count - 1) / video.fps):
+            self._warn(
+                f"decoding {video.path.name} stopped after {index} of about {video.frame_count} frames; "
+                "the file may be damaged or incomplete"
+            )
+
+    def _warn(self, text: str) -> None:
+        if text not in self._video.warnings:
+            self._video.warnings.append(text)
