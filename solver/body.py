@@ -74,12 +74,12 @@ class Body:
         return self._minus_parent(self.J_template)
 
     @cached_property
-    def keypoint_V(self) -> np.ndarray:  # noqa: N802
+    def V(self) -> np.ndarray:  # noqa: N802
         """(M, 3, P) V_j: shape derivative of keypoint j relative to its part's joint."""
         return self.keypoint_shapedirs - self.J_shapedirs[self.keypoint_part]
 
     @cached_property
-    def keypoint_v(self) -> np.ndarray:
+    def v_bar(self) -> np.ndarray:
         """(M, 3) v̄_j: keypoint j relative to its part's joint at β = 0."""
         return self.keypoint_template - self.J_template[self.keypoint_part]
 
@@ -146,7 +146,7 @@ class Body:
 
     def keypoints(self, R: np.ndarray, t: np.ndarray, betas: np.ndarray | None = None) -> np.ndarray:
         """(..., M, 3) keypoints for part poses (..., K+1, 3, 3), (..., K+1, 3)."""
-        local = self.keypoint_v if betas is None else self.keypoint_v + self.keypoint_V @ self._betas(betas)
+        local = self.v_bar if betas is None else self.v_bar + self.V @ self._betas(betas)
         part = self.keypoint_part
         return np.einsum("...mij,mj->...mi", R[..., part, :, :], local) + t[..., part, :]
 
