@@ -1,0 +1,64 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Up, floor and contact on bodies placed in a known world."""
+
+import numpy as np
+import pytest
+from scope.scope_addon.capture.world import estimate_world, foot_contact, sole_points
+from scope.solver import rotations
+from scope.solver.body import load_body
+from scope.solver.frames import R_WORLD_MODEL, transform_points, world_from_level_camera
+
+
+def walk(body, T=60, lean_deg=0.0):
+    """A stiff walk through the world: root positions along x, legs swinging; returns part poses in the world."""
+    omega = np.tile(np.eye(3), (T, body.K + 1, 1, 1))
+    swing = 0.35 * np.sin(np.linspace(0, 6 * np.pi, T))
+    x = np.array([1.0, 0, 0])
+    for side, sign in (("left", 1), ("right", -1)):
+        omega[:, body.joint_names.index(f"{side}_hip")] = rotations.exp(sign * swing[:, None] * x)
+    omega[:, 0] = R_WORLD_MODEL @ rotations.exp(np.radians(lean_deg) * x)
+    R, t = body.forward_kinematics(omega, np.zeros((T, 3)))
+    soles = sole_points(body, R, t, np.zeros(body.P))
+    t = t + np.stack([np.linspace(-1, 1, T), np.linspace(0, 1.5, T), -soles[..., 2].min(1)], 1)[:, None]
+    return R, t
+
+
+@pytest.mark.parametrize("pitch_deg", [-20.0, 0.0, 15.0])
+@pytest.mark.parametrize("roll_deg", [0.0, 8.0])
+def test_up_and_floor_are_recovered_from_a_walk(pitch_deg, roll_deg):
+    body = load_body("scope")
+    R, t = walk(body)
+    up = rotations.exp(np.radians([pitch_deg, 0, roll_deg])) @ [0, -1.0, 0]
+    truth = world_from_level_camera(up, height=1.6)
+    truth[:3, 3] += truth[:3, :3] @ [0, 0, -5.0] * [1, 1, 0]
+    camera_from_world = np.linalg.inv(truth)
+    joints_cam = transform_points(camera_from_world, t)
+    soles_cam = sole_points(body, camera_from_world[:3, :3] @ R, joints_cam, np.zeros(body.P))
+    got = estimate_world(body, joints_cam, soles_cam)
+    angle = np.degrees(np.arccos(np.clip(got[2, :3] @ truth[2, :3], -1, 1)))
+    assert angle < 2.0
+    # The person is up to 6.5 m away: the camera's height above the floor is as uncertain as the angle makes it.
+    assert abs(got[2, 3] - 1.6) < 0.01 + 6.5 * np.sin(np.radians(angle))
+    assert abs(np.median(transform_points(got, soles_cam)[..., 2].min(1))) < 1e-6
+    assert np.allclose(transform_points(got, joints_cam[:1, 0])[0, :2], 0)
+
+
+def test_soles_lie_under_the_ankles_on_the_ground():
+    body = load_body("scope")
+    R, t = body.forward_kinematics(np.tile(np.eye(3), (1, body.K + 1, 1, 1)), np.zeros((1, 3)))
+    soles = sole_points(body, R, t, np.zeros(body.P))[0]
+    lowest = body.v_template[:, 1].min()
+    assert np.abs(soles[:, 1] - lowest).max() < 0.02
+    assert (soles[:2, 0] > 0).all()  # left
+    assert (soles[2:, 0] < 0).all()
+    assert soles[1, 2] > soles[0, 2] + 0.08  # toes are in front of heels
+
+
+def test_contact_is_slow_and_low():
+    times = np.arange(40) / 30
+    soles = np.zeros((40, 4, 3))
+    soles[:, 1, 2] = 0.3  # raised
+    soles[:, 2, 0] = 2.0 * times  # sliding fast
+    p = foot_contact(soles, times)
+    assert (p[:, 0] > 0.9).all()
+    assert (p[:, 1:3] < 0.1).all()
