@@ -1,0 +1,220 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A small z-buffer rasterizer: triangles in the camera frame -> colour, opacity and depth images.
+
+A vertex (x, y, z) in camera axes (OpenCV: x right, y down, z forward, metres) appears at
+
+    (u, v) = K · distort(x / z, y / z)          pixel centres at whole numbers, as OpenCV has them
+
+with OpenCV's five distortion coefficients (k1, k2, p1, p2, k3). Within a triangle 1/z is linear in (u, v), and an
+attribute a is interpolated with perspective: a = Σ λᵢ aᵢ/zᵢ / Σ λᵢ/zᵢ. Distortion bends vertices, not edges.
+Shading is Lambert's, from a light above the camera's left shoulder, plus a rim where the surface turns away.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+NEAR = 0.05  # metres; what is closer is cut off
+_TO_LIGHT = np.array([-0.40, -0.66, -0.63]) / np.linalg.norm([-0.40, -0.66, -0.63])
+_AMBIENT, _DIFFUSE, _RIM = 0.42, 0.58, 0.30
+_IN_FRONT, _BEHIND, _OUTSIDE = 0, 1, 2  # where a vertex lies: visible, behind the near plane, beyond the lens model
+
+
+@dataclass
+class Canvas:
+    """What was drawn: ``rgba`` (H, W, 4) uint8, sRGB and opacity, and ``depth`` (H, W) float32 metres, inf if empty."""
+
+    rgba: np.ndarray
+    depth: np.ndarray
+
+    @classmethod
+    def blank(cls, width: int, height: int) -> Canvas:
+        """An empty canvas."""
+        return cls(np.zeros((height, width, 4), np.uint8), np.full((height, width), np.inf, np.float32))
+
+    @property
+    def coverage(self) -> np.ndarray:
+        """(H, W) bool: where something was drawn."""
+        return np.isfinite(self.depth)
+
+    def clear(self) -> None:
+        """Empty the canvas for the next frame."""
+        self.rgba.fill(0)
+        self.depth.fill(np.inf)
+
+
+def rasterize(
+    canvas: Canvas,
+    vertices_cam: np.ndarray,
+    triangles: np.ndarray,
+    face_colors: np.ndarray,
+    intrinsics: np.ndarray,
+    dist: np.ndarray | None = None,
+    opacity: float = 1.0,
+) -> None:
+    """Draw a mesh into the canvas, in front of or behind what is there already. Faces seen from behind are left out.
+
+    :param vertices_cam: (V, 3) metres, camera frame.
+    :param triangles: (F, 3) vertex indices, counter-clockwise seen from outside.
+    :param face_colors: (F, 3) sRGB, 0..1; or (3,), one colour for all.
+    :param intrinsics: (3, 3) K in pixels of the canvas; dist: up to (5,), none if None.
+    :param opacity: 0..1, written to the canvas's fourth channel.
+    """
+    vertices = np.ascontiguousarray(vertices_cam, np.float64)
+    triangles = np.ascontiguousarray(triangles, np.int32)
+    colors = np.broadcast_to(np.asarray(face_colors, np.float32), (len(triangles), 3))
+    lens = np.zeros(5)
+    if dist is not None:
+        given = np.ravel(dist)[:5]
+        lens[: len(given)] = given
+    K = np.ascontiguousarray(intrinsics, np.float64)
+    shading = shade(vertices, vertex_normals(vertices, triangles))
+    screen, where = _project(vertices, K, lens, _largest_radius2(lens))
+    alpha = np.uint8(round(255 * min(max(opacity, 0.0), 1.0)))
+    _draw(canvas.rgba, canvas.depth, vertices, screen, where, shading, triangles, colors, K, lens, alpha)
+
+
+@njit(cache=True, nogil=True)
+def vertex_normals(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """(V, 3) unit normals, each the area-weighted mean of the triangles around a vertex (zero where there are none)."""
+    normals = np.zeros_like(vertices)
+    for f in range(len(triangles)):
+        a, b, c = triangles[f]
+        e0, e1, e2 = (vertices[b, 0] - vertices[a, 0], vertices[b, 1] - vertices[a, 1], vertices[b, 2] - vertices[a, 2])
+        d0, d1, d2 = (vertices[c, 0] - vertices[a, 0], vertices[c, 1] - vertices[a, 1], vertices[c, 2] - vertices[a, 2])
+        n0, n1, n2 = e1 * d2 - e2 * d1, e2 * d0 - e0 * d2, e0 * d1 - e1 * d0
+        for i in (a, b, c):
+            normals[i, 0] += n0
+            normals[i, 1] += n1
+            normals[i, 2] += n2
+    for i in range(len(normals)):
+        length = np.sqrt(normals[i, 0] ** 2 + normals[i, 1] ** 2 + normals[i, 2] ** 2)
+        if length > 0:
+            normals[i] /= length
+    return normals
+
+
+@njit(cache=True, nogil=True)
+def shade(vertices: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    """(V, 2): factor on the surface's colour (ambient + Lambert), and white to add (rim)."""
+    out = np.empty((len(vertices), 2))
+    for i in range(len(vertices)):
+        x, y, z = vertices[i]
+        n0, n1, n2 = normals[i]
+        lambert = max(0.0, n0 * _TO_LIGHT[0] + n1 * _TO_LIGHT[1] + n2 * _TO_LIGHT[2])
+        facing = max(0.0, -(n0 * x + n1 * y + n2 * z) / max(1e-9, np.sqrt(x * x + y * y + z * z)))
+        out[i, 0] = _AMBIENT + _DIFFUSE * lambert
+        out[i, 1] = _RIM * (1.0 - facing) ** 3
+    return out
+
+
+def _largest_radius2(lens: np.ndarray) -> float:
+    """Squared x/z radius up to which radial distortion grows; beyond it the polynomial folds the image back."""
+    k1, k2, _, _, k3 = lens
+    roots = np.roots([7 * k3, 5 * k2, 3 * k1, 1.0])
+    real = roots[(abs(roots.imag) < 1e-9) & (roots.real > 0)].real
+    return float(real.min()) if len(real) else np.inf
+
+
+@njit(cache=True, nogil=True)
+def _pixel(x: float, y: float, K: np.ndarray, lens: np.ndarray) -> tuple[float, float]:
+    """Pixel of the normalized image point (x, y)."""
+    r2 = x * x + y * y
+    radial = 1 + r2 * (lens[0] + r2 * (lens[1] + r2 * lens[4]))
+    u = x * radial + 2 * lens[2] * x * y + lens[3] * (r2 + 2 * x * x)
+    v = y * radial + lens[2] * (r2 + 2 * y * y) + 2 * lens[3] * x * y
+    return K[0, 0] * u + K[0, 1] * v + K[0, 2], K[1, 1] * v + K[1, 2]
+
+
+@njit(cache=True, nogil=True)
+def _project(vertices: np.ndarray, K: np.ndarray, lens: np.ndarray, largest: float) -> tuple[np.ndarray, np.ndarray]:
+    """(V, 3) pixels and 1/z, and (V,) where each vertex lies."""
+    screen = np.zeros((len(vertices), 3))
+    where = np.zeros(len(vertices), np.uint8)
+    for i in range(len(vertices)):
+        x, y, z = vertices[i]
+        if not z >= NEAR:
+            where[i] = _BEHIND
+        elif not (x * x + y * y) / (z * z) < largest:
+            where[i] = _OUTSIDE
+        else:
+            screen[i, 0], screen[i, 1] = _pixel(x / z, y / z, K, lens)
+            screen[i, 2] = 1.0 / z
+    return screen, where
+
+
+@njit(cache=True, nogil=True)
+def _draw(rgba, depth, vertices, screen, where, shading, triangles, colors, K, lens, alpha):
+    cut = np.empty((4, 5))
+    for f in range(len(triangles)):
+        a, b, c = triangles[f]
+        behind = (where[a] == _BEHIND) + (where[b] == _BEHIND) + (where[c] == _BEHIND)
+        if behind == 3 or where[a] == _OUTSIDE or where[b] == _OUTSIDE or where[c] == _OUTSIDE:
+            continue
+        if behind == 0:
+            _fill(rgba, depth, screen[a], screen[b], screen[c], shading[a], shading[b], shading[c], colors[f], alpha)
+            continue
+        n = _cut_at_near(cut, vertices, shading, triangles[f], K, lens)
+        for k in range(1, n - 1):
+            p, q, r = cut[0], cut[k], cut[k + 1]
+            _fill(rgba, depth, p[:3], q[:3], r[:3], p[3:], q[3:], r[3:], colors[f], alpha)
+
+
+@njit(cache=True, nogil=True)
+def _cut_at_near(cut, vertices, shading, triangle, K, lens):
+    """The part of a triangle beyond the near plane, as a fan of 3 or 4 corners (u, v, 1/z, shading); their number."""
+    n = 0
+    for i in range(3):
+        a, b = triangle[i], triangle[(i + 1) % 3]
+        za, zb = vertices[a, 2], vertices[b, 2]
+        if za >= NEAR:
+            cut[n, 0], cut[n, 1] = _pixel(vertices[a, 0] / za, vertices[a, 1] / za, K, lens)
+            cut[n, 2], cut[n, 3], cut[n, 4] = 1 / za, shading[a, 0], shading[a, 1]
+            n += 1
+        if (za >= NEAR) != (zb >= NEAR):
+            s = (NEAR - za) / (zb - za)
+            x = vertices[a, 0] + s * (vertices[b, 0] - vertices[a, 0])
+            y = vertices[a, 1] + s * (vertices[b, 1] - vertices[a, 1])
+            cut[n, 0], cut[n, 1] = _pixel(x / NEAR, y / NEAR, K, lens)
+            cut[n, 2] = 1 / NEAR
+            cut[n, 3] = shading[a, 0] + s * (shading[b, 0] - shading[a, 0])
+            cut[n, 4] = shading[a, 1] + s * (shading[b, 1] - shading[a, 1])
+            n += 1
+    return n
+
+
+@njit(cache=True, nogil=True)
+def _fill(rgba, depth, a, b, c, shade_a, shade_b, shade_c, color, alpha):
+    """One triangle from screen corners (u, v, 1/z): every pixel centre inside it that is nearer than what is there."""
+    height, width = depth.shape
+    area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+    # Seen from outside, a counter-clockwise triangle turns the other way here, since v points down.
+    if not (area < 0 and abs(area) < 1e18):
+        return
+    u0 = int(np.ceil(min(max(min(a[0], b[0], c[0]), 0.0), width)))
+    u1 = int(np.floor(min(max(max(a[0], b[0], c[0]), -1.0), width - 1.0)))
+    v0 = int(np.ceil(min(max(min(a[1], b[1], c[1]), 0.0), height)))
+    v1 = int(np.floor(min(max(max(a[1], b[1], c[1]), -1.0), height - 1.0)))
+    du_a, dv_a = -(c[1] - b[1]) / area, (c[0] - b[0]) / area
+    du_b, dv_b = -(a[1] - c[1]) / area, (a[0] - c[0]) / area
+    for v in range(v0, v1 + 1):
+        la = du_a * (u0 - b[0]) + dv_a * (v - b[1])
+        lb = du_b * (u0 - c[0]) + dv_b * (v - c[1])
+        for u in range(u0, u1 + 1):
+            lc = 1.0 - la - lb
+            # A hair of tolerance, so that rounding leaves no gap between neighbours.
+            if la >= -1e-9 and lb >= -1e-9 and lc >= -1e-9:
+                wa, wb, wc = la * a[2], lb * b[2], lc * c[2]
+                z = 1.0 / (wa + wb + wc)
+                if z < depth[v, u]:
+                    depth[v, u] = z
+                    gain = (wa * shade_a[0] + wb * shade_b[0] + wc * shade_c[0]) * z * 255
+                    rim = (wa * shade_a[1] + wb * shade_b[1] + wc * shade_c[1]) * z * 255
+                    for k in range(3):
+                        rgba[v, u, k] = np.uint8(min(255.0, gain * color[k] + rim))
+                    rgba[v, u, 3] = alpha
+            la += du_a
+            lb += du_b
