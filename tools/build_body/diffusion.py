@@ -1,0 +1,32 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Local averaging over mesh edges, for weights and for positions; symmetric where its input is."""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+def perineum(mirror: np.ndarray, vertices: np.ndarray) -> np.ndarray:
+    """(3,) the lowest point of the mesh on the midline."""
+    midline = np.flatnonzero(mirror == np.arange(len(vertices)))
+    return vertices[midline[vertices[midline, 1].argmin()]]
+
+
+def bump(vertices: np.ndarray, centre: np.ndarray, radius: float) -> np.ndarray:
+    """(V,) one at the centre, smoothly zero from ``radius`` on."""
+    distance = np.linalg.norm(vertices - centre, axis=1) / radius
+    return np.clip(1.0 - distance**2, 0.0, None) ** 2
+
+
+def diffuse(links: np.ndarray, values: np.ndarray, strength: np.ndarray, rounds: int) -> np.ndarray:
+    """Move each vertex's row towards the mean of its neighbours by ``strength`` (V,) in [0, 1], ``rounds`` times."""
+    active = np.flatnonzero(strength > 0.0)
+    near = links[np.isin(links, active).any(axis=1)]
+    degree = np.bincount(near.ravel(), minlength=len(values))[active, None]
+    values = values.copy()
+    for _ in range(rounds):
+        total = np.zeros_like(values)
+        np.add.at(total, near[:, 0], values[near[:, 1]])
+        np.add.at(total, near[:, 1], values[near[:, 0]])
+        values[active] += strength[active, None] * (total[active] / degree - values[active])
+    return values

@@ -1,0 +1,103 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Closed edge loops of the quad mesh, as the clean borders between materials."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+
+import numpy as np
+
+MAX_LENGTH = 400
+
+
+class QuadLoops:
+    """Walks edge loops: at a vertex with four quads a loop goes on along the opposite edge."""
+
+    def __init__(self, faces: np.ndarray) -> None:
+        """Index the mesh: ``faces`` (F, 4)."""
+        self.faces = faces
+        self.faces_at: dict[int, list[int]] = defaultdict(list)
+        for f, quad in enumerate(faces.tolist()):
+            for v in quad:
+                self.faces_at[v].append(f)
+        self.face_sets = [frozenset(quad) for quad in faces.tolist()]
+
+    def neighbours(self, v: int) -> list[int]:
+        """Vertices that share an edge with ``v``, in ascending order."""
+        found = set()
+        for f in self.faces_at[v]:
+            quad = self.faces[f].tolist()
+            k = quad.index(v)
+            found |= {quad[k - 1], quad[(k + 1) % 4]}
+        return sorted(found)
+
+    def walk(self, start: int, second: int) -> list[int] | None:
+        """The loop through an edge as a list of vertices, or None if it meets a pole or a border."""
+        loop = [start, second]
+        while len(loop) <= MAX_LENGTH:
+            previous, here = loop[-2:]
+            around = self.faces_at[here]
+            if len(around) != 4:
+                return None
+            beside = set().union(*(self.face_sets[f] for f in around if previous in self.face_sets[f]))
+            ahead = [v for v in self.neighbours(here) if v not in beside]
+            if len(ahead) != 1:
+                return None
+            if ahead[0] == start:
+                return loop
+            loop.append(ahead[0])
+        return None
+
+    def nearest(self, vertices: np.ndarray, point: np.ndarray, normal: np.ndarray, radius: float) -> list[int]:
+        """The closed loop around a limb that stays nearest to a plane.
+
+        :param vertices: (V, 3) metres; ``point``, ``normal``: the plane, across the limb at its axis.
+        :param radius: metres; only loops within this distance of ``point`` count.
+        """
+        offset = vertices - point
+        height = offset @ normal
+        candidates = np.flatnonzero((np.abs(height) < 0.03) & (np.linalg.norm(offset, axis=1) < radius))
+        best, best_cost, done = None, np.inf, set()
+        for v in candidates.tolist():
+            for other in self.neighbours(v):
+                if (v, other) in done or abs(height[v] - height[other]) > 0.02:
+                    continue
+                loop = self.walk(v, other)
+                if loop is None:
+                    continue
+                round_trip = loop[1:] + loop[:1]
+                done |= set(zip(loop, round_trip, strict=True)) | set(zip(round_trip, loop, strict=True))
+                ring = offset[loop]
+                across = ring - np.outer(ring @ normal, normal)
+                angles = np.unwrap(np.arctan2(*(across @ _plane_axes(normal)).T))
+                turns_around = abs(angles[-1] - angles[0]) > np.pi
+                cost = np.abs(height[loop]).mean()
+                if turns_around and np.linalg.norm(ring, axis=1).max() < radius and cost < best_cost - 1e-9:
+                    best, best_cost = loop, cost
+        if best is None:
+            raise ValueError(f"no closed edge loop within {radius} m of {np.round(point, 3)}")
+        return best
+
+    def beyond(self, loop: list[int], seed: int) -> np.ndarray:
+        """(F,) bool: faces reached from face ``seed`` without crossing ``loop``."""
+        border = {frozenset(edge) for edge in zip(loop, loop[1:] + loop[:1], strict=True)}
+        reached, queue = np.zeros(len(self.faces), bool), [seed]
+        reached[seed] = True
+        while queue:
+            quad = self.faces[queue.pop()].tolist()
+            for k in range(4):
+                edge = frozenset((quad[k - 1], quad[k]))
+                if edge in border:
+                    continue
+                for f in self.faces_at[quad[k]]:
+                    if not reached[f] and edge <= self.face_sets[f]:
+                        reached[f] = True
+                        queue.append(f)
+        return reached
+
+
+def _plane_axes(normal: np.ndarray) -> np.ndarray:
+    """(3, 2) two axes that span the plane."""
+    first = np.cross(normal, np.eye(3)[np.abs(normal).argmin()])
+    first /= np.linalg.norm(first)
+    return np.stack([first, np.cross(normal, first)], axis=1)
