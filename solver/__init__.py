@@ -1,0 +1,41 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The body model and the sparse constrained solver. numpy and numba only.
+
+    body = load_body("scope")
+    fit(body, Measurements(intrinsics, keypoints2d=Keypoints2D(indices, pixels, confidence))) -> Fit
+"""
+
+from .body import Body, load_body
+from .errors import ShapeError
+from .measurements import Keypoints2D, Keypoints3D, Measurements, OrientationField, PosePriors
+from .optimizer import fit, fit_tree
+from .options import COLD_STAGES, WARM_STAGES, Options, Priors, Stage, Weights, default_priors
+from .state import ClipFit, Fit, State, Status
+from .tree import BodyArrays, Tree, make_tree
+
+__all__ = [
+    "COLD_STAGES",
+    "WARM_STAGES",
+    "Body",
+    "BodyArrays",
+    "ClipFit",
+    "Fit",
+    "Keypoints2D",
+    "Keypoints3D",
+    "Measurements",
+    "Options",
+    "OrientationField",
+    "PosePriors",
+    "Priors",
+    "ShapeError",
+    "Stage",
+    "State",
+    "Status",
+    "Tree",
+    "Weights",
+    "default_priors",
+    "fit",
+    "fit_tree",
+    "load_body",
+    "make_tree",
+]

@@ -1,0 +1,152 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What was measured in one frame. Camera frame: OpenCV's (x right, y down, z forward), metres; image in pixels.
+
+Points are numbered as in the body's keypoints, 0..M-1, followed by the joints: M + i is the origin of part i.
+A confidence multiplies the squared residual; zero or a value that is not finite leaves the measurement out.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .errors import ShapeError
+from .residuals import pose_prior
+from .residuals.part import Array
+
+
+def as_array(value: ArrayLike, shape: tuple[int | None, ...], name: str) -> Array:
+    """Return `value` as contiguous float64 of `shape` (None: any length). Raises ShapeError."""
+    array = np.ascontiguousarray(value, dtype=np.float64)
+    if len(shape) != array.ndim or any(n is not None and n != m for n, m in zip(shape, array.shape, strict=True)):
+        wanted = ", ".join("n" if n is None else str(n) for n in shape) + ("," if len(shape) == 1 else "")
+        raise ShapeError(f"{name} must have shape ({wanted}), but got shape {array.shape}.")
+    return array
+
+
+def as_indices(value: ArrayLike, limit: int, name: str) -> Array:
+    """Return `value` as int64 indices (n,) in 0..limit-1. Raises ShapeError."""
+    array = np.asarray(value)
+    if array.ndim != 1 or (array.size and not np.issubdtype(array.dtype, np.integer)):
+        raise ShapeError(f"{name} must be integers of shape (n,), but got {array.dtype} of shape {array.shape}.")
+    if array.size and (array.min() < 0 or array.max() >= limit):
+        raise ShapeError(f"{name} must lie in 0..{limit - 1}, but go from {array.min()} to {array.max()}.")
+    return np.ascontiguousarray(array, dtype=np.int64)
+
+
+@dataclass
+class Keypoints2D:
+    """Points in the image: indices (n,), pixels (n, 2), confidence (n,)."""
+
+    indices: ArrayLike
+    pixels: ArrayLike
+    confidence: ArrayLike
+
+
+@dataclass
+class Keypoints3D:
+    """Points in space: indices (n,), points (n, 3) in metres in the camera frame, confidence (n,)."""
+
+    indices: ArrayLike
+    points: ArrayLike
+    confidence: ArrayLike
+
+
+@dataclass
+class OrientationField:
+    """Directions from one point to another of the same part: starts (n,), ends (n,), directions (n, 3), confidence (n,).
+
+    A bone is the direction from a joint M + par(i) to its child M + i. Directions are in the camera frame and need
+    not be normalized.
+    """
+
+    starts: ArrayLike
+    ends: ArrayLike
+    directions: ArrayLike
+    confidence: ArrayLike
+
+
+@dataclass
+class PosePriors:
+    """Known estimates of part poses in the camera frame: parts (n,), R (n, 3, 3), t (n, 3), weights (n,) each."""
+
+    parts: ArrayLike
+    R_camera_part: ArrayLike
+    t_camera_part: ArrayLike
+    weight_rotation: ArrayLike
+    weight_translation: ArrayLike
+
+
+@dataclass
+class Measurements:
+    """Everything measured in one frame. `intrinsics` (3, 3) is needed with 2D keypoints.
+
+    `tables` holds (ints, floats) of further registered residuals by name; see residuals/registry.py.
+    """
+
+    intrinsics: ArrayLike | None = None
+    keypoints2d: Keypoints2D | None = None
+    keypoints3d: Keypoints3D | None = None
+    orientation_field: OrientationField | None = None
+    pose_priors: PosePriors | None = None
+    tables: Mapping[str, tuple[Array, Array]] = field(default_factory=dict)
+
+    def packed2d(self, points: int) -> tuple[Array, Array]:
+        """Return indices (n,) and (n, 3) of normalized image coordinates and confidence."""
+        m = self.keypoints2d
+        if m is None:
+            return np.zeros(0, np.int64), np.zeros((0, 3))
+        indices = as_indices(m.indices, points, "Indices of 2D keypoints")
+        n = len(indices)
+        pixels = as_array(m.pixels, (n, 2), "Pixels of 2D keypoints")
+        if self.intrinsics is None:
+            raise ShapeError("2D keypoints need the camera's intrinsics, shape (3, 3), but got None.")
+        K = as_array(self.intrinsics, (3, 3), "Intrinsics")
+        if not (np.isfinite(K).all() and K[0, 0] > 0 and K[1, 1] > 0):
+            raise ShapeError(f"Intrinsics must be finite with positive focal lengths, but got {K.tolist()}.")
+        out = np.empty((n, 3))
+        out[:, 1] = (pixels[:, 1] - K[1, 2]) / K[1, 1]
+        out[:, 0] = (pixels[:, 0] - K[0, 2] - K[0, 1] * out[:, 1]) / K[0, 0]
+        out[:, 2] = as_array(m.confidence, (n,), "Confidence of 2D keypoints")
+        return indices, out
+
+    def packed3d(self, points: int) -> tuple[Array, Array]:
+        """Return indices (n,) and (n, 4) of positions and confidence."""
+        m = self.keypoints3d
+        if m is None:
+            return np.zeros(0, np.int64), np.zeros((0, 4))
+        indices = as_indices(m.indices, points, "Indices of 3D keypoints")
+        out = np.empty((len(indices), 4))
+        out[:, :3] = as_array(m.points, (len(indices), 3), "Points of 3D keypoints")
+        out[:, 3] = as_array(m.confidence, (len(indices),), "Confidence of 3D keypoints")
+        return indices, out
+
+    def packed_directions(self, points: int) -> tuple[Array, Array, Array]:
+        """Return starts (n,), ends (n,) and (n, 4) of directions and confidence."""
+        m = self.orientation_field
+        if m is None:
+            return np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros((0, 4))
+        starts = as_indices(m.starts, points, "Starts of the orientation field")
+        n = len(starts)
+        ends = as_indices(m.ends, points, "Ends of the orientation field")
+        if len(ends) != n:
+            raise ShapeError(f"Ends of the orientation field must have shape ({n},), but got shape {ends.shape}.")
+        out = np.empty((n, 4))
+        out[:, :3] = as_array(m.directions, (n, 3), "Directions of the orientation field")
+        out[:, 3] = as_array(m.confidence, (n,), "Confidence of the orientation field")
+        return starts, ends, out
+
+    def packed_tables(self, K: int) -> dict[str, tuple[Array, Array]]:
+        """Return the tables of the residuals that have their own field."""
+        m = self.pose_priors
+        if m is None:
+            return {}
+        parts = as_indices(m.parts, K + 1, "Parts of pose priors")
+        n = len(parts)
+        R = as_array(m.R_camera_part, (n, 3, 3), "Rotations of pose priors")
+        t = as_array(m.t_camera_part, (n, 3), "Positions of pose priors")
+        w_R = as_array(m.weight_rotation, (n,), "Rotation weights of pose priors")
+        w_t = as_array(m.weight_translation, (n,), "Translation weights of pose priors")
+        keep = np.isfinite(R).all((1, 2)) & np.isfinite(t).all(1) & np.isfinite(w_R) & np.isfinite(w_t)
+        return {"pose_prior": pose_prior.pack(parts[keep], R[keep], t[keep], w_R[keep], w_t[keep])}

@@ -1,0 +1,141 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How to fit: weights, stages, robust kernels, damping, and the priors on joints and shape."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .errors import ShapeError
+from .measurements import as_array
+from .residuals import joint_limits, joint_prior
+from .residuals.part import Array
+from .residuals.registry import FIRST_TABLE, RESIDUALS
+
+
+@dataclass(frozen=True)
+class Weights:
+    """Weight of each kind of residual, on 1/2 |r|^2.
+
+    Units: per squared normalized image coordinate (pixels over focal length), per metre^2, per squared difference of
+    unit vectors, per radian^2; the pose prior's and the tables' weigh what their rows say.
+    """
+
+    keypoints2d: float = 1e6
+    keypoints3d: float = 24000.0
+    orientation_field: float = 2500.0
+    pose_prior: float = 1.0
+    joint_prior: float = 50.0
+    joint_limits: float = 2000.0
+    shape: float = 100.0
+    tables: Mapping[str, float] = field(default_factory=dict)
+
+    def row(self) -> list[float]:
+        """Return the weights in the registry's order."""
+        own = {"pose_prior": self.pose_prior, "joint_prior": self.joint_prior, "joint_limits": self.joint_limits}
+        by_name = {**own, **self.tables}
+        first = [self.keypoints2d, self.keypoints3d, self.orientation_field, self.shape]
+        return first + [by_name.get(name, 1.0) for name in RESIDUALS]
+
+
+@dataclass(frozen=True)
+class Stage:
+    """Weights until the cost's relative decrease in an accepted step falls below `tolerance`."""
+
+    weights: Weights = Weights()
+    tolerance: float = 1e-5
+    max_iterations: int = 50
+
+
+# From far away: directions first, which have no bad minimum nearby, positions in the image and in space joining in.
+_LAST = Weights()
+COLD_STAGES = (
+    Stage(replace(_LAST, orientation_field=1e4, keypoints3d=2400.0, keypoints2d=1e4, joint_prior=1000.0, shape=1000.0), 5e-2, 10),
+    Stage(replace(_LAST, orientation_field=4000.0, keypoints2d=2e5, joint_prior=300.0, shape=400.0), 1e-2, 15),
+    Stage(_LAST, 1e-5, 50),
+)
+WARM_STAGES = (Stage(_LAST, 1e-5, 50),)
+
+
+@dataclass(frozen=True)
+class Options:
+    """How the optimizer works.
+
+    robust_*: Geman-McClure sigma in the square of each residual's unit; infinity turns the kernel off.
+    triggs: 0 is first-order reweighting; up to 1, the second-order correction clamped at that share.
+    damping: Levenberg-Marquardt lambda at the start, on joint rotations in radians; root_length: metres of pelvis
+    motion that are damped like one radian.
+    stages: replaces the default schedule, which depends on whether an initial state is given.
+    """
+
+    stages: Sequence[Stage] | None = None
+    robust_keypoints2d: float = 0.01
+    robust_keypoints3d: float = 0.01
+    robust_orientation_field: float = 0.1
+    triggs: float = 0.0
+    damping: float = 1.0
+    root_length: float = 0.3
+
+    def stage_table(self, stages: Sequence[Stage]) -> tuple[Array, Array, Array]:
+        """Return (S, 2, weights) of weights and 1/sigma, tolerances (S,) and iteration limits (S,)."""
+        if not stages:
+            raise ShapeError("A fit needs at least one stage, but the schedule is empty.")
+        table = np.zeros((len(stages), 2, FIRST_TABLE + len(RESIDUALS)))
+        sigmas = np.array([self.robust_keypoints2d, self.robust_keypoints3d, self.robust_orientation_field])
+        if not (sigmas > 0).all():
+            raise ShapeError(f"Robust scales must be positive, but got {sigmas.tolist()}.")
+        for k, stage in enumerate(stages):
+            table[k, 0] = stage.weights.row()
+        if not (np.isfinite(table).all() and (table >= 0).all()):
+            raise ShapeError("Weights must be finite and not negative.")
+        table[:, 1, :3] = 1.0 / sigmas
+        tolerances = np.array([float(stage.tolerance) for stage in stages])
+        return table, tolerances, np.array([int(stage.max_iterations) for stage in stages], dtype=np.int64)
+
+
+@dataclass(frozen=True)
+class Priors:
+    """What is known before measuring. Everything may be left out.
+
+    joint_mean (K, 3, 3) states of joints 1..K, rest pose if None; joint_weights (K,), ones if None.
+    shape_mean (P,), zeros if None; shape_information (P, P), identity if None: the prior's inverse covariance over
+    `Weights.shape`.
+    limits: tables of residuals/joint_limits.py, for instance `joint_limits.hinges_of(body.joint_names)`.
+    """
+
+    joint_mean: ArrayLike | None = None
+    joint_weights: ArrayLike | None = None
+    shape_mean: ArrayLike | None = None
+    shape_information: ArrayLike | None = None
+    limits: tuple[Array, Array] | None = None
+
+    def packed_tables(self, K: int) -> dict[str, tuple[Array, Array]]:
+        """Return the tables of joint_prior and joint_limits for a body of K joints."""
+        mean = np.tile(np.eye(3), (K, 1, 1)) if self.joint_mean is None else self.joint_mean
+        weights = np.ones(K) if self.joint_weights is None else self.joint_weights
+        mean = as_array(mean, (K, 3, 3), "Means of the joint prior")
+        weights = as_array(weights, (K,), "Weights of the joint prior")
+        if not (np.isfinite(mean).all() and np.isfinite(weights).all()):
+            raise ShapeError("The joint prior must be finite.")
+        tables = {"joint_prior": joint_prior.pack(np.arange(1, K + 1), mean, weights)}
+        if self.limits is not None:
+            if len(self.limits[0]) and not 1 <= np.min(self.limits[0]) <= np.max(self.limits[0]) <= K:
+                raise ShapeError(f"Joints of limits must lie in 1..{K}, but got {np.ravel(self.limits[0]).tolist()}.")
+            tables["joint_limits"] = self.limits
+        return tables
+
+    def packed_shape(self, P: int) -> tuple[Array, Array]:
+        """Return the shape prior's mean (P,) and information (P, P)."""
+        mean = as_array(np.zeros(P) if self.shape_mean is None else self.shape_mean, (P,), "Mean of the shape prior")
+        information = np.eye(P) if self.shape_information is None else self.shape_information
+        information = as_array(information, (P, P), "Information of the shape prior")
+        if not (np.isfinite(mean).all() and np.isfinite(information).all()):
+            raise ShapeError("The shape prior must be finite.")
+        return mean, 0.5 * (information + information.T)
+
+
+def default_priors(body: object) -> Priors:
+    """Return the rest pose, the population's shape, and the limits of the knees and elbows that `body` names."""
+    names = list(getattr(body, "joint_names", ()))
+    return Priors(limits=joint_limits.hinges_of(names))

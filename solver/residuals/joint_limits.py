@@ -1,0 +1,121 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""One-sided limits on a joint's state: its angle about an axis, and how far it swings off that axis.
+
+    phi = log(Omega), a unit axis in the parent's axes at rest, angle = aᵀ phi, swing s = (I - a aᵀ) phi
+    r_1   = sqrt(w) (max(0, angle - upper) - max(0, lower - angle))
+    r_2-4 = sqrt(w_swing) s max(0, 1 - swing_limit / |s|)
+    dr_1/du = sqrt(w) aᵀ J^-1(phi) R_parᵀ;  dr_2-4/du = sqrt(w_swing) (k I + (1 - k) s^ s^ᵀ) (I - a aᵀ) J^-1(phi) R_parᵀ
+with k = 1 - swing_limit / |s|, both zero inside the limits. Radians.
+Source: one-sided penalties on knees and upper arms as the paper's code has them; the ranges are ours.
+"""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..kernel import kernel
+from ..rotations import left_jacobian_inverse, left_jacobian_inverse3, log, log3
+from .joint_prior import add_to_joint
+from .part import Array, Linearization, Part
+
+INTS = 1  # joint
+FLOATS = 8  # axis (3), lower, upper, swing_limit, w, w_swing
+
+# Axis in the parent's rest axes of SMPL's T-pose (x to the person's left, y up, z forward), lower, upper, swing limit.
+# A knee bends the shin backwards; an elbow brings the forearm forwards, and carries some of the forearm's twist.
+HINGES = {
+    "left_knee": ((1.0, 0.0, 0.0), -0.05, 2.6, 0.3),
+    "right_knee": ((1.0, 0.0, 0.0), -0.05, 2.6, 0.3),
+    "left_elbow": ((0.0, -1.0, 0.0), -0.05, 2.7, 1.2),
+    "right_elbow": ((0.0, 1.0, 0.0), -0.05, 2.7, 1.2),
+}
+
+
+@kernel
+def accumulate(tree, ints, floats, weight, inv_sigma, triggs, pose, blocks):  # type: ignore[no-untyped-def]
+    """Add every row's H_uu and g_u to the blocks and return the cost. ints (n, 1), floats (n, 8)."""
+    cost = 0.0
+    for k in range(ints.shape[0]):
+        i = ints[k, 0]
+        f = floats[k]
+        Om = pose.Omega[i]
+        x, y, z = log3(
+            Om[0, 0], Om[0, 1], Om[0, 2], Om[1, 0], Om[1, 1], Om[1, 2], Om[2, 0], Om[2, 1], Om[2, 2]
+        )  # fmt: skip
+        angle = f[0] * x + f[1] * y + f[2] * z
+        r = max(0.0, angle - f[4]) - max(0.0, f[3] - angle)
+        sx, sy, sz = x - angle * f[0], y - angle * f[1], z - angle * f[2]
+        swing = math.sqrt(sx * sx + sy * sy + sz * sz)
+        w, v = weight * f[6], weight * f[7]
+        hinged = r != 0.0 and w > 0.0
+        swung = swing > f[5] and v > 0.0
+        if not hinged and not swung:
+            continue
+        J = left_jacobian_inverse3(x, y, z)
+        h00, h01, h02, h11, h12, h22, g0, g1, g2 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        a0 = f[0] * J[0] + f[1] * J[3] + f[2] * J[6]
+        a1 = f[0] * J[1] + f[1] * J[4] + f[2] * J[7]
+        a2 = f[0] * J[2] + f[1] * J[5] + f[2] * J[8]
+        if hinged:
+            cost += 0.5 * w * r * r
+            h00, h01, h02, h11, h12, h22 = w * a0 * a0, w * a0 * a1, w * a0 * a2, w * a1 * a1, w * a1 * a2, w * a2 * a2
+            g0, g1, g2 = w * r * a0, w * r * a1, w * r * a2
+        if swung:
+            share = 1.0 - f[5] / swing
+            cost += 0.5 * v * share * share * swing * swing
+            # JᵀJ = k^2 (J^-Tᵀ(I - a aᵀ)J^-1) + (1 - k^2) b bᵀ with b = J^-T s^
+            b0 = (sx * J[0] + sy * J[3] + sz * J[6]) / swing
+            b1 = (sx * J[1] + sy * J[4] + sz * J[7]) / swing
+            b2 = (sx * J[2] + sy * J[5] + sz * J[8]) / swing
+            p, q = v * share * share, v * (1.0 - share * share)
+            h00 += p * (J[0] * J[0] + J[3] * J[3] + J[6] * J[6] - a0 * a0) + q * b0 * b0
+            h01 += p * (J[0] * J[1] + J[3] * J[4] + J[6] * J[7] - a0 * a1) + q * b0 * b1
+            h02 += p * (J[0] * J[2] + J[3] * J[5] + J[6] * J[8] - a0 * a2) + q * b0 * b2
+            h11 += p * (J[1] * J[1] + J[4] * J[4] + J[7] * J[7] - a1 * a1) + q * b1 * b1
+            h12 += p * (J[1] * J[2] + J[4] * J[5] + J[7] * J[8] - a1 * a2) + q * b1 * b2
+            h22 += p * (J[2] * J[2] + J[5] * J[5] + J[8] * J[8] - a2 * a2) + q * b2 * b2
+            g = v * share * swing
+            g0, g1, g2 = g0 + g * b0, g1 + g * b1, g2 + g * b2
+        add_to_joint(tree, pose, blocks, i, h00, h01, h02, h11, h12, h22, g0, g1, g2)
+    return cost
+
+
+def pack(
+    joints: Array, axes: Array, lower: Array, upper: Array, swing_limit: Array, w: Array, w_swing: Array
+) -> tuple[Array, Array]:
+    """Return the tables of `accumulate` from joints (n,), unit axes (n, 3), and columns (n,) of limits and weights."""
+    n = len(joints)
+    floats = np.hstack([np.reshape(axes, (n, 3)), np.c_[lower], np.c_[upper], np.c_[swing_limit], np.c_[w], np.c_[w_swing]])
+    return np.reshape(joints, (n, 1)).astype(np.int64), np.ascontiguousarray(floats, dtype=np.float64)
+
+
+def hinges_of(joint_names: Sequence[str]) -> tuple[Array, Array]:
+    """Return the tables of `accumulate` for the knees and elbows among a body's joint names; empty if it has none."""
+    found = [(joint_names.index(name), *hinge) for name, hinge in HINGES.items() if name in joint_names]
+    if not found:
+        return np.zeros((0, INTS), np.int64), np.zeros((0, FLOATS))
+    joints, axes, lower, upper, swing = (np.array(column) for column in zip(*found, strict=True))
+    ones = np.ones(len(joints))
+    return pack(joints, axes, lower, upper, swing, ones, ones)
+
+
+def evaluate(
+    part: Part, axis: Array, lower: float, upper: float, swing_limit: float, w: float, w_swing: float, weight: float = 1.0
+) -> Linearization:
+    """Return the residual (4 rows) times sqrt(weight) and its derivatives."""
+    phi = log(part.Omega)
+    J = left_jacobian_inverse(phi) @ part.R_parent.T
+    angle = axis @ phi
+    s = phi - angle * axis
+    swing = np.linalg.norm(s)
+    r, J_u = np.zeros(4), np.zeros((4, 3))
+    r[0] = max(0.0, angle - upper) - max(0.0, lower - angle)
+    if r[0] != 0.0:
+        J_u[0] = axis @ J
+    if swing > swing_limit:
+        share, unit = 1.0 - swing_limit / swing, s / swing
+        r[1:] = share * s
+        J_u[1:] = (share * np.eye(3) + (1.0 - share) * np.outer(unit, unit)) @ (np.eye(3) - np.outer(axis, axis)) @ J
+    scale = np.sqrt(weight * np.array([w, w_swing, w_swing, w_swing]))
+    return Linearization(scale * r, np.zeros((4, 6)), scale[:, None] * J_u, np.zeros((4, len(part.beta))))

@@ -1,0 +1,88 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A joint's state pulled towards a mean: the rest pose, a learned mean, or last frame's state.
+
+    r = sqrt(w_i) log(Omega_mean_iᵀ Omega_i),   radians
+    dr/du = sqrt(w_i) J^-1(phi) Omega_meanᵀ R_parᵀ,  phi = log(Omega_meanᵀ Omega),  for Omega <- exp(R_parᵀ u) Omega
+The gradient is w Omega_mean phi in the parent's axes, because J^-T(phi) phi = phi.
+Source: section 3 of the paper (joint state prior), with a Gaussian on SO(3) in place of the normalizing flow.
+"""
+
+import numpy as np
+
+from ..kernel import kernel
+from ..rotations import left_jacobian_inverse, left_jacobian_inverse3, log, log3
+from .part import GRADIENT, Array, Linearization, Part
+
+INTS = 1  # joint
+FLOATS = 10  # Omega_mean (9) by rows, w
+
+
+@kernel
+def add_to_joint(tree, pose, blocks, i, h00, h01, h02, h11, h12, h22, g0, g1, g2):  # type: ignore[no-untyped-def]
+    """Add a Hessian and a gradient in the parent's axes to joint i: H_uu += R_par H R_parᵀ, g_u += R_par g."""
+    R = pose.R[tree.parents[i]]
+    for r in range(3):
+        x, y, z = R[r, 0], R[r, 1], R[r, 2]
+        a, b, c = x * h00 + y * h01 + z * h02, x * h01 + y * h11 + z * h12, x * h02 + y * h12 + z * h22
+        for s in range(3):
+            blocks.H_uu[i, r, s] += a * R[s, 0] + b * R[s, 1] + c * R[s, 2]
+        blocks.H_u[i, r, GRADIENT] += x * g0 + y * g1 + z * g2
+
+
+@kernel
+def accumulate(tree, ints, floats, weight, inv_sigma, triggs, pose, blocks):  # type: ignore[no-untyped-def]
+    """Add every row's H_uu and g_u to the blocks and return the cost. ints (n, 1), floats (n, 10)."""
+    cost = 0.0
+    for k in range(ints.shape[0]):
+        i = ints[k, 0]
+        m = floats[k]
+        w = weight * m[9]
+        if w <= 0.0:
+            continue
+        Om = pose.Omega[i]
+        x, y, z = log3(
+            m[0] * Om[0, 0] + m[3] * Om[1, 0] + m[6] * Om[2, 0],
+            m[0] * Om[0, 1] + m[3] * Om[1, 1] + m[6] * Om[2, 1],
+            m[0] * Om[0, 2] + m[3] * Om[1, 2] + m[6] * Om[2, 2],
+            m[1] * Om[0, 0] + m[4] * Om[1, 0] + m[7] * Om[2, 0],
+            m[1] * Om[0, 1] + m[4] * Om[1, 1] + m[7] * Om[2, 1],
+            m[1] * Om[0, 2] + m[4] * Om[1, 2] + m[7] * Om[2, 2],
+            m[2] * Om[0, 0] + m[5] * Om[1, 0] + m[8] * Om[2, 0],
+            m[2] * Om[0, 1] + m[5] * Om[1, 1] + m[8] * Om[2, 1],
+            m[2] * Om[0, 2] + m[5] * Om[1, 2] + m[8] * Om[2, 2],
+        )
+        J = left_jacobian_inverse3(x, y, z)
+        # J^-T J^-1 = q I + (1 - q) a aᵀ with a the axis and q = |phi/2|^2 / sin^2(|phi|/2): read q off the trace
+        s = x * x + y * y + z * z
+        trace = 0.0
+        for e in range(9):
+            trace += J[e] * J[e]
+        q = 0.5 * (trace - 1.0)
+        p = (1.0 - q) / s if s > 1e-12 else -1.0 / 12.0
+        cost += 0.5 * w * s
+        # Omega_mean a: the axis in the parent's axes
+        ax = m[0] * x + m[1] * y + m[2] * z
+        ay = m[3] * x + m[4] * y + m[5] * z
+        az = m[6] * x + m[7] * y + m[8] * z
+        add_to_joint(
+            tree, pose, blocks, i,
+            w * (q + p * ax * ax), w * p * ax * ay, w * p * ax * az,
+            w * (q + p * ay * ay), w * p * ay * az, w * (q + p * az * az),
+            w * ax, w * ay, w * az,
+        )  # fmt: skip
+    return cost
+
+
+def pack(joints: Array, Omega_mean: Array, weights: Array) -> tuple[Array, Array]:
+    """Return the tables of `accumulate` from joints (n,) in 1..K, means (n, 3, 3) and weights (n,)."""
+    n = len(joints)
+    floats = np.hstack([np.reshape(Omega_mean, (n, 9)), np.reshape(weights, (n, 1))])
+    return np.reshape(joints, (n, 1)).astype(np.int64), np.ascontiguousarray(floats, dtype=np.float64)
+
+
+def evaluate(part: Part, Omega_mean: Array, weight: float = 1.0) -> Linearization:
+    """Return the residual (3 rows) times sqrt(weight) and its derivatives."""
+    phi = log(Omega_mean.T @ part.Omega)
+    g = np.sqrt(weight)
+    J_u = g * left_jacobian_inverse(phi) @ Omega_mean.T @ part.R_parent.T
+    return Linearization(g * phi, np.zeros((3, 6)), J_u, np.zeros((3, len(part.beta))))

@@ -1,0 +1,75 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+r"""A keypoint seen in the image.
+
+    r = (f x/z - u, f y/z - v),   p = (x, y, z) = R_i (V_j beta + v_bar_j) + t_i
+with (u, v) the pixel in normalized image coordinates of the given intrinsics, u = (px - cx - skew v) / fx, and f = 1,
+or the unknown focal length over the given one. Weights are therefore per square of a normalized coordinate: one pixel
+squared times focal squared.
+
+    dr/dp = G = (f/z) [[1, 0, -x/z], [0, 1, -y/z]],  dr/dx = G [-[p - origin]x, I],  dr/dbeta = G (R V_j + D),
+    dr/dlog f = f (x/z, y/z)
+
+Nearer than z_min, or behind the camera, z is replaced by z_min in the projection and a third residual,
+(z_min - z) / z_min, which no robust kernel flattens, pushes the point to the front; all is finite and continuous.
+Source: section 3 of the paper, pinhole projection.
+"""
+
+import numpy as np
+
+from ..kernel import kernel
+from .part import Array, Linearization, Part, point_jacobian
+from .robust import geman_mcclure, triggs_share
+
+Z_MIN = 0.1  # metres
+
+
+@kernel
+def term(x, y, z, u, v, focal, weight, inv_sigma, triggs):  # type: ignore[no-untyped-def]
+    """Return (cost, 6 of w GᵀG by rows of its upper triangle, 3 of w Gᵀr, 3 of w Gᵀg, w gᵀg, w gᵀr), g = dr/dlog f."""
+    front = z > Z_MIN
+    iz = 1.0 / (z if front else Z_MIN)
+    gx, gy = focal * x * iz, focal * y * iz
+    rx, ry = gx - u, gy - v
+    s = rx * rx + ry * ry
+    rho, w = geman_mcclure(s, inv_sigma)
+    cost = 0.5 * weight * rho
+    w *= weight
+    a = focal * iz
+    bx, by = (-gx * iz, -gy * iz) if front else (0.0, 0.0)
+    aw = a * w
+    fx, fy = aw * rx, aw * ry
+    fz = w * (bx * rx + by * ry)
+    w00, w01, w02 = a * aw, 0.0, bx * aw
+    w11, w12, w22 = a * aw, by * aw, w * (bx * bx + by * by)
+    if triggs > 0.0 and s > 0.0:
+        k = triggs_share(s, inv_sigma, triggs) / (s * w) if w > 0.0 else 0.0
+        w00, w01, w02 = w00 - k * fx * fx, w01 - k * fx * fy, w02 - k * fx * fz
+        w11, w12, w22 = w11 - k * fy * fy, w12 - k * fy * fz, w22 - k * fz * fz
+    hx, hy, hz = aw * gx, aw * gy, w * (bx * gx + by * gy)
+    if not front:
+        depth = (Z_MIN - z) / Z_MIN
+        cost += 0.5 * weight * depth * depth
+        w22 += weight / (Z_MIN * Z_MIN)
+        fz -= weight * depth / Z_MIN
+    return cost, w00, w01, w02, w11, w12, w22, fx, fy, fz, hx, hy, hz, w * (gx * gx + gy * gy), w * (gx * rx + gy * ry)
+
+
+def evaluate(part: Part, v_bar: Array, V: Array, uv: Array, weight: float = 1.0, focal: float = 1.0) -> Linearization:
+    """Return r sqrt(weight) (2 rows, or 3 behind z_min), without robust kernel, and its derivatives.
+
+    v_bar (3,), V (3, P) of the keypoint in metres; uv (2,) normalized image coordinates.
+    """
+    p = part.R @ (V @ part.beta + v_bar) + part.t
+    front = p[2] > Z_MIN
+    z = p[2] if front else Z_MIN
+    r = focal * p[:2] / z - uv
+    G = np.zeros((2, 3))
+    G[0, 0] = G[1, 1] = focal / z
+    if front:
+        G[:, 2] = -focal * p[:2] / z**2
+    else:
+        r = np.append(r, (Z_MIN - p[2]) / Z_MIN)
+        G = np.vstack([G, [0.0, 0.0, -1.0 / Z_MIN]])
+    J_x, J_beta = point_jacobian(part, p, V)
+    G = G * np.sqrt(weight)
+    return Linearization(r * np.sqrt(weight), G @ J_x, np.zeros((len(r), 3)), G @ J_beta)

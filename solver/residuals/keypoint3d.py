@@ -1,0 +1,35 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A keypoint measured in space, in the camera frame.
+
+    r = p - p_measured,   p = R_i (V_j beta + v_bar_j) + t_i,   metres
+    dr/dx = [-[p - origin]x, I],  dr/dbeta = R V_j + D
+It serves temporal terms as well: last frame's position, or its extrapolation, is a measurement.
+Source: section 3 of the paper.
+"""
+
+import numpy as np
+
+from ..kernel import kernel
+from .part import Array, Linearization, Part, point_jacobian
+from .robust import geman_mcclure, triggs_share
+
+
+@kernel
+def term(x, y, z, mx, my, mz, weight, inv_sigma, triggs):  # type: ignore[no-untyped-def]
+    """Return (cost, w, kappa, 3 of w r): the second-order matrix is w I - kappa (w r)(w r)ᵀ."""
+    rx, ry, rz = x - mx, y - my, z - mz
+    s = rx * rx + ry * ry + rz * rz
+    rho, w = geman_mcclure(s, inv_sigma)
+    w *= weight
+    kappa = 0.0
+    if triggs > 0.0 and s > 0.0 and w > 0.0:
+        kappa = triggs_share(s, inv_sigma, triggs) / (s * w)
+    return 0.5 * weight * rho, w, kappa, w * rx, w * ry, w * rz
+
+
+def evaluate(part: Part, v_bar: Array, V: Array, point: Array, weight: float = 1.0) -> Linearization:
+    """Return r sqrt(weight) (3 rows), without robust kernel, and its derivatives; `point` (3,) metres, camera frame."""
+    p = part.R @ (V @ part.beta + v_bar) + part.t
+    J_x, J_beta = point_jacobian(part, p, V)
+    g = np.sqrt(weight)
+    return Linearization(g * (p - point), g * J_x, np.zeros((3, 3)), g * J_beta)

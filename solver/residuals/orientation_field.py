@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The part orientation field: the unit direction between two points of one part against a measured unit vector.
+
+    r = d/|d| - n,   d = R_i (V beta + v_bar),   (V, v_bar) the difference of the two points' (part origin: zero)
+    dr/dd = G = (I - n^ n^ᵀ) / |d|, n^ = d/|d|;   dr/dx = G [-[d]x, 0],  dr/dbeta = G R V
+Neither the position of the part nor D enters. |r|^2 = 2 - 2 cos(angle); n is in the camera frame.
+A lever shorter than a tenth of a millimetre has no direction and counts for nothing.
+Source: section 3 of the paper (part orientation field).
+"""
+
+import math
+
+import numpy as np
+
+from ..kernel import kernel
+from .part import Array, Linearization, Part, hat_identity
+from .robust import geman_mcclure, triggs_share
+
+SHORTEST = 1e-4  # metres
+
+
+@kernel
+def term(dx, dy, dz, nx, ny, nz, weight, inv_sigma, triggs):  # type: ignore[no-untyped-def]
+    """Return (cost, 6 of w GᵀG by rows of its upper triangle, 3 of w Gᵀr)."""
+    length = math.sqrt(dx * dx + dy * dy + dz * dz)
+    if length < SHORTEST:
+        return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    il = 1.0 / length
+    hx, hy, hz = dx * il, dy * il, dz * il
+    rx, ry, rz = hx - nx, hy - ny, hz - nz
+    s = rx * rx + ry * ry + rz * rz
+    rho, w = geman_mcclure(s, inv_sigma)
+    w *= weight
+    along = hx * rx + hy * ry + hz * rz
+    g = w * il
+    fx, fy, fz = g * (rx - hx * along), g * (ry - hy * along), g * (rz - hz * along)
+    g *= il
+    w00, w01, w02 = g * (1.0 - hx * hx), -g * hx * hy, -g * hx * hz
+    w11, w12, w22 = g * (1.0 - hy * hy), -g * hy * hz, g * (1.0 - hz * hz)
+    if triggs > 0.0 and s > 0.0 and w > 0.0:
+        k = triggs_share(s, inv_sigma, triggs) / (s * w)
+        w00, w01, w02 = w00 - k * fx * fx, w01 - k * fx * fy, w02 - k * fx * fz
+        w11, w12, w22 = w11 - k * fy * fy, w12 - k * fy * fz, w22 - k * fz * fz
+    return 0.5 * weight * rho, w00, w01, w02, w11, w12, w22, fx, fy, fz
+
+
+def evaluate(part: Part, v_bar: Array, V: Array, direction: Array, weight: float = 1.0) -> Linearization:
+    """Return r sqrt(weight) (3 rows), without robust kernel, and its derivatives; `direction` (3,) unit, camera frame."""
+    d = part.R @ (V @ part.beta + v_bar)
+    length = np.linalg.norm(d)
+    zeros = np.zeros((3, 3))
+    if length < SHORTEST:
+        return Linearization(np.zeros(3), np.zeros((3, 6)), zeros, np.zeros((3, len(part.beta))))
+    unit = d / length
+    G = np.sqrt(weight) * (np.eye(3) - np.outer(unit, unit)) / length
+    return Linearization(np.sqrt(weight) * (unit - direction), G @ np.hstack([hat_identity(d)[:, :3], zeros]), zeros, G @ part.R @ V)

@@ -1,0 +1,199 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Rotations: so(3) and SO(3) exponential, logarithm, left Jacobian; unit quaternions.
+
+Conventions: a rotation vector phi (3,) in radians is angle times unit axis; exp(phi) turns right-handed about it;
+quaternions are (w, x, y, z). Perturbations are on the left, R <- exp(w) R, and the left Jacobian J satisfies
+exp(phi + d) = exp(J(phi) d) exp(phi) to first order, so log(exp(w) R) = log(R) + J^-1(log R) w.
+
+The upper half are scalar functions for compiled kernels: they take and return plain numbers, so that nothing is
+allocated. The lower half does the same on numpy arrays with any leading dimensions.
+"""
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .errors import ShapeError
+from .kernel import kernel
+
+_PI_MARGIN = 1e-4  # above cos(angle) = -1 + this, the antisymmetric part of R still fixes the axis accurately
+
+
+@kernel
+def exp3(x: float, y: float, z: float) -> tuple:
+    """Return the nine entries of exp((x, y, z)), row by row.
+
+    R = I + a [phi]x + b [phi]x^2 with a = sin(th)/th, b = (1 - cos(th))/th^2; below half a radian both are summed as
+    series to the last digit, which needs no trigonometric call.
+    """
+    s = x * x + y * y + z * z
+    if s < 0.25:
+        a = 1.0 - s / 6.0 * (1.0 - s / 20.0 * (1.0 - s / 42.0 * (1.0 - s / 72.0 * (1.0 - s / 110.0 * (1.0 - s / 156.0)))))
+        b = 0.5 * (1.0 - s / 12.0 * (1.0 - s / 30.0 * (1.0 - s / 56.0 * (1.0 - s / 90.0 * (1.0 - s / 132.0)))))
+    else:
+        th = math.sqrt(s)
+        a = math.sin(th) / th
+        h = math.sin(0.5 * th)
+        b = 2.0 * h * h / s
+    return (
+        1.0 - b * (y * y + z * z), b * x * y - a * z, b * x * z + a * y,
+        b * x * y + a * z, 1.0 - b * (x * x + z * z), b * y * z - a * x,
+        b * x * z - a * y, b * y * z + a * x, 1.0 - b * (x * x + y * y),
+    )  # fmt: skip
+
+
+@kernel
+def log3(r00, r01, r02, r10, r11, r12, r20, r21, r22) -> tuple:  # type: ignore[no-untyped-def]
+    """Return the rotation vector (3 numbers) of the rotation matrix given row by row, of angle in [0, pi].
+
+    Near pi, where the antisymmetric part vanishes, the axis is the largest column of the symmetric part; exactly at
+    pi the sign is arbitrary.
+    """
+    x, y, z = 0.5 * (r21 - r12), 0.5 * (r02 - r20), 0.5 * (r10 - r01)  # sin(th) axis
+    c = 0.5 * (r00 + r11 + r22 - 1.0)
+    s2 = x * x + y * y + z * z
+    if c > 0.9:
+        # th / sin(th) = asin(s)/s as a series in s^2; here s^2 < 0.19
+        if s2 < 1e-3:
+            k = 1.0 + s2 * (1.0 / 6.0 + s2 * (3.0 / 40.0 + s2 * (15.0 / 336.0 + s2 * (105.0 / 3456.0 + s2 * 945.0 / 42240.0))))
+        else:
+            s = math.sqrt(s2)
+            k = math.atan2(s, c) / s
+        return x * k, y * k, z * k
+    s = math.sqrt(s2)
+    th = math.atan2(s, c)
+    if c > -1.0 + _PI_MARGIN:
+        k = th / s
+        return x * k, y * k, z * k
+    # R + R^T = 2 cos(th) I + 2 (1 - cos(th)) a a^T: take the column of the largest diagonal entry of a a^T
+    if r00 >= r11 and r00 >= r22:
+        ax, ay, az = r00 - c, 0.5 * (r01 + r10), 0.5 * (r02 + r20)
+    elif r11 >= r22:
+        ax, ay, az = 0.5 * (r01 + r10), r11 - c, 0.5 * (r12 + r21)
+    else:
+        ax, ay, az = 0.5 * (r02 + r20), 0.5 * (r12 + r21), r22 - c
+    k = th / math.sqrt(ax * ax + ay * ay + az * az)
+    if ax * x + ay * y + az * z < 0.0:
+        k = -k
+    return ax * k, ay * k, az * k
+
+
+@kernel
+def left_jacobian_inverse3(x: float, y: float, z: float) -> tuple:
+    """Return the nine entries of J^-1 = I - [phi]x / 2 + k [phi]x^2, k = (1 - th/2 cot(th/2)) / th^2; finite at pi."""
+    s = x * x + y * y + z * z
+    if s < 1e-2:
+        k = (1.0 + s * (1.0 / 60.0 + s * (1.0 / 2520.0 + s / 100800.0))) / 12.0
+    else:
+        h = 0.5 * math.sqrt(s)
+        k = (1.0 - h * math.cos(h) / math.sin(h)) / s
+    hx, hy, hz = 0.5 * x, 0.5 * y, 0.5 * z
+    return (
+        1.0 - k * (y * y + z * z), k * x * y + hz, k * x * z - hy,
+        k * x * y - hz, 1.0 - k * (x * x + z * z), k * y * z + hx,
+        k * x * z + hy, k * y * z - hx, 1.0 - k * (x * x + y * y),
+    )  # fmt: skip
+
+
+def _array(value: ArrayLike, tail: tuple[int, ...], name: str) -> NDArray[np.float64]:
+    array = np.asarray(value, dtype=np.float64)
+    if array.shape[-len(tail) :] != tail:
+        raise ShapeError(f"{name} must have shape (..., {', '.join(map(str, tail))}), but got shape {array.shape}.")
+    return array
+
+
+def hat(phi: ArrayLike) -> NDArray[np.float64]:
+    """Return [phi]x, shape (..., 3, 3), with [phi]x p = phi x p."""
+    phi = _array(phi, (3,), "A rotation vector")
+    out = np.zeros((*phi.shape, 3))
+    out[..., 0, 1], out[..., 0, 2], out[..., 1, 2] = -phi[..., 2], phi[..., 1], -phi[..., 0]
+    return out - np.swapaxes(out, -1, -2)
+
+
+def _coefficients(phi: NDArray[np.float64]) -> tuple[NDArray[np.float64], ...]:
+    """Return sin(th)/th, (1 - cos(th))/th^2, (th - sin(th))/th^3, each (..., 1, 1)."""
+    s = np.sum(phi * phi, axis=-1)[..., None, None]
+    small = s < 1e-2
+    th = np.sqrt(np.where(small, 1.0, s))
+    a = np.where(small, 1.0 - s / 6.0 * (1.0 - s / 20.0 * (1.0 - s / 42.0)), np.sin(th) / th)
+    b = np.where(small, 0.5 - s / 24.0 * (1.0 - s / 30.0 * (1.0 - s / 56.0)), 2.0 * (np.sin(0.5 * th) / th) ** 2)
+    c = np.where(small, 1 / 6.0 - s / 120.0 * (1.0 - s / 42.0 * (1.0 - s / 72.0)), (th - np.sin(th)) / th**3)
+    return a, b, c
+
+
+def exp(phi: ArrayLike) -> NDArray[np.float64]:
+    """Return the rotation matrices (..., 3, 3) of rotation vectors (..., 3)."""
+    phi = _array(phi, (3,), "A rotation vector")
+    a, b, _ = _coefficients(phi)
+    cross = hat(phi)
+    return np.eye(3) + a * cross + b * (cross @ cross)
+
+
+def log(rotation: ArrayLike) -> NDArray[np.float64]:
+    """Return the rotation vectors (..., 3), of angle in [0, pi], of rotation matrices (..., 3, 3)."""
+    quaternion = quaternion_from_matrix(rotation)
+    w, v = quaternion[..., :1], quaternion[..., 1:]
+    n = np.linalg.norm(v, axis=-1, keepdims=True)
+    small = n < 1e-6
+    safe = np.where(small, 1.0, n)
+    return v * np.where(small, 2.0 / w - 2.0 * n * n / (3.0 * w**3 + (w == 0)), 2.0 * np.arctan2(n, w) / safe)
+
+
+def left_jacobian(phi: ArrayLike) -> NDArray[np.float64]:
+    """Return J(phi) = I + b [phi]x + c [phi]x^2, shape (..., 3, 3)."""
+    phi = _array(phi, (3,), "A rotation vector")
+    _, b, c = _coefficients(phi)
+    cross = hat(phi)
+    return np.eye(3) + b * cross + c * (cross @ cross)
+
+
+def left_jacobian_inverse(phi: ArrayLike) -> NDArray[np.float64]:
+    """Return J^-1(phi), shape (..., 3, 3), for |phi| < 2 pi."""
+    phi = _array(phi, (3,), "A rotation vector")
+    s = np.sum(phi * phi, axis=-1)[..., None, None]
+    small = s < 1e-2
+    h = 0.5 * np.sqrt(np.where(small, 1.0, s))
+    series = (1.0 + s * (1.0 / 60.0 + s * (1.0 / 2520.0 + s / 100800.0))) / 12.0
+    k = np.where(small, series, (1.0 - h / np.tan(h)) / np.where(small, 1.0, s))
+    cross = hat(phi)
+    return np.eye(3) - 0.5 * cross + k * (cross @ cross)
+
+
+def quaternion_from_matrix(rotation: ArrayLike) -> NDArray[np.float64]:
+    """Return unit quaternions (..., 4), w >= 0, of rotation matrices (..., 3, 3).
+
+    Of the four ways to divide, each matrix takes the one by its largest component, which is never below 1/2.
+    """
+    r = _array(rotation, (3, 3), "A rotation matrix")
+    d = np.diagonal(r, axis1=-2, axis2=-1)
+    squares = np.concatenate([1.0 + d.sum(-1, keepdims=True), 1.0 + 2.0 * d - d.sum(-1, keepdims=True)], axis=-1)
+    antisymmetric = [r[..., 2, 1] - r[..., 1, 2], r[..., 0, 2] - r[..., 2, 0], r[..., 1, 0] - r[..., 0, 1]]
+    outer = np.empty((*r.shape[:-2], 4, 4))  # 4 q q^T
+    for i in range(4):
+        outer[..., i, i] = squares[..., i]
+    for i in range(3):
+        outer[..., 0, i + 1] = outer[..., i + 1, 0] = antisymmetric[i]
+        for j in range(i):
+            outer[..., i + 1, j + 1] = outer[..., j + 1, i + 1] = r[..., i, j] + r[..., j, i]
+    best = np.argmax(squares, axis=-1)
+    q = np.take_along_axis(outer, best[..., None, None], axis=-2)[..., 0, :]
+    q = q / np.linalg.norm(q, axis=-1, keepdims=True)
+    return np.where(q[..., :1] < 0.0, -q, q)
+
+
+def matrix_from_quaternion(quaternion: ArrayLike) -> NDArray[np.float64]:
+    """Return the rotation matrices (..., 3, 3) of quaternions (..., 4), which need not be normalized."""
+    q = _array(quaternion, (4,), "A quaternion")
+    q = q / np.linalg.norm(q, axis=-1, keepdims=True)
+    cross = hat(q[..., 1:])
+    return np.eye(3) + 2.0 * q[..., :1, None] * cross + 2.0 * (cross @ cross)
+
+
+def nearest_rotation(matrix: ArrayLike) -> NDArray[np.float64]:
+    """Return the rotations (..., 3, 3) nearest to the matrices in the Frobenius norm; the identity for non-finite ones."""
+    m = _array(matrix, (3, 3), "A matrix")
+    m = np.where(np.isfinite(m).all(axis=(-2, -1), keepdims=True), m, np.eye(3))
+    u, _, vt = np.linalg.svd(m)
+    u[..., :, 2] *= np.linalg.det(u @ vt)[..., None]
+    return u @ vt

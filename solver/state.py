@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The unknowns of one frame, and what a fit gives back."""
+
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+
+from .linearize import make_pose, place_parts
+from .measurements import as_array
+from .residuals.part import Array, Pose
+from .rotations import nearest_rotation
+from .tree import Tree
+
+
+class Status(Enum):
+    """Why the optimizer stopped."""
+
+    CONVERGED = 0  # the last stage's relative decrease fell below its tolerance
+    MAX_ITERATIONS = 1  # the last stage ran out of iterations
+    STALLED = 2  # no damping, however large, found a lower cost: a minimum to rounding, or a contradiction
+    NO_MEASUREMENTS = 3  # nothing usable was measured: the state is the initial one
+    NON_FINITE = 4  # the cost of the initial state is not finite: the state is the initial one
+
+
+@dataclass
+class State:
+    """Pose and shape of one frame, camera frame, metres."""
+
+    R_camera_root: Array  # (3, 3)
+    t_camera_root: Array  # (3,), the pelvis
+    Omega: Array  # (K, 3, 3), states of joints 1..K
+    beta: Array  # (P,)
+
+    @classmethod
+    def rest(cls, K: int, P: int, distance: float = 3.0) -> "State":
+        """Return the rest pose, upright and facing a camera `distance` metres away."""
+        return cls(np.diag([1.0, -1.0, -1.0]), np.array([0.0, 0.0, distance]), np.tile(np.eye(3), (K, 1, 1)), np.zeros(P))
+
+    def pose(self, tree: Tree) -> Pose:
+        """Return the state for the kernels, with rotations made orthonormal. Raises ShapeError."""
+        K, P = len(tree.parents) - 1, tree.shape
+        pose = make_pose(tree)
+        pose.R[0] = nearest_rotation(as_array(self.R_camera_root, (3, 3), "R_camera_root"))
+        pose.t[0] = as_array(self.t_camera_root, (3,), "t_camera_root")
+        pose.Omega[1:] = nearest_rotation(as_array(self.Omega, (K, 3, 3), "Omega"))
+        pose.beta[:P] = as_array(self.beta, (P,), "beta")
+        place_parts(tree, pose)
+        return pose
+
+    @classmethod
+    def from_pose(cls, tree: Tree, pose: Pose) -> "State":
+        """Copy the state out of the kernels' arrays."""
+        return cls(pose.R[0].copy(), pose.t[0].copy(), pose.Omega[1:].copy(), pose.beta[: tree.shape].copy())
+
+
+@dataclass
+class Fit:
+    """Result of one frame."""
+
+    state: State
+    status: Status
+    cost: float  # of the last stage's weights
+    iterations: int  # evaluations of the blocks after the first
+    R_camera_part: Array  # (K+1, 3, 3)
+    t_camera_part: Array  # (K+1, 3), the joints
+    beta_information: Array  # (P, P), of this frame's measurements alone, pose eliminated; shape prior not included
+    measurements: int  # usable points and directions
+
+
+@dataclass
+class ClipFit:
+    """Result of a clip with one shape."""
+
+    frames: list[Fit]
+    beta: Array  # (P,)
+    beta_information: Array  # (P, P), summed over the frames, shape prior included
+    focal_scale: float  # estimated focal length over that of the intrinsics; 1 if it was not estimated
+    status: Status
+    cost: float
+    iterations: int
