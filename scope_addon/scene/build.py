@@ -1,0 +1,209 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Motions to a Blender scene: one collection per capture with an armature and a mesh per person, and the camera."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from ...solver.body import Body
+from ...solver.errors import MotionFileError, UsageError
+from ..motion import Motion
+from . import animation, armature, body_mesh, camera, shape_keys, timing
+from .transaction import all_or_nothing
+
+CAPTURE_TAG = "scope_capture"  # custom property of a capture's collection; exporters find captures by it
+Progress = Callable[[float, str], None]
+
+
+@dataclass(frozen=True)
+class BuildOptions:
+    """What building may change in the scene, and how the shape is stored."""
+
+    name: str = ""  # of the capture; empty: the footage's or the motion's source name
+    frame_rate: str = "keep"  # "keep" the scene's rate, or "set" it to the motion's
+    resolution: str = "keep"  # "keep" the scene's, or "set" the footage's size and pixel aspect
+    set_frame_range: bool = True
+    active_camera: bool = False  # make the capture's camera the scene's
+    start_frame: float = 0.0  # the scene frame of timestamp 0
+    shape: str = "keyed"  # "keyed" once, "per_frame", or "baked" into the mesh
+    with_camera: bool = True
+
+    def __post_init__(self) -> None:
+        """Refuse values that are not offered."""
+        choices = {"frame_rate": timing.POLICIES, "resolution": timing.POLICIES, "shape": shape_keys.MODES}
+        for option, valid in choices.items():
+            if getattr(self, option) not in valid:
+                raise UsageError(f"{option} must be one of {', '.join(valid)}, but is '{getattr(self, option)}'")
+
+
+NEW_SCENE = BuildOptions(frame_rate="set", resolution="set", active_camera=True)
+
+
+@dataclass
+class Person:
+    """The objects of one motion."""
+
+    armature: bpy.types.Object
+    mesh: bpy.types.Object
+    camera: bpy.types.Object | None
+    motion: Motion = field(repr=False)
+    frames: np.ndarray = field(repr=False)  # (T,) scene frame of each pose
+
+
+@dataclass
+class BuildResult:
+    """What ``build_scene`` made."""
+
+    collection: bpy.types.Collection
+    people: list[Person]
+    frame_rate: float  # of the scene, frames a second
+    frame_range: tuple[float, float]  # first and last key
+    warnings: list[str] = field(default_factory=list)
+
+
+def build_scene(
+    motions: list[Motion],
+    body: Body,
+    footage: str | Path | None = None,
+    options: BuildOptions | None = None,
+    progress: Progress | None = None,
+) -> BuildResult:
+    """Build the motions of one capture in the active scene.
+
+    The scene's frame rate and resolution are only changed when the options say so. When anything fails, or
+    ``progress`` raises ``CancelledError``, the scene is left as it was.
+
+    :param body: the body the motions were fitted with; its joints and coefficients must be the motions'.
+    :param footage: video or picture to show behind the scene, through the camera.
+    :param progress: called with a fraction 0..1 and what is being done; may raise to stop.
+    :raises MotionFileError: a motion does not belong to the body. :raises VideoError: the footage is missing.
+    """
+    options = options or BuildOptions()
+    report = progress or (lambda fraction, message: None)
+    if not motions:
+        raise UsageError("there is no motion to build; capture a video first")
+    for motion in motions:
+        _check(motion, body)
+    scene = bpy.context.scene
+    with all_or_nothing(scene):
+        return _build(scene, motions, body, footage, options, report)
+
+
+def _build(
+    scene: bpy.types.Scene,
+    motions: list[Motion],
+    body: Body,
+    footage: str | Path | None,
+    options: BuildOptions,
+    report: Progress,
+) -> BuildResult:
+    name = options.name or Path(str(footage or motions[0].source or "capture")).stem
+    warnings: list[str] = []
+    if options.frame_rate == "set":
+        timing.set_scene_rate(scene, motions[0].mocap_framerate)
+    rate = timing.scene_rate(scene)
+    if footage is not None and len(motions[0]) > 1 and timing.blender_rate(motions[0].mocap_framerate) != (
+        timing.blender_rate(rate)
+    ):
+        warnings.append(
+            f"the scene plays {rate:.6g} frames a second but the footage {motions[0].mocap_framerate:.6g}: the motion "
+            "keeps its speed, the picture behind it does not; set the scene's rate to the footage's to compare them"
+        )
+    collection = bpy.data.collections.new(name)
+    collection[CAPTURE_TAG] = motions[0].source or name
+    scene.collection.children.link(collection)
+    people: list[Person] = []
+    for index, motion in enumerate(motions):
+        report(index / len(motions), f"building person {index + 1} of {len(motions)}")
+        label = name if len(motions) == 1 else f"{name}_person{index + 1}"
+        people.append(_build_person(label, motion, body, collection, rate, options))
+    if options.with_camera:
+        warnings += _build_cameras(name, people, collection, footage, options)
+    if options.resolution == "set":
+        camera.set_resolution(scene, motions[0])
+    if options.active_camera and people[0].camera is not None:
+        scene.camera = people[0].camera
+    first = float(min(person.frames[0] for person in people))
+    last = float(max(person.frames[-1] for person in people))
+    if options.set_frame_range:
+        timing.set_frame_range(scene, first, last)
+    scene.frame_set(scene.frame_start if options.set_frame_range else scene.frame_current)
+    report(1.0, "built")
+    _select(people)
+    return BuildResult(collection, people, rate, (first, last), warnings)
+
+
+def _build_person(
+    label: str, motion: Motion, body: Body, collection: bpy.types.Collection, rate: float, options: BuildOptions
+) -> Person:
+    rest = armature.rest_pose(body, motion.betas)
+    rig = armature.build_armature(label, body, rest, collection)
+    baked = options.shape == "baked"
+    vertices = body_mesh.rest_vertices_world(body, rest.lift, motion.betas if baked else None)
+    mesh = body_mesh.build_mesh(f"{label}_body", body, vertices, collection)
+    frames = timing.key_frames(motion.timestamps, rate, options.start_frame)
+    action = bpy.data.actions.new(label)
+    animation.animate_armature(rig, action, body, motion, rest, frames)
+    if not baked and body.P:
+        shape_keys.add_shape_keys(mesh, body, motion.betas)
+        shape_keys.key_shape(mesh, action, motion.betas, frames, per_frame=options.shape == "per_frame")
+    body_mesh.skin_to_armature(mesh, rig, body)
+    rig["scope_source"] = motion.source
+    rig["scope_body"] = body.name
+    rig["scope_betas"] = [float(b) for b in motion.betas]
+    return Person(rig, mesh, None, motion, frames)
+
+
+def _build_cameras(
+    name: str,
+    people: list[Person],
+    collection: bpy.types.Collection,
+    footage: str | Path | None,
+    options: BuildOptions,
+) -> list[str]:
+    """Give every person the camera that saw them; people of one picture share one. Returns warnings."""
+    warnings: list[str] = []
+    for index, person in enumerate(people):
+        shared = next((p.camera for p in people[:index] if camera.same_camera(p.motion, person.motion)), None)
+        if shared is not None:
+            person.camera = shared
+            continue
+        person.camera = camera.build_camera(f"{name}_camera", person.motion, collection, person.frames)
+        if camera.pixel_aspect(person.motion) != (1.0, 1.0) and options.resolution == "keep":
+            warnings.append(
+                "the footage's pixels are not square, which Blender keeps with the scene, not the camera: "
+                "set the scene's resolution from the footage for an exact overlay"
+            )
+        if footage is not None:
+            warnings += camera.show_footage(person.camera, footage, person.motion, options.start_frame)
+    return warnings
+
+
+def _select(people: list[Person]) -> None:
+    """Leave the new armatures selected, the first one active, as Blender's importers do."""
+    view_layer = bpy.context.view_layer
+    for obj in view_layer.objects:
+        obj.select_set(False, view_layer=view_layer)
+    for person in people:
+        person.armature.select_set(True, view_layer=view_layer)
+    view_layer.objects.active = people[0].armature
+
+
+def _check(motion: Motion, body: Body) -> None:
+    """The motion was made with a body of these joints and coefficients, and holds numbers."""
+    if motion.joint_count != body.K + 1 or motion.betas.size != body.P:
+        raise MotionFileError(
+            f"the motion has {motion.joint_count} joints and {motion.betas.size} shape coefficients (body "
+            f"'{motion.body_model}'), but body '{body.name}' has {body.K + 1} and {body.P}; choose the body it was "
+            "captured with"
+        )
+    if len(motion) == 0:
+        raise MotionFileError("the motion has no frames; capture the video again")
+    for name in ("poses", "trans", "betas", "intrinsics", "world_from_camera"):
+        if not np.isfinite(getattr(motion, name)).all():
+            raise MotionFileError(f"the motion's {name} contain NaN or infinity; capture the video again")

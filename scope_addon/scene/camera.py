@@ -1,0 +1,145 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A Blender camera that sees what the footage's camera saw, with the footage behind the scene.
+
+OpenCV's pinhole ``u = fx x/z + cx, v = fy y/z + cy`` in a W × H picture is, with the horizontal sensor fit,
+
+    lens / sensor_width = fx / W,     shift_x = 1/2 − cx / W,
+    pixel_aspect_x / pixel_aspect_y = fy / fx,     shift_y = (cy − H/2) / W · fx / fy.
+
+Pixel aspect and resolution belong to the scene in Blender; the camera alone is exact for square pixels.
+Source: Blender's BKE_camera_params_compute_viewplane.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from ...solver.errors import VideoError
+from ...solver.frames import blender_camera_matrix
+from ..motion import Motion
+from .actions import Channels
+from .animation import on_one_hemisphere, quaternion_from_matrix
+
+SENSOR_WIDTH = 36.0  # millimetres; only its ratio to the focal length matters
+PICTURE_SUFFIXES = {".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp"}
+
+
+def pixel_aspect(motion: Motion) -> tuple[float, float]:
+    """The scene's ``pixel_aspect_x, pixel_aspect_y`` for these intrinsics; Blender wants both at least 1."""
+    fx, fy = motion.intrinsics[0, 0], motion.intrinsics[1, 1]
+    ratio = fy / fx
+    if abs(ratio - 1.0) < 1e-6:
+        return 1.0, 1.0
+    return (float(ratio), 1.0) if ratio > 1 else (1.0, float(1 / ratio))
+
+
+def set_resolution(scene: bpy.types.Scene, motion: Motion) -> None:
+    """Give the scene's picture the size and pixel aspect of the footage."""
+    scene.render.resolution_x, scene.render.resolution_y = (int(n) for n in motion.image_size)
+    scene.render.resolution_percentage = 100
+    scene.render.pixel_aspect_x, scene.render.pixel_aspect_y = pixel_aspect(motion)
+
+
+def build_camera(
+    name: str, motion: Motion, collection: bpy.types.Collection, frames: np.ndarray
+) -> bpy.types.Object:
+    """A camera object with the motion's intrinsics, standing where the footage's camera stood.
+
+    :param frames: (T,) scene frame of each pose; a moving camera is keyed there.
+    """
+    data = bpy.data.cameras.new(name)
+    set_lens(data, motion)
+    obj = bpy.data.objects.new(name, data)
+    obj.rotation_mode = "QUATERNION"
+    collection.objects.link(obj)
+    T_world_blendcam = blender_camera_matrix(motion.world_from_camera)
+    locations = T_world_blendcam[:, :3, 3]
+    obj.location = locations[0]
+    obj.rotation_quaternion = quaternion_from_matrix(T_world_blendcam[0, :3, :3])
+    if np.ptp(T_world_blendcam, axis=0).max() > 1e-6:
+        rotations = on_one_hemisphere(np.stack([quaternion_from_matrix(T[:3, :3]) for T in T_world_blendcam]))
+        channels = Channels(obj, bpy.data.actions.new(name))
+        channels.write("location", frames, locations, group="Object Transforms")
+        channels.write("rotation_quaternion", frames, rotations, group="Object Transforms")
+    return obj
+
+
+def set_lens(data: bpy.types.Camera, motion: Motion) -> None:
+    """Focal length, sensor and principal point of ``motion.intrinsics`` on a Blender camera."""
+    width, height = (float(n) for n in motion.image_size)
+    fx, fy, cx, cy = motion.intrinsics[[0, 1, 0, 1], [0, 1, 2, 2]]
+    data.type = "PERSP"
+    data.sensor_fit = "HORIZONTAL"  # AUTO would change with portrait pictures
+    data.sensor_width = SENSOR_WIDTH
+    data.sensor_height = SENSOR_WIDTH * height / width * fx / fy
+    data.lens_unit = "MILLIMETERS"
+    data.lens = SENSOR_WIDTH * fx / width
+    data.shift_x = 0.5 - cx / width
+    data.shift_y = (cy - 0.5 * height) / width * fx / fy
+    data.clip_start, data.clip_end = 0.01, 1000.0
+
+
+def same_camera(a: Motion, b: Motion) -> bool:
+    """Whether two motions were seen by one camera, as those of several people in one picture are."""
+    return (
+        np.array_equal(a.image_size, b.image_size)
+        and np.allclose(a.intrinsics, b.intrinsics, rtol=0, atol=1e-6)
+        and a.world_from_camera.shape == b.world_from_camera.shape
+        and np.allclose(a.world_from_camera, b.world_from_camera, rtol=0, atol=1e-6)
+    )
+
+
+def show_footage(camera: bpy.types.Object, footage: str | Path, motion: Motion, start_frame: float) -> list[str]:
+    """Put the footage behind the scene when one looks through the camera; its first frame at ``start_frame``.
+
+    :return: warnings: what will not line up.
+    :raises VideoError: the file is missing.
+    """
+    path = Path(footage).resolve()
+    if not path.is_file():
+        raise VideoError(f"the footage {path} does not exist; give the video or picture the motion was captured from")
+    background = camera.data.background_images.new()
+    background.alpha = 1.0
+    background.display_depth = "BACK"
+    background.frame_method = "FIT"
+    camera.data.show_background_images = True
+    if path.suffix.lower() in PICTURE_SUFFIXES:
+        background.source = "IMAGE"
+        background.image = bpy.data.images.load(str(path), check_existing=True)
+        size = tuple(background.image.size)
+    else:
+        clip = bpy.data.movieclips.load(str(path), check_existing=True)
+        clip.frame_start = round(start_frame)
+        background.source = "MOVIE_CLIP"
+        background.clip = clip
+        size = tuple(clip.size)
+        _set_lens_distortion(clip, background, motion)
+    if not min(size):
+        return [f"Blender cannot decode {path.name}, so the camera shows no footage"]
+    if tuple(motion.image_size) != size:
+        return [
+            f"Blender shows {path.name} at {size[0]} x {size[1]}, but it was captured at {motion.image_size[0]} x "
+            f"{motion.image_size[1]}: turn or scale the camera's background picture"
+        ]
+    return []
+
+
+def _set_lens_distortion(
+    clip: bpy.types.MovieClip, background: bpy.types.CameraBackgroundImage, motion: Motion
+) -> None:
+    """Tell the clip its lens, and show it undistorted when the lens distorts: Blender's cameras are pinholes."""
+    width, height = (float(n) for n in motion.image_size)
+    lens = clip.tracking.camera
+    lens.sensor_width = SENSOR_WIDTH
+    lens.units = "MILLIMETERS"
+    lens.focal_length = SENSOR_WIDTH * motion.intrinsics[0, 0] / width
+    # Blender counts the principal point's v from the bottom.
+    lens.principal_point_pixels = motion.intrinsics[0, 2], height - motion.intrinsics[1, 2]
+    k1, k2, _, _, k3 = motion.dist
+    lens.distortion_model = "BROWN"
+    lens.brown_k1, lens.brown_k2, lens.brown_k3, lens.brown_k4 = k1, k2, k3, 0.0
+    if np.abs(motion.dist).max() > 0:
+        background.clip_user.use_render_undistorted = True

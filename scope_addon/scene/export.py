@@ -1,0 +1,241 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Captures to files: .glb .fbx .blend .bvh .usdc by what the scene holds, .npz by what was captured.
+
+Captures are linked into a scene of their own for the time of the export, so that nothing else of the user's file goes
+along and nothing depends on selection or visibility. Files are written beside their place and renamed into it.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import tempfile
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, nullcontext
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import bpy
+
+from ...solver.body import Body
+from ...solver.errors import OutputError, UsageError
+from ..motion import Motion
+from . import actions, formats
+from .build import CAPTURE_TAG, NEW_SCENE, BuildOptions, BuildResult, Progress, build_scene
+from .output_paths import check_output, person_paths
+from .shape_keys import mixed_vertices
+
+SHAPES = ("auto", "keys", "baked")
+
+
+@dataclass(frozen=True)
+class ExportOptions:
+    """What goes into the files."""
+
+    camera: bool = False  # the footage's camera, in .glb, .fbx and .usdc; .blend always has it
+    # "keys": morph targets whose value is the coefficient. "baked": a plain mesh of the fitted shape, for engines that
+    # clamp morphs to 0..1. "auto": keys, but baked in .usdc, because USD importers (Blender's among them) clamp.
+    shape: str = "auto"
+
+    def __post_init__(self) -> None:
+        """Refuse values that are not offered."""
+        if self.shape not in SHAPES:
+            raise UsageError(f"shape must be one of {', '.join(SHAPES)}, but is '{self.shape}'")
+
+    def bakes(self, suffix: str) -> bool:
+        """Whether a file of this format gets the shape baked into its mesh."""
+        return self.shape == "baked" or (self.shape == "auto" and suffix == ".usdc")
+
+
+def captures(scene: bpy.types.Scene) -> list[bpy.types.Collection]:
+    """The collections of a scene that hold captures."""
+    return [c for c in scene.collection.children_recursive if CAPTURE_TAG in c]
+
+
+def export(
+    path: str | Path,
+    collections: Sequence[bpy.types.Collection] | None = None,
+    motions: Sequence[Motion] = (),
+    options: ExportOptions | None = None,
+) -> list[Path]:
+    """Write captures to one file (.bvh and .npz: one per person) in the format of its suffix.
+
+    :param collections: the captures; those of the active scene when not given.
+    :param motions: needed for .npz, which holds what was captured rather than what the scene has become.
+    :return: the files written.
+    :raises UsageError: unknown suffix, or nothing to export. :raises OutputError: cannot be written.
+    """
+    path = check_output(path)
+    suffix = path.suffix.lower()
+    if suffix == ".npz":
+        if not motions:
+            raise UsageError(f"cannot write {path.name}: a motion file is written from a capture's motions, not a scene")
+        targets = person_paths(path, len(motions))
+        for target, motion in zip(targets, motions, strict=True):
+            motion.save(target)
+        return targets
+    chosen = list(collections) if collections is not None else captures(bpy.context.scene)
+    if not chosen:
+        raise UsageError(f"cannot write {path.name}: the scene holds no capture; capture a video first")
+    options = options or ExportOptions()
+    with _scene_of(chosen) as scene, _baked_meshes(scene) if options.bakes(suffix) else nullcontext():
+        if suffix == ".bvh":
+            rigs = [obj for obj in scene.objects if obj.type == "ARMATURE"]
+            targets = person_paths(path, len(rigs))
+            for target, rig in zip(targets, rigs, strict=True):
+                _write(target, lambda temporary, rig=rig: formats.write_bvh(temporary, scene, rig))
+            return targets
+        writers = {
+            ".glb": lambda temporary: formats.write_glb(temporary, options.camera),
+            ".fbx": lambda temporary: formats.write_fbx(temporary, options.camera),
+            ".usdc": lambda temporary: formats.write_usd(temporary, options.camera),
+            ".blend": lambda temporary: formats.write_blend(temporary, scene),
+        }
+        _write(path, writers[suffix])
+    return [path]
+
+
+def export_motions(
+    motions: list[Motion],
+    body: Body,
+    path: str | Path | Sequence[str | Path],
+    footage: str | Path | None = None,
+    build_options: BuildOptions | None = None,
+    export_options: ExportOptions | None = None,
+    progress: Progress | None = None,
+) -> tuple[list[Path], list[str]]:
+    """Build the motions in a scene of their own, write one file or several, and leave the session as it was.
+
+    The scene takes the motion's frame rate and the footage's resolution.
+
+    :return: the files written, and the warnings of the build.
+    """
+    paths = [path] if isinstance(path, str | Path) else list(path)
+    for each in paths:
+        check_output(each)
+    written: list[Path] = []
+    warnings: list[str] = []
+    scene_paths = [p for p in paths if Path(p).suffix.lower() != ".npz"]
+    for each in (p for p in paths if p not in scene_paths):
+        written += export(each, motions=motions)
+    if not scene_paths:
+        return written, warnings
+    build_options = build_options or replace(NEW_SCENE, name=Path(scene_paths[0]).stem)
+    with _temporary_scene("Capturing"):
+        result = build_scene(motions, body, footage, build_options, progress)
+        try:
+            for each in scene_paths:
+                written += export(each, [result.collection], motions, export_options)
+        finally:
+            _remove(result)
+    return written, result.warnings
+
+
+def _remove(result: BuildResult) -> None:
+    """Take what a build made out of the file again."""
+    objects = list(result.collection.objects)
+    data = {obj.data for obj in objects}
+    owners = [*objects, *(obj.data.shape_keys for obj in objects if obj.type == "MESH")]
+    used = {owner.animation_data.action for owner in owners if owner and owner.animation_data} - {None}
+    materials = {m for block in data for m in getattr(block, "materials", ())}
+    bpy.data.batch_remove([result.collection, *objects, *data, *used, *materials])
+
+
+@contextmanager
+def _temporary_scene(name: str) -> Iterator[bpy.types.Scene]:
+    """An empty scene that is the window's while the block runs, and gone afterwards."""
+    window, before = bpy.context.window, bpy.context.scene
+    scene = bpy.data.scenes.new(name)
+    scene.world = None
+    try:
+        if window is None:
+            with bpy.context.temp_override(scene=scene, view_layer=scene.view_layers[0]):
+                yield scene
+        else:
+            window.scene = scene
+            yield scene
+    finally:
+        if window is not None:
+            window.scene = before
+        bpy.data.scenes.remove(scene)
+
+
+@contextmanager
+def _scene_of(collections: Sequence[bpy.types.Collection]) -> Iterator[bpy.types.Scene]:
+    """A scene that holds these collections alone, with the rate, picture and range of the scene they come from."""
+    source = bpy.context.scene
+    with _temporary_scene("Capture") as scene:
+        for collection in collections:
+            scene.collection.children.link(collection)
+        for name in ("fps", "fps_base", "resolution_x", "resolution_y", "pixel_aspect_x", "pixel_aspect_y"):
+            setattr(scene.render, name, getattr(source.render, name))
+        cameras = [obj for obj in scene.objects if obj.type == "CAMERA"]
+        scene.camera = source.camera if source.camera in cameras else next(iter(cameras), None)
+        animated = [obj for obj in scene.objects if obj.type == "ARMATURE"]
+        span = actions.frame_range(animated) or (source.frame_start, source.frame_end)
+        scene.frame_end = math.ceil(span[1])
+        scene.frame_start = math.floor(span[0])
+        # Until the view layer is evaluated once, frame changes do not reach the objects that exporters read.
+        bpy.context.view_layer.update()
+        scene.frame_set(scene.frame_start)
+        yield scene
+    source.frame_set(source.frame_current, subframe=source.frame_subframe)
+
+
+@contextmanager
+def _baked_meshes(scene: bpy.types.Scene) -> Iterator[None]:
+    """Let plain copies stand in for the scene's meshes with shape keys: same names, the current mix in the vertices."""
+    shaped = [obj for obj in scene.objects if obj.type == "MESH" and obj.data.shape_keys]
+    names = [(obj, obj.name, obj.data.name) for obj in shaped]
+    copies = []
+    try:
+        # The captures' collections belong to the user's scene too: link their objects instead, and not the originals.
+        for obj in [obj for obj in scene.objects if obj not in shaped]:
+            scene.collection.objects.link(obj)
+        for collection in list(scene.collection.children):
+            scene.collection.children.unlink(collection)
+        for obj, name, data_name in names:
+            obj.name, obj.data.name = f"{name} exporting", f"{data_name} exporting"
+            copy = obj.copy()
+            copies.append(copy)
+            copy.data = obj.data.copy()
+            copy.name, copy.data.name = name, data_name
+            vertices = mixed_vertices(obj)
+            copy.shape_key_clear()
+            copy.data.vertices.foreach_set("co", vertices.ravel())
+            copy.data.update()
+            scene.collection.objects.link(copy)
+        bpy.context.view_layer.update()
+        yield
+    finally:
+        bpy.data.batch_remove([*copies, *(copy.data for copy in copies)])
+        for obj, name, data_name in names:
+            obj.name, obj.data.name = name, data_name
+
+
+def _write(path: Path, writer) -> None:
+    """Run ``writer(temporary path)`` and move its file into place; on failure nothing is left."""
+    try:
+        handle, name = tempfile.mkstemp(prefix=f".{path.stem}.", suffix=path.suffix.lower(), dir=path.parent)
+        os.close(handle)
+    except OSError as error:
+        raise OutputError(f"cannot write {path}: {error.strerror}; choose a folder you can write to") from error
+    temporary = Path(name)
+    temporary.unlink()  # Blender's writers differ in what they do with an existing file
+    try:
+        with formats.quiet():
+            writer(temporary)
+        if not temporary.is_file():
+            raise OutputError(f"cannot write {path}: Blender wrote nothing")
+        os.chmod(temporary, 0o666 & ~_umask())
+        os.replace(temporary, path)
+    except (RuntimeError, OSError) as error:
+        raise OutputError(f"cannot write {path}: {error}") from error
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask

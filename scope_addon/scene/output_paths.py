@@ -1,0 +1,37 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Which files an export may write. Free of bpy, so that the command line can check its arguments first."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from ...solver.errors import OutputError, UsageError
+
+SUFFIXES = (".glb", ".fbx", ".blend", ".bvh", ".usdc", ".npz")
+PER_PERSON = (".bvh", ".npz")  # formats that hold one person a file
+
+
+def check_output(path: str | Path) -> Path:
+    """The path, when a file of a known format can be written there.
+
+    :raises UsageError: unknown suffix. :raises OutputError: the folder is missing or cannot be written to.
+    """
+    path = Path(path)
+    if path.suffix.lower() not in SUFFIXES:
+        raise UsageError(f"cannot write '{path.name}': its suffix must be one of {', '.join(SUFFIXES)}")
+    folder = path.parent
+    if not folder.is_dir():
+        raise OutputError(f"cannot write {path}: the folder {folder} does not exist; create it or choose another")
+    if path.is_dir() or not os.access(folder, os.W_OK):
+        what = "a folder of that name is there" if path.is_dir() else f"the folder {folder} is not writable"
+        raise OutputError(f"cannot write {path}: {what}; choose another place")
+    return path
+
+
+def person_paths(path: str | Path, people: int) -> list[Path]:
+    """One path per person for the formats that hold one: OUT.bvh, or OUT.person1.bvh, OUT.person2.bvh, …"""
+    path = Path(path)
+    if people == 1 or path.suffix.lower() not in PER_PERSON:
+        return [path]
+    return [path.with_name(f"{path.stem}.person{i + 1}{path.suffix}") for i in range(people)]

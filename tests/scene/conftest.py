@@ -1,0 +1,160 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A fresh Blender for every test, a body, and motions whose truth is computed here."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from dataclasses import dataclass
+
+# Blender reads this once, when bpy is first imported: tests must not write in the home folder.
+os.environ["BLENDER_USER_RESOURCES"] = tempfile.mkdtemp(prefix="scope-tests-blender-")
+
+import bpy  # noqa: E402
+import numpy as np  # noqa: E402
+import pytest  # noqa: E402
+from mathutils import Quaternion, Vector  # noqa: E402
+from scope.scope_addon.motion import Motion  # noqa: E402
+from scope.solver.body import Body, load_body  # noqa: E402
+
+BETAS = [1.7, -2.3, 0.5, -0.8, 1.2, 0.0, 0.3, -1.1, 0.9, -0.4]
+
+
+@pytest.fixture(autouse=True)
+def fresh_blender() -> None:
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+
+
+@pytest.fixture(scope="session")
+def body() -> Body:
+    return load_body("scope")
+
+
+def rotation_matrix(rotation_vector: np.ndarray) -> np.ndarray:
+    angle = float(np.linalg.norm(rotation_vector))
+    axis = Vector(rotation_vector / angle) if angle > 1e-12 else Vector((1, 0, 0))
+    return np.array(Quaternion(axis, angle).to_matrix(), float)
+
+
+@dataclass
+class Truth:
+    """Joints (T, K+1, 3) and the parts' rotations (T, K+1, 3, 3), world frame."""
+
+    body: Body
+    betas: np.ndarray
+    R: np.ndarray
+    joints: np.ndarray
+
+    def vertices(self, t: int) -> np.ndarray:
+        return self.body.skin(self.R[t], self.joints[t], self.betas)
+
+
+def truth_of(body: Body, motion: Motion) -> Truth:
+    w = motion.poses.reshape(len(motion), -1, 3)
+    rotations = np.array([[rotation_matrix(v) for v in row] for row in w])
+    R, t = body.forward_kinematics(rotations, motion.trans, motion.betas)
+    return Truth(body, motion.betas, R, t)
+
+
+def make_motion(
+    body: Body,
+    count: int = 12,
+    rate: float = 30.0,
+    seed: int = 0,
+    timestamps: np.ndarray | None = None,
+    betas: list[float] | None = None,
+    offset: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    moving_camera: bool = False,
+    image_size: tuple[int, int] = (640, 480),
+    intrinsics: np.ndarray | None = None,
+    source: str = "walk.mp4",
+) -> Motion:
+    """A smooth random dance, turning while it walks towards the camera."""
+    rng = np.random.default_rng(seed)
+    timestamps = np.arange(count) / rate if timestamps is None else np.asarray(timestamps, float)
+    count, n = len(timestamps), body.K + 1
+    phase = rng.uniform(0, 2 * np.pi, (n, 3))
+    speed, size = rng.uniform(1, 4, (n, 3)), rng.uniform(-0.5, 0.5, (n, 3))
+    w = size * np.sin(speed * timestamps[:, None, None] + phase)
+    for t, time in enumerate(timestamps):
+        heading = Quaternion((0, 0, 1), 2.8 + 1.5 * time)  # passes through half a turn
+        upright = Quaternion((1, 0, 0), np.pi / 2)
+        axis, angle = (heading @ upright).to_axis_angle()
+        w[t, 0] = np.array(axis) * angle
+    trans = np.array(offset) + np.stack([0.3 * timestamps, -0.8 * timestamps, 1.0 + 0.05 * timestamps], axis=1)
+    world_from_camera = np.tile(np.eye(4), (count, 1, 1))
+    world_from_camera[:, :3, :3] = [[1, 0, 0], [0, 0, 1], [0, -1, 0]]
+    world_from_camera[:, :3, 3] = [0.1, -4.0, 1.4]
+    if moving_camera:
+        for t, time in enumerate(timestamps):
+            turn = np.array(Quaternion((0, 0, 1), 0.5 * time).to_matrix())
+            world_from_camera[t, :3, :3] = turn @ world_from_camera[t, :3, :3]
+            world_from_camera[t, :3, 3] += [0.4 * time, 0.1 * time, 0.0]
+    width, height = image_size
+    if intrinsics is None:
+        intrinsics = np.array([[600.0, 0, width / 2], [0, 600.0, height / 2], [0, 0, 1]])
+    chosen = np.zeros(body.P)
+    chosen[:] = (BETAS + [0.0] * body.P)[: body.P] if betas is None else betas
+    blank = {
+        "poses": w.reshape(count, -1),
+        "trans": trans,
+        "poses_raw": w.reshape(count, -1),
+        "trans_raw": trans,
+        "betas": chosen,
+        "body_model": body.name,
+        "gender": "neutral",
+        "mocap_framerate": rate,
+        "frames": np.arange(count),
+        "timestamps": timestamps,
+        "valid": np.ones(count, bool),
+        "joints_cam": np.zeros((count, n, 3)),
+        "keypoints2d": np.zeros((count, 1, 3)),
+        "keypoints2d_names": np.array(["blazepose/nose"]),
+        "intrinsics": intrinsics,
+        "dist": np.zeros(5),
+        "joint_confidence": np.ones((count, n)),
+        "world_from_camera": world_from_camera,
+        "foot_contact": np.zeros((count, 4)),
+        "residual_px": np.zeros(count),
+        "image_size": np.array(image_size),
+        "source": source,
+    }
+    motion = Motion(**blank)
+    joints = truth_of(body, motion).joints
+    R, c = world_from_camera[:, :3, :3], world_from_camera[:, :3, 3]
+    motion.joints_cam = np.einsum("tji,tkj->tki", R, joints - c[:, None]).astype(np.float32)
+    return motion
+
+
+def joints_world(motion: Motion) -> np.ndarray:
+    """(T, K+1, 3) from the camera's view of them, without body or poses."""
+    T = motion.world_from_camera
+    return np.einsum("tij,tkj->tki", T[:, :3, :3], motion.joints_cam) + T[:, None, :3, 3]
+
+
+def go_to(frame: float) -> None:
+    bpy.context.scene.frame_set(int(np.floor(frame)), subframe=float(frame - np.floor(frame)))
+
+
+def bone_heads(armature: bpy.types.Object) -> dict[str, np.ndarray]:
+    """World positions of the posed bones' heads at the current frame."""
+    posed = armature.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    return {bone.name: np.array(posed.matrix_world @ bone.head) for bone in posed.pose.bones}
+
+
+def posed_vertices(mesh: bpy.types.Object) -> np.ndarray:
+    """(V, 3) world positions of the deformed mesh at the current frame."""
+    posed = mesh.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    data = posed.to_mesh()
+    out = np.empty(3 * len(data.vertices), np.float32)
+    data.vertices.foreach_get("co", out)
+    world = np.array(posed.matrix_world)
+    posed.to_mesh_clear()
+    return out.reshape(-1, 3) @ world[:3, :3].T + world[:3, 3]
+
+
+def only(kind: str) -> bpy.types.Object:
+    """The scene's one object of a type."""
+    found = [obj for obj in bpy.context.scene.objects if obj.type == kind]
+    assert len(found) == 1, [obj.name for obj in bpy.context.scene.objects]
+    return found[0]
