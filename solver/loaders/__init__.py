@@ -1,0 +1,15 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Body files that users bring themselves: SMPL (.npz, .pkl), SMPL+H, SMPL-X and STAR, all treated as hostile input.
+
+    model_file.py         load_model(path) -> Body: which reader, which family, shapes checked
+    skeletons.py          joint names, trees and vertex numbers of the SMPL family
+    archive.py            the wanted arrays of a .npz, without unpickling
+    restricted_pickle.py  a pickle interpreter of our own that never calls what the file names
+    pickled_values.py     what that interpreter may build: arrays, sparse matrices, chumpy arrays
+    keypoints.py          detector keypoints for a mesh that has none
+    landmarks.py          face, foot and fingertip points from vertex numbers or from geometry
+"""
+
+from .model_file import is_user_model, load_model
+
+__all__ = ["is_user_model", "load_model"]

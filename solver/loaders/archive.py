@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The wanted arrays of a .npz body file, one by one: official SMPL-X files also carry pickled tables nobody needs here.
+
+Each array's size is checked against its own header before anything is allocated.
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+import zipfile
+import zlib
+from collections.abc import Collection
+from pathlib import Path
+from typing import IO
+
+import numpy as np
+
+from ..errors import ModelFileError
+
+LARGEST_ARRAY = 1 << 30  # bytes unpacked; SMPL-X's 400 shape directions have a tenth of it in float64
+
+# What zipfile and numpy's header reader raise on damaged files.
+_UNREADABLE = (OSError, EOFError, LookupError, ValueError, TypeError, ArithmeticError, RuntimeError)
+_UNREADABLE += (zipfile.BadZipFile, zlib.error, struct.error)
+_HEADER_READERS = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}
+
+
+def npz_keys(path: Path) -> set[str]:
+    """Names of the arrays in a .npz file; empty when it is not a zip file at all."""
+    try:
+        with zipfile.ZipFile(path) as archive:
+            return {name.removesuffix(".npy") for name in archive.namelist()}
+    except _UNREADABLE:
+        return set()
+
+
+def read_members(path: Path, wanted: Collection[str], shape_of: str) -> tuple[dict[str, np.ndarray], tuple[int, ...]]:
+    """Read the arrays of a .npz file that are wanted and present.
+
+    :param shape_of: an array of which only the shape is returned, () when absent.
+    :raises ModelFileError: damaged, too large, or a wanted array holds Python objects.
+    """
+    arrays: dict[str, np.ndarray] = {}
+    shape: tuple[int, ...] = ()
+    try:
+        with zipfile.ZipFile(path) as archive:
+            for entry in archive.infolist():
+                key = entry.filename.removesuffix(".npy")
+                if key not in wanted and key != shape_of:
+                    continue
+                if entry.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+                    raise ModelFileError(f"{key} is compressed in a way that numpy does not use")
+                if key in wanted:
+                    with archive.open(entry) as file:
+                        arrays[key] = _read_array(file, entry.file_size, key)
+                else:
+                    with archive.open(entry) as file:
+                        shape, _, _ = _read_header(file, key)
+    except ModelFileError as cause:
+        raise ModelFileError(f"{path} cannot be used as a body: {cause}") from None
+    except (*_UNREADABLE, MemoryError) as cause:
+        raise ModelFileError(f"{path} is not a readable body file ({cause}); download it again") from cause
+    return arrays, shape
+
+
+def _read_header(file: IO[bytes], key: str) -> tuple[tuple[int, ...], bool, np.dtype]:
+    version = np.lib.format.read_magic(file)
+    if version not in _HEADER_READERS:
+        raise ModelFileError(f"{key} is stored in version {version} of numpy's format; save it with a current numpy")
+    return _HEADER_READERS[version](file)
+
+
+def _read_array(file: IO[bytes], size: int, key: str) -> np.ndarray:
+    shape, fortran, dtype = _read_header(file, key)
+    if dtype.hasobject:
+        raise ModelFileError(f"{key} is stored as a Python object; use the publisher's own .npz or .pkl file")
+    count = math.prod(shape) * dtype.itemsize
+    if any(n < 0 for n in shape) or count > min(size, LARGEST_ARRAY):
+        raise ModelFileError(f"{key} claims the shape {shape}, more than the file holds or a body needs")
+    raw = file.read(count)
+    if len(raw) != count:
+        raise ModelFileError(f"{key} ends too early; download it again")
+    return np.frombuffer(raw, dtype).reshape(shape, order="F" if fortran else "C") if count else np.zeros(shape, dtype)
