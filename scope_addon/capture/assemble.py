@@ -1,0 +1,103 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""From solved body states in the camera to the finished motion: gaps, smoothing, world, contact, confidence."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import numpy as np
+
+from ...solver import rotations
+from ...solver.body import Body
+from ..motion import Motion
+from .camera import Camera
+from .fitting import FittedTrack
+from .landmark_network import KEYPOINT_NAMES
+from .smoothing import fill_gaps, fill_rotation_gaps, smooth_root, smooth_rotations
+from .track import Track
+from .world import estimate_world, foot_contact, sole_points
+
+
+def assemble_motion(
+    body: Body,
+    track: Track,
+    fitted: FittedTrack,
+    camera: Camera,
+    *,
+    fps: Fraction,
+    image_size: tuple[int, int],
+    source: str,
+    smoothing: bool,
+) -> Motion:
+    """The motion file's content for one person.
+
+    Rotations relative to the parent do not depend on the world; the root is smoothed in the camera frame, where image
+    position and depth have their own noise, and then moved into the world: R_world_root = R_world_camera R_camera_root
+    and trans = T_world_camera t_camera_root − J_0(β).
+    """
+    times, valid, betas = track.times, fitted.valid, fitted.betas
+    local_raw = fill_rotation_gaps(fitted.rotations, valid, times)
+    root_raw = fill_gaps(fitted.t_camera_root, valid, times)
+    local, root = local_raw, root_raw
+    if smoothing:
+        local, root = smooth_rotations(local_raw, times), smooth_root(root_raw, times)
+
+    J0 = body.rest_joints(betas)[0]
+    R_cam, joints_cam = body.forward_kinematics(local, root - J0, betas)
+    soles_cam = sole_points(body, R_cam, joints_cam, betas)
+    T_world_camera = estimate_world(body, joints_cam[valid], soles_cam[valid])
+    R_world_camera, t_world_camera = T_world_camera[:3, :3], T_world_camera[:3, 3]
+
+    def in_world(rotation: np.ndarray, position: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        poses = rotation.copy()
+        poses[:, 0] = R_world_camera @ rotation[:, 0]
+        trans = position @ R_world_camera.T + t_world_camera - J0
+        return rotations.log(poses).reshape(len(poses), -1), trans
+
+    poses, trans = in_world(local, root)
+    poses_raw, trans_raw = in_world(local_raw, root_raw)
+    soles_world = soles_cam @ R_world_camera.T + t_world_camera
+    return Motion(
+        poses=poses,
+        trans=trans,
+        poses_raw=poses_raw,
+        trans_raw=trans_raw,
+        betas=betas,
+        body_model=body.name,
+        gender="neutral",
+        mocap_framerate=float(fps),
+        frames=track.frames,
+        timestamps=times,
+        valid=valid,
+        joints_cam=joints_cam,
+        keypoints2d=np.concatenate([track.keypoints_px, track.confidence[..., None]], axis=-1),
+        keypoints2d_names=np.array(KEYPOINT_NAMES),
+        intrinsics=camera.intrinsics,
+        dist=camera.dist,
+        joint_confidence=fitted.joint_confidence,
+        world_from_camera=np.tile(T_world_camera, (len(track), 1, 1)),
+        foot_contact=foot_contact(soles_world, times) * valid[:, None],
+        residual_px=reprojection_error(body, R_cam, joints_cam, betas, track, camera, valid),
+        image_size=np.array(image_size),
+        source=source,
+    )
+
+
+def reprojection_error(
+    body: Body, R: np.ndarray, t: np.ndarray, betas: np.ndarray, track: Track, camera: Camera, valid: np.ndarray
+) -> np.ndarray:
+    """(T,) median distance in pixels between the confident keypoints and the body's own; 0 where nobody was seen.
+
+    :param R, t: (T, K+1, 3, 3), (T, K+1, 3) part poses in the camera frame.
+    """
+    at = body.keypoint_set("blazepose")
+    points = body.keypoints(R, t, betas)[:, [at[name] for name in KEYPOINT_NAMES]]
+    K = camera.intrinsics
+    depth = np.maximum(points[..., 2:], 1e-3)
+    projected = points[..., :2] / depth * [K[0, 0], K[1, 1]] + K[:2, 2]
+    distance = np.linalg.norm(projected - camera.undistort(track.keypoints_px), axis=-1)
+    distance[track.confidence < 0.5] = np.nan
+    out = np.zeros(len(track))
+    for k in np.flatnonzero(valid & np.isfinite(distance).any(1)):
+        out[k] = np.nanmedian(distance[k])
+    return out

@@ -1,0 +1,103 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""From a frame's landmarks to the solver's measurements: 2D keypoints, 3D keypoints, part orientation field.
+
+Weights are inverse variances. The landmark network's 3D landmarks are centred at the hips; their place in the camera
+follows from the 2D landmarks, t = argmin Σ c |(W_j + t)_xy − x_j (W_j + t)_z|², and each is moved onto its own ray, so
+that 3D and 2D keypoints agree and the 3D ones add depth alone.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+
+from ...solver import Body, Keypoints2D, Keypoints3D, Measurements, OrientationField
+from .landmark_network import KEYPOINT_NAMES
+
+# How far a landmark is trusted beside a wrist or knee: the face and fingers lie close together and say little about
+# the body, and what the network calls hip is not quite the body's hip joint.
+_TRUST = {"hip": 0.7, "nose": 0.5, "ear": 0.5, "heel": 0.5, "foot": 0.5}
+_TRUST |= {"pinky": 0.3, "index": 0.3, "thumb": 0.3, "eye": 0.2, "mouth": 0.2}
+_BONES = ("shoulder", "elbow"), ("elbow", "wrist"), ("hip", "knee"), ("knee", "ankle")
+NEAREST_M = 0.3  # a person closer to the camera than this is a mistake
+
+
+class Measurer:
+    """Makes measurements for one body from landmark arrays; the maps between the two are found once."""
+
+    def __init__(self, body: Body, intrinsics: np.ndarray) -> None:
+        self.body, self.intrinsics = body, intrinsics
+        at = body.keypoint_set("blazepose")
+        self.indices = np.array([at[name] for name in KEYPOINT_NAMES])
+        self.trust = np.array([_trust(name) for name in KEYPOINT_NAMES])
+        pairs = [(f"{s}_{a}", f"{s}_{b}") for s in ("left", "right") for a, b in _BONES] + [("right_hip", "left_hip")]
+        first_joint = len(body.keypoint_names)  # the solver numbers the joints after the keypoints
+        self.bone_starts, self.bone_ends = (
+            np.array([first_joint + body.joint_names.index(pair[k]) for pair in pairs]) for k in (0, 1)
+        )
+        self.from_landmark, self.to_landmark = (np.array([KEYPOINT_NAMES.index(p[k]) for p in pairs]) for k in (0, 1))
+
+    @cached_property
+    def _unproject(self) -> np.ndarray:
+        return np.linalg.inv(self.intrinsics)
+
+    def rays(self, pixels: np.ndarray) -> np.ndarray:
+        """(J, 2) pixels without distortion -> (J, 2) normalized image coordinates."""
+        return pixels @ self._unproject[:2, :2].T + self._unproject[:2, 2]
+
+    def measure(self, pixels: np.ndarray, confidence: np.ndarray, world: np.ndarray) -> Measurements:
+        """Measurements of one frame.
+
+        :param pixels: (33, 2) without lens distortion;  confidence: (33,) 0..1;  world: (33, 3) metres, hip-centred.
+        """
+        rays = self.rays(pixels)
+        depth = np.maximum(world[:, 2] + place(world, rays, confidence)[2], NEAREST_M)
+        points = np.concatenate([rays * depth[:, None], depth[:, None]], axis=1)
+        weight = confidence * self.trust
+        return Measurements(
+            intrinsics=self.intrinsics,
+            keypoints2d=Keypoints2D(self.indices, pixels, weight),
+            keypoints3d=Keypoints3D(self.indices, points, weight),
+            orientation_field=OrientationField(
+                self.bone_starts,
+                self.bone_ends,
+                world[self.to_landmark] - world[self.from_landmark],
+                np.minimum(confidence[self.from_landmark], confidence[self.to_landmark]),
+            ),
+        )
+
+    def joint_confidence(self, confidence: np.ndarray) -> np.ndarray:
+        """(T, 33) landmark confidences -> (T, K+1): how far landmarks, not priors, fix each joint's rotation.
+
+        A joint's rotation shows in the keypoints of its own part, away from the joint; failing these, in those of the
+        nearest parts below it. A part with neither is fixed by priors alone: 0.
+        """
+        body = self.body
+        part, lever = body.keypoint_part[self.indices], np.linalg.norm(body.v_bar[self.indices], axis=1)
+        children = [np.flatnonzero(body.parents == i) for i in range(body.K + 1)]
+        out = np.zeros((len(confidence), body.K + 1))
+        for i in range(body.K + 1):
+            fixing = np.flatnonzero((part == i) & (lever > 0.01))
+            below = children[i]
+            while len(fixing) == 0 and len(below):
+                fixing = np.flatnonzero(np.isin(part, below))
+                below = np.concatenate([children[b] for b in below])
+            if len(fixing):
+                out[:, i] = confidence[:, fixing].mean(1)
+        return out
+
+
+def place(world: np.ndarray, rays: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    """(3,) translation that moves hip-centred points onto their rays: linear least squares, see the module's equation."""
+    n = len(world)
+    A = np.zeros((2 * n, 3))
+    A[:n, 0] = A[n:, 1] = 1.0
+    A[:n, 2], A[n:, 2] = -rays[:, 0], -rays[:, 1]
+    b = np.concatenate([rays[:, 0] * world[:, 2] - world[:, 0], rays[:, 1] * world[:, 2] - world[:, 1]])
+    w = np.tile(weight, 2)
+    return np.linalg.lstsq(A * w[:, None], b * w, rcond=None)[0]
+
+
+def _trust(name: str) -> float:
+    return next((value for key, value in _TRUST.items() if key in name), 1.0)

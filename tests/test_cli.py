@@ -1,0 +1,139 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The command line as a user meets it: exit status, one clear sentence, nothing half-written."""
+
+import json
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from scope.scope_addon import cli
+from scope.scope_addon.cli import SAMPLE, main
+from scope.scope_addon.motion import Motion
+
+
+def run(capsys, *argv):
+    status = main([str(a) for a in argv])
+    out, err = capsys.readouterr()
+    return status, out, err
+
+
+def files_below(folder):
+    return sorted(str(p.relative_to(folder)) for p in folder.rglob("*"))
+
+
+BROKEN = {
+    "missing.mp4": None,
+    "empty.mp4": b"",
+    "text.mp4": b"this is not a video\n" * 50,
+    "truncated.mp4": "truncated",
+    "noise.png": bytes(range(256)) * 20,
+}
+
+
+@pytest.mark.parametrize("name", BROKEN)
+def test_bad_footage_gives_one_sentence_status_1_and_no_file(tmp_path, capsys, name):
+    content = BROKEN[name]
+    if content == "truncated":
+        content = SAMPLE.read_bytes()[:4000]
+    if content is not None:
+        (tmp_path / name).write_bytes(content)
+    before = files_below(tmp_path)
+    status, out, err = run(capsys, "capture", tmp_path / name, "-o", tmp_path / "out.npz", "-o", tmp_path / "out.glb")
+    assert status == 1
+    assert out == ""
+    assert name in err
+    assert err.count("\n") == 1
+    assert "Traceback" not in err
+    assert files_below(tmp_path) == before
+
+
+@pytest.mark.parametrize(
+    ("argv", "status", "says"),
+    [
+        (["capture", "-o", "{tmp}/a.xyz"], 2, ".xyz"),
+        (["capture", "-o", "{tmp}/noext"], 2, "suffix"),
+        (["capture", "--overlay", "{tmp}/a.avi"], 2, ".avi"),
+        (["capture", "-o", "{tmp}/none/a.npz"], 1, "none"),
+        (["capture", "-o", "{tmp}"], 2, "suffix"),
+        (["capture", "-o", "{tmp}/a.npz", "-o", "{tmp}/a.npz"], 2, "same name"),
+        (["capture", "--quality", "superb"], 2, "superb"),
+        (["capture", "--fov", "60", "--focal-mm", "26", "-o", "{tmp}/a.npz"], 2, "contradict"),
+        (["capture", "--fov", "wide"], 2, "wide"),
+        (["capture", "--body", "nobody", "-o", "{tmp}/a.npz"], 1, "nobody"),
+        (["frobnicate"], 2, "frobnicate"),
+        ([], 2, "COMMAND"),
+    ],
+)
+def test_bad_arguments(tmp_path, capsys, argv, status, says):
+    got, out, err = run(capsys, *[a.format(tmp=tmp_path) for a in argv])
+    assert got == status
+    assert says in err
+    assert err.count("\n") == 1
+    assert out == ""
+    assert files_below(tmp_path) == []
+
+
+def test_a_picture_of_nobody_ends_with_status_3(tmp_path, capsys):
+    import cv2
+
+    cv2.imwrite(str(tmp_path / "wall.png"), np.full((240, 320, 3), 128, np.uint8))
+    status, _, err = run(capsys, "capture", tmp_path / "wall.png", "-o", tmp_path / "out.npz")
+    assert status == 3
+    assert "no person" in err
+    assert files_below(tmp_path) == ["wall.png"]
+
+
+def test_a_failing_writer_keeps_the_earlier_result(tmp_path, capsys, monkeypatch):
+    import cv2
+
+    picture = tmp_path / "person.png"
+    ok, frame = cv2.VideoCapture(str(SAMPLE)).read()
+    assert ok
+    cv2.imwrite(str(picture), frame)
+    (tmp_path / "out.npz").write_bytes(b"earlier")
+
+    def full_disk(*args, **kwargs):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(np, "savez_compressed", full_disk)
+    status, _, err = run(capsys, "capture", picture, "-o", tmp_path / "out.npz")
+    assert status == 1
+    assert "No space left" in err
+    assert (tmp_path / "out.npz").read_bytes() == b"earlier"
+    assert files_below(tmp_path) == ["out.npz", "person.png"]
+
+
+def test_a_picture_gives_a_motion_of_one_frame_and_json_alone_on_stdout(tmp_path):
+    import cv2
+
+    picture = tmp_path / "person.png"
+    capture = cv2.VideoCapture(str(SAMPLE))
+    ok, frame = capture.read()
+    assert ok
+    cv2.imwrite(str(picture), frame)
+    outputs = [tmp_path / "out.npz", tmp_path / "out.glb"]
+    argv = [sys.executable, "-m", "scope.scope_addon.cli", "capture", picture, "--json", "--overlay", tmp_path / "o.png"]
+    for path in outputs:
+        argv += ["-o", path]
+    done = subprocess.run(list(map(str, argv)), capture_output=True, text=True, env=dict(os.environ), check=False)
+    assert done.returncode == 0, done.stderr
+    report = json.loads(done.stdout)
+    assert report["frames"] == 1
+    assert report["people"] == 1
+    assert set(report["outputs"]) == {str(p) for p in [*outputs, tmp_path / "o.png"]}
+    assert {"fps", "reprojection_px", "warnings"} <= set(report)
+    motion = Motion.load(tmp_path / "out.npz")
+    assert len(motion) == 1
+    assert motion.valid.all()
+    assert cv2.imread(str(tmp_path / "o.png")).shape == frame.shape
+
+
+def test_help_names_every_option(capsys):
+    with pytest.raises(SystemExit) as stop:
+        cli.build_parser().parse_args(["capture", "--help"])
+    assert stop.value.code == 0
+    text = capsys.readouterr().out
+    for suffix in cli.MOTION_SUFFIXES + cli.SCENE_SUFFIXES:
+        assert suffix in text
