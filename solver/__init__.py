@@ -6,11 +6,13 @@
 """
 
 from .body import Body, load_body
+from .clip import carry, fit_clip
 from .errors import ShapeError
 from .measurements import Keypoints2D, Keypoints3D, Measurements, OrientationField, PosePriors
 from .optimizer import fit, fit_tree
 from .options import COLD_STAGES, WARM_STAGES, Options, Priors, Stage, Weights, default_priors
 from .state import ClipFit, Fit, State, Status
+from .temporal import Temporal, with_previous
 from .tree import BodyArrays, Tree, make_tree
 
 __all__ = [
@@ -31,11 +33,15 @@ __all__ = [
     "Stage",
     "State",
     "Status",
+    "Temporal",
     "Tree",
     "Weights",
+    "carry",
     "default_priors",
     "fit",
+    "fit_clip",
     "fit_tree",
     "load_body",
     "make_tree",
+    "with_previous",
 ]

@@ -74,6 +74,23 @@ def make_tree(body: BodyArrays, focal: bool = False) -> Tree:
     )
 
 
+def with_fixed_shape(tree: Tree, beta: ArrayLike) -> Tree:
+    """Return the tree at shape beta (P,), with no shape columns left: poses alone, at a fraction of the cost."""
+    beta = _check(beta, (tree.shape,), "beta")
+    n, m = len(tree.parents), len(tree.v_bar)
+    return Tree(
+        tree.parents,
+        np.zeros((n, 3, 0)),
+        tree.l + tree.S[:, :, : tree.shape] @ beta,
+        tree.point_part,
+        tree.v_bar + tree.V[:, :, : tree.shape] @ beta,
+        np.zeros((m, 3, 0)),
+        tree.keypoints,
+        0,
+        0,
+    )
+
+
 def _check(value: ArrayLike, shape: tuple[int, ...], name: str) -> NDArray[np.float64]:
     array = np.array(value, dtype=np.float64, order="C")
     if array.shape != shape:

@@ -1,0 +1,44 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Causal temporal terms: the last frame's estimate is a constant, so it enters as priors of this frame's pose.
+
+The root's pose becomes a row of the pose prior, each joint's state one of the joint prior with Omega_mean the last
+frame's. Two-sided windows would couple frames and break the linear cost.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from .measurements import Measurements, PosePriors
+from .residuals import joint_prior
+from .state import State
+
+
+@dataclass(frozen=True)
+class Temporal:
+    """Weights of the last frame's estimate: rotation per radian^2 and position per metre^2 of the root; joints in
+    multiples of `Weights.joint_prior`.
+    """
+
+    root_rotation: float = 100.0
+    root_position: float = 100.0
+    joints: float = 1.0
+
+
+def with_previous(measurements: Measurements, previous: State, temporal: Temporal) -> Measurements:
+    """Return the measurements with the pull towards `previous`, in the same camera frame, added to them."""
+    K = len(previous.Omega)
+    rows = joint_prior.pack(np.arange(1, K + 1), previous.Omega, np.full(K, temporal.joints))
+    tables = dict(measurements.tables)
+    if "joint_prior" in tables:
+        rows = tuple(np.concatenate([old, new]) for old, new in zip(tables["joint_prior"], rows, strict=True))
+    tables["joint_prior"] = rows
+    own = measurements.pose_priors or PosePriors(np.zeros(0, int), np.zeros((0, 3, 3)), np.zeros((0, 3)), [], [])
+    root = PosePriors(
+        np.append(own.parts, 0).astype(int),
+        np.concatenate([own.R_camera_part, previous.R_camera_root[None]]),
+        np.concatenate([own.t_camera_part, previous.t_camera_root[None]]),
+        np.append(own.weight_rotation, temporal.root_rotation),
+        np.append(own.weight_translation, temporal.root_position),
+    )
+    return replace(measurements, pose_priors=root, tables=tables)
