@@ -18,11 +18,11 @@ import numpy as np
 
 from ..errors import ModelFileError
 
-LARGEST_ARRAY = 1 << 30  # bytes unpacked; SMPL-X's 400 shape directions have a tenth of it in float64
+LARGEST_ARRAY = 1 << 28  # bytes unpacked; SMPL-X's 400 shape directions in float64 have 100 million
 
 # What zipfile and numpy's header reader raise on damaged files.
-_UNREADABLE = (OSError, EOFError, LookupError, ValueError, TypeError, ArithmeticError, RuntimeError)
-_UNREADABLE += (zipfile.BadZipFile, zlib.error, struct.error)
+_UNREADABLE: tuple[type[Exception], ...] = (OSError, EOFError, LookupError, ValueError, TypeError, ArithmeticError)
+_UNREADABLE += (RuntimeError, MemoryError, zipfile.BadZipFile, zlib.error, struct.error)
 _HEADER_READERS = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}
 
 
@@ -50,7 +50,7 @@ def read_members(path: Path, wanted: Collection[str], shape_of: str) -> tuple[di
                 if key not in wanted and key != shape_of:
                     continue
                 if entry.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
-                    raise ModelFileError(f"{key} is compressed in a way that numpy does not use")
+                    raise ModelFileError(f"{key} is compressed in a way that numpy does not use; save it with numpy")
                 if key in wanted:
                     with archive.open(entry) as file:
                         arrays[key] = _read_array(file, entry.file_size, key)
@@ -59,7 +59,7 @@ def read_members(path: Path, wanted: Collection[str], shape_of: str) -> tuple[di
                         shape, _, _ = _read_header(file, key)
     except ModelFileError as cause:
         raise ModelFileError(f"{path} cannot be used as a body: {cause}") from None
-    except (*_UNREADABLE, MemoryError) as cause:
+    except _UNREADABLE as cause:
         raise ModelFileError(f"{path} is not a readable body file ({cause}); download it again") from cause
     return arrays, shape
 
@@ -77,7 +77,7 @@ def _read_array(file: IO[bytes], size: int, key: str) -> np.ndarray:
         raise ModelFileError(f"{key} is stored as a Python object; use the publisher's own .npz or .pkl file")
     count = math.prod(shape) * dtype.itemsize
     if any(n < 0 for n in shape) or count > min(size, LARGEST_ARRAY):
-        raise ModelFileError(f"{key} claims the shape {shape}, more than the file holds or a body needs")
+        raise ModelFileError(f"{key} claims the shape {shape}, more than the file holds or a body needs; download it again")
     raw = file.read(count)
     if len(raw) != count:
         raise ModelFileError(f"{key} ends too early; download it again")

@@ -43,9 +43,9 @@ Attached = tuple[np.ndarray, str]  # a point (3, 1 + P) and the part it turns wi
 
 
 def derive_keypoints(body: Body) -> Body:
-    """The body with all keypoints; unchanged when its tree does not have SMPL's 22 body joints by name."""
+    """The body with all keypoints, or with none when its tree does not have SMPL's 22 body joints by name."""
     if not set(BODY_JOINTS) <= set(body.joint_names):
-        return body
+        return replace(body, keypoint_shapedirs=np.zeros((0, 3, body.P)))
     points = RestPoints(body)
     hands = {side: _hand(points, side) for side in ("left", "right")}
     found = {**_face(points), **_feet(points)}

@@ -28,6 +28,7 @@ from .skeletons import recognise_skeleton
 
 MAX_BETAS = 16  # as AMASS; SMPL-X and STAR files carry 300, most of them below a millimetre
 SMPLX_SHAPE, SMPLX_EXPRESSION = 300, 100  # how a full SMPL-X file divides shapedirs; older ones have 10 and 10
+MOST_VERTICES, MOST_JOINTS, MOST_WEIGHTS = 200_000, 500, 20_000_000  # SMPL-X: 10475, 55, 576125
 STAR_CORRECTIVES = 93  # 23 quaternions and one shape coefficient; SMPL has 207
 
 _NUMERIC = ("v_template", "shapedirs", "J_regressor", "kintree_table", "weights", "f")
@@ -86,7 +87,7 @@ def _read_tables(path: Path) -> Tables:
             if isinstance(content.get("gender"), str | bytes):
                 arrays["gender"] = to_array(content["gender"])
         except (ModelFileError, ValueError, TypeError, IndexError, OverflowError) as cause:
-            raise ModelFileError(f"{path} cannot be used as a body: {cause}") from None
+            raise ModelFileError(f"{path} cannot be used as a body: {cause}; get it from its publisher again") from None
     missing = [key for key in _REQUIRED if key not in arrays]
     if missing:
         raise ModelFileError(
@@ -100,6 +101,8 @@ def _check_tables(arrays: dict[str, np.ndarray], path: Path) -> None:
     """Types and shapes, at the door."""
     vertices, joints = len(np.atleast_1d(arrays["v_template"])), arrays["kintree_table"].shape[-1:]
     n = joints[0] if joints else 0
+    if vertices > MOST_VERTICES or n > MOST_JOINTS or vertices * n > MOST_WEIGHTS:
+        raise ModelFileError(f"{path}: {vertices} vertices and {n} joints are too many for a body; choose another")
     expected: dict[str, tuple[int | None, ...]] = {
         "v_template": (vertices, 3),
         "weights": (vertices, n),
@@ -179,6 +182,8 @@ def reduce_weights(weights: np.ndarray, path: Path) -> tuple[np.ndarray, np.ndar
     :param weights: (V, K+1).
     :return: skin_joints (V, 4) int and skin_weights (V, 4); with fewer than four joints, the rest is joint 0 at zero.
     """
+    if not np.isfinite(weights).all():
+        raise ModelFileError(f"{path}: weights contains NaN or infinity; download it again")
     weights = np.maximum(weights.astype(np.float64), 0.0)
     if weights.shape[1] < 4:
         weights = np.pad(weights, ((0, 0), (0, 4 - weights.shape[1])))
@@ -186,7 +191,7 @@ def reduce_weights(weights: np.ndarray, path: Path) -> tuple[np.ndarray, np.ndar
     kept = np.take_along_axis(weights, joints, axis=1)
     total = kept.sum(axis=1, keepdims=True)
     if not np.isfinite(total).all() or (total <= 0).any():
-        raise ModelFileError(f"{path}: weights leaves a vertex without a joint, or contains NaN; download it again")
+        raise ModelFileError(f"{path}: weights leaves a vertex without a joint; download it again")
     joints[kept == 0.0] = 0
     return joints, kept / total
 

@@ -83,10 +83,7 @@ def resolve_global(module: object, name: object) -> Role:
     role = ALLOWED_GLOBALS.get((module, name)) if named else None  # type: ignore[arg-type]
     if role is None:
         shown = f"{module:.80}.{name:.80}" if named else "an unnamed global"
-        raise ModelFileError(
-            f"it asks for {shown}, which a body file has no use for and which may be an attack; "
-            "get the file from its publisher again"
-        )
+        raise ModelFileError(f"it asks for {shown}, which a body file has no use for and which may be an attack")
     return role
 
 
@@ -180,7 +177,8 @@ def to_array(value: object, depth: int = 0) -> np.ndarray:
         if value.role is Role.CHUMPY:
             return to_array(value.state.get("x"), depth + 1)
         return _selected(value.state, depth + 1)
-    raise ModelFileError(f"an array was expected, but a {type(value).__name__} was found")
+    found = "an unfinished array" if isinstance(value, PickledArray) else f"a {type(value).__name__}"
+    raise ModelFileError(f"an array was expected, but {found} was found")
 
 
 def _selected(state: dict[str, Any], depth: int) -> np.ndarray:

@@ -41,8 +41,8 @@ def read_pickle(path: Path) -> dict[str, Any]:
     :raises ModelFileError: unreadable, too large, damaged, or asks for anything but arrays; nothing has run then.
     """
     try:
-        with path.open("rb") as file:
-            data = file.read(LARGEST_FILE + 1)
+        with path.open("rb") as file:  # read() sets aside as much as it is asked for
+            data = file.read(min(path.stat().st_size, LARGEST_FILE) + 1)
     except OSError as cause:
         raise ModelFileError(f"{path} cannot be read ({cause.strerror}); choose another body file") from cause
     if len(data) > LARGEST_FILE:
@@ -50,7 +50,7 @@ def read_pickle(path: Path) -> dict[str, Any]:
     try:
         result = Interpreter(data).run()
     except ModelFileError as cause:
-        raise ModelFileError(f"{path} cannot be used as a body: {cause}") from None
+        raise ModelFileError(f"{path} cannot be used as a body: {cause}; get it from its publisher again") from None
     except (ValueError, IndexError, KeyError, TypeError, OverflowError, struct.error, MemoryError) as cause:
         raise ModelFileError(f"{path} is not a readable pickle ({cause}); download it again") from cause
     if not isinstance(result, dict):
@@ -87,7 +87,7 @@ class Interpreter:
         """The next ``count`` bytes."""
         end = self.position + count
         if count < 0 or end > len(self.data):
-            raise ModelFileError("it ends too early; download it again")
+            raise ModelFileError("it ends too early")
         chunk = self.data[self.position : end]
         self.position = end
         return chunk

@@ -1,0 +1,117 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Keypoints of users' bodies: known vertices on published meshes, geometry on any other, rigid and linear in shape."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scope.solver.body import Body, load_body
+from scope.solver.loaders import load_model
+
+PUBLISHED = {  # vertex numbers, as found in several public projects
+    ("smpl", 6890): {"nose": 332, "left_ear": 583, "right_eye": 6260, "left_big_toe": 3216, "right_heel": 6787},
+    ("star", 6890): {"nose": 332, "left_eye": 2800, "right_ear": 4071, "right_small_toe": 6624, "left_heel": 3387},
+    ("smplh", 6890): {"nose": 332, "right_big_toe": 6617, "left_small_toe": 3226},
+    ("smplx", 10475): {"nose": 9120, "left_eye": 9448, "right_ear": 616, "left_big_toe": 5770, "right_heel": 8635},
+}
+TIPS = {
+    ("smpl", 6890): {"left_index_finger_tip": 2319, "right_thumb_tip": 6191},
+    ("star", 6890): {"left_pinky_tip": 2673},
+    ("smplh", 6890): {"left_ring_finger_tip": 2556, "right_middle_finger_tip": 5905},
+    ("smplx", 10475): {"left_thumb_tip": 5361, "right_pinky_tip": 8022},
+}
+
+
+@pytest.mark.parametrize(("family", "vertices"), PUBLISHED)
+def test_published_meshes_use_their_known_vertices(tmp_path, tables_of, family, vertices):
+    np.savez(tmp_path / "body.npz", **tables_of(family, vertices=vertices, betas=3))
+    body = load_model(tmp_path / "body.npz")
+    places = {f"coco/{name}": v for name, v in PUBLISHED[family, vertices].items()}
+    places |= {f"hand/{name}": v for name, v in TIPS[family, vertices].items()}
+    for name, vertex in places.items():
+        i = body.keypoint_names.index(name)
+        np.testing.assert_allclose(body.keypoint_template[i], body.v_template[vertex], atol=1e-12)
+        np.testing.assert_allclose(body.keypoint_shapedirs[i], body.shapedirs[vertex], atol=1e-12)
+
+
+def as_smpl_file(body: Body) -> dict[str, np.ndarray]:
+    """The default body as an SMPL-like file: a regressor that gives its joints exactly, for every shape."""
+    V, n = len(body.v_template), body.K + 1
+    basis = np.column_stack([body.v_template, body.shapedirs.reshape(V, -1), np.ones(V)])
+    wanted = np.column_stack([body.J_template, body.J_shapedirs.reshape(n, -1), np.ones(n)])
+    weights = np.zeros((V, n))
+    np.add.at(weights, (np.arange(V)[:, None], body.skin_joints), body.skin_weights)
+    return {
+        "v_template": body.v_template,
+        "shapedirs": body.shapedirs,
+        "J_regressor": wanted @ np.linalg.pinv(basis),
+        "weights": weights,
+        "kintree_table": np.array([body.parents, np.arange(n)]),
+        "f": body.triangles(),
+    }
+
+
+@pytest.fixture(scope="module", params=["scope", "scope_h"])
+def pair(request, tmp_path_factory) -> tuple[Body, Body]:
+    """The default body with its own keypoints, and the same mesh loaded as a user's file of unknown topology."""
+    own = load_body(request.param)
+    path = tmp_path_factory.mktemp("body") / "body.npz"
+    np.savez(path, **as_smpl_file(own))
+    return own, load_model(path)
+
+
+def test_an_unknown_mesh_gets_keypoints_near_the_true_ones(pair):
+    own, loaded = pair
+    assert loaded.keypoint_names == own.keypoint_names
+    np.testing.assert_array_equal(loaded.keypoint_part, own.keypoint_part)
+    distance = np.linalg.norm(loaded.keypoint_template - own.keypoint_template, axis=1)
+    for name, d in zip(own.keypoint_names, distance, strict=True):
+        assert d < (0.025 if "hand/" in name or "index" in name or "pinky" in name else 0.02), name
+
+
+def test_keypoints_follow_the_shape_as_the_true_ones_do(pair):
+    own, loaded = pair
+    joints = [i for i, n in enumerate(own.keypoint_names) if n.split("/")[1] in own.joint_names]
+    np.testing.assert_allclose(loaded.keypoint_shapedirs[joints], own.keypoint_shapedirs[joints], atol=1e-9)
+    for axis in range(3):
+        betas = np.zeros(own.P)
+        betas[axis] = 2.0
+        moved = (loaded.keypoint_shapedirs - own.keypoint_shapedirs) @ betas
+        assert np.linalg.norm(moved, axis=1).max() < 0.02
+
+
+def test_keypoints_turn_with_their_part(pair):
+    _, loaded = pair
+    rotations = np.broadcast_to(np.eye(3), (loaded.K + 1, 3, 3)).copy()
+    head = loaded.joint_names.index("head")
+    rotations[head] = [[0, 0, 1], [0, 1, 0], [-1, 0, 0]]  # a quarter turn to the person's left
+    R, t = loaded.forward_kinematics(rotations, np.zeros(3))
+    moved = loaded.keypoints(R, t)
+    expected = loaded.keypoint_template.copy()
+    on_head = loaded.keypoint_part == head
+    pivot = loaded.J_template[head]
+    x, y, z = (expected[on_head] - pivot).T
+    expected[on_head] = pivot + np.column_stack([z, y, -x])
+    np.testing.assert_allclose(moved, expected, atol=1e-12)
+    assert on_head.sum() == 16  # 11 of BlazePose, 5 of COCO
+
+
+@pytest.mark.parametrize(("family", "vertices"), [("smpl", 72), ("smpl", 200), ("smplh", 160), ("smplx", 400)])
+def test_coarse_random_meshes_still_get_every_keypoint(tmp_path, tables_of, family, vertices):
+    np.savez(tmp_path / "body.npz", **tables_of(family, vertices=vertices))
+    body = load_model(tmp_path / "body.npz")
+    assert len(body.keypoint_set("blazepose")) == 33
+    assert len(body.keypoint_set("coco")) == 23
+    assert len(body.keypoint_set("hand")) == 42
+    assert np.isfinite(body.keypoint_template).all()
+    place = dict(zip(body.keypoint_names, body.keypoint_template, strict=True))
+    for name in ("ear", "big_toe", "heel"):
+        assert place[f"coco/left_{name}"][0] > place[f"coco/right_{name}"][0]
+
+
+def test_a_mesh_whose_weights_skip_head_hands_and_feet_still_loads(tmp_path, tables_of):
+    tables = tables_of("smpl")
+    weights = np.zeros_like(tables["weights"])
+    weights[:, 0] = 1.0
+    np.savez(tmp_path / "body.npz", **{**tables, "weights": weights})
+    assert len(load_model(tmp_path / "body.npz").keypoint_names) == 98
