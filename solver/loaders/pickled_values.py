@@ -16,7 +16,7 @@ import numpy as np
 
 from ..errors import ModelFileError
 
-LARGEST_DENSE = 20_000_000  # elements of one sparse matrix made dense; SMPL-X's joint regressor has 0.6 million
+LARGEST_DENSE = 5_000_000  # elements of one sparse matrix made dense; SMPL-X's joint regressor has 0.6 million
 DEEPEST_CHUMPY = 8  # nested chumpy expressions; real files have two
 
 _DTYPE = re.compile(r"([<>|=]?)(\?|[biufSU][1-9][0-9]{0,3})")
