@@ -45,7 +45,7 @@ def rest_vertices_world(body: Body, lift: np.ndarray, betas: np.ndarray | None =
 
 
 def skin_to_armature(mesh: bpy.types.Object, armature: bpy.types.Object, body: Body) -> None:
-    """Vertex groups with the body's skin weights, an Armature modifier (linear blending), and the armature as parent."""
+    """Vertex groups with the body's skin weights, an Armature modifier (linear) and the armature as parent."""
     joints, weights = body.skin_joints, body.skin_weights
     for k, joint_name in enumerate(body.joint_names):
         group = mesh.vertex_groups.new(name=joint_name)

@@ -69,7 +69,7 @@ def export(
     suffix = path.suffix.lower()
     if suffix == ".npz":
         if not motions:
-            raise UsageError(f"cannot write {path.name}: a motion file is written from a capture's motions, not a scene")
+            raise UsageError(f"cannot write {path.name}: a motion file holds what was captured, so pass the motions")
         targets = person_paths(path, len(motions))
         for target, motion in zip(targets, motions, strict=True):
             motion.save(target)
@@ -184,33 +184,26 @@ def _scene_of(collections: Sequence[bpy.types.Collection]) -> Iterator[bpy.types
 
 @contextmanager
 def _baked_meshes(scene: bpy.types.Scene) -> Iterator[None]:
-    """Let plain copies stand in for the scene's meshes with shape keys: same names, the current mix in the vertices."""
-    shaped = [obj for obj in scene.objects if obj.type == "MESH" and obj.data.shape_keys]
-    names = [(obj, obj.name, obj.data.name) for obj in shaped]
-    copies = []
+    """Give the scene's objects with shape keys plain meshes for a while, the current mix in their vertices."""
+    shaped = [(obj, obj.data, obj.data.name) for obj in scene.objects if obj.type == "MESH" and obj.data.shape_keys]
+    baked = []
     try:
-        # The captures' collections belong to the user's scene too: link their objects instead, and not the originals.
-        for obj in [obj for obj in scene.objects if obj not in shaped]:
-            scene.collection.objects.link(obj)
-        for collection in list(scene.collection.children):
-            scene.collection.children.unlink(collection)
-        for obj, name, data_name in names:
-            obj.name, obj.data.name = f"{name} exporting", f"{data_name} exporting"
-            copy = obj.copy()
-            copies.append(copy)
-            copy.data = obj.data.copy()
-            copy.name, copy.data.name = name, data_name
+        for obj, mesh, name in shaped:
             vertices = mixed_vertices(obj)
-            copy.shape_key_clear()
-            copy.data.vertices.foreach_set("co", vertices.ravel())
-            copy.data.update()
-            scene.collection.objects.link(copy)
+            plain = bpy.data.meshes.new_from_object(obj)
+            baked.append(plain)
+            mesh.name, plain.name = f"{name} shaped", name
+            plain.vertices.foreach_set("co", vertices.ravel())
+            plain.update()
+            obj.data = plain
         bpy.context.view_layer.update()
         yield
     finally:
-        bpy.data.batch_remove([*copies, *(copy.data for copy in copies)])
-        for obj, name, data_name in names:
-            obj.name, obj.data.name = name, data_name
+        for obj, mesh, _ in shaped:
+            obj.data = mesh
+        bpy.data.batch_remove(baked)
+        for _, mesh, name in shaped:
+            mesh.name = name
 
 
 def _write(path: Path, writer) -> None:

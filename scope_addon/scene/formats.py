@@ -3,10 +3,11 @@
 
 from __future__ import annotations
 
+import io
 import os
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stdout
 from pathlib import Path
 
 import addon_utils
@@ -156,6 +157,14 @@ def _meshes_asleep(scene: bpy.types.Scene) -> Iterator[None]:
             modifier.show_viewport = True
 
 
+class _Nowhere(io.TextIOBase):
+    """A stream that is never closed: exporters keep log handlers that outlive the call."""
+
+    def write(self, text: str) -> int:
+        """Drop the text."""
+        return len(text)
+
+
 @contextmanager
 def quiet() -> Iterator[None]:
     """Keep Blender's writers from printing: standard output may be carrying a report for a program."""
@@ -163,8 +172,9 @@ def quiet() -> Iterator[None]:
     keep = os.dup(1)
     nowhere = os.open(os.devnull, os.O_WRONLY)
     try:
-        os.dup2(nowhere, 1)
-        yield
+        os.dup2(nowhere, 1)  # what Blender's own code prints
+        with redirect_stdout(_Nowhere()):  # what exporters in Python print
+            yield
     finally:
         sys.stdout.flush()
         os.dup2(keep, 1)

@@ -11,10 +11,11 @@ import bpy
 import numpy as np
 
 from ...solver.body import Body
+from ...solver.errors import MotionFileError
 from ...solver.frames import R_WORLD_MODEL
 from .actions import Channels, shape_key_path
 
-SLIDER_LIMIT = 10.0
+SLIDER_LIMIT = 10.0  # as far as Blender lets a slider go
 MODES = ("keyed", "per_frame", "baked")
 
 
@@ -27,7 +28,14 @@ def add_shape_keys(mesh: bpy.types.Object, body: Body, betas: np.ndarray) -> Non
     """Add ``Basis`` (the mesh as it is: β = 0) and one key per coefficient, each at its fitted value.
 
     :param betas: (P,) the fitted shape.
+    :raises MotionFileError: a coefficient lies beyond what Blender's shape keys can hold.
     """
+    farthest = float(betas[np.abs(betas).argmax()])
+    if abs(farthest) > SLIDER_LIMIT:
+        raise MotionFileError(
+            f"the motion's shape coefficient {farthest:.3g} lies beyond Blender's ±{SLIDER_LIMIT:g} for shape keys; "
+            "bake the shape into the mesh instead"
+        )
     basis = mesh.shape_key_add(name="Basis", from_mix=False)
     rest = np.empty(3 * len(body.v_template), np.float32)
     basis.data.foreach_get("co", rest)
@@ -36,8 +44,7 @@ def add_shape_keys(mesh: bpy.types.Object, body: Body, betas: np.ndarray) -> Non
         offset = body.shapedirs[:, :, p] @ R_WORLD_MODEL.T
         key.data.foreach_set("co", (rest + offset.ravel()).astype(np.float32))
         # Blender clamps values, and keys too, to this range without a word: it must come first.
-        limit = max(SLIDER_LIMIT, float(np.ceil(abs(beta))))
-        key.slider_min, key.slider_max = -limit, limit
+        key.slider_min, key.slider_max = -SLIDER_LIMIT, SLIDER_LIMIT
         key.value = float(beta)
 
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from ...solver.errors import MotionFileError, UsageError
 
-# Rates within this many frames a second of a standard one are taken to be that one: 23.976, 23.98 and 23.97602 are 24/1.001.
+# Rates this near (frames a second) to a standard one are taken to be that one: 23.976 and 23.98 are 24 / 1.001.
 TOLERANCE = 0.005
 BROADCAST = tuple(Fraction(n * 1000, 1001) for n in (24, 30, 48, 60, 72, 96, 120, 240))
 POLICIES = ("keep", "set")

@@ -10,12 +10,12 @@ from dataclasses import dataclass
 # Blender reads this once, when bpy is first imported: tests must not write in the home folder.
 os.environ["BLENDER_USER_RESOURCES"] = tempfile.mkdtemp(prefix="scope-tests-blender-")
 
-import bpy  # noqa: E402
-import numpy as np  # noqa: E402
-import pytest  # noqa: E402
-from mathutils import Quaternion, Vector  # noqa: E402
-from scope.scope_addon.motion import Motion  # noqa: E402
-from scope.solver.body import Body, load_body  # noqa: E402
+import bpy
+import numpy as np
+import pytest
+from mathutils import Quaternion, Vector
+from scope.scope_addon.motion import Motion
+from scope.solver.body import Body, load_body
 
 BETAS = [1.7, -2.3, 0.5, -0.8, 1.2, 0.0, 0.3, -1.1, 0.9, -0.4]
 
@@ -56,7 +56,7 @@ def truth_of(body: Body, motion: Motion) -> Truth:
     return Truth(body, motion.betas, R, t)
 
 
-def make_motion(
+def dance(
     body: Body,
     count: int = 12,
     rate: float = 30.0,
@@ -126,35 +126,59 @@ def make_motion(
     return motion
 
 
-def joints_world(motion: Motion) -> np.ndarray:
-    """(T, K+1, 3) from the camera's view of them, without body or poses."""
-    T = motion.world_from_camera
-    return np.einsum("tij,tkj->tki", T[:, :3, :3], motion.joints_cam) + T[:, None, :3, 3]
+class Blender:
+    """What a test reads from the open scene."""
+
+    @staticmethod
+    def go_to(frame: float) -> None:
+        bpy.context.scene.frame_set(int(np.floor(frame)), subframe=float(frame - np.floor(frame)))
+
+    @staticmethod
+    def only(kind: str) -> bpy.types.Object:
+        """The scene's one object of a type."""
+        found = [obj for obj in bpy.context.scene.objects if obj.type == kind]
+        assert len(found) == 1, [obj.name for obj in bpy.context.scene.objects]
+        return found[0]
+
+    @staticmethod
+    def joints(armature: bpy.types.Object, names: tuple[str, ...]) -> np.ndarray:
+        """(len(names), 3) world positions of the posed bones' heads at the current frame."""
+        posed = armature.evaluated_get(bpy.context.evaluated_depsgraph_get())
+        return np.array([posed.matrix_world @ posed.pose.bones[name].head for name in names])
+
+    @staticmethod
+    def vertices(mesh: bpy.types.Object) -> np.ndarray:
+        """(V, 3) world positions of the deformed mesh at the current frame."""
+        posed = mesh.evaluated_get(bpy.context.evaluated_depsgraph_get())
+        data = posed.to_mesh()
+        out = np.empty(3 * len(data.vertices), np.float32)
+        data.vertices.foreach_get("co", out)
+        world = np.array(posed.matrix_world)
+        posed.to_mesh_clear()
+        return out.reshape(-1, 3) @ world[:3, :3].T + world[:3, 3]
 
 
-def go_to(frame: float) -> None:
-    bpy.context.scene.frame_set(int(np.floor(frame)), subframe=float(frame - np.floor(frame)))
+@pytest.fixture(scope="session")
+def blender() -> type[Blender]:
+    return Blender
 
 
-def bone_heads(armature: bpy.types.Object) -> dict[str, np.ndarray]:
-    """World positions of the posed bones' heads at the current frame."""
-    posed = armature.evaluated_get(bpy.context.evaluated_depsgraph_get())
-    return {bone.name: np.array(posed.matrix_world @ bone.head) for bone in posed.pose.bones}
+@pytest.fixture(scope="session")
+def make_motion():
+    return dance
 
 
-def posed_vertices(mesh: bpy.types.Object) -> np.ndarray:
-    """(V, 3) world positions of the deformed mesh at the current frame."""
-    posed = mesh.evaluated_get(bpy.context.evaluated_depsgraph_get())
-    data = posed.to_mesh()
-    out = np.empty(3 * len(data.vertices), np.float32)
-    data.vertices.foreach_get("co", out)
-    world = np.array(posed.matrix_world)
-    posed.to_mesh_clear()
-    return out.reshape(-1, 3) @ world[:3, :3].T + world[:3, 3]
+@pytest.fixture(scope="session")
+def truth():
+    return truth_of
 
 
-def only(kind: str) -> bpy.types.Object:
-    """The scene's one object of a type."""
-    found = [obj for obj in bpy.context.scene.objects if obj.type == kind]
-    assert len(found) == 1, [obj.name for obj in bpy.context.scene.objects]
-    return found[0]
+@pytest.fixture(scope="session")
+def joints_world():
+    """(T, K+1, 3) joints from the camera's view of them, without body or poses."""
+
+    def joints(motion: Motion) -> np.ndarray:
+        T = motion.world_from_camera
+        return np.einsum("tij,tkj->tki", T[:, :3, :3], motion.joints_cam) + T[:, None, :3, 3]
+
+    return joints

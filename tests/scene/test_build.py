@@ -1,0 +1,241 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+import dataclasses
+import subprocess
+import sys
+
+import bpy
+import numpy as np
+import pytest
+from scope.scope_addon.scene import actions, build
+from scope.scope_addon.scene.build import NEW_SCENE, BuildOptions, build_scene
+from scope.solver.errors import CancelledError, MotionFileError, UsageError, VideoError
+from scope.solver.frames import R_WORLD_MODEL
+
+
+def data_counts() -> dict[str, int]:
+    kinds = ("collections", "objects", "meshes", "armatures", "cameras", "actions", "materials", "movieclips", "images")
+    return {kind: len(getattr(bpy.data, kind)) for kind in kinds}
+
+
+@pytest.mark.parametrize("shape", ["keyed", "per_frame", "baked"])
+def test_joints_and_skin_are_the_bodys(body, make_motion, truth, joints_world, blender, shape):
+    motion = make_motion(body, 40)
+    expected = truth(body, motion)
+    person = build_scene([motion], body, options=dataclasses.replace(NEW_SCENE, shape=shape)).people[0]
+    for t in (0, 13, 39):
+        blender.go_to(t)
+        joints = blender.joints(person.armature, body.joint_names)
+        np.testing.assert_allclose(joints, expected.joints[t], atol=1e-5)
+        np.testing.assert_allclose(joints, joints_world(motion)[t], atol=1e-5)
+        np.testing.assert_allclose(blender.vertices(person.mesh), expected.vertices(t), atol=1e-5)
+
+
+def test_the_body_with_fingers(make_motion, truth, blender):
+    from scope.solver.body import load_body
+
+    hands = load_body("scope_h")
+    motion = make_motion(hands, 5)
+    person = build_scene([motion], hands).people[0]
+    blender.go_to(person.frames[4])
+    expected = truth(hands, motion)
+    np.testing.assert_allclose(blender.joints(person.armature, hands.joint_names), expected.joints[4], atol=1e-5)
+    np.testing.assert_allclose(blender.vertices(person.mesh), expected.vertices(4), atol=1e-5)
+
+
+def test_bones_are_the_joints_at_the_fitted_shape(body, make_motion):
+    motion = make_motion(body)
+    armature = build_scene([motion], body).people[0].armature
+    bones = armature.data.bones
+    assert tuple(bones.keys()) == body.joint_names or set(bones.keys()) == set(body.joint_names)
+    heads = np.array([bones[name].head_local for name in body.joint_names])
+    rest = body.rest_joints(motion.betas) @ R_WORLD_MODEL.T
+    np.testing.assert_allclose(heads - heads[0], rest - rest[0], atol=1e-6)
+    parents = [bones[name].parent.name if bones[name].parent else None for name in body.joint_names]
+    assert parents == [body.joint_names[p] if p >= 0 else None for p in body.parents]
+    assert all(0.015 < bone.length < 0.7 for bone in bones)
+    tail = np.array(bones["left_shoulder"].tail_local)
+    np.testing.assert_allclose(tail, heads[body.joint_names.index("left_elbow")], atol=1e-5)
+    assert bones["pelvis"].tail_local[2] > bones["pelvis"].head_local[2]
+    assert np.array_equal(np.array(armature.matrix_world), np.eye(4))
+
+
+def test_the_rest_pose_stands_on_the_floor(body, make_motion, blender):
+    person = build_scene([make_motion(body)], body).people[0]
+    person.armature.data.pose_position = "REST"
+    bpy.context.view_layer.update()
+    vertices = blender.vertices(person.mesh)
+    assert vertices[:, 2].min() == pytest.approx(0.0, abs=1e-5)
+    assert 1.4 < vertices[:, 2].max() < 2.2
+    toes = person.armature.data.bones["left_foot"]
+    assert toes.head_local[1] < person.armature.data.bones["left_ankle"].head_local[1]  # faces −y
+
+
+def test_root_location_is_keyed_along_the_world(body, make_motion):
+    motion = make_motion(body)
+    person = build_scene([motion], body).people[0]
+    curves = [c for c in actions.fcurves(person.armature) if c.data_path == actions.bone_path("pelvis", "location")]
+    keyed = np.stack([actions.read_keys(c)[:, 1] for c in curves], axis=1)
+    np.testing.assert_allclose(keyed - keyed[0], motion.trans - motion.trans[0], atol=1e-5)
+
+
+def test_quaternions_stay_on_one_hemisphere_through_a_turn(body, make_motion, blender):
+    motion = make_motion(body, 60)  # its root turns through 180 degrees, where axis-angle vectors flip
+    person = build_scene([motion], body).people[0]
+    path = actions.bone_path("pelvis", "rotation_quaternion")
+    curves = [c for c in actions.fcurves(person.armature) if c.data_path == path]
+    q = np.stack([actions.read_keys(c)[:, 1] for c in curves], axis=1)
+    assert (np.sum(q[1:] * q[:-1], axis=1) > 0.9).all()
+    np.testing.assert_allclose(np.linalg.norm(q, axis=1), 1.0, atol=1e-5)
+
+
+def test_keys_are_linear_and_every_joint_has_them(body, make_motion):
+    person = build_scene([make_motion(body, 6)], body).people[0]
+    curves = actions.fcurves(person.armature)
+    assert len(curves) == 4 * len(body.joint_names) + 3
+    assert {key.interpolation for curve in curves for key in curve.keyframe_points} == {"LINEAR"}
+    assert {len(curve.keyframe_points) for curve in curves} == {6}
+
+
+def test_variable_frame_rate_keeps_its_timing(body, make_motion, truth, blender):
+    stamps = np.array([0.0, 0.021, 0.093, 0.1, 0.27])
+    motion = make_motion(body, timestamps=stamps, rate=25.0)
+    person = build_scene([motion], body, options=NEW_SCENE).people[0]
+    np.testing.assert_allclose(person.frames, stamps * 25, atol=1e-9)
+    expected = truth(body, motion)
+    for t in range(len(stamps)):
+        blender.go_to(stamps[t] * 25)
+        np.testing.assert_allclose(
+            blender.joints(person.armature, body.joint_names), expected.joints[t], atol=1e-4
+        )
+    assert (bpy.context.scene.frame_start, bpy.context.scene.frame_end) == (0, 7)
+
+
+def test_the_scene_rate_is_kept_unless_asked(body, make_motion, truth, blender):
+    scene = bpy.context.scene
+    scene.render.fps, scene.render.fps_base = 24, 1.0
+    motion = make_motion(body, 31, rate=30.0)
+    result = build_scene([motion], body)
+    assert (scene.render.fps, result.frame_rate) == (24, 24.0)
+    blender.go_to(24.0)  # one second
+    joints = blender.joints(result.people[0].armature, body.joint_names)
+    np.testing.assert_allclose(joints, truth(body, motion).joints[30], atol=1e-4)
+
+
+def test_a_new_scene_takes_rate_size_and_range(body, make_motion):
+    motion = make_motion(body, 10, rate=29.97, image_size=(1080, 1920))
+    result = build_scene([motion], body, options=NEW_SCENE)
+    scene = bpy.context.scene
+    assert (scene.render.fps, scene.render.fps_base) == (30, pytest.approx(1.001))
+    assert (scene.render.resolution_x, scene.render.resolution_y) == (1080, 1920)
+    assert (scene.frame_start, scene.frame_end) == (0, 9)
+    assert scene.camera == result.people[0].camera
+
+
+def test_one_collection_and_one_camera_for_the_people_of_a_capture(body, make_motion, truth, blender):
+    motions = [make_motion(body, 6, betas=[-1.5] + [0.0] * 9), make_motion(body, 6, seed=1, offset=(1.0, 0, 0))]
+    result = build_scene(motions, body)
+    names = {obj.name for obj in result.collection.objects}
+    assert names == {"walk_person1", "walk_person1_body", "walk_person2", "walk_person2_body", "walk_camera"}
+    assert [c.name for c in bpy.context.scene.collection.children] == ["walk"]
+    blender.go_to(result.people[1].frames[5])
+    for motion, person in zip(motions, result.people, strict=True):
+        expected = truth(body, motion)
+        np.testing.assert_allclose(blender.joints(person.armature, body.joint_names), expected.joints[5], atol=1e-4)
+        np.testing.assert_allclose(blender.vertices(person.mesh), expected.vertices(5), atol=1e-4)
+
+
+def test_mesh_has_quads_uvs_materials_and_smooth_faces(body, make_motion):
+    mesh = build_scene([make_motion(body)], body).people[0].mesh.data
+    assert len(mesh.vertices) == len(body.v_template)
+    assert {p.loop_total for p in mesh.polygons} == {4}
+    assert all(p.use_smooth for p in mesh.polygons)
+    assert [m.name for m in mesh.materials] == list(body.material_names)
+    used = np.empty(len(mesh.polygons), np.int32)
+    mesh.polygons.foreach_get("material_index", used)
+    np.testing.assert_array_equal(used, body.face_material)
+    uv = np.empty(2 * len(mesh.loops), np.float32)
+    mesh.uv_layers[0].data.foreach_get("uv", uv)
+    np.testing.assert_allclose(uv.reshape(-1, 4, 2), body.uv[body.uv_faces], atol=1e-6)
+    assert not mesh.validate()
+
+
+@pytest.mark.parametrize("wrong", ["poses", "betas", "joints"])
+def test_a_motion_of_another_body_is_refused_and_nothing_is_built(body, make_motion, wrong):
+    motion = make_motion(body)
+    if wrong == "poses":
+        motion.poses[2, 5] = np.nan
+    elif wrong == "betas":
+        motion.betas = motion.betas[:-1]
+    else:
+        motion.joints_cam = motion.joints_cam[:, :-1]
+    before = data_counts()
+    with pytest.raises(MotionFileError):
+        build_scene([motion], body)
+    assert data_counts() == before
+
+
+def test_unknown_options_are_refused():
+    with pytest.raises(UsageError, match="keyed, per_frame, baked"):
+        BuildOptions(shape="melted")
+    with pytest.raises(UsageError, match="keep, set"):
+        BuildOptions(frame_rate="guess")
+
+
+def test_cancel_and_failure_leave_the_scene_as_it_was(body, make_motion, tmp_path):
+    bpy.ops.mesh.primitive_cube_add()
+    cube = bpy.context.object
+    bpy.ops.object.mode_set(mode="EDIT")
+    scene = bpy.context.scene
+    scene.render.fps, scene.render.fps_base = 25, 1.0
+    scene.frame_start, scene.frame_end = 3, 77
+    scene.frame_set(12)
+
+    def state():
+        render = scene.render
+        settings = (render.fps, render.fps_base, render.resolution_x, scene.frame_start, scene.frame_end)
+        active = bpy.context.view_layer.objects.active
+        return data_counts(), settings, scene.frame_current, scene.camera, active.name, active.mode, cube.select_get()
+
+    before = state()
+
+    def cancel(fraction: float, message: str) -> None:
+        if fraction > 0:
+            raise CancelledError("stopped")
+
+    motions = [make_motion(body), make_motion(body, seed=1)]
+    with pytest.raises(CancelledError):
+        build_scene(motions, body, options=NEW_SCENE, progress=cancel)
+    assert state() == before
+    with pytest.raises(VideoError, match="does not exist"):
+        build_scene(motions, body, footage=tmp_path / "gone.mp4", options=NEW_SCENE)
+    assert state() == before
+
+
+def test_a_single_picture_is_a_motion_of_one_frame(body, make_motion, blender, truth):
+    motion = make_motion(body, 1)
+    person = build_scene([motion], body, options=NEW_SCENE).people[0]
+    blender.go_to(0)
+    joints = blender.joints(person.armature, body.joint_names)
+    np.testing.assert_allclose(joints, truth(body, motion).joints[0], atol=1e-5)
+
+
+def test_scene_modules_import_neither_opencv_nor_onnxruntime():
+    modules = "actions animation armature body_mesh build bvh camera export formats shape_keys timing transaction"
+    code = (
+        "import importlib, sys\n"
+        f"for name in '{modules} output_paths'.split(): importlib.import_module('scope.scope_addon.scene.' + name)\n"
+        "bad = [m for m in ('cv2', 'onnxruntime') if m in sys.modules]\n"
+        "sys.exit(' '.join(bad) or 0)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr[-2000:]
+
+
+def test_output_paths_need_no_blender():
+    code = "import sys, scope.scope_addon.scene.output_paths; sys.exit('bpy' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_captures_are_marked_for_the_exporters(body, make_motion):
+    collection = build_scene([make_motion(body)], body).collection
+    assert collection[build.CAPTURE_TAG] == "walk.mp4"

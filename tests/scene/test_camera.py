@@ -1,0 +1,117 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+import bpy
+import numpy as np
+import pytest
+from bpy_extras.object_utils import world_to_camera_view
+from mathutils import Vector
+from scope.scope_addon.scene.build import NEW_SCENE, BuildOptions, build_scene
+
+
+def projected_by_blender(camera: bpy.types.Object, points_world: np.ndarray) -> np.ndarray:
+    """(N, 2) pixels from the top left, by the matrix Blender renders with."""
+    render = bpy.context.scene.render
+    width, height = render.resolution_x, render.resolution_y
+    graph = bpy.context.evaluated_depsgraph_get()
+    posed = camera.evaluated_get(graph)
+    aspect = {"scale_x": render.pixel_aspect_x, "scale_y": render.pixel_aspect_y}
+    P = np.array(posed.calc_matrix_camera(graph, x=width, y=height, **aspect))
+    view = np.linalg.inv(np.array(posed.matrix_world))
+    homogeneous = np.concatenate([points_world, np.ones((len(points_world), 1))], axis=1)
+    clip = homogeneous @ (P @ view).T
+    ndc = clip[:, :2] / clip[:, 3:]
+    return np.stack([(ndc[:, 0] + 1) / 2 * width, (1 - ndc[:, 1]) / 2 * height], axis=1)
+
+
+def projected_by_intrinsics(motion, t: int) -> np.ndarray:
+    p = motion.joints_cam[t] @ motion.intrinsics.T
+    return p[:, :2] / p[:, 2:]
+
+
+INTRINSICS = {
+    "centred": (900.0, 900.0, 0.5, 0.5),
+    "off centre": (900.0, 900.0, 0.41, 0.63),
+    "wide pixels": (600.0, 900.0, 0.45, 0.57),
+    "tall pixels": (900.0, 700.0, 0.52, 0.4),
+}
+
+
+@pytest.mark.parametrize("size", [(1920, 1080), (1080, 1920), (720, 720)])
+@pytest.mark.parametrize("lens", INTRINSICS)
+def test_the_camera_sees_joints_at_their_pixels(body, make_motion, joints_world, size, lens):
+    fx, fy, x, y = INTRINSICS[lens]
+    K = np.array([[fx, 0, x * size[0]], [0, fy, y * size[1]], [0, 0, 1]])
+    motion = make_motion(body, 8, image_size=size, intrinsics=K)
+    camera = build_scene([motion], body, options=NEW_SCENE).people[0].camera
+    pixels = projected_by_blender(camera, joints_world(motion)[5])
+    np.testing.assert_allclose(pixels, projected_by_intrinsics(motion, 5), atol=0.05)
+
+
+def test_square_pixels_agree_with_blenders_own_helper(body, make_motion, joints_world):
+    K = np.array([[800.0, 0, 700.0], [0, 800.0, 500.0], [0, 0, 1]])
+    motion = make_motion(body, 3, image_size=(1280, 960), intrinsics=K)
+    camera = build_scene([motion], body, options=NEW_SCENE).people[0].camera
+    seen = [world_to_camera_view(bpy.context.scene, camera, Vector(p)) for p in joints_world(motion)[2]]
+    pixels = np.array([[v.x * 1280, (1 - v.y) * 960] for v in seen])
+    np.testing.assert_allclose(pixels, projected_by_intrinsics(motion, 2), atol=0.05)
+
+
+def test_a_moving_camera_is_keyed(body, make_motion, joints_world, blender):
+    motion = make_motion(body, 20, moving_camera=True)
+    camera = build_scene([motion], body, options=NEW_SCENE).people[0].camera
+    for t in (0, 9, 19):
+        blender.go_to(t)
+        pixels = projected_by_blender(camera, joints_world(motion)[t])
+        np.testing.assert_allclose(pixels, projected_by_intrinsics(motion, t), atol=0.05)
+
+
+def test_a_static_camera_has_no_keys(body, make_motion):
+    assert build_scene([make_motion(body)], body).people[0].camera.animation_data is None
+
+
+def test_footage_shows_behind_the_scene(body, make_motion, shared):
+    clips = sorted(p for p in (shared / "data" / "clips").rglob("*") if p.suffix in {".mp4", ".mov", ".avi", ".webm"})
+    clip = clips[0]
+    loaded = bpy.data.movieclips.load(str(clip))
+    size = tuple(loaded.size)
+    bpy.data.movieclips.remove(loaded)
+    motion = make_motion(body, 5, image_size=size)
+    result = build_scene([motion], body, footage=clip, options=BuildOptions(frame_rate="set", start_frame=1.0))
+    camera = result.people[0].camera
+    background = camera.data.background_images[0]
+    assert background.source == "MOVIE_CLIP"
+    assert background.clip.filepath.endswith(clip.name)
+    assert background.clip.frame_start == 1
+    assert camera.data.show_background_images
+    assert result.warnings == []
+
+
+def test_a_picture_shows_behind_the_scene(body, make_motion, tmp_path):
+    picture = tmp_path / "still.png"
+    image = bpy.data.images.new("still", 64, 48)
+    image.filepath_raw, image.file_format = str(picture), "PNG"
+    image.save()
+    motion = make_motion(body, 1, image_size=(64, 48))
+    result = build_scene([motion], body, footage=picture)
+    background = result.people[0].camera.data.background_images[0]
+    assert (background.source, tuple(background.image.size)) == ("IMAGE", (64, 48))
+    assert result.warnings == []
+
+
+def test_a_picture_of_another_size_is_warned_about(body, make_motion, tmp_path):
+    picture = tmp_path / "still.png"
+    image = bpy.data.images.new("still", 32, 48)
+    image.filepath_raw, image.file_format = str(picture), "PNG"
+    image.save()
+    result = build_scene([make_motion(body, 1)], body, footage=picture)
+    assert any("32 x 48" in warning for warning in result.warnings)
+
+
+def test_footage_at_another_rate_than_the_scene_is_warned_about(body, make_motion, tmp_path):
+    picture = tmp_path / "still.png"
+    image = bpy.data.images.new("still", 640, 480)
+    image.filepath_raw, image.file_format = str(picture), "PNG"
+    image.save()
+    bpy.context.scene.render.fps = 24
+    result = build_scene([make_motion(body, 5, rate=30.0)], body, footage=picture)
+    assert len(result.warnings) == 1
+    assert "24 frames a second" in result.warnings[0]

@@ -1,0 +1,376 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Each format is written, read back by Blender's importer, and compared with the solver's own joints and skin."""
+
+import json
+import os
+import re
+import struct
+from pathlib import Path
+
+import bpy
+import numpy as np
+import pytest
+from mathutils.kdtree import KDTree
+from scope.scope_addon.motion import Motion
+from scope.scope_addon.scene import actions, formats
+from scope.scope_addon.scene.build import NEW_SCENE, BuildOptions, build_scene
+from scope.scope_addon.scene.export import ExportOptions, captures, export, export_motions
+from scope.scope_addon.scene.output_paths import SUFFIXES, person_paths
+from scope.solver.errors import OutputError, UsageError
+
+JOINT_TOLERANCE, SKIN_TOLERANCE = 1e-3, 2e-3  # metres
+SCENE_SUFFIXES = [s for s in SUFFIXES if s != ".npz"]
+
+
+def read_back(path: Path, rate: float = 30.0) -> float:
+    """Open the file in an empty scene of this rate; the frame at which its motion's first frame lies."""
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    render = bpy.context.scene.render
+    render.fps, render.fps_base = round(rate), round(rate) / rate
+    if path.suffix == ".glb":
+        bpy.ops.import_scene.gltf(filepath=str(path))
+        # The importer adds a ball that displays bones; it is no part of the file.
+        for obj in [o for o in bpy.data.objects if o.name.startswith("Icosphere")]:
+            bpy.data.objects.remove(obj)
+        return 0.0
+    if path.suffix == ".fbx":
+        if "fbx_import" in dir(bpy.ops.wm):
+            bpy.ops.wm.fbx_import(filepath=str(path))
+            return 1.0
+        bpy.ops.import_scene.fbx(filepath=str(path), anim_offset=0.0)
+    elif path.suffix == ".blend":
+        bpy.ops.wm.open_mainfile(filepath=str(path))
+    elif path.suffix == ".usdc":
+        bpy.ops.wm.usd_import(filepath=str(path))
+        for key in (k for block in bpy.data.shape_keys for k in block.key_blocks):
+            key.slider_min, key.slider_max = -10.0, 10.0  # the importer leaves 0..1, which clamps
+    elif path.suffix == ".bvh":
+        bpy.ops.import_anim.bvh(filepath=str(path), frame_start=1, update_scene_fps=True)
+        return actions.frame_range([next(o for o in bpy.data.objects if o.type == "ARMATURE")])[0]
+    return 0.0
+
+
+def nearest_indices(points: np.ndarray, among: np.ndarray) -> np.ndarray:
+    tree = KDTree(len(among))
+    for i, p in enumerate(among):
+        tree.insert(p, i)
+    tree.balance()
+    return np.array([tree.find(p)[1] for p in points])
+
+
+def corresponding(mesh: bpy.types.Object, body, betas: np.ndarray) -> np.ndarray:
+    """For each vertex of a read-back mesh, the body's vertex: formats may split or reorder them."""
+    if len(mesh.data.vertices) == len(body.v_template):
+        return np.arange(len(body.v_template))
+    rest = np.empty(3 * len(mesh.data.vertices), np.float32)
+    mesh.data.vertices.foreach_get("co", rest)
+    rest = rest.reshape(-1, 3)
+    unshaped = body.rest_vertices(None if mesh.data.shape_keys else betas)
+    world = np.stack([unshaped[:, 0], -unshaped[:, 2], unshaped[:, 1]], axis=1)
+    world[:, 2] += rest[:, 2].min() - world[:, 2].min()
+    match = nearest_indices(rest, world)
+    assert np.abs(rest - world[match]).max() < 1e-4
+    return match
+
+
+@pytest.mark.parametrize("suffix", SCENE_SUFFIXES)
+@pytest.mark.parametrize("rate", [30.0, 30000 / 1001])
+def test_joints_and_skin_survive(body, make_motion, truth, joints_world, blender, tmp_path, suffix, rate):
+    motion = make_motion(body, 12, rate=rate)
+    path = tmp_path / f"walk{suffix}"
+    assert export_motions([motion], body, path) == ([path], [])
+    assert [p.name for p in tmp_path.iterdir()] == [path.name]
+    first = read_back(path, rate)
+    armature = blender.only("ARMATURE")
+    assert set(armature.data.bones.keys()) == set(body.joint_names)
+    expected = truth(body, motion)
+    for t in (0, 4, 11):
+        blender.go_to(first + t)
+        joints = blender.joints(armature, body.joint_names)
+        np.testing.assert_allclose(joints, joints_world(motion)[t], atol=JOINT_TOLERANCE)
+        if suffix != ".bvh":
+            mesh = blender.only("MESH")
+            match = corresponding(mesh, body, motion.betas)
+            assert len(np.unique(match)) == len(body.v_template)
+            found = blender.vertices(mesh)
+            np.testing.assert_allclose(found, expected.vertices(t)[match], atol=SKIN_TOLERANCE)
+
+
+@pytest.mark.parametrize("suffix", [".glb", ".fbx", ".usdc"])
+@pytest.mark.parametrize("shape", ["keys", "baked"])
+def test_shape_as_morphs_or_baked(body, make_motion, truth, blender, tmp_path, suffix, shape):
+    motion = make_motion(body, 4)
+    path = tmp_path / f"walk{suffix}"
+    export_motions([motion], body, path, export_options=ExportOptions(shape=shape))
+    first = read_back(path)
+    mesh = blender.only("MESH")
+    blender.go_to(first + 3)
+    assert (mesh.data.shape_keys is not None) == (shape == "keys")
+    if shape == "keys":
+        keys = mesh.data.shape_keys.key_blocks
+        assert list(keys.keys())[1:] == [f"Shape{p:03d}" for p in range(body.P)]
+        np.testing.assert_allclose([k.value for k in keys[1:]], motion.betas, atol=1e-4)
+    match = corresponding(mesh, body, motion.betas)
+    np.testing.assert_allclose(blender.vertices(mesh), truth(body, motion).vertices(3)[match], atol=SKIN_TOLERANCE)
+
+
+@pytest.mark.parametrize("suffix", SCENE_SUFFIXES)
+def test_variable_frame_rate_keeps_its_timing(body, make_motion, truth, blender, tmp_path, suffix):
+    # Frames at every second tick of 30, then at every tick: files of constant rate must hold the whole ticks.
+    stamps = np.array([0, 2, 4, 5, 6, 8]) / 30
+    motion = make_motion(body, timestamps=stamps, rate=30.0)
+    path = tmp_path / f"walk{suffix}"
+    export_motions([motion], body, path)
+    first = read_back(path)
+    armature, expected = blender.only("ARMATURE"), truth(body, motion)
+    for t, stamp in enumerate(stamps):
+        blender.go_to(first + round(stamp * 30))
+        joints = blender.joints(armature, body.joint_names)
+        np.testing.assert_allclose(joints, expected.joints[t], atol=JOINT_TOLERANCE)
+
+
+@pytest.mark.parametrize("suffix", [".fbx", ".blend", ".bvh"])
+@pytest.mark.parametrize("rate", [24000 / 1001, 25.0, 30000 / 1001, 60000 / 1001])
+def test_formats_that_store_a_frame_rate_store_the_right_one(body, make_motion, tmp_path, suffix, rate):
+    path = tmp_path / f"walk{suffix}"
+    export_motions([make_motion(body, 3, rate=rate)], body, path)
+    read_back(path, 24.0)
+    render = bpy.context.scene.render
+    assert render.fps / render.fps_base == pytest.approx(rate, rel=1e-5)
+
+
+def test_usd_counts_time_in_the_scenes_frames_and_lengths_in_metres(body, make_motion, tmp_path):
+    build_scene([make_motion(body, 3, rate=29.97)], body, options=NEW_SCENE)
+    path = tmp_path / "walk.usda"  # the text form of the same writer
+    formats.write_usd(path)
+    header = path.read_text()[:2000]
+    assert float(re.search(r"timeCodesPerSecond = ([\d.]+)", header)[1]) == pytest.approx(30000 / 1001, rel=1e-6)
+    assert re.search(r"metersPerUnit = 1\b", header)
+    assert 'upAxis = "Z"' in header
+
+
+@pytest.mark.parametrize("suffix", [".glb", ".fbx", ".usdc"])
+def test_materials_survive(body, make_motion, tmp_path, suffix, blender):
+    path = tmp_path / f"walk{suffix}"
+    export_motions([make_motion(body, 2)], body, path)
+    read_back(path)
+    mesh = blender.only("MESH").data
+    used = {mesh.materials[p.material_index].name for p in mesh.polygons}
+    assert used == {body.material_names[i] for i in np.unique(body.face_material)}
+    for material in mesh.materials:
+        shader = next(n for n in material.node_tree.nodes if n.type == "BSDF_PRINCIPLED")
+        color = body.material_colors[body.material_names.index(material.name)]
+        np.testing.assert_allclose(shader.inputs["Base Color"].default_value, color, atol=2e-3)
+
+
+def test_fbx_objects_have_unit_scale_and_no_leaf_bones(body, make_motion, tmp_path, blender):
+    path = tmp_path / "walk.fbx"
+    export_motions([make_motion(body, 2)], body, path)
+    read_back(path)
+    armature = blender.only("ARMATURE")
+    assert len(armature.data.bones) == len(body.joint_names)
+    for obj in (armature, blender.only("MESH")):
+        np.testing.assert_allclose(obj.matrix_world.to_scale(), 1.0, atol=1e-5)
+
+
+def glb_json(path: Path) -> dict:
+    data = path.read_bytes()
+    assert data[:4] == b"glTF"
+    length = struct.unpack("<I", data[12:16])[0]
+    return json.loads(data[20 : 20 + length])
+
+
+def test_glb_holds_one_animation_one_skin_and_named_morphs(body, make_motion, tmp_path):
+    motions = [make_motion(body, 5, rate=25.0), make_motion(body, 5, rate=25.0, seed=1)]
+    path = tmp_path / "pair.glb"
+    export_motions(motions, body, path)
+    gltf = glb_json(path)
+    assert len(gltf["animations"]) == 1
+    assert len(gltf["skins"]) == 2
+    for mesh in gltf["meshes"]:
+        assert mesh["extras"]["targetNames"] == [f"Shape{p:03d}" for p in range(body.P)]
+        np.testing.assert_allclose(mesh["weights"], motions[0].betas, atol=1e-6)
+        for primitive in mesh["primitives"]:
+            assert "JOINTS_0" in primitive["attributes"]
+            assert "JOINTS_1" not in primitive["attributes"]
+    times = {gltf["accessors"][s["input"]]["max"][0] for s in gltf["animations"][0]["samplers"]}
+    assert max(times) == pytest.approx(4 / 25)
+
+
+def test_glb_is_upright_in_its_y_up_frame(body, make_motion, tmp_path):
+    path = tmp_path / "walk.glb"
+    export_motions([make_motion(body, 2)], body, path)
+    gltf = glb_json(path)
+    positions = [gltf["accessors"][p["attributes"]["POSITION"]] for p in gltf["meshes"][0]["primitives"]]
+    low = np.min([p["min"] for p in positions], axis=0)
+    high = np.max([p["max"] for p in positions], axis=0)
+    assert low[1] == pytest.approx(0.0, abs=0.15)  # shaped soles lie at 0, the unshaped mesh near it
+    assert 1.4 < high[1] - low[1] < 2.2
+
+
+def test_the_footages_camera_comes_along_on_request(body, make_motion, tmp_path, blender):
+    path = tmp_path / "walk.glb"
+    motion = make_motion(body, 2)
+    export_motions([motion], body, path, export_options=ExportOptions(camera=True))
+    read_back(path)
+    camera = blender.only("CAMERA")
+    np.testing.assert_allclose(camera.matrix_world.translation, motion.world_from_camera[0, :3, 3], atol=1e-5)
+
+
+def test_blend_opens_with_camera_rate_and_shape_keys(body, make_motion, tmp_path, blender):
+    path = tmp_path / "walk.blend"
+    export_motions([make_motion(body, 6, rate=29.97, image_size=(1080, 1920))], body, path)
+    read_back(path)
+    scene = bpy.context.scene
+    assert (scene.name, scene.frame_start, scene.frame_end) == ("Capture", 0, 5)
+    assert (scene.render.resolution_x, scene.render.resolution_y) == (1080, 1920)
+    assert scene.camera == blender.only("CAMERA")
+    assert captures(scene)[0].name == "walk"
+    keys = blender.only("MESH").data.shape_keys.key_blocks
+    assert (keys["Shape001"].slider_min, keys["Shape001"].slider_max) == (-10, 10)
+
+
+def test_bvh_is_y_up_in_metres_and_one_file_a_person(body, make_motion, tmp_path, truth):
+    motions = [make_motion(body, 3), make_motion(body, 3, seed=1)]
+    written, _ = export_motions(motions, body, tmp_path / "pair.bvh")
+    assert [p.name for p in written] == ["pair.person1.bvh", "pair.person2.bvh"]
+    for path, motion in zip(written, motions, strict=True):
+        lines = path.read_text().splitlines()
+        start = lines.index("MOTION")
+        assert lines[start + 1] == "Frames: 3"
+        rows = np.array([[float(v) for v in line.split()] for line in lines[start + 3 :]])
+        pelvis = truth(body, motion).joints[:, 0]
+        np.testing.assert_allclose(rows[:, :3], pelvis[:, [0, 2, 1]] * [1, 1, -1], atol=1e-5)
+
+
+def test_npz_is_the_motion_itself(body, make_motion, tmp_path):
+    motion = make_motion(body)
+    written, _ = export_motions([motion], body, tmp_path / "walk.npz")
+    np.testing.assert_array_equal(Motion.load(written[0]).poses, motion.poses)
+
+
+def test_several_files_at_once(body, make_motion, tmp_path):
+    paths = [tmp_path / "a.glb", tmp_path / "b.npz", tmp_path / "c.bvh"]
+    written, _ = export_motions([make_motion(body, 2)], body, paths)
+    assert sorted(written) == paths
+    assert all(p.stat().st_size for p in paths)
+
+
+def test_exporting_motions_leaves_no_trace(body, make_motion, tmp_path):
+    bpy.ops.mesh.primitive_cube_add()
+    scene, window = bpy.context.scene, bpy.context.window
+    kinds = "scenes collections objects meshes armatures actions cameras materials shape_keys".split()
+    before = {kind: [b.name for b in getattr(bpy.data, kind)] for kind in kinds}
+    export_motions([make_motion(body, 2)], body, [tmp_path / "a.glb", tmp_path / "a.usdc"])
+    assert {kind: [b.name for b in getattr(bpy.data, kind)] for kind in kinds} == before
+    assert window.scene == scene
+    assert bpy.context.view_layer.objects.active.name == "Cube"
+
+
+@pytest.mark.parametrize("suffix", [".glb", ".fbx", ".usdc", ".blend"])
+def test_only_the_capture_leaves_a_users_scene(body, make_motion, tmp_path, suffix, blender, truth):
+    bpy.ops.mesh.primitive_cube_add()
+    bpy.context.scene.name = "Shot"
+    motion = make_motion(body, 4)
+    result = build_scene([motion], body)
+    person = result.people[0]
+    person.mesh.hide_set(True)  # hidden things are captured things all the same
+    scene = bpy.context.scene
+    scene.frame_set(2)
+    names = sorted(obj.name for obj in bpy.data.objects)
+    path = tmp_path / f"walk{suffix}"
+    assert export(path) == [path]
+    assert sorted(obj.name for obj in bpy.data.objects) == names
+    assert (bpy.context.scene, scene.frame_current) == (scene, 2)
+    assert [s.name for s in bpy.data.scenes] == ["Shot"]
+    assert person.mesh.data.shape_keys is not None
+    first = read_back(path, 24.0)
+    assert not [obj for obj in bpy.data.objects if obj.name.startswith("Cube")]
+    assert [obj.type for obj in bpy.context.scene.objects].count("MESH") == 1
+    blender.go_to(first)
+    joints = blender.joints(blender.only("ARMATURE"), body.joint_names)
+    np.testing.assert_allclose(joints, truth(body, motion).joints[0], atol=JOINT_TOLERANCE)
+
+
+def test_a_users_edit_is_exported(body, make_motion, tmp_path, blender):
+    motion = make_motion(body, 4)
+    person = build_scene([motion], body, options=BuildOptions(frame_rate="set")).people[0]
+    person.armature.location = (5.0, 0.0, 0.0)
+    for suffix in (".bvh", ".glb"):
+        export(tmp_path / f"walk{suffix}")
+    before = None
+    for suffix in (".bvh", ".glb"):
+        first = read_back(tmp_path / f"walk{suffix}")
+        blender.go_to(first + 3)
+        joints = blender.joints(blender.only("ARMATURE"), body.joint_names)
+        assert before is None or np.abs(joints - before).max() < JOINT_TOLERANCE
+        before = joints
+    assert before[0, 0] == pytest.approx(5.0 + motion.trans[3, 0] + body.rest_joints(motion.betas)[0, 0], abs=1e-3)
+
+
+def test_an_unknown_suffix_lists_the_valid_ones(body, make_motion, tmp_path):
+    with pytest.raises(UsageError, match=r"\.glb, \.fbx, \.blend, \.bvh, \.usdc, \.npz"):
+        export_motions([make_motion(body, 1)], body, tmp_path / "walk.obj")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_missing_folder_is_named(body, make_motion, tmp_path):
+    with pytest.raises(OutputError, match="nowhere"):
+        export_motions([make_motion(body, 1)], body, tmp_path / "nowhere" / "walk.glb")
+
+
+@pytest.mark.skipif(os.name == "nt" or os.geteuid() == 0, reason="root and Windows write where the mode bits forbid it")
+def test_an_unwritable_folder_is_named(body, make_motion, tmp_path):
+    tmp_path.chmod(0o500)
+    with pytest.raises(OutputError, match="not writable"):
+        export_motions([make_motion(body, 1)], body, tmp_path / "walk.glb")
+
+
+@pytest.mark.skipif(not Path("/proc/self").is_dir(), reason="needs a folder in which even root cannot make files")
+@pytest.mark.parametrize("suffix", SCENE_SUFFIXES)
+def test_a_folder_that_takes_no_files_is_named(body, make_motion, suffix):
+    with pytest.raises(OutputError, match="cannot write /proc/walk"):
+        export_motions([make_motion(body, 1)], body, f"/proc/walk{suffix}")
+
+
+@pytest.mark.parametrize("suffix", SCENE_SUFFIXES)
+def test_a_failing_writer_leaves_the_old_file_and_no_other(body, make_motion, tmp_path, monkeypatch, suffix):
+    path = tmp_path / f"walk{suffix}"
+    path.write_text("before")
+
+    def fail(temporary, *rest):
+        temporary.write_text("half")
+        raise RuntimeError("disk full")
+
+    name = {".usdc": "usd"}.get(suffix, suffix[1:])
+    monkeypatch.setattr(formats, f"write_{name}", fail)
+    with pytest.raises(OutputError, match="disk full"):
+        export_motions([make_motion(body, 1)], body, path)
+    assert [p.name for p in tmp_path.iterdir()] == [path.name]
+    assert path.read_text() == "before"
+    assert [s.name for s in bpy.data.scenes] == ["Scene"]
+
+
+def test_a_scene_without_captures_cannot_be_exported(tmp_path):
+    with pytest.raises(UsageError, match="no capture"):
+        export(tmp_path / "walk.glb")
+
+
+def test_writers_keep_standard_output_clean(body, make_motion, tmp_path, capfd):
+    paths = [tmp_path / f"walk{suffix}" for suffix in SUFFIXES]
+    capfd.readouterr()
+    export_motions([make_motion(body, 2)], body, paths)
+    assert capfd.readouterr().out == ""
+
+
+@pytest.mark.parametrize(
+    ("path", "people", "expected"),
+    [
+        ("a/walk.npz", 1, ["a/walk.npz"]),
+        ("a/walk.npz", 2, ["a/walk.person1.npz", "a/walk.person2.npz"]),
+        ("walk.v2.bvh", 2, ["walk.v2.person1.bvh", "walk.v2.person2.bvh"]),
+        ("walk.glb", 3, ["walk.glb"]),
+    ],
+)
+def test_one_path_per_person(path, people, expected):
+    assert [p.as_posix() for p in person_paths(path, people)] == expected
