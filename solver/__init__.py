@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The body model and the sparse constrained solver. numpy and numba only.
 
-    body = load_body("scope")
-    fit(body, Measurements(intrinsics, keypoints2d=Keypoints2D(indices, pixels, confidence))) -> Fit
+body = load_body("scope")
+fit(body, Measurements(intrinsics, keypoints2d=Keypoints2D(indices, pixels, confidence))) -> Fit
 """
 
 from .body import Body, load_body

@@ -66,10 +66,8 @@ def fit_clip(
         raise ShapeError(f"There must be one initial state a frame, {len(measurements)}, but got {len(init)}.")
     priors = default_priors(body) if priors is None else priors
     tree = make_tree(body)
-    causal = None
     if init is None:
-        causal = _fit_in_order(tree, measurements, priors, options, temporal)
-        init = [f.state for f in causal]
+        init = [f.state for f in _fit_in_order(tree, measurements, priors, options, temporal)]
     if temporal is not None:
         pulled = [with_previous(m, s, temporal) for m, s in zip(measurements[1:], init, strict=False)]
         measurements = [measurements[0], *pulled]
@@ -82,14 +80,13 @@ def fit_clip(
     joint = _Joint(clip_tree, [frames[k] for k in chosen], priors, options, focal_weight if focal else 0.0)
     joint.run()
     beta, scale = joint.beta[: tree.shape].copy(), float(np.exp(joint.log_focal))
-    fits: list[Fit | None] = [None] * len(frames)
-    for k, fitted in zip(chosen, joint.fits(), strict=True):
-        fits[k] = fitted
+    together = dict(zip(chosen, joint.fits(), strict=True))
     fixed = with_fixed_shape(tree, beta)
-    for k, frame in enumerate(frames):
-        if fits[k] is None:
-            fits[k] = _fit_with_shape(fixed, frame, measurements[k], init[k], beta, scale, priors, options)
-    return ClipFit(fits, beta, joint.information(), scale, joint.status, joint.cost, joint.iterations)  # type: ignore[arg-type]
+    fits = [
+        together[k] if k in together else _fit_with_shape(fixed, measurements[k], init[k], beta, scale, priors, options)
+        for k in range(len(frames))
+    ]
+    return ClipFit(fits, beta, joint.information(), scale, joint.status, joint.cost, joint.iterations)
 
 
 def _fit_in_order(
@@ -113,7 +110,7 @@ def _fit_in_order(
 
 
 def _fit_with_shape(
-    tree: Tree, frame: "_Frame", m: Measurements, init: State, beta: Array, scale: float, priors: Priors, options: Options
+    tree: Tree, m: Measurements, init: State, beta: Array, scale: float, priors: Priors, options: Options
 ) -> Fit:
     """Fit one frame with shape and focal length fixed; `tree` has them built in."""
     if m.intrinsics is not None and scale != 1.0:
@@ -129,16 +126,11 @@ def _fit_with_shape(
 
 @dataclass
 class _Frame:
-    """One frame of the joint optimization; buffers are made when it takes part."""
+    """One frame's terms and where it starts."""
 
     tree: Tree
     terms: Terms
     init: State
-    pose: Pose | None = None
-    trial: Pose | None = None
-    blocks: Blocks | None = None
-    work: Workspace | None = None
-    cost: float = 0.0
 
     @property
     def count(self) -> int:
@@ -146,11 +138,24 @@ class _Frame:
         return len(self.terms.flags) + len(self.terms.ints[0])
 
 
+@dataclass
+class _Active:
+    """A frame that takes part in the joint optimization, with its buffers."""
+
+    terms: Terms
+    count: int
+    pose: Pose
+    trial: Pose
+    blocks: Blocks
+    work: Workspace
+    cost: float = 0.0
+
+
 class _Joint:
     """Levenberg-Marquardt over the poses of several frames and the global columns they share."""
 
     def __init__(self, tree: Tree, frames: list[_Frame], priors: Priors, options: Options, focal_weight: float) -> None:
-        self.tree, self.frames, self.options = tree, frames, options
+        self.tree, self.options = tree, options
         self.P, self.focal_weight = tree.shape, focal_weight
         self.mean, self.prior = priors.packed_shape(tree.shape)
         self.table, self.tolerances, self.limits = options.stage_table(options.stages or WARM_STAGES)
@@ -160,17 +165,14 @@ class _Joint:
         self.beta = np.zeros(tree.S.shape[2])
         self.log_focal = 0.0
         self.status, self.cost, self.iterations = Status.NO_MEASUREMENTS, 0.0, 0
+        # the last frame's shape has seen most, when the frames were fitted in order
+        self.beta[: self.P] = frames[-1].init.beta if frames else self.mean
         shared = make_workspace(tree)
-        for frame in frames:
-            own = make_workspace(tree)
-            frame.work = own._replace(A=shared.A, scratch=shared.scratch)
-            frame.blocks, frame.trial = make_blocks(tree), make_pose(tree)
-            frame.pose = frame.init.pose(tree)
-        self.beta[: self.P] = self.mean
-        if frames:
-            self.beta[: self.P] = frames[-1].init.beta
-        for frame in frames:
-            frame.pose.beta[:] = self.beta  # type: ignore[union-attr]
+        self.frames: list[_Active] = []
+        for f in frames:
+            work = make_workspace(tree)._replace(A=shared.A, scratch=shared.scratch)
+            pose = replace(f.init, beta=self.beta[: self.P]).pose(tree)
+            self.frames.append(_Active(f.terms, f.count, pose, make_pose(tree), make_blocks(tree), work))
 
     def run(self) -> None:
         """Optimize through the stages."""
@@ -203,8 +205,8 @@ class _Joint:
                 self.cost = cost
                 for frame in self.frames:
                     frame.pose, frame.trial = frame.trial, frame.pose
-                self.beta = self.frames[0].pose.beta.copy()  # type: ignore[union-attr]
-                self.log_focal = float(self.frames[0].pose.log_focal[0])  # type: ignore[union-attr]
+                self.beta = self.frames[0].pose.beta.copy()
+                self.log_focal = float(self.frames[0].pose.log_focal[0])
                 if small:
                     return CONVERGED
             else:
@@ -220,21 +222,21 @@ class _Joint:
         total = 0.0
         for f in self.frames:
             pose = f.trial if trial else f.pose
-            f.cost = linearize(self.tree, f.terms, self.table[s], self.options.triggs, pose, f.blocks, f.work.scratch)  # type: ignore[union-attr]
+            f.cost = linearize(self.tree, f.terms, self.table[s], self.options.triggs, pose, f.blocks, f.work.scratch)
             total += f.cost
         pose = self.frames[0].trial if trial else self.frames[0].pose
-        offset = pose.beta[: self.P] - self.mean  # type: ignore[union-attr]
+        offset = pose.beta[: self.P] - self.mean
         total += 0.5 * self.shape_weights[s] * float(offset @ self.prior @ offset)
-        return total + 0.5 * self.focal_weight * float(pose.log_focal[0]) ** 2  # type: ignore[union-attr]
+        return total + 0.5 * self.focal_weight * float(pose.log_focal[0]) ** 2
 
     def _reduced(self, s: int, damping: float) -> tuple[Array, Array, float]:
         """Eliminate every frame's pose; return the summed system of the global columns and the sum of |q~|^2."""
         P, squares = self.P, 0.0
-        C, c = np.zeros_like(self.frames[0].work.C), np.zeros_like(self.beta)  # type: ignore[union-attr]
+        C, c = np.zeros_like(self.frames[0].work.C), np.zeros_like(self.beta)
         for f in self.frames:
             squares += eliminate(self.tree, f.pose, f.blocks, damping, self.root_scale, f.work)
-            C += f.work.C  # type: ignore[union-attr]
-            c += f.work.c  # type: ignore[union-attr]
+            C += f.work.C
+            c += f.work.c
         C[:P, :P] += self.shape_weights[s] * self.prior
         c[:P] += self.shape_weights[s] * (self.prior @ (self.beta[:P] - self.mean))
         if self.tree.globals > P:
@@ -248,7 +250,7 @@ class _Joint:
         dbeta = np.zeros_like(self.beta)
         squares += solve_globals(self.tree, C, c, dbeta)
         for f in self.frames:
-            f.work.dbeta[:] = dbeta  # type: ignore[union-attr]
+            f.work.dbeta[:] = dbeta
             squares += substitute(self.tree, f.pose, damping, self.root_scale, f.work)
             retract(self.tree, f.pose, f.work, f.trial)
         return 0.5 * squares
@@ -256,15 +258,14 @@ class _Joint:
     def fits(self) -> list[Fit]:
         """Return the frames' results."""
         out = []
+        last, triggs = self.table[-1], self.options.triggs
         for f in self.frames:
-            f.cost = linearize(self.tree, f.terms, self.table[-1], self.options.triggs, f.pose, f.blocks, f.work.scratch)  # type: ignore[union-attr]
+            f.cost = linearize(self.tree, f.terms, last, triggs, f.pose, f.blocks, f.work.scratch)
             eliminate(self.tree, f.pose, f.blocks, DAMPING_LEAST, self.root_scale, f.work)
             pose, P = f.pose, self.P
-            state = State.from_pose(self.tree, pose)  # type: ignore[arg-type]
-            information = f.work.C[:P, :P].copy()  # type: ignore[union-attr]
-            out.append(
-                Fit(state, self.status, float(f.cost), self.iterations, pose.R.copy(), pose.t.copy(), information, f.count)  # type: ignore[union-attr]
-            )
+            state, n = State.from_pose(self.tree, pose), self.iterations
+            information = f.work.C[:P, :P].copy()
+            out.append(Fit(state, self.status, float(f.cost), n, pose.R.copy(), pose.t.copy(), information, f.count))
         return out
 
     def information(self) -> Array:

@@ -12,7 +12,7 @@ import numpy as np
 
 from .kernel import kernel
 from .residuals import keypoint2d, keypoint3d, orientation_field, shape_prior
-from .residuals.part import GRADIENT, SHAPE, Blocks, Pose
+from .residuals.part import GRADIENT, SHAPE, Array, Blocks, Pose
 from .residuals.registry import KEYPOINT2D, KEYPOINT3D, ORIENTATION_FIELD, SHAPE_PRIOR, accumulate_tables
 from .rows import add1, add3, set3
 from .terms import HAS_2D, HAS_3D, HAS_DIRECTION, HAS_SHAPE, Terms
@@ -66,7 +66,9 @@ def place_parts(tree: Tree, pose: Pose) -> None:
 
 
 @kernel
-def linearize(tree: Tree, terms: Terms, stage, triggs: float, pose: Pose, blocks: Blocks, scratch) -> float:  # type: ignore[no-untyped-def]
+def linearize(
+    tree: Tree, terms: Terms, stage: Array, triggs: float, pose: Pose, blocks: Blocks, scratch: Array
+) -> float:
     """Place the parts, write the blocks at `pose`, and return the cost.
 
     stage (2, weights) is a row of weights and a row of 1/sigma, in the registry's order; scratch (9, W).
@@ -203,7 +205,9 @@ def linearize(tree: Tree, terms: Terms, stage, triggs: float, pose: Pose, blocks
                 add1(scratch, (3 + r) * W, 0.5, scratch, r * W, W)
             for a in range(P):
                 s = a & ~3
-                add3(C, a * W + s, scratch[3, a], scratch[4, a], scratch[5, a], D, d + s, d + W + s, d + 2 * W + s, W - s)
+                add3(
+                    C, a * W + s, scratch[3, a], scratch[4, a], scratch[5, a], D, d + s, d + W + s, d + 2 * W + s, W - s
+                )
                 add3(
                     C, a * W + s, D[i, 0, a], D[i, 1, a], D[i, 2, a],
                     scratch, 3 * W + s, 4 * W + s, 5 * W + s, W - s,

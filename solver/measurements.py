@@ -55,7 +55,7 @@ class Keypoints3D:
 
 @dataclass
 class OrientationField:
-    """Directions from one point to another of the same part: starts (n,), ends (n,), directions (n, 3), confidence (n,).
+    """Directions between points of one part: starts (n,), ends (n,), directions (n, 3), confidence (n,).
 
     A bone is the direction from a joint M + par(i) to its child M + i. Directions are in the camera frame and need
     not be normalized.

@@ -116,7 +116,8 @@ def fit_tree(tree: Tree, measurements: Measurements, init: State | None, priors:
         status = Status(code)
     pose = poses[which]
     information = shape_information(tree, terms, table[-1], pose, blocks[which], options, work)
-    return Fit(State.from_pose(tree, pose), status, float(cost), int(iterations), pose.R.copy(), pose.t.copy(), information, count)
+    state = State.from_pose(tree, pose)
+    return Fit(state, status, float(cost), int(iterations), pose.R.copy(), pose.t.copy(), information, count)
 
 
 def shape_information(

@@ -51,7 +51,11 @@ class Stage:
 # From far away: directions first, which have no bad minimum nearby, positions in the image and in space joining in.
 _LAST = Weights()
 COLD_STAGES = (
-    Stage(replace(_LAST, orientation_field=1e4, keypoints3d=2400.0, keypoints2d=1e4, joint_prior=1000.0, shape=1000.0), 5e-2, 10),
+    Stage(
+        replace(_LAST, orientation_field=1e4, keypoints3d=2400.0, keypoints2d=1e4, joint_prior=1000.0, shape=1000.0),
+        5e-2,
+        10,
+    ),
     Stage(replace(_LAST, orientation_field=4000.0, keypoints2d=2e5, joint_prior=300.0, shape=400.0), 1e-2, 15),
     Stage(_LAST, 1e-5, 50),
 )

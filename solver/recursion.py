@@ -74,9 +74,9 @@ def eliminate(tree: Tree, pose: Pose, blocks: Blocks, damping: float, root_scale
     """Eliminate all joints and the root's pose; leave the reduced system of the global columns in work.C, work.c.
 
     Returns the sum of |q~|^2, the part of the predicted decrease that is due to what was eliminated.
-    `root_scale` is s, in radians per metre. The blocks are kept as they are, to be eliminated again with another damping.
+    `root_scale` is s, in radians per metre. The blocks are kept, to be eliminated again with another damping.
     """
-    A, Y, L, C, c, scratch = work.A, work.Y, work.L, work.C, work.c, work.scratch
+    A, Y, L, C, c = work.A, work.Y, work.L, work.C, work.c
     W = c.shape[0]
     row = SHAPE + W
     n, P = tree.parents.shape[0], tree.globals
@@ -90,7 +90,6 @@ def eliminate(tree: Tree, pose: Pose, blocks: Blocks, damping: float, root_scale
     for i in range(n - 1, 0, -1):
         sx, sy, sz = pose.t[i, 0] - ox, pose.t[i, 1] - oy, pose.t[i, 2] - oz
         base, y = 6 * i * row, 3 * i * row
-        lin = base + 3 * row
         # UT A = moment about the joint: A_ang - s x A_lin, plus the joint's own row
         for k in range(row):
             Y[i, 0, k] = A[i, 0, k] + blocks.H_u[i, 0, k] - sy * A[i, 5, k] + sz * A[i, 4, k]
@@ -240,7 +239,10 @@ def step(tree: Tree, pose: Pose, blocks: Blocks, damping: float, root_scale: flo
 
 @kernel
 def retract(tree: Tree, pose: Pose, work: Workspace, trial: Pose) -> None:
-    """Write the pose moved by the step to `trial`: R_0 <- exp(w) R_0, t_0 <- t_0 + nu, Omega <- exp(R_parᵀ u) Omega."""
+    """Write the moved pose to `trial`: R_0 <- exp(w) R_0, t_0 <- t_0 + nu, Omega <- exp(R_parᵀ u) Omega.
+
+    R, t and D of the other parts are left to `place_parts`.
+    """
     x, u = work.x, work.u
     for i in range(tree.parents.shape[0]):
         if i == 0:

@@ -29,7 +29,8 @@ def exp3(x: float, y: float, z: float) -> tuple:
     """
     s = x * x + y * y + z * z
     if s < 0.25:
-        a = 1.0 - s / 6.0 * (1.0 - s / 20.0 * (1.0 - s / 42.0 * (1.0 - s / 72.0 * (1.0 - s / 110.0 * (1.0 - s / 156.0)))))
+        a = 1.0 - s / 72.0 * (1.0 - s / 110.0 * (1.0 - s / 156.0))
+        a = 1.0 - s / 6.0 * (1.0 - s / 20.0 * (1.0 - s / 42.0 * a))
         b = 0.5 * (1.0 - s / 12.0 * (1.0 - s / 30.0 * (1.0 - s / 56.0 * (1.0 - s / 90.0 * (1.0 - s / 132.0)))))
     else:
         th = math.sqrt(s)
@@ -56,7 +57,8 @@ def log3(r00, r01, r02, r10, r11, r12, r20, r21, r22) -> tuple:  # type: ignore[
     if c > 0.9:
         # th / sin(th) = asin(s)/s as a series in s^2; here s^2 < 0.19
         if s2 < 1e-3:
-            k = 1.0 + s2 * (1.0 / 6.0 + s2 * (3.0 / 40.0 + s2 * (15.0 / 336.0 + s2 * (105.0 / 3456.0 + s2 * 945.0 / 42240.0))))
+            k = 3.0 / 40.0 + s2 * (15.0 / 336.0 + s2 * (105.0 / 3456.0 + s2 * 945.0 / 42240.0))
+            k = 1.0 + s2 * (1.0 / 6.0 + s2 * k)
         else:
             s = math.sqrt(s2)
             k = math.atan2(s, c) / s
@@ -136,8 +138,8 @@ def log(rotation: ArrayLike) -> NDArray[np.float64]:
     w, v = quaternion[..., :1], quaternion[..., 1:]
     n = np.linalg.norm(v, axis=-1, keepdims=True)
     small = n < 1e-6
-    safe = np.where(small, 1.0, n)
-    return v * np.where(small, 2.0 / w - 2.0 * n * n / (3.0 * w**3 + (w == 0)), 2.0 * np.arctan2(n, w) / safe)
+    # w >= 0, so a small n means w = 1 to rounding: 2 atan(n / w) / n = 2 - 2 n^2 / 3
+    return v * np.where(small, 2.0 - 2.0 / 3.0 * n * n, 2.0 * np.arctan2(n, w) / np.where(small, 1.0, n))
 
 
 def left_jacobian(phi: ArrayLike) -> NDArray[np.float64]:
@@ -191,7 +193,7 @@ def matrix_from_quaternion(quaternion: ArrayLike) -> NDArray[np.float64]:
 
 
 def nearest_rotation(matrix: ArrayLike) -> NDArray[np.float64]:
-    """Return the rotations (..., 3, 3) nearest to the matrices in the Frobenius norm; the identity for non-finite ones."""
+    """Return the rotations (..., 3, 3) nearest to matrices in the Frobenius norm; the identity for non-finite ones."""
     m = _array(matrix, (3, 3), "A matrix")
     m = np.where(np.isfinite(m).all(axis=(-2, -1), keepdims=True), m, np.eye(3))
     u, _, vt = np.linalg.svd(m)

@@ -49,7 +49,8 @@ def _combine(context: Any, builder: Any, sig: Any, args: Any, terms: int, keep: 
         target = at(dst_data, builder.add(d, shift))
         total = builder.load(target, align=8) if keep else None
         for splat, offset in zip(splats, offsets, strict=True):
-            product = builder.fmul(splat, builder.load(at(src_data, builder.add(offset, shift)), align=8), flags=["contract"])
+            value = builder.load(at(src_data, builder.add(offset, shift)), align=8)
+            product = builder.fmul(splat, value, flags=["contract"])
             total = product if total is None else builder.fadd(total, product, flags=["contract"])
         builder.store(total, target, align=8)
     return context.get_dummy_value()

@@ -35,7 +35,8 @@ class State:
     @classmethod
     def rest(cls, K: int, P: int, distance: float = 3.0) -> "State":
         """Return the rest pose, upright and facing a camera `distance` metres away."""
-        return cls(np.diag([1.0, -1.0, -1.0]), np.array([0.0, 0.0, distance]), np.tile(np.eye(3), (K, 1, 1)), np.zeros(P))
+        R_camera_root = np.diag([1.0, -1.0, -1.0])
+        return cls(R_camera_root, np.array([0.0, 0.0, distance]), np.tile(np.eye(3), (K, 1, 1)), np.zeros(P))
 
     def pose(self, tree: Tree) -> Pose:
         """Return the state for the kernels, with rotations made orthonormal. Raises ShapeError."""

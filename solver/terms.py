@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Measurements of one frame as flat arrays: one slot for each point, ordered by body part, with all its measurements."""
+"""Measurements of one frame as flat arrays: one slot a point, with all that was measured of it, by body part."""
 
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -142,6 +142,20 @@ def _padded(a: Array, shape: tuple[int, ...]) -> Array:
     return out
 
 
+def _checked_table(name: str, table: tuple[Array, Array]) -> tuple[Array, Array]:
+    """Return the rows of a registered residual, or raise ShapeError."""
+    if name not in RESIDUALS:
+        raise ShapeError(f"There is no residual named {name!r}; the registered ones are {', '.join(RESIDUALS)}.")
+    ints, floats = np.asarray(table[0], dtype=np.int64), np.asarray(table[1], dtype=np.float64)
+    expected = (RESIDUALS[name].INTS, RESIDUALS[name].FLOATS)
+    if (ints.shape[1:], floats.shape[1:], len(ints)) != ((expected[0],), (expected[1],), len(floats)):
+        raise ShapeError(
+            f"Tables of {name!r} must have shapes (n, {expected[0]}) and (n, {expected[1]}), "
+            f"but got {ints.shape} and {floats.shape}."
+        )
+    return ints, floats
+
+
 def make_terms(tree: Tree, measurements: "Measurements", priors: "Priors") -> Terms:
     """Pack one frame's measurements and priors. Raises ShapeError naming the array that does not fit the body."""
     m = measurements
@@ -160,16 +174,8 @@ def make_terms(tree: Tree, measurements: "Measurements", priors: "Priors") -> Te
     tables.update(m.packed_tables(K))
     tables.update(priors.packed_tables(K))
     for name, table in m.tables.items():
-        if name not in RESIDUALS:
-            raise ShapeError(f"There is no residual named {name!r}; the registered ones are {', '.join(RESIDUALS)}.")
-        tables[name] = tuple(np.concatenate([old, new]) for old, new in zip(tables[name], table, strict=True))
-    for name, (ints, floats) in tables.items():
-        expected = (RESIDUALS[name].INTS, RESIDUALS[name].FLOATS)
-        if (ints.shape[1:], floats.shape[1:], len(ints)) != ((expected[0],), (expected[1],), len(floats)):
-            raise ShapeError(
-                f"Tables of {name!r} must have shapes (n, {expected[0]}) and (n, {expected[1]}), "
-                f"but got {ints.shape} and {floats.shape}."
-            )
+        ints, floats = _checked_table(name, table)
+        tables[name] = np.concatenate([tables[name][0], ints]), np.concatenate([tables[name][1], floats])
     mean, information = priors.packed_shape(P)
     return Terms(
         *slots,

@@ -4,7 +4,8 @@
     phi = log(Omega), a unit axis in the parent's axes at rest, angle = aᵀ phi, swing s = (I - a aᵀ) phi
     r_1   = sqrt(w) (max(0, angle - upper) - max(0, lower - angle))
     r_2-4 = sqrt(w_swing) s max(0, 1 - swing_limit / |s|)
-    dr_1/du = sqrt(w) aᵀ J^-1(phi) R_parᵀ;  dr_2-4/du = sqrt(w_swing) (k I + (1 - k) s^ s^ᵀ) (I - a aᵀ) J^-1(phi) R_parᵀ
+    dr_1/du = sqrt(w) aᵀ J^-1(phi) R_parᵀ
+    dr_2-4/du = sqrt(w_swing) (k I + (1 - k) s^ s^ᵀ) (I - a aᵀ) J^-1(phi) R_parᵀ
 with k = 1 - swing_limit / |s|, both zero inside the limits. Radians.
 Source: one-sided penalties on knees and upper arms as the paper's code has them; the ranges are ours.
 """
@@ -86,7 +87,9 @@ def pack(
 ) -> tuple[Array, Array]:
     """Return the tables of `accumulate` from joints (n,), unit axes (n, 3), and columns (n,) of limits and weights."""
     n = len(joints)
-    floats = np.hstack([np.reshape(axes, (n, 3)), np.c_[lower], np.c_[upper], np.c_[swing_limit], np.c_[w], np.c_[w_swing]])
+    floats = np.hstack(
+        [np.reshape(axes, (n, 3)), np.c_[lower], np.c_[upper], np.c_[swing_limit], np.c_[w], np.c_[w_swing]]
+    )
     return np.reshape(joints, (n, 1)).astype(np.int64), np.ascontiguousarray(floats, dtype=np.float64)
 
 
@@ -101,7 +104,14 @@ def hinges_of(joint_names: Sequence[str]) -> tuple[Array, Array]:
 
 
 def evaluate(
-    part: Part, axis: Array, lower: float, upper: float, swing_limit: float, w: float, w_swing: float, weight: float = 1.0
+    part: Part,
+    axis: Array,
+    lower: float,
+    upper: float,
+    swing_limit: float,
+    w: float,
+    w_swing: float,
+    weight: float = 1.0,
 ) -> Linearization:
     """Return the residual (4 rows) times sqrt(weight) and its derivatives."""
     phi = log(part.Omega)

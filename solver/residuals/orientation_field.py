@@ -45,7 +45,7 @@ def term(dx, dy, dz, nx, ny, nz, weight, inv_sigma, triggs):  # type: ignore[no-
 
 
 def evaluate(part: Part, v_bar: Array, V: Array, direction: Array, weight: float = 1.0) -> Linearization:
-    """Return r sqrt(weight) (3 rows), without robust kernel, and its derivatives; `direction` (3,) unit, camera frame."""
+    """Return r sqrt(weight) (3 rows), without robust kernel, and its derivatives; `direction` (3,) in the camera."""
     d = part.R @ (V @ part.beta + v_bar)
     length = np.linalg.norm(d)
     zeros = np.zeros((3, 3))
@@ -53,4 +53,6 @@ def evaluate(part: Part, v_bar: Array, V: Array, direction: Array, weight: float
         return Linearization(np.zeros(3), np.zeros((3, 6)), zeros, np.zeros((3, len(part.beta))))
     unit = d / length
     G = np.sqrt(weight) * (np.eye(3) - np.outer(unit, unit)) / length
-    return Linearization(np.sqrt(weight) * (unit - direction), G @ np.hstack([hat_identity(d)[:, :3], zeros]), zeros, G @ part.R @ V)
+    return Linearization(
+        np.sqrt(weight) * (unit - direction), G @ np.hstack([hat_identity(d)[:, :3], zeros]), zeros, G @ part.R @ V
+    )

@@ -74,5 +74,8 @@ def hat_identity(e: Array) -> Array:
 
 
 def point_jacobian(part: Part, p: Array, V: Array) -> tuple[Array, Array]:
-    """Return dp/dx (3, 6) and dp/dbeta (3, P) of a point fixed to a part: dp = w x (p - origin) + nu + (R V + D) dbeta."""
+    """Return dp/dx (3, 6) and dp/dbeta (3, P) of a point fixed to a part.
+
+    dp = w x (p - origin) + nu + (R V + D) dbeta
+    """
     return hat_identity(p - part.origin), part.R @ V + part.D

@@ -26,7 +26,9 @@ def moved(body, state, d):
     K = len(Omega)
     R, _, _ = forward(body, *state)
     u = d[6 : 6 + 3 * K].reshape(K, 3)
-    Omega = np.array([R[body.parents[i + 1]].T @ (np.eye(3) + hat(u[i])) @ R[body.parents[i + 1]] @ Omega[i] for i in range(K)])
+    Omega = np.array(
+        [R[body.parents[i + 1]].T @ (np.eye(3) + hat(u[i])) @ R[body.parents[i + 1]] @ Omega[i] for i in range(K)]
+    )
     return (np.eye(3) + hat(d[:3])) @ R0, t0 + d[3:6], Omega, beta + d[6 + 3 * K : 6 + 3 * K + len(beta)]
 
 

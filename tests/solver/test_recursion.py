@@ -80,7 +80,9 @@ def dense_system(body, state, raw, sigmas, scales, priors, weights, extra=0):
 
 @pytest.mark.parametrize("coupled", [False, True])
 @pytest.mark.parametrize("damping", [0.0, 40.0])
-@pytest.mark.parametrize(("K", "P", "M"), [(23, 10, 40), (23, 0, 40), (51, 10, 60), (51, 0, 60), (1, 3, 20), (7, 5, 24)])
+@pytest.mark.parametrize(
+    ("K", "P", "M"), [(23, 10, 40), (23, 0, 40), (51, 10, 60), (51, 0, 60), (1, 3, 20), (7, 5, 24)]
+)
 def test_step_equals_dense_step(K, P, M, damping, coupled):
     for seed in range(2):
         rng, body, state, tree, terms, stage, raw, sigmas, scales, priors, weights = problem(seed, K, P, M)

@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+import numpy as np
+import pytest
+from scope.solver import ShapeError, rotations
+
+RNG = np.random.default_rng(0)
+AXES = RNG.standard_normal((20, 3))
+AXES /= np.linalg.norm(AXES, axis=1)[:, None]
+ANGLES = [
+    0.0,
+    1e-12,
+    1e-8,
+    1e-5,
+    1e-3,
+    0.02,
+    0.099,
+    0.101,
+    0.45,
+    0.5,
+    0.55,
+    1.0,
+    2.0,
+    3.0,
+    3.13,
+    np.pi - 1e-3,
+    np.pi - 1e-5,
+]
+ANGLES += [np.pi - 1e-7, np.pi - 1e-9]
+VECTORS = np.concatenate([angle * AXES for angle in ANGLES])
+
+
+def exp_by_doubling(phi):
+    """Power series of a 1/64 turn, squared six times."""
+    A = rotations.hat(phi) / 64
+    E = sum((np.linalg.matrix_power(A, k) / float(np.prod(np.arange(1, k + 1))) for k in range(12)), np.zeros((3, 3)))
+    for _ in range(6):
+        E = E @ E
+    return E
+
+
+def test_exp_is_the_matrix_exponential():
+    expected = np.array([exp_by_doubling(v) for v in VECTORS])
+    np.testing.assert_allclose(rotations.exp(VECTORS), expected, atol=2e-14)
+    np.testing.assert_allclose([rotations.exp3(*v) for v in VECTORS], expected.reshape(-1, 9), atol=2e-14)
+
+
+def test_log_inverts_exp_up_to_pi():
+    R = rotations.exp(VECTORS)
+    np.testing.assert_allclose(rotations.log(R), VECTORS, atol=1e-9)
+    np.testing.assert_allclose([rotations.log3(*r.ravel()) for r in R], VECTORS, atol=1e-9)
+
+
+@pytest.mark.parametrize("axis", [*np.eye(3), *-np.eye(3), *AXES])
+def test_log_at_pi_is_a_half_turn(axis):
+    R = 2 * np.outer(axis, axis) - np.eye(3)
+    for phi in (rotations.log(R), np.array(rotations.log3(*R.ravel()))):
+        assert np.linalg.norm(phi) == pytest.approx(np.pi, abs=1e-9)
+        np.testing.assert_allclose(rotations.exp(phi), R, atol=1e-9)
+
+
+def test_left_jacobian_is_the_derivative_of_exp():
+    h = 1e-6
+    for phi in VECTORS[::7]:
+        J = rotations.left_jacobian(phi)
+        numeric = [
+            (rotations.log(rotations.exp(phi + h * e) @ rotations.exp(phi).T)
+             - rotations.log(rotations.exp(phi - h * e) @ rotations.exp(phi).T)) / (2 * h)
+            for e in np.eye(3)
+        ]  # fmt: skip
+        np.testing.assert_allclose(J, np.array(numeric).T, atol=1e-8)
+
+
+def test_left_jacobian_inverse():
+    J = rotations.left_jacobian(VECTORS)
+    np.testing.assert_allclose(
+        rotations.left_jacobian_inverse(VECTORS) @ J, np.tile(np.eye(3), (len(J), 1, 1)), atol=1e-10
+    )
+    scalar = np.array([rotations.left_jacobian_inverse3(*v) for v in VECTORS]).reshape(-1, 3, 3)
+    np.testing.assert_allclose(scalar, rotations.left_jacobian_inverse(VECTORS), atol=1e-10)
+
+
+def test_quaternions_go_both_ways():
+    R = rotations.exp(VECTORS)
+    q = rotations.quaternion_from_matrix(R)
+    half = np.linalg.norm(VECTORS, axis=1) / 2
+    np.testing.assert_allclose(q[:, 0], np.cos(half), atol=1e-9)
+    np.testing.assert_allclose(np.linalg.norm(q, axis=1), 1, atol=1e-14)
+    np.testing.assert_allclose(rotations.matrix_from_quaternion(3.0 * q), R, atol=1e-14)
+
+
+def test_nearest_rotation_repairs_and_survives_anything():
+    R = rotations.exp(VECTORS)
+    np.testing.assert_allclose(rotations.nearest_rotation(1.01 * R), R, atol=1e-13)
+    broken = np.stack([np.full((3, 3), np.nan), np.zeros((3, 3)), -np.eye(3), np.full((3, 3), np.inf)])
+    fixed = rotations.nearest_rotation(broken)
+    np.testing.assert_allclose(np.linalg.det(fixed), 1, atol=1e-12)
+    np.testing.assert_allclose(fixed @ np.swapaxes(fixed, 1, 2), np.tile(np.eye(3), (4, 1, 1)), atol=1e-12)
+
+
+def test_shapes_are_checked():
+    with pytest.raises(ShapeError, match=r"\(\.\.\., 3\), but got shape \(4,\)"):
+        rotations.exp(np.zeros(4))
