@@ -77,7 +77,7 @@ def _read_array(file: IO[bytes], size: int, key: str) -> np.ndarray:
         raise ModelFileError(f"{key} is stored as a Python object; use the publisher's own .npz or .pkl file")
     count = math.prod(shape) * dtype.itemsize
     if any(n < 0 for n in shape) or count > min(size, LARGEST_ARRAY):
-        raise ModelFileError(f"{key} claims the shape {shape}, more than a body needs or the file holds; fetch it again")
+        raise ModelFileError(f"{key} claims shape {shape}, more than a body needs or the file holds; choose another")
     raw = file.read(count)
     if len(raw) != count:
         raise ModelFileError(f"{key} ends too early; download it again")
