@@ -1,0 +1,206 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The room, the light, the camera and the person of the sample clip, in Blender."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from ...solver.body import Body
+from ...solver.frames import blender_camera_matrix
+
+LAMPS = {  # name: place (metres, world), power in watts, side in metres
+    "skylight": ((-0.7, -1.9, 5.0), 230.0, 1.6),
+}
+_SAMPLES_ROOM, _SAMPLES_PERSON = 32, 8
+
+
+def build_stage(
+    body: Body, intrinsics: np.ndarray, size: tuple[int, int], world_from_camera: np.ndarray
+) -> bpy.types.Object:
+    """A fresh scene, ready to render; returns the person's mesh object, whose vertices lie in the world frame."""
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    scene = bpy.context.scene
+    _render_settings(scene, size)
+    _camera(scene, intrinsics, size, world_from_camera)
+    _light(scene)
+    _room()
+    return _person(body)
+
+
+def pose_person(person: bpy.types.Object, vertices_world: np.ndarray) -> None:
+    """Give the mesh its vertices for the next frame."""
+    person.data.vertices.foreach_set("co", np.ascontiguousarray(vertices_world, np.float32).ravel())
+    person.data.update()
+
+
+def render_room(person: bpy.types.Object, path: Path) -> None:
+    """Render the empty room to a .png, once and well: nothing in it moves."""
+    scene = bpy.context.scene
+    person.hide_render, scene.cycles.samples = True, _SAMPLES_ROOM
+    _render_to(path)
+    person.hide_render, scene.cycles.samples = False, _SAMPLES_PERSON
+
+
+def render_part(box: tuple[float, float, float, float], path: Path) -> None:
+    """Render only (left, right, bottom, top), shares of the picture counted from its lower left, to a .png."""
+    render = bpy.context.scene.render
+    render.use_border, render.use_crop_to_border = True, False
+    render.border_min_x, render.border_max_x, render.border_min_y, render.border_max_y = box
+    _render_to(path)
+
+
+def _render_to(path: Path) -> None:
+    bpy.context.scene.render.filepath = str(path)
+    bpy.ops.render.render(write_still=True)
+
+
+def encode(frames: list[Path], path: Path, size: tuple[int, int], fps: int, kbit_per_s: int) -> None:
+    """Join pictures into an H.264 .mp4 with Blender's sequencer."""
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    scene = bpy.context.scene
+    scene.view_settings.view_transform = "Standard"
+    scene.frame_start, scene.frame_end = 1, len(frames)
+    editor = scene.sequence_editor_create()
+    strip = editor.strips.new_image("frames", str(frames[0]), channel=1, frame_start=1)
+    for frame in frames[1:]:
+        strip.elements.append(frame.name)
+    render = scene.render
+    render.resolution_x, render.resolution_y = size
+    render.resolution_percentage = 100
+    render.fps, render.fps_base = fps, 1.0
+    render.filepath = str(path)
+    render.use_file_extension = False
+    settings = render.image_settings
+    if hasattr(settings, "media_type"):  # since Blender 5.0
+        settings.media_type = "VIDEO"
+    settings.file_format = "FFMPEG"
+    render.ffmpeg.format, render.ffmpeg.codec = "MPEG4", "H264"
+    render.ffmpeg.constant_rate_factor = "NONE"
+    render.ffmpeg.video_bitrate, render.ffmpeg.maxrate = kbit_per_s, 2 * kbit_per_s
+    render.ffmpeg.minrate = 0
+    render.ffmpeg.gopsize = 30
+    bpy.ops.render.render(animation=True)
+
+
+def _render_settings(scene: bpy.types.Scene, size: tuple[int, int]) -> None:
+    scene.render.engine = "CYCLES"
+    scene.render.resolution_x, scene.render.resolution_y = size
+    scene.render.resolution_percentage = 100
+    scene.render.use_persistent_data = True
+    scene.render.image_settings.file_format = "PNG"
+    scene.view_settings.view_transform = "AgX"
+    scene.view_settings.look = "AgX - Medium High Contrast"
+    cycles = scene.cycles
+    cycles.samples, cycles.use_adaptive_sampling = _SAMPLES_PERSON, False
+    cycles.max_bounces, cycles.diffuse_bounces, cycles.glossy_bounces = 1, 1, 1
+    cycles.use_denoising = True
+    cycles.denoiser = "OPENIMAGEDENOISE"
+    cycles.denoising_quality = "FAST"
+    cycles.denoising_prefilter = "NONE"
+    cycles.seed = 1
+
+
+def _camera(scene: bpy.types.Scene, K: np.ndarray, size: tuple[int, int], world_from_camera: np.ndarray) -> None:
+    """A camera of the given pinhole intrinsics: pixel (u, v) is the centre of a pixel, as OpenCV counts."""
+    data = bpy.data.cameras.new("camera")
+    camera = bpy.data.objects.new("camera", data)
+    scene.collection.objects.link(camera)
+    scene.camera = camera
+    width, height = size
+    data.sensor_fit, data.sensor_width = "HORIZONTAL", 36.0
+    data.lens = K[0, 0] / width * 36.0
+    data.shift_x = -((K[0, 2] + 0.5) - width / 2) / width
+    data.shift_y = ((K[1, 2] + 0.5) - height / 2) / width
+    camera.matrix_world = blender_camera_matrix(world_from_camera).T.tolist()
+
+
+def _light(scene: bpy.types.Scene) -> None:
+    world = bpy.data.worlds.new("sky")
+    scene.world = world
+    world.use_nodes = True
+    background = world.node_tree.nodes["Background"]
+    background.inputs["Color"].default_value = (0.75, 0.85, 1.0, 1)
+    background.inputs["Strength"].default_value = 0.42
+    for name, (place, watts, width) in LAMPS.items():
+        data = bpy.data.lights.new(name, "AREA")
+        data.energy, data.size = watts, width
+        lamp = bpy.data.objects.new(name, data)
+        scene.collection.objects.link(lamp)
+        lamp.location = place
+        toward = lamp.constraints.new("TRACK_TO")
+        toward.target = scene.objects.get("aim") or _aim(scene)
+        toward.track_axis, toward.up_axis = "TRACK_NEGATIVE_Z", "UP_Y"
+
+
+def _aim(scene: bpy.types.Scene) -> bpy.types.Object:
+    aim = bpy.data.objects.new("aim", None)
+    scene.collection.objects.link(aim)
+    aim.location = (0.0, 0.0, 1.0)
+    return aim
+
+
+def _room() -> None:
+    boards = _material("boards", (0.34, 0.21, 0.12), (0.24, 0.14, 0.075), stretch=(1.2, 14.0, 1.0))
+    wall = _material("wall", (0.62, 0.60, 0.55), (0.55, 0.54, 0.50), stretch=(3.0, 3.0, 3.0))
+    dark = _material("skirting", (0.20, 0.19, 0.18))
+    _box("floor", (0, 0, -0.05), (12, 12, 0.1), boards)
+    _box("back wall", (0, 2.45, 2), (12, 0.1, 4), wall)
+    _box("skirting board", (0, 2.39, 0.06), (12, 0.03, 0.12), dark)
+    _box("picture frame", (-1.45, 2.38, 1.75), (0.95, 0.03, 0.7), dark)
+    _box("picture", (-1.45, 2.36, 1.75), (0.85, 0.02, 0.6), _material("canvas", (0.13, 0.30, 0.38), (0.62, 0.42, 0.18)))
+    _box("bench", (1.75, 2.05, 0.22), (1.1, 0.4, 0.44), _material("bench", (0.45, 0.30, 0.16), (0.38, 0.25, 0.13)))
+    _box("mat", (0.05, -0.1, 0.004), (2.4, 1.5, 0.008), _material("mat", (0.22, 0.26, 0.30), (0.19, 0.22, 0.26)))
+
+
+def _box(name: str, center: tuple, size: tuple, material: bpy.types.Material) -> None:
+    corners = [(x, y, z) for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)]
+    faces = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    mesh = bpy.data.meshes.new(name)
+    mesh.from_pydata([[c + s * k for c, s, k in zip(center, size, q, strict=True)] for q in corners], [], faces)
+    mesh.materials.append(material)
+    bpy.context.scene.collection.objects.link(bpy.data.objects.new(name, mesh))
+
+
+def _material(
+    name: str, color: tuple, second: tuple | None = None, stretch: tuple = (2.0, 2.0, 2.0)
+) -> bpy.types.Material:
+    """A matt surface of one linear colour, or mottled between two."""
+    material = bpy.data.materials.new(name)
+    material.use_nodes = True
+    nodes, links = material.node_tree.nodes, material.node_tree.links
+    surface = nodes["Principled BSDF"]
+    surface.inputs["Base Color"].default_value = (*color, 1)
+    surface.inputs["Roughness"].default_value = 0.7
+    if second is None:
+        return material
+    place, mapping = nodes.new("ShaderNodeNewGeometry"), nodes.new("ShaderNodeMapping")
+    noise, ramp = nodes.new("ShaderNodeTexNoise"), nodes.new("ShaderNodeValToRGB")
+    mapping.inputs["Scale"].default_value = stretch
+    noise.inputs["Scale"].default_value = 2.0
+    noise.inputs["Detail"].default_value = 2.0
+    ramp.color_ramp.elements[0].position, ramp.color_ramp.elements[1].position = 0.4, 0.6
+    ramp.color_ramp.elements[0].color, ramp.color_ramp.elements[1].color = (*color, 1), (*second, 1)
+    links.new(place.outputs["Position"], mapping.inputs["Vector"])
+    links.new(mapping.outputs["Vector"], noise.inputs["Vector"])
+    links.new(noise.outputs["Fac"], ramp.inputs["Fac"])
+    links.new(ramp.outputs["Color"], surface.inputs["Base Color"])
+    return material
+
+
+def _person(body: Body) -> bpy.types.Object:
+    if body.face_material is None or body.material_colors is None:
+        raise ValueError(f"body '{body.name}' has no materials")
+    mesh = bpy.data.meshes.new("person")
+    mesh.from_pydata(body.v_template.tolist(), [], body.faces.tolist())
+    for name, color in zip(body.material_names, body.material_colors, strict=True):
+        material = _material(name, tuple(color[:3]))
+        material.node_tree.nodes["Principled BSDF"].inputs["Roughness"].default_value = 0.25 if "eye" in name else 0.6
+        mesh.materials.append(material)
+    mesh.polygons.foreach_set("material_index", body.face_material.astype(np.int32))
+    mesh.polygons.foreach_set("use_smooth", np.ones(len(body.faces), bool))
+    person = bpy.data.objects.new("person", mesh)
+    bpy.context.scene.collection.objects.link(person)
+    return person
