@@ -6,5 +6,6 @@
     expmap.py      comma separated exponential-map values on the CMU skeleton
     deepmimic.py   DeepMimic's humanoid motions (JSON)
     library.py     the archives -> list of takes
+    retarget.py    how a source's skeleton corresponds to our body's parts
     fit_body.py    takes -> poses, translations and shapes of our body; ``python -m scope.tools.mocap.fit_body``
 """

@@ -1,0 +1,226 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Fit our body to every take: ``python -m scope.tools.mocap.fit_body ARCHIVES -o build/mocap/motions.npz``.
+
+For each performer one shape from the bone lengths, then for each frame our own solver on
+
+    24000 Σ_j c_j |t_j − p̂_j|² + Σ_i w_i |log(R̂_iᵀ R_i)|² + joint limits + rest-pose prior
+
+with p̂ and R̂ from ``retarget.py``. The offsets o_j are the performer's mean of what a first pass over some frames, in
+which rotations outweigh positions, leaves over. The world has y up; poses and trans are as SMPL means them.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import time
+from dataclasses import dataclass
+from itertools import groupby
+from pathlib import Path
+
+import numpy as np
+
+from ...solver import Keypoints3D, Measurements, Options, PosePriors, Priors, Stage, State, Weights, fit_tree, make_tree
+from ...solver.body import Body, load_body
+from ...solver.residuals import joint_limits
+from ...solver.rotations import log
+from .library import load_library
+from .retarget import Correspondence, Follow, correspond, segment_rotations, shape_from_lengths, targets
+from .take import Take
+
+FPS = 30.0
+CALIBRATION_FRAMES = 200  # per performer, for the offsets
+ROUNDS = 2
+FREE_JOINT_WEIGHT = 50.0  # per radian^2, towards rest: parts that the source does not have
+FOLLOWING_JOINT_WEIGHT = 0.5
+FLOOR_QUANTILE = 0.05  # of the frames, ordered by the height of the lowest point of the feet
+SOLES = ("heel", "foot_index")
+# Degrees a joint's state can reach; beyond, the recording is broken (a left foot turned around in 01_12, for one).
+MOST_DEGREES = {"ankle": 75.0, "foot": 70.0, "wrist": 85.0, "hand": 60.0, "head": 60.0, "neck": 75.0, "collar": 50.0}
+MOST_DEGREES |= {"hip": 140.0, "knee": 155.0, "elbow": 160.0, "shoulder": 175.0}
+MOST_DEGREES_PER_SECOND = 1700.0  # of a joint; kicks and flips reach 1400
+
+
+@dataclass
+class FittedTake:
+    """Our body's motion for a take."""
+
+    take: Take
+    betas: np.ndarray  # (P,)
+    R: np.ndarray  # (T, K+1, 3, 3) part to world
+    t: np.ndarray  # (T, K+1, 3) joints, world, metres
+    poses: np.ndarray  # (T, 3 (K+1)) axis-angle
+    trans: np.ndarray  # (T, 3)
+    error: np.ndarray  # (T, K+1) metres between joint and target, NaN without target
+    valid: np.ndarray  # (T,) bool, False where the recording is broken
+
+
+class _Fitter:
+    """The solver set up for one performer."""
+
+    def __init__(self, body: Body, betas: np.ndarray, found: Correspondence, position_weight: float = 24000.0) -> None:
+        self.body, self.betas, self.found, self.tree = body, betas, found, make_tree(body)
+        names = list(body.joint_names)
+        self.parts = np.array([names.index(p) for p in found.parts])
+        self.joints = np.array([names.index(j) for j in found.points])
+        self.indices = len(body.keypoint_part) + self.joints
+        self.confidence = np.array([point.confidence for point in found.points.values()])
+        self.weights = np.array([follow.weight for follow in found.parts.values()])
+        followed = np.isin(np.arange(1, body.K + 1), self.parts)
+        self.priors = Priors(
+            joint_weights=np.where(followed, FOLLOWING_JOINT_WEIGHT, FREE_JOINT_WEIGHT),
+            shape_mean=betas,
+            limits=joint_limits.hinges_of(names),
+        )
+        weights = Weights(keypoints3d=position_weight, joint_prior=1.0, shape=1e8, pose_prior=1.0)
+        stage = Stage(weights, tolerance=1e-4, max_iterations=20)
+        self.options = Options(stages=(stage,), robust_keypoints3d=np.inf, damping=1e-3)
+
+    def __call__(self, R_target: np.ndarray, p_target: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Part poses R (T, K+1, 3, 3), t (T, K+1, 3) for targets (T, parts, 3, 3) and (T, points, 3)."""
+        T, n = len(R_target), self.body.K + 1
+        R, t = np.empty((T, n, 3, 3)), np.empty((T, n, 3))
+        none = np.zeros((len(self.parts), 3))
+        for k in range(T):
+            fit = fit_tree(
+                self.tree,
+                Measurements(
+                    keypoints3d=Keypoints3D(self.indices, p_target[k], self.confidence),
+                    pose_priors=PosePriors(self.parts, R_target[k], none, self.weights, np.zeros(len(self.parts))),
+                ),
+                self._start(R_target[k], p_target[k]),
+                self.priors,
+                self.options,
+            )
+            R[k], t[k] = fit.R_camera_part, fit.t_camera_part
+        return R, t
+
+    def _start(self, R_target: np.ndarray, p_target: np.ndarray) -> State:
+        """The state in which every part has its target's rotation and the joints their targets' centroid."""
+        R = np.empty((self.body.K + 1, 3, 3))
+        Omega = np.tile(np.eye(3), (self.body.K + 1, 1, 1))
+        for i, parent in enumerate(self.body.parents):
+            row = np.flatnonzero(self.parts == i)
+            R[i] = R_target[row[0]] if len(row) else R[parent]
+            Omega[i] = R[i] if parent < 0 else R[parent].T @ R[i]
+        _, t = self.body.forward_kinematics(Omega, np.zeros(3), self.betas)
+        return State(R[0], t[0] + (p_target - t[self.joints]).mean(axis=0), Omega[1:], self.betas)
+
+
+def fit_performer(body: Body, takes: list[Take]) -> list[FittedTake]:
+    """Fit all takes of one performer."""
+    betas = shape_from_lengths(body, takes[0])
+    found = correspond(body, betas, takes)
+    calibrate_offsets(body, betas, found, takes)
+    fitter = _Fitter(body, betas, found)
+    return [_fitted(body, betas, take, fitter) for take in takes]
+
+
+def calibrate_offsets(body: Body, betas: np.ndarray, found: Correspondence, takes: list[Take]) -> None:
+    """Set ``found.offset`` to the mean over frames of R_world_sᵀ (t_j − p_s), from fits on some frames of the takes."""
+    step = max(1, sum(map(len, takes)) // CALIBRATION_FRAMES)
+    some = [Take(t.name, t.subject, t.fps, t.joint_names, t.positions[::step], t.source,
+                 orientations=None if t.orientations is None else t.orientations[::step]) for t in takes]  # fmt: skip
+    for k in range(ROUNDS):
+        fitter = _Fitter(body, betas, found, position_weight=24.0 if k == 0 else 2400.0)
+        left_over: dict[str, list[np.ndarray]] = {joint: [] for joint in found.points}
+        for take in some:
+            _, t = fitter(*targets(take, found))
+            for joint, point in found.points.items():
+                gap = t[:, body.joint_names.index(joint)] - take.joint(point.joint)
+                R = segment_rotations(take, Follow(point.segment))
+                left_over[joint].append(np.einsum("tji,tj->ti", R, gap))
+        found.offset = {joint: np.concatenate(gaps).mean(axis=0) for joint, gaps in left_over.items()}
+
+
+def _fitted(body: Body, betas: np.ndarray, take: Take, fitter: _Fitter) -> FittedTake:
+    R_target, p_target = targets(take, fitter.found)
+    R, t = fitter(R_target, p_target)
+    error = np.full(t.shape[:2], np.nan)
+    error[:, fitter.joints] = np.linalg.norm(t[:, fitter.joints] - p_target, axis=2)
+    # The floor goes to y = 0.
+    soles = [i for n, i in body.keypoint_set("blazepose").items() if n.endswith(SOLES)]
+    height = body.keypoints(R, t, betas)[:, soles, 1].min(axis=1)
+    t = t - [0.0, np.quantile(height, FLOOR_QUANTILE), 0.0]
+    Omega = R.copy()
+    Omega[:, 1:] = np.swapaxes(R[:, body.parents[1:]], -1, -2) @ R[:, 1:]
+    poses = log(Omega).reshape(len(R), -1)
+    valid = plausible(body, Omega, take.fps)
+    return FittedTake(take, betas, R, t, poses, t[:, 0] - body.rest_joints(betas)[0], error, valid)
+
+
+def plausible(body: Body, Omega: np.ndarray, fps: float) -> np.ndarray:
+    """(T,) bool: every joint of (T, K+1, 3, 3) states is within its range, and turns no faster than joints do."""
+    most = np.array([MOST_DEGREES.get(name.rpartition("_")[2], 180.0) for name in body.joint_names])
+    inside = (np.degrees(np.linalg.norm(log(Omega[:, 1:]), axis=-1)) <= most[1:]).all(axis=1)
+    turns = log(np.swapaxes(Omega[:-1, 1:], -1, -2) @ Omega[1:, 1:])
+    slow = (np.degrees(np.linalg.norm(turns, axis=-1)) * fps <= MOST_DEGREES_PER_SECOND).all(axis=1)
+    return inside & np.append(True, slow) & np.append(slow, True)
+
+
+def fit_library(body: Body, takes: list[Take]) -> list[FittedTake]:
+    """Fit every take but mirror images, performer by performer."""
+    chosen = sorted((t for t in takes if not t.mirrored), key=lambda t: (t.source, t.subject, t.name))
+    return [f for _, group in groupby(chosen, key=lambda t: t.subject) for f in fit_performer(body, list(group))]
+
+
+def save(path: Path, body: Body, fitted: list[FittedTake]) -> None:
+    """Write all motions into one .npz.
+
+    poses (F, 3(K+1)) f32, trans (F, 3) f32, joint_error (F, K+1) f32 metres or NaN, valid (F,) bool (False where the
+    recording is broken). Take k has the frames take_start[k]:take_start[k+1], take_name, take_source, take_subject,
+    take_fps and take_betas[k]; up is ``y``.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    temporary = path.with_suffix(".part.npz")
+    np.savez_compressed(
+        temporary,
+        poses=np.concatenate([f.poses for f in fitted]).astype(np.float32),
+        trans=np.concatenate([f.trans for f in fitted]).astype(np.float32),
+        joint_error=np.concatenate([f.error for f in fitted]).astype(np.float32),
+        valid=np.concatenate([f.valid for f in fitted]),
+        take_start=np.cumsum([0] + [len(f.take) for f in fitted]),
+        take_name=np.array([f.take.name for f in fitted]),
+        take_source=np.array([f.take.source for f in fitted]),
+        take_subject=np.array([f.take.subject for f in fitted]),
+        take_fps=np.array([f.take.fps for f in fitted]),
+        take_betas=np.array([f.betas for f in fitted]),
+        body_model=body.name,
+        up="y",
+    )
+    os.replace(temporary, path)
+
+
+def report(body: Body, fitted: list[FittedTake]) -> str:
+    """Minutes and joint errors (median / 95 %) for each source, and the errors of each joint."""
+    lines = []
+    for source, group in groupby(fitted, key=lambda f: f.take.source):
+        of_source = list(group)
+        error = np.concatenate([f.error for f in of_source]) * 1000
+        minutes = sum(f.take.seconds for f in of_source) / 60
+        known = error[np.isfinite(error)]
+        lines.append(f"{source}: {len(of_source)} takes, {minutes:.1f} min, {len(error)} frames, joint error "
+                     f"{np.median(known):.1f} / {np.quantile(known, 0.95):.1f} mm, "
+                     f"{sum(int((~f.valid).sum()) for f in of_source)} frames broken")  # fmt: skip
+        for j, name in enumerate(body.joint_names):
+            if np.isfinite(error[:, j]).all():
+                lines.append(f"    {name:15s} {np.median(error[:, j]):5.1f} / {np.quantile(error[:, j], 0.95):5.1f}")
+    return "\n".join(lines)
+
+
+def main() -> None:
+    """Command line."""
+    parser = argparse.ArgumentParser(description="Fit the default body to the motion archives.")
+    parser.add_argument("archives", type=Path, help="folder with the three .tar.xz")
+    parser.add_argument("-o", "--output", type=Path, default=Path("build/mocap/motions.npz"))
+    arguments = parser.parse_args()
+    start = time.perf_counter()
+    body = load_body("scope")
+    fitted = fit_library(body, load_library(arguments.archives, FPS))
+    save(arguments.output, body, fitted)
+    print(report(body, fitted))
+    print(f"{arguments.output}: {time.perf_counter() - start:.0f} s")
+
+
+if __name__ == "__main__":
+    main()
