@@ -1,8 +1,39 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How every kernel of the solver is compiled."""
+"""How every kernel of the solver is compiled, and when its cached machine code is still good."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
 
 from numba import njit
 
 # Reordering sums and fusing multiplications is allowed; assuming that no NaN or infinity occurs is not, because the
 # optimizer must recognise them. The GIL is released, so that frames can be solved in threads.
-kernel = njit(cache=True, nogil=True, error_model="numpy", fastmath={"reassoc", "contract", "arcp", "nsz"})
+_OPTIONS = {"nogil": True, "error_model": "numpy", "fastmath": {"reassoc", "contract", "arcp", "nsz"}}
+
+
+def source_stamp() -> tuple:
+    """Return name, modification time and size of every source file that kernels may come from."""
+    here = Path(__file__).parent
+    files = sorted([*here.glob("*.py"), *here.glob("residuals/*.py")])
+    return tuple((f.name, s.st_mtime, s.st_size) for f in files for s in [f.stat()])
+
+
+_STAMP = source_stamp()
+
+
+def kernel(function: Callable[..., Any]) -> Any:
+    """Compile a kernel on its first call, and keep the machine code for later sessions.
+
+    Numba throws a cached kernel away when its own file has changed, but kernels are inlined into their callers in
+    other files, which would go on using the old code; so the stamp that numba compares covers all of them.
+    Where no folder can be written to, nothing is kept.
+    """
+    try:
+        compiled = njit(cache=True, **_OPTIONS)(function)
+    except RuntimeError:  # numba found no place for its cache
+        return njit(**_OPTIONS)(function)
+    cache_file = getattr(getattr(compiled, "_cache", None), "_cache_file", None)
+    if hasattr(cache_file, "_source_stamp"):  # not part of numba's interface: without it, numba's own rule stands
+        cache_file._source_stamp = _STAMP
+    return compiled

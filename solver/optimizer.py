@@ -13,7 +13,7 @@ from .kernel import kernel
 from .linearize import linearize, make_blocks, make_pose
 from .measurements import Measurements
 from .options import COLD_STAGES, WARM_STAGES, Options, Priors, default_priors
-from .recursion import eliminate, make_workspace, retract, step
+from .recursion import Workspace, eliminate, make_workspace, retract, step
 from .residuals.part import Array, Blocks, Pose
 from .residuals.registry import SHAPE_PRIOR
 from .state import Fit, State, Status
@@ -121,9 +121,9 @@ def fit_tree(tree: Tree, measurements: Measurements, init: State | None, priors:
 
 
 def shape_information(
-    tree: Tree, terms: Terms, stage: Array, pose: Pose, blocks: Blocks, options: Options, work: object
+    tree: Tree, terms: Terms, stage: Array, pose: Pose, blocks: Blocks, options: Options, work: Workspace
 ) -> Array:
     """Return C - N_0ᵀ M_0^-1 N_0 (P, P) without the shape prior: what one frame says about beta, pose eliminated."""
     eliminate(tree, pose, blocks, DAMPING_LEAST, 1.0 / options.root_length, work)
     P = tree.shape
-    return work.C[:P, :P] - stage[0, SHAPE_PRIOR] * terms.shape_information[:P, :P]  # type: ignore[attr-defined]
+    return work.C[:P, :P] - stage[0, SHAPE_PRIOR] * terms.shape_information[:P, :P]

@@ -10,12 +10,15 @@ allocated. The lower half does the same on numpy arrays with any leading dimensi
 """
 
 import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .errors import ShapeError
 from .kernel import kernel
+
+Array = NDArray[Any]
 
 _PI_MARGIN = 1e-4  # above cos(angle) = -1 + this, the antisymmetric part of R still fixes the axis accurately
 
@@ -98,14 +101,14 @@ def left_jacobian_inverse3(x: float, y: float, z: float) -> tuple:
     )  # fmt: skip
 
 
-def _array(value: ArrayLike, tail: tuple[int, ...], name: str) -> NDArray[np.float64]:
+def _array(value: ArrayLike, tail: tuple[int, ...], name: str) -> Array:
     array = np.asarray(value, dtype=np.float64)
     if array.shape[-len(tail) :] != tail:
         raise ShapeError(f"{name} must have shape (..., {', '.join(map(str, tail))}), but got shape {array.shape}.")
     return array
 
 
-def hat(phi: ArrayLike) -> NDArray[np.float64]:
+def hat(phi: ArrayLike) -> Array:
     """Return [phi]x, shape (..., 3, 3), with [phi]x p = phi x p."""
     phi = _array(phi, (3,), "A rotation vector")
     out = np.zeros((*phi.shape, 3))
@@ -113,7 +116,7 @@ def hat(phi: ArrayLike) -> NDArray[np.float64]:
     return out - np.swapaxes(out, -1, -2)
 
 
-def _coefficients(phi: NDArray[np.float64]) -> tuple[NDArray[np.float64], ...]:
+def _coefficients(phi: Array) -> tuple[Array, ...]:
     """Return sin(th)/th, (1 - cos(th))/th^2, (th - sin(th))/th^3, each (..., 1, 1)."""
     s = np.sum(phi * phi, axis=-1)[..., None, None]
     small = s < 1e-2
@@ -124,7 +127,7 @@ def _coefficients(phi: NDArray[np.float64]) -> tuple[NDArray[np.float64], ...]:
     return a, b, c
 
 
-def exp(phi: ArrayLike) -> NDArray[np.float64]:
+def exp(phi: ArrayLike) -> Array:
     """Return the rotation matrices (..., 3, 3) of rotation vectors (..., 3)."""
     phi = _array(phi, (3,), "A rotation vector")
     a, b, _ = _coefficients(phi)
@@ -132,7 +135,7 @@ def exp(phi: ArrayLike) -> NDArray[np.float64]:
     return np.eye(3) + a * cross + b * (cross @ cross)
 
 
-def log(rotation: ArrayLike) -> NDArray[np.float64]:
+def log(rotation: ArrayLike) -> Array:
     """Return the rotation vectors (..., 3), of angle in [0, pi], of rotation matrices (..., 3, 3)."""
     quaternion = quaternion_from_matrix(rotation)
     w, v = quaternion[..., :1], quaternion[..., 1:]
@@ -142,7 +145,7 @@ def log(rotation: ArrayLike) -> NDArray[np.float64]:
     return v * np.where(small, 2.0 - 2.0 / 3.0 * n * n, 2.0 * np.arctan2(n, w) / np.where(small, 1.0, n))
 
 
-def left_jacobian(phi: ArrayLike) -> NDArray[np.float64]:
+def left_jacobian(phi: ArrayLike) -> Array:
     """Return J(phi) = I + b [phi]x + c [phi]x^2, shape (..., 3, 3)."""
     phi = _array(phi, (3,), "A rotation vector")
     _, b, c = _coefficients(phi)
@@ -150,7 +153,7 @@ def left_jacobian(phi: ArrayLike) -> NDArray[np.float64]:
     return np.eye(3) + b * cross + c * (cross @ cross)
 
 
-def left_jacobian_inverse(phi: ArrayLike) -> NDArray[np.float64]:
+def left_jacobian_inverse(phi: ArrayLike) -> Array:
     """Return J^-1(phi), shape (..., 3, 3), for |phi| < 2 pi."""
     phi = _array(phi, (3,), "A rotation vector")
     s = np.sum(phi * phi, axis=-1)[..., None, None]
@@ -162,7 +165,7 @@ def left_jacobian_inverse(phi: ArrayLike) -> NDArray[np.float64]:
     return np.eye(3) - 0.5 * cross + k * (cross @ cross)
 
 
-def quaternion_from_matrix(rotation: ArrayLike) -> NDArray[np.float64]:
+def quaternion_from_matrix(rotation: ArrayLike) -> Array:
     """Return unit quaternions (..., 4), w >= 0, of rotation matrices (..., 3, 3).
 
     Of the four ways to divide, each matrix takes the one by its largest component, which is never below 1/2.
@@ -184,7 +187,7 @@ def quaternion_from_matrix(rotation: ArrayLike) -> NDArray[np.float64]:
     return np.where(q[..., :1] < 0.0, -q, q)
 
 
-def matrix_from_quaternion(quaternion: ArrayLike) -> NDArray[np.float64]:
+def matrix_from_quaternion(quaternion: ArrayLike) -> Array:
     """Return the rotation matrices (..., 3, 3) of quaternions (..., 4), which need not be normalized."""
     q = _array(quaternion, (4,), "A quaternion")
     q = q / np.linalg.norm(q, axis=-1, keepdims=True)
@@ -192,7 +195,7 @@ def matrix_from_quaternion(quaternion: ArrayLike) -> NDArray[np.float64]:
     return np.eye(3) + 2.0 * q[..., :1, None] * cross + 2.0 * (cross @ cross)
 
 
-def nearest_rotation(matrix: ArrayLike) -> NDArray[np.float64]:
+def nearest_rotation(matrix: ArrayLike) -> Array:
     """Return the rotations (..., 3, 3) nearest to matrices in the Frobenius norm; the identity for non-finite ones."""
     m = _array(matrix, (3, 3), "A matrix")
     m = np.where(np.isfinite(m).all(axis=(-2, -1), keepdims=True), m, np.eye(3))

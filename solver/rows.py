@@ -14,11 +14,12 @@ from typing import Any
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
-from numba.extending import intrinsic
+from numba.extending import intrinsic as _intrinsic
 
 LANES = 4
 _VECTOR = ir.VectorType(ir.DoubleType(), LANES)
 _INT32 = ir.IntType(32)
+intrinsic: Any = _intrinsic  # its first parameter is the compiler's, which type checkers do not see
 
 
 def padded(n: int) -> int:

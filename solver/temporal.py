@@ -31,7 +31,8 @@ def with_previous(measurements: Measurements, previous: State, temporal: Tempora
     rows = joint_prior.pack(np.arange(1, K + 1), previous.Omega, np.full(K, temporal.joints))
     tables = dict(measurements.tables)
     if "joint_prior" in tables:
-        rows = tuple(np.concatenate([old, new]) for old, new in zip(tables["joint_prior"], rows, strict=True))
+        ints, floats = tables["joint_prior"]
+        rows = np.concatenate([ints, rows[0]]), np.concatenate([floats, rows[1]])
     tables["joint_prior"] = rows
     own = measurements.pose_priors or PosePriors(np.zeros(0, int), np.zeros((0, 3, 3)), np.zeros((0, 3)), [], [])
     root = PosePriors(

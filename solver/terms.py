@@ -163,7 +163,7 @@ def make_terms(tree: Tree, measurements: "Measurements", priors: "Priors") -> Te
     i2, m2 = m.packed2d(n_points)
     i3, m3 = m.packed3d(n_points)
     starts, ends, md = m.packed_directions(n_points)
-    *slots, bad = _pack(tree, i2, m2, i3, m3, starts, ends, md)
+    offsets, flags, rest, V, image, point, direction, bad = _pack(tree, i2, m2, i3, m3, starts, ends, md)
     if bad >= 0:
         raise ShapeError(
             f"Orientation {bad} goes from point {starts[bad]} to point {ends[bad]}, which no body part has in common; "
@@ -178,7 +178,13 @@ def make_terms(tree: Tree, measurements: "Measurements", priors: "Priors") -> Te
         tables[name] = np.concatenate([tables[name][0], ints]), np.concatenate([tables[name][1], floats])
     mean, information = priors.packed_shape(P)
     return Terms(
-        *slots,
+        offsets,
+        flags,
+        rest,
+        V,
+        image,
+        point,
+        direction,
         tuple(np.ascontiguousarray(tables[name][0], dtype=np.int64) for name in RESIDUALS),
         tuple(np.ascontiguousarray(tables[name][1], dtype=np.float64) for name in RESIDUALS),
         _padded(mean, (W,)),

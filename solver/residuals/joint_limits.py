@@ -116,7 +116,7 @@ def evaluate(
     """Return the residual (4 rows) times sqrt(weight) and its derivatives."""
     phi = log(part.Omega)
     J = left_jacobian_inverse(phi) @ part.R_parent.T
-    angle = axis @ phi
+    angle = float(axis @ phi)
     s = phi - angle * axis
     swing = np.linalg.norm(s)
     r, J_u = np.zeros(4), np.zeros((4, 3))

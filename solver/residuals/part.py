@@ -9,12 +9,12 @@ Derivatives are with respect to
 """
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+Array = NDArray[Any]  # float64, or int64 for indices
 
 
 @dataclass

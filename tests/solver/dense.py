@@ -44,7 +44,7 @@ def jacobian(body, state, residual, extra=0):
 
 
 def residuals(body, data, focal=False):
-    """The residual vector of the measurements in `data`, weights and first-order robust factors at the state included."""
+    """The function (state, d) -> unweighted residuals of `data`, a list of (n, width) arrays."""
     u = (data["pixels"][:, 0] - INTRINSICS[0, 2]) / INTRINSICS[0, 0]
     v = (data["pixels"][:, 1] - INTRINSICS[1, 2]) / INTRINSICS[1, 1]
 

@@ -1,0 +1,30 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Cached machine code is dropped when any file of the solver changes, not only the kernel's own."""
+
+import shutil
+import subprocess
+import sys
+
+SOURCE = {
+    "__init__.py": "",
+    "inner.py": "from .kernel import kernel\n\n\n@kernel\ndef inner(x):\n    return x + {value}.0\n",
+    "outer.py": "from .inner import inner\nfrom .kernel import kernel\n\n@kernel\ndef outer(x):\n    return inner(x)\n",
+}
+
+
+def test_a_changed_callee_reaches_its_cached_caller(tmp_path):
+    from scope.solver import kernel
+
+    package = tmp_path / "package"
+    package.mkdir()
+    shutil.copy(kernel.__file__, package)
+    found = []
+    for value in (1, 22):
+        for name, text in SOURCE.items():
+            if value == 1 or name == "inner.py":
+                (package / name).write_text(text.format(value=value))
+        code = "from package.outer import outer; print(outer(0.0), len(outer.stats.cache_hits))"
+        for _ in range(2):
+            run = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True)
+            found.append(run.stdout.split())
+    assert found == [["1.0", "0"], ["1.0", "1"], ["22.0", "0"], ["22.0", "1"]]
