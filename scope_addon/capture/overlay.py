@@ -131,7 +131,7 @@ def body_colors(body: Body, person: int) -> np.ndarray:
         return np.tile(tint(person), (len(body.faces), 1))
     linear = np.clip(body.material_colors[:, :3], 0, 1)
     srgb = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
-    return (0.7 * tint(person) + 0.3 * srgb)[body.face_material]
+    return (0.85 * tint(person) + 0.15 * srgb)[body.face_material]
 
 
 def camera_vertices(motion: Motion, body: Body, row: int) -> np.ndarray:
