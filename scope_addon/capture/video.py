@@ -30,6 +30,7 @@ import numpy as np
 
 from ...solver.errors import VideoError
 from .exif import read_exif
+from .quicktime import focal_35mm
 
 cv2.setLogLevel(0)  # silent: failures are reported by exception, in one sentence
 
@@ -157,7 +158,8 @@ def _open_moving(path: Path) -> Video:
         fps = exact_fps(reader.get(cv2.CAP_PROP_FPS)) or _fps_from_timestamps(reader)
         count = reader.get(cv2.CAP_PROP_FRAME_COUNT)
     height, width = first[1].shape[:2]
-    return Video(path, width, height, fps, max(1, int(count)) if 0 < count < 1e9 else 1)
+    frame_count = max(1, int(count)) if 0 < count < 1e9 else 1
+    return Video(path, width, height, fps, frame_count, focal_35mm(path))
 
 
 def exact_fps(fps: float) -> Fraction | None:
