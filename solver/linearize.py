@@ -14,7 +14,7 @@ from .kernel import kernel
 from .residuals import keypoint2d, keypoint3d, orientation_field, shape_prior
 from .residuals.part import GRADIENT, SHAPE, Array, Blocks, Pose
 from .residuals.registry import KEYPOINT2D, KEYPOINT3D, ORIENTATION_FIELD, SHAPE_PRIOR, accumulate_tables
-from .rows import add1, add3, set3
+from .rows import add1, add3, add_block, set3, set_block
 from .terms import HAS_2D, HAS_3D, HAS_DIRECTION, HAS_SHAPE, Terms
 from .tree import Tree
 
@@ -53,16 +53,14 @@ def place_parts(tree: Tree, pose: Pose) -> None:
             x += tree.S[i, 0, a] * b
             y += tree.S[i, 1, a] * b
             z += tree.S[i, 2, a] * b
-        s = 3 * i * W
-        add_to = 3 * i * W
-        parent = 3 * j * W
+        turn = (Q[0, 0], Q[0, 1], Q[0, 2], Q[1, 0], Q[1, 1], Q[1, 2], Q[2, 0], Q[2, 1], Q[2, 2])
+        set_block(D, 3 * i * W, W, turn, tree.S, 3 * i * W, W, W)
+        add1(D, 3 * i * W, 1.0, D, 3 * j * W, 3 * W)
         for r in range(3):
             q0, q1, q2 = Q[r, 0], Q[r, 1], Q[r, 2]
             for c in range(3):
                 R[i, r, c] = q0 * Om[0, c] + q1 * Om[1, c] + q2 * Om[2, c]
             t[i, r] = t[j, r] + q0 * x + q1 * y + q2 * z
-            set3(D, add_to + r * W, q0, q1, q2, tree.S, s, s + W, s + 2 * W, W)
-            add1(D, add_to + r * W, 1.0, D, parent + r * W, W)
 
 
 @kernel
@@ -131,13 +129,13 @@ def linearize(
                     nx, ny, nz = nx + ey * pz - ez * py, ny + ez * px - ex * pz, nz + ex * py - ey * px
             if flags & HAS_3D:
                 q = terms.point[j]
-                e, w, k, ux, uy, uz = keypoint3d.term(
+                e, w3d, k, ux, uy, uz = keypoint3d.term(
                     ex + tx, ey + ty, ez + tz, q[0], q[1], q[2], w3 * q[3], k3, triggs
                 )
                 cost += e
                 gx, gy, gz = gx + ux, gy + uy, gz + uz
-                w00, w01, w02 = w00 + w - k * ux * ux, w01 - k * ux * uy, w02 - k * ux * uz
-                w11, w12, w22 = w11 + w - k * uy * uy, w12 - k * uy * uz, w22 + w - k * uz * uz
+                w00, w01, w02 = w00 + w3d - k * ux * ux, w01 - k * ux * uy, w02 - k * ux * uz
+                w11, w12, w22 = w11 + w3d - k * uy * uy, w12 - k * uy * uz, w22 + w3d - k * uz * uz
             # position terms: [e]x W, and the force
             b00, b01, b02 = ey * w02 - ez * w01, ey * w12 - ez * w11, ey * w22 - ez * w12
             b10, b11, b12 = ez * w00 - ex * w02, ez * w01 - ex * w12, ez * w02 - ex * w22
@@ -150,13 +148,10 @@ def linearize(
             shaped = flags & HAS_SHAPE
             if shaped:
                 v = 3 * j * W
-                set3(scratch, 0, r00, r01, r02, V, v, v + W, v + 2 * W, W)
-                set3(scratch, W, r10, r11, r12, V, v, v + W, v + 2 * W, W)
-                set3(scratch, 2 * W, r20, r21, r22, V, v, v + W, v + 2 * W, W)
+                set_block(scratch, 0, W, (r00, r01, r02, r10, r11, r12, r20, r21, r22), V, v, W, W)
                 if flags & (HAS_2D | HAS_3D):
-                    add3(A, base + 3 * row + SHAPE, w00, w01, w02, scratch, 0, W, 2 * W, W)
-                    add3(A, base + 4 * row + SHAPE, w01, w11, w12, scratch, 0, W, 2 * W, W)
-                    add3(A, base + 5 * row + SHAPE, w02, w12, w22, scratch, 0, W, 2 * W, W)
+                    w = (w00, w01, w02, w01, w11, w12, w02, w12, w22)
+                    add_block(A, base + 3 * row + SHAPE, row, w, scratch, 0, W, W)
             if flags & HAS_DIRECTION:
                 q = terms.direction[j]
                 e, d00, d01, d02, d11, d12, d22, ux, uy, uz = orientation_field.term(
@@ -176,12 +171,9 @@ def linearize(
             y22 += ex * b21 - ey * b20
             mx, my, mz = mx + ey * gz - ez * gy, my + ez * gx - ex * gz, mz + ex * gy - ey * gx
             if shaped:
-                add3(A, base + SHAPE, b00, b01, b02, scratch, 0, W, 2 * W, W)
-                add3(A, base + row + SHAPE, b10, b11, b12, scratch, 0, W, 2 * W, W)
-                add3(A, base + 2 * row + SHAPE, b20, b21, b22, scratch, 0, W, 2 * W, W)
-                set3(scratch, 3 * W, w00, w01, w02, scratch, 0, W, 2 * W, W)
-                set3(scratch, 4 * W, w01, w11, w12, scratch, 0, W, 2 * W, W)
-                set3(scratch, 5 * W, w02, w12, w22, scratch, 0, W, 2 * W, W)
+                add_block(A, base + SHAPE, row, (b00, b01, b02, b10, b11, b12, b20, b21, b22), scratch, 0, W, W)
+                w = (w00, w01, w02, w01, w11, w12, w02, w12, w22)
+                set_block(scratch, 3 * W, W, w, scratch, 0, W, W)
                 for a in range(P):
                     s = a & ~3
                     add3(
@@ -196,9 +188,7 @@ def linearize(
         d = 3 * i * W
         if i > 0 and P > 0:
             lin = base + 3 * row + SHAPE
-            set3(scratch, 0, a00, a01, a02, D, d, d + W, d + 2 * W, W)
-            set3(scratch, W, a01, a11, a12, D, d, d + W, d + 2 * W, W)
-            set3(scratch, 2 * W, a02, a12, a22, D, d, d + W, d + 2 * W, W)
+            set_block(scratch, 0, W, (a00, a01, a02, a01, a11, a12, a02, a12, a22), D, d, W, W)
             for r in range(3):
                 # H = G + A D / 2, then C += HT D + DT H
                 set3(scratch, (3 + r) * W, 1.0, 0.0, 0.0, A, lin + r * row, lin, lin, W)
@@ -215,9 +205,7 @@ def linearize(
             for r in range(3):
                 add1(A, lin + r * row, 1.0, scratch, r * W, W)
             ang = base + SHAPE
-            add3(A, ang, x00, x01, x02, D, d, d + W, d + 2 * W, W)
-            add3(A, ang + row, x10, x11, x12, D, d, d + W, d + 2 * W, W)
-            add3(A, ang + 2 * row, x20, x21, x22, D, d, d + W, d + 2 * W, W)
+            add_block(A, ang, row, (x00, x01, x02, x10, x11, x12, x20, x21, x22), D, d, W, W)
             add3(c, 0, fx, fy, fz, D, d, d + W, d + 2 * W, W)
             if fit_focal:
                 for a in range(P):
@@ -229,9 +217,7 @@ def linearize(
         # shift to the pelvis: moments gain s x force, with s the part's origin from there
         sx, sy, sz = tx - ox, ty - oy, tz - oz
         lin = base + 3 * row + SHAPE
-        add3(A, base + SHAPE, 0.0, -sz, sy, A, lin, lin + row, lin + 2 * row, W)
-        add3(A, base + row + SHAPE, sz, 0.0, -sx, A, lin, lin + row, lin + 2 * row, W)
-        add3(A, base + 2 * row + SHAPE, -sy, sx, 0.0, A, lin, lin + row, lin + 2 * row, W)
+        add_block(A, base + SHAPE, row, (0.0, -sz, sy, sz, 0.0, -sx, -sy, sx, 0.0), A, lin, row, W)
         # Z = X + [s]x A is the corner of M; M_aa = Y + X [s]xT + [s]x ZT
         z00, z01, z02 = x00 + sy * a02 - sz * a01, x01 + sy * a12 - sz * a11, x02 + sy * a22 - sz * a12
         z10, z11, z12 = x10 + sz * a00 - sx * a02, x11 + sz * a01 - sx * a12, x12 + sz * a02 - sx * a22

@@ -19,7 +19,7 @@ import numpy as np
 from .kernel import kernel
 from .residuals.part import GRADIENT, SHAPE, Array, Blocks, Pose
 from .rotations import exp3
-from .rows import add1, add3, set3
+from .rows import add1, add3, add_block, set_block
 from .tree import Tree
 
 TINY = 1e-13  # a pivot below this share of its diagonal is no information: that direction stays where it is
@@ -91,10 +91,9 @@ def eliminate(tree: Tree, pose: Pose, blocks: Blocks, damping: float, root_scale
         sx, sy, sz = pose.t[i, 0] - ox, pose.t[i, 1] - oy, pose.t[i, 2] - oz
         base, y = 6 * i * row, 3 * i * row
         # UT A = moment about the joint: A_ang - s x A_lin, plus the joint's own row
-        for k in range(row):
-            Y[i, 0, k] = A[i, 0, k] + blocks.H_u[i, 0, k] - sy * A[i, 5, k] + sz * A[i, 4, k]
-            Y[i, 1, k] = A[i, 1, k] + blocks.H_u[i, 1, k] - sz * A[i, 3, k] + sx * A[i, 5, k]
-            Y[i, 2, k] = A[i, 2, k] + blocks.H_u[i, 2, k] - sx * A[i, 4, k] + sy * A[i, 3, k]
+        set_block(Y, y, row, (0.0, sz, -sy, -sz, 0.0, sx, sy, -sx, 0.0), A, base + 3 * row, row, row)
+        add1(Y, y, 1.0, A, base, 3 * row)
+        add1(Y, y, 1.0, blocks.H_u, y, 3 * row)
         T = Y[i]
         H = blocks.H_uu[i]
         # Q = Y U + H_uu + lambda I (+ UT H_uxT)
@@ -124,15 +123,18 @@ def eliminate(tree: Tree, pose: Pose, blocks: Blocks, damping: float, root_scale
         i20 = -(l20 * i00 + l21 * i10) * i22
         F = L[i]
         F[0], F[1], F[2], F[3], F[4], F[5] = i00, i10, i11, i20, i21, i22
-        set3(Y, y + 2 * row, i20, i21, i22, Y, y, y + row, y + 2 * row, row)
-        set3(Y, y + row, i10, i11, 0.0, Y, y, y + row, y, row)
-        set3(Y, y, i00, 0.0, 0.0, Y, y, y, y, row)
+        set_block(Y, y, row, (i00, 0.0, 0.0, i10, i11, 0.0, i20, i21, i22), Y, y, row, row)
         g0, g1, g2 = T[0, GRADIENT], T[1, GRADIENT], T[2, GRADIENT]
         squares += g0 * g0 + g1 * g1 + g2 * g2
         to = 6 * tree.parents[i] * row
         add1(A, to, 1.0, A, base, 6 * row)
-        for r in range(6):
-            add3(A, to + r * row, -T[0, r], -T[1, r], -T[2, r], Y, y, y + row, y + 2 * row, row)
+        for r in range(0, 6, 3):
+            minus = (
+                -T[0, r], -T[1, r], -T[2, r],
+                -T[0, r + 1], -T[1, r + 1], -T[2, r + 1],
+                -T[0, r + 2], -T[1, r + 2], -T[2, r + 2],
+            )  # fmt: skip
+            add_block(A, to + r * row, row, minus, Y, y, row, row)
         e = y + SHAPE
         add3(c, 0, -g0, -g1, -g2, Y, e, e + row, e + 2 * row, W)
         for a in range(P):
