@@ -107,13 +107,6 @@ def _build(
     if options.frame_rate == "set":
         timing.set_scene_rate(scene, motions[0].mocap_framerate)
     rate = timing.scene_rate(scene)
-    if footage is not None and len(motions[0]) > 1 and timing.blender_rate(motions[0].mocap_framerate) != (
-        timing.blender_rate(rate)
-    ):
-        warnings.append(
-            f"the scene plays {rate:.6g} frames a second but the footage {motions[0].mocap_framerate:.6g}: the motion "
-            "keeps its speed, the picture behind it does not; set the scene's rate to the footage's to compare them"
-        )
     collection = bpy.data.collections.new(name)
     collection[CAPTURE_TAG] = motions[0].source or name
     scene.collection.children.link(collection)
@@ -180,7 +173,7 @@ def _build_cameras(
                 "set the scene's resolution from the footage for an exact overlay"
             )
         if footage is not None:
-            warnings += camera.show_footage(person.camera, footage, person.motion, options.start_frame)
+            warnings += camera.show_footage(person.camera, footage, person.motion, person.frames)
     return warnings
 
 

@@ -92,15 +92,20 @@ def same_camera(a: Motion, b: Motion) -> bool:
     )
 
 
-def show_footage(camera: bpy.types.Object, footage: str | Path, motion: Motion, start_frame: float) -> list[str]:
-    """Put the footage behind the scene when one looks through the camera; its first frame at ``start_frame``.
+def show_footage(camera: bpy.types.Object, footage: str | Path, motion: Motion, frames: np.ndarray) -> list[str]:
+    """Put the footage behind the scene when one looks through the camera.
 
+    Blender shows one frame of a clip per frame of the scene, so it agrees with the motion where the scene's rate is
+    the footage's and constant; a picture stays.
+
+    :param frames: (T,) scene frame of each pose.
     :return: warnings: what will not line up.
     :raises VideoError: the file is missing.
     """
     path = Path(footage).resolve()
     if not path.is_file():
         raise VideoError(f"the footage {path} does not exist; give the video or picture the motion was captured from")
+    warnings: list[str] = []
     background = camera.data.background_images.new()
     background.alpha = 1.0
     background.display_depth = "BACK"
@@ -112,25 +117,34 @@ def show_footage(camera: bpy.types.Object, footage: str | Path, motion: Motion, 
         size = tuple(background.image.size)
     else:
         clip = bpy.data.movieclips.load(str(path), check_existing=True)
-        clip.frame_start = round(start_frame)
+        clip.frame_start = round(frames[0] - motion.frames[0])
+        drift = float(np.abs(frames - (clip.frame_start + motion.frames)).max())
+        if drift > 1.0:
+            warnings.append(
+                f"the picture behind the scene drifts from the motion by up to {drift:.0f} frames, because the scene "
+                "does not play at the footage's constant frame rate; the motion keeps its speed"
+            )
         background.source = "MOVIE_CLIP"
         background.clip = clip
         size = tuple(clip.size)
         _set_lens_distortion(clip, background, motion)
     if not min(size):
-        return [f"Blender cannot decode {path.name}, so the camera shows no footage"]
-    if tuple(motion.image_size) != size:
-        return [
+        warnings = [f"Blender cannot decode {path.name}, so the camera shows no footage"]
+    elif tuple(motion.image_size) != size:
+        warnings.append(
             f"Blender shows {path.name} at {size[0]} x {size[1]}, but it was captured at {motion.image_size[0]} x "
             f"{motion.image_size[1]}: turn or scale the camera's background picture"
-        ]
-    return []
+        )
+    return warnings
 
 
 def _set_lens_distortion(
     clip: bpy.types.MovieClip, background: bpy.types.CameraBackgroundImage, motion: Motion
 ) -> None:
-    """Tell the clip its lens, and show it undistorted when the lens distorts: Blender's cameras are pinholes."""
+    """Tell the clip its lens, and show it undistorted when the lens distorts: Blender's cameras are pinholes.
+
+    Only the radial terms k1, k2, k3 go over: Blender and OpenCV write them alike.
+    """
     width, height = (float(n) for n in motion.image_size)
     lens = clip.tracking.camera
     lens.sensor_width = SENSOR_WIDTH

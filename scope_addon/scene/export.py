@@ -144,20 +144,17 @@ def _remove(result: BuildResult) -> None:
 @contextmanager
 def _temporary_scene(name: str) -> Iterator[bpy.types.Scene]:
     """An empty scene that is the window's while the block runs, and gone afterwards."""
-    window, before = bpy.context.window, bpy.context.scene
-    scene = bpy.data.scenes.new(name)
-    scene.world = None
-    try:
-        if window is None:
-            with bpy.context.temp_override(scene=scene, view_layer=scene.view_layers[0]):
-                yield scene
-        else:
+    # Edit mode and the exporters work on a window's scene; timers have no window of their own, so they borrow one.
+    window = bpy.context.window or bpy.context.window_manager.windows[0]
+    with bpy.context.temp_override(window=window):
+        before = window.scene
+        scene = bpy.data.scenes.new(name)
+        try:
             window.scene = scene
             yield scene
-    finally:
-        if window is not None:
+        finally:
             window.scene = before
-        bpy.data.scenes.remove(scene)
+            bpy.data.scenes.remove(scene)
 
 
 @contextmanager

@@ -12,14 +12,14 @@ SUFFIXES = (".glb", ".fbx", ".blend", ".bvh", ".usdc", ".npz")
 PER_PERSON = (".bvh", ".npz")  # formats that hold one person a file
 
 
-def check_output(path: str | Path) -> Path:
+def check_output(path: str | Path, suffixes: tuple[str, ...] = SUFFIXES) -> Path:
     """The path, when a file of a known format can be written there.
 
     :raises UsageError: unknown suffix. :raises OutputError: the folder is missing or cannot be written to.
     """
     path = Path(path)
-    if path.suffix.lower() not in SUFFIXES:
-        raise UsageError(f"cannot write '{path.name}': its suffix must be one of {', '.join(SUFFIXES)}")
+    if path.suffix.lower() not in suffixes:
+        raise UsageError(f"cannot write '{path.name}': its suffix must be one of {', '.join(suffixes)}")
     folder = path.parent
     if not folder.is_dir():
         raise OutputError(f"cannot write {path}: the folder {folder} does not exist; create it or choose another")

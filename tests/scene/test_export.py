@@ -38,6 +38,13 @@ def read_back(path: Path, rate: float = 30.0) -> float:
             bpy.ops.wm.fbx_import(filepath=str(path))
             return 1.0
         bpy.ops.import_scene.fbx(filepath=str(path), anim_offset=0.0)
+        # The older importer counts seconds in whole frame rates: it puts 29.97's keys at 30 a second.
+        stretch = rate / round(rate)
+        for curve in [c for obj in bpy.data.objects for c in actions.fcurves(obj)]:
+            coordinates = actions.read_keys(curve)
+            coordinates[:, 0] *= stretch
+            curve.keyframe_points.foreach_set("co", coordinates.ravel())
+            curve.update()
     elif path.suffix == ".blend":
         bpy.ops.wm.open_mainfile(filepath=str(path))
     elif path.suffix == ".usdc":
@@ -265,6 +272,13 @@ def test_exporting_motions_leaves_no_trace(body, make_motion, tmp_path):
     assert {kind: [b.name for b in getattr(bpy.data, kind)] for kind in kinds} == before
     assert window.scene == scene
     assert bpy.context.view_layer.objects.active.name == "Cube"
+
+
+def test_a_caller_without_a_window_can_export(body, make_motion, tmp_path):
+    with bpy.context.temp_override(window=None):  # as in a timer
+        assert bpy.context.window is None
+        written, _ = export_motions([make_motion(body, 2)], body, [tmp_path / "a.bvh", tmp_path / "b.glb"])
+    assert all(path.is_file() for path in written)
 
 
 @pytest.mark.parametrize("suffix", [".glb", ".fbx", ".usdc", ".blend"])
