@@ -13,15 +13,18 @@ import os
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import NoReturn, TextIO
 
-from ..solver.body import ASSETS, BUILT_IN
-from ..solver.errors import OutputError, ScopeError, UsageError
+from ..solver.body import ASSETS, BUILT_IN, Body
+from ..solver.errors import ScopeError, UsageError
+from .motion import Motion
+from .scene.output_paths import SUFFIXES, check_output, person_paths
 
 SAMPLE = ASSETS / "sample" / "sample.mp4"
 MOTION_SUFFIXES = (".npz",)
-SCENE_SUFFIXES = (".glb", ".fbx", ".blend", ".bvh", ".usdc")
+SHAPE_MODES = ("keyed", "per_frame", "baked")
 OVERLAY_SUFFIXES = (".mp4", ".png", ".jpg")
 QUALITIES = ("fast", "balanced", "best")
 
@@ -45,7 +48,7 @@ def build_parser() -> argparse.ArgumentParser:
         type=Path,
         default=[],
         metavar="OUT",
-        help=f"result file, may be repeated; the suffix says what: {', '.join(MOTION_SUFFIXES + SCENE_SUFFIXES)}"
+        help=f"result file, may be repeated; the suffix says what: {', '.join(SUFFIXES)}"
         " (default: .npz and .glb beside the video)",
     )
     capture.add_argument("--overlay", type=Path, metavar="FILE", help="draw the body over the footage (.mp4, .png, .jpg)")
@@ -55,8 +58,12 @@ def build_parser() -> argparse.ArgumentParser:
     capture.add_argument("--fov", type=float, metavar="DEGREES", help="field of view along the longer side")
     capture.add_argument("--calibration", type=Path, metavar="FILE", help="JSON with intrinsics, dist and size")
     capture.add_argument("--no-smoothing", action="store_true", help="keep every frame as it was solved")
-    capture.add_argument("--shape-keys-per-frame", action="store_true", help="key the shape on every frame")
-    capture.add_argument("--bake-shape", action="store_true", help="apply the shape to the mesh, without shape keys")
+    capture.add_argument(
+        "--shape-keys",
+        choices=SHAPE_MODES,
+        default="keyed",
+        help="keyed once, per_frame, or baked into the mesh for engines that clamp morphs (default: keyed)",
+    )
     capture.add_argument("--threads", type=int, default=0, metavar="N", help="threads for the networks (default: all)")
     capture.add_argument("--json", action="store_true", help="print a machine-readable report on stdout")
     capture.add_argument("--quiet", action="store_true", help="no progress bar")
@@ -105,10 +112,8 @@ def run_capture(args: argparse.Namespace) -> dict:
     )
     with _ProgressBar(sys.stderr, show=sys.stderr.isatty() and not args.quiet) as progress:
         result = capture(video, body, options, progress)
-        written: list[Path] = []
-        for path in outputs:
-            progress(f"writing {path.name}", 0, 0)
-            written += _write(path, result.motions, body, video, args)
+        progress("writing", 0, 0)
+        written = _write(outputs, result.motions, body, video, args)
         if args.overlay:
             write_overlay(args.overlay, video, result.motions, body, progress=lambda i, n: progress("overlay", i, n))
             written.append(args.overlay)
@@ -120,40 +125,39 @@ def run_capture(args: argparse.Namespace) -> dict:
     return report
 
 
-def _write(path: Path, motions: list, body, video: Path, args: argparse.Namespace) -> list[Path]:
-    if path.suffix.lower() in MOTION_SUFFIXES:
-        if len(motions) == 1:
-            motions[0].save(path)
-            return [path]
-        names = [path.with_name(f"{path.stem}.person{k}{path.suffix}") for k in range(1, len(motions) + 1)]
-        for motion, name in zip(motions, names, strict=True):
-            motion.save(name)
-        return names
-    from .scene.export import export_motions
+def _write(outputs: list[Path], motions: list[Motion], body: Body, video: Path, args: argparse.Namespace) -> list[Path]:
+    """Write every result file; bpy is loaded only when one of them needs a scene."""
+    motion_files = [p for p in outputs if p.suffix.lower() in MOTION_SUFFIXES]
+    scene_files = [p for p in outputs if p not in motion_files]
+    written: list[Path] = []
+    for path in motion_files:
+        targets = person_paths(path, len(motions))
+        for target, motion in zip(targets, motions, strict=True):
+            motion.save(target)
+        written += targets
+    if scene_files:
+        from .scene.build import NEW_SCENE
+        from .scene.export import export_motions
 
-    export_motions(
-        motions, body, path, footage=video, shape_keys_per_frame=args.shape_keys_per_frame, bake_shape=args.bake_shape
-    )
-    return [path]
+        options = replace(NEW_SCENE, name=video.stem, shape=args.shape_keys)
+        files, warnings = export_motions(motions, body, scene_files, footage=video, build_options=options)
+        written += files
+        for warning in warnings:
+            print(f"scope: warning: {warning}", file=sys.stderr)
+    return written
 
 
 def _check_outputs(outputs: list[Path], overlay: Path | None, video: Path) -> None:
     """Everything that can be known to fail is said before the work, not after it."""
-    wanted = [(p, MOTION_SUFFIXES + SCENE_SUFFIXES) for p in outputs]
-    wanted += [(overlay, OVERLAY_SUFFIXES)] if overlay else []
-    for path, suffixes in wanted:
-        if path.suffix.lower() not in suffixes:
-            raise UsageError(f"{path}: the suffix '{path.suffix}' is not known; use one of {', '.join(suffixes)}")
-        if path.is_dir():
-            raise OutputError(f"{path} is a folder; give a file name")
-        if not path.parent.is_dir():
-            raise OutputError(f"the folder {path.parent} does not exist; make it first or choose another")
-        if not os.access(path.parent, os.W_OK):
-            raise OutputError(f"the folder {path.parent} cannot be written to; choose another with -o")
+    for path in outputs:
+        check_output(path)
+    if overlay:
+        check_output(overlay, OVERLAY_SUFFIXES)
+    paths = [*outputs, overlay] if overlay else outputs
+    for path in paths:
         if path.exists() and video.exists() and path.samefile(video):
             raise UsageError(f"{path} is the footage itself; choose another name")
-    names = [str(p) for p, _ in wanted]
-    if len(set(names)) < len(names):
+    if len({str(p) for p in paths}) < len(paths):
         raise UsageError("two outputs have the same name; give each its own")
 
 
@@ -210,5 +214,19 @@ def _stdout_for_report() -> Iterator[TextIO]:
         os.close(real)
 
 
+def run() -> NoReturn:
+    """Entry point of a process of our own: ``main``, then an exit that cannot hang.
+
+    Blender's module destroys a condition variable at exit while one of its own threads still waits on it, which blocks
+    forever; everything of ours is written and closed by then, so the process leaves without those destructors.
+    """
+    status = main()
+    sys.stdout.flush()
+    sys.stderr.flush()
+    if "bpy" in sys.modules:
+        os._exit(status)
+    sys.exit(status)
+
+
 if __name__ == "__main__":
-    sys.exit(main())
+    run()

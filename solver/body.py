@@ -52,6 +52,7 @@ class Body:
     material_names: tuple[str, ...] = ()
     material_colors: np.ndarray | None = None  # (C, 4) linear RGBA
     license: str = ""
+    gender: str = "neutral"
 
     @property
     def K(self) -> int:
@@ -164,7 +165,9 @@ _REQUIRED += ("keypoint_shapedirs",)
 
 
 def load_body(which: str | Path = "scope") -> Body:
-    """Load a body by name (``scope``: K = 23, ``scope_h``: K = 51) or from a .npz in the same format.
+    """Load a body by name (``scope``: K = 23, ``scope_h``: K = 51), from a .npz in the same format, or a user's model.
+
+    A user's SMPL, SMPL+H, SMPL-X or STAR file (.npz, or .pkl) goes through ``loaders.load_model``. Our own format:
 
     Keys: joint_names, kintree_table (2, K+1), v_template, shapedirs, J_template, J_shapedirs, skin_joints,
     skin_weights, faces, keypoint_names/part/template/shapedirs; optional uv, uv_faces, face_material,
@@ -176,6 +179,10 @@ def load_body(which: str | Path = "scope") -> Body:
     if not path.is_file():
         names = ", ".join(BUILT_IN)
         raise ModelFileError(f"body '{which}' was not found: give one of {names}, or the path of a body .npz file")
+    from .loaders import is_user_model, load_model  # here, because the loaders build a Body
+
+    if is_user_model(path):
+        return load_model(path)
     data = read_npz(path, ModelFileError, "body file")
     missing = [k for k in _REQUIRED if k not in data]
     if missing:

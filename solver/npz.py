@@ -13,6 +13,9 @@ from .errors import InputError
 
 LARGEST_BYTES = 4 << 30  # unpacked; an hour of SMPL+H motion at 60 fps takes a quarter of this
 
+# What zipfile, zlib and numpy raise on damaged or hostile files.
+_BROKEN = (OSError, ValueError, KeyError, EOFError, RuntimeError, MemoryError, zipfile.BadZipFile, zlib.error)
+
 
 def read_npz(path: Path, error: type[InputError], what: str) -> dict[str, np.ndarray]:
     """All arrays of a .npz file, never unpickling.
@@ -29,5 +32,5 @@ def read_npz(path: Path, error: type[InputError], what: str) -> dict[str, np.nda
             return {key: file[key] for key in file.files}
     except FileNotFoundError as cause:
         raise error(f"{path} does not exist; choose an existing {what}") from cause
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error, NotImplementedError, RuntimeError) as cause:
+    except _BROKEN as cause:
         raise error(f"{path} is not a readable {what} ({cause}); choose another file") from cause

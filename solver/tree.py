@@ -11,14 +11,25 @@ from .rows import padded
 
 
 class BodyArrays(Protocol):
-    """What the solver reads of a body; `scope.solver.Body` has it, and so may any other object."""
+    """What the solver reads of a body; `scope.solver.Body` has it, and so may any other object.
 
-    parents: NDArray[np.int64]  # (K+1,), -1 for part 0
-    S: NDArray[np.float64]  # (K+1, 3, P), joint offsets by shape
-    l: NDArray[np.float64]  # (K+1, 3), joint offsets at beta = 0, metres
-    keypoint_part: NDArray[np.int64]  # (M,)
-    v_bar: NDArray[np.float64]  # (M, 3), keypoints relative to their part's origin at beta = 0, metres
-    V: NDArray[np.float64]  # (M, 3, P)
+    Properties, because reading is all the solver does: (K+1,) parents, -1 for part 0; (K+1, 3, P) S, joint offsets by
+    shape; (K+1, 3) l, joint offsets at beta = 0, metres; (M,) keypoint_part; (M, 3) v_bar, keypoints relative to
+    their part's origin at beta = 0, metres; (M, 3, P) V.
+    """
+
+    @property
+    def parents(self) -> np.ndarray: ...  # noqa: D102
+    @property
+    def S(self) -> np.ndarray: ...  # noqa: D102, N802
+    @property
+    def l(self) -> np.ndarray: ...  # noqa: D102, E743
+    @property
+    def keypoint_part(self) -> np.ndarray: ...  # noqa: D102
+    @property
+    def v_bar(self) -> np.ndarray: ...  # noqa: D102
+    @property
+    def V(self) -> np.ndarray: ...  # noqa: D102, N802
 
 
 class Tree(NamedTuple):

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import os
+import sys
 from pathlib import Path
 
 import pytest
@@ -20,3 +21,21 @@ def shared() -> Path:
             pytest.fail(f"{SHARED}/data must be there in CI: the tests on real clips may not be skipped")
         pytest.skip("../shared/data is not beside this checkout: the tests on real clips need it")
     return SHARED
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_unconfigure(config: pytest.Config) -> None:
+    """Leave without Blender's exit handlers, which can wait forever for a thread of their own (see ``cli.run``)."""
+    if "bpy" in sys.modules:
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(int(config.stash.get(EXIT_STATUS, 1)))
+
+
+EXIT_STATUS = pytest.StashKey[int]()
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> None:
+    """Remember the status for ``pytest_unconfigure``, which is not told."""
+    session.config.stash[EXIT_STATUS] = int(exitstatus)

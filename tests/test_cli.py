@@ -135,5 +135,5 @@ def test_help_names_every_option(capsys):
         cli.build_parser().parse_args(["capture", "--help"])
     assert stop.value.code == 0
     text = capsys.readouterr().out
-    for suffix in cli.MOTION_SUFFIXES + cli.SCENE_SUFFIXES:
+    for suffix in cli.SUFFIXES:
         assert suffix in text

@@ -71,8 +71,7 @@ def load_model(path: str | Path, max_betas: int = MAX_BETAS) -> Body:
     except MemoryError as cause:
         raise ModelFileError(f"{path} is too large for this computer's memory; choose a smaller body file") from cause
     _check(body, path)
-    if "gender" in Body.__dataclass_fields__:
-        body = replace(body, gender=read_gender(tables.arrays.get("gender"), path))  # type: ignore[call-arg]
+    body = replace(body, gender=read_gender(tables.arrays.get("gender"), path))
     return body
 
 

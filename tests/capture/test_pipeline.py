@@ -1,0 +1,147 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The main job on real footage with 3D truth and on our own clip with exact truth."""
+
+import json
+import subprocess
+import sys
+
+import cv2
+import numpy as np
+import pytest
+from scope.scope_addon.capture.pipeline import CaptureOptions, capture
+from scope.scope_addon.cli import SAMPLE
+from scope.scope_addon.motion import Motion
+from scope.solver.body import load_body
+from scope.solver.errors import CancelledError, NoPersonError
+
+
+@pytest.fixture(scope="module")
+def body():
+    return load_body("scope")
+
+
+@pytest.fixture(scope="module")
+def sample(body):
+    return capture(SAMPLE, body, CaptureOptions(quality="best"))
+
+
+def smpl_by_hand(body, pose, trans, betas):
+    """SMPL's own formula with 4x4 matrices and cv2's Rodrigues: rest joints, chain, blend. Joints and vertices."""
+    J = body.J_template + body.J_shapedirs @ betas
+    v = body.v_template + body.shapedirs @ betas
+    G = []
+    for i, p in enumerate(body.parents):
+        local = np.eye(4)
+        local[:3, :3] = cv2.Rodrigues(np.asarray(pose[3 * i : 3 * i + 3], float))[0]
+        local[:3, 3] = J[i] if p < 0 else J[i] - J[p]
+        G.append(local if p < 0 else G[p] @ local)
+    G = np.array(G)
+    joints = G[:, :3, 3] + trans
+    W = np.zeros((len(v), len(J)))
+    np.put_along_axis(W, body.skin_joints, 0, axis=1)
+    for s in range(body.skin_joints.shape[1]):
+        W[np.arange(len(v)), body.skin_joints[:, s]] += body.skin_weights[:, s]
+    for i in range(len(J)):
+        G[i, :3, 3] -= G[i, :3, :3] @ J[i]
+    verts = np.einsum("vk,kij,vj->vi", W, G, np.c_[v, np.ones(len(v))])[:, :3] + trans
+    return joints, verts
+
+
+def test_an_independent_smpl_formula_meets_joints_cam_through_world_from_camera(sample, body):
+    m = sample.motions[0]
+    for k in (0, len(m) // 2, len(m) - 1):
+        joints, verts = smpl_by_hand(body, m.poses[k], m.trans[k], m.betas.astype(float))
+        in_world = m.joints_cam[k] @ m.world_from_camera[k, :3, :3].T + m.world_from_camera[k, :3, 3]
+        assert np.abs(joints - in_world).max() < 1e-4
+        assert abs(verts[:, 2].min()) < 0.35  # on the floor, give or take a step or a jump
+
+
+def test_the_sample_is_captured_close_to_its_exact_truth(sample):
+    m = sample.motions[0]
+    truth = np.load(SAMPLE.with_name("sample_truth.npz"))
+    assert len(m) == len(truth["joints_cam"])
+    assert m.valid.mean() >= 0.98
+    ours, exact = (x - x[:, :1] for x in (m.joints_cam[m.valid], truth["joints_cam"][m.valid]))
+    limbs = [1, 2, 4, 5, 7, 8, 16, 17, 18, 19, 20, 21]
+    error = np.linalg.norm(ours - exact, axis=-1)[:, limbs].mean()
+    flat = np.linalg.norm(ours * [1, 1, 0] - exact, axis=-1)[:, limbs].mean()
+    assert error < 0.09
+    assert error < 0.8 * flat  # the depth is worth something
+    assert m.residual_px[m.valid].mean() < 0.015 * m.image_size.max()
+
+
+def test_the_motion_is_complete_and_its_values_are_sane(sample):
+    m = sample.motions[0]
+    assert np.array_equal(m.frames, np.arange(len(m)))
+    assert np.all(np.diff(m.timestamps) > 0)
+    for name in ("poses", "trans", "poses_raw", "trans_raw", "betas", "joints_cam", "keypoints2d", "world_from_camera"):
+        assert np.isfinite(getattr(m, name)).all(), name
+    assert (m.joints_cam[..., 2] > 0.3).all()
+    for name in ("joint_confidence", "foot_contact"):
+        assert (getattr(m, name) >= 0).all()
+        assert (getattr(m, name) <= 1).all()
+    R = m.world_from_camera[:, :3, :3]
+    assert np.allclose(R @ np.swapaxes(R, -1, -2), np.eye(3), atol=1e-9)
+    assert not np.array_equal(m.poses, m.poses_raw)
+
+
+def test_the_report_can_be_written_as_json_and_counts_right(sample):
+    report = json.loads(json.dumps(sample.report))
+    assert report["frames"] == len(sample.motions[0])
+    assert report["people"] == 1
+    assert {"decode", "networks", "solver", "total"} <= set(report["fps"])
+
+
+def test_real_footage_with_truth_beats_the_raw_landmarks(shared, body, tmp_path):
+    """Raw BlazePose-heavy has 129.7 mm MPJPE-root and 89 mm PA-MPJPE on this camera."""
+    result = capture(shared / "data/pose2sim/cam3.mp4", body, CaptureOptions(quality="best"))
+    result.motions[0].save(tmp_path / "cam3.npz")
+    argv = [sys.executable, shared / "tools/evaluate.py", shared / "data/pose2sim/truth_cam3.npz", tmp_path / "cam3.npz"]
+    figures = json.loads(subprocess.run(list(map(str, argv)), capture_output=True, text=True, check=True).stdout)
+    assert "warnings" not in figures
+    assert figures["coverage"] == 1.0
+    assert figures["mpjpe_root"] < 100
+    assert figures["pa_mpjpe"] < 75
+    assert figures["mpjpe_root"] < 0.8 * figures["mpjpe_root_flat"]
+    assert figures["lr_swap"] + figures["mirror"] + figures["mirror_swap"] <= 0.02
+    assert figures["best_offset"] == 0
+    assert figures["jitter_rel"] < 150
+
+
+def test_frames_without_the_person_are_filled_and_marked(body, tmp_path):
+    footage, blanked = cv2.VideoCapture(str(SAMPLE)), tmp_path / "blanked.avi"
+    size = int(footage.get(cv2.CAP_PROP_FRAME_WIDTH)), int(footage.get(cv2.CAP_PROP_FRAME_HEIGHT))
+    writer = cv2.VideoWriter(str(blanked), cv2.VideoWriter_fourcc(*"MJPG"), 30, size)
+    for k in range(30):
+        _, image = footage.read()
+        writer.write(np.full_like(image, 90) if 10 <= k < 18 else image)
+    writer.release()
+    result = capture(blanked, body, CaptureOptions(quality="fast"))
+    m = result.motions[0]
+    assert not m.valid[10:18].any()
+    assert m.valid[:9].all()
+    assert m.valid[20:].all()
+    assert np.isfinite(m.poses).all()
+    steps = np.linalg.norm(np.diff(m.joints_cam.mean(1), axis=0), axis=-1)
+    assert steps.max() < 0.15  # metres a frame: no jump into or out of the gap
+    assert any("8 of 30" in w or "9 of 30" in w or "10 of 30" in w for w in result.report["warnings"])
+
+
+def test_nobody_is_said_so(body, tmp_path):
+    cv2.imwrite(str(tmp_path / "grey.png"), np.full((300, 400, 3), 100, np.uint8))
+    with pytest.raises(NoPersonError, match="grey.png"):
+        capture(tmp_path / "grey.png", body, CaptureOptions(quality="fast"))
+
+
+def test_cancel_comes_through(body):
+    def cancel(stage, done, total):
+        if done >= 3:
+            raise CancelledError("stopped")
+
+    with pytest.raises(CancelledError):
+        capture(SAMPLE, body, CaptureOptions(quality="fast"), cancel)
+
+
+def test_a_motion_survives_its_file(sample, tmp_path):
+    sample.motions[0].save(tmp_path / "m.npz")
+    assert np.array_equal(Motion.load(tmp_path / "m.npz").poses, sample.motions[0].poses)
