@@ -40,7 +40,7 @@ def build_parser() -> argparse.ArgumentParser:
     parser = _Parser(prog="scope", description="Markerless motion capture: video in, animated body out.")
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND", parser_class=_Parser)
     capture = commands.add_parser("capture", help="capture the person in a video or picture")
-    capture.add_argument("video", nargs="?", type=Path, metavar="VIDEO", help="video or picture; the sample clip without")
+    capture.add_argument("video", nargs="?", type=Path, metavar="VIDEO", help="video or picture (default: a sample)")
     capture.add_argument(
         "-o",
         "--output",
@@ -51,7 +51,9 @@ def build_parser() -> argparse.ArgumentParser:
         help=f"result file, may be repeated; the suffix says what: {', '.join(SUFFIXES)}"
         " (default: .npz and .glb beside the video)",
     )
-    capture.add_argument("--overlay", type=Path, metavar="FILE", help="draw the body over the footage (.mp4, .png, .jpg)")
+    capture.add_argument(
+        "--overlay", type=Path, metavar="FILE", help="draw the body over the footage: .mp4, .png, .jpg"
+    )
     capture.add_argument("--quality", choices=QUALITIES, default="best", help="speed against accuracy (default: best)")
     capture.add_argument("--body", default="scope", help=f"{', '.join(BUILT_IN)} or a body .npz (default: scope)")
     capture.add_argument("--focal-mm", type=float, metavar="MM", help="35 mm equivalent focal length of the camera")

@@ -75,7 +75,7 @@ class Body:
         return self._minus_parent(self.J_template)
 
     @cached_property
-    def V(self) -> np.ndarray:  # noqa: N802
+    def V(self) -> np.ndarray:
         """(M, 3, P) V_j: shape derivative of keypoint j relative to its part's joint."""
         return self.keypoint_shapedirs - self.J_shapedirs[self.keypoint_part]
 
@@ -94,7 +94,7 @@ class Body:
         found = {n.split("/", 1)[1]: i for i, n in enumerate(self.keypoint_names) if n.startswith(prefix + "/")}
         if not found:
             sets = sorted({n.split("/", 1)[0] for n in self.keypoint_names})
-            raise ModelFileError(f"body '{self.name}' has no keypoint set '{prefix}'; it has {', '.join(sets) or 'none'}")
+            raise ModelFileError(f"body '{self.name}' has no keypoints '{prefix}'; it has {', '.join(sets) or 'none'}")
         return found
 
     def rest_joints(self, betas: np.ndarray | None = None) -> np.ndarray:

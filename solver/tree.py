@@ -21,7 +21,7 @@ class BodyArrays(Protocol):
     @property
     def parents(self) -> np.ndarray: ...  # noqa: D102
     @property
-    def S(self) -> np.ndarray: ...  # noqa: D102, N802
+    def S(self) -> np.ndarray: ...  # noqa: D102
     @property
     def l(self) -> np.ndarray: ...  # noqa: D102, E743
     @property
@@ -29,7 +29,7 @@ class BodyArrays(Protocol):
     @property
     def v_bar(self) -> np.ndarray: ...  # noqa: D102
     @property
-    def V(self) -> np.ndarray: ...  # noqa: D102, N802
+    def V(self) -> np.ndarray: ...  # noqa: D102
 
 
 class Tree(NamedTuple):

@@ -114,7 +114,16 @@ def test_a_picture_gives_a_motion_of_one_frame_and_json_alone_on_stdout(tmp_path
     assert ok
     cv2.imwrite(str(picture), frame)
     outputs = [tmp_path / "out.npz", tmp_path / "out.glb"]
-    argv = [sys.executable, "-m", "scope.scope_addon.cli", "capture", picture, "--json", "--overlay", tmp_path / "o.png"]
+    argv = [
+        sys.executable,
+        "-m",
+        "scope.scope_addon.cli",
+        "capture",
+        picture,
+        "--json",
+        "--overlay",
+        tmp_path / "o.png",
+    ]
     for path in outputs:
         argv += ["-o", path]
     done = subprocess.run(list(map(str, argv)), capture_output=True, text=True, env=dict(os.environ), check=False)

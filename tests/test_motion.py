@@ -53,14 +53,15 @@ def test_the_file_holds_plain_arrays_under_the_documented_names_and_types(tmp_pa
     with np.load(tmp_path / "a.npz", allow_pickle=False) as file:
         types = {k: file[k].dtype.kind + str(file[k].dtype.itemsize) for k in file.files if file[k].dtype.kind != "U"}
     assert types["poses"] == types["trans"] == types["betas"] == types["joints_cam"] == "f4"
-    assert types["frames"] == "i8" and types["timestamps"] == "f8" and types["mocap_framerate"] == "f8"
-    assert types["valid"] == "b1" and types["world_from_camera"] == types["intrinsics"] == "f8"
+    assert types["frames"] == "i8"
+    assert types["timestamps"] == types["mocap_framerate"] == types["world_from_camera"] == types["intrinsics"] == "f8"
+    assert types["valid"] == "b1"
 
 
 def test_a_wrong_shape_is_named():
+    motion = make_motion()
+    motion.trans = np.zeros((5, 3), np.float32)
     with pytest.raises(MotionFileError, match=r"trans must have shape \(4, 3\), but has \(5, 3\)"):
-        motion = make_motion()
-        motion.trans = np.zeros((5, 3), np.float32)
         motion.validate()
 
 

@@ -58,7 +58,8 @@ def choose_camera(
     :param metadata_focal_mm: as ``focal_mm``, from the file's own metadata.
     :raises UsageError: more than one of the user's ways at once, or an impossible value.
     """
-    given = [n for n, v in (("--focal-mm", focal_mm), ("--fov", fov_deg), ("--calibration", calibration)) if v is not None]
+    ways = {"--focal-mm": focal_mm, "--fov": fov_deg, "--calibration": calibration}
+    given = [name for name, value in ways.items() if value is not None]
     if len(given) > 1:
         raise UsageError(f"{' and '.join(given)} contradict each other: give one of them")
     longer = max(width, height)
@@ -66,12 +67,13 @@ def choose_camera(
         return _read_calibration(Path(calibration), width, height)
     if focal_mm is not None:
         if not 1.0 <= focal_mm <= 2000.0:
-            raise UsageError(f"--focal-mm {focal_mm:g} is not a focal length: give 35 mm equivalent millimetres, such as 26")
+            raise UsageError(f"--focal-mm {focal_mm:g} is not a focal length: give 35 mm equivalent ones, such as 26")
         return Camera(pinhole(width, height, focal_mm / FILM_WIDTH_MM * longer), np.zeros(5), f"given, {focal_mm:g} mm")
     if fov_deg is not None:
         if not 1.0 <= fov_deg <= 175.0:
-            raise UsageError(f"--fov {fov_deg:g} is not a field of view: give degrees along the longer side, such as 60")
-        return Camera(pinhole(width, height, _focal_from_fov(longer, fov_deg)), np.zeros(5), f"given, {fov_deg:g} degrees")
+            raise UsageError(f"--fov {fov_deg:g} is not a field of view: give degrees along the longer side, say 60")
+        focal_px = _focal_from_fov(longer, fov_deg)
+        return Camera(pinhole(width, height, focal_px), np.zeros(5), f"given, {fov_deg:g} degrees")
     if metadata_focal_mm:
         focal_px = metadata_focal_mm / FILM_WIDTH_MM * longer
         return Camera(pinhole(width, height, focal_px), np.zeros(5), f"the file's metadata, {metadata_focal_mm:g} mm")
@@ -93,7 +95,9 @@ def _read_calibration(path: Path, width: int, height: int) -> Camera:
     except OSError as error:
         raise InputError(f"cannot read the calibration {path}: {error.strerror}") from error
     except (ValueError, KeyError, TypeError, IndexError) as error:
-        raise InputError(f'{path} is not a calibration: it needs "intrinsics" (3x3), optionally "dist" and "size"') from error
+        raise InputError(
+            f'{path} is not a calibration: it needs "intrinsics" (3x3), if need be "dist", "size"'
+        ) from error
     good = K.shape == (3, 3) and dist.size <= 5 and np.isfinite(K).all() and np.isfinite(dist).all()
     if not good or K[0, 0] <= 0 or K[1, 1] <= 0 or known_width <= 0 or known_height <= 0:
         raise InputError(f"{path}: intrinsics must be 3x3 with positive focal lengths, dist at most 5 finite numbers")

@@ -43,11 +43,6 @@ _WEIGHTS = Weights(
 )
 # Joints that no pair of landmarks fixes on their own stay closer to rest.
 _STIFF_JOINTS = {"spine": 5.0, "collar": 5.0, "foot": 5.0, "hand": 5.0, "neck": 3.0, "head": 3.0}
-_COLD = (
-    Stage(replace(_WEIGHTS, orientation_field=1600.0, keypoints2d=1e3, joint_prior=30.0, shape=1000.0), 5e-2, 10),
-    Stage(replace(_WEIGHTS, keypoints2d=1e4, joint_prior=9.0, shape=100.0), 1e-2, 10),
-    Stage(_WEIGHTS, 1e-4, 50),
-)
 _WARM = (Stage(_WEIGHTS, 1e-4, 50),)
 _ROBUST = Options(robust_keypoints2d=0.01, robust_keypoints3d=0.1, robust_orientation_field=1.0)
 
@@ -104,16 +99,34 @@ def fit_track(body: Body, track: Track, camera: Camera, progress: Callable[[str,
 
 
 def _fit_frame(tree: Tree, measurements: Measurements, init: State | None, priors: Priors) -> Fit:
-    options = replace(_ROBUST, stages=_COLD if init is None else _WARM)
+    options = replace(_ROBUST, stages=_cold_stages(_WEIGHTS) if init is None else _WARM)
     return fit_tree(tree, measurements, init, priors, options)
 
 
 def _fit_shape(
     measurements: list[Measurements], body: Body, priors: Priors, progress: Callable[[str, int, int], None]
 ) -> np.ndarray:
-    """(P,) the one shape that these frames share."""
+    """(P,) the one shape that these frames share.
+
+    The detector misplaces a keypoint in the same way in every frame, so all frames together say as much about the
+    shape as one: the prior counts once a frame.
+    """
     progress("finding the shape", 0, 0)
-    return fit_clip(body, measurements, priors=priors, options=replace(_ROBUST, stages=_COLD)).beta
+    weights = replace(_WEIGHTS, shape=_WEIGHTS.shape * len(measurements))
+    return fit_clip(body, measurements, priors=priors, options=replace(_ROBUST, stages=_cold_stages(weights))).beta
+
+
+def _cold_stages(weights: Weights) -> tuple[Stage, ...]:
+    """From no estimate at all: directions and priors first, then the image, then everything at its own weight."""
+    return (
+        Stage(
+            replace(weights, orientation_field=1600.0, keypoints2d=1e3, joint_prior=30.0, shape=100 * weights.shape),
+            5e-2,
+            10,
+        ),
+        Stage(replace(weights, keypoints2d=1e4, joint_prior=9.0, shape=10 * weights.shape), 1e-2, 10),
+        Stage(weights, 1e-4, 50),
+    )
 
 
 def _joint_weights(body: Body) -> np.ndarray:

@@ -89,7 +89,7 @@ class Measurer:
 
 
 def place(world: np.ndarray, rays: np.ndarray, weight: np.ndarray) -> np.ndarray:
-    """(3,) translation that moves hip-centred points onto their rays: linear least squares, see the module's equation."""
+    """(3,) translation that moves hip-centred points onto their rays, by the least squares of the module's equation."""
     n = len(world)
     A = np.zeros((2 * n, 3))
     A[:n, 0] = A[n:, 1] = 1.0

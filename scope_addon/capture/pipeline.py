@@ -9,8 +9,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
 from ...solver.body import Body
 from ...solver.errors import NoPersonError
 from ..motion import Motion
@@ -83,7 +81,7 @@ def capture(path: str | Path, body: Body, options: CaptureOptions, progress: Pro
         )
     missing = int((~motion.valid).sum())
     if missing:
-        warnings.append(f"{path.name}: the person was not seen in {missing} of {len(motion)} frames; these are filled in")
+        warnings.append(f"{path.name}: nobody was seen in {missing} of {len(motion)} frames; these are filled in")
     report = {
         "source": str(path),
         "frames": len(motion),

@@ -28,7 +28,9 @@ def test_metadata_counts_only_without_the_users_word():
 
 def test_calibration_scales_with_the_footage(tmp_path):
     path = tmp_path / "cam.json"
-    path.write_text(json.dumps({"intrinsics": [[1000, 0, 500], [0, 1100, 300], [0, 0, 1]], "dist": [0.1, 0], "size": [1000, 600]}))
+    path.write_text(
+        json.dumps({"intrinsics": [[1000, 0, 500], [0, 1100, 300], [0, 0, 1]], "dist": [0.1, 0], "size": [1000, 600]})
+    )
     camera = choose_camera(2000, 1200, calibration=path)
     assert np.allclose(camera.intrinsics, [[2000, 0, 1000], [0, 2200, 600], [0, 0, 1]])
     assert np.allclose(camera.dist, [0.1, 0, 0, 0, 0])
@@ -36,7 +38,9 @@ def test_calibration_scales_with_the_footage(tmp_path):
 
 def test_undistorted_points_project_back_through_the_distortion(tmp_path):
     path = tmp_path / "cam.json"
-    path.write_text(json.dumps({"intrinsics": [[900, 0, 320], [0, 900, 240], [0, 0, 1]], "dist": [-0.2, 0.05, 0.001, -0.002, 0]}))
+    path.write_text(
+        json.dumps({"intrinsics": [[900, 0, 320], [0, 900, 240], [0, 0, 1]], "dist": [-0.2, 0.05, 0.001, -0.002, 0]})
+    )
     camera = choose_camera(640, 480, calibration=path)
     x, y = 0.2, -0.15  # normalized point; the Brown model written out
     k1, k2, p1, p2, _ = camera.dist
@@ -47,13 +51,18 @@ def test_undistorted_points_project_back_through_the_distortion(tmp_path):
     assert np.allclose(camera.undistort(pixels[None]), np.array([[x, y]]) * 900 + [320, 240], atol=0.05)
 
 
-@pytest.mark.parametrize("options", [{"focal_mm": 26, "fov_deg": 60}, {"fov_deg": 0}, {"fov_deg": 180}, {"focal_mm": -1}])
+@pytest.mark.parametrize(
+    "options", [{"focal_mm": 26, "fov_deg": 60}, {"fov_deg": 0}, {"fov_deg": 180}, {"focal_mm": -1}]
+)
 def test_contradictory_or_impossible_values_are_refused(options):
     with pytest.raises(UsageError):
         choose_camera(640, 480, **options)
 
 
-@pytest.mark.parametrize("text", ["", "[]", "{}", '{"intrinsics": 1}', '{"intrinsics": [[0,0,0],[0,0,0],[0,0,1]]}', '{"intrinsics": [["a"]]}'])
+@pytest.mark.parametrize(
+    "text",
+    ["", "[]", "{}", '{"intrinsics": 1}', '{"intrinsics": [[0,0,0],[0,0,0],[0,0,1]]}', '{"intrinsics": [["a"]]}'],
+)
 def test_a_broken_calibration_is_named(tmp_path, text):
     path = tmp_path / "cam.json"
     path.write_text(text)

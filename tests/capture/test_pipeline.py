@@ -96,7 +96,8 @@ def test_real_footage_with_truth_beats_the_raw_landmarks(shared, body, tmp_path)
     """Raw BlazePose-heavy has 129.7 mm MPJPE-root and 89 mm PA-MPJPE on this camera."""
     result = capture(shared / "data/pose2sim/cam3.mp4", body, CaptureOptions(quality="best"))
     result.motions[0].save(tmp_path / "cam3.npz")
-    argv = [sys.executable, shared / "tools/evaluate.py", shared / "data/pose2sim/truth_cam3.npz", tmp_path / "cam3.npz"]
+    truth = shared / "data/pose2sim/truth_cam3.npz"
+    argv = [sys.executable, shared / "tools/evaluate.py", truth, tmp_path / "cam3.npz"]
     figures = json.loads(subprocess.run(list(map(str, argv)), capture_output=True, text=True, check=True).stdout)
     assert "warnings" not in figures
     assert figures["coverage"] == 1.0

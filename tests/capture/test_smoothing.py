@@ -50,7 +50,9 @@ def test_rotations_stay_rotations_and_cross_pi_without_a_jump():
     R = turn(np.linspace(0, 4 * np.pi, 240) + 0.05 * np.random.default_rng(1).normal(size=240))[:, None]
     smooth = smooth_rotations(R, times)
     assert np.allclose(smooth @ np.swapaxes(smooth, -1, -2), np.eye(3), atol=1e-9)
-    steps = np.arccos(np.clip((np.trace(np.swapaxes(smooth[:-1, 0], -1, -2) @ smooth[1:, 0], axis1=1, axis2=2) - 1) / 2, -1, 1))
+    steps = np.arccos(
+        np.clip((np.trace(np.swapaxes(smooth[:-1, 0], -1, -2) @ smooth[1:, 0], axis1=1, axis2=2) - 1) / 2, -1, 1)
+    )
     assert steps.max() < 2.0 * (4 * np.pi / 239)
 
 

@@ -6,7 +6,9 @@ import pytest
 from scope.solver import frames
 
 
-@pytest.mark.parametrize("R", [frames.R_WORLD_MODEL, frames.R_WORLD_LEVELCAMERA, frames.R_CAMERA_BLENDCAM, frames.R_GLTF_WORLD])
+@pytest.mark.parametrize(
+    "R", [frames.R_WORLD_MODEL, frames.R_WORLD_LEVELCAMERA, frames.R_CAMERA_BLENDCAM, frames.R_GLTF_WORLD]
+)
 def test_every_convention_is_a_rotation(R):
     assert np.allclose(R @ R.T, np.eye(3)) and np.isclose(np.linalg.det(R), 1)
 
