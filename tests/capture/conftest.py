@@ -1,0 +1,44 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Frames of the real clips, read by plain OpenCV and not by the code under test."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+Frames = Callable[..., Iterator[np.ndarray]]
+
+
+@pytest.fixture(scope="session")
+def frames(shared: Path) -> Frames:
+    """``frames("clips/NAME", stop=None, every=1)``: RGB frames in order."""
+    cv2 = pytest.importorskip("cv2")
+
+    def read(name: str, stop: int | None = None, every: int = 1) -> Iterator[np.ndarray]:
+        video = cv2.VideoCapture(str(shared / "data" / f"{name}.mp4"))
+        index = 0
+        while stop is None or index < stop:
+            ok, image = video.read()
+            if not ok:
+                assert index, f"{name} cannot be read"
+                return
+            if index % every == 0:
+                yield np.ascontiguousarray(image[:, :, ::-1])
+            index += 1
+
+    return read
+
+
+@pytest.fixture(scope="session")
+def first_frame(frames: Frames) -> Callable[..., np.ndarray]:
+    """``first_frame("clips/NAME", skip=0)``."""
+    return lambda name, skip=0: list(frames(name, stop=skip + 1))[-1]
+
+
+@pytest.fixture(scope="session")
+def last_frame(frames: Frames) -> Callable[[str], np.ndarray]:
+    """``last_frame("clips/NAME")``."""
+    return lambda name: list(frames(name))[-1]
