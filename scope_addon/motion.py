@@ -12,6 +12,7 @@ import os
 import tempfile
 from dataclasses import dataclass, fields
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -102,7 +103,7 @@ class Motion:
         missing = sorted(known - set(data) - {"source"})
         if missing:
             raise MotionFileError(f"{path} lacks {', '.join(missing)}: it is not a motion file of this version")
-        values = {k: v.item() if v.ndim == 0 else v for k, v in data.items() if k in known}
+        values: dict[str, Any] = {k: v.item() if v.ndim == 0 else v for k, v in data.items() if k in known}
         return cls(**values)
 
 

@@ -159,9 +159,10 @@ class Body:
         return np.concatenate([f[:, [0, 1, 2]], f[:, [0, 2, 3]]]).astype(np.int32)
 
 
-_REQUIRED = ("joint_names", "kintree_table", "v_template", "shapedirs", "J_template", "J_shapedirs")
-_REQUIRED += ("skin_joints", "skin_weights", "faces", "keypoint_names", "keypoint_part", "keypoint_template")
-_REQUIRED += ("keypoint_shapedirs",)
+_REQUIRED = (
+    *("joint_names", "kintree_table", "v_template", "shapedirs", "J_template", "J_shapedirs", "skin_joints"),
+    *("skin_weights", "faces", "keypoint_names", "keypoint_part", "keypoint_template", "keypoint_shapedirs"),
+)
 
 
 def load_body(which: str | Path = "scope") -> Body:
@@ -200,9 +201,17 @@ def load_body(which: str | Path = "scope") -> Body:
         faces=data["faces"].astype(np.int32),
         material_names=tuple(map(str, data.get("material_names", ()))),
         license=str(data.get("license", "")),
-        **{k: data[k] for k in ("v_template", "shapedirs", "J_template", "J_shapedirs", "skin_weights")},
-        **{k: data[k] for k in ("keypoint_template", "keypoint_shapedirs")},
-        **{k: data[k] for k in ("uv", "uv_faces", "face_material", "material_colors") if k in data},
+        v_template=data["v_template"],
+        shapedirs=data["shapedirs"],
+        J_template=data["J_template"],
+        J_shapedirs=data["J_shapedirs"],
+        skin_weights=data["skin_weights"],
+        keypoint_template=data["keypoint_template"],
+        keypoint_shapedirs=data["keypoint_shapedirs"],
+        uv=data.get("uv"),
+        uv_faces=data.get("uv_faces"),
+        face_material=data.get("face_material"),
+        material_colors=data.get("material_colors"),
     )
     _check(body, path)
     return body

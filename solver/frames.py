@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import numpy as np
 
-# Model y up becomes world z up: (x, y, z) -> (x, -z, y); the person then faces world −y, as Blender's front view expects.
+# Model y up becomes world z up, (x, y, z) -> (x, -z, y): the person faces world −y, into Blender's front view.
 R_WORLD_MODEL = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 # A level OpenCV camera in the world: x right stays, y down is −z, z forward is +y.
 R_WORLD_LEVELCAMERA = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])

@@ -9,7 +9,7 @@ from numba import njit
 
 # Reordering sums and fusing multiplications is allowed; assuming that no NaN or infinity occurs is not, because the
 # optimizer must recognise them. The GIL is released, so that frames can be solved in threads.
-_OPTIONS = {"nogil": True, "error_model": "numpy", "fastmath": {"reassoc", "contract", "arcp", "nsz"}}
+_OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": {"reassoc", "contract", "arcp", "nsz"}}
 
 
 def source_stamp() -> tuple:
@@ -34,6 +34,6 @@ def kernel(function: Callable[..., Any]) -> Any:
     except RuntimeError:  # numba found no place for its cache
         return njit(**_OPTIONS)(function)
     cache_file = getattr(getattr(compiled, "_cache", None), "_cache_file", None)
-    if hasattr(cache_file, "_source_stamp"):  # not part of numba's interface: without it, numba's own rule stands
+    if cache_file is not None and hasattr(cache_file, "_source_stamp"):  # not part of numba's interface: without it, numba's own rule stands
         cache_file._source_stamp = _STAMP
     return compiled

@@ -10,7 +10,8 @@ from scope.solver import frames
     "R", [frames.R_WORLD_MODEL, frames.R_WORLD_LEVELCAMERA, frames.R_CAMERA_BLENDCAM, frames.R_GLTF_WORLD]
 )
 def test_every_convention_is_a_rotation(R):
-    assert np.allclose(R @ R.T, np.eye(3)) and np.isclose(np.linalg.det(R), 1)
+    assert np.allclose(R @ R.T, np.eye(3))
+    assert np.isclose(np.linalg.det(R), 1)
 
 
 def test_model_up_is_world_up_and_model_front_faces_blenders_front_view():
@@ -28,7 +29,8 @@ def test_level_camera_sees_the_sky_at_negative_y_and_looks_along_world_y():
 def test_the_given_up_becomes_world_z(up):
     T = frames.world_from_level_camera(np.array(up, float))
     assert np.allclose(T[:3, :3] @ (np.array(up) / np.linalg.norm(up)), [0, 0, 1])
-    assert np.allclose(T[:3, :3] @ T[:3, :3].T, np.eye(3)) and np.isclose(np.linalg.det(T[:3, :3]), 1)
+    assert np.allclose(T[:3, :3] @ T[:3, :3].T, np.eye(3))
+    assert np.isclose(np.linalg.det(T[:3, :3]), 1)
 
 
 def test_blender_camera_looks_along_its_minus_z_where_opencv_looks_along_plus_z():
