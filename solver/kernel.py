@@ -34,6 +34,7 @@ def kernel(function: Callable[..., Any]) -> Any:
     except RuntimeError:  # numba found no place for its cache
         return njit(**_OPTIONS)(function)
     cache_file = getattr(getattr(compiled, "_cache", None), "_cache_file", None)
-    if cache_file is not None and hasattr(cache_file, "_source_stamp"):  # not part of numba's interface: without it, numba's own rule stands
+    # Not part of numba's interface: without it, numba's own rule stands.
+    if cache_file is not None and hasattr(cache_file, "_source_stamp"):
         cache_file._source_stamp = _STAMP
     return compiled
