@@ -1,2 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Scope: markerless motion capture. Imports nothing until it is asked to, so that ``scope.solver`` needs no bpy."""
+
+
+def register() -> None:
+    """Called by Blender when the extension is enabled."""
+    from .scope_addon import ui
+
+    ui.register()
+
+
+def unregister() -> None:
+    """Called by Blender when the extension is disabled."""
+    from .scope_addon import ui
+
+    ui.unregister()

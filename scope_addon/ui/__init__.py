@@ -1,0 +1,40 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Blender's side: properties, preferences, panel, operators, the modal job. Each module lists its ``CLASSES``.
+
+Only bpy and the standard library are loaded when the extension is enabled; the solver's libraries come with the first
+use, so that they cost nothing when Blender starts.
+"""
+
+from __future__ import annotations
+
+import bpy
+
+from . import capture_operators, command, drop, export_operators, panel, preferences, properties, view_operators
+
+_MODULES = (properties, preferences, capture_operators, export_operators, view_operators, drop, panel)
+
+
+def register() -> None:
+    """Add everything to Blender."""
+    done = []
+    try:
+        for module in _MODULES:
+            for cls in module.CLASSES:
+                bpy.utils.register_class(cls)
+                done.append(cls)
+        properties.attach()
+        command.register()
+    except Exception:
+        for cls in reversed(done):
+            bpy.utils.unregister_class(cls)
+        raise
+
+
+def unregister() -> None:
+    """Take everything out of Blender again, a running capture included."""
+    capture_operators.stop_everything()
+    command.unregister()
+    properties.detach()
+    for module in reversed(_MODULES):
+        for cls in reversed(module.CLASSES):
+            bpy.utils.unregister_class(cls)

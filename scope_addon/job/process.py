@@ -1,0 +1,153 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The parent's side of a job: starts the worker, takes its lines without ever waiting, ends it."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import queue
+import shutil
+import subprocess
+import sys
+import threading
+from collections.abc import Sequence
+from pathlib import Path
+
+from ...solver.errors import ScopeError, SetupError
+from .request import JobRequest
+
+ROOT = Path(__file__).resolve().parents[2]
+START_SCRIPT = Path(__file__).with_name("start_worker.py")
+LOG = "worker.log"
+_WINDOWS_FLAGS = getattr(subprocess, "CREATE_NO_WINDOW", 0) | getattr(subprocess, "BELOW_NORMAL_PRIORITY_CLASS", 0)
+
+
+class WorkerFailedError(ScopeError):
+    """The worker said why it failed, or died without a word."""
+
+
+class WorkerProcess:
+    """One running worker. Call ``poll`` now and then; ``close`` ends it and removes its folder, in any state."""
+
+    def __init__(
+        self,
+        request: JobRequest,
+        job_folder: Path,
+        kernels: Path,
+        python: Sequence[str] = (sys.executable,),
+        script: Path = START_SCRIPT,
+    ) -> None:
+        """Start it.
+
+        :param python: interpreter and its arguments; inside Blender ``[sys.executable, *bpy.app.python_args]``.
+        :raises SetupError: the process cannot be started.
+        """
+        self.job_folder = job_folder
+        self.finished = False
+        # An entry "" is the current folder, which isolated Python leaves out for good reason.
+        search_path = [p for p in sys.path if p and os.path.exists(p)]
+        command = [*python, str(script), str(ROOT), str(job_folder), *search_path]
+        environment = dict(os.environ, NUMBA_CACHE_DIR=str(kernels))
+        try:
+            with (job_folder / LOG).open("wb") as log:
+                self._process = subprocess.Popen(
+                    command,
+                    stdin=subprocess.PIPE,
+                    stdout=subprocess.PIPE,
+                    stderr=log,
+                    env=environment,
+                    creationflags=_WINDOWS_FLAGS,
+                )
+        except OSError as error:
+            shutil.rmtree(job_folder, ignore_errors=True)
+            raise SetupError(f"cannot start {python[0]}: {error.strerror}; install Blender again") from error
+        self._lines: queue.SimpleQueue[bytes | None] = queue.SimpleQueue()
+        threading.Thread(target=self._read, name="scope-worker-lines", daemon=True).start()
+        with contextlib.suppress(OSError):  # it died already; poll() says so
+            assert self._process.stdin is not None
+            self._process.stdin.write(request.to_json().encode() + b"\n")
+            self._process.stdin.flush()
+
+    @property
+    def pid(self) -> int:
+        """Of the worker."""
+        return self._process.pid
+
+    @property
+    def alive(self) -> bool:
+        """Whether the process still runs."""
+        return self._process.poll() is None
+
+    def poll(self) -> list[dict]:
+        """The messages since the last call; ``finished`` after the result.
+
+        :raises WorkerFailedError: the worker reported an error or died.
+        """
+        messages = []
+        while True:
+            try:
+                line = self._lines.get_nowait()
+            except queue.Empty:
+                return messages
+            if line is None:
+                if not self.finished:
+                    raise WorkerFailedError(self._last_words())
+                return messages
+            message = _parse(line)
+            if message is None:
+                continue
+            if message["event"] == "error":
+                raise WorkerFailedError(str(message.get("message", "the capture failed")))
+            self.finished = self.finished or message["event"] == "result"
+            messages.append(message)
+
+    def wait(self, timeout_s: float = 5.0) -> None:
+        """After the result: let the worker end, so that nothing holds its files when they are moved."""
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            self._process.wait(timeout_s)
+        self._end()
+        (self.job_folder / LOG).unlink(missing_ok=True)
+
+    def close(self) -> None:
+        """End the worker if it still runs, and remove its folder if it is still there."""
+        self._end()
+        shutil.rmtree(self.job_folder, ignore_errors=True)
+
+    def _end(self) -> None:
+        if self.alive:
+            self._process.kill()
+        with contextlib.suppress(OSError):
+            assert self._process.stdin is not None
+            self._process.stdin.close()
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            self._process.wait(timeout=5)
+
+    def _read(self) -> None:
+        """In a thread: pipes cannot be read without waiting on every system."""
+        assert self._process.stdout is not None
+        with contextlib.suppress(OSError, ValueError), self._process.stdout as stream:
+            for line in stream:
+                self._lines.put(line)
+        self._lines.put(None)
+
+    def _last_words(self) -> str:
+        """One sentence about a worker that died without saying why."""
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            self._process.wait(timeout=5)
+        code = self._process.returncode
+        how = f"was ended by signal {-code}" if code is not None and code < 0 else f"ended with status {code}"
+        log = b""
+        with contextlib.suppress(OSError):
+            log = (self.job_folder / LOG).read_bytes()[-2000:]
+        last = next((text for text in reversed(log.decode("utf-8", "replace").splitlines()) if text.strip()), "")
+        hint = f" ({last.strip()[:200]})" if last else "; the system may have run out of memory"
+        return f"the capture process {how} before it was done{hint}; capture again"
+
+
+def _parse(line: bytes) -> dict | None:
+    try:
+        message = json.loads(line)
+    except ValueError:
+        return None
+    return message if isinstance(message, dict) and "event" in message else None

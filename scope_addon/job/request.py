@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a worker is asked to do, and the key under which its result can be found again."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from ...solver.errors import UsageError
+
+_SAMPLE_BYTES = 1 << 20  # of the footage's beginning and end; reading gigabytes would hold up the window
+
+
+@dataclass(frozen=True)
+class JobRequest:
+    """One capture. Everything but ``threads`` decides the result."""
+
+    footage: str
+    body: str = "scope"  # a built-in body's name or a file
+    quality: str = "best"
+    focal_mm: float | None = None  # 35 mm equivalent
+    fov_deg: float | None = None  # along the longer side
+    smoothing: bool = True
+    threads: int = 0  # 0: as many as there are cores
+
+    def to_json(self) -> str:
+        """One line."""
+        return json.dumps(asdict(self))
+
+    @classmethod
+    def from_json(cls, text: str) -> JobRequest:
+        """:raises UsageError: not a request."""
+        try:
+            return cls(**json.loads(text))
+        except (ValueError, TypeError) as error:
+            raise UsageError(f"this is not a capture request: {error}") from error
+
+    def key(self, code_version: str) -> str:
+        """Hexadecimal key of the result: equal only for the same footage, options and program.
+
+        :param code_version: changes whenever the program might capture differently.
+        :raises OSError: the footage cannot be read.
+        """
+        values = asdict(self)
+        del values["threads"], values["footage"]
+        digest = hashlib.sha256(json.dumps([values, code_version], sort_keys=True).encode())
+        _add_file(digest, Path(self.footage))
+        if Path(self.body).is_file():
+            _add_file(digest, Path(self.body))
+        return digest.hexdigest()[:32]
+
+
+def _add_file(digest: hashlib._Hash, path: Path) -> None:
+    """Size, time of change, first and last megabyte."""
+    status = path.stat()
+    digest.update(f"{path.name} {status.st_size} {status.st_mtime_ns}".encode())
+    with path.open("rb") as file:
+        digest.update(file.read(_SAMPLE_BYTES))
+        file.seek(max(0, status.st_size - _SAMPLE_BYTES))
+        digest.update(file.read(_SAMPLE_BYTES))
+
+
+def code_version(root: Path) -> str:
+    """Of the installed program: newest change and total size of its sources and networks."""
+    folders = [root / "solver", root / "scope_addon" / "capture"]
+    files = [f for folder in folders for f in folder.rglob("*.py")]
+    files += [root / "assets" / "networks" / "built.json", *(root / "assets" / "body").glob("*.npz")]
+    status = {f.relative_to(root).as_posix(): f.stat() for f in files if f.is_file()}
+    stamps = sorted((name, s.st_size, s.st_mtime_ns) for name, s in status.items())
+    return hashlib.sha256(json.dumps(stamps).encode()).hexdigest()

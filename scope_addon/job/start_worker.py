@@ -1,0 +1,35 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The script a worker process starts with; run by Blender's Python, isolated (``-I``), without Blender.
+
+    python -I start_worker.py ROOT JOB_FOLDER SEARCH_PATH...      the request on stdin, one line
+
+Blender calls the extension ``bl_ext.<repository>.scope``, below a parent that exists only inside Blender; here its root
+folder is loaded as the package ``scope``. Isolated Python ignores PYTHONPATH, so the folders of numpy and of the
+extension's wheels come as arguments.
+"""
+
+import importlib.util
+import sys
+from pathlib import Path
+
+
+def load_package(root: Path) -> None:
+    """Load the extension's root folder as the package ``scope``."""
+    spec = importlib.util.spec_from_file_location("scope", root / "__init__.py", submodule_search_locations=[str(root)])
+    assert spec is not None
+    assert spec.loader is not None
+    package = importlib.util.module_from_spec(spec)
+    sys.modules["scope"] = package
+    spec.loader.exec_module(package)
+
+
+if __name__ == "__main__":
+    root, job_folder, *search_path = sys.argv[1:]
+    # The parent's order decides: an extension's own wheels come before what else is installed. The script's own folder
+    # is not among them, or its modules would shadow others.
+    own = str(Path(__file__).resolve().parent)
+    sys.path[:] = search_path + [p for p in sys.path if p not in search_path and p != own]
+    load_package(Path(root))
+    from scope.scope_addon.job.worker import main
+
+    main(Path(job_folder))

@@ -1,0 +1,192 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""One capture, from the pressed button to the built scene. ``step`` moves it on and never waits for the worker.
+
+The modal operator calls ``step`` on a timer; scripts and tests call it in a loop.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+import bpy
+
+from ...solver.body import load_body
+from ...solver.errors import UsageError, VideoError
+from ..job.cache import Cache, CachedCapture
+from ..job.process import ROOT, START_SCRIPT, WorkerProcess
+from ..job.progress import JobProgress
+from ..job.request import JobRequest, code_version
+from ..motion import Motion
+from ..scene.build import BuildOptions, BuildResult, build_scene
+from .preferences import cache, preferences
+from .result import show_result
+
+
+class CaptureJob:
+    """A capture for one scene, with the settings the scene has now."""
+
+    def __init__(self, scene: bpy.types.Scene, python: Sequence[str] = (), script: Path = START_SCRIPT) -> None:
+        """Start the worker, or find the finished capture in the cache.
+
+        :param python: interpreter of the worker; Blender's own when empty.
+        :raises ScopeError: what can be known to fail without capturing.
+        """
+        self.progress = JobProgress()
+        self.cancel_requested = False
+        self._scene_uid = scene.session_uid
+        self._options = build_options(scene)
+        self._request = capture_request(scene)
+        self._cache: Cache = cache()
+        self._key = self._request.key(code_version(ROOT))
+        self._captured: CachedCapture | None = self._cache.find(self._key)
+        self._worker: WorkerProcess | None = None
+        self._building = False
+        if self._captured is None:
+            python = python or [sys.executable, *bpy.app.python_args]
+            folder = self._cache.new_job_folder()
+            self._worker = WorkerProcess(self._request, folder, self._cache.kernels, python, script)
+
+    @property
+    def worker(self) -> WorkerProcess | None:
+        """None where the result was cached."""
+        return self._worker
+
+    def step(self) -> bool:
+        """Go on as far as is possible without waiting; False once the scene is built.
+
+        :raises ScopeError: the capture failed; the scene is as it was and nothing is left on disk.
+        """
+        try:
+            return self._step()
+        except BaseException:
+            self.close()
+            raise
+
+    def close(self) -> None:
+        """Stop, in any state, and leave no process and no unfinished file."""
+        if self._worker is not None:
+            self._worker.close()
+
+    def _step(self) -> bool:
+        if self._captured is None:
+            self._listen()
+            return True
+        if not self._building:  # one step later, so that the panel can say what is going on
+            self._building = True
+            self.progress.update("building the scene", 0, 0)
+            return True
+        scene = next((s for s in bpy.data.scenes if s.session_uid == self._scene_uid), None)
+        if scene is None:
+            raise UsageError("the scene was removed while its footage was captured; capture in another scene")
+        self._build(scene, self._captured)
+        return False
+
+    def _listen(self) -> None:
+        assert self._worker is not None
+        for message in self._worker.poll():
+            if message["event"] == "progress":
+                self.progress.update(message["stage"], message["done"], message["total"])
+            elif message["event"] == "result":
+                self._worker.wait()
+                self._captured = self._cache.keep(
+                    self._worker.job_folder, self._key, message["motions"], message["report"]
+                )
+                limit = preferences()
+                self._cache.prune((limit.cache_limit_gb if limit else 2) * 10**9)
+                self._worker.close()
+
+    def _build(self, scene: bpy.types.Scene, captured: CachedCapture) -> None:
+        motions = [Motion.load(path) for path in captured.motions]
+        body = load_body(self._request.body)
+        warnings = list(captured.report.get("warnings", ()))
+        footage: str | None = self._request.footage
+        if not Path(self._request.footage).is_file():
+            warnings.append(f"{footage} has gone, so the camera shows no footage")
+            footage = None
+        with _window_shows(scene):
+            result = build_scene(motions, body, footage, self._options)
+        remember_motions(result, captured.motions)
+        report = dict(captured.report, warnings=warnings + result.warnings)
+        show_result(scene.scope.result, self._request.footage, report, result)
+
+
+def capture_request(scene: bpy.types.Scene) -> JobRequest:
+    """What the scene's settings ask the worker for.
+
+    :raises VideoError, UsageError: no footage or body is chosen, or it is not there.
+    """
+    settings, chosen = scene.scope, preferences()
+    if not settings.footage:
+        raise UsageError("choose a video or picture first")
+    footage = Path(bpy.path.abspath(settings.footage))
+    if not footage.is_file():
+        raise VideoError(f"{footage} does not exist; choose the video or picture again")
+    body = {"SCOPE": "scope", "SCOPE_H": "scope_h"}.get(settings.body)
+    if body is None:
+        path = settings.body_file or (chosen.body_file if chosen else "")
+        if not path:
+            raise UsageError("choose a body file, here or in the preferences, or use the built-in body")
+        body = bpy.path.abspath(path)
+    return JobRequest(
+        footage=str(footage),
+        body=body,
+        quality=settings.quality.lower(),
+        focal_mm=settings.focal_mm if settings.lens == "FOCAL" else None,
+        fov_deg=math.degrees(settings.fov) if settings.lens == "FOV" else None,
+        smoothing=settings.smoothing,
+        threads=chosen.threads if chosen else 0,
+    )
+
+
+def build_options(scene: bpy.types.Scene) -> BuildOptions:
+    """How the scene's settings want the scene built."""
+    settings = scene.scope
+    frame_rate = settings.frame_rate.lower()
+    if frame_rate == "auto":
+        frame_rate = "keep" if _is_animated(scene) else "set"
+    return BuildOptions(
+        frame_rate=frame_rate,
+        set_frame_range=settings.set_frame_range,
+        start_frame=float(settings.start_frame),
+        shape=settings.shape.lower(),
+        with_camera=settings.with_camera,
+    )
+
+
+def remember_motions(result: BuildResult, paths: Sequence[Path]) -> None:
+    """Note at the capture where its motion files are."""
+    result.collection["scope_motions"] = [str(path) for path in paths]
+
+
+def sentence(error: Exception) -> str:
+    """An error's message as the panel shows it."""
+    text = str(error).strip() or type(error).__name__
+    return text[:1].upper() + text[1:]
+
+
+def _is_animated(scene: bpy.types.Scene) -> bool:
+    """Whether another frame rate would change the speed of something in the scene."""
+    owners = [scene, *scene.objects, *(obj.data for obj in scene.objects if obj.data)]
+    data = [owner.animation_data for owner in owners if owner.animation_data]
+    return any(animation.action or animation.nla_tracks for animation in data)
+
+
+@contextmanager
+def _window_shows(scene: bpy.types.Scene) -> Iterator[None]:
+    """Let the window show the scene while it is built: the user may have gone to another one meanwhile."""
+    if bpy.context.scene == scene:
+        yield
+        return
+    window = bpy.context.window or bpy.context.window_manager.windows[0]
+    with bpy.context.temp_override(window=window):
+        before = window.scene
+        window.scene = scene
+        try:
+            yield
+        finally:
+            window.scene = before
+

@@ -1,0 +1,35 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""``blender --background --command scope capture …``: the shell's command line, inside Blender."""
+
+from __future__ import annotations
+
+import os
+
+import bpy
+
+_handle: object | None = None
+
+
+def run(argv: list[str]) -> int:
+    """Called by Blender with the arguments after ``scope``; returns the exit status."""
+    from .preferences import cache
+
+    # Not the worker's folder: compiled code remembers the package's name, which differs.
+    os.environ.setdefault("NUMBA_CACHE_DIR", str(cache().root / "kernels" / "command"))
+    from ..cli import main
+
+    return main(argv)
+
+
+def register() -> None:
+    """Add the command."""
+    global _handle
+    _handle = bpy.utils.register_cli_command("scope", run)
+
+
+def unregister() -> None:
+    """Take it away."""
+    global _handle
+    if _handle is not None:
+        bpy.utils.unregister_cli_command(_handle)
+    _handle = None

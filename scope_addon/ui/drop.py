@@ -1,0 +1,25 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Footage dropped from the system's file browser into the 3D viewport."""
+
+from __future__ import annotations
+
+import bpy
+
+from .capture_operators import SUFFIXES
+
+
+class SCOPE_FH_footage(bpy.types.FileHandler):
+    """Videos and pictures become the scene's footage."""
+
+    bl_idname = "SCOPE_FH_footage"
+    bl_label = "Capture with Scope"
+    bl_import_operator = "scope.choose_footage"
+    bl_file_extensions = ";".join(SUFFIXES)
+
+    @classmethod
+    def poll_drop(cls, context: bpy.types.Context) -> bool:
+        """Over a 3D viewport, where the panel is."""
+        return bool(context.area) and context.area.type == "VIEW_3D"
+
+
+CLASSES = (SCOPE_FH_footage,)

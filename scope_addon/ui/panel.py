@@ -1,0 +1,154 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The sidebar of the 3D viewport, tab Scope."""
+
+from __future__ import annotations
+
+import textwrap
+from pathlib import Path
+
+import bpy
+
+from .capture_operators import state
+from .export_operators import FORMATS
+from .view_operators import camera_of
+
+_PIXELS_PER_LETTER = 7.0
+
+
+class _Tab:
+    bl_space_type = "VIEW_3D"
+    bl_region_type = "UI"
+    bl_category = "Scope"
+
+
+class SCOPE_PT_capture(_Tab, bpy.types.Panel):
+    """Footage, the one button, progress."""
+
+    bl_idname = "SCOPE_PT_capture"
+    bl_label = "Capture"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Draw the panel."""
+        layout, settings = self.layout, context.scene.scope
+        running = state.job is not None
+        column = layout.column()
+        column.enabled = not running
+        row = column.row(align=True)
+        row.prop(settings, "footage", text="", placeholder="Video or picture") if _has_placeholder() else row.prop(
+            settings, "footage", text=""
+        )
+        row.operator("scope.choose_footage", text="", icon="FILE_MOVIE")
+        if not settings.footage:
+            column.operator("scope.use_sample", icon="PLAY")
+        column.prop(settings, "quality", expand=True)
+        if running:
+            _draw_progress(layout, state.job.progress)
+        else:
+            row = layout.row()
+            row.scale_y = 1.6
+            row.operator("scope.capture", icon="ARMATURE_DATA")
+        if state.message and state.scene_uid == context.scene.session_uid:
+            _draw_text(context, layout.box(), state.message, "ERROR")
+
+
+def _draw_progress(layout: bpy.types.UILayout, progress) -> None:
+    layout.progress(text=f"{100 * progress.fraction:.0f} %", factor=progress.fraction)
+    for part in progress.text().split(", "):
+        layout.label(text=part)
+    row = layout.row()
+    row.scale_y = 1.6
+    row.operator("scope.cancel", text="Cancel", icon="CANCEL")
+
+
+class SCOPE_PT_person(_Tab, bpy.types.Panel):
+    """The body and the lens."""
+
+    bl_idname = "SCOPE_PT_person"
+    bl_parent_id = "SCOPE_PT_capture"
+    bl_label = "Body and Lens"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Draw the panel."""
+        layout, settings = _split(self.layout), context.scene.scope
+        layout.enabled = state.job is None
+        layout.prop(settings, "body")
+        if settings.body == "FILE":
+            layout.prop(settings, "body_file", text="File")
+        layout.prop(settings, "shape")
+        layout.prop(settings, "lens")
+        if settings.lens == "FOCAL":
+            layout.prop(settings, "focal_mm", text="35 mm Equivalent")
+        elif settings.lens == "FOV":
+            layout.prop(settings, "fov", text="Angle")
+        layout.prop(settings, "smoothing")
+
+
+class SCOPE_PT_scene(_Tab, bpy.types.Panel):
+    """What capturing may change in the scene."""
+
+    bl_idname = "SCOPE_PT_scene"
+    bl_parent_id = "SCOPE_PT_capture"
+    bl_label = "Scene"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Draw the panel."""
+        layout, settings = _split(self.layout), context.scene.scope
+        layout.enabled = state.job is None
+        layout.prop(settings, "frame_rate")
+        layout.prop(settings, "start_frame")
+        layout.prop(settings, "set_frame_range")
+        layout.prop(settings, "with_camera")
+
+
+class SCOPE_PT_result(_Tab, bpy.types.Panel):
+    """What was found, and where it can go."""
+
+    bl_idname = "SCOPE_PT_result"
+    bl_label = "Result"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Something was captured and is still there."""
+        return context.scene.scope.result.collection is not None
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Draw the panel."""
+        layout, result = self.layout, context.scene.scope.result
+        column = layout.column(align=True)
+        column.label(text=Path(result.footage).name, icon="FILE_MOVIE")
+        column.label(text="1 person" if result.people == 1 else f"{result.people} people", icon="OUTLINER_OB_ARMATURE")
+        column.label(text=f"{result.frames} frames, {result.frames_per_second:.1f} captured a second", icon="TIME")
+        column.label(text=f"{result.reprojection_px:.1f} px from the footage on average", icon="CON_CAMERASOLVER")
+        column.label(text=f"Lens: {result.camera}", icon="CAMERA_DATA")
+        for warning in result.warnings:
+            _draw_text(context, layout.box(), warning.text, "ERROR")
+        if camera_of(context.scene) is not None:
+            layout.operator("scope.look_through", icon="VIEW_CAMERA")
+        layout.label(text="Export")
+        grid = layout.grid_flow(columns=2, even_columns=True, align=True)
+        for key, label, _, _ in FORMATS:
+            grid.operator("scope.export", text=label).format = key
+
+
+def _split(layout: bpy.types.UILayout) -> bpy.types.UILayout:
+    layout.use_property_split = True
+    layout.use_property_decorate = False
+    return layout
+
+
+def _has_placeholder() -> bool:
+    return "placeholder" in bpy.types.UILayout.bl_rna.functions["prop"].parameters
+
+
+def _draw_text(context: bpy.types.Context, layout: bpy.types.UILayout, text: str, icon: str) -> None:
+    """A sentence in as many lines as the sidebar's width needs."""
+    scale = context.preferences.system.ui_scale
+    width = max(20, int((context.region.width / scale - 60) / _PIXELS_PER_LETTER)) if context.region else 40
+    column = layout.column(align=True)
+    for index, line in enumerate(textwrap.wrap(text, width)):
+        column.label(text=line, icon=icon if index == 0 else "BLANK1")
+
+
+CLASSES = (SCOPE_PT_capture, SCOPE_PT_person, SCOPE_PT_scene, SCOPE_PT_result)

@@ -1,0 +1,160 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the panel offers and what it shows, kept with each scene and saved in the .blend."""
+
+from __future__ import annotations
+
+import math
+
+import bpy
+from bpy.props import (
+    BoolProperty,
+    CollectionProperty,
+    EnumProperty,
+    FloatProperty,
+    FloatVectorProperty,
+    IntProperty,
+    IntVectorProperty,
+    PointerProperty,
+    StringProperty,
+)
+
+_FIXED: set[str] = set()  # not animatable: a keyframe on a setting would only confuse
+
+# The numbers are what a .blend stores; they must never change.
+QUALITIES = (
+    ("FAST", "Fast", "Smallest network: for a first look or a slow computer", 0),
+    ("BALANCED", "Balanced", "A little less exact than the best, and faster", 1),
+    ("BEST", "Best", "Largest network, most exact", 2),
+)
+BODIES = (
+    ("SCOPE", "Body", "The built-in body with SMPL's 24 joints", 0),
+    ("SCOPE_H", "Body with Hands", "The built-in body with SMPL+H's 52 joints: fingers that you can animate", 1),
+    ("FILE", "From File", "Your own SMPL, SMPL+H, SMPL-X or STAR file", 2),
+)
+LENSES = (
+    ("AUTO", "Automatic", "Read from the file where the camera wrote it, assumed otherwise", 0),
+    ("FOCAL", "Focal Length", "You know the focal length in 35 mm film terms", 1),
+    ("FOV", "Field of View", "You know the field of view along the picture's longer side", 2),
+)
+FRAME_RATES = (
+    ("AUTO", "Automatic", "Set the scene's frame rate to the footage's while nothing in the scene is animated yet", 0),
+    ("SET", "Set from Footage", "Set the scene's frame rate to the footage's", 1),
+    ("KEEP", "Keep", "Leave the scene's frame rate; the motion keeps its speed, with keys between frames", 2),
+)
+SHAPES = (
+    ("KEYED", "Shape Keys", "The body's shape as shape keys with one keyframe each", 0),
+    ("PER_FRAME", "Shape Keys per Frame", "The same, with a keyframe on every frame", 1),
+    ("BAKED", "In the Mesh", "No shape keys: the shape is the mesh, for engines that limit shape keys to 0..1", 2),
+)
+
+
+class SCOPE_PG_warning(bpy.types.PropertyGroup):
+    """One line of the result."""
+
+    text: StringProperty()
+
+
+class SCOPE_PG_result(bpy.types.PropertyGroup):
+    """What the last capture of this scene found."""
+
+    footage: StringProperty()
+    collection: PointerProperty(type=bpy.types.Collection)
+    people: IntProperty()
+    frames: IntProperty()
+    valid_frames: IntProperty()
+    reprojection_px: FloatProperty()
+    frames_per_second: FloatProperty()
+    camera: StringProperty()
+    resolution: IntVectorProperty(size=2)
+    pixel_aspect: FloatVectorProperty(size=2)
+    warnings: CollectionProperty(type=SCOPE_PG_warning)
+
+
+class SCOPE_PG_settings(bpy.types.PropertyGroup):
+    """What the user chose."""
+
+    footage: StringProperty(
+        name="Footage", subtype="FILE_PATH", options=_FIXED, description="Video or picture of a person to capture"
+    )
+    quality: EnumProperty(
+        name="Quality", items=QUALITIES, default="BEST", options=_FIXED, description="Speed against accuracy"
+    )
+    body: EnumProperty(
+        name="Body", items=BODIES, default="SCOPE", options=_FIXED, description="The body that is fitted to the person"
+    )
+    body_file: StringProperty(
+        name="Body File",
+        subtype="FILE_PATH",
+        options=_FIXED,
+        description="SMPL, SMPL+H, SMPL-X or STAR model (.npz or .pkl); the one in the preferences when empty",
+    )
+    lens: EnumProperty(
+        name="Lens",
+        items=LENSES,
+        default="AUTO",
+        options=_FIXED,
+        description="Where the camera's focal length comes from",
+    )
+    focal_mm: FloatProperty(
+        name="Focal Length",
+        default=26.0,
+        min=4.0,
+        max=2000.0,
+        soft_max=200.0,
+        options=_FIXED,
+        description="35 mm equivalent focal length in millimetres; a telephone's main camera has about 26",
+    )
+    fov: FloatProperty(
+        name="Field of View",
+        subtype="ANGLE",
+        default=math.radians(65.0),
+        min=math.radians(2.0),
+        max=math.radians(170.0),
+        options=_FIXED,
+        description="Angle of view along the longer side of the picture",
+    )
+    smoothing: BoolProperty(
+        name="Smooth",
+        default=True,
+        options=_FIXED,
+        description="Take the jitter out of the motion; off keeps every frame as it was solved",
+    )
+    frame_rate: EnumProperty(
+        name="Frame Rate",
+        items=FRAME_RATES,
+        default="AUTO",
+        options=_FIXED,
+        description="What happens to the scene's frame rate",
+    )
+    start_frame: IntProperty(
+        name="First Frame", default=1, options=_FIXED, description="Scene frame on which the footage begins"
+    )
+    set_frame_range: BoolProperty(
+        name="Set Frame Range",
+        default=True,
+        options=_FIXED,
+        description="Let the scene play from the first to the last captured frame",
+    )
+    shape: EnumProperty(
+        name="Shape", items=SHAPES, default="KEYED", options=_FIXED, description="How the person's body shape is stored"
+    )
+    with_camera: BoolProperty(
+        name="Camera with Footage",
+        default=True,
+        options=_FIXED,
+        description="Add the camera the footage was seen with, the footage behind the scene",
+    )
+    result: PointerProperty(type=SCOPE_PG_result)
+
+
+CLASSES = (SCOPE_PG_warning, SCOPE_PG_result, SCOPE_PG_settings)
+
+
+def attach() -> None:
+    """Give every scene its settings."""
+    bpy.types.Scene.scope = PointerProperty(type=SCOPE_PG_settings)
+
+
+def detach() -> None:
+    """Take the settings away; their values stay in the .blend until it is saved without the extension."""
+    del bpy.types.Scene.scope
