@@ -1,0 +1,180 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Builds the extension: a staging copy with the wheels of every platform, zipped and validated by Blender's own tool.
+
+Blender's ``extension build`` is one Python file that needs no running Blender; PyPI's bpy carries it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib.util
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tomllib
+import zipfile
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+BUILD = ROOT / "build"
+WHEELS, STAGING, DIST = BUILD / "wheels", BUILD / "staging", BUILD / "dist"
+
+# pip's names of the platforms a wheel may be for, newest first; the oldest systems that onnxruntime and llvmlite serve.
+PLATFORMS = {
+    "windows-x64": ["win_amd64"],
+    "macos-arm64": ["macosx_14_0_arm64"],
+    "linux-x64": ["manylinux_2_28_x86_64", "manylinux_2_27_x86_64", "manylinux_2_17_x86_64", "manylinux2014_x86_64"],
+}
+PYTHONS = ("3.13", "3.11")  # Blender 5.1 and later; 4.2 to 5.0
+# Everything that is imported. onnxruntime's metadata asks for flatbuffers, packaging and protobuf too, but running a
+# network imports none of them. numpy is Blender's own, always.
+PACKAGES = ("numba", "llvmlite", "onnxruntime", "opencv-contrib-python-headless")
+CONTENT = ("__init__.py", "LICENSE", "THIRD_PARTY.md", "solver", "scope_addon", "assets")
+LEFT_OUT = ("__pycache__", "*.pyc", ".*", "sample_truth.npz", "pictures")
+
+
+def main() -> int:
+    """Build; returns the exit status."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("platforms", nargs="*", metavar="PLATFORM", help=f"of {', '.join(PLATFORMS)} (default: all)")
+    platforms = parser.parse_args().platforms or list(PLATFORMS)
+    unknown = sorted(set(platforms) - set(PLATFORMS))
+    if unknown:
+        print(f"build: unknown platform {', '.join(unknown)}; choose of {', '.join(PLATFORMS)}", file=sys.stderr)
+        return 2
+    wheels = {platform: download_wheels(platform) for platform in platforms}
+    stage(wheels)
+    shutil.rmtree(DIST, ignore_errors=True)
+    DIST.mkdir(parents=True)
+    blender_extension("build", "--source-dir", str(STAGING), "--output-dir", str(DIST), "--split-platforms")
+    archives = sorted(DIST.glob("*.zip"))
+    assert len(archives) == len(platforms), archives
+    for archive in archives:
+        blender_extension("validate", str(archive))
+        check(archive)
+        print(f"{archive.relative_to(ROOT)}  {archive.stat().st_size / 1e6:.0f} MB")
+    return 0
+
+
+def download_wheels(platform: str) -> list[Path]:
+    """The platform's wheels for every Python, as the locks name and hash them; nothing is fetched twice."""
+    paths: list[Path] = []
+    for python in PYTHONS:
+        folder = WHEELS / platform / python
+        folder.mkdir(parents=True, exist_ok=True)
+        pins = folder / "requirements.txt"
+        wanted = locked(python)
+        if not pins.is_file() or pins.read_text() != wanted or len(list(folder.glob("*.whl"))) != len(PACKAGES):
+            for old in folder.iterdir():
+                old.unlink()
+            request = folder / "request.txt"
+            request.write_text(wanted)
+            command = [sys.executable, "-m", "pip", "download", "--quiet", "--disable-pip-version-check", "--no-deps"]
+            command += ["--only-binary=:all:", "--require-hashes", "--implementation", "cp", "--python-version", python]
+            for tag in PLATFORMS[platform]:
+                command += ["--platform", tag]
+            subprocess.run([*command, "--dest", str(folder), "--requirement", str(request)], check=True)
+            request.rename(pins)
+        paths += sorted(folder.glob("*.whl"))
+    return paths
+
+
+def locked(python: str) -> str:
+    """The entries of our packages in the lock of a Python, hashes included."""
+    text = (ROOT / "scripts" / f"requirements-{python}.txt").read_text()
+    entries = re.findall(r"^(\S+?)==\S+(?:.*\\\n)*.*$", text, flags=re.M)
+    blocks = re.findall(r"^\S+?==\S+(?:.*\\\n)*.*$", text, flags=re.M)
+    found = {name: block for name, block in zip(entries, blocks, strict=True) if name in PACKAGES}
+    missing = sorted(set(PACKAGES) - set(found))
+    if missing:
+        raise SystemExit(f"build: the lock for Python {python} lacks {', '.join(missing)}; run ./scripts/lock")
+    return "\n".join(found[name] for name in PACKAGES) + "\n"
+
+
+def shipped_name(wheel: str) -> str:
+    """The file name under which every Blender since 4.2.0 takes the right wheel; the content stays as it is.
+
+    - Until 4.4 Blender compares a wheel's Python tag with its own Python, also for the stable ABI, and would pass over
+      a ``cp37-abi3``; such a wheel gets the tags of the Pythons we ship for as well.
+    - 4.2's first releases do not look at the tag, and take of two wheels of one version the one whose name sorts last.
+      Their Python is 3.11, so the others get a build number, which sorts before it.
+    """
+    name, version, *build, python, abi, platform = wheel.removesuffix(".whl").split("-")
+    tags = ["cp" + p.replace(".", "") for p in sorted(PYTHONS)]
+    if abi == "abi3":
+        python = ".".join([python, *tags])
+    elif python != "cp311":
+        build = ["1"]
+    return "-".join([name, version, *build, python, abi, platform]) + ".whl"
+
+
+def stage(wheels: dict[str, list[Path]]) -> None:
+    """A copy of what is shipped, with the wheels beside it and the manifest that lists them."""
+    shutil.rmtree(STAGING, ignore_errors=True)
+    (STAGING / "wheels").mkdir(parents=True)
+    for name in CONTENT:
+        source, target = ROOT / name, STAGING / name
+        if source.is_dir():
+            shutil.copytree(source, target, ignore=shutil.ignore_patterns(*LEFT_OUT))
+        else:
+            shutil.copy2(source, target)
+    names = []
+    for path in (p for paths in wheels.values() for p in paths):
+        target = STAGING / "wheels" / shipped_name(path.name)
+        if not target.exists():  # the stable ABI's wheel is there for both Pythons
+            os.link(path, target)
+            names.append(f"./wheels/{target.name}")
+    manifest = (ROOT / "blender_manifest.toml").read_text()
+    top, tables = manifest.split("\n[", 1)
+    lists = {"platforms": list(wheels), "wheels": names}
+    for key, values in lists.items():
+        top += f"\n{key} = [\n" + "".join(f'    "{value}",\n' for value in values) + "]\n"
+    tables = tables.split("\n[build]")[0]  # everything in the staging folder is meant
+    (STAGING / "blender_manifest.toml").write_text(f"{top}\n[{tables}\n")
+
+
+def blender_extension(*arguments: str) -> None:
+    """Run Blender's extension tool."""
+    spec = importlib.util.find_spec("bpy")
+    package = Path(spec.origin).parent if spec and spec.origin else ROOT / "no bpy"
+    found = sorted(package.glob("*/scripts/**/blender_ext.py"))
+    if not found:
+        raise SystemExit("build: bpy is not installed, which carries Blender's extension tool; run ./scripts/setup")
+    done = subprocess.run([sys.executable, str(found[0]), *arguments], capture_output=True, text=True, check=False)
+    if done.returncode:
+        raise SystemExit(f"build: Blender's extension tool refused:\n{done.stdout}{done.stderr}")
+
+
+def check(archive: Path) -> None:
+    """What Blender's tool cannot know: everything a capture needs is in, numpy is not."""
+    with zipfile.ZipFile(archive) as file:
+        names = file.namelist()
+        manifest = tomllib.loads(file.read(next(n for n in names if n.endswith("blender_manifest.toml"))).decode())
+    generated = manifest["build"]["generated"]  # what Blender's tool left of the lists for this platform
+    wheels = [Path(w).name for w in generated["wheels"]]
+    problems = [f"{w} is listed but not there" for w in wheels if not any(n.endswith(f"wheels/{w}") for n in names)]
+    for python in PYTHONS:
+        tag = "cp" + python.replace(".", "")
+        for package in PACKAGES:
+            prefix = package.replace("-", "_") + "-"
+            fitting = [w for w in wheels if w.startswith(prefix) and tag in re.split(r"[-.]", w)]
+            if len(fitting) != 1:
+                problems.append(f"{len(fitting)} wheels of {package} for Python {python}")
+    if any(w.lower().startswith("numpy") for w in wheels):
+        problems.append("numpy is shipped")
+    networks = ("pose_detection", "pose_landmark_lite", "pose_landmark_full", "pose_landmark_heavy")
+    wanted = [f"assets/networks/{n}.onnx" for n in networks]
+    wanted += ["assets/networks/LICENSE-mediapipe.txt", "assets/body/scope.npz", "assets/body/scope_h.npz"]
+    wanted += ["assets/body/LICENSE.md", "assets/sample/sample.mp4", "LICENSE", "__init__.py"]
+    problems += [f"{w} is missing" for w in wanted if not any(n.endswith(w) for n in names)]
+    if len(generated["platforms"]) != 1:
+        problems.append(f"made for {', '.join(generated['platforms'])}, not for one platform")
+    problems += [f"{n} does not belong in" for n in names if "__pycache__" in n or n.endswith((".pyc", ".nbi", ".nbc"))]
+    if problems:
+        raise SystemExit(f"build: {archive.name}: {'; '.join(problems)}")
+
+
+if __name__ == "__main__":
+    sys.exit(main())
