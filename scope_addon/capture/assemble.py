@@ -12,10 +12,11 @@ from ...solver.body import Body
 from ..motion import Motion
 from .camera import Camera
 from .fitting import FittedTrack
+from .grounding import stand_on_floor, standing_probability
 from .landmark_network import KEYPOINT_NAMES
 from .smoothing import fill_gaps, fill_rotation_gaps, smooth_root, smooth_rotations
 from .track import Track
-from .world import estimate_world, foot_contact, sole_points
+from .world import estimate_world, sole_points, with_soles
 
 
 def assemble_motion(
@@ -43,10 +44,20 @@ def assemble_motion(
         local, root = smooth_rotations(local_raw, times), smooth_root(root_raw, times)
 
     J0 = body.rest_joints(betas)[0]
-    R_cam, joints_cam = body.forward_kinematics(local, root - J0, betas)
-    soles_cam = sole_points(body, R_cam, joints_cam, betas)
+    soled = with_soles(body, betas)
+
+    def place(local: np.ndarray, root: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Rotations and positions of all parts, and the soles, in the camera frame."""
+        R, t = body.forward_kinematics(local, root - J0, betas)
+        return R, t, sole_points(soled, R, t)
+
+    _, joints_cam, soles_cam = place(local, root)
     T_world_camera = estimate_world(body, joints_cam[valid], soles_cam[valid])
     R_world_camera, t_world_camera = T_world_camera[:3, :3], T_world_camera[:3, 3]
+    contact = standing_probability(soles_cam, R_world_camera[2], times) * valid[:, None]
+    if smoothing:
+        local, root = stand_on_floor(soled, local, root, betas, place, contact, T_world_camera, times)
+    R_cam, joints_cam, soles_cam = place(local, root)
 
     def in_world(rotation: np.ndarray, position: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         poses = rotation.copy()
@@ -56,7 +67,6 @@ def assemble_motion(
 
     poses, trans = in_world(local, root)
     poses_raw, trans_raw = in_world(local_raw, root_raw)
-    soles_world = soles_cam @ R_world_camera.T + t_world_camera
     return Motion(
         poses=poses,
         trans=trans,
@@ -76,7 +86,7 @@ def assemble_motion(
         dist=camera.dist,
         joint_confidence=fitted.joint_confidence,
         world_from_camera=np.tile(T_world_camera, (len(track), 1, 1)),
-        foot_contact=foot_contact(soles_world, times) * valid[:, None],
+        foot_contact=contact,
         residual_px=reprojection_error(body, R_cam, joints_cam, betas, track, camera, valid),
         image_size=np.array(image_size),
         source=source,

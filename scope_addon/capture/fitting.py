@@ -78,7 +78,8 @@ def fit_track(body: Body, track: Track, camera: Camera, progress: Callable[[str,
     last_time = -np.inf
     for k in range(T):
         if track.seen[k]:
-            init = last.state if last is not None and track.times[k] - last_time <= LONGEST_COAST_S else None
+            fresh = last is None or track.acquired[k] or track.times[k] - last_time > LONGEST_COAST_S
+            init = None if fresh or last is None else last.state
             found = _fit_frame(tree, measure(k), init, priors)
             if found.status not in (Status.NO_MEASUREMENTS, Status.NON_FINITE):
                 last, last_time, valid[k] = found, track.times[k], True

@@ -12,7 +12,9 @@ import numpy as np
 
 from ...solver.rotations import matrix_from_quaternion, quaternion_from_matrix
 
-ROTATION_CUTOFF_HZ = 6.0  # human limb motion lies below; detector noise is spread evenly
+# Human limb motion lies below some 6 Hz, detector noise is spread evenly. A Gaussian falls off slowly: with 4.5 Hz it
+# lets as much noise through as the 6 Hz Butterworth filter that is usual for marker data.
+ROTATION_CUTOFF_HZ = 4.5
 DEPTH_CUTOFF_HZ = 2.0  # a single camera measures depth an order worse than the image position
 
 

@@ -20,6 +20,7 @@ class Track:
     keypoints_px: np.ndarray  # (T, 33, 2) pixels of the decoded, upright frame
     confidence: np.ndarray  # (T, 33) 0..1
     world_landmarks: np.ndarray  # (T, 33, 3) metres, hip-centred, axes of the camera
+    acquired: np.ndarray  # (T,) found by the detector in this frame: it may be another person than before
 
     def __len__(self) -> int:
         return len(self.frames)
@@ -32,11 +33,13 @@ class TrackBuilder:
         self._frames: list[int] = []
         self._times: list[float] = []
         self._observations: list[np.ndarray | None] = []
+        self._acquired: list[bool] = []
 
     def add(self, frame: int, time_s: float, observation: Observation | None) -> None:
         """Append one frame; ``None`` where the person was not seen."""
         self._frames.append(frame)
         self._times.append(time_s)
+        self._acquired.append(observation is not None and observation.acquired)
         if observation is None:
             self._observations.append(None)
         else:
@@ -58,4 +61,5 @@ class TrackBuilder:
             keypoints_px=rows[..., :2],
             confidence=rows[..., 2],
             world_landmarks=rows[..., 3:],
+            acquired=np.array(self._acquired, bool),
         )

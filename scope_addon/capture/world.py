@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The world of a static camera: which way is up, where the floor is, and when the feet stand on it."""
+"""The world of a static camera: which way is up, and where the floor is."""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 
@@ -11,9 +13,8 @@ from ...solver.frames import transform_points, world_from_level_camera
 STANDING_KNEE_COS = np.cos(np.radians(30.0))  # thigh and shank within 30 degrees of one line
 FLOOR_NOISE_M = 0.05  # scatter of a supporting foot's depth-borne height
 UP_NOISE_RAD = np.radians(5.0)  # scatter of the body's own up direction over a clip
-CONTACT_SPEED_M_S = 0.35
-CONTACT_HEIGHT_M = 0.06
 FOOT_PARTS = ("left_ankle", "left_foot", "right_ankle", "right_foot")
+SOLES = ("sole/left_heel", "sole/left_toe", "sole/right_heel", "sole/right_toe")
 
 
 def up_from_standing(body: Body, joints_cam: np.ndarray) -> np.ndarray:
@@ -69,22 +70,36 @@ def up_from_floor(feet_cam: np.ndarray, up: np.ndarray) -> np.ndarray:
     return n / np.linalg.norm(n)
 
 
-def sole_points(body: Body, R: np.ndarray, t: np.ndarray, betas: np.ndarray) -> np.ndarray:
-    """(T, 4, 3) lowest points in the rest pose of left heel, left toe, right heel, right toe, moved with their parts.
+def with_soles(body: Body, betas: np.ndarray) -> Body:
+    """The body with four more keypoints: ``sole/left_heel``, ``sole/left_toe`` and the right ones.
 
-    :param R, t: (T, K+1, 3, 3), (T, K+1, 3) part poses in any frame; the result is in that frame.
+    Each lies on the ankle or foot part, in the middle of the part's lowest centimetre at rest, where it presses on the
+    floor. Exact for these betas; the points keep their place relative to the joint for others.
     """
     v, J = body.rest_vertices(betas), body.rest_joints(betas)
     strongest = body.skin_joints[np.arange(len(v)), body.skin_weights.argmax(1)]
-    out = np.empty((len(R), 4, 3))
-    for k, name in enumerate(FOOT_PARTS):
-        part = body.joint_names.index(name)
+    parts = np.array([body.joint_names.index(name) for name in FOOT_PARTS], np.int32)
+    local = np.zeros((len(parts), 3))
+    for k, part in enumerate(parts):
         own = v[strongest == part] if (strongest == part).any() else J[part : part + 1]
-        # The sole: the part's lowest centimetre at rest; its centre is where the part presses on the floor.
         sole = own[own[:, 1] <= own[:, 1].min() + 0.01].mean(0)
         sole[1] = own[:, 1].min()
-        out[:, k] = np.einsum("tij,j->ti", R[:, part], sole - J[part]) + t[:, part]
-    return out
+        local[k] = sole - J[part]
+    return replace(
+        body,
+        keypoint_names=(*body.keypoint_names, *SOLES),
+        keypoint_part=np.concatenate([body.keypoint_part, parts]),
+        keypoint_template=np.concatenate([body.keypoint_template, body.J_template[parts] + local]),
+        keypoint_shapedirs=np.concatenate([body.keypoint_shapedirs, body.J_shapedirs[parts]]),
+    )
+
+
+def sole_points(body_with_soles: Body, R: np.ndarray, t: np.ndarray) -> np.ndarray:
+    """(T, 4, 3) the soles of ``with_soles``'s body.
+
+    :param R, t: (T, K+1, 3, 3), (T, K+1, 3) part poses in any frame; the result is in that frame.
+    """
+    return body_with_soles.keypoints(R, t)[..., -len(SOLES) :, :]
 
 
 def estimate_world(body: Body, joints_cam: np.ndarray, soles_cam: np.ndarray) -> np.ndarray:
@@ -99,23 +114,3 @@ def estimate_world(body: Body, joints_cam: np.ndarray, soles_cam: np.ndarray) ->
     start = transform_points(T_world_camera, joints_cam[:1, 0])[0]
     T_world_camera[:2, 3] -= start[:2]
     return T_world_camera
-
-
-def foot_contact(soles_world: np.ndarray, times: np.ndarray) -> np.ndarray:
-    """(T, 4) probability that left heel, left toe, right heel, right toe stand: slow and near the floor.
-
-    p = s((v₀ − v)/(v₀/4)) · s((h₀ − h)/(h₀/4)) with the logistic function s; v over neighbouring frames.
-
-    :param soles_world: (T, 4, 3) metres, world frame;  times: (T,) seconds.
-    """
-    if len(times) > 1:
-        speed = np.linalg.norm(np.gradient(soles_world, times, axis=0), axis=-1)
-    else:
-        speed = np.zeros(soles_world.shape[:2])
-
-    def logistic(x: np.ndarray) -> np.ndarray:
-        return 1 / (1 + np.exp(-np.clip(x, -30, 30)))
-
-    slow = logistic(4 * (1 - speed / CONTACT_SPEED_M_S))
-    low = logistic(4 * (1 - soles_world[..., 2] / CONTACT_HEIGHT_M))
-    return slow * low

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Up, floor and contact on bodies placed in a known world."""
+"""Up and floor on bodies placed in a known world."""
 
 import numpy as np
 import pytest
-from scope.scope_addon.capture.world import estimate_world, foot_contact, sole_points
+from scope.scope_addon.capture.world import estimate_world, sole_points, with_soles
 from scope.solver import rotations
 from scope.solver.body import load_body
 from scope.solver.frames import R_WORLD_MODEL, transform_points, world_from_level_camera
@@ -18,7 +18,7 @@ def walk(body, T=60, lean_deg=0.0):
         omega[:, body.joint_names.index(f"{side}_hip")] = rotations.exp(sign * swing[:, None] * x)
     omega[:, 0] = R_WORLD_MODEL @ rotations.exp(np.radians(lean_deg) * x)
     R, t = body.forward_kinematics(omega, np.zeros((T, 3)))
-    soles = sole_points(body, R, t, np.zeros(body.P))
+    soles = sole_points(with_soles(body, np.zeros(body.P)), R, t)
     t = t + np.stack([np.linspace(-1, 1, T), np.linspace(0, 1.5, T), -soles[..., 2].min(1)], 1)[:, None]
     return R, t
 
@@ -33,7 +33,7 @@ def test_up_and_floor_are_recovered_from_a_walk(pitch_deg, roll_deg):
     truth[:3, 3] += truth[:3, :3] @ [0, 0, -5.0] * [1, 1, 0]
     camera_from_world = np.linalg.inv(truth)
     joints_cam = transform_points(camera_from_world, t)
-    soles_cam = sole_points(body, camera_from_world[:3, :3] @ R, joints_cam, np.zeros(body.P))
+    soles_cam = sole_points(with_soles(body, np.zeros(body.P)), camera_from_world[:3, :3] @ R, joints_cam)
     got = estimate_world(body, joints_cam, soles_cam)
     angle = np.degrees(np.arccos(np.clip(got[2, :3] @ truth[2, :3], -1, 1)))
     assert angle < 2.0
@@ -46,7 +46,7 @@ def test_up_and_floor_are_recovered_from_a_walk(pitch_deg, roll_deg):
 def test_soles_lie_under_the_ankles_on_the_ground():
     body = load_body("scope")
     R, t = body.forward_kinematics(np.tile(np.eye(3), (1, body.K + 1, 1, 1)), np.zeros((1, 3)))
-    soles = sole_points(body, R, t, np.zeros(body.P))[0]
+    soles = sole_points(with_soles(body, np.zeros(body.P)), R, t)[0]
     lowest = body.v_template[:, 1].min()
     assert np.abs(soles[:, 1] - lowest).max() < 0.02
     assert (soles[:2, 0] > 0).all()  # left
@@ -54,11 +54,9 @@ def test_soles_lie_under_the_ankles_on_the_ground():
     assert soles[1, 2] > soles[0, 2] + 0.08  # toes are in front of heels
 
 
-def test_contact_is_slow_and_low():
-    times = np.arange(40) / 30
-    soles = np.zeros((40, 4, 3))
-    soles[:, 1, 2] = 0.3  # raised
-    soles[:, 2, 0] = 2.0 * times  # sliding fast
-    p = foot_contact(soles, times)
-    assert (p[:, 0] > 0.9).all()
-    assert (p[:, 1:3] < 0.1).all()
+def test_soles_of_another_shape_are_on_its_own_ground():
+    body = load_body("scope")
+    betas = np.array([1.5, -1.0, *np.zeros(body.P - 2)])
+    R, t = body.forward_kinematics(np.tile(np.eye(3), (1, body.K + 1, 1, 1)), np.zeros((1, 3)), betas)
+    lowest = body.skin(R[0], t[0], betas)[:, 1].min()
+    assert np.abs(sole_points(with_soles(body, betas), R, t)[0, :, 1] - lowest).max() < 0.02

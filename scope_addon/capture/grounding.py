@@ -1,0 +1,203 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Feet that stand on the floor and stay where they stand, for a static camera.
+
+One camera sees directions well and depth badly. Where a foot stands, the floor and the foot's own stillness say how
+far away the person is, so the depth of every frame is corrected first (``correct_depth``). What is left of sliding is
+taken out by fitting each frame once more with the standing feet held at one place (``hold_feet``): the same solver, the
+smoothed motion as its prior.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from ...solver import (
+    Body,
+    Keypoints3D,
+    Measurements,
+    Options,
+    PosePriors,
+    Priors,
+    Stage,
+    State,
+    Weights,
+    default_priors,
+    fit_tree,
+    make_tree,
+)
+from .smoothing import gaussian_smooth, smooth_rotations
+
+CONTACT_SPEED_M_S = 0.3  # across the line of sight; a swinging foot moves at 1 m/s and more
+CONTACT_HEIGHT_M = 0.05  # above the frame's lowest sole point
+FLOOR_SIGMA_M = 0.03
+DEPTH_SIGMA_M = 0.25  # how wrong the depth of a whole clip may be
+DEPTH_RATE_SIGMA = 0.3  # and how fast that error changes, m/s
+SLIDE_SIGMA_M_S = 0.1  # a standing foot's horizontal speed
+STEP_CUTOFF_HZ = 12.0  # takes off the edges where a foot begins and ceases to be held
+
+
+Place = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray, np.ndarray]]
+
+
+def stand_on_floor(
+    body_with_soles: Body,
+    rotations: np.ndarray,
+    root_cam: np.ndarray,
+    betas: np.ndarray,
+    place: Place,
+    contact: np.ndarray,
+    T_world_camera: np.ndarray,
+    times: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray]:
+    """The motion with its depth corrected by the floor, and standing feet held.
+
+    :param rotations, root_cam: (T, K+1, 3, 3), (T, 3) in the camera frame, smoothed.
+    :param place: rotations and root positions to part rotations, joints and soles, camera frame.
+    :param contact: (T, 4) probability that each sole stands.
+    :return: rotations and root positions.
+    """
+    soles = place(rotations, root_cam)[2]
+    away = correct_depth(root_cam, soles, contact, T_world_camera, times)
+    root_cam = root_cam + away[:, None] * root_cam / np.linalg.norm(root_cam, axis=1, keepdims=True)
+    R, t = T_world_camera[:3, :3], T_world_camera[:3, 3]
+    held = anchors(place(rotations, root_cam)[2] @ R.T + t, contact)
+    indices = np.arange(len(body_with_soles.keypoint_names) - held.shape[1], len(body_with_soles.keypoint_names))
+    rotations, root_cam = hold_feet(body_with_soles, rotations, root_cam, betas, (indices, (held - t) @ R, contact))
+    return smooth_rotations(rotations, times, STEP_CUTOFF_HZ), root_cam
+
+
+def standing_probability(soles_cam: np.ndarray, up: np.ndarray, times: np.ndarray) -> np.ndarray:
+    """(T, F) probability that each sole point stands: slow across the line of sight and lowest of its frame.
+
+    p = s(4(1 − v/v₀)) s(4(1 − h/h₀)) with the logistic s. Depth, the noisy direction, takes no part in the speed v, and
+    the height h is measured from the frame's lowest sole point, not from a floor that is not known yet.
+
+    :param soles_cam: (T, F, 3) metres, camera frame;  up: (3,) unit;  times: (T,) seconds.
+    """
+    height = soles_cam @ up
+    height = height - height.min(axis=1, keepdims=True)
+    speed = np.zeros(height.shape)
+    if len(times) > 2:
+        velocity = np.gradient(gaussian_smooth(soles_cam, times, 6.0), times, axis=0)
+        ray = soles_cam / np.linalg.norm(soles_cam, axis=-1, keepdims=True)
+        speed = np.linalg.norm(velocity - ray * (velocity * ray).sum(-1, keepdims=True), axis=-1)
+    return _logistic(4 * (1 - speed / CONTACT_SPEED_M_S)) * _logistic(4 * (1 - height / CONTACT_HEIGHT_M))
+
+
+def correct_depth(
+    root_cam: np.ndarray, soles_cam: np.ndarray, contact: np.ndarray, T_world_camera: np.ndarray, times: np.ndarray
+) -> np.ndarray:
+    """(T,) metres by which to move each frame's body along its root's line of sight.
+
+    With the ray's upward and horizontal parts g and d (world), heights h and horizontal steps s of the soles,
+    minimizes over δ
+        Σ_t c_t (h_t + g_t δ_t)²/σ_h² + δ_t²/σ_δ²
+        + Σ_t c_t |s_t + d_t (δ_t+1 − δ_t)|²/(σ_s Δt)² + (δ_t+1 − δ_t)²/(σ_r Δt)²,
+    a tridiagonal system, solved in O(T).
+
+    :param root_cam: (T, 3);  soles_cam: (T, F, 3);  contact: (T, F);  times: (T,).
+    """
+    T = len(times)
+    R, height0 = T_world_camera[:3, :3], T_world_camera[2, 3]
+    sure = np.clip(2 * contact - 1, 0, 1)  # a foot in the air, doubtful as it may be, says nothing about the floor
+    ray_world = (root_cam / np.linalg.norm(root_cam, axis=1, keepdims=True)) @ R.T
+    soles_world = soles_cam @ R.T
+    height = soles_world[..., 2] + height0
+    g, d = ray_world[:, 2], ray_world[:, :2]
+
+    diagonal = np.full(T, 1 / DEPTH_SIGMA_M**2) + sure.sum(1) * g**2 / FLOOR_SIGMA_M**2
+    right = -(sure * height).sum(1) * g / FLOOR_SIGMA_M**2
+    off = np.zeros(max(T - 1, 0))
+    if T > 1:
+        step = np.maximum(np.diff(times), 1e-6)
+        pair = np.minimum(contact[1:], contact[:-1])
+        moved = np.diff(soles_world[..., :2], axis=0)
+        along = 0.5 * (d[1:] + d[:-1])
+        slide = 1 / (SLIDE_SIGMA_M_S * step) ** 2
+        stiffness = 1 / (DEPTH_RATE_SIGMA * step) ** 2 + slide * pair.sum(1) * (along**2).sum(1)
+        pull = slide * (pair[..., None] * moved * along[:, None]).sum((1, 2))
+        diagonal[:-1] += stiffness
+        diagonal[1:] += stiffness
+        off -= stiffness
+        right[:-1] += pull
+        right[1:] -= pull
+    return _solve_tridiagonal(diagonal, off, right)
+
+
+def hold_feet(
+    body: Body,
+    rotations: np.ndarray,
+    root_cam: np.ndarray,
+    betas: np.ndarray,
+    targets: tuple[np.ndarray, np.ndarray, np.ndarray],
+) -> tuple[np.ndarray, np.ndarray]:
+    """Fit each frame once more with held points, everything else staying at the given motion.
+
+    :param rotations: (T, K+1, 3, 3);  root_cam: (T, 3): the motion to stay at, camera frame.
+    :param targets: keypoint indices (F,), positions (T, F, 3) in the camera frame, weights (T, F) 0..1.
+    :return: rotations and root positions as given.
+    """
+    tree = make_tree(body)
+    indices, positions, weights = targets
+    priors = replace(
+        default_priors(body), shape_mean=betas, shape_information=np.eye(body.P) * 1e8, joint_weights=_leg_freedom(body)
+    )
+    options = Options(stages=(Stage(_HOLD, 1e-3, 8),), robust_keypoints3d=np.inf)
+    rotations, root_cam = rotations.copy(), root_cam.copy()
+    for t in np.flatnonzero(weights.max(1) > 0.05):
+        state = State(rotations[t, 0], root_cam[t], rotations[t, 1:], betas)
+        measurements = Measurements(
+            keypoints3d=Keypoints3D(indices, positions[t], weights[t]),
+            pose_priors=PosePriors([0], rotations[t, :1], root_cam[t : t + 1], [1 / 0.01**2], [1 / 0.005**2]),
+        )
+        here: Priors = replace(priors, joint_mean=rotations[t, 1:])
+        found = fit_tree(tree, measurements, state, here, options).state
+        rotations[t, 0], rotations[t, 1:], root_cam[t] = found.R_camera_root, found.Omega, found.t_camera_root
+    return rotations, root_cam
+
+
+# A standing foot is held to 5 mm; the pelvis may give 5 mm and half a degree, a leg's joints some degrees.
+_HOLD = Weights(keypoints3d=1 / 0.005**2, joint_prior=1 / 0.03**2, joint_limits=2000.0, shape=1.0)
+
+
+def _leg_freedom(body: Body) -> np.ndarray:
+    """(K,) joint weights that let hips, knees and ankles do the work."""
+    return np.array([0.1 if any(n in name for n in ("hip", "knee", "ankle")) else 1.0 for name in body.joint_names[1:]])
+
+
+def anchors(soles_world: np.ndarray, contact: np.ndarray) -> np.ndarray:
+    """(T, F, 3) where each sole point stands: the mean of the span of contact it is in, on the floor.
+
+    Frames outside any span get the sole's own position.
+    """
+    out = soles_world.copy()
+    for f in range(contact.shape[1]):
+        standing = contact[:, f] > 0.5
+        edges = np.flatnonzero(np.diff(np.r_[False, standing, False]))
+        for start, end in zip(edges[::2], edges[1::2], strict=True):
+            w = contact[start:end, f, None]
+            out[start:end, f] = (w * soles_world[start:end, f]).sum(0) / w.sum()
+            out[start:end, f, 2] = 0.0
+    return out
+
+
+def _solve_tridiagonal(diagonal: np.ndarray, off: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """Thomas's algorithm for a symmetric positive definite tridiagonal matrix."""
+    n = len(diagonal)
+    c, x = np.zeros(n), np.zeros(n)
+    pivot = diagonal[0]
+    x[0] = right[0] / pivot
+    for k in range(1, n):
+        c[k - 1] = off[k - 1] / pivot
+        pivot = diagonal[k] - off[k - 1] * c[k - 1]
+        x[k] = (right[k] - off[k - 1] * x[k - 1]) / pivot
+    for k in range(n - 2, -1, -1):
+        x[k] -= c[k] * x[k + 1]
+    return x
+
+
+def _logistic(x: np.ndarray) -> np.ndarray:
+    return 1 / (1 + np.exp(-np.clip(x, -30, 30)))

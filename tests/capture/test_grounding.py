@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Contact, depth and held feet on motions whose truth is known."""
+
+import numpy as np
+import pytest
+from scope.scope_addon.capture import grounding
+from scope.scope_addon.capture.world import sole_points, with_soles
+from scope.solver import rotations
+from scope.solver.body import load_body
+from scope.solver.frames import transform_points, world_from_level_camera
+
+FPS = 30.0
+
+
+@pytest.fixture(scope="module")
+def step():
+    """A person who shifts the weight and raises the left foot for a second, 4 m from a camera 1.5 m high."""
+    body = load_body("scope")
+    T = 90
+    times = np.arange(T) / FPS
+    T_world_camera = world_from_level_camera(np.array([0.0, -1.0, -0.2]), height=1.5)
+    R_camera_world = T_world_camera[:3, :3].T
+    lift = np.clip(np.sin((times - 1.0) * np.pi), 0, 1)  # 1 s to 2 s
+    omega = np.tile(np.eye(3), (T, body.K + 1, 1, 1))
+    names = body.joint_names
+    x = np.array([1.0, 0, 0])
+    omega[:, names.index("left_hip")] = rotations.exp(-0.9 * lift[:, None] * x)
+    omega[:, names.index("left_knee")] = rotations.exp(1.2 * lift[:, None] * x)
+    facing = rotations.exp(np.array([np.pi / 2, 0, 0]))  # model y up to world z up
+    omega[:, 0] = R_camera_world @ facing
+    soled = with_soles(body, np.zeros(body.P))
+
+    def place(local, root):
+        R, t = body.forward_kinematics(local, root)
+        return R, t, sole_points(soled, R, t)
+
+    root_world = np.tile([0.0, 4.0, 0.0], (T, 1))
+    lowest = place(omega, np.zeros((T, 3)))[2][:, 2:] @ T_world_camera[2, :3]
+    root_world[:, 2] = -lowest.min(1)
+    root = transform_points(np.linalg.inv(T_world_camera), root_world)
+    return soled, omega, root, place, T_world_camera, times
+
+
+def test_the_raised_foot_is_known_from_the_standing_one(step):
+    _, omega, root, place, T_world_camera, times = step
+    p = grounding.standing_probability(place(omega, root)[2], T_world_camera[2, :3], times)
+    assert (p[:, 2:] > 0.8).all()  # right
+    assert (p[:20, :2] > 0.8).all()
+    assert (p[36:54, :2] < 0.3).all()
+    assert (p[75:, :2] > 0.8).all()
+
+
+def test_wrong_depth_is_found_again_by_the_floor(step):
+    _, omega, root, place, T_world_camera, times = step
+    unit = root / np.linalg.norm(root, axis=1, keepdims=True)
+    wrong = 0.15 * np.sin(2 * np.pi * 0.4 * times)
+    seen = place(omega, root + wrong[:, None] * unit)[2]
+    contact = grounding.standing_probability(seen, T_world_camera[2, :3], times)
+    away = grounding.correct_depth(root + wrong[:, None] * unit, seen, contact, T_world_camera, times)
+    assert np.abs(away + wrong).mean() < 0.25 * np.abs(wrong).mean()
+    left = np.diff(wrong + away)[:28]  # while both feet stand
+    assert np.abs(left).max() < 0.1 * np.abs(np.diff(wrong)).max()  # and what is left hardly slides
+
+
+def test_right_depth_is_left_alone(step):
+    _, omega, root, place, T_world_camera, times = step
+    soles = place(omega, root)[2]
+    contact = grounding.standing_probability(soles, T_world_camera[2, :3], times)
+    assert np.abs(grounding.correct_depth(root, soles, contact, T_world_camera, times)).max() < 0.05
+
+
+def test_the_depth_system_is_solved_as_a_dense_one():
+    rng = np.random.default_rng(0)
+    off = rng.normal(size=30)
+    diagonal = 3 + np.abs(np.r_[off, 0]) + np.abs(np.r_[0, off])
+    right = rng.normal(size=31)
+    dense = np.diag(diagonal) + np.diag(off, 1) + np.diag(off, -1)
+    assert np.allclose(grounding._solve_tridiagonal(diagonal, off, right), np.linalg.solve(dense, right))
+
+
+def test_a_trembling_motion_stands_still_where_it_stands(step):
+    soled, omega, root, place, T_world_camera, times = step
+    rng = np.random.default_rng(1)
+    noise = grounding.gaussian_smooth(rng.normal(size=(len(times), soled.K + 1, 3)), times, 4.5)
+    shaken = omega @ rotations.exp(0.06 * noise)
+    shaken_root = root + 0.02 * grounding.gaussian_smooth(rng.normal(size=root.shape), times, 4.5)
+    contact = grounding.standing_probability(place(omega, root)[2], T_world_camera[2, :3], times)
+    local, moved = grounding.stand_on_floor(
+        soled, shaken, shaken_root, np.zeros(soled.P), place, contact, T_world_camera, times
+    )
+    before, after = (
+        transform_points(T_world_camera, place(*m)[2][:, 2]) for m in ((shaken, shaken_root), (local, moved))
+    )
+    assert after.std(0).max() < 0.4 * before.std(0).max()
+    assert np.abs(after[:, 2]).max() < 0.015  # on the floor
+    assert np.abs(place(local, moved)[1] - place(shaken, shaken_root)[1]).max() < 0.2  # nobody was thrown about
+
+
+def test_a_still_and_a_single_frame_pass(step):
+    soled, omega, root, place, T_world_camera, times = step
+    contact = grounding.standing_probability(place(omega[:1], root[:1])[2], T_world_camera[2, :3], times[:1])
+    local, moved = grounding.stand_on_floor(
+        soled, omega[:1], root[:1], np.zeros(soled.P), place, contact, T_world_camera, times[:1]
+    )
+    assert np.allclose(place(local, moved)[2][0, 2:] @ T_world_camera[2, :3] + 1.5, 0, atol=0.02)
