@@ -12,11 +12,24 @@ from ...solver.body import Body
 from ..motion import Motion
 from .camera import Camera
 from .fitting import FittedTrack
-from .grounding import stand_on_floor, standing_probability
+from .grounding import correct_depth, stand_on_floor, standing_probability
 from .landmark_network import KEYPOINT_NAMES
 from .smoothing import fill_gaps, fill_rotation_gaps, smooth_root, smooth_rotations
 from .track import Track
 from .world import estimate_world, sole_points, with_soles
+
+
+def root_on_floor(body: Body, track: Track, fitted: FittedTrack) -> np.ndarray:
+    """(T, 3) smoothed pelvis positions in the camera frame, their distance corrected by the floor and standing feet."""
+    times, J0 = track.times, body.rest_joints(fitted.betas)[0]
+    local = smooth_rotations(fill_rotation_gaps(fitted.rotations, fitted.valid, times), times)
+    root = smooth_root(fill_gaps(fitted.t_camera_root, fitted.valid, times), times)
+    R, joints = body.forward_kinematics(local, root - J0, fitted.betas)
+    soles = sole_points(with_soles(body, fitted.betas), R, joints)
+    T_world_camera = estimate_world(body, joints[fitted.valid], soles[fitted.valid])
+    contact = standing_probability(soles, T_world_camera[2, :3], times) * fitted.valid[:, None]
+    away = correct_depth(root, soles, contact, T_world_camera, times)
+    return root + away[:, None] * root / np.linalg.norm(root, axis=1, keepdims=True)
 
 
 def assemble_motion(

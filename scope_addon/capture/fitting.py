@@ -71,6 +71,43 @@ def fit_track(body: Body, track: Track, camera: Camera, progress: Callable[[str,
     betas = _fit_shape([measure(k) for k in _spread(np.flatnonzero(track.seen), SHAPE_FRAMES)], body, priors, progress)
     priors = replace(priors, shape_mean=betas, shape_information=np.eye(body.P) * SHAPE_CERTAINTY)
 
+    return _fit_frames(body, track, betas, priors, measurer, pixels, None, progress)
+
+
+def refit_track(
+    body: Body,
+    track: Track,
+    camera: Camera,
+    first: FittedTrack,
+    root_cam: np.ndarray,
+    progress: Callable[[str, int, int], None],
+) -> FittedTrack:
+    """Fit every frame again, from its first fit, with the pelvis known to be at ``root_cam`` (T, 3), camera frame.
+
+    A pose and a distance that explain the same image can both be wrong together; once the floor has told the distance,
+    the pose follows.
+    """
+    priors = replace(default_priors(body), joint_weights=_joint_weights(body), shape_mean=first.betas)
+    priors = replace(priors, shape_information=np.eye(body.P) * SHAPE_CERTAINTY)
+    states = [
+        State(first.rotations[k, 0], root_cam[k], first.rotations[k, 1:], first.betas) if first.valid[k] else None
+        for k in range(len(track))
+    ]
+    measurer, pixels = Measurer(body, camera.intrinsics), camera.undistort(track.keypoints_px)
+    return _fit_frames(body, track, first.betas, priors, measurer, pixels, states, progress)
+
+
+def _fit_frames(
+    body: Body,
+    track: Track,
+    betas: np.ndarray,
+    priors: Priors,
+    measurer: Measurer,
+    pixels: np.ndarray,
+    states: list[State | None] | None,
+    progress: Callable[[str, int, int], None],
+) -> FittedTrack:
+    """Every seen frame in order: from the frame before, or from ``states`` with their roots as priors."""
     T, tree = len(track), make_tree(body)
     rotations = np.tile(np.eye(3), (T, body.K + 1, 1, 1))
     root, valid, iterations = np.zeros((T, 3)), np.zeros(T, bool), 0
@@ -78,9 +115,14 @@ def fit_track(body: Body, track: Track, camera: Camera, progress: Callable[[str,
     last_time = -np.inf
     for k in range(T):
         if track.seen[k]:
-            fresh = last is None or track.acquired[k] or track.times[k] - last_time > LONGEST_COAST_S
-            init = None if fresh or last is None else last.state
-            found = _fit_frame(tree, measure(k), init, priors)
+            if states is not None:
+                init = states[k]
+            else:
+                fresh = last is None or track.acquired[k] or track.times[k] - last_time > LONGEST_COAST_S
+                init = None if fresh or last is None else last.state
+            known_root = init.t_camera_root if init is not None and states is not None else None
+            measured = measurer.measure(pixels[k], track.confidence[k], track.world_landmarks[k], known_root)
+            found = _fit_frame(tree, measured, init, priors)
             if found.status not in (Status.NO_MEASUREMENTS, Status.NON_FINITE):
                 last, last_time, valid[k] = found, track.times[k], True
                 iterations += found.iterations
@@ -88,7 +130,7 @@ def fit_track(body: Body, track: Track, camera: Camera, progress: Callable[[str,
             rotations[k, 0], rotations[k, 1:] = last.state.R_camera_root, last.state.Omega
             root[k] = last.state.t_camera_root
         if k % 16 == 0 or k == T - 1:
-            progress("solving", k + 1, T)
+            progress("solving" if states is None else "solving on the floor", k + 1, T)
     return FittedTrack(
         rotations=rotations,
         t_camera_root=root,

@@ -12,7 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ...solver import Body, Keypoints2D, Keypoints3D, Measurements, OrientationField
+from ...solver import Body, Keypoints2D, Keypoints3D, Measurements, OrientationField, PosePriors
 from .landmark_network import KEYPOINT_NAMES
 
 # How far a landmark is trusted beside a wrist or knee: the face and fingers lie close together and say little about
@@ -20,6 +20,7 @@ from .landmark_network import KEYPOINT_NAMES
 _TRUST = {"hip": 0.7, "nose": 0.5, "ear": 0.5, "heel": 0.5, "foot": 0.5}
 _TRUST |= {"pinky": 0.3, "index": 0.3, "thumb": 0.3, "eye": 0.2, "mouth": 0.2}
 _BONES = ("shoulder", "elbow"), ("elbow", "wrist"), ("hip", "knee"), ("knee", "ankle")
+ROOT_SIGMA_M = 0.12  # of a pelvis above feet that stand on the floor
 NEAREST_M = 0.3  # a person closer to the camera than this is a mistake
 
 
@@ -46,13 +47,18 @@ class Measurer:
         """(J, 2) pixels without distortion -> (J, 2) normalized image coordinates."""
         return pixels @ self._unproject[:2, :2].T + self._unproject[:2, 2]
 
-    def measure(self, pixels: np.ndarray, confidence: np.ndarray, world: np.ndarray) -> Measurements:
+    def measure(
+        self, pixels: np.ndarray, confidence: np.ndarray, world: np.ndarray, root_cam: np.ndarray | None = None
+    ) -> Measurements:
         """Measurements of one frame.
 
         :param pixels: (33, 2) without lens distortion;  confidence: (33,) 0..1;  world: (33, 3) metres, hip-centred.
+        :param root_cam: (3,) where the pelvis is known to be, metres, camera frame; places the 3D keypoints and is a
+            prior of ``ROOT_SIGMA_M``.
         """
         rays = self.rays(pixels)
-        depth = np.maximum(world[:, 2] + place(world, rays, confidence)[2], NEAREST_M)
+        distance = place(world, rays, confidence)[2] if root_cam is None else root_cam[2]
+        depth = np.maximum(world[:, 2] + distance, NEAREST_M)
         points = np.concatenate([rays * depth[:, None], depth[:, None]], axis=1)
         weight = confidence * self.trust
         return Measurements(
@@ -65,6 +71,7 @@ class Measurer:
                 world[self.to_landmark] - world[self.from_landmark],
                 np.minimum(confidence[self.from_landmark], confidence[self.to_landmark]),
             ),
+            pose_priors=None if root_cam is None else _root_prior(root_cam),
         )
 
     def joint_confidence(self, confidence: np.ndarray) -> np.ndarray:
@@ -97,6 +104,10 @@ def place(world: np.ndarray, rays: np.ndarray, weight: np.ndarray) -> np.ndarray
     b = np.concatenate([rays[:, 0] * world[:, 2] - world[:, 0], rays[:, 1] * world[:, 2] - world[:, 1]])
     w = np.tile(weight, 2)
     return np.linalg.lstsq(A * w[:, None], b * w, rcond=None)[0]
+
+
+def _root_prior(root_cam: np.ndarray) -> PosePriors:
+    return PosePriors([0], np.eye(3)[None], root_cam[None], [0.0], [1 / ROOT_SIGMA_M**2])
 
 
 def _trust(name: str) -> float:

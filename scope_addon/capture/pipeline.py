@@ -12,9 +12,9 @@ from pathlib import Path
 from ...solver.body import Body
 from ...solver.errors import NoPersonError
 from ..motion import Motion
-from .assemble import assemble_motion
+from .assemble import assemble_motion, root_on_floor
 from .camera import choose_camera
-from .fitting import fit_track
+from .fitting import fit_track, refit_track
 from .track import Track, TrackBuilder
 from .tracker import PersonTracker
 from .video import Video, open_video
@@ -66,9 +66,12 @@ def capture(path: str | Path, body: Body, options: CaptureOptions, progress: Pro
         track = _observe(video, PersonTracker(options.quality, options.threads or os.cpu_count() or 1), clock, progress)
         warnings = list(video.warnings)
     _require_person(track, path)
+    smoothing = options.smoothing and len(track) > 1
 
     with clock.stage("solver"):
         fitted = fit_track(body, track, camera, progress)
+        if smoothing:
+            fitted = refit_track(body, track, camera, fitted, root_on_floor(body, track, fitted), progress)
         motion = assemble_motion(
             body,
             track,
@@ -77,7 +80,7 @@ def capture(path: str | Path, body: Body, options: CaptureOptions, progress: Pro
             fps=video.fps,
             image_size=(video.width, video.height),
             source=path.name,
-            smoothing=options.smoothing and not video.is_still,
+            smoothing=smoothing,
         )
     missing = int((~motion.valid).sum())
     if missing:
