@@ -39,6 +39,11 @@ class Cache:
         """Where the worker's numba keeps compiled code."""
         return self.root / "kernels"
 
+    @property
+    def has_kernels(self) -> bool:
+        """Whether a capture has compiled the solver here before."""
+        return next(self.kernels.rglob("*.nbi"), None) is not None
+
     def find(self, key: str) -> CachedCapture | None:
         """A finished capture, or None."""
         folder = self.root / "captures" / key

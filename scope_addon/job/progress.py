@@ -13,8 +13,9 @@ STAGES = {"starting": 0.02, "finding the person": 0.68, "finding the shape": 0.1
 class JobProgress:
     """Takes the worker's progress messages and says what a user wants to know."""
 
-    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
-        self._clock = clock
+    def __init__(self, first_use: bool = False, clock: Callable[[], float] = time.monotonic) -> None:
+        """:param first_use: no compiled solver is in the cache yet."""
+        self._clock, self._first_use = clock, first_use
         self._began = self._stage_began = clock()
         self._stage_first = 0
         self.stage, self.done, self.total = "starting", 0, 0
@@ -24,6 +25,11 @@ class JobProgress:
         if stage != self.stage:
             self.stage, self._stage_began, self._stage_first = stage, self._clock(), done
         self.done, self.total = done, total
+
+    @property
+    def compiling(self) -> bool:
+        """Whether the solver is being compiled, which happens in the first capture after installing."""
+        return self._first_use and self.stage == "finding the shape"
 
     @property
     def fraction(self) -> float:
@@ -45,20 +51,23 @@ class JobProgress:
     def seconds_left(self) -> float | None:
         """Estimate for the whole job; None while it would be a guess."""
         elapsed, fraction = self._clock() - self._began, self.fraction
-        if elapsed < 2 or fraction < 0.05:
+        if elapsed < 2 or fraction < 0.05 or self.total == 0:
             return None
         return elapsed * (1 - fraction) / fraction
 
-    def text(self) -> str:
-        """One line: stage, frames, speed, time left."""
-        parts = [self.stage.capitalize()]
+    def lines(self) -> list[str]:
+        """What is being done, and, where known, how fast and for how long."""
+        doing = self.stage.capitalize()
         if self.total > 0:
-            parts[0] += f" {self.done} / {self.total}"
-        if self.frames_per_second:
-            parts.append(f"{self.frames_per_second:.1f} frames/s")
-        if self.seconds_left is not None:
-            parts.append(f"{duration(self.seconds_left)} left")
-        return ", ".join(parts)
+            doing += f", {self.done} of {self.total} frames"
+        lines = [doing]
+        if self.compiling:
+            lines.append("First use: preparing the solver takes a minute")
+        speed = [f"{self.frames_per_second:.1f} frames/s"] if self.frames_per_second else []
+        left = [f"{duration(self.seconds_left)} left"] if self.seconds_left is not None else []
+        if speed or left:
+            lines.append(", ".join(speed + left))
+        return lines
 
 
 def duration(seconds: float) -> str:

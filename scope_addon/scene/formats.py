@@ -14,6 +14,7 @@ import addon_utils
 import bpy
 import numpy as np
 
+from ...solver.errors import OutputError
 from . import bvh, timing
 
 
@@ -190,5 +191,8 @@ def _need(module: str) -> None:
 
 def _call(operator, **settings) -> None:
     """Call an exporter with those of our settings that this Blender's version of it has."""
-    known = operator.get_rna_type().properties.keys()
+    try:
+        known = operator.get_rna_type().properties.keys()
+    except KeyError as error:
+        raise OutputError("this Blender was built without a writer for the format; use one from blender.org") from error
     operator(**{name: value for name, value in settings.items() if name in known})

@@ -29,18 +29,18 @@ from .result import show_result
 class CaptureJob:
     """A capture for one scene, with the settings the scene has now."""
 
-    def __init__(self, scene: bpy.types.Scene, python: Sequence[str] = (), script: Path = START_SCRIPT) -> None:
+    def __init__(self, scene: bpy.types.Scene, python: Sequence[str] = ()) -> None:
         """Start the worker, or find the finished capture in the cache.
 
-        :param python: interpreter of the worker; Blender's own when empty.
+        :param python: interpreter of the worker and its arguments; Blender's own when empty.
         :raises ScopeError: what can be known to fail without capturing.
         """
-        self.progress = JobProgress()
+        self._cache: Cache = cache()
+        self.progress = JobProgress(first_use=not self._cache.has_kernels)
         self.cancel_requested = False
         self._scene_uid = scene.session_uid
         self._options = build_options(scene)
         self._request = capture_request(scene)
-        self._cache: Cache = cache()
         self._key = self._request.key(code_version(ROOT))
         self._captured: CachedCapture | None = self._cache.find(self._key)
         self._worker: WorkerProcess | None = None
@@ -48,7 +48,7 @@ class CaptureJob:
         if self._captured is None:
             python = python or [sys.executable, *bpy.app.python_args]
             folder = self._cache.new_job_folder()
-            self._worker = WorkerProcess(self._request, folder, self._cache.kernels, python, script)
+            self._worker = WorkerProcess(self._request, folder, self._cache.kernels, python, START_SCRIPT)
 
     @property
     def worker(self) -> WorkerProcess | None:

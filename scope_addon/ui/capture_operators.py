@@ -117,7 +117,7 @@ class SCOPE_OT_capture(bpy.types.Operator):
         if event.type != "TIMER":
             return {"PASS_THROUGH"}
         outcome = self._step()
-        context.workspace.status_text_set(f"Scope: {job.progress.text()}   (Esc to cancel)")
+        context.workspace.status_text_set(f"Scope: {', '.join(job.progress.lines())}   (Esc to cancel)")
         redraw(context)
         return self._end(context, outcome) if outcome else {"PASS_THROUGH"}
 

@@ -8,9 +8,10 @@ from pathlib import Path
 
 import bpy
 
+from ..job.progress import JobProgress, duration
 from .capture_operators import state
 from .export_operators import FORMATS
-from .view_operators import camera_of
+from .view_operators import camera_of, is_looking_through
 
 _PIXELS_PER_LETTER = 7.0
 
@@ -33,14 +34,14 @@ class SCOPE_PT_capture(_Tab, bpy.types.Panel):
         running = state.job is not None
         column = layout.column()
         column.enabled = not running
-        row = column.row(align=True)
-        row.prop(settings, "footage", text="", placeholder="Video or picture") if _has_placeholder() else row.prop(
-            settings, "footage", text=""
-        )
-        row.operator("scope.choose_footage", text="", icon="FILE_MOVIE")
         if not settings.footage:
+            row = column.row()
+            row.scale_y = 1.6
+            row.operator("scope.choose_footage", icon="FILE_MOVIE")
             column.operator("scope.use_sample", icon="PLAY")
-        column.prop(settings, "quality", expand=True)
+            return
+        column.prop(settings, "footage", text="", icon="FILE_MOVIE")
+        column.row(align=True).prop(settings, "quality", expand=True)
         if running:
             _draw_progress(layout, state.job.progress)
         else:
@@ -51,10 +52,11 @@ class SCOPE_PT_capture(_Tab, bpy.types.Panel):
             _draw_text(context, layout.box(), state.message, "ERROR")
 
 
-def _draw_progress(layout: bpy.types.UILayout, progress) -> None:
+def _draw_progress(layout: bpy.types.UILayout, progress: JobProgress) -> None:
     layout.progress(text=f"{100 * progress.fraction:.0f} %", factor=progress.fraction)
-    for part in progress.text().split(", "):
-        layout.label(text=part)
+    column = layout.column(align=True)
+    for part in progress.lines():
+        column.label(text=part)
     row = layout.row()
     row.scale_y = 1.6
     row.operator("scope.cancel", text="Cancel", icon="CANCEL")
@@ -119,27 +121,29 @@ class SCOPE_PT_result(_Tab, bpy.types.Panel):
         column = layout.column(align=True)
         column.label(text=Path(result.footage).name, icon="FILE_MOVIE")
         column.label(text="1 person" if result.people == 1 else f"{result.people} people", icon="OUTLINER_OB_ARMATURE")
-        column.label(text=f"{result.frames} frames, {result.frames_per_second:.1f} captured a second", icon="TIME")
-        column.label(text=f"{result.reprojection_px:.1f} px from the footage on average", icon="CON_CAMERASOLVER")
+        took = duration(result.frames / result.frames_per_second) if result.frames_per_second else "no time"
+        frames = "1 frame" if result.frames == 1 else f"{result.frames} frames"
+        column.label(text=f"{frames}, captured in {took}", icon="TIME")
+        column.label(text=f"{result.reprojection_px:.1f} pixels off the footage on average", icon="CON_CAMERASOLVER")
         column.label(text=f"Lens: {result.camera}", icon="CAMERA_DATA")
         for warning in result.warnings:
             _draw_text(context, layout.box(), warning.text, "ERROR")
         if camera_of(context.scene) is not None:
-            layout.operator("scope.look_through", icon="VIEW_CAMERA")
+            back = is_looking_through(context)
+            text = "Back to the Scene" if back else "Compare with Footage"
+            layout.operator("scope.look_through", text=text, icon="VIEW_CAMERA", depress=back)
         layout.label(text="Export")
         grid = layout.grid_flow(columns=2, even_columns=True, align=True)
         for key, label, _, _ in FORMATS:
-            grid.operator("scope.export", text=label).format = key
+            cell = grid.column()
+            cell.enabled = key != "USDC" or "usd_export" in dir(bpy.ops.wm)  # some systems build Blender without USD
+            cell.operator("scope.export", text=label).format = key
 
 
 def _split(layout: bpy.types.UILayout) -> bpy.types.UILayout:
     layout.use_property_split = True
     layout.use_property_decorate = False
     return layout
-
-
-def _has_placeholder() -> bool:
-    return "placeholder" in bpy.types.UILayout.bl_rna.functions["prop"].parameters
 
 
 def _draw_text(context: bpy.types.Context, layout: bpy.types.UILayout, text: str, icon: str) -> None:

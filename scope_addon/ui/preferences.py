@@ -61,7 +61,7 @@ class SCOPE_AP_preferences(bpy.types.AddonPreferences):
 
 
 class SCOPE_OT_clear_cache(bpy.types.Operator):
-    """Remove captured motion from the cache. Scenes that were built from it stay as they are."""
+    """Remove captured motion from the cache. Scenes that were built from it stay as they are"""
 
     bl_idname = "scope.clear_cache"
     bl_label = "Clear Cache"

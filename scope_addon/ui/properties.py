@@ -19,6 +19,8 @@ from bpy.props import (
 )
 
 _FIXED: set[str] = set()  # not animatable: a keyframe on a setting would only confuse
+# Paths may begin with "//", the .blend's folder; since 4.5 Blender wants to be told.
+_PATH = {"PATH_SUPPORTS_BLEND_RELATIVE"} if bpy.app.version >= (4, 5, 0) else set()
 
 # The numbers are what a .blend stores; they must never change.
 QUALITIES = (
@@ -74,7 +76,7 @@ class SCOPE_PG_settings(bpy.types.PropertyGroup):
     """What the user chose."""
 
     footage: StringProperty(
-        name="Footage", subtype="FILE_PATH", options=_FIXED, description="Video or picture of a person to capture"
+        name="Footage", subtype="FILE_PATH", options=_PATH, description="Video or picture of a person to capture"
     )
     quality: EnumProperty(
         name="Quality", items=QUALITIES, default="BEST", options=_FIXED, description="Speed against accuracy"
@@ -85,7 +87,7 @@ class SCOPE_PG_settings(bpy.types.PropertyGroup):
     body_file: StringProperty(
         name="Body File",
         subtype="FILE_PATH",
-        options=_FIXED,
+        options=_PATH,
         description="SMPL, SMPL+H, SMPL-X or STAR model (.npz or .pkl); the one in the preferences when empty",
     )
     lens: EnumProperty(

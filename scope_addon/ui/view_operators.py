@@ -7,7 +7,7 @@ import bpy
 
 
 class SCOPE_OT_look_through(bpy.types.Operator):
-    """Look through the capture's camera, the footage behind the body. Gives the scene the footage's resolution"""
+    """See the body over the footage, through the capture's camera, and back. Sets the scene's camera and resolution"""
 
     bl_idname = "scope.look_through"
     bl_label = "Compare with Footage"
@@ -21,15 +21,42 @@ class SCOPE_OT_look_through(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Set the scene's camera and resolution, and the viewport's view."""
         scene, camera = context.scene, camera_of(context.scene)
+        if is_looking_through(context):
+            bpy.ops.view3d.localview(frame_selected=False)
+            context.space_data.region_3d.view_perspective = "PERSP"
+            return {"FINISHED"}
         scene.camera = camera
         render, result = scene.render, scene.scope.result
         render.resolution_x, render.resolution_y = result.resolution
         render.pixel_aspect_x, render.pixel_aspect_y = result.pixel_aspect
         render.resolution_percentage = 100
-        for area in context.screen.areas if context.screen else ():
-            if area.type == "VIEW_3D":
-                area.spaces.active.region_3d.view_perspective = "CAMERA"
+        if not bpy.app.background and context.area and context.area.type == "VIEW_3D":
+            self._show_alone(context, scene.scope.result.collection)
         return {"FINISHED"}
+
+    def _show_alone(self, context: bpy.types.Context, collection: bpy.types.Collection) -> None:
+        """Local view: what else is in the scene would hide the footage or the body."""
+        space, selected, active = context.space_data, context.selected_objects, context.view_layer.objects.active
+        if active and active.mode != "OBJECT":
+            bpy.ops.object.mode_set(mode="OBJECT")
+        if space.local_view:
+            bpy.ops.view3d.localview(frame_selected=False)
+        bpy.ops.object.select_all(action="DESELECT")
+        for obj in collection.all_objects:
+            obj.select_set(True)
+        bpy.ops.view3d.localview(frame_selected=False)
+        bpy.ops.object.select_all(action="DESELECT")
+        for obj in selected:
+            obj.select_set(True)
+        space.region_3d.view_perspective = "CAMERA"
+
+
+def is_looking_through(context: bpy.types.Context) -> bool:
+    """Whether the viewport shows a capture alone through its camera."""
+    space = context.space_data
+    if space is None or space.type != "VIEW_3D" or not space.local_view:
+        return False
+    return space.region_3d.view_perspective == "CAMERA" and context.scene.camera == camera_of(context.scene)
 
 
 def camera_of(scene: bpy.types.Scene) -> bpy.types.Object | None:

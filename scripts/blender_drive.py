@@ -1,0 +1,200 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Runs inside a Blender with a window: uses the panel as a person would, and takes a picture of every state.
+
+    blender --python blender_drive.py -- VIDEO OUT_FOLDER
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import time
+import traceback
+from collections.abc import Iterator
+from pathlib import Path
+
+import bpy
+
+VIDEO, OUT = sys.argv[sys.argv.index("--") + 1], Path(sys.argv[sys.argv.index("--") + 2])
+report: dict = {"blender": bpy.app.version_string, "python": sys.version.split()[0], "exports": []}
+
+
+def viewport() -> dict:
+    """Context of the 3D viewport's main region."""
+    window = bpy.context.window_manager.windows[0]
+    area = next(a for a in window.screen.areas if a.type == "VIEW_3D")
+    return {"window": window, "area": area, "region": next(r for r in area.regions if r.type == "WINDOW")}
+
+
+def picture(name: str) -> None:
+    """Of the whole screen."""
+    subprocess.run(["import", "-window", "root", str(OUT / f"{name}.png")], check=True)
+
+
+def key(name: str) -> None:
+    """Press a key over the viewport."""
+    subprocess.run(["xdotool", "mousemove", "500", "400", "key", name], check=True)
+
+
+def click(x: int, y: int) -> None:
+    """The left button, in the screen's pixels from its top left."""
+    subprocess.run(["xdotool", "mousemove", str(x), str(y), "click", "1"], check=True)
+
+
+def addon():
+    """The extension's module of operators, for looking at the job."""
+    name = next(n for n in sys.modules if n.startswith("bl_ext.") and n.endswith(".scope_addon.ui.capture_operators"))
+    return sys.modules[name]
+
+
+def invoke(operator, *arguments, **settings) -> None:
+    """Call an operator as a button does."""
+    with bpy.context.temp_override(**viewport()):
+        operator(*arguments, **settings)
+
+
+def inventory() -> dict:
+    """What the file holds; cancelling must not change it."""
+    kinds = ("objects", "meshes", "armatures", "cameras", "actions", "collections", "images", "movieclips", "materials")
+    return {kind: sorted(b.name for b in getattr(bpy.data, kind)) for kind in kinds}
+
+
+def steps() -> Iterator[float]:
+    """The session; yields seconds to wait."""
+    scene = bpy.context.scene
+    area = viewport()["area"]
+    area.spaces.active.show_region_ui = True
+    yield 1.0
+    sidebar = next(r for r in area.regions if r.type == "UI")
+    try:
+        sidebar.active_panel_category = "Scope"
+    except AttributeError:
+        report["tab"] = "could not be chosen by script"
+    yield 2.0
+    picture("1_new_scene")
+
+    bpy.ops.scope.choose_footage(filepath=VIDEO)
+    scene.scope.quality = "FAST"
+    yield 1.0
+    picture("2_footage_chosen")
+
+    before = inventory()
+    invoke(bpy.ops.scope.capture, "INVOKE_DEFAULT")
+    yield 4.0
+    picture("3_capturing")
+    worker = addon().state.job.worker
+    folder, pid = worker.job_folder, worker.pid
+    key("Escape")
+    yield 2.0
+    picture("4_cancelled")
+    left = [] if inventory() == before else ["data in the file"]
+    left += [str(folder)] if folder.exists() else []
+    left += [f"process {pid}"] if os.path.exists(f"/proc/{pid}") and worker.alive else []
+    left += ["a running job"] if addon().state.job is not None else []
+    report["left_after_cancel"] = left
+
+    began, last, gaps = time.monotonic(), time.monotonic(), []
+    invoke(bpy.ops.scope.capture, "INVOKE_DEFAULT")
+    pictures = 0
+    while addon().state.job is not None:
+        yield 0.02
+        now = time.monotonic()
+        building = addon().state.job is None or addon().state.job.progress.stage == "building the scene"
+        if not building:
+            gaps.append(now - last)
+        last = now
+        if now - began > 25 * (pictures + 1) and pictures < 3:
+            pictures += 1
+            picture(f"5_capturing_{pictures}")
+            last = time.monotonic()
+    report["capture_s"] = round(time.monotonic() - began, 1)
+    gaps.sort()
+    report["timer_gap_ms"] = {
+        "median": round(1e3 * gaps[len(gaps) // 2], 1),
+        "p99": round(1e3 * gaps[int(0.99 * len(gaps))], 1),
+        "largest": round(1e3 * gaps[-1], 1),
+    }
+    yield 2.0
+    picture("6_result")
+    assert scene.scope.result.collection is not None, addon().state.message
+    result = scene.scope.result
+    report["people"], report["frames"] = result.people, result.frames
+    report["reprojection_px"] = round(result.reprojection_px, 2)
+    report["warnings"] = [w.text for w in result.warnings]
+    report["scene_rate"] = [scene.render.fps, round(scene.render.fps_base, 4)]
+    shutil.copy(result.collection["scope_motions"][0], OUT / "motion.npz")
+
+    invoke(bpy.ops.scope.look_through)
+    scene.frame_set(result.frames // 2)
+    yield 2.0
+    picture("7_compared_with_footage")
+
+    invoke(bpy.ops.scope.look_through)
+    yield 1.0
+    formats = [("FBX", "fbx"), ("GLB", "glb"), ("BVH", "bvh")]
+    formats += [("USDC", "usdc")] if "usd_export" in dir(bpy.ops.wm) else []  # Debian builds Blender without USD
+    for kind, suffix in formats:
+        invoke(bpy.ops.scope.export, filepath=str(OUT / f"export.{suffix}"), format=kind)
+        report["exports"].append(f"export.{suffix}")
+    yield 1.0
+    invoke(bpy.ops.scope.export, "INVOKE_DEFAULT", format="GLB")
+    yield 3.0
+    picture("8_export_window")
+    for window in list(bpy.context.window_manager.windows)[1:]:
+        with bpy.context.temp_override(window=window):
+            bpy.ops.wm.window_close()
+    yield 1.0
+
+    began = time.monotonic()
+    invoke(bpy.ops.scope.capture, "INVOKE_DEFAULT")
+    while addon().state.job is not None:
+        yield 0.02
+    report["cached_capture_s"] = round(time.monotonic() - began, 2)
+    bpy.ops.ed.undo()
+    yield 1.0
+    report["captures_after_undo"] = sum("scope_capture" in c for c in bpy.data.collections)
+    picture("9_undone")
+
+    scene = bpy.context.scene
+    scene.scope.footage = "/scope/gone.mp4"
+    try:
+        invoke(bpy.ops.scope.capture, "INVOKE_DEFAULT")
+    except RuntimeError as error:
+        report["missing_footage"] = str(error).strip()
+    yield 1.5
+    picture("10_missing_footage")
+    bpy.ops.screen.userpref_show()
+    bpy.context.preferences.active_section = "ADDONS"
+    bpy.context.window_manager.addon_search = "Scope"
+    module = next(a.module for a in bpy.context.preferences.addons if a.module.endswith(".scope"))
+    bpy.ops.preferences.addon_expand(module=module)
+    yield 3.0
+    picture("11_preferences")
+
+
+def run() -> None:
+    """Drive ``steps`` by Blender's timers and leave."""
+    session = steps()
+
+    def advance() -> float | None:
+        try:
+            return next(session)
+        except StopIteration:
+            (OUT / "report.json").write_text(json.dumps(report))
+            status = 0
+        except BaseException:
+            traceback.print_exc()
+            picture("failed")
+            status = 1
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(status)  # Blender's own exit can hang
+
+    bpy.context.preferences.view.show_splash = False
+    bpy.app.timers.register(advance, first_interval=3.0)
+
+
+run()

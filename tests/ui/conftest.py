@@ -1,0 +1,139 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The extension registered in a fresh Blender, a cache of its own, and workers that do as they are told."""
+
+from __future__ import annotations
+
+import os
+import sys
+import tempfile
+import textwrap
+from pathlib import Path
+
+# Blender reads this once, when bpy is first imported: tests must not write in the home folder.
+os.environ.setdefault("BLENDER_USER_RESOURCES", tempfile.mkdtemp(prefix="scope-tests-blender-"))
+
+import bpy
+import numpy as np
+import pytest
+import scope
+from scope.scope_addon.job.cache import Cache
+from scope.scope_addon.motion import Motion
+from scope.solver.body import load_body
+
+ROOT = Path(scope.__file__).resolve().parent
+
+
+@pytest.fixture(scope="session")
+def root() -> Path:
+    return ROOT
+
+
+@pytest.fixture(autouse=True)
+def registered(tmp_path, monkeypatch):
+    """A fresh Blender with the extension. The cache is this test's, but for the compiled solver."""
+    from scope.scope_addon.ui import preferences
+
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    scope.register()
+    monkeypatch.setattr(preferences, "user_folder", lambda: tmp_path / "user")
+    monkeypatch.setattr(Cache, "kernels", property(lambda cache: ROOT / "build" / "test-kernels"))
+    (ROOT / "build" / "test-kernels").mkdir(parents=True, exist_ok=True)
+    yield
+    scope.unregister()
+
+
+@pytest.fixture
+def footage(tmp_path) -> Path:
+    """A file that a fake worker takes for footage: the sample's first frame."""
+    import cv2
+
+    ok, image = cv2.VideoCapture(str(ROOT / "assets" / "sample" / "sample.mp4")).read()
+    assert ok
+    path = tmp_path / "person.png"
+    cv2.imwrite(str(path), image)
+    return path
+
+
+@pytest.fixture(scope="session")
+def standing() -> Motion:
+    """A body that stands still for ten frames, three of which nobody saw."""
+    body, count = load_body("scope"), 10
+    K1 = body.K + 1
+    poses = np.zeros((count, 3 * K1))
+    poses[:, 0] = np.pi / 2
+    camera = np.tile(np.eye(4), (count, 1, 1))
+    camera[:, :3] = [[1, 0, 0, 0], [0, 0, 1, -4], [0, -1, 0, 1]]
+    valid = np.ones(count, bool)
+    valid[[3, 4, 7]] = False
+    return Motion(
+        poses=poses,
+        trans=np.tile([0, 0, 1.0], (count, 1)),
+        poses_raw=poses,
+        trans_raw=np.tile([0, 0, 1.0], (count, 1)),
+        betas=np.zeros(body.P),
+        body_model="scope",
+        gender="neutral",
+        mocap_framerate=25.0,
+        frames=np.arange(count),
+        timestamps=np.arange(count) / 25.0,
+        valid=valid,
+        joints_cam=np.ones((count, K1, 3)),
+        keypoints2d=np.zeros((count, 1, 3)),
+        keypoints2d_names=np.array(["blazepose/nose"]),
+        intrinsics=np.array([[500.0, 0, 320], [0, 500.0, 240], [0, 0, 1]]),
+        dist=np.zeros(5),
+        joint_confidence=np.ones((count, K1)),
+        world_from_camera=camera,
+        foot_contact=np.zeros((count, 4)),
+        residual_px=np.full(count, 2.0),
+        image_size=np.array([640, 480]),
+        source="person.png",
+    )
+
+
+@pytest.fixture
+def fake_worker(tmp_path, monkeypatch, standing):
+    """Make the next captures run a script instead of the worker; its body is given as text.
+
+    It finds ``folder``, ``request``, ``send(event, **values)`` and ``finish()``, which sends the standing body.
+    """
+    from scope.scope_addon.ui import capture_job
+
+    standing.save(tmp_path / "standing.npz")
+
+    def use(body: str) -> None:
+        script = tmp_path / "fake_worker.py"
+        script.write_text(
+            textwrap.dedent(f"""
+                import json, os, shutil, sys, time
+                folder, request = sys.argv[2], json.loads(sys.stdin.readline())
+                def send(event, **values):
+                    print(json.dumps(dict(values, event=event)), flush=True)
+                def finish():
+                    shutil.copy({str(tmp_path / "standing.npz")!r}, folder + "/person1.npz")
+                    report = {{"people": 1, "reprojection_px": 2.5, "fps": {{"total": 5.0}}, "warnings": ["a warning"]}}
+                    send("result", motions=["person1.npz"], report=report)
+            """)
+            + textwrap.dedent(body)
+        )
+        monkeypatch.setattr(capture_job, "START_SCRIPT", script)
+
+    return use
+
+
+@pytest.fixture
+def python() -> list[str]:
+    return [sys.executable, *bpy.app.python_args]
+
+
+def inventory() -> dict:
+    """What the file holds and how the scene is set."""
+    kinds = ("objects", "meshes", "armatures", "cameras", "actions", "collections", "images", "movieclips", "materials")
+    scene = bpy.context.scene
+    blocks = {kind: sorted(b.name for b in getattr(bpy.data, kind)) for kind in kinds}
+    return blocks | {"range": (scene.frame_start, scene.frame_end), "rate": (scene.render.fps, scene.render.fps_base)}
+
+
+@pytest.fixture
+def contents():
+    return inventory

@@ -1,0 +1,138 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Settings in the .blend, dropped files, export buttons, the camera button, texts."""
+
+import bpy
+import pytest
+from scope.scope_addon.job.progress import JobProgress, duration
+from scope.scope_addon.ui import drop
+from scope.scope_addon.ui.preferences import cache
+
+FINISH = "finish()"
+
+
+def captured(fake_worker, footage):
+    fake_worker(FINISH)
+    bpy.context.scene.scope.footage = str(footage)
+    bpy.ops.scope.capture()
+
+
+def test_settings_and_result_survive_the_file(fake_worker, footage, tmp_path):
+    captured(fake_worker, footage)
+    settings = bpy.context.scene.scope
+    wanted = {"quality": "FAST", "body": "FILE", "body_file": "//smpl.npz", "lens": "FOCAL", "focal_mm": 35.0}
+    wanted |= {"smoothing": False, "frame_rate": "KEEP", "start_frame": 101, "shape": "BAKED", "with_camera": False}
+    for name, value in wanted.items():
+        setattr(settings, name, value)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "saved.blend"))
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    assert bpy.context.scene.scope.quality == "BEST"
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "saved.blend"))
+    settings = bpy.context.scene.scope
+    assert {name: getattr(settings, name) for name in wanted} == wanted
+    assert settings.result.frames == 10
+    assert settings.result.collection.name == "person"
+    assert len(settings.result.warnings) == 2
+
+
+def test_each_scene_has_its_own_settings():
+    first, second = bpy.context.scene, bpy.data.scenes.new("second")
+    first.scope.quality = "FAST"
+    assert second.scope.quality == "BEST"
+
+
+def test_dropped_files_become_the_footage(footage):
+    suffixes = drop.SCOPE_FH_footage.bl_file_extensions.split(";")
+    assert {".mp4", ".mov", ".png", ".jpg"} <= set(suffixes)
+    # What Blender does with a dropped file: the handler's operator, with a path.
+    assert bpy.ops.scope.choose_footage("INVOKE_DEFAULT", filepath=str(footage)) == {"FINISHED"}
+    assert bpy.context.scene.scope.footage == str(footage)
+    with pytest.raises(RuntimeError, match="not a file"):
+        bpy.ops.scope.choose_footage(filepath=str(footage.parent))
+    assert bpy.context.scene.scope.footage == str(footage)
+
+
+def test_buttons_wait_for_what_they_need(fake_worker, footage):
+    assert not bpy.ops.scope.capture.poll()
+    assert not bpy.ops.scope.export.poll()
+    assert not bpy.ops.scope.look_through.poll()
+    captured(fake_worker, footage)
+    assert bpy.ops.scope.capture.poll()
+    assert bpy.ops.scope.export.poll()
+    assert bpy.ops.scope.look_through.poll()
+
+
+@pytest.mark.parametrize(("kind", "suffix"), [("FBX", ".fbx"), ("GLB", ".glb"), ("BVH", ".bvh"), ("USDC", ".usdc")])
+def test_export_buttons_write_and_leave_the_file_alone(fake_worker, footage, tmp_path, contents, kind, suffix):
+    if kind == "USDC" and "usd_export" not in dir(bpy.ops.wm):
+        pytest.skip("this Blender was built without USD")
+    captured(fake_worker, footage)
+    before = contents()
+    assert bpy.ops.scope.export(filepath=str(tmp_path / "walk"), format=kind) == {"FINISHED"}
+    assert (tmp_path / f"walk{suffix}").stat().st_size > 1000
+    assert contents() == before
+
+
+def test_export_of_the_active_capture_alone(fake_worker, footage, tmp_path):
+    captured(fake_worker, footage)
+    bpy.ops.scope.capture()
+    bpy.ops.scope.export(filepath=str(tmp_path / "both.bvh"), format="BVH", which="ALL")
+    assert len(list(tmp_path.glob("both*.bvh"))) == 2
+    bpy.ops.scope.export(filepath=str(tmp_path / "one.bvh"), format="BVH", which="ACTIVE")
+    assert [p.name for p in tmp_path.glob("one*.bvh")] == ["one.bvh"]
+    bpy.context.view_layer.objects.active = None
+    with pytest.raises(RuntimeError, match="belongs to no capture"):
+        bpy.ops.scope.export(filepath=str(tmp_path / "none.bvh"), format="BVH", which="ACTIVE")
+
+
+def test_an_export_that_cannot_be_written_is_told(fake_worker, footage, tmp_path):
+    captured(fake_worker, footage)
+    with pytest.raises(RuntimeError, match="does not exist"):
+        bpy.ops.scope.export(filepath=str(tmp_path / "none" / "walk.glb"), format="GLB")
+
+
+def test_looking_through_the_camera_sets_camera_and_resolution(fake_worker, footage):
+    captured(fake_worker, footage)
+    scene = bpy.context.scene
+    assert scene.camera is None
+    bpy.ops.scope.look_through()
+    assert scene.camera.name == "person_camera"
+    assert (scene.render.resolution_x, scene.render.resolution_y) == (640, 480)
+
+
+def test_clearing_the_cache_leaves_the_scene(fake_worker, footage, monkeypatch, tmp_path):
+    from scope.scope_addon.job.cache import Cache
+
+    monkeypatch.setattr(Cache, "kernels", property(lambda cache: cache.root / "kernels"))
+    captured(fake_worker, footage)
+    bystander = cache().root / "notes.txt"
+    bystander.write_text("the user's")
+    assert cache().size() > 1000
+    bpy.ops.scope.clear_cache()
+    assert cache().size() == 0
+    assert bystander.exists()
+    assert bpy.context.scene.scope.result.collection is not None
+
+
+def test_progress_says_stage_speed_and_time_left():
+    now = [0.0]
+    progress = JobProgress(clock=lambda: now[0])
+    assert progress.lines() == ["Starting"]
+    progress.update("finding the person", 0, 100)
+    now[0] = 10.0
+    progress.update("finding the person", 50, 100)
+    assert progress.frames_per_second == pytest.approx(5.0)
+    assert 0.3 < progress.fraction < 0.4
+    assert progress.lines()[0] == "Finding the person, 50 of 100 frames"
+    assert progress.lines()[1].startswith("5.0 frames/s, ")
+    before = progress.fraction
+    progress.update("finding the shape", 0, 0)
+    assert progress.fraction > before
+    assert progress.seconds_left is None
+    assert len(JobProgress(first_use=True).lines()) == 1
+
+
+@pytest.mark.parametrize(
+    ("seconds", "text"), [(0.2, "0 s"), (59.6, "1 min 00 s"), (125, "2 min 05 s"), (3720, "1 h 02 min")]
+)
+def test_durations(seconds, text):
+    assert duration(seconds) == text

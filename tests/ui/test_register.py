@@ -1,0 +1,99 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Enabling and disabling, under both of the package's names, and what it costs."""
+
+import subprocess
+import sys
+from importlib import import_module
+
+import addon_utils
+import bpy
+import pytest
+import scope
+
+
+@pytest.fixture
+def unregistered():
+    scope.unregister()
+    yield
+    scope.register()
+
+
+def ours():
+    return sorted(name for name in dir(bpy.types) if name.startswith("SCOPE_"))
+
+
+def test_twice_in_a_shell(unregistered):
+    assert ours() == []
+    for _ in range(2):
+        scope.register()
+        assert {"SCOPE_PT_capture", "SCOPE_FH_footage"} <= set(ours())
+        assert bpy.context.scene.scope.quality == "BEST"
+        scope.unregister()
+        assert ours() == []
+        assert not hasattr(bpy.types.Scene, "scope")
+
+
+def test_twice_as_an_extension_with_preferences(unregistered, tmp_path, root):
+    (tmp_path / "scope").symlink_to(root)
+    repository = bpy.context.preferences.extensions.repos.new(
+        name="test", module="scope_test", custom_directory=str(tmp_path), remote_url=""
+    )
+    name = "bl_ext.scope_test.scope"
+    try:
+        addon_utils.extensions_refresh()
+        for _ in range(2):
+            assert addon_utils.enable(name, default_set=True) is not None
+            assert bpy.context.preferences.addons[name].preferences.cache_limit_gb == 2
+            assert "SCOPE_PT_capture" in ours()
+            folder = import_module(f"{name}.scope_addon.ui.preferences").cache().root
+            assert folder.is_relative_to(bpy.utils.extension_path_user(name))
+            addon_utils.disable(name, default_set=True)
+            assert ours() == []
+    finally:
+        bpy.context.preferences.extensions.repos.remove(repository)
+
+
+def test_enabling_loads_no_heavy_library(tmp_path):
+    code = (
+        "import sys, os, bpy, scope; scope.register(); scope.unregister();"
+        "print(sorted({'numba', 'cv2', 'onnxruntime', 'llvmlite'} & set(sys.modules)), flush=True); os._exit(0)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip().splitlines()[-1] == "[]"
+
+
+def test_a_failing_registration_leaves_nothing(unregistered, monkeypatch):
+    from scope.scope_addon.ui import command
+
+    def refuse():
+        raise RuntimeError("refused")
+
+    with monkeypatch.context() as patch, pytest.raises(RuntimeError, match="refused"):
+        patch.setattr(command, "register", refuse)
+        scope.register()
+    assert ours() == []
+
+
+def test_every_operator_and_setting_has_a_tooltip():
+    from scope.scope_addon import ui
+
+    for module in ui._MODULES:
+        for cls in module.CLASSES:
+            if issubclass(cls, bpy.types.Operator):
+                assert len(cls.__doc__) > 10, cls
+                assert not cls.__doc__.endswith("."), cls  # Blender adds the full stop
+                assert cls.bl_idname.startswith("scope.")
+    shown = [bpy.context.scene.scope.bl_rna, ui.preferences.SCOPE_AP_preferences.bl_rna]
+    for rna in shown:
+        for prop in rna.properties:
+            if prop.identifier not in ("rna_type", "name", "bl_idname", "result"):
+                assert prop.description.strip(), prop.identifier
+                if prop.type == "ENUM":
+                    assert all(item.description for item in prop.enum_items), prop.identifier
+
+
+def test_the_command_reaches_the_shells_command_line(capsys):
+    from scope.scope_addon.ui import command
+
+    assert command.run(["capture", "/nowhere/at/all.mp4", "-o", "/nowhere/a.npz"]) != 0
+    assert "nowhere" in capsys.readouterr().err
