@@ -33,7 +33,7 @@ from .smoothing import gaussian_smooth, smooth_rotations
 CONTACT_SPEED_M_S = 0.3  # across the line of sight; a swinging foot moves at 1 m/s and more
 CONTACT_HEIGHT_M = 0.05  # above the frame's lowest sole point
 FLOOR_SIGMA_M = 0.03
-DEPTH_SIGMA_M = 0.25  # how wrong the depth of a whole clip may be
+DEPTH_SIGMA_M = 0.1  # how wrong a depth that fits the image may be
 DEPTH_RATE_SIGMA = 0.3  # and how fast that error changes, m/s
 SLIDE_SIGMA_M_S = 0.1  # a standing foot's horizontal speed
 STEP_CUTOFF_HZ = 12.0  # takes off the edges where a foot begins and ceases to be held
