@@ -1,0 +1,113 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Imports go one way: ui -> scene, capture -> solver; each room needs only its own libraries; two names work."""
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+
+# Runs in a fresh interpreter: forbids modules, then imports every module below some packages.
+IMPORT_ALL = """
+import importlib, pkgutil, sys
+
+class Forbid:
+    def find_spec(self, name, path=None, target=None):
+        if name.split(".")[0] in {forbidden!r}:
+            raise ImportError(name + " is out of bounds here")
+
+sys.meta_path.insert(0, Forbid())
+for package in {packages!r}:
+    module = importlib.import_module(package)
+    for found in pkgutil.walk_packages(getattr(module, "__path__", []), package + "."):
+        importlib.import_module(found.name)
+loaded = {{name.split(".")[0] for name in sys.modules}} & {forbidden!r}
+assert not loaded, loaded
+"""
+
+# The package under the name that Blender gives it: bl_ext.<repository>.scope.
+AS_EXTENSION = """
+import importlib.util, sys, types
+
+for name in ("bl_ext", "bl_ext.user_default"):
+    sys.modules[name] = types.ModuleType(name)
+    sys.modules[name].__path__ = []
+spec = importlib.util.spec_from_file_location(
+    "bl_ext.user_default.scope", {init!r}, submodule_search_locations=[{root!r}]
+)
+module = importlib.util.module_from_spec(spec)
+before = set(sys.modules)
+sys.modules[spec.name] = module
+spec.loader.exec_module(module)
+assert set(sys.modules) - before == {{spec.name}}, "the root package imports something at import time"
+importlib.import_module("bl_ext.user_default.scope.solver")
+importlib.import_module("bl_ext.user_default.scope.scope_addon.capture.pipeline")
+importlib.import_module("bl_ext.user_default.scope.scope_addon.cli")
+assert not [name for name in sys.modules if name == "scope" or name.startswith("scope.")]
+"""
+
+
+def run(code: str) -> None:
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, cwd="/")
+    assert done.returncode == 0, done.stderr[-2000:]
+
+
+@pytest.mark.parametrize(
+    ("packages", "forbidden"),
+    [
+        (["scope.solver"], {"bpy", "cv2", "onnxruntime", "scipy", "torch"}),
+        (["scope.scope_addon.capture", "scope.scope_addon.motion"], {"bpy", "scipy", "torch"}),
+    ],
+)
+def test_rooms_without_blender(packages, forbidden):
+    run(IMPORT_ALL.format(packages=packages, forbidden=forbidden))
+
+
+def test_the_scene_needs_no_networks_and_no_opencv():
+    # os._exit, because Blender's module can hang in its exit handlers.
+    code = IMPORT_ALL.format(packages=["scope.scope_addon.scene"], forbidden={"cv2", "onnxruntime", "torch"})
+    run(code + "\nimport os\nos._exit(0)")
+
+
+def test_the_package_works_under_blenders_name():
+    run(AS_EXTENSION.format(init=str(ROOT / "__init__.py"), root=str(ROOT)))
+
+
+def sources(folder: str) -> list[Path]:
+    return sorted((ROOT / folder).rglob("*.py"))
+
+
+def imported(path: Path) -> list[tuple[int, str]]:
+    """(level, module) of every import statement in a file, also inside functions."""
+    out = []
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            out += [(0, alias.name) for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            out.append((node.level, node.module or ""))
+    return out
+
+
+def room(path: Path, level: int, module: str) -> str:
+    """The folder, relative to the root, that a relative import of a file points into."""
+    base = path.relative_to(ROOT).parent.parts
+    return "/".join([*base[: len(base) - (level - 1)], *module.split(".")]) if level else module
+
+
+@pytest.mark.parametrize("path", sources("solver") + sources("scope_addon"), ids=lambda p: str(p.relative_to(ROOT)))
+def test_imports_are_relative_and_go_one_way(path):
+    here = path.relative_to(ROOT).as_posix()
+    for level, module in imported(path):
+        # The worker's start is a script, run by path in a process where the package has no name yet: it gives it one.
+        if path.name != "start_worker.py":
+            assert module.split(".")[0] != "scope" or level, f"{here}: 'import {module}' is not relative"
+        target = room(path, level, module)
+        if here.startswith("solver/"):
+            assert not target.startswith(("scope_addon", "tools"))
+        for own, others in (("capture", ("scene", "ui")), ("scene", ("capture", "ui"))):
+            if here.startswith(f"scope_addon/{own}/"):
+                assert not target.startswith(tuple(f"scope_addon/{other}" for other in others)), f"{here} -> {target}"
+        assert not target.startswith("tools"), f"{here}: the product may not need tools"
