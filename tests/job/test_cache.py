@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Finished captures are found again, half-finished ones never, and the oldest go first."""
+
+import os
+import time
+
+import pytest
+from scope.scope_addon.job.cache import Cache
+from scope.solver.errors import OutputError
+
+
+@pytest.fixture
+def cache(tmp_path):
+    return Cache(tmp_path / "cache")
+
+
+def add(cache, key, size=1000):
+    folder = cache.new_job_folder()
+    (folder / "person1.npz").write_bytes(b"x" * size)
+    return cache.keep(folder, key, ["person1.npz"], {"people": 1})
+
+
+def test_kept_captures_are_found(cache):
+    assert cache.find("a") is None
+    kept = add(cache, "a")
+    assert cache.find("a") == kept
+    assert kept.motions[0].read_bytes() == b"x" * 1000
+    assert kept.report == {"people": 1}
+    assert list((cache.root / "jobs").iterdir()) == []
+
+
+def test_a_damaged_capture_is_not_found(cache):
+    kept = add(cache, "a")
+    kept.motions[0].unlink()
+    assert cache.find("a") is None
+    (kept.motions[0].parent / "report.json").write_text("{")
+    assert cache.find("a") is None
+    add(cache, "a")
+    assert cache.find("a") is not None
+
+
+def test_names_from_a_report_cannot_leave_the_folder(cache):
+    add(cache, "a")
+    folder = cache.root / "captures" / "a"
+    (cache.root / "secret.npz").write_bytes(b"")
+    (folder / "report.json").write_text('{"motions": ["../../secret.npz"], "report": {}}')
+    assert cache.find("a") is None
+
+
+def test_pruning_removes_what_was_used_longest_ago(cache):
+    for age, key in enumerate(["new", "middle", "old"]):
+        add(cache, key)
+        os.utime(cache.root / "captures" / key, (time.time() - 100 * age,) * 2)
+    cache.prune(2500)
+    assert [k for k in ("new", "middle", "old") if cache.find(k)] == ["new", "middle"]
+    cache.prune(1)
+    assert cache.find("new") is None or cache.find("middle") is None
+    assert cache.size() > 0
+
+
+def test_abandoned_jobs_are_removed_and_running_ones_left(cache):
+    running, abandoned = cache.new_job_folder(), cache.new_job_folder()
+    os.utime(abandoned, (1, 1))
+    cache.clear()
+    cache.new_job_folder()
+    assert running.exists()
+    assert not abandoned.exists()
+
+
+def test_a_folder_that_cannot_be_written_to_is_told(tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(OutputError, match="choose another folder"):
+        Cache(tmp_path / "file" / "cache").new_job_folder()

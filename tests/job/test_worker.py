@@ -1,0 +1,116 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The real worker process without Blender: its search path, its words, and its end when the parent is gone."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from scope.scope_addon.job.process import START_SCRIPT, WorkerFailedError, WorkerProcess
+from scope.scope_addon.job.request import JobRequest, code_version
+from scope.solver.errors import SetupError, UsageError
+
+ROOT = START_SCRIPT.parents[2]
+SAMPLE = str(ROOT / "assets" / "sample" / "sample.mp4")
+
+
+def wait_for(condition, timeout_s=60.0):
+    end = time.monotonic() + timeout_s
+    while not condition():
+        assert time.monotonic() < end
+        time.sleep(0.02)
+
+
+def runs(pid):
+    """Whether a process exists and is not a zombie that nobody waited for."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0] != "Z"
+    except OSError:
+        return False
+
+
+@pytest.fixture
+def kernels():
+    folder = ROOT / "build" / "test-kernels"
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder
+
+
+@pytest.fixture
+def folder(tmp_path):
+    (tmp_path / "job").mkdir()
+    return tmp_path / "job"
+
+
+def test_an_isolated_worker_starts_and_reports(folder, kernels, tmp_path):
+    """-I drops PYTHONPATH, the script's and the current folder, as inside Blender."""
+    worker = WorkerProcess(JobRequest(SAMPLE, quality="fast"), folder, kernels, [sys.executable, "-I"])
+    messages = []
+    wait_for(lambda: messages.extend(worker.poll()) or any(m.get("done", 0) > 2 for m in messages))
+    assert {m["event"] for m in messages} == {"progress"}
+    assert worker.alive
+    worker.close()
+    assert not worker.alive
+    assert not folder.exists()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="looks at /proc")
+def test_the_worker_ends_when_its_parent_is_killed(folder, kernels):
+    code = (
+        "import sys, time\nfrom pathlib import Path\n"
+        "from scope.scope_addon.job.process import WorkerProcess, JobRequest\n"
+        f"worker = WorkerProcess(JobRequest({SAMPLE!r}), Path({str(folder)!r}), Path({str(kernels)!r}))\n"
+        "while not worker.poll(): time.sleep(0.01)\n"
+        "print(worker.pid, flush=True); time.sleep(600)"
+    )
+    parent = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True)
+    assert parent.stdout is not None
+    pid = int(parent.stdout.readline())
+    assert runs(pid)
+    parent.send_signal(signal.SIGKILL)
+    parent.wait()
+    wait_for(lambda: not runs(pid))
+    wait_for(lambda: not folder.exists())
+
+
+def test_a_missing_library_is_told(folder, kernels, tmp_path, monkeypatch):
+    (tmp_path / "cv2").mkdir()
+    (tmp_path / "cv2" / "__init__.py").write_text("raise ImportError('wrong platform')")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    worker = WorkerProcess(JobRequest(SAMPLE), folder, kernels, [sys.executable, "-I"])
+    with pytest.raises(WorkerFailedError, match=r"wrong platform.*install the extension again"):
+        wait_for(lambda: worker.poll() and False)
+    worker.close()
+
+
+def test_a_python_that_is_not_there_is_told(folder, kernels):
+    with pytest.raises(SetupError, match="nowhere"):
+        WorkerProcess(JobRequest(SAMPLE), folder, kernels, ["/nowhere/python"])
+    assert not folder.exists()
+
+
+def test_requests_travel_as_one_line():
+    request = JobRequest("a\nb.mp4", quality="fast", fov_deg=60.0)
+    assert "\n" not in request.to_json()
+    assert JobRequest.from_json(request.to_json()) == request
+    for text in ("", "[]", json.dumps({"footage": "a", "colour": 1})):
+        with pytest.raises(UsageError):
+            JobRequest.from_json(text)
+
+
+def test_keys_tell_what_changes_the_result(tmp_path):
+    clip = tmp_path / "clip.mp4"
+    clip.write_bytes(b"x" * 100)
+    request = JobRequest(str(clip))
+    assert request.key("1") == JobRequest(str(clip), threads=3).key("1")
+    assert request.key("1") != request.key("2")
+    assert request.key("1") != JobRequest(str(clip), quality="fast").key("1")
+    key, status = request.key("1"), clip.stat()
+    clip.write_bytes(b"x" * 99 + b"y")
+    os.utime(clip, ns=(status.st_atime_ns, status.st_mtime_ns))
+    assert request.key("1") != key
+    assert code_version(ROOT) == code_version(ROOT)
