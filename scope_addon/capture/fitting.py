@@ -29,6 +29,7 @@ from ...solver import (
     make_tree,
 )
 from .camera import Camera
+from .lifter import Lifted, Lifter
 from .measure import Measurer
 from .track import Track
 
@@ -63,15 +64,16 @@ def fit_track(body: Body, track: Track, camera: Camera, progress: Callable[[str,
     """Fit the body to a track of which at least one frame was seen."""
     measurer = Measurer(body, camera.intrinsics)
     pixels = camera.undistort(track.keypoints_px)
+    lifted = _lift(measurer, track, pixels)
     priors = replace(default_priors(body), joint_weights=_joint_weights(body))
 
     def measure(k: int) -> Measurements:
-        return measurer.measure(pixels[k], track.confidence[k], track.world_landmarks[k])
+        return measurer.measure(pixels[k], track.confidence[k], lifted.points[k], lifted.sigma_along[k])
 
     betas = _fit_shape([measure(k) for k in _spread(np.flatnonzero(track.seen), SHAPE_FRAMES)], body, priors, progress)
     priors = replace(priors, shape_mean=betas, shape_information=np.eye(body.P) * SHAPE_CERTAINTY)
 
-    return _fit_frames(body, track, betas, priors, measurer, pixels, None, progress)
+    return _fit_frames(body, track, betas, priors, measurer, pixels, lifted, None, progress)
 
 
 def refit_track(
@@ -94,7 +96,12 @@ def refit_track(
         for k in range(len(track))
     ]
     measurer, pixels = Measurer(body, camera.intrinsics), camera.undistort(track.keypoints_px)
-    return _fit_frames(body, track, first.betas, priors, measurer, pixels, states, progress)
+    lifted = _lift(measurer, track, pixels)
+    return _fit_frames(body, track, first.betas, priors, measurer, pixels, lifted, states, progress)
+
+
+def _lift(measurer: Measurer, track: Track, pixels: np.ndarray) -> Lifted:
+    return Lifter().lift_both_ways(measurer.rays(pixels), track.confidence, track.world_landmarks)
 
 
 def _fit_frames(
@@ -104,6 +111,7 @@ def _fit_frames(
     priors: Priors,
     measurer: Measurer,
     pixels: np.ndarray,
+    lifted: Lifted,
     states: list[State | None] | None,
     progress: Callable[[str, int, int], None],
 ) -> FittedTrack:
@@ -121,7 +129,8 @@ def _fit_frames(
                 fresh = last is None or track.acquired[k] or track.times[k] - last_time > LONGEST_COAST_S
                 init = None if fresh or last is None else last.state
             known_root = init.t_camera_root if init is not None and states is not None else None
-            measured = measurer.measure(pixels[k], track.confidence[k], track.world_landmarks[k], known_root)
+            points, sigma = lifted.points[k], lifted.sigma_along[k]
+            measured = measurer.measure(pixels[k], track.confidence[k], points, sigma, known_root)
             found = _fit_frame(tree, measured, init, priors)
             if found.status not in (Status.NO_MEASUREMENTS, Status.NON_FINITE):
                 last, last_time, valid[k] = found, track.times[k], True

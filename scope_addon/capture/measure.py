@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """From a frame's landmarks to the solver's measurements: 2D keypoints, 3D keypoints, part orientation field.
 
-Weights are inverse variances. The landmark network's 3D landmarks are centred at the hips; their place in the camera
-follows from the 2D landmarks, t = argmin Σ c |(W_j + t)_xy − x_j (W_j + t)_z|², and each is moved onto its own ray, so
-that 3D and 2D keypoints agree and the 3D ones add depth alone.
+Weights are inverse variances. The lifting network's points P are centred at the hips; their place in the camera
+follows from the 2D landmarks, t = argmin Σ c |(P_j + t)_xy − x_j (P_j + t)_z|². How far each is trusted, from the
+standard deviation that the network foretells.
 """
 
 from __future__ import annotations
@@ -20,6 +20,9 @@ from .landmark_network import KEYPOINT_NAMES
 _TRUST = {"hip": 0.7, "nose": 0.5, "ear": 0.5, "heel": 0.5, "foot": 0.5}
 _TRUST |= {"pinky": 0.3, "index": 0.3, "thumb": 0.3, "eye": 0.2, "mouth": 0.2}
 _BONES = ("shoulder", "elbow"), ("elbow", "wrist"), ("hip", "knee"), ("knee", "ankle")
+DEPTH_SIGMA_M = 0.1  # standard deviation of a 3D keypoint of confidence 1
+DIRECTION_SIGMA = 0.3  # the same of a bone's direction
+MOST_CONFIDENCE = 2.0  # of a direction
 ROOT_SIGMA_M = 0.12  # of a pelvis above feet that stand on the floor
 NEAREST_M = 0.3  # a person closer to the camera than this is a mistake
 
@@ -48,28 +51,38 @@ class Measurer:
         return pixels @ self._unproject[:2, :2].T + self._unproject[:2, 2]
 
     def measure(
-        self, pixels: np.ndarray, confidence: np.ndarray, world: np.ndarray, root_cam: np.ndarray | None = None
+        self,
+        pixels: np.ndarray,
+        confidence: np.ndarray,
+        points: np.ndarray,
+        sigma: np.ndarray,
+        root_cam: np.ndarray | None = None,
     ) -> Measurements:
         """Measurements of one frame.
 
-        :param pixels: (33, 2) without lens distortion;  confidence: (33,) 0..1;  world: (33, 3) metres, hip-centred.
+        :param pixels: (33, 2) without lens distortion;  confidence: (33,) 0..1;  points: (33, 3) metres, hip-centred,
+            camera axes;  sigma: (33,) metres, the standard deviation of their depth.
         :param root_cam: (3,) where the pelvis is known to be, metres, camera frame; places the 3D keypoints and is a
             prior of ``ROOT_SIGMA_M``.
         """
         rays = self.rays(pixels)
-        distance = place(world, rays, confidence)[2] if root_cam is None else root_cam[2]
-        depth = np.maximum(world[:, 2] + distance, NEAREST_M)
-        points = np.concatenate([rays * depth[:, None], depth[:, None]], axis=1)
-        weight = confidence * self.trust
+        place_cam = place(points, rays, confidence)
+        if root_cam is not None:
+            place_cam = place_cam * (root_cam[2] / max(place_cam[2], NEAREST_M))
+        placed = points + place_cam
+        placed[:, 2] = np.maximum(placed[:, 2], NEAREST_M)
+        bones = points[self.to_landmark] - points[self.from_landmark]
+        slope = np.hypot(sigma[self.to_landmark], sigma[self.from_landmark])
+        slope /= np.maximum(np.linalg.norm(bones, axis=1), 0.1)
         return Measurements(
             intrinsics=self.intrinsics,
-            keypoints2d=Keypoints2D(self.indices, pixels, weight),
-            keypoints3d=Keypoints3D(self.indices, points, weight),
+            keypoints2d=Keypoints2D(self.indices, pixels, confidence * self.trust),
+            keypoints3d=Keypoints3D(self.indices, placed, (DEPTH_SIGMA_M / sigma) ** 2),
             orientation_field=OrientationField(
                 self.bone_starts,
                 self.bone_ends,
-                world[self.to_landmark] - world[self.from_landmark],
-                np.minimum(confidence[self.from_landmark], confidence[self.to_landmark]),
+                bones,
+                np.minimum((DIRECTION_SIGMA / slope) ** 2, MOST_CONFIDENCE),
             ),
             pose_priors=None if root_cam is None else _root_prior(root_cam),
         )

@@ -1,0 +1,130 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The lifting network: keypoints in the image and a guess at their depth to our body's keypoints in space.
+
+The network sees every person through a virtual camera that looks straight at them, so that neither place in the
+picture nor size changes its input. With x̂_j the keypoint's ray (x/z, y/z, 1) and c the mean ray of hips and shoulders,
+
+    R_virtual_camera = rows (right, down, c/|c|),  right ⟂ the camera's y axis
+    u_j = project(R_virtual_camera x̂_j),  s = rms_j |u_j − ū| over the limbs
+    input = [u_j / s, confidence_j, W_j / 0.5 m · known, known, log s]
+
+with W the world landmarks (known = 1) or zeros (known = 0). The output, in the virtual camera's axes, are the
+keypoints of our body relative to the middle of its hips and the logarithm of their standard deviations across and
+along the line of sight; the positions are turned back into camera axes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from pathlib import Path
+
+import numpy as np
+
+from ...solver.errors import ModelFileError, SetupError, ShapeError
+from .networks import open_session
+
+LIFTER_FILE = Path(__file__).resolve().parents[2] / "assets" / "lifter" / "lifter.onnx"
+KEYPOINT_COUNT = 33
+INPUT_SIZE = KEYPOINT_COUNT * 6 + 2
+WORLD_UNIT_M = 0.5
+TORSO = np.array([11, 12, 23, 24])  # shoulders and hips
+HIPS = np.array([23, 24])
+LIMBS = np.array([0, *range(11, 17), *range(23, 29)])  # nose, arms, legs: what gives a person their size in the image
+_BATCH = 4096
+
+
+@dataclass(frozen=True)
+class Lifted:
+    """Keypoints of our body in space, for T frames.
+
+    ``points`` (T, 33, 3) metres, the middle of the hips at 0, camera axes; ``sigma_across``, ``sigma_along`` (T, 33)
+    metres: standard deviation of a coordinate across, and along, the line of sight to the person.
+    """
+
+    points: np.ndarray
+    sigma_across: np.ndarray
+    sigma_along: np.ndarray
+
+
+def virtual_camera(rays: np.ndarray) -> np.ndarray:
+    """(T, 33, 2) normalized image coordinates -> (T, 3, 3) R_virtual_camera, which turns the person onto the z axis."""
+    center = rays[:, TORSO].mean(axis=1)
+    z = np.concatenate([center, np.ones_like(center[:, :1])], axis=1)
+    z /= np.linalg.norm(z, axis=1, keepdims=True)
+    x = np.stack([z[:, 2], np.zeros_like(z[:, 0]), -z[:, 0]], axis=1)
+    x /= np.linalg.norm(x, axis=1, keepdims=True)
+    return np.stack([x, np.cross(z, x), z], axis=1)
+
+
+def person_size(image_points: np.ndarray) -> np.ndarray:
+    """(T, 33, 2) -> (T,) s of the module's equation, in the points' unit."""
+    limbs = image_points[:, LIMBS]
+    return np.maximum(np.sqrt(np.square(limbs - limbs.mean(axis=1, keepdims=True)).sum(axis=-1).mean(axis=-1)), 1e-4)
+
+
+def network_input(rays: np.ndarray, confidence: np.ndarray, world: np.ndarray, known: np.ndarray) -> tuple:
+    """What the network sees of T people, see the module's equation.
+
+    :param rays: (T, 33, 2) normalized image coordinates;  confidence: (T, 33);  world: (T, 33, 3) metres;
+        known: (T,) 1 where the world landmarks are to be used.
+    :return: input (T, 200) and R_virtual_camera (T, 3, 3).
+    """
+    R = virtual_camera(rays)
+    seen = rays @ np.swapaxes(R[:, :, :2], 1, 2) + R[:, None, :, 2]
+    u = seen[..., :2] / np.maximum(seen[..., 2:], 0.1)
+    s = person_size(u)[:, None]
+    n = len(rays)
+    known = np.asarray(known, rays.dtype).reshape(n, 1)
+    parts = [
+        np.clip(u.reshape(n, -1) / s, -6.0, 6.0),
+        confidence,
+        world.reshape(n, -1) / WORLD_UNIT_M * known,
+        known,
+        np.log(s),
+    ]
+    return np.concatenate(parts, axis=1), R
+
+
+class Lifter:
+    """The lifting network on the CPU; keeps nothing between calls."""
+
+    def __init__(self, path: Path | None = None, threads: int = 1) -> None:
+        self.path = path or LIFTER_FILE
+        if not self.path.is_file():
+            raise SetupError(f"{self.path} is missing, which belongs to the repository: restore it.")
+        self._session = open_session(self.path, threads)
+        shapes = [s.shape[1:] for s in (*self._session.get_inputs(), *self._session.get_outputs())]
+        if shapes != [[INPUT_SIZE], [KEYPOINT_COUNT, 3], [KEYPOINT_COUNT, 2]]:
+            raise ModelFileError(f"{self.path} is not a lifting network of this version: its shapes are {shapes}.")
+
+    def lift(self, rays: np.ndarray, confidence: np.ndarray, world: np.ndarray | None) -> Lifted:
+        """Lift T frames at once.
+
+        :param rays: (T, 33, 2) image coordinates without lens distortion, over the focal length;
+            confidence: (T, 33) 0..1;  world: (T, 33, 3) metres, hip-centred, or None to do without.
+        """
+        T = len(rays)
+        for name, value, shape in (("rays", rays, (T, 33, 2)), ("confidence", confidence, (T, 33))):
+            if value.shape != shape:
+                raise ShapeError(f"{name} must have shape {shape}, but has {value.shape}")
+        if world is None:
+            world, known = np.zeros((T, KEYPOINT_COUNT, 3)), np.zeros(T)
+        else:
+            known = np.ones(T)
+        x, R = network_input(rays, confidence, world, known)
+        points, log_sigma = self.run(x.astype(np.float32))
+        points = points - points[:, HIPS].mean(axis=1, keepdims=True)
+        sigma = np.exp(log_sigma)
+        return Lifted(points @ R, sigma[..., 0], sigma[..., 1])
+
+    def lift_both_ways(self, rays: np.ndarray, confidence: np.ndarray, world: np.ndarray) -> Lifted:
+        """The mean of what the network finds with and without the world landmarks, better than either on real clips."""
+        ways = [self.lift(rays, confidence, given) for given in (world, None)]
+        return Lifted(*(sum(getattr(w, f.name) for w in ways) / len(ways) for f in fields(Lifted)))
+
+    def run(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The bare network: input (T, 200) -> points (T, 33, 3) and log σ (T, 33, 2), virtual camera's axes."""
+        name = self._session.get_inputs()[0].name
+        runs = [self._session.run(None, {name: x[k : k + _BATCH]}) for k in range(0, max(len(x), 1), _BATCH)]
+        points, log_sigma = (np.concatenate([r[i] for r in runs]).astype(float) for i in (0, 1))
+        return points, log_sigma

@@ -1,0 +1,109 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The committed lifting network on people whose depth is known exactly, and its invariances."""
+
+import numpy as np
+import pytest
+from scope.scope_addon.capture.left_right import SWAPPED
+from scope.scope_addon.capture.lifter import HIPS, LIFTER_FILE, Lifter, network_input, virtual_camera
+from scope.solver.body import load_body
+from scope.solver.errors import ModelFileError, SetupError, ShapeError
+from scope.solver.rotations import exp
+
+
+@pytest.fixture(scope="module")
+def lifter():
+    return Lifter()
+
+
+@pytest.fixture(scope="module")
+def people():
+    """(T, 33, 3) keypoints of the body in the camera frame: walking-like poses, every heading, a camera 5 m away."""
+    body, rng = load_body("scope"), np.random.default_rng(0)
+    at = list(body.keypoint_set("blazepose").values())
+    out = []
+    for k in range(48):
+        pose = rng.normal(0, 0.05, (body.K + 1, 3))
+        swing = 0.5 * np.sin(k)
+        for name, angle in (("left_hip", -swing), ("right_hip", swing), ("left_knee", 0.4), ("right_knee", 0.4)):
+            pose[body.joint_names.index(name), 0] += angle
+        for name, side in (("left_shoulder", -1), ("right_shoulder", 1)):
+            pose[body.joint_names.index(name), 2] += 1.2 * side
+        R = exp(pose)
+        R[0] = np.diag([1.0, -1.0, -1.0]) @ exp(np.array([0, 2 * np.pi * k / 48, 0])) @ R[0]
+        parts = body.forward_kinematics(R, np.array([0.3, 0.1, 5.0]))
+        out.append(body.keypoints(*parts)[at])
+    return np.array(out)
+
+
+def relative(points):
+    return points - points[:, HIPS].mean(axis=1, keepdims=True)
+
+
+def test_depth_of_unseen_people_is_found_from_their_image_alone(lifter, people):
+    rays = people[..., :2] / people[..., 2:]
+    lifted = lifter.lift(rays, np.ones(rays.shape[:2]), None)
+    limbs = [*range(11, 17), *range(25, 29)]
+    error = np.linalg.norm(lifted.points - relative(people), axis=-1)[:, limbs].mean()
+    flat = np.linalg.norm(relative(people) * [1, 1, 0] - relative(people), axis=-1)[:, limbs].mean()
+    assert error < 0.1
+    assert error < 0.7 * flat
+
+
+def test_true_world_landmarks_make_it_better(lifter, people):
+    rays, ones = people[..., :2] / people[..., 2:], np.ones(people.shape[:2])
+    R = virtual_camera(rays)
+    given = relative(people) @ np.swapaxes(R, 1, 2)  # landmark networks look straight at the person
+    without, informed = lifter.lift(rays, ones, None), lifter.lift(rays, ones, given)
+    error = [np.linalg.norm(x.points - relative(people), axis=-1).mean() for x in (without, informed)]
+    assert error[1] < error[0]
+
+
+def test_errors_are_as_large_as_foretold(lifter, people):
+    rays = people[..., :2] / people[..., 2:]
+    lifted = lifter.lift(rays, np.ones(rays.shape[:2]), None)
+    z = (lifted.points - relative(people))[..., 2] / lifted.sigma_along
+    assert 0.3 < np.sqrt(np.square(z).mean()) < 1.7
+    assert (lifted.sigma_along > 0).all()
+    assert lifted.sigma_along[:, 15].mean() > lifted.sigma_along[:, HIPS].mean()  # wrists are harder than hips
+
+
+def test_the_mirror_image_is_lifted_to_the_mirror_image(lifter, people):
+    rays, ones = people[..., :2] / people[..., 2:], np.ones(people.shape[:2])
+    plain = lifter.lift(rays, ones, None).points
+    mirrored = lifter.lift(rays[:, SWAPPED] * [-1, 1], ones, None).points
+    assert np.linalg.norm(mirrored - plain[:, SWAPPED] * [-1, 1, 1], axis=-1).mean() < 0.05
+
+
+def test_the_virtual_camera_looks_at_the_person_and_stands_upright():
+    rays = np.random.default_rng(0).uniform(-0.5, 0.5, (20, 33, 2))
+    R = virtual_camera(rays)
+    assert np.allclose(R @ np.swapaxes(R, 1, 2), np.eye(3), atol=1e-12)
+    assert np.allclose(np.linalg.det(R), 1)
+    center = np.concatenate([rays[:, [11, 12, 23, 24]].mean(axis=1), np.ones((20, 1))], axis=1)
+    seen = np.einsum("tij,tj->ti", R, center)
+    assert np.abs(seen[:, :2]).max() < 1e-12
+    assert np.allclose(R[:, 0, 1], 0)  # its x axis stays level
+
+
+def test_turning_the_camera_changes_neither_input_nor_shape(lifter, people):
+    """A pan about the camera's own centre moves the person in the picture; what is lifted turns with it."""
+    turn = exp(np.array([0.0, 0.35, 0.0]))
+    turned = people @ turn.T
+    rays, other = (p[..., :2] / p[..., 2:] for p in (people, turned))
+    ones, none = np.ones(rays.shape[:2]), np.zeros(people.shape)
+    x, _ = network_input(rays, ones, none, np.zeros(len(rays)))
+    y, _ = network_input(other, ones, none, np.zeros(len(rays)))
+    # The mean of rays is not quite the ray of a mean, so the two cameras differ a little.
+    assert np.abs(x - y).max() < 0.1
+    a, b = lifter.lift(rays, ones, None).points, lifter.lift(other, ones, None).points
+    assert np.linalg.norm(a @ turn.T - b, axis=-1).mean() < 0.03
+
+
+def test_wrong_shapes_and_files_are_named(lifter, tmp_path):
+    with pytest.raises(ShapeError, match="confidence"):
+        lifter.lift(np.zeros((2, 33, 2)), np.zeros((3, 33)), None)
+    with pytest.raises(SetupError, match="nowhere"):
+        Lifter(tmp_path / "nowhere.onnx")
+    (tmp_path / "junk.onnx").write_bytes(LIFTER_FILE.read_bytes()[:1000])
+    with pytest.raises(ModelFileError, match="junk"):
+        Lifter(tmp_path / "junk.onnx")

@@ -1,0 +1,164 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The lifter's training data against geometry worked out by hand, and its export against PyTorch."""
+
+import numpy as np
+import pytest
+from scope.scope_addon.capture.landmark_network import KEYPOINT_NAMES
+from scope.scope_addon.capture.lifter import HIPS, Lifter, virtual_camera
+from scope.solver.body import load_body
+from scope.solver.rotations import exp
+from scope.tools.train_lifter import detector_noise
+from scope.tools.train_lifter.augment import Motions, PoseSampler, small_rotations
+from scope.tools.train_lifter.dataset import Dataset, cameras
+from scope.tools.train_lifter.observed_errors import ObservedErrors
+
+
+@pytest.fixture(scope="module")
+def body():
+    return load_body("scope")
+
+
+@pytest.fixture(scope="module")
+def motions(body):
+    rng = np.random.default_rng(3)
+    Omega = exp(rng.normal(0, 0.2, (40, body.K + 1, 3))).astype(np.float32)
+    return Motions(Omega, np.repeat(np.arange(4), 10))
+
+
+@pytest.fixture(scope="module")
+def dataset(body, motions):
+    return Dataset(body, motions)
+
+
+def test_small_rotations_are_the_exponential():
+    phi = np.random.default_rng(0).normal(0, 1, (50, 3))
+    assert np.allclose(small_rotations(phi), exp(phi), atol=1e-6)
+
+
+def test_keypoints_are_those_of_the_body(body, dataset, motions):
+    at = list(body.keypoint_set("blazepose").values())
+    bones, local = body.l[None].astype(np.float32), body.v_bar[at][None].astype(np.float32)
+    ours, _ = dataset.keypoints(motions.Omega[:1], bones, local)
+    R, t = body.forward_kinematics(motions.Omega[0].astype(float), -body.rest_joints()[0])
+    assert np.allclose(ours[0], body.keypoints(R, t)[at], atol=1e-5)
+
+
+def test_proportions_without_spread_are_the_body_with_its_shapes(body, motions, monkeypatch):
+    monkeypatch.setattr("scope.tools.train_lifter.augment.BONE_SPREAD", 0.0)
+    rng, same = np.random.default_rng(1), np.random.default_rng(1)
+    bones, _ = PoseSampler(body, motions).proportions(rng, 3)
+    betas = np.clip(same.standard_normal((3, body.P)), -2.5, 2.5)
+    for k in range(3):
+        J = body.rest_joints(betas[k])
+        assert np.allclose(bones[k, 1:], J[1:] - J[body.parents[1:]], atol=1e-5)
+
+
+def test_a_mirrored_pose_has_mirrored_keypoints(body, dataset, motions):
+    at = list(body.keypoint_set("blazepose").values())
+    symmetric = body.v_bar[at].copy()
+    symmetric[detector_noise.SWAPPED] = (symmetric[detector_noise.SWAPPED] + symmetric * [-1, 1, 1]) / 2
+    symmetric = (symmetric + symmetric[detector_noise.SWAPPED] * [-1, 1, 1]) / 2
+    bones = (body.l + body.l[dataset.sampler.partner] * [-1, 1, 1]) / 2
+    give = [np.repeat(a[None], 5, 0).astype(np.float32) for a in (bones, symmetric)]
+    Omega = motions.Omega[:5]
+    plain, _ = dataset.keypoints(Omega, *give)
+    mirrored, _ = dataset.keypoints(dataset.sampler.mirror(Omega), *give)
+    assert np.allclose(mirrored, plain[:, detector_noise.SWAPPED] * [-1, 1, 1], atol=1e-5)
+
+
+def test_left_and_right_are_exchanged_by_name():
+    other = {"left": "right", "right": "left"}
+    for k, name in enumerate(KEYPOINT_NAMES):
+        partner = "_".join(other.get(word, word) for word in name.split("_"))
+        assert KEYPOINT_NAMES[detector_noise.SWAPPED[k]] == partner
+
+
+def test_a_camera_that_looks_down_sees_the_world_s_up_tip_towards_it():
+    R = cameras(np.random.default_rng(0), 2000)
+    assert np.allclose(R @ np.swapaxes(R, 1, 2), np.eye(3), atol=1e-5)
+    assert np.allclose(np.linalg.det(R), 1, atol=1e-5)
+    up = R[:, :, 1]  # the world's up in camera axes: y down, z forward
+    pitch = np.degrees(np.arcsin(np.clip(-up[:, 2], -1, 1)))
+    assert (up[:, 1] < 0).all()
+    assert np.median(pitch) > 5
+    assert np.quantile(pitch, 0.99) < 46
+
+
+def test_input_without_noise_is_the_projection_of_the_target(dataset, monkeypatch):
+    """With the detector's errors off, the virtual camera at the right distance projects the target onto the input."""
+    monkeypatch.setattr(detector_noise, "PLACEMENT", np.zeros(33))
+    monkeypatch.setattr(detector_noise, "IMAGE_NOISE", 0.0)
+    monkeypatch.setattr(detector_noise, "CUT_SHARE", 0.0)
+    monkeypatch.setattr(detector_noise, "SWAP_SHARE", 0.0)
+    monkeypatch.setattr(detector_noise, "FOCAL_SPREAD", 0.0)
+    batch = dataset.batch((0, 0), 20)
+    for x, P in zip(batch.input.astype(float), batch.points.astype(float), strict=True):
+        u = x[:66].reshape(33, 2) * np.exp(x[-1])
+        # u (P_z + t_z) = P_xy + t_xy, linear in t
+        A = np.zeros((66, 3))
+        A[0::2, 0] = A[1::2, 1] = 1
+        A[:, 2] = -u.ravel()
+        b = (u * P[:, 2:] - P[:, :2]).ravel()
+        t, *_ = np.linalg.lstsq(A, b, rcond=None)
+        assert np.abs(A @ t - b).max() < 2e-3
+        assert 1.5 < t[2] < 13
+        assert np.abs(P[HIPS].mean(axis=0)).max() < 1e-5
+
+
+def test_a_batch_depends_on_its_seed_alone(dataset):
+    a, b, c = dataset.batch((0, 5), 8), dataset.batch((0, 5), 8), dataset.batch((0, 6), 8)
+    assert np.array_equal(a.input, b.input)
+    assert not np.array_equal(a.input, c.input)
+    assert np.isfinite(a.input).all()
+
+
+def test_world_landmarks_are_hip_centred_and_distorted_as_much_as_landmark_networks_do(dataset):
+    scene = dataset.scene(np.random.default_rng(0), 500)
+    truth = scene.points - scene.points[:, HIPS].mean(axis=1, keepdims=True)
+    world = detector_noise.world_landmarks(np.random.default_rng(1), truth)
+    assert np.abs(world[:, HIPS].mean(axis=1)).max() < 1e-5
+    error = np.linalg.norm(world - truth, axis=-1)[:, 11:].mean()
+    assert 0.06 < error < 0.2
+
+
+def test_observed_errors_of_a_flattening_detector_flatten_other_poses(dataset):
+    """A detector that sees 0.4 of the depth, and the image shifted by 0.1 of the person's size."""
+    scene = dataset.scene(np.random.default_rng(0), 400)
+    points = scene.points.astype(float)
+    rays = points[..., :2] / points[..., 2:]
+    relative = points - points[:, HIPS].mean(axis=1, keepdims=True)
+    R = virtual_camera(rays)
+    world = (relative @ np.swapaxes(R, 1, 2)) * [1, 1, 0.4]
+    limbs = rays[:, [0, *range(11, 17), *range(23, 29)]]
+    size = np.sqrt(np.square(limbs - limbs.mean(1, keepdims=True)).sum(-1).mean(-1))
+    shifted = rays + [0, 0.1] * size[:, None, None]
+    seen = ObservedErrors(points, shifted, np.full((400, 33), 0.9), world)
+    pose = (relative @ np.swapaxes(R, 1, 2))[:50]
+    errors, confidence, drawn = seen.draw(np.random.default_rng(0), pose)
+    assert np.allclose(errors[..., 1], 0.1, atol=0.02)
+    assert np.abs(errors[..., 0]).max() < 0.02
+    assert np.allclose(confidence, 0.9)
+    assert np.sqrt(np.mean((drawn - pose * [1, 1, 0.4]) ** 2)) < 0.02
+
+
+def test_the_exported_network_is_the_trained_one(tmp_path):
+    torch = pytest.importorskip("torch")
+    pytest.importorskip("onnx")
+    from scope.tools.train_lifter.export import export
+    from scope.tools.train_lifter.network import LiftingNetwork
+
+    torch.manual_seed(0)
+    network = LiftingNetwork(width=32, blocks=2)
+    for p in network.parameters():
+        torch.nn.init.normal_(p, 0, 0.2)
+        p.data = p.data.half().float()
+    network.mean.normal_()
+    network.spread.uniform_(0.5, 2)
+    network.sigma_offset.normal_(0, 0.1)
+    export(network, tmp_path / "lifter.onnx")
+    x = np.random.default_rng(0).normal(0, 1, (7, 200)).astype(np.float32)
+    with torch.no_grad():
+        points, log_sigma = (a.numpy() for a in network(torch.from_numpy(x)))
+    ours, sigma = Lifter(tmp_path / "lifter.onnx").run(x)
+    assert np.abs(ours - points).max() < 1e-3 * np.abs(points).max()
+    assert np.abs(sigma - log_sigma).max() < 1e-3

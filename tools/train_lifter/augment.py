@@ -1,0 +1,144 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Many poses and proportions from few recordings.
+
+A pose is a state of each joint, Ω (24, 3, 3), and a root rotation into a world with y up. Torso, arms and legs come
+from different frames now and then, joints are turned at random, the body leans, and half of everything is mirrored.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from ...solver.body import Body
+from ...solver.rotations import exp
+
+_MIRROR = np.diag([-1.0, 1.0, 1.0])
+# Share of samples in which a part comes from a frame of its own.
+SWAP_UPPER, SWAP_ARM, SWAP_LEG = 0.5, 0.4, 0.2
+# Radians about a random axis, times a factor per sample of |N(0, 1)|.
+JOINT_NOISE = {"shoulder": 0.45, "collar": 0.1, "elbow": 0.25, "wrist": 0.3, "hand": 0.2, "hip": 0.2, "knee": 0.2}
+JOINT_NOISE |= {"ankle": 0.2, "foot": 0.1, "spine": 0.08, "neck": 0.15, "head": 0.2}
+LEAN, STRONG_LEAN, STRONG_LEAN_SHARE = np.radians(12.0), np.radians(50.0), 0.08
+SHAPE_SPREAD, SHAPE_LIMIT = 1.0, 2.5
+BONE_SPREAD = 0.04  # of the logarithm of each bone's length, left and right alike
+CLUSTERS = 256
+
+
+@dataclass(frozen=True)
+class Motions:
+    """Frames of all takes: ``Omega`` (F, 24, 3, 3) f32, row 0 the root into the world; ``take`` (F,) its take."""
+
+    Omega: np.ndarray
+    take: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.Omega)
+
+    def select(self, frames: np.ndarray) -> Motions:
+        """Only these frames (mask or indices)."""
+        return Motions(self.Omega[frames], self.take[frames])
+
+    @cached_property
+    def share(self) -> np.ndarray:
+        """(F,) probability with which a frame is drawn: common poses, such as walking, do not crowd out rare ones.
+
+        Proportional to 1/√(frames in the same cluster of joint states), clusters by k-means on Ω.
+        """
+        x = self.Omega[:, 1:].reshape(len(self), -1)
+        rng = np.random.default_rng(0)
+        centers = x[rng.choice(len(x), min(CLUSTERS, len(x)), replace=False)]
+        for _ in range(5):
+            label = np.argmin(np.square(centers).sum(1) - 2 * x @ centers.T, axis=1)
+            count = np.bincount(label, minlength=len(centers))
+            total = np.stack([np.bincount(label, x[:, d], len(centers)) for d in range(x.shape[1])], axis=1)
+            centers = np.where(count[:, None] > 0, total / np.maximum(count, 1)[:, None], centers).astype(x.dtype)
+        share = 1 / np.sqrt(count[label])
+        return share / share.sum()
+
+
+def load_motions(path: Path) -> Motions:
+    """The sound frames of a file written by ``tools.mocap.fit_body``."""
+    with np.load(path) as data:
+        poses, valid, start = data["poses"], data["valid"], data["take_start"]
+    take = np.repeat(np.arange(len(start) - 1), np.diff(start))
+    Omega = exp(poses.reshape(len(poses), -1, 3).astype(float)).astype(np.float32)
+    return Motions(Omega[valid], take[valid])
+
+
+class PoseSampler:
+    """Draws augmented poses and shapes for one body."""
+
+    def __init__(self, body: Body, motions: Motions) -> None:
+        self.body, self.motions = body, motions
+        self._cumulative = np.cumsum(motions.share)
+        names = body.joint_names
+        partner = {"left": "right", "right": "left"}
+        self.partner = np.array([names.index("_".join(partner.get(w, w) for w in n.split("_"))) for n in names])
+        roots = ("spine1", "left_collar", "right_collar", "left_hip", "right_hip")
+        self._parts = [self._below(root) for root in roots]
+        self._noise = np.array([next((v for k, v in JOINT_NOISE.items() if k in n), 0.0) for n in names])
+
+    def _below(self, joint: str) -> np.ndarray:
+        """The joint and all that hang on it."""
+        inside = {self.body.joint_names.index(joint)}
+        for i, parent in enumerate(self.body.parents):
+            if int(parent) in inside:
+                inside.add(i)
+        return np.array(sorted(inside))
+
+    def mirror(self, Omega: np.ndarray) -> np.ndarray:
+        """The mirror image of poses (..., 24, 3, 3) about the body's (and the world's) x = 0."""
+        signs = np.outer(np.diag(_MIRROR), np.diag(_MIRROR)).astype(Omega.dtype)
+        return (Omega * signs)[..., self.partner, :, :]
+
+    def _frames(self, rng: np.random.Generator, n: int) -> np.ndarray:
+        drawn = np.searchsorted(self._cumulative, rng.random(n) * self._cumulative[-1])
+        Omega = self.motions.Omega[np.minimum(drawn, len(self.motions) - 1)]
+        flip = rng.random(n) < 0.5
+        Omega[flip] = self.mirror(Omega[flip])
+        return Omega
+
+    def poses(self, rng: np.random.Generator, n: int) -> np.ndarray:
+        """(n, 24, 3, 3) f32; row 0 turns the root into a world with y up, heading at random."""
+        Omega = self._frames(rng, n)
+        for joints, share in zip(self._parts, (SWAP_UPPER, SWAP_ARM, SWAP_ARM, SWAP_LEG, SWAP_LEG), strict=True):
+            rows = np.flatnonzero(rng.random(n) < share)
+            Omega[np.ix_(rows, joints)] = self._frames(rng, len(rows))[:, joints]
+        strength = np.abs(rng.standard_normal((n, 1, 1), np.float32))
+        turn = rng.standard_normal((n, len(self._noise), 3), np.float32) * self._noise[:, None] * strength
+        Omega = Omega @ small_rotations(turn.astype(np.float32))
+        heading, direction = rng.uniform(0, 2 * np.pi, (2, n))
+        lean = rng.standard_normal(n) * np.where(rng.random(n) < STRONG_LEAN_SHARE, STRONG_LEAN, LEAN)
+        axis = np.stack([np.cos(direction), np.zeros(n), np.sin(direction)], axis=1)
+        about_y = np.stack([np.zeros(n), heading, np.zeros(n)], axis=1)
+        Omega[:, 0] = small_rotations((axis * lean[:, None]).astype(np.float32)) @ (
+            small_rotations(about_y.astype(np.float32)) @ Omega[:, 0]
+        )
+        return Omega
+
+    def proportions(self, rng: np.random.Generator, n: int) -> tuple[np.ndarray, np.ndarray]:
+        """Random bodies: joints from their parents (n, 24, 3), BlazePose keypoints from their joints (n, 33, 3)."""
+        body, at = self.body, np.array(list(self.body.keypoint_set("blazepose").values()))
+        betas = np.clip(rng.standard_normal((n, body.P)) * SHAPE_SPREAD, -SHAPE_LIMIT, SHAPE_LIMIT)
+        factor = np.exp(rng.standard_normal((n, body.K + 1)) * BONE_SPREAD)
+        factor = factor[:, np.minimum(np.arange(body.K + 1), self.partner)]
+        bones = (body.l + np.einsum("ijp,np->nij", body.S, betas)) * factor[..., None]
+        keypoints = body.v_bar[at] + np.einsum("ijp,np->nij", body.V[at], betas)
+        return bones.astype(np.float32), keypoints.astype(np.float32)
+
+
+def small_rotations(phi: np.ndarray) -> np.ndarray:
+    """exp of rotation vectors (..., 3) in their own precision: I + sin θ/θ [φ] + (1 − cos θ)/θ² [φ]²."""
+    x, y, z = np.moveaxis(phi, -1, 0)
+    theta = np.sqrt(x * x + y * y + z * z) + 1e-8
+    a, b = np.sin(theta) / theta, (1 - np.cos(theta)) / (theta * theta)
+    R = np.empty((*phi.shape, 3), phi.dtype)
+    R[..., 0, 0], R[..., 1, 1], R[..., 2, 2] = 1 - b * (y * y + z * z), 1 - b * (x * x + z * z), 1 - b * (x * x + y * y)
+    R[..., 0, 1], R[..., 1, 0] = b * x * y - a * z, b * x * y + a * z
+    R[..., 0, 2], R[..., 2, 0] = b * x * z + a * y, b * x * z - a * y
+    R[..., 1, 2], R[..., 2, 1] = b * y * z - a * x, b * y * z + a * x
+    return R

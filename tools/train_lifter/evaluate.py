@@ -1,0 +1,74 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Measure a lifting network: ``python -m scope.tools.train_lifter.evaluate MOTIONS PAIRS [--network lifter.onnx]``.
+
+On held-out takes with the detector's errors imitated, and on held-out renders that the landmark network really saw:
+the error of the limbs' keypoints beside that of the world landmarks, and how well the deviations foretell errors.
+Needs neither PyTorch nor onnx.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+
+import numpy as np
+
+from ...scope_addon.capture.lifter import HIPS, LIFTER_FILE, Lifter, virtual_camera
+from ...solver.body import load_body
+from .augment import load_motions
+from .dataset import Dataset
+from .observed_errors import ObservedErrors, load_pairs
+from .split import held_out_frames
+
+MEASURED = np.array([*range(11, 17), *range(25, 29)])  # shoulders, elbows, wrists, knees, ankles; hips are the origin
+
+
+def measure_renders(lifter: Lifter, pairs: Path) -> dict:
+    """Millimetres on renders: world landmarks, network with and without them; deviation of error over predicted σ."""
+    points, rays, confidence, world = (a.astype(float) for a in load_pairs(pairs, held_out=True))
+    truth = points - points[:, HIPS].mean(axis=1, keepdims=True)
+    result = {"renders": len(points), "world_landmarks_mm": _limb_error(world - truth)}
+    for name, given in (("with_world", world), ("without_world", None)):
+        lifted = lifter.lift(rays, confidence, given)
+        error = lifted.points - truth
+        seen = np.einsum("tij,tkj->tki", virtual_camera(rays), error)
+        result[f"{name}_mm"] = _limb_error(error)
+        result[f"{name}_deviation_across"] = _deviation(seen[..., :2] / lifted.sigma_across[..., None])
+        result[f"{name}_deviation_along"] = _deviation(seen[..., 2] / lifted.sigma_along)
+    return result
+
+
+def measure_takes(lifter: Lifter, motions: Path, pairs: Path, n: int = 8192) -> dict:
+    """Millimetres on held-out takes with imitated errors, all of them and those with known world landmarks."""
+    frames, observed = held_out_frames(load_motions(motions)), ObservedErrors.load(pairs, held_out=True)
+    batch = Dataset(load_body("scope"), frames, observed).batch((2, 0), n)
+    points, _ = lifter.run(batch.input)
+    error, known = points - batch.points, batch.input[:, -2] > 0.5
+    return {"takes": n, "with_world_mm": _limb_error(error[known]), "without_world_mm": _limb_error(error[~known])}
+
+
+def _limb_error(error: np.ndarray) -> float:
+    return round(1000 * float(np.linalg.norm(error[:, MEASURED], axis=-1).mean()), 1)
+
+
+def _deviation(z: np.ndarray) -> float:
+    """Root mean square of the 99 % smallest."""
+    z = np.sort(np.abs(z[:, MEASURED]).ravel())
+    return round(float(np.sqrt(np.square(z[: int(0.99 * len(z))]).mean())), 2)
+
+
+def main() -> None:
+    """Command line."""
+    parser = argparse.ArgumentParser(description="Measure a lifting network.")
+    parser.add_argument("motions", type=Path)
+    parser.add_argument("pairs", type=Path)
+    parser.add_argument("--network", type=Path, default=LIFTER_FILE)
+    a = parser.parse_args()
+    lifter = Lifter(a.network)
+    result = measure_renders(lifter, a.pairs) | {"imitated": measure_takes(lifter, a.motions, a.pairs)}
+    print(json.dumps(result, indent=1))
+
+
+if __name__ == "__main__":
+    main()

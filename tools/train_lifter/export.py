@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Writes the network as ONNX: matrices as half floats with a Cast behind them, the rest in single precision."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import onnx
+import torch
+from onnx import TensorProto, helper, numpy_helper
+
+from ...scope_addon.capture.lifter import INPUT_SIZE, KEYPOINT_COUNT
+from .network import LOG_SIGMA_RANGE, LiftingNetwork
+
+OPSET = 17
+
+
+class _Graph:
+    def __init__(self) -> None:
+        self.nodes: list[onnx.NodeProto] = []
+        self.weights: list[onnx.TensorProto] = []
+
+    def constant(self, name: str, value: np.ndarray) -> str:
+        self.weights.append(numpy_helper.from_array(np.ascontiguousarray(value), name))
+        return name
+
+    def add(self, kind: str, inputs: list[str], output: str, **attributes: Any) -> str:
+        self.nodes.append(helper.make_node(kind, inputs, [output], **attributes))
+        return output
+
+    def linear(self, x: str, name: str, weight: np.ndarray, bias: np.ndarray) -> str:
+        half = self.constant(f"{name}.weight", weight.astype(np.float16))
+        single = self.add("Cast", [half], f"{name}.weight32", to=TensorProto.FLOAT)
+        return self.add("Gemm", [x, single, self.constant(f"{name}.bias", bias)], name, transB=1)
+
+    def norm(self, x: str, name: str, layer: torch.nn.LayerNorm) -> str:
+        scale, bias = (self.constant(f"{name}.{k}", getattr(layer, k).detach().numpy()) for k in ("weight", "bias"))
+        return self.add("LayerNormalization", [x, scale, bias], name, axis=-1, epsilon=layer.eps)
+
+
+def export(network: LiftingNetwork, path: Path) -> None:
+    """Write ``network``; the input's normalization becomes part of the first layer."""
+    network = network.float().eval()
+    g = _Graph()
+    array = lambda tensor: tensor.detach().numpy().astype(np.float32)  # noqa: E731
+    x = g.add("Sub", ["input", g.constant("mean", array(network.mean))], "centred")
+    x = g.add("Div", [x, g.constant("spread", array(network.spread))], "normalized")
+    x = g.linear(x, "enter", array(network.enter.weight), array(network.enter.bias))
+    for k, block in enumerate(network.blocks):
+        y = g.norm(x, f"norm{k}", block.norm)
+        y = g.linear(y, f"first{k}", array(block.first.weight), array(block.first.bias))
+        y = g.add("Relu", [y], f"relu{k}")
+        y = g.linear(y, f"second{k}", array(block.second.weight), array(block.second.bias))
+        x = g.add("Add", [x, y], f"sum{k}")
+    x = g.norm(x, "norm", network.norm)
+    weight, bias, n = array(network.leave.weight), array(network.leave.bias), KEYPOINT_COUNT * 3
+    points = g.linear(x, "flat_points", weight[:n], bias[:n])
+    g.add("Reshape", [points, g.constant("points_shape", np.array([-1, KEYPOINT_COUNT, 3]))], "points")
+    sigma = g.linear(x, "flat_sigma", weight[n:], bias[n:] - 3.0)
+    sigma = g.add("Reshape", [sigma, g.constant("sigma_shape", np.array([-1, KEYPOINT_COUNT, 2]))], "sigma_raw")
+    low, high = (g.constant(f"sigma_limit{k}", np.array(v, np.float32)) for k, v in enumerate(LOG_SIGMA_RANGE))
+    sigma = g.add("Clip", [sigma, low, high], "sigma_clipped")
+    g.add("Add", [sigma, g.constant("sigma_offset", array(network.sigma_offset))], "log_sigma")
+    graph = helper.make_graph(
+        g.nodes,
+        "lifter",
+        [helper.make_tensor_value_info("input", TensorProto.FLOAT, ["n", INPUT_SIZE])],
+        [
+            helper.make_tensor_value_info("points", TensorProto.FLOAT, ["n", KEYPOINT_COUNT, 3]),
+            helper.make_tensor_value_info("log_sigma", TensorProto.FLOAT, ["n", KEYPOINT_COUNT, 2]),
+        ],
+        g.weights,
+    )
+    opset = [helper.make_opsetid("", OPSET)]
+    model = helper.make_model(graph, producer_name="scope", opset_imports=opset, ir_version=8)
+    onnx.checker.check_model(model, full_check=True)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    temporary = path.with_suffix(".part")
+    onnx.save(model, str(temporary))
+    os.replace(temporary, path)

@@ -1,0 +1,65 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The lifting network and its loss, in PyTorch."""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor, nn
+
+from ...scope_addon.capture.lifter import INPUT_SIZE, KEYPOINT_COUNT
+
+WIDTH, BLOCKS = 512, 2
+DIRECTION_WEIGHT = 0.5
+LOG_SIGMA_RANGE = (-5.5, 0.5)  # 4 mm .. 1.6 m
+_ARMS, _LEGS = [(11, 13), (13, 15), (12, 14), (14, 16)], [(23, 25), (25, 27), (24, 26), (26, 28)]
+BONES = torch.tensor([*_ARMS, *_LEGS, (11, 12), (23, 24), (11, 23), (12, 24)])
+
+
+class Block(nn.Module):
+    """x + W₂ relu(W₁ norm(x))."""
+
+    def __init__(self, width: int) -> None:
+        super().__init__()
+        self.norm, self.first, self.second = nn.LayerNorm(width), nn.Linear(width, width), nn.Linear(width, width)
+        nn.init.zeros_(self.second.weight)
+
+    def forward(self, x: Tensor) -> Tensor:
+        """(n, width) -> (n, width)."""
+        return x + self.second(torch.relu(self.first(self.norm(x))))
+
+
+class LiftingNetwork(nn.Module):
+    """(n, 200) -> points (n, 33, 3) metres and log σ (n, 33, 2), across and along the line of sight."""
+
+    def __init__(self, width: int = WIDTH, blocks: int = BLOCKS) -> None:
+        super().__init__()
+        self.register_buffer("mean", torch.zeros(INPUT_SIZE))
+        self.register_buffer("spread", torch.ones(INPUT_SIZE))
+        self.register_buffer("sigma_offset", torch.zeros(KEYPOINT_COUNT, 2))
+        self.enter = nn.Linear(INPUT_SIZE, width)
+        self.blocks = nn.Sequential(*(Block(width) for _ in range(blocks)))
+        self.norm = nn.LayerNorm(width)
+        self.leave = nn.Linear(width, KEYPOINT_COUNT * 5)
+
+    def forward(self, x: Tensor) -> tuple[Tensor, Tensor]:
+        """Points and log σ."""
+        out = self.leave(self.norm(self.blocks(self.enter((x - self.mean) / self.spread)))).float()
+        points, log_sigma = out[:, : KEYPOINT_COUNT * 3], out[:, KEYPOINT_COUNT * 3 :]
+        log_sigma = log_sigma.reshape(-1, KEYPOINT_COUNT, 2) - 3.0
+        return points.reshape(-1, KEYPOINT_COUNT, 3), log_sigma.clamp(*LOG_SIGMA_RANGE) + self.sigma_offset
+
+
+def loss(points: Tensor, log_sigma: Tensor, truth: Tensor) -> Tensor:
+    """Σ over coordinates of the Laplace density's −log, and 1 − cos of the bones' directions; the mean over samples.
+
+    −log p(e) = √2 |e| / σ + log σ (+ const), with one σ for both coordinates across the line of sight.
+    """
+    log_sigma = log_sigma[..., [0, 0, 1]]
+    likelihood = (2**0.5 * (points - truth).abs() * torch.exp(-log_sigma) + log_sigma).mean()
+    direction = nn.functional.cosine_similarity(bones(points), bones(truth), dim=-1)
+    return likelihood + DIRECTION_WEIGHT * (1 - direction).mean()
+
+
+def bones(points: Tensor) -> Tensor:
+    """(n, 33, 3) -> (n, 12, 3) from a bone's start to its end."""
+    return points[:, BONES[:, 1]] - points[:, BONES[:, 0]]

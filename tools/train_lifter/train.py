@@ -1,0 +1,172 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Train the lifting network: ``python -m scope.tools.train_lifter.train MOTIONS PAIRS -o assets/lifter``.
+
+AdamW with a cosine schedule in bfloat16; what is exported is the exponential mean of the weights. Every tenth take
+and every fifth pair are held out: they choose nothing but the calibration of the uncertainties, and measure.
+"""
+
+from __future__ import annotations
+
+import argparse
+import copy
+import json
+import math
+import time
+from collections import deque
+from collections.abc import Iterator
+from multiprocessing import get_context
+from pathlib import Path
+
+import numpy as np
+import torch
+
+from ...scope_addon.capture.lifter import HIPS, network_input
+from ...solver.body import load_body
+from .augment import load_motions
+from .dataset import Batch, Dataset
+from .export import export
+from .network import LiftingNetwork, loss
+from .observed_errors import ObservedErrors, load_pairs
+from .split import held_out_frames, training_frames
+
+BATCH = 1024
+PEAK_RATE, WARM_UP, DECAY = 1e-3, 200, 0.01
+MEAN_DECAY = 0.997
+AHEAD = 16  # batches made before they are needed
+_TRAINING, _VALIDATION = 0, 1  # first number of a batch's seed
+
+_dataset: Dataset | None = None
+
+
+def _start(motions: Path, pairs: Path) -> None:
+    global _dataset
+    _dataset = Dataset(load_body("scope"), training_frames(load_motions(motions)), ObservedErrors.load(pairs))
+
+
+def _make(seed: tuple[int, ...]) -> Batch:
+    assert _dataset is not None
+    return _dataset.batch(seed, BATCH)
+
+
+def batches(motions: Path, pairs: Path, seed: int, steps: int, workers: int) -> Iterator[Batch]:
+    """The batches of a training, in order, whatever the number of processes."""
+    with get_context("spawn").Pool(workers, _start, (motions, pairs)) as pool:
+        waiting = deque(pool.apply_async(_make, ((_TRAINING, seed, k),)) for k in range(min(AHEAD, steps)))
+        for k in range(len(waiting), steps + len(waiting)):
+            yield waiting.popleft().get()
+            if k < steps:
+                waiting.append(pool.apply_async(_make, ((_TRAINING, seed, k),)))
+
+
+def held_out_batch(motions: Path, pairs: Path, n: int = 8192) -> Batch:
+    """Samples of the takes, and errors of the pairs, that are kept from training."""
+    frames, observed = held_out_frames(load_motions(motions)), ObservedErrors.load(pairs, held_out=True)
+    return Dataset(load_body("scope"), frames, observed).batch((_VALIDATION, 0), n)
+
+
+def held_out_renders(pairs: Path) -> Batch:
+    """What the landmark network saw of the renders that are kept from training; world landmarks known."""
+    points, rays, confidence, world = load_pairs(pairs, held_out=True)
+    x, R = network_input(rays, confidence, world, np.ones(len(rays)))
+    relative = points - points[:, HIPS].mean(axis=1, keepdims=True)
+    return Batch(x.astype(np.float32), (relative @ np.swapaxes(R, 1, 2)).astype(np.float32))
+
+
+@torch.no_grad()
+def measure(network: LiftingNetwork, batch: Batch) -> dict:
+    """Errors in mm on a batch, and the standard deviation of error over σ, across and along the line of sight."""
+    points, log_sigma = network(torch.from_numpy(batch.input))
+    error = (points - torch.from_numpy(batch.points)).numpy()
+    z = error / np.exp(log_sigma.numpy())[..., [0, 0, 1]]
+    limbs = np.linalg.norm(error, axis=-1)[:, [11, 12, 13, 14, 15, 16, 25, 26, 27, 28]]
+    known = batch.input[:, -2] > 0.5
+    result = {
+        "mpjpe_with_world_mm": float(1000 * limbs[known].mean()),
+        "depth_rms_mm": float(1000 * np.sqrt(np.square(error[..., 2]).mean())),
+        "deviation_across": float(z[..., :2].std()),
+        "deviation_along": float(z[..., 2].std()),
+    }
+    if not known.all():
+        result["mpjpe_without_world_mm"] = float(1000 * limbs[~known].mean())
+    return result
+
+
+@torch.no_grad()
+def calibrate(network: LiftingNetwork, batch: Batch) -> None:
+    """Shift each keypoint's log σ so that its errors over σ have unit variance (of 99 % of them) on the batch."""
+    network.sigma_offset.zero_()
+    points, log_sigma = network(torch.from_numpy(batch.input))
+    error = (points - torch.from_numpy(batch.points)).numpy()
+    z = np.abs(error / np.exp(log_sigma.numpy())[..., [0, 0, 1]])
+    for k, axes in enumerate(([0, 1], [2])):
+        part = np.moveaxis(z[..., axes], 1, 0).reshape(z.shape[1], -1)
+        part = np.minimum(part, np.quantile(part, 0.99, axis=1, keepdims=True))
+        network.sigma_offset[:, k] = torch.from_numpy(np.log(np.sqrt(np.square(part).mean(axis=1))).astype(np.float32))
+
+
+def train(motions: Path, pairs: Path, folder: Path, seed: int, steps: int, workers: int, minutes: float) -> None:
+    """Train and export. The schedule follows the steps or the time, ``minutes``, whichever ends first."""
+    torch.manual_seed(seed)
+    torch.set_num_threads(1)
+    validation = held_out_batch(motions, pairs)
+    renders = held_out_renders(pairs)
+    network = LiftingNetwork()
+    x = torch.from_numpy(validation.input)
+    network.mean.copy_(x.mean(0))
+    network.spread.copy_(x.std(0) + 1e-3)
+    mean = copy.deepcopy(network)
+    matrices = {"params": [p for p in network.parameters() if p.ndim > 1], "weight_decay": DECAY}
+    others = {"params": [p for p in network.parameters() if p.ndim == 1], "weight_decay": 0.0}
+    optimizer = torch.optim.AdamW([matrices, others], PEAK_RATE, (0.9, 0.98))
+    log: list[dict] = []
+    start, total = time.perf_counter(), 0.0
+    for step, batch in enumerate(batches(motions, pairs, seed, steps, workers)):
+        done = max(step / steps, (time.perf_counter() - start) / (60 * minutes))
+        if done >= 1:
+            break
+        for group in optimizer.param_groups:
+            group["lr"] = PEAK_RATE * min((step + 1) / WARM_UP, 0.5 + 0.5 * math.cos(math.pi * done))
+        with torch.autocast("cpu", torch.bfloat16):
+            points, log_sigma = network(torch.from_numpy(batch.input))
+        value = loss(points, log_sigma, torch.from_numpy(batch.points))
+        optimizer.zero_grad(set_to_none=True)
+        value.backward()
+        torch.nn.utils.clip_grad_norm_(network.parameters(), 1.0)
+        optimizer.step()
+        decay = min(MEAN_DECAY, (step + 1) / (step + 10))
+        with torch.no_grad():
+            for a, b in zip(mean.parameters(), network.parameters(), strict=True):
+                a.lerp_(b, 1 - decay)
+        total += value.item()
+        if (step + 1) % 500 == 0:
+            row = {"step": step + 1, "s": round(time.perf_counter() - start), "loss": total / 500}
+            row |= measure(mean, validation)
+            row["mpjpe_renders_mm"] = measure(mean, renders)["mpjpe_with_world_mm"]
+            total = 0.0
+            log.append({k: round(v, 4) for k, v in row.items()})
+            print(json.dumps(log[-1]), flush=True)
+    calibrate(mean, validation)
+    measured = {"held_out": measure(mean, validation), "held_out_renders": measure(mean, renders)}
+    summary = {"seed": seed, "steps": step, "batch": BATCH, **measured, "log": log}
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "log.json").write_text(json.dumps(summary, indent=1) + "\n")
+    export(mean, folder / "lifter.onnx")
+    print(json.dumps(measured))
+
+
+def main() -> None:
+    """Command line."""
+    parser = argparse.ArgumentParser(description="Train the lifting network.")
+    parser.add_argument("motions", type=Path, help="file written by scope.tools.mocap.fit_body")
+    parser.add_argument("pairs", type=Path, help="file written by scope.tools.train_lifter.render_pairs")
+    parser.add_argument("-o", "--output", type=Path, default=Path("assets/lifter"))
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--steps", type=int, default=10000)
+    parser.add_argument("--minutes", type=float, default=30.0)
+    parser.add_argument("--workers", type=int, default=2)
+    a = parser.parse_args()
+    train(a.motions, a.pairs, a.output, a.seed, a.steps, a.workers, a.minutes)
+
+
+if __name__ == "__main__":
+    main()
