@@ -8,6 +8,7 @@ fit(body, Measurements(intrinsics, keypoints2d=Keypoints2D(indices, pixels, conf
 from .body import Body, load_body
 from .clip import carry, fit_clip
 from .errors import ShapeError
+from .learned_prior import JointPrior, load_joint_prior
 from .measurements import Keypoints2D, Keypoints3D, Measurements, OrientationField, PosePriors
 from .optimizer import fit, fit_tree
 from .options import COLD_STAGES, WARM_STAGES, Options, Priors, Stage, Weights, default_priors
@@ -22,6 +23,7 @@ __all__ = [
     "BodyArrays",
     "ClipFit",
     "Fit",
+    "JointPrior",
     "Keypoints2D",
     "Keypoints3D",
     "Measurements",
@@ -42,6 +44,7 @@ __all__ = [
     "fit_clip",
     "fit_tree",
     "load_body",
+    "load_joint_prior",
     "make_tree",
     "with_previous",
 ]

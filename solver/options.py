@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .errors import ShapeError
+from .learned_prior import load_joint_prior
 from .measurements import as_array
 from .residuals import joint_limits, joint_prior
 from .residuals.part import Array
@@ -19,7 +20,8 @@ class Weights:
     """Weight of each kind of residual, on 1/2 |r|^2.
 
     Units: per squared normalized image coordinate (pixels over focal length), per metre^2, per squared difference of
-    unit vectors, per radian^2; the pose prior's and the tables' weigh what their rows say.
+    unit vectors, per radian^2; joint_flow multiplies a density's exponent, so that 1 is what was learned; the pose
+    prior's and the tables' weigh what their rows say.
     """
 
     keypoints2d: float = 1e6
@@ -28,12 +30,18 @@ class Weights:
     pose_prior: float = 1.0
     joint_prior: float = 50.0
     joint_limits: float = 2000.0
+    joint_flow: float = 1.0
     shape: float = 100.0
     tables: Mapping[str, float] = field(default_factory=dict)
 
     def row(self) -> list[float]:
         """Return the weights in the registry's order."""
-        own = {"pose_prior": self.pose_prior, "joint_prior": self.joint_prior, "joint_limits": self.joint_limits}
+        own = {
+            "pose_prior": self.pose_prior,
+            "joint_prior": self.joint_prior,
+            "joint_limits": self.joint_limits,
+            "joint_flow": self.joint_flow,
+        }
         by_name = {**own, **self.tables}
         first = [self.keypoints2d, self.keypoints3d, self.orientation_field, self.shape]
         return first + [by_name.get(name, 1.0) for name in RESIDUALS]
@@ -52,11 +60,18 @@ class Stage:
 _LAST = Weights()
 COLD_STAGES = (
     Stage(
-        replace(_LAST, orientation_field=1e4, keypoints3d=2400.0, keypoints2d=1e4, joint_prior=1000.0, shape=1000.0),
+        replace(
+            _LAST, orientation_field=1e4, keypoints3d=2400.0, keypoints2d=1e4,
+            joint_prior=1000.0, joint_flow=10.0, shape=1000.0,
+        ),  # fmt: skip
         5e-2,
         10,
     ),
-    Stage(replace(_LAST, orientation_field=4000.0, keypoints2d=2e5, joint_prior=300.0, shape=400.0), 1e-2, 15),
+    Stage(
+        replace(_LAST, orientation_field=4000.0, keypoints2d=2e5, joint_prior=300.0, joint_flow=3.0, shape=400.0),
+        1e-2,
+        15,
+    ),
     Stage(_LAST, 1e-5, 50),
 )
 WARM_STAGES = (Stage(_LAST, 1e-5, 50),)
@@ -106,6 +121,7 @@ class Priors:
     shape_mean (P,), zeros if None; shape_information (P, P), identity if None: the prior's inverse covariance over
     `Weights.shape`.
     limits: tables of residuals/joint_limits.py, for instance `joint_limits.hinges_of(body.joint_names)`.
+    flow: tables of residuals/joint_flow.py, for instance `load_joint_prior().tables(body.joint_names)`.
     """
 
     joint_mean: ArrayLike | None = None
@@ -113,9 +129,10 @@ class Priors:
     shape_mean: ArrayLike | None = None
     shape_information: ArrayLike | None = None
     limits: tuple[Array, Array] | None = None
+    flow: tuple[Array, Array] | None = None
 
     def packed_tables(self, K: int) -> dict[str, tuple[Array, Array]]:
-        """Return the tables of joint_prior and joint_limits for a body of K joints."""
+        """Return the tables of joint_prior, joint_limits and joint_flow for a body of K joints."""
         mean = np.tile(np.eye(3), (K, 1, 1)) if self.joint_mean is None else self.joint_mean
         weights = np.ones(K) if self.joint_weights is None else self.joint_weights
         mean = as_array(mean, (K, 3, 3), "Means of the joint prior")
@@ -123,10 +140,12 @@ class Priors:
         if not (np.isfinite(mean).all() and np.isfinite(weights).all()):
             raise ShapeError("The joint prior must be finite.")
         tables = {"joint_prior": joint_prior.pack(np.arange(1, K + 1), mean, weights)}
-        if self.limits is not None:
-            if len(self.limits[0]) and not 1 <= np.min(self.limits[0]) <= np.max(self.limits[0]) <= K:
-                raise ShapeError(f"Joints of limits must lie in 1..{K}, but got {np.ravel(self.limits[0]).tolist()}.")
-            tables["joint_limits"] = self.limits
+        for name, table, least in (("limits", self.limits, 1), ("flow", self.flow, 0)):
+            if table is None:
+                continue
+            if len(table[0]) and not least <= np.min(table[0]) <= np.max(table[0]) <= K:
+                raise ShapeError(f"Joints of {name} must lie in 1..{K}, but got {np.ravel(table[0]).tolist()}.")
+            tables[f"joint_{name}"] = table
         return tables
 
     def packed_shape(self, P: int) -> tuple[Array, Array]:
@@ -139,7 +158,17 @@ class Priors:
         return mean, 0.5 * (information + information.T)
 
 
-def default_priors(body: object) -> Priors:
-    """Return the rest pose, the population's shape, and the limits of the knees and elbows that `body` names."""
+def default_priors(body: object, log_det: float = 0.0) -> Priors:
+    """Return what is known of any person: the learned prior of the joints that `body` names as SMPL does, the limits
+    of its knees and elbows, and the population's shape. Joints without a learned prior are drawn to the rest pose.
+
+    log_det: 0 for the learned prior's 1/2 |z|^2, as in the paper; 1 for its whole -log p (residuals/joint_flow.py).
+    Raises ModelFileError when the prior cannot be read.
+    """
     names = list(getattr(body, "joint_names", ()))
-    return Priors(limits=joint_limits.hinges_of(names))
+    limits = joint_limits.hinges_of(names)
+    if not names:
+        return Priors(limits=limits)
+    prior = load_joint_prior()
+    unknown = np.array([name not in prior.names for name in names[1:]], dtype=np.float64)
+    return Priors(joint_weights=unknown, limits=limits, flow=prior.tables(names, log_det=log_det))

@@ -16,10 +16,15 @@ those of one point into one term.
 import numpy as np
 
 from ..kernel import kernel
-from . import joint_limits, joint_prior, pose_prior
+from . import joint_flow, joint_limits, joint_prior, pose_prior
 from .part import Array
 
-RESIDUALS = {"pose_prior": pose_prior, "joint_prior": joint_prior, "joint_limits": joint_limits}
+RESIDUALS = {
+    "pose_prior": pose_prior,
+    "joint_prior": joint_prior,
+    "joint_limits": joint_limits,
+    "joint_flow": joint_flow,
+}
 
 # Columns of a stage's weights: the measurements, the shape prior, then RESIDUALS in order.
 KEYPOINT2D, KEYPOINT3D, ORIENTATION_FIELD, SHAPE_PRIOR, FIRST_TABLE = range(5)
@@ -32,6 +37,7 @@ def accumulate_tables(tree, ints, floats, weights, inv_sigma, triggs, pose, bloc
     cost = pose_prior.accumulate(tree, ints[0], floats[0], w[0], s[0], triggs, pose, blocks)
     cost += joint_prior.accumulate(tree, ints[1], floats[1], w[1], s[1], triggs, pose, blocks)
     cost += joint_limits.accumulate(tree, ints[2], floats[2], w[2], s[2], triggs, pose, blocks)
+    cost += joint_flow.accumulate(tree, ints[3], floats[3], w[3], s[3], triggs, pose, blocks)
     return cost
 
 

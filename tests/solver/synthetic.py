@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scope.solver import rotations
+from scope.solver.residuals import joint_flow
 
 
 @dataclass
@@ -64,3 +65,22 @@ def project(points, intrinsics=INTRINSICS):
     """Return pixels (n, 2) of points (n, 3) in the camera frame."""
     p = points @ intrinsics.T
     return p[:, :2] / p[:, 2:]
+
+
+def random_flow(rng, mean, bend=0.3):
+    """Return parameters (SIZE,) of a joint flow about `mean` (3, 3), far from linear."""
+    p = np.zeros(joint_flow.SIZE)
+    p[:9] = np.ravel(mean)
+    for k in range(joint_flow.LAYERS):
+        values = {name: bend * rng.standard_normal(shape) for name, shape in joint_flow.LAYER_SHAPES.items()}
+        values["A"] = rotations.exp(rng.standard_normal(3)) @ (np.eye(3) + 0.2 * np.tri(3))
+        values |= {name: rng.standard_normal(np.shape(values[name])) for name in ("W2", "W3", "c2", "c3")}
+        values["beta"] = rng.uniform(-0.7, 0.7, 3)
+        at = joint_flow.FIRST_LAYER + k * joint_flow.LAYER_SIZE
+        p[at : at + joint_flow.LAYER_SIZE] = np.concatenate([np.ravel(v) for v in values.values()])
+    p[joint_flow.LAST : joint_flow.LAST + 12] = np.append(2.0 * np.eye(3), rng.standard_normal(3))
+    matrices = [p[joint_flow.LAST : joint_flow.LAST + 9]]
+    matrices += [p[joint_flow.FIRST_LAYER + k * joint_flow.LAYER_SIZE :][:9] for k in range(joint_flow.LAYERS)]
+    p[joint_flow.CONSTANT] = sum(np.log(abs(np.linalg.det(A.reshape(3, 3)))) for A in matrices) - np.log(2 / np.pi**2)
+    p[joint_flow.BOUND] = joint_flow.transform(p, mean)[2] + 1.0
+    return p

@@ -11,6 +11,7 @@ from scope.solver.measurements import Keypoints2D, Keypoints3D, Measurements, Or
 from scope.solver.options import Stage, Weights
 from scope.solver.recursion import make_workspace
 from scope.solver.residuals import (
+    joint_flow,
     joint_limits,
     joint_prior,
     keypoint2d,
@@ -24,7 +25,7 @@ from scope.solver.residuals import (
 from scope.solver.residuals.part import GRADIENT, SHAPE, Part
 from scope.solver.terms import make_terms
 
-from .synthetic import INTRINSICS, random_body, random_state
+from .synthetic import INTRINSICS, random_body, random_flow, random_state
 
 P = 6
 AXIS = np.array([0.6, 0.0, 0.8])
@@ -71,6 +72,7 @@ def check_derivatives(evaluate, part, atol=2e-7, h=1e-6):
 V_BAR, V = 0.2 * np.random.default_rng(8).standard_normal(3), 0.05 * np.random.default_rng(9).standard_normal((3, P))
 L = np.random.default_rng(10).standard_normal((P, P))
 HAT = rotations.exp([0.2, -0.5, 0.3])
+FLOW = random_flow(np.random.default_rng(11), HAT)
 
 CASES = {
     "keypoint2d": lambda part, w: keypoint2d.evaluate(part, V_BAR, V, np.array([0.1, 0.2]), w, 1.2),
@@ -78,6 +80,8 @@ CASES = {
     "orientation_field": lambda part, w: orientation_field.evaluate(part, V_BAR, V, AXIS, w),
     "pose_prior": lambda part, w: pose_prior.evaluate(part, HAT, np.array([0.1, 0.1, 2.5]), 2.0, 3.0, w),
     "joint_prior": lambda part, w: joint_prior.evaluate(part, HAT, w),
+    "joint_flow": lambda part, w: joint_flow.evaluate(part, FLOW, w),
+    "joint_flow_log_det": lambda part, w: joint_flow.evaluate(part, FLOW, w, 0.6),
     "joint_limits": lambda part, w: joint_limits.evaluate(part, AXIS, -0.1, 0.1, 0.05, 2.0, 3.0, w),
     "shape_prior": lambda part, w: shape_prior.evaluate(part, np.ones(P), L @ L.T, w),
 }
@@ -89,7 +93,7 @@ def test_derivatives_at_random_states(name, seed):
     check_derivatives(lambda part: CASES[name](part, 1.7), random_part(np.random.default_rng(seed)))
 
 
-@pytest.mark.parametrize("name", ["joint_prior", "pose_prior", "joint_limits"])
+@pytest.mark.parametrize("name", ["joint_prior", "joint_flow", "joint_flow_log_det", "pose_prior", "joint_limits"])
 @pytest.mark.parametrize("angle", [0.0, 1e-9, 1e-5, 1e-2, 3.0, np.pi - 1e-3])
 def test_derivatives_near_identity_and_near_pi(name, angle):
     rng = np.random.default_rng(3)
@@ -99,7 +103,7 @@ def test_derivatives_near_identity_and_near_pi(name, angle):
     if name == "pose_prior":
         part.R = HAT @ turn
     else:
-        part.Omega = (HAT if name == "joint_prior" else np.eye(3)) @ turn
+        part.Omega = (np.eye(3) if name == "joint_limits" else HAT) @ turn
     if name == "joint_limits":  # the swing's kink is not at zero angle
         check_derivatives(lambda p: joint_limits.evaluate(p, AXIS, -2.9, 0.4, 0.3, 2.0, 3.0), part, atol=2e-5)
     else:
@@ -123,7 +127,8 @@ def test_weight_is_linear_in_the_cost(name):
 
 
 def test_every_registered_residual_is_in_these_tests():
-    assert set(registry.RESIDUALS) | {"keypoint2d", "keypoint3d", "orientation_field", "shape_prior"} == set(CASES)
+    others = {"keypoint2d", "keypoint3d", "orientation_field", "shape_prior", "joint_flow_log_det"}
+    assert set(registry.RESIDUALS) | others == set(CASES)
     for module in registry.RESIDUALS.values():
         assert list(inspect.signature(module.accumulate.py_func).parameters) == [
             "tree", "ints", "floats", "weight", "inv_sigma", "triggs", "pose", "blocks",
@@ -160,7 +165,7 @@ def check_blocks(tree, blocks, cost, i, found):
 
 
 @pytest.mark.parametrize("seed", range(3))
-@pytest.mark.parametrize("name", ["pose_prior", "joint_prior", "joint_limits"])
+@pytest.mark.parametrize("name", ["pose_prior", "joint_prior", "joint_flow", "joint_flow_log_det", "joint_limits"])
 def test_table_kernels_accumulate_their_residual(name, seed):
     rng, _, tree, pose = chain(seed)
     i, w = 3, 1.9
@@ -171,6 +176,11 @@ def test_table_kernels_accumulate_their_residual(name, seed):
     elif name == "joint_prior":
         tables = joint_prior.pack([i], HAT[None], [2.0])
         found = joint_prior.evaluate(part, HAT, 2.0 * w)
+    elif name.startswith("joint_flow"):
+        h = 0.7 if name.endswith("log_det") else 0.0
+        tables = joint_flow.pack([i], FLOW[None], [2.0], h)
+        found = joint_flow.evaluate(part, FLOW, 2.0 * w, h)
+        name = "joint_flow"
     else:
         tables = joint_limits.pack([i], AXIS[None], [-0.1], [0.1], [0.05], [2.0], [3.0])
         found = joint_limits.evaluate(part, AXIS, -0.1, 0.1, 0.05, 2.0, 3.0, w)

@@ -1,0 +1,77 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The joint-state prior learned from motion capture: one flow for each joint, by name, read from assets/prior."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+
+from .errors import ModelFileError
+from .npz import read_npz
+from .residuals import joint_flow
+from .residuals.part import Array
+
+BUILT_IN = Path(__file__).resolve().parent.parent / "assets" / "prior" / "joint_prior.npz"
+
+
+@dataclass(frozen=True)
+class JointPrior:
+    """Parameters (n, SIZE) of residuals/joint_flow.py for the joints ``names`` (n,), in SMPL's rest axes."""
+
+    names: tuple[str, ...]
+    parameters: Array
+
+    def of(self, joint: str) -> Array:
+        """Return the parameters (SIZE,) of a joint. Raises KeyError."""
+        if joint not in self.names:
+            raise KeyError(f"The prior has no joint {joint!r}; it has {', '.join(self.names)}.")
+        return self.parameters[self.names.index(joint)]
+
+    def tables(
+        self, joint_names: Sequence[str], weights: Mapping[str, float] | None = None, log_det: float = 0.0
+    ) -> tuple[Array, Array]:
+        """Return the tables of residuals/joint_flow.py for the joints of a body (K+1,) that have a prior.
+
+        weights: w by joint name, one where nothing is said. log_det: h, one for the density's maximum, zero for
+        the paper's 1/2 |z|^2.
+        """
+        rows = [(i, name) for i, name in enumerate(joint_names) if i > 0 and name in self.names]
+        w = np.array([1.0 if weights is None else float(weights.get(name, 1.0)) for _, name in rows])
+        parameters = np.array([self.of(name) for _, name in rows]).reshape(len(rows), joint_flow.SIZE)
+        return joint_flow.pack(np.array([i for i, _ in rows], np.int64), parameters, w, log_det)
+
+    def sample(self, joint: str, count: int, rng: np.random.Generator) -> Array:
+        """Return states (count, 3, 3) of a joint drawn from its prior."""
+        return joint_flow.invert(self.of(joint), rng.standard_normal((count, 3)))
+
+    def log_density(self, joint: str, Omega: Array) -> Array:
+        """Return the log density (...) of states (..., 3, 3) against the normalized Haar measure, in nats."""
+        return joint_flow.log_density(self.of(joint), Omega)
+
+
+@lru_cache(maxsize=4)
+def load_joint_prior(path: str | Path = BUILT_IN) -> JointPrior:
+    """Read a prior written by tools/train_prior.
+
+    File: joint_names (n,) str, parameters (n, SIZE) f64, layers and hidden (). Raises ModelFileError.
+    """
+    arrays = read_npz(Path(path), ModelFileError, "joint prior")
+    expected = {"layers": joint_flow.LAYERS, "hidden": joint_flow.HIDDEN}
+    for key in ("joint_names", "parameters", *expected):
+        if key not in arrays:
+            raise ModelFileError(f"{path}: the joint prior has no array '{key}'; write it with tools/train_prior")
+    for key, value in expected.items():
+        if arrays[key].shape != () or int(arrays[key]) != value:
+            raise ModelFileError(f"{path}: the joint prior has {key} = {arrays[key]}, but the solver evaluates {value}")
+    names = tuple(str(name) for name in np.ravel(arrays["joint_names"]))
+    parameters = np.ascontiguousarray(arrays["parameters"], dtype=np.float64)
+    if parameters.shape != (len(names), joint_flow.SIZE) or not np.isfinite(parameters).all():
+        raise ModelFileError(
+            f"{path}: parameters of the joint prior must be finite and of shape ({len(names)}, {joint_flow.SIZE}), "
+            f"but have shape {parameters.shape}"
+        )
+    return JointPrior(names, parameters)

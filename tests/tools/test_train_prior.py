@@ -1,0 +1,167 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Training data, export and baselines of the joint-state prior, and the one in assets/. Nothing needs PyTorch."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scope.solver import load_body, rotations
+from scope.solver.learned_prior import BUILT_IN, load_joint_prior
+from scope.solver.residuals import joint_flow as jf
+from scope.tools.train_prior import baselines
+from scope.tools.train_prior.data import FOLDS, MIRROR, MODELS, PAIRED, TEST, TRUNK, group_of, load_samples, mirrored
+from scope.tools.train_prior.export import HAND_DEVIATION, fixed, flat
+from scope.tools.train_prior.export import mirrored as mirrored_parameters
+from scope.tools.train_prior.rotation_statistics import balanced, mean_rotation
+
+FIXTURE = Path(__file__).with_name("flow_by_torch.npz")
+
+
+def uniform_rotations(rng, n):
+    return rotations.matrix_from_quaternion(rng.standard_normal((n, 4)))
+
+
+def concentrated(rng, n, deviations=(0.1, 0.3, 0.8)):
+    return rotations.exp([0.5, -1.0, 0.2]) @ rotations.exp(rng.standard_normal((n, 3)) * deviations)
+
+
+@pytest.fixture(scope="module")
+def prior():
+    return load_joint_prior()
+
+
+def test_export_evaluates_to_what_torch_computed():
+    row = dict(np.load(FIXTURE))
+    states, z, log_likelihood = row.pop("states"), row.pop("z"), row.pop("log_likelihood")
+    parameters = flat(row, states)
+    np.testing.assert_allclose(jf.transform(parameters, states)[0], z, rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(jf.log_density(parameters, states), log_likelihood, rtol=1e-9, atol=1e-8)
+
+
+def test_mirrored_parameters_are_the_flow_of_the_mirror_image():
+    rng = np.random.default_rng(0)
+    row = dict(np.load(FIXTURE))
+    parameters = flat(row, row["states"])
+    Omega = uniform_rotations(rng, 50)
+    z, _, log_det, _ = jf.transform(parameters, Omega)
+    found = jf.transform(mirrored_parameters(parameters), MIRROR @ Omega @ MIRROR)
+    np.testing.assert_allclose(found[0], z, atol=1e-9)
+    np.testing.assert_allclose(found[2], log_det, atol=1e-9)
+    turned = mirrored(rotations.exp([[0.3, 0.2, -0.1]]))
+    np.testing.assert_allclose(rotations.log(turned), [[0.3, -0.2, 0.1]], atol=1e-12)
+
+
+def test_joints_without_data_have_a_gaussian_about_rest():
+    angles = rotations.log(jf.invert(fixed(HAND_DEVIATION), np.random.default_rng(0).standard_normal((50_000, 3))))
+    np.testing.assert_allclose(angles.std(0), HAND_DEVIATION, rtol=0.03)
+    np.testing.assert_allclose(angles.mean(0), 0.0, atol=0.01)
+
+
+def test_performers_do_not_straddle_the_split():
+    assert group_of("cmu_asf_amc", "cmu_02") in TEST
+    assert group_of("cmu_expmap", "expmap_train_soccer_3") == group_of("cmu_expmap", "expmap_test_soccer_1") in TEST
+    assert group_of("cmu_expmap", "expmap_train_running_2") == group_of("cmu_expmap", "expmap_test_walking_12")
+    assert group_of("cmu_expmap", "expmap_train_basketball_signal_1") == "expmap_basketball"
+    assert not set(TEST) & {g for fold in FOLDS for g in fold}
+
+
+def test_balance_of_performers():
+    group = np.array(["a"] * 8 + ["b"] * 2)
+    np.testing.assert_allclose(balanced(group, 0.0), 0.1)
+    np.testing.assert_allclose([balanced(group, 1.0)[:8].sum(), balanced(group, 1.0)[8:].sum()], 0.5)
+
+
+@pytest.mark.parametrize("s", [(0.0, 0.0, 0.0), (3.0, 1.0, -0.5), (8.0, 5.0, 2.0), (12.0, 3.0, -2.5)])
+def test_fisher_constant_is_the_integral_over_rotations(s):
+    R = uniform_rotations(np.random.default_rng(1), 2_000_000)
+    values = np.exp(R[:, 0, 0] * s[0] + R[:, 1, 1] * s[1] + R[:, 2, 2] * s[2])
+    tolerance = 4.0 * values.std() / values.mean() / np.sqrt(len(values))
+    constant, gradient = baselines.log_fisher_constant(np.array(s))
+    assert constant == pytest.approx(np.log(values.mean()), abs=max(tolerance, 1e-9))
+    moments = (np.diagonal(R, axis1=1, axis2=2) * values[:, None]).mean(0) / values.mean()
+    np.testing.assert_allclose(gradient, moments, atol=5.0 * (tolerance + 1.0 / np.sqrt(len(values))))
+
+
+def test_fisher_constant_in_the_concentrated_limit():
+    """c(s) -> exp(sum s) / sqrt(8 pi) / sqrt of the product of the pairs' sums, to first order in 1/s."""
+    s = np.array([4000.0, 2500.0, 1000.0])
+    pairs = np.array([s[0] + s[1], s[0] + s[2], s[1] + s[2]])
+    limit = s.sum() - 0.5 * np.log(8.0 * np.pi) - 0.5 * np.log(pairs).sum()
+    assert baselines.log_fisher_constant(s)[0] == pytest.approx(limit, abs=2e-3)
+
+
+@pytest.mark.parametrize("fit", ["gaussian", "fisher"])
+def test_baselines_are_normalized_and_fit_their_own_samples(fit):
+    rng = np.random.default_rng(2)
+    R = concentrated(rng, 20_000)
+    weights = np.full(len(R), 1.0 / len(R))
+    if fit == "gaussian":
+        density = baselines.gaussian(R, weights, mean_rotation(R, weights))
+    else:
+        density = baselines.matrix_fisher(R, weights)
+    values = np.exp(density(uniform_rotations(rng, 1_000_000)))
+    assert values.mean() == pytest.approx(1.0, abs=4.0 * values.std() / 1000.0)
+    fresh = concentrated(rng, 20_000)
+    exact = 1.5 * np.log(2 * np.pi * np.e) + np.log(0.1 * 0.3 * 0.8) - np.log(8 * np.pi**2)  # but for the volume factor
+    assert -density(fresh).mean() == pytest.approx(exact, abs=0.2)
+
+
+def test_built_in_prior_covers_the_default_body(prior):
+    assert prior.names == load_body("scope").joint_names[1:]
+    assert BUILT_IN.stat().st_size < 1e6
+    names = load_body("scope_h").joint_names
+    ints, floats = prior.tables(names)
+    assert sorted(ints[ints > 0]) == [i for i, name in enumerate(names) if name in prior.names]
+    assert (ints > 0).sum() == 21
+    assert floats.shape == (len(ints), jf.FLOATS)
+
+
+@pytest.mark.parametrize("joint", [*TRUNK, *(f"left_{name}" for name in PAIRED), "right_elbow"])
+def test_built_in_prior_is_a_density_of_each_joint(prior, joint):
+    """Its mass, with samples of a wider flow as proposals: z scaled by 1.5."""
+    rng = np.random.default_rng(3)
+    wide = prior.of(joint).copy()
+    wide[jf.LAST : jf.LAST + 12] /= 1.5
+    wide[jf.CONSTANT] -= 3.0 * np.log(1.5)
+    z = rng.standard_normal((20_000, 3))
+    Omega = jf.invert(wide, z)
+    np.testing.assert_allclose(jf.transform(wide, Omega)[0], z, atol=1e-4)
+    ratio = np.exp(prior.log_density(joint, Omega) - jf.log_density(wide, Omega))
+    assert ratio.mean() == pytest.approx(1.0, abs=5.0 * ratio.std() / np.sqrt(len(ratio)))
+
+
+@pytest.fixture(scope="module")
+def samples():
+    motions = Path(__file__).resolve().parents[2] / "build" / "mocap" / "motions.npz"
+    if not motions.exists():
+        pytest.skip("build/mocap/motions.npz is not built: python -m scope.tools.mocap.fit_body makes it")
+    return load_samples(motions, load_body("scope").joint_names)
+
+
+def test_samples_of_the_prior_look_like_the_data(prior, samples):
+    """Mean rotation, and spread about it along its principal axes, of training performers and of samples."""
+    rng = np.random.default_rng(4)
+    for model in MODELS:
+        joint = model if model in TRUNK else f"left_{model}"
+        s = samples[model]
+        data, weights = s.rotations[s.is_training], balanced(s.group[s.is_training], 0.7)
+        drawn = prior.sample(joint, 4000, rng)
+        M = mean_rotation(data, weights)
+        x, y = rotations.log(M.T @ data), rotations.log(M.T @ drawn)
+        C = np.einsum("n,ni,nj->ij", weights, x, x)
+        spread, axes = np.linalg.eigh(C)
+        found = np.diag(axes.T @ (y.T @ y / len(y)) @ axes)
+        assert np.linalg.norm(y.mean(0)) < 0.35 * np.sqrt(spread[2]) + np.radians(1.0), model
+        ratio = np.sqrt(found[1:] + np.radians(1.0) ** 2) / np.sqrt(spread[1:] + np.radians(1.0) ** 2)
+        assert (0.6 < ratio).all(), (model, ratio)
+        assert (ratio < 1.6).all(), (model, ratio)
+
+
+def test_flow_is_better_than_both_baselines_on_performers_it_has_not_seen(prior, samples):
+    from scope.tools.train_prior.report import held_out
+
+    rows = held_out(prior, samples)
+    count = np.array([1 if r.joint in TRUNK else 2 for r in rows])
+    mean = [np.average([getattr(r, key) for r in rows], weights=count) for key in ("flow", "gaussian", "fisher")]
+    assert mean[0] < min(mean[1:]) - 0.1
+    assert count[[r.best for r in rows]].sum() >= 18
