@@ -16,11 +16,13 @@ from .assemble import assemble_motion, root_on_floor
 from .camera import choose_camera
 from .fitting import fit_track, refit_track
 from .track import Track, TrackBuilder
-from .tracker import PersonTracker
-from .video import Video, open_video
+from .tracker import Observation, PersonTracker
+from .video import Frame, Video, open_video
 
 # Called with the stage's name, what is done and the total (0: unknown). May raise CancelledError.
 Progress = Callable[[str, int, int], None]
+# Called with each decoded frame and who was seen in it.
+Watch = Callable[[Frame, Observation | None], None]
 
 SHORTEST_SHARE = 0.02  # seen in fewer frames than this, a "person" is a mistake of the detector
 
@@ -45,7 +47,13 @@ class Capture:
     report: dict
 
 
-def capture(path: str | Path, body: Body, options: CaptureOptions, progress: Progress = lambda *_: None) -> Capture:
+def capture(
+    path: str | Path,
+    body: Body,
+    options: CaptureOptions,
+    progress: Progress = lambda *_: None,
+    watch: Watch = lambda *_: None,
+) -> Capture:
     """Capture the strongest person of a video or picture.
 
     :raises VideoError: the footage cannot be used.
@@ -63,7 +71,8 @@ def capture(path: str | Path, body: Body, options: CaptureOptions, progress: Pro
             calibration=options.calibration,
             metadata_focal_mm=video.focal_35mm,
         )
-        track = _observe(video, PersonTracker(options.quality, options.threads or os.cpu_count() or 1), clock, progress)
+        tracker = PersonTracker(options.quality, options.threads or os.cpu_count() or 1)
+        track = _observe(video, tracker, clock, progress, watch)
         warnings = list(video.warnings)
     _require_person(track, path)
     smoothing = options.smoothing and len(track) > 1
@@ -103,7 +112,7 @@ def capture(path: str | Path, body: Body, options: CaptureOptions, progress: Pro
     return Capture([motion], report)
 
 
-def _observe(video: Video, tracker: PersonTracker, clock: _Clock, progress: Progress) -> Track:
+def _observe(video: Video, tracker: PersonTracker, clock: _Clock, progress: Progress, watch: Watch) -> Track:
     builder = TrackBuilder()
     frames = iter(video)
     while True:
@@ -112,7 +121,9 @@ def _observe(video: Video, tracker: PersonTracker, clock: _Clock, progress: Prog
         if frame is None:
             return builder.build()
         with clock.stage("networks"):
-            builder.add(frame.index, frame.timestamp_s, tracker.step(frame.image_rgb))
+            observation = tracker.step(frame.image_rgb)
+            builder.add(frame.index, frame.timestamp_s, observation)
+        watch(frame, observation)
         progress("finding the person", frame.index + 1, video.frame_count)
 
 

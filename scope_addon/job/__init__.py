@@ -4,6 +4,7 @@
 The parent writes one JSON request; the worker answers with JSON lines on stdout:
 
     {"event": "progress", "stage": str, "done": int, "total": int}     total 0: unknown
+    {"event": "preview", "file": str, "width": int, "height": int, "frame": int}
     {"event": "result", "motions": [file name, ...], "report": {...}}
     {"event": "error", "message": str}
 

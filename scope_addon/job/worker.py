@@ -47,6 +47,7 @@ def run(request: JobRequest, job_folder: Path, reporter: Reporter) -> int:
         # Imported here, so that a missing wheel becomes a sentence in the panel as well.
         from ...solver.body import load_body
         from ..capture.pipeline import CaptureOptions, capture
+        from .preview import FILE, PreviewWriter
 
         options = CaptureOptions(
             quality=request.quality,
@@ -55,7 +56,9 @@ def run(request: JobRequest, job_folder: Path, reporter: Reporter) -> int:
             smoothing=request.smoothing,
             threads=request.threads,
         )
-        result = capture(request.footage, load_body(request.body), options, reporter.progress)
+        watch = PreviewWriter(job_folder, reporter.send)
+        result = capture(request.footage, load_body(request.body), options, reporter.progress, watch)
+        (job_folder / FILE).unlink(missing_ok=True)
         names = [f"person{i + 1}.npz" for i in range(len(result.motions))]
         reporter.progress("writing", 0, 0)
         for name, motion in zip(names, result.motions, strict=True):

@@ -22,6 +22,7 @@ from ..job.progress import JobProgress
 from ..job.request import JobRequest, code_version
 from ..motion import Motion
 from ..scene.build import BuildOptions, BuildResult, build_scene
+from . import preview_picture
 from .preferences import cache, preferences
 from .result import show_result
 
@@ -90,6 +91,8 @@ class CaptureJob:
         for message in self._worker.poll():
             if message["event"] == "progress":
                 self.progress.update(message["stage"], message["done"], message["total"])
+            elif message["event"] == "preview":
+                self._show_preview(message)
             elif message["event"] == "result":
                 self._worker.wait()
                 self._captured = self._cache.keep(
@@ -98,6 +101,14 @@ class CaptureJob:
                 limit = preferences()
                 self._cache.prune((limit.cache_limit_gb if limit else 2) * 10**9)
                 self._worker.close()
+
+    def _show_preview(self, message: dict) -> None:
+        assert self._worker is not None
+        try:
+            pixels = (self._worker.job_folder / Path(message["file"]).name).read_bytes()
+        except OSError:
+            return  # on Windows, while the worker puts the next one there
+        preview_picture.show(pixels, message["width"], message["height"])
 
     def _build(self, scene: bpy.types.Scene, captured: CachedCapture) -> None:
         motions = [Motion.load(path) for path in captured.motions]

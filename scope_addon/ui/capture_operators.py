@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING
 import bpy
 from bpy.props import StringProperty
 
+from . import preview_picture
+
 if TYPE_CHECKING:
     from .capture_job import CaptureJob
 
@@ -33,9 +35,8 @@ state = _State()
 
 def stop_everything() -> None:
     """End a running capture: the extension is being disabled, or a test begins."""
-    if state.job is not None:
-        state.job.close()
-    state.job, state.message = None, ""
+    stop_job()
+    state.message = ""
 
 
 class SCOPE_OT_choose_footage(bpy.types.Operator):
@@ -207,6 +208,7 @@ def stop_job() -> None:
     if state.job is not None:
         state.job.close()
     state.job = None
+    preview_picture.clear()
 
 
 def redraw(context: bpy.types.Context) -> None:

@@ -9,6 +9,7 @@ from pathlib import Path
 import bpy
 
 from ..job.progress import JobProgress, duration
+from . import preview_picture
 from .capture_operators import state
 from .export_operators import FORMATS
 from .view_operators import camera_of, is_looking_through
@@ -54,6 +55,8 @@ class SCOPE_PT_capture(_Tab, bpy.types.Panel):
 
 def _draw_progress(layout: bpy.types.UILayout, progress: JobProgress) -> None:
     layout.progress(text=f"{100 * progress.fraction:.0f} %", factor=progress.fraction)
+    if icon := preview_picture.icon_id():
+        layout.template_icon(icon_value=icon, scale=9.0)
     column = layout.column(align=True)
     for part in progress.lines():
         column.label(text=part)

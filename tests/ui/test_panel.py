@@ -1,10 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Settings in the .blend, dropped files, export buttons, the camera button, texts."""
 
+import time
+
 import bpy
 import pytest
 from scope.scope_addon.job.progress import JobProgress, duration
 from scope.scope_addon.ui import drop
+from scope.scope_addon.ui.capture_operators import state, stop_everything
 from scope.scope_addon.ui.preferences import cache
 
 FINISH = "finish()"
@@ -111,6 +114,28 @@ def test_clearing_the_cache_leaves_the_scene(fake_worker, footage, monkeypatch, 
     assert cache().size() == 0
     assert bystander.exists()
     assert bpy.context.scene.scope.result.collection is not None
+
+
+def test_the_current_frame_is_shown_while_capturing(fake_worker, footage):
+    from scope.scope_addon.ui import preview_picture
+    from scope.scope_addon.ui.capture_job import CaptureJob
+
+    fake_worker(
+        "open(folder + '/preview.rgba', 'wb').write(bytes(range(24)))\n"
+        "send('preview', file='preview.rgba', width=3, height=2, frame=0)\n"
+        "send('progress', stage='solving', done=1, total=10)\nsys.stdin.read()"
+    )
+    bpy.context.scene.scope.footage = str(footage)
+    state.job = job = CaptureJob(bpy.context.scene)
+    while job.step() and job.progress.done == 0:
+        time.sleep(0.01)
+    icon = preview_picture._collection["frame"]
+    assert tuple(icon.image_size) == (3, 2)
+    assert icon.image_pixels[0] == int.from_bytes(bytes(range(4)), "little")
+    stop_everything()
+    assert preview_picture.icon_id() == 0
+    preview_picture.show(b"half", 3, 2)
+    assert preview_picture.icon_id() == 0
 
 
 def test_progress_says_stage_speed_and_time_left():

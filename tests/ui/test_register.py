@@ -68,9 +68,10 @@ def test_a_failing_registration_leaves_nothing(unregistered, monkeypatch):
     def refuse():
         raise RuntimeError("refused")
 
-    with monkeypatch.context() as patch, pytest.raises(RuntimeError, match="refused"):
+    with monkeypatch.context() as patch:
         patch.setattr(command, "register", refuse)
-        scope.register()
+        with pytest.raises(RuntimeError, match="refused"):
+            scope.register()
     assert ours() == []
 
 
