@@ -73,6 +73,7 @@ def steps() -> Iterator[float]:
         sidebar.active_panel_category = "Scope"
     except AttributeError:
         report["tab"] = "could not be chosen by script"
+    area.tag_redraw()
     yield 2.0
     picture("1_new_scene")
 

@@ -212,11 +212,10 @@ def stop_job() -> None:
 
 
 def redraw(context: bpy.types.Context) -> None:
-    """Draw the sidebars anew."""
-    for window in context.window_manager.windows:
-        for area in window.screen.areas:
-            if area.type == "VIEW_3D":
-                area.tag_redraw()
+    """Draw the sidebars anew, not the viewports beside them: drawing a heavy scene again and again would be felt."""
+    areas = [a for window in context.window_manager.windows for a in window.screen.areas if a.type == "VIEW_3D"]
+    for region in (r for area in areas for r in area.regions if r.type == "UI"):
+        region.tag_redraw()
 
 
 CLASSES = (SCOPE_OT_choose_footage, SCOPE_OT_use_sample, SCOPE_OT_capture, SCOPE_OT_cancel)

@@ -94,7 +94,7 @@ def user_folder() -> Path:
     try:
         return Path(bpy.utils.extension_path_user(PACKAGE, create=True))
     except ValueError:
-        return Path(tempfile.gettempdir()) / "scope"
+        return Path(tempfile.gettempdir()) / "scope-user"
 
 
 def _cache_size(root: Path) -> int:

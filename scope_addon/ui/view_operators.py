@@ -23,7 +23,7 @@ class SCOPE_OT_look_through(bpy.types.Operator):
         scene, camera = context.scene, camera_of(context.scene)
         if is_looking_through(context):
             bpy.ops.view3d.localview(frame_selected=False)
-            context.space_data.region_3d.view_perspective = "PERSP"
+            bpy.ops.view3d.view_camera()  # Blender's own toggle: it knows the view there was before
             return {"FINISHED"}
         scene.camera = camera
         render, result = scene.render, scene.scope.result
@@ -48,7 +48,8 @@ class SCOPE_OT_look_through(bpy.types.Operator):
         bpy.ops.object.select_all(action="DESELECT")
         for obj in selected:
             obj.select_set(True)
-        space.region_3d.view_perspective = "CAMERA"
+        if space.region_3d.view_perspective != "CAMERA":
+            bpy.ops.view3d.view_camera()
 
 
 def is_looking_through(context: bpy.types.Context) -> bool:

@@ -51,7 +51,7 @@ def test_an_isolated_worker_starts_and_reports(folder, kernels, tmp_path):
     worker = WorkerProcess(JobRequest(SAMPLE, quality="fast"), folder, kernels, [sys.executable, "-I"])
     messages = []
     wait_for(lambda: messages.extend(worker.poll()) or any(m.get("done", 0) > 2 for m in messages))
-    assert {m["event"] for m in messages} == {"progress"}
+    assert {m["event"] for m in messages} == {"progress", "preview"}
     assert worker.alive
     worker.close()
     assert not worker.alive
