@@ -34,12 +34,13 @@ class WorkerProcess:
         self,
         request: JobRequest,
         job_folder: Path,
-        kernels: Path,
+        kernels: Path | None,
         python: Sequence[str] = (sys.executable,),
         script: Path = START_SCRIPT,
     ) -> None:
         """Start it.
 
+        :param kernels: where numba keeps compiled code; beside the sources when None.
         :param python: interpreter and its arguments; inside Blender ``[sys.executable, *bpy.app.python_args]``.
         :raises SetupError: the process cannot be started.
         """
@@ -48,7 +49,7 @@ class WorkerProcess:
         # An entry "" is the current folder, which isolated Python leaves out for good reason.
         search_path = [p for p in sys.path if p and os.path.exists(p)]
         command = [*python, str(script), str(ROOT), str(job_folder), *search_path]
-        environment = dict(os.environ, NUMBA_CACHE_DIR=str(kernels))
+        environment = dict(os.environ, **({"NUMBA_CACHE_DIR": str(kernels)} if kernels else {}))
         try:
             with (job_folder / LOG).open("wb") as log:
                 self._process = subprocess.Popen(

@@ -34,21 +34,14 @@ def runs(pid):
 
 
 @pytest.fixture
-def kernels():
-    folder = ROOT / "build" / "test-kernels"
-    folder.mkdir(parents=True, exist_ok=True)
-    return folder
-
-
-@pytest.fixture
 def folder(tmp_path):
     (tmp_path / "job").mkdir()
     return tmp_path / "job"
 
 
-def test_an_isolated_worker_starts_and_reports(folder, kernels, tmp_path):
+def test_an_isolated_worker_starts_and_reports(folder):
     """-I drops PYTHONPATH, the script's and the current folder, as inside Blender."""
-    worker = WorkerProcess(JobRequest(SAMPLE, quality="fast"), folder, kernels, [sys.executable, "-I"])
+    worker = WorkerProcess(JobRequest(SAMPLE, quality="fast"), folder, None, [sys.executable, "-I"])
     messages = []
     wait_for(lambda: messages.extend(worker.poll()) or any(m.get("done", 0) > 2 for m in messages))
     assert {m["event"] for m in messages} == {"progress", "preview"}
@@ -59,11 +52,11 @@ def test_an_isolated_worker_starts_and_reports(folder, kernels, tmp_path):
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="looks at /proc")
-def test_the_worker_ends_when_its_parent_is_killed(folder, kernels):
+def test_the_worker_ends_when_its_parent_is_killed(folder):
     code = (
         "import sys, time\nfrom pathlib import Path\n"
         "from scope.scope_addon.job.process import WorkerProcess, JobRequest\n"
-        f"worker = WorkerProcess(JobRequest({SAMPLE!r}), Path({str(folder)!r}), Path({str(kernels)!r}))\n"
+        f"worker = WorkerProcess(JobRequest({SAMPLE!r}), Path({str(folder)!r}), None)\n"
         "while not worker.poll(): time.sleep(0.01)\n"
         "print(worker.pid, flush=True); time.sleep(600)"
     )
@@ -77,19 +70,19 @@ def test_the_worker_ends_when_its_parent_is_killed(folder, kernels):
     wait_for(lambda: not folder.exists())
 
 
-def test_a_missing_library_is_told(folder, kernels, tmp_path, monkeypatch):
+def test_a_missing_library_is_told(folder, tmp_path, monkeypatch):
     (tmp_path / "cv2").mkdir()
     (tmp_path / "cv2" / "__init__.py").write_text("raise ImportError('wrong platform')")
     monkeypatch.syspath_prepend(str(tmp_path))
-    worker = WorkerProcess(JobRequest(SAMPLE), folder, kernels, [sys.executable, "-I"])
+    worker = WorkerProcess(JobRequest(SAMPLE), folder, None, [sys.executable, "-I"])
     with pytest.raises(WorkerFailedError, match=r"wrong platform.*install the extension again"):
         wait_for(lambda: worker.poll() and False)
     worker.close()
 
 
-def test_a_python_that_is_not_there_is_told(folder, kernels):
+def test_a_python_that_is_not_there_is_told(folder):
     with pytest.raises(SetupError, match="nowhere"):
-        WorkerProcess(JobRequest(SAMPLE), folder, kernels, ["/nowhere/python"])
+        WorkerProcess(JobRequest(SAMPLE), folder, None, ["/nowhere/python"])
     assert not folder.exists()
 
 
@@ -114,3 +107,15 @@ def test_keys_tell_what_changes_the_result(tmp_path):
     os.utime(clip, ns=(status.st_atime_ns, status.st_mtime_ns))
     assert request.key("1") != key
     assert code_version(ROOT) == code_version(ROOT)
+
+
+def test_compiled_code_goes_where_it_is_told(folder, tmp_path):
+    script = tmp_path / "script.py"
+    script.write_text("import json, os; print(json.dumps({'event': 'result', 'at': os.environ['NUMBA_CACHE_DIR']}))")
+    worker = WorkerProcess(JobRequest(SAMPLE), folder, tmp_path / "kernels", [sys.executable, "-I"], script)
+    messages = []
+    wait_for(lambda: messages.extend(worker.poll()) or worker.finished)
+    worker.wait()
+    assert messages[0]["at"] == str(tmp_path / "kernels")
+    assert list(folder.iterdir()) == []
+    worker.close()

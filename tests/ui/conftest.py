@@ -16,7 +16,7 @@ import bpy
 import numpy as np
 import pytest
 import scope
-from scope.scope_addon.job.cache import Cache
+from scope.scope_addon.job.process import WorkerProcess
 from scope.scope_addon.motion import Motion
 from scope.solver.body import load_body
 
@@ -30,14 +30,17 @@ def root() -> Path:
 
 @pytest.fixture(autouse=True)
 def registered(tmp_path, monkeypatch):
-    """A fresh Blender with the extension. The cache is this test's, but for the compiled solver."""
-    from scope.scope_addon.ui import preferences
+    """A fresh Blender with the extension. The cache is this test's, the compiled solver everybody's."""
+    from scope.scope_addon.ui import capture_job, preferences
 
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     scope.register()
     monkeypatch.setattr(preferences, "user_folder", lambda: tmp_path / "user")
-    monkeypatch.setattr(Cache, "kernels", property(lambda cache: ROOT / "build" / "test-kernels"))
-    (ROOT / "build" / "test-kernels").mkdir(parents=True, exist_ok=True)
+    monkeypatch.setattr(
+        capture_job,
+        "WorkerProcess",
+        lambda request, folder, kernels, *rest: WorkerProcess(request, folder, None, *rest),
+    )
     yield
     scope.unregister()
 

@@ -102,10 +102,7 @@ def test_looking_through_the_camera_sets_camera_and_resolution(fake_worker, foot
     assert (scene.render.resolution_x, scene.render.resolution_y) == (640, 480)
 
 
-def test_clearing_the_cache_leaves_the_scene(fake_worker, footage, monkeypatch, tmp_path):
-    from scope.scope_addon.job.cache import Cache
-
-    monkeypatch.setattr(Cache, "kernels", property(lambda cache: cache.root / "kernels"))
+def test_clearing_the_cache_leaves_the_scene(fake_worker, footage):
     captured(fake_worker, footage)
     bystander = cache().root / "notes.txt"
     bystander.write_text("the user's")
