@@ -37,7 +37,7 @@ def wait_for(condition, timeout_s=20.0):
 
 
 def job_files():
-    return [p for p in cache().root.rglob("*") if "captures" not in p.parts and p.name != "jobs"]
+    return [p for p in cache().root.rglob("*") if "captures" not in p.parts and p.name not in ("jobs", "kernels")]
 
 
 def captures():
