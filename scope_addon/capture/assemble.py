@@ -19,16 +19,35 @@ from .track import Track
 from .world import estimate_world, sole_points, with_soles
 
 
-def root_on_floor(body: Body, track: Track, fitted: FittedTrack) -> np.ndarray:
-    """(T, 3) smoothed pelvis positions in the camera frame, their distance corrected by the floor and standing feet."""
+def place_in_camera(
+    body: Body, track: Track, fitted: FittedTrack, smoothing: bool
+) -> tuple[np.ndarray, np.ndarray]:
+    """Joints (T, K+1, 3) and soles (T, 4, 3) of the valid frames, camera frame, metres: what a world is found from."""
+    times, valid, J0 = track.times, fitted.valid, body.rest_joints(fitted.betas)[0]
+    local = fill_rotation_gaps(fitted.rotations, valid, times)
+    root = fill_gaps(fitted.t_camera_root, valid, times)
+    if smoothing:
+        local, root = smooth_rotations(local, times), smooth_root(root, times)
+    R, joints = body.forward_kinematics(local, root - J0, fitted.betas)
+    soles = sole_points(with_soles(body, fitted.betas), R, joints)
+    return joints[valid], soles[valid]
+
+
+def root_on_floor(
+    body: Body, track: Track, fitted: FittedTrack, T_floor_camera: np.ndarray | None = None
+) -> np.ndarray:
+    """(T, 3) smoothed pelvis positions in the camera frame, their distance corrected by the floor and standing feet.
+
+    ``T_floor_camera`` (4, 4): the floor at z = 0; None: it is found from this person alone.
+    """
     times, J0 = track.times, body.rest_joints(fitted.betas)[0]
     local = smooth_rotations(fill_rotation_gaps(fitted.rotations, fitted.valid, times), times)
     root = smooth_root(fill_gaps(fitted.t_camera_root, fitted.valid, times), times)
     R, joints = body.forward_kinematics(local, root - J0, fitted.betas)
     soles = sole_points(with_soles(body, fitted.betas), R, joints)
-    T_world_camera = estimate_world(body, joints[fitted.valid], soles[fitted.valid])
-    contact = standing_probability(soles, T_world_camera[2, :3], times) * fitted.valid[:, None]
-    away = correct_depth(root, soles, contact, T_world_camera, times)
+    T = estimate_world(body, joints[fitted.valid], soles[fitted.valid]) if T_floor_camera is None else T_floor_camera
+    contact = standing_probability(soles, T[2, :3], times) * fitted.valid[:, None]
+    away = correct_depth(root, soles, contact, T, times)
     return root + away[:, None] * root / np.linalg.norm(root, axis=1, keepdims=True)
 
 
@@ -42,8 +61,13 @@ def assemble_motion(
     image_size: tuple[int, int],
     source: str,
     smoothing: bool,
+    T_world_camera: np.ndarray | None = None,
+    floor_m: float = 0.0,
 ) -> Motion:
     """The motion file's content for one person.
+
+    ``T_world_camera`` (4, 4): the world that several people share, and ``floor_m``, the height in it of what this
+    person stands on; None: the world is found from this person alone.
 
     Rotations relative to the parent do not depend on the world; the root is smoothed in the camera frame, where image
     position and depth have their own noise, and then moved into the world: R_world_root = R_world_camera R_camera_root
@@ -65,11 +89,14 @@ def assemble_motion(
         return R, t, sole_points(soled, R, t)
 
     _, joints_cam, soles_cam = place(local, root)
-    T_world_camera = estimate_world(body, joints_cam[valid], soles_cam[valid])
+    if T_world_camera is None:
+        T_world_camera = estimate_world(body, joints_cam[valid], soles_cam[valid])
+    T_floor_camera = T_world_camera.copy()
+    T_floor_camera[2, 3] -= floor_m
     R_world_camera, t_world_camera = T_world_camera[:3, :3], T_world_camera[:3, 3]
     contact = standing_probability(soles_cam, R_world_camera[2], times) * valid[:, None]
     if smoothing:
-        local, root = stand_on_floor(soled, local, root, betas, place, contact, T_world_camera, times)
+        local, root = stand_on_floor(soled, local, root, betas, place, contact, T_floor_camera, times)
     R_cam, joints_cam, soles_cam = place(local, root)
 
     def in_world(rotation: np.ndarray, position: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

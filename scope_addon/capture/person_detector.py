@@ -46,14 +46,16 @@ class PersonDetector:
         self._session = open_session(network_path("pose_detection", folder), threads)
         self._anchors = make_anchors()
 
-    def detect(self, image_rgb: np.ndarray, threshold: float = SCORE_THRESHOLD) -> list[Detection]:
+    def detect(
+        self, image_rgb: np.ndarray, threshold: float = SCORE_THRESHOLD, closely: bool = False
+    ) -> list[Detection]:
         """All people in an (H, W, 3) uint8 image with a score of at least ``threshold``, best first.
 
-        Looks once at the whole image. Where that finds nobody it is sure of and the image is oblong, overlapping
-        squares of its shorter side follow: they show the people larger.
+        Looks once at the whole image. Where that finds nobody it is sure of, or ``closely`` is asked for, and the image
+        is oblong, overlapping squares of its shorter side follow: they show the people larger.
         """
         found = self._detect_in(image_rgb, threshold, (0, 0))
-        if not found or found[0].score < _SURE_SCORE:
+        if closely or not found or found[0].score < _SURE_SCORE:
             for left, top, side in squares(*image_rgb.shape[:2]):
                 found += self._detect_in(image_rgb[top : top + side, left : left + side], threshold, (left, top))
             found = unique(found)

@@ -10,21 +10,26 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ...solver.body import Body
-from ...solver.errors import NoPersonError
+from ...solver.errors import NoPersonError, UsageError
 from ..motion import Motion
 from .assemble import assemble_motion, root_on_floor
-from .camera import choose_camera
-from .fitting import fit_track, refit_track
-from .track import Track, TrackBuilder
-from .tracker import Observation, PersonTracker
+from .camera import Camera, choose_camera
+from .fitting import FittedTrack, fit_track, refit_track
+from .left_right import repair_left_right
+from .observation import Observation
+from .people import PeopleBuilder
+from .shared_world import share_world
+from .track import Track
+from .tracker import MOST_PEOPLE, PeopleTracker
 from .video import Frame, Video, open_video
 
 # Called with the stage's name, what is done and the total (0: unknown). May raise CancelledError.
 Progress = Callable[[str, int, int], None]
-# Called with each decoded frame and who was seen in it.
+# Called with each decoded frame and the largest person seen in it.
 Watch = Callable[[Frame, Observation | None], None]
 
-SHORTEST_SHARE = 0.02  # seen in fewer frames than this, a "person" is a mistake of the detector
+LARGEST = "largest"
+ALL = "all"
 
 
 @dataclass(frozen=True)
@@ -32,6 +37,7 @@ class CaptureOptions:
     """How to capture; the defaults suit a phone clip of one person."""
 
     quality: str = "best"  # fast, balanced, best
+    people: int | str = LARGEST  # how many at most; "all"; "largest": the most prominent one over the clip
     focal_mm: float | None = None
     fov_deg: float | None = None
     calibration: Path | None = None
@@ -54,7 +60,7 @@ def capture(
     progress: Progress = lambda *_: None,
     watch: Watch = lambda *_: None,
 ) -> Capture:
-    """Capture the strongest person of a video or picture.
+    """Capture the people of a video or picture, the most prominent one first.
 
     :raises VideoError: the footage cannot be used.
     :raises NoPersonError: nobody was found.
@@ -62,6 +68,7 @@ def capture(
     """
     path = Path(path)
     clock = _Clock()
+    most = _most_people(options.people)
     with open_video(path) as video:
         camera = choose_camera(
             video.width,
@@ -71,69 +78,113 @@ def capture(
             calibration=options.calibration,
             metadata_focal_mm=video.focal_35mm,
         )
-        tracker = PersonTracker(options.quality, options.threads or os.cpu_count() or 1)
-        track = _observe(video, tracker, clock, progress, watch)
+        threads = options.threads or os.cpu_count() or 1
+        tracker = PeopleTracker(options.quality, threads, None if options.people == LARGEST else most)
+        seen = _observe(video, tracker, clock, progress, watch)
         warnings = list(video.warnings)
-    _require_person(track, path)
-    smoothing = options.smoothing and len(track) > 1
-
     with clock.stage("solver"):
-        fitted = fit_track(body, track, camera, progress)
-        if smoothing:
-            fitted = refit_track(body, track, camera, fitted, root_on_floor(body, track, fitted), progress)
-        motion = assemble_motion(
-            body,
-            track,
-            fitted,
-            camera,
-            fps=video.fps,
-            image_size=(video.width, video.height),
-            source=path.name,
-            smoothing=smoothing,
-        )
-    missing = int((~motion.valid).sum())
-    if missing:
-        warnings.append(f"{path.name}: nobody was seen in {missing} of {len(motion)} frames; these are filled in")
+        tracks = [repair_left_right(track) for track in seen.build(most)]
+        if not tracks:
+            raise _nobody(path, len(seen))
+        smoothing = options.smoothing and len(seen) > 1
+        about = {"fps": video.fps, "image_size": (video.width, video.height), "source": path.name}
+        motions, fits = _solve(body, tracks, camera, smoothing, about, progress)
+    for number, motion in enumerate(motions, 1):
+        missing = int((~motion.valid).sum())
+        if missing:
+            who = "the person" if len(motions) == 1 else f"person {number}"
+            warnings.append(
+                f"{path.name}: {who} was not seen in {missing} of {len(motion)} frames; these are filled in"
+            )
     report = {
         "source": str(path),
-        "frames": len(motion),
-        "people": 1,
-        "valid_frames": int(motion.valid.sum()),
+        "frames": len(seen),
+        "people": len(motions),
+        "valid_frames": int(motions[0].valid.sum()),
+        "per_person": [_about_person(motion) for motion in motions],
         "quality": options.quality,
         "body": body.name,
         "camera": camera.source,
         "focal_px": float(camera.intrinsics[0, 0]),
         "frame_rate": [video.fps.numerator, video.fps.denominator],
-        "fps": clock.rates(len(motion)),
-        "reprojection_px": float(motion.residual_px[motion.valid].mean()),
-        "iterations": fitted.iterations,
+        "fps": clock.rates(len(seen)),
+        "reprojection_px": float(motions[0].residual_px[motions[0].valid].mean()),
+        "iterations": fits[0].iterations,
         "warnings": warnings,
     }
-    return Capture([motion], report)
+    return Capture(motions, report)
 
 
-def _observe(video: Video, tracker: PersonTracker, clock: _Clock, progress: Progress, watch: Watch) -> Track:
-    builder = TrackBuilder()
+def _observe(video: Video, tracker: PeopleTracker, clock: _Clock, progress: Progress, watch: Watch) -> PeopleBuilder:
+    """Everybody in every frame. No picture is kept, so that an hour takes no more memory than a minute."""
+    builder = PeopleBuilder()
     frames = iter(video)
     while True:
         with clock.stage("decode"):
             frame = next(frames, None)
         if frame is None:
-            return builder.build()
+            return builder
         with clock.stage("networks"):
-            observation = tracker.step(frame.image_rgb)
-            builder.add(frame.index, frame.timestamp_s, observation)
-        watch(frame, observation)
-        progress("finding the person", frame.index + 1, video.frame_count)
+            observations = tracker.step(frame.image_rgb)
+            builder.add(frame.index, frame.timestamp_s, observations)
+        watch(frame, max((o for _, o in observations), key=lambda o: o.region.side_px, default=None))
+        progress("finding the person", len(builder), max(video.frame_count, len(builder)))
 
 
-def _require_person(track: Track, path: Path) -> None:
-    seen, total = int(track.seen.sum()), len(track)
-    if seen == 0 or seen < SHORTEST_SHARE * total:
-        looked = f"in the {total} frames of {path.name}" if total > 1 else f"in {path.name}"
-        raise NoPersonError(
-            f"no person was found {looked}: the footage needs one person of whom most of the body is in the picture"
+def _solve(
+    body: Body, tracks: list[Track], camera: Camera, smoothing: bool, about: dict, progress: Progress
+) -> tuple[list[Motion], list[FittedTrack]]:
+    """Each person on their own, in one world."""
+    fits = [fit_track(body, track, camera, progress) for track in tracks]
+    several = len(tracks) > 1
+    if smoothing:
+        world = share_world(body, tracks, fits, smoothing) if several else None
+        for k, (track, fit) in enumerate(zip(tracks, fits, strict=True)):
+            root = root_on_floor(body, track, fit, world.floor_from_camera(k) if world else None)
+            fits[k] = refit_track(body, track, camera, fit, root, progress)
+    world = share_world(body, tracks, fits, smoothing) if several else None
+    motions = [
+        assemble_motion(
+            body,
+            track,
+            fit,
+            camera,
+            smoothing=smoothing,
+            T_world_camera=world.T_world_camera if world else None,
+            floor_m=world.floors_m[k] if world else 0.0,
+            **about,
         )
+        for k, (track, fit) in enumerate(zip(tracks, fits, strict=True))
+    ]
+    return motions, fits
+
+
+def _about_person(motion: Motion) -> dict:
+    """What the report says of one person."""
+    seen = motion.frames[motion.valid]
+    return {
+        "valid_frames": len(seen),
+        "first_frame": int(seen[0]),
+        "last_frame": int(seen[-1]),
+        "reprojection_px": float(motion.residual_px[motion.valid].mean()),
+    }
+
+
+def _most_people(people: int | str) -> int:
+    if people == LARGEST:
+        return 1
+    if people == ALL:
+        return MOST_PEOPLE
+    if isinstance(people, str) or not 1 <= people <= MOST_PEOPLE:
+        raise UsageError(f"people must be {LARGEST}, {ALL} or 1 to {MOST_PEOPLE}, but is {people!r}")
+    return people
+
+
+def _nobody(path: Path, frames: int) -> NoPersonError:
+    looked = f"in the {frames} frames of {path.name}" if frames > 1 else f"in {path.name}"
+    return NoPersonError(
+        f"no person was found {looked}: the footage needs one person of whom most of the body is in the picture"
+    )
 
 
 class _Clock:

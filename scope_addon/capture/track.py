@@ -1,13 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the networks saw of one person over a clip, as arrays."""
+"""What the networks saw of one person: over an unbroken stretch of frames (tracklet), and over a clip (track)."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from .tracker import Observation
+from .appearance import SIZE as APPEARANCE_SIZE
+from .landmark_network import KEYPOINT_COUNT
+from .observation import Observation
 
 
 @dataclass
@@ -20,46 +23,66 @@ class Track:
     keypoints_px: np.ndarray  # (T, 33, 2) pixels of the decoded, upright frame
     confidence: np.ndarray  # (T, 33) 0..1
     world_landmarks: np.ndarray  # (T, 33, 3) metres, hip-centred, axes of the camera
-    acquired: np.ndarray  # (T,) found by the detector in this frame: it may be another person than before
+    acquired: np.ndarray  # (T,) the person was not followed from the frame before, but found (again) in this one
+    # The strong network's world landmarks, in few frames: rows (A,) and (A, 33, 3). See `left_right`.
+    judged_rows: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int64))
+    judged_landmarks: np.ndarray = field(default_factory=lambda: np.zeros((0, KEYPOINT_COUNT, 3)))
 
     def __len__(self) -> int:
         return len(self.frames)
 
 
-class TrackBuilder:
-    """Collects observations frame by frame, in float32: an hour of video takes some 50 MB."""
+@dataclass
+class Tracklet:
+    """Grows frame by frame, in float32: an hour of one person takes some 90 MB, and no picture is kept."""
 
-    def __init__(self) -> None:
-        self._frames: list[int] = []
-        self._times: list[float] = []
-        self._observations: list[np.ndarray | None] = []
-        self._acquired: list[bool] = []
+    rows: list[int] = field(default_factory=list)  # place of each frame in the clip
+    values: list[np.ndarray] = field(default_factory=list)  # (33, 6) pixels, confidence, world landmarks
+    centers_px: list[np.ndarray] = field(default_factory=list)  # (2,) middle of the trunk
+    sides_px: list[float] = field(default_factory=list)  # of the region
+    appearance: np.ndarray = field(default_factory=lambda: np.zeros(APPEARANCE_SIZE))  # sum over the frames
+    judged: list[tuple[int, np.ndarray]] = field(default_factory=list)
 
-    def add(self, frame: int, time_s: float, observation: Observation | None) -> None:
-        """Append one frame; ``None`` where the person was not seen."""
-        self._frames.append(frame)
-        self._times.append(time_s)
-        self._acquired.append(observation is not None and observation.acquired)
-        if observation is None:
-            self._observations.append(None)
-        else:
-            o = observation
-            row = np.concatenate([o.keypoints_px, o.keypoints_confidence[:, None], o.world_landmarks], axis=1)
-            self._observations.append(row.astype(np.float32))
+    def add(self, row: int, observation: Observation) -> None:
+        """Append the frame in place ``row``; what is not finite counts as not seen."""
+        o = observation
+        values = np.concatenate([o.keypoints_px, o.keypoints_confidence[:, None], o.world_landmarks], axis=1)
+        if not np.isfinite(values).all():
+            return
+        self.rows.append(row)
+        self.values.append(values.astype(np.float32))
+        self.centers_px.append(o.keypoints_px[[11, 12, 23, 24]].mean(axis=0))
+        self.sides_px.append(o.region.side_px)
+        if o.appearance is not None:
+            self.appearance = self.appearance + o.appearance
+        if o.judged_landmarks is not None:
+            self.judged.append((row, o.judged_landmarks))
 
-    def build(self) -> Track:
-        """The arrays of everything added so far."""
-        rows = np.zeros((len(self._frames), 33, 6))
-        seen = np.zeros(len(self._frames), bool)
-        for k, row in enumerate(self._observations):
-            if row is not None and np.isfinite(row).all():
-                rows[k], seen[k] = row, True
-        return Track(
-            frames=np.array(self._frames, np.int64),
-            times=np.array(self._times, float),
-            seen=seen,
-            keypoints_px=rows[..., :2],
-            confidence=rows[..., 2],
-            world_landmarks=rows[..., 3:],
-            acquired=np.array(self._acquired, bool),
-        )
+    @property
+    def prominence(self) -> float:
+        """Size in the picture, summed over the frames."""
+        return float(np.sum(self.sides_px))
+
+
+def make_track(frames: Sequence[int], times: Sequence[float], tracklets: Sequence[Tracklet]) -> Track:
+    """One person's track from tracklets that follow each other, in a clip of these frames."""
+    values = np.zeros((len(frames), KEYPOINT_COUNT, 6))
+    seen, acquired = np.zeros(len(frames), bool), np.zeros(len(frames), bool)
+    judged: list[tuple[int, np.ndarray]] = []
+    for tracklet in tracklets:
+        if tracklet.rows:
+            values[tracklet.rows] = tracklet.values
+            seen[tracklet.rows] = True
+            acquired[tracklet.rows[0]] = True
+            judged += tracklet.judged
+    return Track(
+        frames=np.array(frames, np.int64),
+        times=np.array(times, float),
+        seen=seen,
+        keypoints_px=values[..., :2],
+        confidence=values[..., 2],
+        world_landmarks=values[..., 3:],
+        acquired=acquired,
+        judged_rows=np.array([row for row, _ in judged], np.int64),
+        judged_landmarks=np.array([w for _, w in judged], float).reshape(-1, KEYPOINT_COUNT, 3),
+    )

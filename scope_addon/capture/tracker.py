@@ -1,16 +1,25 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Follows one person through a video: detect once, then let each frame's landmarks say where to look next."""
+"""Follows people through a video: detect now and then, and let each person's landmarks say where to look next.
+
+What comes out are tracklets: unbroken stretches in which somebody was followed from frame to frame. A tracklet ends
+where the person is lost, and also where it is in doubt that it is still the same person: behind somebody else, or
+after a leap. Which tracklets are one person is decided over the whole clip, see `people`.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from ...solver.errors import ShapeError
+from .appearance import appearance
 from .landmark_network import LandmarkNetwork, PoseEstimate
+from .left_right import looks_swapped
 from .networks import landmark_network_name
+from .observation import Observation
 from .person_detector import Detection, PersonDetector
 from .region import Region
 
@@ -24,103 +33,265 @@ UNSURE_SPREAD_THRESHOLD = 0.47
 UNSURE_DISAGREEMENT_THRESHOLD = 0.18
 SMALLEST_SIDE_PX = 24.0
 LARGEST_SIDE = 6.0  # in longer sides of the image
-MEMORY_FRAMES = 60  # how long a lost person is preferred over a stronger one
-_CANDIDATES = 3
+
+SAME_BODY = 0.1  # mean distance of the keypoints, in sides of the region, below which two bodies are one
+MOST_WITHIN = 0.5  # share of the keypoints that somebody who was found with little certainty has within another's box
+LEAP = 0.25  # the same, from where motion foretold: more in one frame may be another person
+SEARCH_FRAMES = 8  # between two looks for others who have come into the picture
+SEARCH_FRAMES_LARGEST = 20
+EAGER_FRAMES = 15  # how long a lost person is looked for in every frame
+MEMORY_FRAMES = 60  # how long in every fourth, and preferred over a stronger one
+RIVAL_SIDE = 0.5  # who is smaller than this share of the largest will not be the most prominent person
+MOST_PEOPLE = 12
+JUDGE_FRAMES = 30  # between two looks of the strong network that tells left from right
+JUDGE_AGAIN_FRAMES = 8  # the same where left and right seem to have changed places
+APPEARANCE_FRAMES = 4
+_TURNS = (0.0, math.pi / 2, math.pi, -math.pi / 2)  # of the region in which somebody who was just lost is looked for
+_TURNED_PRESENCE = 0.8
+_VELOCITY_MEMORY = 0.7
 
 
-@dataclass(frozen=True)
-class Observation:
-    """The person in one frame.
+@dataclass
+class _Followed:
+    """Somebody who was seen in the last frame, or lost ``lost`` frames ago."""
 
-    ``keypoints_px`` (33, 2) pixels of the frame; ``keypoints_confidence`` (33,) 0..1; ``world_landmarks`` (33, 3)
-    metres, the middle of the hips at 0, in camera axes (x right, y down, z forward); ``presence``: the network's
-    probability that there is a person; ``region``: where it looked; ``acquired``: the person was found by the
-    detector in this frame, so it may be another one than in the frame before. Order: `KEYPOINT_NAMES`.
+    tracklet: int
+    estimate: PoseEstimate
+    velocity_px: np.ndarray  # (2,) per frame, smoothed
+    age: int = 0
+    lost: int = 0
+    since_judged: int = JUDGE_FRAMES
+    swapped: bool = False  # whether left and right changed places since the strong network looked
+
+    @property
+    def foretold(self) -> Region:
+        """Where to look ``lost`` frames later: the middle goes on as it went."""
+        region = self.estimate.next_region
+        x, y = np.asarray(region.center_px) + self.velocity_px * self.lost
+        return replace(region, center_px=(float(x), float(y)))
+
+    def surprise(self, estimate: PoseEstimate) -> float:
+        """Mean distance of the keypoints from where motion foretold them, in sides of the region."""
+        foretold = self.estimate.keypoints_px + self.velocity_px
+        return _apart(estimate.keypoints_px, foretold) / self.estimate.region.side_px
+
+    def go_on(self, estimate: PoseEstimate) -> None:
+        step = (estimate.keypoints_px - self.estimate.keypoints_px).mean(axis=0)
+        memory = min(_VELOCITY_MEMORY, self.age / (self.age + 1))
+        self.velocity_px = memory * self.velocity_px + (1 - memory) * step
+        self.swapped |= looks_swapped(self.estimate.world_landmarks, estimate.world_landmarks)
+        self.estimate, self.age, self.since_judged = estimate, self.age + 1, self.since_judged + 1
+
+
+class PeopleTracker:
+    """The people of a video. Frames are given in order; `reset` before another video.
+
+    :param people: how many people are wanted at most; None: only the most prominent one of the clip. Then only those
+        who may turn out to be it are followed.
     """
 
-    keypoints_px: np.ndarray
-    keypoints_confidence: np.ndarray
-    world_landmarks: np.ndarray
-    presence: float
-    region: Region
-    acquired: bool
-
-
-class PersonTracker:
-    """The strongest person of a video. Frames are given in order; `reset` before another video."""
-
-    def __init__(self, quality: str, threads: int, folder: Path | None = None) -> None:
+    def __init__(self, quality: str, threads: int, people: int | None = None, folder: Path | None = None) -> None:
         self._landmarks = LandmarkNetwork(landmark_network_name(quality), threads, folder)
         self._detector = PersonDetector(threads, folder)
+        strongest = landmark_network_name("best")
+        judged = landmark_network_name(quality) != strongest
+        self._judge = LandmarkNetwork(strongest, threads, folder) if judged else None
+        self._largest_only = people is None
+        self._most = 2 if people is None else min(people + 1, MOST_PEOPLE)
         self.reset()
 
     def reset(self) -> None:
-        """Forget the person: the next frame starts with a detection."""
-        self._next: Region | None = None
-        self._last: Region | None = None
-        self._lost_frames = 0
+        """Forget everybody: the next frame starts with a detection."""
+        self._live: list[_Followed] = []
+        self._lost: list[_Followed] = []
+        self._tracklets = 0
+        self._since_search = 10**9
 
-    def step(self, image_rgb: np.ndarray) -> Observation | None:
-        """The person in the next frame, (H, W, 3) uint8 RGB, or None when there is nobody.
+    def step(self, image_rgb: np.ndarray) -> list[tuple[int, Observation]]:
+        """Everybody in the next frame, (H, W, 3) uint8 RGB, each with the number of the tracklet.
 
-        The detector runs only where the region that the frame before foretold does not hold a believable body.
+        The detector runs when somebody was lost and, for those who come in, every few frames.
         """
         if image_rgb.ndim != 3 or image_rgb.shape[2] != 3 or image_rgb.dtype != np.uint8:
             raise ShapeError(f"A frame must be (H, W, 3) uint8 RGB, but got {image_rgb.shape} {image_rgb.dtype}.")
-        estimate = None if self._next is None else self._look(image_rgb, self._next)
-        acquired = estimate is None
-        if estimate is None:
-            estimate = self._acquire(image_rgb)
-        if estimate is None:
-            self._next = None
-            self._lost_frames += 1
-            return None
-        self._next, self._last, self._lost_frames = estimate.next_region, estimate.region, 0
-        return Observation(
-            estimate.keypoints_px,
-            estimate.keypoints_confidence,
-            estimate.world_landmarks,
-            estimate.presence,
-            estimate.region,
-            acquired,
-        )
+        self._follow(image_rgb)
+        self._look_round(image_rgb)
+        if self._search_is_due():
+            self._search(image_rgb)
+        judged = self._ask_judge(image_rgb)
+        return [(f.tracklet, self._observe(image_rgb, f, judged.get(f.tracklet))) for f in self._live]
 
-    def _acquire(self, image_rgb: np.ndarray) -> PoseEstimate | None:
-        """The first believable body among the detections.
+    def _follow(self, image_rgb: np.ndarray) -> None:
+        """Move everybody who was seen in the frame before on to this one; the others are lost."""
+        for lost in self._lost:
+            lost.lost += 1
+        self._lost = [lost for lost in self._lost if lost.lost <= MEMORY_FRAMES]
+        found = self._look(image_rgb, [f.estimate.next_region for f in self._live])
+        seen = [(f, e, f.surprise(e)) for f, e in zip(self._live, found, strict=True) if e is not None]
+        # Two on one body: somebody went behind somebody else. It belongs to whom it does not surprise.
+        seen.sort(key=lambda entry: entry[2])
+        kept: list[_Followed] = []
+        accepted: list[PoseEstimate] = []
+        for followed, estimate, surprise in seen:
+            if any(same_body(estimate, other) for other in accepted):
+                continue
+            accepted.append(estimate)
+            if surprise > LEAP:
+                kept.append(self._start(estimate))
+                self._lose(followed)
+            else:
+                followed.go_on(estimate)
+                kept.append(followed)
+        for followed in self._live:
+            if followed not in kept and followed not in self._lost:
+                self._lose(followed)
+        self._live = sorted(kept, key=lambda f: f.tracklet)
+
+    def _look_round(self, image_rgb: np.ndarray) -> None:
+        """Somebody who was lost a moment ago and turned upside down is where motion foretold, but not upright."""
+        for lost in [f for f in self._lost if f.lost <= EAGER_FRAMES and f.age > 5]:
+            if len(self._live) >= self._most:
+                return
+            region = lost.foretold
+            turned = [replace(region, rotation=region.rotation + turn) for turn in _TURNS]
+            found = [e for e in self._look(image_rgb, turned, sure=False) if e and e.presence >= _TURNED_PRESENCE]
+            if found:
+                self._add(max(found, key=lambda e: e.presence), sure=False)
+
+    def _search_is_due(self) -> bool:
+        self._since_search += 1
+        missed = [f.lost for f in self._lost]
+        if not self._live or any(n <= EAGER_FRAMES for n in missed):
+            return True
+        every = SEARCH_FRAMES_LARGEST if self._largest_only else SEARCH_FRAMES
+        return self._since_search >= (min(every, 4) if missed else every)
+
+    def _search(self, image_rgb: np.ndarray) -> None:
+        """Start a tracklet for every believable body that the detector finds and that is not followed yet.
 
         Each is looked at twice: the landmarks know better than the detector where the body lies.
         """
-        for detection in self._ranked(self._detector.detect(image_rgb))[:_CANDIDATES]:
-            (first,) = self._landmarks.estimate(image_rgb, [detection.region])
-            if first.presence < PRESENCE_THRESHOLD:
-                continue
-            second = self._look(image_rgb, first.next_region, sure=detection.score >= SURE_SCORE)
-            if second is not None:
-                return second
-        return None
+        self._since_search = 0
+        detections = [d for d in self._ranked(self._detect(image_rgb)) if self._may_be_new(d.region)]
+        detections = detections[: 3 if self._largest_only else 2 * self._most]
+        if not detections:
+            return
+        first = self._landmarks.estimate(image_rgb, [d.region for d in detections])
+        likely = [k for k, e in enumerate(first) if e.presence >= PRESENCE_THRESHOLD]
+        for sure in (True, False):
+            chosen = [k for k in likely if (detections[k].score >= SURE_SCORE) == sure]
+            for estimate in self._look(image_rgb, [first[k].next_region for k in chosen], sure):
+                if estimate is not None:
+                    self._add(estimate, sure)
+
+    def _detect(self, image_rgb: np.ndarray) -> list[Detection]:
+        return self._detector.detect(image_rgb, closely=not self._largest_only)
 
     def _ranked(self, detections: list[Detection]) -> list[Detection]:
-        """Whoever may be the person lost a moment ago first, then by score times size."""
-        last = self._last if self._lost_frames <= MEMORY_FRAMES else None
+        """Whoever may have been lost a moment ago first, then by score times size."""
 
         def rank(detection: Detection) -> tuple[bool, float]:
             region = detection.region
-            return last is not None and region.resembles(last, 0.5), detection.score * region.side_px
+            return any(region.resembles(f.foretold, 0.5) for f in self._lost), detection.score * region.side_px
 
         return sorted(detections, key=rank, reverse=True)
 
-    def _look(self, image_rgb: np.ndarray, region: Region, sure: bool = True) -> PoseEstimate | None:
-        """The landmarks in a region, or None when they are not a body in this image."""
-        height, width = image_rgb.shape[:2]
-        x, y = region.center_px
-        reach = region.side_px / 2
-        outside = x + reach < 0 or y + reach < 0 or x - reach > width or y - reach > height
-        if outside or not SMALLEST_SIDE_PX <= region.side_px <= LARGEST_SIDE * max(height, width):
-            return None
-        (estimate,) = self._landmarks.estimate(image_rgb, [region])
-        believable = (
-            estimate.presence >= PRESENCE_THRESHOLD
-            and estimate.spread >= (SPREAD_THRESHOLD if sure else UNSURE_SPREAD_THRESHOLD)
-            and estimate.disagreement <= (DISAGREEMENT_THRESHOLD if sure else UNSURE_DISAGREEMENT_THRESHOLD)
+    def _may_be_new(self, region: Region) -> bool:
+        """Not somebody who is followed already, and of a size that matters."""
+        if any(region.resembles(f.estimate.next_region, 0.12) for f in self._live):
+            return False
+        largest = max((f.estimate.region.side_px for f in self._live), default=0.0)
+        return not self._largest_only or region.side_px >= RIVAL_SIDE * largest
+
+    def _add(self, estimate: PoseEstimate, sure: bool) -> None:
+        """Start a tracklet, unless the body is followed already or there are enough of at least its size."""
+        if any(same_body(estimate, f.estimate) for f in self._live):
+            return
+        # The legs of somebody who is followed, or a coat in their arms, can look like somebody of their own.
+        if not sure and any(share_within(estimate, f.estimate) > MOST_WITHIN for f in self._live):
+            return
+        if len(self._live) >= self._most:
+            weakest = min(self._live, key=lambda f: f.estimate.region.side_px)
+            if estimate.region.side_px < 1.5 * weakest.estimate.region.side_px:
+                return
+            self._live.remove(weakest)
+        if self._largest_only and self._live and estimate.region.side_px < RIVAL_SIDE * self._largest_side():
+            return
+        self._lost = [f for f in self._lost if not estimate.region.resembles(f.foretold, 0.35)]
+        self._live.append(self._start(estimate))
+
+    def _largest_side(self) -> float:
+        return max(f.estimate.region.side_px for f in self._live)
+
+    def _start(self, estimate: PoseEstimate) -> _Followed:
+        self._tracklets += 1
+        return _Followed(self._tracklets - 1, estimate, np.zeros(2))
+
+    def _lose(self, followed: _Followed) -> None:
+        followed.lost = 1
+        self._lost.append(followed)
+
+    def _ask_judge(self, image_rgb: np.ndarray) -> dict[int, np.ndarray]:
+        """World landmarks of the strong network, by tracklet, for those whose left and right are due or in doubt."""
+        if self._judge is None:
+            return {}
+        due = [f for f in self._live if f.since_judged >= (JUDGE_AGAIN_FRAMES if f.swapped else JUDGE_FRAMES)]
+        for followed in due:
+            followed.since_judged, followed.swapped = 0, False
+        estimates = self._judge.estimate(image_rgb, [f.estimate.region for f in due])
+        return {f.tracklet: e.world_landmarks for f, e in zip(due, estimates, strict=True) if believable(e)}
+
+    def _observe(self, image_rgb: np.ndarray, followed: _Followed, judged: np.ndarray | None) -> Observation:
+        e = followed.estimate
+        look = followed.age % APPEARANCE_FRAMES == 0
+        return Observation(
+            e.keypoints_px,
+            e.keypoints_confidence,
+            e.world_landmarks,
+            e.presence,
+            e.region,
+            acquired=followed.age == 0,
+            appearance=appearance(image_rgb, e.keypoints_px) if look else None,
+            judged_landmarks=judged,
         )
-        return estimate if believable else None
+
+    def _look(self, image_rgb: np.ndarray, regions: list[Region], sure: bool = True) -> list[PoseEstimate | None]:
+        """The landmarks in each region, or None where they are not a body in this image; one batch."""
+        useful = [k for k, region in enumerate(regions) if _is_in_image(region, image_rgb)]
+        estimates = self._landmarks.estimate(image_rgb, [regions[k] for k in useful])
+        out: list[PoseEstimate | None] = [None] * len(regions)
+        for k, estimate in zip(useful, estimates, strict=True):
+            out[k] = estimate if believable(estimate, sure) else None
+        return out
+
+
+def believable(estimate: PoseEstimate, sure: bool = True) -> bool:
+    """Whether landmarks are those of a body; ``sure``: there is good reason to expect one here."""
+    return (
+        estimate.presence >= PRESENCE_THRESHOLD
+        and estimate.spread >= (SPREAD_THRESHOLD if sure else UNSURE_SPREAD_THRESHOLD)
+        and estimate.disagreement <= (DISAGREEMENT_THRESHOLD if sure else UNSURE_DISAGREEMENT_THRESHOLD)
+    )
+
+
+def same_body(a: PoseEstimate, b: PoseEstimate) -> bool:
+    """Whether two estimates describe one body in the image."""
+    return _apart(a.keypoints_px, b.keypoints_px) < SAME_BODY * min(a.region.side_px, b.region.side_px)
+
+
+def share_within(a: PoseEstimate, b: PoseEstimate) -> float:
+    """Share of a's keypoints that lie in the box round b's."""
+    low, high = b.keypoints_px.min(axis=0), b.keypoints_px.max(axis=0)
+    return float(((a.keypoints_px >= low) & (a.keypoints_px <= high)).all(axis=1).mean())
+
+
+def _apart(a: np.ndarray, b: np.ndarray) -> float:
+    return float(np.linalg.norm(a - b, axis=-1).mean())
+
+
+def _is_in_image(region: Region, image_rgb: np.ndarray) -> bool:
+    height, width = image_rgb.shape[:2]
+    x, y = region.center_px
+    reach = region.side_px / 2
+    outside = x + reach < 0 or y + reach < 0 or x - reach > width or y - reach > height
+    return not outside and SMALLEST_SIDE_PX <= region.side_px <= LARGEST_SIDE * max(height, width)

@@ -1,0 +1,31 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the networks say about one person in one frame."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .region import Region
+
+
+@dataclass(frozen=True)
+class Observation:
+    """The person in one frame.
+
+    ``keypoints_px`` (33, 2) pixels of the frame; ``keypoints_confidence`` (33,) 0..1; ``world_landmarks`` (33, 3)
+    metres, the middle of the hips at 0, in camera axes (x right, y down, z forward); ``presence``: the network's
+    probability that there is a person; ``region``: where it looked; ``acquired``: the person was not followed from the
+    frame before; ``appearance``: see `appearance`, in some frames; ``judged_landmarks``: what the strong network says
+    in place of ``world_landmarks``, in few frames. Order: `KEYPOINT_NAMES`.
+    """
+
+    keypoints_px: np.ndarray
+    keypoints_confidence: np.ndarray
+    world_landmarks: np.ndarray
+    presence: float
+    region: Region
+    acquired: bool
+    appearance: np.ndarray | None = None
+    judged_landmarks: np.ndarray | None = None

@@ -1,0 +1,57 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The people of a clip: collects what the tracker sees and decides, at the end, who is who and who counts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from .association import link
+from .observation import Observation
+from .track import Track, Tracklet, make_track
+
+SHORTEST_SHARE = 0.02  # seen in fewer frames than this, a "person" is a mistake of the detector
+SHORTEST_S = 0.3  # the same for the longest time without interruption
+LEAST_PROMINENCE = 0.05  # of the most prominent person's
+
+
+class PeopleBuilder:
+    """Collects observations frame by frame; what it keeps grows by a kilobyte per person and frame."""
+
+    def __init__(self) -> None:
+        self._frames: list[int] = []
+        self._times: list[float] = []
+        self._tracklets: dict[int, Tracklet] = {}
+
+    def add(self, frame: int, time_s: float, observations: Sequence[tuple[int, Observation]]) -> None:
+        """Append one frame: everybody who was seen in it, with the number of the tracklet."""
+        row = len(self._frames)
+        self._frames.append(frame)
+        self._times.append(time_s)
+        for number, observation in observations:
+            self._tracklets.setdefault(number, Tracklet()).add(row, observation)
+
+    def __len__(self) -> int:
+        return len(self._frames)
+
+    def build(self, most: int) -> list[Track]:
+        """At most ``most`` people, the most prominent (size times frames) first; each track has a row per frame.
+
+        Nobody, if even the most prominent one was seen in too few frames to be believed.
+        """
+        tracklets = list(self._tracklets.values())
+        people = [[tracklets[k] for k in chain] for chain in link(tracklets, self._times)]
+        people.sort(key=_prominence, reverse=True)
+        counted = [person for person in people if self._is_believable(person)][:most]
+        least = LEAST_PROMINENCE * _prominence(counted[0]) if counted else 0.0
+        return [make_track(self._frames, self._times, person) for person in counted if _prominence(person) >= least]
+
+    def _is_believable(self, person: list[Tracklet]) -> bool:
+        """Seen often enough, and for long enough without interruption."""
+        span = self._times[-1] - self._times[0]
+        longest = max(self._times[t.rows[-1]] - self._times[t.rows[0]] for t in person)
+        often = sum(len(t.rows) for t in person) >= SHORTEST_SHARE * len(self)
+        return often and longest >= min(SHORTEST_S, 0.5 * span)
+
+
+def _prominence(person: list[Tracklet]) -> float:
+    return sum(t.prominence for t in person)
