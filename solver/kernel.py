@@ -25,14 +25,26 @@ _STAMP = source_stamp()
 def kernel(function: Callable[..., Any]) -> Any:
     """Compile a kernel on its first call, and keep the machine code for later sessions.
 
+    It may not create arrays; views of those it is given are fine. So no references need to be counted, which would be
+    two atomic operations for every array at every call.
+
     Numba throws a cached kernel away when its own file has changed, but kernels are inlined into their callers in
     other files, which would go on using the old code; so the stamp that numba compares covers all of them.
     Where no folder can be written to, nothing is kept.
     """
+    return _compiled(function, _nrt=False)
+
+
+def allocating_kernel(function: Callable[..., Any]) -> Any:
+    """Compile a kernel that creates arrays; otherwise as `kernel`."""
+    return _compiled(function, _nrt=True)
+
+
+def _compiled(function: Callable[..., Any], **options: Any) -> Any:
     try:
-        compiled = njit(cache=True, **_OPTIONS)(function)
+        compiled = njit(cache=True, **_OPTIONS, **options)(function)
     except RuntimeError:  # numba found no place for its cache
-        return njit(**_OPTIONS)(function)
+        return njit(**_OPTIONS, **options)(function)
     cache_file = getattr(getattr(compiled, "_cache", None), "_cache_file", None)
     # Not part of numba's interface: without it, numba's own rule stands.
     if cache_file is not None and hasattr(cache_file, "_source_stamp"):

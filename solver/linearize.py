@@ -5,18 +5,65 @@ The 2D keypoint, 3D keypoint and orientation terms of one point are merged: with
 its part's origin, W = GᵀG of the position terms, W_d of the direction, f and f_d the gradients,
     M += [[ [e]x (W + W_d) [e]xᵀ, [e]x W ], [., W]],   N += [ e x (W + W_d) V' ; W V' ],   C += V'ᵀ (W + W_d) V'
 with V' = R_i V. The derivative D of the part's origin by shape is added once per part, and the part's sums, taken
-about its own origin, are then shifted to the pelvis, the origin of all twists.
+about its own origin, are then shifted to the pelvis, the origin of all twists. Products that go into C are gathered as
+pairs of rows and multiplied many at a time.
 """
 
 import numpy as np
 
+from .gram import add_gram
 from .kernel import kernel
 from .residuals import keypoint2d, keypoint3d, orientation_field, shape_prior
 from .residuals.part import GRADIENT, SHAPE, Array, Blocks, Pose
 from .residuals.registry import KEYPOINT2D, KEYPOINT3D, ORIENTATION_FIELD, SHAPE_PRIOR, accumulate_tables
-from .rows import add1, add3, add_block, set3, set_block
+from .row_pass import row_pass
+from .rows import add3, clear
 from .terms import HAS_2D, HAS_3D, HAS_DIRECTION, HAS_SHAPE, Terms
 from .tree import Tree
+
+QUEUE = 48  # pairs of rows (X, Z) of C += XᵀZ that are gathered before they are multiplied
+
+
+def make_scratch(tree: Tree) -> Array:
+    """Return the working memory of `linearize`: a queue of pairs of rows, each row X followed by its Z."""
+    return np.zeros((2 * QUEUE, tree.S.shape[2]))
+
+
+def _dot(a, b):  # type: ignore[no-untyped-def]
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def _place_formula(s, D_parent, S, D):  # type: ignore[no-untyped-def]
+    """D = D_par + R_par S."""
+    return [], [], [D_parent[r] + _dot(s[3 * r : 3 * r + 3], S) for r in range(3)]
+
+
+def _point_formula(s, N, V, pairs):  # type: ignore[no-untyped-def]
+    """V' = R V;  N += [[e]x W_all; W] V';  pairs (V', W_all V'). s: R (9), [e]x W_all (9), W (6), W_all (6)."""
+    moved = [_dot(s[3 * r : 3 * r + 3], V) for r in range(3)]
+    W, W_all = ([[a[0], a[1], a[2]], [a[1], a[3], a[4]], [a[2], a[4], a[5]]] for a in (s[18:24], s[24:30]))
+    angular = [N[r] + _dot(s[9 + 3 * r : 12 + 3 * r], moved) for r in range(3)]
+    linear = [N[3 + r] + _dot(W[r], moved) for r in range(3)]
+    weighted = [_dot(W_all[r], moved) for r in range(3)]
+    return angular + linear, [], [row for pair in zip(moved, weighted, strict=True) for row in pair]
+
+
+def _part_formula(s, N, D, pairs):  # type: ignore[no-untyped-def]
+    """Add the origin's motion D to N and shift it to the pelvis. s: A (6), Z (9), the origin s (3), one half.
+
+    With H = N_lin + A D / 2:  C += HᵀD + DᵀH,  N_ang += [s]x N_lin + Z D,  N_lin += A D.
+    """
+    a, Z, (x, y, z), half = s[:6], s[6:15], s[15:18], s[18]
+    AD = [_dot(row, D) for row in ([a[0], a[1], a[2]], [a[1], a[3], a[4]], [a[2], a[4], a[5]])]
+    H = [N[3 + r] + AD[r] * half for r in range(3)]
+    turned = [y * N[5] - z * N[4], z * N[3] - x * N[5], x * N[4] - y * N[3]]
+    angular = [N[r] + turned[r] + _dot(Z[3 * r : 3 * r + 3], D) for r in range(3)]
+    pairs = [row for r in range(3) for row in (H[r], D[r])] + [row for r in range(3) for row in (D[r], H[r])]
+    return angular + [N[3 + r] + AD[r] for r in range(3)], [], pairs
+
+
+_place = row_pass(_place_formula, (3, 3, 0))
+_point, _part = row_pass(_point_formula, (6, 3, 0)), row_pass(_part_formula, (6, 3, 0))
 
 
 def make_pose(tree: Tree) -> Pose:
@@ -54,8 +101,7 @@ def place_parts(tree: Tree, pose: Pose) -> None:
             y += tree.S[i, 1, a] * b
             z += tree.S[i, 2, a] * b
         turn = (Q[0, 0], Q[0, 1], Q[0, 2], Q[1, 0], Q[1, 1], Q[1, 2], Q[2, 0], Q[2, 1], Q[2, 2])
-        set_block(D, 3 * i * W, W, turn, tree.S, 3 * i * W, W, W)
-        add1(D, 3 * i * W, 1.0, D, 3 * j * W, 3 * W)
+        _place(turn, W, D, 3 * j * W, W, tree.S, 3 * i * W, W, D, 3 * i * W, W)
         for r in range(3):
             q0, q1, q2 = Q[r, 0], Q[r, 1], Q[r, 2]
             for c in range(3):
@@ -64,12 +110,28 @@ def place_parts(tree: Tree, pose: Pose) -> None:
 
 
 @kernel
+def clear_blocks(blocks: Blocks) -> None:
+    """Set everything but A to zero."""
+    n, W = blocks.H_u.shape[0], blocks.c.shape[0]
+    if blocks.cross[0]:
+        clear(blocks.H_u, 0, 3 * n * (SHAPE + W))
+        blocks.cross[0] = 0
+    for i in range(n):
+        for r in range(3):
+            blocks.H_u[i, r, GRADIENT] = 0.0
+            for k in range(3):
+                blocks.H_uu[i, r, k] = 0.0
+    clear(blocks.C, 0, W * W)
+    clear(blocks.c, 0, W)
+
+
+@kernel
 def linearize(
     tree: Tree, terms: Terms, stage: Array, triggs: float, pose: Pose, blocks: Blocks, scratch: Array
 ) -> float:
     """Place the parts, write the blocks at `pose`, and return the cost.
 
-    stage (2, weights) is a row of weights and a row of 1/sigma, in the registry's order; scratch (9, W).
+    stage (2, weights) is a row of weights and a row of 1/sigma, in the registry's order; scratch of `make_scratch`.
     """
     place_parts(tree, pose)
     weights, inv_sigma = stage[0], stage[1]
@@ -80,18 +142,15 @@ def linearize(
     row = SHAPE + W
     fit_focal = tree.globals > P
     focal = np.exp(pose.log_focal[0])
-    blocks.H_u[:] = 0.0
-    blocks.H_uu[:] = 0.0
-    blocks.cross[0] = 0
-    C[:] = 0.0
-    c[:] = 0.0
+    clear_blocks(blocks)
+    waiting = 0  # pairs in the queue
     ox, oy, oz = pose.t[0, 0], pose.t[0, 1], pose.t[0, 2]
     cost = 0.0
     for i in range(tree.parents.shape[0]):
-        A[i] = 0.0
+        base = 6 * i * row
+        clear(A, base, 6 * row)
         if terms.starts[i] == terms.starts[i + 1]:
             continue
-        base = 6 * i * row
         R = pose.R[i]
         r00, r01, r02, r10, r11, r12 = R[0, 0], R[0, 1], R[0, 2], R[1, 0], R[1, 1], R[1, 2]
         r20, r21, r22 = R[2, 0], R[2, 1], R[2, 2]
@@ -145,13 +204,7 @@ def linearize(
             x10, x11, x12 = x10 + b10, x11 + b11, x12 + b12
             x20, x21, x22 = x20 + b20, x21 + b21, x22 + b22
             fx, fy, fz = fx + gx, fy + gy, fz + gz
-            shaped = flags & HAS_SHAPE
-            if shaped:
-                v = 3 * j * W
-                set_block(scratch, 0, W, (r00, r01, r02, r10, r11, r12, r20, r21, r22), V, v, W, W)
-                if flags & (HAS_2D | HAS_3D):
-                    w = (w00, w01, w02, w01, w11, w12, w02, w12, w22)
-                    add_block(A, base + 3 * row + SHAPE, row, w, scratch, 0, W, W)
+            p00, p01, p02, p11, p12, p22 = w00, w01, w02, w11, w12, w22
             if flags & HAS_DIRECTION:
                 q = terms.direction[j]
                 e, d00, d01, d02, d11, d12, d22, ux, uy, uz = orientation_field.term(
@@ -170,65 +223,48 @@ def linearize(
             y12 += ex * b11 - ey * b10
             y22 += ex * b21 - ey * b20
             mx, my, mz = mx + ey * gz - ez * gy, my + ez * gx - ex * gz, mz + ex * gy - ey * gx
-            if shaped:
-                add_block(A, base + SHAPE, row, (b00, b01, b02, b10, b11, b12, b20, b21, b22), scratch, 0, W, W)
-                w = (w00, w01, w02, w01, w11, w12, w02, w12, w22)
-                set_block(scratch, 3 * W, W, w, scratch, 0, W, W)
-                for a in range(P):
-                    s = a & ~3
-                    add3(
-                        C, a * W + s, scratch[0, a], scratch[1, a], scratch[2, a],
-                        scratch, 3 * W + s, 4 * W + s, 5 * W + s, W - s,
-                    )  # fmt: skip
-                add3(c, 0, gx, gy, gz, scratch, 0, W, 2 * W, W)
-                if fit_focal and flags & HAS_2D:
-                    for a in range(P):
-                        C[a, P] += scratch[0, a] * px + scratch[1, a] * py + scratch[2, a] * pz
-        # the motion D of the origin by shape, once: C += GT D + DT G + DT A D with G = N_lin so far
-        d = 3 * i * W
-        if i > 0 and P > 0:
-            lin = base + 3 * row + SHAPE
-            set_block(scratch, 0, W, (a00, a01, a02, a01, a11, a12, a02, a12, a22), D, d, W, W)
-            for r in range(3):
-                # H = G + A D / 2, then C += HT D + DT H
-                set3(scratch, (3 + r) * W, 1.0, 0.0, 0.0, A, lin + r * row, lin, lin, W)
-                add1(scratch, (3 + r) * W, 0.5, scratch, r * W, W)
-            for a in range(P):
-                s = a & ~3
-                add3(
-                    C, a * W + s, scratch[3, a], scratch[4, a], scratch[5, a], D, d + s, d + W + s, d + 2 * W + s, W - s
-                )
-                add3(
-                    C, a * W + s, D[i, 0, a], D[i, 1, a], D[i, 2, a],
-                    scratch, 3 * W + s, 4 * W + s, 5 * W + s, W - s,
+            if flags & HAS_SHAPE:
+                if waiting + 3 > QUEUE:
+                    add_gram(C, W, scratch, 0, 2 * W, scratch, W, 2 * W, waiting)
+                    waiting = 0
+                at = 2 * waiting * W
+                waiting += 3
+                entries = (
+                    r00, r01, r02, r10, r11, r12, r20, r21, r22, b00, b01, b02, b10, b11, b12, b20, b21, b22,
+                    p00, p01, p02, p11, p12, p22, w00, w01, w02, w11, w12, w22,
                 )  # fmt: skip
-            for r in range(3):
-                add1(A, lin + r * row, 1.0, scratch, r * W, W)
-            ang = base + SHAPE
-            add_block(A, ang, row, (x00, x01, x02, x10, x11, x12, x20, x21, x22), D, d, W, W)
-            add3(c, 0, fx, fy, fz, D, d, d + W, d + 2 * W, W)
-            if fit_focal:
-                for a in range(P):
-                    C[a, P] += D[i, 0, a] * hx + D[i, 1, a] * hy + D[i, 2, a] * hz
+                _point(entries, W, A, base + SHAPE, row, V, 3 * j * W, W, scratch, at, W)
+                add3(c, 0, gx, gy, gz, scratch, at, at + 2 * W, at + 4 * W, W)
+                if fit_focal and flags & HAS_2D:
+                    k = 2 * (waiting - 3)
+                    for a in range(P):
+                        C[a, P] += scratch[k, a] * px + scratch[k + 2, a] * py + scratch[k + 4, a] * pz
+        B = A[i]
         if fit_focal:
-            B = A[i]
             B[0, SHAPE + P], B[1, SHAPE + P], B[2, SHAPE + P] = nx, ny, nz
             B[3, SHAPE + P], B[4, SHAPE + P], B[5, SHAPE + P] = hx, hy, hz
         # shift to the pelvis: moments gain s x force, with s the part's origin from there
         sx, sy, sz = tx - ox, ty - oy, tz - oz
-        lin = base + 3 * row + SHAPE
-        add_block(A, base + SHAPE, row, (0.0, -sz, sy, sz, 0.0, -sx, -sy, sx, 0.0), A, lin, row, W)
         # Z = X + [s]x A is the corner of M; M_aa = Y + X [s]xT + [s]x ZT
         z00, z01, z02 = x00 + sy * a02 - sz * a01, x01 + sy * a12 - sz * a11, x02 + sy * a22 - sz * a12
         z10, z11, z12 = x10 + sz * a00 - sx * a02, x11 + sz * a01 - sx * a12, x12 + sz * a02 - sx * a22
         z20, z21, z22 = x20 + sx * a01 - sy * a00, x21 + sx * a11 - sy * a01, x22 + sx * a12 - sy * a02
+        if i > 0 and W > 0:
+            if waiting + 6 > QUEUE:
+                add_gram(C, W, scratch, 0, 2 * W, scratch, W, 2 * W, waiting)
+                waiting = 0
+            origin = (
+                a00, a01, a02, a11, a12, a22, z00, z01, z02, z10, z11, z12, z20, z21, z22, sx, sy, sz, 0.5
+            )  # fmt: skip
+            _part(origin, W, A, base + SHAPE, row, D, 3 * i * W, W, scratch, 2 * waiting * W, W)
+            waiting += 6
+            add3(c, 0, fx, fy, fz, D, 3 * i * W, 3 * i * W + W, 3 * i * W + 2 * W, W)
         y00 += sy * x02 - sz * x01 + sy * z02 - sz * z01
         y01 += sz * x00 - sx * x02 + sy * z12 - sz * z11
         y02 += sx * x01 - sy * x00 + sy * z22 - sz * z21
         y11 += sz * x10 - sx * x12 + sz * z10 - sx * z12
         y12 += sx * x11 - sy * x10 + sz * z20 - sx * z22
         y22 += sx * x21 - sy * x20 + sx * z21 - sy * z20
-        B = A[i]
         B[0, 0], B[0, 1], B[0, 2], B[0, 3], B[0, 4], B[0, 5] = y00, y01, y02, z00, z01, z02
         B[1, 0], B[1, 1], B[1, 2], B[1, 3], B[1, 4], B[1, 5] = y01, y11, y12, z10, z11, z12
         B[2, 0], B[2, 1], B[2, 2], B[2, 3], B[2, 4], B[2, 5] = y02, y12, y22, z20, z21, z22
@@ -239,6 +275,7 @@ def linearize(
         B[1, GRADIENT] = my + sz * fx - sx * fz
         B[2, GRADIENT] = mz + sx * fy - sy * fx
         B[3, GRADIENT], B[4, GRADIENT], B[5, GRADIENT] = fx, fy, fz
+    add_gram(C, W, scratch, 0, 2 * W, scratch, W, 2 * W, waiting)
     cost += accumulate_tables(tree, terms.ints, terms.floats, weights, inv_sigma, triggs, pose, blocks)
     cost += shape_prior.accumulate(terms.shape_mean, terms.shape_information, weights[SHAPE_PRIOR], pose, blocks)
     return cost

@@ -16,10 +16,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .gram import subtract_gram
 from .kernel import kernel
+from .linearize import make_scratch
 from .residuals.part import GRADIENT, SHAPE, Array, Blocks, Pose
 from .rotations import exp3
-from .rows import add1, add3, add_block, set_block
+from .row_pass import row_pass
+from .rows import add1, add3, copy
 from .tree import Tree
 
 TINY = 1e-13  # a pivot below this share of its diagonal is no information: that direction stays where it is
@@ -31,42 +34,67 @@ class Workspace(NamedTuple):
     A: Array  # (K+1, 6, 8+W), sums over subtrees
     Y: Array  # (K+1, 3, 8+W), [Y~ | q~ | 0 | E~]
     L: Array  # (K+1, 6), the inverse of L by rows of its lower triangle
-    root: Array  # (6, 6), Cholesky factor of the damped M_0
-    N: Array  # (6, 8+W), L_root^-1 [. | m_0 | 0 | N_0]
+    root: Array  # (6, 8+W), L_0^-1 [M_0 + Lambda | m_0 | 0 | N_0]: L_0ᵀ in its upper triangle, 1/L_ii on the diagonal
     C: Array  # (W, W), full; after `eliminate` the reduced system of the frame, then its factor
     c: Array  # (W,)
     x: Array  # (K+1, 6), twists
     u: Array  # (K+1, 3), joint increments
     dbeta: Array  # (W,)
-    scratch: Array  # (9, W)
+    scratch: Array  # of `linearize`
 
 
 def make_workspace(tree: Tree) -> Workspace:
     """Return a workspace of zeros for `tree`."""
     n, w = len(tree.parents), tree.S.shape[2]
     row = SHAPE + w
-    shapes = ((n, 6, row), (n, 3, row), (n, 6), (6, 6), (6, row), (w, w), (w,), (n, 6), (n, 3), (w,), (9, w))
-    return Workspace(*(np.zeros(shape) for shape in shapes))
+    shapes: list[tuple[int, ...]] = [(n, 6, row), (n, 3, row), (n, 6), (6, row), (w, w), (w,), (n, 6), (n, 3), (w,)]
+    arrays = [np.zeros(shape) for shape in shapes]
+    return Workspace(*arrays, scratch=make_scratch(tree))
+
+
+def _moment_formula(s, A, Y, _):  # type: ignore[no-untyped-def]
+    """Y = UᵀA: the moment about the joint, A_ang - s x A_lin. s: the joint's origin."""
+    x, y, z = s
+    turned = [y * A[5] - z * A[4], z * A[3] - x * A[5], x * A[4] - y * A[3]]
+    return [], [A[r] - turned[r] for r in range(3)], []
+
+
+def _scale_formula(s, Y, _, __):  # type: ignore[no-untyped-def]
+    """Y~ = L^-1 Y. s: L^-1 by rows of its lower triangle."""
+    return [Y[0] * s[0], Y[0] * s[1] + Y[1] * s[2], Y[0] * s[3] + Y[1] * s[4] + Y[2] * s[5]], [], []
+
+
+def _parent_formula(s, A_parent, A, Y):  # type: ignore[no-untyped-def]
+    """A_par += A - Y~ᵀY~. s: the first six columns of Y~ (18)."""
+    out = []
+    for r in range(6):
+        out.append(A_parent[r] + A[r] - Y[0] * s[3 * r] - Y[1] * s[3 * r + 1] - Y[2] * s[3 * r + 2])
+    return out, [], []
+
+
+_moment, _scale = row_pass(_moment_formula, (6, 0, 0)), row_pass(_scale_formula, (3, 0, 0))
+_to_parent = row_pass(_parent_formula, (6, 6, 3))
 
 
 @kernel
-def cholesky(H, n: int) -> None:  # type: ignore[no-untyped-def]
-    """Factorize the lower triangle of H (n, n) in place, H = L Lᵀ, with 1 / L_ii on the diagonal.
+def factorize(H, row: int, n: int, diagonal) -> None:  # type: ignore[no-untyped-def]
+    """Replace [H | rest], rows of length `row` whose first n columns are symmetric, by L^-1 [H | rest], H = L Lᵀ.
 
-    A pivot that is not positive to rounding gets 0 for its inverse, so that its unknown becomes 0.
+    Only the upper triangle is read, and L_ii^-1 is put on the diagonal. A pivot that is not positive to rounding gets
+    0 for its inverse, so that its unknown becomes 0. diagonal (n,) is overwritten.
     """
     for j in range(n):
-        floor = TINY * abs(H[j, j])
+        diagonal[j] = H[j, j]
+    for j in range(n):
         d = H[j, j]
-        for k in range(j):
-            d -= H[j, k] * H[j, k]
-        inverse = 1.0 / math.sqrt(d) if d > floor and d > 1e-290 else 0.0
-        H[j, j] = inverse
+        inverse = 1.0 / math.sqrt(d) if d > TINY * abs(diagonal[j]) and d > 1e-290 else 0.0
+        square = -inverse * inverse
         for i in range(j + 1, n):
-            s = H[i, j]
-            for k in range(j):
-                s -= H[i, k] * H[j, k]
-            H[i, j] = s * inverse
+            first = i & ~3
+            add1(H, i * row + first, H[j, i] * square, H, j * row + first, row - first)
+        for k in range(row):
+            H[j, k] *= inverse
+        H[j, j] = inverse
 
 
 @kernel
@@ -80,20 +108,20 @@ def eliminate(tree: Tree, pose: Pose, blocks: Blocks, damping: float, root_scale
     W = c.shape[0]
     row = SHAPE + W
     n, P = tree.parents.shape[0], tree.globals
-    A[:] = blocks.A
-    for a in range(P):
-        c[a] = blocks.c[a]
-        for b in range(W):
-            C[a, b] = blocks.C[a, b]
+    copy(A, 0, blocks.A, 0, 6 * n * row)
+    copy(c, 0, blocks.c, 0, W)
+    copy(C, 0, blocks.C, 0, W * W)
     ox, oy, oz = pose.t[0, 0], pose.t[0, 1], pose.t[0, 2]
     squares = 0.0
     for i in range(n - 1, 0, -1):
         sx, sy, sz = pose.t[i, 0] - ox, pose.t[i, 1] - oy, pose.t[i, 2] - oz
         base, y = 6 * i * row, 3 * i * row
-        # UT A = moment about the joint: A_ang - s x A_lin, plus the joint's own row
-        set_block(Y, y, row, (0.0, sz, -sy, -sz, 0.0, sx, sy, -sx, 0.0), A, base + 3 * row, row, row)
-        add1(Y, y, 1.0, A, base, 3 * row)
-        add1(Y, y, 1.0, blocks.H_u, y, 3 * row)
+        _moment((sx, sy, sz), row, A, base, row, Y, y, row, Y, y, row)
+        if blocks.cross[0]:
+            add1(Y, y, 1.0, blocks.H_u, y, 3 * row)
+        else:
+            for r in range(3):
+                Y[i, r, GRADIENT] += blocks.H_u[i, r, GRADIENT]
         T = Y[i]
         H = blocks.H_uu[i]
         # Q = Y U + H_uu + lambda I (+ UT H_uxT)
@@ -123,45 +151,30 @@ def eliminate(tree: Tree, pose: Pose, blocks: Blocks, damping: float, root_scale
         i20 = -(l20 * i00 + l21 * i10) * i22
         F = L[i]
         F[0], F[1], F[2], F[3], F[4], F[5] = i00, i10, i11, i20, i21, i22
-        set_block(Y, y, row, (i00, 0.0, 0.0, i10, i11, 0.0, i20, i21, i22), Y, y, row, row)
+        _scale((i00, i10, i11, i20, i21, i22), row, Y, y, row, Y, y, row, Y, y, row)
         g0, g1, g2 = T[0, GRADIENT], T[1, GRADIENT], T[2, GRADIENT]
         squares += g0 * g0 + g1 * g1 + g2 * g2
         to = 6 * tree.parents[i] * row
-        add1(A, to, 1.0, A, base, 6 * row)
-        for r in range(0, 6, 3):
-            minus = (
-                -T[0, r], -T[1, r], -T[2, r],
-                -T[0, r + 1], -T[1, r + 1], -T[2, r + 1],
-                -T[0, r + 2], -T[1, r + 2], -T[2, r + 2],
-            )  # fmt: skip
-            add_block(A, to + r * row, row, minus, Y, y, row, row)
+        columns = (
+            T[0, 0], T[1, 0], T[2, 0], T[0, 1], T[1, 1], T[2, 1], T[0, 2], T[1, 2], T[2, 2],
+            T[0, 3], T[1, 3], T[2, 3], T[0, 4], T[1, 4], T[2, 4], T[0, 5], T[1, 5], T[2, 5],
+        )  # fmt: skip
+        _to_parent(columns, row, A, to, row, A, base, row, Y, y, row)
         e = y + SHAPE
         add3(c, 0, -g0, -g1, -g2, Y, e, e + row, e + 2 * row, W)
-        for a in range(P):
-            s = a & ~3
-            add3(
-                C, a * W + s, -T[0, SHAPE + a], -T[1, SHAPE + a], -T[2, SHAPE + a],
-                Y, e + s, e + row + s, e + 2 * row + s, W - s,
-            )  # fmt: skip
-    M, N = work.root, work.N
+    if W > 0:
+        subtract_gram(C, W, Y, 3 * row + SHAPE, row, 3 * (n - 1))
+    root = work.root
+    copy(root, 0, A, 0, 6 * row)
     for r in range(6):
-        for k in range(r + 1):
-            M[r, k] = A[0, r, k]
-        M[r, r] += damping if r < 3 else damping * root_scale * root_scale
-    cholesky(M, 6)
+        root[r, r] += damping if r < 3 else damping * root_scale * root_scale
+    factorize(root, row, 6, work.x[0])
     for r in range(6):
-        for k in range(GRADIENT, row):
-            N[r, k] = A[0, r, k]
-        for j in range(r):
-            add1(N, r * row + SHAPE, -M[r, j], N, j * row + SHAPE, W)
-            N[r, GRADIENT] -= M[r, j] * N[j, GRADIENT]
-        for k in range(GRADIENT, row):
-            N[r, k] *= M[r, r]
-        g = N[r, GRADIENT]
+        g = root[r, GRADIENT]
         squares += g * g
-        add1(c, 0, -g, N, r * row + SHAPE, W)
-        for a in range(P):
-            add1(C, a * W, -N[r, SHAPE + a], N, r * row + SHAPE, W)
+        add1(c, 0, -g, root, r * row + SHAPE, W)
+    if W > 0:
+        subtract_gram(C, W, root, SHAPE, row, 6)
     for a in range(P):
         for b in range(a):
             C[a, b] = C[b, a]
@@ -171,19 +184,21 @@ def eliminate(tree: Tree, pose: Pose, blocks: Blocks, damping: float, root_scale
 @kernel
 def solve_globals(tree: Tree, C, c, dbeta) -> float:  # type: ignore[no-untyped-def]
     """Solve C dbeta = -c for the global columns, overwriting C with its factor; return |L^-1 c|^2."""
-    P = tree.globals
-    cholesky(C, P)
+    P, W = tree.globals, C.shape[0]
+    factorize(C, W, P, dbeta)
+    for a in range(P):
+        dbeta[a] = -c[a]
     squares = 0.0
     for a in range(P):
-        s = -c[a]
-        for b in range(a):
-            s -= C[a, b] * dbeta[b]
-        dbeta[a] = s * C[a, a]
-        squares += dbeta[a] * dbeta[a]
+        y = dbeta[a] * C[a, a]
+        squares += y * y
+        for b in range(a + 1, P):
+            dbeta[b] -= C[a, b] * y
+        dbeta[a] = y
     for a in range(P - 1, -1, -1):
         s = dbeta[a]
         for b in range(a + 1, P):
-            s -= C[b, a] * dbeta[b]
+            s -= C[a, b] * dbeta[b]
         dbeta[a] = s * C[a, a]
     return squares
 
@@ -191,18 +206,15 @@ def solve_globals(tree: Tree, C, c, dbeta) -> float:  # type: ignore[no-untyped-
 @kernel
 def substitute(tree: Tree, pose: Pose, damping: float, root_scale: float, work: Workspace) -> float:
     """Fill work.x and work.u from work.dbeta, and return dᵀ Lambda d of the damping that was added."""
-    x, u, Y, N, M, dbeta = work.x, work.u, work.Y, work.N, work.root, work.dbeta
+    x, u, Y, root, dbeta = work.x, work.u, work.Y, work.root, work.dbeta
     P = tree.globals
-    for r in range(6):
-        s = -N[r, GRADIENT]
-        for a in range(P):
-            s -= N[r, SHAPE + a] * dbeta[a]
-        x[0, r] = s
     for r in range(5, -1, -1):
-        s = x[0, r]
+        s = -root[r, GRADIENT]
+        for a in range(P):
+            s -= root[r, SHAPE + a] * dbeta[a]
         for j in range(r + 1, 6):
-            s -= M[j, r] * x[0, j]
-        x[0, r] = s * M[r, r]
+            s -= root[r, j] * x[0, j]
+        x[0, r] = s * root[r, r]
     ox, oy, oz = pose.t[0, 0], pose.t[0, 1], pose.t[0, 2]
     squares = x[0, 0] ** 2 + x[0, 1] ** 2 + x[0, 2] ** 2
     squares += root_scale**2 * (x[0, 3] ** 2 + x[0, 4] ** 2 + x[0, 5] ** 2)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from .errors import ShapeError
-from .kernel import kernel
+from .kernel import allocating_kernel, kernel
 from .residuals.part import Array
 from .residuals.registry import RESIDUALS, empty_tables
 from .tree import Tree
@@ -50,7 +50,7 @@ def _common_part(tree: Tree, a: int, b: int) -> tuple:
     return -1, -1, -1
 
 
-@kernel
+@allocating_kernel
 def _pack(tree: Tree, i2, m2, i3, m3, i_start, i_end, md) -> tuple:  # type: ignore[no-untyped-def]
     """Return (starts, flags, rest, V, image, point, direction, first direction without a common part or -1).
 

@@ -24,7 +24,7 @@ from typing import Any
 
 import numpy as np
 
-from ..kernel import kernel
+from ..kernel import allocating_kernel, kernel
 from ..lanes import LANES, sqrt, step
 from ..rotations import exp, exp3, log, log3, matrix_from_quaternion
 from .joint_prior import add_to_joint
@@ -177,7 +177,7 @@ def _gather(pose, ints, k, state):  # type: ignore[no-untyped-def]
             state[(3 * r + 2) * LANES + lane] = Om[r, 2]
 
 
-@kernel
+@allocating_kernel
 def _keep_off_half_turns(floats, k, state):  # type: ignore[no-untyped-def]
     """Take the joints of row k in `state` that are nearly a half turn from their M back to pi - `NEAREST`."""
     M, R = np.empty((3, 3)), np.empty((3, 3))
@@ -201,7 +201,7 @@ def _keep_off_half_turns(floats, k, state):  # type: ignore[no-untyped-def]
                 state[(3 * r + c) * LANES + lane] = M[r, 0] * E[c] + M[r, 1] * E[3 + c] + M[r, 2] * E[6 + c]
 
 
-@kernel
+@allocating_kernel
 def accumulate(tree, ints, floats, weight, inv_sigma, triggs, pose, blocks):  # type: ignore[no-untyped-def]
     """Add every joint's H_uu and g_u to the blocks and return the cost. ints (n, LANES), floats (n, FLOATS)."""
     cost = 0.0
