@@ -39,7 +39,7 @@ def build_parser() -> argparse.ArgumentParser:
     """The whole argparse tree."""
     parser = _Parser(prog="scope", description="Markerless motion capture: video in, animated body out.")
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND", parser_class=_Parser)
-    capture = commands.add_parser("capture", help="capture the person in a video or picture")
+    capture = commands.add_parser("capture", help="capture the people in a video or picture")
     capture.add_argument("video", nargs="?", type=Path, metavar="VIDEO", help="video or picture (default: a sample)")
     capture.add_argument(
         "-o",
@@ -55,6 +55,15 @@ def build_parser() -> argparse.ArgumentParser:
         "--overlay", type=Path, metavar="FILE", help="draw the body over the footage: .mp4, .png, .jpg"
     )
     capture.add_argument("--quality", choices=QUALITIES, default="best", help="speed against accuracy (default: best)")
+    capture.add_argument(
+        "--people",
+        default="largest",
+        metavar="N|all|largest",
+        help="how many people at most; largest: the most prominent one over the clip (default: largest)",
+    )
+    capture.add_argument("--start", metavar="TIME", help="from when: seconds, MM:SS or HH:MM:SS.mmm")
+    capture.add_argument("--end", metavar="TIME", help="until when")
+    capture.add_argument("--fps", metavar="N", help="use only so many frames per second, such as 12 or 29.97")
     capture.add_argument("--body", default="scope", help=f"{', '.join(BUILT_IN)} or a body .npz (default: scope)")
     capture.add_argument("--focal-mm", type=float, metavar="MM", help="35 mm equivalent focal length of the camera")
     capture.add_argument("--fov", type=float, metavar="DEGREES", help="field of view along the longer side")
@@ -102,10 +111,17 @@ def run_capture(args: argparse.Namespace) -> dict:
     from ..solver.body import load_body
     from .capture.overlay import write_overlay
     from .capture.pipeline import CaptureOptions, capture
+    from .capture.video_range import VideoRange, parse_rate, parse_time
 
     body = load_body(args.body)
     options = CaptureOptions(
         quality=args.quality,
+        people=_people(args.people),
+        wanted=VideoRange(
+            parse_time(args.start) if args.start else 0.0,
+            parse_time(args.end) if args.end else float("inf"),
+            parse_rate(args.fps) if args.fps else None,
+        ),
         focal_mm=args.focal_mm,
         fov_deg=args.fov,
         calibration=args.calibration,
@@ -125,6 +141,15 @@ def run_capture(args: argparse.Namespace) -> dict:
     if not args.json:
         print(_summary(report), file=sys.stderr)
     return report
+
+
+def _people(text: str) -> int | str:
+    """``--people``: a number, "all" or "largest"."""
+    if text in ("all", "largest"):
+        return text
+    if not text.isdecimal() or int(text) < 1:
+        raise UsageError(f"--people takes a number from 1 on, all or largest, not {text!r}")
+    return int(text)
 
 
 def _write(outputs: list[Path], motions: list[Motion], body: Body, video: Path, args: argparse.Namespace) -> list[Path]:

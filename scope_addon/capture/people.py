@@ -5,6 +5,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from .association import link
 from .observation import Observation
 from .track import Track, Tracklet, make_track
@@ -12,6 +14,8 @@ from .track import Track, Tracklet, make_track
 SHORTEST_SHARE = 0.02  # seen in fewer frames than this, a "person" is a mistake of the detector
 SHORTEST_S = 0.3  # the same for the longest time without interruption
 LEAST_PROMINENCE = 0.05  # of the most prominent person's
+MERGED = 0.25  # mean distance of the keypoints, in sides of the region, of somebody who is becoming somebody else
+LONGEST_MERGER = 12  # frames
 
 
 class PeopleBuilder:
@@ -38,7 +42,11 @@ class PeopleBuilder:
 
         Nobody, if even the most prominent one was seen in too few frames to be believed.
         """
+        if not self._tracklets:
+            return []
         tracklets = list(self._tracklets.values())
+        for tracklet in tracklets:
+            trim_merged_end(tracklet, tracklets)
         people = [[tracklets[k] for k in chain] for chain in link(tracklets, self._times)]
         people.sort(key=_prominence, reverse=True)
         counted = [person for person in people if self._is_believable(person)][:most]
@@ -51,6 +59,31 @@ class PeopleBuilder:
         longest = max(self._times[t.rows[-1]] - self._times[t.rows[0]] for t in person)
         often = sum(len(t.rows) for t in person) >= SHORTEST_SHARE * len(self)
         return often and longest >= min(SHORTEST_S, 0.5 * span)
+
+
+def trim_merged_end(tracklet: Tracklet, others: Sequence[Tracklet]) -> None:
+    """Take off the last frames of a tracklet that slid onto somebody who goes on to be seen after its end.
+
+    That is how a tracklet ends when its person goes behind somebody else: for some frames the network already sees a
+    part of the one in front.
+    """
+    if not tracklet.rows:
+        return
+    end = tracklet.rows[-1]
+    keep = len(tracklet.rows)
+    for other in others:
+        if other is tracklet or not other.rows or other.rows[-1] <= end or other.rows[0] > end:
+            continue
+        at = {row: k for k, row in enumerate(other.rows)}
+        for k in range(len(tracklet.rows) - 1, max(len(tracklet.rows) - 1 - LONGEST_MERGER, 0), -1):
+            j = at.get(tracklet.rows[k])
+            if j is None:
+                break
+            apart = np.linalg.norm(tracklet.values[k][:, :2] - other.values[j][:, :2], axis=1).mean()
+            if apart > MERGED * min(tracklet.sides_px[k], other.sides_px[j]):
+                break
+            keep = min(keep, k)
+    tracklet.cut(keep)
 
 
 def _prominence(person: list[Tracklet]) -> float:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ...solver.body import Body
-from ...solver.errors import NoPersonError, UsageError
+from ...solver.errors import NoPersonError, UsageError, VideoError
 from ..motion import Motion
 from .assemble import assemble_motion, root_on_floor
 from .camera import Camera, choose_camera
@@ -22,6 +22,7 @@ from .shared_world import share_world
 from .track import Track
 from .tracker import MOST_PEOPLE, PeopleTracker
 from .video import Frame, Video, open_video
+from .video_range import VideoRange
 
 # Called with the stage's name, what is done and the total (0: unknown). May raise CancelledError.
 Progress = Callable[[str, int, int], None]
@@ -41,6 +42,7 @@ class CaptureOptions:
     focal_mm: float | None = None
     fov_deg: float | None = None
     calibration: Path | None = None
+    wanted: VideoRange = VideoRange()  # which frames
     smoothing: bool = True
     threads: int = 0  # 0: as many as there are cores
 
@@ -69,7 +71,7 @@ def capture(
     path = Path(path)
     clock = _Clock()
     most = _most_people(options.people)
-    with open_video(path) as video:
+    with open_video(path, options.wanted) as video:
         camera = choose_camera(
             video.width,
             video.height,
@@ -84,6 +86,8 @@ def capture(
         warnings = list(video.warnings)
     with clock.stage("solver"):
         tracks = [repair_left_right(track) for track in seen.build(most)]
+        if len(seen) == 0:
+            raise VideoError(f"{path} has no frame in the time that was asked for; change the start or the end")
         if not tracks:
             raise _nobody(path, len(seen))
         smoothing = options.smoothing and len(seen) > 1
@@ -128,7 +132,7 @@ def _observe(video: Video, tracker: PeopleTracker, clock: _Clock, progress: Prog
             observations = tracker.step(frame.image_rgb)
             builder.add(frame.index, frame.timestamp_s, observations)
         watch(frame, max((o for _, o in observations), key=lambda o: o.region.side_px, default=None))
-        progress("finding the person", len(builder), max(video.frame_count, len(builder)))
+        progress("finding the person", len(builder), max(video.expected_frames, len(builder)))
 
 
 def _solve(

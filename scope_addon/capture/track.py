@@ -58,6 +58,13 @@ class Tracklet:
         if o.judged_landmarks is not None:
             self.judged.append((row, o.judged_landmarks))
 
+    def cut(self, count: int) -> None:
+        """Keep the first ``count`` frames."""
+        if count < len(self.rows):
+            end = self.rows[count]
+            self.judged = [(row, w) for row, w in self.judged if row < end]
+            del self.rows[count:], self.values[count:], self.centers_px[count:], self.sides_px[count:]
+
     @property
     def prominence(self) -> float:
         """Size in the picture, summed over the frames."""

@@ -6,6 +6,9 @@
             frame.index, frame.timestamp_s, frame.image_rgb
     video.warnings                     # what the user should hear: stopped early, changed size, ...
 
+``open_video("dance.mp4", VideoRange(start_s=60, end_s=90, fps=Fraction(25)))`` gives a part of it, or fewer frames;
+index and time of each frame stay those of the whole video.
+
 OpenCV says the frame rate as a float; ``video.fps`` is the rational the container meant (30000/1001, not 29.97003).
 """
 
@@ -31,11 +34,13 @@ import numpy as np
 from ...solver.errors import VideoError
 from .exif import read_exif
 from .quicktime import focal_35mm
+from .video_range import VideoRange
 
 cv2.setLogLevel(0)  # silent: failures are reported by exception, in one sentence
 
 STILL_FPS = Fraction(30)  # a picture has no rate; one frame of the commonest does no harm in a scene
 _JPEG_STREAMS = (".mjpeg", ".mjpg")  # begin like a picture, but are many
+_WORTH_A_JUMP_S = 20.0
 _AHEAD = 4  # decoded frames waiting: a 4K frame takes 25 MB
 _TURN = {90: cv2.ROTATE_90_CLOCKWISE, 180: cv2.ROTATE_180, 270: cv2.ROTATE_90_COUNTERCLOCKWISE}
 _STANDARD_RATES = [Fraction(n) for n in (24, 25, 30, 48, 50, 60, 120, 240)]
@@ -53,9 +58,11 @@ class Frame:
 
 @dataclass
 class Video:
-    """Footage that was opened and whose first frame was decoded. Each iteration starts at the first frame.
+    """Footage that was opened and whose first frame was decoded. Each iteration starts at the first frame of the range.
 
-    ``frame_count`` is what the container claims and may be wrong. ``focal_35mm`` is in mm on a 36 × 24 mm frame.
+    ``frame_count`` is what the container claims of the whole and may be wrong; ``expected_frames`` is what follows
+    from it for the range. ``fps`` is of the frames that come out, ``source_fps`` of those in the file. ``focal_35mm``
+    is in mm on a 36 × 24 mm frame.
     """
 
     path: Path
@@ -66,8 +73,22 @@ class Video:
     focal_35mm: float | None = None
     is_still: bool = False
     warnings: list[str] = field(default_factory=list)
+    wanted: VideoRange = field(default_factory=VideoRange)
+    _source_fps: Fraction | None = field(default=None, repr=False)
     _still: np.ndarray | None = field(default=None, repr=False)
     _decoders: list[_Decoder] = field(default_factory=list, repr=False)
+
+    @property
+    def source_fps(self) -> Fraction:
+        """Frame rate of the file."""
+        return self._source_fps or self.fps
+
+    @property
+    def expected_frames(self) -> int:
+        """How many frames an iteration gives, as far as the container is right."""
+        length = self.frame_count / self.source_fps
+        start, end = Fraction(self.wanted.start_s), Fraction(min(self.wanted.end_s, float(length)))
+        return max(1, round((min(end, length) - start) * self.fps))
 
     def __iter__(self) -> Iterator[Frame]:
         if self._still is not None:
@@ -90,12 +111,13 @@ class Video:
         self.close()
 
 
-def open_video(path: str | Path) -> Video:
+def open_video(path: str | Path, wanted: VideoRange | None = None) -> Video:
     """Open a video or a picture (JPEG, PNG, WebP, TIFF, BMP, ...; 16-bit and alpha too) and decode its first frame.
 
-    :raises VideoError: it does not exist, is not a file, or holds nothing that can be decoded.
+    :raises VideoError: it does not exist, is not a file, holds nothing that can be decoded, or ends before the range.
     """
     path = Path(path)
+    wanted = wanted or VideoRange()
     if path.is_dir():
         raise VideoError(f"{path} is a folder; give one video or picture file")
     try:
@@ -109,7 +131,7 @@ def open_video(path: str | Path) -> Video:
     if size == 0:
         raise VideoError(f"{path} is empty (0 bytes); export or download it again")
     picture = cv2.haveImageReader(str(path)) and path.suffix.lower() not in _JPEG_STREAMS
-    return _open_still(path) if picture else _open_moving(path)
+    return _open_still(path) if picture else _open_moving(path, wanted)
 
 
 def _open_still(path: Path) -> Video:
@@ -150,7 +172,7 @@ def _upright(image: np.ndarray, orientation: int) -> np.ndarray:
     return np.ascontiguousarray(image[:: -1 if vertical else 1, :: -1 if horizontal else 1])
 
 
-def _open_moving(path: Path) -> Video:
+def _open_moving(path: Path, wanted: VideoRange) -> Video:
     with closing(_Reader(path)) as reader:
         first = reader.read()
         if first is None:
@@ -159,7 +181,20 @@ def _open_moving(path: Path) -> Video:
         count = reader.get(cv2.CAP_PROP_FRAME_COUNT)
     height, width = first[1].shape[:2]
     frame_count = max(1, int(count)) if 0 < count < 1e9 else 1
-    return Video(path, width, height, fps, frame_count, focal_35mm(path))
+    video = Video(path, width, height, fps, frame_count, focal_35mm(path), wanted=wanted)
+    if wanted.start_s > 0 and count > 0 and wanted.start_s * fps > frame_count + fps:
+        raise VideoError(
+            f"{path} lasts {frame_count / float(fps):.1f} s, but the start is at {wanted.start_s:g} s; start earlier"
+        )
+    if wanted.fps is not None:
+        video._source_fps = fps
+        video.fps = min(wanted.fps, fps)
+        if wanted.fps > fps:
+            video.warnings.append(
+                f"{path.name} has {float(fps):g} frames per second; {float(wanted.fps):g} would repeat some, "
+                "so all were used once"
+            )
+    return video
 
 
 def exact_fps(fps: float) -> Fraction | None:
@@ -200,13 +235,15 @@ class _Reader:
         self._turn = _TURN.get(round(self.get(cv2.CAP_PROP_ORIENTATION_META)) % 360)
         num, den = self.get(cv2.CAP_PROP_SAR_NUM), self.get(cv2.CAP_PROP_SAR_DEN)
         self._aspect = num / den if num > 0 and den > 0 else 1.0
+        self._grabbed = False
 
     def get(self, prop: int) -> float:
         return self._capture.get(prop)
 
     def read(self) -> tuple[float, np.ndarray] | None:
         """Next frame: seconds and upright RGB; None at the end, or where decoding stops."""
-        ok, image = self._capture.read()
+        ok, image = self._capture.retrieve() if self._grabbed else self._capture.read()
+        self._grabbed = False
         if not ok or image is None:
             return None
         if abs(self._aspect - 1) > 1e-3:  # stretch the shorter side, so that no detail is lost
@@ -217,6 +254,32 @@ class _Reader:
         if self._turn is not None:
             image = cv2.rotate(image, self._turn)
         return self.get(cv2.CAP_PROP_POS_MSEC) / 1000, cv2.cvtColor(image, cv2.COLOR_BGR2RGB)
+
+    def skip_to(self, seconds: float, fps: Fraction) -> int:
+        """Go on to the first frame at or after that time; returns its index, or where the video ends.
+
+        A jump saves decoding what comes before, where the container knows where it leads; else frame by frame.
+        """
+        if seconds > _WORTH_A_JUMP_S:
+            early = seconds - _WORTH_A_JUMP_S / 2
+            self._capture.set(cv2.CAP_PROP_POS_FRAMES, int(early * fps))
+            index = round(self.get(cv2.CAP_PROP_POS_FRAMES))
+            landed = self._capture.grab()
+            time = self.get(cv2.CAP_PROP_POS_MSEC) / 1000
+            if landed and time < seconds and abs(time - index / fps) < 0.5 / fps:
+                return self._grab_to(seconds, index, time, fps)
+            self._capture.set(cv2.CAP_PROP_POS_FRAMES, 0)
+        if not self._capture.grab():
+            return 0
+        return self._grab_to(seconds, 0, self.get(cv2.CAP_PROP_POS_MSEC) / 1000, fps)
+
+    def _grab_to(self, seconds: float, index: int, time: float, fps: Fraction) -> int:
+        """From the frame that was just grabbed. The next ``read`` gives the frame whose index is returned."""
+        while time < seconds - 1e-6 and self._capture.grab():
+            stamp = self.get(cv2.CAP_PROP_POS_MSEC) / 1000
+            index, time = index + 1, stamp if stamp > time else time + float(1 / fps)
+        self._grabbed = True
+        return index
 
     def close(self) -> None:
         self._capture.release()
@@ -268,22 +331,30 @@ class _Decoder:
 
     def _decode(self, reader: _Reader) -> None:
         video, index, time = self._video, 0, 0.0
+        chooser = video.wanted.chooser()
         resized = False
+        first = index = reader.skip_to(video.wanted.start_s, video.source_fps) if video.wanted.start_s > 0 else 0
         while not self._stop.is_set() and (got := reader.read()) is not None:
             # Some containers have no timestamps, others repeat one: time then goes on at the frame rate.
-            time = got[0] if index == 0 or got[0] > time else time + float(1 / video.fps)
+            time = got[0] if index == first or got[0] > time else time + float(1 / video.source_fps)
             image = got[1]
+            if time > video.wanted.end_s + 1e-6:
+                break
             if image.shape[:2] != (video.height, video.width):
                 image, resized = cv2.resize(image, (video.width, video.height)), True
-            self._put(Frame(index, time, image))
+            for frame in chooser.choose(Frame(index, time, image)):
+                self._put(frame)
             index += 1
+        for frame in chooser.rest():
+            self._put(frame)
         if self._stop.is_set():
             return
         if resized:
             self._warn(f"the picture size changes within {video.path.name}; all frames were scaled to the first")
         # Both tests: a container that counts frames from its duration is wrong for a variable frame rate.
         missing = video.frame_count - index
-        if missing > max(1, video.frame_count // 50) and time < 0.95 * float((video.frame_count - 1) / video.fps):
+        last = min(float((video.frame_count - 1) / video.source_fps), video.wanted.end_s)
+        if missing > max(1, video.frame_count // 50) and time < 0.95 * last:
             self._warn(
                 f"decoding {video.path.name} stopped after {index} of about {video.frame_count} frames; "
                 "the file may be damaged or incomplete"
