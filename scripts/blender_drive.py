@@ -99,10 +99,14 @@ def steps() -> Iterator[float]:
 
     began, last, gaps = time.monotonic(), time.monotonic(), []
     invoke(bpy.ops.scope.capture, "INVOKE_DEFAULT")
-    pictures = 0
+    pictures, preview = 0, False
     while addon().state.job is not None:
         yield 0.02
         now = time.monotonic()
+        if not preview and addon().state.job is not None and addon().state.job.progress.done > 20:
+            preview = True
+            picture("5_finding_the_person")
+            last = now = time.monotonic()
         building = addon().state.job is None or addon().state.job.progress.stage == "building the scene"
         if not building:
             gaps.append(now - last)

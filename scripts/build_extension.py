@@ -54,7 +54,7 @@ def main() -> int:
     for archive in archives:
         blender_extension("validate", str(archive))
         check(archive)
-        print(f"{archive.relative_to(ROOT)}  {archive.stat().st_size / 1e6:.0f} MB")
+        print(f"{archive}  {archive.stat().st_size / 1e6:.0f} MB")
     return 0
 
 

@@ -85,7 +85,7 @@ class WorkerProcess:
 
         :raises WorkerFailedError: the worker reported an error or died.
         """
-        messages = []
+        messages: list[dict] = []
         while True:
             try:
                 line = self._lines.get_nowait()

@@ -26,21 +26,22 @@ class JobProgress:
         self._began = self._stage_began = clock()
         self._stage_first = 0
         self.stage, self.done, self.total = "starting", 0, 0
+        self.fraction = 0.0  # of the whole job, 0..1; it never goes back, though stages repeat for each person
 
     def update(self, stage: str, done: int, total: int) -> None:
         """One message of the worker."""
         if stage != self.stage:
             self.stage, self._stage_began, self._stage_first = stage, self._clock(), done
         self.done, self.total = done, total
+        self.fraction = max(self.fraction, self._reached())
 
     @property
     def compiling(self) -> bool:
         """Whether the solver is being compiled, which happens in the first capture after installing."""
         return self._first_use and self.stage == "finding the shape"
 
-    @property
-    def fraction(self) -> float:
-        """Of the whole job, 0..1; a stage without a total stands still at its beginning."""
+    def _reached(self) -> float:
+        """A stage without a total stands still at its beginning."""
         if self.stage not in STAGES:
             return 0.0
         names = list(STAGES)

@@ -20,6 +20,7 @@ class JobRequest:
     footage: str
     body: str = "scope"  # a built-in body's name or a file
     quality: str = "best"
+    people: int | str = "largest"  # how many at most, "all", or "largest": the most prominent one
     focal_mm: float | None = None  # 35 mm equivalent
     fov_deg: float | None = None  # along the longer side
     smoothing: bool = True

@@ -51,6 +51,7 @@ def run(request: JobRequest, job_folder: Path, reporter: Reporter) -> int:
 
         options = CaptureOptions(
             quality=request.quality,
+            people=request.people,
             focal_mm=request.focal_mm,
             fov_deg=request.fov_deg,
             smoothing=request.smoothing,

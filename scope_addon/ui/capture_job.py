@@ -146,6 +146,7 @@ def capture_request(scene: bpy.types.Scene) -> JobRequest:
         footage=str(footage),
         body=body,
         quality=settings.quality.lower(),
+        people=settings.people_count if settings.people == "COUNT" else settings.people.lower(),
         focal_mm=settings.focal_mm if settings.lens == "FOCAL" else None,
         fov_deg=math.degrees(settings.fov) if settings.lens == "FOV" else None,
         smoothing=settings.smoothing,

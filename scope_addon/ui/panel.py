@@ -32,9 +32,8 @@ class SCOPE_PT_capture(_Tab, bpy.types.Panel):
     def draw(self, context: bpy.types.Context) -> None:
         """Draw the panel."""
         layout, settings = self.layout, context.scene.scope
-        running = state.job is not None
         column = layout.column()
-        column.enabled = not running
+        column.enabled = state.job is None
         if not settings.footage:
             row = column.row()
             row.scale_y = 1.6
@@ -43,8 +42,8 @@ class SCOPE_PT_capture(_Tab, bpy.types.Panel):
             return
         column.prop(settings, "footage", text="", icon="FILE_MOVIE")
         column.row(align=True).prop(settings, "quality", expand=True)
-        if running:
-            _draw_progress(layout, state.job.progress)
+        if state.job is not None:
+            _draw_progress(context, layout, state.job.progress)
         else:
             row = layout.row()
             row.scale_y = 1.6
@@ -53,30 +52,32 @@ class SCOPE_PT_capture(_Tab, bpy.types.Panel):
             _draw_text(context, layout.box(), state.message, "ERROR")
 
 
-def _draw_progress(layout: bpy.types.UILayout, progress: JobProgress) -> None:
+def _draw_progress(context: bpy.types.Context, layout: bpy.types.UILayout, progress: JobProgress) -> None:
     layout.progress(text=f"{100 * progress.fraction:.0f} %", factor=progress.fraction)
     if icon := preview_picture.icon_id():
-        layout.template_icon(icon_value=icon, scale=9.0)
-    column = layout.column(align=True)
+        layout.template_icon(icon_value=icon, scale=10.0)
     for part in progress.lines():
-        column.label(text=part)
+        _draw_text(context, layout, part)
     row = layout.row()
     row.scale_y = 1.6
     row.operator("scope.cancel", text="Cancel", icon="CANCEL")
 
 
 class SCOPE_PT_person(_Tab, bpy.types.Panel):
-    """The body and the lens."""
+    """Who is captured, as what, and the lens."""
 
     bl_idname = "SCOPE_PT_person"
     bl_parent_id = "SCOPE_PT_capture"
-    bl_label = "Body and Lens"
+    bl_label = "People and Lens"
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context: bpy.types.Context) -> None:
         """Draw the panel."""
         layout, settings = _split(self.layout), context.scene.scope
         layout.enabled = state.job is None
+        layout.prop(settings, "people")
+        if settings.people == "COUNT":
+            layout.prop(settings, "people_count", text="Number")
         layout.prop(settings, "body")
         if settings.body == "FILE":
             layout.prop(settings, "body_file", text="File")
@@ -149,13 +150,13 @@ def _split(layout: bpy.types.UILayout) -> bpy.types.UILayout:
     return layout
 
 
-def _draw_text(context: bpy.types.Context, layout: bpy.types.UILayout, text: str, icon: str) -> None:
+def _draw_text(context: bpy.types.Context, layout: bpy.types.UILayout, text: str, icon: str = "NONE") -> None:
     """A sentence in as many lines as the sidebar's width needs."""
     scale = context.preferences.system.ui_scale
     width = max(20, int((context.region.width / scale - 60) / _PIXELS_PER_LETTER)) if context.region else 40
     column = layout.column(align=True)
     for index, line in enumerate(textwrap.wrap(text, width)):
-        column.label(text=line, icon=icon if index == 0 else "BLANK1")
+        column.label(text=line, icon=icon if index == 0 or icon == "NONE" else "BLANK1")
 
 
 CLASSES = (SCOPE_PT_capture, SCOPE_PT_person, SCOPE_PT_scene, SCOPE_PT_result)

@@ -28,6 +28,11 @@ QUALITIES = (
     ("BALANCED", "Balanced", "A little less exact than the best, and faster", 1),
     ("BEST", "Best", "Largest network, most exact", 2),
 )
+PEOPLE = (
+    ("LARGEST", "One", "The most prominent person", 0),
+    ("ALL", "Everyone", "Everybody who is seen well enough", 1),
+    ("COUNT", "At Most", "The most prominent ones, as many as you say", 2),
+)
 BODIES = (
     ("SCOPE", "Body", "The built-in body with SMPL's 24 joints", 0),
     ("SCOPE_H", "Body with Hands", "The built-in body with SMPL+H's 52 joints: fingers that you can animate", 1),
@@ -80,6 +85,12 @@ class SCOPE_PG_settings(bpy.types.PropertyGroup):
     )
     quality: EnumProperty(
         name="Quality", items=QUALITIES, default="BEST", options=_FIXED, description="Speed against accuracy"
+    )
+    people: EnumProperty(
+        name="People", items=PEOPLE, default="LARGEST", options=_FIXED, description="Who is captured"
+    )
+    people_count: IntProperty(
+        name="At Most", default=2, min=1, max=12, options=_FIXED, description="How many people are captured at most"
     )
     body: EnumProperty(
         name="Body", items=BODIES, default="SCOPE", options=_FIXED, description="The body that is fitted to the person"

@@ -26,7 +26,8 @@ def show_result(shown: bpy.types.PropertyGroup, footage: str, report: dict, resu
     shown.people = len(result.people)
     shown.frames = max(len(p.motion) for p in result.people)
     shown.valid_frames = int(sum(p.motion.valid.sum() for p in result.people))
-    shown.reprojection_px = float(report.get("reprojection_px", 0.0))
+    residuals = np.concatenate([p.motion.residual_px[p.motion.valid] for p in result.people])
+    shown.reprojection_px = float(residuals.mean()) if residuals.size else 0.0
     shown.frames_per_second = float(report.get("fps", {}).get("total", 0.0))
     shown.camera = str(report.get("camera", ""))
     first = result.people[0].motion
@@ -35,23 +36,24 @@ def show_result(shown: bpy.types.PropertyGroup, footage: str, report: dict, resu
     shown.warnings.clear()
     lines = list(report.get("warnings", ()))
     for index, person in enumerate(result.people):
-        name = "The person" if len(result.people) == 1 else f"Person {index + 1}"
-        lines += frame_warnings(name, person.motion, person.frames)
+        whose = "" if len(result.people) == 1 else f"person {index + 1}: "
+        lines += frame_warnings(whose, person.motion, person.frames)
     for line in lines:
         shown.warnings.add().text = line[:1].upper() + line[1:]
 
 
-def frame_warnings(name: str, motion: Motion, frames: np.ndarray) -> list[str]:
+def frame_warnings(whose: str, motion: Motion, frames: np.ndarray) -> list[str]:
     """Spans of scene frames where the motion is guessed or far from the footage.
 
+    :param whose: put before each line, for several people.
     :param frames: (T,) scene frame of each pose.
     """
     lines = []
     if not motion.valid.all():
-        lines.append(f"{name} was not seen in frames {spans(~motion.valid, frames)}: filled in")
+        lines.append(f"{whose}filled in without being seen: frames {spans(~motion.valid, frames)}")
     off = motion.valid & (motion.residual_px > _OFF_SHARE * motion.image_size.max())
     if off.any():
-        lines.append(f"{name} is far from the footage in frames {spans(off, frames)}: check these")
+        lines.append(f"{whose}far from the footage, worth a look: frames {spans(off, frames)}")
     return lines
 
 

@@ -51,8 +51,8 @@ def test_a_result_is_built_shown_and_cached(fake_worker, footage):
     assert bpy.ops.scope.capture() == {"FINISHED"}
     result = scene.scope.result
     assert (result.people, result.frames, result.valid_frames) == (1, 10, 7)
-    assert result.reprojection_px == pytest.approx(2.5)
-    assert [w.text for w in result.warnings] == ["A warning", "The person was not seen in frames 4-5, 8: filled in"]
+    assert result.reprojection_px == pytest.approx(2.0)
+    assert [w.text for w in result.warnings] == ["A warning", "Filled in without being seen: frames 4-5, 8"]
     assert result.collection == captures()[0]
     assert (scene.render.fps, scene.frame_start, scene.frame_end) == (25, 1, 10)
     assert job_files() == []
@@ -61,13 +61,24 @@ def test_a_result_is_built_shown_and_cached(fake_worker, footage):
     assert len(captures()) == 2
 
 
+def test_several_people_are_built_and_told_apart(fake_worker, footage):
+    fake_worker("assert request['people'] == 3\nfinish(2)")
+    scene = bpy.context.scene
+    scene.scope.footage, scene.scope.people, scene.scope.people_count = str(footage), "COUNT", 3
+    bpy.ops.scope.capture()
+    assert scene.scope.result.people == 2
+    assert [w.text[:8] for w in scene.scope.result.warnings[1:]] == ["Person 1", "Person 2"]
+    assert len([o for o in captures()[0].objects if o.type == "ARMATURE"]) == 2
+
+
 def test_other_options_are_another_capture(fake_worker, footage):
     fake_worker(FINISH)
     scene = bpy.context.scene
     scene.scope.footage = str(footage)
     bpy.ops.scope.capture()
     fake_worker("send('error', message='asked again')")
-    for name, value in {"quality": "FAST", "lens": "FOV", "smoothing": False, "body": "SCOPE_H"}.items():
+    others = {"quality": "FAST", "lens": "FOV", "smoothing": False, "body": "SCOPE_H", "people": "ALL"}
+    for name, value in others.items():
         before = getattr(scene.scope, name)
         setattr(scene.scope, name, value)
         with pytest.raises(RuntimeError, match="Asked again"):

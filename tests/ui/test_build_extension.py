@@ -1,0 +1,88 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The built extension: Blender's own tool accepts it, and every Blender takes the wheels of its Python."""
+
+import importlib.util
+import zipfile
+from pathlib import Path
+
+import bpy
+import pytest
+
+CP311 = "numba-0.68.1-cp311-cp311-manylinux_2_27_x86_64.manylinux_2_28_x86_64.whl"
+CP313 = CP311.replace("311", "313")
+STABLE = "opencv_contrib_python_headless-4.11.0.86-cp37-abi3-manylinux_2_17_x86_64.manylinux2014_x86_64.whl"
+
+
+@pytest.fixture
+def builder(root, tmp_path, monkeypatch):
+    spec = importlib.util.spec_from_file_location("build_extension", root / "scripts" / "build_extension.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    for name in ("WHEELS", "STAGING", "DIST"):
+        monkeypatch.setattr(module, name, tmp_path / name.lower())
+    return module
+
+
+def blenders_tool():
+    path = Path(bpy.utils.resource_path("LOCAL"), "scripts", "addons_core", "bl_pkg", "cli", "blender_ext.py")
+    spec = importlib.util.spec_from_file_location("blender_ext", path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_names_under_which_every_blender_takes_the_right_wheel(builder):
+    names = [builder.shipped_name(name) for name in (CP311, CP313, STABLE)]
+    assert names[0] == CP311
+    # 4.2's first releases compare nothing but the names of wheels of one version, and run Python 3.11.
+    assert max(names[:2]) == CP311
+    tool = blenders_tool()
+    for name, wanted in zip(names, [{(3, 11)}, {(3, 13)}, {(3, 11), (3, 13)}], strict=True):
+        assert wanted <= tool.python_versions_from_wheel_python_tag(name.split("-")[-3])
+        assert tool.blender_platform_compatible_with_wheel_platform_from_filepath("linux-x64", name)
+        assert not tool.blender_platform_compatible_with_wheel_platform_from_filepath("windows-x64", name)
+
+
+def test_the_locks_name_every_wheel_with_hashes(builder):
+    for python in builder.PYTHONS:
+        entries = builder.locked(python)
+        assert [line.split("==")[0] for line in entries.splitlines() if "==" in line] == list(builder.PACKAGES)
+        assert entries.count("--hash=sha256:") >= 3 * len(builder.PACKAGES)
+
+
+def fake_wheels(folder, names):
+    folder.mkdir(parents=True, exist_ok=True)
+    for name in names:
+        with zipfile.ZipFile(folder / name, "w") as file:
+            file.writestr("module.py", "")
+    return [folder / name for name in names]
+
+
+def test_a_build_with_empty_wheels(builder, root, tmp_path, monkeypatch, capsys):
+    if not list((root / "assets" / "networks").glob("*.onnx")):
+        pytest.skip("the networks are not built")
+
+    def wheels(platform):
+        tag = builder.PLATFORMS[platform][0]
+        names = [f"opencv_contrib_python_headless-4.11.0.86-cp37-abi3-{tag}.whl"]
+        others = [name for name in builder.PACKAGES if not name.startswith("opencv")]
+        names += [f"{name}-1.0-{cp}-{cp}-{tag}.whl" for cp in ("cp313", "cp311") for name in others]
+        return fake_wheels(tmp_path / platform, names)
+
+    monkeypatch.setattr(builder, "download_wheels", wheels)
+    monkeypatch.setattr("sys.argv", ["build"])
+    assert builder.main() == 0
+    archives = sorted(p.name for p in builder.DIST.glob("*.zip"))
+    assert [a.split("-")[-1] for a in archives] == ["linux_x64.zip", "macos_arm64.zip", "windows_x64.zip"]
+    with zipfile.ZipFile(builder.DIST / archives[0]) as file:
+        names = file.namelist()
+    assert not any("numpy" in n or "/tests/" in n or n.startswith(("tests/", "tools/", ".")) for n in names)
+    monkeypatch.setattr(builder, "PACKAGES", (*builder.PACKAGES, "forgotten"))
+    with pytest.raises(SystemExit, match="0 wheels of forgotten for Python 3.13"):
+        builder.check(builder.DIST / archives[0])
+
+
+def test_an_unknown_platform_is_told(builder, monkeypatch, capsys):
+    monkeypatch.setattr("sys.argv", ["build", "amiga"])
+    assert builder.main() == 2
+    assert "amiga" in capsys.readouterr().err
