@@ -9,10 +9,12 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from ...solver.names import BLAZEPOSE
 from .networks import network_path, open_session
 from .region import MARGIN, Region, region_from_points
 
 INPUT_SIZE = 256
+KEYPOINT_NAMES = BLAZEPOSE  # the network's order
 KEYPOINT_COUNT = 33
 _POINTS = 39  # the keypoints, two auxiliary points, four that are not used
 _HIP_CENTER, _BODY_CIRCLE = 33, 34  # auxiliary points: middle of the hips; on the circle about it that holds the body
@@ -20,13 +22,6 @@ _HIPS = (23, 24)
 _WINDOW = 7  # cells of the heatmap that refine one keypoint
 _HEAT_THRESHOLD = 0.5
 
-KEYPOINT_NAMES = (
-    "nose", "left_eye_inner", "left_eye", "left_eye_outer", "right_eye_inner", "right_eye", "right_eye_outer",
-    "left_ear", "right_ear", "mouth_left", "mouth_right", "left_shoulder", "right_shoulder", "left_elbow",
-    "right_elbow", "left_wrist", "right_wrist", "left_pinky", "right_pinky", "left_index", "right_index", "left_thumb",
-    "right_thumb", "left_hip", "right_hip", "left_knee", "right_knee", "left_ankle", "right_ankle", "left_heel",
-    "right_heel", "left_foot_index", "right_foot_index",
-)  # fmt: skip
 
 
 @dataclass(frozen=True)

@@ -7,12 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-BODY_JOINTS = (
-    "pelvis", "left_hip", "right_hip", "spine1", "left_knee", "right_knee", "spine2", "left_ankle", "right_ankle",
-    "spine3", "left_foot", "right_foot", "neck", "left_collar", "right_collar", "head", "left_shoulder",
-    "right_shoulder", "left_elbow", "right_elbow", "left_wrist", "right_wrist",
-)  # fmt: skip
-BODY_PARENTS = (-1, 0, 0, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 9, 9, 12, 13, 14, 16, 17, 18, 19)
+from ..names import BODY_JOINTS, BODY_PARENTS
+
 HAND_ORDER = ("index", "middle", "pinky", "ring", "thumb")  # as SMPL+H and SMPL-X store them
 FACE_JOINTS = ("jaw", "left_eye_smplhf", "right_eye_smplhf")
 _HEAD, _WRISTS = BODY_JOINTS.index("head"), (BODY_JOINTS.index("left_wrist"), BODY_JOINTS.index("right_wrist"))

@@ -11,21 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...solver.names import BLAZEPOSE, COCO
 from .joints import Skeleton, cube_row, other_side
 from .source import SourceMesh
 
-BLAZEPOSE = (
-    "nose", "left_eye_inner", "left_eye", "left_eye_outer", "right_eye_inner", "right_eye", "right_eye_outer",
-    "left_ear", "right_ear", "mouth_left", "mouth_right", "left_shoulder", "right_shoulder", "left_elbow",
-    "right_elbow", "left_wrist", "right_wrist", "left_pinky", "right_pinky", "left_index", "right_index",
-    "left_thumb", "right_thumb", "left_hip", "right_hip", "left_knee", "right_knee", "left_ankle", "right_ankle",
-    "left_heel", "right_heel", "left_foot_index", "right_foot_index",
-)  # fmt: skip
-COCO = (
-    "nose", "left_eye", "right_eye", "left_ear", "right_ear", "left_shoulder", "right_shoulder", "left_elbow",
-    "right_elbow", "left_wrist", "right_wrist", "left_hip", "right_hip", "left_knee", "right_knee", "left_ankle",
-    "right_ankle", "left_big_toe", "left_small_toe", "left_heel", "right_big_toe", "right_small_toe", "right_heel",
-)  # fmt: skip
 HAND_FINGERS = ("thumb", "index_finger", "middle_finger", "ring_finger", "pinky")  # MakeHuman's fingers 1 to 5
 THUMB_POINTS, FINGER_POINTS = ("cmc", "mcp", "ip", "tip"), ("mcp", "pip", "dip", "tip")
 
