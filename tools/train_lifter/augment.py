@@ -22,7 +22,8 @@ SWAP_UPPER, SWAP_ARM, SWAP_LEG = 0.5, 0.4, 0.2
 # Radians about a random axis, times a factor per sample of |N(0, 1)|.
 JOINT_NOISE = {"shoulder": 0.45, "collar": 0.1, "elbow": 0.25, "wrist": 0.3, "hand": 0.2, "hip": 0.2, "knee": 0.2}
 JOINT_NOISE |= {"ankle": 0.2, "foot": 0.1, "spine": 0.08, "neck": 0.15, "head": 0.2}
-LEAN, STRONG_LEAN, STRONG_LEAN_SHARE = np.radians(12.0), np.radians(50.0), 0.08
+LEAN, STRONG_LEAN, STRONG_LEAN_SHARE = np.radians(7.0), np.radians(45.0), 0.1
+AS_RECORDED = 0.25  # share of samples whose joints are not turned
 SHAPE_SPREAD, SHAPE_LIMIT = 1.0, 2.5
 BONE_SPREAD = 0.04  # of the logarithm of each bone's length, left and right alike
 CLUSTERS = 256
@@ -108,7 +109,7 @@ class PoseSampler:
         for joints, share in zip(self._parts, (SWAP_UPPER, SWAP_ARM, SWAP_ARM, SWAP_LEG, SWAP_LEG), strict=True):
             rows = np.flatnonzero(rng.random(n) < share)
             Omega[np.ix_(rows, joints)] = self._frames(rng, len(rows))[:, joints]
-        strength = np.abs(rng.standard_normal((n, 1, 1), np.float32))
+        strength = np.abs(rng.standard_normal((n, 1, 1), np.float32)) * (rng.random((n, 1, 1)) > AS_RECORDED)
         turn = rng.standard_normal((n, len(self._noise), 3), np.float32) * self._noise[:, None] * strength
         Omega = Omega @ small_rotations(turn.astype(np.float32))
         heading, direction = rng.uniform(0, 2 * np.pi, (2, n))

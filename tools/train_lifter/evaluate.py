@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Measure a lifting network: ``python -m scope.tools.train_lifter.evaluate MOTIONS PAIRS [--network lifter.onnx]``.
 
-On held-out takes with the detector's errors imitated, and on held-out renders that the landmark network really saw:
+On held-out takes with the detector's errors imitated, and on renders that the landmark network really saw:
 the error of the limbs' keypoints beside that of the world landmarks, and how well the deviations foretell errors.
 Needs neither PyTorch nor onnx.
 """
@@ -18,7 +18,7 @@ from ...scope_addon.capture.lifter import HIPS, LIFTER_FILE, Lifter, virtual_cam
 from ...solver.body import load_body
 from .augment import load_motions
 from .dataset import Dataset
-from .observed_errors import ObservedErrors, load_pairs
+from .pairs import load_pairs
 from .split import held_out_frames
 
 MEASURED = np.array([*range(11, 17), *range(25, 29)])  # shoulders, elbows, wrists, knees, ankles; hips are the origin
@@ -26,7 +26,7 @@ MEASURED = np.array([*range(11, 17), *range(25, 29)])  # shoulders, elbows, wris
 
 def measure_renders(lifter: Lifter, pairs: Path) -> dict:
     """Millimetres on renders: world landmarks, network with and without them; deviation of error over predicted σ."""
-    points, rays, confidence, world = (a.astype(float) for a in load_pairs(pairs, held_out=True))
+    points, rays, confidence, world = (a.astype(float) for a in load_pairs(pairs))
     truth = points - points[:, HIPS].mean(axis=1, keepdims=True)
     result = {"renders": len(points), "world_landmarks_mm": _limb_error(world - truth)}
     for name, given in (("with_world", world), ("without_world", None)):
@@ -39,10 +39,9 @@ def measure_renders(lifter: Lifter, pairs: Path) -> dict:
     return result
 
 
-def measure_takes(lifter: Lifter, motions: Path, pairs: Path, n: int = 8192) -> dict:
+def measure_takes(lifter: Lifter, motions: Path, n: int = 8192) -> dict:
     """Millimetres on held-out takes with imitated errors, all of them and those with known world landmarks."""
-    frames, observed = held_out_frames(load_motions(motions)), ObservedErrors.load(pairs, held_out=True)
-    batch = Dataset(load_body("scope"), frames, observed).batch((2, 0), n)
+    batch = Dataset(load_body("scope"), held_out_frames(load_motions(motions))).batch((2, 0), n)
     points, _ = lifter.run(batch.input)
     error, known = points - batch.points, batch.input[:, -2] > 0.5
     return {"takes": n, "with_world_mm": _limb_error(error[known]), "without_world_mm": _limb_error(error[~known])}
@@ -66,7 +65,7 @@ def main() -> None:
     parser.add_argument("--network", type=Path, default=LIFTER_FILE)
     a = parser.parse_args()
     lifter = Lifter(a.network)
-    result = measure_renders(lifter, a.pairs) | {"imitated": measure_takes(lifter, a.motions, a.pairs)}
+    result = measure_renders(lifter, a.pairs) | {"imitated": measure_takes(lifter, a.motions)}
     print(json.dumps(result, indent=1))
 
 

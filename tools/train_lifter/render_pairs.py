@@ -19,7 +19,7 @@ from ...scope_addon.capture.rasterizer import Canvas, rasterize
 from ...scope_addon.capture.region import region_from_points
 from ...solver.body import Body, load_body
 from .augment import PoseSampler, load_motions
-from .dataset import cameras
+from .dataset import cameras, pitches
 from .split import training_frames
 
 PICTURE_PX = 420
@@ -79,7 +79,7 @@ def observe(
     R, t = body.forward_kinematics(Omega, np.zeros(3), betas)
     vertices, points = body.skin(R, t, betas), body.keypoints(R, t, betas)[at]
     middle = points[[23, 24]].mean(axis=0)
-    R_camera_world = cameras(rng, 1)[0].astype(float)
+    R_camera_world = cameras(rng, 1, pitches(rng, 1))[0].astype(float)
     away = [0, 0, np.exp(rng.uniform(np.log(NEAREST_M), np.log(FARTHEST_M)))]
     vertices, points = ((p - middle) @ R_camera_world.T + away for p in (vertices, points))
     if vertices[:, 2].min() < 0.3:

@@ -2,7 +2,7 @@
 """Train the lifting network: ``python -m scope.tools.train_lifter.train MOTIONS PAIRS -o assets/lifter``.
 
 AdamW with a cosine schedule in bfloat16; what is exported is the exponential mean of the weights. Every tenth take
-and every fifth pair are held out: they choose nothing but the calibration of the uncertainties, and measure.
+is held out, to measure and to calibrate the uncertainties; renders that the landmark network saw only measure.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from .augment import load_motions
 from .dataset import Batch, Dataset
 from .export import export
 from .network import LiftingNetwork, loss
-from .observed_errors import ObservedErrors, load_pairs
+from .pairs import load_pairs
 from .split import held_out_frames, training_frames
 
 BATCH = 1024
@@ -38,9 +38,9 @@ _TRAINING, _VALIDATION = 0, 1  # first number of a batch's seed
 _dataset: Dataset | None = None
 
 
-def _start(motions: Path, pairs: Path) -> None:
+def _start(motions: Path) -> None:
     global _dataset
-    _dataset = Dataset(load_body("scope"), training_frames(load_motions(motions)), ObservedErrors.load(pairs))
+    _dataset = Dataset(load_body("scope"), training_frames(load_motions(motions)))
 
 
 def _make(seed: tuple[int, ...]) -> Batch:
@@ -48,9 +48,9 @@ def _make(seed: tuple[int, ...]) -> Batch:
     return _dataset.batch(seed, BATCH)
 
 
-def batches(motions: Path, pairs: Path, seed: int, steps: int, workers: int) -> Iterator[Batch]:
+def batches(motions: Path, seed: int, steps: int, workers: int) -> Iterator[Batch]:
     """The batches of a training, in order, whatever the number of processes."""
-    with get_context("spawn").Pool(workers, _start, (motions, pairs)) as pool:
+    with get_context("spawn").Pool(workers, _start, (motions,)) as pool:
         waiting = deque(pool.apply_async(_make, ((_TRAINING, seed, k),)) for k in range(min(AHEAD, steps)))
         for k in range(len(waiting), steps + len(waiting)):
             yield waiting.popleft().get()
@@ -58,15 +58,14 @@ def batches(motions: Path, pairs: Path, seed: int, steps: int, workers: int) -> 
                 waiting.append(pool.apply_async(_make, ((_TRAINING, seed, k),)))
 
 
-def held_out_batch(motions: Path, pairs: Path, n: int = 8192) -> Batch:
-    """Samples of the takes, and errors of the pairs, that are kept from training."""
-    frames, observed = held_out_frames(load_motions(motions)), ObservedErrors.load(pairs, held_out=True)
-    return Dataset(load_body("scope"), frames, observed).batch((_VALIDATION, 0), n)
+def held_out_batch(motions: Path, n: int = 8192) -> Batch:
+    """Samples of the takes that are kept from training."""
+    return Dataset(load_body("scope"), held_out_frames(load_motions(motions))).batch((_VALIDATION, 0), n)
 
 
-def held_out_renders(pairs: Path) -> Batch:
-    """What the landmark network saw of the renders that are kept from training; world landmarks known."""
-    points, rays, confidence, world = load_pairs(pairs, held_out=True)
+def renders(pairs: Path) -> Batch:
+    """What the landmark network saw of renders of our body; world landmarks known."""
+    points, rays, confidence, world = load_pairs(pairs)
     x, R = network_input(rays, confidence, world, np.ones(len(rays)))
     relative = points - points[:, HIPS].mean(axis=1, keepdims=True)
     return Batch(x.astype(np.float32), (relative @ np.swapaxes(R, 1, 2)).astype(np.float32))
@@ -108,8 +107,8 @@ def train(motions: Path, pairs: Path, folder: Path, seed: int, steps: int, worke
     """Train and export. The schedule follows the steps or the time, ``minutes``, whichever ends first."""
     torch.manual_seed(seed)
     torch.set_num_threads(1)
-    validation = held_out_batch(motions, pairs)
-    renders = held_out_renders(pairs)
+    validation = held_out_batch(motions)
+    rendered = renders(pairs)
     network = LiftingNetwork()
     x = torch.from_numpy(validation.input)
     network.mean.copy_(x.mean(0))
@@ -120,7 +119,7 @@ def train(motions: Path, pairs: Path, folder: Path, seed: int, steps: int, worke
     optimizer = torch.optim.AdamW([matrices, others], PEAK_RATE, (0.9, 0.98))
     log: list[dict] = []
     start, total = time.perf_counter(), 0.0
-    for step, batch in enumerate(batches(motions, pairs, seed, steps, workers)):
+    for step, batch in enumerate(batches(motions, seed, steps, workers)):
         done = max(step / steps, (time.perf_counter() - start) / (60 * minutes))
         if done >= 1:
             break
@@ -141,12 +140,12 @@ def train(motions: Path, pairs: Path, folder: Path, seed: int, steps: int, worke
         if (step + 1) % 500 == 0:
             row = {"step": step + 1, "s": round(time.perf_counter() - start), "loss": total / 500}
             row |= measure(mean, validation)
-            row["mpjpe_renders_mm"] = measure(mean, renders)["mpjpe_with_world_mm"]
+            row["mpjpe_renders_mm"] = measure(mean, rendered)["mpjpe_with_world_mm"]
             total = 0.0
             log.append({k: round(v, 4) for k, v in row.items()})
             print(json.dumps(log[-1]), flush=True)
     calibrate(mean, validation)
-    measured = {"held_out": measure(mean, validation), "held_out_renders": measure(mean, renders)}
+    measured = {"held_out": measure(mean, validation), "renders": measure(mean, rendered)}
     summary = {"seed": seed, "steps": step, "batch": BATCH, **measured, "log": log}
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "log.json").write_text(json.dumps(summary, indent=1) + "\n")
