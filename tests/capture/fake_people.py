@@ -1,0 +1,114 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Invented people for tests of tracking: pictures of coloured boxes, and networks that see people in them.
+
+The fake networks know where everybody is, and fail as the real ones do: whoever is hidden is not detected, and the
+landmarks in a region are those of the visible person nearest to its middle, whoever that is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from scope.scope_addon.capture.landmark_network import KEYPOINT_NAMES, PoseEstimate
+from scope.scope_addon.capture.person_detector import Detection
+from scope.scope_addon.capture.region import Region
+
+_HEIGHTS = {"shoulder": -0.5, "elbow": -0.3, "wrist": -0.1, "hip": 0.0, "knee": 0.45, "ankle": 0.85, "heel": 0.9, "foot": 0.9}
+_BODY = np.array(
+    [
+        [
+            (0.15 if "left" in name else -0.15 if "right" in name else 0.0) * (2 if "wrist" in name else 1),
+            next((h for key, h in _HEIGHTS.items() if key in name), -0.2 if "_" in name and "mouth" not in name else -0.7),
+            0.0,
+        ]
+        for name in KEYPOINT_NAMES
+    ]
+)
+
+
+@dataclass
+class Person:
+    """``center_px(t)`` of the hips, None while out of the picture; ``size_px`` of a metre; hidden while t is in it."""
+
+    center_px: Callable[[int], tuple[float, float] | None]
+    color: tuple[int, int, int]
+    size_px: float = 100.0
+    hidden: range = range(0)
+    swapped: range = range(0)
+
+    def place(self, t: int) -> np.ndarray | None:
+        center = self.center_px(t)
+        return None if t in self.hidden or center is None else np.asarray(center, float)
+
+    def body(self, t: int) -> np.ndarray:
+        """(33, 3) metres, with arms and legs that move."""
+        swing = 0.1 * np.sin(0.3 * t + np.arange(33))
+        return _BODY + np.stack([swing, np.zeros(33), swing], axis=1)
+
+
+def pictures(people: list[Person], count: int, size: tuple[int, int] = (1200, 400)) -> Iterator[np.ndarray]:
+    for t in range(count):
+        image = np.full((size[1], size[0], 3), 128, np.uint8)
+        for person in people:
+            place = person.place(t)
+            if place is not None:
+                half = np.array([0.3, 0.9]) * person.size_px
+                low, high = (tuple(int(v) for v in corner) for corner in (place - half, place + half))
+                cv2.rectangle(image, low, high, person.color, -1)
+        image[0, 0] = t % 256, t // 256, 0
+        yield image
+
+
+def _time(image: np.ndarray) -> int:
+    return int(image[0, 0, 0]) + 256 * int(image[0, 0, 1])
+
+
+class FakeDetector:
+    def __init__(self, people: list[Person]) -> None:
+        self.people, self.calls = people, 0
+
+    def detect(self, image: np.ndarray, threshold: float = 0.5, closely: bool = False) -> list[Detection]:
+        self.calls += 1
+        found = []
+        for person in self.people:
+            place = person.place(_time(image))
+            if place is not None:
+                points = np.array([place, place - [0, person.size_px], place, place])
+                found.append(Detection(0.95, np.zeros(4), points))
+        return found
+
+
+class FakeLandmarks:
+    def __init__(self, people: list[Person], right: bool = False) -> None:
+        self.people, self.right, self.batches = people, right, []
+
+    def estimate(self, image: np.ndarray, regions: list[Region]) -> list[PoseEstimate]:
+        self.batches.append(len(regions))
+        return [self._one(_time(image), region) for region in regions]
+
+    def _one(self, t: int, region: Region) -> PoseEstimate:
+        def far(person: Person) -> float:
+            place = person.place(t)
+            return np.inf if place is None else float(np.linalg.norm(place - region.center_px)) / region.side_px
+
+        person = min(self.people, key=far)
+        seen = far(person) < 0.4
+        place = person.place(t) if seen else np.asarray(region.center_px)
+        body = person.body(t)
+        if t in person.swapped and not self.right:
+            from scope.scope_addon.capture.left_right import SWAPPED
+
+            body = body[SWAPPED]
+        there = Region((float(place[0]), float(place[1])), 2.5 * person.size_px, 0.0)
+        return PoseEstimate(
+            keypoints_px=place + body[:, :2] * person.size_px,
+            visibility=np.ones(33),
+            in_frame=np.ones(33),
+            world_landmarks=body,
+            presence=0.99 if seen else 0.0,
+            region=region if seen else there,
+            next_region=there,
+        )

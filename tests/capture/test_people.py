@@ -1,0 +1,182 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Who is who: invented people who meet, hide, leave and come back, and two real clips moved across each other."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from scope.scope_addon.capture import tracker as tracker_module
+from scope.scope_addon.capture.people import PeopleBuilder
+from scope.scope_addon.capture.track import Track
+from scope.scope_addon.capture.tracker import PeopleTracker
+from scope.solver.errors import SetupError
+
+from .fake_people import FakeDetector, FakeLandmarks, Person, pictures
+
+RED, BLUE, GREEN = (200, 40, 40), (40, 60, 200), (40, 160, 60)
+FPS = 30
+
+
+@pytest.fixture
+def follow(monkeypatch: pytest.MonkeyPatch) -> Callable[..., list[Track]]:
+    """``follow(people, count, wanted=None)``: the tracks of the invented people."""
+
+    def run(people: list[Person], count: int, wanted: int | None = None) -> list[Track]:
+        monkeypatch.setattr(tracker_module, "LandmarkNetwork", lambda name, *_: FakeLandmarks(people, "heavy" in name))
+        monkeypatch.setattr(tracker_module, "PersonDetector", lambda *_: FakeDetector(people))
+        tracker, builder = PeopleTracker("fast", 1, wanted), PeopleBuilder()
+        for t, image in enumerate(pictures(people, count)):
+            builder.add(t, t / FPS, tracker.step(image))
+        return builder.build(wanted or 1)
+
+    return run
+
+
+def who(track: Track, people: list[Person]) -> set[int]:
+    """The people whose hips the track's hips were at, in any of its frames."""
+    out = set()
+    for t in np.flatnonzero(track.seen):
+        hips = track.keypoints_px[t, [23, 24]].mean(axis=0)
+        places = [np.inf if p.place(t) is None else np.linalg.norm(p.place(t) - hips) for p in people]
+        assert min(places) < 60
+        out.add(int(np.argmin(places)))
+    return out
+
+
+@pytest.mark.parametrize("colors", [(RED, BLUE), (RED, RED)], ids=["different clothes", "same clothes"])
+@pytest.mark.parametrize("hidden", [0, 10, 20])
+def test_a_crossing(follow: Callable[..., list[Track]], colors: tuple, hidden: int) -> None:
+    """The one behind is hidden for some frames, in which the network sees the one in front in the region of both."""
+    meets = 60
+    back = Person(lambda t: (200 + 6.0 * t, 200), colors[0], hidden=range(meets - hidden // 2, meets + hidden // 2))
+    front = Person(lambda t: (920 - 6.0 * t, 205), colors[1], size_px=110)
+    tracks = follow([back, front], 120, wanted=2)
+    assert [who(track, [back, front]) for track in tracks] == [{1}, {0}]
+    assert tracks[0].seen.mean() >= 0.98
+    assert tracks[1].seen.sum() >= 120 - hidden - 22  # not while the two bodies cannot be told apart
+
+
+def test_a_person_who_comes_and_goes(follow: Callable[..., list[Track]]) -> None:
+    stays = Person(lambda t: (300, 200), BLUE)
+    visits = Person(lambda t: (1100 - 4.0 * (t - 40), 200) if 40 <= t < 100 else None, RED)
+    tracks = follow([stays, visits], 150, wanted=4)
+    assert len(tracks) == 2
+    assert [who(track, [stays, visits]) for track in tracks] == [{0}, {1}]
+    seen = np.flatnonzero(tracks[1].seen)
+    assert 40 <= seen[0] <= 49  # the others are looked for every eighth frame
+    assert seen[-1] == 99
+
+
+def test_known_again_by_the_clothes_after_a_long_time(follow: Callable[..., list[Track]]) -> None:
+    red = Person(lambda t: (200, 200) if not 40 <= t < 140 else None, RED)
+    blue = Person(lambda t: (700, 200) if not 30 <= t < 160 else None, BLUE)
+    moved = Person(lambda t: (640, 200) if t >= 140 else (200, 200) if t < 40 else None, RED)
+    tracks = follow([red, blue], 220, wanted=2)
+    assert [who(track, [red, blue]) for track in tracks] == [{0}, {1}]
+    tracks = follow([moved, blue], 220, wanted=2)  # comes back where the other one was
+    assert [who(track, [moved, blue]) for track in tracks] == [{0}, {1}]
+
+
+def test_the_most_prominent_one_is_chosen_over_the_clip_and_kept(follow: Callable[..., list[Track]]) -> None:
+    """Neither the first nor the largest at some time, and a gap rather than somebody else."""
+    first = Person(lambda t: (200, 200) if t < 60 else None, RED)
+    main = Person(lambda t: (900, 200) if t >= 20 else None, BLUE, hidden=range(100, 110))
+    (track,) = follow([first, main], 200)
+    assert who(track, [first, main]) == {1}
+    assert not track.seen[:20].any()
+    assert not track.seen[100:110].any()
+    assert track.seen[45:100].all()
+    assert track.seen[112:].all()
+
+
+def test_someone_small_beside_the_most_prominent_one_costs_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    people = [Person(lambda t: (300, 200), BLUE), Person(lambda t: (900, 200), RED, size_px=40)]
+    networks = FakeLandmarks(people)
+    monkeypatch.setattr(tracker_module, "LandmarkNetwork", lambda name, *_: networks)
+    monkeypatch.setattr(tracker_module, "PersonDetector", lambda *_: FakeDetector(people))
+    tracker = PeopleTracker("best", 1)
+    for image in pictures(people, 100):
+        assert len(tracker.step(image)) == 1
+    assert sum(networks.batches) <= 104
+    tracker = PeopleTracker("best", 1, people=2)
+    assert [len(tracker.step(image)) for image in pictures(people, 3)] == [2, 2, 2]
+    assert networks.batches[-1] == 2  # both in one batch
+
+
+def test_a_flicker_is_nobody(follow: Callable[..., list[Track]]) -> None:
+    blinks = Person(lambda t: (200 + 30 * (t // 20), 200) if t % 20 < 3 else None, RED)
+    assert follow([blinks], 200, wanted=3) == []
+
+
+def test_exchanged_left_and_right_are_judged(follow: Callable[..., list[Track]]) -> None:
+    from scope.scope_addon.capture.left_right import repair_left_right
+
+    person = Person(lambda t: (300 + t, 200), BLUE, swapped=range(15, 110))
+    (track,) = follow([person], 120)
+    left, right = (track.keypoints_px[:, k, 0] for k in (11, 12))
+    assert (left < right).sum() == 95
+    repaired = repair_left_right(track)
+    assert (repaired.keypoints_px[:, 11, 0] > repaired.keypoints_px[:, 12, 0]).all()
+    assert len(track.judged_rows) <= 120 // 30 + 3
+
+
+def panels(shared: Path, camera: str) -> tuple[list[np.ndarray], np.ndarray]:
+    """The middle of a clip, 500 pixels high, and the true middle of the trunk in each frame, (100, 2) pixels."""
+    truth = np.load(shared / f"data/pose2sim/truth_{camera}.npz")
+    names = [str(n) for n in truth["names"]]
+    trunk = [names.index(n) for n in ("LShoulder", "RShoulder", "LHip", "RHip")]
+    at = np.full((100, 2), np.nan)
+    at[truth["frame_index"]] = np.nanmean(truth["uv"][:, trunk], axis=1)
+    left, top, right, bottom = 60, 330, 860, 1330
+    video = cv2.VideoCapture(str(shared / f"data/pose2sim/{camera}.mp4"))
+    images = [video.read()[1][top:bottom, left:right, ::-1] for _ in range(100)]
+    return [cv2.resize(i, (400, 500), interpolation=cv2.INTER_AREA) for i in images], (at - [left, top]) / 2
+
+
+def composite(shared: Path, cameras: tuple[str, str], crossing: bool) -> Iterator[tuple[np.ndarray, np.ndarray, bool]]:
+    """Frames, the true places (2, 2) and whether the first one is hidden; the second clip passes in front."""
+    (back, back_at), (front, front_at) = (panels(shared, camera) for camera in cameras)
+    for t in range(100):
+        x = [round(11 * t), round(11 * (99 - t))] if crossing else [0, 700]
+        image = np.full((520, 1500, 3), 140, np.uint8)
+        for offset, panel in zip(x, (back[t], front[t]), strict=True):
+            image[:500, offset : offset + 400] = panel
+        places = np.stack([back_at[t] + [x[0], 0], front_at[t] + [x[1], 0]])
+        yield image, places, bool(x[1] < places[0, 0] < x[1] + 400)
+
+
+@pytest.mark.parametrize(
+    ("cameras", "crossing"), [(("cam2", "cam3"), True), (("cam4", "cam1"), True), (("cam1", "cam3"), False)]
+)
+def test_real_people_are_never_mixed_up(shared: Path, cameras: tuple[str, str], crossing: bool) -> None:
+    """The same man twice, so that clothes say nothing; hidden for some twenty frames where the clips cross."""
+    try:
+        tracker, builder = PeopleTracker("fast", threads=2, people=2), PeopleBuilder()
+    except SetupError as error:
+        pytest.skip(f"the networks are not built: {error}")
+    places, hidden = [], []
+    for t, (image, at, is_hidden) in enumerate(composite(shared, cameras, crossing)):
+        builder.add(t, t / 60, tracker.step(image))
+        places.append(at)
+        hidden.append(is_hidden)
+    truth, visible = np.array(places), ~np.array(hidden)
+    assert visible.sum() >= 75
+    assert crossing == (not visible.all())
+    tracks = builder.build(2)
+    assert len(tracks) == 2
+    found = []
+    for track in tracks:
+        trunk = track.keypoints_px[:, [11, 12, 23, 24]].mean(axis=1)
+        distance = np.linalg.norm(trunk[:, None] - truth, axis=-1)
+        rows = track.seen & visible & np.isfinite(truth).all(axis=(1, 2))
+        people = np.unique(distance[rows].argmin(axis=1))
+        assert len(people) == 1, "switched"
+        assert np.percentile(distance[rows].min(axis=1), 90) < 40
+        found.append(int(people[0]))
+    assert sorted(found) == [0, 1]
+    for track, person in zip(tracks, found, strict=True):
+        assert track.seen[visible].mean() >= (0.98 if person == 1 or not crossing else 0.9)
