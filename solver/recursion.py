@@ -48,8 +48,7 @@ def make_workspace(tree: Tree) -> Workspace:
     n, w = len(tree.parents), tree.S.shape[2]
     row = SHAPE + w
     shapes: list[tuple[int, ...]] = [(n, 6, row), (n, 3, row), (n, 6), (6, row), (w, w), (w,), (n, 6), (n, 3), (w,)]
-    arrays = [np.zeros(shape) for shape in shapes]
-    return Workspace(*arrays, scratch=make_scratch(tree))
+    return Workspace(*[np.zeros(shape) for shape in shapes] + [make_scratch(tree)])
 
 
 def _moment_formula(s, A, Y, _):  # type: ignore[no-untyped-def]
