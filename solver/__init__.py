@@ -8,9 +8,9 @@ fit(body, Measurements(intrinsics, keypoints2d=Keypoints2D(indices, pixels, conf
 from .body import Body, load_body
 from .clip import carry, fit_clip
 from .errors import ShapeError
+from .frame_solver import FrameSolver, fit, fit_tree
 from .learned_prior import JointPrior, load_joint_prior
 from .measurements import Keypoints2D, Keypoints3D, Measurements, OrientationField, PosePriors
-from .optimizer import fit, fit_tree
 from .options import COLD_STAGES, WARM_STAGES, Options, Priors, Stage, Weights, default_priors
 from .state import ClipFit, Fit, State, Status
 from .temporal import Temporal, with_previous
@@ -23,6 +23,7 @@ __all__ = [
     "BodyArrays",
     "ClipFit",
     "Fit",
+    "FrameSolver",
     "JointPrior",
     "Keypoints2D",
     "Keypoints3D",

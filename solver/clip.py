@@ -14,16 +14,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .errors import ShapeError
+from .frame_solver import fit_tree
 from .linearize import linearize, make_blocks, make_pose
 from .measurements import Measurements
-from .optimizer import CONVERGED, DAMPING_LEAST, DAMPING_MOST, MAX_ITERATIONS, NON_FINITE, STALLED, fit_tree
+from .optimizer import CONVERGED, DAMPING_LEAST, DAMPING_MOST, MAX_ITERATIONS, NON_FINITE, STALLED
 from .options import WARM_STAGES, Options, Priors, default_priors
 from .recursion import Workspace, eliminate, make_workspace, retract, solve_globals, substitute
 from .residuals.part import Array, Blocks, Pose
 from .residuals.registry import SHAPE_PRIOR
 from .state import ClipFit, Fit, State, Status
 from .temporal import Temporal, with_previous
-from .terms import Terms, make_terms
+from .terms import Terms, make_terms, usable
 from .tree import BodyArrays, Tree, make_tree, with_fixed_shape
 
 
@@ -73,10 +74,10 @@ def fit_clip(
         measurements = [measurements[0], *pulled]
     clip_tree = make_tree(body, focal)
     frames = [_Frame(clip_tree, make_terms(clip_tree, m, priors), s) for m, s in zip(measurements, init, strict=True)]
-    usable = [k for k, frame in enumerate(frames) if frame.count]
-    chosen = usable
-    if len(usable) > shape_frames > 0:
-        chosen = [usable[k] for k in np.linspace(0, len(usable) - 1, shape_frames).round().astype(int)]
+    seen = [k for k, frame in enumerate(frames) if frame.count]
+    chosen = seen
+    if len(seen) > shape_frames > 0:
+        chosen = [seen[k] for k in np.linspace(0, len(seen) - 1, shape_frames).round().astype(int)]
     joint = _Joint(clip_tree, [frames[k] for k in chosen], priors, options, focal_weight if focal else 0.0)
     joint.run()
     beta, scale = joint.beta[: tree.shape].copy(), float(np.exp(joint.log_focal))
@@ -135,7 +136,7 @@ class _Frame:
     @property
     def count(self) -> int:
         """Usable measurements."""
-        return len(self.terms.flags) + len(self.terms.ints[0])
+        return usable(self.terms)
 
 
 @dataclass

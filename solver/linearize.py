@@ -163,6 +163,8 @@ def linearize(
         hx, hy, hz, nx, ny, nz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
         for j in range(terms.starts[i], terms.starts[i + 1]):
             flags = terms.flags[j]
+            if flags <= HAS_SHAPE:
+                continue
             vx, vy, vz = rest[j, 0], rest[j, 1], rest[j, 2]
             if flags & HAS_SHAPE:
                 for a in range(P):

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .errors import ShapeError
+from .kernel import kernel
 from .residuals import pose_prior
 from .residuals.part import Array
 
@@ -19,6 +20,8 @@ from .residuals.part import Array
 def as_array(value: ArrayLike, shape: tuple[int | None, ...], name: str) -> Array:
     """Return `value` as contiguous float64 of `shape` (None: any length). Raises ShapeError."""
     array = np.ascontiguousarray(value, dtype=np.float64)
+    if array.shape == shape and array.ndim:
+        return array
     if len(shape) != array.ndim or any(n is not None and n != m for n, m in zip(shape, array.shape, strict=True)):
         wanted = ", ".join("n" if n is None else str(n) for n in shape) + ("," if len(shape) == 1 else "")
         raise ShapeError(f"{name} must have shape ({wanted}), but got shape {array.shape}.")
@@ -28,11 +31,37 @@ def as_array(value: ArrayLike, shape: tuple[int | None, ...], name: str) -> Arra
 def as_indices(value: ArrayLike, limit: int, name: str) -> Array:
     """Return `value` as int64 indices (n,) in 0..limit-1. Raises ShapeError."""
     array = np.asarray(value)
-    if array.ndim != 1 or (array.size and not np.issubdtype(array.dtype, np.integer)):
+    if array.ndim != 1 or (array.size and array.dtype.kind not in "iu"):
         raise ShapeError(f"{name} must be integers of shape (n,), but got {array.dtype} of shape {array.shape}.")
-    if array.size and (array.min() < 0 or array.max() >= limit):
+    array = np.ascontiguousarray(array, dtype=np.int64)
+    if not _all_below(array, limit):
         raise ShapeError(f"{name} must lie in 0..{limit - 1}, but go from {array.min()} to {array.max()}.")
-    return np.ascontiguousarray(array, dtype=np.int64)
+    return array
+
+
+@kernel
+def _all_below(indices: Array, limit: int) -> bool:
+    for k in range(indices.shape[0]):
+        if not 0 <= indices[k] < limit:
+            return False
+    return True
+
+
+@kernel
+def _normalize(K: Array, pixels: Array, confidence: Array, out: Array) -> bool:
+    """Write normalized image coordinates and confidence; False if the intrinsics K are not usable."""
+    total = 0.0
+    for r in range(3):
+        for c in range(3):
+            total += 0.0 * K[r, c]
+    if total != 0.0 or not K[0, 0] > 0.0 or not K[1, 1] > 0.0:
+        return False
+    for k in range(out.shape[0]):
+        v = (pixels[k, 1] - K[1, 2]) / K[1, 1]
+        out[k, 0] = (pixels[k, 0] - K[0, 2] - K[0, 1] * v) / K[0, 0]
+        out[k, 1] = v
+        out[k, 2] = confidence[k]
+    return True
 
 
 @dataclass
@@ -103,12 +132,9 @@ class Measurements:
         if self.intrinsics is None:
             raise ShapeError("2D keypoints need the camera's intrinsics, shape (3, 3), but got None.")
         K = as_array(self.intrinsics, (3, 3), "Intrinsics")
-        if not (np.isfinite(K).all() and K[0, 0] > 0 and K[1, 1] > 0):
-            raise ShapeError(f"Intrinsics must be finite with positive focal lengths, but got {K.tolist()}.")
         out = np.empty((n, 3))
-        out[:, 1] = (pixels[:, 1] - K[1, 2]) / K[1, 1]
-        out[:, 0] = (pixels[:, 0] - K[0, 2] - K[0, 1] * out[:, 1]) / K[0, 0]
-        out[:, 2] = as_array(m.confidence, (n,), "Confidence of 2D keypoints")
+        if not _normalize(K, pixels, as_array(m.confidence, (n,), "Confidence of 2D keypoints"), out):
+            raise ShapeError(f"Intrinsics must be finite with positive focal lengths, but got {K.tolist()}.")
         return indices, out
 
     def packed3d(self, points: int) -> tuple[Array, Array]:

@@ -195,9 +195,36 @@ def matrix_from_quaternion(quaternion: ArrayLike) -> Array:
     return np.eye(3) + 2.0 * q[..., :1, None] * cross + 2.0 * (cross @ cross)
 
 
+@kernel
+def orthonormalize(R) -> bool:  # type: ignore[no-untyped-def]
+    """Make nearly orthonormal matrices (n, 3, 3) so to rounding, R <- R (3 I - RᵀR) / 2; False at one that is not."""
+    for k in range(R.shape[0]):
+        M = R[k]
+        n00 = M[0, 0] * M[0, 0] + M[1, 0] * M[1, 0] + M[2, 0] * M[2, 0] - 1.0
+        n11 = M[0, 1] * M[0, 1] + M[1, 1] * M[1, 1] + M[2, 1] * M[2, 1] - 1.0
+        n22 = M[0, 2] * M[0, 2] + M[1, 2] * M[1, 2] + M[2, 2] * M[2, 2] - 1.0
+        n01 = M[0, 0] * M[0, 1] + M[1, 0] * M[1, 1] + M[2, 0] * M[2, 1]
+        n02 = M[0, 0] * M[0, 2] + M[1, 0] * M[1, 2] + M[2, 0] * M[2, 2]
+        n12 = M[0, 1] * M[0, 2] + M[1, 1] * M[1, 2] + M[2, 1] * M[2, 2]
+        worst = max(max(max(abs(n00), abs(n11)), abs(n22)), max(max(abs(n01), abs(n02)), abs(n12)))
+        det = M[0, 0] * (M[1, 1] * M[2, 2] - M[1, 2] * M[2, 1])
+        det += M[0, 1] * (M[1, 2] * M[2, 0] - M[1, 0] * M[2, 2])
+        det += M[0, 2] * (M[1, 0] * M[2, 1] - M[1, 1] * M[2, 0])
+        if not (worst < 1e-7 and det > 0.0):
+            return False
+        for r in range(3):
+            a, b, c = 0.5 * M[r, 0], 0.5 * M[r, 1], 0.5 * M[r, 2]
+            M[r, 0] -= a * n00 + b * n01 + c * n02
+            M[r, 1] -= a * n01 + b * n11 + c * n12
+            M[r, 2] -= a * n02 + b * n12 + c * n22
+    return True
+
+
 def nearest_rotation(matrix: ArrayLike) -> Array:
     """Return the rotations (..., 3, 3) nearest to matrices in the Frobenius norm; the identity for non-finite ones."""
-    m = _array(matrix, (3, 3), "A matrix")
+    m = np.array(_array(matrix, (3, 3), "A matrix"), order="C")
+    if orthonormalize(m.reshape(-1, 3, 3)):
+        return m
     m = np.where(np.isfinite(m).all(axis=(-2, -1), keepdims=True), m, np.eye(3))
     u, _, vt = np.linalg.svd(m)
     u[..., :, 2] *= np.linalg.det(u @ vt)[..., None]

@@ -51,30 +51,22 @@ def _common_part(tree: Tree, a: int, b: int) -> tuple:
 
 
 @allocating_kernel
-def _pack(tree: Tree, i2, m2, i3, m3, i_start, i_end, md) -> tuple:  # type: ignore[no-untyped-def]
-    """Return (starts, flags, rest, V, image, point, direction, first direction without a common part or -1).
+def _lay_out(tree: Tree, i2, i3, i_start, i_end) -> tuple:  # type: ignore[no-untyped-def]
+    """Return (starts, shaped, rest, V, slots of 2D, of 3D, of directions, first direction without a common part or -1).
 
-    Points measured in several ways share one slot, unless one way repeats. Terms without confidence, or with a value
-    that is not finite, are left out.
+    Points measured in several ways share one slot, unless one way repeats. `shaped` is HAS_SHAPE where V is not zero.
     """
     n_points, W = tree.V.shape[0], tree.S.shape[2]
     n_parts = tree.parents.shape[0]
-    most = i2.shape[0] + i3.shape[0] + i_end.shape[0]
+    counts = (i2.shape[0], i3.shape[0], i_end.shape[0])
+    most = counts[0] + counts[1] + counts[2]
     of_point = np.full(n_points + n_parts, -1, np.int64)  # after the points: joints as points of their parents
-    part, kind = np.empty(most, np.int64), np.zeros(most, np.int64)
-    rest, V = np.zeros((most, 3)), np.zeros((most, 3, W))
-    image, point, direction = np.zeros((most, 3)), np.zeros((most, 4)), np.zeros((most, 4))
-    n = 0
-    bad = -1
+    part, listed = np.empty(most, np.int64), np.zeros(most, np.int64)
+    point, minus = np.empty(most, np.int64), np.full(most, -1, np.int64)  # numbered as of_point
+    slots = np.empty(most, np.int64)
+    n, term = 0, 0
     for way in range(3):
-        count = i2.shape[0] if way == 0 else (i3.shape[0] if way == 1 else i_end.shape[0])
-        for k in range(count):
-            values = m2[k] if way == 0 else (m3[k] if way == 1 else md[k])
-            finite = True
-            for v in values:
-                finite = finite and np.isfinite(v)
-            if not finite or values[-1] <= 0.0:
-                continue
+        for k in range(counts[way]):
             first, last = -1, -1
             if way < 2:
                 end = i2[k] if way == 0 else i3[k]
@@ -83,57 +75,142 @@ def _pack(tree: Tree, i2, m2, i3, m3, i_start, i_end, md) -> tuple:  # type: ign
                 end = i_end[k]
                 i, first, last = _common_part(tree, i_start[k], end)
                 if i < 0:
-                    bad = k
-                    break
-                norm = np.sqrt(values[0] ** 2 + values[1] ** 2 + values[2] ** 2)
-                if norm < 1e-9:
-                    continue
+                    empty = np.zeros(0, np.int64)
+                    return empty, empty, np.zeros((0, 3)), np.zeros((0, 3, W)), empty, empty, empty, k
             key = end if last < 0 else n_points + last
             from_origin = way < 2 or (first < 0 and i_start[k] == tree.keypoints + i)
             slot = of_point[key] if from_origin else -1
             bit = HAS_2D if way == 0 else (HAS_3D if way == 1 else HAS_DIRECTION)
-            if slot < 0 or kind[slot] & bit:
+            if slot < 0 or listed[slot] & bit:
                 slot = n
                 n += 1
+                part[slot], point[slot] = i, key
                 if from_origin:
                     of_point[key] = slot
-                part[slot] = i
-                if last < 0:
-                    rest[slot], V[slot] = tree.v_bar[end], tree.V[end]
                 else:
-                    rest[slot], V[slot] = tree.l[last], tree.S[last]
-                if not from_origin:
-                    if first < 0:
-                        rest[slot] -= tree.v_bar[i_start[k]]
-                        V[slot] -= tree.V[i_start[k]]
-                    else:
-                        rest[slot] -= tree.l[first]
-                        V[slot] -= tree.S[first]
-                for r in range(3):
-                    for a in range(W):
-                        if V[slot, r, a] != 0.0:
-                            kind[slot] |= HAS_SHAPE
-            kind[slot] |= bit
-            if way == 0:
-                image[slot, 0], image[slot, 1], image[slot, 2] = values[0], values[1], values[2]
-            elif way == 1:
-                for r in range(4):
-                    point[slot, r] = values[r]
-            else:
-                for r in range(3):
-                    direction[slot, r] = values[r] / norm
-                direction[slot, 3] = values[3]
+                    minus[slot] = i_start[k] if first < 0 else n_points + first
+            listed[slot] |= bit
+            slots[term] = slot
+            term += 1
     starts = np.zeros(n_parts + 1, np.int64)
     for k in range(n):
         starts[part[k] + 1] += 1
     for i in range(n_parts):
         starts[i + 1] += starts[i]
-    order = np.empty(n, np.int64)
-    free = starts[:-1].copy()
+    shaped, rest, V = np.zeros(n, np.int64), np.zeros((n, 3)), np.zeros((n, 3, W))
+    place, free = np.empty(n, np.int64), starts[:-1].copy()
     for k in range(n):
-        order[free[part[k]]] = k
+        at = free[part[k]]
         free[part[k]] += 1
-    return starts, kind[order], rest[order], V[order], image[order], point[order], direction[order], bad
+        place[k] = at
+        for sign, key in ((1.0, point[k]), (-1.0, minus[k])):
+            if key < 0:
+                continue
+            for r in range(3):
+                rest[at, r] += sign * (tree.v_bar[key, r] if key < n_points else tree.l[key - n_points, r])
+                for c in range(W):
+                    V[at, r, c] += sign * (tree.V[key, r, c] if key < n_points else tree.S[key - n_points, r, c])
+        for r in range(3):
+            for c in range(W):
+                if V[at, r, c] != 0.0:
+                    shaped[at] = HAS_SHAPE
+    for k in range(most):
+        slots[k] = place[slots[k]]
+    a, b = counts[0], counts[0] + counts[1]
+    return starts, shaped, rest, V, slots[:a], slots[a:b], slots[b:], -1
+
+
+@kernel
+def _finite(values, k: int) -> bool:  # type: ignore[no-untyped-def]
+    """Whether row k is finite and its confidence, the last, is positive."""
+    last = values.shape[1] - 1
+    total = 0.0
+    for r in range(last + 1):
+        total += 0.0 * values[k, r]
+    return total == 0.0 and values[k, last] > 0.0
+
+
+@kernel
+def _fill(  # type: ignore[no-untyped-def]
+    shaped, slots2, slots3, slots_d, m2, m3, md, flags, image, point, direction
+) -> int:
+    """Write the values and flags of all that is usable; return how many slots have anything."""
+    for k in range(flags.shape[0]):
+        flags[k] = shaped[k]
+    for k in range(slots2.shape[0]):
+        if _finite(m2, k):
+            at = slots2[k]
+            flags[at] |= HAS_2D
+            for r in range(3):
+                image[at, r] = m2[k, r]
+    for k in range(slots3.shape[0]):
+        if _finite(m3, k):
+            at = slots3[k]
+            flags[at] |= HAS_3D
+            for r in range(4):
+                point[at, r] = m3[k, r]
+    for k in range(slots_d.shape[0]):
+        norm = np.sqrt(md[k, 0] ** 2 + md[k, 1] ** 2 + md[k, 2] ** 2)
+        if _finite(md, k) and norm >= 1e-9:
+            at = slots_d[k]
+            flags[at] |= HAS_DIRECTION
+            for r in range(3):
+                direction[at, r] = md[k, r] / norm
+            direction[at, 3] = md[k, 3]
+    count = 0
+    for k in range(flags.shape[0]):
+        if flags[k] & (HAS_2D | HAS_3D | HAS_DIRECTION):
+            count += 1
+    return count
+
+
+@kernel
+def _same(a, b) -> bool:  # type: ignore[no-untyped-def]
+    """Whether two lists of indices are equal."""
+    if a.shape[0] != b.shape[0]:
+        return False
+    for k in range(a.shape[0]):
+        if a[k] != b[k]:
+            return False
+    return True
+
+
+class Layout:
+    """Which slot every measurement goes to: the part of `Terms` that stays while the same points are measured."""
+
+    def __init__(self, tree: Tree, indices: tuple[Array, ...]) -> None:
+        """Lay out the slots for indices of 2D, 3D, and starts and ends of directions. Raises ShapeError."""
+        self.indices = tuple(index.copy() for index in indices)
+        self.starts, self.shaped, self.rest, self.V, *slots, bad = _lay_out(tree, *self.indices)
+        self.slots = tuple(slots)
+        if bad >= 0:
+            raise ShapeError(
+                f"Orientation {bad} goes from point {indices[2][bad]} to point {indices[3][bad]}, which no body part "
+                f"has in common; both ends must be fixed to one part."
+            )
+        n = len(self.rest)
+        self.values = np.zeros(n, np.int64), np.zeros((n, 3)), np.zeros((n, 4)), np.zeros((n, 4))
+
+    def fits(self, indices: tuple[Array, ...]) -> bool:
+        """Whether it is the layout of these indices."""
+        return all(_same(a, b) for a, b in zip(self.indices, indices, strict=True))
+
+
+class PackedPriors(NamedTuple):
+    """Priors laid out for the kernels."""
+
+    tables: dict[str, tuple[Array, Array]]
+    shape_mean: Array  # (W,)
+    shape_information: Array  # (W, W)
+
+
+def pack_priors(tree: Tree, priors: "Priors") -> PackedPriors:
+    """Check and lay out the priors. Raises ShapeError."""
+    tables = empty_tables()
+    tables.update(priors.packed_tables(len(tree.parents) - 1))
+    W = tree.S.shape[2]
+    mean, information = priors.packed_shape(tree.shape)
+    return PackedPriors(tables, _padded(mean, (W,)), _padded(information, (W, W)))
 
 
 def _padded(a: Array, shape: tuple[int, ...]) -> Array:
@@ -158,35 +235,41 @@ def _checked_table(name: str, table: tuple[Array, Array]) -> tuple[Array, Array]
 
 def make_terms(tree: Tree, measurements: "Measurements", priors: "Priors") -> Terms:
     """Pack one frame's measurements and priors. Raises ShapeError naming the array that does not fit the body."""
+    return fill_terms(tree, measurements, pack_priors(tree, priors), None)[0]
+
+
+def fill_terms(
+    tree: Tree, measurements: "Measurements", priors: PackedPriors, layout: Layout | None
+) -> tuple[Terms, int, Layout]:
+    """Return the terms, how many slots are in use, and the layout, whose arrays the terms share.
+
+    `layout` is an earlier frame's: it is used again where the same points were measured.
+    """
     m = measurements
     n_points = len(tree.point_part)
     i2, m2 = m.packed2d(n_points)
     i3, m3 = m.packed3d(n_points)
     starts, ends, md = m.packed_directions(n_points)
-    offsets, flags, rest, V, image, point, direction, bad = _pack(tree, i2, m2, i3, m3, starts, ends, md)
-    if bad >= 0:
-        raise ShapeError(
-            f"Orientation {bad} goes from point {starts[bad]} to point {ends[bad]}, which no body part has in common; "
-            f"both ends must be fixed to one part."
-        )
-    tables = empty_tables()
-    K, P, W = len(tree.parents) - 1, tree.shape, tree.S.shape[2]
-    tables.update(m.packed_tables(K))
-    tables.update(priors.packed_tables(K))
-    for name, table in m.tables.items():
-        ints, floats = _checked_table(name, table)
-        tables[name] = np.concatenate([tables[name][0], ints]), np.concatenate([tables[name][1], floats])
-    mean, information = priors.packed_shape(P)
-    return Terms(
-        offsets,
-        flags,
-        rest,
-        V,
-        image,
-        point,
-        direction,
-        tuple(np.ascontiguousarray(tables[name][0], dtype=np.int64) for name in RESIDUALS),
-        tuple(np.ascontiguousarray(tables[name][1], dtype=np.float64) for name in RESIDUALS),
-        _padded(mean, (W,)),
-        _padded(information, (W, W)),
-    )
+    indices = i2, i3, starts, ends
+    if layout is None or not layout.fits(indices):
+        layout = Layout(tree, indices)
+    count = _fill(layout.shaped, *layout.slots, m2, m3, md, *layout.values)
+    tables = priors.tables
+    own = m.packed_tables(len(tree.parents) - 1)
+    if own or m.tables:
+        tables = {**tables, **own}
+        for name, table in m.tables.items():
+            more = _checked_table(name, table)
+            tables[name] = np.concatenate([tables[name][0], more[0]]), np.concatenate([tables[name][1], more[1]])
+    ints = tuple([np.ascontiguousarray(tables[name][0], dtype=np.int64) for name in RESIDUALS])
+    floats = tuple([np.ascontiguousarray(tables[name][1], dtype=np.float64) for name in RESIDUALS])
+    terms = Terms(
+        layout.starts, layout.values[0], layout.rest, layout.V, *layout.values[1:], ints, floats,
+        priors.shape_mean, priors.shape_information,
+    )  # fmt: skip
+    return terms, count, layout
+
+
+def usable(terms: Terms) -> int:
+    """Return how many points, directions and poses were measured."""
+    return int(np.count_nonzero(terms.flags & ~HAS_SHAPE)) + len(terms.ints[0])
