@@ -67,7 +67,7 @@ class JobProgress:
         """What is being done, and, where known, how fast and for how long."""
         doing = self.stage.capitalize()
         if self.total > 0:
-            doing += f", {self.done} of {self.total} frames"
+            doing += f", {self.done} of {self.total}"
         lines = [doing]
         if self.compiling:
             lines.append("First use: preparing the solver takes a minute")

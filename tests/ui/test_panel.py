@@ -145,7 +145,7 @@ def test_progress_says_stage_speed_and_time_left():
     progress.update("finding the person", 50, 100)
     assert progress.frames_per_second == pytest.approx(5.0)
     assert 0.3 < progress.fraction < 0.4
-    assert progress.lines()[0] == "Finding the person, 50 of 100 frames"
+    assert progress.lines()[0] == "Finding the person, 50 of 100"
     assert progress.lines()[1].startswith("5.0 frames/s, ")
     before = progress.fraction
     progress.update("finding the shape", 0, 0)
