@@ -16,17 +16,16 @@ from scope.scope_addon.capture.landmark_network import KEYPOINT_NAMES, PoseEstim
 from scope.scope_addon.capture.person_detector import Detection
 from scope.scope_addon.capture.region import Region
 
-_HEIGHTS = {"shoulder": -0.5, "elbow": -0.3, "wrist": -0.1, "hip": 0.0, "knee": 0.45, "ankle": 0.85, "heel": 0.9, "foot": 0.9}
-_BODY = np.array(
-    [
-        [
-            (0.15 if "left" in name else -0.15 if "right" in name else 0.0) * (2 if "wrist" in name else 1),
-            next((h for key, h in _HEIGHTS.items() if key in name), -0.2 if "_" in name and "mouth" not in name else -0.7),
-            0.0,
-        ]
-        for name in KEYPOINT_NAMES
-    ]
-)
+_HEIGHTS = {"shoulder": -0.5, "elbow": -0.3, "wrist": -0.1, "hip": 0.0, "knee": 0.45, "ankle": 0.85, "heel": 0.9}
+_HEIGHTS |= {"foot": 0.9, "pinky": -0.05, "index": -0.05, "thumb": -0.05}
+
+
+def _joint(name: str) -> tuple[float, float, float]:
+    side = 0.15 if "left" in name else -0.15 if "right" in name else 0.0
+    return (2 * side if "wrist" in name else side), next((h for key, h in _HEIGHTS.items() if key in name), -0.7), 0.0
+
+
+_BODY = np.array([_joint(name) for name in KEYPOINT_NAMES])
 
 
 @dataclass

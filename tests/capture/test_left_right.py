@@ -6,7 +6,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scope.scope_addon.capture.landmark_network import KEYPOINT_NAMES
-from scope.scope_addon.capture.left_right import SWAPPED, find_swapped_frames
+from scope.scope_addon.capture.left_right import EXCHANGED, SWAPPED, TURNED, find_labels, labelled, repair_left_right
+from scope.scope_addon.capture.track import Track
 
 
 def walker(count: int, turn_rad: float = 0.0) -> np.ndarray:
@@ -33,7 +34,7 @@ def test_minority_stretch_is_found(stretch: slice, turn_rad: float) -> None:
     expected = np.zeros(120, bool)
     expected[stretch] = True
     world[stretch] = world[stretch][:, SWAPPED]
-    np.testing.assert_array_equal(find_swapped_frames(world), expected)
+    np.testing.assert_array_equal(find_labels(world) == EXCHANGED, expected)
 
 
 def test_gaps_and_new_people() -> None:
@@ -43,15 +44,57 @@ def test_gaps_and_new_people() -> None:
     world[expected] = world[expected][:, SWAPPED]
     world[28:33] = np.nan
     expected[28:30] = False
-    np.testing.assert_array_equal(find_swapped_frames(world), expected)
+    np.testing.assert_array_equal(find_labels(world) == EXCHANGED, expected)
     # someone else, seen from behind, for the second half: no exchange
     other = np.concatenate([walker(40), walker(30)[:, SWAPPED]])
     starts = np.arange(70) == 40
-    assert not find_swapped_frames(other, starts).any()
-    assert find_swapped_frames(other)[40:].all()
+    assert not find_labels(other, starts).any()
+    assert find_labels(other)[40:].all()
+
+
+@pytest.mark.parametrize("turn_rad", [0.0, np.pi])
+def test_few_judged_frames_overrule_the_majority(turn_rad: float) -> None:
+    right = walker(120, turn_rad)
+    expected = np.zeros(120, int)
+    expected[20:100] = EXCHANGED
+    expected[40:60] = TURNED
+    wrong = labelled(right, expected)  # both exchanges undo themselves
+    judged = np.full_like(right, np.nan)
+    judged[::30] = right[::30] + np.random.default_rng(0).normal(0, 0.05, (4, 33, 3))
+    np.testing.assert_array_equal(find_labels(wrong, judged=judged), expected)
+    np.testing.assert_allclose(labelled(wrong, expected), right)
+
+
+def test_a_track_is_repaired_and_left_alone_where_nobody_was_seen() -> None:
+    right = walker(90)
+    wrong, seen = right.copy(), np.ones(90, bool)
+    wrong[10:70] = wrong[10:70][:, SWAPPED]
+    wrong[80:85] += [0.0, 0.0, 0.5]  # what the judge sees otherwise
+    seen[40:44] = False
+    rows = np.array([0, 30, 60, 82])
+    track = Track(
+        frames=np.arange(90),
+        times=np.arange(90) / 30,
+        seen=seen,
+        keypoints_px=np.where(seen[:, None, None], wrong[..., :2], 0),
+        confidence=np.where(seen[:, None], wrong[..., 0], 0),
+        world_landmarks=np.where(seen[:, None, None], wrong, 0),
+        acquired=np.arange(90) == 0,
+        judged_rows=rows,
+        judged_landmarks=right[rows],
+    )
+    repaired = repair_left_right(track)
+    calm = seen & (np.arange(90) < 75)
+    np.testing.assert_allclose(repaired.world_landmarks[calm], right[calm], atol=1e-9)
+    np.testing.assert_allclose(repaired.keypoints_px[calm], right[calm][..., :2])
+    np.testing.assert_allclose(repaired.confidence[calm], right[calm][..., 0])
+    np.testing.assert_allclose(repaired.world_landmarks[82], right[82], atol=1e-9)
+    assert (np.abs(repaired.world_landmarks - wrong)[81:84, :, 2].mean(axis=1) > 0.3).all()
+    assert not repaired.world_landmarks[~seen].any()
+    assert not repaired.keypoints_px[~seen].any()
 
 
 def test_nothing_to_do() -> None:
-    assert find_swapped_frames(np.zeros((0, 33, 3))).shape == (0,)
-    assert not find_swapped_frames(np.full((5, 33, 3), np.nan)).any()
-    assert not find_swapped_frames(np.zeros((5, 33, 3))).any()
+    assert find_labels(np.zeros((0, 33, 3))).shape == (0,)
+    assert not find_labels(np.full((5, 33, 3), np.nan)).any()
+    assert not find_labels(np.zeros((5, 33, 3))).any()

@@ -39,7 +39,7 @@ def test_frames_of_a_part_are_those_of_the_whole(long_video: Path, start: float,
         frames = list(video)
         assert video.expected_frames == pytest.approx(len(frames), abs=1)
         assert not video.warnings
-    assert [f.index for f in frames] == [k for k in range(60 * FPS) if start <= k / FPS + 1e-6 and k / FPS <= end + 1e-6]
+    assert [f.index for f in frames] == [k for k in range(60 * FPS) if start - 1e-6 <= k / FPS <= end + 1e-6]
     assert [shown(f) for f in frames] == [f.index for f in frames]
     assert [f.timestamp_s for f in frames] == pytest.approx([f.index / FPS for f in frames])
 
@@ -47,7 +47,7 @@ def test_frames_of_a_part_are_those_of_the_whole(long_video: Path, start: float,
 def test_resampled(long_video: Path) -> None:
     with open_video(long_video, VideoRange(1.0, 2.0, Fraction(10))) as video:
         assert video.fps == 10
-        assert [f.index for f in video] == pytest.approx([25, 27.5, 30, 32.5, 35, 37.5, 40, 42.5, 45, 47.5, 50], abs=0.5)
+        assert [f.index for f in video] == pytest.approx(list(np.arange(25, 51, 2.5)), abs=0.5)
     with open_video(long_video, VideoRange(1.0, 2.0, Fraction(60))) as video:
         assert video.fps == FPS
         assert [f.index for f in video] == list(range(25, 51))
