@@ -68,6 +68,7 @@ class FrameSolver:
         self._poses = make_pose(tree), make_pose(tree)
         self._blocks = make_blocks(tree), make_blocks(tree)
         self._work = make_workspace(tree)
+        self._rest = np.tile(np.eye(3), (len(tree.parents) - 1, 1, 1))
         self._layout: Layout | None = None
         self._packed: tuple[Priors, PackedPriors] | None = None
         self._schedules: list[tuple[Options, Sequence[Stage], tuple[Array, Array, Array]]] = []
@@ -116,7 +117,7 @@ class FrameSolver:
 
     def _mean(self, priors: Priors) -> Array:
         if priors.joint_mean is None:
-            return np.tile(np.eye(3), (len(self.tree.parents) - 1, 1, 1))
+            return self._rest
         return np.asarray(priors.joint_mean, dtype=np.float64)
 
     def _enter(self, state: State) -> None:

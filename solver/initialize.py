@@ -9,62 +9,122 @@ Position: by 3D keypoints, the difference of centroids; by 2D keypoints, the lin
 
 import numpy as np
 
-from .linearize import place_parts
+from .kernel import kernel
+from .linearize import make_pose, place_parts
 from .residuals.part import Array
 from .state import State
 from .terms import HAS_2D, HAS_3D, HAS_DIRECTION, Terms
 from .tree import Tree
 
 NEAREST, FARTHEST = 0.3, 100.0  # metres, of the first guess
+FRONTAL = np.diag([1.0, -1.0, -1.0])  # upright and facing the camera
+DISTANCE = 3.0
 
 
-def _rotation_onto(source: Array, target: Array, weight: Array) -> Array | None:
-    """Return R minimizing sum w |R source - target|^2, or None where the vectors do not fix it."""
-    u, s, vt = np.linalg.svd((target * weight[:, None]).T @ source)
+@kernel
+def _moments(tree, terms, pose, points, space, directed) -> None:  # type: ignore[no-untyped-def]
+    """Place the parts; write every slot's point (n, 3), and sums w, w s (3), w m (3), w m sᵀ (9) of two kinds.
+
+    space: s the points and m where they were measured; directed: s the levers and m the measured directions.
+    """
+    place_parts(tree, pose)
+    for i in range(tree.parents.shape[0]):
+        for j in range(terms.starts[i], terms.starts[i + 1]):
+            x, y, z = terms.rest[j, 0], terms.rest[j, 1], terms.rest[j, 2]
+            for a in range(tree.shape):
+                x += terms.V[j, 0, a] * pose.beta[a]
+                y += terms.V[j, 1, a] * pose.beta[a]
+                z += terms.V[j, 2, a] * pose.beta[a]
+            flags = terms.flags[j]
+            for r in range(3):
+                e = pose.R[i, r, 0] * x + pose.R[i, r, 1] * y + pose.R[i, r, 2] * z
+                points[j, r] = e + pose.t[i, r]
+                if flags & HAS_DIRECTION:
+                    w = terms.direction[j, 3]
+                    directed[1 + r] += w * e
+                    for k in range(3):
+                        directed[7 + 3 * k + r] += w * terms.direction[j, k] * e
+                if flags & HAS_3D:
+                    w = terms.point[j, 3]
+                    space[1 + r] += w * points[j, r]
+                    space[4 + r] += w * terms.point[j, r]
+                    for k in range(3):
+                        space[7 + 3 * k + r] += w * terms.point[j, k] * points[j, r]
+            if flags & HAS_3D:
+                space[0] += terms.point[j, 3]
+            if flags & HAS_DIRECTION:
+                directed[0] += terms.direction[j, 3]
+
+
+@kernel
+def _image_system(terms, points, R, H, g, mean) -> None:  # type: ignore[no-untyped-def]
+    """Add the normal equations H t = g of the module's two rows for each 2D keypoint; mean: sums of w, w u, w v."""
+    for j in range(points.shape[0]):
+        if not terms.flags[j] & HAS_2D:
+            continue
+        u, v, w = terms.image[j, 0], terms.image[j, 1], terms.image[j, 2]
+        x = R[0, 0] * points[j, 0] + R[0, 1] * points[j, 1] + R[0, 2] * points[j, 2]
+        y = R[1, 0] * points[j, 0] + R[1, 1] * points[j, 1] + R[1, 2] * points[j, 2]
+        z = R[2, 0] * points[j, 0] + R[2, 1] * points[j, 1] + R[2, 2] * points[j, 2]
+        a, b = u * z - x, v * z - y
+        H[0, 0] += w
+        H[1, 1] += w
+        H[0, 2] -= w * u
+        H[2, 0] -= w * u
+        H[1, 2] -= w * v
+        H[2, 1] -= w * v
+        H[2, 2] += w * (u * u + v * v)
+        g[0] += w * a
+        g[1] += w * b
+        g[2] -= w * (u * a + v * b)
+        mean[0] += w
+        mean[1] += w * u
+        mean[2] += w * v
+
+
+def _rotation_onto(products: Array) -> Array | None:
+    """Return R maximizing tr(Rᵀ B) for B = sum w target sourceᵀ (3, 3), or None where B does not fix it."""
+    if not np.isfinite(products).all():
+        return None
+    u, s, vt = np.linalg.svd(products)
     if not s[0] > 0 or s[1] < 1e-4 * s[0]:
         return None
-    return u @ np.diag([1.0, 1.0, np.linalg.det(u @ vt)]) @ vt
+    u[:, 2] *= np.linalg.det(u @ vt)
+    return u @ vt
 
 
 def initial_state(tree: Tree, terms: Terms, joint_mean: Array, beta: Array) -> State:
     """Return a first state; finite whatever the measurements are. joint_mean (K, 3, 3), beta (P,)."""
-    K, P = len(tree.parents) - 1, tree.shape
-    state = State(np.eye(3), np.zeros(3), joint_mean.copy(), beta.copy())
-    pose = state.pose(tree)
-    place_parts(tree, pose)
-    part = np.repeat(np.arange(K + 1), np.diff(terms.starts))
-    lever = np.einsum("nij,nj->ni", pose.R[part], terms.rest + terms.V[:, :, :P] @ beta)
-    point = lever + pose.t[part]
-    in_image, in_space = (terms.flags & HAS_2D) > 0, (terms.flags & HAS_3D) > 0
-    directed = (terms.flags & HAS_DIRECTION) > 0
-    frontal = State.rest(K, P)
+    pose = make_pose(tree)
+    pose.Omega[1:] = joint_mean
+    pose.beta[: tree.shape] = beta
+    points, space, directed = np.empty((len(terms.flags), 3)), np.zeros(16), np.zeros(16)
+    _moments(tree, terms, pose, points, space, directed)
     R, t = None, None
-    if in_space.any():
-        weight = terms.point[in_space, 3]
-        source, target = point[in_space], terms.point[in_space, :3]
-        center = np.average(source, axis=0, weights=weight), np.average(target, axis=0, weights=weight)
-        R = _rotation_onto(source - center[0], target - center[1], weight)
-    if R is None and directed.any():
-        R = _rotation_onto(lever[directed], terms.direction[directed, :3], terms.direction[directed, 3])
+    if space[0] > 0.0:
+        products = space[7:].reshape(3, 3) - np.outer(space[4:7], space[1:4] / space[0])
+        R = _rotation_onto(products)
+    if R is None and directed[0] > 0.0:
+        R = _rotation_onto(directed[7:].reshape(3, 3))
     if R is None:
-        R = frontal.R_camera_root
-    if in_space.any():
-        t = center[1] - R @ center[0]
-    elif in_image.any():
-        t = _position_in_image(point[in_image] @ R.T, terms.image[in_image])
+        R = FRONTAL
+    if space[0] > 0.0:
+        t = (space[4:7] - R @ space[1:4]) / space[0]
+    else:
+        t = _position_in_image(terms, points, np.ascontiguousarray(R))
     if t is None or not np.isfinite(t).all():
-        t = frontal.t_camera_root
-    return State(R, t, joint_mean.copy(), beta.copy())
+        t = np.array([0.0, 0.0, DISTANCE])
+    return State(R.copy(), t, joint_mean.copy(), beta.copy())
 
 
-def _position_in_image(points: Array, image: Array) -> Array | None:
-    """Return t (3,) by linear least squares from points (n, 3) and (n, 3) of u, v, confidence; None if behind."""
-    u, v, w = image[:, 0], image[:, 1], np.sqrt(image[:, 2])
-    zero, one = np.zeros_like(u), np.ones_like(u)
-    rows = np.concatenate([np.stack([one, zero, -u], 1) * w[:, None], np.stack([zero, one, -v], 1) * w[:, None]])
-    right = np.concatenate([(u * points[:, 2] - points[:, 0]) * w, (v * points[:, 2] - points[:, 1]) * w])
-    t = np.linalg.lstsq(rows, right, rcond=None)[0]
+def _position_in_image(terms: Terms, points: Array, R: Array) -> Array | None:
+    """Return t (3,) by linear least squares; where it is not in front of the camera, at a distance on the mean ray."""
+    H, g, mean = np.zeros((3, 3)), np.zeros(3), np.zeros(3)
+    _image_system(terms, points, R, H, g, mean)
+    if not mean[0] > 0.0 or not np.isfinite(H).all() or not np.isfinite(g).all():
+        return None
+    t = np.linalg.lstsq(H, g, rcond=None)[0]
     if not NEAREST < t[2] < FARTHEST:
-        depth = min(max(3.0, t[2]), FARTHEST)
-        return np.array([np.average(u, weights=image[:, 2]) * depth, np.average(v, weights=image[:, 2]) * depth, depth])
+        depth = min(max(DISTANCE, t[2]), FARTHEST)
+        return np.array([mean[1] / mean[0] * depth, mean[2] / mean[0] * depth, depth])
     return t
