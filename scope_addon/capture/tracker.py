@@ -35,10 +35,11 @@ SMALLEST_SIDE_PX = 24.0
 LARGEST_SIDE = 6.0  # in longer sides of the image
 
 SAME_BODY = 0.1  # mean distance of the keypoints, in sides of the region, below which two bodies are one
-MOST_WITHIN = 0.5  # share of the keypoints that somebody who was found with little certainty has within another's box
+MOST_WITHIN = 0.5  # share of keypoints that somebody found with little certainty may have in another's box
 LEAP = 0.25  # the same, from where motion foretold: more in one frame may be another person
 SEARCH_FRAMES = 8  # between two looks for others who have come into the picture
 SEARCH_FRAMES_LARGEST = 20
+ESTABLISHED_FRAMES = 10
 EAGER_FRAMES = 15  # how long a lost person is looked for in every frame
 MEMORY_FRAMES = 60  # how long in every fourth, and preferred over a stronger one
 RIVAL_SIDE = 0.5  # who is smaller than this share of the largest will not be the most prominent person
@@ -128,8 +129,9 @@ class PeopleTracker:
         self._lost = [lost for lost in self._lost if lost.lost <= MEMORY_FRAMES]
         found = self._look(image_rgb, [f.estimate.next_region for f in self._live])
         seen = [(f, e, f.surprise(e)) for f, e in zip(self._live, found, strict=True) if e is not None]
-        # Two on one body: somebody went behind somebody else. It belongs to whom it does not surprise.
-        seen.sort(key=lambda entry: entry[2])
+        # Two on one body: somebody went behind somebody else. It belongs to whom it does not surprise; but of a body
+        # that has long been followed and one that was found just now, the latter was a mistake.
+        seen.sort(key=lambda entry: (entry[2] > LEAP, -min(entry[0].age, ESTABLISHED_FRAMES), entry[2]))
         kept: list[_Followed] = []
         accepted: list[PoseEstimate] = []
         for followed, estimate, surprise in seen:
@@ -207,8 +209,9 @@ class PeopleTracker:
         """Start a tracklet, unless the body is followed already or there are enough of at least its size."""
         if any(same_body(estimate, f.estimate) for f in self._live):
             return
-        # The legs of somebody who is followed, or a coat in their arms, can look like somebody of their own.
-        if not sure and any(share_within(estimate, f.estimate) > MOST_WITHIN for f in self._live):
+        # The legs of somebody who is followed, or they and what is behind them, can look like somebody of their own.
+        others = [f.estimate for f in self._live]
+        if not sure and any(max(share_within(estimate, e), share_within(e, estimate)) > MOST_WITHIN for e in others):
             return
         if len(self._live) >= self._most:
             weakest = min(self._live, key=lambda f: f.estimate.region.side_px)
