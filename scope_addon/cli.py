@@ -40,7 +40,9 @@ def build_parser() -> argparse.ArgumentParser:
     parser = _Parser(prog="scope", description="Markerless motion capture: video in, animated body out.")
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND", parser_class=_Parser)
     capture = commands.add_parser("capture", help="capture the people in a video or picture")
-    capture.add_argument("video", nargs="?", type=Path, metavar="VIDEO", help="video or picture (default: a sample)")
+    capture.add_argument(
+        "video", nargs="?", type=Path, metavar="VIDEO", help="video, picture or folder of pictures (default: a sample)"
+    )
     capture.add_argument(
         "-o",
         "--output",
@@ -63,7 +65,7 @@ def build_parser() -> argparse.ArgumentParser:
     )
     capture.add_argument("--start", metavar="TIME", help="from when: seconds, MM:SS or HH:MM:SS.mmm")
     capture.add_argument("--end", metavar="TIME", help="until when")
-    capture.add_argument("--fps", metavar="N", help="use only so many frames per second, such as 12 or 29.97")
+    capture.add_argument("--fps", metavar="N", help="use so many frames per second, such as 12 or 29.97")
     capture.add_argument("--body", default="scope", help=f"{', '.join(BUILT_IN)} or a body .npz (default: scope)")
     capture.add_argument("--focal-mm", type=float, metavar="MM", help="35 mm equivalent focal length of the camera")
     capture.add_argument("--fov", type=float, metavar="DEGREES", help="field of view along the longer side")
@@ -133,7 +135,14 @@ def run_capture(args: argparse.Namespace) -> dict:
         progress("writing", 0, 0)
         written = _write(outputs, result.motions, body, video, args)
         if args.overlay:
-            write_overlay(args.overlay, video, result.motions, body, progress=lambda i, n: progress("overlay", i, n))
+            write_overlay(
+                args.overlay,
+                video,
+                result.motions,
+                body,
+                progress=lambda i, n: progress("overlay", i, n),
+                wanted=options.wanted,
+            )
             written.append(args.overlay)
     report = dict(result.report, outputs=[str(p) for p in written])
     for warning in report["warnings"]:
@@ -166,8 +175,9 @@ def _write(outputs: list[Path], motions: list[Motion], body: Body, video: Path, 
         from .scene.build import NEW_SCENE
         from .scene.export import export_motions
 
+        footage = video if video.is_file() else None  # Blender's camera shows files, not folders of pictures
         options = replace(NEW_SCENE, name=video.stem, shape=args.shape_keys)
-        files, warnings = export_motions(motions, body, scene_files, footage=video, build_options=options)
+        files, warnings = export_motions(motions, body, scene_files, footage=footage, build_options=options)
         written += files
         for warning in warnings:
             print(f"scope: warning: {warning}", file=sys.stderr)

@@ -23,6 +23,7 @@ from ...solver.rotations import exp
 from ..motion import Motion
 from .rasterizer import Canvas, rasterize
 from .video import Frame, Video, open_video
+from .video_range import VideoRange
 
 VIDEO_SUFFIXES = (".mp4", ".mov", ".mkv")
 STILL_SUFFIXES = (".png", ".jpg", ".jpeg", ".webp")
@@ -44,12 +45,14 @@ def write_overlay(
     *,
     opacity: float = 0.6,
     progress: Progress | None = None,
+    wanted: VideoRange | None = None,
 ) -> None:
     """Write the footage with every person's body over it.
 
     The video has the footage's rate and size (at most 1920 pixels along the longer side, both sides even). A picture
     suffix (.png, .jpg, .webp) gives the first frame in which somebody was seen.
 
+    :param wanted: the part of the footage that was captured.
     :param progress: called with (frames done, frames expected); what it raises stops the work, and nothing is left.
     :raises OutputError: the suffix is none of ours, or the file cannot be written.
     """
@@ -59,7 +62,7 @@ def write_overlay(
     if suffix not in VIDEO_SUFFIXES + STILL_SUFFIXES:
         known = ", ".join(VIDEO_SUFFIXES + STILL_SUFFIXES)
         raise OutputError(f"cannot write the overlay {path}: its suffix must be one of {known}")
-    with open_video(video_path) as video, _written_beside(path) as temporary:
+    with open_video(video_path, wanted) as video, _written_beside(path) as temporary:
         painter = _Painter(people, body, video, opacity, even=suffix in VIDEO_SUFFIXES)
         if suffix in STILL_SUFFIXES:
             _write_still(temporary, painter, video, _first_seen(people))

@@ -19,7 +19,7 @@ import queue
 import threading
 from collections.abc import Iterator
 from contextlib import closing
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from pathlib import Path
 
@@ -33,6 +33,7 @@ import numpy as np
 
 from ...solver.errors import VideoError
 from .exif import read_exif
+from .image_sequence import PictureReader, find_pictures
 from .quicktime import focal_35mm
 from .video_range import VideoRange
 
@@ -75,6 +76,7 @@ class Video:
     warnings: list[str] = field(default_factory=list)
     wanted: VideoRange = field(default_factory=VideoRange)
     _source_fps: Fraction | None = field(default=None, repr=False)
+    _pictures: list[Path] = field(default_factory=list, repr=False)
     _still: np.ndarray | None = field(default=None, repr=False)
     _decoders: list[_Decoder] = field(default_factory=list, repr=False)
 
@@ -114,12 +116,17 @@ class Video:
 def open_video(path: str | Path, wanted: VideoRange | None = None) -> Video:
     """Open a video or a picture (JPEG, PNG, WebP, TIFF, BMP, ...; 16-bit and alpha too) and decode its first frame.
 
+    Numbered pictures are a video as well (`image_sequence`); what is wanted then says their rate, else it is 30.
+
     :raises VideoError: it does not exist, is not a file, holds nothing that can be decoded, or ends before the range.
     """
     path = Path(path)
     wanted = wanted or VideoRange()
+    pictures = find_pictures(path, wanted.fps is not None)
+    if pictures:
+        return _open_sequence(path, pictures, wanted)
     if path.is_dir():
-        raise VideoError(f"{path} is a folder; give one video or picture file")
+        raise VideoError(f"{path} is a folder without a picture; give a video, a picture or a folder of pictures")
     try:
         size = path.stat().st_size
         with path.open("rb"):
@@ -132,6 +139,20 @@ def open_video(path: str | Path, wanted: VideoRange | None = None) -> Video:
         raise VideoError(f"{path} is empty (0 bytes); export or download it again")
     picture = cv2.haveImageReader(str(path)) and path.suffix.lower() not in _JPEG_STREAMS
     return _open_still(path) if picture else _open_moving(path, wanted)
+
+
+def _open_sequence(path: Path, pictures: list[Path], wanted: VideoRange) -> Video:
+    fps = wanted.fps or STILL_FPS
+    first = PictureReader(pictures, fps).read()
+    if first is None:
+        raise VideoError(f"{pictures[0]} is a picture that cannot be decoded; it may be damaged, so export it again")
+    height, width = first[1].shape[:2]
+    focal_mm = read_exif(pictures[0].read_bytes()).focal_35mm
+    video = Video(path, width, height, fps, len(pictures), focal_mm, wanted=replace(wanted, fps=None))
+    video._pictures = pictures
+    if wanted.fps is None and len(pictures) > 1:
+        video.warnings.append(f"{path.name}: pictures have no frame rate, so 30 a second were taken; say --fps")
+    return video
 
 
 def _open_still(path: Path) -> Video:
@@ -323,13 +344,15 @@ class _Decoder:
 
     def _run(self) -> None:
         try:
-            with closing(_Reader(self._video.path)) as reader:
+            pictures = self._video._pictures
+            source = PictureReader(pictures, self._video.fps) if pictures else _Reader(self._video.path)
+            with closing(source) as reader:
                 self._decode(reader)
             self._put(None)
         except Exception as error:  # carried to the thread that iterates, which raises it
             self._put(error)
 
-    def _decode(self, reader: _Reader) -> None:
+    def _decode(self, reader: _Reader | PictureReader) -> None:
         video, index, time = self._video, 0, 0.0
         chooser = video.wanted.chooser()
         resized = False

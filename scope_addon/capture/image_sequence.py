@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Numbered pictures as a video: a folder, a pattern (walk_####.png, walk_%04d.png), or the first one with a rate."""
+
+from __future__ import annotations
+
+import re
+from fractions import Fraction
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+_SUFFIXES = {".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".webp", ".exr"}
+_NUMBER_SIGN = re.compile(r"#+|%0?\d*d")
+_LAST_NUMBER = re.compile(r"(\d+)(?!.*\d)")
+
+
+def find_pictures(path: Path, rate_given: bool) -> list[Path]:
+    """The pictures of a sequence in order of their numbers; empty where the path is no sequence.
+
+    A folder or a pattern is one. A single picture stands for itself, unless a rate is given and others follow it.
+    """
+    if path.is_dir():
+        return sorted((p for p in path.iterdir() if p.is_file() and p.suffix.lower() in _SUFFIXES), key=_in_order)
+    sign = _NUMBER_SIGN.search(path.name)
+    if sign and not path.exists() and path.parent.is_dir():
+        return _matching(path.parent, path.name[: sign.start()], path.name[sign.end() :], first=0)
+    number = _LAST_NUMBER.search(path.stem)
+    if rate_given and number and path.is_file() and cv2.haveImageReader(str(path)):
+        before, after = path.stem[: number.start()], path.stem[number.end() :] + path.suffix
+        found = _matching(path.parent, before, after, first=int(number.group()))
+        return found if len(found) > 1 else []
+    return []
+
+
+class PictureReader:
+    """The pictures one after the other, as ``video`` reads a file: ``read``, ``skip_to``, ``close``."""
+
+    def __init__(self, pictures: list[Path], fps: Fraction) -> None:
+        self._pictures, self._fps, self._next = pictures, fps, 0
+
+    def read(self) -> tuple[float, np.ndarray] | None:
+        """Next picture: seconds and RGB; None after the last one, or where one cannot be decoded."""
+        if self._next >= len(self._pictures):
+            return None
+        data = np.frombuffer(self._pictures[self._next].read_bytes(), np.uint8)
+        image = cv2.imdecode(data, cv2.IMREAD_COLOR) if len(data) else None
+        if image is None:
+            return None
+        time = float(self._next / self._fps)
+        self._next += 1
+        return time, cv2.cvtColor(image, cv2.COLOR_BGR2RGB)
+
+    def skip_to(self, seconds: float, fps: Fraction) -> int:
+        """Go to the first picture at or after that time; returns its index."""
+        while self._next < len(self._pictures) and float(self._next / fps) < seconds - 1e-6:
+            self._next += 1
+        return self._next
+
+    def close(self) -> None:
+        """Nothing is open between two pictures."""
+
+
+def _matching(folder: Path, before: str, after: str, first: int) -> list[Path]:
+    name = re.compile(re.escape(before) + r"(\d+)" + re.escape(after))
+    numbered = [(int(m.group(1)), p) for p in folder.iterdir() if (m := name.fullmatch(p.name))]
+    return [p for number, p in sorted(numbered) if number >= first and p.suffix.lower() in _SUFFIXES]
+
+
+def _in_order(path: Path) -> list[tuple[int, int, str]]:
+    """A key that puts frame 10 after frame 9."""
+    return [(0, int(part), "") if part.isdecimal() else (1, 0, part) for part in re.split(r"(\d+)", path.name)]

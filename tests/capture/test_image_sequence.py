@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Numbered pictures are footage too."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from scope.scope_addon.capture.video import open_video
+from scope.scope_addon.capture.video_range import VideoRange
+from scope.solver.errors import VideoError
+
+NUMBERS = [*range(7, 12), 100]
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """Frames 7 to 11 and 100, not zero-padded, as bright as their number; and what does not belong to them."""
+    for number in NUMBERS:
+        cv2.imwrite(str(tmp_path / f"walk_{number}.png"), np.full((20, 30, 3), number, np.uint8))
+    (tmp_path / "notes.txt").write_text("no picture")
+    return tmp_path
+
+
+def brightness(path: Path, wanted: VideoRange | None = None) -> list[int]:
+    with open_video(path, wanted) as video:
+        return [int(frame.image_rgb[0, 0, 0]) for frame in video]
+
+
+@pytest.mark.parametrize("name", ["", "walk_####.png", "walk_%04d.png", "walk_%d.png", "walk_7.png"])
+def test_in_the_order_of_their_numbers(folder: Path, name: str) -> None:
+    wanted = VideoRange(fps=Fraction(12))
+    assert brightness(folder / name, wanted) == NUMBERS
+    with open_video(folder / name, wanted) as video:
+        frames = list(video)
+        assert (video.fps, video.frame_count, video.width, video.height) == (12, 6, 30, 20)
+        assert [f.timestamp_s for f in frames] == pytest.approx([k / 12 for k in range(6)])
+        assert not video.warnings
+
+
+def test_a_part_of_them(folder: Path) -> None:
+    assert brightness(folder, VideoRange(0.1, 0.3, Fraction(10))) == [8, 9, 10]
+    assert brightness(folder / "walk_9.png", VideoRange(fps=Fraction(10))) == [9, 10, 11, 100]
+
+
+def test_without_a_rate(folder: Path) -> None:
+    with open_video(folder / "walk_9.png") as video:
+        assert video.is_still
+    with open_video(folder) as video:
+        assert video.fps == 30
+        assert "--fps" in video.warnings[0]
+
+
+def test_a_damaged_picture_ends_it_with_a_warning(folder: Path) -> None:
+    (folder / "walk_9.png").write_bytes(b"no picture any more")
+    with open_video(folder, VideoRange(fps=Fraction(10))) as video:
+        assert [int(f.image_rgb[0, 0, 0]) for f in video] == [7, 8]
+        assert "stopped after 2" in video.warnings[0]
+
+
+def test_nothing_to_see(tmp_path: Path) -> None:
+    (tmp_path / "empty").mkdir()
+    for path, words in ((tmp_path / "empty", "folder without a picture"), (tmp_path / "x_##.png", "does not exist")):
+        with pytest.raises(VideoError, match=words):
+            open_video(path)
