@@ -60,6 +60,10 @@ class Region:
         R_camera_crop[:2, :2] = self.R_image_crop
         return np.asarray(vectors) @ R_camera_crop.T
 
+    def is_near(self, other: Region) -> bool:
+        """Whether somebody in the one may hide somebody in the other: centres within three quarters of a side."""
+        return math.dist(self.center_px, other.center_px) <= 0.75 * max(self.side_px, other.side_px)
+
     def resembles(self, other: Region, distance: float) -> bool:
         """Whether both may hold the same person: centres within ``distance`` sides, sides within a factor of two."""
         apart = math.dist(self.center_px, other.center_px)

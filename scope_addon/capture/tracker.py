@@ -47,8 +47,12 @@ MOST_PEOPLE = 12
 JUDGE_FRAMES = 30  # between two looks of the strong network that tells left from right
 JUDGE_AGAIN_FRAMES = 8  # the same where left and right seem to have changed places
 APPEARANCE_FRAMES = 4
-_TURNS = (0.0, math.pi / 2, math.pi, -math.pi / 2)  # of the region in which somebody who was just lost is looked for
-_TURNED_PRESENCE = 0.8
+# How the region is turned and sized in which somebody who was just lost is looked for, and what is believed there.
+_TURNS = tuple(k * math.pi / 6 for k in range(12))
+_TURNED_SIZES = (1.0, 1.35)
+_TURNED_PRESENCE = 0.9
+_TURNED_LEAP = 0.35  # mean distance of the keypoints from where they were foretold, in sides of the region
+CURLED_SPREAD = 0.25
 _VELOCITY_MEMORY = 0.7
 
 
@@ -73,7 +77,7 @@ class _Followed:
 
     def surprise(self, estimate: PoseEstimate) -> float:
         """Mean distance of the keypoints from where motion foretold them, in sides of the region."""
-        foretold = self.estimate.keypoints_px + self.velocity_px
+        foretold = self.estimate.keypoints_px + self.velocity_px * max(self.lost, 1)
         return _apart(estimate.keypoints_px, foretold) / self.estimate.region.side_px
 
     def go_on(self, estimate: PoseEstimate) -> None:
@@ -150,15 +154,31 @@ class PeopleTracker:
         self._live = sorted(kept, key=lambda f: f.tracklet)
 
     def _look_round(self, image_rgb: np.ndarray) -> None:
-        """Somebody who was lost a moment ago and turned upside down is where motion foretold, but not upright."""
+        """Whoever was lost a moment ago is where motion foretold, but turned: a somersault, a fall, a handstand.
+
+        A body that curls up or hangs upside down looks less like one, so what is found must lie where it was foretold.
+        Whoever has gone behind somebody else is not looked for: what shows there is somebody else.
+        """
         for lost in [f for f in self._lost if f.lost <= EAGER_FRAMES and f.age > 5]:
             if len(self._live) >= self._most:
                 return
-            region = lost.foretold
-            turned = [replace(region, rotation=region.rotation + turn) for turn in _TURNS]
-            found = [e for e in self._look(image_rgb, turned, sure=False) if e and e.presence >= _TURNED_PRESENCE]
-            if found:
-                self._add(max(found, key=lambda e: e.presence), sure=False)
+            if any(f.estimate.next_region.is_near(lost.foretold) for f in self._live):
+                continue
+            turned = [
+                replace(lost.foretold, rotation=lost.foretold.rotation + turn, side_px=lost.foretold.side_px * size)
+                for size in _TURNED_SIZES
+                for turn in _TURNS
+            ]
+            regions = [region for region in turned if _is_in_image(region, image_rgb)]
+            found = [e for e in self._landmarks.estimate(image_rgb, regions) if e.presence >= _TURNED_PRESENCE]
+            found = [e for e in found if e.spread >= CURLED_SPREAD and e.disagreement <= DISAGREEMENT_THRESHOLD]
+            found = [e for e in found if _shows(e, image_rgb) and not any(same_body(e, f.estimate) for f in self._live)]
+            nearest = min(found, key=lost.surprise, default=None)
+            if nearest is not None and lost.surprise(nearest) <= _TURNED_LEAP:
+                lost.go_on(nearest)
+                lost.lost = 0
+                self._lost.remove(lost)
+                self._live.append(lost)
 
     def _search_is_due(self) -> bool:
         self._since_search += 1
@@ -286,6 +306,13 @@ def share_within(a: PoseEstimate, b: PoseEstimate) -> float:
     """Share of a's keypoints that lie in the box round b's."""
     low, high = b.keypoints_px.min(axis=0), b.keypoints_px.max(axis=0)
     return float(((a.keypoints_px >= low) & (a.keypoints_px <= high)).all(axis=1).mean())
+
+
+def _shows(estimate: PoseEstimate, image_rgb: np.ndarray) -> bool:
+    """Whether the middle of the body lies in the image; landmarks can also be imagined beside it."""
+    height, width = image_rgb.shape[:2]
+    x, y = estimate.keypoints_px.mean(axis=0)
+    return bool(0 <= x < width and 0 <= y < height)
 
 
 def _apart(a: np.ndarray, b: np.ndarray) -> float:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from scope.scope_addon.capture.observation import Observation
 from scope.scope_addon.capture.tracker import PeopleTracker
+from scope.scope_addon.capture.video import open_video
 from scope.solver.errors import SetupError, ShapeError
 
 Frames = Callable[..., Iterator[np.ndarray]]
@@ -89,3 +90,22 @@ def test_odd_images(tracker: PeopleTracker) -> None:
         assert tracker.step(np.zeros((*shape, 3), np.uint8)) == []
     with pytest.raises(ShapeError, match=r"\(5, 5\)"):
         tracker.step(np.zeros((5, 5), np.uint8))
+
+
+def test_a_somersault_is_followed_all_the_way_round(shared):
+    """The man turns over once in the air, against the sun, between frames 165 and 183."""
+    tracker, seen = PeopleTracker("best", threads=2), {}
+    with open_video(shared / "data/clips/walk_side_static.mp4") as video:
+        for frame in video:
+            if frame.index > 186:
+                break
+            if frame.index >= 150:
+                for tracklet, observation in tracker.step(frame.image_rgb):
+                    if observation.keypoints_px[:, 1].mean() < 600:  # the man in the air, not the woman on the grass
+                        seen.setdefault(tracklet, {})[frame.index] = observation
+    (man,) = (track for track in seen.values() if 165 in track)
+    assert sorted(man) == list(range(150, 187))
+    head_above_hips = {k: o.keypoints_px[[23, 24], 1].mean() - o.keypoints_px[0, 1] for k, o in man.items()}
+    assert head_above_hips[150] > 0
+    assert head_above_hips[175] < 0
+    assert head_above_hips[186] > 0
