@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""`./scripts/bench solver [--quick] [--json FILE]`: measure, print the tables, write the figures."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+from pathlib import Path
+
+for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ[_name] = "1"  # before numpy: everything is measured in one thread
+
+from . import frames, peers, plots, report, startup, steps  # noqa: E402
+
+OUT = frames.CACHE
+
+
+def solver(quick: bool) -> dict:
+    """Measure everything about the solver; return the figures and print them as they come."""
+    rounds = 20 if quick else 100
+    figures: dict = steps.target_table(rounds)
+    figures |= startup.startup()
+    experiments = {}
+    for number in (1, 2, 3):
+        rows = steps.experiment(number, 5 if quick else 40)
+        experiments[number] = rows
+        print(report.experiment_lines(number, rows), end="\n\n", flush=True)
+        plots.plot_experiment(OUT, number, rows)
+    figures["experiments"] = experiments
+    figures |= _real_frames(quick)
+    figures["peers"] = {} if quick else peers.run_all()
+    print(report.target_lines(figures), end="\n\n")
+    if figures["peers"]:
+        rows = [[name, found] for name, found in figures["peers"].items()]
+        print(report.table(("one iteration, K=23 P=10 N=120, us", "measured, or why not"), rows), end="\n\n")
+    print(f"Plots are in {OUT}")
+    return figures
+
+
+def _real_frames(quick: bool) -> dict:
+    """Return cold_frame_ms, warm_frame_ms and the convergence report."""
+    names = frames.QUICK_CLIPS if quick else frames.CLIPS
+    if not frames.DATA.is_dir():
+        print(f"{frames.DATA} is not beside this checkout: no real frames were measured", file=sys.stderr)
+        return {"cold_frame_ms": None, "warm_frame_ms": None, "convergence": []}
+    clips = frames.load_clips(names)
+    rows, figures = [], {}
+    settings = [(tolerance, 0.0) for tolerance in frames.TOLERANCES] + [(frames.REPORTED, 0.9)]
+    for tolerance, triggs in settings:
+        for kind, outcome in frames.measure(clips, tolerance, triggs, every=5 if quick else 1).items():
+            rows.append({"kind": kind, "tolerance": tolerance, "triggs": triggs, **outcome.summary()})
+            if (tolerance, triggs) == (frames.REPORTED, 0.0):
+                figures[f"{kind}_frame_ms"] = rows[-1]["milliseconds"]
+    print(report.frame_lines(rows), end="\n\n", flush=True)
+    return {**figures, "convergence": rows}
+
+
+def main() -> int:
+    """Run the command line; return the exit status."""
+    parser = argparse.ArgumentParser(prog="bench")
+    parser.add_argument("what", choices=["solver"])
+    parser.add_argument("--quick", action="store_true", help="fewer repetitions, one clip, no other libraries")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures as JSON")
+    args = parser.parse_args()
+    figures = solver(args.quick)
+    if args.json:
+        part = args.json.with_suffix(".part")
+        part.write_text(json.dumps(figures, indent=1))
+        part.replace(args.json)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

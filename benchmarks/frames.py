@@ -1,0 +1,175 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Cold and warm fits of real frames: iterations, time, and how many converge.
+
+The measurements are those that the capture hands to the solver: the clips beside the checkout go through its networks
+once, and what arrives at the solver is kept in build/bench. Weights, stages and robust scales are the capture's; the
+shape is unknown in every frame. Cold: without an earlier estimate, from `initial_state` through all stages. Warm: from
+the frame before. Converged: cost within 0.1 % and joints within 1 mm of the same start run to a relative decrease of
+1e-12.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from ..scope_addon.capture import fitting
+from ..scope_addon.capture.pipeline import CaptureOptions, capture
+from ..solver import Body, Fit, FrameSolver, Options, Priors, Stage, State, load_body
+from ..solver.measurements import Keypoints2D, Keypoints3D, Measurements, OrientationField
+
+ROOT = Path(__file__).resolve().parent.parent
+DATA, CACHE = ROOT.parent / "shared" / "data", ROOT / "build" / "bench"
+CLIPS = (
+    *(f"pose2sim/cam{k}.mp4" for k in (1, 2, 3, 4)),
+    *(f"clips/{name}.mp4" for name in ("gesture_square", "squats_5fps", "run_moving_camera", "walk_side_static")),
+)
+QUICK_CLIPS = CLIPS[:1]
+TOLERANCES = (1e-4, 1e-5, 1e-6)  # relative decrease at which the last stage stops
+REPORTED = 1e-5  # the solver's own
+COST_SHARE, JOINTS_M = 1e-3, 1e-3
+KEYS = ("pixels", "confidence2d", "points", "confidence3d", "directions", "confidence_directions")
+FIXED = ("intrinsics", "indices", "starts", "ends", "joint_weights")
+
+
+@dataclass
+class Clip:
+    """The measurements of one clip's frames in order, and the joint prior's weights."""
+
+    frames: list[Measurements]
+    joint_weights: np.ndarray  # (K,)
+
+
+def load_clips(names: Sequence[str]) -> list[Clip]:
+    """Read the clips' measurements, running the capture's networks where that has not been done yet."""
+    body = load_body("scope")
+    clips = []
+    for name in names:
+        path = CACHE / (Path(name).stem + ".npz")
+        if not path.exists():
+            print(f"finding keypoints in {name}, once", file=sys.stderr)
+            _record(DATA / name, body, path)
+        clips.append(_read(path))
+    return clips
+
+
+def _record(video: Path, body: Body, path: Path) -> None:
+    """Capture a clip and keep what its first pass hands to the solver."""
+    calls: list[tuple[Measurements, Priors]] = []
+    original = fitting.fit_tree
+
+    def listening(tree, measurements, init, priors, options):  # type: ignore[no-untyped-def]
+        if measurements.pose_priors is None:  # the second pass knows the floor
+            calls.append((measurements, priors))
+        return original(tree, measurements, init, priors, options)
+
+    fitting.fit_tree = listening
+    try:
+        capture(video, body, CaptureOptions(smoothing=False))
+    finally:
+        fitting.fit_tree = original
+    write(path, calls)
+
+
+def write(path: Path, calls: Sequence[tuple[Measurements, Priors]]) -> None:
+    """Keep measurements, all of the same points, in a file."""
+    rows = [_values(m) for m, _ in calls]
+    arrays = {key: np.array([row[k] for row in rows]) for k, key in enumerate(KEYS)}
+    m, priors = calls[0]
+    fixed = (m.intrinsics, m.keypoints2d.indices, m.orientation_field.starts, m.orientation_field.ends)
+    arrays |= dict(zip(FIXED, (*fixed, priors.joint_weights), strict=True))
+    path.parent.mkdir(parents=True, exist_ok=True)
+    part = path.with_suffix(".part.npz")
+    np.savez(part, **arrays)
+    part.replace(path)
+
+
+def _values(m: Measurements) -> tuple:
+    a, b, c = m.keypoints2d, m.keypoints3d, m.orientation_field
+    return a.pixels, a.confidence, b.points, b.confidence, c.directions, c.confidence
+
+
+def _read(path: Path) -> Clip:
+    with np.load(path) as data:
+        arrays = {key: data[key] for key in (*KEYS, *FIXED)}
+    frames = []
+    for row in zip(*(arrays[key] for key in KEYS), strict=True):
+        pixels, c2, points, c3, directions, cd = row
+        frames.append(
+            Measurements(
+                arrays["intrinsics"],
+                Keypoints2D(arrays["indices"], pixels, c2),
+                Keypoints3D(arrays["indices"], points, c3),
+                OrientationField(arrays["starts"], arrays["ends"], directions, cd),
+            )
+        )
+    return Clip(frames, arrays["joint_weights"])
+
+
+def capture_options(cold: bool, tolerance: float, triggs: float = 0.0, limit: int = 50) -> Options:
+    """Return the capture's options with another end of the last stage."""
+    stages = fitting._cold_stages(fitting._WEIGHTS) if cold else fitting._WARM
+    last: Stage = replace(stages[-1], tolerance=tolerance, max_iterations=limit)
+    return replace(fitting._ROBUST, stages=(*stages[:-1], last), triggs=triggs)
+
+
+def capture_priors(body: Body, clip: Clip) -> Priors:
+    """Return the capture's priors with the shape unknown."""
+    from ..solver import default_priors
+
+    return replace(default_priors(body), joint_weights=clip.joint_weights)
+
+
+@dataclass
+class Outcome:
+    """What became of the fits of one kind, cold or warm, at one tolerance; one entry a frame."""
+
+    milliseconds: np.ndarray
+    iterations: np.ndarray
+    converged: np.ndarray  # bool
+    cost: np.ndarray
+
+    def summary(self) -> dict[str, float]:
+        """Return medians and shares."""
+        return {
+            "frames": len(self.cost),
+            "milliseconds": float(np.median(self.milliseconds)),
+            "iterations": float(np.median(self.iterations)),
+            "converged": float(np.mean(self.converged)),
+            "cost": float(np.median(self.cost)),
+        }
+
+
+def measure(clips: Sequence[Clip], tolerance: float, triggs: float = 0.0, every: int = 1) -> dict[str, Outcome]:
+    """Fit every frame cold and warm; return the outcomes by kind. `every` k-th frame is judged, all are followed."""
+    body = load_body("scope")
+    rows: dict[str, list[tuple]] = {"cold": [], "warm": []}
+    options = {kind: capture_options(kind == "cold", tolerance, triggs) for kind in rows}
+    tight = {kind: capture_options(kind == "cold", 1e-12, triggs, 1000) for kind in rows}
+    for clip in clips:
+        solver = FrameSolver(body, capture_priors(body, clip))
+        last: State | None = None
+        for number, m in enumerate(clip.frames):
+            for kind, init in (("cold", None), ("warm", last)):
+                if kind == "warm" and init is None:
+                    continue
+                start = time.perf_counter()
+                found = solver.fit(m, init, None, options[kind])
+                elapsed = time.perf_counter() - start
+                if kind == "warm" or last is None:
+                    last = found.state
+                if number % every == 0 and number > 0:
+                    best = solver.fit(m, init, None, tight[kind])
+                    rows[kind].append((elapsed * 1e3, found.iterations, same(found, best), found.cost))
+    return {kind: Outcome(*(np.array(column) for column in zip(*r, strict=True))) for kind, r in rows.items()}
+
+
+def same(found: Fit, best: Fit) -> bool:
+    """Whether a fit has converged to `best`."""
+    apart = np.linalg.norm(found.t_camera_part - best.t_camera_part, axis=1).max()
+    return bool(abs(found.cost - best.cost) <= COST_SHARE * best.cost and apart <= JOINTS_M)

@@ -1,0 +1,64 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The figures of `./scripts/bench solver` as text."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from .steps import TARGETS, growth
+
+FRAME_TARGETS = {"iteration": 30.0, "prior_23_joints": 5.0, "cold_frame_ms": 0.8, "warm_frame_ms": 0.2}
+STARTUP_TARGETS = {"first_call_s": 20.0, "cached_call_s": 0.3}
+
+
+def table(head: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
+    """Return a Markdown table."""
+    lines = [head, ["---"] * len(head), *rows]
+    return "\n".join("| " + " | ".join(_cell(x) for x in line) + " |" for line in lines)
+
+
+def _cell(x: object) -> str:
+    if x is None:
+        return ""
+    return f"{x:.3g}" if isinstance(x, float) and x < 100 else f"{x:.0f}" if isinstance(x, float) else str(x)
+
+
+def target_lines(figures: dict) -> str:
+    """Return the target table, from whatever of it was measured."""
+    rows: list[list[object]] = []
+    for name, (_, _, _, _, target) in TARGETS.items():
+        ratio = figures["dense_over_sparse"][name]
+        rows.append([f"step {name}", figures["gn_step"][name], target, f"dense: {ratio:.1f} x"])
+    for name, target in (FRAME_TARGETS | STARTUP_TARGETS).items():
+        if figures.get(name) is not None:
+            rows.append([name, figures[name], target, None])
+    return table(("median, one thread, us unless said", "measured", "target", ""), rows)
+
+
+def experiment_lines(number: int, rows: list[dict[str, float]]) -> str:
+    """Return one experiment: times with and without the sparse formulation, speedup, and SMPL+H over SMPL."""
+    key = "P" if number == 3 else "N"
+    by_place = {(row["K"], row[key]): row for row in rows}
+    lines: list[list[object]] = []
+    for at in sorted({row[key] for row in rows}):
+        a, b = by_place[23, at], by_place[51, at]
+        speedups = [a["dense"] / a["sparse"], b["dense"] / b["sparse"]]
+        ratios = [b["sparse"] / a["sparse"], b["dense"] / a["dense"]]
+        lines.append([at, a["sparse"], a["dense"], b["sparse"], b["dense"], *speedups, *ratios])
+    head = (key, "SMPL sparse", "SMPL dense", "SMPL+H sparse", "SMPL+H dense", "speedup SMPL", "speedup SMPL+H",
+            "SMPL+H / SMPL sparse", "dense")  # fmt: skip
+    text = f"Experiment {number}, us a step\n\n" + table(head, lines)
+    if number < 3:
+        fits = [f"{m} K={K}: N^{growth(rows, K, m):.2f}" for K in (23, 51) for m in ("sparse", "dense")]
+        text += "\n\nGrowth from N = 120 to 600: " + ", ".join(fits)
+    return text
+
+
+def frame_lines(convergence: list[dict]) -> str:
+    """Return the convergence report on real frames."""
+    keys = ("kind", "tolerance", "triggs", "frames", "milliseconds", "iterations", "converged", "cost")
+    return table(keys, [[_exact(row[k]) for k in keys] for row in convergence])
+
+
+def _exact(x: object) -> object:
+    return f"{x:g}" if isinstance(x, float) and x < 1e-2 else x
