@@ -67,7 +67,7 @@ def test_triangles_cover_the_pixels_of_opencv_polygons():
     rng = np.random.default_rng(3)
     for _ in range(40):
         corners = rng.uniform([-20, -20], [WIDTH + 20, HEIGHT + 20], (3, 2))
-        if np.cross(corners[1] - corners[0], corners[2] - corners[0]) > 0:
+        if np.linalg.det(np.stack([corners[1] - corners[0], corners[2] - corners[0]])) > 0:
             corners = corners[::-1]
         z = rng.uniform(0.5, 4, 3)
         points = np.stack([(corners[:, 0] - K[0, 2]) / K[0, 0] * z, (corners[:, 1] - K[1, 2]) / K[1, 1] * z, z], -1)
