@@ -27,6 +27,7 @@ MOTION_SUFFIXES = (".npz",)
 SHAPE_MODES = ("keyed", "per_frame", "baked")
 OVERLAY_SUFFIXES = (".mp4", ".png", ".jpg")
 QUALITIES = ("fast", "balanced", "best")
+PROGRAM = (sys.executable, "-m", f"{__package__}.cli")
 
 
 class _Parser(argparse.ArgumentParser):
@@ -40,6 +41,7 @@ def build_parser() -> argparse.ArgumentParser:
     parser = _Parser(prog="scope", description="Markerless motion capture: video in, animated body out.")
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND", parser_class=_Parser)
     capture = commands.add_parser("capture", help="capture the people in a video or picture")
+    capture.set_defaults(run=run_capture)
     capture.add_argument(
         "video", nargs="?", type=Path, metavar="VIDEO", help="video, picture or folder of pictures (default: a sample)"
     )
@@ -56,6 +58,27 @@ def build_parser() -> argparse.ArgumentParser:
     capture.add_argument(
         "--overlay", type=Path, metavar="FILE", help="draw the body over the footage: .mp4, .png, .jpg"
     )
+    _add_options(capture)
+    batch = commands.add_parser("batch", help="capture every video and picture of a folder")
+    batch.set_defaults(run=run_batch)
+    batch.add_argument("folder", type=Path, metavar="FOLDER", help="folder of videos, pictures and picture sequences")
+    batch.add_argument("--out", type=Path, required=True, metavar="FOLDER", help="where the results go")
+    batch.add_argument(
+        "--formats",
+        default="npz,glb",
+        metavar="LIST",
+        help=f"what to write of every clip: {', '.join(s[1:] for s in SUFFIXES)} (default: npz,glb)",
+    )
+    batch.add_argument("--overlays", action="store_true", help="also write NAME.overlay.mp4 of every video")
+    batch.add_argument("--recursive", action="store_true", help="folders below too")
+    batch.add_argument("--jobs", type=int, default=1, metavar="N", help="clips captured at once (default: 1)")
+    batch.add_argument("--again", action="store_true", help="also what was captured before and has not changed")
+    _add_options(batch)
+    return parser
+
+
+def _add_options(capture: argparse.ArgumentParser) -> None:
+    """How to capture: the same for one clip and for a folder of them."""
     capture.add_argument("--quality", choices=QUALITIES, default="best", help="speed against accuracy (default: best)")
     capture.add_argument(
         "--people",
@@ -80,18 +103,21 @@ def build_parser() -> argparse.ArgumentParser:
     capture.add_argument("--threads", type=int, default=0, metavar="N", help="threads for the networks (default: all)")
     capture.add_argument("--json", action="store_true", help="print a machine-readable report on stdout")
     capture.add_argument("--quiet", action="store_true", help="no progress bar")
-    return parser
 
 
-def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command line; returns the exit status."""
+def main(argv: Sequence[str] | None = None, program: Sequence[str] = PROGRAM) -> int:
+    """Run the command line; returns the exit status.
+
+    :param program: how a process of its own is started that takes these arguments; a batch starts one per clip.
+    """
     try:
         args = build_parser().parse_args(argv)
+        args.program = list(program)
         with _stdout_for_report() as stdout:
-            report = run_capture(args)
+            report = args.run(args)
             if args.json:
                 print(json.dumps(report), file=stdout, flush=True)
-        return 0
+        return report.pop("exit_status", 0)
     except ScopeError as error:
         print(f"scope: {error}", file=sys.stderr)
         return error.exit_status
@@ -150,6 +176,42 @@ def run_capture(args: argparse.Namespace) -> dict:
     if not args.json:
         print(_summary(report), file=sys.stderr)
     return report
+
+
+def run_batch(args: argparse.Namespace) -> dict:
+    """``scope batch``: one process per clip, so that none can harm another; returns the report of all."""
+    from .job.batch import Batch
+
+    formats = [f".{f.strip().lstrip('.').lower()}" for f in args.formats.split(",") if f.strip()]
+    for suffix in formats or ["."]:
+        if suffix not in SUFFIXES:
+            known = ",".join(s[1:] for s in SUFFIXES)
+            raise UsageError(f"--formats takes a list out of {known}, not {args.formats!r}")
+    if args.jobs < 1:
+        raise UsageError(f"--jobs takes a number from 1 on, not {args.jobs}")
+    batch = Batch(args.folder, args.out, args.program, _given_options(args), formats, args.overlays)
+    with _ProgressBar(sys.stderr, show=sys.stderr.isatty() and not args.quiet) as progress:
+        report = batch.run(args.jobs, recursive=args.recursive, again=args.again, progress=progress, say=_say)
+    if not args.json:
+        counts = ", ".join(f"{n} {what.replace('_', ' ')}" for what, n in report["counts"].items() if n)
+        _say(f"{counts or 'nothing to capture'}; report in {batch.report_file}")
+    return report
+
+
+def _given_options(args: argparse.Namespace) -> dict[str, str | None]:
+    """The options of a capture that differ from their defaults, as a command line has them; None: no value."""
+    parser = _Parser(add_help=False)
+    _add_options(parser)
+    given: dict[str, str | None] = {}
+    for action in parser._actions:
+        value = getattr(args, action.dest)
+        if value != action.default and action.dest not in ("json", "quiet"):
+            given[action.option_strings[-1]] = None if action.nargs == 0 else str(value)
+    return given
+
+
+def _say(text: str) -> None:
+    print(f"scope: {text}", file=sys.stderr, flush=True)
 
 
 def _people(text: str) -> int | str:

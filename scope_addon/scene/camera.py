@@ -19,12 +19,12 @@ import numpy as np
 
 from ...solver.errors import VideoError
 from ...solver.frames import blender_camera_matrix
+from ..footage import PICTURE_SUFFIXES
 from ..motion import Motion
 from .actions import Channels
 from .animation import on_one_hemisphere, quaternion_from_matrix
 
 SENSOR_WIDTH = 36.0  # millimetres; only its ratio to the focal length matters
-PICTURE_SUFFIXES = {".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp"}
 
 
 def pixel_aspect(motion: Motion) -> tuple[float, float]:

@@ -10,14 +10,12 @@ from typing import TYPE_CHECKING
 import bpy
 from bpy.props import StringProperty
 
+from ..footage import FOOTAGE_SUFFIXES
 from . import preview_picture
 
 if TYPE_CHECKING:
     from .capture_job import CaptureJob
 
-VIDEO_SUFFIXES = (".mp4", ".mov", ".m4v", ".avi", ".mkv", ".webm", ".mpg", ".mpeg", ".wmv", ".mts", ".m2ts", ".3gp")
-PICTURE_SUFFIXES = (".jpg", ".jpeg", ".png", ".webp", ".tif", ".tiff", ".bmp")
-SUFFIXES = VIDEO_SUFFIXES + PICTURE_SUFFIXES
 SAMPLE = Path(__file__).resolve().parents[2] / "assets" / "sample" / "sample.mp4"
 TIMER_S = 0.1
 
@@ -47,7 +45,7 @@ class SCOPE_OT_choose_footage(bpy.types.Operator):
     bl_options = {"UNDO"}
 
     filepath: StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"})
-    filter_glob: StringProperty(default=";".join(f"*{s}" for s in SUFFIXES), options={"HIDDEN"})
+    filter_glob: StringProperty(default=";".join(f"*{s}" for s in FOOTAGE_SUFFIXES), options={"HIDDEN"})
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         """Dropped files come with a path; otherwise ask for one."""

@@ -18,7 +18,8 @@ def run(argv: list[str]) -> int:
     os.environ.setdefault("NUMBA_CACHE_DIR", str(cache().root / "kernels" / "command"))
     from ..cli import main
 
-    return main(argv)
+    # A batch starts one process per clip, each a Blender, because exports need one.
+    return main(argv, program=(bpy.app.binary_path, "--background", "--command", "scope"))
 
 
 def register() -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import bpy
 
-from .capture_operators import SUFFIXES
+from ..footage import FOOTAGE_SUFFIXES
 
 
 class SCOPE_FH_footage(bpy.types.FileHandler):
@@ -14,7 +14,7 @@ class SCOPE_FH_footage(bpy.types.FileHandler):
     bl_idname = "SCOPE_FH_footage"
     bl_label = "Capture with Scope"
     bl_import_operator = "scope.choose_footage"
-    bl_file_extensions = ";".join(SUFFIXES)
+    bl_file_extensions = ";".join(FOOTAGE_SUFFIXES)
 
     @classmethod
     def poll_drop(cls, context: bpy.types.Context) -> bool:

@@ -1,0 +1,266 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A folder of footage, one process per clip: what fails harms nothing else, what is finished is not done again.
+
+Beside the results lies ``scope-batch.json``, renewed after every clip, so that a batch that was stopped goes on where
+it was. A clip is finished when its content (SHA-256), the options, the program and the result files are the same.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import json
+import os
+import subprocess
+import time
+from collections import Counter
+from collections.abc import Callable, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from pathlib import Path
+
+from ...solver.errors import InputError, NoPersonError, OutputError, UsageError
+from ..footage import FOOTAGE_SUFFIXES, PICTURE_SUFFIXES, VIDEO_SUFFIXES
+from .request import code_version
+
+REPORT_NAME = "scope-batch.json"
+STATUSES = ("done", "skipped", "no_person", "failed")
+_ROOT = Path(__file__).resolve().parents[2]
+_OVERLAY = ".overlay"
+
+
+class Batch:
+    """One folder of footage and one folder of results.
+
+    :param program: how a process is started that understands ``capture FILE -o OUT --json``.
+    :param options: of every capture: option string to value, None where it takes none.
+    :param suffixes: of the result files, such as ``.npz``.
+    :raises InputError: no such folder. :raises OutputError: the results' folder cannot be made.
+    """
+
+    def __init__(
+        self,
+        folder: Path,
+        out: Path,
+        program: Sequence[str],
+        options: dict[str, str | None],
+        suffixes: Sequence[str],
+        overlays: bool = False,
+    ) -> None:
+        if not folder.is_dir():
+            raise InputError(f"{folder} is not a folder; give the folder with the footage")
+        try:
+            out.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise OutputError(f"cannot make the folder {out}: {error.strerror}; choose another with --out") from error
+        self.folder, self.out = folder.resolve(), out.resolve()
+        self.report_file = out / REPORT_NAME
+        self._program, self._options, self._suffixes, self._overlays = list(program), options, suffixes, overlays
+        self._running: set[subprocess.Popen] = set()
+        self._stopped = False
+
+    def clips(self, recursive: bool) -> dict[str, Path]:
+        """Name of the result without suffix, to the footage; in order. Results of an earlier batch are not footage."""
+        found = sorted(self._below(self.folder, recursive))
+        stems = Counter(self._relative(path).with_suffix("") for path in found)
+        named = {}
+        for path in found:
+            relative = self._relative(path)
+            stem = relative.with_suffix("") if path.is_file() else relative
+            named[(relative if stems[relative.with_suffix("")] > 1 else stem).as_posix()] = path
+        return named
+
+    def run(
+        self,
+        jobs: int,
+        *,
+        recursive: bool = False,
+        again: bool = False,
+        progress: Callable[[str, int, int], None] = lambda stage, done, total: None,
+        say: Callable[[str], None] = lambda text: None,
+    ) -> dict:
+        """Capture what is not finished; returns the report, which is also on disk.
+
+        ``exit_status`` is 1 when a clip failed, else 3 when one showed no person, else 0.
+
+        :raises UsageError: no footage. :raises OutputError: the report cannot be written.
+        """
+        clips = self.clips(recursive)
+        if not clips:
+            raise UsageError(
+                f"no footage in {self.folder}: no file ends with one of {' '.join(FOOTAGE_SUFFIXES)}"
+                + ("" if recursive else "; --recursive looks into the folders below")
+            )
+        before = {} if again else self._earlier()
+        threads = {} if jobs == 1 else {"--threads": str(max(1, (os.cpu_count() or 1) // jobs))}
+        entries: dict[str, dict] = {}
+        with ThreadPoolExecutor(jobs) as pool:
+            futures: dict[Future, str] = {
+                pool.submit(self._one, name, path, before.get(name), threads): name for name, path in clips.items()
+            }
+            try:
+                progress("clips", 0, len(clips))
+                pending = set(futures)
+                while pending:
+                    finished, pending = wait(pending, return_when=FIRST_COMPLETED)
+                    for future in finished:
+                        entry = entries[futures[future]] = future.result()
+                        after = f": {entry['message']}" if entry.get("message") else ""
+                        say(f"{len(entries)}/{len(clips)} {entry['file']} {entry['status'].replace('_', ' ')}{after}")
+                    report = self._report({name: entries[name] for name in clips if name in entries}, before)
+                    progress("clips", len(entries), len(clips))
+            except BaseException:
+                self._stop()
+                pool.shutdown(cancel_futures=True)
+                raise
+        return report
+
+    def _one(self, name: str, path: Path, earlier: dict | None, threads: dict[str, str]) -> dict:
+        """Capture one clip, unless it is finished; never raises for what a clip does wrong."""
+        start = time.monotonic()
+        entry: dict = {"file": self._relative(path).as_posix(), "name": name}
+        try:
+            entry["key"] = self._key(path)
+        except OSError as error:
+            return entry | {"status": "failed", "message": f"{path} cannot be read: {error.strerror}"}
+        if earlier and earlier.get("key") == entry["key"] and self._is_finished(earlier):
+            return earlier | {"file": entry["file"], "status": earlier["status"].replace("done", "skipped")}
+        target = self.out / name
+        arguments = [*self._program, "capture", str(path), "--json", "--quiet"]
+        for suffix in self._suffixes:
+            arguments += ["-o", f"{target}{suffix}"]
+        if self._overlays:
+            suffix = ".png" if path.suffix.lower() in PICTURE_SUFFIXES else ".mp4"
+            arguments += ["--overlay", f"{target}{_OVERLAY}{suffix}"]
+        for option, value in (threads | self._options).items():
+            arguments += [option] if value is None else [option, value]
+        try:
+            target.parent.mkdir(parents=True, exist_ok=True)
+            status, stdout, stderr = self._call(arguments)
+        except OSError as error:
+            return entry | {"status": "failed", "message": f"the system refused: {error.strerror}"}
+        entry["seconds"] = round(time.monotonic() - start, 2)
+        report = _last_object(stdout)
+        if status == 0 and report is not None:
+            outputs = [Path(p).resolve().relative_to(self.out).as_posix() for p in report.pop("outputs")]
+            return entry | {"status": "done", "outputs": outputs, "report": report}
+        if status == NoPersonError.exit_status:
+            return entry | {"status": "no_person", "outputs": [], "message": _sentence(stderr)}
+        return entry | {"status": "failed", "message": _sentence(stderr) or f"the process ended with status {status}"}
+
+    def _call(self, arguments: list[str]) -> tuple[int, str, str]:
+        if self._stopped:
+            return 130, "", ""
+        process = subprocess.Popen(
+            arguments,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            encoding="utf-8",
+            errors="replace",
+        )
+        self._running.add(process)
+        try:
+            stdout, stderr = process.communicate()
+        finally:
+            self._running.discard(process)
+        return process.returncode, stdout, stderr
+
+    def _stop(self) -> None:
+        self._stopped = True
+        for process in list(self._running):
+            with contextlib.suppress(OSError):
+                process.terminate()
+
+    def _key(self, path: Path) -> str:
+        """Of footage, options and program together."""
+        digest = hashlib.sha256(code_version(_ROOT).encode())
+        values = {k: v for k, v in self._options.items() if k != "--threads"}
+        digest.update(json.dumps([sorted(values.items()), list(self._suffixes), self._overlays]).encode())
+        named = [Path(v) for v in values.values() if v and Path(v).is_file()]  # a body, a calibration, a network
+        for file in [*(sorted(path.iterdir()) if path.is_dir() else [path]), *named]:
+            if file.is_file():
+                with file.open("rb") as stream:
+                    digest.update(hashlib.file_digest(stream, "sha256").digest())
+        return digest.hexdigest()
+
+    def _is_finished(self, entry: dict) -> bool:
+        if entry.get("status") not in ("done", "skipped", "no_person"):
+            return False
+        outputs = entry.get("outputs")
+        return isinstance(outputs, list) and all(isinstance(p, str) and (self.out / p).is_file() for p in outputs)
+
+    def _earlier(self) -> dict[str, dict]:
+        """Entries of the last report by name; none where it is missing or damaged."""
+        try:
+            entries = json.loads(self.report_file.read_text(encoding="utf-8"))["files"]
+            return {e["name"]: e for e in entries if isinstance(e["status"], str)}
+        except (OSError, ValueError, KeyError, TypeError):
+            return {}
+
+    def _report(self, entries: dict[str, dict], before: dict[str, dict]) -> dict:
+        """Write and return the report. Earlier entries stay until their turn, or a batch stopped early forgets them."""
+        counts = Counter(e["status"] for e in entries.values())
+        status = 1 if counts["failed"] else NoPersonError.exit_status if counts["no_person"] else 0
+        report = {
+            "folder": str(self.folder),
+            "options": self._options,
+            "counts": {s: counts[s] for s in STATUSES},
+            "files": list(({n: e for n, e in before.items() if n not in entries} | entries).values()),
+            "exit_status": status,
+        }
+        beside = self.report_file.with_name(f".{REPORT_NAME}.{os.getpid()}")
+        try:
+            beside.write_text(json.dumps(report, indent=1), encoding="utf-8")
+            os.replace(beside, self.report_file)
+        except OSError as error:
+            beside.unlink(missing_ok=True)
+            raise OutputError(f"cannot write {self.report_file}: {error.strerror}; free some space") from error
+        return report
+
+    def _relative(self, path: Path) -> Path:
+        return path.relative_to(self.folder)
+
+    def _below(self, folder: Path, recursive: bool) -> list[Path]:
+        found: list[Path] = []
+        for path in folder.iterdir():
+            suffix = path.suffix.lower()
+            if path.name.startswith(".") or path == self.out or path.stem.endswith(_OVERLAY):
+                continue
+            if path.is_dir():
+                if _is_sequence(path):
+                    found.append(path)
+                elif recursive:
+                    found += self._below(path, recursive)
+            elif suffix in FOOTAGE_SUFFIXES:
+                found.append(path)
+        return found
+
+
+def _is_sequence(folder: Path) -> bool:
+    """Whether a folder holds the numbered pictures of one clip, and no other footage or folder."""
+    try:
+        content = [p for p in folder.iterdir() if not p.name.startswith(".")]
+    except OSError:
+        return False
+    pictures = [p for p in content if p.suffix.lower() in PICTURE_SUFFIXES and any(c.isdigit() for c in p.stem)]
+    others = [p for p in content if p.is_dir() or p.suffix.lower() in VIDEO_SUFFIXES]
+    return len(pictures) > 1 and not others
+
+
+def _last_object(text: str) -> dict | None:
+    """The report on the last line; what the program said before it is not ours."""
+    for line in reversed(text.splitlines()):
+        if line.startswith("{"):
+            try:
+                return json.loads(line)
+            except ValueError:
+                return None
+    return None
+
+
+def _sentence(stderr: str) -> str:
+    """What went wrong, without the program's name before it."""
+    lines = [line.strip() for line in stderr.splitlines() if line.strip()]
+    own = [line.removeprefix("scope: ") for line in lines if line.startswith("scope: ") and "warning:" not in line]
+    return (own or lines or [""])[-1]

@@ -1,0 +1,182 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A folder of footage: nothing is done twice, nothing that fails stops the rest, whatever the clips do."""
+
+import json
+import shutil
+import sys
+from pathlib import Path
+
+import pytest
+from scope.scope_addon.cli import SAMPLE, main
+from scope.scope_addon.job.batch import REPORT_NAME, Batch
+from scope.solver.errors import InputError, UsageError
+
+# Stands for the capture: what the clip's text says happens, and every call is noted beside the clips.
+PROGRAM = """
+import json, sys, pathlib
+clip = pathlib.Path(sys.argv[2])
+with open(clip.parent / "calls.log", "a") as log:
+    log.write(json.dumps(sys.argv[1:]) + "\\n")
+text = clip.read_text() if clip.is_file() else "ok"
+outputs = [sys.argv[i + 1] for i, a in enumerate(sys.argv) if a == "-o"]
+if text == "nobody":
+    print("scope: no person found", file=sys.stderr); sys.exit(3)
+if text == "broken":
+    print("scope: warning: slow\\nscope: it is not a video", file=sys.stderr); sys.exit(1)
+if text == "crash":
+    import os; os.abort()
+print("Blender says something")
+for path in outputs:
+    pathlib.Path(path).write_text("result of " + text)
+print(json.dumps({"frames": 3, "outputs": outputs}))
+"""
+
+
+@pytest.fixture
+def folder(tmp_path):
+    clips = tmp_path / "clips"
+    clips.mkdir()
+    for name, text in {"a.mp4": "ok", "b.mov": "broken", "c.png": "nobody", "d.avi": "crash", "e.webm": "fine"}.items():
+        (clips / name).write_text(text)
+    (clips / "notes.txt").write_text("not footage")
+    return clips
+
+
+def calls(folder):
+    log = folder / "calls.log"
+    lines = log.read_text().splitlines() if log.exists() else []
+    log.unlink(missing_ok=True)
+    return sorted(Path(json.loads(line)[1]).name for line in lines)
+
+
+def batch(folder, out, options=None, suffixes=(".npz", ".glb")):
+    program = [sys.executable, "-c", PROGRAM]
+    return Batch(folder, out, program, options or {}, suffixes)
+
+
+@pytest.mark.parametrize("jobs", [1, 3])
+def test_every_clip_has_its_own_fate(folder, tmp_path, jobs):
+    out = tmp_path / "out"
+    report = batch(folder, out).run(jobs)
+    statuses = {e["file"]: e["status"] for e in report["files"]}
+    assert statuses == {"a.mp4": "done", "b.mov": "failed", "c.png": "no_person", "d.avi": "failed", "e.webm": "done"}
+    assert report["exit_status"] == 1
+    assert report["counts"] == {"done": 2, "skipped": 0, "no_person": 1, "failed": 2}
+    assert json.loads((out / REPORT_NAME).read_text()) == report
+    messages = {e["file"]: e.get("message") for e in report["files"]}
+    assert messages["b.mov"] == "it is not a video"
+    assert "status" in messages["d.avi"]
+    assert sorted(p.name for p in out.iterdir()) == ["a.glb", "a.npz", "e.glb", "e.npz", REPORT_NAME]
+
+
+def test_what_is_finished_is_not_done_again_and_what_changed_is(folder, tmp_path):
+    out = tmp_path / "out"
+    batch(folder, out).run(1)
+    assert len(calls(folder)) == 5
+    report = batch(folder, out).run(1)
+    assert calls(folder) == ["b.mov", "d.avi"]  # what failed is tried again
+    assert report["counts"] == {"done": 0, "skipped": 2, "no_person": 1, "failed": 2}
+
+    (folder / "b.mov").write_text("mended")
+    (folder / "d.avi").unlink()
+    (out / "e.glb").unlink()
+    report = batch(folder, out).run(1)
+    assert calls(folder) == ["b.mov", "e.webm"]
+    assert report["exit_status"] == 3  # only the picture of nobody is left
+
+    (folder / "a.mp4").touch()  # a later time, the same content
+    batch(folder, out).run(1)
+    assert calls(folder) == []
+    batch(folder, out, {"--quality": "fast"}).run(1)
+    assert calls(folder) == ["a.mp4", "b.mov", "c.png", "e.webm"]
+
+
+def test_a_moved_folder_of_footage_is_still_finished(folder, tmp_path):
+    batch(folder, tmp_path / "out").run(1)
+    moved = tmp_path / "moved"
+    shutil.move(folder, moved)
+    calls(moved)
+    batch(moved, tmp_path / "out").run(1)
+    assert calls(moved) == ["b.mov", "d.avi"]
+
+
+def test_a_damaged_report_is_no_obstacle(folder, tmp_path):
+    out = tmp_path / "out"
+    batch(folder, out).run(1)
+    for text in ("", "{", "[]", '{"files": 3}', '{"files": [{"name": "a", "status": {}, "key": 1}]}'):
+        calls(folder)
+        (out / REPORT_NAME).write_text(text)
+        batch(folder, out).run(1)
+        assert len(calls(folder)) == 5
+
+
+def test_names(tmp_path):
+    clips = tmp_path / "clips"
+    (clips / "below" / "deep").mkdir(parents=True)
+    (clips / "walk").mkdir()
+    for name in ("a.mp4", "a.mov", "b.mp4", "b.overlay.mp4", "below/c.mp4", "below/deep/d.mp4", ".hidden.mp4"):
+        (clips / name).write_text("x")
+    for i in range(3):
+        (clips / "walk" / f"frame{i:03}.png").write_text("x")
+    out = clips / "out"
+    out.mkdir()
+    (out / "old.mp4").write_text("x")
+    flat = batch(clips, out).clips(recursive=False)
+    assert list(flat) == ["a.mov", "a.mp4", "b", "walk"]
+    assert flat["walk"] == clips / "walk"
+    assert list(batch(clips, out).clips(recursive=True)) == ["a.mov", "a.mp4", "b", "below/c", "below/deep/d", "walk"]
+    report = batch(clips, out, suffixes=(".npz",)).run(1, recursive=True)
+    assert report["exit_status"] == 0
+    assert (out / "below" / "deep" / "d.npz").is_file()
+
+
+def test_an_interrupt_stops_the_running_clips_and_keeps_the_finished(folder, tmp_path):
+    def interrupt(stage, done, total):
+        if done == 2:
+            raise KeyboardInterrupt
+
+    out = tmp_path / "out"
+    with pytest.raises(KeyboardInterrupt):
+        batch(folder, out).run(1, progress=interrupt)
+    report = json.loads((out / REPORT_NAME).read_text())
+    assert len(report["files"]) == 2
+    calls(folder)
+    batch(folder, out).run(1)
+    assert "a.mp4" not in calls(folder)
+
+
+def test_nothing_to_do_is_said(tmp_path):
+    with pytest.raises(InputError, match="nowhere"):
+        batch(tmp_path / "nowhere", tmp_path / "out")
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(UsageError, match="no footage"):
+        batch(tmp_path / "empty", tmp_path / "out").run(1)
+
+
+@pytest.mark.parametrize(
+    ("argv", "says"), [(["--formats", "xyz"], "xyz"), (["--formats", ","], "formats"), (["--jobs", "0"], "0")]
+)
+def test_bad_arguments(tmp_path, capsys, argv, says):
+    assert main(["batch", str(tmp_path), "--out", str(tmp_path / "out"), *argv]) == 2
+    err = capsys.readouterr().err
+    assert says in err
+    assert err.count("\n") == 1
+    assert not (tmp_path / "out").exists()
+
+
+def test_the_real_capture_of_a_folder(tmp_path, capfd):
+    clips = tmp_path / "clips"
+    clips.mkdir()
+    shutil.copy(SAMPLE, clips / "walk.mp4")
+    (clips / "text.mp4").write_text("this is not a video")
+    argv = ["batch", str(clips), "--out", str(tmp_path / "out"), "--jobs", "2", "--formats", "npz"]
+    argv += ["--quality", "fast", "--end", "0.3", "--json"]
+    assert main(argv) == 1
+    report = json.loads(capfd.readouterr().out)
+    entries = {e["file"]: e for e in report["files"]}
+    assert entries["walk.mp4"]["status"] == "done", entries
+    assert entries["walk.mp4"]["outputs"] == ["walk.npz"]
+    assert entries["walk.mp4"]["report"]["people"] == 1
+    assert "text.mp4" in entries["text.mp4"]["message"]
+    assert report["options"] == {"--quality": "fast", "--end": "0.3"}
+    assert sorted(p.name for p in (tmp_path / "out").iterdir()) == [REPORT_NAME, "walk.npz"]
