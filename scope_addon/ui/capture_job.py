@@ -47,7 +47,8 @@ class CaptureJob:
         self._worker: WorkerProcess | None = None
         self._building = False
         if self._captured is None:
-            python = python or [sys.executable, *bpy.app.python_args]
+            # Blender 4.2 does not say how it runs Python; it is isolated there too.
+            python = python or [sys.executable, *getattr(bpy.app, "python_args", ("-I",))]
             folder = self._cache.new_job_folder()
             self._worker = WorkerProcess(self._request, folder, self._cache.kernels, python, START_SCRIPT)
 
