@@ -10,7 +10,15 @@ from .clip import carry, fit_clip
 from .errors import ShapeError
 from .frame_solver import FrameSolver, fit, fit_tree
 from .learned_prior import JointPrior, load_joint_prior
-from .measurements import Keypoints2D, Keypoints3D, Measurements, OrientationField, PosePriors
+from .measurements import (
+    Floor,
+    FootContacts,
+    Keypoints2D,
+    Keypoints3D,
+    Measurements,
+    OrientationField,
+    PosePriors,
+)
 from .options import COLD_STAGES, WARM_STAGES, Options, Priors, Stage, Weights, default_priors
 from .state import ClipFit, Fit, State, Status
 from .temporal import Temporal, with_previous
@@ -23,6 +31,8 @@ __all__ = [
     "BodyArrays",
     "ClipFit",
     "Fit",
+    "Floor",
+    "FootContacts",
     "FrameSolver",
     "JointPrior",
     "Keypoints2D",

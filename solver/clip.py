@@ -20,6 +20,7 @@ from .measurements import Measurements
 from .optimizer import CONVERGED, DAMPING_LEAST, DAMPING_MOST, MAX_ITERATIONS, NON_FINITE, STALLED
 from .options import WARM_STAGES, Options, Priors, default_priors
 from .recursion import Workspace, eliminate, make_workspace, retract, solve_globals, substitute
+from .report import cost_by_term
 from .residuals.part import Array, Blocks, Pose
 from .residuals.registry import SHAPE_PRIOR
 from .state import ClipFit, Fit, State, Status
@@ -87,7 +88,10 @@ def fit_clip(
         together[k] if k in together else _fit_with_shape(fixed, measurements[k], init[k], beta, scale, priors, options)
         for k in range(len(frames))
     ]
-    return ClipFit(fits, beta, joint.information(), scale, joint.status, joint.cost, joint.iterations)
+    shares = joint.cost_by_term() if options.report else {}
+    return ClipFit(
+        fits, beta, joint.information(), scale, joint.status, joint.cost, joint.iterations, joint.rejected, shares
+    )
 
 
 def _fit_in_order(
@@ -165,7 +169,8 @@ class _Joint:
         self.root_scale = 1.0 / options.root_length
         self.beta = np.zeros(tree.S.shape[2])
         self.log_focal = 0.0
-        self.status, self.cost, self.iterations = Status.NO_MEASUREMENTS, 0.0, 0
+        self.status, self.cost = Status.NO_MEASUREMENTS, 0.0
+        self.iterations, self.rejected = 0, 0
         # the last frame's shape has seen most, when the frames were fitted in order
         self.beta[: self.P] = frames[-1].init.beta if frames else self.mean
         shared = make_workspace(tree)
@@ -211,6 +216,7 @@ class _Joint:
                 if small:
                     return CONVERGED
             else:
+                self.rejected += 1
                 self._linearize(s, trial=False)  # one set of blocks a frame: memory, not time, is what a clip lacks
                 damping *= grow
                 grow *= 2.0
@@ -266,8 +272,29 @@ class _Joint:
             pose, P = f.pose, self.P
             state, n = State.from_pose(self.tree, pose), self.iterations
             information = f.work.C[:P, :P].copy()
-            out.append(Fit(state, self.status, float(f.cost), n, pose.R.copy(), pose.t.copy(), information, f.count))
+            shares = self._shares(f) if self.options.report else {}
+            out.append(
+                Fit(
+                    state, self.status, float(f.cost), n, pose.R.copy(), pose.t.copy(), information, f.count,
+                    self.rejected, shares,
+                )  # fmt: skip
+            )
         return out
+
+    def _shares(self, f: _Active) -> dict[str, float]:
+        return cost_by_term(self.tree, f.terms, self.table[-1], self.options.triggs, f.pose, f.blocks, f.work.scratch)
+
+    def cost_by_term(self) -> dict[str, float]:
+        """Return what the clip's cost is made of: the frames' sums, the shape prior once, the focal length's prior."""
+        total: dict[str, float] = {}
+        for f in self.frames:
+            for name, cost in self._shares(f).items():
+                total[name] = total.get(name, 0.0) + cost
+        offset = self.beta[: self.P] - self.mean
+        total["shape_prior"] = 0.5 * self.shape_weights[-1] * float(offset @ self.prior @ offset)
+        if self.tree.globals > self.P:
+            total["focal_prior"] = 0.5 * self.focal_weight * self.log_focal**2
+        return total
 
     def information(self) -> Array:
         """Return the information matrix of beta (P, P), prior included, poses and focal length eliminated."""

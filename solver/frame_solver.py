@@ -13,6 +13,7 @@ from .measurements import Measurements, as_array
 from .optimizer import optimize
 from .options import COLD_STAGES, WARM_STAGES, Options, Priors, Stage, default_priors
 from .recursion import make_workspace
+from .report import cost_by_term
 from .residuals.part import Array
 from .residuals.registry import SHAPE_PRIOR
 from .rotations import nearest_rotation, orthonormalize
@@ -91,14 +92,20 @@ class FrameSolver:
         if init is None:
             init = initial_state(tree, terms, self._mean(priors), packed.shape_mean[: tree.shape])
         self._enter(init)
-        cost, code, iterations, which = optimize(
+        cost, code, iterations, rejected, which = optimize(
             tree, terms, count > 0, table, tolerances, limits, options.triggs, options.damping,
             1.0 / options.root_length, pose, other, self._blocks[0], self._blocks[1], work,
         )  # fmt: skip
         found, P = self._poses[which], tree.shape
         information = work.C[:P, :P] - table[-1, 0, SHAPE_PRIOR] * packed.shape_information[:P, :P]
         state = State.from_pose(tree, found)
-        return Fit(state, Status(code), cost, iterations, found.R.copy(), found.t.copy(), information, count)
+        shares = {}
+        if options.report:
+            blocks, last = self._blocks[0], table[-1]
+            shares = cost_by_term(tree, terms, last, options.triggs, found, blocks, work.scratch)
+        return Fit(
+            state, Status(code), cost, iterations, found.R.copy(), found.t.copy(), information, count, rejected, shares
+        )
 
     def _pack(self, priors: Priors) -> PackedPriors:
         if self._packed is None or self._packed[0] is not priors:

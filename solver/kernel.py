@@ -40,6 +40,15 @@ def allocating_kernel(function: Callable[..., Any]) -> Any:
     return _compiled(function, _nrt=True)
 
 
+def inlined_kernel(function: Callable[..., Any]) -> Any:
+    """Compile a kernel that only others call: as `kernel`, but kept on disk within its callers alone.
+
+    For functions made in a loop, which numba's cache cannot tell apart.
+    """
+    options = dict(_OPTIONS, _nrt=False)
+    return njit(**options)(function)
+
+
 def _compiled(function: Callable[..., Any], **options: Any) -> Any:
     try:
         compiled = njit(cache=True, **_OPTIONS, **options)(function)

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from .errors import ShapeError
 from .kernel import kernel
-from .residuals import pose_prior
+from .residuals import floor, foot_contact, pose_prior
 from .residuals.part import Array
 
 
@@ -108,6 +108,29 @@ class PosePriors:
 
 
 @dataclass
+class FootContacts:
+    """Points that stand still: indices (n,), where (n, 3), in metres in this frame's camera, and probability (n,)."""
+
+    indices: ArrayLike
+    points: ArrayLike
+    probability: ArrayLike
+
+
+@dataclass
+class Floor:
+    """The plane normal^T p = offset in this frame's camera, and the points that may not be below it.
+
+    indices (n,), normal (3,), a unit vector pointing up, offset in metres, contact (n,): the probability of touching
+    the floor, 0 where a point is free to be above.
+    """
+
+    indices: ArrayLike
+    normal: ArrayLike
+    offset: float
+    contact: ArrayLike
+
+
+@dataclass
 class Measurements:
     """Everything measured in one frame. `intrinsics` (3, 3) is needed with 2D keypoints.
 
@@ -119,6 +142,8 @@ class Measurements:
     keypoints3d: Keypoints3D | None = None
     orientation_field: OrientationField | None = None
     pose_priors: PosePriors | None = None
+    foot_contacts: FootContacts | None = None
+    floor: Floor | None = None
     tables: Mapping[str, tuple[Array, Array]] = field(default_factory=dict)
 
     def packed2d(self, points: int) -> tuple[Array, Array]:
@@ -163,16 +188,48 @@ class Measurements:
         out[:, 3] = as_array(m.confidence, (n,), "Confidence of the orientation field")
         return starts, ends, out
 
-    def packed_tables(self, K: int) -> dict[str, tuple[Array, Array]]:
-        """Return the tables of the residuals that have their own field."""
-        m = self.pose_priors
-        if m is None:
-            return {}
-        parts = as_indices(m.parts, K + 1, "Parts of pose priors")
-        n = len(parts)
-        R = as_array(m.R_camera_part, (n, 3, 3), "Rotations of pose priors")
-        t = as_array(m.t_camera_part, (n, 3), "Positions of pose priors")
-        w_R = as_array(m.weight_rotation, (n,), "Rotation weights of pose priors")
-        w_t = as_array(m.weight_translation, (n,), "Translation weights of pose priors")
-        keep = np.isfinite(R).all((1, 2)) & np.isfinite(t).all(1) & np.isfinite(w_R) & np.isfinite(w_t)
-        return {"pose_prior": pose_prior.pack(parts[keep], R[keep], t[keep], w_R[keep], w_t[keep])}
+    def packed_tables(self, K: int, points: int) -> dict[str, tuple[Array, Array]]:
+        """Return the tables of the residuals that have their own field; rows that are not finite are left out."""
+        tables = {}
+        if self.pose_priors is not None:
+            tables["pose_prior"] = _pose_prior_rows(self.pose_priors, K)
+        if self.foot_contacts is not None:
+            tables["foot_contact"] = _foot_contact_rows(self.foot_contacts, points)
+        if self.floor is not None:
+            tables["floor"] = _floor_rows(self.floor, points)
+        return tables
+
+
+def _pose_prior_rows(m: PosePriors, K: int) -> tuple[Array, Array]:
+    parts = as_indices(m.parts, K + 1, "Parts of pose priors")
+    n = len(parts)
+    R = as_array(m.R_camera_part, (n, 3, 3), "Rotations of pose priors")
+    t = as_array(m.t_camera_part, (n, 3), "Positions of pose priors")
+    w_R = as_array(m.weight_rotation, (n,), "Rotation weights of pose priors")
+    w_t = as_array(m.weight_translation, (n,), "Translation weights of pose priors")
+    keep = np.isfinite(R).all((1, 2)) & np.isfinite(t).all(1) & np.isfinite(w_R) & np.isfinite(w_t)
+    return pose_prior.pack(parts[keep], R[keep], t[keep], w_R[keep], w_t[keep])
+
+
+def _foot_contact_rows(m: FootContacts, points: int) -> tuple[Array, Array]:
+    indices = as_indices(m.indices, points, "Indices of foot contacts")
+    n = len(indices)
+    stand = as_array(m.points, (n, 3), "Points of foot contacts")
+    weight = as_array(m.probability, (n,), "Probability of foot contacts")
+    keep = np.isfinite(stand).all(1) & np.isfinite(weight)
+    return foot_contact.pack(indices[keep], stand[keep], weight[keep])
+
+
+def _floor_rows(m: Floor, points: int) -> tuple[Array, Array]:
+    indices = as_indices(m.indices, points, "Indices of the floor's points")
+    normal = as_array(m.normal, (3,), "Normal of the floor")
+    contact = as_array(m.contact, (len(indices),), "Contact with the floor")
+    length = float(np.linalg.norm(normal))
+    if not (np.isfinite(length) and np.isfinite(m.offset) and abs(length - 1.0) < 1e-6):
+        raise ShapeError(
+            f"The floor needs a finite offset and a normal of length 1, but got offset {m.offset} and a normal of "
+            f"length {length:.6g}; divide both by that length."
+        )
+    keep = np.isfinite(contact)
+    indices = indices[keep]
+    return floor.pack(indices, normal, float(m.offset), np.ones(len(indices)), contact[keep])

@@ -21,17 +21,18 @@ def optimize(  # type: ignore[no-untyped-def]
     tree, terms, measured, stages, tolerances, limits, triggs, damping, root_scale, pose, other_pose, blocks,
     other_blocks, work,
 ):
-    """Run all stages from `pose` and return (cost, status, iterations, 1 if the result is in `other_pose`).
+    """Run all stages from `pose`; return (cost, status, iterations, how many were rejected, 1 if the result is in
+    `other_pose`).
 
     stages (S, 2, weights), tolerances (S,), limits (S,). Without measurements, or for a cost that is not finite, the
     pose stays where it is. At the end work.C is the reduced system of the result: see `eliminate`.
     """
     cur, nxt, cur_blocks, nxt_blocks, swapped = pose, other_pose, blocks, other_blocks, 0
-    cost, status, iterations = 0.0, CONVERGED, 0
+    cost, status, iterations, rejected = 0.0, CONVERGED, 0, 0
     if not measured:
         cost = linearize(tree, terms, stages[-1], triggs, cur, cur_blocks, work.scratch)
         eliminate(tree, cur, cur_blocks, DAMPING_LEAST, root_scale, work)
-        return cost, NO_MEASUREMENTS, iterations, swapped
+        return cost, NO_MEASUREMENTS, iterations, rejected, swapped
     for s in range(stages.shape[0]):
         stage = stages[s]
         lam, grow = damping, 2.0
@@ -64,10 +65,11 @@ def optimize(  # type: ignore[no-untyped-def]
                     status = CONVERGED
                     break
             else:
+                rejected += 1
                 lam *= grow
                 grow *= 2.0
                 if lam > DAMPING_MOST:
                     status = STALLED
                     break
     eliminate(tree, cur, cur_blocks, DAMPING_LEAST, root_scale, work)
-    return cost, status, iterations, swapped
+    return cost, status, iterations, rejected, swapped

@@ -31,6 +31,8 @@ class Weights:
     joint_prior: float = 50.0
     joint_limits: float = 2000.0
     joint_flow: float = 1.0
+    foot_contact: float = 4e4
+    floor: float = 4e4
     shape: float = 100.0
     tables: Mapping[str, float] = field(default_factory=dict)
 
@@ -41,6 +43,8 @@ class Weights:
             "joint_prior": self.joint_prior,
             "joint_limits": self.joint_limits,
             "joint_flow": self.joint_flow,
+            "foot_contact": self.foot_contact,
+            "floor": self.floor,
         }
         by_name = {**own, **self.tables}
         first = [self.keypoints2d, self.keypoints3d, self.orientation_field, self.shape]
@@ -86,6 +90,7 @@ class Options:
     damping: Levenberg-Marquardt lambda at the start, on joint rotations in radians; root_length: metres of pelvis
     motion that are damped like one radian.
     stages: replaces the default schedule, which depends on whether an initial state is given.
+    report: also tell what the cost is made of (`Fit.cost_by_term`), which takes another eleven evaluations.
     """
 
     stages: Sequence[Stage] | None = None
@@ -95,6 +100,7 @@ class Options:
     triggs: float = 0.0
     damping: float = 1.0
     root_length: float = 0.3
+    report: bool = False
 
     def stage_table(self, stages: Sequence[Stage]) -> tuple[Array, Array, Array]:
         """Return (S, 2, weights) of weights and 1/sigma, tolerances (S,) and iteration limits (S,)."""

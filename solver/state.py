@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The unknowns of one frame, and what a fit gives back."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 
 import numpy as np
@@ -57,7 +57,7 @@ class State:
 
 @dataclass
 class Fit:
-    """Result of one frame."""
+    """Result of one frame, and how it was reached: `status` says why the optimizer stopped."""
 
     state: State
     status: Status
@@ -67,6 +67,8 @@ class Fit:
     t_camera_part: Array  # (K+1, 3), the joints
     beta_information: Array  # (P, P), of this frame's measurements alone, pose eliminated; shape prior not included
     measurements: int  # usable points and directions
+    rejected: int = 0  # of the iterations, those whose step did not lower the cost
+    cost_by_term: dict[str, float] = field(default_factory=dict)  # adds up to `cost`; with Options.report only
 
 
 @dataclass
@@ -80,3 +82,5 @@ class ClipFit:
     status: Status
     cost: float
     iterations: int
+    rejected: int = 0
+    cost_by_term: dict[str, float] = field(default_factory=dict)  # adds up to `cost`; with Options.report only

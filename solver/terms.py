@@ -255,7 +255,7 @@ def fill_terms(
         layout = Layout(tree, indices)
     count = _fill(layout.shaped, *layout.slots, m2, m3, md, *layout.values)
     tables = priors.tables
-    own = m.packed_tables(len(tree.parents) - 1)
+    own = m.packed_tables(len(tree.parents) - 1, n_points)
     if own or m.tables:
         tables = {**tables, **own}
         for name, table in m.tables.items():

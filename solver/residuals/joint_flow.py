@@ -27,7 +27,7 @@ import numpy as np
 from ..kernel import allocating_kernel, kernel
 from ..lanes import LANES, sqrt, step
 from ..rotations import exp, exp3, log, log3, matrix_from_quaternion
-from .joint_prior import add_to_joint
+from .accumulation import add_to_joint
 from .part import Array, Linearization, Part
 
 LAYERS, HIDDEN = 4, 4

@@ -17,7 +17,7 @@ import numpy as np
 
 from ..kernel import kernel
 from ..rotations import left_jacobian_inverse, left_jacobian_inverse3, log, log3
-from .joint_prior import add_to_joint
+from .accumulation import add_to_joint
 from .part import Array, Linearization, Part
 
 INTS = 1  # joint

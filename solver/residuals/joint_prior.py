@@ -10,23 +10,12 @@ Source: section 3 of the paper (joint state prior), with a Gaussian on SO(3) in 
 import numpy as np
 
 from ..kernel import kernel
-from ..rotations import left_jacobian_inverse, left_jacobian_inverse3, log, log3
-from .part import GRADIENT, Array, Linearization, Part
+from ..rotations import left_jacobian_inverse, left_jacobian_inverse3, log
+from .accumulation import add_to_joint, relative_log
+from .part import Array, Linearization, Part
 
 INTS = 1  # joint
 FLOATS = 10  # Omega_mean (9) by rows, w
-
-
-@kernel
-def add_to_joint(tree, pose, blocks, i, h00, h01, h02, h11, h12, h22, g0, g1, g2):  # type: ignore[no-untyped-def]
-    """Add a Hessian and a gradient in the parent's axes to joint i: H_uu += R_par H R_parᵀ, g_u += R_par g."""
-    R = pose.R[tree.parents[i]]
-    for r in range(3):
-        x, y, z = R[r, 0], R[r, 1], R[r, 2]
-        a, b, c = x * h00 + y * h01 + z * h02, x * h01 + y * h11 + z * h12, x * h02 + y * h12 + z * h22
-        for s in range(3):
-            blocks.H_uu[i, r, s] += a * R[s, 0] + b * R[s, 1] + c * R[s, 2]
-        blocks.H_u[i, r, GRADIENT] += x * g0 + y * g1 + z * g2
 
 
 @kernel
@@ -39,18 +28,7 @@ def accumulate(tree, ints, floats, weight, inv_sigma, triggs, pose, blocks):  # 
         w = weight * m[9]
         if w <= 0.0:
             continue
-        Om = pose.Omega[i]
-        x, y, z = log3(
-            m[0] * Om[0, 0] + m[3] * Om[1, 0] + m[6] * Om[2, 0],
-            m[0] * Om[0, 1] + m[3] * Om[1, 1] + m[6] * Om[2, 1],
-            m[0] * Om[0, 2] + m[3] * Om[1, 2] + m[6] * Om[2, 2],
-            m[1] * Om[0, 0] + m[4] * Om[1, 0] + m[7] * Om[2, 0],
-            m[1] * Om[0, 1] + m[4] * Om[1, 1] + m[7] * Om[2, 1],
-            m[1] * Om[0, 2] + m[4] * Om[1, 2] + m[7] * Om[2, 2],
-            m[2] * Om[0, 0] + m[5] * Om[1, 0] + m[8] * Om[2, 0],
-            m[2] * Om[0, 1] + m[5] * Om[1, 1] + m[8] * Om[2, 1],
-            m[2] * Om[0, 2] + m[5] * Om[1, 2] + m[8] * Om[2, 2],
-        )
+        x, y, z = relative_log(m, pose.Omega[i])
         J = left_jacobian_inverse3(x, y, z)
         # J^-T J^-1 = q I + (1 - q) a aᵀ with a the axis and q = |phi/2|^2 / sin^2(|phi|/2): read q off the trace
         s = x * x + y * y + z * z

@@ -11,9 +11,9 @@ Source: section 3 of the paper (pose prior on T_i).
 import numpy as np
 
 from ..kernel import kernel
-from ..rotations import left_jacobian_inverse, left_jacobian_inverse3, log, log3
-from ..rows import add1, add3
-from .part import GRADIENT, SHAPE, Array, Linearization, Part, hat_identity
+from ..rotations import left_jacobian_inverse, left_jacobian_inverse3, log
+from .accumulation import add_to_point, relative_log
+from .part import GRADIENT, Array, Linearization, Part, hat_identity
 
 INTS = 1  # part
 FLOATS = 14  # R^ (9) by rows, t^ (3), w_R, w_t
@@ -22,10 +22,7 @@ FLOATS = 14  # R^ (9) by rows, t^ (3), w_R, w_t
 @kernel
 def accumulate(tree, ints, floats, weight, inv_sigma, triggs, pose, blocks):  # type: ignore[no-untyped-def]
     """Add every row's M, N, m, C, c to the blocks and return the cost. ints (n, 1), floats (n, 14)."""
-    A, C, D = blocks.A, blocks.C, pose.D
-    W = C.shape[0]
-    row = SHAPE + W
-    o0, o1, o2 = pose.t[0, 0], pose.t[0, 1], pose.t[0, 2]
+    A = blocks.A
     cost = 0.0
     for k in range(ints.shape[0]):
         i = ints[k, 0]
@@ -33,17 +30,7 @@ def accumulate(tree, ints, floats, weight, inv_sigma, triggs, pose, blocks):  # 
         R = pose.R[i]
         w_r, w_t = weight * h[12], weight * h[13]
         if w_r > 0.0:
-            phi = log3(
-                h[0] * R[0, 0] + h[3] * R[1, 0] + h[6] * R[2, 0],
-                h[0] * R[0, 1] + h[3] * R[1, 1] + h[6] * R[2, 1],
-                h[0] * R[0, 2] + h[3] * R[1, 2] + h[6] * R[2, 2],
-                h[1] * R[0, 0] + h[4] * R[1, 0] + h[7] * R[2, 0],
-                h[1] * R[0, 1] + h[4] * R[1, 1] + h[7] * R[2, 1],
-                h[1] * R[0, 2] + h[4] * R[1, 2] + h[7] * R[2, 2],
-                h[2] * R[0, 0] + h[5] * R[1, 0] + h[8] * R[2, 0],
-                h[2] * R[0, 1] + h[5] * R[1, 1] + h[8] * R[2, 1],
-                h[2] * R[0, 2] + h[5] * R[1, 2] + h[8] * R[2, 2],
-            )
+            phi = relative_log(h, R)
             cost += 0.5 * w_r * (phi[0] * phi[0] + phi[1] * phi[1] + phi[2] * phi[2])
             Ji = left_jacobian_inverse3(phi[0], phi[1], phi[2])
             for r in range(3):
@@ -58,38 +45,13 @@ def accumulate(tree, ints, floats, weight, inv_sigma, triggs, pose, blocks):  # 
                     b2 = Ji[6] * h[3 * s] + Ji[7] * h[3 * s + 1] + Ji[8] * h[3 * s + 2]
                     A[i, r, s] += w_r * (a0 * b0 + a1 * b1 + a2 * b2)
         if w_t > 0.0:
-            e0, e1, e2 = pose.t[i, 0] - o0, pose.t[i, 1] - o1, pose.t[i, 2] - o2
             f0, f1, f2 = pose.t[i, 0] - h[9], pose.t[i, 1] - h[10], pose.t[i, 2] - h[11]
             cost += 0.5 * w_t * (f0 * f0 + f1 * f1 + f2 * f2)
-            f0, f1, f2 = w_t * f0, w_t * f1, w_t * f2
-            n = e0 * e0 + e1 * e1 + e2 * e2
-            e = (e0, e1, e2)
-            for r in range(3):
-                A[i, 3 + r, 3 + r] += w_t
-                A[i, r, r] += w_t * n
-                for s in range(3):
-                    A[i, r, s] -= w_t * e[r] * e[s]
-            for r, s, x in ((1, 0, e2), (0, 2, e1), (2, 1, e0)):  # w_t [e]x in the corner, its transpose below
-                A[i, r, 3 + s] += w_t * x
-                A[i, s, 3 + r] -= w_t * x
-                A[i, 3 + s, r] += w_t * x
-                A[i, 3 + r, s] -= w_t * x
-            A[i, 0, GRADIENT] += e1 * f2 - e2 * f1
-            A[i, 1, GRADIENT] += e2 * f0 - e0 * f2
-            A[i, 2, GRADIENT] += e0 * f1 - e1 * f0
-            A[i, 3, GRADIENT] += f0
-            A[i, 4, GRADIENT] += f1
-            A[i, 5, GRADIENT] += f2
-            d = 3 * i * W
-            base = 6 * i * row + SHAPE
-            add3(A, base, 0.0, -w_t * e2, w_t * e1, D, d, d + W, d + 2 * W, W)
-            add3(A, base + row, w_t * e2, 0.0, -w_t * e0, D, d, d + W, d + 2 * W, W)
-            add3(A, base + 2 * row, -w_t * e1, w_t * e0, 0.0, D, d, d + W, d + 2 * W, W)
-            for r in range(3):
-                add1(A, base + (3 + r) * row, w_t, D, d + r * W, W)
-            add3(blocks.c, 0, f0, f1, f2, D, d, d + W, d + 2 * W, W)
-            for a in range(tree.globals):
-                add3(C, a * W, w_t * D[i, 0, a], w_t * D[i, 1, a], w_t * D[i, 2, a], D, d, d + W, d + 2 * W, W)
+            origin = tree.keypoints + i  # the part's origin as a point
+            add_to_point(
+                tree, pose, blocks, origin, 0.0, 0.0, 0.0,
+                w_t, 0.0, 0.0, w_t, 0.0, w_t, w_t * f0, w_t * f1, w_t * f2,
+            )  # fmt: skip
     return cost
 
 

@@ -11,6 +11,8 @@ from scope.solver.measurements import Keypoints2D, Keypoints3D, Measurements, Or
 from scope.solver.options import Stage, Weights
 from scope.solver.recursion import make_workspace
 from scope.solver.residuals import (
+    floor,
+    foot_contact,
     joint_flow,
     joint_limits,
     joint_prior,
@@ -78,6 +80,9 @@ CASES = {
     "keypoint2d": lambda part, w: keypoint2d.evaluate(part, V_BAR, V, np.array([0.1, 0.2]), w, 1.2),
     "keypoint3d": lambda part, w: keypoint3d.evaluate(part, V_BAR, V, np.array([0.1, 0.2, 3.1]), w),
     "orientation_field": lambda part, w: orientation_field.evaluate(part, V_BAR, V, AXIS, w),
+    "foot_contact": lambda part, w: foot_contact.evaluate(part, V_BAR, V, np.array([0.1, 0.2, 3.1]), w),
+    "floor": lambda part, w: floor.evaluate(part, V_BAR, V, AXIS, 9.0, 2.0, 0.0, w),
+    "floor_above": lambda part, w: floor.evaluate(part, V_BAR, V, AXIS, -9.0, 2.0, 3.0, w),
     "pose_prior": lambda part, w: pose_prior.evaluate(part, HAT, np.array([0.1, 0.1, 2.5]), 2.0, 3.0, w),
     "joint_prior": lambda part, w: joint_prior.evaluate(part, HAT, w),
     "joint_flow": lambda part, w: joint_flow.evaluate(part, FLOW, w),
@@ -127,7 +132,7 @@ def test_weight_is_linear_in_the_cost(name):
 
 
 def test_every_registered_residual_is_in_these_tests():
-    others = {"keypoint2d", "keypoint3d", "orientation_field", "shape_prior", "joint_flow_log_det"}
+    others = {"keypoint2d", "keypoint3d", "orientation_field", "shape_prior", "joint_flow_log_det", "floor_above"}
     assert set(registry.RESIDUALS) | others == set(CASES)
     for module in registry.RESIDUALS.values():
         assert list(inspect.signature(module.accumulate.py_func).parameters) == [
@@ -165,10 +170,18 @@ def check_blocks(tree, blocks, cost, i, found):
 
 
 @pytest.mark.parametrize("seed", range(3))
-@pytest.mark.parametrize("name", ["pose_prior", "joint_prior", "joint_flow", "joint_flow_log_det", "joint_limits"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        *("pose_prior", "joint_prior", "joint_flow", "joint_flow_log_det", "joint_limits"),
+        *("foot_contact", "floor", "floor_above", "foot_contact_of_a_joint"),
+    ],
+)
 def test_table_kernels_accumulate_their_residual(name, seed):
-    rng, _, tree, pose = chain(seed)
+    rng, body, tree, pose = chain(seed)
     i, w = 3, 1.9
+    k = int(np.flatnonzero(body.keypoint_part == i)[0])
+    v_bar, shape = body.v_bar[k], body.V[k]
     part = part_of(tree, pose, i)
     if name == "pose_prior":
         tables = pose_prior.pack([i], HAT[None], np.array([[0.1, 0.1, 2.5]]), [2.0], [3.0])
@@ -181,6 +194,17 @@ def test_table_kernels_accumulate_their_residual(name, seed):
         tables = joint_flow.pack([i], FLOW[None], [2.0], h)
         found = joint_flow.evaluate(part, FLOW, 2.0 * w, h)
         name = "joint_flow"
+    elif name.startswith("foot_contact"):
+        if name.endswith("joint"):
+            k, v_bar, shape = 10 + i, np.zeros(3), np.zeros((3, P))
+        tables = foot_contact.pack([k], np.array([[0.1, 0.2, 3.1]]), [2.0])
+        found = foot_contact.evaluate(part, v_bar, shape, np.array([0.1, 0.2, 3.1]), 2.0 * w)
+        name = "foot_contact"
+    elif name.startswith("floor"):
+        offset = -9.0 if name.endswith("above") else 9.0
+        tables = floor.pack([k], AXIS, offset, [2.0], [3.0])
+        found = floor.evaluate(part, v_bar, shape, AXIS, offset, 2.0, 3.0, w)
+        name = "floor"
     else:
         tables = joint_limits.pack([i], AXIS[None], [-0.1], [0.1], [0.05], [2.0], [3.0])
         found = joint_limits.evaluate(part, AXIS, -0.1, 0.1, 0.05, 2.0, 3.0, w)

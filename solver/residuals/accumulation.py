@@ -1,0 +1,118 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What residuals of a point or of a joint have in common: from their weight and gradient to the Gauss-Newton blocks.
+
+A residual of a point p fixed to part i, with W = GᵀG and f = Gᵀr for G = dr/dp, adds, with e = p - origin and
+B = R_i V + D_i,
+    M += [[ [e]x W [e]xᵀ, [e]x W ], [., W]],   N += [[e]x W B ; W B],   m += [e x f ; f],   C += BᵀWB,   c += Bᵀf
+and one of a joint's state adds its Hessian and gradient, turned from the parent's axes to the camera's.
+Source: section 3 of the paper.
+"""
+
+from ..kernel import kernel
+from ..rotations import log3
+from .part import GRADIENT, SHAPE
+
+
+@kernel
+def relative_log(h, R):  # type: ignore[no-untyped-def]
+    """Return log(H^T R), three numbers; h begins with H (9) by rows, R (3, 3)."""
+    return log3(
+        h[0] * R[0, 0] + h[3] * R[1, 0] + h[6] * R[2, 0],
+        h[0] * R[0, 1] + h[3] * R[1, 1] + h[6] * R[2, 1],
+        h[0] * R[0, 2] + h[3] * R[1, 2] + h[6] * R[2, 2],
+        h[1] * R[0, 0] + h[4] * R[1, 0] + h[7] * R[2, 0],
+        h[1] * R[0, 1] + h[4] * R[1, 1] + h[7] * R[2, 1],
+        h[1] * R[0, 2] + h[4] * R[1, 2] + h[7] * R[2, 2],
+        h[2] * R[0, 0] + h[5] * R[1, 0] + h[8] * R[2, 0],
+        h[2] * R[0, 1] + h[5] * R[1, 1] + h[8] * R[2, 1],
+        h[2] * R[0, 2] + h[5] * R[1, 2] + h[8] * R[2, 2],
+    )
+
+
+@kernel
+def add_to_joint(tree, pose, blocks, i, h00, h01, h02, h11, h12, h22, g0, g1, g2):  # type: ignore[no-untyped-def]
+    """Add a Hessian and a gradient in the parent's axes to joint i: H_uu += R_par H R_parᵀ, g_u += R_par g."""
+    R = pose.R[tree.parents[i]]
+    for r in range(3):
+        x, y, z = R[r, 0], R[r, 1], R[r, 2]
+        a, b, c = x * h00 + y * h01 + z * h02, x * h01 + y * h11 + z * h12, x * h02 + y * h12 + z * h22
+        for s in range(3):
+            blocks.H_uu[i, r, s] += a * R[s, 0] + b * R[s, 1] + c * R[s, 2]
+        blocks.H_u[i, r, GRADIENT] += x * g0 + y * g1 + z * g2
+
+
+@kernel
+def lever(tree, pose, k):  # type: ignore[no-untyped-def]
+    """Return R_i (V_k beta + v_bar_k), from the part's origin to point k, in camera axes."""
+    x, y, z = tree.v_bar[k, 0], tree.v_bar[k, 1], tree.v_bar[k, 2]
+    for a in range(tree.shape):
+        b = pose.beta[a]
+        x += tree.V[k, 0, a] * b
+        y += tree.V[k, 1, a] * b
+        z += tree.V[k, 2, a] * b
+    R = pose.R[tree.point_part[k]]
+    return (
+        R[0, 0] * x + R[0, 1] * y + R[0, 2] * z,
+        R[1, 0] * x + R[1, 1] * y + R[1, 2] * z,
+        R[2, 0] * x + R[2, 1] * y + R[2, 2] * z,
+    )
+
+
+@kernel
+def _shape_derivative(tree, pose, k, i, a):  # type: ignore[no-untyped-def]
+    """Return column a of B = R_i V_k + D_i."""
+    R, D = pose.R[i], pose.D[i]
+    x, y, z = tree.V[k, 0, a], tree.V[k, 1, a], tree.V[k, 2, a]
+    return (
+        R[0, 0] * x + R[0, 1] * y + R[0, 2] * z + D[0, a],
+        R[1, 0] * x + R[1, 1] * y + R[1, 2] * z + D[1, a],
+        R[2, 0] * x + R[2, 1] * y + R[2, 2] * z + D[2, a],
+    )
+
+
+@kernel
+def add_to_point(tree, pose, blocks, k, lx, ly, lz, w00, w01, w02, w11, w12, w22, f0, f1, f2):  # type: ignore[no-untyped-def]
+    """Add W (its upper triangle) and f of point k, whose `lever` is (lx, ly, lz). One point at a time, for the few that
+    touch something; the many that are measured go through linearize.py.
+    """
+    i = tree.point_part[k]
+    A, C, c = blocks.A[i], blocks.C, blocks.c
+    t, o = pose.t[i], pose.t[0]
+    x, y, z = lx + t[0] - o[0], ly + t[1] - o[1], lz + t[2] - o[2]
+    W = ((w00, w01, w02), (w01, w11, w12), (w02, w12, w22))
+    for s in range(3):
+        # column s of W, of [e]x W, and of [e]x W [e]xT = -[e]x W [e]x
+        A[3, 3 + s] += W[0][s]
+        A[4, 3 + s] += W[1][s]
+        A[5, 3 + s] += W[2][s]
+    b00, b01, b02 = y * w02 - z * w01, y * w12 - z * w11, y * w22 - z * w12
+    b10, b11, b12 = z * w00 - x * w02, z * w01 - x * w12, z * w02 - x * w22
+    b20, b21, b22 = x * w01 - y * w00, x * w11 - y * w01, x * w12 - y * w02
+    corner = ((b00, b01, b02), (b10, b11, b12), (b20, b21, b22))
+    for r in range(3):
+        for s in range(3):
+            A[r, 3 + s] += corner[r][s]
+            A[3 + s, r] += corner[r][s]
+        b0, b1, b2 = corner[r]
+        A[r, 0] += y * b2 - z * b1
+        A[r, 1] += z * b0 - x * b2
+        A[r, 2] += x * b1 - y * b0
+    A[0, GRADIENT] += y * f2 - z * f1
+    A[1, GRADIENT] += z * f0 - x * f2
+    A[2, GRADIENT] += x * f1 - y * f0
+    A[3, GRADIENT] += f0
+    A[4, GRADIENT] += f1
+    A[5, GRADIENT] += f2
+    for a in range(tree.shape):
+        B0, B1, B2 = _shape_derivative(tree, pose, k, i, a)
+        c[a] += B0 * f0 + B1 * f1 + B2 * f2
+        g0, g1, g2 = w00 * B0 + w01 * B1 + w02 * B2, w01 * B0 + w11 * B1 + w12 * B2, w02 * B0 + w12 * B1 + w22 * B2
+        A[0, SHAPE + a] += y * g2 - z * g1
+        A[1, SHAPE + a] += z * g0 - x * g2
+        A[2, SHAPE + a] += x * g1 - y * g0
+        A[3, SHAPE + a] += g0
+        A[4, SHAPE + a] += g1
+        A[5, SHAPE + a] += g2
+        for b in range(a, tree.shape):
+            E0, E1, E2 = _shape_derivative(tree, pose, k, i, b)
+            C[a, b] += g0 * E0 + g1 * E1 + g2 * E2

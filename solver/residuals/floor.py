@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The floor: no point may be below it, and one in contact may not be above it either.
+
+    h = n^T p - d,   p = R_i (V_j beta + v_bar_j) + t_i,   metres above the plane n^T p = d in the camera frame
+    r = sqrt(w) h,   w = w_below where h < 0, else w_above
+    dr/dx = sqrt(w) n^T [-[p - origin]x, I],   dr/dbeta = sqrt(w) n^T (R_i V_j + D_i)
+With w_above = 0 it is one-sided; with the probability of contact there it holds standing feet down. r and, where both
+weights are equal, dr/dp are continuous at h = 0; the cost and its gradient always are.
+Source: a one-sided height keeps the form r_i(T_i, beta) of section 3 of the paper.
+"""
+
+import numpy as np
+
+from ..kernel import kernel
+from .accumulation import add_to_point, lever
+from .part import Array, Linearization, Part, point_jacobian
+
+INTS = 1  # point, numbered as in the measurements
+FLOATS = 6  # n (3), a unit vector, d, w_below, w_above
+
+
+@kernel
+def accumulate(tree, ints, floats, weight, inv_sigma, triggs, pose, blocks):  # type: ignore[no-untyped-def]
+    """Add every row's M, N, m, C, c to the blocks and return the cost. ints (n, 1), floats (n, 6)."""
+    cost = 0.0
+    for k in range(ints.shape[0]):
+        f = floats[k]
+        j = ints[k, 0]
+        x, y, z = lever(tree, pose, j)
+        t = pose.t[tree.point_part[j]]
+        a, b, c = f[0], f[1], f[2]
+        h = a * (x + t[0]) + b * (y + t[1]) + c * (z + t[2]) - f[3]
+        w = weight * (f[4] if h < 0.0 else f[5])
+        if w <= 0.0:
+            continue
+        cost += 0.5 * w * h * h
+        add_to_point(
+            tree, pose, blocks, j, x, y, z,
+            w * a * a, w * a * b, w * a * c, w * b * b, w * b * c, w * c * c, w * h * a, w * h * b, w * h * c,
+        )  # fmt: skip
+    return cost
+
+
+def pack(points: Array, normal: Array, offset: float, w_below: Array, w_above: Array) -> tuple[Array, Array]:
+    """Return the tables of `accumulate` from points (n,), the plane's unit normal (3,) and offset, and weights (n,)."""
+    n = len(points)
+    plane = np.tile(np.append(normal, offset), (n, 1))
+    floats = np.hstack([plane, np.reshape(w_below, (n, 1)), np.reshape(w_above, (n, 1))])
+    return np.reshape(points, (n, 1)).astype(np.int64), np.ascontiguousarray(floats, dtype=np.float64)
+
+
+def evaluate(
+    part: Part,
+    v_bar: Array,
+    V: Array,
+    normal: Array,
+    offset: float,
+    w_below: float,
+    w_above: float,
+    weight: float = 1.0,
+) -> Linearization:
+    """Return the residual (1 row) times sqrt(weight) and its derivatives."""
+    p = part.R @ (V @ part.beta + v_bar) + part.t
+    J_x, J_beta = point_jacobian(part, p, V)
+    h = float(normal @ p) - offset
+    g = np.sqrt(weight * (w_below if h < 0.0 else w_above))
+    return Linearization(np.array([g * h]), g * (normal @ J_x)[None], np.zeros((1, 3)), g * (normal @ J_beta)[None])

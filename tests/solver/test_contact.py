@@ -1,0 +1,143 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Feet that stand and a floor nobody sinks into, as terms of the solver."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scope.solver import (
+    Floor,
+    FootContacts,
+    Keypoints2D,
+    Keypoints3D,
+    Measurements,
+    Options,
+    Priors,
+    ShapeError,
+    State,
+    fit,
+    fit_clip,
+    load_body,
+    make_tree,
+    rotations,
+)
+
+BODY = load_body("scope")
+NAMES = list(BODY.keypoint_names)
+SOLES = ("left_heel", "left_foot_index", "right_heel", "right_foot_index")
+FEET = np.array([NAMES.index(f"blazepose/{name}") for name in SOLES])
+UP = rotations.exp([0.2, 0.0, 0.1]) @ np.array([0.0, -1.0, 0.0])  # a camera that looks down and is not quite level
+INTRINSICS = np.array([[1000.0, 0.0, 500.0], [0.0, 1000.0, 500.0], [0.0, 0.0, 1.0]])
+
+
+def points(state):
+    """All keypoints in the camera frame, straight from the definition."""
+    tree = make_tree(BODY)
+    pose = state.pose(tree)
+    n = len(NAMES)
+    local = tree.V[:n, :, : tree.shape] @ state.beta + tree.v_bar[:n]
+    return np.einsum("mij,mj->mi", pose.R[tree.point_part[:n]], local) + pose.t[tree.point_part[:n]]
+
+
+def standing(seed=0):
+    rng = np.random.default_rng(seed)
+    state = State.rest(23, 10, 4.0)
+    Omega = rotations.exp(0.15 * rng.standard_normal((23, 3)))
+    return State(state.R_camera_root, state.t_camera_root, Omega, 0.5 * rng.standard_normal(10))
+
+
+def seen(state, noise=0.0, seed=0, **more):
+    """All keypoints in space with noise in metres."""
+    rng = np.random.default_rng(seed)
+    p = points(state)
+    return Measurements(
+        keypoints3d=Keypoints3D(np.arange(len(p)), p + noise * rng.standard_normal(p.shape), np.full(len(p), 0.02)),
+        **more,
+    )
+
+
+def test_a_standing_foot_stays_where_it_stands_although_it_is_seen_to_slide():
+    state = standing()
+    p = points(state)
+    slid = seen(state)
+    slid.keypoints3d.points[FEET[:2]] += [0.06, 0.0, 0.03]
+    free = fit(BODY, slid, init=state)
+    held = fit(BODY, replace(slid, foot_contacts=FootContacts(FEET[:2], p[FEET[:2]], [1.0, 1.0])), init=state)
+    off_free, off_held = (np.linalg.norm(points(f.state)[FEET[:2]] - p[FEET[:2]], axis=1).max() for f in (free, held))
+    assert off_free > 0.025
+    assert off_held < 0.25 * off_free
+    # the other foot goes on where it was seen
+    np.testing.assert_allclose(points(held.state)[FEET[2:]], p[FEET[2:]], atol=0.02)
+
+
+def test_nobody_sinks_into_the_floor_and_nobody_in_the_air_is_pulled_down():
+    state = standing()
+    p = points(state)
+    height = (p[FEET] @ UP).min()
+    raised = Floor(FEET, UP, height + 0.05, np.zeros(4))
+    lowest = (points(fit(BODY, seen(state, floor=raised), init=state).state)[FEET] @ UP).min() - (height + 0.05)
+    assert lowest > -0.01
+    far_below = Floor(FEET, UP, height - 0.3, np.zeros(4))
+    found, plain = (fit(BODY, m, init=state) for m in (seen(state, floor=far_below), seen(state)))
+    np.testing.assert_array_equal(found.t_camera_part, plain.t_camera_part)
+    touching = Floor(FEET, UP, height - 0.03, np.ones(4))
+    held = points(fit(BODY, seen(state, floor=touching), init=state).state)[FEET] @ UP - (height - 0.03)
+    free = points(fit(BODY, seen(state), init=state).state)[FEET] @ UP - (height - 0.03)
+    assert np.abs(held).max() < 0.3 * np.abs(free).max()
+
+
+def test_the_floor_tells_the_depth_that_a_picture_does_not():
+    """With 2D alone, distance and size are one; a floor of known height under standing feet decides."""
+    state = standing(3)
+    p = points(state)
+    pixels = p @ INTRINSICS.T
+    image = Keypoints2D(np.arange(len(p)), pixels[:, :2] / pixels[:, 2:], np.ones(len(p)))
+    priors = Priors(shape_mean=state.beta * 0.0)
+    far = State(state.R_camera_root, state.t_camera_root * 1.15, state.Omega, np.zeros(10))
+    only = fit(BODY, Measurements(INTRINSICS, image), init=far, priors=priors)
+    height = float(np.mean(p[FEET] @ UP))
+    ground = Floor(FEET, UP, height, np.ones(4))
+    held = fit(BODY, Measurements(INTRINSICS, image, floor=ground), init=far, priors=priors)
+    error = [np.linalg.norm(f.state.t_camera_root - state.t_camera_root) for f in (only, held)]
+    assert error[1] < 0.5 * error[0]
+
+
+def test_contacts_hold_through_a_clip_with_one_shape():
+    state = standing(1)
+    stand = points(state)[FEET]
+    frames = [seen(state, 0.02, seed) for seed in range(6)]
+    contact = FootContacts(FEET, stand, np.ones(4))
+    slide = {}
+    for name, clip in (("free", frames), ("held", [replace(m, foot_contacts=contact) for m in frames])):
+        feet = np.array([points(f.state)[FEET] for f in fit_clip(BODY, clip).frames])
+        slide[name] = np.linalg.norm(np.diff(feet, axis=0), axis=-1).max()
+    assert slide["held"] < 0.2 * slide["free"]
+
+
+def test_a_point_that_is_not_finite_is_left_out_and_no_probability_is_no_contact():
+    state = standing()
+    m = seen(state)
+    plain = fit(BODY, m, init=state)
+    stand = points(state)[FEET[:2]] + 1.0
+    for where, probability in ((stand, [0.0, 0.0]), (stand * np.nan, [1.0, 1.0]), (stand, [np.nan, np.nan])):
+        found = fit(BODY, replace(m, foot_contacts=FootContacts(FEET[:2], where, probability)), init=state)
+        np.testing.assert_array_equal(found.t_camera_part, plain.t_camera_part)
+    floor = Floor(FEET, UP, 100.0, np.full(4, np.nan))
+    np.testing.assert_array_equal(
+        fit(BODY, replace(m, floor=floor), init=state).t_camera_part, plain.t_camera_part
+    )
+
+
+@pytest.mark.parametrize(
+    ("more", "message"),
+    [
+        ({"floor": Floor(FEET, 2.0 * UP, 0.0, np.zeros(4))}, "length 2"),
+        ({"floor": Floor(FEET, UP, np.nan, np.zeros(4))}, "offset nan"),
+        ({"floor": Floor(FEET, UP, 0.0, np.zeros(3))}, r"\(4,\)"),
+        ({"floor": Floor([10000], UP, 0.0, [0.0])}, "10000"),
+        ({"foot_contacts": FootContacts(FEET, np.zeros((3, 3)), np.ones(4))}, r"\(4, 3\)"),
+    ],
+)
+def test_what_does_not_fit_is_refused(more, message):
+    with pytest.raises(ShapeError, match=message):
+        fit(BODY, seen(standing(), **more), options=Options())
