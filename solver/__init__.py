@@ -5,6 +5,7 @@ body = load_body("scope")
 fit(body, Measurements(intrinsics, keypoints2d=Keypoints2D(indices, pixels, confidence))) -> Fit
 """
 
+from .batch import fit_batch, fit_clips
 from .body import Body, load_body
 from .clip import carry, fit_clip
 from .errors import ShapeError
@@ -52,7 +53,9 @@ __all__ = [
     "carry",
     "default_priors",
     "fit",
+    "fit_batch",
     "fit_clip",
+    "fit_clips",
     "fit_tree",
     "load_body",
     "load_joint_prior",
