@@ -54,7 +54,13 @@ def _real_frames(quick: bool) -> dict:
             if (tolerance, triggs) == (frames.REPORTED, 0.0):
                 figures[f"{kind}_frame_ms"] = rows[-1]["milliseconds"]
     print(report.frame_lines(rows), end="\n\n", flush=True)
-    return {**figures, "convergence": rows}
+    batch = frames.throughput(clips)
+    print(
+        f"Batch of cold frames: {batch['one_thread']:.0f} a second in one thread, {batch['all_cores']:.0f} on "
+        f"{batch['cores']} cores, {batch['ratio']:.2f} x",
+        end="\n\n",
+    )
+    return {**figures, "convergence": rows, "batch": batch}
 
 
 def main() -> int:

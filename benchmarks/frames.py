@@ -10,6 +10,7 @@ the frame before. Converged: cost within 0.1 % and joints within 1 mm of the sam
 
 from __future__ import annotations
 
+import os
 import sys
 import time
 from collections.abc import Sequence
@@ -20,7 +21,7 @@ import numpy as np
 
 from ..scope_addon.capture import fitting
 from ..scope_addon.capture.pipeline import CaptureOptions, capture
-from ..solver import Body, Fit, FrameSolver, Options, Priors, Stage, State, load_body
+from ..solver import Body, Fit, FrameSolver, Options, Priors, Stage, State, fit_batch, load_body
 from ..solver.measurements import Keypoints2D, Keypoints3D, Measurements, OrientationField
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -173,3 +174,19 @@ def same(found: Fit, best: Fit) -> bool:
     """Whether a fit has converged to `best`."""
     apart = np.linalg.norm(found.t_camera_part - best.t_camera_part, axis=1).max()
     return bool(abs(found.cost - best.cost) <= COST_SHARE * best.cost and apart <= JOINTS_M)
+
+
+def throughput(clips: Sequence[Clip], repeats: int = 5) -> dict[str, float]:
+    """Frames fitted in a second, each by itself from no earlier estimate: one thread, all cores, and their ratio."""
+    body = load_body("scope")
+    priors = capture_priors(body, clips[0])
+    frames = [m for clip in clips for m in clip.frames]
+    options = capture_options(True, REPORTED)
+    rates: dict[int, list[float]] = {1: [], 0: []}
+    for _ in range(repeats):
+        for threads, found in rates.items():
+            start = time.perf_counter()
+            fit_batch(body, frames, priors=priors, options=options, threads=threads)
+            found.append(len(frames) / (time.perf_counter() - start))
+    one, all_cores = float(np.median(rates[1])), float(np.median(rates[0]))
+    return {"one_thread": one, "all_cores": all_cores, "cores": os.cpu_count() or 1, "ratio": all_cores / one}

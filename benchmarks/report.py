@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from .steps import TARGETS, growth
+from .steps import TARGETS, growth, growth_in_joints
 
 FRAME_TARGETS = {"iteration": 30.0, "prior_23_joints": 5.0, "cold_frame_ms": 0.8, "warm_frame_ms": 0.2}
 STARTUP_TARGETS = {"first_call_s": 20.0, "cached_call_s": 0.3}
@@ -51,7 +51,8 @@ def experiment_lines(number: int, rows: list[dict[str, float]]) -> str:
     if number < 3:
         fits = [f"{m} K={K}: N^{growth(rows, K, m):.2f}" for K in (23, 51) for m in ("sparse", "dense")]
         text += "\n\nGrowth from N = 120 to 600: " + ", ".join(fits)
-    return text
+    joints = [f"{m}: K^{growth_in_joints(rows, m):.2f}" for m in ("sparse", "dense")]
+    return text + "\n\nGrowth from K = 23 to 51: " + ", ".join(joints)
 
 
 def frame_lines(convergence: list[dict]) -> str:

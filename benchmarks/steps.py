@@ -97,3 +97,10 @@ def growth(rows: list[dict[str, float]], K: int, method: str) -> float:
     """Return the exponent a of time ~ N^a, fitted over the rows of K joints."""
     chosen = [row for row in rows if row["K"] == K]
     return float(np.polyfit(np.log([r["N"] for r in chosen]), np.log([r[method] for r in chosen]), 1)[0])
+
+
+def growth_in_joints(rows: list[dict[str, float]], method: str) -> float:
+    """Return the median exponent a of time ~ K^a between the bodies of the rows, over points of equal P and N."""
+    by_place = {(row["K"], row["P"], row["N"]): row[method] for row in rows}
+    pairs = [(t, by_place[51, P, N]) for (K, P, N), t in by_place.items() if K == 23]
+    return float(np.median([np.log(b / a) / np.log(51 / 23) for a, b in pairs]))

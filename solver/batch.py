@@ -18,7 +18,8 @@ from .tree import BodyArrays, make_tree
 
 _CHUNK = 16  # frames handed to a thread at a time: a thread changes hands in tens of microseconds
 
-_T, _R = TypeVar("_T"), TypeVar("_R")
+_T = TypeVar("_T")
+_R = TypeVar("_R")
 
 
 def fit_batch(
@@ -32,9 +33,9 @@ def fit_batch(
 ) -> list[Fit]:
     """Fit frames that have nothing to do with each other, in order of `measurements`.
 
-    Every frame comes out as `fit` gives it, bit by bit, whatever the number of threads. `init` may hold a state for each
-    frame, None where there is none. threads: 0 is one for each core. Raises ShapeError for arrays that do not fit the
-    body, whichever frame they belong to.
+    Every frame comes out as `fit` gives it, bit by bit, whatever the number of threads. `init` may hold a state for
+    each frame, None where there is none. threads: 0 is one for each core. Raises ShapeError for arrays that do not fit
+    the body, whichever frame they belong to.
     """
     if init is not None and len(init) != len(measurements):
         raise ShapeError(f"There must be one initial state a frame, {len(measurements)}, but got {len(init)}.")
@@ -77,7 +78,7 @@ def fit_clips(
 
 
 def _spread(work: Callable[[_T], _R], jobs: Iterable[_T], threads: int) -> list[_R]:
-    """Results in the jobs' order; the first job runs alone, so that kernels are compiled once and not by every thread."""
+    """Results in the jobs' order. The first job runs alone, so that kernels are compiled once, not by every thread."""
     queue = list(jobs)
     threads = min(threads if threads > 0 else os.cpu_count() or 1, max(1, len(queue)))
     if threads == 1:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from .initialize import initial_state
-from .kernel import kernel
+from .kernel import announce_compilation, kernel
 from .linearize import make_blocks, make_pose
 from .measurements import Measurements, as_array
 from .optimizer import optimize
@@ -62,6 +62,7 @@ class FrameSolver:
         options: Options = Options(),  # noqa: B008 - frozen
     ) -> None:
         """Check the body and make room. Raises ShapeError."""
+        announce_compilation(optimize)
         self.tree = body if isinstance(body, Tree) else make_tree(body)
         self.priors = default_priors(body) if priors is None else priors
         self.options = options

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """How every kernel of the solver is compiled, and when its cached machine code is still good."""
 
+import logging
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -20,6 +21,7 @@ def source_stamp() -> tuple:
 
 
 _STAMP = source_stamp()
+_LOG = logging.getLogger(__name__)
 
 
 def kernel(function: Callable[..., Any]) -> Any:
@@ -59,3 +61,20 @@ def _compiled(function: Callable[..., Any], **options: Any) -> Any:
     if cache_file is not None and hasattr(cache_file, "_source_stamp"):
         cache_file._source_stamp = _STAMP
     return compiled
+
+
+def is_compiled(dispatcher: Any) -> bool:
+    """Whether a kernel's machine code is in memory or, still good, on disk."""
+    if dispatcher.signatures:
+        return True
+    cache_file = getattr(getattr(dispatcher, "_cache", None), "_cache_file", None)
+    try:
+        return cache_file is not None and bool(cache_file._load_index())
+    except Exception:  # not part of numba's interface: without it, or with a damaged index, say that it takes time
+        return False
+
+
+def announce_compilation(dispatcher: Any) -> None:
+    """Tell the log, which goes to stderr unless somebody arranged otherwise, why the coming call takes long."""
+    if not is_compiled(dispatcher):
+        _LOG.warning("Compiling the solver for this machine, once: 10 to 20 seconds.")

@@ -28,3 +28,27 @@ def test_a_changed_callee_reaches_its_cached_caller(tmp_path):
             run = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True)
             found.append(run.stdout.split())
     assert found == [["1.0", "0"], ["1.0", "1"], ["22.0", "0"], ["22.0", "1"]]
+
+
+def test_compiling_is_announced_once(tmp_path):
+    """The first session says why it waits; the next one finds the machine code and says nothing."""
+    from scope.solver import kernel
+
+    package = tmp_path / "package"
+    package.mkdir()
+    shutil.copy(kernel.__file__, package)
+    for name, text in SOURCE.items():
+        (package / name).write_text(text.format(value=1))
+    code = """
+from package.kernel import announce_compilation
+from package.outer import outer
+announce_compilation(outer); outer(0.0); announce_compilation(outer)
+"""
+
+    def said():
+        run = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True)
+        return run.stderr.count("Compiling the solver")
+
+    assert [said(), said()] == [1, 0]
+    (package / "inner.py").write_text(SOURCE["inner.py"].format(value=22))
+    assert [said(), said()] == [1, 0]
