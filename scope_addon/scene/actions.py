@@ -120,6 +120,18 @@ def read_keys(curve: bpy.types.FCurve) -> np.ndarray:
     return coordinates.reshape(-1, 2)
 
 
+def rewrite_keys(
+    curve: bpy.types.FCurve, frames: np.ndarray, values: np.ndarray, interpolation: str = "LINEAR"
+) -> None:
+    """Replace a curve's keys by values (T,) at frames (T,)."""
+    keys = curve.keyframe_points
+    keys.clear()
+    keys.add(len(frames))
+    keys.foreach_set("co", np.stack([frames, values], axis=1).astype(np.float32).ravel())
+    keys.foreach_set("interpolation", np.full(len(frames), INTERPOLATION[interpolation], np.int32))
+    curve.update()
+
+
 def frame_range(datablocks: Iterable[bpy.types.ID]) -> tuple[float, float] | None:
     """First and last key over the datablocks' curves; None when nothing is keyed."""
     spans = [tuple(curve.range()) for datablock in datablocks for curve in fcurves(datablock)]

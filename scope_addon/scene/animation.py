@@ -60,7 +60,7 @@ def on_one_hemisphere(quaternions: np.ndarray) -> np.ndarray:
 
 
 def pose_channels(body: Body, motion: Motion, rest: RestPose, M: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Blender's channels of every frame.
+    """Blender's channels of every frame of a motion.
 
     :param M: (K+1, 3, 3) rest orientations.
     :return: rotations (T, K+1, 4), w first, on one hemisphere; root locations (T, 3) metres, world axes.

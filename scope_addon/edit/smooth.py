@@ -1,0 +1,57 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Smoothing more or less, always from the motion as it was solved, so that trying costs nothing."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...solver.body import Body
+from ...solver.errors import UsageError
+from ...solver.frames import transform_points
+from ...solver.rotations import exp
+from ..capture.smoothing import DEPTH_CUTOFF_HZ, ROTATION_CUTOFF_HZ, gaussian_smooth, smooth_rotations
+from ..motion import Motion
+from .clip import Clip, between
+
+
+def clip_of(body: Body, motion: Motion, raw: bool) -> Clip:
+    """The motion as keys: as it was finished, or as it was solved (``raw``)."""
+    poses, trans = (motion.poses_raw, motion.trans_raw) if raw else (motion.poses, motion.trans)
+    rotations = exp(poses.reshape(len(motion), -1, 3).astype(float))
+    return Clip(motion.timestamps, rotations, body.rest_joints(motion.betas)[0] + trans)
+
+
+def smoothed(body: Body, motion: Motion, strength: float) -> Clip:
+    """Zero-phase smoothing from the raw motion.
+
+    The cut-off frequency is 4.5 Hz / strength: 0 leaves the raw motion, 1 is what a capture does, 3 is calm. What the
+    capture did besides, holding the feet that stand, is kept as its difference from the plain smoothing at strength 1,
+    and fades out below it. The distance from the camera, which one camera measures badly, is smoothed more than the
+    position in the picture.
+
+    :raises UsageError: the strength is negative or not a number.
+    """
+    if not np.isfinite(strength) or strength < 0:
+        raise UsageError(f"smoothing takes a strength from 0 on, not {strength}")
+    raw = clip_of(body, motion, raw=True)
+    if strength == 0 or len(raw) < 3:
+        return raw
+    plain, wanted = _plain(raw, motion, 1.0), _plain(raw, motion, strength)
+    finished = clip_of(body, motion, raw=False)
+    share = min(strength, 1.0)
+    correction = np.swapaxes(plain.rotations, -1, -2) @ finished.rotations
+    part = between(np.broadcast_to(np.eye(3), correction.shape), correction, np.full(correction.shape[:2], share))
+    return Clip(raw.times, wanted.rotations @ part, wanted.root + share * (finished.root - plain.root))
+
+
+def _plain(raw: Clip, motion: Motion, strength: float) -> Clip:
+    """Smoothing alone."""
+    rotations = smooth_rotations(raw.rotations, raw.times, ROTATION_CUTOFF_HZ / strength)
+    T = motion.world_from_camera
+    camera = np.einsum("tij,tj->ti", np.swapaxes(T[:, :3, :3], 1, 2), raw.root - T[:, :3, 3])
+    z = np.maximum(camera[:, 2:], 1e-3)
+    ray = gaussian_smooth(camera[:, :2] / z, raw.times, ROTATION_CUTOFF_HZ / strength)
+    depth = np.exp(gaussian_smooth(np.log(z), raw.times, DEPTH_CUTOFF_HZ / strength))
+    seen = np.concatenate([ray * depth, depth], axis=1)
+    root = np.array([transform_points(pose, point[None])[0] for pose, point in zip(T, seen, strict=True)])
+    return Clip(raw.times, rotations, root)

@@ -1,0 +1,96 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A captured armature's keys as a clip in numpy, and back: what the operators after a capture work on.
+
+The inverse of ``animation.py``: Ω_i = C_iᵀ B_i C_i, R_0 = R_world_model C_0ᵀ B_0 C_0, pelvis = location + h_0, in the
+armature's space. The keys are the truth; so undo, and what an animator has changed by hand, count.
+"""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+
+from ...solver.body import Body
+from ...solver.errors import UsageError
+from ...solver.frames import R_WORLD_MODEL
+from ...solver.rotations import matrix_from_quaternion
+from ...solver.rotations import quaternion_from_matrix as quaternions
+from ..edit.clip import Clip
+from .actions import bone_path, fcurves, read_keys, rewrite_keys
+from .animation import on_one_hemisphere
+from .armature import rest_orientations
+
+ROTATION, LOCATION = "rotation_quaternion", "location"
+
+
+def read_clip(armature: bpy.types.Object, body: Body, rate: float) -> tuple[Clip, np.ndarray]:
+    """The motion that the keys hold, and the scene frames (T,) of its keys.
+
+    Where curves have keys at different frames, every frame that has a key on any of them counts.
+
+    :param rate: scene frames a second.
+    :raises UsageError: a bone or its keys are missing.
+    """
+    curves = _curves(armature, body)
+    frames = np.unique(np.concatenate([read_keys(curve)[:, 0] for bone in curves.values() for curve in bone]))
+    values = {path: np.stack([_values(curve, frames) for curve in bone], axis=1) for path, bone in curves.items()}
+    root = body.joint_names[0]
+    q = np.stack([values[bone_path(name, ROTATION)] for name in body.joint_names], axis=1)
+    B = matrix_from_quaternion(q / np.maximum(np.linalg.norm(q, axis=-1, keepdims=True), 1e-9))
+    C = _axes(armature, body)
+    rotations = np.einsum("kji,tkjl,klm->tkim", C, B, C)
+    rotations[:, 0] = R_WORLD_MODEL @ rotations[:, 0]
+    pelvis = values[bone_path(root, LOCATION)] + np.array(armature.data.bones[root].head_local)
+    return Clip(frames / rate, rotations, pelvis), frames
+
+
+def channels(armature: bpy.types.Object, body: Body, clip: Clip) -> tuple[np.ndarray, np.ndarray]:
+    """Blender's values of a clip: quaternions (T, K+1, 4) on one hemisphere, root locations (T, 3)."""
+    C = _axes(armature, body)
+    rotations = clip.rotations.copy()
+    rotations[:, 0] = R_WORLD_MODEL.T @ rotations[:, 0]
+    B = np.einsum("kij,tkjl,kml->tkim", C, rotations, C)
+    head = np.array(armature.data.bones[body.joint_names[0]].head_local)
+    return on_one_hemisphere(quaternions(B)), clip.root - head
+
+
+def write_clip(armature: bpy.types.Object, body: Body, clip: Clip, frames: np.ndarray) -> None:
+    """Replace the keys of all bones by the clip's, at scene frames (T,); curves, groups and action stay."""
+    q, location = channels(armature, body, clip)
+    root = body.joint_names[0]
+    for path, bone in _curves(armature, body).items():
+        name = next((n for n in body.joint_names if path == bone_path(n, ROTATION)), None)
+        values = location if path == bone_path(root, LOCATION) else q[:, body.joint_names.index(name)]
+        for index, curve in enumerate(bone):
+            rewrite_keys(curve, frames, values[:, index])
+
+
+def _curves(armature: bpy.types.Object, body: Body) -> dict[str, list[bpy.types.FCurve]]:
+    """Curves by data path, in order of their index: every bone's rotation, and the root's location."""
+    wanted = {bone_path(name, ROTATION): 4 for name in body.joint_names} | {bone_path(body.joint_names[0], LOCATION): 3}
+    found: dict[str, dict[int, bpy.types.FCurve]] = {path: {} for path in wanted}
+    for curve in fcurves(armature):
+        if curve.data_path in found and len(curve.keyframe_points):
+            found[curve.data_path][curve.array_index] = curve
+    missing = [path for path, count in wanted.items() if len(found[path]) != count]
+    if missing:
+        raise UsageError(
+            f"'{armature.name}' has lost the keys of {missing[0]}; undo what removed them, or capture again"
+        )
+    return {path: [by_index[i] for i in sorted(by_index)] for path, by_index in found.items()}
+
+
+def _values(curve: bpy.types.FCurve, frames: np.ndarray) -> np.ndarray:
+    """(T,) the curve at frames; read off where its keys are there, which is much faster."""
+    keys = read_keys(curve)
+    if len(keys) == len(frames) and (keys[:, 0] == frames).all():
+        return keys[:, 1].astype(float)
+    return np.array([curve.evaluate(frame) for frame in frames])
+
+
+def _axes(armature: bpy.types.Object, body: Body) -> np.ndarray:
+    """(K+1, 3, 3) C_i = M_iᵀ R_world_model."""
+    missing = [name for name in body.joint_names if name not in armature.data.bones]
+    if missing:
+        raise UsageError(f"'{armature.name}' has no bone '{missing[0]}'; choose an armature that Scope has captured")
+    return np.swapaxes(rest_orientations(armature, body), 1, 2) @ R_WORLD_MODEL
