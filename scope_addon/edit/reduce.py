@@ -14,7 +14,7 @@ from ...solver.errors import UsageError
 def keep_of_quaternions(times: np.ndarray, q: np.ndarray, bound: float) -> np.ndarray:
     """Indices of the keys to keep so that no rotation (T, 4), on one hemisphere, is off by more than ``bound`` rad."""
     _check(bound)
-    return _keep(times, q, lambda a, b, part: _angles(_lerp(times, q, a, b, part), q[part]), bound)
+    return _keep(times, q, lambda a, b, part: angles_between(_lerp(times, q, a, b, part), q[part]), bound)
 
 
 def keep_of_positions(times: np.ndarray, p: np.ndarray, bound: float) -> np.ndarray:
@@ -51,8 +51,8 @@ def _lerp(times: np.ndarray, values: np.ndarray, a: int, b: int, part: slice) ->
     return values[a] + share * (values[b] - values[a])
 
 
-def _angles(q: np.ndarray, wanted: np.ndarray) -> np.ndarray:
-    """Angle between rotations, in radians, by the sine of half of it: exact where it is small."""
-    q = q / np.linalg.norm(q, axis=1, keepdims=True)
-    chord = np.minimum(np.linalg.norm(q - wanted, axis=1), np.linalg.norm(q + wanted, axis=1))
+def angles_between(q: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+    """(...) angle in radians between rotations (..., 4), by the sine of a quarter of it: exact where it is small."""
+    q = q / np.linalg.norm(q, axis=-1, keepdims=True)
+    chord = np.minimum(np.linalg.norm(q - wanted, axis=-1), np.linalg.norm(q + wanted, axis=-1))
     return 4.0 * np.arcsin(np.clip(0.5 * chord, 0.0, 1.0))

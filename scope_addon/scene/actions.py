@@ -132,6 +132,19 @@ def rewrite_keys(
     curve.update()
 
 
+def repeat_for_ever(datablock: bpy.types.ID, onwards: set[tuple[str, int]] | None = None) -> None:
+    """Let every curve of a datablock repeat.
+
+    :param onwards: data paths and indices of the curves that go on from where a repetition ended.
+    """
+    for curve in fcurves(datablock):
+        for modifier in [m for m in curve.modifiers if m.type == "CYCLES"]:
+            curve.modifiers.remove(modifier)
+        modifier = curve.modifiers.new("CYCLES")
+        going = (curve.data_path, curve.array_index) in (onwards or set())
+        modifier.mode_before = modifier.mode_after = "REPEAT_OFFSET" if going else "REPEAT"
+
+
 def frame_range(datablocks: Iterable[bpy.types.ID]) -> tuple[float, float] | None:
     """First and last key over the datablocks' curves; None when nothing is keyed."""
     spans = [tuple(curve.range()) for datablock in datablocks for curve in fcurves(datablock)]

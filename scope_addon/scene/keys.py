@@ -7,6 +7,8 @@ armature's space. The keys are the truth; so undo, and what an animator has chan
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import bpy
 import numpy as np
 
@@ -16,6 +18,7 @@ from ...solver.frames import R_WORLD_MODEL
 from ...solver.rotations import matrix_from_quaternion
 from ...solver.rotations import quaternion_from_matrix as quaternions
 from ..edit.clip import Clip
+from ..edit.reduce import angles_between, keep_of_positions, keep_of_quaternions
 from .actions import bone_path, fcurves, read_keys, rewrite_keys
 from .animation import on_one_hemisphere
 from .armature import rest_orientations
@@ -33,6 +36,12 @@ def read_clip(armature: bpy.types.Object, body: Body, rate: float) -> tuple[Clip
     """
     curves = _curves(armature, body)
     frames = np.unique(np.concatenate([read_keys(curve)[:, 0] for bone in curves.values() for curve in bone]))
+    return read_at(armature, body, rate, frames), frames
+
+
+def read_at(armature: bpy.types.Object, body: Body, rate: float, frames: np.ndarray) -> Clip:
+    """The motion at scene frames (T,), as Blender interpolates it."""
+    curves = _curves(armature, body)
     values = {path: np.stack([_values(curve, frames) for curve in bone], axis=1) for path, bone in curves.items()}
     root = body.joint_names[0]
     q = np.stack([values[bone_path(name, ROTATION)] for name in body.joint_names], axis=1)
@@ -41,7 +50,7 @@ def read_clip(armature: bpy.types.Object, body: Body, rate: float) -> tuple[Clip
     rotations = np.einsum("kji,tkjl,klm->tkim", C, B, C)
     rotations[:, 0] = R_WORLD_MODEL @ rotations[:, 0]
     pelvis = values[bone_path(root, LOCATION)] + np.array(armature.data.bones[root].head_local)
-    return Clip(frames / rate, rotations, pelvis), frames
+    return Clip(frames / rate, rotations, pelvis)
 
 
 def channels(armature: bpy.types.Object, body: Body, clip: Clip) -> tuple[np.ndarray, np.ndarray]:
@@ -57,12 +66,51 @@ def channels(armature: bpy.types.Object, body: Body, clip: Clip) -> tuple[np.nda
 def write_clip(armature: bpy.types.Object, body: Body, clip: Clip, frames: np.ndarray) -> None:
     """Replace the keys of all bones by the clip's, at scene frames (T,); curves, groups and action stay."""
     q, location = channels(armature, body, clip)
-    root = body.joint_names[0]
+    rotation_paths = [bone_path(name, ROTATION) for name in body.joint_names]
     for path, bone in _curves(armature, body).items():
-        name = next((n for n in body.joint_names if path == bone_path(n, ROTATION)), None)
-        values = location if path == bone_path(root, LOCATION) else q[:, body.joint_names.index(name)]
+        values = location if path == location_path(body) else q[:, rotation_paths.index(path)]
         for index, curve in enumerate(bone):
             rewrite_keys(curve, frames, values[:, index])
+
+
+@dataclass(frozen=True)
+class Reduction:
+    """What ``reduce_keys`` did: numbers of keys, and the largest errors at the frames that had keys."""
+
+    before: int
+    after: int
+    angle: float  # radians, of any bone against its parent
+    joint_m: float  # of any joint in the armature's space
+
+
+def reduce_keys(armature: bpy.types.Object, body: Body, rate: float, angle: float, distance: float) -> Reduction:
+    """Remove the keys that linear interpolation does not need, each bone by itself.
+
+    :param angle: radians that any bone's rotation may be off by; distance: metres that the pelvis may.
+    """
+    clip, frames = read_clip(armature, body, rate)
+    q, location = channels(armature, body, clip)
+    before = after = 0
+    for path, bone in _curves(armature, body).items():
+        before += sum(len(curve.keyframe_points) for curve in bone)
+        if path == location_path(body):
+            values, keep = location, keep_of_positions(clip.times, location, distance)
+        else:
+            values = q[:, [bone_path(name, ROTATION) for name in body.joint_names].index(path)]
+            keep = keep_of_quaternions(clip.times, values, angle)
+        for index, curve in enumerate(bone):
+            rewrite_keys(curve, frames[keep], values[keep, index])
+        after += len(keep) * len(bone)
+    reduced = read_at(armature, body, rate, frames)
+    off = angles_between(channels(armature, body, reduced)[0], q)
+    betas = np.array(list(armature.get("scope_betas", np.zeros(body.P))), float)
+    moved = np.linalg.norm(reduced.joints(body, betas) - clip.joints(body, betas), axis=-1)
+    return Reduction(before, after, float(off.max()), float(moved.max()))
+
+
+def location_path(body: Body) -> str:
+    """Data path of the root's location."""
+    return bone_path(body.joint_names[0], LOCATION)
 
 
 def _curves(armature: bpy.types.Object, body: Body) -> dict[str, list[bpy.types.FCurve]]:

@@ -9,9 +9,23 @@ from __future__ import annotations
 
 import bpy
 
-from . import capture_operators, command, drop, export_operators, panel, preferences, properties, view_operators
+from . import (
+    capture_operators,
+    command,
+    drop,
+    edit_operators,
+    edit_panel,
+    export_operators,
+    panel,
+    preferences,
+    properties,
+    view_operators,
+)
 
-_MODULES = (properties, preferences, capture_operators, export_operators, view_operators, drop, panel)
+_MODULES = (
+    *(properties, preferences, capture_operators, export_operators, view_operators, edit_operators, drop),
+    *(panel, edit_panel),
+)
 
 
 def register() -> None:

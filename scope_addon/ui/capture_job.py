@@ -121,7 +121,7 @@ class CaptureJob:
             footage = None
         with _window_shows(scene):
             result = build_scene(motions, body, footage, self._options)
-        remember_motions(result, captured.motions)
+        remember_motions(result, captured.motions, self._request.body)
         report = dict(captured.report, warnings=warnings + result.warnings)
         show_result(scene.scope.result, self._request.footage, report, result)
 
@@ -170,9 +170,12 @@ def build_options(scene: bpy.types.Scene) -> BuildOptions:
     )
 
 
-def remember_motions(result: BuildResult, paths: Sequence[Path]) -> None:
-    """Note at the capture where its motion files are."""
+def remember_motions(result: BuildResult, paths: Sequence[Path], body: str) -> None:
+    """Note at the capture where its motion files are, and at each person which one and which body is theirs."""
     result.collection["scope_motions"] = [str(path) for path in paths]
+    for person, path in zip(result.people, paths, strict=True):
+        person.armature["scope_motion"] = str(path)
+        person.armature["scope_body_file"] = body
 
 
 def sentence(error: Exception) -> str:

@@ -7,34 +7,17 @@ from scope.scope_addon.edit import floor, loop, reduce, root_motion, spans
 from scope.scope_addon.edit.clip import Clip, between, resample, sample
 from scope.solver import load_body
 from scope.solver.errors import UsageError
-from scope.solver.frames import R_WORLD_MODEL
 from scope.solver.rotations import exp, log, matrix_from_quaternion, quaternion_from_matrix
+
+from .walking import ARMS_DOWN, RATE, walk
 
 BODY = load_body("scope")
 NAMES = list(BODY.joint_names)
 BETAS = np.zeros(BODY.P)
-RATE = 30.0
-ARMS_DOWN = {"left_shoulder": [0, 0, -1.2], "right_shoulder": [0, 0, 1.2]}
 
 
 def angle(a, b):
     return np.linalg.norm(log(np.swapaxes(a, -1, -2) @ b), axis=-1)
-
-
-def walk(seconds=4.0, period=1.0, speed=1.2, rate=RATE):
-    """A walk along −y: legs and arms swing, knees bend, the pelvis bobs."""
-    t = np.arange(int(seconds * rate) + 1) / rate
-    w = np.zeros((len(t), len(NAMES), 3))
-    for name, value in ARMS_DOWN.items():
-        w[:, NAMES.index(name)] = value
-    phase = 2 * np.pi * t / period
-    for side, sign in (("left", 1.0), ("right", -1.0)):
-        w[:, NAMES.index(f"{side}_hip"), 0] = -0.4 * sign * np.sin(phase)
-        w[:, NAMES.index(f"{side}_knee"), 0] = 0.4 * (1 + sign * np.cos(phase))
-    rotations = exp(w)
-    rotations[:, 0] = R_WORLD_MODEL
-    root = np.stack([np.zeros_like(t), -speed * t, 0.95 + 0.02 * np.cos(2 * phase)], axis=1)
-    return Clip(t, rotations, root)
 
 
 def test_sampling_meets_the_keys_and_goes_along_the_arc_between_them():

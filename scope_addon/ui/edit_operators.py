@@ -1,0 +1,400 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Work on a captured motion: smooth, mend, floor, root motion, loop, fewer keys, another rate.
+
+Every one of them reads the keys of the active capture's armature and writes them anew; only smoothing begins again with
+the motion as it was solved, which the cache keeps. None of them looks at the footage again.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+import bpy
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
+
+if TYPE_CHECKING:
+    from ...solver.body import Body
+
+
+def captured_armature(context: bpy.types.Context) -> bpy.types.Object | None:
+    """The armature that is meant: the active object's, else the only one of the scene's last capture."""
+    obj = context.view_layer.objects.active if context.view_layer else None
+    while obj is not None:
+        if "scope_source" in obj:
+            return obj
+        found = [child for child in obj.children if "scope_source" in child]
+        if len(found) == 1:
+            return found[0]
+        obj = obj.parent
+    collection = context.scene.scope.result.collection
+    found = [o for o in collection.all_objects if "scope_source" in o] if collection else []
+    return found[0] if len(found) == 1 else None
+
+
+class _Edit(bpy.types.Operator):
+    """What the operators share: whom they work on, and failure as a sentence."""
+
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """A captured armature is meant."""
+        if captured_armature(context) is None:
+            cls.poll_message_set("Select the armature of a capture first")
+            return False
+        return True
+
+    def edit(self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float) -> str:
+        """Change the keys; returns what to tell, or nothing. Each operator has its own."""
+        raise NotImplementedError
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Do it; what goes wrong is told and changes nothing."""
+        from ...solver.errors import ScopeError
+        from ..scene.timing import scene_rate
+
+        armature = captured_armature(context)
+        assert armature is not None  # poll has asked
+        try:
+            with _kept_on_failure(armature):
+                said = self.edit(context, armature, _body_of(armature), scene_rate(context.scene))
+        except (ScopeError, OSError) as error:
+            text = str(error)
+            self.report({"ERROR"}, text[:1].upper() + text[1:])
+            return {"CANCELLED"}
+        if said:
+            self.report({"INFO"}, said)
+        return {"FINISHED"}
+
+
+class _Span(_Edit):
+    """An operator on some frames, asked for in a dialog that begins with the preview range or what is near."""
+
+    start: IntProperty(name="First Frame", description="First frame of the span")
+    end: IntProperty(name="Last Frame", description="Last frame of the span, included")
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        """Ask for the frames."""
+        scene = context.scene
+        if scene.use_preview_range:
+            self.start, self.end = scene.frame_preview_start, scene.frame_preview_end
+        else:
+            self.start, self.end = self.default_span(scene)
+        return context.window_manager.invoke_props_dialog(self)
+
+    def default_span(self, scene: bpy.types.Scene) -> tuple[int, int]:
+        """Where nothing was chosen: about the current frame."""
+        return scene.frame_current - 2, scene.frame_current + 2
+
+
+class SCOPE_OT_smooth(_Edit):
+    """Smooth the motion more or less, from how it was solved. Takes back what was changed by hand"""
+
+    bl_idname = "scope.smooth"
+    bl_label = "Smooth Again"
+
+    strength: FloatProperty(
+        name="Strength",
+        default=1.0,
+        min=0.0,
+        soft_max=4.0,
+        max=20.0,
+        description="0 keeps every frame as it was solved, 1 is what a capture does, 3 is calm",
+    )
+
+    def edit(self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float) -> str:
+        """From the cached motion."""
+        from ..edit.smooth import smoothed
+        from ..scene.keys import write_clip
+        from ..scene.root_object import to_bones
+        from ..scene.timing import key_frames
+
+        motion = _cached_motion(armature)
+        to_bones(armature, body, rate)
+        clip = smoothed(body, motion, self.strength)
+        write_clip(armature, body, clip, key_frames(motion.timestamps, rate, float(armature.get("scope_start", 0.0))))
+        return ""
+
+
+class SCOPE_OT_interpolate_span(_Span):
+    """Go smoothly over frames that went wrong, from the last good pose before them to the first one after"""
+
+    bl_idname = "scope.interpolate_span"
+    bl_label = "Bridge Frames"
+
+    def edit(self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float) -> str:
+        """Keys inside the span."""
+        from ..edit.spans import interpolate
+        from ..scene.keys import read_clip, write_clip
+
+        clip, frames = read_clip(armature, body, rate)
+        write_clip(armature, body, interpolate(clip, self.start / rate, self.end / rate), frames)
+        return ""
+
+
+class SCOPE_OT_swap_sides(_Span):
+    """Exchange left and right within some frames: each limb goes where the other one is"""
+
+    bl_idname = "scope.swap_sides"
+    bl_label = "Swap Left and Right"
+
+    limbs: EnumProperty(
+        name="Limbs",
+        items=(
+            ("both", "Arms and Legs", "All four limbs", 0),
+            ("legs", "Legs", "The legs alone", 1),
+            ("arms", "Arms", "The arms alone", 2),
+        ),
+        default="both",
+        description="Which limbs are exchanged",
+    )
+
+    def edit(self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float) -> str:
+        """Keys inside the span."""
+        from ..edit.spans import swap_sides
+        from ..scene.keys import read_clip, write_clip
+
+        clip, frames = read_clip(armature, body, rate)
+        write_clip(armature, body, swap_sides(clip, body, self.start / rate, self.end / rate, self.limbs), frames)
+        return ""
+
+
+class SCOPE_OT_refloor(_Edit):
+    """Put the standing feet on the floor (the grid, z = 0)"""
+
+    bl_idname = "scope.refloor"
+    bl_label = "Feet to Floor"
+
+    level: BoolProperty(
+        name="Level the World",
+        default=False,
+        description="Turn the motion so that the places where feet stood lie level; the camera no longer fits then",
+    )
+    lift: BoolProperty(
+        name="Lift Sunken Feet", default=True, description="Raise the frames in which a foot is below the floor"
+    )
+
+    def edit(self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float) -> str:
+        """All keys."""
+        from ..edit.floor import refloor
+        from ..scene.keys import read_clip, write_clip
+
+        clip, frames = read_clip(armature, body, rate)
+        floored = refloor(clip, body, _betas(armature, body), level=self.level, lift=self.lift)
+        write_clip(armature, body, floored, frames)
+        return ""
+
+
+class SCOPE_OT_root_motion(_Edit):
+    """Where the person's way over the floor is stored"""
+
+    bl_idname = "scope.root_motion"
+    bl_label = "Root Motion"
+
+    mode: EnumProperty(
+        name="Way",
+        items=(
+            ("BONES", "In the Bones", "The pelvis moves through the scene, as captured", 0),
+            ("OBJECT", "On an Object", "An empty above which the person moves carries the way: root motion", 1),
+            ("IN_PLACE", "In Place", "No way at all: the person stays on the spot", 2),
+        ),
+        default="OBJECT",
+        description="Where the way goes",
+    )
+    heading: BoolProperty(
+        name="With Heading", default=True, description="Turning about the upright axis goes with the way"
+    )
+
+    def edit(self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float) -> str:
+        """All keys."""
+        from ..scene.root_object import to_bones, to_root_object
+
+        if self.mode == "BONES":
+            to_bones(armature, body, rate)
+        else:
+            to_root_object(armature, body, rate, in_place=self.mode == "IN_PLACE", heading=self.heading)
+        return ""
+
+
+class SCOPE_OT_loop(_Span):
+    """Cut the best cycle out of some frames, close it, and let it repeat"""
+
+    bl_idname = "scope.loop"
+    bl_label = "Make Loop"
+
+    shortest: FloatProperty(
+        name="Shortest",
+        default=0.5,
+        min=0.1,
+        soft_max=5.0,
+        subtype="TIME_ABSOLUTE",
+        description="Seconds that a cycle takes at least",
+    )
+    blend: FloatProperty(
+        name="Blend",
+        default=0.2,
+        min=0.0,
+        soft_max=1.0,
+        subtype="TIME_ABSOLUTE",
+        description="Seconds at the end over which the cycle is closed",
+    )
+    repeat: BoolProperty(
+        name="Repeat", default=True, description="Let the curves repeat for ever, going on from where a cycle ended"
+    )
+
+    def default_span(self, scene: bpy.types.Scene) -> tuple[int, int]:
+        """The whole scene."""
+        return scene.frame_start, scene.frame_end
+
+    def edit(self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float) -> str:
+        """Find, cut, close."""
+        from ..edit.clip import Clip
+        from ..edit.loop import best_cycle, close_cycle
+        from ..scene.actions import repeat_for_ever
+        from ..scene.keys import location_path, read_clip, write_clip
+        from ..scene.root_object import to_bones
+
+        to_bones(armature, body, rate)
+        clip, frames = read_clip(armature, body, rate)
+        betas = _betas(armature, body)
+        cycle = best_cycle(clip, body, betas, self.start / rate, self.end / rate, self.shortest)
+        closed: Clip = close_cycle(clip, cycle, self.blend)
+        first, last = float(frames[cycle.first]), float(frames[cycle.last])
+        write_clip(armature, body, closed, frames[cycle.first : cycle.last + 1])
+        if self.repeat:
+            repeat_for_ever(armature, onwards={(location_path(body), 0), (location_path(body), 1)})
+        context.scene.frame_start, context.scene.frame_end = math.ceil(first), math.floor(last) - 1
+        return f"A cycle of {closed.times[-1]:.2f} s, its ends {100 * cycle.error_m:.1f} cm apart before closing"
+
+
+class SCOPE_OT_reduce_keys(_Edit):
+    """Remove the keys that the motion does not need, within an error that you choose"""
+
+    bl_idname = "scope.reduce_keys"
+    bl_label = "Reduce Keys"
+
+    degrees: FloatProperty(
+        name="Rotation",
+        default=0.5,
+        min=0.01,
+        soft_max=5.0,
+        max=45.0,
+        description="Most that a bone may turn, in degrees",
+    )
+    millimetres: FloatProperty(
+        name="Position",
+        default=2.0,
+        min=0.01,
+        soft_max=50.0,
+        max=1000.0,
+        description="Most that the pelvis may move, in millimetres",
+    )
+
+    def edit(self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float) -> str:
+        """All keys, bone by bone."""
+        from ..scene.keys import reduce_keys
+
+        found = reduce_keys(armature, body, rate, math.radians(self.degrees), self.millimetres / 1000.0)
+        return (
+            f"{found.before} keys became {found.after}; bones are off by {math.degrees(found.angle):.2f} degrees, "
+            f"joints by {1000 * found.joint_m:.1f} mm at most"
+        )
+
+
+class SCOPE_OT_bake_rate(_Edit):
+    """A key on every frame of a rate that you choose, from the first one on"""
+
+    bl_idname = "scope.bake_rate"
+    bl_label = "Bake to Rate"
+
+    rate: FloatProperty(
+        name="Keys per Second", default=0.0, min=0.0, soft_max=120.0, max=1000.0,
+        description="0: one key on each frame of the scene",
+    )  # fmt: skip
+
+    def edit(self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float) -> str:
+        """All keys; on whole frames where it is the scene's rate."""
+        import numpy as np
+
+        from ..edit.clip import resample, sample
+        from ..scene.keys import read_clip, write_clip
+
+        clip, frames = read_clip(armature, body, rate)
+        if self.rate > 0:
+            baked = resample(clip, self.rate)
+            write_clip(armature, body, baked, baked.times * rate)
+            return f"{len(frames)} keys became {len(baked)}"
+        whole = np.arange(math.ceil(frames[0] - 1e-4), math.floor(frames[-1] + 1e-4) + 1, dtype=float)
+        write_clip(armature, body, sample(clip, whole / rate), whole)
+        return f"{len(frames)} keys became {len(whole)}"
+
+
+@contextmanager
+def _kept_on_failure(armature: bpy.types.Object) -> Iterator[None]:
+    """Restore the action when an operator fails halfway; the undo step of a cancelled operator is not written."""
+    animation = armature.animation_data
+    before = animation.action if animation else None
+    copy = before.copy() if before is not None else None
+    try:
+        yield
+    except BaseException:
+        if copy is not None and before is not None:
+            slot = getattr(animation, "action_slot", None)
+            identifier = slot.identifier if slot else None
+            animation.action = copy
+            if identifier is not None:
+                animation.action_slot = next(s for s in copy.slots if s.identifier == identifier)
+            name = before.name
+            before.user_remap(copy)
+            bpy.data.actions.remove(before)
+            copy.name = name
+        raise
+    if copy is not None:
+        bpy.data.actions.remove(copy)
+
+
+def _body_of(armature: bpy.types.Object) -> Body:
+    from ...solver.body import load_body
+
+    return load_body(armature.get("scope_body_file") or armature["scope_body"])
+
+
+def _betas(armature: bpy.types.Object, body: Body):  # type: ignore[no-untyped-def]
+    import numpy as np
+
+    from ...solver.errors import UsageError
+
+    betas = np.array(list(armature.get("scope_betas", ())), float)
+    if betas.shape != (body.P,):
+        raise UsageError(f"'{armature.name}' does not say its body's shape; capture again")
+    return betas
+
+
+def _cached_motion(armature: bpy.types.Object):  # type: ignore[no-untyped-def]
+    from pathlib import Path
+
+    from ...solver.errors import UsageError
+    from ..motion import Motion
+
+    path = armature.get("scope_motion", "")
+    if not path or not Path(path).is_file():
+        raise UsageError(
+            "the motion as it was solved is no longer in the cache, so it cannot be smoothed anew; capture the footage "
+            "again"
+        )
+    return Motion.load(path)
+
+
+CLASSES = (
+    SCOPE_OT_smooth,
+    SCOPE_OT_interpolate_span,
+    SCOPE_OT_swap_sides,
+    SCOPE_OT_refloor,
+    SCOPE_OT_root_motion,
+    SCOPE_OT_loop,
+    SCOPE_OT_reduce_keys,
+    SCOPE_OT_bake_rate,
+)

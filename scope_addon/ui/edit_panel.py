@@ -1,0 +1,48 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The buttons for work on a captured motion."""
+
+from __future__ import annotations
+
+import bpy
+
+from .edit_operators import captured_armature
+
+
+class SCOPE_PT_edit(bpy.types.Panel):
+    """Smoothing, mending, floor, root motion, loops and keys of the selected person."""
+
+    bl_space_type = "VIEW_3D"
+    bl_region_type = "UI"
+    bl_category = "Scope"
+    bl_idname = "SCOPE_PT_edit"
+    bl_label = "Refine"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """A captured person is meant."""
+        return captured_armature(context) is not None
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Draw the panel."""
+        layout = self.layout
+        armature = captured_armature(context)
+        layout.label(text=armature.name if armature else "", icon="OUTLINER_OB_ARMATURE")
+        row = layout.row(align=True)
+        for text, strength in (("Raw", 0.0), ("Normal", 1.0), ("Calm", 2.5)):
+            row.operator("scope.smooth", text=text).strength = strength
+        column = layout.column(align=True)
+        column.operator("scope.interpolate_span", icon="IPO_EASE_IN_OUT")
+        column.operator("scope.swap_sides", icon="MOD_MIRROR")
+        column.operator("scope.refloor", icon="TRIA_DOWN_BAR")
+        layout.label(text="Way over the Floor")
+        row = layout.row(align=True)
+        for text, mode in (("In Bones", "BONES"), ("On Object", "OBJECT"), ("In Place", "IN_PLACE")):
+            row.operator("scope.root_motion", text=text).mode = mode
+        layout.label(text="Keys")
+        column = layout.column(align=True)
+        column.operator("scope.loop", icon="FILE_REFRESH")
+        column.operator("scope.reduce_keys", icon="KEY_DEHLT")
+        column.operator("scope.bake_rate", icon="KEYFRAME_HLT")
+
+
+CLASSES = (SCOPE_PT_edit,)

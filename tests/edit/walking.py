@@ -1,0 +1,65 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A walk made of sines, as a clip and as a captured motion."""
+
+import numpy as np
+from scope.scope_addon.edit.clip import Clip
+from scope.scope_addon.motion import Motion
+from scope.solver import load_body
+from scope.solver.frames import R_WORLD_MODEL
+from scope.solver.rotations import exp, log
+
+BODY = load_body("scope")
+NAMES = list(BODY.joint_names)
+RATE = 30.0
+ARMS_DOWN = {"left_shoulder": [0, 0, -1.2], "right_shoulder": [0, 0, 1.2]}
+
+
+def walk(seconds=4.0, period=1.0, speed=1.2, rate=RATE):
+    """A walk along −y: legs and arms swing, knees bend, the pelvis bobs."""
+    t = np.arange(int(seconds * rate) + 1) / rate
+    w = np.zeros((len(t), len(NAMES), 3))
+    for name, value in ARMS_DOWN.items():
+        w[:, NAMES.index(name)] = value
+    phase = 2 * np.pi * t / period
+    for side, sign in (("left", 1.0), ("right", -1.0)):
+        w[:, NAMES.index(f"{side}_hip"), 0] = -0.4 * sign * np.sin(phase)
+        w[:, NAMES.index(f"{side}_knee"), 0] = 0.4 * (1 + sign * np.cos(phase))
+    rotations = exp(w)
+    rotations[:, 0] = R_WORLD_MODEL
+    root = np.stack([np.zeros_like(t), -speed * t, 0.95 + 0.02 * np.cos(2 * phase)], axis=1)
+    return Clip(t, rotations, root)
+
+
+def motion_of(clip, noise=0.0, seed=0):
+    """A capture of the clip by a level camera 4 m away; its raw motion has noise in radians."""
+    rng = np.random.default_rng(seed)
+    T, K1 = clip.rotations.shape[:2]
+    shaken = clip.rotations @ exp(noise * rng.standard_normal((T, K1, 3)))
+    camera = np.tile(np.eye(4), (T, 1, 1))
+    camera[:, :3] = [[1, 0, 0, 0], [0, 0, 1, -4], [0, -1, 0, 1]]
+    J0 = BODY.rest_joints(np.zeros(BODY.P))[0]
+    joints = clip.joints(BODY, np.zeros(BODY.P))
+    return Motion(
+        poses=log(clip.rotations).reshape(T, -1),
+        trans=clip.root - J0,
+        poses_raw=log(shaken).reshape(T, -1),
+        trans_raw=clip.root - J0 + 0.1 * noise * rng.standard_normal((T, 3)),
+        betas=np.zeros(BODY.P),
+        body_model="scope",
+        gender="neutral",
+        mocap_framerate=RATE,
+        frames=np.arange(T),
+        timestamps=clip.times,
+        valid=np.ones(T, bool),
+        joints_cam=(joints - camera[0, :3, 3]) @ camera[0, :3, :3],
+        keypoints2d=np.zeros((T, 1, 3)),
+        keypoints2d_names=np.array(["nose"]),
+        intrinsics=np.array([[600.0, 0, 320], [0, 600.0, 240], [0, 0, 1]]),
+        dist=np.zeros(5),
+        joint_confidence=np.ones((T, K1)),
+        world_from_camera=camera,
+        foot_contact=np.zeros((T, 4)),
+        residual_px=np.zeros(T),
+        image_size=np.array([640, 480]),
+        source="walk.mp4",
+    )

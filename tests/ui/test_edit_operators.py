@@ -1,0 +1,192 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The operators on a captured motion, by what Blender's depsgraph shows afterwards."""
+
+import bpy
+import numpy as np
+import pytest
+from scope.scope_addon.scene.build import BuildOptions, build_scene
+from scope.scope_addon.scene.keys import read_clip
+from scope.scope_addon.scene.root_object import root_object
+from scope.solver.rotations import exp, log
+
+from ..edit.walking import BODY, NAMES, RATE, motion_of, walk
+
+SECONDS = 3.0
+
+
+@pytest.fixture
+def rig(tmp_path):
+    """A captured walk, its armature active, with the motion file that the cache would keep."""
+    scene = bpy.context.scene
+    scene.render.fps, scene.render.fps_base = int(RATE), 1.0
+    motion = motion_of(walk(SECONDS), noise=0.05)
+    result = build_scene([motion], BODY, None, BuildOptions(start_frame=1.0))
+    armature = result.people[0].armature
+    path = tmp_path / "person1.npz"
+    motion.save(path)
+    armature["scope_motion"], armature["scope_body_file"] = str(path), "scope"
+    return armature
+
+
+def seen(rig, frames=range(1, 80, 7)):
+    """(T, K+1, 3) heads of all bones in the world, as Blender evaluates them."""
+    out = []
+    for frame in frames:
+        bpy.context.scene.frame_set(frame)
+        posed = rig.evaluated_get(bpy.context.evaluated_depsgraph_get())
+        out.append([np.array(posed.matrix_world @ posed.pose.bones[name].head) for name in NAMES])
+    return np.array(out)
+
+
+def keys(rig):
+    return read_clip(rig, BODY, RATE)
+
+
+def turned(a, b):
+    return np.degrees(np.linalg.norm(log(np.swapaxes(a, -1, -2) @ b), axis=-1).max())
+
+
+def test_the_keys_are_read_as_they_were_written(rig):
+    clip, frames = keys(rig)
+    truth = walk(SECONDS)
+    assert turned(clip.rotations, truth.rotations) < 0.01
+    np.testing.assert_allclose(clip.root, truth.root, atol=1e-5)
+    np.testing.assert_allclose(frames, 1 + np.arange(len(truth)))
+    np.testing.assert_allclose(clip.joints(BODY, np.zeros(BODY.P))[0], seen(rig, [1])[0], atol=1e-4)
+
+
+def test_smoothing_from_raw_and_back(rig):
+    before, action = seen(rig), rig.animation_data.action
+    bpy.ops.scope.smooth(strength=0.0)
+    raw = seen(rig)
+    assert np.abs(raw - before).max() > 0.02
+    bpy.ops.scope.smooth(strength=3.0)
+    calm = seen(rig)
+    shaking = [np.linalg.norm(np.diff(joints, 2, axis=0), axis=-1).mean() for joints in (calm, raw)]
+    assert shaking[0] < shaking[1]
+    bpy.ops.scope.smooth(strength=1.0)  # what the capture did
+    np.testing.assert_allclose(seen(rig), before, atol=2e-4)
+    assert rig.animation_data.action == action
+
+
+def test_smoothing_without_the_cached_motion_is_told(rig):
+    before = seen(rig)
+    rig["scope_motion"] = "/nowhere/person1.npz"
+    with pytest.raises(RuntimeError, match="no longer in the cache"):
+        bpy.ops.scope.smooth(strength=2.0)
+    np.testing.assert_array_equal(seen(rig), before)
+
+
+def test_bridging_and_swapping_a_span(rig):
+    before = keys(rig)[0]
+    bpy.ops.scope.swap_sides(start=20, end=30, limbs="legs")
+    swapped = keys(rig)[0]
+    assert turned(swapped.rotations[19:30], before.rotations[19:30]) > 10
+    assert turned(np.delete(swapped.rotations, range(19, 30), 0), np.delete(before.rotations, range(19, 30), 0)) < 0.01
+    bpy.ops.scope.swap_sides(start=20, end=30, limbs="legs")
+    assert turned(keys(rig)[0].rotations, before.rotations) < 0.05
+    bpy.ops.scope.interpolate_span(start=40, end=44)
+    assert 0.1 < turned(keys(rig)[0].rotations, before.rotations) < 8
+    with pytest.raises(RuntimeError, match="reaches the motion's end"):
+        bpy.ops.scope.interpolate_span(start=-5, end=44)
+
+
+def test_feet_to_floor(rig):
+    clip, _ = keys(rig)
+    from scope.scope_addon.scene.keys import write_clip
+
+    clip.root[:, 2] += 0.3
+    write_clip(rig, BODY, clip, 1 + np.arange(len(clip)))
+    bpy.ops.scope.refloor()
+    lowest = keys(rig)[0].soles(BODY, np.zeros(BODY.P))[..., 2].min(axis=1)
+    assert np.abs(lowest).max() < 0.06  # this walk's feet are not exactly on a floor themselves
+    assert lowest.min() > -1e-4
+
+
+@pytest.mark.parametrize("heading", [True, False])
+def test_root_motion_looks_the_same_and_comes_back(rig, heading):
+    before, clip = seen(rig), keys(rig)[0]
+    bpy.ops.scope.root_motion(mode="OBJECT", heading=heading)
+    empty = root_object(rig)
+    np.testing.assert_allclose(seen(rig), before, atol=2e-4)
+    assert np.abs(keys(rig)[0].root[:, :2]).max() < 1e-5
+    bpy.context.scene.frame_set(60)
+    assert empty.matrix_world.translation.y == pytest.approx(-1.2 * 59 / RATE, abs=1e-3)
+    bpy.ops.scope.root_motion(mode="IN_PLACE", heading=heading)
+    there = seen(rig)
+    assert np.ptp(there[:, 0, :2], axis=0).max() < 1e-3
+    np.testing.assert_allclose(there[0], before[0], atol=2e-4)
+    bpy.ops.scope.root_motion(mode="BONES")
+    assert root_object(rig) is None
+    np.testing.assert_allclose(seen(rig), before, atol=2e-4)
+    assert turned(keys(rig)[0].rotations, clip.rotations) < 0.05
+    assert not [o for o in bpy.data.objects if "scope_root" in o]
+
+
+def test_a_loop_goes_on_for_ever_where_it_ended(rig):
+    bpy.ops.scope.loop(start=5, end=85, shortest=0.8)
+    scene = bpy.context.scene
+    length = scene.frame_end + 1 - scene.frame_start
+    assert length in (30, 60)  # a period is one second
+    first = scene.frame_start
+    once, next_time = seen(rig, [first, first + 10]), seen(rig, [first + length, first + length + 10])
+    gone = next_time[:, 0] - once[:, 0]
+    np.testing.assert_allclose(gone[:, 1], -1.2 * length / RATE, atol=0.02)
+    np.testing.assert_allclose(next_time - next_time[:, :1], once - once[:, :1], atol=2e-3)
+
+
+@pytest.mark.parametrize("degrees", [0.3, 2.0])
+def test_reduced_keys_stay_within_what_was_asked(rig, degrees):
+    before, dense = seen(rig, range(1, 91)), keys(rig)[0]
+    count = sum(len(c.keyframe_points) for c in _curves(rig))
+    bpy.ops.scope.reduce_keys(degrees=degrees, millimetres=3.0)
+    after = sum(len(c.keyframe_points) for c in _curves(rig))
+    assert after < 0.5 * count
+    reduced, frames = keys(rig)
+    truth = dense.rotations[np.round(frames - 1).astype(int)]
+    assert turned(reduced.rotations, truth) <= degrees * 1.01 + 0.01
+    assert np.abs(seen(rig, range(1, 91))[:, 0] - before[:, 0]).max() < 0.0031
+
+
+def test_baking_to_rates(rig):
+    before = seen(rig)
+    bpy.ops.scope.bake_rate(rate=15.0)
+    assert len(keys(rig)[1]) == 46
+    np.testing.assert_allclose(np.diff(keys(rig)[1]), 2.0)
+    assert np.abs(seen(rig) - before).max() < 0.03
+    bpy.ops.scope.bake_rate(rate=0.0)
+    np.testing.assert_allclose(keys(rig)[1], 1 + np.arange(91))
+
+
+def test_edits_need_a_captured_armature_and_find_the_only_one():
+    assert not bpy.ops.scope.smooth.poll()
+    bpy.ops.object.empty_add()
+    assert not bpy.ops.scope.refloor.poll()
+
+
+def test_lost_keys_are_told_and_change_nothing(rig):
+    from scope.scope_addon.scene.actions import fcurves
+
+    name = NAMES[5]
+    for curve in fcurves(rig):
+        if name in curve.data_path:
+            curve.keyframe_points.clear()
+    with pytest.raises(RuntimeError, match="has lost the keys"):
+        bpy.ops.scope.refloor()
+
+
+def test_an_edit_can_be_undone_by_hand_made_changes_too(rig):
+    """The keys are the truth: a pose changed by hand survives another edit."""
+    clip, _ = keys(rig)
+    from scope.scope_addon.scene.keys import write_clip
+
+    clip.rotations[:, NAMES.index("head")] = exp([0.3, 0.0, 0.0])
+    write_clip(rig, BODY, clip, 1 + np.arange(len(clip)))
+    bpy.ops.scope.refloor()
+    assert turned(keys(rig)[0].rotations[:, NAMES.index("head")], exp([0.3, 0.0, 0.0])) < 0.01
+
+
+def _curves(rig):
+    from scope.scope_addon.scene.actions import fcurves
+
+    return fcurves(rig)
