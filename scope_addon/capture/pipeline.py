@@ -123,16 +123,18 @@ def _observe(video: Video, tracker: PeopleTracker, clock: _Clock, progress: Prog
     """Everybody in every frame. No picture is kept, so that an hour takes no more memory than a minute."""
     builder = PeopleBuilder()
     frames = iter(video)
-    while True:
+    with clock.stage("decode"):
+        upcoming = next(frames, None)
+    while upcoming is not None:
+        frame = upcoming
         with clock.stage("decode"):
-            frame = next(frames, None)
-        if frame is None:
-            return builder
+            upcoming = next(frames, None)
         with clock.stage("networks"):
-            observations = tracker.step(frame.image_rgb)
+            observations = tracker.step(frame.image_rgb, upcoming.image_rgb if upcoming else None)
             builder.add(frame.index, frame.timestamp_s, observations)
         watch(frame, max((o for _, o in observations), key=lambda o: o.region.side_px, default=None))
         progress("finding the person", len(builder), max(video.expected_frames, len(builder)))
+    return builder
 
 
 def _solve(

@@ -8,6 +8,7 @@ landmarks in a region are those of the visible person nearest to its middle, who
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from concurrent.futures import Future
 from dataclasses import dataclass
 
 import cv2
@@ -83,10 +84,17 @@ class FakeDetector:
 class FakeLandmarks:
     def __init__(self, people: list[Person], right: bool = False) -> None:
         self.people, self.right, self.batches = people, right, []
+        self.ahead = 0
 
     def estimate(self, image: np.ndarray, regions: list[Region]) -> list[PoseEstimate]:
         self.batches.append(len(regions))
         return [self._one(_time(image), region) for region in regions]
+
+    def begin(self, image: np.ndarray, region: Region) -> Future[PoseEstimate]:
+        look: Future[PoseEstimate] = Future()
+        look.set_result(self._one(_time(image), region))
+        self.ahead += 1
+        return look
 
     def _one(self, t: int, region: Region) -> PoseEstimate:
         def far(person: Person) -> float:

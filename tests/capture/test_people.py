@@ -107,6 +107,25 @@ def test_someone_small_beside_the_most_prominent_one_costs_nothing(monkeypatch: 
     assert networks.batches[-1] == 2  # both in one batch
 
 
+@pytest.mark.parametrize("leap", [0, 90], ids=["steady", "leaps"])
+def test_looking_ahead_changes_nothing_but_the_order(monkeypatch: pytest.MonkeyPatch, leap: int) -> None:
+    """What was foretold is used where the person goes on as before, and looked at again where not."""
+    people = [Person(lambda t: (200 + 3.0 * t + (leap if t >= 20 else 0), 200), BLUE)]
+    networks = FakeLandmarks(people)
+    monkeypatch.setattr(tracker_module, "LandmarkNetwork", lambda name, *_: networks)
+    monkeypatch.setattr(tracker_module, "PersonDetector", lambda *_: FakeDetector(people))
+    images = list(pictures(people, 60))
+    plain, ahead = PeopleTracker("best", 1), PeopleTracker("best", 1)
+    expected = [plain.step(image) for image in images]
+    networks.batches.clear()
+    found = [ahead.step(image, upcoming) for image, upcoming in zip(images, [*images[1:], None], strict=True)]
+    for one, other in zip(expected, found, strict=True):
+        np.testing.assert_allclose(one[0][1].keypoints_px, other[0][1].keypoints_px)
+        assert [number for number, _ in one] == [number for number, _ in other]
+    assert networks.ahead >= 50
+    assert sum(networks.batches) <= (8 if leap == 0 else 16)
+
+
 def test_a_flicker_is_nobody(follow: Callable[..., list[Track]]) -> None:
     blinks = Person(lambda t: (200 + 30 * (t // 20), 200) if t % 20 < 3 else None, RED)
     assert follow([blinks], 200, wanted=3) == []
