@@ -19,6 +19,8 @@ from pathlib import Path
 import bpy
 
 VIDEO, OUT = sys.argv[sys.argv.index("--") + 1], Path(sys.argv[sys.argv.index("--") + 2])
+# Where the panel's buttons are on a screen of 1600 x 1000, in pixels from its top left.
+FAST_BUTTON, CAPTURE_BUTTON = (1086, 151), (1174, 183)
 report: dict = {"blender": bpy.app.version_string, "python": sys.version.split()[0], "exports": []}
 
 
@@ -40,8 +42,9 @@ def key(name: str) -> None:
 
 
 def click(x: int, y: int) -> None:
-    """The left button, in the screen's pixels from its top left."""
-    subprocess.run(["xdotool", "mousemove", str(x), str(y), "click", "1"], check=True)
+    """The left button, in the screen's pixels from its top left; as slowly as a hand, while Blender goes on."""
+    steps = ["mousemove", str(x), str(y), "sleep", "0.4", "mousedown", "1", "sleep", "0.1", "mouseup", "1"]
+    subprocess.Popen(["xdotool", *steps])
 
 
 def addon():
@@ -78,13 +81,16 @@ def steps() -> Iterator[float]:
     picture("1_new_scene")
 
     bpy.ops.scope.choose_footage(filepath=VIDEO)
-    scene.scope.quality = "FAST"
+    area.tag_redraw()
     yield 1.0
+    click(*FAST_BUTTON)
+    yield 1.0
+    report["mouse_chose"] = scene.scope.quality
     picture("2_footage_chosen")
 
     before = inventory()
-    invoke(bpy.ops.scope.capture, "INVOKE_DEFAULT")
-    yield 4.0
+    click(*CAPTURE_BUTTON)
+    yield 5.0
     picture("3_capturing")
     worker = addon().state.job.worker
     folder, pid = worker.job_folder, worker.pid
@@ -97,8 +103,10 @@ def steps() -> Iterator[float]:
     left += ["a running job"] if addon().state.job is not None else []
     report["left_after_cancel"] = left
 
+    click(*CAPTURE_BUTTON)
+    while addon().state.job is None:
+        yield 0.02
     began, last, gaps = time.monotonic(), time.monotonic(), []
-    invoke(bpy.ops.scope.capture, "INVOKE_DEFAULT")
     pictures, preview = 0, False
     while addon().state.job is not None:
         yield 0.02
@@ -139,6 +147,13 @@ def steps() -> Iterator[float]:
 
     invoke(bpy.ops.scope.look_through)
     yield 1.0
+    invoke(bpy.ops.scope.smooth, strength=2.5)
+    invoke(bpy.ops.scope.root_motion, mode="OBJECT")
+    area.tag_redraw()
+    yield 1.0
+    picture("7_refined")
+    invoke(bpy.ops.scope.root_motion, mode="BONES")
+    invoke(bpy.ops.scope.smooth, strength=1.0)
     formats = [("FBX", "fbx"), ("GLB", "glb"), ("BVH", "bvh")]
     formats += [("USDC", "usdc")] if "usd_export" in dir(bpy.ops.wm) else []  # Debian builds Blender without USD
     for kind, suffix in formats:
