@@ -19,12 +19,16 @@ from . import (
     panel,
     preferences,
     properties,
+    retarget_operators,
+    retarget_panel,
+    retarget_properties,
     view_operators,
 )
 
 _MODULES = (
     *(properties, preferences, capture_operators, export_operators, view_operators, edit_operators, drop),
-    *(panel, edit_panel),
+    *(retarget_properties, retarget_operators),
+    *(panel, edit_panel, retarget_panel),
 )
 
 
@@ -37,6 +41,7 @@ def register() -> None:
                 bpy.utils.register_class(cls)
                 done.append(cls)
         properties.attach()
+        retarget_properties.attach()
         command.register()
     except Exception:
         for cls in reversed(done):
@@ -48,6 +53,7 @@ def unregister() -> None:
     """Take everything out of Blender again, a running capture included."""
     capture_operators.stop_everything()
     command.unregister()
+    retarget_properties.detach()
     properties.detach()
     for module in reversed(_MODULES):
         for cls in reversed(module.CLASSES):

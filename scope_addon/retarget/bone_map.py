@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Which bone of a rig follows which part of the body, and its file."""
+
+from __future__ import annotations
+
+import json
+import os
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from ...solver.errors import InputError
+
+SIDED = ("hip", "knee", "ankle", "foot", "collar", "shoulder", "elbow", "wrist")
+SPINE = ("spine1", "spine2", "spine3")
+PARTS = ("pelvis", *SPINE, "neck", "head", *(f"{side}_{part}" for side in ("left", "right") for part in SIDED))
+NEEDED = ("pelvis", *(f"{side}_{part}" for side in ("left", "right") for part in ("hip", "knee")))
+_FORMAT, _LARGEST_BYTES = "scope bone map", 1_000_000
+
+
+@dataclass
+class BoneMap:
+    """``parts``: bone name -> body part. Several bones may share the spine or the neck; others have one bone each."""
+
+    parts: dict[str, str]
+    confidence: dict[str, float] = field(default_factory=dict)  # 0..1 where it was guessed
+
+    def bone(self, part: str) -> str | None:
+        """The first bone of a part, None where the rig has none."""
+        return next((bone for bone, p in self.parts.items() if p == part), None)
+
+    def check(self) -> None:
+        """Refuse what cannot be retargeted.
+
+        :raises InputError: an unknown part, a limb with two bones, or no pelvis or legs.
+        """
+        for bone, part in self.parts.items():
+            if part not in PARTS:
+                raise InputError(f"bone '{bone}' is mapped to '{part}', which is no body part; use {', '.join(PARTS)}")
+        for part in PARTS:
+            bones = [bone for bone, p in self.parts.items() if p == part]
+            if len(bones) > 1 and part not in SPINE and part != "neck":
+                raise InputError(f"'{part}' has {len(bones)} bones, {' and '.join(bones)}; keep one of them")
+        missing = [part for part in NEEDED if self.bone(part) is None]
+        if missing:
+            raise InputError(f"the bone map has no bone for {', '.join(missing)}; choose one for each in the list")
+
+
+def save_bone_map(bone_map: BoneMap, path: str | Path) -> None:
+    """Write JSON, whole or not at all."""
+    path = Path(path)
+    beside = path.with_name(path.name + ".part")
+    text = json.dumps({"format": _FORMAT, "version": 1, "bones": bone_map.parts}, indent=2, ensure_ascii=False)
+    try:
+        beside.write_text(text + "\n", encoding="utf-8")
+        os.replace(beside, path)
+    finally:
+        beside.unlink(missing_ok=True)
+
+
+def load_bone_map(path: str | Path) -> BoneMap:
+    """Read what ``save_bone_map`` wrote.
+
+    :raises InputError: the file is not such a map; the message says why.
+    """
+    path = Path(path)
+    try:
+        if path.stat().st_size > _LARGEST_BYTES:
+            raise InputError(f"{path}: too large for a bone map; choose a file that Scope has saved")
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InputError(f"{path}: the bone map cannot be read ({error.strerror}); choose another file") from error
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"{path}: this is not JSON ({error}); choose a bone map that Scope has saved") from error
+    bones = content.get("bones") if isinstance(content, dict) else None
+    if not isinstance(content, dict) or content.get("format") != _FORMAT or content.get("version") != 1:
+        raise InputError(f"{path}: this JSON is no bone map of Scope, version 1; choose another file")
+    if not isinstance(bones, dict) or not all(isinstance(part, str) and bone for bone, part in bones.items()):
+        raise InputError(f"{path}: 'bones' must pair names of bones with body parts")
+    out = BoneMap(dict(bones))
+    try:
+        out.check()
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from error
+    return out

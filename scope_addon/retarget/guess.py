@@ -1,0 +1,179 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Guess which bone is which body part, by name and by where the bones rest."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+import numpy as np
+
+from .bone_map import BoneMap
+
+_SIDES = {"l": "left", "left": "left", "r": "right", "right": "right"}
+_CENTRE = {
+    "pelvis": ("pelvis", "hips", "hip"),
+    "spine": ("spine", "chest", "upperchest", "torso", "abdomen", "waist"),
+    "neck": ("neck",),
+    "head": ("head",),
+}
+_LIMBS = {
+    "hip": ("thigh", "upleg", "upperleg", "hip"),
+    "knee": ("shin", "calf", "leg", "lowerleg", "knee"),
+    "ankle": ("ankle", "foot"),
+    "foot": ("toe", "toes", "toebase", "ball", "foot"),  # SMPL calls the toes "foot" beside an "ankle"
+    "collar": ("clavicle", "collar", "shoulder"),
+    "shoulder": ("upperarm", "uparm", "arm", "shoulder"),
+    "elbow": ("forearm", "lowerarm", "elbow"),
+    "wrist": ("hand", "wrist"),
+}
+
+
+@dataclass(frozen=True)
+class RestBones:
+    """A rig's bones at rest, parents before children: names, parents' indices (-1: none), heads (B, 3), z up."""
+
+    names: list[str]
+    parents: np.ndarray
+    heads: np.ndarray
+
+
+def tokens(name: str) -> tuple[str, str]:
+    """The name without prefix, side, digits and case, and its side ('left', 'right' or '')."""
+    words = re.findall(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+", name.rsplit(":", 1)[-1])
+    words = [word.lower() for word in words]
+    side = next((_SIDES[word] for word in words if word in _SIDES), "")
+    return "".join(word for word in words if word not in _SIDES), side
+
+
+def guess(bones: RestBones) -> BoneMap:
+    """The most likely map: by name, and by geometry where the names say nothing.
+
+    Confidence is 1 where name and geometry agree, 0.8 for a name alone, 0.5 for geometry alone.
+    """
+    named, shaped = _rigify(bones) or by_name(bones), by_geometry(bones)
+    if len(set(named.values())) < 8:
+        return BoneMap(shaped, dict.fromkeys(shaped, 0.5))
+    return BoneMap(named, {bone: 1.0 if shaped.get(bone) == part else 0.8 for bone, part in named.items()})
+
+
+def _rigify(bones: RestBones) -> dict[str, str] | None:
+    """Rigify's names, which number trunk, neck and head alike; None for other rigs."""
+    names = set(bones.names)
+    if {"torso", "thigh_fk.L", "spine_fk.002"} <= names:
+        found = {"torso": "pelvis", "spine_fk.002": "spine1", "spine_fk.003": "spine3"}
+        found |= {"neck": "neck", "head": "head"}
+        suffix = "_fk"
+    elif {"spine.001", "spine.003", "spine.006", "thigh.L"} <= names:
+        found = {"spine": "pelvis", "spine.001": "spine1", "spine.002": "spine2", "spine.003": "spine3"}
+        found |= {"spine.004": "neck", "spine.005": "neck", "spine.006": "head"}
+        suffix = ""
+    else:
+        return None
+    limbs = {"thigh": "hip", "shin": "knee", "foot": "ankle", "toe": "foot", "upper_arm": "shoulder"}
+    limbs |= {"forearm": "elbow", "hand": "wrist"}
+    for letter, side in (("L", "left"), ("R", "right")):
+        found[f"shoulder.{letter}"] = f"{side}_collar"
+        found |= {f"{limb}{suffix}.{letter}": f"{side}_{part}" for limb, part in limbs.items()}
+    return {bone: part for bone, part in found.items() if bone in names}
+
+
+def by_name(bones: RestBones) -> dict[str, str]:
+    """Bones whose names say what they are; of several candidates the one nearest to the root."""
+    cores = [tokens(name) for name in bones.names]
+    depth = _depths(bones.parents)
+    order = sorted(range(len(cores)), key=lambda i: (depth[i], bones.names[i]))
+    found: dict[str, str] = {}
+    for side in ("left", "right"):
+        sided = {i for i in order if cores[i][1] == side}
+        # "hip, knee, ..., collar, shoulder" as SMPL says it: there a shoulder is the upper arm.
+        with_collar = any(cores[i][0] in ("clavicle", "collar") for i in sided)
+        for part, words in _LIMBS.items():
+            if part == "collar" and with_collar:
+                words = words[:2]
+            for word in words:
+                first = next((i for i in order if i in sided and cores[i][0] == word), None)
+                if first is not None and bones.names[first] not in found:
+                    found[bones.names[first]] = f"{side}_{part}"
+                    break
+    for part, words in _CENTRE.items():
+        candidates = [i for i in order if not cores[i][1] and cores[i][0] in words]
+        if part == "spine":
+            found |= {bones.names[i]: name for i, name in zip(candidates, _spread(len(candidates)), strict=True)}
+        elif part == "neck":
+            found |= {bones.names[i]: "neck" for i in candidates}
+        elif candidates:
+            found[bones.names[candidates[0]]] = part
+    thighs = [bones.names.index(b) for b, part in found.items() if part.endswith("_hip")]
+    if "pelvis" not in found.values() and len(thighs) == 2:  # the bone from which both legs hang
+        shared = [i for i in _ancestors(bones.parents, thighs[0]) if i in _ancestors(bones.parents, thighs[1])]
+        if shared:
+            found[bones.names[shared[0]]] = "pelvis"
+    return found
+
+
+def by_geometry(bones: RestBones) -> dict[str, str]:
+    """Legs are the chains to the lowest ends on either side, arms those to the widest, the head is the highest end."""
+    heads, parents = bones.heads, bones.parents
+    leaves = [i for i in range(len(parents)) if i not in set(parents.tolist())]
+    height = max(float(np.ptp(heads[:, 2])), 1e-9)
+    z = (heads[:, 2] - heads[:, 2].min()) / height
+    axis = int(np.argmax(np.ptp(heads[:, :2], axis=0)))  # arms make a person wider than deep
+    across = heads[:, axis] - np.median(heads[:, axis])
+    across = across if axis == 0 else -across
+    found: dict[str, str] = {}
+    chains: dict[str, list[int]] = {}
+    for side, sign in (("left", 1.0), ("right", -1.0)):
+        legs = [i for i in leaves if sign * across[i] > 0.01 * height and z[i] < 0.15]
+        arms = [i for i in leaves if sign * across[i] > 0.1 * height and z[i] > 0.3]
+        if legs:
+            chains[f"{side} leg"] = _chain(parents, min(legs, key=lambda i: len(_ancestors(parents, i))))
+        if arms:
+            chains[f"{side} arm"] = _chain(parents, max(arms, key=lambda i: sign * across[i]))
+    if not {"left leg", "right leg"} <= chains.keys():
+        return {}
+    shared = [i for i in chains["left leg"] if i in chains["right leg"]]
+    if not shared:
+        return {}
+    found[bones.names[shared[-1]]] = "pelvis"
+    for limb, chain in chains.items():
+        side, kind = limb.split()
+        other = chains.get(("right " if side == "left" else "left ") + kind, shared)
+        own = [i for i in chain if i not in other]
+        parts: tuple[str, ...]
+        if kind == "leg":
+            parts = ("hip", "knee", "ankle", "foot")
+        else:
+            lengths = [float(np.linalg.norm(heads[b] - heads[a])) for a, b in zip(own, own[1:], strict=False)]
+            collar = len(own) > 3 and lengths[0] < 0.7 * lengths[1]
+            parts = ("collar",) * collar + ("shoulder", "elbow", "wrist")
+        found |= {bones.names[i]: f"{side}_{part}" for i, part in zip(own, parts, strict=False)}
+    top = _chain(parents, int(max(leaves, key=lambda i: z[i])))
+    trunk = [i for i in top if i not in shared]
+    arms = chains.get("left arm", [])
+    spine = [i for i in trunk if i in arms]
+    rest = [i for i in trunk if i not in arms]
+    found |= {bones.names[i]: name for i, name in zip(spine, _spread(len(spine)), strict=True)}
+    found |= {bones.names[i]: name for i, name in zip(rest, ("neck", "head"), strict=False)}
+    return found
+
+
+def _spread(count: int) -> list[str]:
+    """Parts of the spine for so many bones: the last one always carries the chest."""
+    return [f"spine{int(np.ceil(3 * (k + 1) / count))}" for k in range(count)]
+
+
+def _ancestors(parents: np.ndarray, i: int) -> list[int]:
+    found = []
+    while parents[i] >= 0:
+        i = int(parents[i])
+        found.append(i)
+    return found
+
+
+def _chain(parents: np.ndarray, i: int) -> list[int]:
+    return [*reversed(_ancestors(parents, i)), i]
+
+
+def _depths(parents: np.ndarray) -> list[int]:
+    return [len(_ancestors(parents, i)) for i in range(len(parents))]

@@ -1,0 +1,193 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Put a captured motion on the user's own rig: guess the bones, edit and keep the list, retarget."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import bpy
+from bpy.props import EnumProperty, StringProperty
+
+from .edit_operators import _betas, _body_of, captured_armature
+
+if TYPE_CHECKING:
+    from ..retarget.bone_map import BoneMap
+
+
+def chosen_source(context: bpy.types.Context) -> bpy.types.Object | None:
+    """The captured armature that is meant; the rig itself may well be the active object."""
+    found = captured_armature(context)
+    if found is None:
+        captured = [obj for obj in context.scene.objects if obj.type == "ARMATURE" and "scope_source" in obj]
+        found = captured[0] if len(captured) == 1 else None
+    return found
+
+
+class _OnRig(bpy.types.Operator):
+    """What the operators share: a rig is chosen, and failure is a sentence."""
+
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """A rig is chosen."""
+        rig = context.scene.scope_retarget.rig
+        if rig is None or rig.name not in context.view_layer.objects:
+            cls.poll_message_set("Choose your rig first")
+            return False
+        return True
+
+    def work(self, context: bpy.types.Context) -> str:
+        """Do it; returns what to tell."""
+        raise NotImplementedError
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Do it; what goes wrong is told."""
+        from ...solver.errors import ScopeError
+
+        try:
+            said = self.work(context)
+        except (ScopeError, OSError) as error:
+            text = str(error)
+            self.report({"ERROR"}, text[:1].upper() + text[1:])
+            return {"CANCELLED"}
+        self.report({"INFO"}, said)
+        return {"FINISHED"}
+
+
+class SCOPE_OT_guess_bones(_OnRig):
+    """Find out which bone of the rig is which body part, by names and rest pose"""
+
+    bl_idname = "scope.guess_bones"
+    bl_label = "Guess Bones"
+
+    def work(self, context: bpy.types.Context) -> str:
+        """Fill the list."""
+        from ..scene.retarget import guess_bone_map
+
+        found = guess_bone_map(context.scene.scope_retarget.rig)
+        _show(context, found)
+        return f"{len(found.parts)} bones found; check the list"
+
+
+class SCOPE_OT_retarget(_OnRig):
+    """Move your rig as the captured person moves, as a new action. The rig's former action stays in the file"""
+
+    bl_idname = "scope.retarget"
+    bl_label = "Retarget"
+
+    def work(self, context: bpy.types.Context) -> str:
+        """Key the rig."""
+        from ...solver.errors import UsageError
+        from ..scene.retarget import RetargetOptions, guess_bone_map, retarget
+        from ..scene.timing import scene_rate
+
+        settings, source = context.scene.scope_retarget, chosen_source(context)
+        if source is None:
+            raise UsageError("select the armature of a capture: there is none, or more than one")
+        if not len(settings.pairs):
+            _show(context, guess_bone_map(settings.rig))
+        body = _body_of(source)
+        action = retarget(
+            source,
+            body,
+            _betas(source, body),
+            settings.rig,
+            _map_of(context),
+            scene_rate(context.scene),
+            RetargetOptions(feet=settings.feet, in_place=settings.in_place),
+        )
+        return f"'{settings.rig.name}' moves by the action '{action.name}'"
+
+
+class SCOPE_OT_save_bone_map(_OnRig):
+    """Save the list of bones as a JSON file for rigs of the same kind"""
+
+    bl_idname = "scope.save_bone_map"
+    bl_label = "Save Bone Map"
+
+    filepath: StringProperty(subtype="FILE_PATH", default="bones.json")
+    filter_glob: StringProperty(default="*.json", options={"HIDDEN"})
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        """Ask for the file."""
+        context.window_manager.fileselect_add(self)
+        return {"RUNNING_MODAL"}
+
+    def work(self, context: bpy.types.Context) -> str:
+        """Write."""
+        from ..retarget.bone_map import save_bone_map
+
+        save_bone_map(_map_of(context), bpy.path.abspath(self.filepath))
+        return f"Saved {self.filepath}"
+
+
+class SCOPE_OT_load_bone_map(_OnRig):
+    """Read a list of bones that was saved as JSON"""
+
+    bl_idname = "scope.load_bone_map"
+    bl_label = "Load Bone Map"
+
+    filepath: StringProperty(subtype="FILE_PATH")
+    filter_glob: StringProperty(default="*.json", options={"HIDDEN"})
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        """Ask for the file."""
+        context.window_manager.fileselect_add(self)
+        return {"RUNNING_MODAL"}
+
+    def work(self, context: bpy.types.Context) -> str:
+        """Fill the list."""
+        from ..retarget.bone_map import load_bone_map
+
+        _show(context, load_bone_map(bpy.path.abspath(self.filepath)))
+        return f"Read {self.filepath}"
+
+
+class SCOPE_OT_edit_bone_pair(_OnRig):
+    """Add a line to the list of bones, or take the chosen one out"""
+
+    bl_idname = "scope.edit_bone_pair"
+    bl_label = "Edit Bone List"
+
+    action: EnumProperty(items=(("ADD", "Add", "Add a line"), ("REMOVE", "Remove", "Remove the chosen line")))
+
+    def work(self, context: bpy.types.Context) -> str:
+        """Change the list."""
+        settings = context.scene.scope_retarget
+        if self.action == "ADD":
+            settings.pairs.add()
+            settings.active = len(settings.pairs) - 1
+        elif len(settings.pairs):
+            settings.pairs.remove(settings.active)
+            settings.active = max(0, min(settings.active, len(settings.pairs) - 1))
+        return f"{len(settings.pairs)} bones"
+
+
+def _show(context: bpy.types.Context, bone_map: BoneMap) -> None:
+    """Put a map into the list, in the order of the body's parts."""
+    from ..retarget.bone_map import PARTS
+
+    settings = context.scene.scope_retarget
+    settings.pairs.clear()
+    for bone, part in sorted(bone_map.parts.items(), key=lambda pair: PARTS.index(pair[1])):
+        pair = settings.pairs.add()
+        pair.bone, pair.part, pair.confidence = bone, part, bone_map.confidence.get(bone, 1.0)
+    settings.active = 0
+
+
+def _map_of(context: bpy.types.Context) -> BoneMap:
+    """The list as a map; lines without a bone or a part do not count."""
+    from ..retarget.bone_map import BoneMap
+
+    pairs = [pair for pair in context.scene.scope_retarget.pairs if pair.bone and pair.part]
+    return BoneMap({pair.bone: pair.part for pair in pairs}, {pair.bone: pair.confidence for pair in pairs})
+
+
+CLASSES = (
+    SCOPE_OT_guess_bones,
+    SCOPE_OT_retarget,
+    SCOPE_OT_save_bone_map,
+    SCOPE_OT_load_bone_map,
+    SCOPE_OT_edit_bone_pair,
+)

@@ -1,0 +1,61 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The retarget section of the sidebar."""
+
+from __future__ import annotations
+
+import bpy
+
+from .retarget_operators import chosen_source
+
+
+class SCOPE_UL_bone_pairs(bpy.types.UIList):
+    """Bones of the rig and the body parts that they follow."""
+
+    def draw_item(self, context, layout, data, item, icon, active_data, active_property, index) -> None:  # type: ignore[no-untyped-def]
+        """One line: part, bone, and a question mark where the guess is not sure."""
+        rig = data.rig
+        row = layout.row(align=True)
+        row.prop(item, "part", text="", emboss=False)
+        known = rig is not None and item.bone in rig.data.bones
+        row.alert = not known
+        if rig is not None:
+            row.prop_search(item, "bone", rig.data, "bones", text="")
+        row.label(text="", icon="ERROR" if not known else "CHECKMARK" if item.confidence > 0.6 else "QUESTION")
+
+
+class SCOPE_PT_retarget(bpy.types.Panel):
+    """Put the captured motion on a rig of your own."""
+
+    bl_space_type = "VIEW_3D"
+    bl_region_type = "UI"
+    bl_category = "Scope"
+    bl_idname = "SCOPE_PT_retarget"
+    bl_label = "Retarget"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """There is a captured person."""
+        return chosen_source(context) is not None
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Draw the panel."""
+        layout, settings = self.layout, context.scene.scope_retarget
+        layout.prop(settings, "rig")
+        if settings.rig is None:
+            return
+        row = layout.row(align=True)
+        row.operator("scope.guess_bones", icon="VIEWZOOM")
+        row.operator("scope.load_bone_map", text="", icon="FILE_FOLDER")
+        row.operator("scope.save_bone_map", text="", icon="FILE_TICK")
+        row = layout.row()
+        row.template_list("SCOPE_UL_bone_pairs", "", settings, "pairs", settings, "active", rows=6)
+        column = row.column(align=True)
+        column.operator("scope.edit_bone_pair", text="", icon="ADD").action = "ADD"
+        column.operator("scope.edit_bone_pair", text="", icon="REMOVE").action = "REMOVE"
+        layout.prop(settings, "feet")
+        layout.prop(settings, "in_place")
+        layout.operator("scope.retarget", icon="ARMATURE_DATA")
+
+
+CLASSES = (SCOPE_UL_bone_pairs, SCOPE_PT_retarget)

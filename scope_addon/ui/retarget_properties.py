@@ -1,0 +1,50 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The retarget section's settings: the rig, and which bone is which body part. Kept with the scene."""
+
+from __future__ import annotations
+
+import bpy
+from bpy.props import BoolProperty, CollectionProperty, FloatProperty, IntProperty, PointerProperty, StringProperty
+
+
+class SCOPE_PG_bone_pair(bpy.types.PropertyGroup):
+    """One bone of the user's rig and the body part that it follows."""
+
+    bone: StringProperty(name="Bone", description="Bone of your rig")
+    part: StringProperty(name="Body Part", description="Part of the captured body that this bone follows")
+    confidence: FloatProperty(name="Confidence", min=0.0, max=1.0, description="How sure the guess is")
+
+
+def _is_armature(_settings: bpy.types.PropertyGroup, obj: bpy.types.Object) -> bool:
+    return obj.type == "ARMATURE" and "scope_source" not in obj
+
+
+class SCOPE_PG_retarget(bpy.types.PropertyGroup):
+    """What the user chose."""
+
+    rig: PointerProperty(
+        name="Rig", type=bpy.types.Object, poll=_is_armature, description="Your own armature that shall move"
+    )
+    pairs: CollectionProperty(type=SCOPE_PG_bone_pair)
+    active: IntProperty()
+    feet: BoolProperty(
+        name="Feet on the Floor",
+        default=True,
+        description="Let the feet stand where the captured ones do, scaled to the rig; bends the legs a little",
+    )
+    in_place: BoolProperty(
+        name="In Place", default=False, description="Leave the way over the floor out: the character stays on the spot"
+    )
+
+
+CLASSES = (SCOPE_PG_bone_pair, SCOPE_PG_retarget)
+
+
+def attach() -> None:
+    """Give every scene its settings."""
+    bpy.types.Scene.scope_retarget = PointerProperty(type=SCOPE_PG_retarget)
+
+
+def detach() -> None:
+    """Take the settings away."""
+    del bpy.types.Scene.scope_retarget

@@ -1,0 +1,283 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Retargeting, judged by what Blender's depsgraph shows of the rig and by forward kinematics of our own."""
+
+import math
+
+import addon_utils
+import bpy
+import numpy as np
+import pytest
+from mathutils import Matrix, Vector
+from scope.scope_addon.retarget.bone_map import BoneMap, load_bone_map, save_bone_map
+from scope.scope_addon.scene.build import BuildOptions, build_scene
+from scope.scope_addon.scene.retarget import RetargetOptions, guess_bone_map, retarget
+from scope.solver.errors import InputError, UsageError
+
+from ..edit.walking import BODY, RATE, motion_of, walk
+
+NAMES = list(BODY.joint_names)
+FRAMES = range(1, 60, 6)
+# Parts in the order of a person's chains, with positions of the left side in a T-pose; metres.
+PLACES = {
+    "pelvis": (0, 0, 0.95), "spine1": (0, 0.01, 1.05), "spine2": (0, 0.02, 1.2), "spine3": (0, 0.01, 1.33),
+    "neck": (0, 0.02, 1.5), "head": (0, 0, 1.6), "hip": (0.1, 0, 0.9), "knee": (0.1, -0.01, 0.5),
+    "ankle": (0.1, 0.02, 0.08), "foot": (0.1, -0.12, 0.02), "collar": (0.04, 0.0, 1.44), "shoulder": (0.17, 0.02, 1.45),
+    "elbow": (0.43, 0.03, 1.45), "wrist": (0.68, 0.02, 1.45),
+}  # fmt: skip
+PARENTS = {
+    "spine1": "pelvis", "spine2": "spine1", "spine3": "spine2", "neck": "spine3", "head": "neck", "hip": "pelvis",
+    "knee": "hip", "ankle": "knee", "foot": "ankle", "collar": "spine3", "shoulder": "collar", "elbow": "shoulder",
+    "wrist": "elbow",
+}  # fmt: skip
+SIDED = ("hip", "knee", "ankle", "foot", "collar", "shoulder", "elbow", "wrist")
+CENTRE = ("pelvis", "spine1", "spine2", "spine3", "neck", "head")
+SCHEMES = {
+    "mixamo": (
+        ("Hips", "Spine", "Spine1", "Spine2", "Neck", "Head"),
+        ("UpLeg", "Leg", "Foot", "ToeBase", "Shoulder", "Arm", "ForeArm", "Hand"),
+        lambda name, side: "mixamorig:" + side.title() + name,
+    ),
+    "unreal": (
+        ("pelvis", "spine_01", "spine_02", "spine_03", "neck_01", "head"),
+        ("thigh", "calf", "foot", "ball", "clavicle", "upperarm", "lowerarm", "hand"),
+        lambda name, side: f"{name}_{side[0]}" if side else name,
+    ),
+    "unity": (
+        ("Hips", "Spine", "Chest", "UpperChest", "Neck", "Head"),
+        ("UpperLeg", "LowerLeg", "Foot", "Toes", "Shoulder", "UpperArm", "LowerArm", "Hand"),
+        lambda name, side: side.title() + name,
+    ),
+    "mpfb": (
+        ("root", "spine05", "spine03", "spine01", "neck01", "head"),
+        ("upperleg01", "lowerleg01", "foot", "toe1-1", "clavicle", "upperarm01", "lowerarm01", "wrist"),
+        lambda name, side: f"{name}.{side[0].upper()}" if side else name,
+    ),
+    "smpl": (
+        CENTRE,
+        SIDED,
+        lambda name, side: f"{side}_{name}" if side else name,
+    ),
+    "nameless": (
+        tuple("abcdef"),
+        tuple("ghijklmn"),
+        lambda name, side: {"left": "x", "right": "y", "": "z"}[side] * 3 + name,
+    ),
+}
+
+
+def names_of(scheme):
+    """Part -> bone."""
+    centre, sided, spell = SCHEMES[scheme]
+    found = {part: spell(name, "") for part, name in zip(CENTRE, centre, strict=True)}
+    for side in ("left", "right"):
+        found |= {f"{side}_{part}": spell(name, side) for part, name in zip(SIDED, sided, strict=True)}
+    return found
+
+
+def build_rig(scheme, size=1.3, drop=40.0, seed=1, matrix=None):
+    """A rig of other proportions in an A-pose, its rolls random; in mode Euler for every fifth bone."""
+    rng = np.random.default_rng(seed)
+    matrix = matrix or Matrix()
+    bones = names_of(scheme)
+    data = bpy.data.armatures.new(scheme)
+    rig = bpy.data.objects.new(scheme, data)
+    bpy.context.scene.collection.objects.link(rig)
+    bpy.context.view_layer.objects.active = rig
+
+    def place(part):
+        side, _, kind = part.partition("_")
+        p = Vector(PLACES[kind or part])
+        if kind in ("shoulder", "elbow", "wrist"):
+            centre = Vector(PLACES["shoulder"])
+            p = centre + Matrix.Rotation(math.radians(drop), 3, "Y") @ (p - centre) * 0.9
+        return Vector((-p.x if side == "right" else p.x, p.y, p.z)) * size
+
+    bpy.ops.object.mode_set(mode="EDIT")
+    for part, name in bones.items():
+        side, _, kind = part.partition("_")
+        head = place(part)
+        after = {"hip": "knee", "knee": "ankle", "ankle": "foot", "shoulder": "elbow", "elbow": "wrist"}.get(kind)
+        tail = place(f"{side}_{after}") if after else head + Vector((0, 0, 0.1))
+        if kind == "wrist":
+            tail = head + (head - place(f"{side}_elbow")) * 0.4
+        elif kind == "foot":
+            tail = head + Vector((0, -0.06, 0))
+        bone = data.edit_bones.new(name)
+        bone.head, bone.tail = matrix.inverted() @ head, matrix.inverted() @ tail
+        bone.roll = rng.uniform(-3, 3)
+        parent = PARENTS.get(kind or part)
+        if parent:
+            bone.parent = data.edit_bones[bones[f"{side}_{parent}" if parent in SIDED else parent]]
+    bpy.ops.object.mode_set(mode="OBJECT")
+    rig.matrix_world = matrix
+    for k, bone in enumerate(rig.pose.bones):
+        bone.rotation_mode = ("QUATERNION", "QUATERNION", "XYZ", "QUATERNION", "AXIS_ANGLE")[k % 5]
+    bpy.context.view_layer.update()
+    return rig, bones
+
+
+@pytest.fixture
+def source():
+    scene = bpy.context.scene
+    scene.render.fps, scene.render.fps_base = int(RATE), 1.0
+    return build_scene([motion_of(walk(2.0))], BODY, None, BuildOptions(start_frame=1.0)).people[0].armature
+
+
+def truth():
+    """(T, K+1, 3) joints by plain forward kinematics of the motion file."""
+    motion, rest = motion_of(walk(2.0)), BODY.rest_joints(np.zeros(BODY.P))
+    out = np.empty((len(motion), len(NAMES), 3))
+    for t, row in enumerate(motion.poses.reshape(len(motion), -1, 3)):
+        R = []
+        for i, w in enumerate(row):
+            w = Vector(w)
+            local = np.array(Matrix.Rotation(w.length, 3, w if w.length else Vector((1, 0, 0))))
+            parent = BODY.parents[i]
+            R.append(local if parent < 0 else R[parent] @ local)
+            if parent < 0:
+                out[t, i] = rest[0] + motion.trans[t]
+            else:
+                out[t, i] = out[t, parent] + R[parent] @ (rest[i] - rest[parent])
+    return out
+
+
+def seen(rig, bones, frames=FRAMES):
+    """(T, B, 3) heads in the world."""
+    out = []
+    for frame in frames:
+        bpy.context.scene.frame_set(frame)
+        posed = rig.evaluated_get(bpy.context.evaluated_depsgraph_get())
+        out.append([np.array(posed.matrix_world @ posed.pose.bones[name].head) for name in bones])
+    return np.array(out)
+
+
+def direction_error(rig, bone_of, pairs):
+    """Largest angle in degrees between a limb of the rig and the body's."""
+    joints, worst = truth()[[f - 1 for f in FRAMES]], 0.0
+    for a, b in pairs:
+        ours = seen(rig, [bone_of[a], bone_of[b]])
+        ours = ours[:, 1] - ours[:, 0]
+        theirs = joints[:, NAMES.index(b)] - joints[:, NAMES.index(a)]
+        cosine = (ours * theirs).sum(1) / np.linalg.norm(ours, axis=1) / np.linalg.norm(theirs, axis=1)
+        worst = max(worst, float(np.degrees(np.arccos(np.clip(cosine, -1, 1))).max()))
+    return worst
+
+
+ARMS = [(f"{s}_{a}", f"{s}_{b}") for s in ("left", "right") for a, b in (("shoulder", "elbow"), ("elbow", "wrist"))]
+LEGS = [(f"{s}_{a}", f"{s}_{b}") for s in ("left", "right") for a, b in (("hip", "knee"), ("knee", "ankle"))]
+
+
+def run(source, rig, bone_map=None, **options):
+    return retarget(
+        source, BODY, np.zeros(BODY.P), rig, bone_map or guess_bone_map(rig), RATE, RetargetOptions(**options)
+    )
+
+
+def check_feet(rig, bone_of, floor=0.0):
+    """Ankles move as the body's do, scaled: so feet that stand neither slide nor float."""
+    joints = truth()[[f - 1 for f in FRAMES]]
+    rest = BODY.rest_joints(np.zeros(BODY.P))
+    lowest = BODY.rest_vertices(np.zeros(BODY.P))[:, 1].min()
+    length = {}
+    for name in ("left", "right"):
+        parts = [f"{name}_{p}" for p in ("hip", "knee", "ankle")]
+        ours = [np.array(rig.matrix_world @ rig.data.bones[bone_of[p]].head_local) for p in parts]
+        theirs = [rest[NAMES.index(p)] for p in parts]
+        length[name] = [sum(np.linalg.norm(np.subtract(p[k + 1], p[k])) for k in (0, 1)) for p in (ours, theirs)]
+    scale = sum(v[0] for v in length.values()) / sum(v[1] for v in length.values())
+    for side in ("left", "right"):
+        ankle = f"{side}_ankle"
+        height = (rig.matrix_world @ rig.data.bones[bone_of[ankle]].head_local).z - floor
+        goal = scale * joints[:, NAMES.index(ankle)]
+        goal[:, 2] += height - scale * (rest[NAMES.index(ankle), 1] - lowest)
+        error = np.linalg.norm(seen(rig, [bone_of[ankle]])[:, 0] - goal, axis=1)
+        assert error.max() < 0.01, (side, error.max())
+
+
+FBX = Matrix.LocRotScale((0.4, -0.3, 0), Matrix.Rotation(math.radians(90), 3, "X").to_quaternion(), (0.01,) * 3)
+
+
+@pytest.mark.parametrize("scheme", ["mixamo", "unreal"])
+@pytest.mark.parametrize("feet", [False, True])
+def test_limbs_point_where_the_body_points(source, scheme, feet):
+    rig, bone_of = build_rig(scheme, matrix=FBX if scheme == "mixamo" else None)
+    run(source, rig, feet=feet)
+    assert direction_error(rig, bone_of, ARMS) < 1.0
+    if feet:
+        check_feet(rig, bone_of)
+    else:
+        assert direction_error(rig, bone_of, LEGS) < 1.0
+
+
+def test_rigify(source):
+    """Metarig and generated rig in one test: Blender cannot enable this add-on twice in a process."""
+    addon_utils.enable("rigify", default_set=True)
+    bpy.ops.object.armature_human_metarig_add()
+    metarig = bpy.context.object
+    bpy.ops.pose.rigify_generate()
+    generated = next(o for o in bpy.context.scene.objects if o.type == "ARMATURE" and "torso" in o.data.bones)
+    limbs = ("thigh", "shin", "foot", "upper_arm", "forearm", "hand")
+    parts = ("hip", "knee", "ankle", "shoulder", "elbow", "wrist")
+    for rig, spell in ((metarig, "{}"), (generated, "ORG-{}")):
+        bone_of = {
+            f"{side}_{part}": spell.format(f"{limb}.{side[0].upper()}")
+            for side in ("left", "right")
+            for part, limb in zip(parts, limbs, strict=True)
+        }
+        run(source, rig, feet=False)
+        assert direction_error(rig, bone_of, ARMS + LEGS) < 1.0
+        run(source, rig)
+        assert direction_error(rig, bone_of, ARMS) < 1.0
+        check_feet(rig, bone_of)
+
+
+@pytest.mark.parametrize("scheme", sorted(SCHEMES))
+def test_bones_are_guessed(scheme):
+    rig, bone_of = build_rig(scheme)
+    found = guess_bone_map(rig)
+    wrong = {bone: found.parts.get(bone) for part, bone in bone_of.items() if found.parts.get(bone) != part}
+    assert not wrong
+    assert all(0 < c <= 1 for c in found.confidence.values())
+
+
+def test_the_rigs_own_action_stays(source):
+    rig, bone_of = build_rig("unreal")
+    rig.pose.bones[0].keyframe_insert("location", frame=3)
+    before = rig.animation_data.action
+    run(source, rig)
+    assert rig.animation_data.action != before
+    assert before.use_fake_user
+
+
+def test_in_place_stays_on_the_spot(source):
+    rig, bone_of = build_rig("unreal")
+    run(source, rig, in_place=True)
+    assert np.ptp(seen(rig, [bone_of["pelvis"]])[:, 0, :2], axis=0).max() < 1e-3
+
+
+def test_a_map_is_read_as_it_was_saved(tmp_path):
+    rig, _ = build_rig("mixamo")
+    found = guess_bone_map(rig)
+    save_bone_map(found, tmp_path / "map.json")
+    assert load_bone_map(tmp_path / "map.json").parts == found.parts
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["", "[]", "{" * 5000, "[" * 100000, '{"format": "scope bone map", "version": 1, "bones": {"a": 3}}',
+     '{"format": "scope bone map", "version": 1, "bones": {"a": "tail"}}',
+     '{"format": "scope bone map", "version": 1, "bones": {}}', '{"format": 1}'],
+)  # fmt: skip
+def test_hostile_maps_are_refused(tmp_path, text):
+    path = tmp_path / "map.json"
+    path.write_text(text)
+    with pytest.raises(InputError, match="map.json"):
+        load_bone_map(path)
+
+
+def test_what_cannot_be_retargeted_is_said(source):
+    rig, _ = build_rig("unreal")
+    with pytest.raises(UsageError, match="another armature"):
+        run(source, source, guess_bone_map(rig))
+    with pytest.raises(InputError, match="pelvis"):
+        run(source, rig, BoneMap({"head": "head"}))

@@ -1,0 +1,46 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The retarget section as a user works it."""
+
+import bpy
+import numpy as np
+import pytest
+from scope.scope_addon.scene.build import BuildOptions, build_scene
+
+from ..edit.walking import BODY, RATE, motion_of, walk
+from ..scene.test_retarget import build_rig, seen
+
+
+@pytest.fixture
+def rig():
+    scene = bpy.context.scene
+    scene.render.fps, scene.render.fps_base = int(RATE), 1.0
+    source = build_scene([motion_of(walk(2.0))], BODY, None, BuildOptions(start_frame=1.0)).people[0].armature
+    source["scope_body_file"] = "scope"
+    rig, _ = build_rig("unreal")
+    bpy.context.scene.scope_retarget.rig = rig
+    return rig
+
+
+def test_guess_keep_and_retarget(rig, tmp_path):
+    settings = bpy.context.scene.scope_retarget
+    bpy.ops.scope.guess_bones()
+    count = len(settings.pairs)
+    assert count == 22
+    bpy.ops.scope.save_bone_map(filepath=str(tmp_path / "bones.json"))
+    settings.active = count - 1
+    bpy.ops.scope.edit_bone_pair(action="REMOVE")
+    assert len(settings.pairs) == count - 1
+    bpy.ops.scope.load_bone_map(filepath=str(tmp_path / "bones.json"))
+    assert len(settings.pairs) == count
+    bpy.ops.scope.retarget()
+    assert np.ptp(seen(rig, ["pelvis"])[:, 0, 1]) > 1.0  # it walks
+
+
+def test_a_list_without_legs_is_refused(rig):
+    bpy.ops.scope.guess_bones()
+    for pair in bpy.context.scene.scope_retarget.pairs:
+        if pair.part == "left_knee":
+            pair.bone = ""
+    with pytest.raises(RuntimeError, match="left_knee"):
+        bpy.ops.scope.retarget()
+    assert rig.animation_data is None or rig.animation_data.action is None
