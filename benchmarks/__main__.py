@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`./scripts/bench solver [--quick] [--json FILE]`: measure, print the tables, write the figures."""
+"""`./scripts/bench solver|perception [--quick] [--json FILE]`: measure, print the tables, write the figures."""
 
 from __future__ import annotations
 
@@ -66,11 +66,16 @@ def _real_frames(quick: bool) -> dict:
 def main() -> int:
     """Run the command line; return the exit status."""
     parser = argparse.ArgumentParser(prog="bench")
-    parser.add_argument("what", choices=["solver"])
-    parser.add_argument("--quick", action="store_true", help="fewer repetitions, one clip, no other libraries")
+    parser.add_argument("what", choices=["solver", "perception"])
+    parser.add_argument("--quick", action="store_true", help="fewer repetitions, the default preset alone")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures as JSON")
     args = parser.parse_args()
-    figures = solver(args.quick)
+    if args.what == "solver":
+        figures = solver(args.quick)
+    else:
+        from .perception import perception
+
+        figures = perception(args.quick)
     if args.json:
         part = args.json.with_suffix(".part")
         part.write_text(json.dumps(figures, indent=1))

@@ -114,7 +114,7 @@ def _read(path: Path) -> Clip:
 
 def capture_options(cold: bool, tolerance: float, triggs: float = 0.0, limit: int = 50) -> Options:
     """Return the capture's options with another end of the last stage."""
-    stages = fitting._cold_stages(fitting._WEIGHTS) if cold else fitting._WARM
+    stages = (fitting._cold_stages if cold else fitting._warm_stages)(fitting._WEIGHTS)
     last: Stage = replace(stages[-1], tolerance=tolerance, max_iterations=limit)
     return replace(fitting._ROBUST, stages=(*stages[:-1], last), triggs=triggs)
 

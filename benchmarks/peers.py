@@ -31,7 +31,7 @@ def run_all() -> dict[str, float | str]:
 
 
 def _run(name: str, package: str) -> float:
-    python = _environment(name, package)
+    python = make_environment(name, *COMMON, package)
     path = CACHE / "path"  # the root folder under the name of the package
     path.mkdir(parents=True, exist_ok=True)
     link = path / "scope"
@@ -43,13 +43,14 @@ def _run(name: str, package: str) -> float:
     return float(done.stdout.strip().splitlines()[-1])
 
 
-def _environment(name: str, package: str) -> Path:
+def make_environment(name: str, *packages: str) -> Path:
+    """Return the interpreter of an environment with these packages, made on first use."""
     folder = CACHE / name
     python, stamp = folder / "bin" / "python", folder / "installed"
     if not stamp.exists():
-        print(f"installing {package} in {folder}, once", file=sys.stderr)
+        print(f"installing {packages[-1]} in {folder}, once", file=sys.stderr)
         subprocess.run([sys.executable, "-m", "venv", str(folder)], check=True, capture_output=True, text=True)
-        command = [str(python), "-m", "pip", "install", "--quiet", "--only-binary", ":all:", *COMMON, package]
+        command = [str(python), "-m", "pip", "install", "--quiet", "--only-binary", ":all:", *packages]
         subprocess.run(command, check=True, capture_output=True, text=True)
         stamp.touch()
     return python

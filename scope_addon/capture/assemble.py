@@ -61,6 +61,7 @@ def assemble_motion(
     image_size: tuple[int, int],
     source: str,
     smoothing: bool,
+    hold_feet: bool = True,
     T_world_camera: np.ndarray | None = None,
     floor_m: float = 0.0,
 ) -> Motion:
@@ -95,7 +96,7 @@ def assemble_motion(
     T_floor_camera[2, 3] -= floor_m
     R_world_camera, t_world_camera = T_world_camera[:3, :3], T_world_camera[:3, 3]
     contact = standing_probability(soles_cam, R_world_camera[2], times) * valid[:, None]
-    if smoothing:
+    if smoothing and hold_feet:
         local, root = stand_on_floor(soled, local, root, betas, place, contact, T_floor_camera, times)
     R_cam, joints_cam, soles_cam = place(local, root)
 

@@ -30,7 +30,8 @@ from ...solver import (
 )
 from .camera import Camera
 from .lifter import Lifted, Lifter
-from .measure import Measurer
+from .measure import DEPTH_SIGMA_M, Measurer
+from .parts import ALL_PARTS, Parts
 from .track import Track
 
 SHAPE_FRAMES = 64  # frames that decide the shape; more of them are more of the same
@@ -44,7 +45,6 @@ _WEIGHTS = Weights(
 )
 # Joints that no pair of landmarks fixes on their own stay closer to rest.
 _STIFF_JOINTS = {"spine": 5.0, "collar": 5.0, "foot": 5.0, "hand": 5.0, "neck": 3.0, "head": 3.0}
-_WARM = (Stage(_WEIGHTS, 1e-4, 50),)
 _ROBUST = Options(robust_keypoints2d=0.01, robust_keypoints3d=0.1, robust_orientation_field=1.0)
 
 
@@ -60,20 +60,27 @@ class FittedTrack:
     iterations: float  # mean per frame
 
 
-def fit_track(body: Body, track: Track, camera: Camera, progress: Callable[[str, int, int], None]) -> FittedTrack:
+def fit_track(
+    body: Body,
+    track: Track,
+    camera: Camera,
+    progress: Callable[[str, int, int], None],
+    parts: Parts = ALL_PARTS,
+) -> FittedTrack:
     """Fit the body to a track of which at least one frame was seen."""
     measurer = Measurer(body, camera.intrinsics)
     pixels = camera.undistort(track.keypoints_px)
-    lifted = _lift(measurer, track, pixels)
+    lifted = _lift(measurer, track, pixels, parts)
     priors = replace(default_priors(body), joint_weights=_joint_weights(body))
 
     def measure(k: int) -> Measurements:
         return measurer.measure(pixels[k], track.confidence[k], lifted.points[k], lifted.sigma_along[k])
 
-    betas = _fit_shape([measure(k) for k in _spread(np.flatnonzero(track.seen), SHAPE_FRAMES)], body, priors, progress)
+    frames = [measure(k) for k in _spread(np.flatnonzero(track.seen), SHAPE_FRAMES)]
+    betas = _fit_shape(frames, body, priors, parts, progress)
     priors = replace(priors, shape_mean=betas, shape_information=np.eye(body.P) * SHAPE_CERTAINTY)
 
-    return _fit_frames(body, track, betas, priors, measurer, pixels, lifted, None, progress)
+    return _fit_frames(body, track, betas, priors, measurer, pixels, lifted, None, parts, progress)
 
 
 def refit_track(
@@ -83,6 +90,7 @@ def refit_track(
     first: FittedTrack,
     root_cam: np.ndarray,
     progress: Callable[[str, int, int], None],
+    parts: Parts = ALL_PARTS,
 ) -> FittedTrack:
     """Fit every frame again, from its first fit, with the pelvis known to be at ``root_cam`` (T, 3), camera frame.
 
@@ -96,12 +104,18 @@ def refit_track(
         for k in range(len(track))
     ]
     measurer, pixels = Measurer(body, camera.intrinsics), camera.undistort(track.keypoints_px)
-    lifted = _lift(measurer, track, pixels)
-    return _fit_frames(body, track, first.betas, priors, measurer, pixels, lifted, states, progress)
+    lifted = _lift(measurer, track, pixels, parts)
+    return _fit_frames(body, track, first.betas, priors, measurer, pixels, lifted, states, parts, progress)
 
 
-def _lift(measurer: Measurer, track: Track, pixels: np.ndarray) -> Lifted:
-    return Lifter().lift_both_ways(measurer.rays(pixels), track.confidence, track.world_landmarks)
+def _lift(measurer: Measurer, track: Track, pixels: np.ndarray, parts: Parts) -> Lifted:
+    if not parts.lifter:
+        sigma = np.full(track.confidence.shape, DEPTH_SIGMA_M)
+        return Lifted(track.world_landmarks, sigma, sigma)
+    rays = measurer.rays(pixels)
+    if not parts.world_landmarks:
+        return Lifter().lift(rays, track.confidence, None)
+    return Lifter().lift_both_ways(rays, track.confidence, track.world_landmarks)
 
 
 def _fit_frames(
@@ -113,10 +127,11 @@ def _fit_frames(
     pixels: np.ndarray,
     lifted: Lifted,
     states: list[State | None] | None,
+    parts: Parts,
     progress: Callable[[str, int, int], None],
 ) -> FittedTrack:
     """Every seen frame in order: from the frame before, or from ``states`` with their roots as priors."""
-    T, tree = len(track), make_tree(body)
+    T, tree, weights = len(track), make_tree(body), parts.weights(_WEIGHTS)
     rotations = np.tile(np.eye(3), (T, body.K + 1, 1, 1))
     root, valid, iterations = np.zeros((T, 3)), np.zeros(T, bool), 0
     last: Fit | None = None
@@ -131,7 +146,7 @@ def _fit_frames(
             known_root = init.t_camera_root if init is not None and states is not None else None
             points, sigma = lifted.points[k], lifted.sigma_along[k]
             measured = measurer.measure(pixels[k], track.confidence[k], points, sigma, known_root)
-            found = _fit_frame(tree, measured, init, priors)
+            found = _fit_frame(tree, measured, init, priors, weights)
             if found.status not in (Status.NO_MEASUREMENTS, Status.NON_FINITE):
                 last, last_time, valid[k] = found, track.times[k], True
                 iterations += found.iterations
@@ -150,13 +165,17 @@ def _fit_frames(
     )
 
 
-def _fit_frame(tree: Tree, measurements: Measurements, init: State | None, priors: Priors) -> Fit:
-    options = replace(_ROBUST, stages=_cold_stages(_WEIGHTS) if init is None else _WARM)
+def _fit_frame(tree: Tree, measurements: Measurements, init: State | None, priors: Priors, weights: Weights) -> Fit:
+    options = replace(_ROBUST, stages=_cold_stages(weights) if init is None else _warm_stages(weights))
     return fit_tree(tree, measurements, init, priors, options)
 
 
 def _fit_shape(
-    measurements: list[Measurements], body: Body, priors: Priors, progress: Callable[[str, int, int], None]
+    measurements: list[Measurements],
+    body: Body,
+    priors: Priors,
+    parts: Parts,
+    progress: Callable[[str, int, int], None],
 ) -> np.ndarray:
     """(P,) the one shape that these frames share.
 
@@ -164,7 +183,7 @@ def _fit_shape(
     shape as one: the prior counts once a frame.
     """
     progress("finding the shape", 0, 0)
-    weights = replace(_WEIGHTS, shape=_WEIGHTS.shape * len(measurements))
+    weights = replace(parts.weights(_WEIGHTS), shape=_WEIGHTS.shape * len(measurements))
     return fit_clip(body, measurements, priors=priors, options=replace(_ROBUST, stages=_cold_stages(weights))).beta
 
 
@@ -172,13 +191,26 @@ def _cold_stages(weights: Weights) -> tuple[Stage, ...]:
     """From no estimate at all: directions and priors first, then the image, then everything at its own weight."""
     return (
         Stage(
-            replace(weights, orientation_field=1600.0, keypoints2d=1e3, joint_prior=30.0, shape=100 * weights.shape),
+            replace(
+                weights,
+                orientation_field=4 * weights.orientation_field,
+                keypoints2d=1e3,
+                joint_prior=10 * weights.joint_prior,
+                shape=100 * weights.shape,
+            ),
             5e-2,
             10,
         ),
-        Stage(replace(weights, keypoints2d=1e4, joint_prior=9.0, shape=10 * weights.shape), 1e-2, 10),
-        Stage(weights, 1e-4, 50),
+        Stage(
+            replace(weights, keypoints2d=1e4, joint_prior=3 * weights.joint_prior, shape=10 * weights.shape), 1e-2, 10
+        ),
+        *_warm_stages(weights),
     )
+
+
+def _warm_stages(weights: Weights) -> tuple[Stage, ...]:
+    """From the state of a frame close by."""
+    return (Stage(weights, 1e-4, 50),)
 
 
 def _joint_weights(body: Body) -> np.ndarray:

@@ -17,6 +17,7 @@ from .camera import Camera, choose_camera
 from .fitting import FittedTrack, fit_track, refit_track
 from .left_right import repair_left_right
 from .observation import Observation
+from .parts import ALL_PARTS, Parts
 from .people import PeopleBuilder
 from .shared_world import share_world
 from .track import Track
@@ -45,6 +46,7 @@ class CaptureOptions:
     wanted: VideoRange = VideoRange()  # which frames
     smoothing: bool = True
     threads: int = 0  # 0: as many as there are cores
+    parts: Parts = ALL_PARTS  # for experiments
 
 
 @dataclass
@@ -85,14 +87,14 @@ def capture(
         seen = _observe(video, tracker, clock, progress, watch)
         warnings = list(video.warnings)
     with clock.stage("solver"):
-        tracks = [repair_left_right(track) for track in seen.build(most)]
+        tracks = [repair_left_right(t) if options.parts.left_right else t for t in seen.build(most)]
         if len(seen) == 0:
             raise VideoError(f"{path} has no frame in the time that was asked for; change the start or the end")
         if not tracks:
             raise _nobody(path, len(seen))
         smoothing = options.smoothing and len(seen) > 1
         about = {"fps": video.fps, "image_size": (video.width, video.height), "source": path.name}
-        motions, fits = _solve(body, tracks, camera, smoothing, about, progress)
+        motions, fits = _solve(body, tracks, camera, smoothing, options.parts, about, progress)
     for number, motion in enumerate(motions, 1):
         missing = int((~motion.valid).sum())
         if missing:
@@ -138,16 +140,22 @@ def _observe(video: Video, tracker: PeopleTracker, clock: _Clock, progress: Prog
 
 
 def _solve(
-    body: Body, tracks: list[Track], camera: Camera, smoothing: bool, about: dict, progress: Progress
+    body: Body,
+    tracks: list[Track],
+    camera: Camera,
+    smoothing: bool,
+    parts: Parts,
+    about: dict,
+    progress: Progress,
 ) -> tuple[list[Motion], list[FittedTrack]]:
     """Each person on their own, in one world."""
-    fits = [fit_track(body, track, camera, progress) for track in tracks]
+    fits = [fit_track(body, track, camera, progress, parts) for track in tracks]
     several = len(tracks) > 1
-    if smoothing:
+    if smoothing and parts.second_pass:
         world = share_world(body, tracks, fits, smoothing) if several else None
         for k, (track, fit) in enumerate(zip(tracks, fits, strict=True)):
             root = root_on_floor(body, track, fit, world.floor_from_camera(k) if world else None)
-            fits[k] = refit_track(body, track, camera, fit, root, progress)
+            fits[k] = refit_track(body, track, camera, fit, root, progress, parts)
     world = share_world(body, tracks, fits, smoothing) if several else None
     motions = [
         assemble_motion(
@@ -156,6 +164,7 @@ def _solve(
             fit,
             camera,
             smoothing=smoothing,
+            hold_feet=parts.contact,
             T_world_camera=world.T_world_camera if world else None,
             floor_m=world.floors_m[k] if world else 0.0,
             **about,

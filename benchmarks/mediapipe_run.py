@@ -1,0 +1,34 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""MediaPipe's own Python pipeline over a video, in an environment of its own: prints frames per second.
+
+    python mediapipe_run.py VIDEO COMPLEXITY FRAMES
+
+Decoding by OpenCV and MediaPipe's pose solution with its defaults for video (tracking and smoothing), nothing after it.
+Loading and the first frame are not counted.
+"""
+
+import sys
+import time
+
+import cv2
+import mediapipe
+
+
+def main() -> None:
+    """Run the command line."""
+    path, complexity, most = sys.argv[1], int(sys.argv[2]), int(sys.argv[3])
+    video, count, since = cv2.VideoCapture(path), 0, 0.0
+    with mediapipe.solutions.pose.Pose(model_complexity=complexity) as pose:
+        while count <= most:
+            ok, image = video.read()
+            if not ok:
+                break
+            pose.process(cv2.cvtColor(image, cv2.COLOR_BGR2RGB))
+            count += 1
+            if count == 1:
+                since = time.perf_counter()
+    print((count - 1) / (time.perf_counter() - since))
+
+
+if __name__ == "__main__":
+    main()

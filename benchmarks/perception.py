@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""`./scripts/bench perception`: accuracy against truth, what each part brings, frames per second."""
+
+from __future__ import annotations
+
+import sys
+
+from ..scope_addon.capture.pipeline import CaptureOptions
+from ..solver import Body, load_body
+from .accuracy import ABLATION, CAMERAS, SHOWN, calibration, evaluate_all
+from .frames import DATA
+from .report import table
+from .throughput import decoding, end_to_end, looped, side_by_side, warm_up
+
+LONG_CLIP, TWO_PEOPLE = "clips/run_moving_camera.mp4", "clips/two_people_portrait.mp4"
+PRESETS = ("fast", "balanced", "best")
+SPEED_TARGETS = {"fast": 60.0, CaptureOptions().quality: 30.0}
+
+
+def perception(quick: bool) -> dict:
+    """Measure everything, print the tables as they come, return the figures."""
+    if not DATA.is_dir():
+        print(f"{DATA} is not beside this checkout: nothing was measured", file=sys.stderr)
+        return {}
+    body = load_body("scope")
+    warm_up(body)
+    figures = _speed(body, quick)
+    figures |= _accuracy(body)
+    if not quick:
+        presets = {q: evaluate_all(body, lambda _, q=q: CaptureOptions(quality=q)) for q in PRESETS}
+        figures["presets"] = {q: _show(q, found) for q, found in presets.items()}
+        figures["ablation"] = _ablation(body)
+    return figures
+
+
+def _speed(body: Body, quick: bool) -> dict:
+    default = CaptureOptions().quality
+    frames, rounds = (450, 1) if quick else (1800, 3)
+    video = looped(LONG_CLIP, frames)
+    presets = {}
+    for quality in (default,) if quick else PRESETS:
+        presets[quality] = side_by_side(body, video, quality, 300, rounds)
+    pair = end_to_end(body, looped(TWO_PEOPLE, 300 if quick else 600), "fast", 2)
+    chosen = presets[default]
+    fps = {key: chosen[key] for key in ("end_to_end", "mediapipe", "networks", "solver", "over_mediapipe")}
+    fps |= {"decode": decoding(video), "two_people_fast": pair["end_to_end"]}
+    rows = [
+        [q, f["end_to_end"], SPEED_TARGETS.get(q), f["networks"], f["solver"], f["cpu_ms_per_frame"], f["mediapipe"],
+         f["over_mediapipe"]]
+        for q, f in presets.items()
+    ]  # fmt: skip
+    rows.append(
+        ["fast, two people", pair["end_to_end"], 35.0, pair["networks"], pair["solver"], pair["cpu_ms_per_frame"],
+         None, None]
+    )  # fmt: skip
+    head = ("preset", "end to end", "target", "networks", "solver", "CPU ms/frame", "MediaPipe", "ratio, target 1.5")
+    print(f"Frames per second, {frames} frames of 1080p; decoding alone {fps['decode']:.0f}; default: {default}\n")
+    print(table(head, rows), end="\n\n", flush=True)
+    return {"fps": fps, "fps_presets": presets | {"two_people_fast": pair}, "default": default}
+
+
+def _accuracy(body: Body) -> dict:
+    estimated = evaluate_all(body, lambda _: CaptureOptions())
+    given = evaluate_all(body, lambda camera: CaptureOptions(calibration=calibration(camera)))
+    head = ("default preset", *(heading for heading, _ in SHOWN.values()))
+    rows: list[list[object]] = [["target", *(target for _, target in SHOWN.values())]]
+    for name, found in (("estimated", estimated), ("given", given)):
+        rows += [[f"{camera}, {name} intrinsics", *_row(found[camera])] for camera in (*CAMERAS, "mean")]
+    print(table(head, rows), end="\n\n", flush=True)
+    return {"clips": estimated, "clips_given_intrinsics": given}
+
+
+def _ablation(body: Body) -> dict:
+    found, rows = {}, []
+    for name, options in ABLATION.items():
+        mean = evaluate_all(body, lambda _, options=options: CaptureOptions(**options))["mean"]
+        found[name] = mean
+        rows.append([name, *_row(mean)])
+    print(table(("mean of four cameras", *(heading for heading, _ in SHOWN.values())), rows), end="\n\n", flush=True)
+    return found
+
+
+def _show(quality: str, found: dict[str, dict]) -> dict:
+    print(table((quality, *(heading for heading, _ in SHOWN.values())), [["mean", *_row(found["mean"])]]), end="\n\n")
+    return found["mean"]
+
+
+def _row(figures: dict) -> list[float]:
+    return [figures[key] for key in SHOWN]
