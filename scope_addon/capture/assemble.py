@@ -64,8 +64,12 @@ def assemble_motion(
     hold_feet: bool = True,
     T_world_camera: np.ndarray | None = None,
     floor_m: float = 0.0,
+    R_first_camera: np.ndarray | None = None,
 ) -> Motion:
     """The motion file's content for one person.
+
+    ``fitted`` is in axes that do not turn, the first frame's; ``R_first_camera`` (T, 3, 3) takes each frame's camera
+    axes to them (None: the camera stands still), and the camera is that of the first frame below.
 
     ``T_world_camera`` (4, 4): the world that several people share, and ``floor_m``, the height in it of what this
     person stands on; None: the world is found from this person alone.
@@ -106,6 +110,13 @@ def assemble_motion(
         trans = position @ R_world_camera.T + t_world_camera - J0
         return rotations.log(poses).reshape(len(poses), -1), trans
 
+    T_world_frame = np.tile(T_world_camera, (len(track), 1, 1))
+    if R_first_camera is not None:
+        R_camera_first = np.swapaxes(R_first_camera, 1, 2)
+        T_world_frame[:, :3, :3] = R_world_camera @ R_first_camera
+        R_cam = R_camera_first[:, None] @ R_cam
+        joints_cam = np.einsum("tij,tkj->tki", R_camera_first, joints_cam)
+
     poses, trans = in_world(local, root)
     poses_raw, trans_raw = in_world(local_raw, root_raw)
     return Motion(
@@ -126,7 +137,7 @@ def assemble_motion(
         intrinsics=camera.intrinsics,
         dist=camera.dist,
         joint_confidence=fitted.joint_confidence,
-        world_from_camera=np.tile(T_world_camera, (len(track), 1, 1)),
+        world_from_camera=T_world_frame,
         foot_contact=contact,
         residual_px=reprojection_error(body, R_cam, joints_cam, betas, track, camera, valid),
         image_size=np.array(image_size),

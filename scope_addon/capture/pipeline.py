@@ -6,14 +6,17 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+
+import numpy as np
 
 from ...solver.body import Body
 from ...solver.errors import NoPersonError, UsageError, VideoError
 from ..motion import Motion
 from .assemble import assemble_motion, root_on_floor
 from .camera import Camera, choose_camera
+from .camera_motion import BackgroundTracker
 from .fitting import FittedTrack, fit_track, refit_track
 from .left_right import repair_left_right
 from .observation import Observation
@@ -84,7 +87,8 @@ def capture(
         )
         threads = options.threads or os.cpu_count() or 1
         tracker = PeopleTracker(options.quality, threads, None if options.people == LARGEST else most)
-        seen = _observe(video, tracker, clock, progress, watch)
+        background = BackgroundTracker(camera, video.width, video.height)
+        seen = _observe(video, tracker, background, clock, progress, watch)
         warnings = list(video.warnings)
     with clock.stage("solver"):
         tracks = [repair_left_right(t) if options.parts.left_right else t for t in seen.build(most)]
@@ -94,7 +98,9 @@ def capture(
             raise _nobody(path, len(seen))
         smoothing = options.smoothing and len(seen) > 1
         about = {"fps": video.fps, "image_size": (video.width, video.height), "source": path.name}
-        motions, fits = _solve(body, tracks, camera, smoothing, options.parts, about, progress)
+        turning = background.motion()
+        R_first_camera = None if turning.is_static else turning.R_first_camera
+        motions, fits = _solve(body, tracks, camera, R_first_camera, smoothing, options.parts, about, progress)
     for number, motion in enumerate(motions, 1):
         missing = int((~motion.valid).sum())
         if missing:
@@ -111,6 +117,7 @@ def capture(
         "quality": options.quality,
         "body": body.name,
         "camera": camera.source,
+        "camera_turns_deg": round(turning.largest_turn_deg, 2) if R_first_camera is not None else 0.0,
         "focal_px": float(camera.intrinsics[0, 0]),
         "frame_rate": [video.fps.numerator, video.fps.denominator],
         "fps": clock.rates(len(seen)),
@@ -121,8 +128,15 @@ def capture(
     return Capture(motions, report)
 
 
-def _observe(video: Video, tracker: PeopleTracker, clock: _Clock, progress: Progress, watch: Watch) -> PeopleBuilder:
-    """Everybody in every frame. No picture is kept, so that an hour takes no more memory than a minute."""
+def _observe(
+    video: Video,
+    tracker: PeopleTracker,
+    background: BackgroundTracker,
+    clock: _Clock,
+    progress: Progress,
+    watch: Watch,
+) -> PeopleBuilder:
+    """Everybody in every frame, and what is behind them. No picture is kept: an hour takes no more than a minute."""
     builder = PeopleBuilder()
     frames = iter(video)
     with clock.stage("decode"):
@@ -134,6 +148,8 @@ def _observe(video: Video, tracker: PeopleTracker, clock: _Clock, progress: Prog
         with clock.stage("networks"):
             observations = tracker.step(frame.image_rgb, upcoming.image_rgb if upcoming else None)
             builder.add(frame.index, frame.timestamp_s, observations)
+        with clock.stage("background"):
+            background.add(frame.image_rgb, frame.timestamp_s, [o.keypoints_px for _, o in observations])
         watch(frame, max((o for _, o in observations), key=lambda o: o.region.side_px, default=None))
         progress("finding the person", len(builder), max(video.expected_frames, len(builder)))
     return builder
@@ -143,19 +159,30 @@ def _solve(
     body: Body,
     tracks: list[Track],
     camera: Camera,
+    R_first_camera: np.ndarray | None,
     smoothing: bool,
     parts: Parts,
     about: dict,
     progress: Progress,
 ) -> tuple[list[Motion], list[FittedTrack]]:
-    """Each person on their own, in one world."""
-    fits = [fit_track(body, track, camera, progress, parts) for track in tracks]
+    """Each person on their own, in one world. Fitted in each frame's camera, everything else in the first frame's axes.
+
+    :param R_first_camera: (T, 3, 3) how a camera turned that did not stand still, else None.
+    """
+
+    def to_first(fit: FittedTrack) -> FittedTrack:
+        return fit if R_first_camera is None else fit.turned(R_first_camera)
+
+    fits = [to_first(fit_track(body, track, camera, progress, parts)) for track in tracks]
     several = len(tracks) > 1
     if smoothing and parts.second_pass:
         world = share_world(body, tracks, fits, smoothing) if several else None
         for k, (track, fit) in enumerate(zip(tracks, fits, strict=True)):
             root = root_on_floor(body, track, fit, world.floor_from_camera(k) if world else None)
-            fits[k] = refit_track(body, track, camera, fit, root, progress, parts)
+            first = replace(fit, t_camera_root=root)
+            if R_first_camera is not None:
+                first = first.turned(np.swapaxes(R_first_camera, 1, 2))
+            fits[k] = to_first(refit_track(body, track, camera, first, first.t_camera_root, progress, parts))
     world = share_world(body, tracks, fits, smoothing) if several else None
     motions = [
         assemble_motion(
@@ -167,6 +194,7 @@ def _solve(
             hold_feet=parts.contact,
             T_world_camera=world.T_world_camera if world else None,
             floor_m=world.floors_m[k] if world else 0.0,
+            R_first_camera=R_first_camera,
             **about,
         )
         for k, (track, fit) in enumerate(zip(tracks, fits, strict=True))

@@ -74,13 +74,13 @@ def smooth_rotations(R: np.ndarray, times: np.ndarray, cutoff_hz: float = ROTATI
     return matrix_from_quaternion(q / np.linalg.norm(q, axis=-1, keepdims=True))
 
 
-def smooth_root(t_camera_root: np.ndarray, times: np.ndarray) -> np.ndarray:
-    """Zero-phase low-pass of the root's position (T, 3) in the camera frame.
+def smooth_root(t_camera_root: np.ndarray, times: np.ndarray, strength: float = 1.0) -> np.ndarray:
+    """Zero-phase low-pass of the root's position (T, 3) about the camera's centre, in axes that do not turn.
 
-    Image position (x/z, y/z) and depth (log z) are filtered apart: depth is the noisier one, and a wrong depth must
-    not move the person off the footage.
+    Direction and distance (its logarithm) are filtered apart: distance is the noisier one, and a wrong distance must
+    not move the person off the footage. The cut-off frequencies are divided by ``strength``.
     """
-    z = t_camera_root[:, 2:]
-    ray = gaussian_smooth(t_camera_root[:, :2] / z, times, ROTATION_CUTOFF_HZ)
-    depth = np.exp(gaussian_smooth(np.log(z), times, DEPTH_CUTOFF_HZ))
-    return np.concatenate([ray * depth, depth], axis=1)
+    distance = np.maximum(np.linalg.norm(t_camera_root, axis=1, keepdims=True), 1e-6)
+    ray = gaussian_smooth(t_camera_root / distance, times, ROTATION_CUTOFF_HZ / strength)
+    ray /= np.maximum(np.linalg.norm(ray, axis=1, keepdims=True), 1e-6)
+    return ray * np.exp(gaussian_smooth(np.log(distance), times, DEPTH_CUTOFF_HZ / strength))

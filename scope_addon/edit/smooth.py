@@ -7,9 +7,8 @@ import numpy as np
 
 from ...solver.body import Body
 from ...solver.errors import UsageError
-from ...solver.frames import transform_points
 from ...solver.rotations import exp
-from ..capture.smoothing import DEPTH_CUTOFF_HZ, ROTATION_CUTOFF_HZ, gaussian_smooth, smooth_rotations
+from ..capture.smoothing import ROTATION_CUTOFF_HZ, smooth_root, smooth_rotations
 from ..motion import Motion
 from .clip import Clip, between
 
@@ -45,13 +44,7 @@ def smoothed(body: Body, motion: Motion, strength: float) -> Clip:
 
 
 def _plain(raw: Clip, motion: Motion, strength: float) -> Clip:
-    """Smoothing alone."""
+    """Smoothing alone; the position about the camera, which may turn but not travel."""
     rotations = smooth_rotations(raw.rotations, raw.times, ROTATION_CUTOFF_HZ / strength)
-    T = motion.world_from_camera
-    camera = np.einsum("tij,tj->ti", np.swapaxes(T[:, :3, :3], 1, 2), raw.root - T[:, :3, 3])
-    z = np.maximum(camera[:, 2:], 1e-3)
-    ray = gaussian_smooth(camera[:, :2] / z, raw.times, ROTATION_CUTOFF_HZ / strength)
-    depth = np.exp(gaussian_smooth(np.log(z), raw.times, DEPTH_CUTOFF_HZ / strength))
-    seen = np.concatenate([ray * depth, depth], axis=1)
-    root = np.array([transform_points(pose, point[None])[0] for pose, point in zip(T, seen, strict=True)])
-    return Clip(raw.times, rotations, root)
+    center = motion.world_from_camera[:, :3, 3]
+    return Clip(raw.times, rotations, center + smooth_root(raw.root - center, raw.times, strength))

@@ -1,0 +1,210 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How a camera turns while it films, from the background.
+
+Corners of the background, those outside the people's regions, are followed from frame to frame (Lucas-Kanade). Their
+directions b in the present camera and a in an earlier key frame's satisfy b = R a for a camera that only turns, however
+far away they are; R is the least-squares rotation of the directions that agree with it (two directions make a
+hypothesis, the one with most support is refined). Rotations are chained over key frames alone, a new one only where
+too few corners are left, so that errors add up over few links. A camera that also moves makes near corners disagree;
+the far ones, of which there are many, decide.
+
+Sources: Fischler and Bolles 1981 (random sample consensus), Kabsch 1976 (rotation between two sets of directions).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from ...solver.rotations import exp, log
+from .camera import Camera
+from .smoothing import fill_rotation_gaps
+
+WORKING_SIDE_PX = 480  # the longer side of the picture that corners are followed in
+MOST_CORNERS = 240
+FEWEST_CORNERS = 24
+KEY_SHARE = 0.5  # of a key frame's corners; with fewer left, the next key frame begins
+AGREEING_PX = 1.2  # in the working picture
+TRUSTED_SHARE = 0.35  # of corners that must agree; a crowd or water that fills the picture says nothing
+SAMPLES_HZ = 12.0  # a hand trembles at up to 10 Hz, but by less than can be seen here
+STATIC_DEG = 0.35  # turning less than this over the clip is a camera on a stand
+
+
+@dataclass(frozen=True)
+class CameraMotion:
+    """The camera's turning over T frames."""
+
+    R_first_camera: np.ndarray  # (T, 3, 3) the camera's axes in those of the first frame
+    known: np.ndarray  # (T,) bool; elsewhere it is interpolated
+
+    @property
+    def is_static(self) -> bool:
+        """Whether the camera stands still, as far as can be told."""
+        return not self.known.any() or self.largest_turn_deg < STATIC_DEG
+
+    @property
+    def largest_turn_deg(self) -> float:
+        """Between any frame and the first one."""
+        return float(np.degrees(np.linalg.norm(log(self.R_first_camera), axis=-1).max()))
+
+
+class BackgroundTracker:
+    """Follows the background through a clip; frames come in order, each with the people's places.
+
+    :param camera: the intrinsics of the full picture.
+    """
+
+    def __init__(self, camera: Camera, width: int, height: int) -> None:
+        self._scale = WORKING_SIDE_PX / max(width, height)
+        self._step = max(1, int(0.5 / self._scale))
+        self._size = (round(width * self._scale), round(height * self._scale))
+        self._camera = camera
+        self._tolerance = AGREEING_PX / (self._scale * camera.intrinsics[0, 0])  # radians
+        self._random = np.random.default_rng(0)
+        self._times: list[float] = []
+        self._rotations: list[np.ndarray | None] = []
+        self._last_used = -np.inf
+        self._picture: np.ndarray | None = None
+        self._points: np.ndarray = np.zeros((0, 2), np.float32)  # in the working picture
+        self._key_rays = np.zeros((0, 3))
+        self._key_count = 0
+        self._R_first_key = np.eye(3)
+        self._R_key_last = np.eye(3)
+
+    def add(self, image_rgb: np.ndarray, time_s: float, people: Sequence[np.ndarray]) -> None:
+        """The next frame.
+
+        :param people: (n, 2) points of each person in pixels: the background is what lies outside their boxes.
+        """
+        self._times.append(time_s)
+        if time_s - self._last_used < 0.98 / SAMPLES_HZ:
+            self._rotations.append(None)
+            return
+        self._last_used = time_s
+        # Every second pixel or so, then areas: averaging all of a large picture would take longer than all the rest.
+        coarse = np.ascontiguousarray(image_rgb[:: self._step, :: self._step])
+        picture = cv2.cvtColor(cv2.resize(coarse, self._size, interpolation=cv2.INTER_AREA), cv2.COLOR_RGB2GRAY)
+        boxes = [self._box(points) for points in people]
+        if self._picture is None:
+            self._begin_key(picture, boxes)
+            self._rotations.append(np.eye(3))
+            return
+        R_camera_key = self._follow(picture, boxes)
+        if R_camera_key is None:  # a cut, or nothing to see: begin anew where the camera was last
+            self._R_first_key = self._R_first_key @ self._R_key_last
+            self._begin_key(picture, boxes)
+            self._rotations.append(None)
+            return
+        self._R_key_last = R_camera_key.T
+        self._rotations.append(self._R_first_key @ self._R_key_last)
+        self._picture = picture
+        if len(self._points) < max(KEY_SHARE * self._key_count, FEWEST_CORNERS):
+            self._R_first_key = self._R_first_key @ self._R_key_last
+            self._begin_key(picture, boxes)
+
+    def motion(self) -> CameraMotion:
+        """Of all frames so far; frames between those that were looked at lie on the arc between them."""
+        known = np.array([R is not None for R in self._rotations], bool)
+        R = np.array([np.eye(3) if R is None else R for R in self._rotations]).reshape(-1, 3, 3)
+        if known.sum() < 2:
+            return CameraMotion(np.tile(np.eye(3), (len(R), 1, 1)), np.zeros(len(R), bool))
+        times = np.array(self._times)
+        filled = fill_rotation_gaps(R[:, None], known, times)[:, 0]
+        a, b = np.flatnonzero(known)[-2:]
+        late = np.arange(b + 1, len(R))
+        if len(late) and times[-1] - times[b] < 1.5 / SAMPLES_HZ:  # the camera goes on turning as it did
+            rate = log(R[a].T @ R[b]) / (times[b] - times[a])
+            filled[late] = R[b] @ exp((times[late] - times[b])[:, None] * rate)
+        return CameraMotion(filled[0].T @ filled, known)
+
+    def _follow(self, picture: np.ndarray, boxes: list[np.ndarray]) -> np.ndarray | None:
+        """Rotation (3, 3) from the key frame's axes to the present camera's; None where it cannot be told."""
+        if len(self._points) < FEWEST_CORNERS:
+            return None
+        assert self._picture is not None
+        moved, found = _flow(self._picture, picture, self._points)
+        back, again = _flow(picture, self._picture, moved)
+        good = found & again & (np.abs(back - self._points).max(1) < 0.7)
+        good &= ((moved >= 0) & (moved < self._size)).all(1) & ~_inside(moved, boxes)
+        self._points, self._key_rays = moved[good], self._key_rays[good]
+        if len(self._points) < FEWEST_CORNERS:
+            return None
+        rays = self._rays(self._points)
+        R, agree = consensus_rotation(self._key_rays, rays, self._tolerance, self._random)
+        if agree.mean() < TRUSTED_SHARE or agree.sum() < FEWEST_CORNERS // 2:
+            return None
+        return R
+
+    def _begin_key(self, picture: np.ndarray, boxes: list[np.ndarray]) -> None:
+        mask = np.full(picture.shape, 255, np.uint8)
+        for x0, y0, x1, y1 in boxes:
+            mask[max(0, int(y0)) : max(0, int(y1) + 1), max(0, int(x0)) : max(0, int(x1) + 1)] = 0
+        corners = cv2.goodFeaturesToTrack(picture, MOST_CORNERS, 0.01, 7, mask=mask)
+        self._points = np.asarray([] if corners is None else corners, np.float32).reshape(-1, 2)
+        self._key_rays = self._rays(self._points)
+        self._key_count, self._picture = len(self._points), picture
+        self._R_key_last = np.eye(3)
+
+    def _rays(self, points: np.ndarray) -> np.ndarray:
+        """(n, 3) unit directions, camera frame, of points in the working picture."""
+        # A working pixel's centre in the full picture: OpenCV scales areas, not their centres.
+        full = ((points + 0.5) / (self._scale * self._step) - 0.5) * self._step
+        full = self._camera.undistort(full)
+        K = self._camera.intrinsics
+        rays = np.concatenate([(full - K[:2, 2]) / [K[0, 0], K[1, 1]], np.ones((len(full), 1))], axis=1)
+        return rays / np.linalg.norm(rays, axis=1, keepdims=True)
+
+    def _box(self, points: np.ndarray) -> np.ndarray:
+        """x0, y0, x1, y1 in the working picture, a tenth larger on every side."""
+        low, high = points.min(0) * self._scale, points.max(0) * self._scale
+        margin = 0.1 * (high - low).max() + 4.0
+        return np.concatenate([low - margin, high + margin])
+
+
+def consensus_rotation(
+    a: np.ndarray, b: np.ndarray, tolerance: float, random: np.random.Generator, hypotheses: int = 128
+) -> tuple[np.ndarray, np.ndarray]:
+    """The rotation R with b = R a that most directions agree with.
+
+    :param a, b: (n, 3) unit vectors, n at least 2.
+    :param tolerance: radians.
+    :return: (3, 3), and (n,) whether each pair agrees.
+    """
+    pairs = random.integers(0, len(a), (hypotheses, 2))
+    pairs = pairs[pairs[:, 0] != pairs[:, 1]]
+    R = _kabsch(a[pairs], b[pairs])
+    off = np.linalg.norm(np.einsum("hij,nj->hni", R, a) - b, axis=-1)
+    best = R[int((off < tolerance).sum(1).argmax())]
+    agree = np.linalg.norm(a @ best.T - b, axis=1) < tolerance
+    for _ in range(3):
+        if agree.sum() < 2:
+            break
+        best = _kabsch(a[agree][None], b[agree][None])[0]
+        agree = np.linalg.norm(a @ best.T - b, axis=1) < tolerance
+    return best, agree
+
+
+def _kabsch(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """(..., 3, 3) rotations that best take (..., n, 3) directions a to b."""
+    U, _, Vt = np.linalg.svd(np.swapaxes(b, -1, -2) @ a)
+    sign = np.sign(np.linalg.det(U @ Vt))
+    U[..., :, 2] *= sign[..., None]
+    return U @ Vt
+
+
+def _flow(before: np.ndarray, after: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Where corners (n, 2) have gone, and whether each was found."""
+    start = points.astype(np.float32)
+    moved, found, _ = cv2.calcOpticalFlowPyrLK(before, after, start, start.copy(), winSize=(15, 15), maxLevel=3)
+    return np.array(moved, np.float32), np.array(found).ravel() == 1
+
+
+def _inside(points: np.ndarray, boxes: Sequence[np.ndarray]) -> np.ndarray:
+    """(n,) whether each point (n, 2) lies in one of the boxes."""
+    inside = np.zeros(len(points), bool)
+    for box in boxes:
+        inside |= ((points >= box[:2]) & (points <= box[2:])).all(1)
+    return inside
