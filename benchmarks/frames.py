@@ -20,8 +20,15 @@ from pathlib import Path
 import numpy as np
 
 from ..scope_addon.capture import fitting
-from ..scope_addon.capture.pipeline import CaptureOptions, capture
+from ..scope_addon.capture.camera import choose_camera
+from ..scope_addon.capture.fitting import prepare_track
+from ..scope_addon.capture.left_right import repair_left_right
+from ..scope_addon.capture.people import PeopleBuilder
+from ..scope_addon.capture.tracker import PeopleTracker
+from ..scope_addon.capture.video import open_video
+from ..scope_addon.capture.video_range import VideoRange
 from ..solver import Body, Fit, FrameSolver, Options, Priors, Stage, State, fit_batch, load_body
+from ..solver.errors import NoPersonError
 from ..solver.measurements import Keypoints2D, Keypoints3D, Measurements, OrientationField
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -60,20 +67,17 @@ def load_clips(names: Sequence[str]) -> list[Clip]:
 
 
 def _record(video: Path, body: Body, path: Path) -> None:
-    """Capture a clip and keep what its first pass hands to the solver."""
-    calls: list[tuple[Measurements, Priors]] = []
-    original = fitting.fit_tree
-
-    def listening(tree, measurements, init, priors, options):  # type: ignore[no-untyped-def]
-        if measurements.pose_priors is None:  # the second pass knows the floor
-            calls.append((measurements, priors))
-        return original(tree, measurements, init, priors, options)
-
-    fitting.fit_tree = listening
-    try:
-        capture(video, body, CaptureOptions(smoothing=False))
-    finally:
-        fitting.fit_tree = original
+    """Find the person in a clip and keep what the first pass over it hands to the solver."""
+    tracker, people = PeopleTracker("best", os.cpu_count() or 1, None), PeopleBuilder()
+    with open_video(video, VideoRange()) as footage:
+        camera = choose_camera(footage.width, footage.height, metadata_focal_mm=footage.focal_35mm)
+        for frame in footage:
+            people.add(frame.index, frame.timestamp_s, tracker.step(frame.image_rgb))
+    tracks = people.build(1)
+    if not tracks:
+        raise NoPersonError(f"no person was found in {video}: the benchmark needs the clips of ../shared")
+    prepared = prepare_track(body, repair_left_right(tracks[0]), camera)
+    calls = [(prepared.measure(int(k)), prepared.priors) for k in np.flatnonzero(prepared.track.seen)]
     write(path, calls)
 
 
@@ -114,9 +118,9 @@ def _read(path: Path) -> Clip:
 
 def capture_options(cold: bool, tolerance: float, triggs: float = 0.0, limit: int = 50) -> Options:
     """Return the capture's options with another end of the last stage."""
-    stages = (fitting._cold_stages if cold else fitting._warm_stages)(fitting._WEIGHTS)
+    stages = (fitting.cold_stages if cold else fitting.warm_stages)(fitting.WEIGHTS)
     last: Stage = replace(stages[-1], tolerance=tolerance, max_iterations=limit)
-    return replace(fitting._ROBUST, stages=(*stages[:-1], last), triggs=triggs)
+    return replace(fitting.ROBUST, stages=(*stages[:-1], last), triggs=triggs)
 
 
 def capture_priors(body: Body, clip: Clip) -> Priors:

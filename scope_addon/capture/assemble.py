@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""From solved body states in the camera to the finished motion: gaps, smoothing, world, contact, confidence."""
+"""From a motion in the camera frame to the finished one: world, contact, confidence."""
 
 from __future__ import annotations
 
@@ -14,40 +14,22 @@ from .camera import Camera
 from .fitting import FittedTrack
 from .grounding import correct_depth, stand_on_floor, standing_probability
 from .landmark_network import KEYPOINT_NAMES
-from .smoothing import fill_gaps, fill_rotation_gaps, smooth_root, smooth_rotations
+from .placement import PlacedTrack
 from .track import Track
-from .world import estimate_world, sole_points, with_soles
+from .world import estimate_world
 
 
-def place_in_camera(
-    body: Body, track: Track, fitted: FittedTrack, smoothing: bool
-) -> tuple[np.ndarray, np.ndarray]:
-    """Joints (T, K+1, 3) and soles (T, 4, 3) of the valid frames, camera frame, metres: what a world is found from."""
-    times, valid, J0 = track.times, fitted.valid, body.rest_joints(fitted.betas)[0]
-    local = fill_rotation_gaps(fitted.rotations, valid, times)
-    root = fill_gaps(fitted.t_camera_root, valid, times)
-    if smoothing:
-        local, root = smooth_rotations(local, times), smooth_root(root, times)
-    R, joints = body.forward_kinematics(local, root - J0, fitted.betas)
-    soles = sole_points(with_soles(body, fitted.betas), R, joints)
-    return joints[valid], soles[valid]
-
-
-def root_on_floor(
-    body: Body, track: Track, fitted: FittedTrack, T_floor_camera: np.ndarray | None = None
-) -> np.ndarray:
+def root_on_floor(placed: PlacedTrack, T_floor_camera: np.ndarray | None = None) -> np.ndarray:
     """(T, 3) smoothed pelvis positions in the camera frame, their distance corrected by the floor and standing feet.
 
     ``T_floor_camera`` (4, 4): the floor at z = 0; None: it is found from this person alone.
     """
-    times, J0 = track.times, body.rest_joints(fitted.betas)[0]
-    local = smooth_rotations(fill_rotation_gaps(fitted.rotations, fitted.valid, times), times)
-    root = smooth_root(fill_gaps(fitted.t_camera_root, fitted.valid, times), times)
-    R, joints = body.forward_kinematics(local, root - J0, fitted.betas)
-    soles = sole_points(with_soles(body, fitted.betas), R, joints)
-    T = estimate_world(body, joints[fitted.valid], soles[fitted.valid]) if T_floor_camera is None else T_floor_camera
-    contact = standing_probability(soles, T[2, :3], times) * fitted.valid[:, None]
-    away = correct_depth(root, soles, contact, T, times)
+    valid, root = placed.valid, placed.root
+    T = T_floor_camera
+    if T is None:
+        T = estimate_world(placed.body, placed.joints[valid], placed.soles[valid])
+    contact = standing_probability(placed.soles, T[2, :3], placed.times) * valid[:, None]
+    away = correct_depth(root, placed.soles, contact, T, placed.times)
     return root + away[:, None] * root / np.linalg.norm(root, axis=1, keepdims=True)
 
 
@@ -55,6 +37,7 @@ def assemble_motion(
     body: Body,
     track: Track,
     fitted: FittedTrack,
+    placed: PlacedTrack,
     camera: Camera,
     *,
     fps: Fraction,
@@ -66,7 +49,7 @@ def assemble_motion(
     floor_m: float = 0.0,
     R_first_camera: np.ndarray | None = None,
 ) -> Motion:
-    """The motion file's content for one person.
+    """The motion file's content for one person, from ``fitted`` and the same as ``placed``.
 
     ``fitted`` is in axes that do not turn, the first frame's; ``R_first_camera`` (T, 3, 3) takes each frame's camera
     axes to them (None: the camera stands still), and the camera is that of the first frame below.
@@ -78,31 +61,20 @@ def assemble_motion(
     position and depth have their own noise, and then moved into the world: R_world_root = R_world_camera R_camera_root
     and trans = T_world_camera t_camera_root − J_0(β).
     """
-    times, valid, betas = track.times, fitted.valid, fitted.betas
-    local_raw = fill_rotation_gaps(fitted.rotations, valid, times)
-    root_raw = fill_gaps(fitted.t_camera_root, valid, times)
-    local, root = local_raw, root_raw
-    if smoothing:
-        local, root = smooth_rotations(local_raw, times), smooth_root(root_raw, times)
-
-    J0 = body.rest_joints(betas)[0]
-    soled = with_soles(body, betas)
-
-    def place(local: np.ndarray, root: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Rotations and positions of all parts, and the soles, in the camera frame."""
-        R, t = body.forward_kinematics(local, root - J0, betas)
-        return R, t, sole_points(soled, R, t)
-
-    _, joints_cam, soles_cam = place(local, root)
+    times, valid, betas = placed.times, placed.valid, placed.betas
+    local, root = placed.rotations, placed.root
     if T_world_camera is None:
-        T_world_camera = estimate_world(body, joints_cam[valid], soles_cam[valid])
+        T_world_camera = estimate_world(body, placed.joints[valid], placed.soles[valid])
     T_floor_camera = T_world_camera.copy()
     T_floor_camera[2, 3] -= floor_m
     R_world_camera, t_world_camera = T_world_camera[:3, :3], T_world_camera[:3, 3]
-    contact = standing_probability(soles_cam, R_world_camera[2], times) * valid[:, None]
+    contact = standing_probability(placed.soles, R_world_camera[2], times) * valid[:, None]
     if smoothing and hold_feet:
-        local, root = stand_on_floor(soled, local, root, betas, place, contact, T_floor_camera, times)
-    R_cam, joints_cam, soles_cam = place(local, root)
+        local, root = stand_on_floor(
+            placed.body, local, root, betas, placed.place, contact, T_floor_camera, times
+        )
+    R_cam, joints_cam, _ = placed.place(local, root)
+    J0 = body.rest_joints(betas)[0]
 
     def in_world(rotation: np.ndarray, position: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         poses = rotation.copy()
@@ -118,7 +90,7 @@ def assemble_motion(
         joints_cam = np.einsum("tij,tkj->tki", R_camera_first, joints_cam)
 
     poses, trans = in_world(local, root)
-    poses_raw, trans_raw = in_world(local_raw, root_raw)
+    poses_raw, trans_raw = in_world(placed.rotations_raw, placed.root_raw)
     return Motion(
         poses=poses,
         trans=trans,

@@ -40,12 +40,12 @@ SHAPE_CERTAINTY = 1e6  # information (1/σ² per coefficient) that holds the sha
 
 # Inverse variances: 5 px at a focal length of 1600 px (normalized 0.003) for the image, 0.1 m for depth, 3 degrees for
 # directions, 0.6 rad for a joint about its rest state. Chosen on real clips with 3D truth.
-_WEIGHTS = Weights(
+WEIGHTS = Weights(
     keypoints2d=1e5, keypoints3d=100.0, orientation_field=400.0, joint_prior=3.0, joint_limits=2000.0, shape=10.0
 )
 # Joints that no pair of landmarks fixes on their own stay closer to rest.
 _STIFF_JOINTS = {"spine": 5.0, "collar": 5.0, "foot": 5.0, "hand": 5.0, "neck": 3.0, "head": 3.0}
-_ROBUST = Options(robust_keypoints2d=0.01, robust_keypoints3d=0.1, robust_orientation_field=1.0)
+ROBUST = Options(robust_keypoints2d=0.01, robust_keypoints3d=0.1, robust_orientation_field=1.0)
 
 
 @dataclass
@@ -67,52 +67,34 @@ class FittedTrack:
         return replace(self, rotations=rotations, t_camera_root=root)
 
 
-def fit_track(
-    body: Body,
-    track: Track,
-    camera: Camera,
-    progress: Callable[[str, int, int], None],
-    parts: Parts = ALL_PARTS,
-) -> FittedTrack:
-    """Fit the body to a track of which at least one frame was seen."""
-    measurer = Measurer(body, camera.intrinsics)
-    pixels = camera.undistort(track.keypoints_px)
-    lifted = _lift(measurer, track, pixels, parts)
-    priors = replace(default_priors(body), joint_weights=_joint_weights(body))
+@dataclass(frozen=True)
+class PreparedTrack:
+    """What every pass over a track needs, computed once: undistorted keypoints, the lifter's points, priors."""
 
-    def measure(k: int) -> Measurements:
-        return measurer.measure(pixels[k], track.confidence[k], lifted.points[k], lifted.sigma_along[k])
+    body: Body
+    track: Track
+    measurer: Measurer
+    pixels: np.ndarray  # (T, J, 2) keypoints as an ideal pinhole would see them
+    lifted: Lifted
+    priors: Priors  # the shape unknown
+    weights: Weights
 
-    frames = [measure(k) for k in _spread(np.flatnonzero(track.seen), SHAPE_FRAMES)]
-    betas = _fit_shape(frames, body, priors, parts, progress)
-    priors = replace(priors, shape_mean=betas, shape_information=np.eye(body.P) * SHAPE_CERTAINTY)
+    def measure(self, k: int, root_cam: np.ndarray | None = None) -> Measurements:
+        """Frame ``k`` for the solver; ``root_cam`` (3,): where the pelvis is known to be, camera frame, metres."""
+        points, sigma = self.lifted.points[k], self.lifted.sigma_along[k]
+        return self.measurer.measure(self.pixels[k], self.track.confidence[k], points, sigma, root_cam)
 
-    return _fit_frames(body, track, betas, priors, measurer, pixels, lifted, None, parts, progress)
+    def priors_with_shape(self, betas: np.ndarray) -> Priors:
+        """The priors once the shape is known."""
+        return replace(self.priors, shape_mean=betas, shape_information=np.eye(self.body.P) * SHAPE_CERTAINTY)
 
 
-def refit_track(
-    body: Body,
-    track: Track,
-    camera: Camera,
-    first: FittedTrack,
-    root_cam: np.ndarray,
-    progress: Callable[[str, int, int], None],
-    parts: Parts = ALL_PARTS,
-) -> FittedTrack:
-    """Fit every frame again, from its first fit, with the pelvis known to be at ``root_cam`` (T, 3), camera frame.
-
-    A pose and a distance that explain the same image can both be wrong together; once the floor has told the distance,
-    the pose follows.
-    """
-    priors = replace(default_priors(body), joint_weights=_joint_weights(body), shape_mean=first.betas)
-    priors = replace(priors, shape_information=np.eye(body.P) * SHAPE_CERTAINTY)
-    states = [
-        State(first.rotations[k, 0], root_cam[k], first.rotations[k, 1:], first.betas) if first.valid[k] else None
-        for k in range(len(track))
-    ]
+def prepare_track(body: Body, track: Track, camera: Camera, parts: Parts = ALL_PARTS) -> PreparedTrack:
+    """Undistort and lift a track; the lifting network runs here and nowhere else."""
     measurer, pixels = Measurer(body, camera.intrinsics), camera.undistort(track.keypoints_px)
     lifted = _lift(measurer, track, pixels, parts)
-    return _fit_frames(body, track, first.betas, priors, measurer, pixels, lifted, states, parts, progress)
+    priors = replace(default_priors(body), joint_weights=_joint_weights(body))
+    return PreparedTrack(body, track, measurer, pixels, lifted, priors, parts.weights(WEIGHTS))
 
 
 def _lift(measurer: Measurer, track: Track, pixels: np.ndarray, parts: Parts) -> Lifted:
@@ -125,20 +107,35 @@ def _lift(measurer: Measurer, track: Track, pixels: np.ndarray, parts: Parts) ->
     return Lifter().lift_both_ways(rays, track.confidence, track.world_landmarks)
 
 
+def fit_track(prepared: PreparedTrack, progress: Callable[[str, int, int], None]) -> FittedTrack:
+    """Fit the body to a track of which at least one frame was seen."""
+    return _fit_frames(prepared, _fit_shape(prepared, progress), None, progress)
+
+
+def refit_track(
+    prepared: PreparedTrack, first: FittedTrack, root_cam: np.ndarray, progress: Callable[[str, int, int], None]
+) -> FittedTrack:
+    """Fit every frame again, from its first fit, with the pelvis known to be at ``root_cam`` (T, 3), camera frame.
+
+    A pose and a distance that explain the same image can both be wrong together; once the floor has told the distance,
+    the pose follows.
+    """
+    states = [
+        State(first.rotations[k, 0], root_cam[k], first.rotations[k, 1:], first.betas) if first.valid[k] else None
+        for k in range(len(prepared.track))
+    ]
+    return _fit_frames(prepared, first.betas, states, progress)
+
+
 def _fit_frames(
-    body: Body,
-    track: Track,
+    prepared: PreparedTrack,
     betas: np.ndarray,
-    priors: Priors,
-    measurer: Measurer,
-    pixels: np.ndarray,
-    lifted: Lifted,
     states: list[State | None] | None,
-    parts: Parts,
     progress: Callable[[str, int, int], None],
 ) -> FittedTrack:
     """Every seen frame in order: from the frame before, or from ``states`` with their roots as priors."""
-    T, tree, weights = len(track), make_tree(body), parts.weights(_WEIGHTS)
+    body, track, priors = prepared.body, prepared.track, prepared.priors_with_shape(betas)
+    T, tree = len(track), make_tree(body)
     rotations = np.tile(np.eye(3), (T, body.K + 1, 1, 1))
     root, valid, iterations = np.zeros((T, 3)), np.zeros(T, bool), 0
     last: Fit | None = None
@@ -151,9 +148,7 @@ def _fit_frames(
                 fresh = last is None or track.acquired[k] or track.times[k] - last_time > LONGEST_COAST_S
                 init = None if fresh or last is None else last.state
             known_root = init.t_camera_root if init is not None and states is not None else None
-            points, sigma = lifted.points[k], lifted.sigma_along[k]
-            measured = measurer.measure(pixels[k], track.confidence[k], points, sigma, known_root)
-            found = _fit_frame(tree, measured, init, priors, weights)
+            found = _fit_frame(tree, prepared.measure(k, known_root), init, priors, prepared.weights)
             if found.status not in (Status.NO_MEASUREMENTS, Status.NON_FINITE):
                 last, last_time, valid[k] = found, track.times[k], True
                 iterations += found.iterations
@@ -167,34 +162,30 @@ def _fit_frames(
         t_camera_root=root,
         betas=betas,
         valid=valid,
-        joint_confidence=measurer.joint_confidence(track.confidence) * valid[:, None],
+        joint_confidence=prepared.measurer.joint_confidence(track.confidence) * valid[:, None],
         iterations=iterations / max(int(valid.sum()), 1),
     )
 
 
 def _fit_frame(tree: Tree, measurements: Measurements, init: State | None, priors: Priors, weights: Weights) -> Fit:
-    options = replace(_ROBUST, stages=_cold_stages(weights) if init is None else _warm_stages(weights))
+    options = replace(ROBUST, stages=cold_stages(weights) if init is None else warm_stages(weights))
     return fit_tree(tree, measurements, init, priors, options)
 
 
-def _fit_shape(
-    measurements: list[Measurements],
-    body: Body,
-    priors: Priors,
-    parts: Parts,
-    progress: Callable[[str, int, int], None],
-) -> np.ndarray:
+def _fit_shape(prepared: PreparedTrack, progress: Callable[[str, int, int], None]) -> np.ndarray:
     """(P,) the one shape that these frames share.
 
     The detector misplaces a keypoint in the same way in every frame, so all frames together say as much about the
     shape as one: the prior counts once a frame.
     """
     progress("finding the shape", 0, 0)
-    weights = replace(parts.weights(_WEIGHTS), shape=_WEIGHTS.shape * len(measurements))
-    return fit_clip(body, measurements, priors=priors, options=replace(_ROBUST, stages=_cold_stages(weights))).beta
+    measurements = [prepared.measure(k) for k in _spread(np.flatnonzero(prepared.track.seen), SHAPE_FRAMES)]
+    weights = replace(prepared.weights, shape=WEIGHTS.shape * len(measurements))
+    options = replace(ROBUST, stages=cold_stages(weights))
+    return fit_clip(prepared.body, measurements, priors=prepared.priors, options=options).beta
 
 
-def _cold_stages(weights: Weights) -> tuple[Stage, ...]:
+def cold_stages(weights: Weights) -> tuple[Stage, ...]:
     """From no estimate at all: directions and priors first, then the image, then everything at its own weight."""
     return (
         Stage(
@@ -211,11 +202,11 @@ def _cold_stages(weights: Weights) -> tuple[Stage, ...]:
         Stage(
             replace(weights, keypoints2d=1e4, joint_prior=3 * weights.joint_prior, shape=10 * weights.shape), 1e-2, 10
         ),
-        *_warm_stages(weights),
+        *warm_stages(weights),
     )
 
 
-def _warm_stages(weights: Weights) -> tuple[Stage, ...]:
+def warm_stages(weights: Weights) -> tuple[Stage, ...]:
     """From the state of a frame close by."""
     return (Stage(weights, 1e-4, 50),)
 

@@ -17,11 +17,12 @@ from ..motion import Motion
 from .assemble import assemble_motion, root_on_floor
 from .camera import Camera, choose_camera
 from .camera_motion import BackgroundTracker
-from .fitting import FittedTrack, fit_track, refit_track
+from .fitting import FittedTrack, fit_track, prepare_track, refit_track
 from .left_right import repair_left_right
 from .observation import Observation
 from .parts import ALL_PARTS, Parts
 from .people import PeopleBuilder
+from .placement import PlacedTrack, place_track
 from .shared_world import share_world
 from .track import Track
 from .tracker import MOST_PEOPLE, PeopleTracker
@@ -173,22 +174,31 @@ def _solve(
     def to_first(fit: FittedTrack) -> FittedTrack:
         return fit if R_first_camera is None else fit.turned(R_first_camera)
 
-    fits = [to_first(fit_track(body, track, camera, progress, parts)) for track in tracks]
+    def to_frames(fit: FittedTrack) -> FittedTrack:
+        return fit if R_first_camera is None else fit.turned(np.swapaxes(R_first_camera, 1, 2))
+
+    prepared = [prepare_track(body, track, camera, parts) for track in tracks]
+    fits = [to_first(fit_track(each, progress)) for each in prepared]
     several = len(tracks) > 1
+
+    def place() -> list[PlacedTrack]:
+        return [place_track(body, track, fit, smoothing) for track, fit in zip(tracks, fits, strict=True)]
+
+    placed = place()
     if smoothing and parts.second_pass:
-        world = share_world(body, tracks, fits, smoothing) if several else None
-        for k, (track, fit) in enumerate(zip(tracks, fits, strict=True)):
-            root = root_on_floor(body, track, fit, world.floor_from_camera(k) if world else None)
-            first = replace(fit, t_camera_root=root)
-            if R_first_camera is not None:
-                first = first.turned(np.swapaxes(R_first_camera, 1, 2))
-            fits[k] = to_first(refit_track(body, track, camera, first, first.t_camera_root, progress, parts))
-    world = share_world(body, tracks, fits, smoothing) if several else None
+        world = share_world(body, placed) if several else None
+        for k, fit in enumerate(fits):
+            root = root_on_floor(placed[k], world.floor_from_camera(k) if world else None)
+            first = to_frames(replace(fit, t_camera_root=root))
+            fits[k] = to_first(refit_track(prepared[k], first, first.t_camera_root, progress))
+        placed = place()
+    world = share_world(body, placed) if several else None
     motions = [
         assemble_motion(
             body,
-            track,
-            fit,
+            tracks[k],
+            fits[k],
+            placed[k],
             camera,
             smoothing=smoothing,
             hold_feet=parts.contact,
@@ -197,7 +207,7 @@ def _solve(
             R_first_camera=R_first_camera,
             **about,
         )
-        for k, (track, fit) in enumerate(zip(tracks, fits, strict=True))
+        for k in range(len(tracks))
     ]
     return motions, fits
 

@@ -9,9 +9,7 @@ import numpy as np
 
 from ...solver.body import Body
 from ...solver.frames import world_from_level_camera
-from .assemble import place_in_camera
-from .fitting import FittedTrack
-from .track import Track
+from .placement import PlacedTrack
 from .world import up_from_floor, up_from_standing
 
 SAME_FLOOR_M = 0.4  # how far apart, for their distances are not known well, the feet of people on one floor may seem
@@ -31,18 +29,19 @@ class SharedWorld:
         return T
 
 
-def share_world(body: Body, tracks: list[Track], fits: list[FittedTrack], smoothing: bool) -> SharedWorld:
+def share_world(body: Body, placed: list[PlacedTrack]) -> SharedWorld:
     """Up from all bodies and all floors together, the floor and the origin from the first, most prominent person.
 
     Each person's feet count from their own mean place, so that neither a step nor a wrong distance tilts the world.
     """
-    placed = [place_in_camera(body, track, fit, smoothing) for track, fit in zip(tracks, fits, strict=True)]
-    up = up_from_standing(body, np.concatenate([joints for joints, _ in placed]))
-    centered = [soles - _lowest(soles, up).mean(axis=0) for _, soles in placed]
+    all_soles = [person.soles[person.valid] for person in placed]
+    all_joints = [person.joints[person.valid] for person in placed]
+    up = up_from_standing(body, np.concatenate(all_joints))
+    centered = [soles - _lowest(soles, up).mean(axis=0) for soles in all_soles]
     up = up_from_floor(np.concatenate(centered), up)
-    heights = [float(np.median(_lowest(soles, up) @ up)) for _, soles in placed]
+    heights = [float(np.median(_lowest(soles, up) @ up)) for soles in all_soles]
     T_world_camera = world_from_level_camera(up, height=-heights[0])
-    start = T_world_camera[:3, :3] @ placed[0][0][0, 0] + T_world_camera[:3, 3]
+    start = T_world_camera[:3, :3] @ all_joints[0][0, 0] + T_world_camera[:3, 3]
     T_world_camera[:2, 3] -= start[:2]
     own = [height - heights[0] for height in heights]
     return SharedWorld(T_world_camera, [h if abs(h) > SAME_FLOOR_M else 0.0 for h in own])

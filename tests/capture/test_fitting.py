@@ -1,0 +1,57 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Both fits of a track work from one preparation."""
+
+from __future__ import annotations
+
+import numpy as np
+from scope.scope_addon.capture import fitting
+from scope.scope_addon.capture.camera import choose_camera
+from scope.scope_addon.capture.landmark_network import KEYPOINT_NAMES
+from scope.scope_addon.capture.placement import place_track
+from scope.scope_addon.capture.track import Track
+from scope.solver import load_body
+
+FRAMES = 4
+
+
+def _standing_track(body, camera) -> Track:
+    """A person in the rest pose, upright, 4 m in front of the camera."""
+    flip = np.diag([1.0, -1.0, -1.0])  # body y up, OpenCV y down
+    rotations = np.tile(np.eye(3), (1, body.K + 1, 1, 1))
+    rotations[:, 0] = flip
+    R, t = body.forward_kinematics(rotations, np.array([[0.0, 0.0, 4.0]]), np.zeros(body.P))
+    at = body.keypoint_set("blazepose")
+    points = body.keypoints(R, t, np.zeros(body.P))[0, [at[name] for name in KEYPOINT_NAMES]]
+    pixels = points[:, :2] / points[:, 2:] * camera.intrinsics[0, 0] + camera.intrinsics[:2, 2]
+    hips = [KEYPOINT_NAMES.index(f"{side}_hip") for side in ("left", "right")]
+    J = len(KEYPOINT_NAMES)
+    return Track(
+        frames=np.arange(FRAMES),
+        times=np.arange(FRAMES) / 30.0,
+        keypoints_px=np.tile(pixels, (FRAMES, 1, 1)),
+        confidence=np.ones((FRAMES, J)),
+        world_landmarks=np.tile(points - points[hips].mean(0), (FRAMES, 1, 1)),
+        seen=np.ones(FRAMES, bool),
+        acquired=np.arange(FRAMES) == 0,
+    )
+
+
+def test_the_lifting_network_runs_once_for_both_fits(monkeypatch):
+    body, camera = load_body("scope"), choose_camera(1080, 1920)
+    track = _standing_track(body, camera)
+    lifts = []
+
+    class CountingLifter(fitting.Lifter):
+        def lift_both_ways(self, *arguments):
+            lifts.append(1)
+            return super().lift_both_ways(*arguments)
+
+    monkeypatch.setattr(fitting, "Lifter", CountingLifter)
+    prepared = fitting.prepare_track(body, track, camera)
+    first = fitting.fit_track(prepared, lambda *_: None)
+    second = fitting.refit_track(prepared, first, first.t_camera_root, lambda *_: None)
+    assert len(lifts) == 1
+    np.testing.assert_array_equal(second.betas, first.betas)
+    placed = place_track(body, track, second, smoothing=False)
+    np.testing.assert_allclose(placed.joints[:, 0], second.t_camera_root, atol=1e-9)
+    assert abs(placed.joints[:, 0, 2].mean() - 4.0) < 0.6  # metres; one view tells the distance by the body's size
