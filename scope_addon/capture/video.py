@@ -193,10 +193,18 @@ def _upright(image: np.ndarray, orientation: int) -> np.ndarray:
     return np.ascontiguousarray(image[:: -1 if vertical else 1, :: -1 if horizontal else 1])
 
 
+def _codec(reader: _Reader) -> str:
+    """Four letters that name the codec."""
+    code = int(reader.get(cv2.CAP_PROP_FOURCC)) & 0xFFFFFFFF
+    return code.to_bytes(4, "little").decode("ascii", "replace")
+
+
 def _open_moving(path: Path, wanted: VideoRange) -> Video:
     with closing(_Reader(path)) as reader:
         first = reader.read()
         if first is None:
+            if _codec(reader) in ("av01", "AV01"):
+                raise VideoError(f"{path} is AV1 video, which OpenCV cannot decode; convert it to H.264 .mp4 first")
             raise VideoError(f"{path} opens but no frame of it can be decoded; convert it to H.264 .mp4 and try again")
         fps = exact_fps(reader.get(cv2.CAP_PROP_FPS)) or _fps_from_timestamps(reader)
         count = reader.get(cv2.CAP_PROP_FRAME_COUNT)
