@@ -14,6 +14,10 @@ from ...solver.errors import InputError, UsageError
 
 # Without any better knowledge: a field of view of 60 degrees along the longer side, between a phone's main camera
 # (65-70 degrees, less the crop of its video stabilization) and a camera's standard lens (40-54 degrees).
+# It is not estimated from the person: over four calibrated cameras (59.4 to 60.1 degrees), the fit's cost at an image
+# noise of 5 px had its minimum at 70, 50, 85 and 85 degrees (the last two at the end of what was tried), since the
+# lifted points lean on the assumed focal length themselves. Assuming 50 or 70 degrees there put the person 0.6 to 0.8 m
+# wrong in the camera frame, but changed the error relative to the pelvis by 7 mm at most.
 DEFAULT_FOV_DEG = 60.0
 FILM_WIDTH_MM = 36.0  # "35 mm equivalent" focal lengths refer to this width along the longer side
 
