@@ -63,7 +63,10 @@ def repair_left_right(track: Track) -> Track:
 
 def labelled(world_landmarks: np.ndarray, labels: np.ndarray) -> np.ndarray:
     """World landmarks (T, 33, 3) with the labels (T,) of `find_labels` applied."""
-    return _variants(world_landmarks)[np.arange(len(labels)), labels]
+    out = world_landmarks.copy()
+    out[labels != AS_SAID] = world_landmarks[labels != AS_SAID][:, SWAPPED]
+    out[labels == TURNED] *= [1.0, 1.0, -1.0]
+    return out
 
 
 def looks_swapped(before: np.ndarray, after: np.ndarray) -> bool:
@@ -92,7 +95,6 @@ def find_labels(
     :param judged: (T, 33, 3) the same as a better network sees it; rows of NaN where it did not look.
     """
     count = len(world_landmarks)
-    body = _variants(world_landmarks)
     known = np.isfinite(world_landmarks[:, _LIMBS]).all(axis=(1, 2))
     own_cost = np.array([0.0, frame_cost_m, frame_cost_m + TURN_COST_M])
     same = np.arange(3)
@@ -103,17 +105,18 @@ def find_labels(
         if not known[t]:
             came_from[t] = same
             continue
+        body = _variants(world_landmarks[t])
         if previous is None or (starts is not None and starts[t]):
             came_from[t] = int(np.argmin(cost))
             cost = np.full(3, cost.min())
         else:
-            total = cost[:, None] + _distance(previous[:, None], body[t][None])
+            total = cost[:, None] + _distance(previous[:, None], body[None])
             came_from[t] = total.argmin(axis=0)
             cost = total.min(axis=0)
         cost = cost + own_cost
         if judged is not None and np.isfinite(judged[t][_LIMBS]).all():
-            cost = cost + _distance(body[t], judged[t])
-        previous = body[t]
+            cost = cost + _distance(body, judged[t])
+        previous = body
     labels = np.zeros(count, int)
     state = int(np.argmin(cost))
     for t in range(count - 1, -1, -1):
@@ -123,9 +126,9 @@ def find_labels(
 
 
 def _variants(world_landmarks: np.ndarray) -> np.ndarray:
-    """(T, 3, 33, 3) as said, exchanged, turned."""
-    exchanged = world_landmarks[:, SWAPPED]
-    return np.stack([world_landmarks, exchanged, exchanged * [1.0, 1.0, -1.0]], axis=1)
+    """(3, 33, 3) one frame's landmarks as said, exchanged, turned."""
+    exchanged = world_landmarks[SWAPPED]
+    return np.stack([world_landmarks, exchanged, exchanged * [1.0, 1.0, -1.0]])
 
 
 def _pull(world: np.ndarray, track: Track) -> np.ndarray:

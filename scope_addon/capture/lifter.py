@@ -107,10 +107,15 @@ class Lifter:
         for name, value, shape in (("rays", rays, (T, 33, 2)), ("confidence", confidence, (T, 33))):
             if value.shape != shape:
                 raise ShapeError(f"{name} must have shape {shape}, but has {value.shape}")
+        batches = [slice(k, k + _BATCH) for k in range(0, max(T, 1), _BATCH)]  # an hour at once would take a gigabyte
+        lifted = [self._lift(rays[b], confidence[b], None if world is None else world[b]) for b in batches]
+        return Lifted(*(np.concatenate([getattr(part, f.name) for part in lifted]) for f in fields(Lifted)))
+
+    def _lift(self, rays: np.ndarray, confidence: np.ndarray, world: np.ndarray | None) -> Lifted:
         if world is None:
-            world, known = np.zeros((T, KEYPOINT_COUNT, 3)), np.zeros(T)
+            world, known = np.zeros((len(rays), KEYPOINT_COUNT, 3)), np.zeros(len(rays))
         else:
-            known = np.ones(T)
+            known = np.ones(len(rays))
         x, R = network_input(rays, confidence, world, known)
         points, log_sigma = self.run(x.astype(np.float32))
         points = points - points[:, HIPS].mean(axis=1, keepdims=True)

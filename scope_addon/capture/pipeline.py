@@ -91,13 +91,15 @@ def capture(
         background = BackgroundTracker(camera, video.width, video.height)
         seen = _observe(video, tracker, background, clock, progress, watch)
         warnings = list(video.warnings)
+    frames = len(seen)
     with clock.stage("solver"):
         tracks = [repair_left_right(t) if options.parts.left_right else t for t in seen.build(most)]
-        if len(seen) == 0:
+        del tracker, seen  # of an hour they would keep half a gigabyte
+        if frames == 0:
             raise VideoError(f"{path} has no frame in the time that was asked for; change the start or the end")
         if not tracks:
-            raise _nobody(path, len(seen))
-        smoothing = options.smoothing and len(seen) > 1
+            raise _nobody(path, frames)
+        smoothing = options.smoothing and frames > 1
         about = {"fps": video.fps, "image_size": (video.width, video.height), "source": path.name}
         turning = background.motion()
         R_first_camera = None if turning.is_static else turning.R_first_camera
@@ -111,7 +113,7 @@ def capture(
             )
     report = {
         "source": str(path),
-        "frames": len(seen),
+        "frames": frames,
         "people": len(motions),
         "valid_frames": int(motions[0].valid.sum()),
         "per_person": [_about_person(motion) for motion in motions],
@@ -121,7 +123,7 @@ def capture(
         "camera_turns_deg": round(turning.largest_turn_deg, 2) if R_first_camera is not None else 0.0,
         "focal_px": float(camera.intrinsics[0, 0]),
         "frame_rate": [video.fps.numerator, video.fps.denominator],
-        "fps": clock.rates(len(seen)),
+        "fps": clock.rates(frames),
         "reprojection_px": float(motions[0].residual_px[motions[0].valid].mean()),
         "iterations": fits[0].iterations,
         "warnings": warnings,
