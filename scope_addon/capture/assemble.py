@@ -11,8 +11,9 @@ from ...solver import rotations
 from ...solver.body import Body
 from ..motion import Motion
 from .camera import Camera
+from .camera_path import CameraPath
 from .fitting import FittedTrack
-from .grounding import correct_depth, stand_on_floor, standing_probability
+from .grounding import along_sight, correct_depth, stand_on_floor, standing_probability
 from .landmark_network import KEYPOINT_NAMES
 from .placement import PlacedTrack
 from .track import Track
@@ -29,8 +30,8 @@ def root_on_floor(placed: PlacedTrack, T_floor_camera: np.ndarray | None = None)
     if T is None:
         T = estimate_world(placed.body, placed.joints[valid], placed.soles[valid])
     contact = standing_probability(placed.soles, T[2, :3], placed.times) * valid[:, None]
-    away = correct_depth(root, placed.soles, contact, T, placed.times)
-    return root + away[:, None] * root / np.linalg.norm(root, axis=1, keepdims=True)
+    away = correct_depth(root - placed.center, placed.soles, contact, T, placed.times)
+    return root + away[:, None] * along_sight(root - placed.center)
 
 
 def assemble_motion(
@@ -47,12 +48,11 @@ def assemble_motion(
     hold_feet: bool = True,
     T_world_camera: np.ndarray | None = None,
     floor_m: float = 0.0,
-    R_first_camera: np.ndarray | None = None,
+    path: CameraPath | None = None,
 ) -> Motion:
     """The motion file's content for one person, from ``fitted`` and the same as ``placed``.
 
-    ``fitted`` is in axes that do not turn, the first frame's; ``R_first_camera`` (T, 3, 3) takes each frame's camera
-    axes to them (None: the camera stands still), and the camera is that of the first frame below.
+    ``path``: where each frame's camera was (None: on a stand); "the camera" below is the first frame's.
 
     ``T_world_camera`` (4, 4): the world that several people share, and ``floor_m``, the height in it of what this
     person stands on; None: the world is found from this person alone.
@@ -71,7 +71,7 @@ def assemble_motion(
     contact = standing_probability(placed.soles, R_world_camera[2], times) * valid[:, None]
     if smoothing and hold_feet:
         local, root = stand_on_floor(
-            placed.body, local, root, betas, placed.place, contact, T_floor_camera, times
+            placed.body, local, root, betas, placed.place, contact, T_floor_camera, times, placed.center
         )
     R_cam, joints_cam, _ = placed.place(local, root)
     J0 = body.rest_joints(betas)[0]
@@ -82,13 +82,9 @@ def assemble_motion(
         trans = position @ R_world_camera.T + t_world_camera - J0
         return rotations.log(poses).reshape(len(poses), -1), trans
 
-    T_world_frame = np.tile(T_world_camera, (len(track), 1, 1))
-    if R_first_camera is not None:
-        R_camera_first = np.swapaxes(R_first_camera, 1, 2)
-        T_world_frame[:, :3, :3] = R_world_camera @ R_first_camera
-        R_cam = R_camera_first[:, None] @ R_cam
-        joints_cam = np.einsum("tij,tkj->tki", R_camera_first, joints_cam)
-
+    path = path or CameraPath.on_a_stand(len(track))
+    R_cam = np.swapaxes(path.R_first_camera, 1, 2)[:, None] @ R_cam
+    joints_cam = path.points_to_frames(joints_cam)
     poses, trans = in_world(local, root)
     poses_raw, trans_raw = in_world(placed.rotations_raw, placed.root_raw)
     return Motion(
@@ -109,7 +105,7 @@ def assemble_motion(
         intrinsics=camera.intrinsics,
         dist=camera.dist,
         joint_confidence=fitted.joint_confidence,
-        world_from_camera=T_world_frame,
+        world_from_camera=path.world_from_frames(T_world_camera),
         foot_contact=contact,
         residual_px=reprojection_error(body, R_cam, joints_cam, betas, track, camera, valid),
         image_size=np.array(image_size),

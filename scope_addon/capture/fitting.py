@@ -59,12 +59,6 @@ class FittedTrack:
     joint_confidence: np.ndarray  # (T, K+1) 0..1
     iterations: float  # mean per frame
 
-    def turned(self, R_new_camera: np.ndarray) -> FittedTrack:
-        """The same in other axes: R_new_camera (T, 3, 3) takes each frame's camera axes to them; the centre stays."""
-        rotations = self.rotations.copy()
-        rotations[:, 0] = R_new_camera @ rotations[:, 0]
-        root = np.einsum("tij,tj->ti", R_new_camera, self.t_camera_root)
-        return replace(self, rotations=rotations, t_camera_root=root)
 
 
 @dataclass(frozen=True)

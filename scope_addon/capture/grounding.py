@@ -51,22 +51,29 @@ def stand_on_floor(
     contact: np.ndarray,
     T_world_camera: np.ndarray,
     times: np.ndarray,
+    center: np.ndarray | float = 0.0,
 ) -> tuple[np.ndarray, np.ndarray]:
     """The motion with its depth corrected by the floor, and standing feet held.
 
     :param rotations, root_cam: (T, K+1, 3, 3), (T, 3) in the camera frame, smoothed.
     :param place: rotations and root positions to part rotations, joints and soles, camera frame.
     :param contact: (T, 4) probability that each sole stands.
+    :param center: (T, 3) of the camera, where it travels.
     :return: rotations and root positions.
     """
     soles = place(rotations, root_cam)[2]
-    away = correct_depth(root_cam, soles, contact, T_world_camera, times)
-    root_cam = root_cam + away[:, None] * root_cam / np.linalg.norm(root_cam, axis=1, keepdims=True)
+    away = correct_depth(root_cam - center, soles, contact, T_world_camera, times)
+    root_cam = root_cam + away[:, None] * along_sight(root_cam - center)
     R, t = T_world_camera[:3, :3], T_world_camera[:3, 3]
     held = anchors(place(rotations, root_cam)[2] @ R.T + t, contact)
     indices = np.arange(len(body_with_soles.keypoint_names) - held.shape[1], len(body_with_soles.keypoint_names))
     rotations, root_cam = hold_feet(body_with_soles, rotations, root_cam, betas, (indices, (held - t) @ R, contact))
     return smooth_rotations(rotations, times, STEP_CUTOFF_HZ), root_cam
+
+
+def along_sight(root: np.ndarray) -> np.ndarray:
+    """(T, 3) unit vectors from the camera's centre to positions (T, 3) about it."""
+    return root / np.maximum(np.linalg.norm(root, axis=1, keepdims=True), 1e-9)
 
 
 def standing_probability(soles_cam: np.ndarray, up: np.ndarray, times: np.ndarray) -> np.ndarray:
@@ -98,12 +105,12 @@ def correct_depth(
         + Σ_t c_t |s_t + d_t (δ_t+1 − δ_t)|²/(σ_s Δt)² + (δ_t+1 − δ_t)²/(σ_r Δt)²,
     a tridiagonal system, solved in O(T).
 
-    :param root_cam: (T, 3);  soles_cam: (T, F, 3);  contact: (T, F);  times: (T,).
+    :param root_cam: (T, 3), about the camera's centre;  soles_cam: (T, F, 3);  contact: (T, F);  times: (T,).
     """
     T = len(times)
     R, height0 = T_world_camera[:3, :3], T_world_camera[2, 3]
     sure = np.clip(2 * contact - 1, 0, 1)  # a foot in the air, doubtful as it may be, says nothing about the floor
-    ray_world = (root_cam / np.linalg.norm(root_cam, axis=1, keepdims=True)) @ R.T
+    ray_world = along_sight(root_cam) @ R.T
     soles_world = soles_cam @ R.T
     height = soles_world[..., 2] + height0
     g, d = ray_world[:, 2], ray_world[:, :2]

@@ -17,6 +17,8 @@ from ..motion import Motion
 from .assemble import assemble_motion, root_on_floor
 from .camera import Camera, choose_camera
 from .camera_motion import BackgroundTracker
+from .camera_path import CameraPath
+from .camera_travel import camera_travel
 from .fitting import FittedTrack, fit_track, prepare_track, refit_track
 from .left_right import repair_left_right
 from .observation import Observation
@@ -28,6 +30,7 @@ from .track import Track
 from .tracker import MOST_PEOPLE, PeopleTracker
 from .video import Frame, Video, open_video
 from .video_range import VideoRange
+from .world import estimate_world
 
 # Called with the stage's name, what is done and the total (0: unknown). May raise CancelledError.
 Progress = Callable[[str, int, int], None]
@@ -102,8 +105,8 @@ def capture(
         smoothing = options.smoothing and frames > 1
         about = {"fps": video.fps, "image_size": (video.width, video.height), "source": path.name}
         turning = background.motion()
-        R_first_camera = None if turning.is_static else turning.R_first_camera
-        motions, fits = _solve(body, tracks, camera, R_first_camera, smoothing, options.parts, about, progress)
+        turns = CameraPath.on_a_stand(len(seen)) if turning.is_static else CameraPath.turning(turning.R_first_camera)
+        motions, fits, went = _solve(body, tracks, camera, turns, smoothing, options.parts, about, progress)
     for number, motion in enumerate(motions, 1):
         missing = int((~motion.valid).sum())
         if missing:
@@ -120,7 +123,8 @@ def capture(
         "quality": options.quality,
         "body": body.name,
         "camera": camera.source,
-        "camera_turns_deg": round(turning.largest_turn_deg, 2) if R_first_camera is not None else 0.0,
+        "camera_turns_deg": 0.0 if turning.is_static else round(turning.largest_turn_deg, 2),
+        "camera_travels_m": round(float(np.linalg.norm(np.diff(went.center, axis=0), axis=1).sum()), 2),
         "focal_px": float(camera.intrinsics[0, 0]),
         "frame_rate": [video.fps.numerator, video.fps.denominator],
         "fps": clock.rates(frames),
@@ -162,37 +166,35 @@ def _solve(
     body: Body,
     tracks: list[Track],
     camera: Camera,
-    R_first_camera: np.ndarray | None,
+    path: CameraPath,
     smoothing: bool,
     parts: Parts,
     about: dict,
     progress: Progress,
-) -> tuple[list[Motion], list[FittedTrack]]:
-    """Each person on their own, in one world. Fitted in each frame's camera, everything else in the first frame's axes.
+) -> tuple[list[Motion], list[FittedTrack], CameraPath]:
+    """Each person on their own, in one world: fitted in each frame's camera, all else in the first frame's axes.
 
-    :param R_first_camera: (T, 3, 3) how a camera turned that did not stand still, else None.
+    :param path: how the camera turned; returned with how it travelled.
     """
-
-    def to_first(fit: FittedTrack) -> FittedTrack:
-        return fit if R_first_camera is None else fit.turned(R_first_camera)
-
-    def to_frames(fit: FittedTrack) -> FittedTrack:
-        return fit if R_first_camera is None else fit.turned(np.swapaxes(R_first_camera, 1, 2))
-
     prepared = [prepare_track(body, track, camera, parts) for track in tracks]
-    fits = [to_first(fit_track(each, progress)) for each in prepared]
+    fits = [fit_track(each, progress) for each in prepared]
     several = len(tracks) > 1
 
     def place() -> list[PlacedTrack]:
-        return [place_track(body, track, fit, smoothing) for track, fit in zip(tracks, fits, strict=True)]
+        return [place_track(body, track, fit, smoothing, path) for track, fit in zip(tracks, fits, strict=True)]
 
     placed = place()
+    if smoothing and not path.is_static:
+        first = placed[0]
+        up = estimate_world(body, first.joints[first.valid], first.soles[first.valid])[2, :3]
+        path = replace(path, center=camera_travel(first.soles, first.valid, up, first.times))
+        placed = place()
     if smoothing and parts.second_pass:
         world = share_world(body, placed) if several else None
         for k, fit in enumerate(fits):
             root = root_on_floor(placed[k], world.floor_from_camera(k) if world else None)
-            first = to_frames(replace(fit, t_camera_root=root))
-            fits[k] = to_first(refit_track(prepared[k], first, first.t_camera_root, progress))
+            known = path.to_frames(replace(path.to_first(fit), t_camera_root=root))
+            fits[k] = refit_track(prepared[k], known, known.t_camera_root, progress)
         placed = place()
     world = share_world(body, placed) if several else None
     motions = [
@@ -206,12 +208,12 @@ def _solve(
             hold_feet=parts.contact,
             T_world_camera=world.T_world_camera if world else None,
             floor_m=world.floors_m[k] if world else 0.0,
-            R_first_camera=R_first_camera,
+            path=path,
             **about,
         )
         for k in range(len(tracks))
     ]
-    return motions, fits
+    return motions, fits, path
 
 
 def _about_person(motion: Motion) -> dict:
