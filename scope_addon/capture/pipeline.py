@@ -105,7 +105,7 @@ def capture(
         smoothing = options.smoothing and frames > 1
         about = {"fps": video.fps, "image_size": (video.width, video.height), "source": path.name}
         turning = background.motion()
-        turns = CameraPath.on_a_stand(len(seen)) if turning.is_static else CameraPath.turning(turning.R_first_camera)
+        turns = CameraPath.on_a_stand(frames) if turning.is_static else CameraPath.turning(turning.R_first_camera)
         motions, fits, went = _solve(body, tracks, camera, turns, smoothing, options.parts, about, progress)
     for number, motion in enumerate(motions, 1):
         missing = int((~motion.valid).sum())
