@@ -75,7 +75,15 @@ def resample(clip: Clip, rate: float) -> Clip:
         raise UsageError(f"a motion cannot be baked to {rate} frames a second; choose a rate above zero")
     count = int(np.floor((clip.times[-1] - clip.times[0]) * rate + 1e-6)) + 1
     times = clip.times[0] + np.arange(count) / rate
+    return sample(band_limited(clip, rate), times)
+
+
+def band_limited(clip: Clip, rate: float) -> Clip:
+    """The clip without rotations faster than ``rate`` keys a second can show, where it has many more keys than that.
+
+    Else what swings between two new keys would show as slow motion.
+    """
     step = np.median(np.diff(clip.times)) if len(clip) > 1 else 1.0 / rate
-    if 1.0 / rate > 1.5 * step:  # else what swings between two new keys would show as slow motion
-        clip = Clip(clip.times, smooth_rotations(clip.rotations, clip.times, 0.45 * rate), clip.root)
-    return sample(clip, times)
+    if 1.0 / rate <= 1.5 * step:
+        return clip
+    return Clip(clip.times, smooth_rotations(clip.rotations, clip.times, 0.45 * rate), clip.root)

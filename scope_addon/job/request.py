@@ -23,6 +23,8 @@ class JobRequest:
     people: int | str = "largest"  # how many at most, "all", or "largest": the most prominent one
     focal_mm: float | None = None  # 35 mm equivalent
     fov_deg: float | None = None  # along the longer side
+    start_s: float = 0.0  # of the video
+    end_s: float | None = None  # None: to its end
     smoothing: bool = True
     threads: int = 0  # 0: as many as there are cores
 

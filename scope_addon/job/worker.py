@@ -47,6 +47,7 @@ def run(request: JobRequest, job_folder: Path, reporter: Reporter) -> int:
         # Imported here, so that a missing wheel becomes a sentence in the panel as well.
         from ...solver.body import load_body
         from ..capture.pipeline import CaptureOptions, capture
+        from ..capture.video_range import VideoRange
         from .preview import FILE, PreviewWriter
 
         options = CaptureOptions(
@@ -54,6 +55,7 @@ def run(request: JobRequest, job_folder: Path, reporter: Reporter) -> int:
             people=request.people,
             focal_mm=request.focal_mm,
             fov_deg=request.fov_deg,
+            wanted=VideoRange(request.start_s, float("inf") if request.end_s is None else request.end_s),
             smoothing=request.smoothing,
             threads=request.threads,
         )

@@ -55,8 +55,8 @@ class Channels:
         values: np.ndarray,
         interpolation: str = "LINEAR",
         group: str = "",
-    ) -> None:
-        """Write one property: a curve per column.
+    ) -> list[bpy.types.FCurve]:
+        """Write one property: a curve per column, which are returned.
 
         :param data_path: RNA path from the datablock, e.g. from ``bone_path``.
         :param frames: (T,) scene frames, increasing, fractions allowed.
@@ -69,6 +69,7 @@ class Channels:
         coordinates = np.empty((len(frames), 2), np.float32)
         coordinates[:, 0] = frames
         modes = np.full(len(frames), INTERPOLATION[interpolation], np.int32)
+        curves = []
         for index in range(columns.shape[1]):
             curve = self._owner.fcurves.new(data_path, index=index)
             if group:
@@ -79,6 +80,8 @@ class Channels:
             keys.foreach_set("co", coordinates.ravel())
             keys.foreach_set("interpolation", modes)
             curve.update()
+            curves.append(curve)
+        return curves
 
     def _group(self, name: str) -> bpy.types.ActionGroup:
         if name not in self._groups:
@@ -89,6 +92,12 @@ class Channels:
 def bone_path(bone_name: str, channel: str) -> str:
     """RNA path of a pose bone's channel; quotes and backslashes in the name are escaped."""
     return f'pose.bones["{bpy.utils.escape_identifier(bone_name)}"].{channel}'
+
+
+def bone_property_path(bone_name: str, name: str) -> str:
+    """RNA path of a pose bone's custom property."""
+    bone, key = bpy.utils.escape_identifier(bone_name), bpy.utils.escape_identifier(name)
+    return f'pose.bones["{bone}"]["{key}"]'
 
 
 def shape_key_path(key_name: str) -> str:

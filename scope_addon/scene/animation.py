@@ -83,7 +83,7 @@ def animate_armature(
     motion: Motion,
     rest: RestPose,
     frames: np.ndarray,
-) -> None:
+) -> Channels:
     """Key every joint's rotation and the root's location at ``frames`` (T,), linear in between."""
     rotations, locations = pose_channels(body, motion, rest, rest_orientations(armature, body))
     channels = Channels(armature, action)
@@ -91,3 +91,4 @@ def animate_armature(
     channels.write(bone_path(root, "location"), frames, locations, group=root)
     for i, name in enumerate(body.joint_names):
         channels.write(bone_path(name, "rotation_quaternion"), frames, rotations[:, i], group=name)
+    return channels

@@ -13,7 +13,8 @@ import numpy as np
 from ...solver.body import Body
 from ...solver.errors import MotionFileError, UsageError
 from ..motion import Motion
-from . import animation, armature, body_mesh, camera, shape_keys, timing
+from . import animation, armature, body_mesh, bone_display, camera, measurements, shape_keys, timing
+from .keys import bake_whole_frames
 from .transaction import all_or_nothing
 
 CAPTURE_TAG = "scope_capture"  # custom property of a capture's collection; exporters find captures by it
@@ -25,17 +26,20 @@ class BuildOptions:
     """What building may change in the scene, and how the shape is stored."""
 
     name: str = ""  # of the capture; empty: the footage's or the motion's source name
-    frame_rate: str = "keep"  # "keep" the scene's rate, or "set" it to the motion's
+    # "keep" the scene's rate, keys where the pictures were; "resample": keep it, a key on every whole frame;
+    # "set" it to the motion's.
+    frame_rate: str = "keep"
     resolution: str = "keep"  # "keep" the scene's, or "set" the footage's size and pixel aspect
     set_frame_range: bool = True
     active_camera: bool = False  # make the capture's camera the scene's
     start_frame: float = 0.0  # the scene frame of timestamp 0
     shape: str = "keyed"  # "keyed" once, "per_frame", or "baked" into the mesh
     with_camera: bool = True
+    with_markers: bool = True  # on the timeline, where the motion deserves a look
 
     def __post_init__(self) -> None:
         """Refuse values that are not offered."""
-        choices = {"frame_rate": timing.POLICIES, "resolution": timing.POLICIES, "shape": shape_keys.MODES}
+        choices = {"frame_rate": timing.RATE_POLICIES, "resolution": timing.POLICIES, "shape": shape_keys.MODES}
         for option, valid in choices.items():
             if getattr(self, option) not in valid:
                 raise UsageError(f"{option} must be one of {', '.join(valid)}, but is '{getattr(self, option)}'")
@@ -115,6 +119,10 @@ def _build(
         report(index / len(motions), f"building person {index + 1} of {len(motions)}")
         label = name if len(motions) == 1 else f"{name}_person{index + 1}"
         people.append(_build_person(label, motion, body, collection, rate, options))
+    if options.with_markers:
+        for index, person in enumerate(people):
+            whose = "" if len(people) == 1 else f"person {index + 1} "
+            measurements.mark_low_confidence(scene, whose, person.motion, person.frames)
     if options.with_camera:
         warnings += _build_cameras(name, people, collection, footage, options)
     if options.resolution == "set":
@@ -140,8 +148,14 @@ def _build_person(
     vertices = body_mesh.rest_vertices_world(body, rest.lift, motion.betas if baked else None)
     mesh = body_mesh.build_mesh(f"{label}_body", body, vertices, collection)
     frames = timing.key_frames(motion.timestamps, rate, options.start_frame)
+    shaped = vertices if baked else body_mesh.rest_vertices_world(body, rest.lift, motion.betas)
+    bone_display.show_bones(rig, body, rest, shaped)
     action = bpy.data.actions.new(label)
-    animation.animate_armature(rig, action, body, motion, rest, frames)
+    action.use_fake_user = True  # stays when the armature goes on to another action or to NLA strips
+    channels = animation.animate_armature(rig, action, body, motion, rest, frames)
+    measurements.key_measurements(rig, channels, body, motion, frames)
+    if options.frame_rate == "resample":
+        bake_whole_frames(rig, body, rate)
     if not baked and body.P:
         shape_keys.add_shape_keys(mesh, body, motion.betas)
         shape_keys.key_shape(mesh, action, motion.betas, frames, per_frame=options.shape == "per_frame")

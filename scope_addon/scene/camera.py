@@ -116,7 +116,7 @@ def show_footage(camera: bpy.types.Object, footage: str | Path, motion: Motion, 
         background.image = bpy.data.images.load(str(path), check_existing=True)
         size = tuple(background.image.size)
     else:
-        clip = bpy.data.movieclips.load(str(path), check_existing=True)
+        clip = bpy.data.movieclips.load(str(path))  # its own: another capture may begin elsewhere or have another lens
         clip.frame_start = round(frames[0] - motion.frames[0])
         drift = float(np.abs(frames - (clip.frame_start + motion.frames)).max())
         if drift > 1.0:

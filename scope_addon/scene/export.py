@@ -21,6 +21,7 @@ from ...solver.body import Body
 from ...solver.errors import OutputError, UsageError
 from ..motion import Motion
 from . import actions, formats
+from .bone_display import remove_if_unused
 from .build import CAPTURE_TAG, NEW_SCENE, BuildOptions, BuildResult, Progress, build_scene
 from .output_paths import check_output, person_paths
 from .shape_keys import mixed_vertices
@@ -139,6 +140,7 @@ def _remove(result: BuildResult) -> None:
     used = {owner.animation_data.action for owner in owners if owner and owner.animation_data} - {None}
     materials = {m for block in data for m in getattr(block, "materials", ())}
     bpy.data.batch_remove([result.collection, *objects, *data, *used, *materials])
+    remove_if_unused()
 
 
 @contextmanager

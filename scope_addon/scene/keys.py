@@ -7,6 +7,7 @@ armature's space. The keys are the truth; so undo, and what an animator has chan
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import bpy
@@ -17,7 +18,7 @@ from ...solver.errors import UsageError
 from ...solver.frames import R_WORLD_MODEL
 from ...solver.rotations import matrix_from_quaternion
 from ...solver.rotations import quaternion_from_matrix as quaternions
-from ..edit.clip import Clip
+from ..edit.clip import Clip, band_limited, sample
 from ..edit.reduce import angles_between, keep_of_positions, keep_of_quaternions
 from .actions import bone_path, fcurves, read_keys, rewrite_keys
 from .animation import on_one_hemisphere
@@ -71,6 +72,19 @@ def write_clip(armature: bpy.types.Object, body: Body, clip: Clip, frames: np.nd
         values = location if path == location_path(body) else q[:, rotation_paths.index(path)]
         for index, curve in enumerate(bone):
             rewrite_keys(curve, frames, values[:, index])
+
+
+def bake_whole_frames(armature: bpy.types.Object, body: Body, rate: float) -> tuple[int, int]:
+    """A key on every whole frame of the scene between the first key and the last; returns keys a curve before, after.
+
+    :param rate: scene frames a second. Detail faster than that is smoothed away first.
+    """
+    clip, frames = read_clip(armature, body, rate)
+    whole = np.arange(math.ceil(frames[0] - 1e-4), math.floor(frames[-1] + 1e-4) + 1, dtype=float)
+    if not len(whole):  # all keys lie between two frames
+        whole = np.round(frames[:1])
+    write_clip(armature, body, sample(band_limited(clip, rate), whole / rate), whole)
+    return len(frames), len(whole)
 
 
 @dataclass(frozen=True)

@@ -20,6 +20,7 @@ from ...solver.errors import MotionFileError, UsageError
 TOLERANCE = 0.005
 BROADCAST = tuple(Fraction(n * 1000, 1001) for n in (24, 30, 48, 60, 72, 96, 120, 240))
 POLICIES = ("keep", "set")
+RATE_POLICIES = (*POLICIES, "resample")
 
 
 def blender_rate(frames_per_second: float) -> tuple[int, float]:

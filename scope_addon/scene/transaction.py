@@ -24,6 +24,7 @@ def all_or_nothing(scene: bpy.types.Scene) -> Iterator[None]:
     view_layer = bpy.context.view_layer
     active = view_layer.objects.active
     mode = active.mode if active else "OBJECT"
+    markers = set(scene.timeline_markers.values())
     selected = [obj for obj in view_layer.objects if obj.select_get(view_layer=view_layer)]
     try:
         yield
@@ -33,6 +34,8 @@ def all_or_nothing(scene: bpy.types.Scene) -> Iterator[None]:
             bpy.ops.object.mode_set(mode="OBJECT")
         new = [b for kind in _KINDS for b in getattr(bpy.data, kind) if b.session_uid not in before[kind]]
         bpy.data.batch_remove(new)
+        for marker in [m for m in scene.timeline_markers if m not in markers]:
+            scene.timeline_markers.remove(marker)
         for name, value in render.items():
             setattr(scene.render, name, value)
         scene.frame_end = max(settings["frame_end"], scene.frame_start)

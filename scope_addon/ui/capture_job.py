@@ -137,6 +137,8 @@ def capture_request(scene: bpy.types.Scene) -> JobRequest:
     footage = Path(bpy.path.abspath(settings.footage))
     if not footage.is_file():
         raise VideoError(f"{footage} does not exist; choose the video or picture again")
+    if settings.use_range and settings.range_end <= settings.range_start:
+        raise UsageError("the part of the video ends before it begins; change From or To")
     body = {"SCOPE": "scope", "SCOPE_H": "scope_h"}.get(settings.body)
     if body is None:
         path = settings.body_file or (chosen.body_file if chosen else "")
@@ -150,6 +152,8 @@ def capture_request(scene: bpy.types.Scene) -> JobRequest:
         people=settings.people_count if settings.people == "COUNT" else settings.people.lower(),
         focal_mm=settings.focal_mm if settings.lens == "FOCAL" else None,
         fov_deg=math.degrees(settings.fov) if settings.lens == "FOV" else None,
+        start_s=settings.range_start if settings.use_range else 0.0,
+        end_s=settings.range_end if settings.use_range else None,
         smoothing=settings.smoothing,
         threads=chosen.threads if chosen else 0,
     )
@@ -167,6 +171,7 @@ def build_options(scene: bpy.types.Scene) -> BuildOptions:
         start_frame=float(settings.start_frame),
         shape=settings.shape.lower(),
         with_camera=settings.with_camera,
+        with_markers=settings.with_markers,
     )
 
 

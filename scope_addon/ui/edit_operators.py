@@ -317,19 +317,17 @@ class SCOPE_OT_bake_rate(_Edit):
 
     def edit(self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float) -> str:
         """All keys; on whole frames where it is the scene's rate."""
-        import numpy as np
+        from ..edit.clip import resample
+        from ..scene.keys import bake_whole_frames, read_clip, write_clip
 
-        from ..edit.clip import resample, sample
-        from ..scene.keys import read_clip, write_clip
-
-        clip, frames = read_clip(armature, body, rate)
         if self.rate > 0:
+            clip, frames = read_clip(armature, body, rate)
             baked = resample(clip, self.rate)
             write_clip(armature, body, baked, baked.times * rate)
-            return f"{len(frames)} keys became {len(baked)}"
-        whole = np.arange(math.ceil(frames[0] - 1e-4), math.floor(frames[-1] + 1e-4) + 1, dtype=float)
-        write_clip(armature, body, sample(clip, whole / rate), whole)
-        return f"{len(frames)} keys became {len(whole)}"
+            before, after = len(frames), len(baked)
+        else:
+            before, after = bake_whole_frames(armature, body, rate)
+        return f"{before} keys became {after}"
 
 
 @contextmanager

@@ -64,7 +64,7 @@ def _draw_progress(context: bpy.types.Context, layout: bpy.types.UILayout, progr
 
 
 class SCOPE_PT_person(_Tab, bpy.types.Panel):
-    """Who is captured, as what, and the lens."""
+    """Who is captured, as what, the lens, and which part of the video."""
 
     bl_idname = "SCOPE_PT_person"
     bl_parent_id = "SCOPE_PT_capture"
@@ -88,6 +88,11 @@ class SCOPE_PT_person(_Tab, bpy.types.Panel):
         elif settings.lens == "FOV":
             layout.prop(settings, "fov", text="Angle")
         layout.prop(settings, "smoothing")
+        layout.prop(settings, "use_range")
+        if settings.use_range:
+            column = layout.column(align=True)
+            column.prop(settings, "range_start")
+            column.prop(settings, "range_end")
 
 
 class SCOPE_PT_scene(_Tab, bpy.types.Panel):
@@ -106,6 +111,7 @@ class SCOPE_PT_scene(_Tab, bpy.types.Panel):
         layout.prop(settings, "start_frame")
         layout.prop(settings, "set_frame_range")
         layout.prop(settings, "with_camera")
+        layout.prop(settings, "with_markers")
 
 
 class SCOPE_PT_result(_Tab, bpy.types.Panel):
@@ -131,17 +137,34 @@ class SCOPE_PT_result(_Tab, bpy.types.Panel):
         column.label(text=f"{result.reprojection_px:.1f} pixels off the footage on average", icon="CON_CAMERASOLVER")
         column.label(text=f"Lens: {result.camera}", icon="CAMERA_DATA")
         for warning in result.warnings:
-            _draw_text(context, layout.box(), warning.text, "ERROR")
+            _draw_warning(context, layout.box(), warning)
         if camera_of(context.scene) is not None:
             back = is_looking_through(context)
             text = "Back to the Scene" if back else "Compare with Footage"
             layout.operator("scope.look_through", text=text, icon="VIEW_CAMERA", depress=back)
+            for background in camera_of(context.scene).data.background_images[:1]:
+                layout.prop(background, "alpha", text="Footage Opacity", slider=True)
+            layout.operator("scope.footage_to_sequencer", icon="SEQUENCE")
         layout.label(text="Export")
         grid = layout.grid_flow(columns=2, even_columns=True, align=True)
         for key, label, _, _ in FORMATS:
             cell = grid.column()
             cell.enabled = key != "USDC" or "usd_export" in dir(bpy.ops.wm)  # some systems build Blender without USD
             cell.operator("scope.export", text=label).format = key
+
+
+def _draw_warning(context: bpy.types.Context, box: bpy.types.UILayout, warning: bpy.types.PropertyGroup) -> None:
+    """What is wrong, and a button for each span of frames, that goes there."""
+    _draw_text(context, box, warning.text, "ERROR")
+    if warning.spans:
+        grid = box.grid_flow(columns=4, even_columns=True, align=True, row_major=True)
+        for span in warning.spans.split(","):
+            grid.operator("scope.go_to_frame", text=span).frame = first_frame(span)
+
+
+def first_frame(span: str) -> int:
+    """12 of ``12-18``, -3 of ``-3-4``."""
+    return int(span[0] + span[1:].split("-", 1)[0])
 
 
 def _split(layout: bpy.types.UILayout) -> bpy.types.UILayout:

@@ -47,6 +47,7 @@ FRAME_RATES = (
     ("AUTO", "Automatic", "Set the scene's frame rate to the footage's while nothing in the scene is animated yet", 0),
     ("SET", "Set from Footage", "Set the scene's frame rate to the footage's", 1),
     ("KEEP", "Keep", "Leave the scene's frame rate; the motion keeps its speed, with keys between frames", 2),
+    ("RESAMPLE", "Resample to Scene", "Leave the scene's frame rate; one key on each of its frames", 3),
 )
 SHAPES = (
     ("KEYED", "Shape Keys", "The body's shape as shape keys with one keyframe each", 0),
@@ -59,6 +60,7 @@ class SCOPE_PG_warning(bpy.types.PropertyGroup):
     """One line of the result."""
 
     text: StringProperty()
+    spans: StringProperty()  # scene frames it is about: "12-18,40"
 
 
 class SCOPE_PG_result(bpy.types.PropertyGroup):
@@ -126,6 +128,34 @@ class SCOPE_PG_settings(bpy.types.PropertyGroup):
         options=_FIXED,
         description="Angle of view along the longer side of the picture",
     )
+    use_range: BoolProperty(
+        name="Part of the Video",
+        default=False,
+        options=_FIXED,
+        description="Capture only a part of the video",
+    )
+    range_start: FloatProperty(
+        name="From",
+        default=0.0,
+        min=0.0,
+        step=10,
+        precision=2,
+        subtype="TIME_ABSOLUTE",
+        unit="TIME_ABSOLUTE",
+        options=_FIXED,
+        description="Seconds into the video from which on it is captured",
+    )
+    range_end: FloatProperty(
+        name="To",
+        default=10.0,
+        min=0.0,
+        step=10,
+        precision=2,
+        subtype="TIME_ABSOLUTE",
+        unit="TIME_ABSOLUTE",
+        options=_FIXED,
+        description="Seconds into the video up to which it is captured",
+    )
     smoothing: BoolProperty(
         name="Smooth",
         default=True,
@@ -150,6 +180,12 @@ class SCOPE_PG_settings(bpy.types.PropertyGroup):
     )
     shape: EnumProperty(
         name="Shape", items=SHAPES, default="KEYED", options=_FIXED, description="How the person's body shape is stored"
+    )
+    with_markers: BoolProperty(
+        name="Markers",
+        default=True,
+        options=_FIXED,
+        description="Put markers on the timeline where the motion deserves a look",
     )
     with_camera: BoolProperty(
         name="Camera with Footage",

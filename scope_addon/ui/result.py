@@ -3,17 +3,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-
 import bpy
 import numpy as np
 
+from ..low_confidence import REASONS, Span, low_confidence_spans
 from ..motion import Motion
 from ..scene.build import BuildResult
 from ..scene.camera import pixel_aspect
 
-_OFF_SHARE = 0.03  # of the picture's longer side: a body this far off its keypoints is worth a look
-_MOST_SPANS = 6
+_MOST_SPANS = 12  # buttons
 
 
 def show_result(shown: bpy.types.PropertyGroup, footage: str, report: dict, result: BuildResult) -> None:
@@ -34,35 +32,35 @@ def show_result(shown: bpy.types.PropertyGroup, footage: str, report: dict, resu
     shown.resolution = [int(n) for n in first.image_size]
     shown.pixel_aspect = pixel_aspect(first)
     shown.warnings.clear()
-    lines = list(report.get("warnings", ()))
+    for line in report.get("warnings", ()):
+        _warn(shown, str(line))
     for index, person in enumerate(result.people):
         whose = "" if len(result.people) == 1 else f"person {index + 1}: "
-        lines += frame_warnings(whose, person.motion, person.frames)
-    for line in lines:
-        shown.warnings.add().text = line[:1].upper() + line[1:]
+        for reason, spans in frame_warnings(person.motion, person.frames).items():
+            _warn(shown, whose + REASONS[reason], spans)
 
 
-def frame_warnings(whose: str, motion: Motion, frames: np.ndarray) -> list[str]:
-    """Spans of scene frames where the motion is guessed or far from the footage.
+def frame_warnings(motion: Motion, frames: np.ndarray) -> dict[str, str]:
+    """The spans of scene frames that deserve a look, by reason; of very many the longest.
 
-    :param whose: put before each line, for several people.
     :param frames: (T,) scene frame of each pose.
+    :return: reason, a key of ``REASONS``, to spans as in ``12-18,40``.
     """
-    lines = []
-    if not motion.valid.all():
-        lines.append(f"{whose}filled in without being seen: frames {spans(~motion.valid, frames)}")
-    off = motion.valid & (motion.residual_px > _OFF_SHARE * motion.image_size.max())
-    if off.any():
-        lines.append(f"{whose}far from the footage, worth a look: frames {spans(off, frames)}")
-    return lines
+    by_reason: dict[str, list[Span]] = {}
+    for span in low_confidence_spans(motion):
+        by_reason.setdefault(span.reason, []).append(span)
+    return {reason: _text(spans, frames) for reason, spans in by_reason.items()}
 
 
-def spans(mask: np.ndarray, frames: np.ndarray) -> str:
-    """``12-18, 40`` for the frames where the mask is true; ``…`` after some."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], np.asarray(mask, int), [0]])))
-    pairs: Iterable[tuple[int, int]] = list(zip(edges[::2], edges[1::2] - 1, strict=True))
+def _text(spans: list[Span], frames: np.ndarray) -> str:
+    longest = sorted(spans, key=lambda span: span.first - span.last)[:_MOST_SPANS]
     texts = []
-    for first, last in pairs:
-        a, b = round(float(frames[first])), round(float(frames[last]))
+    for span in sorted(longest, key=lambda span: span.first):
+        a, b = round(float(frames[span.first])), round(float(frames[span.last]))
         texts.append(f"{a}" if a == b else f"{a}-{b}")
-    return ", ".join(texts[:_MOST_SPANS]) + (", …" if len(texts) > _MOST_SPANS else "")
+    return ",".join(texts)
+
+
+def _warn(shown: bpy.types.PropertyGroup, text: str, spans: str = "") -> None:
+    warning = shown.warnings.add()
+    warning.text, warning.spans = text[:1].upper() + text[1:], spans

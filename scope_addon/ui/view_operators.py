@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import bpy
+from bpy.props import IntProperty
 
 
 class SCOPE_OT_look_through(bpy.types.Operator):
@@ -66,4 +67,55 @@ def camera_of(scene: bpy.types.Scene) -> bpy.types.Object | None:
     return next((o for o in collection.all_objects if o.type == "CAMERA"), None) if collection else None
 
 
-CLASSES = (SCOPE_OT_look_through,)
+class SCOPE_OT_go_to_frame(bpy.types.Operator):
+    """Go to the frame, to see what the warning is about"""
+
+    bl_idname = "scope.go_to_frame"
+    bl_label = "Go to Frame"
+    bl_options = {"INTERNAL"}
+
+    frame: IntProperty(name="Frame", description="Scene frame to show")
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Set the current frame."""
+        context.scene.frame_set(self.frame)
+        return {"FINISHED"}
+
+
+class SCOPE_OT_footage_to_sequencer(bpy.types.Operator):
+    """Put the footage, picture and sound, into the video sequencer, in time with the motion"""
+
+    bl_idname = "scope.footage_to_sequencer"
+    bl_label = "Footage to Sequencer"
+    bl_options = {"UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Something was captured."""
+        return context.scene.scope.result.collection is not None
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Add the strips."""
+        from ...solver.errors import ScopeError
+        from ..scene.footage_strip import add_footage_strips
+        from ..scene.timing import scene_rate
+
+        scene, result = context.scene, context.scene.scope.result
+        armatures = (o for o in result.collection.all_objects if "scope_start" in o)
+        start = next((float(o["scope_start"]) for o in armatures), 0.0)
+        try:
+            strips = add_footage_strips(scene, bpy.path.abspath(result.footage), start)
+        except ScopeError as error:
+            self.report({"ERROR"}, str(error)[:1].upper() + str(error)[1:])
+            return {"CANCELLED"}
+        rate = getattr(strips[-1], "fps", 0.0)
+        if rate and abs(rate - scene_rate(scene)) > 0.01:
+            self.report(
+                {"WARNING"},
+                f"The scene plays at {scene_rate(scene):.5g} frames/s and the footage at {rate:.5g}: the strip drifts "
+                "from the motion",
+            )
+        return {"FINISHED"}
+
+
+CLASSES = (SCOPE_OT_look_through, SCOPE_OT_go_to_frame, SCOPE_OT_footage_to_sequencer)

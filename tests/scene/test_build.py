@@ -90,7 +90,7 @@ def test_quaternions_stay_on_one_hemisphere_through_a_turn(body, make_motion, bl
 
 def test_keys_are_linear_and_every_joint_has_them(body, make_motion):
     person = build_scene([make_motion(body, 6)], body).people[0]
-    curves = actions.fcurves(person.armature)
+    curves = [curve for curve in actions.fcurves(person.armature) if not curve.data_path.endswith('"]')]
     assert len(curves) == 4 * len(body.joint_names) + 3
     assert {key.interpolation for curve in curves for key in curve.keyframe_points} == {"LINEAR"}
     assert {len(curve.keyframe_points) for curve in curves} == {6}
@@ -220,10 +220,13 @@ def test_a_single_picture_is_a_motion_of_one_frame(body, make_motion, blender, t
 
 
 def test_scene_modules_import_neither_opencv_nor_onnxruntime():
-    modules = "actions animation armature body_mesh build bvh camera export formats shape_keys timing transaction"
+    modules = (
+        "actions animation armature body_mesh bone_display build bvh camera export footage_strip formats keys "
+        "measurements output_paths shape_keys timing transaction"
+    )
     code = (
         "import importlib, sys\n"
-        f"for name in '{modules} output_paths'.split(): importlib.import_module('scope.scope_addon.scene.' + name)\n"
+        f"for name in '{modules}'.split(): importlib.import_module('scope.scope_addon.scene.' + name)\n"
         "bad = [m for m in ('cv2', 'onnxruntime') if m in sys.modules]\n"
         "sys.exit(' '.join(bad) or 0)"
     )

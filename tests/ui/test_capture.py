@@ -52,7 +52,8 @@ def test_a_result_is_built_shown_and_cached(fake_worker, footage):
     result = scene.scope.result
     assert (result.people, result.frames, result.valid_frames) == (1, 10, 7)
     assert result.reprojection_px == pytest.approx(2.0)
-    assert [w.text for w in result.warnings] == ["A warning", "Filled in without being seen: frames 4-5, 8"]
+    shown = [(w.text, w.spans) for w in result.warnings]
+    assert shown == [("A warning", ""), ("Filled in without being seen", "4-5,8")]
     assert result.collection == captures()[0]
     assert (scene.render.fps, scene.frame_start, scene.frame_end) == (25, 1, 10)
     assert job_files() == []

@@ -6,6 +6,7 @@ import time
 import bpy
 import pytest
 from scope.scope_addon.job.progress import JobProgress, duration
+from scope.scope_addon.scene.footage_strip import strips_of
 from scope.scope_addon.ui import drop
 from scope.scope_addon.ui.capture_operators import state, stop_everything
 from scope.scope_addon.ui.preferences import cache
@@ -24,7 +25,7 @@ def test_settings_and_result_survive_the_file(fake_worker, footage, tmp_path):
     settings = bpy.context.scene.scope
     wanted = {"quality": "FAST", "body": "FILE", "body_file": "//smpl.npz", "lens": "FOCAL", "focal_mm": 35.0}
     wanted |= {"smoothing": False, "frame_rate": "KEEP", "start_frame": 101, "shape": "BAKED", "with_camera": False}
-    wanted |= {"people": "ALL", "people_count": 5}
+    wanted |= {"people": "ALL", "people_count": 5, "use_range": True, "range_start": 2.5, "with_markers": False}
     for name, value in wanted.items():
         setattr(settings, name, value)
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "saved.blend"))
@@ -101,6 +102,41 @@ def test_looking_through_the_camera_sets_camera_and_resolution(fake_worker, foot
     bpy.ops.scope.look_through()
     assert scene.camera.name == "person_camera"
     assert (scene.render.resolution_x, scene.render.resolution_y) == (640, 480)
+
+
+def test_warnings_lead_to_their_frames(fake_worker, footage):
+    from scope.scope_addon.ui.panel import first_frame
+
+    captured(fake_worker, footage)
+    scene = bpy.context.scene
+    spans = scene.scope.result.warnings[1].spans.split(",")
+    assert [first_frame(span) for span in spans] == [4, 8]
+    bpy.ops.scope.go_to_frame(frame=8)
+    assert scene.frame_current == 8
+    assert [first_frame(span) for span in ("-12--4", "-3-4", "7")] == [-12, -3, 7]
+    assert [m.frame for m in scene.timeline_markers] == [4]  # both spans: they lie near each other
+
+
+def test_the_footage_goes_to_the_sequencer(fake_worker, footage):
+    assert not bpy.ops.scope.footage_to_sequencer.poll()
+    bpy.context.scene.scope.start_frame = 11
+    captured(fake_worker, footage)
+    assert bpy.ops.scope.footage_to_sequencer() == {"FINISHED"}
+    assert [strip.frame_final_start for strip in strips_of(bpy.context.scene.sequence_editor)] == [11]
+    footage.unlink()
+    with pytest.raises(RuntimeError, match="does not exist"):
+        bpy.ops.scope.footage_to_sequencer()
+
+
+def test_a_part_of_the_video_is_asked_for(fake_worker, footage):
+    fake_worker("assert (request['start_s'], request['end_s']) == (1.5, 3.0)\nfinish()")
+    settings = bpy.context.scene.scope
+    settings.footage = str(footage)
+    settings.use_range, settings.range_start, settings.range_end = True, 1.5, 3.0
+    assert bpy.ops.scope.capture() == {"FINISHED"}
+    settings.range_end = 1.0
+    with pytest.raises(RuntimeError, match="ends before it begins"):
+        bpy.ops.scope.capture()
 
 
 def test_clearing_the_cache_leaves_the_scene(fake_worker, footage):

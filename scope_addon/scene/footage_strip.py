@@ -1,0 +1,65 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The footage in the video sequencer: picture and sound, in time with the motion."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import bpy
+
+from ...solver.errors import VideoError
+from ..footage import PICTURE_SUFFIXES
+
+
+def add_footage_strips(scene: bpy.types.Scene, footage: str | Path, start_frame: float) -> list[bpy.types.Strip]:
+    """Put the footage on free channels above what is there; returns the new strips.
+
+    A scene that had no strips goes on rendering its camera: without that, rendering would give the footage alone.
+
+    :param start_frame: scene frame of timestamp 0.
+    :raises VideoError: the file is missing, or Blender cannot read it.
+    """
+    path = Path(footage)
+    if not path.is_file():
+        raise VideoError(f"the footage {path} does not exist; choose the video or picture again and capture it anew")
+    editor = scene.sequence_editor or scene.sequence_editor_create()
+    strips = strips_of(editor)
+    if not len(strips):
+        scene.render.use_sequencer = False
+    channel = max((strip.channel for strip in strips), default=0) + 1
+    start = round(start_frame)
+    added = []
+    try:
+        if path.suffix.lower() in PICTURE_SUFFIXES:
+            added.append(strips.new_image(path.stem, str(path), channel, start))
+        else:
+            sound = _sound(strips, path, channel, start)
+            added += [sound] if sound else []
+            added.append(strips.new_movie(path.stem, str(path), channel + len(added), start))
+            if not added[-1].elements[0].orig_width:  # how Blender tells of a film that it cannot open
+                raise RuntimeError
+    except RuntimeError as error:
+        for strip in added:
+            strips.remove(strip)
+        raise VideoError(f"Blender cannot read {path}; convert it to MP4 (H.264)") from error
+    return added
+
+
+def strips_of(editor: bpy.types.SequenceEditor):  # type: ignore[no-untyped-def]
+    """The editor's own strips; the name changed after 4.3 and the old one went with 5.0."""
+    return editor.strips if hasattr(editor, "strips") else editor.sequences
+
+
+def _sound(strips, path: Path, channel: int, start: int) -> bpy.types.Strip | None:  # type: ignore[no-untyped-def]
+    """The sound's strip; None for silent footage, which Blender tells by a failure or by a strip without length."""
+    try:
+        strip = strips.new_sound(path.stem, str(path), channel, start)
+    except RuntimeError:
+        return None
+    if strip.frame_duration > 1:
+        return strip
+    sound = strip.sound
+    strips.remove(strip)
+    if sound is not None and sound.users == 0:
+        bpy.data.sounds.remove(sound)
+    return None

@@ -1,0 +1,55 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+from pathlib import Path
+
+import bpy
+import pytest
+import scope
+from scope.scope_addon.scene.footage_strip import add_footage_strips, strips_of
+from scope.solver.errors import VideoError
+
+SAMPLE = Path(scope.__file__).resolve().parent / "assets" / "sample" / "sample.mp4"
+
+
+def test_the_footage_begins_where_the_motion_does():
+    scene = bpy.context.scene
+    added = add_footage_strips(scene, SAMPLE, 101.0)
+    assert [(s.type, s.frame_final_start) for s in added] == [("MOVIE", 101)]
+    assert not scene.render.use_sequencer  # else a render would give the footage alone
+
+
+def test_strips_that_are_there_stay_and_go_on_rendering():
+    scene = bpy.context.scene
+    strips = strips_of(scene.sequence_editor_create())
+    strips.new_effect("mine", "COLOR", 2, 1, **effect_end(60))
+    added = add_footage_strips(scene, SAMPLE, 1.0)
+    assert added[0].channel == 3
+    assert scene.render.use_sequencer
+    assert "mine" in strips
+
+
+def effect_end(frame: int) -> dict:
+    """``new_effect`` takes a length from 5.0 on, before that an end."""
+    return {"length": frame} if bpy.app.version >= (5, 0, 0) else {"frame_end": frame}
+
+
+def test_sound_comes_along(shared):
+    added = add_footage_strips(bpy.context.scene, shared / "data" / "clips" / "walk_side_static.mp4", 1.0)
+    assert [s.type for s in added] == ["SOUND", "MOVIE"]
+    assert added[0].channel != added[1].channel
+
+
+def test_a_picture_becomes_an_image_strip(tmp_path):
+    image = bpy.data.images.new("still", 8, 8)
+    image.filepath_raw, image.file_format = str(tmp_path / "still.png"), "PNG"
+    image.save()
+    assert add_footage_strips(bpy.context.scene, tmp_path / "still.png", 1.0)[0].type == "IMAGE"
+
+
+def test_footage_that_is_gone_or_no_video_is_told(tmp_path):
+    with pytest.raises(VideoError, match="does not exist"):
+        add_footage_strips(bpy.context.scene, tmp_path / "gone.mp4", 1.0)
+    broken = tmp_path / "broken.mp4"
+    broken.write_bytes(b"not a film")
+    with pytest.raises(VideoError, match="cannot read"):
+        add_footage_strips(bpy.context.scene, broken, 1.0)
+    assert not strips_of(bpy.context.scene.sequence_editor)
