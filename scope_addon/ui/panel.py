@@ -138,11 +138,12 @@ class SCOPE_PT_result(_Tab, bpy.types.Panel):
         column.label(text=f"Lens: {result.camera}", icon="CAMERA_DATA")
         for warning in result.warnings:
             _draw_warning(context, layout.box(), warning)
-        if camera_of(context.scene) is not None:
+        camera = camera_of(context.scene)
+        if camera is not None:
             back = is_looking_through(context)
             text = "Back to the Scene" if back else "Compare with Footage"
             layout.operator("scope.look_through", text=text, icon="VIEW_CAMERA", depress=back)
-            for background in camera_of(context.scene).data.background_images[:1]:
+            for background in camera.data.background_images[:1]:
                 layout.prop(background, "alpha", text="Footage Opacity", slider=True)
             layout.operator("scope.footage_to_sequencer", icon="SEQUENCE")
         layout.label(text="Export")
