@@ -3,8 +3,18 @@
 
 import numpy as np
 import pytest
+from scope.scope_addon.capture.landmark_network import KEYPOINT_NAMES, LandmarkNetwork
 from scope.scope_addon.capture.left_right import SWAPPED
-from scope.scope_addon.capture.lifter import HIPS, LIFTER_FILE, Lifter, network_input, virtual_camera
+from scope.scope_addon.capture.lifter import (
+    HIPS,
+    LIFTER_FILE,
+    Lifted,
+    Lifter,
+    mixture,
+    network_input,
+    virtual_camera,
+)
+from scope.scope_addon.capture.person_detector import PersonDetector
 from scope.solver.body import load_body
 from scope.solver.errors import ModelFileError, SetupError, ShapeError
 from scope.solver.rotations import exp
@@ -65,6 +75,65 @@ def test_errors_are_as_large_as_foretold(lifter, people):
     assert 0.3 < np.sqrt(np.square(z).mean()) < 1.7
     assert (lifted.sigma_along > 0).all()
     assert lifted.sigma_along[:, 15].mean() > lifted.sigma_along[:, HIPS].mean()  # wrists are harder than hips
+
+
+@pytest.fixture(scope="module")
+def real_people(shared, frames):
+    """What the landmark network sees of a man, filmed by four cameras, and where he truly was, hips' middle at 0.
+
+    rays (n, 33, 2), confidence (n, 33), world landmarks (n, 33, 3), true limbs (n, 10, 3), NaN where not
+    measured, and their keypoints' numbers.
+    """
+    detector, network = PersonDetector(threads=1), LandmarkNetwork("pose_landmark_heavy", threads=1)
+    limbs = [f"{side}_{part}" for part in ("shoulder", "elbow", "wrist", "knee", "ankle") for side in ("left", "right")]
+    found = []
+    for camera in range(1, 5):
+        truth = np.load(shared / "data" / "pose2sim" / f"truth_cam{camera}.npz")
+        names = [{"L": "left_", "R": "right_"}.get(n[0], "") + n[1:].lower() for n in truth["names"]]
+        rows = {int(index): row for row, index in enumerate(truth["frame_index"])}
+        for k, image in enumerate(frames(f"pose2sim/cam{camera}", stop=81, every=20)):
+            if 20 * k not in rows:
+                continue
+            joints = truth["joints"][rows[20 * k]]
+            (seen,) = network.estimate(image, [max(detector.detect(image), key=lambda d: d.region.side_px).region])
+            (seen,) = network.estimate(image, [seen.next_region])
+            K = truth["intrinsics"]
+            rays = (seen.keypoints_px - K[:2, 2]) / np.diag(K)[:2]
+            hips = joints[[names.index("left_hip"), names.index("right_hip")]].mean(axis=0)
+            limb_joints = joints[[names.index(n) for n in limbs]] - hips
+            found.append((rays, seen.keypoints_confidence, seen.world_landmarks, limb_joints))
+    return [np.array(part) for part in zip(*found, strict=True)], [KEYPOINT_NAMES.index(n) for n in limbs]
+
+
+def test_real_people_are_lifted_better_than_by_their_world_landmarks(lifter, real_people):
+    (rays, confidence, world, truth), limbs = real_people
+    lifted = lifter.lift_both_ways(rays, confidence, world)
+    ours, theirs = (np.nanmean(np.linalg.norm(p[:, limbs] - truth, axis=-1)) for p in (lifted.points, world))
+    assert len(truth) >= 15
+    assert ours < 0.115
+    assert ours < 0.85 * theirs
+
+
+def test_errors_on_real_people_are_as_large_as_foretold(lifter, real_people):
+    """Root mean square of residual over deviation, one for honest deviations, all four cameras together."""
+    (rays, confidence, world, truth), limbs = real_people
+    lifted = lifter.lift_both_ways(rays, confidence, world)
+    error = (lifted.points[:, limbs] - truth) @ np.swapaxes(virtual_camera(rays), 1, 2)
+    across = error[..., :2] / lifted.sigma_across[:, limbs, None]
+    along = error[..., 2] / lifted.sigma_along[:, limbs]
+    assert 0.75 < np.sqrt(np.nanmean(np.square(across))) < 1.25
+    assert 0.75 < np.sqrt(np.nanmean(np.square(along))) < 1.25
+
+
+def test_disagreement_widens_the_deviation_along_its_own_axis(people):
+    rng, R = np.random.default_rng(1), virtual_camera(people[..., :2] / people[..., 2:])
+    sigma = rng.uniform(0.02, 0.1, (2, *people.shape[:2]))
+    depth = np.swapaxes(R, 1, 2) @ np.array([0.0, 0.0, 0.2])  # of the virtual camera, in camera axes
+    ways = [Lifted(people + side * depth[:, None], sigma[0], sigma[1]) for side in (-1, 1)]
+    both = mixture(ways, R)
+    assert np.allclose(both.points, people)
+    assert np.allclose(both.sigma_across, sigma[0])
+    assert np.allclose(both.sigma_along, np.hypot(sigma[1], 0.2))
 
 
 def test_the_mirror_image_is_lifted_to_the_mirror_image(lifter, people):
