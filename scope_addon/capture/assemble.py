@@ -17,10 +17,13 @@ from .grounding import along_sight, correct_depth, stand_on_floor, standing_prob
 from .landmark_network import KEYPOINT_NAMES
 from .placement import PlacedTrack
 from .track import Track
+from .vertical_lines import Lines
 from .world import estimate_world
 
 
-def root_on_floor(placed: PlacedTrack, T_floor_camera: np.ndarray | None = None) -> np.ndarray:
+def root_on_floor(
+    placed: PlacedTrack, T_floor_camera: np.ndarray | None = None, lines: Lines | None = None
+) -> np.ndarray:
     """(T, 3) smoothed pelvis positions in the camera frame, their distance corrected by the floor and standing feet.
 
     ``T_floor_camera`` (4, 4): the floor at z = 0; None: it is found from this person alone.
@@ -28,7 +31,7 @@ def root_on_floor(placed: PlacedTrack, T_floor_camera: np.ndarray | None = None)
     valid, root = placed.valid, placed.root
     T = T_floor_camera
     if T is None:
-        T = estimate_world(placed.body, placed.joints[valid], placed.soles[valid])
+        T = estimate_world(placed.body, placed.joints[valid], placed.soles[valid], lines)
     contact = standing_probability(placed.soles, T[2, :3], placed.times) * valid[:, None]
     away = correct_depth(root - placed.center, placed.soles, contact, T, placed.times)
     return root + away[:, None] * along_sight(root - placed.center)
@@ -49,10 +52,12 @@ def assemble_motion(
     T_world_camera: np.ndarray | None = None,
     floor_m: float = 0.0,
     path: CameraPath | None = None,
+    lines: Lines | None = None,
 ) -> Motion:
     """The motion file's content for one person, from ``fitted`` and the same as ``placed``.
 
     ``path``: where each frame's camera was (None: on a stand); "the camera" below is the first frame's.
+    ``lines``: of the background, in its axes.
 
     ``T_world_camera`` (4, 4): the world that several people share, and ``floor_m``, the height in it of what this
     person stands on; None: the world is found from this person alone.
@@ -64,7 +69,7 @@ def assemble_motion(
     times, valid, betas = placed.times, placed.valid, placed.betas
     local, root = placed.rotations, placed.root
     if T_world_camera is None:
-        T_world_camera = estimate_world(body, placed.joints[valid], placed.soles[valid])
+        T_world_camera = estimate_world(body, placed.joints[valid], placed.soles[valid], lines)
     T_floor_camera = T_world_camera.copy()
     T_floor_camera[2, 3] -= floor_m
     R_world_camera, t_world_camera = T_world_camera[:3, :3], T_world_camera[:3, 3]

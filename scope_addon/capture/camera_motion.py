@@ -22,6 +22,7 @@ import numpy as np
 from ...solver.rotations import exp, log
 from .camera import Camera
 from .smoothing import fill_rotation_gaps
+from .vertical_lines import Lines, find_lines
 
 WORKING_SIDE_PX = 480  # the longer side of the picture that corners are followed in
 MOST_CORNERS = 240
@@ -73,6 +74,7 @@ class BackgroundTracker:
         self._key_count = 0
         self._R_first_key = np.eye(3)
         self._R_key_last = np.eye(3)
+        self._lines, self._lines_row = Lines.none(), -1  # of the first frame in which somebody is seen
 
     def add(self, image_rgb: np.ndarray, time_s: float, people: Sequence[np.ndarray]) -> None:
         """The next frame.
@@ -80,6 +82,8 @@ class BackgroundTracker:
         :param people: (n, 2) points of each person in pixels: the background is what lies outside their boxes.
         """
         self._times.append(time_s)
+        if people and self._lines_row < 0:
+            self._lines_row, self._lines = len(self._times) - 1, find_lines(image_rgb, self._camera, people)
         if time_s - self._last_used < 0.98 / SAMPLES_HZ:
             self._rotations.append(None)
             return
@@ -119,6 +123,10 @@ class BackgroundTracker:
             rate = log(R[a].T @ R[b]) / (times[b] - times[a])
             filled[late] = R[b] @ exp((times[late] - times[b])[:, None] * rate)
         return CameraMotion(filled[0].T @ filled, known)
+
+    def lines(self, motion: CameraMotion) -> Lines:
+        """Straight lines of the background, in the first frame's axes."""
+        return self._lines if motion.is_static else self._lines.turned(motion.R_first_camera[self._lines_row])
 
     def _follow(self, picture: np.ndarray, boxes: list[np.ndarray]) -> np.ndarray | None:
         """Rotation (3, 3) from the key frame's axes to the present camera's; None where it cannot be told."""

@@ -28,6 +28,7 @@ from .placement import PlacedTrack, place_track
 from .shared_world import share_world
 from .track import Track
 from .tracker import MOST_PEOPLE, PeopleTracker
+from .vertical_lines import Lines
 from .video import Frame, Video, open_video
 from .video_range import VideoRange
 from .world import estimate_world
@@ -106,7 +107,9 @@ def capture(
         about = {"fps": video.fps, "image_size": (video.width, video.height), "source": path.name}
         turning = background.motion()
         turns = CameraPath.on_a_stand(frames) if turning.is_static else CameraPath.turning(turning.R_first_camera)
-        motions, fits, went = _solve(body, tracks, camera, turns, smoothing, options.parts, about, progress)
+        motions, fits, went = _solve(
+            body, tracks, camera, turns, background.lines(turning), smoothing, options.parts, about, progress
+        )
     for number, motion in enumerate(motions, 1):
         missing = int((~motion.valid).sum())
         if missing:
@@ -167,6 +170,7 @@ def _solve(
     tracks: list[Track],
     camera: Camera,
     path: CameraPath,
+    lines: Lines,
     smoothing: bool,
     parts: Parts,
     about: dict,
@@ -174,7 +178,7 @@ def _solve(
 ) -> tuple[list[Motion], list[FittedTrack], CameraPath]:
     """Each person on their own, in one world: fitted in each frame's camera, all else in the first frame's axes.
 
-    :param path: how the camera turned; returned with how it travelled.
+    :param path: how the camera turned; returned with how it travelled. lines: of the background, which tell up.
     """
     prepared = [prepare_track(body, track, camera, parts) for track in tracks]
     fits = [fit_track(each, progress) for each in prepared]
@@ -186,17 +190,17 @@ def _solve(
     placed = place()
     if smoothing and not path.is_static:
         first = placed[0]
-        up = estimate_world(body, first.joints[first.valid], first.soles[first.valid])[2, :3]
+        up = estimate_world(body, first.joints[first.valid], first.soles[first.valid], lines)[2, :3]
         path = replace(path, center=camera_travel(first.soles, first.valid, up, first.times))
         placed = place()
     if smoothing and parts.second_pass:
-        world = share_world(body, placed) if several else None
+        world = share_world(body, placed, lines) if several else None
         for k, fit in enumerate(fits):
-            root = root_on_floor(placed[k], world.floor_from_camera(k) if world else None)
+            root = root_on_floor(placed[k], world.floor_from_camera(k) if world else None, lines)
             known = path.to_frames(replace(path.to_first(fit), t_camera_root=root))
             fits[k] = refit_track(prepared[k], known, known.t_camera_root, progress)
         placed = place()
-    world = share_world(body, placed) if several else None
+    world = share_world(body, placed, lines) if several else None
     motions = [
         assemble_motion(
             body,
@@ -209,6 +213,7 @@ def _solve(
             T_world_camera=world.T_world_camera if world else None,
             floor_m=world.floors_m[k] if world else 0.0,
             path=path,
+            lines=lines,
             **about,
         )
         for k in range(len(tracks))

@@ -10,7 +10,8 @@ import numpy as np
 from ...solver.body import Body
 from ...solver.frames import world_from_level_camera
 from .placement import PlacedTrack
-from .world import up_from_floor, up_from_standing
+from .vertical_lines import Lines
+from .world import up_from_standing, upright
 
 SAME_FLOOR_M = 0.4  # how far apart, for their distances are not known well, the feet of people on one floor may seem
 
@@ -29,8 +30,9 @@ class SharedWorld:
         return T
 
 
-def share_world(body: Body, placed: list[PlacedTrack]) -> SharedWorld:
-    """Up from all bodies and all floors together, the floor and the origin from the first, most prominent person.
+def share_world(body: Body, placed: list[PlacedTrack], lines: Lines | None = None) -> SharedWorld:
+    """Up from the background's lines, or from all bodies and floors together; the floor and the origin from the first,
+    most prominent person.
 
     Each person's feet count from their own mean place, so that neither a step nor a wrong distance tilts the world.
     """
@@ -38,7 +40,7 @@ def share_world(body: Body, placed: list[PlacedTrack]) -> SharedWorld:
     all_joints = [person.joints[person.valid] for person in placed]
     up = up_from_standing(body, np.concatenate(all_joints))
     centered = [soles - _lowest(soles, up).mean(axis=0) for soles in all_soles]
-    up = up_from_floor(np.concatenate(centered), up)
+    up = upright(up, np.concatenate(centered), lines)
     heights = [float(np.median(_lowest(soles, up) @ up)) for soles in all_soles]
     T_world_camera = world_from_level_camera(up, height=-heights[0])
     start = T_world_camera[:3, :3] @ all_joints[0][0, 0] + T_world_camera[:3, 3]

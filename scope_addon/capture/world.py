@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The world of a static camera: which way is up, and where the floor is."""
+"""The world of a camera: which way is up, and where the floor is."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 
 from ...solver.body import Body
 from ...solver.frames import transform_points, world_from_level_camera
+from .vertical_lines import Lines, up_from_lines
 
 STANDING_KNEE_COS = np.cos(np.radians(30.0))  # thigh and shank within 30 degrees of one line
 FLOOR_NOISE_M = 0.05  # scatter of a supporting foot's depth-borne height
@@ -70,6 +71,12 @@ def up_from_floor(feet_cam: np.ndarray, up: np.ndarray) -> np.ndarray:
     return n / np.linalg.norm(n)
 
 
+def upright(up_body: np.ndarray, feet_cam: np.ndarray, lines: Lines | None) -> np.ndarray:
+    """(3,) up, from the body's own: by the lines of the background, or else by where the feet were."""
+    by_lines = up_from_lines(lines, up_body) if lines is not None else None
+    return up_from_floor(feet_cam, up_body) if by_lines is None else by_lines
+
+
 def with_soles(body: Body, betas: np.ndarray) -> Body:
     """The body with four more keypoints: ``sole/left_heel``, ``sole/left_toe`` and the right ones.
 
@@ -102,13 +109,16 @@ def sole_points(body_with_soles: Body, R: np.ndarray, t: np.ndarray) -> np.ndarr
     return body_with_soles.keypoints(R, t)[..., -len(SOLES) :, :]
 
 
-def estimate_world(body: Body, joints_cam: np.ndarray, soles_cam: np.ndarray) -> np.ndarray:
+def estimate_world(
+    body: Body, joints_cam: np.ndarray, soles_cam: np.ndarray, lines: Lines | None = None
+) -> np.ndarray:
     """World of a static camera: z up, the floor at z = 0, the person's first position above the origin.
 
     :param joints_cam, soles_cam: (T, K+1, 3) and (T, 4, 3) of the valid frames.
+    :param lines: of the background, which know better than a body that leans.
     :return: (4, 4) world_from_camera.
     """
-    up = up_from_floor(soles_cam, up_from_standing(body, joints_cam))
+    up = upright(up_from_standing(body, joints_cam), soles_cam, lines)
     lowest = (soles_cam @ up).min(1)
     T_world_camera = world_from_level_camera(up, height=-float(np.median(lowest)))
     start = transform_points(T_world_camera, joints_cam[:1, 0])[0]

@@ -1,0 +1,98 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Up by upright edges: drawn rooms whose camera is known, and real pictures whose true up is."""
+
+import cv2
+import numpy as np
+import pytest
+from scope.scope_addon.capture.camera import Camera, choose_camera, pinhole
+from scope.scope_addon.capture.vertical_lines import Lines, find_lines, up_from_lines
+from scope.solver.rotations import exp
+
+WIDTH, HEIGHT = 1280, 720
+K = pinhole(WIDTH, HEIGHT, 1100.0)
+CAMERA = Camera(K, np.zeros(5), "given")
+LEVEL_UP = np.array([0.0, -1.0, 0.0])
+
+
+def room(R_camera_level, posts=14, clutter=0, seed=0):
+    """A picture of posts and of level edges, with clutter, by a camera that is turned from level."""
+    rng = np.random.default_rng(seed)
+    picture = np.full((HEIGHT, WIDTH, 3), 120, np.uint8)
+
+    def line(a, b, colour):
+        ends = np.array([a, b]) @ R_camera_level.T
+        if (ends[:, 2] > 0.5).all():
+            pixels = ends @ K.T
+            pixels = np.round(pixels[:, :2] / pixels[:, 2:]).astype(int)
+            cv2.line(picture, tuple(map(int, pixels[0])), tuple(map(int, pixels[1])), colour, 3, cv2.LINE_AA)
+
+    for _ in range(posts):
+        x, z = rng.uniform(-4, 4), rng.uniform(4, 9)
+        line([x, -1.5, z], [x, 1.2, z], (30, 30, 30))
+    for _ in range(10):
+        y, z = rng.uniform(-1.5, 1.2), rng.uniform(4, 9)
+        line([-4, y, z], [4, y, z], (220, 220, 220))
+    for _ in range(clutter):
+        a = rng.uniform([-4, -1.5, 4], [4, 1.2, 9])
+        line(a, a + rng.uniform(-0.7, 0.7, 3), (60, 60, 200))
+    return picture
+
+
+def angle_deg(a, b):
+    return float(np.degrees(np.arccos(np.clip(a @ b, -1, 1))))
+
+
+@pytest.mark.parametrize("turn", [[0, 0, 0], [0.25, 0, 0.0], [-0.15, 0.3, 0.2], [0.3, -0.5, -0.25]])
+def test_posts_correct_a_body_that_leans(turn):
+    R = exp(turn)
+    truth = R @ LEVEL_UP
+    lines = find_lines(room(R, clutter=25), CAMERA, [])
+    leaning = exp([0.12, 0.0, 0.15]) @ truth
+    found = up_from_lines(lines, leaning)
+    assert angle_deg(leaning, truth) > 9
+    assert angle_deg(found, truth) < 1.0
+
+
+def test_a_picture_without_anything_upright_says_nothing():
+    assert up_from_lines(Lines.none(), LEVEL_UP) is None
+    blank = np.full((HEIGHT, WIDTH, 3), 90, np.uint8)
+    assert up_from_lines(find_lines(blank, CAMERA, []), LEVEL_UP) is None
+    level_edges_alone = room(np.eye(3), posts=0)
+    assert up_from_lines(find_lines(level_edges_alone, CAMERA, []), LEVEL_UP) is None
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_leaves_and_rubbish_do_not_turn_the_world(seed):
+    rubbish = room(np.eye(3), posts=0, clutter=60, seed=seed)
+    found = up_from_lines(find_lines(rubbish, CAMERA, []), LEVEL_UP)
+    assert found is None or angle_deg(found, LEVEL_UP) < 6.0
+
+
+def test_the_lines_of_people_do_not_count():
+    picture = room(np.eye(3), posts=0)
+    for k in range(12):
+        cv2.line(picture, (600 + 8 * k, 200), (500 + 8 * k, 520), (0, 0, 0), 3)  # somebody's striped coat
+    box = np.array([[480.0, 190.0], [700.0, 530.0]])
+    assert len(find_lines(picture, CAMERA, []).lengths) > len(find_lines(picture, CAMERA, [box]).lengths) + 5
+
+
+def test_lines_turn_with_their_axes():
+    R = exp([0.1, 0.4, -0.2])
+    lines = find_lines(room(np.eye(3)), CAMERA, [])
+    turned = up_from_lines(lines.turned(R), R @ LEVEL_UP)
+    np.testing.assert_allclose(turned, R @ up_from_lines(lines, LEVEL_UP), atol=1e-6)
+
+
+@pytest.mark.parametrize("number", [1, 2, 3, 4])
+def test_real_cameras_that_are_rolled_and_pitched(shared, number):
+    """Four pictures of a laboratory; their truth says which way is up."""
+    folder = shared / "data" / "pose2sim"
+    ok, picture = cv2.VideoCapture(str(folder / f"cam{number}.mp4")).read()
+    assert ok
+    truth = np.load(folder / f"truth_cam{number}.npz")["up"]
+    camera = choose_camera(picture.shape[1], picture.shape[0])  # the focal length is not known
+    lines = find_lines(cv2.cvtColor(picture, cv2.COLOR_BGR2RGB), camera, [])
+    rng = np.random.default_rng(number)
+    for _ in range(3):
+        leaning = exp(np.radians(7) * rng.standard_normal(3)) @ truth
+        assert angle_deg(up_from_lines(lines, leaning), truth) < 6.0
