@@ -33,6 +33,7 @@ LIMBS = np.array([0, *range(11, 17), *range(23, 29)])  # nose, arms, legs: what 
 # What the network's deviations across and along the line of sight, right on imitated detections, are short of on real
 # pictures: poses, builds and detector errors there are not those of the training.
 SIGMA_ON_PICTURES = np.array([1.0, 1.3])
+WORLD_SHARE = 0.75  # of the estimate that knows the world landmarks, when both are mixed
 _BATCH = 4096
 
 
@@ -88,16 +89,18 @@ def network_input(rays: np.ndarray, confidence: np.ndarray, world: np.ndarray, k
     return np.concatenate(parts, axis=1), R
 
 
-def mixture(ways: list[Lifted], R_virtual_camera: np.ndarray) -> Lifted:
-    """Mean and deviation of an even mixture of several estimates of the same frames.
+def mixture(ways: list[Lifted], shares: list[float], R_virtual_camera: np.ndarray) -> Lifted:
+    """Mean and deviation of a mixture of several estimates of the same frames; the shares a_i sum to 1.
 
-    P = mean_i P_i and σ² = mean_i σ_i² + mean_i (P_i − P)², the latter in the axes of ``R_virtual_camera`` (T, 3, 3):
+    P = Σ_i a_i P_i and σ² = Σ_i a_i (σ_i² + (P_i − P)²), the latter in the axes of ``R_virtual_camera`` (T, 3, 3):
     where estimates disagree, the deviation grows.
     """
-    points = np.mean([way.points for way in ways], axis=0)
-    off = np.mean([np.square((way.points - points) @ np.swapaxes(R_virtual_camera, 1, 2)) for way in ways], axis=0)
-    across = np.mean([np.square(way.sigma_across) for way in ways], axis=0) + off[..., :2].mean(axis=-1)
-    along = np.mean([np.square(way.sigma_along) for way in ways], axis=0) + off[..., 2]
+    mixed = list(zip(shares, ways, strict=True))
+    points = np.sum([a * way.points for a, way in mixed], axis=0)
+    turned = np.swapaxes(R_virtual_camera, 1, 2)
+    off = np.sum([a * np.square((way.points - points) @ turned) for a, way in mixed], axis=0)
+    across = np.sum([a * np.square(way.sigma_across) for a, way in mixed], axis=0) + off[..., :2].mean(axis=-1)
+    along = np.sum([a * np.square(way.sigma_along) for a, way in mixed], axis=0) + off[..., 2]
     return Lifted(points, np.sqrt(across), np.sqrt(along))
 
 
@@ -139,9 +142,9 @@ class Lifter:
         return Lifted(points @ R, sigma[..., 0], sigma[..., 1])
 
     def lift_both_ways(self, rays: np.ndarray, confidence: np.ndarray, world: np.ndarray) -> Lifted:
-        """The mean of what the network finds with and without the world landmarks, better than either on real clips."""
-        with_world, without = (self.lift(rays, confidence, given) for given in (world, None))
-        return mixture([with_world, without], virtual_camera(rays))
+        """What the network finds with the world landmarks and without them, mixed: better than either on real clips."""
+        ways = [self.lift(rays, confidence, given) for given in (world, None)]
+        return mixture(ways, [WORLD_SHARE, 1 - WORLD_SHARE], virtual_camera(rays))
 
     def run(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The bare network: input (T, 200) -> points (T, 33, 3) and log σ (T, 33, 2), virtual camera's axes."""

@@ -130,10 +130,13 @@ def test_disagreement_widens_the_deviation_along_its_own_axis(people):
     sigma = rng.uniform(0.02, 0.1, (2, *people.shape[:2]))
     depth = np.swapaxes(R, 1, 2) @ np.array([0.0, 0.0, 0.2])  # of the virtual camera, in camera axes
     ways = [Lifted(people + side * depth[:, None], sigma[0], sigma[1]) for side in (-1, 1)]
-    both = mixture(ways, R)
+    both = mixture(ways, [0.5, 0.5], R)
     assert np.allclose(both.points, people)
     assert np.allclose(both.sigma_across, sigma[0])
     assert np.allclose(both.sigma_along, np.hypot(sigma[1], 0.2))
+    uneven = mixture(ways, [0.75, 0.25], R)
+    assert np.allclose(uneven.points, people - 0.5 * depth[:, None])
+    assert np.allclose(uneven.sigma_along, np.sqrt(sigma[1] ** 2 + 0.75 * 0.1**2 + 0.25 * 0.3**2))
 
 
 def test_the_mirror_image_is_lifted_to_the_mirror_image(lifter, people):
