@@ -14,11 +14,13 @@ from ...solver.body import Body
 from .armature import RestPose, rest_orientations
 
 RING = "scope_bone_ring"
-# Blender's own palettes, so that selected and active bones get their shades; left blue, right red, as studios have it.
-SIDES = {"Left": "THEME04", "Right": "THEME01", "Middle": "THEME09"}
+# Left blue, right red, as studios have it; brighter than Blender's own palettes, which drown on the dark suit.
+SIDES = {"Left": (0.12, 0.56, 1.0), "Right": (1.0, 0.22, 0.16), "Middle": (1.0, 0.76, 0.1)}
+_SELECTED, _ACTIVE = 0.5, 0.8  # shares of white in the colours of selected and active bones
 _RING_POINTS = 32
 _CLEARANCE = 1.12  # ring radius over that of the flesh
 _THINNEST = 0.008  # metres
+_WIRE_WIDTH = 2.0  # pixels
 
 
 def side_of(joint_name: str) -> str:
@@ -38,12 +40,13 @@ def show_bones(armature: bpy.types.Object, body: Body, rest: RestPose, vertices:
     for i, name in enumerate(body.joint_names):
         side, bone, posed = side_of(name), armature.data.bones[name], armature.pose.bones[name]
         collections[side].assign(bone)
-        bone.color.palette = SIDES[side]
+        _color(bone, SIDES[side])
         radius = _CLEARANCE * float(radii[i])
         posed.custom_shape = ring
         posed.use_custom_shape_bone_size = False
         posed.custom_shape_scale_xyz = (radius, radius, radius)
         posed.custom_shape_translation = (0.0, 0.5 * bone.length, 0.0)
+        posed.custom_shape_wire_width = _WIRE_WIDTH
         bone.show_wire = True
 
 
@@ -71,6 +74,14 @@ def remove_if_unused() -> None:
     if ring is not None and ring.users == 0:
         mesh = ring.data
         bpy.data.batch_remove([ring, mesh])
+
+
+def _color(bone: bpy.types.Bone, color: tuple[float, float, float]) -> None:
+    bone.color.palette = "CUSTOM"
+    custom = bone.color.custom
+    custom.normal, custom.select, custom.active = (
+        tuple(c + white * (1.0 - c) for c in color) for white in (0.0, _SELECTED, _ACTIVE)
+    )
 
 
 def _ring() -> bpy.types.Object:

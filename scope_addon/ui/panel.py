@@ -68,7 +68,7 @@ class SCOPE_PT_person(_Tab, bpy.types.Panel):
 
     bl_idname = "SCOPE_PT_person"
     bl_parent_id = "SCOPE_PT_capture"
-    bl_label = "People and Lens"
+    bl_label = "Options"
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context: bpy.types.Context) -> None:

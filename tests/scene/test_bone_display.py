@@ -9,9 +9,10 @@ from scope.scope_addon.scene.build import build_scene
 def test_sides_have_their_colours_and_collections(body, make_motion):
     armature = build_scene([make_motion(body, 2)], body).people[0].armature
     bones = armature.data.bones
-    palettes = {side: {bones[n].color.palette for n in names} for side, names in sides(body).items()}
-    assert all(len(found) == 1 and "DEFAULT" not in found for found in palettes.values())
-    assert len({next(iter(found)) for found in palettes.values()}) == 3
+    assert {bone.color.palette for bone in bones} == {"CUSTOM"}
+    colours = {side: {tuple(bones[n].color.custom.normal) for n in names} for side, names in sides(body).items()}
+    assert all(len(found) == 1 for found in colours.values())
+    assert len(set.union(*colours.values())) == 3
     collections = {c.name: {b.name for b in c.bones} for c in armature.data.collections}
     assert collections == {side: set(names) for side, names in sides(body).items()}
 
