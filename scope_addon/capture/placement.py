@@ -11,8 +11,8 @@ from ...solver.body import Body
 from .camera_path import CameraPath
 from .fitting import FittedTrack
 from .smoothing import fill_gaps, fill_rotation_gaps, smooth_root, smooth_rotations
+from .soles import sole_points, with_soles
 from .track import Track
-from .world import sole_points, with_soles
 
 
 @dataclass(frozen=True)

@@ -3,8 +3,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from ...solver.body import Body
@@ -14,8 +12,6 @@ from .vertical_lines import Lines, up_from_lines
 STANDING_KNEE_COS = np.cos(np.radians(30.0))  # thigh and shank within 30 degrees of one line
 FLOOR_NOISE_M = 0.05  # scatter of a supporting foot's depth-borne height
 UP_NOISE_RAD = np.radians(5.0)  # scatter of the body's own up direction over a clip
-FOOT_PARTS = ("left_ankle", "left_foot", "right_ankle", "right_foot")
-SOLES = ("sole/left_heel", "sole/left_toe", "sole/right_heel", "sole/right_toe")
 
 
 def up_from_standing(body: Body, joints_cam: np.ndarray) -> np.ndarray:
@@ -75,38 +71,6 @@ def upright(up_body: np.ndarray, feet_cam: np.ndarray, lines: Lines | None) -> n
     """(3,) up, from the body's own: by the lines of the background, or else by where the feet were."""
     by_lines = up_from_lines(lines, up_body) if lines is not None else None
     return up_from_floor(feet_cam, up_body) if by_lines is None else by_lines
-
-
-def with_soles(body: Body, betas: np.ndarray) -> Body:
-    """The body with four more keypoints: ``sole/left_heel``, ``sole/left_toe`` and the right ones.
-
-    Each lies on the ankle or foot part, in the middle of the part's lowest centimetre at rest, where it presses on the
-    floor. Exact for these betas; the points keep their place relative to the joint for others.
-    """
-    v, J = body.rest_vertices(betas), body.rest_joints(betas)
-    strongest = body.skin_joints[np.arange(len(v)), body.skin_weights.argmax(1)]
-    parts = np.array([body.joint_names.index(name) for name in FOOT_PARTS], np.int32)
-    local = np.zeros((len(parts), 3))
-    for k, part in enumerate(parts):
-        own = v[strongest == part] if (strongest == part).any() else J[part : part + 1]
-        sole = own[own[:, 1] <= own[:, 1].min() + 0.01].mean(0)
-        sole[1] = own[:, 1].min()
-        local[k] = sole - J[part]
-    return replace(
-        body,
-        keypoint_names=(*body.keypoint_names, *SOLES),
-        keypoint_part=np.concatenate([body.keypoint_part, parts]),
-        keypoint_template=np.concatenate([body.keypoint_template, body.J_template[parts] + local]),
-        keypoint_shapedirs=np.concatenate([body.keypoint_shapedirs, body.J_shapedirs[parts]]),
-    )
-
-
-def sole_points(body_with_soles: Body, R: np.ndarray, t: np.ndarray) -> np.ndarray:
-    """(T, 4, 3) the soles of ``with_soles``'s body.
-
-    :param R, t: (T, K+1, 3, 3), (T, K+1, 3) part poses in any frame; the result is in that frame.
-    """
-    return body_with_soles.keypoints(R, t)[..., -len(SOLES) :, :]
 
 
 def estimate_world(

@@ -11,7 +11,7 @@ from ...solver.body import Body
 from ...solver.errors import UsageError
 from ...solver.rotations import exp, log
 from ..capture.smoothing import smooth_rotations
-from ..capture.world import sole_points, with_soles
+from ..capture.soles import sole_points, with_soles
 
 
 @dataclass

@@ -4,7 +4,7 @@
 import numpy as np
 import pytest
 from scope.scope_addon.capture import grounding
-from scope.scope_addon.capture.world import sole_points, with_soles
+from scope.scope_addon.capture.soles import sole_points, with_soles
 from scope.solver import rotations
 from scope.solver.body import load_body
 from scope.solver.frames import transform_points, world_from_level_camera

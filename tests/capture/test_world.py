@@ -3,7 +3,8 @@
 
 import numpy as np
 import pytest
-from scope.scope_addon.capture.world import estimate_world, sole_points, with_soles
+from scope.scope_addon.capture.soles import sole_points, with_soles
+from scope.scope_addon.capture.world import estimate_world
 from scope.solver import rotations
 from scope.solver.body import load_body
 from scope.solver.frames import R_WORLD_MODEL, transform_points, world_from_level_camera
