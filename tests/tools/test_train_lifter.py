@@ -129,53 +129,24 @@ def test_held_cameras_look_down_on_hips_below_them_and_less_so_from_afar():
     assert np.subtract(*np.degrees(np.quantile(far, [0.6, 0.1]))) < 12
 
 
-@pytest.fixture
-def exported(tmp_path):
-    """Writes a small random network and gives it back, with its file."""
+def test_the_exported_network_is_the_trained_one(tmp_path):
     torch = pytest.importorskip("torch")
     pytest.importorskip("onnx")
     from scope.tools.train_lifter.export import export
     from scope.tools.train_lifter.network import LiftingNetwork
 
-    def write(seed):
-        torch.manual_seed(seed)
-        network = LiftingNetwork(width=32, blocks=2)
-        for p in network.parameters():
-            torch.nn.init.normal_(p, 0, 0.2)
-            p.data = p.data.half().float()
-        network.mean.normal_()
-        network.spread.uniform_(0.5, 2)
-        network.sigma_offset.normal_(0, 0.1)
-        export(network, tmp_path / f"{seed}.onnx")
-        return network, tmp_path / f"{seed}.onnx"
-
-    return write
-
-
-INPUT = np.random.default_rng(0).normal(0, 1, (7, 200)).astype(np.float32)
-
-
-def test_the_exported_network_is_the_trained_one(exported):
-    import torch
-
-    network, file = exported(0)
+    torch.manual_seed(0)
+    network = LiftingNetwork(width=32, blocks=2)
+    for p in network.parameters():
+        torch.nn.init.normal_(p, 0, 0.2)
+        p.data = p.data.half().float()
+    network.mean.normal_()
+    network.spread.uniform_(0.5, 2)
+    network.sigma_offset.normal_(0, 0.1)
+    export(network, tmp_path / "lifter.onnx")
+    x = np.random.default_rng(0).normal(0, 1, (7, 200)).astype(np.float32)
     with torch.no_grad():
-        points, log_sigma = (a.numpy() for a in network(torch.from_numpy(INPUT)))
-    ours, sigma = Lifter(file).run(INPUT)
+        points, log_sigma = (a.numpy() for a in network(torch.from_numpy(x)))
+    ours, sigma = Lifter(tmp_path / "lifter.onnx").run(x)
     assert np.abs(ours - points).max() < 1e-3 * np.abs(points).max()
     assert np.abs(sigma - log_sigma).max() < 1e-3
-
-
-def test_merged_networks_give_the_moments_of_their_mixture(exported, tmp_path):
-    files = [exported(seed)[1] for seed in (0, 1, 2)]
-    from scope.tools.train_lifter.ensemble import merge
-
-    merge(files, tmp_path / "merged.onnx")
-    members = [Lifter(file).run(INPUT) for file in files]
-    points, sigma = Lifter(tmp_path / "merged.onnx").run(INPUT)
-    draws = np.stack([p for p, _ in members])
-    off = np.square(draws - draws.mean(axis=0)).mean(axis=0)
-    variance = np.mean([np.exp(2 * s) for _, s in members], axis=0)
-    variance += np.stack([off[..., :2].mean(axis=-1), off[..., 2]], axis=-1)
-    assert np.allclose(points, draws.mean(axis=0), atol=1e-4)
-    assert np.allclose(sigma, np.log(variance) / 2, atol=1e-4)

@@ -81,20 +81,3 @@ def export(network: LiftingNetwork, path: Path) -> None:
     temporary = path.with_suffix(".part")
     onnx.save(model, str(temporary))
     os.replace(temporary, path)
-
-
-@torch.no_grad()
-def load_weights(network: LiftingNetwork, path: Path) -> None:
-    """Set ``network`` to what ``export`` wrote to ``path``, at the precision of half floats."""
-    arrays = {w.name: torch.from_numpy(numpy_helper.to_array(w).copy()) for w in onnx.load(str(path)).graph.initializer}
-    network.mean.copy_(arrays["mean"])
-    network.spread.copy_(arrays["spread"])
-    network.sigma_offset.zero_()
-    layers = {"enter": network.enter, "norm": network.norm}
-    for k, block in enumerate(network.blocks):
-        layers |= {f"norm{k}": block.norm, f"first{k}": block.first, f"second{k}": block.second}
-    for name, layer in layers.items():
-        layer.weight.copy_(arrays[f"{name}.weight"])
-        layer.bias.copy_(arrays[f"{name}.bias"])
-    network.leave.weight.copy_(torch.cat([arrays["flat_points.weight"], arrays["flat_sigma.weight"]]))
-    network.leave.bias.copy_(torch.cat([arrays["flat_points.bias"], arrays["flat_sigma.bias"] + 3.0]))

@@ -24,7 +24,7 @@ from ...scope_addon.capture.lifter import HIPS, network_input
 from ...solver.body import load_body
 from .augment import load_motions
 from .dataset import Batch, Dataset
-from .export import export, load_weights
+from .export import export
 from .network import LiftingNetwork, loss
 from .pairs import load_pairs
 from .split import held_out_frames, training_frames
@@ -103,21 +103,8 @@ def calibrate(network: LiftingNetwork, batch: Batch) -> None:
         network.sigma_offset[:, k] = torch.from_numpy(np.log(np.sqrt(np.square(part).mean(axis=1))).astype(np.float32))
 
 
-def train(
-    motions: Path,
-    pairs: Path,
-    folder: Path,
-    seed: int,
-    steps: int,
-    workers: int,
-    minutes: float,
-    peak_rate: float = PEAK_RATE,
-    init: Path | None = None,
-) -> None:
-    """Train and export. The schedule follows the steps or the time, ``minutes``, whichever ends first.
-
-    ``init`` is an exported network to go on from.
-    """
+def train(motions: Path, pairs: Path, folder: Path, seed: int, steps: int, workers: int, minutes: float) -> None:
+    """Train and export. The schedule follows the steps or the time, ``minutes``, whichever ends first."""
     torch.manual_seed(seed)
     torch.set_num_threads(1)
     validation = held_out_batch(motions)
@@ -126,12 +113,10 @@ def train(
     x = torch.from_numpy(validation.input)
     network.mean.copy_(x.mean(0))
     network.spread.copy_(x.std(0) + 1e-3)
-    if init is not None:
-        load_weights(network, init)
     mean = copy.deepcopy(network)
     matrices = {"params": [p for p in network.parameters() if p.ndim > 1], "weight_decay": DECAY}
     others = {"params": [p for p in network.parameters() if p.ndim == 1], "weight_decay": 0.0}
-    optimizer = torch.optim.AdamW([matrices, others], peak_rate, (0.9, 0.98))
+    optimizer = torch.optim.AdamW([matrices, others], PEAK_RATE, (0.9, 0.98))
     log: list[dict] = []
     start, total = time.perf_counter(), 0.0
     for step, batch in enumerate(batches(motions, seed, steps, workers)):
@@ -139,7 +124,7 @@ def train(
         if done >= 1:
             break
         for group in optimizer.param_groups:
-            group["lr"] = peak_rate * min((step + 1) / WARM_UP, 0.5 + 0.5 * math.cos(math.pi * done))
+            group["lr"] = PEAK_RATE * min((step + 1) / WARM_UP, 0.5 + 0.5 * math.cos(math.pi * done))
         with torch.autocast("cpu", torch.bfloat16):
             points, log_sigma = network(torch.from_numpy(batch.input))
         value = loss(points, log_sigma, torch.from_numpy(batch.points))
@@ -178,10 +163,8 @@ def main() -> None:
     parser.add_argument("--steps", type=int, default=10000)
     parser.add_argument("--minutes", type=float, default=30.0)
     parser.add_argument("--workers", type=int, default=2)
-    parser.add_argument("--rate", type=float, default=PEAK_RATE, help="the highest learning rate")
-    parser.add_argument("--init", type=Path, help="exported network of one member to go on from")
     a = parser.parse_args()
-    train(a.motions, a.pairs, a.output, a.seed, a.steps, a.workers, a.minutes, a.rate, a.init)
+    train(a.motions, a.pairs, a.output, a.seed, a.steps, a.workers, a.minutes)
 
 
 if __name__ == "__main__":
