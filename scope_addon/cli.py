@@ -17,7 +17,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import NoReturn, TextIO
 
-from ..solver.body import ASSETS, BUILT_IN, Body
+from ..solver.body import ASSETS, BUILT_IN, Body, body_with_hands
 from ..solver.errors import ScopeError, UsageError
 from .motion import Motion
 from .scene.output_paths import SUFFIXES, check_output, person_paths
@@ -90,6 +90,7 @@ def _add_options(capture: argparse.ArgumentParser) -> None:
     capture.add_argument("--end", metavar="TIME", help="until when")
     capture.add_argument("--fps", metavar="N", help="use so many frames per second, such as 12 or 29.97")
     capture.add_argument("--body", default="scope", help=f"{', '.join(BUILT_IN)} or a body .npz (default: scope)")
+    capture.add_argument("--hands", action="store_true", help="fingers too, on scope_h unless --body says otherwise")
     capture.add_argument("--focal-mm", type=float, metavar="MM", help="35 mm equivalent focal length of the camera")
     capture.add_argument("--fov", type=float, metavar="DEGREES", help="field of view along the longer side")
     capture.add_argument("--calibration", type=Path, metavar="FILE", help="JSON with intrinsics, dist and size")
@@ -141,7 +142,7 @@ def run_capture(args: argparse.Namespace) -> dict:
     from .capture.pipeline import CaptureOptions, capture
     from .capture.video_range import VideoRange, parse_rate, parse_time
 
-    body = load_body(args.body)
+    body = load_body(body_with_hands(args.body) if args.hands else args.body)
     options = CaptureOptions(
         quality=args.quality,
         people=_people(args.people),
@@ -154,6 +155,7 @@ def run_capture(args: argparse.Namespace) -> dict:
         fov_deg=args.fov,
         calibration=args.calibration,
         smoothing=not args.no_smoothing,
+        hands=args.hands,
         threads=max(0, args.threads),
     )
     with _ProgressBar(sys.stderr, show=sys.stderr.isatty() and not args.quiet) as progress:

@@ -165,6 +165,7 @@ def check(archive: Path) -> None:
     if any(w.lower().startswith("numpy") for w in wheels):
         problems.append("numpy is shipped")
     networks = ("pose_detection", "pose_landmark_lite", "pose_landmark_full", "pose_landmark_heavy")
+    networks += ("palm_detection", "hand_landmark")
     wanted = [f"assets/networks/{n}.onnx" for n in networks]
     wanted += ["assets/networks/LICENSE-mediapipe.txt", "assets/body/scope.npz", "assets/body/scope_h.npz"]
     wanted += ["assets/body/LICENSE.md", "assets/sample/sample.mp4", "LICENSE", "__init__.py"]

@@ -25,6 +25,11 @@ ASSETS = Path(__file__).resolve().parent.parent / "assets"
 BUILT_IN = {"scope": ASSETS / "body" / "scope.npz", "scope_h": ASSETS / "body" / "scope_h.npz"}
 
 
+def body_with_hands(which: str) -> str:
+    """The built-in body with fingers instead of the one without; any other stays."""
+    return "scope_h" if which == "scope" else which
+
+
 @dataclass(frozen=True)
 class Body:
     """A body model. All lengths in metres, in the model frame, at zero pose.

@@ -14,6 +14,7 @@ from .camera import Camera
 from .camera_path import CameraPath
 from .fitting import FittedTrack
 from .grounding import along_sight, correct_depth, stand_on_floor, standing_probability
+from .hand_measure import HAND_KEYPOINT_NAMES
 from .landmark_network import KEYPOINT_NAMES
 from .placement import PlacedTrack
 from .track import Track
@@ -105,8 +106,8 @@ def assemble_motion(
         timestamps=times,
         valid=valid,
         joints_cam=joints_cam,
-        keypoints2d=np.concatenate([track.keypoints_px, track.confidence[..., None]], axis=-1),
-        keypoints2d_names=np.array(KEYPOINT_NAMES),
+        keypoints2d=_keypoints2d(track),
+        keypoints2d_names=np.array(KEYPOINT_NAMES if track.hands is None else KEYPOINT_NAMES + HAND_KEYPOINT_NAMES),
         intrinsics=camera.intrinsics,
         dist=camera.dist,
         joint_confidence=fitted.joint_confidence,
@@ -116,6 +117,14 @@ def assemble_motion(
         image_size=np.array(image_size),
         source=source,
     )
+
+
+def _keypoints2d(track: Track) -> np.ndarray:
+    """(T, J, 3) pixels and confidence of the body's keypoints, and of the hands' where they were looked for."""
+    body = np.concatenate([track.keypoints_px, track.confidence[..., None]], axis=-1)
+    if track.hands is None:
+        return body
+    return np.concatenate([body, track.hands[..., :3].reshape(len(track), -1, 3)], axis=1)
 
 
 def reprojection_error(

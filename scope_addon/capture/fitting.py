@@ -29,6 +29,7 @@ from ...solver import (
     make_tree,
 )
 from .camera import Camera
+from .hand_measure import HandMeasurer, calm_fingers, with_finger_limits
 from .lifter import Lifted, Lifter
 from .measure import DEPTH_SIGMA_M, Measurer
 from .parts import ALL_PARTS, Parts
@@ -72,11 +73,20 @@ class PreparedTrack:
     lifted: Lifted
     priors: Priors  # the shape unknown
     weights: Weights
+    hand_measurer: HandMeasurer | None = None
+    hands: np.ndarray | None = None  # (T, 2, 21, 6) as the track's, without distortion; None: not looked for
 
     def measure(self, k: int, root_cam: np.ndarray | None = None) -> Measurements:
         """Frame ``k`` for the solver; ``root_cam`` (3,): where the pelvis is known to be, camera frame, metres."""
         points, sigma = self.lifted.points[k], self.lifted.sigma_along[k]
         return self.measurer.measure(self.pixels[k], self.track.confidence[k], points, sigma, root_cam)
+
+    def measure_with_hands(self, k: int, root_cam: np.ndarray | None = None) -> Measurements:
+        """The same with the hands, where these were looked for. The shape is found without: it says little of hands."""
+        measured = self.measure(k, root_cam)
+        if self.hand_measurer is None or self.hands is None:
+            return measured
+        return self.hand_measurer.add(measured, self.hands[k])
 
     def priors_with_shape(self, betas: np.ndarray) -> Priors:
         """The priors once the shape is known."""
@@ -88,7 +98,12 @@ def prepare_track(body: Body, track: Track, camera: Camera, parts: Parts = ALL_P
     measurer, pixels = Measurer(body, camera.intrinsics), camera.undistort(track.keypoints_px)
     lifted = _lift(measurer, track, pixels, parts)
     priors = replace(default_priors(body), joint_weights=_joint_weights(body))
-    return PreparedTrack(body, track, measurer, pixels, lifted, priors, parts.weights(WEIGHTS))
+    prepared = PreparedTrack(body, track, measurer, pixels, lifted, priors, parts.weights(WEIGHTS))
+    if track.hands is None:
+        return prepared
+    hands = np.concatenate([camera.undistort(track.hands[..., :2]), track.hands[..., 2:]], axis=-1)
+    measurer_of_hands = HandMeasurer(body, camera.intrinsics)
+    return replace(prepared, hand_measurer=measurer_of_hands, hands=hands, priors=with_finger_limits(priors, body))
 
 
 def _lift(measurer: Measurer, track: Track, pixels: np.ndarray, parts: Parts) -> Lifted:
@@ -142,7 +157,7 @@ def _fit_frames(
                 fresh = last is None or track.acquired[k] or track.times[k] - last_time > LONGEST_COAST_S
                 init = None if fresh or last is None else last.state
             known_root = init.t_camera_root if init is not None and states is not None else None
-            found = _fit_frame(tree, prepared.measure(k, known_root), init, priors, prepared.weights)
+            found = _fit_frame(tree, prepared.measure_with_hands(k, known_root), init, priors, prepared.weights)
             if found.status not in (Status.NO_MEASUREMENTS, Status.NON_FINITE):
                 last, last_time, valid[k] = found, track.times[k], True
                 iterations += found.iterations
@@ -151,12 +166,17 @@ def _fit_frames(
             root[k] = last.state.t_camera_root
         if k % 16 == 0 or k == T - 1:
             progress("solving" if states is None else "solving on the floor", k + 1, T)
+    confidence = prepared.measurer.joint_confidence(track.confidence)
+    if prepared.hand_measurer is not None and prepared.hands is not None:
+        confidence = np.maximum(confidence, prepared.hand_measurer.joint_confidence(prepared.hands))
+        seen = (prepared.hands[:, :, 0, 2] > 0) & valid[:, None]
+        rotations = calm_fingers(rotations, prepared.hand_measurer.fingers, seen, track.times)
     return FittedTrack(
         rotations=rotations,
         t_camera_root=root,
         betas=betas,
         valid=valid,
-        joint_confidence=prepared.measurer.joint_confidence(track.confidence) * valid[:, None],
+        joint_confidence=confidence * valid[:, None],
         iterations=iterations / max(int(valid.sum()), 1),
     )
 

@@ -58,7 +58,12 @@ def repair_left_right(track: Track) -> Track:
         keypoints_px=exchange(track.keypoints_px),
         confidence=exchange(track.confidence),
         world_landmarks=np.where(track.seen[:, None, None], repaired, 0.0),
+        hands=None if track.hands is None else _exchange_hands(track.hands, exchanged),
     )
+
+
+def _exchange_hands(hands: np.ndarray, exchanged: np.ndarray) -> np.ndarray:
+    return np.where(exchanged[:, None, None, None], hands[:, ::-1], hands)
 
 
 def labelled(world_landmarks: np.ndarray, labels: np.ndarray) -> np.ndarray:

@@ -18,7 +18,8 @@ class Observation:
     metres, the middle of the hips at 0, in camera axes (x right, y down, z forward); ``presence``: the network's
     probability that there is a person; ``region``: where it looked; ``acquired``: the person was not followed from the
     frame before; ``appearance``: see `appearance`, in some frames; ``judged_landmarks``: what the strong network says
-    in place of ``world_landmarks``, in few frames. Order: `KEYPOINT_NAMES`.
+    in place of ``world_landmarks``, in few frames. Order: `KEYPOINT_NAMES`. ``hands`` (2, 21, 6), when they are asked
+    for: pixels, confidence and world landmarks of the left and right hand, see `hand_tracker`; zeros where not seen.
     """
 
     keypoints_px: np.ndarray
@@ -29,3 +30,4 @@ class Observation:
     acquired: bool
     appearance: np.ndarray | None = None
     judged_landmarks: np.ndarray | None = None
+    hands: np.ndarray | None = None

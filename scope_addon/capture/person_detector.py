@@ -105,11 +105,14 @@ def letterbox(image_rgb: np.ndarray) -> tuple[np.ndarray, float, np.ndarray]:
     return square, scale, np.array([left, top], float)
 
 
-def make_anchors() -> np.ndarray:
-    """(2254, 2) anchor centres in input pixels, in the network's order: by layer, row, column, anchor of the cell."""
+def make_anchors(size: int = INPUT_SIZE, strides: tuple[tuple[int, int], ...] = _LAYERS) -> np.ndarray:
+    """(N, 2) anchor centres in input pixels, in the network's order: by layer, row, column, anchor of the cell.
+
+    ``strides``: stride and anchors per cell of each layer; the person detector has 2254 anchors.
+    """
     layers = []
-    for stride, per_cell in _LAYERS:
-        cells = (np.arange(INPUT_SIZE // stride) + 0.5) * stride
+    for stride, per_cell in strides:
+        cells = (np.arange(size // stride) + 0.5) * stride
         y, x = np.meshgrid(cells, cells, indexing="ij")
         layers.append(np.repeat(np.stack([x, y], -1).reshape(-1, 2), per_cell, axis=0))
     return np.concatenate(layers)
@@ -118,7 +121,7 @@ def make_anchors() -> np.ndarray:
 def decode(
     boxes: np.ndarray, logits: np.ndarray, anchors: np.ndarray, threshold: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Scores (N,) and values (N, 12) = left, top, right, bottom, 4 × (x, y) in input pixels, best first.
+    """Scores (N,) and values (N, 4 + 2n) = left, top, right, bottom, n × (x, y) in input pixels, best first.
 
     The network gives per anchor the box's centre and the points relative to the anchor, and the box's size.
     """
@@ -127,8 +130,8 @@ def decode(
     chosen = chosen[np.argsort(-score[chosen], kind="stable")]
     raw, anchor = boxes[chosen].astype(float), anchors[chosen]
     center, half = raw[:, :2] + anchor, raw[:, 2:4] / 2
-    points = raw[:, 4:].reshape(-1, 4, 2) + anchor[:, None]
-    return score[chosen], np.concatenate([center - half, center + half, points.reshape(-1, 8)], axis=1)
+    points = raw[:, 4:] + np.tile(anchor, (1, raw.shape[1] // 2 - 2))
+    return score[chosen], np.concatenate([center - half, center + half, points], axis=1)
 
 
 def merge_overlapping(score: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

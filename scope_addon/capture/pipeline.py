@@ -20,6 +20,8 @@ from .camera_motion import BackgroundTracker
 from .camera_path import CameraPath
 from .camera_travel import camera_travel
 from .fitting import FittedTrack, fit_track, prepare_track, refit_track
+from .hand_measure import require_fingers
+from .hand_tracker import HandTracker
 from .left_right import repair_left_right
 from .observation import Observation
 from .parts import ALL_PARTS, Parts
@@ -54,6 +56,7 @@ class CaptureOptions:
     wanted: VideoRange = VideoRange()  # which frames
     smoothing: bool = True
     threads: int = 0  # 0: as many as there are cores
+    hands: bool = False  # fingers too; the body needs finger joints
     parts: Parts = ALL_PARTS  # for experiments
 
 
@@ -74,6 +77,7 @@ def capture(
 ) -> Capture:
     """Capture the people of a video or picture, the most prominent one first.
 
+    :raises UsageError: hands are asked for and the body has no fingers.
     :raises VideoError: the footage cannot be used.
     :raises NoPersonError: nobody was found.
     :raises CancelledError: raised by ``progress`` itself, passed on.
@@ -81,6 +85,8 @@ def capture(
     path = Path(path)
     clock = _Clock()
     most = _most_people(options.people)
+    if options.hands:
+        require_fingers(body)
     with open_video(path, options.wanted) as video:
         camera = choose_camera(
             video.width,
@@ -93,7 +99,8 @@ def capture(
         threads = options.threads or os.cpu_count() or 1
         tracker = PeopleTracker(options.quality, threads, None if options.people == LARGEST else most)
         background = BackgroundTracker(camera, video.width, video.height)
-        seen = _observe(video, tracker, background, clock, progress, watch)
+        hands = HandTracker(threads) if options.hands else None
+        seen = _observe(video, tracker, hands, background, clock, progress, watch)
         warnings = list(video.warnings)
     frames = len(seen)
     with clock.stage("solver"):
@@ -141,6 +148,7 @@ def capture(
 def _observe(
     video: Video,
     tracker: PeopleTracker,
+    hands: HandTracker | None,
     background: BackgroundTracker,
     clock: _Clock,
     progress: Progress,
@@ -157,7 +165,10 @@ def _observe(
             upcoming = next(frames, None)
         with clock.stage("networks"):
             observations = tracker.step(frame.image_rgb, upcoming.image_rgb if upcoming else None)
-            builder.add(frame.index, frame.timestamp_s, observations)
+        if hands is not None:
+            with clock.stage("hands"):
+                observations = hands.step(frame.image_rgb, observations)
+        builder.add(frame.index, frame.timestamp_s, observations)
         with clock.stage("background"):
             background.add(frame.image_rgb, frame.timestamp_s, [o.keypoints_px for _, o in observations])
         watch(frame, max((o for _, o in observations), key=lambda o: o.region.side_px, default=None))

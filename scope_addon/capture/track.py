@@ -27,6 +27,8 @@ class Track:
     # The strong network's world landmarks, in few frames: rows (A,) and (A, 33, 3). See `left_right`.
     judged_rows: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int64))
     judged_landmarks: np.ndarray = field(default_factory=lambda: np.zeros((0, KEYPOINT_COUNT, 3)))
+    # (T, 2, 21, 6) pixels, confidence, world landmarks of the left and right hand; None: they were not looked for.
+    hands: np.ndarray | None = None
 
     def __len__(self) -> int:
         return len(self.frames)
@@ -42,6 +44,7 @@ class Tracklet:
     sides_px: list[float] = field(default_factory=list)  # of the region
     appearance: np.ndarray = field(default_factory=lambda: np.zeros(APPEARANCE_SIZE))  # sum over the frames
     judged: list[tuple[int, np.ndarray]] = field(default_factory=list)
+    hands: list[np.ndarray] = field(default_factory=list)  # (2, 21, 6) each; none when they are not looked for
 
     def add(self, row: int, observation: Observation) -> None:
         """Append the frame in place ``row``; what is not finite counts as not seen."""
@@ -57,6 +60,8 @@ class Tracklet:
             self.appearance = self.appearance + o.appearance
         if o.judged_landmarks is not None:
             self.judged.append((row, o.judged_landmarks))
+        if o.hands is not None:
+            self.hands.append(np.where(np.isfinite(o.hands), o.hands, 0.0).astype(np.float32))
 
     def cut(self, count: int) -> None:
         """Keep the first ``count`` frames."""
@@ -64,6 +69,7 @@ class Tracklet:
             end = self.rows[count]
             self.judged = [(row, w) for row, w in self.judged if row < end]
             del self.rows[count:], self.values[count:], self.centers_px[count:], self.sides_px[count:]
+            del self.hands[count:]
 
     @property
     def prominence(self) -> float:
@@ -76,12 +82,16 @@ def make_track(frames: Sequence[int], times: Sequence[float], tracklets: Sequenc
     values = np.zeros((len(frames), KEYPOINT_COUNT, 6))
     seen, acquired = np.zeros(len(frames), bool), np.zeros(len(frames), bool)
     judged: list[tuple[int, np.ndarray]] = []
+    shapes = {hands.shape for tracklet in tracklets for hands in tracklet.hands[:1]}
+    hands = np.zeros((len(frames), *shapes.pop())) if shapes else None
     for tracklet in tracklets:
         if tracklet.rows:
             values[tracklet.rows] = tracklet.values
             seen[tracklet.rows] = True
             acquired[tracklet.rows[0]] = True
             judged += tracklet.judged
+        if hands is not None and tracklet.hands:
+            hands[tracklet.rows] = tracklet.hands
     return Track(
         frames=np.array(frames, np.int64),
         times=np.array(times, float),
@@ -92,4 +102,5 @@ def make_track(frames: Sequence[int], times: Sequence[float], tracklets: Sequenc
         acquired=acquired,
         judged_rows=np.array([row for row, _ in judged], np.int64),
         judged_landmarks=np.array([w for _, w in judged], float).reshape(-1, KEYPOINT_COUNT, 3),
+        hands=hands,
     )

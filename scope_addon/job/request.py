@@ -26,6 +26,7 @@ class JobRequest:
     start_s: float = 0.0  # of the video
     end_s: float | None = None  # None: to its end
     smoothing: bool = True
+    hands: bool = False  # fingers too, on a body that has them
     threads: int = 0  # 0: as many as there are cores
 
     def to_json(self) -> str:

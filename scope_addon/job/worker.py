@@ -57,6 +57,7 @@ def run(request: JobRequest, job_folder: Path, reporter: Reporter) -> int:
             fov_deg=request.fov_deg,
             wanted=VideoRange(request.start_s, float("inf") if request.end_s is None else request.end_s),
             smoothing=request.smoothing,
+            hands=request.hands,
             threads=request.threads,
         )
         watch = PreviewWriter(job_folder, reporter.send)

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import bpy
 
-from ...solver.body import load_body
+from ...solver.body import body_with_hands, load_body
 from ...solver.errors import UsageError, VideoError
 from ..job.cache import Cache, CachedCapture
 from ..job.process import ROOT, START_SCRIPT, WorkerProcess
@@ -145,6 +145,8 @@ def capture_request(scene: bpy.types.Scene) -> JobRequest:
         if not path:
             raise UsageError("choose a body file, here or in the preferences, or use the built-in body")
         body = bpy.path.abspath(path)
+    if settings.hands:
+        body = body_with_hands(body)
     return JobRequest(
         footage=str(footage),
         body=body,
@@ -155,6 +157,7 @@ def capture_request(scene: bpy.types.Scene) -> JobRequest:
         start_s=settings.range_start if settings.use_range else 0.0,
         end_s=settings.range_end if settings.use_range else None,
         smoothing=settings.smoothing,
+        hands=settings.hands,
         threads=chosen.threads if chosen else 0,
     )
 

@@ -103,6 +103,12 @@ class SCOPE_PG_settings(bpy.types.PropertyGroup):
         options=_PATH,
         description="SMPL, SMPL+H, SMPL-X or STAR model (.npz or .pkl); the one in the preferences when empty",
     )
+    hands: BoolProperty(
+        name="Hands",
+        default=False,
+        options=_FIXED,
+        description="Capture the fingers too, on the body with hands; takes longer",
+    )
     lens: EnumProperty(
         name="Lens",
         items=LENSES,

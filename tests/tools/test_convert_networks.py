@@ -21,25 +21,6 @@ from scope.tools.convert_networks.to_onnx import convert_model  # noqa: E402
 
 DOWNLOADS = Path(__file__).resolve().parents[2] / "build" / "downloads"
 
-# Not built yet, but their operators (MEAN, FULLY_CONNECTED, PRELU) must convert too.
-HAND_NETWORKS = (
-    Network(
-        "hand_landmark",
-        WHEEL,
-        "mediapipe/modules/hand_landmark/hand_landmark_full.tflite",
-        (1, 224, 224, 3),
-        ((0, "landmarks", (1, 63)), (1, "presence", (1, 1)), (2, "handedness", (1, 1)), (3, "world", (1, 63))),
-    ),
-    Network(
-        "palm_detection",
-        WHEEL,
-        "mediapipe/modules/palm_detection/palm_detection_full.tflite",
-        (1, 192, 192, 3),
-        ((0, "boxes", (1, 2016, 18)), (1, "scores", (1, 2016, 1))),
-    ),
-)
-
-
 def model_bytes(network: Network) -> bytes:
     try:
         return read_member(fetch(network.package, DOWNLOADS), network.member)
@@ -57,7 +38,7 @@ def assert_same_as_tflite(network: Network, pictures: np.ndarray) -> None:
     interpreter_module = pytest.importorskip(
         "ai_edge_litert.interpreter", reason="the comparison needs the package ai-edge-litert", exc_type=ImportError
     )
-    images = pictures.astype(np.float32) * 2 - 1 if "detection" in network.name else pictures.astype(np.float32)
+    images = pictures.astype(np.float32) * 2 - 1 if network.name == "pose_detection" else pictures.astype(np.float32)
     session = onnxruntime.InferenceSession(convert(network), providers=["CPUExecutionProvider"])
     ours = session.run(None, {"input": np.ascontiguousarray(images.transpose(0, 3, 1, 2))})
     interpreter = interpreter_module.Interpreter(model_content=model_bytes(network))
@@ -76,7 +57,7 @@ def assert_same_as_tflite(network: Network, pictures: np.ndarray) -> None:
         assert np.abs(found - truth).max() < 1e-3 * output_range, name
 
 
-@pytest.mark.parametrize("network", NETWORKS + HAND_NETWORKS, ids=lambda n: n.name)
+@pytest.mark.parametrize("network", NETWORKS, ids=lambda n: n.name)
 def test_equals_tflite_on_noise(network: Network) -> None:
     height, width = network.input_shape[1:3]
     assert_same_as_tflite(network, np.random.default_rng(3).random((2, height, width, 3)))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Turns MediaPipe's TFLite pose networks into ONNX files for onnxruntime.
+"""Turns MediaPipe's TFLite pose and hand networks into ONNX files for onnxruntime.
 
 ``python -m scope.tools.convert_networks [--out assets/networks]`` fetches the two pinned packages (`fetch`), reads the
 models (`flatbuffer`, `tflite`), folds compressed weights into plain constants (`constants`), and writes one ONNX graph

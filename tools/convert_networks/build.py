@@ -49,7 +49,8 @@ def convert_network(network: Network, downloads: Path) -> bytes:
 def _notice(downloads: Path) -> bytes:
     files = "\n".join(f"  {n.name}.onnx from {n.member.rsplit('/', 1)[-1]} of {n.package.source}" for n in NETWORKS)
     head = (
-        "These files are the MediaPipe pose networks, Copyright The MediaPipe Authors, Apache License 2.0 (below).\n"
+        "These files are the MediaPipe pose and hand networks, Copyright The MediaPipe Authors, Apache License 2.0\n"
+        "(below).\n"
         "Changes: converted from TensorFlow Lite to ONNX, channels first, the segmentation output removed.\n"
         f"{files}\n\n"
     )

@@ -62,4 +62,18 @@ NETWORKS = (
         )
         for size in ("lite", "full", "heavy")
     ),
+    Network(
+        "palm_detection",
+        WHEEL,
+        "mediapipe/modules/palm_detection/palm_detection_full.tflite",
+        (1, 192, 192, 3),
+        ((0, "boxes", (1, 2016, 18)), (1, "scores", (1, 2016, 1))),
+    ),
+    Network(
+        "hand_landmark",
+        WHEEL,
+        "mediapipe/modules/hand_landmark/hand_landmark_full.tflite",
+        (1, 224, 224, 3),
+        ((0, "landmarks", (1, 63)), (1, "presence", (1, 1)), (2, "handedness", (1, 1)), (3, "world", (1, 63))),
+    ),
 )
