@@ -22,10 +22,12 @@ from ...solver.frames import R_WORLD_MODEL
 from ...solver.rotations import exp, log
 from ..edit.clip import Clip
 from .bone_map import SPINE, BoneMap
+from .feet import FootRest, ankle_goal, flat_toes, sinking
 from .legs import reach
 
 UP = np.array([0.0, 0.0, 1.0])
 _NEXT = {"hip": "knee", "knee": "ankle", "shoulder": "elbow", "elbow": "wrist", "wrist": "hand"}
+_SOLE_M, _HEEL_M = 0.015, 0.02  # the sole's thickness, and how long a piece of it is the heel
 
 
 @dataclass(frozen=True)
@@ -103,15 +105,78 @@ def transfer(
     lift[2] = (rig.heads[hips, 2].mean() - rig.floor) - scale * rested
     heads += (scale * source_hips + lift - heads[:, hips].mean(axis=1))[:, None]
     if feet:
-        for side in sides:
-            if f"{side}_ankle" in row:
-                ankle, source = row[f"{side}_ankle"], index[f"{side}_ankle"]
-                goal = scale * joints[:, source]
-                goal[:, 2] += (rig.heads[ankle, 2] - rig.floor) - scale * (rest[source, 2] - sole)
-                # Reach, then let what hangs on the leg follow; the foot keeps its turn.
-                reach(world, heads, (row[f"{side}_hip"], row[f"{side}_knee"], ankle), goal)
-        heads = _positions(rig, world) + (heads[:, hips[:1]] - _positions(rig, world)[:, hips[:1]])
+        _stand(rig, row, world, heads, turns, A @ F, body, betas, joints, scale)
     return Pose(world, heads)
+
+
+def _stand(
+    rig: Skeleton,
+    row: dict[str, int],
+    world: np.ndarray,
+    heads: np.ndarray,
+    turns: np.ndarray,
+    AF: np.ndarray,
+    body: Body,
+    betas: np.ndarray,
+    joints: np.ndarray,
+    scale: float,
+) -> None:
+    """Bring the ankles, and with them heels and balls, to where the body's are; in place."""
+    index = {part: k for k, part in enumerate(body.joint_names)}
+    sides = [side for side in ("left", "right") if f"{side}_ankle" in row]
+    feet = body_feet(body, betas)
+    legs, goals = [], []
+    for side in sides:
+        hip, knee, ankle = (row[f"{side}_{part}"] for part in ("hip", "knee", "ankle"))
+        own = _rig_foot(rig, AF[ankle], ankle, row.get(f"{side}_foot"), feet[side], scale)
+        legs.append((hip, knee, ankle))
+        goals.append(ankle_goal(feet[side], own, scale, turns[:, ankle], joints[:, index[f"{side}_ankle"]]))
+        toe = row.get(f"{side}_foot")
+        if toe is not None:
+            ball = goals[-1] + turns[:, ankle] @ own.ball
+            # Imported bones' tails may point anywhere; the toes lie as the foot does.
+            tip = own.ball * [1, 1, 0] / np.linalg.norm(own.ball[:2]) * np.linalg.norm(rig.tails[toe] - rig.heads[toe])
+            flat = flat_toes(turns[:, toe], tip, ball, own.height + own.ball[2])
+            world[:, toe] = flat @ AF[toe] @ rig.rotations[toe]
+    if not legs:
+        return
+    hips = [leg[0] for leg in legs]
+    rested = [[np.linalg.norm(rig.heads[b] - rig.heads[a]) for a, b in zip(leg, leg[1:], strict=False)] for leg in legs]
+    heads[..., 2] -= sinking(heads[:, hips], np.stack(goals, 1), 0.9995 * np.array(rested).sum(1))[:, None]
+    first = heads[:, hips[0]].copy()
+    for leg, goal in zip(legs, goals, strict=True):
+        reach(world, heads, leg, goal)
+    heads[:] = _positions(rig, world)
+    heads += (first - heads[:, hips[0]])[:, None]
+
+
+def body_feet(body: Body, betas: np.ndarray) -> dict[str, FootRest]:
+    """The rested body's feet by side; the heel is the rear end of what the foot, without its toes, stands on."""
+    v, J = body.rest_vertices(betas) @ R_WORLD_MODEL.T, body.rest_joints(betas) @ R_WORLD_MODEL.T
+    strongest = body.skin_joints[np.arange(len(v)), body.skin_weights.argmax(1)]
+    low = float(v[:, 2].min())
+    out = {}
+    for side in ("left", "right"):
+        part = body.joint_names.index(f"{side}_ankle")
+        ankle, ball = J[part], J[body.joint_names.index(f"{side}_foot")]
+        sole = v[(strongest == part) & (v[:, 2] < low + _SOLE_M)]
+        heel = sole[sole[:, 1] > sole[:, 1].max() - _HEEL_M].mean(axis=0) if len(sole) else ankle
+        out[side] = FootRest(np.array([*heel[:2], low]) - ankle, ball - ankle, float(ankle[2]) - low)
+    return out
+
+
+def _rig_foot(
+    rig: Skeleton, AF: np.ndarray, ankle: int, toe: int | None, source: FootRest, scale: float
+) -> FootRest:
+    """The rig's foot; where no bone tells its ball, it is as long as the body's."""
+    height = float(rig.heads[ankle, 2]) - rig.floor
+    ball = AF @ ((rig.heads[toe] if toe is not None else rig.tails[ankle]) - rig.heads[ankle])
+    length = float(np.linalg.norm(source.ball[:2]))
+    share = float(np.linalg.norm(ball[:2])) / length
+    if not 0.3 * scale < share < 3 * scale or ball @ source.ball < 0:
+        share, ball = scale, np.array([*(scale * source.ball[:2]), -0.8 * height])
+    heel = np.array([*(share * source.heel[:2]), -height])  # no bone tells it: as far behind as the body's
+    return FootRest(heel, ball, height)
 
 
 def basis(rig: Skeleton, world: np.ndarray) -> np.ndarray:

@@ -72,16 +72,44 @@ def retarget(
         raise UsageError(f"'{rig.name}' has no bone '{missing[0]}'; guess the bones anew or correct the list")
     clip, frames = read_clip(source, body, rate)
     clip = path_clip(source, clip, frames)
-    with _at_rest(rig):
-        skeleton = _probe(rig, list(bone_map.parts))
-    pose = transfer(clip, body, betas, skeleton, bone_map, feet=options.feet)
-    root = skeleton.names.index(bone_map.bone("pelvis") or "")
-    heads = pose.heads[:, root].copy()
-    if options.in_place:
-        heads[:, :2] = skeleton.heads[root, :2]
-    _write(rig, skeleton, basis(skeleton, pose.rotations), root, heads, frames, source.name)
+    with _all_or_nothing(rig):
+        with _at_rest(rig):
+            skeleton = _probe(rig, list(bone_map.parts))
+        pose = transfer(clip, body, betas, skeleton, bone_map, feet=options.feet)
+        root = skeleton.names.index(bone_map.bone("pelvis") or "")
+        heads = pose.heads[:, root].copy()
+        if options.in_place:
+            heads[:, :2] = skeleton.heads[root, :2]
+        _write(rig, skeleton, basis(skeleton, pose.rotations), root, heads, frames, source.name)
     assert rig.animation_data is not None
     return rig.animation_data.action
+
+
+@contextmanager
+def _all_or_nothing(rig: bpy.types.Object) -> Iterator[None]:
+    """What fails leaves the rig's switches and its action as they were, and no action of its own."""
+    switches = [(bone, name, bone[name]) for bone in rig.pose.bones for name in _SWITCHES if name in bone]
+    had_data = rig.animation_data is not None
+    action = rig.animation_data.action if rig.animation_data else None
+    slot = getattr(rig.animation_data, "action_slot", None)
+    kept = action.use_fake_user if action else False
+    known = set(bpy.data.actions)
+    try:
+        yield
+    except BaseException:
+        for bone, name, value in switches:
+            bone[name] = value
+        if not had_data:
+            rig.animation_data_clear()
+        elif rig.animation_data.action != action:
+            rig.animation_data.action = action
+            if slot is not None:
+                rig.animation_data.action_slot = slot
+        if action:
+            action.use_fake_user = kept
+        bpy.data.batch_remove([new for new in bpy.data.actions if new not in known])
+        rig.update_tag()
+        raise
 
 
 def _write(rig, skeleton, rotations, root, heads, frames, name):  # type: ignore[no-untyped-def]

@@ -173,27 +173,6 @@ def run(source, rig, bone_map=None, **options):
     )
 
 
-def check_feet(rig, bone_of, floor=0.0):
-    """Ankles move as the body's do, scaled: so feet that stand neither slide nor float."""
-    joints = truth()[[f - 1 for f in FRAMES]]
-    rest = BODY.rest_joints(np.zeros(BODY.P))
-    lowest = BODY.rest_vertices(np.zeros(BODY.P))[:, 1].min()
-    length = {}
-    for name in ("left", "right"):
-        parts = [f"{name}_{p}" for p in ("hip", "knee", "ankle")]
-        ours = [np.array(rig.matrix_world @ rig.data.bones[bone_of[p]].head_local) for p in parts]
-        theirs = [rest[NAMES.index(p)] for p in parts]
-        length[name] = [sum(np.linalg.norm(np.subtract(p[k + 1], p[k])) for k in (0, 1)) for p in (ours, theirs)]
-    scale = sum(v[0] for v in length.values()) / sum(v[1] for v in length.values())
-    for side in ("left", "right"):
-        ankle = f"{side}_ankle"
-        height = (rig.matrix_world @ rig.data.bones[bone_of[ankle]].head_local).z - floor
-        goal = scale * joints[:, NAMES.index(ankle)]
-        goal[:, 2] += height - scale * (rest[NAMES.index(ankle), 1] - lowest)
-        error = np.linalg.norm(seen(rig, [bone_of[ankle]])[:, 0] - goal, axis=1)
-        assert error.max() < 0.01, (side, error.max())
-
-
 FBX = Matrix.LocRotScale((0.4, -0.3, 0), Matrix.Rotation(math.radians(90), 3, "X").to_quaternion(), (0.01,) * 3)
 
 
@@ -203,9 +182,7 @@ def test_limbs_point_where_the_body_points(source, scheme, feet):
     rig, bone_of = build_rig(scheme, matrix=FBX if scheme == "mixamo" else None)
     run(source, rig, feet=feet)
     assert direction_error(rig, bone_of, ARMS) < 1.0
-    if feet:
-        check_feet(rig, bone_of)
-    else:
+    if not feet:  # test_retarget_feet.py has the legs of standing feet
         assert direction_error(rig, bone_of, LEGS) < 1.0
 
 
@@ -228,7 +205,6 @@ def test_rigify(source):
         assert direction_error(rig, bone_of, ARMS + LEGS) < 1.0
         run(source, rig)
         assert direction_error(rig, bone_of, ARMS) < 1.0
-        check_feet(rig, bone_of)
 
 
 @pytest.mark.parametrize("scheme", sorted(SCHEMES))
@@ -247,6 +223,26 @@ def test_the_rigs_own_action_stays(source):
     run(source, rig)
     assert rig.animation_data.action != before
     assert before.use_fake_user
+
+
+@pytest.mark.parametrize("step", ["transfer", "_probe", "_channel"])
+def test_what_fails_leaves_the_rig_as_it_was(source, monkeypatch, step):
+    rig, _ = build_rig("unreal")
+    bone = rig.pose.bones[3]
+    bone["IK_FK"] = 0.25
+    rig.pose.bones[0].keyframe_insert("location", frame=3)
+    before, actions = rig.animation_data.action, len(bpy.data.actions)
+
+    def fail(*args, **keywords):
+        raise MemoryError
+
+    monkeypatch.setattr(f"scope.scope_addon.scene.retarget.{step}", fail)
+    with pytest.raises(MemoryError):
+        run(source, rig)
+    assert bone["IK_FK"] == 0.25
+    assert rig.animation_data.action == before
+    assert len(bpy.data.actions) == actions
+    assert not before.use_fake_user
 
 
 def test_in_place_stays_on_the_spot(source):

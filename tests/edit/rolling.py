@@ -1,0 +1,107 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A walk whose feet roll from the heel over the sole onto the ball, each of them at rest on the floor in its turn."""
+
+import numpy as np
+from scope.scope_addon.edit.clip import Clip
+from scope.solver.frames import R_WORLD_MODEL
+
+from .walking import BODY, NAMES, RATE
+
+ZERO = np.zeros(BODY.P)
+J = BODY.rest_joints(ZERO) @ R_WORLD_MODEL.T
+V = BODY.rest_vertices(ZERO) @ R_WORLD_MODEL.T
+FLOOR = V[:, 2].min()
+PERIOD, STANCE, STRIDE = 1.2, 0.62, 1.0
+FLAT, RISE = 0.2, 0.55  # shares of the stance at which the sole is down, and at which the heel leaves
+
+
+def joint(part):
+    return J[NAMES.index(part)]
+
+
+def heel_of(side):
+    """On the floor, a centimetre before the rear end of the sole."""
+    ankle = joint(f"{side}_ankle")
+    own = V[(np.sign(V[:, 0]) == np.sign(ankle[0])) & (V[:, 2] < FLOOR + 0.01)]
+    return np.array([ankle[0], own[:, 1].max() - 0.01, FLOOR])
+
+
+def turn_by(vector):
+    """(3, 3) of a rotation vector, by Rodrigues' formula."""
+    angle = np.linalg.norm(vector)
+    x, y, z = vector / max(angle, 1e-12)
+    K = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    return np.eye(3) + np.sin(angle) * K + (1 - np.cos(angle)) * K @ K
+
+
+def pitch(degrees):
+    """Toes down about the sideways axis of a person who looks along −y."""
+    return turn_by(np.array([np.radians(degrees), 0, 0]))
+
+
+def foot(side, step):
+    """(ankle, turn of the foot, turn of the toes, heel stands, ball stands) at a time in steps of this foot."""
+    number, phase = np.floor(step), step % 1 / STANCE
+    place = joint(f"{side}_ankle") + [0, -STRIDE * number, -FLOOR]
+    heel, ball = heel_of(side) - joint(f"{side}_ankle"), joint(f"{side}_foot") - joint(f"{side}_ankle")
+    if phase < FLAT:
+        turn = pitch(-22 * (1 - phase / FLAT) ** 2)
+        return place + heel - turn @ heel, turn, turn, True, False
+    if phase < RISE:
+        return place, np.eye(3), np.eye(3), True, True
+    if phase < 1:
+        turn = pitch(45 * ((phase - RISE) / (1 - RISE)) ** 2)
+        return place + ball - turn @ ball, turn, np.eye(3), False, True
+    share = (step % 1 - STANCE) / (1 - STANCE)
+    ease = share * share * (3 - 2 * share)
+    off, on = pitch(45), pitch(-22)
+    first, last = place + ball - off @ ball, place + [0, -STRIDE, 0] + heel - on @ heel
+    ankle = first + ease * (last - first) + [0, 0, 0.09 * np.sin(np.pi * share)]
+    turn = pitch(45 - 67 * ease)
+    return ankle, turn, pitch(-22 * ease), False, False
+
+
+def shortest(a, b):
+    a, b = a / np.linalg.norm(a), b / np.linalg.norm(b)
+    axis = np.cross(a, b)
+    return turn_by(axis / np.linalg.norm(axis) * np.arctan2(np.linalg.norm(axis), a @ b))
+
+
+def rolling_walk(seconds=2.6, stiff_toes=False):
+    """The clip, and per side where heel and ball stand: (T, 2) bool.
+
+    :param stiff_toes: the toes do not bend, as in a capture that cannot see them.
+    """
+    times = np.arange(int(seconds * RATE) + 1) / RATE
+    rotations = np.tile(np.eye(3), (len(times), len(NAMES), 1, 1))
+    root = np.empty((len(times), 3))
+    stands = {"left": np.zeros((len(times), 2), bool), "right": np.zeros((len(times), 2), bool)}
+    for t, time in enumerate(times):
+        D = {name: np.eye(3) for name in NAMES}
+        D["left_shoulder"], D["right_shoulder"] = (turn_by(np.array([0, sign * 1.2, 0])) for sign in (1, -1))
+        for side in ("left", "right"):
+            for part in ("elbow", "wrist", "hand"):
+                D[f"{side}_{part}"] = D[f"{side}_shoulder"]
+        height = -FLOOR - 0.07 + 0.015 * np.cos(4 * np.pi * time / PERIOD)
+        root[t] = J[0] + [0, -STRIDE * (time / PERIOD - 0.5 * STANCE + 0.04), height]
+        for side, begin in (("left", 0.0), ("right", 0.5)):
+            ankle, D[f"{side}_ankle"], D[f"{side}_foot"], *stands[side][t] = foot(side, time / PERIOD + begin)
+            if stiff_toes:
+                D[f"{side}_foot"] = D[f"{side}_ankle"]
+            ankle = ankle + [0, STRIDE * begin, 0]
+            hip = root[t] + joint(f"{side}_hip") - J[0]
+            upper = joint(f"{side}_knee") - joint(f"{side}_hip")
+            lower = joint(f"{side}_ankle") - joint(f"{side}_knee")
+            a, b, way = np.linalg.norm(upper), np.linalg.norm(lower), ankle - hip
+            c = np.linalg.norm(way)
+            assert c < a + b, "the walk's legs are too short"
+            along = (a * a - b * b + c * c) / (2 * c)
+            front = np.cross(np.cross(way, [0, -1, 0]), way)
+            knee = way / c * along + front / np.linalg.norm(front) * np.sqrt(a * a - along * along)
+            D[f"{side}_hip"] = shortest(upper, knee)
+            D[f"{side}_knee"] = shortest(D[f"{side}_hip"] @ lower, way - knee) @ D[f"{side}_hip"]
+        for i, name in enumerate(NAMES):
+            parent = BODY.parents[i]
+            R = D[name] if parent < 0 else D[NAMES[parent]].T @ D[name]
+            rotations[t, i] = R @ R_WORLD_MODEL if parent < 0 else R_WORLD_MODEL.T @ R @ R_WORLD_MODEL
+    return Clip(times, rotations, root), stands

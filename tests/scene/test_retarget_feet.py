@@ -1,0 +1,108 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Feet that stand on the body stand on the rig: heel and ball, contact by contact, as the depsgraph shows them."""
+
+import addon_utils
+import bpy
+import numpy as np
+import pytest
+from scope.scope_addon.scene.build import BuildOptions, build_scene
+
+from ..edit.rolling import STRIDE, joint, rolling_walk
+from ..edit.walking import BODY, RATE, motion_of
+from .test_retarget import FBX, build_rig, run
+
+PART = {"thigh": "hip", "shin": "knee", "foot": "ankle", "toe": "foot"}
+
+
+@pytest.fixture
+def source():
+    return captured(rolling_walk()[0])
+
+
+def captured(clip):
+    scene = bpy.context.scene
+    scene.render.fps, scene.render.fps_base = int(RATE), 1.0
+    return build_scene([motion_of(clip)], BODY, None, BuildOptions(start_frame=1.0)).people[0].armature
+
+
+def contacts(stands):
+    """Spans of frames in which a point stands."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], stands.astype(int), [0]])))
+    return [slice(a, b) for a, b in zip(edges[::2], edges[1::2], strict=True) if b - a > 2]
+
+
+def points(rig, foot, ball):
+    """(T, 2, 3) heel and ball in the world, and where they are at rest."""
+    _, stands = rolling_walk()
+    ankle = np.array(rig.matrix_world @ rig.data.bones[foot].head_local)
+    back = ankle - np.array(rig.matrix_world @ rig.data.bones[ball].head_local)
+    heel = ankle + back * [1, 1, 0] * 0.3
+    heel[2] = 0.0
+    local = np.linalg.inv(np.array(rig.matrix_world @ rig.data.bones[foot].matrix_local)) @ [*heel, 1]
+    seen = []
+    for frame in range(1, len(stands["left"]) + 1):
+        bpy.context.scene.frame_set(frame)
+        posed = rig.evaluated_get(bpy.context.evaluated_depsgraph_get())
+        at = np.array(posed.matrix_world @ posed.pose.bones[foot].matrix) @ local
+        seen.append([at[:3], np.array(posed.matrix_world @ posed.pose.bones[ball].head)])
+    rest_ball = np.array(rig.matrix_world @ rig.data.bones[ball].head_local)
+    return np.array(seen), np.array([heel, rest_ball])
+
+
+def leg_length(rig, spell):
+    places = [rig.matrix_world @ rig.data.bones[spell("left", part)].head_local for part in ("thigh", "shin", "foot")]
+    return (places[1] - places[0]).length + (places[2] - places[1]).length
+
+
+def check_contacts(rig, spell):
+    """Every contact: the point slides less than 1 cm, and its height is its resting one within 1 cm; steps scale."""
+    _, stands = rolling_walk()
+    scale = leg_length(rig, spell) / sum(
+        np.linalg.norm(joint(f"left_{a}") - joint(f"left_{b}")) for a, b in (("hip", "knee"), ("knee", "ankle"))
+    )
+    for side in ("left", "right"):
+        seen, rest = points(rig, spell(side, "foot"), spell(side, "toe"))
+        for k, what in enumerate(("heel", "ball")):
+            spans = contacts(stands[side][:, k])
+            assert spans
+            for span in spans:
+                p = seen[span, k]
+                slide = np.linalg.norm(p[:, None, :2] - p[None, :, :2], axis=-1).max()
+                off = np.abs(p[:, 2] - rest[k, 2]).max()
+                assert slide < 0.01, (side, what, span, slide)
+                assert off < 0.01, (side, what, span, off)
+            first, second = (seen[span, k, :2].mean(axis=0) for span in spans[-2:])
+            assert abs(np.linalg.norm(second - first) - scale * STRIDE) < 0.02
+
+
+@pytest.mark.parametrize(("scheme", "size"), [("mixamo", 1.3), ("mixamo", 0.7), ("unreal", 1.0)])
+def test_feet_stand(source, scheme, size):
+    rig, bone_of = build_rig(scheme, size=size, matrix=FBX if scheme == "mixamo" else None)
+    run(source, rig)
+    check_contacts(rig, lambda side, part: bone_of[f"{side}_{PART[part]}"])
+
+
+def test_toes_that_were_not_seen_to_bend_stay_flat():
+    rig, bone_of = build_rig("mixamo")
+    run(captured(rolling_walk(stiff_toes=True)[0]), rig)
+    _, stands = rolling_walk()
+    bpy.context.view_layer.update()
+    for side in ("left", "right"):
+        bone = bone_of[f"{side}_foot"]
+        rest = np.array(rig.matrix_world @ rig.data.bones[bone].matrix_local)[:3, 1]
+        for frame in np.flatnonzero(stands[side][:, 1]):
+            bpy.context.scene.frame_set(int(frame) + 1)
+            posed = rig.evaluated_get(bpy.context.evaluated_depsgraph_get())
+            along = np.array(posed.matrix_world @ posed.pose.bones[bone].matrix)[:3, 1]
+            assert np.degrees(np.arccos(np.clip(along @ rest, -1, 1))) < 2.0
+
+
+def test_feet_of_rigify_stand(source):
+    addon_utils.enable("rigify", default_set=True)
+    bpy.ops.object.armature_human_metarig_add()
+    metarig = bpy.context.object
+    bpy.ops.pose.rigify_generate()
+    generated = next(o for o in bpy.context.scene.objects if o.type == "ARMATURE" and "torso" in o.data.bones)
+    for rig, prefix in ((metarig, ""), (generated, "ORG-")):
+        run(source, rig)
+        check_contacts(rig, lambda side, part, prefix=prefix: f"{prefix}{part}.{side[0].upper()}")
