@@ -156,6 +156,7 @@ def _build_person(
     measurements.key_measurements(rig, channels, body, motion, frames)
     if options.frame_rate == "resample":
         bake_whole_frames(rig, body, rate)
+        rig["scope_resampled"] = True  # smoothing again keeps to it
     if not baked and body.P:
         shape_keys.add_shape_keys(mesh, body, motion.betas)
         shape_keys.key_shape(mesh, action, motion.betas, frames, per_frame=options.shape == "per_frame")

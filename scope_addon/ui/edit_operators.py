@@ -108,7 +108,7 @@ class SCOPE_OT_smooth(_Edit):
     def edit(self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float) -> str:
         """From the cached motion."""
         from ..edit.smooth import smoothed
-        from ..scene.keys import write_clip
+        from ..scene.keys import bake_whole_frames, write_clip
         from ..scene.root_object import to_bones
         from ..scene.timing import key_frames
 
@@ -116,6 +116,8 @@ class SCOPE_OT_smooth(_Edit):
         to_bones(armature, body, rate)
         clip = smoothed(body, motion, self.strength)
         write_clip(armature, body, clip, key_frames(motion.timestamps, rate, float(armature.get("scope_start", 0.0))))
+        if armature.get("scope_resampled"):
+            bake_whole_frames(armature, body, rate)
         return ""
 
 

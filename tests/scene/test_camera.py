@@ -128,6 +128,17 @@ def test_a_motion_from_the_middle_of_the_footage_stays_with_it(body, make_motion
     assert result.warnings == []
 
 
+def test_captures_of_the_same_footage_do_not_disturb_each_other(body, make_motion, clip):
+    motion = make_motion(body, 5, image_size=(64, 48))
+    starts = (1.0, 50.0)
+    results = [
+        build_scene([motion], body, footage=clip, options=BuildOptions(frame_rate="set", start_frame=start))
+        for start in starts
+    ]
+    shown = [result.people[0].camera.data.background_images[0].clip.frame_start for result in results]
+    assert shown == [1, 50]
+
+
 def test_footage_at_another_rate_than_the_scene_is_warned_about(body, make_motion, clip):
     bpy.context.scene.render.fps = 24
     motion = make_motion(body, 20, rate=30.0, image_size=(64, 48))

@@ -69,6 +69,19 @@ def test_smoothing_from_raw_and_back(rig):
     assert rig.animation_data.action == action
 
 
+def test_smoothing_a_resampled_motion_keeps_its_keys_on_whole_frames(tmp_path):
+    scene = bpy.context.scene
+    scene.render.fps, scene.render.fps_base = 24, 1.0
+    motion = motion_of(walk(SECONDS), noise=0.05)
+    rig = build_scene([motion], BODY, None, BuildOptions(frame_rate="resample", start_frame=1.0)).people[0].armature
+    motion.save(tmp_path / "person1.npz")
+    rig["scope_motion"], rig["scope_body_file"] = str(tmp_path / "person1.npz"), "scope"
+    before = read_clip(rig, BODY, 24.0)[1]
+    np.testing.assert_array_equal(before, np.arange(1, len(before) + 1))
+    bpy.ops.scope.smooth(strength=2.0)
+    np.testing.assert_array_equal(read_clip(rig, BODY, 24.0)[1], before)
+
+
 def test_smoothing_without_the_cached_motion_is_told(rig):
     before = seen(rig)
     rig["scope_motion"] = "/nowhere/person1.npz"
