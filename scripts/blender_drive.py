@@ -13,7 +13,7 @@ import subprocess
 import sys
 import time
 import traceback
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import bpy
@@ -45,6 +45,17 @@ def click(x: int, y: int) -> None:
     """The left button, in the screen's pixels from its top left; as slowly as a hand, while Blender goes on."""
     steps = ["mousemove", str(x), str(y), "sleep", "0.4", "mousedown", "1", "sleep", "0.1", "mouseup", "1"]
     subprocess.Popen(["xdotool", *steps])
+
+
+def press(place: tuple[int, int], happened: Callable[[], bool]) -> Iterator[float]:
+    """Click until something has happened: a busy machine draws late, and a button that is not there takes no click."""
+    for _ in range(6):
+        click(*place)
+        for _ in range(40):
+            yield 0.1
+            if happened():
+                return
+    raise RuntimeError(f"the button at {place} took no click")
 
 
 def addon():
@@ -83,14 +94,14 @@ def steps() -> Iterator[float]:
     bpy.ops.scope.choose_footage(filepath=VIDEO)
     area.tag_redraw()
     yield 1.0
-    click(*FAST_BUTTON)
+    yield from press(FAST_BUTTON, lambda: scene.scope.quality == "FAST")
     yield 1.0
     report["mouse_chose"] = scene.scope.quality
     picture("2_footage_chosen")
 
     before = inventory()
-    click(*CAPTURE_BUTTON)
-    yield 5.0
+    yield from press(CAPTURE_BUTTON, lambda: addon().state.job is not None)
+    yield 4.0
     picture("3_capturing")
     worker = addon().state.job.worker
     folder, pid = worker.job_folder, worker.pid
@@ -103,9 +114,7 @@ def steps() -> Iterator[float]:
     left += ["a running job"] if addon().state.job is not None else []
     report["left_after_cancel"] = left
 
-    click(*CAPTURE_BUTTON)
-    while addon().state.job is None:
-        yield 0.02
+    yield from press(CAPTURE_BUTTON, lambda: addon().state.job is not None)
     began, last, gaps = time.monotonic(), time.monotonic(), []
     pictures, preview = 0, False
     while addon().state.job is not None:
