@@ -139,7 +139,10 @@ def _remove(result: BuildResult) -> None:
     owners = [*objects, *(obj.data.shape_keys for obj in objects if obj.type == "MESH")]
     used = {owner.animation_data.action for owner in owners if owner and owner.animation_data} - {None}
     materials = {m for block in data for m in getattr(block, "materials", ())}
+    shown = {footage for block in data for picture in getattr(block, "background_images", ())
+             for footage in (picture.clip, picture.image) if footage}  # fmt: skip
     bpy.data.batch_remove([result.collection, *objects, *data, *used, *materials])
+    bpy.data.batch_remove([footage for footage in shown if footage.users == 0])
     remove_if_unused()
 
 
@@ -168,6 +171,8 @@ def _scene_of(collections: Sequence[bpy.types.Collection]) -> Iterator[bpy.types
             scene.collection.children.link(collection)
         for name in ("fps", "fps_base", "resolution_x", "resolution_y", "pixel_aspect_x", "pixel_aspect_y"):
             setattr(scene.render, name, getattr(source.render, name))
+        for marker in source.timeline_markers:
+            scene.timeline_markers.new(marker.name, frame=marker.frame)
         cameras = [obj for obj in scene.objects if obj.type == "CAMERA"]
         scene.camera = source.camera if source.camera in cameras else next(iter(cameras), None)
         animated = [obj for obj in scene.objects if obj.type == "ARMATURE"]

@@ -10,6 +10,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 import pytest
+import scope
 from mathutils.kdtree import KDTree
 from scope.scope_addon.motion import Motion
 from scope.scope_addon.scene import actions, formats
@@ -226,9 +227,13 @@ def test_the_footages_camera_comes_along_on_request(body, make_motion, tmp_path,
 
 def test_blend_opens_with_camera_rate_and_shape_keys(body, make_motion, tmp_path, blender):
     path = tmp_path / "walk.blend"
-    export_motions([make_motion(body, 6, rate=29.97, image_size=(1080, 1920))], body, path)
+    motion = make_motion(body, 6, rate=29.97, image_size=(1080, 1920))
+    motion.valid[3:5] = False
+    export_motions([motion], body, path)
     read_back(path)
     scene = bpy.context.scene
+    assert [(marker.name, marker.frame) for marker in scene.timeline_markers] == [("not seen 3-4", 3)]
+    assert {bone.custom_shape.type for bone in blender.only("ARMATURE").pose.bones} == {"MESH"}
     assert (scene.name, scene.frame_start, scene.frame_end) == ("Capture", 0, 5)
     assert (scene.render.resolution_x, scene.render.resolution_y) == (1080, 1920)
     assert scene.camera == blender.only("CAMERA")
@@ -266,9 +271,10 @@ def test_several_files_at_once(body, make_motion, tmp_path):
 def test_exporting_motions_leaves_no_trace(body, make_motion, tmp_path):
     bpy.ops.mesh.primitive_cube_add()
     scene, window = bpy.context.scene, bpy.context.window
-    kinds = "scenes collections objects meshes armatures actions cameras materials shape_keys".split()
+    kinds = "scenes collections objects meshes armatures actions cameras materials shape_keys movieclips".split()
     before = {kind: [b.name for b in getattr(bpy.data, kind)] for kind in kinds}
-    export_motions([make_motion(body, 2)], body, [tmp_path / "a.glb", tmp_path / "a.usdc"])
+    sample = Path(scope.__file__).resolve().parent / "assets" / "sample" / "sample.mp4"
+    export_motions([make_motion(body, 2)], body, [tmp_path / "a.glb", tmp_path / "a.usdc"], footage=sample)
     assert {kind: [b.name for b in getattr(bpy.data, kind)] for kind in kinds} == before
     assert window.scene == scene
     assert bpy.context.view_layer.objects.active.name == "Cube"
