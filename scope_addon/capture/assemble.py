@@ -13,10 +13,11 @@ from ..motion import Motion
 from .camera import Camera
 from .camera_path import CameraPath
 from .fitting import FittedTrack
+from .frame_blocks import by_blocks
 from .grounding import along_sight, correct_depth, stand_on_floor, standing_probability
 from .hand_measure import HAND_KEYPOINT_NAMES
 from .landmark_network import KEYPOINT_NAMES
-from .placement import PlacedTrack
+from .placement import PlacedTrack, raw_motion
 from .track import Track
 from .vertical_lines import Lines
 from .world import estimate_world
@@ -68,6 +69,7 @@ def assemble_motion(
     and trans = T_world_camera t_camera_root − J_0(β).
     """
     times, valid, betas = placed.times, placed.valid, placed.betas
+    path = path or CameraPath.on_a_stand(len(track))
     local, root = placed.rotations, placed.root
     if T_world_camera is None:
         T_world_camera = estimate_world(body, placed.joints[valid], placed.soles[valid], lines)
@@ -75,24 +77,22 @@ def assemble_motion(
     T_floor_camera[2, 3] -= floor_m
     R_world_camera, t_world_camera = T_world_camera[:3, :3], T_world_camera[:3, 3]
     contact = standing_probability(placed.soles, R_world_camera[2], times) * valid[:, None]
-    if smoothing and hold_feet:
-        local, root = stand_on_floor(
-            placed.body, local, root, betas, placed.place, contact, T_floor_camera, times, placed.center
-        )
-    R_cam, joints_cam, _ = placed.place(local, root)
     J0 = body.rest_joints(betas)[0]
 
     def in_world(rotation: np.ndarray, position: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        poses = rotation.copy()
-        poses[:, 0] = R_world_camera @ rotation[:, 0]
+        poses = rotations.log(rotation)
+        poses[:, 0] = rotations.log(R_world_camera @ rotation[:, 0])
         trans = position @ R_world_camera.T + t_world_camera - J0
-        return rotations.log(poses).reshape(len(poses), -1), trans
+        return poses.reshape(len(poses), -1).astype(np.float32), trans
 
-    path = path or CameraPath.on_a_stand(len(track))
-    R_cam = np.swapaxes(path.R_first_camera, 1, 2)[:, None] @ R_cam
-    joints_cam = path.points_to_frames(joints_cam)
-    poses, trans = in_world(local, root)
-    poses_raw, trans_raw = in_world(placed.rotations_raw, placed.root_raw)
+    poses_raw, trans_raw = by_blocks(in_world, *raw_motion(track, fitted, path))
+    if smoothing and hold_feet:
+        local, root = stand_on_floor(
+            placed.body, local, root, betas, lambda *m: placed.place(*m)[1], contact, T_floor_camera, times,
+            placed.center,
+        )  # fmt: skip
+    poses, trans = by_blocks(in_world, local, root)
+    joints_cam = path.points_to_frames(placed.place(local, root)[0])
     return Motion(
         poses=poses,
         trans=trans,
@@ -113,7 +113,7 @@ def assemble_motion(
         joint_confidence=fitted.joint_confidence,
         world_from_camera=path.world_from_frames(T_world_camera),
         foot_contact=contact,
-        residual_px=reprojection_error(body, R_cam, joints_cam, betas, track, camera, valid),
+        residual_px=reprojection_error(body, local, root, betas, track, camera, valid, path),
         image_size=np.array(image_size),
         source=source,
     )
@@ -128,20 +128,42 @@ def _keypoints2d(track: Track) -> np.ndarray:
 
 
 def reprojection_error(
-    body: Body, R: np.ndarray, t: np.ndarray, betas: np.ndarray, track: Track, camera: Camera, valid: np.ndarray
+    body: Body,
+    rotation: np.ndarray,
+    root: np.ndarray,
+    betas: np.ndarray,
+    track: Track,
+    camera: Camera,
+    valid: np.ndarray,
+    path: CameraPath,
 ) -> np.ndarray:
     """(T,) median distance in pixels between the confident keypoints and the body's own; 0 where nobody was seen.
 
-    :param R, t: (T, K+1, 3, 3), (T, K+1, 3) part poses in the camera frame.
+    :param rotation, root: (T, K+1, 3, 3), (T, 3) the body in the first frame's camera axes.
     """
     at = body.keypoint_set("blazepose")
-    points = body.keypoints(R, t, betas)[:, [at[name] for name in KEYPOINT_NAMES]]
-    K = camera.intrinsics
-    depth = np.maximum(points[..., 2:], 1e-3)
-    projected = points[..., :2] / depth * [K[0, 0], K[1, 1]] + K[:2, 2]
-    distance = np.linalg.norm(projected - camera.undistort(track.keypoints_px), axis=-1)
-    distance[track.confidence < 0.5] = np.nan
-    out = np.zeros(len(track))
-    for k in np.flatnonzero(valid & np.isfinite(distance).any(1)):
-        out[k] = np.nanmedian(distance[k])
-    return out
+    order = [at[name] for name in KEYPOINT_NAMES]
+    K, J0 = camera.intrinsics, body.rest_joints(betas)[0]
+
+    def error(
+        rotation: np.ndarray,
+        root: np.ndarray,
+        keypoints_px: np.ndarray,
+        confidence: np.ndarray,
+        valid: np.ndarray,
+        R_first_camera: np.ndarray,
+        center: np.ndarray,
+    ) -> tuple[np.ndarray]:
+        points = body.keypoints(*body.forward_kinematics(rotation, root - J0, betas), betas)[:, order]
+        points = CameraPath(R_first_camera, center).points_to_frames(points)
+        depth = np.maximum(points[..., 2:], 1e-3)
+        projected = points[..., :2] / depth * [K[0, 0], K[1, 1]] + K[:2, 2]
+        distance = np.linalg.norm(projected - camera.undistort(keypoints_px), axis=-1)
+        distance[confidence < 0.5] = np.nan
+        known = valid & np.isfinite(distance).any(1)
+        median = np.zeros(len(root))
+        median[known] = np.nanmedian(distance[known], axis=1)
+        return (median,)
+
+    each = (rotation, root, track.keypoints_px, track.confidence, valid, path.R_first_camera, path.center)
+    return by_blocks(error, *each)[0]

@@ -33,17 +33,12 @@ class CameraPath:
         return not self.center.any() and bool((self.R_first_camera == np.eye(3)).all())
 
     def to_first(self, fit: FittedTrack) -> FittedTrack:
-        """A fit in each frame's camera, in the first frame's axes."""
+        """A fit in each frame's camera, in the first frame's axes; the fit itself where the camera does not move."""
+        if self.is_static:
+            return fit
         rotations = fit.rotations.copy()
         rotations[:, 0] = self.R_first_camera @ rotations[:, 0]
         root = np.einsum("tij,tj->ti", self.R_first_camera, fit.t_camera_root) + self.center
-        return replace(fit, rotations=rotations, t_camera_root=root)
-
-    def to_frames(self, fit: FittedTrack) -> FittedTrack:
-        """The inverse of ``to_first``."""
-        rotations = fit.rotations.copy()
-        rotations[:, 0] = np.swapaxes(self.R_first_camera, 1, 2) @ rotations[:, 0]
-        root = np.einsum("tji,tj->ti", self.R_first_camera, fit.t_camera_root - self.center)
         return replace(fit, rotations=rotations, t_camera_root=root)
 
     def points_to_frames(self, points: np.ndarray) -> np.ndarray:

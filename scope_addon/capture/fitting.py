@@ -129,20 +129,22 @@ def refit_track(
     A pose and a distance that explain the same image can both be wrong together; once the floor has told the distance,
     the pose follows.
     """
-    states = [
-        State(first.rotations[k, 0], root_cam[k], first.rotations[k, 1:], first.betas) if first.valid[k] else None
-        for k in range(len(prepared.track))
-    ]
-    return _fit_frames(prepared, first.betas, states, progress)
+
+    def state(k: int) -> State | None:
+        if not first.valid[k]:
+            return None
+        return State(first.rotations[k, 0], root_cam[k], first.rotations[k, 1:], first.betas)
+
+    return _fit_frames(prepared, first.betas, state, progress)
 
 
 def _fit_frames(
     prepared: PreparedTrack,
     betas: np.ndarray,
-    states: list[State | None] | None,
+    state: Callable[[int], State | None] | None,
     progress: Callable[[str, int, int], None],
 ) -> FittedTrack:
-    """Every seen frame in order: from the frame before, or from ``states`` with their roots as priors."""
+    """Every seen frame in order: from the frame before, or from ``state(k)`` with its root as a prior."""
     body, track, priors = prepared.body, prepared.track, prepared.priors_with_shape(betas)
     T, tree = len(track), make_tree(body)
     rotations = np.tile(np.eye(3), (T, body.K + 1, 1, 1))
@@ -151,12 +153,12 @@ def _fit_frames(
     last_time = -np.inf
     for k in range(T):
         if track.seen[k]:
-            if states is not None:
-                init = states[k]
+            if state is not None:
+                init = state(k)
             else:
                 fresh = last is None or track.acquired[k] or track.times[k] - last_time > LONGEST_COAST_S
                 init = None if fresh or last is None else last.state
-            known_root = init.t_camera_root if init is not None and states is not None else None
+            known_root = init.t_camera_root if init is not None and state is not None else None
             found = _fit_frame(tree, prepared.measure_with_hands(k, known_root), init, priors, prepared.weights)
             if found.status not in (Status.NO_MEASUREMENTS, Status.NON_FINITE):
                 last, last_time, valid[k] = found, track.times[k], True
@@ -165,7 +167,7 @@ def _fit_frames(
             rotations[k, 0], rotations[k, 1:] = last.state.R_camera_root, last.state.Omega
             root[k] = last.state.t_camera_root
         if k % 16 == 0 or k == T - 1:
-            progress("solving" if states is None else "solving on the floor", k + 1, T)
+            progress("solving" if state is None else "solving on the floor", k + 1, T)
     confidence = prepared.measurer.joint_confidence(track.confidence)
     if prepared.hand_measurer is not None and prepared.hands is not None:
         confidence = np.maximum(confidence, prepared.hand_measurer.joint_confidence(prepared.hands))

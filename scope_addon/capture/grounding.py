@@ -39,7 +39,7 @@ SLIDE_SIGMA_M_S = 0.1  # a standing foot's horizontal speed
 STEP_CUTOFF_HZ = 12.0  # takes off the edges where a foot begins and ceases to be held
 
 
-Place = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray, np.ndarray]]
+SolesOf = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 
 def stand_on_floor(
@@ -47,7 +47,7 @@ def stand_on_floor(
     rotations: np.ndarray,
     root_cam: np.ndarray,
     betas: np.ndarray,
-    place: Place,
+    soles_of: SolesOf,
     contact: np.ndarray,
     T_world_camera: np.ndarray,
     times: np.ndarray,
@@ -56,19 +56,19 @@ def stand_on_floor(
     """The motion with its depth corrected by the floor, and standing feet held.
 
     :param rotations, root_cam: (T, K+1, 3, 3), (T, 3) in the camera frame, smoothed.
-    :param place: rotations and root positions to part rotations, joints and soles, camera frame.
+    :param soles_of: rotations and root positions to soles (T, 4, 3), camera frame.
     :param contact: (T, 4) probability that each sole stands.
     :param center: (T, 3) of the camera, where it travels.
     :return: rotations and root positions.
     """
-    soles = place(rotations, root_cam)[2]
+    soles = soles_of(rotations, root_cam)
     away = correct_depth(root_cam - center, soles, contact, T_world_camera, times)
     root_cam = root_cam + away[:, None] * along_sight(root_cam - center)
     R, t = T_world_camera[:3, :3], T_world_camera[:3, 3]
-    held = anchors(place(rotations, root_cam)[2] @ R.T + t, contact)
+    held = anchors(soles_of(rotations, root_cam) @ R.T + t, contact)
     indices = np.arange(len(body_with_soles.keypoint_names) - held.shape[1], len(body_with_soles.keypoint_names))
     rotations, root_cam = hold_feet(body_with_soles, rotations, root_cam, betas, (indices, (held - t) @ R, contact))
-    return smooth_rotations(rotations, times, STEP_CUTOFF_HZ), root_cam
+    return smooth_rotations(rotations, times, STEP_CUTOFF_HZ, out=rotations), root_cam
 
 
 def along_sight(root: np.ndarray) -> np.ndarray:

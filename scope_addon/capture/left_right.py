@@ -38,15 +38,17 @@ AS_SAID, EXCHANGED, TURNED = 0, 1, 2  # TURNED: exchanged, and the depth reverse
 def repair_left_right(track: Track) -> Track:
     """The track with left and right (and depth) as `find_labels` finds them, and corrected by the judged frames."""
     world = np.where(track.seen[:, None, None], track.world_landmarks, np.nan)
-    judged = np.full_like(world, np.nan)
-    judged[track.judged_rows] = track.judged_landmarks
-    cost = FRAME_COST_M if len(track.judged_rows) else FRAME_COST_UNJUDGED_M
-    labels = find_labels(world, track.acquired, judged, cost)
+    judged = None
+    if len(track.judged_rows):
+        judged = np.full_like(world, np.nan)
+        judged[track.judged_rows] = track.judged_landmarks
+    labels = find_labels(world, track.acquired, judged, FRAME_COST_UNJUDGED_M if judged is None else FRAME_COST_M)
+    del judged
     exchanged = labels != AS_SAID
-    repaired = labelled(world, labels)
-    repaired = repaired + _pull(repaired, track)
     if not exchanged.any() and not len(track.judged_rows):
         return track
+    repaired = labelled(world, labels)
+    repaired += _pull(repaired, track)
 
     def exchange(values: np.ndarray) -> np.ndarray:
         out = values.copy()
@@ -165,9 +167,10 @@ def _pull(world: np.ndarray, track: Track) -> np.ndarray:
         values.append(judged[row] - world[row] if far else nothing)
     knots.append(knots[-1] + REACH_S)
     values.append(nothing)
-    flat = np.array(values).reshape(len(knots), -1)
-    out = np.stack([np.interp(track.times, knots, column) for column in flat.T], axis=1)
-    return out.reshape(world.shape)
+    out = np.empty_like(world)
+    for column, value in zip(out.reshape(len(out), -1).T, np.array(values).reshape(len(knots), -1).T, strict=True):
+        column[:] = np.interp(track.times, knots, value)
+    return out
 
 
 def _distance(a: np.ndarray, b: np.ndarray) -> np.ndarray:

@@ -15,12 +15,13 @@ along the line of sight; the positions are turned back into camera axes.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from ...solver.errors import ModelFileError, SetupError, ShapeError
+from .frame_blocks import by_blocks
 from .networks import open_session
 
 LIFTER_FILE = Path(__file__).resolve().parents[2] / "assets" / "lifter" / "lifter.onnx"
@@ -126,11 +127,11 @@ class Lifter:
         for name, value, shape in (("rays", rays, (T, 33, 2)), ("confidence", confidence, (T, 33))):
             if value.shape != shape:
                 raise ShapeError(f"{name} must have shape {shape}, but has {value.shape}")
-        batches = [slice(k, k + _BATCH) for k in range(0, max(T, 1), _BATCH)]  # an hour at once would take a gigabyte
-        lifted = [self._lift(rays[b], confidence[b], None if world is None else world[b]) for b in batches]
-        return Lifted(*(np.concatenate([getattr(part, f.name) for part in lifted]) for f in fields(Lifted)))
+        if world is None:
+            return Lifted(*by_blocks(lambda r, c: self._lift(r, c, None), rays, confidence))
+        return Lifted(*by_blocks(self._lift, rays, confidence, world))
 
-    def _lift(self, rays: np.ndarray, confidence: np.ndarray, world: np.ndarray | None) -> Lifted:
+    def _lift(self, rays: np.ndarray, confidence: np.ndarray, world: np.ndarray | None) -> tuple[np.ndarray, ...]:
         if world is None:
             world, known = np.zeros((len(rays), KEYPOINT_COUNT, 3)), np.zeros(len(rays))
         else:
@@ -139,12 +140,17 @@ class Lifter:
         points, log_sigma = self.run(x.astype(np.float32))
         points = points - points[:, HIPS].mean(axis=1, keepdims=True)
         sigma = np.exp(log_sigma) * SIGMA_ON_PICTURES
-        return Lifted(points @ R, sigma[..., 0], sigma[..., 1])
+        return points @ R, sigma[..., 0], sigma[..., 1]
 
     def lift_both_ways(self, rays: np.ndarray, confidence: np.ndarray, world: np.ndarray) -> Lifted:
         """What the network finds with the world landmarks and without them, mixed: better than either on real clips."""
-        ways = [self.lift(rays, confidence, given) for given in (world, None)]
-        return mixture(ways, [WORLD_SHARE, 1 - WORLD_SHARE], virtual_camera(rays))
+
+        def lift(rays: np.ndarray, confidence: np.ndarray, world: np.ndarray) -> tuple[np.ndarray, ...]:
+            ways = [self.lift(rays, confidence, given) for given in (world, None)]
+            mean = mixture(ways, [WORLD_SHARE, 1 - WORLD_SHARE], virtual_camera(rays))
+            return mean.points, mean.sigma_across, mean.sigma_along
+
+        return Lifted(*by_blocks(lift, rays, confidence, world))
 
     def run(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The bare network: input (T, 200) -> points (T, 33, 3) and log σ (T, 33, 2), virtual camera's axes."""

@@ -198,26 +198,31 @@ def _solve(
     def place() -> list[PlacedTrack]:
         return [place_track(body, track, fit, smoothing, path) for track, fit in zip(tracks, fits, strict=True)]
 
+    # Of an hour, each of these lists takes hundreds of megabytes: none stays for longer than it is needed.
     placed = place()
     if smoothing and not path.is_static:
         first = placed[0]
         up = estimate_world(body, first.joints[first.valid], first.soles[first.valid], lines)[2, :3]
         path = replace(path, center=camera_travel(first.soles, first.valid, up, first.times))
+        del first
+        placed.clear()
         placed = place()
     if smoothing and parts.second_pass:
         world = share_world(body, placed, lines) if several else None
-        for k, fit in enumerate(fits):
-            root = root_on_floor(placed[k], world.floor_from_camera(k) if world else None, lines)
-            known = path.to_frames(replace(path.to_first(fit), t_camera_root=root))
-            fits[k] = refit_track(prepared[k], known, known.t_camera_root, progress)
+        floors = [world.floor_from_camera(k) if world else None for k in range(len(tracks))]
+        roots = [root_on_floor(each, floor, lines)[:, None] for each, floor in zip(placed, floors, strict=True)]
+        placed.clear()
+        for k, root in enumerate(roots):
+            fits[k] = refit_track(prepared[k], fits[k], path.points_to_frames(root)[:, 0], progress)
         placed = place()
+    prepared.clear()
     world = share_world(body, placed, lines) if several else None
     motions = [
         assemble_motion(
             body,
             tracks[k],
             fits[k],
-            placed[k],
+            placed.pop(0),
             camera,
             smoothing=smoothing,
             hold_feet=parts.contact,

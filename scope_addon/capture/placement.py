@@ -10,6 +10,7 @@ import numpy as np
 from ...solver.body import Body
 from .camera_path import CameraPath
 from .fitting import FittedTrack
+from .frame_blocks import by_blocks
 from .smoothing import fill_gaps, fill_rotation_gaps, smooth_root, smooth_rotations
 from .soles import sole_points, with_soles
 from .track import Track
@@ -17,22 +18,20 @@ from .track import Track
 
 @dataclass(frozen=True)
 class PlacedTrack:
-    """T frames without gaps, in the first frame's camera axes, metres; ``raw``: before smoothing."""
+    """T frames without gaps, smoothed if so asked, in the first frame's camera axes, metres."""
 
     body: Body  # with soles for these betas
     betas: np.ndarray  # (P,)
     times: np.ndarray  # (T,) seconds
     valid: np.ndarray  # (T,) bool: measured, not filled in
-    rotations_raw: np.ndarray  # (T, K+1, 3, 3); part 0 R_camera_root, the others relative to their parents
-    root_raw: np.ndarray  # (T, 3) the pelvis
-    rotations: np.ndarray  # (T, K+1, 3, 3)
-    root: np.ndarray  # (T, 3)
+    rotations: np.ndarray  # (T, K+1, 3, 3); part 0 R_camera_root, the others relative to their parents
+    root: np.ndarray  # (T, 3) the pelvis
     joints: np.ndarray  # (T, K+1, 3)
     soles: np.ndarray  # (T, 4, 3)
     center: np.ndarray  # (T, 3) of the camera
 
-    def place(self, rotations: np.ndarray, root: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Rotations and positions of all parts, and the soles, of another motion of this body, camera frame."""
+    def place(self, rotations: np.ndarray, root: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Joints (T, K+1, 3) and soles (T, 4, 3) of another motion of this body, camera frame."""
         return _place(self.body, self.betas, rotations, root)
 
 
@@ -44,23 +43,31 @@ def place_track(
     :param fitted: in each frame's camera; path: where that was (None: on a stand).
     """
     path = path or CameraPath.on_a_stand(len(track))
-    fitted = path.to_first(fitted)
     times, valid, betas = track.times, fitted.valid, fitted.betas
-    rotations_raw = fill_rotation_gaps(fitted.rotations, valid, times)
-    root_raw = fill_gaps(fitted.t_camera_root, valid, times)
-    rotations, root = rotations_raw, root_raw
+    rotations, root = raw_motion(track, fitted, path)
     if smoothing:
-        rotations = smooth_rotations(rotations_raw, times)
-        root = path.center + smooth_root(root_raw - path.center, times)
+        rotations = smooth_rotations(rotations, times)
+        root = path.center + smooth_root(root - path.center, times)
     soled = with_soles(body, betas)
-    _, joints, soles = _place(soled, betas, rotations, root)
-    return PlacedTrack(
-        soled, betas, times, valid, rotations_raw, root_raw, rotations, root, joints, soles, path.center
-    )
+    joints, soles = _place(soled, betas, rotations, root)
+    return PlacedTrack(soled, betas, times, valid, rotations, root, joints, soles, path.center)
+
+
+def raw_motion(track: Track, fitted: FittedTrack, path: CameraPath) -> tuple[np.ndarray, np.ndarray]:
+    """Rotations (T, K+1, 3, 3) and pelvis (T, 3) as fitted, gaps filled, in the first frame's camera axes."""
+    fitted = path.to_first(fitted)
+    rotations = fill_rotation_gaps(fitted.rotations, fitted.valid, track.times)
+    return rotations, fill_gaps(fitted.t_camera_root, fitted.valid, track.times)
 
 
 def _place(
     soled: Body, betas: np.ndarray, rotations: np.ndarray, root: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    R, t = soled.forward_kinematics(rotations, root - soled.rest_joints(betas)[0], betas)
-    return R, t, sole_points(soled, R, t)
+) -> tuple[np.ndarray, np.ndarray]:
+    at_rest = soled.rest_joints(betas)[0]
+
+    def place(rotations: np.ndarray, root: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        R, t = soled.forward_kinematics(rotations, root - at_rest, betas)
+        return t, sole_points(soled, R, t)
+
+    joints, soles = by_blocks(place, rotations, root)
+    return joints, soles

@@ -16,6 +16,7 @@ from ...solver.rotations import matrix_from_quaternion, quaternion_from_matrix
 # lets as much noise through as the 6 Hz Butterworth filter that is usual for marker data.
 ROTATION_CUTOFF_HZ = 4.5
 DEPTH_CUTOFF_HZ = 2.0  # a single camera measures depth an order worse than the image position
+_ROTATIONS_AT_ONCE = 200_000  # with what numpy needs in between, some 200 MB
 
 
 def fill_gaps(values: np.ndarray, valid: np.ndarray, times: np.ndarray) -> np.ndarray:
@@ -46,8 +47,18 @@ def fill_rotation_gaps(R: np.ndarray, valid: np.ndarray, times: np.ndarray) -> n
         return R
     good = np.flatnonzero(valid)
     held = R[good[np.clip(np.searchsorted(good, np.arange(len(R)), side="right") - 1, 0, None)]]
-    q = fill_gaps(continuous_quaternions(held), valid, times)
-    return matrix_from_quaternion(q / np.linalg.norm(q, axis=-1, keepdims=True))
+    out = np.empty_like(R)
+    for joints in _some_joints(R):
+        q = fill_gaps(continuous_quaternions(held[:, joints]), valid, times)
+        out[:, joints] = matrix_from_quaternion(q / np.linalg.norm(q, axis=-1, keepdims=True))
+    return out
+
+
+def _some_joints(R: np.ndarray) -> list[slice]:
+    """Of rotations (T, J, 3, 3), so many joints at a time that a long clip's intermediate results stay small."""
+    T, J = R.shape[:2]
+    count = max(1, min(J, _ROTATIONS_AT_ONCE // max(T, 1)))
+    return [slice(j, j + count) for j in range(0, J, count)]
 
 
 def gaussian_smooth(values: np.ndarray, times: np.ndarray, cutoff_hz: float) -> np.ndarray:
@@ -68,10 +79,15 @@ def gaussian_smooth(values: np.ndarray, times: np.ndarray, cutoff_hz: float) -> 
     return (total / weight[:, None]).reshape(values.shape)
 
 
-def smooth_rotations(R: np.ndarray, times: np.ndarray, cutoff_hz: float = ROTATION_CUTOFF_HZ) -> np.ndarray:
-    """Zero-phase low-pass of rotations (T, J, 3, 3)."""
-    q = gaussian_smooth(continuous_quaternions(R), times, cutoff_hz)
-    return matrix_from_quaternion(q / np.linalg.norm(q, axis=-1, keepdims=True))
+def smooth_rotations(
+    R: np.ndarray, times: np.ndarray, cutoff_hz: float = ROTATION_CUTOFF_HZ, out: np.ndarray | None = None
+) -> np.ndarray:
+    """Zero-phase low-pass of rotations (T, J, 3, 3); ``out`` may be ``R`` itself."""
+    out = np.empty(R.shape) if out is None else out
+    for joints in _some_joints(R):
+        q = gaussian_smooth(continuous_quaternions(R[:, joints]), times, cutoff_hz)
+        out[:, joints] = matrix_from_quaternion(q / np.linalg.norm(q, axis=-1, keepdims=True))
+    return out
 
 
 def smooth_root(t_camera_root: np.ndarray, times: np.ndarray, strength: float = 1.0) -> np.ndarray:

@@ -79,14 +79,15 @@ class Tracklet:
 
 def make_track(frames: Sequence[int], times: Sequence[float], tracklets: Sequence[Tracklet]) -> Track:
     """One person's track from tracklets that follow each other, in a clip of these frames."""
-    values = np.zeros((len(frames), KEYPOINT_COUNT, 6))
+    values = np.zeros((len(frames), KEYPOINT_COUNT, 6), np.float32)
     seen, acquired = np.zeros(len(frames), bool), np.zeros(len(frames), bool)
     judged: list[tuple[int, np.ndarray]] = []
     shapes = {hands.shape for tracklet in tracklets for hands in tracklet.hands[:1]}
     hands = np.zeros((len(frames), *shapes.pop())) if shapes else None
     for tracklet in tracklets:
         if tracklet.rows:
-            values[tracklet.rows] = tracklet.values
+            for row, value in zip(tracklet.rows, tracklet.values, strict=True):
+                values[row] = value
             seen[tracklet.rows] = True
             acquired[tracklet.rows[0]] = True
             judged += tracklet.judged
