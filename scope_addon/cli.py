@@ -15,12 +15,15 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import NoReturn, TextIO
+from typing import TYPE_CHECKING, NoReturn, TextIO
 
 from ..solver.body import ASSETS, BUILT_IN, Body, body_with_hands
 from ..solver.errors import ScopeError, UsageError
 from .motion import Motion
 from .scene.output_paths import SUFFIXES, check_output, person_paths
+
+if TYPE_CHECKING:
+    from .retarget.rig_source import RigSource
 
 SAMPLE = ASSETS / "sample" / "sample.mp4"
 MOTION_SUFFIXES = (".npz",)
@@ -101,6 +104,11 @@ def _add_options(capture: argparse.ArgumentParser) -> None:
         default="keyed",
         help="keyed once, per_frame, or baked into the mesh for engines that clamp morphs (default: keyed)",
     )
+    capture.add_argument(
+        "--retarget", type=Path, metavar="RIG", help="put the motion on the rig in this .blend, .fbx or .glb instead"
+    )
+    capture.add_argument("--rig-object", default="", metavar="NAME", help="the armature, where RIG holds several")
+    capture.add_argument("--bone-map", type=Path, metavar="FILE", help="which bone is which: JSON saved in the panel")
     capture.add_argument("--threads", type=int, default=0, metavar="N", help="threads for the networks (default: all)")
     capture.add_argument("--json", action="store_true", help="print a machine-readable report on stdout")
     capture.add_argument("--quiet", action="store_true", help="no progress bar")
@@ -135,6 +143,7 @@ def run_capture(args: argparse.Namespace) -> dict:
     video = args.video or SAMPLE
     outputs = args.output or [video.with_suffix(".npz"), video.with_suffix(".glb")]
     _check_outputs(outputs, args.overlay, video)
+    rig = _rig_of(args, outputs)
 
     # Imported here, so that --help and a wrong argument answer at once.
     from ..solver.body import load_body
@@ -161,7 +170,7 @@ def run_capture(args: argparse.Namespace) -> dict:
     with _ProgressBar(sys.stderr, show=sys.stderr.isatty() and not args.quiet) as progress:
         result = capture(video, body, options, progress)
         progress("writing", 0, 0)
-        written = _write(outputs, result.motions, body, video, args)
+        written = _write(outputs, result.motions, body, video, args, rig)
         if args.overlay:
             write_overlay(
                 args.overlay,
@@ -191,6 +200,7 @@ def run_batch(args: argparse.Namespace) -> dict:
             raise UsageError(f"--formats takes a list out of {known}, not {args.formats!r}")
     if args.jobs < 1:
         raise UsageError(f"--jobs takes a number from 1 on, not {args.jobs}")
+    _rig_of(args, [args.out / f"clip{suffix}" for suffix in formats])
     batch = Batch(args.folder, args.out, args.program, _given_options(args), formats, args.overlays)
     with _ProgressBar(sys.stderr, show=sys.stderr.isatty() and not args.quiet) as progress:
         report = batch.run(args.jobs, recursive=args.recursive, again=args.again, progress=progress, say=_say)
@@ -225,7 +235,36 @@ def _people(text: str) -> int | str:
     return int(text)
 
 
-def _write(outputs: list[Path], motions: list[Motion], body: Body, video: Path, args: argparse.Namespace) -> list[Path]:
+def _rig_of(args: argparse.Namespace, outputs: list[Path]) -> RigSource | None:
+    """The user's rig, tried before the work is done."""
+    if args.retarget is None:
+        for value, option in ((args.bone_map, "--bone-map"), (args.rig_object, "--rig-object")):
+            if value:
+                raise UsageError(f"{option} is about a rig: give its file with --retarget")
+        return None
+    from .retarget.rig_source import rig_source
+
+    rig = rig_source(args.retarget, args.rig_object, args.bone_map)
+    scene_files = [p for p in outputs if p.suffix.lower() not in MOTION_SUFFIXES]
+    if not scene_files:
+        raise UsageError("--retarget needs an output that holds a rig, such as -o OUT.glb; a motion file holds none")
+    for path in scene_files:
+        if path.exists() and path.samefile(rig.path):
+            raise UsageError(f"{path} is the rig's own file; choose another name")
+    from .scene.rig_file import check_rig
+
+    check_rig(rig)
+    return rig
+
+
+def _write(
+    outputs: list[Path],
+    motions: list[Motion],
+    body: Body,
+    video: Path,
+    args: argparse.Namespace,
+    rig: RigSource | None = None,
+) -> list[Path]:
     """Write every result file; bpy is loaded only when one of them needs a scene."""
     motion_files = [p for p in outputs if p.suffix.lower() in MOTION_SUFFIXES]
     scene_files = [p for p in outputs if p not in motion_files]
@@ -241,7 +280,12 @@ def _write(outputs: list[Path], motions: list[Motion], body: Body, video: Path, 
 
         footage = video if video.is_file() else None  # Blender's camera shows files, not folders of pictures
         options = replace(NEW_SCENE, name=video.stem, shape=args.shape_keys)
-        files, warnings = export_motions(motions, body, scene_files, footage=footage, build_options=options)
+        if rig is not None:
+            from .scene.rig_export import export_on_rig
+
+            files, warnings = export_on_rig(motions, body, scene_files, rig, options, footage)
+        else:
+            files, warnings = export_motions(motions, body, scene_files, footage=footage, build_options=options)
         written += files
         for warning in warnings:
             print(f"scope: warning: {warning}", file=sys.stderr)

@@ -122,7 +122,7 @@ def export_motions(
     if not scene_paths:
         return written, warnings
     build_options = build_options or replace(NEW_SCENE, name=Path(scene_paths[0]).stem)
-    with _temporary_scene("Capturing"):
+    with temporary_scene("Capturing"):
         result = build_scene(motions, body, footage, build_options, progress)
         try:
             for each in scene_paths:
@@ -147,7 +147,7 @@ def _remove(result: BuildResult) -> None:
 
 
 @contextmanager
-def _temporary_scene(name: str) -> Iterator[bpy.types.Scene]:
+def temporary_scene(name: str) -> Iterator[bpy.types.Scene]:
     """An empty scene that is the window's while the block runs, and gone afterwards."""
     # Edit mode and the exporters work on a window's scene; timers have no window of their own, so they borrow one.
     window = bpy.context.window or bpy.context.window_manager.windows[0]
@@ -166,7 +166,7 @@ def _temporary_scene(name: str) -> Iterator[bpy.types.Scene]:
 def _scene_of(collections: Sequence[bpy.types.Collection]) -> Iterator[bpy.types.Scene]:
     """A scene that holds these collections alone, with the rate, picture and range of the scene they come from."""
     source = bpy.context.scene
-    with _temporary_scene("Capture") as scene:
+    with temporary_scene("Capture") as scene:
         for collection in collections:
             scene.collection.children.link(collection)
         for name in ("fps", "fps_base", "resolution_x", "resolution_y", "pixel_aspect_x", "pixel_aspect_y"):

@@ -20,8 +20,8 @@ from . import bvh, timing
 
 def write_glb(path: Path, camera: bool = False) -> None:
     """glTF binary: y up, metres, four influences a vertex, shape keys as morph targets, all motion in one animation."""
-    _need("io_scene_gltf2")
-    _call(
+    need_addon("io_scene_gltf2")
+    call_operator(
         bpy.ops.export_scene.gltf,
         filepath=str(path),
         export_format="GLB",
@@ -50,8 +50,8 @@ def write_glb(path: Path, camera: bool = False) -> None:
 
 def write_fbx(path: Path, camera: bool = False) -> None:
     """FBX: y up, objects at scale 1 with the file's unit set to metres, no leaf bones, every frame keyed."""
-    _need("io_scene_fbx")
-    _call(
+    need_addon("io_scene_fbx")
+    call_operator(
         bpy.ops.export_scene.fbx,
         filepath=str(path),
         use_selection=False,
@@ -80,7 +80,7 @@ def write_fbx(path: Path, camera: bool = False) -> None:
 
 def write_usd(path: Path, camera: bool = False) -> None:
     """USD crate: z up, metres, skeleton, blend shapes, preview materials."""
-    _call(
+    call_operator(
         bpy.ops.wm.usd_export,
         filepath=str(path),
         selected_objects_only=False,
@@ -183,16 +183,16 @@ def quiet() -> Iterator[None]:
         os.close(nowhere)
 
 
-def _need(module: str) -> None:
-    """Enable an exporter that comes with Blender, for this session only, where a user has turned it off."""
+def need_addon(module: str) -> None:
+    """Enable an exporter or importer that comes with Blender, for this session only, where a user has turned it off."""
     if not addon_utils.check(module)[1]:
         addon_utils.enable(module, default_set=False)
 
 
-def _call(operator, **settings) -> None:
-    """Call an exporter with those of our settings that this Blender's version of it has."""
+def call_operator(operator, **settings) -> None:
+    """Call an exporter or importer with those of our settings that this Blender's version of it has."""
     try:
         known = operator.get_rna_type().properties.keys()
     except KeyError as error:
-        raise OutputError("this Blender was built without a writer for the format; use one from blender.org") from error
+        raise OutputError("this Blender was built without the format; use one from blender.org") from error
     operator(**{name: value for name, value in settings.items() if name in known})

@@ -1,0 +1,51 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Motions on the user's own rig, to files: the rig takes the captured body's place, the camera stays."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import bpy
+
+from ...solver.body import Body
+from ..motion import Motion
+from ..retarget.rig_source import RigSource
+from .build import BuildOptions, build_scene
+from .export import export, temporary_scene
+from .output_paths import check_output
+from .retarget import retarget
+from .rig_file import bones_of, forgotten, load_rig
+
+
+def export_on_rig(
+    motions: list[Motion],
+    body: Body,
+    paths: Sequence[Path],
+    source: RigSource,
+    build_options: BuildOptions,
+    footage: Path | None = None,
+) -> tuple[list[Path], list[str]]:
+    """Put every person's motion on a rig of its own, write one file or several, and leave the session as it was.
+
+    :return: the files written, and the warnings.
+    :raises InputError, UsageError: the rig cannot be used; see ``load_rig``. :raises OutputError: cannot be written.
+    """
+    for path in paths:
+        check_output(path)
+    written: list[Path] = []
+    with forgotten(), temporary_scene("Retargeting"):
+        result = build_scene(motions, body, footage, build_options)
+        warnings = list(result.warnings)
+        for number, person in enumerate(result.people, 1):
+            rig = load_rig(source, result.collection)
+            bones = bones_of(source, rig)
+            if number == 1 and any(c <= 0.5 for c in bones.confidence.values()):
+                warnings.append(f"the bones of '{rig.name}' were guessed by its rest pose alone; look at the result")
+            retarget(person.armature, body, person.motion.betas, rig, bones, result.frame_rate)
+            if len(motions) > 1:
+                rig.name = f"{rig.name}_person{number}"
+        bpy.data.batch_remove([obj for person in result.people for obj in (person.armature, person.mesh)])
+        for path in paths:
+            written += export(path, [result.collection])
+    return written, warnings
