@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..solver.names import BODY_JOINTS
 from .motion import Motion
 
 FAR_SHARE = 0.03  # of the picture's longer side: a body this far off its keypoints is worth a look
@@ -40,9 +41,10 @@ def low_confidence_spans(motion: Motion, gap_s: float = 0.0) -> list[Span]:
 
 
 def body_confidence(motion: Motion) -> np.ndarray:
-    """(T,) mean confidence over the joints that are ever seen; fingers and the like, fixed by priors, do not count."""
-    shown = motion.joint_confidence.max(axis=0) > 0
-    return motion.joint_confidence[:, shown].mean(axis=1) if shown.any() else np.zeros(len(motion))
+    """(T,) mean confidence over the body's joints that are ever seen; fingers, which often do not show, do not count."""
+    confidence = motion.joint_confidence[:, : len(BODY_JOINTS)]
+    shown = confidence.max(axis=0) > 0
+    return confidence[:, shown].mean(axis=1) if shown.any() else np.zeros(len(motion))
 
 
 def _spans(mask: np.ndarray, timestamps: np.ndarray, gap_s: float) -> list[tuple[int, int]]:

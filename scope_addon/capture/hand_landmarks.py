@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 
 from .hand_region import region_from_landmarks
+from .landmark_network import disagreement
 from .networks import network_path, open_session
 from .region import Region
 
@@ -44,6 +45,14 @@ class HandEstimate:
     def next_region(self) -> Region:
         """Where to look in the next frame."""
         return region_from_landmarks(self.keypoints_px)
+
+    @property
+    def disagreement(self) -> float:
+        """How far the keypoints in the image and in space contradict each other, see `PoseEstimate.disagreement`.
+
+        0.08..0.2 for hands that show; up to 0.5 for hidden ones that the network imagines.
+        """
+        return disagreement(self.keypoints_px, self.world_landmarks)
 
     @property
     def size_px(self) -> float:

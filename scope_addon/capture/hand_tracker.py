@@ -25,6 +25,7 @@ SEARCH_SCALE = 2.3  # side of the square in which a palm is looked for, over the
 EAGER_FRAMES = 10  # how long a lost hand is looked for in every frame
 PATIENT_FRAMES = 4  # afterwards, every so many frames
 SMALLEST_HAND_PX = 12.0
+DISAGREEMENT_THRESHOLD = 0.3
 STRANGER = 0.15  # probability of the right side below which a hand is not the one that is wanted
 
 
@@ -94,7 +95,10 @@ class HandTracker:
 
 
 def belongs(estimate: HandEstimate, person: Observation, scale: float, side: int) -> bool:
-    """Whether a hand may be this one of the person: near the body's wrist, of a hand's size, not the other hand."""
+    """Whether a hand may be this one of the person: near the body's wrist, as large as a hand, not the other hand.
+
+    And one that agrees with itself, which an imagined one does not.
+    """
     wrist = WRISTS[side]
     sure = person.keypoints_confidence[wrist] >= SURE_WRIST
     length = HAND_LENGTH_M * scale
@@ -104,6 +108,7 @@ def belongs(estimate: HandEstimate, person: Observation, scale: float, side: int
         apart <= (WRIST_APART if sure else UNSURE_WRIST_APART) * length
         and 0.25 * length <= estimate.size_px <= 2.0 * length
         and likely >= STRANGER
+        and estimate.disagreement <= DISAGREEMENT_THRESHOLD
     )
 
 

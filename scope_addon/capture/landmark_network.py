@@ -71,10 +71,15 @@ class PoseEstimate:
         min over s, t of ‖p − s·w_xy − t‖ / ‖p − mean(p)‖: a scaled orthographic view of the world landmarks w. Below
         0.15 for people; perspective adds some.
         """
-        image = self.keypoints_px - self.keypoints_px.mean(axis=0)
-        space = self.world_landmarks[:, :2] - self.world_landmarks[:, :2].mean(axis=0)
-        scale = (image * space).sum() / np.maximum((space**2).sum(), 1e-12)
-        return float(np.linalg.norm(image - scale * space) / np.maximum(np.linalg.norm(image), 1e-12))
+        return disagreement(self.keypoints_px, self.world_landmarks)
+
+
+def disagreement(keypoints_px: np.ndarray, world_landmarks: np.ndarray) -> float:
+    """How far keypoints (n, 2) are from a scaled orthographic view of (n, 3), see `PoseEstimate.disagreement`."""
+    image = keypoints_px - keypoints_px.mean(axis=0)
+    space = world_landmarks[:, :2] - world_landmarks[:, :2].mean(axis=0)
+    scale = (image * space).sum() / np.maximum((space**2).sum(), 1e-12)
+    return float(np.linalg.norm(image - scale * space) / np.maximum(np.linalg.norm(image), 1e-12))
 
 
 class LandmarkNetwork:

@@ -24,7 +24,8 @@ def hand_at(wrist, left=0.95, presence=0.95):
     """An upright hand as the network would say it."""
     points = np.array([[0.0, 0.0], *([x, y] for x in (-0.25, -0.12, 0, 0.12, 0.24) for y in (-0.5, -0.65, -0.8, -1))])
     region = Region((wrist[0], wrist[1] - LENGTH / 2), 2 * LENGTH, 0.0)
-    return HandEstimate(points * LENGTH + wrist, np.zeros((21, 3)), presence, left, region)
+    world = np.pad(points * HAND_LENGTH_M, ((0, 0), (0, 1)))
+    return HandEstimate(points * LENGTH + wrist, world, presence, left, region)
 
 
 def person(left_wrist=(300, 500), right_wrist=(700, 500)):
@@ -138,3 +139,11 @@ def test_nothing_is_made_up_where_nobody_is():
     tracker = HandTracker(1)
     assert tracker.step(IMAGE, []) == []
     assert not seen(tracker, person()).any()
+
+
+def test_a_hand_that_contradicts_itself_is_imagined(follow):
+    hand = hand_at((300, 500))
+    hand.world_landmarks[:] = hand.world_landmarks[:, [1, 0, 2]]
+    assert hand.disagreement > 0.5
+    assert hand_at((300, 500)).disagreement < 1e-9
+    assert not seen(follow([hand]), person())[0]

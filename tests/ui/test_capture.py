@@ -72,13 +72,20 @@ def test_several_people_are_built_and_told_apart(fake_worker, footage):
     assert len([o for o in captures()[0].objects if o.type == "ARMATURE"]) == 2
 
 
+def test_hands_ask_for_the_body_with_fingers(fake_worker, footage):
+    fake_worker("assert request['hands'] and request['body'] == 'scope_h'\nsend('error', message='so it was')")
+    bpy.context.scene.scope.footage, bpy.context.scene.scope.hands = str(footage), True
+    with pytest.raises(RuntimeError, match="So it was"):
+        bpy.ops.scope.capture()
+
+
 def test_other_options_are_another_capture(fake_worker, footage):
     fake_worker(FINISH)
     scene = bpy.context.scene
     scene.scope.footage = str(footage)
     bpy.ops.scope.capture()
     fake_worker("send('error', message='asked again')")
-    others = {"quality": "FAST", "lens": "FOV", "smoothing": False, "body": "SCOPE_H", "people": "ALL"}
+    others = {"quality": "FAST", "lens": "FOV", "smoothing": False, "body": "SCOPE_H", "people": "ALL", "hands": True}
     for name, value in others.items():
         before = getattr(scene.scope, name)
         setattr(scene.scope, name, value)
