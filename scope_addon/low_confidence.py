@@ -41,7 +41,7 @@ def low_confidence_spans(motion: Motion, gap_s: float = 0.0) -> list[Span]:
 
 
 def body_confidence(motion: Motion) -> np.ndarray:
-    """(T,) mean confidence over the body's joints that are ever seen; fingers, which often do not show, do not count."""
+    """(T,) mean confidence over the body's joints that are ever seen; fingers, which often hide, do not count."""
     confidence = motion.joint_confidence[:, : len(BODY_JOINTS)]
     shown = confidence.max(axis=0) > 0
     return confidence[:, shown].mean(axis=1) if shown.any() else np.zeros(len(motion))

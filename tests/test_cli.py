@@ -151,3 +151,13 @@ def test_help_names_every_option(capsys):
     text = capsys.readouterr().out
     for suffix in cli.SUFFIXES:
         assert suffix in text
+
+
+def test_hands_need_a_body_with_fingers(tmp_path, capsys):
+    from scope.solver.body import BUILT_IN
+
+    out = tmp_path / "out.npz"
+    status, _, err = run(capsys, "capture", str(SAMPLE), "--hands", "--body", str(BUILT_IN["scope"]), "-o", str(out))
+    assert status == 2
+    assert "no finger joints" in err
+    assert not out.exists()

@@ -43,6 +43,13 @@ def test_joints_that_nothing_measures_do_not_count():
     np.testing.assert_array_equal(body_confidence(motion()), 1.0)
 
 
+def test_fingers_that_are_not_seen_leave_the_body_sure():
+    m = motion()
+    m.joint_confidence = np.ones((30, 52))
+    m.joint_confidence[5:, 22:] = 0.0
+    np.testing.assert_array_equal(body_confidence(m), 1.0)
+
+
 def test_it_needs_no_blender():
     code = "import sys, scope.scope_addon.low_confidence; sys.exit('bpy' in sys.modules)"
     assert run([sys.executable, "-c", code], check=False).returncode == 0

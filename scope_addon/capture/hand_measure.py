@@ -27,6 +27,7 @@ PIXEL_TRUST = 0.3  # of a hand's keypoint beside the body's wrist: 21 lie close 
 DIRECTION_TRUST = 0.25  # of a bone's direction of presence 1: twice the deviation of a bone of the body
 # Radians that a joint of a finger bends towards the palm, at least and at most, and how far it swings off that.
 _KNUCKLE, _HINGE = (-0.5, 1.7, 0.4), (-0.2, 2.0, 0.2)
+_THUMB = (-0.4, 0.4, 1.2)  # the same about its own bone: how far it twists, and swings
 SHORT_GAP_S, LONG_GAP_S = 0.3, 1.0  # fingers that are not seen move on until the one, and are at rest from the other
 
 
@@ -125,22 +126,23 @@ def with_finger_limits(priors: Priors, body: Body) -> Priors:
     """The priors and how far fingers bend: towards the palm, about the axis that is across bone and palm at rest.
 
     The palm's side is that of (index − wrist) × (little finger − wrist) on the right hand, the other on the left. The
-    thumb's joints turn about axes of their own and are left to the joint prior.
+    thumb's joints turn about axes of their own: they are only kept from twisting about their bones and from going too far.
     """
     J, joints, axes, ranges = body.J_template, [], [], []
     for side, sign in (("left", -1.0), ("right", 1.0)):
         fingers = finger_joints(body, side)
         wrist = J[body.joint_names.index(f"{side}_wrist")]
         palm = sign * np.cross(J[fingers[0]] - wrist, J[fingers[9]] - wrist)
-        tips = {f: body.keypoint_names.index(f"hand/{side}_{_TIP[f]}") for f in FINGERS[:4]}
-        for number, finger in enumerate(FINGERS[:4]):
+        tips = {f: body.keypoint_names.index(f"hand/{side}_{_TIP[f]}") for f in FINGERS}
+        for number, finger in enumerate(FINGERS):
             three = fingers[3 * number : 3 * number + 3]
             ends = [J[three[1]], J[three[2]], body.keypoint_template[tips[finger]]]
             for k, (joint, end) in enumerate(zip(three, ends, strict=True)):
-                axis = np.cross(end - J[joint], palm)
+                bone = end - J[joint]
+                axis = bone if finger == "thumb" else np.cross(bone, palm)
                 joints.append(joint)
                 axes.append(axis / np.linalg.norm(axis))
-                ranges.append(_KNUCKLE if k == 0 else _HINGE)
+                ranges.append(_THUMB if finger == "thumb" else _KNUCKLE if k == 0 else _HINGE)
     lower, upper, swing = np.array(ranges).T
     ones = np.ones(len(joints))
     ints, floats = joint_limits.pack(np.array(joints), np.array(axes), lower, upper, swing, ones, ones)
