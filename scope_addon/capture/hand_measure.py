@@ -126,7 +126,7 @@ def with_finger_limits(priors: Priors, body: Body) -> Priors:
     """The priors and how far fingers bend: towards the palm, about the axis that is across bone and palm at rest.
 
     The palm's side is that of (index − wrist) × (little finger − wrist) on the right hand, the other on the left. The
-    thumb's joints turn about axes of their own: they are only kept from twisting about their bones and from going too far.
+    thumb's joints turn about axes of their own: they are only kept from twisting about their bones and going too far.
     """
     J, joints, axes, ranges = body.J_template, [], [], []
     for side, sign in (("left", -1.0), ("right", 1.0)):
