@@ -30,6 +30,7 @@ MOTION_SUFFIXES = (".npz",)
 SHAPE_MODES = ("keyed", "per_frame", "baked")
 OVERLAY_SUFFIXES = (".mp4", ".png", ".jpg")
 QUALITIES = ("fast", "balanced", "best")
+PROVIDERS = ("auto", "cpu", "cuda", "tensorrt", "directml", "coreml")
 PROGRAM = (sys.executable, "-m", f"{__package__}.cli")
 
 
@@ -109,6 +110,11 @@ def _add_options(capture: argparse.ArgumentParser) -> None:
     )
     capture.add_argument("--rig-object", default="", metavar="NAME", help="the armature, where RIG holds several")
     capture.add_argument("--bone-map", type=Path, metavar="FILE", help="which bone is which: JSON saved in the panel")
+    capture.add_argument("--detector", type=Path, metavar="FILE", help="your own person detector, an .onnx file")
+    capture.add_argument("--keypoints", type=Path, metavar="FILE", help="your own keypoint network, an .onnx file")
+    capture.add_argument(
+        "--provider", choices=PROVIDERS, default="auto", help="what the networks run on (default: the best there is)"
+    )
     capture.add_argument("--threads", type=int, default=0, metavar="N", help="threads for the networks (default: all)")
     capture.add_argument("--json", action="store_true", help="print a machine-readable report on stdout")
     capture.add_argument("--quiet", action="store_true", help="no progress bar")
@@ -166,6 +172,9 @@ def run_capture(args: argparse.Namespace) -> dict:
         smoothing=not args.no_smoothing,
         hands=args.hands,
         threads=max(0, args.threads),
+        provider=args.provider,
+        detector=args.detector,
+        keypoints=args.keypoints,
     )
     with _ProgressBar(sys.stderr, show=sys.stderr.isatty() and not args.quiet) as progress:
         result = capture(video, body, options, progress)
@@ -310,7 +319,8 @@ def _summary(report: dict) -> str:
     people = "1 person" if report["people"] == 1 else f"{report['people']} people"
     return (
         f"{people}, {report['frames']} frames, {report['fps']['total']:.1f} frames/s, "
-        f"reprojection error {report['reprojection_px']:.1f} px; wrote {', '.join(report['outputs'])}"
+        f"reprojection error {report['reprojection_px']:.1f} px, networks on {report['execution']}; "
+        f"wrote {', '.join(report['outputs'])}"
     )
 
 

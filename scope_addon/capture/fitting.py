@@ -111,7 +111,7 @@ def _lift(measurer: Measurer, track: Track, pixels: np.ndarray, parts: Parts) ->
         sigma = np.full(track.confidence.shape, DEPTH_SIGMA_M)
         return Lifted(track.world_landmarks, sigma, sigma)
     rays = measurer.rays(pixels)
-    if not parts.world_landmarks:
+    if not (parts.world_landmarks and track.knows_depth):
         return Lifter().lift(rays, track.confidence, None)
     return Lifter().lift_both_ways(rays, track.confidence, track.world_landmarks)
 

@@ -9,6 +9,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from .execution import Execution
 from .hand_region import region_from_landmarks
 from .landmark_network import disagreement
 from .networks import network_path, open_session
@@ -63,8 +64,8 @@ class HandEstimate:
 class HandNetwork:
     """The hand landmark network on the CPU; keeps nothing between calls."""
 
-    def __init__(self, threads: int, folder: Path | None = None) -> None:
-        self._session = open_session(network_path("hand_landmark", folder), threads)
+    def __init__(self, threads: int, folder: Path | None = None, execution: Execution | None = None) -> None:
+        self._session = open_session(network_path("hand_landmark", folder), threads, execution)
 
     def estimate(self, image_rgb: np.ndarray, region: Region) -> HandEstimate:
         """The hand in a region of an (H, W, 3) uint8 image."""

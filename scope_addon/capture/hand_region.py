@@ -19,6 +19,10 @@ _ARM = np.array(
     [[KEYPOINT_NAMES.index(f"{side}_{name}") for name in ("elbow", "wrist", "index", "pinky")] for side in SIDES]
 )
 WRISTS = _ARM[:, 1]
+_STATURE = [
+    [KEYPOINT_NAMES.index(f"{side}_{name}") for name in ("shoulder", "hip", "knee", "ankle")] for side in SIDES
+]
+_STATURE_M = 1.35  # shoulder to ankle along the bones
 _MIDDLE = 0.45  # of the hand's length: how far beyond the wrist its middle lies
 _BODY_SCALE = 1.5  # sides of the region per hand length: the body tells roughly where the hand is
 _PALM_SCALE, _PALM_SHIFT = 2.6, 0.5  # MediaPipe's: side over the palm's box, and how far towards the fingers, in boxes
@@ -29,8 +33,12 @@ _STEADY = np.array([0, 1, 2, 3, 5, 6, 9, 10, 13, 14, 17, 18])  # keypoints of pa
 def pixels_per_metre(keypoints_px: np.ndarray, world_landmarks: np.ndarray) -> float:
     """How large a metre at the person's distance is in the image.
 
-    s = ‖p − mean p‖ / ‖w_xy − mean w_xy‖ of all 33 keypoints p and world landmarks w: a scaled orthographic view.
+    s = ‖p − mean p‖ / ‖w_xy − mean w_xy‖ of all 33 keypoints p and world landmarks w: a scaled orthographic view. Where
+    the world landmarks are not known (all 0), the length of trunk and longer leg in the image over an adult's.
     """
+    if not world_landmarks.any():
+        trunk_and_legs = [np.linalg.norm(np.diff(keypoints_px[chain], axis=0), axis=1).sum() for chain in _STATURE]
+        return float(max(trunk_and_legs)) / _STATURE_M
     image = keypoints_px - keypoints_px.mean(axis=0)
     space = world_landmarks[:, :2] - world_landmarks[:, :2].mean(axis=0)
     return float(np.linalg.norm(image) / np.maximum(np.linalg.norm(space), 1e-9))

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from .execution import Execution
 from .hand_landmarks import HAND_POINTS, HandEstimate, HandNetwork
 from .hand_region import HAND_LENGTH_M, SIDES, WRISTS, pixels_per_metre, region_from_body
 from .observation import Observation
@@ -40,9 +41,9 @@ class _Hand:
 class HandTracker:
     """The hands of the people whom `PeopleTracker` follows; frames are given in order."""
 
-    def __init__(self, threads: int, folder: Path | None = None) -> None:
-        self._network = HandNetwork(threads, folder)
-        self._palms = PalmDetector(threads, folder)
+    def __init__(self, threads: int, folder: Path | None = None, execution: Execution | None = None) -> None:
+        self._network = HandNetwork(threads, folder, execution)
+        self._palms = PalmDetector(threads, folder, execution)
         self._hands: dict[tuple[int, int], _Hand] = {}
 
     def step(

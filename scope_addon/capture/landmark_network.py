@@ -13,6 +13,7 @@ import cv2
 import numpy as np
 
 from ...solver.names import BLAZEPOSE
+from .execution import Execution
 from .networks import network_path, open_session
 from .region import MARGIN, Region, region_from_points
 
@@ -37,8 +38,9 @@ class PoseEstimate:
 
     ``keypoints_px`` (33, 2) image pixels; ``visibility``, ``in_frame`` (33,) probabilities that a keypoint is seen
     and that it lies inside the picture; ``world_landmarks`` (33, 3) metres in camera axes (x right, y down,
-    z forward), the middle of the hips at 0; ``presence``: probability that there is a person at all; ``region``: where
-    it looked; ``next_region``: where to look in the next frame.
+    z forward), the middle of the hips at 0, or all 0 from a network that knows nothing of depth; ``presence``:
+    probability that there is a person at all; ``region``: where it looked; ``next_region``: where to look in the next
+    frame.
     """
 
     keypoints_px: np.ndarray
@@ -69,9 +71,9 @@ class PoseEstimate:
         """How far the keypoints in the image and in space contradict each other, relative to the keypoints' spread.
 
         min over s, t of ‖p − s·w_xy − t‖ / ‖p − mean(p)‖: a scaled orthographic view of the world landmarks w. Below
-        0.15 for people; perspective adds some.
+        0.15 for people; perspective adds some. 0 where the world landmarks are not known.
         """
-        return disagreement(self.keypoints_px, self.world_landmarks)
+        return disagreement(self.keypoints_px, self.world_landmarks) if self.world_landmarks.any() else 0.0
 
 
 def disagreement(keypoints_px: np.ndarray, world_landmarks: np.ndarray) -> float:
@@ -89,15 +91,17 @@ class LandmarkNetwork:
     less time than one after the other with all: threads that share a region wait for each other at every layer.
     """
 
-    def __init__(self, name: str, threads: int, folder: Path | None = None) -> None:
-        self._path, self._threads = network_path(name, folder), threads
+    def __init__(
+        self, name: str, threads: int, folder: Path | None = None, execution: Execution | None = None
+    ) -> None:
+        self._path, self._threads, self._execution = network_path(name, folder), threads, execution
         self._pool = ThreadPoolExecutor(min(_WORKERS, threads), "scope-landmarks")
         self._sessions: dict[int, onnxruntime.InferenceSession] = {}
         self._session(threads)  # opened now, so that a bad file is told before the first frame
 
     def _session(self, threads: int) -> onnxruntime.InferenceSession:
         if threads not in self._sessions:
-            self._sessions[threads] = open_session(self._path, threads)
+            self._sessions[threads] = open_session(self._path, threads, self._execution)
         return self._sessions[threads]
 
     @property

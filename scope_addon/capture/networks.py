@@ -9,6 +9,7 @@ from types import ModuleType
 from typing import TYPE_CHECKING
 
 from ...solver.errors import ModelFileError, SetupError, UsageError
+from .execution import CPU, DIRECTML, PROVIDERS, Execution, OneAtATime
 
 if TYPE_CHECKING:
     import onnxruntime
@@ -36,24 +37,50 @@ def network_path(name: str, folder: Path | None = None) -> Path:
     return path
 
 
-def open_session(path: Path, threads: int) -> onnxruntime.InferenceSession:
-    """An onnxruntime session on the CPU with ``threads`` threads; ModelFileError when the file is not sound."""
+def open_session(path: Path, threads: int, execution: Execution | None = None) -> onnxruntime.InferenceSession:
+    """An onnxruntime session with ``threads`` threads, on what ``execution`` asks for if that is there.
+
+    :raises ModelFileError: the file is not sound, or uses operators that onnxruntime does not have.
+    """
     if threads < 1:
         raise UsageError(f"{threads} threads were asked for; at least 1 is needed.")
-    onnxruntime = _runtime()
-    options = onnxruntime.SessionOptions()
+    runtime, execution = _runtime(), execution or Execution()
+    for name in execution.candidates(runtime.get_available_providers()):
+        try:
+            session = _open_on(name, path, threads)
+        except Exception as error:  # onnxruntime's exceptions share no base of their own
+            if name == CPU:
+                raise ModelFileError(_cannot_load(path, error)) from error
+            execution.fell_back(name, error)
+            continue
+        if session.get_providers()[0] != PROVIDERS[name][0]:  # onnxruntime went on without it, and only logged that
+            execution.fell_back(name, "its libraries or its device are missing")
+            if name != CPU:
+                continue
+        execution.succeeded(name)
+        return session
+    raise AssertionError("the CPU is always tried")
+
+
+def _open_on(name: str, path: Path, threads: int) -> onnxruntime.InferenceSession:
+    runtime = _runtime()
+    options = runtime.SessionOptions()
     options.intra_op_num_threads = threads
     options.inter_op_num_threads = 1
     # Threads of one network that wait in a busy loop would take the cores from the next one.
     options.add_session_config_entry("session.force_spinning_stop", "1")
     options.log_severity_level = 4  # errors arrive as exceptions, with our words around them
-    try:
-        return onnxruntime.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
-    except Exception as error:  # onnxruntime's exceptions share no base of their own
-        raise ModelFileError(
-            f"{path}: onnxruntime cannot load this network ({error}). Build it again with: "
-            "python -m scope.tools.convert_networks --force"
-        ) from error
+    options.enable_mem_pattern = name != DIRECTML  # which cannot have it
+    providers = [PROVIDERS[n][0] for n in dict.fromkeys((name, CPU))]
+    session = runtime.InferenceSession(str(path), options, providers=providers)
+    return OneAtATime(session) if name == DIRECTML else session
+
+
+def _cannot_load(path: Path, error: Exception) -> str:
+    text = f"{path}: onnxruntime cannot load this network ({' '.join(str(error).split())})."
+    if path.parent == NETWORKS_FOLDER:
+        return f"{text} Build it again with: python -m scope.tools.convert_networks --force"
+    return f"{text} Give an ONNX file that uses standard operators alone."
 
 
 @cache

@@ -15,11 +15,12 @@ class Observation:
     """The person in one frame.
 
     ``keypoints_px`` (33, 2) pixels of the frame; ``keypoints_confidence`` (33,) 0..1; ``world_landmarks`` (33, 3)
-    metres, the middle of the hips at 0, in camera axes (x right, y down, z forward); ``presence``: the network's
-    probability that there is a person; ``region``: where it looked; ``acquired``: the person was not followed from the
-    frame before; ``appearance``: see `appearance`, in some frames; ``judged_landmarks``: what the strong network says
-    in place of ``world_landmarks``, in few frames. Order: `KEYPOINT_NAMES`. ``hands`` (2, 21, 6), when they are asked
-    for: pixels, confidence and world landmarks of the left and right hand, see `hand_tracker`; zeros where not seen.
+    metres, the middle of the hips at 0, in camera axes (x right, y down, z forward), or all 0 where depth is unknown;
+    ``presence``: the network's probability that there is a person; ``region``: where it looked; ``acquired``: the
+    person was not followed from the frame before; ``appearance``: see `appearance`, in some frames;
+    ``judged_landmarks``: what the strong network says in place of ``world_landmarks``, in few frames. Order:
+    `KEYPOINT_NAMES`. ``hands`` (2, 21, 6), when they are asked for: pixels, confidence and world landmarks of the left
+    and right hand, see `hand_tracker`; zeros where not seen.
     """
 
     keypoints_px: np.ndarray

@@ -9,6 +9,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from .execution import Execution
 from .hand_region import region_from_palm
 from .networks import network_path, open_session
 from .person_detector import decode, make_anchors, merge_overlapping
@@ -30,8 +31,8 @@ class Palm:
 class PalmDetector:
     """The palm detection network on the CPU; keeps nothing between calls."""
 
-    def __init__(self, threads: int, folder: Path | None = None) -> None:
-        self._session = open_session(network_path("palm_detection", folder), threads)
+    def __init__(self, threads: int, folder: Path | None = None, execution: Execution | None = None) -> None:
+        self._session = open_session(network_path("palm_detection", folder), threads, execution)
         self._anchors = make_anchors(INPUT_SIZE, _LAYERS)
 
     def detect(self, image_rgb: np.ndarray, where: Region, threshold: float = SCORE_THRESHOLD) -> list[Palm]:

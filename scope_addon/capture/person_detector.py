@@ -10,6 +10,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from .execution import Execution
 from .networks import network_path, open_session
 from .region import Region, region_from_points
 
@@ -42,8 +43,8 @@ class Detection:
 class PersonDetector:
     """The detection network on the CPU. One call looks at one image; nothing is kept between calls."""
 
-    def __init__(self, threads: int, folder: Path | None = None) -> None:
-        self._session = open_session(network_path("pose_detection", folder), threads)
+    def __init__(self, threads: int, folder: Path | None = None, execution: Execution | None = None) -> None:
+        self._session = open_session(network_path("pose_detection", folder), threads, execution)
         self._anchors = make_anchors()
 
     def detect(

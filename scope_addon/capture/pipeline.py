@@ -19,6 +19,7 @@ from .camera import Camera, choose_camera
 from .camera_motion import BackgroundTracker
 from .camera_path import CameraPath
 from .camera_travel import camera_travel
+from .execution import AUTO, Execution
 from .fitting import FittedTrack, fit_track, prepare_track, refit_track
 from .hand_measure import require_fingers
 from .hand_tracker import HandTracker
@@ -57,6 +58,9 @@ class CaptureOptions:
     smoothing: bool = True
     threads: int = 0  # 0: as many as there are cores
     hands: bool = False  # fingers too; the body needs finger joints
+    provider: str = AUTO  # what the networks run on; see `execution`
+    detector: Path | None = None  # the user's own networks, ONNX files; see `adapters`
+    keypoints: Path | None = None
     parts: Parts = ALL_PARTS  # for experiments
 
 
@@ -83,6 +87,8 @@ def capture(
     :raises CancelledError: raised by ``progress`` itself, passed on.
     """
     path = Path(path)
+    if options.keypoints and not options.parts.lifter:
+        raise UsageError("the lifter cannot be left out with a keypoint file: such a network tells nothing of depth")
     clock = _Clock()
     most = _most_people(options.people)
     if options.hands:
@@ -97,11 +103,19 @@ def capture(
             metadata_focal_mm=video.focal_35mm,
         )
         threads = options.threads or os.cpu_count() or 1
-        tracker = PeopleTracker(options.quality, threads, None if options.people == LARGEST else most)
+        execution = Execution(options.provider)
+        tracker = PeopleTracker(
+            options.quality,
+            threads,
+            None if options.people == LARGEST else most,
+            detector=options.detector,
+            keypoints=options.keypoints,
+            execution=execution,
+        )
         background = BackgroundTracker(camera, video.width, video.height)
-        hands = HandTracker(threads) if options.hands else None
+        hands = HandTracker(threads, execution=execution) if options.hands else None
         seen = _observe(video, tracker, hands, background, clock, progress, watch)
-        warnings = list(video.warnings)
+        warnings = execution.warnings + list(video.warnings)
     frames = len(seen)
     with clock.stage("solver"):
         tracks = [repair_left_right(t) if options.parts.left_right else t for t in seen.build(most)]
@@ -131,6 +145,9 @@ def capture(
         "valid_frames": int(motions[0].valid.sum()),
         "per_person": [_about_person(motion) for motion in motions],
         "quality": options.quality,
+        "detector": str(options.detector or "built-in"),
+        "keypoints": str(options.keypoints or "built-in"),
+        "execution": execution.describe(threads),
         "body": body.name,
         "camera": camera.source,
         "camera_turns_deg": 0.0 if turning.is_static else round(turning.largest_turn_deg, 2),

@@ -22,7 +22,7 @@ class Track:
     seen: np.ndarray  # (T,) bool
     keypoints_px: np.ndarray  # (T, 33, 2) pixels of the decoded, upright frame
     confidence: np.ndarray  # (T, 33) 0..1
-    world_landmarks: np.ndarray  # (T, 33, 3) metres, hip-centred, axes of the camera
+    world_landmarks: np.ndarray  # (T, 33, 3) metres, hip-centred, axes of the camera; all 0: unknown
     acquired: np.ndarray  # (T,) the person was not followed from the frame before, but found (again) in this one
     # The strong network's world landmarks, in few frames: rows (A,) and (A, 33, 3). See `left_right`.
     judged_rows: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int64))
@@ -32,6 +32,11 @@ class Track:
 
     def __len__(self) -> int:
         return len(self.frames)
+
+    @property
+    def knows_depth(self) -> bool:
+        """Whether the landmark network told depth; a user's keypoint network does not."""
+        return bool(self.world_landmarks.any())
 
 
 @dataclass

@@ -12,11 +12,15 @@ import math
 from concurrent.futures import Future
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 
 from ...solver.errors import ShapeError
+from .adapters.box_detector import BoxDetector
+from .adapters.keypoint_network import KeypointNetwork
 from .appearance import appearance
+from .execution import Execution
 from .landmark_network import LandmarkNetwork, PoseEstimate
 from .left_right import looks_swapped
 from .networks import landmark_network_name
@@ -107,15 +111,33 @@ class PeopleTracker:
 
     :param people: how many people are wanted at most; None: only the most prominent one of the clip. Then only those
         who may turn out to be it are followed.
+    :param detector, keypoints: ONNX files of the user's that take the place of ours; see `adapters`.
     """
 
-    def __init__(self, quality: str, threads: int, people: int | None = None, folder: Path | None = None) -> None:
-        self._landmarks = LandmarkNetwork(landmark_network_name(quality), threads, folder)
-        self._detector = PersonDetector(threads, folder)
-        strongest = landmark_network_name("best")
-        judged = landmark_network_name(quality) != strongest
-        self._judge = LandmarkNetwork(strongest, threads, folder) if judged else None
-        self._looks_ahead = not judged
+    def __init__(
+        self,
+        quality: str,
+        threads: int,
+        people: int | None = None,
+        folder: Path | None = None,
+        *,
+        detector: Path | None = None,
+        keypoints: Path | None = None,
+        execution: Execution | None = None,
+    ) -> None:
+        self._detector: PersonDetector | BoxDetector = (
+            BoxDetector(detector, threads, execution) if detector else PersonDetector(threads, folder, execution)
+        )
+        name, strongest = landmark_network_name(quality), landmark_network_name("best")
+        self._landmarks: LandmarkNetwork | KeypointNetwork
+        self._judge: LandmarkNetwork | None = None
+        if keypoints:
+            self._landmarks = KeypointNetwork(keypoints, threads, execution)
+        else:
+            self._landmarks = LandmarkNetwork(name, threads, folder, execution)
+            if name != strongest:
+                self._judge = LandmarkNetwork(strongest, threads, folder, execution)
+        self._looks_ahead = not keypoints and self._judge is None
         self._largest_only = people is None
         self._most = 2 if people is None else min(people + 1, MOST_PEOPLE)
         self.reset()
@@ -178,7 +200,7 @@ class PeopleTracker:
             if upcoming_rgb is None or not self._looks_ahead or f.age < SETTLED_FRAMES:
                 continue
             if _is_in_image(f.expected, upcoming_rgb):
-                f.foreseen = self._landmarks.begin(upcoming_rgb, f.expected)
+                f.foreseen = cast(LandmarkNetwork, self._landmarks).begin(upcoming_rgb, f.expected)
         found: dict[int, PoseEstimate | None] = {}
         for f, look in zip(self._live, foreseen, strict=True):
             estimate = look.result() if look is not None else None

@@ -175,9 +175,10 @@ class Batch:
     def _key(self, path: Path) -> str:
         """Of footage, options and program together."""
         digest = hashlib.sha256(code_version(_ROOT).encode())
-        values = {k: v for k, v in self._options.items() if k != "--threads"}
+        values = {k: v for k, v in self._options.items() if k not in ("--threads", "--provider")}
         digest.update(json.dumps([sorted(values.items()), list(self._suffixes), self._overlays]).encode())
         named = [Path(v) for v in values.values() if v and Path(v).is_file()]  # a body, a calibration, a network
+        named += [file.with_suffix(".json") for file in named if file.suffix == ".onnx"]  # what describes it
         for file in [*(sorted(path.iterdir()) if path.is_dir() else [path]), *named]:
             if file.is_file():
                 with file.open("rb") as stream:

@@ -15,7 +15,7 @@ _SAMPLE_BYTES = 1 << 20  # of the footage's beginning and end; reading gigabytes
 
 @dataclass(frozen=True)
 class JobRequest:
-    """One capture. Everything but ``threads`` decides the result."""
+    """One capture. Everything but ``threads`` and ``provider`` decides the result."""
 
     footage: str
     body: str = "scope"  # a built-in body's name or a file
@@ -27,6 +27,9 @@ class JobRequest:
     end_s: float | None = None  # None: to its end
     smoothing: bool = True
     hands: bool = False  # fingers too, on a body that has them
+    detector: str = ""  # the user's own networks, ONNX files; empty: ours
+    keypoints: str = ""
+    provider: str = "auto"  # what the networks run on
     threads: int = 0  # 0: as many as there are cores
 
     def to_json(self) -> str:
@@ -48,11 +51,15 @@ class JobRequest:
         :raises OSError: the footage cannot be read.
         """
         values = asdict(self)
-        del values["threads"], values["footage"]
+        del values["threads"], values["provider"], values["footage"]
         digest = hashlib.sha256(json.dumps([values, code_version], sort_keys=True).encode())
         _add_file(digest, Path(self.footage))
         if Path(self.body).is_file():
             _add_file(digest, Path(self.body))
+        for network in filter(None, (self.detector, self.keypoints)):
+            for file in (Path(network), Path(network).with_suffix(".json")):
+                if file.is_file():  # the worker says what is wrong with one that is not there
+                    _add_file(digest, file)
         return digest.hexdigest()[:32]
 
 

@@ -59,6 +59,9 @@ def run(request: JobRequest, job_folder: Path, reporter: Reporter) -> int:
             smoothing=request.smoothing,
             hands=request.hands,
             threads=request.threads,
+            provider=request.provider,
+            detector=Path(request.detector) if request.detector else None,
+            keypoints=Path(request.keypoints) if request.keypoints else None,
         )
         watch = PreviewWriter(job_folder, reporter.send)
         result = capture(request.footage, load_body(request.body), options, reporter.progress, watch)

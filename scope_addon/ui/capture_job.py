@@ -158,6 +158,9 @@ def capture_request(scene: bpy.types.Scene) -> JobRequest:
         end_s=settings.range_end if settings.use_range else None,
         smoothing=settings.smoothing,
         hands=settings.hands,
+        detector=bpy.path.abspath(chosen.detector_file) if chosen else "",
+        keypoints=bpy.path.abspath(chosen.keypoints_file) if chosen else "",
+        provider=chosen.provider.lower() if chosen else "auto",
         threads=chosen.threads if chosen else 0,
     )
 

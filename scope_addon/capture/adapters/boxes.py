@@ -1,0 +1,77 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What all box detectors share: the letterboxed picture they look at, suppression of doubles, and the way back.
+
+Positions in the network's picture are measured from its left and top edges, as detectors do; positions in the image
+from the centre of the top left pixel, as OpenCV does.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+_BORDER = 114  # the grey that the YOLO family is trained with
+OVERLAP_THRESHOLD = 0.5
+
+
+@dataclass(frozen=True)
+class Boxes:
+    """``corners`` (N, 4) left, top, right, bottom in pixels of the network's picture; ``scores`` (N,) 0..1."""
+
+    corners: np.ndarray
+    scores: np.ndarray
+
+
+@dataclass(frozen=True)
+class Letterbox:
+    """Where the image lies in the network's picture: picture = scale · (pixel + ½) + offset."""
+
+    picture_rgb: np.ndarray
+    scale: np.ndarray  # (x, y)
+    offset: np.ndarray  # (x, y)
+
+    def to_image(self, points: np.ndarray) -> np.ndarray:
+        """Positions (..., 2) in the network's picture to pixels of the image."""
+        return (points - self.offset) / self.scale - 0.5
+
+
+def letterbox(image_rgb: np.ndarray, width: int, height: int, *, centered: bool, stretched: bool = False) -> Letterbox:
+    """The image at one scale within a grey picture, in its middle or top left corner; or stretched all over it."""
+    rows, columns = image_rgb.shape[:2]
+    if stretched:
+        size = width, height
+    else:
+        scale = min(width / columns, height / rows)
+        size = max(1, round(columns * scale)), max(1, round(rows * scale))
+    left, top = ((width - size[0]) // 2, (height - size[1]) // 2) if centered else (0, 0)
+    shrinks = size[0] < columns
+    picture = np.full((height, width, 3), _BORDER, np.uint8)
+    picture[top : top + size[1], left : left + size[0]] = cv2.resize(
+        image_rgb, size, interpolation=cv2.INTER_AREA if shrinks else cv2.INTER_LINEAR
+    )
+    return Letterbox(picture, np.array([size[0] / columns, size[1] / rows]), np.array([left, top], float))
+
+
+def corners_of(centers_and_sizes: np.ndarray) -> np.ndarray:
+    """(N, 4) centre x, y, width, height -> left, top, right, bottom."""
+    center, half = centers_and_sizes[:, :2], centers_and_sizes[:, 2:4] / 2
+    return np.concatenate([center - half, center + half], axis=1)
+
+
+def suppress(boxes: Boxes, threshold: float) -> Boxes:
+    """The boxes of at least this score, best first, without those that overlap a better one by more than half."""
+    size = boxes.corners[:, 2:] - boxes.corners[:, :2]
+    chosen = np.flatnonzero((boxes.scores >= threshold) & (size > 0).all(axis=1))
+    order = chosen[np.argsort(-boxes.scores[chosen], kind="stable")]
+    kept: list[int] = []
+    while len(order):
+        best, rest = order[0], order[1:]
+        kept.append(int(best))
+        low = np.maximum(boxes.corners[best, :2], boxes.corners[rest, :2])
+        high = np.minimum(boxes.corners[best, 2:], boxes.corners[rest, 2:])
+        shared = np.maximum(high - low, 0).prod(axis=1)
+        union = size[best].prod() + size[rest].prod(axis=1) - shared
+        order = rest[shared <= OVERLAP_THRESHOLD * union]
+    return Boxes(boxes.corners[kept], boxes.scores[kept])

@@ -1,0 +1,75 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A whole capture with plugged-in networks, which are ours behind the outputs of others."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+pytest.importorskip("onnx", reason="the graphs are made with the build-time package onnx")
+
+from scope.scope_addon.capture.pipeline import Capture, CaptureOptions, capture
+from scope.scope_addon.capture.tracker import PeopleTracker
+from scope.scope_addon.capture.video_range import VideoRange
+from scope.scope_addon.cli import SAMPLE
+from scope.solver.body import load_body
+from scope.solver.errors import SetupError
+
+from .wrapped_networks import box_rows, coco_simcc
+
+Frames = Callable[..., Iterator[np.ndarray]]
+
+
+@pytest.fixture(scope="module")
+def networks(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    folder = tmp_path_factory.mktemp("networks")
+    try:
+        return box_rows(folder / "detector.onnx"), coco_simcc(folder / "keypoints.onnx")
+    except SetupError as error:
+        pytest.skip(f"the networks are not built: {error}")
+
+
+def captured(detector: Path | None = None, keypoints: Path | None = None) -> Capture:
+    options = CaptureOptions(
+        quality="fast", wanted=VideoRange(0.0, 1.0), threads=2, detector=detector, keypoints=keypoints
+    )
+    return capture(SAMPLE, load_body("scope"), options)
+
+
+def test_a_capture_with_both_is_as_good_as_ours(networks: tuple[Path, Path]) -> None:
+    ours, theirs = captured(), captured(*networks)
+    assert theirs.report["detector"] == str(networks[0])
+    assert theirs.report["execution"] == "CPU, 2 threads"
+    motion = theirs.motions[0]
+    assert motion.valid.all()
+    truth = np.load(SAMPLE.with_name("sample_truth.npz"))["joints_cam"][motion.frames]
+    errors = []
+    for found in (ours.motions[0].joints_cam, motion.joints_cam):
+        a, b = (j - j[:, :1] for j in (found[:, :22], truth[:, :22]))
+        errors.append(np.linalg.norm(a - b, axis=-1).mean())
+    assert errors[1] < 1.25 * errors[0] + 0.01
+    assert not motion.keypoints2d[:, [1, 9, 17, 31], 2].any()  # what COCO lacks: eye corner, mouth, finger, toe
+
+
+def test_lost_and_found_again(networks: tuple[Path, Path]) -> None:
+    video = cv2.VideoCapture(str(SAMPLE))
+    images = [np.ascontiguousarray(video.read()[1][:, :, ::-1]) for _ in range(6)]
+    tracker = PeopleTracker("fast", 2, detector=networks[0], keypoints=networks[1])
+    before = [tracker.step(image) for image in images[:3]]
+    assert [tracker.step(np.zeros_like(images[0])) for _ in range(3)] == [[]] * 3
+    after = [tracker.step(image) for image in images[3:]]
+    assert all(len(seen) == 1 for seen in before + after)
+    assert after[0][0][1].acquired
+    assert after[0][0][1].region.resembles(before[-1][0][1].region, 0.15)
+
+
+def test_two_people_stay_themselves(networks: tuple[Path, Path], frames: Frames) -> None:
+    tracker = PeopleTracker("fast", 2, people=4, detector=networks[0], keypoints=networks[1])
+    for image in frames("clips/two_people_portrait", stop=24):
+        seen = dict(tracker.step(image))
+        assert sorted(seen) == [0, 1]
+    assert abs(seen[0].region.center_px[0] - seen[1].region.center_px[0]) > 200
