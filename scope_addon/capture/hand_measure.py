@@ -16,7 +16,7 @@ from ...solver import Body, Keypoints2D, Measurements, OrientationField, Priors
 from ...solver.errors import UsageError
 from ...solver.residuals import joint_limits
 from ...solver.rotations import exp, log
-from .hand_landmarks import HAND_NAMES
+from .hand_landmarks import HAND_NAMES, HAND_POINTS
 from .hand_region import SIDES
 from .lifter import KEYPOINT_COUNT, virtual_camera
 from .smoothing import fill_rotation_gaps
@@ -24,6 +24,7 @@ from .smoothing import fill_rotation_gaps
 FINGERS = ("index", "middle", "ring", "pinky", "thumb")
 HAND_KEYPOINT_NAMES = tuple(f"hand/{side}_{name}" for side in SIDES for name in HAND_NAMES)
 PIXEL_TRUST = 0.3  # of a hand's keypoint beside the body's wrist: 21 lie close together and err together
+WRIST_PIXEL_TRUST = 0.05  # the hand's network puts the wrist further into the palm than the body has its joint
 DIRECTION_TRUST = 0.25  # of a bone's direction of presence 1: twice the deviation of a bone of the body
 # Radians that a joint of a finger bends towards the palm, at least and at most, and how far it swings off that.
 _KNUCKLE, _HINGE = (-0.5, 1.7, 0.4), (-0.2, 2.0, 0.2)
@@ -87,7 +88,7 @@ class HandMeasurer:
             keypoints2d=Keypoints2D(
                 np.concatenate([first.indices, self.indices[seen].ravel()]),
                 np.concatenate([first.pixels, hands[seen, :, :2].reshape(-1, 2)]),
-                np.concatenate([first.confidence, PIXEL_TRUST * confidence.ravel()]),
+                np.concatenate([first.confidence, (_PIXEL_TRUST * confidence).ravel()]),
             ),
             orientation_field=OrientationField(
                 np.concatenate([bones.starts, self._starts[seen].ravel()]),
@@ -120,6 +121,10 @@ def _bones() -> list[tuple[int, int]]:
 
 # The keypoints that are joints: the wrist, then each finger's three, the thumb first, in the keypoints' order.
 _JOINTS = np.array([0, *(4 * finger + k for finger in range(5) for k in (1, 2, 3))])
+
+
+_PIXEL_TRUST = np.full(HAND_POINTS, PIXEL_TRUST)
+_PIXEL_TRUST[0] = WRIST_PIXEL_TRUST
 
 
 def with_finger_limits(priors: Priors, body: Body) -> Priors:

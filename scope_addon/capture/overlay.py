@@ -21,6 +21,7 @@ from ...solver.body import Body
 from ...solver.errors import OutputError, ShapeError
 from ...solver.rotations import exp
 from ..motion import Motion
+from .landmark_network import KEYPOINT_COUNT
 from .rasterizer import Canvas, rasterize
 from .video import Frame, Video, open_video
 from .video_range import VideoRange
@@ -222,10 +223,11 @@ class _Painter:
 
     def _dots(self, image: np.ndarray, keypoints: np.ndarray, color: np.ndarray) -> None:
         radius = max(1, round(max(image.shape[:2]) / 500))
-        for u, v, confidence in keypoints:
+        for k, (u, v, confidence) in enumerate(keypoints):
             if confidence > 0.3 and np.isfinite((u, v)).all() and max(abs(u), abs(v)) < 1e5:
                 center = (round(float(u * self._scale)), round(float(v * self._scale)))
-                cv2.circle(image, center, radius + 1, (20, 20, 20), -1, cv2.LINE_AA)
+                if k < KEYPOINT_COUNT:  # a hand's lie close together: they go without the rim
+                    cv2.circle(image, center, radius + 1, (20, 20, 20), -1, cv2.LINE_AA)
                 cv2.circle(image, center, radius, tuple(int(c) for c in 255 * (0.5 + 0.5 * color)), -1, cv2.LINE_AA)
 
 
