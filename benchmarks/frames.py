@@ -39,7 +39,7 @@ CLIPS = (
 )
 QUICK_CLIPS = CLIPS[:1]
 TOLERANCES = (1e-4, 1e-5, 1e-6)  # relative decrease at which the last stage stops
-REPORTED = 1e-5  # the solver's own
+REPORTED = 1e-6  # the solver's own
 COST_SHARE, JOINTS_M = 1e-3, 1e-3
 KEYS = ("pixels", "confidence2d", "points", "confidence3d", "directions", "confidence_directions")
 FIXED = ("intrinsics", "indices", "starts", "ends", "joint_weights")

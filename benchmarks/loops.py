@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Compiled loops around what is timed, so that no call from Python is inside the measurement."""
 
+from ..solver.curvature import correct, learn, remember
 from ..solver.kernel import kernel
 from ..solver.linearize import linearize
 from ..solver.recursion import retract, step
@@ -45,16 +46,19 @@ def linearizations(count, tree, terms, stage, bank, pose, blocks, work):  # type
 
 @kernel
 def iterations(  # type: ignore[no-untyped-def]
-    count, tree, terms, stage, damping, root_scale, bank, pose, trial, blocks, other, work
+    count, tree, terms, stage, damping, root_scale, bank, pose, trial, blocks, other, curvature, work
 ):
     """Solve, move and linearize at the trial point `count` times: an iteration, accepted or rejected."""
     put(bank, 0, pose)
     total = linearize(tree, terms, stage, 0.0, pose, blocks, work.scratch)
     for k in range(count):
         put(bank, k, pose)
+        correct(tree, pose, blocks, curvature, 1.0)
         total += step(tree, pose, blocks, damping, root_scale, work)
         retract(tree, pose, work, trial)
         total += linearize(tree, terms, stage, 0.0, trial, other, work.scratch)
+        learn(tree, pose, work.u, trial, other, True, curvature)
+        remember(tree, trial, other, curvature)
     return total
 
 

@@ -7,6 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from ..solver.curvature import make_curvature
 from ..solver.linearize import make_blocks, make_pose
 from ..solver.recursion import make_workspace
 from . import loops
@@ -42,9 +43,9 @@ def dense_run(p: Problem) -> Callable[[int], object]:
 def iteration_run(p: Problem) -> Callable[[int], object]:
     """Return run(n): n whole iterations: step, move, linearize at the trial point."""
     poses, blocks = (make_pose(p.tree), make_pose(p.tree)), (make_blocks(p.tree), make_blocks(p.tree))
-    work = make_workspace(p.tree)
+    curvature, work = make_curvature(p.tree), make_workspace(p.tree)
     return lambda n: loops.iterations(
-        n, p.tree, p.terms, p.stage, p.damping, p.root_scale, p.bank, *poses, *blocks, work
+        n, p.tree, p.terms, p.stage, p.damping, p.root_scale, p.bank, *poses, *blocks, curvature, work
     )
 
 

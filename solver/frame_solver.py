@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from .curvature import make_curvature
 from .initialize import initial_state
 from .kernel import announce_compilation, kernel
 from .linearize import make_blocks, make_pose
@@ -69,6 +70,7 @@ class FrameSolver:
         tree = self.tree
         self._poses = make_pose(tree), make_pose(tree)
         self._blocks = make_blocks(tree), make_blocks(tree)
+        self._curvature = make_curvature(tree)
         self._work = make_workspace(tree)
         self._rest = np.tile(np.eye(3), (len(tree.parents) - 1, 1, 1))
         self._layout: Layout | None = None
@@ -95,7 +97,8 @@ class FrameSolver:
         self._enter(init)
         cost, code, iterations, rejected, which = optimize(
             tree, terms, count > 0, table, tolerances, limits, options.triggs, options.damping,
-            1.0 / options.root_length, pose, other, self._blocks[0], self._blocks[1], work,
+            1.0 / options.root_length, pose, other, self._blocks[0], self._blocks[1],
+            self._curvature, work,
         )  # fmt: skip
         found, P = self._poses[which], tree.shape
         information = work.C[:P, :P] - table[-1, 0, SHAPE_PRIOR] * packed.shape_information[:P, :P]

@@ -56,7 +56,7 @@ class Stage:
     """Weights until the cost's relative decrease in an accepted step falls below `tolerance`."""
 
     weights: Weights = Weights()
-    tolerance: float = 1e-5
+    tolerance: float = 1e-6
     max_iterations: int = 50
 
 
@@ -76,9 +76,9 @@ COLD_STAGES = (
         1e-2,
         15,
     ),
-    Stage(_LAST, 1e-5, 50),
+    Stage(_LAST, 1e-6, 50),
 )
-WARM_STAGES = (Stage(_LAST, 1e-5, 50),)
+WARM_STAGES = (Stage(_LAST, 1e-6, 50),)
 
 
 @dataclass(frozen=True)
