@@ -88,9 +88,7 @@ class BackgroundTracker:
             self._rotations.append(None)
             return
         self._last_used = time_s
-        # Every second pixel or so, then areas: averaging all of a large picture would take longer than all the rest.
-        coarse = np.ascontiguousarray(image_rgb[:: self._step, :: self._step])
-        picture = cv2.cvtColor(cv2.resize(coarse, self._size, interpolation=cv2.INTER_AREA), cv2.COLOR_RGB2GRAY)
+        picture = self._shrink(image_rgb)
         boxes = [self._box(points) for points in people]
         if self._picture is None:
             self._begin_key(picture, boxes)
@@ -146,6 +144,13 @@ class BackgroundTracker:
             return None
         return R
 
+    def _shrink(self, image_rgb: np.ndarray) -> np.ndarray:
+        """The working picture, grey. Every second pixel or so, then areas: averaging all of them would take longer."""
+        columns, rows = image_rgb.shape[1] // self._step, image_rgb.shape[0] // self._step
+        whole = image_rgb[: rows * self._step, : columns * self._step]
+        coarse = cv2.resize(whole, (columns, rows), interpolation=cv2.INTER_NEAREST)
+        return cv2.cvtColor(cv2.resize(coarse, self._size, interpolation=cv2.INTER_AREA), cv2.COLOR_RGB2GRAY)
+
     def _begin_key(self, picture: np.ndarray, boxes: list[np.ndarray]) -> None:
         mask = np.full(picture.shape, 255, np.uint8)
         for x0, y0, x1, y1 in boxes:
@@ -184,8 +189,9 @@ def consensus_rotation(
     pairs = random.integers(0, len(a), (hypotheses, 2))
     pairs = pairs[pairs[:, 0] != pairs[:, 1]]
     R = _kabsch(a[pairs], b[pairs])
-    off = np.linalg.norm(np.einsum("hij,nj->hni", R, a) - b, axis=-1)
-    best = R[int((off < tolerance).sum(1).argmax())]
+    # |R a − b|² = 2 − 2 bᵀ R a, for all hypotheses and directions in one product of matrices
+    near = R.reshape(-1, 9) @ (b[:, :, None] * a[:, None]).reshape(-1, 9).T > 1.0 - 0.5 * tolerance**2
+    best = R[int(near.sum(1).argmax())]
     agree = np.linalg.norm(a @ best.T - b, axis=1) < tolerance
     for _ in range(3):
         if agree.sum() < 2:

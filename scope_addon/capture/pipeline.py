@@ -6,6 +6,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -171,25 +172,35 @@ def _observe(
     progress: Progress,
     watch: Watch,
 ) -> PeopleBuilder:
-    """Everybody in every frame, and what is behind them. No picture is kept: an hour takes no more than a minute."""
+    """Everybody in every frame, and what is behind them. No picture is kept: an hour takes no more than a minute.
+
+    The background of a frame is looked at beside the people of the next one, in a thread of its own.
+    """
     builder = PeopleBuilder()
     frames = iter(video)
     with clock.stage("decode"):
         upcoming = next(frames, None)
-    while upcoming is not None:
-        frame = upcoming
-        with clock.stage("decode"):
-            upcoming = next(frames, None)
-        with clock.stage("networks"):
-            observations = tracker.step(frame.image_rgb, upcoming.image_rgb if upcoming else None)
-        if hands is not None:
-            with clock.stage("hands"):
-                observations = hands.step(frame.image_rgb, observations)
-        builder.add(frame.index, frame.timestamp_s, observations)
-        with clock.stage("background"):
-            background.add(frame.image_rgb, frame.timestamp_s, [o.keypoints_px for _, o in observations])
-        watch(frame, max((o for _, o in observations), key=lambda o: o.region.side_px, default=None))
-        progress("finding the person", len(builder), max(video.expected_frames, len(builder)))
+    with ThreadPoolExecutor(1, "scope-background") as beside:
+        looking: Future[None] | None = None
+        while upcoming is not None:
+            frame = upcoming
+            with clock.stage("decode"):
+                upcoming = next(frames, None)
+            with clock.stage("networks"):
+                observations = tracker.step(frame.image_rgb, upcoming.image_rgb if upcoming else None)
+            if hands is not None:
+                with clock.stage("hands"):
+                    observations = hands.step(frame.image_rgb, observations)
+            builder.add(frame.index, frame.timestamp_s, observations)
+            with clock.stage("background"):
+                if looking is not None:
+                    looking.result()
+                people = [o.keypoints_px for _, o in observations]
+                looking = beside.submit(background.add, frame.image_rgb, frame.timestamp_s, people)
+            watch(frame, max((o for _, o in observations), key=lambda o: o.region.side_px, default=None))
+            progress("finding the person", len(builder), max(video.expected_frames, len(builder)))
+        if looking is not None:
+            looking.result()
     return builder
 
 
