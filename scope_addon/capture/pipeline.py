@@ -139,6 +139,8 @@ def capture(
             warnings.append(
                 f"{path.name}: {who} was not seen in {missing} of {len(motion)} frames; these are filled in"
             )
+        if options.hands and not any(hand_frames(motion).values()):
+            warnings.append(f"{path.name}: no hands were found; come closer, or show the palms more to the camera")
     report = {
         "source": str(path),
         "frames": frames,
@@ -268,12 +270,20 @@ def _solve(
 def _about_person(motion: Motion) -> dict:
     """What the report says of one person."""
     seen = motion.frames[motion.valid]
-    return {
+    return hand_frames(motion) | {
         "valid_frames": len(seen),
         "first_frame": int(seen[0]),
         "last_frame": int(seen[-1]),
         "reprojection_px": float(motion.residual_px[motion.valid].mean()),
     }
+
+
+def hand_frames(motion: Motion) -> dict[str, int]:
+    """In how many frames each hand was seen; empty where hands were not looked for."""
+    names = motion.keypoints2d_names.tolist()
+    wrists = {f"{side}_hand_frames": f"hand/{side}_wrist" for side in ("left", "right")}
+    confidence = {key: motion.keypoints2d[:, names.index(name), 2] for key, name in wrists.items() if name in names}
+    return {key: int((values > 0).sum()) for key, values in confidence.items()}
 
 
 def _most_people(people: int | str) -> int:

@@ -12,8 +12,12 @@ from scope.scope_addon.capture.hand_tracker import HandTracker
 from scope.scope_addon.capture.landmark_network import KEYPOINT_NAMES
 from scope.scope_addon.capture.observation import Observation
 from scope.scope_addon.capture.palm_detector import Palm
+from scope.scope_addon.capture.pipeline import CaptureOptions, capture
 from scope.scope_addon.capture.region import Region
 from scope.scope_addon.capture.tracker import PeopleTracker
+from scope.scope_addon.capture.video_range import VideoRange
+from scope.solver.body import load_body
+from scope.solver.rotations import exp
 
 SCALE = 500.0  # pixels per metre
 LENGTH = HAND_LENGTH_M * SCALE
@@ -147,3 +151,25 @@ def test_a_hand_that_contradicts_itself_is_imagined(follow):
     assert hand.disagreement > 0.5
     assert hand_at((300, 500)).disagreement < 1e-9
     assert not seen(follow([hand]), person())[0]
+
+
+def test_a_capture_with_hands_from_file_to_motion(shared):
+    """Fingers near the keypoints in the image, and everything of the motion in step with each other."""
+    body = load_body("scope_h")
+    wanted = VideoRange(1.4, 2.0, None)
+    options = CaptureOptions(quality="fast", hands=True, threads=1, smoothing=False, wanted=wanted)
+    result = capture(shared / "data/clips/gesture_square.mp4", body, options)
+    m = result.motions[0]
+    assert m.body_model == "scope_h"
+    assert m.keypoints2d.shape[1] == len(m.keypoints2d_names) == 33 + 42
+    assert result.report["per_person"][0]["left_hand_frames"] > 0.8 * len(m)
+    index = [body.keypoint_names.index(str(name)) for name in m.keypoints2d_names[33:]]
+    R, t = body.forward_kinematics(exp(m.poses.reshape(len(m), -1, 3).astype(float)), m.trans.astype(float), m.betas)
+    points = body.keypoints(R, t, m.betas.astype(float))[:, index]
+    camera_from_world = np.linalg.inv(m.world_from_camera)
+    points = np.einsum("tij,tkj->tki", camera_from_world[:, :3, :3], points) + camera_from_world[:, None, :3, 3]
+    pixels = points[..., :2] / points[..., 2:] * m.intrinsics[0, 0] + m.intrinsics[:2, 2]
+    off = np.linalg.norm(pixels - m.keypoints2d[:, 33:, :2], axis=-1)[m.keypoints2d[:, 33:, 2] > 0]
+    assert np.median(off) < 3.5  # pixels; a palm measures 13 of them
+    finger = body.joint_names.index("left_index2")
+    assert np.array_equal(m.joint_confidence[:, finger] > 0, m.keypoints2d[:, 33, 2] > 0)
