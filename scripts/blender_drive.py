@@ -161,6 +161,17 @@ def steps() -> Iterator[float]:
     area.tag_redraw()
     yield 1.0
     picture("7_refined")
+    scene.view_layers[0].objects.active = next(o for o in result.collection.objects if o.type == "ARMATURE")
+    invoke(bpy.ops.object.mode_set, mode="POSE")
+    invoke(bpy.ops.pose.select_all, action="DESELECT")
+    yield 1.0
+    picture("7_bones")
+    invoke(bpy.ops.object.mode_set, mode="OBJECT")
+    invoke(bpy.ops.scope.footage_to_sequencer)
+    editor = scene.sequence_editor
+    strips = editor.strips_all if hasattr(editor, "strips_all") else editor.sequences_all
+    report["strips"] = sorted(strip.type for strip in strips)
+    report["markers"] = [marker.name for marker in scene.timeline_markers]
     invoke(bpy.ops.scope.root_motion, mode="BONES")
     invoke(bpy.ops.scope.smooth, strength=1.0)
     formats = [("FBX", "fbx"), ("GLB", "glb"), ("BVH", "bvh")]
