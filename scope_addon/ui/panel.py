@@ -137,6 +137,8 @@ class SCOPE_PT_result(_Tab, bpy.types.Panel):
         column.label(text=f"{frames}, captured in {took}", icon="TIME")
         column.label(text=f"{result.reprojection_px:.1f} pixels off the footage on average", icon="CON_CAMERASOLVER")
         column.label(text=f"Lens: {result.camera}", icon="CAMERA_DATA")
+        if result.execution:
+            column.label(text=f"Networks on {result.execution}", icon="MEMORY")
         for warning in result.warnings:
             _draw_warning(context, layout.box(), warning)
         camera = camera_of(context.scene)

@@ -74,6 +74,7 @@ class SCOPE_PG_result(bpy.types.PropertyGroup):
     reprojection_px: FloatProperty()
     frames_per_second: FloatProperty()
     camera: StringProperty()
+    execution: StringProperty()
     resolution: IntVectorProperty(size=2)
     pixel_aspect: FloatVectorProperty(size=2)
     warnings: CollectionProperty(type=SCOPE_PG_warning)

@@ -28,6 +28,7 @@ def show_result(shown: bpy.types.PropertyGroup, footage: str, report: dict, resu
     shown.reprojection_px = float(residuals.mean()) if residuals.size else 0.0
     shown.frames_per_second = float(report.get("fps", {}).get("total", 0.0))
     shown.camera = str(report.get("camera", ""))
+    shown.execution = str(report.get("execution", ""))
     first = result.people[0].motion
     shown.resolution = [int(n) for n in first.image_size]
     shown.pixel_aspect = pixel_aspect(first)

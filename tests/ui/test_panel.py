@@ -2,12 +2,14 @@
 """Settings in the .blend, dropped files, export buttons, the camera button, texts."""
 
 import time
+from types import SimpleNamespace
 
 import bpy
 import pytest
+from scope.scope_addon import cli
 from scope.scope_addon.job.progress import JobProgress, duration
 from scope.scope_addon.scene.footage_strip import strips_of
-from scope.scope_addon.ui import drop
+from scope.scope_addon.ui import capture_job, drop, preferences
 from scope.scope_addon.ui.capture_operators import state, stop_everything
 from scope.scope_addon.ui.preferences import cache
 
@@ -137,6 +139,23 @@ def test_a_part_of_the_video_is_asked_for(fake_worker, footage):
     settings.range_end = 1.0
     with pytest.raises(RuntimeError, match="ends before it begins"):
         bpy.ops.scope.capture()
+
+
+def test_the_preferences_reach_the_worker(fake_worker, footage, monkeypatch):
+    chosen = SimpleNamespace(
+        threads=3, provider="DIRECTML", detector_file="/a/d.onnx", keypoints_file="/a/k.onnx", body_file="",
+        cache_folder="", cache_limit_gb=2,
+    )  # fmt: skip
+    monkeypatch.setattr(capture_job, "preferences", lambda: chosen)
+    wanted = {"threads": 3, "provider": "directml", "detector": "/a/d.onnx", "keypoints": "/a/k.onnx"}
+    fake_worker(f"wanted = {wanted}\nassert {{k: request[k] for k in wanted}} == wanted\nfinish()")
+    bpy.context.scene.scope.footage = str(footage)
+    assert bpy.ops.scope.capture() == {"FINISHED"}
+
+
+def test_the_preferences_offer_what_the_command_line_does():
+    assert [number for *_, number in preferences.PROVIDERS] == list(range(6))
+    assert {name.lower() for name, *_ in preferences.PROVIDERS} == set(cli.PROVIDERS)
 
 
 def test_clearing_the_cache_leaves_the_scene(fake_worker, footage):

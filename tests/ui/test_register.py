@@ -44,6 +44,7 @@ def test_twice_as_an_extension_with_preferences(unregistered, tmp_path, root):
         for _ in range(2):
             assert addon_utils.enable(name, default_set=True) is not None
             assert bpy.context.preferences.addons[name].preferences.cache_limit_gb == 2
+            assert bpy.context.preferences.addons[name].preferences.provider == "AUTO"
             assert "SCOPE_PT_capture" in ours()
             folder = import_module(f"{name}.scope_addon.ui.preferences").cache().root
             assert folder.is_relative_to(bpy.utils.extension_path_user(name))
