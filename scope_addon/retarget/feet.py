@@ -9,7 +9,8 @@ place for the ankle,
 
 with D the turn of the foot and Y its heading alone. On a flat foot both agree with the body's ankle, so that a longer
 foot is longer at both ends and nothing jumps; a point that stands still on the body stands still on the rig. The lower
-of the two decides, by a logistic of the difference in their heights.
+of the two decides, by a logistic of the difference in their heights. Neither gets below the floor, even where a
+capture's foot does.
 """
 
 from __future__ import annotations
@@ -53,7 +54,10 @@ def ankle_goal(
         goals.append(place + yaw @ ((q - scale * s) * [1, 1, 0]) - turn @ q)
         heights.append(above)
     share = 1.0 / (1.0 + np.exp(np.clip((heights[1] - heights[0]) / _SOFT_M, -50, 50)))  # 1: the ball carries
-    return (1 - share)[:, None] * goals[0] + share[:, None] * goals[1]
+    goal = (1 - share)[:, None] * goals[0] + share[:, None] * goals[1]
+    lowest = np.stack([goal[:, 2] + (turn @ q)[:, 2] - (rig.height + q[2]) for q in (rig.heel, rig.ball)]).min(axis=0)
+    goal[:, 2] += np.maximum(0.0, -lowest)
+    return goal
 
 
 def flat_toes(toe: np.ndarray, rest: np.ndarray, ball: np.ndarray, ball_rest: float) -> np.ndarray:

@@ -30,7 +30,7 @@ class SCOPE_PG_retarget(bpy.types.PropertyGroup):
     feet: BoolProperty(
         name="Feet on the Floor",
         default=True,
-        description="Let the feet stand where the captured ones do, scaled to the rig; bends the legs a little",
+        description="Hold heel or ball where the captured ones stand, scaled to the rig, and never below the floor",
     )
     in_place: BoolProperty(
         name="In Place", default=False, description="Leave the way over the floor out: the character stays on the spot"

@@ -82,6 +82,17 @@ def test_feet_stand(source, scheme, size):
     check_contacts(rig, lambda side, part: bone_of[f"{side}_{PART[part]}"])
 
 
+def test_feet_of_a_capture_below_the_floor_stay_on_it():
+    clip, stands = rolling_walk()
+    clip.root[:, 2] -= 0.05
+    rig, bone_of = build_rig("mixamo")
+    run(captured(clip), rig)
+    for side in ("left", "right"):
+        seen, rest = points(rig, bone_of[f"{side}_ankle"], bone_of[f"{side}_foot"])
+        assert (seen[..., 2] - rest[:, 2]).min() > -0.01
+        assert np.abs(seen[stands[side][:, 1], 1, 2] - rest[1, 2]).max() < 0.01
+
+
 def test_toes_that_were_not_seen_to_bend_stay_flat():
     rig, bone_of = build_rig("mixamo")
     run(captured(rolling_walk(stiff_toes=True)[0]), rig)

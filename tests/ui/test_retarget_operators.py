@@ -44,3 +44,18 @@ def test_a_list_without_legs_is_refused(rig):
     with pytest.raises(RuntimeError, match="left_knee"):
         bpy.ops.scope.retarget()
     assert rig.animation_data is None or rig.animation_data.action is None
+
+
+def test_undo_takes_the_motion_away(rig):
+    name = rig.name
+    bpy.ops.scope.guess_bones()
+    bpy.ops.ed.undo_push(message="before")
+    bpy.ops.scope.retarget()
+    bpy.ops.ed.undo_push(message="Retarget")  # an operator called by a script pushes none itself
+    assert bpy.data.objects[name].animation_data.action is not None
+    bpy.ops.ed.undo()
+    rig = bpy.data.objects[name]
+    assert rig.animation_data is None or rig.animation_data.action is None
+    assert len(bpy.context.scene.scope_retarget.pairs) == 22
+    bpy.ops.ed.redo()
+    assert bpy.data.objects[name].animation_data.action is not None
