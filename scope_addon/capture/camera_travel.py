@@ -16,7 +16,7 @@ import numpy as np
 from .smoothing import gaussian_smooth
 
 LEAST_M_S = 0.25  # slower sliding is the error of one camera's depth
-STEADY = 0.5  # of its median, the middle half of the standing feet's velocities may differ by
+STEADY = 0.8  # of its median, that half of the standing feet's velocities may be off it by
 FEWEST_SAMPLES = 12
 VERTICAL_M_S = 0.6  # of a sole that carries the body
 SMOOTH_HZ = 0.5  # a camera that is carried or driven changes its speed slowly
