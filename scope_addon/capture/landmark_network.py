@@ -29,6 +29,7 @@ _HIPS = (23, 24)
 _WINDOW = 7  # cells of the heatmap that refine one keypoint
 _HEAT_THRESHOLD = 0.5
 _WORKERS = 2  # regions looked at in parallel
+_WORTH_ALL_THREADS = ("pose_landmark_heavy",)
 _OUTPUTS = ["landmarks", "presence", "heatmap", "world"]
 
 
@@ -87,17 +88,19 @@ def disagreement(keypoints_px: np.ndarray, world_landmarks: np.ndarray) -> float
 class LandmarkNetwork:
     """A landmark network (``pose_landmark_lite``, ``_full`` or ``_heavy``) on the CPU; keeps nothing between calls.
 
-    A region alone gets all threads. Several are looked at in parallel with one half of the threads each, which takes
-    less time than one after the other with all: threads that share a region wait for each other at every layer.
+    Several regions are looked at in parallel with one half of the threads each, which takes less time than one after
+    the other with all: threads that share a region wait for each other at every layer. A region alone gets all threads
+    of the strong network; those of the small ones would wait for as long as they work, and decoding needs a core.
     """
 
     def __init__(
         self, name: str, threads: int, folder: Path | None = None, execution: Execution | None = None
     ) -> None:
         self._path, self._threads, self._execution = network_path(name, folder), threads, execution
+        self._threads_alone = threads if name in _WORTH_ALL_THREADS else max(1, threads // _WORKERS)
         self._pool = ThreadPoolExecutor(min(_WORKERS, threads), "scope-landmarks")
         self._sessions: dict[int, onnxruntime.InferenceSession] = {}
-        self._session(threads)  # opened now, so that a bad file is told before the first frame
+        self._session(self._threads_alone)  # opened now, so that a bad file is told before the first frame
 
     def _session(self, threads: int) -> onnxruntime.InferenceSession:
         if threads not in self._sessions:
@@ -106,7 +109,7 @@ class LandmarkNetwork:
 
     @property
     def _alone(self) -> onnxruntime.InferenceSession:
-        return self._session(self._threads)
+        return self._session(self._threads_alone)
 
     @property
     def _shared(self) -> onnxruntime.InferenceSession:
