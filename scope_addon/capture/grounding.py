@@ -16,7 +16,8 @@ import numpy as np
 
 from ...solver import (
     Body,
-    Keypoints3D,
+    Floor,
+    FootContacts,
     Measurements,
     Options,
     PosePriors,
@@ -67,7 +68,9 @@ def stand_on_floor(
     R, t = T_world_camera[:3, :3], T_world_camera[:3, 3]
     held = anchors(soles_of(rotations, root_cam) @ R.T + t, contact)
     indices = np.arange(len(body_with_soles.keypoint_names) - held.shape[1], len(body_with_soles.keypoint_names))
-    rotations, root_cam = hold_feet(body_with_soles, rotations, root_cam, betas, (indices, (held - t) @ R, contact))
+    floor = R[2], -float(t[2])
+    targets = indices, (held - t) @ R, contact
+    rotations, root_cam = hold_feet(body_with_soles, rotations, root_cam, betas, targets, floor)
     return smooth_rotations(rotations, times, STEP_CUTOFF_HZ, out=rotations), root_cam
 
 
@@ -140,11 +143,13 @@ def hold_feet(
     root_cam: np.ndarray,
     betas: np.ndarray,
     targets: tuple[np.ndarray, np.ndarray, np.ndarray],
+    floor: tuple[np.ndarray, float],
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Fit each frame once more with held points, everything else staying at the given motion.
+    """Fit each frame once more with held points above a floor, everything else staying at the given motion.
 
     :param rotations: (T, K+1, 3, 3);  root_cam: (T, 3): the motion to stay at, camera frame.
     :param targets: keypoint indices (F,), positions (T, F, 3) in the camera frame, weights (T, F) 0..1.
+    :param floor: its unit normal (3,), upwards, and offset: normal . p = offset on it, camera frame.
     :return: rotations and root positions as given.
     """
     tree = make_tree(body)
@@ -152,12 +157,14 @@ def hold_feet(
     priors = replace(
         default_priors(body), shape_mean=betas, shape_information=np.eye(body.P) * 1e8, joint_weights=_leg_freedom(body)
     )
-    options = Options(stages=(Stage(_HOLD, 1e-3, 8),), robust_keypoints3d=np.inf)
+    options = Options(stages=(Stage(_HOLD, 1e-3, 8),))
+    free = np.zeros(len(indices))  # contact decides where a sole is; the floor alone where it cannot be
     rotations, root_cam = rotations.copy(), root_cam.copy()
     for t in np.flatnonzero(weights.max(1) > 0.05):
         state = State(rotations[t, 0], root_cam[t], rotations[t, 1:], betas)
         measurements = Measurements(
-            keypoints3d=Keypoints3D(indices, positions[t], weights[t]),
+            foot_contacts=FootContacts(indices, positions[t], weights[t]),
+            floor=Floor(indices, *floor, free),
             pose_priors=PosePriors([0], rotations[t, :1], root_cam[t : t + 1], [1 / 0.01**2], [1 / 0.005**2]),
         )
         here: Priors = replace(priors, joint_mean=rotations[t, 1:])
@@ -166,8 +173,8 @@ def hold_feet(
     return rotations, root_cam
 
 
-# A standing foot is held to 5 mm; the pelvis may give 5 mm and half a degree, a leg's joints some degrees.
-_HOLD = Weights(keypoints3d=1 / 0.005**2, joint_prior=1 / 0.03**2, joint_limits=2000.0, shape=1.0)
+# A standing foot is held to 5 mm, no sole may be far below the floor; the pelvis may give 5 mm and half a degree, a leg's joints some degrees.
+_HOLD = Weights(foot_contact=1 / 0.005**2, floor=1 / 0.02**2, joint_prior=1 / 0.03**2, joint_limits=2000.0, shape=1.0)
 
 
 def _leg_freedom(body: Body) -> np.ndarray:
