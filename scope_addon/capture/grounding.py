@@ -173,7 +173,8 @@ def hold_feet(
     return rotations, root_cam
 
 
-# A standing foot is held to 5 mm, no sole may be far below the floor; the pelvis may give 5 mm and half a degree, a leg's joints some degrees.
+# A standing foot is held to 5 mm, no sole may be far below the floor; the pelvis may give 5 mm and half a degree, a
+# leg's joints some degrees.
 _HOLD = Weights(foot_contact=1 / 0.005**2, floor=1 / 0.02**2, joint_prior=1 / 0.03**2, joint_limits=2000.0, shape=1.0)
 
 
