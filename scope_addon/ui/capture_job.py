@@ -189,12 +189,6 @@ def remember_motions(result: BuildResult, paths: Sequence[Path], body: str) -> N
         person.armature["scope_body_file"] = body
 
 
-def sentence(error: Exception) -> str:
-    """An error's message as the panel shows it."""
-    text = str(error).strip() or type(error).__name__
-    return text[:1].upper() + text[1:]
-
-
 def _is_animated(scene: bpy.types.Scene) -> bool:
     """Whether another frame rate would change the speed of something in the scene."""
     owners = [scene, *scene.objects, *(obj.data for obj in scene.objects if obj.data)]

@@ -12,6 +12,7 @@ from bpy.props import StringProperty
 
 from ..footage import FOOTAGE_SUFFIXES
 from . import preview_picture
+from .telling import sentence
 
 if TYPE_CHECKING:
     from .capture_job import CaptureJob
@@ -165,8 +166,7 @@ class SCOPE_OT_capture(bpy.types.Operator):
         return {"FINISHED"}
 
     def _fail(self, error: Exception | str) -> bool:
-        text = str(error).strip() or type(error).__name__
-        state.message = text[:1].upper() + text[1:]
+        state.message = sentence(error)
         stop_job()  # before the report, which raises when a script called us
         self.report({"ERROR"}, state.message)
         return False

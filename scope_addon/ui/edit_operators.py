@@ -15,29 +15,15 @@ from typing import TYPE_CHECKING
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
 
+from .captured_person import betas_of, body_of, cached_motion, captured_armature
+from .telling import TellingOperator
+
 if TYPE_CHECKING:
     from ...solver.body import Body
 
 
-def captured_armature(context: bpy.types.Context) -> bpy.types.Object | None:
-    """The armature that is meant: the active object's, else the only one of the scene's last capture."""
-    obj = context.view_layer.objects.active if context.view_layer else None
-    while obj is not None:
-        if "scope_source" in obj:
-            return obj
-        found = [child for child in obj.children if "scope_source" in child]
-        if len(found) == 1:
-            return found[0]
-        obj = obj.parent
-    collection = context.scene.scope.result.collection
-    found = [o for o in collection.all_objects if "scope_source" in o] if collection else []
-    return found[0] if len(found) == 1 else None
-
-
-class _Edit(bpy.types.Operator):
-    """What the operators share: whom they work on, and failure as a sentence."""
-
-    bl_options = {"REGISTER", "UNDO"}
+class _Edit(TellingOperator):
+    """What the operators share: whom they work on, and that a failure leaves the keys as they were."""
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -47,27 +33,19 @@ class _Edit(bpy.types.Operator):
             return False
         return True
 
-    def edit(self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float) -> str:
-        """Change the keys; returns what to tell, or nothing. Each operator has its own."""
-        raise NotImplementedError
+    if TYPE_CHECKING:  # each operator has its own
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        """Do it; what goes wrong is told and changes nothing."""
-        from ...solver.errors import ScopeError
+        def edit(self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float) -> str:
+            """Change the keys; returns what to tell, or nothing."""
+
+    def work(self, context: bpy.types.Context) -> str:
+        """Change the keys, or none of them."""
         from ..scene.timing import scene_rate
 
         armature = captured_armature(context)
         assert armature is not None  # poll has asked
-        try:
-            with _kept_on_failure(armature):
-                said = self.edit(context, armature, _body_of(armature), scene_rate(context.scene))
-        except (ScopeError, OSError) as error:
-            text = str(error)
-            self.report({"ERROR"}, text[:1].upper() + text[1:])
-            return {"CANCELLED"}
-        if said:
-            self.report({"INFO"}, said)
-        return {"FINISHED"}
+        with _kept_on_failure(armature):
+            return self.edit(context, armature, body_of(armature), scene_rate(context.scene))
 
 
 class _Span(_Edit):
@@ -112,7 +90,7 @@ class SCOPE_OT_smooth(_Edit):
         from ..scene.root_object import to_bones
         from ..scene.timing import key_frames
 
-        motion = _cached_motion(armature)
+        motion = cached_motion(armature)
         to_bones(armature, body, rate)
         clip = smoothed(body, motion, self.strength)
         write_clip(armature, body, clip, key_frames(motion.timestamps, rate, float(armature.get("scope_start", 0.0))))
@@ -185,7 +163,7 @@ class SCOPE_OT_refloor(_Edit):
         from ..scene.keys import read_clip, write_clip
 
         clip, frames = read_clip(armature, body, rate)
-        floored = refloor(clip, body, _betas(armature, body), level=self.level, lift=self.lift)
+        floored = refloor(clip, body, betas_of(armature, body), level=self.level, lift=self.lift)
         write_clip(armature, body, floored, frames)
         return ""
 
@@ -261,7 +239,7 @@ class SCOPE_OT_loop(_Span):
 
         to_bones(armature, body, rate)
         clip, frames = read_clip(armature, body, rate)
-        betas = _betas(armature, body)
+        betas = betas_of(armature, body)
         cycle = best_cycle(clip, body, betas, self.start / rate, self.end / rate, self.shortest)
         closed: Clip = close_cycle(clip, cycle, self.blend)
         first, last = float(frames[cycle.first]), float(frames[cycle.last])
@@ -299,7 +277,8 @@ class SCOPE_OT_reduce_keys(_Edit):
         """All keys, bone by bone."""
         from ..scene.keys import reduce_keys
 
-        found = reduce_keys(armature, body, rate, math.radians(self.degrees), self.millimetres / 1000.0)
+        betas = betas_of(armature, body)
+        found = reduce_keys(armature, body, betas, rate, math.radians(self.degrees), self.millimetres / 1000.0)
         return (
             f"{found.before} keys became {found.after}; bones are off by {math.degrees(found.angle):.2f} degrees, "
             f"joints by {1000 * found.joint_m:.1f} mm at most"
@@ -354,38 +333,6 @@ def _kept_on_failure(armature: bpy.types.Object) -> Iterator[None]:
         raise
     if copy is not None:
         bpy.data.actions.remove(copy)
-
-
-def _body_of(armature: bpy.types.Object) -> Body:
-    from ...solver.body import load_body
-
-    return load_body(armature.get("scope_body_file") or armature["scope_body"])
-
-
-def _betas(armature: bpy.types.Object, body: Body):  # type: ignore[no-untyped-def]
-    import numpy as np
-
-    from ...solver.errors import UsageError
-
-    betas = np.array(list(armature.get("scope_betas", ())), float)
-    if betas.shape != (body.P,):
-        raise UsageError(f"'{armature.name}' does not say its body's shape; capture again")
-    return betas
-
-
-def _cached_motion(armature: bpy.types.Object):  # type: ignore[no-untyped-def]
-    from pathlib import Path
-
-    from ...solver.errors import UsageError
-    from ..motion import Motion
-
-    path = armature.get("scope_motion", "")
-    if not path or not Path(path).is_file():
-        raise UsageError(
-            "the motion as it was solved is no longer in the cache, so it cannot be smoothed anew; capture the footage "
-            "again"
-        )
-    return Motion.load(path)
 
 
 CLASSES = (

@@ -5,15 +5,13 @@ from __future__ import annotations
 
 import bpy
 
-from .edit_operators import captured_armature
+from .captured_person import captured_armature
+from .panel import Tab
 
 
-class SCOPE_PT_edit(bpy.types.Panel):
+class SCOPE_PT_edit(Tab, bpy.types.Panel):
     """Smoothing, mending, floor, root motion, loops and keys of the selected person."""
 
-    bl_space_type = "VIEW_3D"
-    bl_region_type = "UI"
-    bl_category = "Scope"
     bl_idname = "SCOPE_PT_edit"
     bl_label = "Refine"
 

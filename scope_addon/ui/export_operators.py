@@ -8,6 +8,8 @@ from pathlib import Path
 import bpy
 from bpy.props import BoolProperty, EnumProperty, StringProperty
 
+from .telling import sentence
+
 FORMATS = (
     ("FBX", "FBX", "For Unreal Engine, Unity, Maya and MotionBuilder: armature, mesh and animation", 0),
     ("GLB", "glTF", "For the web, Godot and other engines: one .glb file with everything", 1),
@@ -104,7 +106,7 @@ class SCOPE_OT_export(bpy.types.Operator):
         try:
             written = export(path, collections, options=ExportOptions(camera=self.camera, shape=self.shape.lower()))
         except ScopeError as error:
-            self.report({"ERROR"}, str(error)[:1].upper() + str(error)[1:])
+            self.report({"ERROR"}, sentence(error))
             return {"CANCELLED"}
         self.report({"INFO"}, f"Wrote {', '.join(p.name for p in written)} in {written[0].parent}")
         return {"FINISHED"}

@@ -17,13 +17,15 @@ from .view_operators import camera_of, is_looking_through
 _PIXELS_PER_LETTER = 7.0
 
 
-class _Tab:
+class Tab:
+    """Where all of Scope's panels are."""
+
     bl_space_type = "VIEW_3D"
     bl_region_type = "UI"
     bl_category = "Scope"
 
 
-class SCOPE_PT_capture(_Tab, bpy.types.Panel):
+class SCOPE_PT_capture(Tab, bpy.types.Panel):
     """Footage, the one button, progress."""
 
     bl_idname = "SCOPE_PT_capture"
@@ -63,7 +65,7 @@ def _draw_progress(context: bpy.types.Context, layout: bpy.types.UILayout, progr
     row.operator("scope.cancel", text="Cancel", icon="CANCEL")
 
 
-class SCOPE_PT_person(_Tab, bpy.types.Panel):
+class SCOPE_PT_person(Tab, bpy.types.Panel):
     """Who is captured, as what, the lens, and which part of the video."""
 
     bl_idname = "SCOPE_PT_person"
@@ -96,7 +98,7 @@ class SCOPE_PT_person(_Tab, bpy.types.Panel):
             column.prop(settings, "range_end")
 
 
-class SCOPE_PT_scene(_Tab, bpy.types.Panel):
+class SCOPE_PT_scene(Tab, bpy.types.Panel):
     """What capturing may change in the scene."""
 
     bl_idname = "SCOPE_PT_scene"
@@ -115,7 +117,7 @@ class SCOPE_PT_scene(_Tab, bpy.types.Panel):
         layout.prop(settings, "with_markers")
 
 
-class SCOPE_PT_result(_Tab, bpy.types.Panel):
+class SCOPE_PT_result(Tab, bpy.types.Panel):
     """What was found, and where it can go."""
 
     bl_idname = "SCOPE_PT_result"

@@ -10,6 +10,7 @@ from ..low_confidence import REASONS, Span, low_confidence_spans
 from ..motion import Motion
 from ..scene.build import BuildResult
 from ..scene.camera import pixel_aspect
+from .telling import sentence
 
 _MOST_SPANS = 12  # buttons
 
@@ -64,4 +65,4 @@ def _text(spans: list[Span], frames: np.ndarray) -> str:
 
 def _warn(shown: bpy.types.PropertyGroup, text: str, spans: str = "") -> None:
     warning = shown.warnings.add()
-    warning.text, warning.spans = text[:1].upper() + text[1:], spans
+    warning.text, warning.spans = sentence(text), spans

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import bpy
 from bpy.props import EnumProperty, StringProperty
 
-from .edit_operators import _betas, _body_of, captured_armature
+from .captured_person import betas_of, body_of, captured_armature
+from .telling import TellingOperator
 
 if TYPE_CHECKING:
     from ..retarget.bone_map import BoneMap
@@ -23,10 +24,8 @@ def chosen_source(context: bpy.types.Context) -> bpy.types.Object | None:
     return found
 
 
-class _OnRig(bpy.types.Operator):
-    """What the operators share: a rig is chosen, and failure is a sentence."""
-
-    bl_options = {"REGISTER", "UNDO"}
+class _OnRig(TellingOperator):
+    """What the operators share: a rig is chosen."""
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -36,23 +35,6 @@ class _OnRig(bpy.types.Operator):
             cls.poll_message_set("Choose your rig first")
             return False
         return True
-
-    def work(self, context: bpy.types.Context) -> str:
-        """Do it; returns what to tell."""
-        raise NotImplementedError
-
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        """Do it; what goes wrong is told."""
-        from ...solver.errors import ScopeError
-
-        try:
-            said = self.work(context)
-        except (ScopeError, OSError) as error:
-            text = str(error)
-            self.report({"ERROR"}, text[:1].upper() + text[1:])
-            return {"CANCELLED"}
-        self.report({"INFO"}, said)
-        return {"FINISHED"}
 
 
 class SCOPE_OT_guess_bones(_OnRig):
@@ -87,11 +69,11 @@ class SCOPE_OT_retarget(_OnRig):
             raise UsageError("select the armature of a capture: there is none, or more than one")
         if not len(settings.pairs):
             _show(context, guess_bone_map(settings.rig))
-        body = _body_of(source)
+        body = body_of(source)
         action = retarget(
             source,
             body,
-            _betas(source, body),
+            betas_of(source, body),
             settings.rig,
             _map_of(context),
             scene_rate(context.scene),

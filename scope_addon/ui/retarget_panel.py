@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import bpy
 
+from .panel import Tab
 from .retarget_operators import chosen_source
 
 
@@ -23,12 +24,9 @@ class SCOPE_UL_bone_pairs(bpy.types.UIList):
         row.label(text="", icon="ERROR" if not known else "CHECKMARK" if item.confidence > 0.6 else "QUESTION")
 
 
-class SCOPE_PT_retarget(bpy.types.Panel):
+class SCOPE_PT_retarget(Tab, bpy.types.Panel):
     """Put the captured motion on a rig of your own."""
 
-    bl_space_type = "VIEW_3D"
-    bl_region_type = "UI"
-    bl_category = "Scope"
     bl_idname = "SCOPE_PT_retarget"
     bl_label = "Retarget"
     bl_options = {"DEFAULT_CLOSED"}

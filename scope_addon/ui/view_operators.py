@@ -6,6 +6,8 @@ from __future__ import annotations
 import bpy
 from bpy.props import IntProperty
 
+from .telling import sentence
+
 
 class SCOPE_OT_look_through(bpy.types.Operator):
     """See the body over the footage, through the capture's camera, and back. Sets the scene's camera and resolution"""
@@ -106,7 +108,7 @@ class SCOPE_OT_footage_to_sequencer(bpy.types.Operator):
         try:
             strips = add_footage_strips(scene, bpy.path.abspath(result.footage), start)
         except ScopeError as error:
-            self.report({"ERROR"}, str(error)[:1].upper() + str(error)[1:])
+            self.report({"ERROR"}, sentence(error))
             return {"CANCELLED"}
         rate = getattr(strips[-1], "fps", 0.0)
         if rate and abs(rate - scene_rate(scene)) > 0.01:

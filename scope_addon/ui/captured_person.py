@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The captured person that the user means, and what the armature remembers of the capture."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import bpy
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from ...solver.body import Body
+    from ..motion import Motion
+
+
+def captured_armature(context: bpy.types.Context) -> bpy.types.Object | None:
+    """The armature that is meant: the active object's, else the only one of the scene's last capture."""
+    obj = context.view_layer.objects.active if context.view_layer else None
+    while obj is not None:
+        if "scope_source" in obj:
+            return obj
+        found = [child for child in obj.children if "scope_source" in child]
+        if len(found) == 1:
+            return found[0]
+        obj = obj.parent
+    collection = context.scene.scope.result.collection
+    found = [o for o in collection.all_objects if "scope_source" in o] if collection else []
+    return found[0] if len(found) == 1 else None
+
+
+def body_of(armature: bpy.types.Object) -> Body:
+    """The body that the person was captured with. :raises ModelFileError: its file has gone."""
+    from ...solver.body import load_body
+
+    return load_body(armature.get("scope_body_file") or armature["scope_body"])
+
+
+def betas_of(armature: bpy.types.Object, body: Body) -> np.ndarray:
+    """(P,) the person's shape. :raises UsageError: the armature does not say it."""
+    import numpy as np
+
+    from ...solver.errors import UsageError
+
+    betas = np.array(list(armature.get("scope_betas", ())), float)
+    if betas.shape != (body.P,):
+        raise UsageError(f"'{armature.name}' does not say its body's shape; capture again")
+    return betas
+
+
+def cached_motion(armature: bpy.types.Object) -> Motion:
+    """The motion as it was solved. :raises UsageError: it is no longer in the cache."""
+    from ...solver.errors import UsageError
+    from ..motion import Motion
+
+    path = armature.get("scope_motion", "")
+    if not path or not Path(path).is_file():
+        raise UsageError(
+            "the motion as it was solved is no longer in the cache, so it cannot be smoothed anew; capture the footage "
+            "again"
+        )
+    return Motion.load(path)
