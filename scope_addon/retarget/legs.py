@@ -34,14 +34,18 @@ def reach(world: np.ndarray, heads: np.ndarray, leg: tuple[int, int, int], goal:
     wanted = np.arccos(np.clip((distance**2 - a**2 - b**2) / (2 * a * b), -1, 1))
     at_knee = exp(normal * (wanted - bend)[:, None])
     reached = upper + np.einsum("tij,tj->ti", at_knee, lower)
-    swing = _shortest(reached, goal - hip)
+    swing = shortest_turn(reached, goal - hip)
     world[:, thigh] = swing @ world[:, thigh]
     world[:, shin] = swing @ at_knee @ world[:, shin]
 
 
-def _shortest(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """(T, 3, 3) smallest rotations from directions a to b."""
-    axis = np.cross(a, b)
-    sine = np.linalg.norm(axis, axis=1)
-    angle = np.arctan2(sine, np.sum(a * b, axis=1))
-    return exp(axis / np.maximum(sine, 1e-12)[:, None] * angle[:, None])
+def shortest_turn(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """(..., 3, 3) the smallest rotations that take directions a to directions b (..., 3); half a turn if opposite."""
+    a = a / np.maximum(np.linalg.norm(a, axis=-1, keepdims=True), 1e-12)
+    b = b / np.maximum(np.linalg.norm(b, axis=-1, keepdims=True), 1e-12)
+    axis, cosine = np.cross(a, b), (a * b).sum(axis=-1)
+    sine = np.linalg.norm(axis, axis=-1)
+    aside = np.cross(a, np.eye(3)[np.abs(a).argmin(axis=-1)])  # any way across is the smallest for opposite ones
+    axis = np.where(((sine < 1e-9) & (cosine < 0))[..., None], aside, axis)
+    length = np.maximum(np.linalg.norm(axis, axis=-1), 1e-12)
+    return exp(axis * (np.arctan2(sine, cosine) / length)[..., None])

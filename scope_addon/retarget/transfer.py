@@ -19,11 +19,11 @@ import numpy as np
 
 from ...solver.body import Body
 from ...solver.frames import R_WORLD_MODEL
-from ...solver.rotations import exp, log
-from ..edit.clip import Clip
+from ...solver.rotations import exp
+from ..edit.clip import Clip, between
 from .bone_map import SPINE, BoneMap
 from .feet import FootRest, ankle_goal, flat_toes, sinking
-from .legs import reach
+from .legs import reach, shortest_turn
 
 UP = np.array([0.0, 0.0, 1.0])
 _NEXT = {"hip": "knee", "knee": "ankle", "shoulder": "elbow", "elbow": "wrist", "wrist": "hand"}
@@ -51,20 +51,6 @@ class Pose:
 
     rotations: np.ndarray
     heads: np.ndarray
-
-
-def shortest_turn(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """(3, 3) the smallest rotation that takes the direction of a to that of b."""
-    a, b = a / np.linalg.norm(a), b / np.linalg.norm(b)
-    axis = np.cross(a, b)
-    sine, cosine = float(np.linalg.norm(axis)), float(a @ b)
-    if sine < 1e-9:
-        if cosine > 0:
-            return np.eye(3)
-        axis = np.cross(a, np.eye(3)[np.argmin(np.abs(a))])
-        sine = float(np.linalg.norm(axis))
-        return exp(axis / sine * np.pi)
-    return exp(axis / sine * np.arctan2(sine, cosine))
 
 
 def transfer(
@@ -247,8 +233,7 @@ def _turns(D: np.ndarray, rig: Skeleton, part_of: list[str], index: dict[str, in
             low = min(int(place), len(chain) - 2)
             first, second = D[:, index[chain[low]]], D[:, index[chain[low + 1]]]
             share = place - low
-            turned = second if share == 1 else first @ exp(share * log(np.swapaxes(first, 1, 2) @ second))
-            out[:, b] = turned
+            out[:, b] = second if share == 1 else between(first, second, share)
     return out
 
 

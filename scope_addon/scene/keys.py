@@ -44,13 +44,12 @@ def read_at(armature: bpy.types.Object, body: Body, rate: float, frames: np.ndar
     """The motion at scene frames (T,), as Blender interpolates it."""
     curves = _curves(armature, body)
     values = {path: np.stack([_values(curve, frames) for curve in bone], axis=1) for path, bone in curves.items()}
-    root = body.joint_names[0]
     q = np.stack([values[bone_path(name, ROTATION)] for name in body.joint_names], axis=1)
     B = matrix_from_quaternion(q / np.maximum(np.linalg.norm(q, axis=-1, keepdims=True), 1e-9))
     C = _axes(armature, body)
     rotations = np.einsum("kji,tkjl,klm->tkim", C, B, C)
     rotations[:, 0] = R_WORLD_MODEL @ rotations[:, 0]
-    pelvis = values[bone_path(root, LOCATION)] + np.array(armature.data.bones[root].head_local)
+    pelvis = values[location_path(body)] + _root_head(armature, body)
     return Clip(frames / rate, rotations, pelvis)
 
 
@@ -60,18 +59,15 @@ def channels(armature: bpy.types.Object, body: Body, clip: Clip) -> tuple[np.nda
     rotations = clip.rotations.copy()
     rotations[:, 0] = R_WORLD_MODEL.T @ rotations[:, 0]
     B = np.einsum("kij,tkjl,kml->tkim", C, rotations, C)
-    head = np.array(armature.data.bones[body.joint_names[0]].head_local)
-    return on_one_hemisphere(quaternions(B)), clip.root - head
+    return on_one_hemisphere(quaternions(B)), clip.root - _root_head(armature, body)
 
 
 def write_clip(armature: bpy.types.Object, body: Body, clip: Clip, frames: np.ndarray) -> None:
     """Replace the keys of all bones by the clip's, at scene frames (T,); curves, groups and action stay."""
-    q, location = channels(armature, body, clip)
-    rotation_paths = [bone_path(name, ROTATION) for name in body.joint_names]
+    values = _values_by_path(body, *channels(armature, body, clip))
     for path, bone in _curves(armature, body).items():
-        values = location if path == location_path(body) else q[:, rotation_paths.index(path)]
         for index, curve in enumerate(bone):
-            rewrite_keys(curve, frames, values[:, index])
+            rewrite_keys(curve, frames, values[path][:, index])
 
 
 def bake_whole_frames(armature: bpy.types.Object, body: Body, rate: float) -> tuple[int, int]:
@@ -97,27 +93,28 @@ class Reduction:
     joint_m: float  # of any joint in the armature's space
 
 
-def reduce_keys(armature: bpy.types.Object, body: Body, rate: float, angle: float, distance: float) -> Reduction:
+def reduce_keys(
+    armature: bpy.types.Object, body: Body, betas: np.ndarray, rate: float, angle: float, distance: float
+) -> Reduction:
     """Remove the keys that linear interpolation does not need, each bone by itself.
 
     :param angle: radians that any bone's rotation may be off by; distance: metres that the pelvis may.
     """
     clip, frames = read_clip(armature, body, rate)
     q, location = channels(armature, body, clip)
+    values = _values_by_path(body, q, location)
     before = after = 0
     for path, bone in _curves(armature, body).items():
         before += sum(len(curve.keyframe_points) for curve in bone)
         if path == location_path(body):
-            values, keep = location, keep_of_positions(clip.times, location, distance)
+            keep = keep_of_positions(clip.times, location, distance)
         else:
-            values = q[:, [bone_path(name, ROTATION) for name in body.joint_names].index(path)]
-            keep = keep_of_quaternions(clip.times, values, angle)
+            keep = keep_of_quaternions(clip.times, values[path], angle)
         for index, curve in enumerate(bone):
-            rewrite_keys(curve, frames[keep], values[keep, index])
+            rewrite_keys(curve, frames[keep], values[path][keep, index])
         after += len(keep) * len(bone)
     reduced = read_at(armature, body, rate, frames)
     off = angles_between(channels(armature, body, reduced)[0], q)
-    betas = np.array(list(armature.get("scope_betas", np.zeros(body.P))), float)
     moved = np.linalg.norm(reduced.joints(body, betas) - clip.joints(body, betas), axis=-1)
     return Reduction(before, after, float(off.max()), float(moved.max()))
 
@@ -127,9 +124,20 @@ def location_path(body: Body) -> str:
     return bone_path(body.joint_names[0], LOCATION)
 
 
+def _values_by_path(body: Body, q: np.ndarray, location: np.ndarray) -> dict[str, np.ndarray]:
+    """What ``channels`` gives, (T, 4) or (T, 3) by data path."""
+    rotations = {bone_path(name, ROTATION): q[:, k] for k, name in enumerate(body.joint_names)}
+    return rotations | {location_path(body): location}
+
+
+def _root_head(armature: bpy.types.Object, body: Body) -> np.ndarray:
+    """(3,) h_0."""
+    return np.array(armature.data.bones[body.joint_names[0]].head_local)
+
+
 def _curves(armature: bpy.types.Object, body: Body) -> dict[str, list[bpy.types.FCurve]]:
     """Curves by data path, in order of their index: every bone's rotation, and the root's location."""
-    wanted = {bone_path(name, ROTATION): 4 for name in body.joint_names} | {bone_path(body.joint_names[0], LOCATION): 3}
+    wanted = {bone_path(name, ROTATION): 4 for name in body.joint_names} | {location_path(body): 3}
     found: dict[str, dict[int, bpy.types.FCurve]] = {path: {} for path in wanted}
     for curve in fcurves(armature):
         if curve.data_path in found and len(curve.keyframe_points):
