@@ -55,6 +55,7 @@ class Batch:
         self.folder, self.out = folder.resolve(), out.resolve()
         self.report_file = out / REPORT_NAME
         self._program, self._options, self._suffixes, self._overlays = list(program), options, suffixes, overlays
+        self._basis = self._key_basis()
         self._running: set[subprocess.Popen] = set()
         self._stopped = False
 
@@ -172,17 +173,22 @@ class Batch:
             with contextlib.suppress(OSError):
                 process.terminate()
 
-    def _key(self, path: Path) -> str:
-        """Of footage, options and program together."""
+    def _key_basis(self) -> hashlib._Hash:
+        """Of program and options, the same for every clip."""
         digest = hashlib.sha256(code_version(_ROOT).encode())
-        values = {k: v for k, v in self._options.items() if k not in ("--threads", "--provider")}
+        values = {k: v for k, v in self._options.items() if k != "--threads"}
         digest.update(json.dumps([sorted(values.items()), list(self._suffixes), self._overlays]).encode())
-        named = [Path(v) for v in values.values() if v and Path(v).is_file()]  # a body, a calibration, a network
-        named += [file.with_suffix(".json") for file in named if file.suffix == ".onnx"]  # what describes it
-        for file in [*(sorted(path.iterdir()) if path.is_dir() else [path]), *named]:
+        for value in values.values():
+            if value and Path(value).is_file():  # a body, a calibration, a network
+                _add_content(digest, Path(value))
+        return digest
+
+    def _key(self, path: Path) -> str:
+        """Of program, options and footage together."""
+        digest = self._basis.copy()
+        for file in sorted(path.iterdir()) if path.is_dir() else [path]:
             if file.is_file():
-                with file.open("rb") as stream:
-                    digest.update(hashlib.file_digest(stream, "sha256").digest())
+                _add_content(digest, file)
         return digest.hexdigest()
 
     def _is_finished(self, entry: dict) -> bool:
@@ -236,6 +242,11 @@ class Batch:
             elif suffix in FOOTAGE_SUFFIXES:
                 found.append(path)
         return found
+
+
+def _add_content(digest: hashlib._Hash, file: Path) -> None:
+    with file.open("rb") as stream:
+        digest.update(hashlib.file_digest(stream, "sha256").digest())
 
 
 def _is_sequence(folder: Path) -> bool:
