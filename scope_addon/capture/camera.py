@@ -39,6 +39,12 @@ class Camera:
         flat = np.ascontiguousarray(points_px, float).reshape(-1, 1, 2)
         return cv2.undistortPoints(flat, self.intrinsics, self.dist, P=self.intrinsics).reshape(points_px.shape)
 
+    def rays(self, points_px: np.ndarray) -> np.ndarray:
+        """(..., 3) directions with z = 1, camera frame, in which pixels (..., 2) were seen."""
+        K = self.intrinsics
+        flat = (self.undistort(points_px) - K[:2, 2]) / [K[0, 0], K[1, 1]]
+        return np.concatenate([flat, np.ones((*flat.shape[:-1], 1))], axis=-1)
+
 
 def pinhole(width: int, height: int, focal_px: float) -> np.ndarray:
     """(3, 3) intrinsics with square pixels and the principal point in the middle."""

@@ -165,9 +165,7 @@ class BackgroundTracker:
         """(n, 3) unit directions, camera frame, of points in the working picture."""
         # A working pixel's centre in the full picture: OpenCV scales areas, not their centres.
         full = ((points + 0.5) / (self._scale * self._step) - 0.5) * self._step
-        full = self._camera.undistort(full)
-        K = self._camera.intrinsics
-        rays = np.concatenate([(full - K[:2, 2]) / [K[0, 0], K[1, 1]], np.ones((len(full), 1))], axis=1)
+        rays = self._camera.rays(full)
         return rays / np.linalg.norm(rays, axis=1, keepdims=True)
 
     def _box(self, points: np.ndarray) -> np.ndarray:

@@ -61,7 +61,6 @@ class FittedTrack:
     iterations: float  # mean per frame
 
 
-
 @dataclass(frozen=True)
 class PreparedTrack:
     """What every pass over a track needs, computed once: undistorted keypoints, the lifter's points, priors."""

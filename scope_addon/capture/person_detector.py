@@ -11,6 +11,7 @@ import cv2
 import numpy as np
 
 from .execution import Execution
+from .letterbox import fit_in
 from .networks import network_path, open_session
 from .region import Region, region_from_points
 
@@ -95,15 +96,8 @@ def letterbox(image_rgb: np.ndarray) -> tuple[np.ndarray, float, np.ndarray]:
 
     Returns the square, the scale and the (x, y) offset: square = scale · (pixel + ½) + offset.
     """
-    height, width = image_rgb.shape[:2]
-    scale = INPUT_SIZE / max(height, width)
-    columns, rows = max(1, round(width * scale)), max(1, round(height * scale))
-    left, top = (INPUT_SIZE - columns) // 2, (INPUT_SIZE - rows) // 2
-    square = np.zeros((INPUT_SIZE, INPUT_SIZE, 3), np.uint8)
-    square[top : top + rows, left : left + columns] = cv2.resize(
-        image_rgb, (columns, rows), interpolation=cv2.INTER_AREA if scale < 1 else cv2.INTER_LINEAR
-    )
-    return square, scale, np.array([left, top], float)
+    fitted = fit_in(image_rgb, INPUT_SIZE, INPUT_SIZE, border=0)
+    return fitted.picture_rgb, INPUT_SIZE / max(image_rgb.shape[:2]), fitted.offset
 
 
 def make_anchors(size: int = INPUT_SIZE, strides: tuple[tuple[int, int], ...] = _LAYERS) -> np.ndarray:

@@ -72,9 +72,7 @@ def find_lines(image_rgb: np.ndarray, camera: Camera, people: Sequence[np.ndarra
         keep &= ~((middle > low - margin) & (middle < high + margin)).all(axis=1)
     chosen = np.flatnonzero(keep)
     chosen = chosen[np.argsort(-length[chosen])[:MOST_LINES]]
-    K = camera.intrinsics
-    flat = camera.undistort(ends[chosen].reshape(-1, 2))
-    rays = np.concatenate([(flat - K[:2, 2]) / [K[0, 0], K[1, 1]], np.ones((len(flat), 1))], axis=1).reshape(-1, 2, 3)
+    rays = camera.rays(ends[chosen])
     normals = np.cross(rays[:, 0], rays[:, 1])
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
     return Lines(normals, length[chosen])

@@ -9,8 +9,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
+
+from ..letterbox import Letterbox, fit_in
 
 _BORDER = 114  # the grey that the YOLO family is trained with
 OVERLAP_THRESHOLD = 0.5
@@ -24,34 +25,9 @@ class Boxes:
     scores: np.ndarray
 
 
-@dataclass(frozen=True)
-class Letterbox:
-    """Where the image lies in the network's picture: picture = scale · (pixel + ½) + offset."""
-
-    picture_rgb: np.ndarray
-    scale: np.ndarray  # (x, y)
-    offset: np.ndarray  # (x, y)
-
-    def to_image(self, points: np.ndarray) -> np.ndarray:
-        """Positions (..., 2) in the network's picture to pixels of the image."""
-        return (points - self.offset) / self.scale - 0.5
-
-
 def letterbox(image_rgb: np.ndarray, width: int, height: int, *, centered: bool, stretched: bool = False) -> Letterbox:
-    """The image at one scale within a grey picture, in its middle or top left corner; or stretched all over it."""
-    rows, columns = image_rgb.shape[:2]
-    if stretched:
-        size = width, height
-    else:
-        scale = min(width / columns, height / rows)
-        size = max(1, round(columns * scale)), max(1, round(rows * scale))
-    left, top = ((width - size[0]) // 2, (height - size[1]) // 2) if centered else (0, 0)
-    shrinks = size[0] < columns
-    picture = np.full((height, width, 3), _BORDER, np.uint8)
-    picture[top : top + size[1], left : left + size[0]] = cv2.resize(
-        image_rgb, size, interpolation=cv2.INTER_AREA if shrinks else cv2.INTER_LINEAR
-    )
-    return Letterbox(picture, np.array([size[0] / columns, size[1] / rows]), np.array([left, top], float))
+    """The image as the YOLO family wants it, on its grey."""
+    return fit_in(image_rgb, width, height, border=_BORDER, centered=centered, stretched=stretched)
 
 
 def corners_of(centers_and_sizes: np.ndarray) -> np.ndarray:
