@@ -39,6 +39,23 @@ def blender_camera_matrix(world_from_camera: np.ndarray) -> np.ndarray:
     return np.asarray(world_from_camera) @ turn
 
 
+def blender_brown_distortion(dist: np.ndarray) -> tuple[float, float, float, float, float]:
+    """Coefficients k1, k2, k3, p1, p2 of Blender's Brown lens that distorts as OpenCV's (k1, k2, p1, p2, k3) does.
+
+    Both add to (x, y)(1 + k1 r² + k2 r⁴ + k3 r⁶), in units of the focal length, the tangential
+
+        OpenCV, y down:    (2 p1 xy + p2 (r² + 2x²),  p1 (r² + 2y²) + 2 p2 xy)
+        Blender, y up:     (p1 (r² + 2x²) + 2 p2 xy,  p2 (r² + 2y²) + 2 p1 xy)
+
+    so that their names are exchanged, and the one that belongs to y changes its sign.
+    Source: OpenCV's camera calibration, libmv's ApplyBrownDistortionModel.
+
+    :param dist: (5,) of the footage's camera.
+    """
+    k1, k2, p1, p2, k3 = (float(c) for c in dist)
+    return k1, k2, k3, p2, -p1
+
+
 def world_from_level_camera(up_camera: np.ndarray, height: float = 0.0) -> np.ndarray:
     """World frame of a camera whose view of "up" is known: z along ``up``, the camera looking along +y.
 

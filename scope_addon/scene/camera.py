@@ -18,7 +18,7 @@ import bpy
 import numpy as np
 
 from ...solver.errors import VideoError
-from ...solver.frames import blender_camera_matrix
+from ...solver.frames import blender_brown_distortion, blender_camera_matrix
 from ..footage import PICTURE_SUFFIXES
 from ..motion import Motion
 from .actions import Channels
@@ -87,6 +87,7 @@ def same_camera(a: Motion, b: Motion) -> bool:
     return (
         np.array_equal(a.image_size, b.image_size)
         and np.allclose(a.intrinsics, b.intrinsics, rtol=0, atol=1e-6)
+        and np.array_equal(a.dist, b.dist)
         and a.world_from_camera.shape == b.world_from_camera.shape
         and np.allclose(a.world_from_camera, b.world_from_camera, rtol=0, atol=1e-6)
     )
@@ -96,7 +97,8 @@ def show_footage(camera: bpy.types.Object, footage: str | Path, motion: Motion, 
     """Put the footage behind the scene when one looks through the camera.
 
     Blender shows one frame of a clip per frame of the scene, so it agrees with the motion where the scene's rate is
-    the footage's and constant; a picture stays.
+    the footage's and constant. A picture stays, but that of a distorting lens: only a clip can be undistorted, and it
+    shows the picture in its own frame.
 
     :param frames: (T,) scene frame of each pose.
     :return: warnings: what will not line up.
@@ -111,7 +113,7 @@ def show_footage(camera: bpy.types.Object, footage: str | Path, motion: Motion, 
     background.display_depth = "BACK"
     background.frame_method = "FIT"
     camera.data.show_background_images = True
-    if path.suffix.lower() in PICTURE_SUFFIXES:
+    if path.suffix.lower() in PICTURE_SUFFIXES and not motion.dist.any():
         background.source = "IMAGE"
         background.image = bpy.data.images.load(str(path), check_existing=True)
         size = tuple(background.image.size)
@@ -143,7 +145,7 @@ def _set_lens_distortion(
 ) -> None:
     """Tell the clip its lens, and show it undistorted when the lens distorts: Blender's cameras are pinholes.
 
-    Only the radial terms k1, k2, k3 go over: Blender and OpenCV write them alike.
+    :param motion: its ``dist`` is OpenCV's, for which ``blender_brown_distortion`` has Blender's names.
     """
     width, height = (float(n) for n in motion.image_size)
     lens = clip.tracking.camera
@@ -152,8 +154,8 @@ def _set_lens_distortion(
     lens.focal_length = SENSOR_WIDTH * motion.intrinsics[0, 0] / width
     # Blender counts the principal point's v from the bottom.
     lens.principal_point_pixels = motion.intrinsics[0, 2], height - motion.intrinsics[1, 2]
-    k1, k2, _, _, k3 = motion.dist
     lens.distortion_model = "BROWN"
+    k1, k2, k3, p1, p2 = blender_brown_distortion(motion.dist)
     lens.brown_k1, lens.brown_k2, lens.brown_k3, lens.brown_k4 = k1, k2, k3, 0.0
-    if np.abs(motion.dist).max() > 0:
-        background.clip_user.use_render_undistorted = True
+    lens.brown_p1, lens.brown_p2 = p1, p2
+    background.clip_user.use_render_undistorted = bool(motion.dist.any())
