@@ -12,7 +12,12 @@ from ...solver.errors import InputError
 
 SIDED = ("hip", "knee", "ankle", "foot", "collar", "shoulder", "elbow", "wrist")
 SPINE = ("spine1", "spine2", "spine3")
-PARTS = ("pelvis", *SPINE, "neck", "head", *(f"{side}_{part}" for side in ("left", "right") for part in SIDED))
+FINGERS = ("thumb", "index", "middle", "ring", "pinky")
+PHALANGES = tuple(f"{finger}{k}" for finger in FINGERS for k in (1, 2, 3))  # as SMPL+H calls them, from the knuckle on
+PARTS = (
+    *("pelvis", *SPINE, "neck", "head"),
+    *(f"{side}_{part}" for side in ("left", "right") for part in (*SIDED, *PHALANGES)),
+)
 NEEDED = ("pelvis", *(f"{side}_{part}" for side in ("left", "right") for part in ("hip", "knee")))
 _FORMAT, _LARGEST_BYTES = "scope bone map", 1_000_000
 

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .bone_map import BoneMap
+from .bone_map import FINGERS, BoneMap
+from .fingers import find_fingers
 
 _SIDES = {"l": "left", "left": "left", "r": "right", "right": "right"}
 _CENTRE = {
@@ -51,10 +52,20 @@ def guess(bones: RestBones) -> BoneMap:
 
     Confidence is 1 where name and geometry agree, 0.8 for a name alone, 0.5 for geometry alone.
     """
-    named, shaped = _rigify(bones) or by_name(bones), by_geometry(bones)
+    rigify = _rigify(bones)
+    named, shaped = rigify or by_name(bones), by_geometry(bones)
+    shaped |= _fingers(bones, shaped)
     if len(set(named.values())) < 8:
         return BoneMap(shaped, dict.fromkeys(shaped, 0.5))
+    if rigify is None:
+        named |= _fingers(bones, named)
     return BoneMap(named, {bone: 1.0 if shaped.get(bone) == part else 0.8 for bone, part in named.items()})
+
+
+def _fingers(bones: RestBones, parts: dict[str, str]) -> dict[str, str]:
+    """The fingers below the wrists of a map."""
+    wrists = {part.partition("_")[0]: bones.names.index(b) for b, part in parts.items() if part.endswith("_wrist")}
+    return find_fingers(bones.names, bones.parents, bones.heads, wrists)
 
 
 def _rigify(bones: RestBones) -> dict[str, str] | None:
@@ -75,6 +86,9 @@ def _rigify(bones: RestBones) -> dict[str, str] | None:
     for letter, side in (("L", "left"), ("R", "right")):
         found[f"shoulder.{letter}"] = f"{side}_collar"
         found |= {f"{limb}{suffix}.{letter}": f"{side}_{part}" for limb, part in limbs.items()}
+        for finger in FINGERS:
+            bone = finger if finger == "thumb" else f"f_{finger}"
+            found |= {f"{bone}.{k:02d}.{letter}": f"{side}_{finger}{k}" for k in (1, 2, 3)}
     return {bone: part for bone, part in found.items() if bone in names}
 
 

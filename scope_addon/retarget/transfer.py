@@ -9,6 +9,8 @@ the rested limb along the body's own,
 
 So a limb's direction is the body's whatever pose the rig rests in, and its twist is the one it rests with. Trunk and
 head keep the posture in which the rig was built (A_b = I); feet turn about the upright axis alone, so soles stay flat.
+Where fingers are captured and the rig has them, the palms lie on each other too, so that fingers bend about the right
+axes.
 """
 
 from __future__ import annotations
@@ -21,12 +23,14 @@ from ...solver.body import Body
 from ...solver.frames import R_WORLD_MODEL
 from ...solver.rotations import exp
 from ..edit.clip import Clip, between
-from .bone_map import SPINE, BoneMap
+from .bone_map import FINGERS, SPINE, BoneMap
 from .feet import FootRest, ankle_goal, flat_toes, sinking
 from .legs import reach, shortest_turn
 
 UP = np.array([0.0, 0.0, 1.0])
 _NEXT = {"hip": "knee", "knee": "ankle", "shoulder": "elbow", "elbow": "wrist", "wrist": "hand"}
+_NEXT |= {f"{finger}{k}": f"{finger}{k + 1}" for finger in FINGERS for k in (1, 2, 3)}  # the fourth is nobody's
+_MOST_TURN = np.radians(100)  # between two palms at rest; beyond it a finger was taken for another one
 _SOLE_M, _HEEL_M = 0.015, 0.02  # the sole's thickness, and how long a piece of it is the heel
 
 
@@ -212,13 +216,37 @@ def _rest_alignment(
                 angle = np.arctan2(wanted[1], wanted[0]) - np.arctan2(flat[1], flat[0])
                 A[b] = exp(UP * ((angle + np.pi) % (2 * np.pi) - np.pi))
         elif kind in _NEXT:
+            A[b] = before = A[parent] if parent >= 0 and part_of[parent].partition("_")[2] in _NEXT else np.eye(3)
             end = row.get(f"{side}_{_NEXT[kind]}")
             along = (rig.heads[end] if end is not None else rig.tails[b]) - rig.heads[b]
+            # Zero for last phalanges, whose ends no joint tells: they bend on the one before as the rig was built.
             wanted = rest[index.get(f"{side}_{_NEXT[kind]}", index[part])] - rest[index[part]]
-            before = A[parent] if parent >= 0 and part_of[parent].partition("_")[2] in _NEXT else np.eye(3)
             if np.linalg.norm(along) > 1e-9 and np.linalg.norm(wanted) > 1e-9:
                 A[b] = shortest_turn(before @ F @ along, wanted) @ before
+            if kind == "wrist":
+                palm = _palm_alignment(rig.heads @ F.T, row, rest, index, side)
+                if palm is not None and (np.trace(palm @ A[b].T) - 1) / 2 > np.cos(_MOST_TURN):
+                    A[b] = palm
     return A
+
+
+def _palm_alignment(
+    heads: np.ndarray, row: dict[str, int], rest: np.ndarray, index: dict[str, int], side: str
+) -> np.ndarray | None:
+    """(3, 3) the turn of the rig's palm onto the body's, by wrist and knuckles; None where one has no fingers."""
+    parts = [f"{side}_{part}" for part in ("wrist", "index1", "pinky1")]
+    if not all(part in row and part in index for part in parts):
+        return None
+    palms = []
+    for points, rows in ((heads, row), (rest, index)):
+        wrist, first, last = (points[rows[part]] for part in parts)
+        across, along = first - last, (first + last) / 2 - wrist
+        normal = np.cross(along, across)
+        if np.linalg.norm(normal) < 1e-9:
+            return None
+        axes = np.stack([along, np.cross(normal, along), normal], axis=1)
+        palms.append(axes / np.linalg.norm(axes, axis=0))
+    return palms[1] @ palms[0].T
 
 
 def _turns(D: np.ndarray, rig: Skeleton, part_of: list[str], index: dict[str, int]) -> np.ndarray:

@@ -18,7 +18,7 @@ from mathutils import Matrix, Quaternion
 from ...solver.body import Body
 from ...solver.errors import UsageError
 from ...solver.rotations import quaternion_from_matrix
-from ..retarget.bone_map import BoneMap
+from ..retarget.bone_map import PHALANGES, BoneMap
 from ..retarget.guess import RestBones, guess
 from ..retarget.transfer import Skeleton, basis, transfer
 from .actions import Channels, bone_path
@@ -58,7 +58,7 @@ def retarget(
 ) -> bpy.types.Action:
     """Key the mapped bones of ``rig`` so that it moves as the captured ``source``; returns the new action.
 
-    The rig's former action stays in the file.
+    The rig's former action stays in the file. Fingers stay as they are where none were captured.
 
     :raises UsageError: the rig is the source, or has no such bones.
     :raises InputError: the map cannot be used.
@@ -70,11 +70,12 @@ def retarget(
     missing = [name for name in bone_map.parts if name not in rig.pose.bones]
     if missing:
         raise UsageError(f"'{rig.name}' has no bone '{missing[0]}'; guess the bones anew or correct the list")
+    bone_map = BoneMap({bone: part for bone, part in bone_map.parts.items() if part in body.joint_names})
     clip, frames = read_clip(source, body, rate)
     clip = path_clip(source, clip, frames)
     with _all_or_nothing(rig):
         with _at_rest(rig):
-            skeleton = _probe(rig, list(bone_map.parts))
+            skeleton = _probe(rig, bone_map.parts)
         pose = transfer(clip, body, betas, skeleton, bone_map, feet=options.feet)
         root = skeleton.names.index(bone_map.bone("pelvis") or "")
         heads = pose.heads[:, root].copy()
@@ -148,17 +149,20 @@ def _channel(mode: str, R: np.ndarray) -> tuple[str, np.ndarray]:
     return "rotation_euler", values
 
 
-def _probe(rig: bpy.types.Object, names: list[str]) -> Skeleton:
+def _probe(rig: bpy.types.Object, parts: dict[str, str]) -> Skeleton:
     """The mapped bones at rest, ordered, with what each one follows."""
+    names = list(parts)
     rest = _matrices(rig, names)
     follows = np.zeros((len(names), len(names)), bool)
-    turn = Quaternion((0.6, 0.48, 0.64), 0.5)
-    for a, name in enumerate(names):
-        rig.pose.bones[name].matrix_basis = turn.to_matrix().to_4x4()
+    for group in _independent(parts):
+        for k, a in enumerate(group):  # by another angle each, so that one sees whom a bone follows
+            turn = Quaternion((0.6, 0.48, 0.64), 0.5 + 0.15 * k)
+            rig.pose.bones[names[a]].matrix_basis = turn.to_matrix().to_4x4()
         turned = _rotations(_matrices(rig, names)) @ np.swapaxes(_rotations(rest), 1, 2)
-        rig.pose.bones[name].matrix_basis = Matrix()
-        follows[:, a] = np.abs(turned - turned[a]).max(axis=(1, 2)) < 0.02
-        follows[a, a] = False
+        for a in group:
+            rig.pose.bones[names[a]].matrix_basis = Matrix()
+            follows[:, a] = np.abs(turned - turned[a]).max(axis=(1, 2)) < 0.02
+            follows[a, a] = False
     order = sorted(range(len(names)), key=lambda b: int(follows[b].sum()))
     parents = []
     for b in order:
@@ -172,6 +176,16 @@ def _probe(rig: bpy.types.Object, names: list[str]) -> Skeleton:
     return Skeleton(
         [names[b] for b in order], np.array(parents), matrices[:, :3, 3], ends, _rotations(matrices), float(floor)
     )
+
+
+def _independent(parts: dict[str, str]) -> list[list[int]]:
+    """Rows of bones none of which moves another: those of both sides, and of all fingers. Each evaluation costs."""
+    groups: dict[str, list[int]] = {}
+    for row, (bone, part) in enumerate(parts.items()):
+        side, _, kind = part.partition("_")
+        key = "phalanx" + kind[-1] if kind in PHALANGES else kind
+        groups.setdefault(key or bone, []).append(row)
+    return list(groups.values())
 
 
 def _matrices(rig: bpy.types.Object, names: list[str]) -> np.ndarray:

@@ -30,22 +30,22 @@ def walk(seconds=4.0, period=1.0, speed=1.2, rate=RATE):
     return Clip(t, rotations, root)
 
 
-def motion_of(clip, noise=0.0, seed=0):
+def motion_of(clip, noise=0.0, seed=0, body=BODY):
     """A capture of the clip by a level camera 4 m away; its raw motion has noise in radians."""
     rng = np.random.default_rng(seed)
     T, K1 = clip.rotations.shape[:2]
     shaken = clip.rotations @ exp(noise * rng.standard_normal((T, K1, 3)))
     camera = np.tile(np.eye(4), (T, 1, 1))
     camera[:, :3] = [[1, 0, 0, 0], [0, 0, 1, -4], [0, -1, 0, 1]]
-    J0 = BODY.rest_joints(np.zeros(BODY.P))[0]
-    joints = clip.joints(BODY, np.zeros(BODY.P))
+    J0 = body.rest_joints(np.zeros(body.P))[0]
+    joints = clip.joints(body, np.zeros(body.P))
     return Motion(
         poses=log(clip.rotations).reshape(T, -1),
         trans=clip.root - J0,
         poses_raw=log(shaken).reshape(T, -1),
         trans_raw=clip.root - J0 + 0.1 * noise * rng.standard_normal((T, 3)),
-        betas=np.zeros(BODY.P),
-        body_model="scope",
+        betas=np.zeros(body.P),
+        body_model=body.name,
         gender="neutral",
         mocap_framerate=RATE,
         frames=np.arange(T),

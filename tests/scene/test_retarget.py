@@ -123,16 +123,16 @@ def source():
     return build_scene([motion_of(walk(2.0))], BODY, None, BuildOptions(start_frame=1.0)).people[0].armature
 
 
-def truth():
+def truth(motion=None, body=BODY):
     """(T, K+1, 3) joints by plain forward kinematics of the motion file."""
-    motion, rest = motion_of(walk(2.0)), BODY.rest_joints(np.zeros(BODY.P))
-    out = np.empty((len(motion), len(NAMES), 3))
+    motion, rest = motion or motion_of(walk(2.0)), body.rest_joints(np.zeros(body.P))
+    out = np.empty((len(motion), body.K + 1, 3))
     for t, row in enumerate(motion.poses.reshape(len(motion), -1, 3)):
         R = []
         for i, w in enumerate(row):
             w = Vector(w)
             local = np.array(Matrix.Rotation(w.length, 3, w if w.length else Vector((1, 0, 0))))
-            parent = BODY.parents[i]
+            parent = body.parents[i]
             R.append(local if parent < 0 else R[parent] @ local)
             if parent < 0:
                 out[t, i] = rest[0] + motion.trans[t]

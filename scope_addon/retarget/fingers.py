@@ -1,0 +1,104 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Which bones of a rig are the fingers' phalanges, below the wrists that are known: by name, else by geometry."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+
+from .bone_map import FINGERS
+
+_WORDS = {
+    "thumb": ("thumb",),
+    "index": ("index", "pointer"),
+    "middle": ("middle", "mid"),
+    "ring": ("ring",),
+    "pinky": ("pinky", "pinkie", "little"),
+}
+# Bones of a hand that are no phalanges; a thumb's metacarpal moves, and counts as its first one.
+_NO_PHALANX = re.compile(r"end|nub|tip|site|master|palm|twist|pole|ik|target", re.IGNORECASE)
+_METACARPAL = re.compile(r"carpal|\bmeta\b", re.IGNORECASE)
+_NUMBERED = re.compile(r"finger[ _.-]*(\d)", re.IGNORECASE)
+_PHALANGES = 3
+
+
+def find_fingers(names: list[str], parents: np.ndarray, heads: np.ndarray, wrists: dict[str, int]) -> dict[str, str]:
+    """Bone -> part (``left_index1``, ...) for the fingers below each wrist.
+
+    :param parents: (B,) indices, -1: none; heads: (B, 3) at rest; wrists: row of the hand's bone by side.
+    """
+    found: dict[str, str] = {}
+    for side, wrist in wrists.items():
+        below = _below(parents, wrist)
+        chains = _by_name(names, parents, below) or _by_geometry(parents, heads, wrist, below)
+        for finger, chain in chains.items():
+            found |= {names[i]: f"{side}_{finger}{k}" for k, i in enumerate(chain[:_PHALANGES], 1)}
+    return found
+
+
+def _by_name(names: list[str], parents: np.ndarray, below: list[int]) -> dict[str, list[int]]:
+    """Finger -> its bones from the knuckle on; empty where the names tell of no finger."""
+    own: dict[str, set[int]] = {}
+    numbered: dict[int, set[int]] = {}
+    for i in below:
+        name = names[i].rsplit(":", 1)[-1]
+        words = re.findall(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+", name)
+        if any(_NO_PHALANX.fullmatch(word) for word in words):
+            continue
+        bare = name.lower()
+        finger = next((f for f, known in _WORDS.items() if any(word in bare for word in known)), None)
+        number = _NUMBERED.search(name)
+        if finger == "thumb" or (finger and not _METACARPAL.search(name)):
+            own.setdefault(finger, set()).add(i)
+        elif finger is None and number:
+            numbered.setdefault(int(number.group(1)), set()).add(i)
+    unnamed = [finger for finger in FINGERS if finger not in own]
+    own |= {finger: numbered[n] for finger, n in zip(unnamed, sorted(numbered), strict=False)}
+    return {finger: _longest(parents, bones) for finger, bones in own.items()}
+
+
+def _by_geometry(parents: np.ndarray, heads: np.ndarray, wrist: int, below: list[int]) -> dict[str, list[int]]:
+    """Five chains below a wrist: the one that points aside is the thumb, the others follow by their distance to it."""
+    leaves = [i for i in below if i not in set(parents[below].tolist())]
+    chains = []
+    for leaf in leaves:
+        chain = [leaf]
+        while parents[chain[0]] != wrist:
+            chain.insert(0, int(parents[chain[0]]))
+        chains.append(chain)
+    if len(chains) != len(FINGERS) or any(not _PHALANGES <= len(chain) <= _PHALANGES + 2 for chain in chains):
+        return {}
+    along = np.array([heads[chain[-1]] - heads[chain[0]] for chain in chains])
+    along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-12)
+    thumb = int((along @ along.sum(axis=0)).argmin())
+    middles = np.array([heads[chain].mean(axis=0) for chain in chains])
+    order = np.argsort(np.linalg.norm(middles - middles[thumb], axis=1), kind="stable")
+    out = {}
+    for finger, k in zip(FINGERS, order, strict=True):
+        chain = chains[k]
+        from_wrist = np.linalg.norm(heads[chain] - heads[wrist], axis=1)
+        palm = finger != "thumb" and len(chain) > _PHALANGES and from_wrist[0] < 0.5 * from_wrist[1]
+        out[finger] = chain[palm:]
+    return out
+
+
+def _below(parents: np.ndarray, wrist: int) -> list[int]:
+    """Rows of everything that hangs on the wrist."""
+    found = {wrist}
+    for i in range(len(parents)):  # parents come before children
+        if int(parents[i]) in found:
+            found.add(i)
+    return sorted(found - {wrist})
+
+
+def _longest(parents: np.ndarray, bones: set[int]) -> list[int]:
+    """The longest line of descent within ``bones``, from the top."""
+    best: list[int] = []
+    for i in sorted(bones):
+        chain = [i]
+        while int(parents[chain[0]]) in bones:
+            chain.insert(0, int(parents[chain[0]]))
+        if len(chain) > len(best):
+            best = chain
+    return best
