@@ -5,15 +5,21 @@ The smaller networks do so for dozens of frames at a stretch, for most of a clip
 show. One frame does not tell, but the body does not turn round between two frames: at either end of such a stretch the
 labels jump. Which side of a jump is right, the largest network says, which looked at a few frames (`tracker`). Its
 judgement also corrects the landmarks in space round these frames, where the two networks are far apart.
+
+A network that tells nothing of depth is judged by what the lifting network makes of its keypoints, as said and with
+left and right exchanged: in the picture alone, seen from the side, exchanged legs are a step as good as any.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
-from .landmark_network import KEYPOINT_NAMES
+from .camera import Camera
+from .landmark_network import KEYPOINT_NAMES, PoseEstimate
+from .lifter import Lifter
 from .track import Track
 
 _PARTNERS = {"left": "right", "right": "left"}
@@ -28,6 +34,8 @@ _LIMBS = np.array([11, 12, 13, 14, 15, 16, 23, 24, 25, 26, 27, 28])
 FRAME_COST_M = 0.005
 FRAME_COST_UNJUDGED_M = 0.04
 TURN_COST_M = 0.005  # for reversing the depth on top
+# The same where both readings were lifted. Per second: whoever walks at a low rate makes long steps between frames.
+LIFTED_COST_M_S = 0.05
 # Where the judge's landmarks are further off than this, they pull on those of the frames near by.
 FAR_APART_M = 0.12
 REACH_S = 0.13
@@ -35,32 +43,41 @@ REACH_S = 0.13
 AS_SAID, EXCHANGED, TURNED = 0, 1, 2  # TURNED: exchanged, and the depth reversed: the front taken for the back
 
 
-def repair_left_right(track: Track) -> Track:
+def repair_left_right(track: Track, camera: Camera) -> Track:
     """The track with left and right (and depth) as `find_labels` finds them, and corrected by the judged frames."""
-    world = np.where(track.seen[:, None, None], track.world_landmarks, np.nan)
     judged = None
     if len(track.judged_rows):
-        judged = np.full_like(world, np.nan)
+        judged = np.full(track.world_landmarks.shape, np.nan, np.float32)
         judged[track.judged_rows] = track.judged_landmarks
+    if not track.knows_depth:
+        return _exchanged(track, _find_lifted_labels(track, camera, judged) != AS_SAID)
+    world = np.where(track.seen[:, None, None], track.world_landmarks, np.nan)
     labels = find_labels(world, track.acquired, judged, FRAME_COST_UNJUDGED_M if judged is None else FRAME_COST_M)
     del judged
-    exchanged = labels != AS_SAID
-    if not exchanged.any() and not len(track.judged_rows):
+    if not (labels != AS_SAID).any() and not len(track.judged_rows):
         return track
     repaired = labelled(world, labels)
     repaired += _pull(repaired, track)
+    return replace(
+        _exchanged(track, labels != AS_SAID), world_landmarks=np.where(track.seen[:, None, None], repaired, 0.0)
+    )
+
+
+def _exchanged(track: Track, where: np.ndarray) -> Track:
+    """The track with left and right of keypoints and hands exchanged in the frames ``where`` (T,) says so."""
+    if not where.any():
+        return track
 
     def exchange(values: np.ndarray) -> np.ndarray:
         out = values.copy()
-        out[exchanged] = values[exchanged][:, SWAPPED]
+        out[where] = values[where][:, SWAPPED]
         return out
 
     return replace(
         track,
         keypoints_px=exchange(track.keypoints_px),
         confidence=exchange(track.confidence),
-        world_landmarks=np.where(track.seen[:, None, None], repaired, 0.0),
-        hands=None if track.hands is None else _exchange_hands(track.hands, exchanged),
+        hands=None if track.hands is None else _exchange_hands(track.hands, where),
     )
 
 
@@ -76,9 +93,17 @@ def labelled(world_landmarks: np.ndarray, labels: np.ndarray) -> np.ndarray:
     return out
 
 
-def looks_swapped(before: np.ndarray, after: np.ndarray) -> bool:
-    """Whether the world landmarks (33, 3) of two successive frames lie closer with left and right exchanged in one."""
-    return bool(_distance(before[SWAPPED], after) < _distance(before, after))
+def looks_swapped(before: PoseEstimate, after: PoseEstimate) -> bool:
+    """Whether the bodies of two successive frames lie closer with left and right exchanged in one of them."""
+    a, b = _body(before), _body(after)
+    return bool(_distance(a[SWAPPED], b) < _distance(a, b))
+
+
+def _body(estimate: PoseEstimate) -> np.ndarray:
+    """(33, n) the body about its middle: in space, or in the picture where depth is not known."""
+    if estimate.world_landmarks.any():
+        return estimate.world_landmarks
+    return estimate.keypoints_px - estimate.keypoints_px[_LIMBS].mean(axis=0)
 
 
 def find_labels(
@@ -101,23 +126,59 @@ def find_labels(
     :param starts: (T,) bool, frames that need not continue the one before (the person was found anew).
     :param judged: (T, 33, 3) the same as a better network sees it; rows of NaN where it did not look.
     """
-    count = len(world_landmarks)
     known = np.isfinite(world_landmarks[:, _LIMBS]).all(axis=(1, 2))
-    own_cost = np.array([0.0, frame_cost_m, frame_cost_m + TURN_COST_M])
-    same = np.arange(3)
-    cost = np.zeros(3)
-    came_from = np.zeros((count, 3), int)
+    costs = np.array([0.0, frame_cost_m, frame_cost_m + TURN_COST_M])
+    return _cheapest(lambda t: _variants(world_landmarks[t]), _steps, known, costs, starts, judged)
+
+
+def _find_lifted_labels(track: Track, camera: Camera, judged: np.ndarray | None) -> np.ndarray:
+    """Labels, (T,) AS_SAID or EXCHANGED, of a track without depth: those of `find_labels` for the lifted bodies.
+
+    The lifting network may move one reading less than the other, which says nothing: the mean counts.
+    """
+    rays, lifter = camera.rays(track.keypoints_px)[..., :2], Lifter()
+    bodies = [
+        lifter.lift(rays[:, order], track.confidence[:, order], None).points.astype(np.float32)
+        for order in (np.arange(len(SWAPPED)), SWAPPED)
+    ]
+    step_s = float(np.median(np.diff(track.times))) if len(track) > 1 else 0.0
+    costs = np.array([0.0, LIFTED_COST_M_S * step_s])
+
+    def step(before: np.ndarray, after: np.ndarray) -> np.ndarray:
+        distance = _steps(before, after)
+        return (distance + distance[::-1, ::-1]) / 2
+
+    return _cheapest(lambda t: np.stack([body[t] for body in bodies]), step, track.seen, costs, track.acquired, judged)
+
+
+def _cheapest(
+    readings: Callable[[int], np.ndarray],
+    step: Callable[[np.ndarray, np.ndarray], np.ndarray],
+    known: np.ndarray,
+    own_cost: np.ndarray,
+    starts: np.ndarray | None,
+    judged: np.ndarray | None,
+) -> np.ndarray:
+    """(T,) labels of least cost, see `find_labels`.
+
+    :param readings: frame to its bodies (n, 33, 3) by label;  step: two frames' bodies to the (n, n) costs of going
+        from one label to another;  known: (T,) bool, frames that have any;  own_cost: (n,) of each label, per frame.
+    """
+    count = len(known)
+    same = np.arange(len(own_cost))
+    cost = np.zeros(len(own_cost))
+    came_from = np.zeros((count, len(own_cost)), np.int8)
     previous: np.ndarray | None = None
     for t in range(count):
         if not known[t]:
             came_from[t] = same
             continue
-        body = _variants(world_landmarks[t])
+        body = readings(t)
         if previous is None or (starts is not None and starts[t]):
             came_from[t] = int(np.argmin(cost))
-            cost = np.full(3, cost.min())
+            cost = np.full(len(own_cost), cost.min())
         else:
-            total = cost[:, None] + _distance(previous[:, None], body[None])
+            total = cost[:, None] + step(previous, body)
             came_from[t] = total.argmin(axis=0)
             cost = total.min(axis=0)
         cost = cost + own_cost
@@ -130,6 +191,11 @@ def find_labels(
         labels[t] = state if known[t] else AS_SAID
         state = int(came_from[t, state])
     return labels
+
+
+def _steps(before: np.ndarray, after: np.ndarray) -> np.ndarray:
+    """(n, n) distances of the bodies (n, 33, 3) of two successive frames."""
+    return _distance(before[:, None], after[None])
 
 
 def _variants(world_landmarks: np.ndarray) -> np.ndarray:

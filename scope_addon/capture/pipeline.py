@@ -119,7 +119,7 @@ def capture(
         warnings = execution.warnings + list(video.warnings)
     frames = len(seen)
     with clock.stage("solver"):
-        tracks = [repair_left_right(t) if options.parts.left_right else t for t in seen.build(most)]
+        tracks = [repair_left_right(t, camera) if options.parts.left_right else t for t in seen.build(most)]
         del tracker, seen  # of an hour they would keep half a gigabyte
         if frames == 0:
             raise VideoError(f"{path} has no frame in the time that was asked for; change the start or the end")

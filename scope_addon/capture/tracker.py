@@ -10,13 +10,14 @@ from __future__ import annotations
 
 import math
 from concurrent.futures import Future
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import cast
 
 import numpy as np
 
-from ...solver.errors import ShapeError
+from ...solver.errors import SetupError, ShapeError
 from .adapters.box_detector import BoxDetector
 from .adapters.keypoint_network import KeypointNetwork
 from .appearance import appearance
@@ -102,7 +103,7 @@ class _Followed:
         step = (estimate.keypoints_px - self.estimate.keypoints_px).mean(axis=0)
         memory = min(_VELOCITY_MEMORY, self.age / (self.age + 1))
         self.velocity_px = memory * self.velocity_px + (1 - memory) * step
-        self.swapped |= looks_swapped(self.estimate.world_landmarks, estimate.world_landmarks)
+        self.swapped |= looks_swapped(self.estimate, estimate)
         self.estimate, self.age, self.since_judged = estimate, self.age + 1, self.since_judged + 1
 
 
@@ -133,6 +134,8 @@ class PeopleTracker:
         self._judge: LandmarkNetwork | None = None
         if keypoints:
             self._landmarks = KeypointNetwork(keypoints, threads, execution)
+            with suppress(SetupError):  # without ours, whichever reading is the steadiest
+                self._judge = LandmarkNetwork(strongest, threads, folder, execution)
         else:
             self._landmarks = LandmarkNetwork(name, threads, folder, execution)
             if name != strongest:

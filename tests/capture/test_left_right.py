@@ -5,9 +5,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scope.scope_addon.capture.camera import Camera, pinhole
 from scope.scope_addon.capture.landmark_network import KEYPOINT_NAMES
 from scope.scope_addon.capture.left_right import EXCHANGED, SWAPPED, TURNED, find_labels, labelled, repair_left_right
 from scope.scope_addon.capture.track import Track
+from scope.solver.body import load_body
+from scope.solver.rotations import exp
+
+CAMERA = Camera(pinhole(1280, 720, 1100.0), np.zeros(5), "of the test")
 
 
 def walker(count: int, turn_rad: float = 0.0) -> np.ndarray:
@@ -83,7 +88,7 @@ def test_a_track_is_repaired_and_left_alone_where_nobody_was_seen() -> None:
         judged_rows=rows,
         judged_landmarks=right[rows],
     )
-    repaired = repair_left_right(track)
+    repaired = repair_left_right(track, CAMERA)
     calm = seen & (np.arange(90) < 75)
     np.testing.assert_allclose(repaired.world_landmarks[calm], right[calm], atol=1e-9)
     np.testing.assert_allclose(repaired.keypoints_px[calm], right[calm][..., :2])
@@ -98,3 +103,74 @@ def test_nothing_to_do() -> None:
     assert find_labels(np.zeros((0, 33, 3))).shape == (0,)
     assert not find_labels(np.full((5, 33, 3), np.nan)).any()
     assert not find_labels(np.zeros((5, 33, 3))).any()
+
+
+def someone_walking(frames: int, rate: float, heading: float, turn: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+    """(T, 33, 2) pixels and (T, 33, 3) world landmarks of the body as it walks, a step of each foot in a second."""
+    body = load_body("scope")
+    at = list(body.keypoint_set("blazepose").values())
+    pixels, world = [], []
+    for k in range(frames):
+        swing, pose = 0.5 * np.sin(2 * np.pi * k / rate), np.zeros((body.K + 1, 3))
+        for name, axis, angle in (
+            ("left_hip", 0, -swing),
+            ("right_hip", 0, swing),
+            ("left_knee", 0, 0.4),
+            ("right_knee", 0, 0.4),
+            ("left_shoulder", 2, -1.2),
+            ("right_shoulder", 2, 1.2),
+            ("left_elbow", 1, -0.5 + 0.4 * swing),
+            ("right_elbow", 1, 0.5 + 0.4 * swing),
+        ):
+            pose[body.joint_names.index(name), axis] += angle
+        R = exp(pose)
+        R[0] = np.diag([1.0, -1.0, -1.0]) @ exp(np.array([0, heading + turn * k / rate, 0])) @ R[0]
+        points = body.keypoints(*body.forward_kinematics(R, np.array([0.3, 0.1, 4.0])))[at]
+        world.append(points - points[[23, 24]].mean(axis=0))
+        pixels.append(points[:, :2] / points[:, 2:] * 1100.0 + [640.0, 360.0])
+    return np.array(pixels), np.array(world)
+
+
+def track_without_depth(pixels: np.ndarray, rate: float, judged: dict[int, np.ndarray]) -> Track:
+    count = len(pixels)
+    return Track(
+        frames=np.arange(count),
+        times=np.arange(count) / rate,
+        seen=np.ones(count, bool),
+        keypoints_px=pixels,
+        confidence=np.tile(np.where(np.arange(33) % 2 == 0, 0.9, 0.8), (count, 1)),
+        world_landmarks=np.zeros((count, 33, 3)),
+        acquired=np.arange(count) == 0,
+        judged_rows=np.array(list(judged), np.int64),
+        judged_landmarks=np.array(list(judged.values())).reshape(-1, 33, 3),
+    )
+
+
+HEADINGS = {"front": 0.0, "aslant": 0.8, "side": np.pi / 2, "back": np.pi}
+
+
+# Seen from the side, either reading goes on as steadily where the legs pass each other: only the judge knows.
+@pytest.mark.parametrize(
+    ("name", "is_judged"), [*((name, True) for name in HEADINGS), ("front", False), ("aslant", False), ("back", False)]
+)
+def test_keypoints_without_depth_are_repaired(name: str, is_judged: bool) -> None:
+    """What a user's network exchanged: found by steadiness alone, or for most of the clip, by few judged frames."""
+    right, world = someone_walking(90, 30.0, HEADINGS[name])
+    stretch = slice(8, 85) if is_judged else slice(30, 55)
+    wrong = right.copy()
+    wrong[stretch] = wrong[stretch][:, SWAPPED]
+    track = track_without_depth(wrong, 30.0, {k: world[k] for k in (5, 35, 65)} if is_judged else {})
+    repaired = repair_left_right(track, CAMERA)
+    off = np.linalg.norm(repaired.keypoints_px - right, axis=-1)[:, 11:29].mean(axis=1)
+    assert (off > 1.0).mean() <= 0.01
+    np.testing.assert_array_equal(repaired.confidence[40], track.confidence[40][SWAPPED])
+    assert not repaired.world_landmarks.any()
+
+
+@pytest.mark.parametrize("rate", [30.0, 10.0, 6.0])
+@pytest.mark.parametrize("turn", [0.0, 1.5])
+def test_whoever_walks_and_turns_is_left_alone(rate: float, turn: float) -> None:
+    """At a low rate, exchanged legs are often nearer to those of the frame before, in the picture."""
+    pixels, _ = someone_walking(60, rate, np.pi / 2, turn)
+    track = track_without_depth(pixels, rate, {})
+    assert repair_left_right(track, CAMERA) is track
