@@ -17,9 +17,9 @@ from .frame_blocks import by_blocks
 from .grounding import along_sight, correct_depth, stand_on_floor, standing_probability
 from .hand_measure import HAND_KEYPOINT_NAMES
 from .landmark_network import KEYPOINT_NAMES
+from .line_segments import Lines
 from .placement import PlacedTrack, raw_motion
 from .track import Track
-from .vertical_lines import Lines
 from .world import estimate_world
 
 

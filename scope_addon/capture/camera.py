@@ -14,11 +14,13 @@ from ...solver.errors import InputError, UsageError
 
 # Without any better knowledge: a field of view of 60 degrees along the longer side, between a phone's main camera
 # (65-70 degrees, less the crop of its video stabilization) and a camera's standard lens (40-54 degrees).
-# It is not estimated from the person: over four calibrated cameras (59.4 to 60.1 degrees), the fit's cost at an image
-# noise of 5 px had its minimum at 70, 50, 85 and 85 degrees (the last two at the end of what was tried), since the
-# lifted points lean on the assumed focal length themselves. Assuming 50 or 70 degrees there put the person 0.6 to 0.8 m
-# wrong in the camera frame, but changed the error relative to the pelvis by 7 mm at most.
+# Where the background has edges, these tell more (focal_length.py). The person does not: over four calibrated cameras
+# (59.4 to 60.1 degrees), the fit's cost at an image noise of 5 px had its minimum at 70, 50, 85 and 85 degrees (the
+# last two at the end of what was tried), since the lifted points lean on the assumed focal length themselves. Assuming
+# 50 or 70 degrees there put the person 0.6 to 0.8 m wrong in the camera frame, but changed the error relative to the
+# pelvis by 7 mm at most.
 DEFAULT_FOV_DEG = 60.0
+ASSUMED_DEVIATION = 0.25  # relative error of the default, one standard deviation: 48 to 74 degrees
 FILM_WIDTH_MM = 36.0  # "35 mm equivalent" focal lengths refer to this width along the longer side
 
 
@@ -29,6 +31,7 @@ class Camera:
     intrinsics: np.ndarray  # (3, 3)
     dist: np.ndarray  # (5,)
     source: str  # said in the report
+    focal_deviation: float = 0.0  # relative error of the focal length, one standard deviation; 0: given
 
     def undistort(self, points_px: np.ndarray) -> np.ndarray:
         """Pixels (..., 2) as an ideal pinhole with the same intrinsics would see them."""
@@ -88,7 +91,15 @@ def choose_camera(
         focal_px = metadata_focal_mm / FILM_WIDTH_MM * longer
         return Camera(pinhole(width, height, focal_px), np.zeros(5), f"the file's metadata, {metadata_focal_mm:g} mm")
     focal_px = _focal_from_fov(longer, DEFAULT_FOV_DEG)
-    return Camera(pinhole(width, height, focal_px), np.zeros(5), f"assumed, {DEFAULT_FOV_DEG:g} degrees")
+    source = f"assumed, {DEFAULT_FOV_DEG:g} degrees"
+    return Camera(pinhole(width, height, focal_px), np.zeros(5), source, ASSUMED_DEVIATION)
+
+
+def estimated_camera(width: int, height: int, focal_px: float, deviation: float) -> Camera:
+    """The camera with a focal length told by the picture itself, ``deviation`` its relative error."""
+    fov_deg = 2 * math.degrees(math.atan(max(width, height) / (2 * focal_px)))
+    source = f"estimated from edges in the background, {fov_deg:.0f} degrees, focal length ± {100 * deviation:.0f} %"
+    return Camera(pinhole(width, height, focal_px), np.zeros(5), source, deviation)
 
 
 def _focal_from_fov(longer: int, fov_deg: float) -> float:

@@ -15,14 +15,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import accumulate
 
 import cv2
 import numpy as np
 
 from ...solver.rotations import exp, log
 from .camera import Camera
+from .line_segments import Lines, Segments, find_segments
 from .smoothing import fill_rotation_gaps
-from .vertical_lines import Lines, find_lines
 
 WORKING_SIDE_PX = 480  # the longer side of the picture that corners are followed in
 MOST_CORNERS = 240
@@ -74,7 +75,7 @@ class BackgroundTracker:
         self._key_count = 0
         self._R_first_key = np.eye(3)
         self._R_key_last = np.eye(3)
-        self._lines, self._lines_row = Lines.none(), -1  # of the first frame in which somebody is seen
+        self._segments, self._segments_row = Segments.none(), -1  # of the first frame in which somebody is seen
 
     def add(self, image_rgb: np.ndarray, time_s: float, people: Sequence[np.ndarray]) -> None:
         """The next frame.
@@ -82,8 +83,8 @@ class BackgroundTracker:
         :param people: (n, 2) points of each person in pixels: the background is what lies outside their boxes.
         """
         self._times.append(time_s)
-        if people and self._lines_row < 0:
-            self._lines_row, self._lines = len(self._times) - 1, find_lines(image_rgb, self._camera, people)
+        if people and self._segments_row < 0:
+            self._segments_row, self._segments = len(self._times) - 1, find_segments(image_rgb, people)
         if time_s - self._last_used < 0.98 / SAMPLES_HZ:
             self._rotations.append(None)
             return
@@ -107,12 +108,21 @@ class BackgroundTracker:
             self._R_first_key = self._R_first_key @ self._R_key_last
             self._begin_key(picture, boxes)
 
-    def motion(self) -> CameraMotion:
-        """Of all frames so far; frames between those that were looked at lie on the arc between them."""
+    def motion(self, camera: Camera) -> CameraMotion:
+        """Of all frames so far; frames between those that were looked at lie on the arc between them.
+
+        :param camera: the intrinsics as they are known now. A short turn moves the picture by f times its angle, so the
+            angles shrink as the focal length grows; turns about the line of sight stay.
+        """
         known = np.array([R is not None for R in self._rotations], bool)
         R = np.array([np.eye(3) if R is None else R for R in self._rotations]).reshape(-1, 3, 3)
         if known.sum() < 2:
             return CameraMotion(np.tile(np.eye(3), (len(R), 1, 1)), np.zeros(len(R), bool))
+        ratio = self._camera.intrinsics[0, 0] / camera.intrinsics[0, 0]
+        if ratio != 1.0:
+            seen = R[known]
+            steps = exp(log(np.swapaxes(seen[:-1], 1, 2) @ seen[1:]) * [ratio, ratio, 1.0])
+            R[known] = np.array(list(accumulate(steps, np.matmul, initial=seen[0])))
         times = np.array(self._times)
         filled = fill_rotation_gaps(R[:, None], known, times)[:, 0]
         a, b = np.flatnonzero(known)[-2:]
@@ -122,9 +132,15 @@ class BackgroundTracker:
             filled[late] = R[b] @ exp((times[late] - times[b])[:, None] * rate)
         return CameraMotion(filled[0].T @ filled, known)
 
-    def lines(self, motion: CameraMotion) -> Lines:
-        """Straight lines of the background, in the first frame's axes."""
-        return self._lines if motion.is_static else self._lines.turned(motion.R_first_camera[self._lines_row])
+    @property
+    def segments(self) -> Segments:
+        """Straight edges of the background, in the first frame in which somebody is seen."""
+        return self._segments
+
+    def lines(self, motion: CameraMotion, camera: Camera) -> Lines:
+        """The same in the first frame's axes."""
+        lines = self._segments.lines(camera)
+        return lines if motion.is_static else lines.turned(motion.R_first_camera[self._segments_row])
 
     def _follow(self, picture: np.ndarray, boxes: list[np.ndarray]) -> np.ndarray | None:
         """Rotation (3, 3) from the key frame's axes to the present camera's; None where it cannot be told."""

@@ -16,15 +16,17 @@ from ...solver.body import Body
 from ...solver.errors import NoPersonError, UsageError, VideoError
 from ..motion import Motion
 from .assemble import assemble_motion, root_on_floor
-from .camera import Camera, choose_camera
+from .camera import Camera, choose_camera, estimated_camera
 from .camera_motion import BackgroundTracker
 from .camera_path import CameraPath
 from .camera_travel import camera_travel
 from .execution import AUTO, Execution
 from .fitting import FittedTrack, fit_track, prepare_track, refit_track
+from .focal_length import focal_from_edges
 from .hand_measure import require_fingers
 from .hand_tracker import HandTracker
 from .left_right import repair_left_right
+from .line_segments import Lines
 from .observation import Observation
 from .parts import ALL_PARTS, Parts
 from .people import PeopleBuilder
@@ -32,7 +34,6 @@ from .placement import PlacedTrack, place_track
 from .shared_world import share_world
 from .track import Track
 from .tracker import MOST_PEOPLE, PeopleTracker
-from .vertical_lines import Lines
 from .video import Frame, Video, open_video
 from .video_range import VideoRange
 from .world import estimate_world
@@ -127,10 +128,11 @@ def capture(
             raise _nobody(path, frames)
         smoothing = options.smoothing and frames > 1
         about = {"fps": video.fps, "image_size": (video.width, video.height), "source": path.name}
-        turning = background.motion()
+        camera = _better_known(camera, background, video)
+        turning = background.motion(camera)
         turns = CameraPath.on_a_stand(frames) if turning.is_static else CameraPath.turning(turning.R_first_camera)
         motions, fits, went = _solve(
-            body, tracks, camera, turns, background.lines(turning), smoothing, options.parts, about, progress
+            body, tracks, camera, turns, background.lines(turning, camera), smoothing, options.parts, about, progress
         )
     for number, motion in enumerate(motions, 1):
         missing = int((~motion.valid).sum())
@@ -156,6 +158,7 @@ def capture(
         "camera_turns_deg": 0.0 if turning.is_static else round(turning.largest_turn_deg, 2),
         "camera_travels_m": round(float(np.linalg.norm(np.diff(went.center, axis=0), axis=1).sum()), 2),
         "focal_px": float(camera.intrinsics[0, 0]),
+        "focal_deviation": round(camera.focal_deviation, 3),
         "frame_rate": [video.fps.numerator, video.fps.denominator],
         "fps": clock.rates(frames),
         "reprojection_px": float(motions[0].residual_px[motions[0].valid].mean()),
@@ -265,6 +268,14 @@ def _solve(
         for k in range(len(tracks))
     ]
     return motions, fits, path
+
+
+def _better_known(camera: Camera, background: BackgroundTracker, video: Video) -> Camera:
+    """The camera, with the focal length that the background tells if it was only assumed."""
+    if camera.focal_deviation == 0.0:
+        return camera
+    found = focal_from_edges(background.segments, video.width, video.height, camera.intrinsics[0, 0])
+    return estimated_camera(video.width, video.height, found.focal_px, found.deviation) if found else camera
 
 
 def _about_person(motion: Motion) -> dict:

@@ -9,8 +9,8 @@ import numpy as np
 
 from ...solver.body import Body
 from ...solver.frames import world_from_level_camera
+from .line_segments import Lines
 from .placement import PlacedTrack
-from .vertical_lines import Lines
 from .world import up_from_standing, upright
 
 SAME_FLOOR_M = 0.4  # how far apart, for their distances are not known well, the feet of people on one floor may seem

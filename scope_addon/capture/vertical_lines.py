@@ -9,73 +9,20 @@ With u what the body says is up, v maximizes over unit vectors
 w_i the line's length in sides of the picture. The sum's best directions are those of pairs of lines; of these the best
 one is refined. Where too little that is upright is to be seen, nothing is said.
 
-Sources: line segments by von Gioi et al. 2010 (LSD); vanishing points by Barnard 1983.
+Source: vanishing points by Barnard 1983.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-
-import cv2
 import numpy as np
 
-from .camera import Camera
+from .line_segments import Lines
 
-WORKING_SIDE_PX = 960
-SHORTEST = 0.03  # of the longer side
 LARGEST_TILT = np.radians(25.0)  # between what the body says and what lines may say
 BODY_SIGMA = np.radians(10.0)
 LINE_SIGMA = np.radians(0.8)
 KAPPA = 4.0
-MOST_LINES = 250
 LEAST_SUPPORT = 0.4  # sides of the picture, all upright lines together: less may be chance
-
-
-@dataclass(frozen=True)
-class Lines:
-    """Straight lines of a picture."""
-
-    normals: np.ndarray  # (N, 3) of the planes that they span with the camera's centre
-    lengths: np.ndarray  # (N,) in sides of the picture
-
-    @classmethod
-    def none(cls) -> Lines:
-        """Nothing is known."""
-        return cls(np.zeros((0, 3)), np.zeros(0))
-
-    def turned(self, R_new_camera: np.ndarray) -> Lines:
-        """The same in other axes."""
-        return Lines(self.normals @ R_new_camera.T, self.lengths)
-
-
-def find_lines(image_rgb: np.ndarray, camera: Camera, people: Sequence[np.ndarray]) -> Lines:
-    """The lines of a picture, camera frame.
-
-    :param people: (n, 2) points of each person in pixels; lines within their boxes are left out.
-    """
-    height, width = image_rgb.shape[:2]
-    scale = min(1.0, WORKING_SIDE_PX / max(width, height))
-    grey = cv2.cvtColor(image_rgb, cv2.COLOR_RGB2GRAY)
-    if scale < 1.0:
-        grey = cv2.resize(grey, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
-    found = cv2.createLineSegmentDetector().detect(grey)[0]
-    if found is None:
-        return Lines.none()
-    ends = (found.reshape(-1, 2, 2) + 0.5) / scale - 0.5
-    length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) / max(width, height)
-    keep = length > SHORTEST
-    middle = ends.mean(axis=1)
-    for points in people:
-        low, high = points.min(axis=0), points.max(axis=0)
-        margin = 0.1 * (high - low).max()
-        keep &= ~((middle > low - margin) & (middle < high + margin)).all(axis=1)
-    chosen = np.flatnonzero(keep)
-    chosen = chosen[np.argsort(-length[chosen])[:MOST_LINES]]
-    rays = camera.rays(ends[chosen])
-    normals = np.cross(rays[:, 0], rays[:, 1])
-    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
-    return Lines(normals, length[chosen])
 
 
 def up_from_lines(lines: Lines, up: np.ndarray) -> np.ndarray | None:

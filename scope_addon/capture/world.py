@@ -7,7 +7,8 @@ import numpy as np
 
 from ...solver.body import Body
 from ...solver.frames import transform_points, world_from_level_camera
-from .vertical_lines import Lines, up_from_lines
+from .line_segments import Lines
+from .vertical_lines import up_from_lines
 
 STANDING_KNEE_COS = np.cos(np.radians(30.0))  # thigh and shank within 30 degrees of one line
 FLOOR_NOISE_M = 0.05  # scatter of a supporting foot's depth-borne height

@@ -34,11 +34,11 @@ def angle_deg(a, b):
     return np.degrees(np.linalg.norm(log(np.swapaxes(a, -1, -2) @ b), axis=-1))
 
 
-def follow(pictures, people=lambda k: []):
-    tracker = BackgroundTracker(CAMERA, WIDTH, HEIGHT)
+def follow(pictures, people=lambda k: [], assumed=CAMERA):
+    tracker = BackgroundTracker(assumed, WIDTH, HEIGHT)
     for k, picture in enumerate(pictures):
         tracker.add(picture, k / FPS, people(k))
-    return tracker.motion()
+    return tracker.motion(CAMERA)
 
 
 def test_a_pan_with_tilt_and_roll_is_found(panorama):
@@ -49,6 +49,15 @@ def test_a_pan_with_tilt_and_roll_is_found(panorama):
     assert not found.is_static
     assert angle_deg(found.R_first_camera, truth).max() < 0.3
     assert found.known.sum() >= T / 3
+
+
+@pytest.mark.parametrize("ratio", [0.85, 1.2])
+def test_a_pan_is_right_once_the_focal_length_is_known(panorama, ratio):
+    s = np.linspace(0, 1, 60)[:, None]
+    truth = exp(np.concatenate([0.05 * np.sin(3 * s), 0.5 * s, 0.05 * s], axis=1))
+    wrong = Camera(pinhole(WIDTH, HEIGHT, ratio * FOCAL), np.zeros(5), "assumed", 0.25)
+    found = follow((view(panorama, R) for R in truth), assumed=wrong)
+    assert angle_deg(found.R_first_camera, truth).max() < 1.0  # 4 to 6 degrees without
 
 
 def test_a_camera_on_a_stand_is_static_in_spite_of_noise_and_of_somebody_who_walks_through(panorama):

@@ -5,7 +5,8 @@ import cv2
 import numpy as np
 import pytest
 from scope.scope_addon.capture.camera import Camera, choose_camera, pinhole
-from scope.scope_addon.capture.vertical_lines import Lines, find_lines, up_from_lines
+from scope.scope_addon.capture.line_segments import Lines, find_segments
+from scope.scope_addon.capture.vertical_lines import up_from_lines
 from scope.solver.rotations import exp
 
 WIDTH, HEIGHT = 1280, 720
@@ -46,7 +47,7 @@ def angle_deg(a, b):
 def test_posts_correct_a_body_that_leans(turn):
     R = exp(turn)
     truth = R @ LEVEL_UP
-    lines = find_lines(room(R, clutter=25), CAMERA, [])
+    lines = find_segments(room(R, clutter=25), []).lines(CAMERA)
     leaning = exp([0.12, 0.0, 0.15]) @ truth
     found = up_from_lines(lines, leaning)
     assert angle_deg(leaning, truth) > 9
@@ -56,15 +57,15 @@ def test_posts_correct_a_body_that_leans(turn):
 def test_a_picture_without_anything_upright_says_nothing():
     assert up_from_lines(Lines.none(), LEVEL_UP) is None
     blank = np.full((HEIGHT, WIDTH, 3), 90, np.uint8)
-    assert up_from_lines(find_lines(blank, CAMERA, []), LEVEL_UP) is None
+    assert up_from_lines(find_segments(blank, []).lines(CAMERA), LEVEL_UP) is None
     level_edges_alone = room(np.eye(3), posts=0)
-    assert up_from_lines(find_lines(level_edges_alone, CAMERA, []), LEVEL_UP) is None
+    assert up_from_lines(find_segments(level_edges_alone, []).lines(CAMERA), LEVEL_UP) is None
 
 
 @pytest.mark.parametrize("seed", range(4))
 def test_leaves_and_rubbish_do_not_turn_the_world(seed):
     rubbish = room(np.eye(3), posts=0, clutter=60, seed=seed)
-    found = up_from_lines(find_lines(rubbish, CAMERA, []), LEVEL_UP)
+    found = up_from_lines(find_segments(rubbish, []).lines(CAMERA), LEVEL_UP)
     assert found is None or angle_deg(found, LEVEL_UP) < 6.0
 
 
@@ -73,12 +74,12 @@ def test_the_lines_of_people_do_not_count():
     for k in range(12):
         cv2.line(picture, (600 + 8 * k, 200), (500 + 8 * k, 520), (0, 0, 0), 3)  # somebody's striped coat
     box = np.array([[480.0, 190.0], [700.0, 530.0]])
-    assert len(find_lines(picture, CAMERA, []).lengths) > len(find_lines(picture, CAMERA, [box]).lengths) + 5
+    assert len(find_segments(picture, []).lengths) > len(find_segments(picture, [box]).lengths) + 5
 
 
 def test_lines_turn_with_their_axes():
     R = exp([0.1, 0.4, -0.2])
-    lines = find_lines(room(np.eye(3)), CAMERA, [])
+    lines = find_segments(room(np.eye(3)), []).lines(CAMERA)
     turned = up_from_lines(lines.turned(R), R @ LEVEL_UP)
     np.testing.assert_allclose(turned, R @ up_from_lines(lines, LEVEL_UP), atol=1e-6)
 
@@ -91,7 +92,7 @@ def test_real_cameras_that_are_rolled_and_pitched(shared, number):
     assert ok
     truth = np.load(folder / f"truth_cam{number}.npz")["up"]
     camera = choose_camera(picture.shape[1], picture.shape[0])  # the focal length is not known
-    lines = find_lines(cv2.cvtColor(picture, cv2.COLOR_BGR2RGB), camera, [])
+    lines = find_segments(cv2.cvtColor(picture, cv2.COLOR_BGR2RGB), []).lines(camera)
     rng = np.random.default_rng(number)
     for _ in range(3):
         leaning = exp(np.radians(7) * rng.standard_normal(3)) @ truth
