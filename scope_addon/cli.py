@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, NoReturn, TextIO
 from ..solver.body import ASSETS, BUILT_IN, Body, body_with_hands
 from ..solver.errors import ScopeError, UsageError
 from .motion import Motion
+from .retarget.rig_source import ROOTS
 from .scene.output_paths import SUFFIXES, check_output, person_paths
 
 if TYPE_CHECKING:
@@ -110,6 +111,12 @@ def _add_options(capture: argparse.ArgumentParser) -> None:
     )
     capture.add_argument("--rig-object", default="", metavar="NAME", help="the armature, where RIG holds several")
     capture.add_argument("--bone-map", type=Path, metavar="FILE", help="which bone is which: JSON saved in the panel")
+    capture.add_argument(
+        "--retarget-root",
+        choices=ROOTS,
+        default=ROOTS[0],
+        help="where the rig keeps the way over the floor (default: bone)",
+    )
     capture.add_argument("--detector", type=Path, metavar="FILE", help="your own person detector, an .onnx file")
     capture.add_argument("--keypoints", type=Path, metavar="FILE", help="your own keypoint network, an .onnx file")
     capture.add_argument(
@@ -247,7 +254,9 @@ def _people(text: str) -> int | str:
 def _rig_of(args: argparse.Namespace, outputs: list[Path]) -> RigSource | None:
     """The user's rig, tried before the work is done."""
     if args.retarget is None:
-        for value, option in ((args.bone_map, "--bone-map"), (args.rig_object, "--rig-object")):
+        given = {"--bone-map": args.bone_map, "--rig-object": args.rig_object}
+        given["--retarget-root"] = args.retarget_root != ROOTS[0]
+        for option, value in given.items():
             if value:
                 raise UsageError(f"{option} is about a rig: give its file with --retarget")
         return None
@@ -292,7 +301,7 @@ def _write(
         if rig is not None:
             from .scene.rig_export import export_on_rig
 
-            files, warnings = export_on_rig(motions, body, scene_files, rig, options, footage)
+            files, warnings = export_on_rig(motions, body, scene_files, rig, options, args.retarget_root, footage)
         else:
             files, warnings = export_motions(motions, body, scene_files, footage=footage, build_options=options)
         written += files

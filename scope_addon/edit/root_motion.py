@@ -30,7 +30,7 @@ def floor_path(clip: Clip, *, heading: bool = True) -> tuple[np.ndarray, np.ndar
 
 def relative_to_path(clip: Clip, positions: np.ndarray, angles: np.ndarray) -> Clip:
     """The motion as seen from something that stands at ``positions`` and has turned by ``angles``."""
-    turn = _about_z(angles)
+    turn = about_z(angles)
     rotations = clip.rotations.copy()
     rotations[:, 0] = np.swapaxes(turn, 1, 2) @ rotations[:, 0]
     return Clip(clip.times, rotations, np.einsum("tji,tj->ti", turn, clip.root - positions))
@@ -38,13 +38,14 @@ def relative_to_path(clip: Clip, positions: np.ndarray, angles: np.ndarray) -> C
 
 def with_path(clip: Clip, positions: np.ndarray, angles: np.ndarray) -> Clip:
     """The inverse of ``relative_to_path``."""
-    turn = _about_z(angles)
+    turn = about_z(angles)
     rotations = clip.rotations.copy()
     rotations[:, 0] = turn @ rotations[:, 0]
     return Clip(clip.times, rotations, np.einsum("tij,tj->ti", turn, clip.root) + positions)
 
 
-def _about_z(angles: np.ndarray) -> np.ndarray:
+def about_z(angles: np.ndarray) -> np.ndarray:
+    """(T, 3, 3) turns about the upright axis by angles (T,)."""
     c, s = np.cos(angles), np.sin(angles)
     zero, one = np.zeros_like(c), np.ones_like(c)
     return np.stack([c, -s, zero, s, c, zero, zero, zero, one], axis=-1).reshape(-1, 3, 3)

@@ -51,10 +51,14 @@ class Skeleton:
 
 @dataclass(frozen=True)
 class Pose:
-    """A skeleton's motion in the world: rotations (T, B, 3, 3), heads (T, B, 3) metres."""
+    """A skeleton's motion in the world: rotations (T, B, 3, 3), heads (T, B, 3) metres.
+
+    ``facing``: radians about the upright axis from where the rested rig faces to where the rested body does.
+    """
 
     rotations: np.ndarray
     heads: np.ndarray
+    facing: float
 
 
 def transfer(
@@ -96,7 +100,7 @@ def transfer(
     heads += (scale * source_hips + lift - heads[:, hips].mean(axis=1))[:, None]
     if feet:
         _stand(rig, row, world, heads, turns, A @ F, body, betas, joints, scale)
-    return Pose(world, heads)
+    return Pose(world, heads, float(np.arctan2(F[1, 0], F[0, 0])))
 
 
 def _stand(

@@ -122,6 +122,14 @@ def fcurves(datablock: bpy.types.ID) -> list[bpy.types.FCurve]:
     return found
 
 
+def fcurves_of(action: bpy.types.Action) -> list[bpy.types.FCurve]:
+    """Every F-curve of an action, whatever it animates, in any Blender."""
+    if not has_slots():
+        return list(action.fcurves)
+    strips = [strip for layer in action.layers for strip in layer.strips]
+    return [curve for strip in strips for bag in strip.channelbags for curve in bag.fcurves]
+
+
 def read_keys(curve: bpy.types.FCurve) -> np.ndarray:
     """(T, 2) frame and value of each key."""
     coordinates = np.empty(2 * len(curve.keyframe_points), np.float32)

@@ -7,6 +7,7 @@ constraints, as Rigify's controls have them, need no knowledge of their own, and
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -18,16 +19,20 @@ from mathutils import Matrix, Quaternion
 from ...solver.body import Body
 from ...solver.errors import UsageError
 from ...solver.rotations import quaternion_from_matrix
+from ..edit.root_motion import about_z, floor_path
 from ..retarget.bone_map import PHALANGES, BoneMap
 from ..retarget.guess import RestBones, guess
+from ..retarget.rig_source import ROOTS
 from ..retarget.transfer import Skeleton, basis, transfer
-from .actions import Channels, bone_path
+from .actions import Channels, bone_path, fcurves_of, read_keys
 from .animation import on_one_hemisphere
 from .keys import read_clip
-from .root_object import path_clip
+from .root_object import drop_root, hang_on_root, root_object, seen_clip, topmost
+from .transaction import all_or_nothing
 
 # Rigify's switches: limbs by FK, neck and head with the chest.
 _SWITCHES = ("IK_FK", "neck_follow", "head_follow")
+_WRITTEN = "scope_keys"  # custom property of an action: what its keys were when they were written
 
 
 @dataclass(frozen=True)
@@ -35,7 +40,13 @@ class RetargetOptions:
     """What the user may choose."""
 
     feet: bool = True  # feet stand where the body's do
-    in_place: bool = False  # no way over the floor
+    root: str = "bone"  # where the way over the floor is kept: one of ``ROOTS``
+    offset: tuple[float, float, float] = (0.0, 0.0, 0.0)  # metres that the rig stands aside from the captured person
+
+    def __post_init__(self) -> None:
+        """Refuse values that are not offered."""
+        if self.root not in ROOTS:
+            raise UsageError(f"root must be one of {', '.join(ROOTS)}, but is '{self.root}'")
 
 
 def guess_bone_map(rig: bpy.types.Object) -> BoneMap:
@@ -58,7 +69,8 @@ def retarget(
 ) -> bpy.types.Action:
     """Key the mapped bones of ``rig`` so that it moves as the captured ``source``; returns the new action.
 
-    The rig's former action stays in the file. Fingers stay as they are where none were captured.
+    The rig's former action stays in the file, but one that came of retargeting and is as it was written. Fingers stay
+    as they are where none were captured.
 
     :raises UsageError: the rig is the source, or has no such bones.
     :raises InputError: the map cannot be used.
@@ -72,65 +84,100 @@ def retarget(
         raise UsageError(f"'{rig.name}' has no bone '{missing[0]}'; guess the bones anew or correct the list")
     bone_map = BoneMap({bone: part for bone, part in bone_map.parts.items() if part in body.joint_names})
     clip, frames = read_clip(source, body, rate)
-    clip = path_clip(source, clip, frames)
-    with _all_or_nothing(rig):
+    clip = seen_clip(source, clip, frames)
+    with all_or_nothing(bpy.context.scene, rig, topmost(rig)):
         with _at_rest(rig):
-            skeleton = _probe(rig, bone_map.parts)
+            skeleton, place = _probe(rig, bone_map.parts), np.array(rig.matrix_world, float)
         pose = transfer(clip, body, betas, skeleton, bone_map, feet=options.feet)
         root = skeleton.names.index(bone_map.bone("pelvis") or "")
-        heads = pose.heads[:, root].copy()
-        if options.in_place:
+        rotations, heads, yaw = _where_seen(source, pose.rotations, pose.heads[:, root])
+        heads += options.offset
+        way = None
+        if options.root == "in-place":
             heads[:, :2] = skeleton.heads[root, :2]
-        _write(rig, skeleton, basis(skeleton, pose.rotations), root, heads, frames, source.name)
-    assert rig.animation_data is not None
-    return rig.animation_data.action
+        elif options.root == "object":
+            positions, angles = heads * [1.0, 1.0, 0.0], floor_path(clip)[1] + yaw + pose.facing
+            turn, origin = about_z(angles), place[:3, 3] * [1.0, 1.0, 0.0]
+            rotations = np.swapaxes(turn, 1, 2)[:, None] @ rotations
+            heads = np.einsum("tji,tj->ti", turn, heads - positions) + origin
+            way = positions - turn @ origin, angles
+        former = rig.animation_data.action if rig.animation_data else None
+        action = _write(rig, place, skeleton, basis(skeleton, rotations), root, heads, frames)
+        if way is None:
+            drop_root(rig)
+        else:
+            hang_on_root(rig, frames, *way)
+        _put_by(former)
+        action.name = f"{rig.name}_{source.name}"
+    return action
 
 
-@contextmanager
-def _all_or_nothing(rig: bpy.types.Object) -> Iterator[None]:
-    """What fails leaves the rig's switches and its action as they were, and no action of its own."""
-    switches = [(bone, name, bone[name]) for bone in rig.pose.bones for name in _SWITCHES if name in bone]
-    had_data = rig.animation_data is not None
-    action = rig.animation_data.action if rig.animation_data else None
-    slot = getattr(rig.animation_data, "action_slot", None)
-    kept = action.use_fake_user if action else False
-    known = set(bpy.data.actions)
-    try:
-        yield
-    except BaseException:
-        for bone, name, value in switches:
-            bone[name] = value
-        if not had_data:
-            rig.animation_data_clear()
-        elif rig.animation_data.action != action:
-            rig.animation_data.action = action
-            if slot is not None:
-                rig.animation_data.action_slot = slot
-        if action:
-            action.use_fake_user = kept
-        bpy.data.batch_remove([new for new in bpy.data.actions if new not in known])
-        rig.update_tag()
-        raise
+def _where_seen(
+    source: bpy.types.Object, rotations: np.ndarray, heads: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, float]:
+    """Moved and turned as the user has moved and turned the captured armature; and by how much about the upright axis.
+
+    A root object's way is in the motion already. How large the armature is drawn says nothing of the rig.
+
+    :param rotations: (T, B, 3, 3); heads: (T, 3).
+    """
+    if root_object(source) is not None:
+        return rotations, heads.copy(), 0.0
+    bpy.context.view_layer.update()
+    place, turn, _ = source.matrix_world.decompose()
+    R = np.array(turn.to_matrix())
+    return R @ rotations, heads @ R.T + np.array(place), float(turn.to_euler("ZYX").z)
 
 
-def _write(rig, skeleton, rotations, root, heads, frames, name):  # type: ignore[no-untyped-def]
-    """A new action with the keys; each bone's in the mode that it has."""
-    animation = rig.animation_data or rig.animation_data_create()
-    if animation.action is not None:
-        animation.action.use_fake_user = True
-    action = bpy.data.actions.new(f"{rig.name}_{name}")
+def _write(
+    rig: bpy.types.Object,
+    place: np.ndarray,
+    skeleton: Skeleton,
+    rotations: np.ndarray,
+    root: int,
+    heads: np.ndarray,
+    frames: np.ndarray,
+) -> bpy.types.Action:
+    """A new action with the keys, each bone's in the mode that it has.
+
+    :param place: (4, 4) the rig's object to world at rest; rotations: (T, B, 3, 3) of the channels; heads: (T, 3) where
+        the root bone belongs, in the world at rest.
+    """
+    action = bpy.data.actions.new(rig.name)
     channels = Channels(rig, action)
+    curves = []
     for b, bone_name in enumerate(skeleton.names):
         bone = rig.pose.bones[bone_name]
         path, values = _channel(bone.rotation_mode, rotations[:, b])
-        channels.write(bone_path(bone_name, path), frames, values, group=bone_name)
+        curves += channels.write(bone_path(bone_name, path), frames, values, group=bone_name)
     bone = rig.pose.bones[skeleton.names[root]]
-    world = np.array(rig.matrix_world, float)[:3, :3]
+    world = place[:3, :3]
     moved = (heads - skeleton.heads[root]) @ np.linalg.inv(world).T
     if bone.bone.use_local_location:
         axes = skeleton.rotations[root].T @ (world / np.cbrt(np.linalg.det(world)))
         moved = moved @ axes.T
     channels.write(bone_path(bone.name, "location"), frames, moved, group=bone.name)
+    action[_WRITTEN] = _checksum(action)
+    return action
+
+
+def _put_by(former: bpy.types.Action | None) -> None:
+    """Keep the rig's former action in the file, but for one of an earlier retargeting that nobody has worked on."""
+    if former is None:
+        return
+    if former.get(_WRITTEN) == _checksum(former) and former.users == 0:
+        bpy.data.actions.remove(former)
+    else:
+        former.use_fake_user = True
+
+
+def _checksum(action: bpy.types.Action) -> str:
+    """Tells whether keys have been changed."""
+    found = hashlib.sha256()
+    for curve in fcurves_of(action):
+        found.update(f"{curve.data_path}[{curve.array_index}] {len(curve.modifiers)}".encode())
+        found.update(read_keys(curve).tobytes())
+    return found.hexdigest()
 
 
 def _channel(mode: str, R: np.ndarray) -> tuple[str, np.ndarray]:
@@ -203,13 +250,15 @@ def _rotations(matrices: np.ndarray) -> np.ndarray:
 
 @contextmanager
 def _at_rest(rig: bpy.types.Object) -> Iterator[None]:
-    """The rig without animation and pose, limbs switched to FK; animation comes back, and the switches stay."""
+    """The rig without animation, pose and root object, limbs switched to FK; all comes back, but the switches stay."""
     animation = rig.animation_data
     action = animation.action if animation else None
     slot = getattr(animation, "action_slot", None)
     nla = animation.use_nla if animation else False
     bases = [(bone, bone.matrix_basis.copy()) for bone in rig.pose.bones]
+    top, empty = topmost(rig), root_object(rig)
     try:
+        top.parent = None
         if animation:
             animation.action, animation.use_nla = None, False
         for bone, _ in bases:
@@ -222,6 +271,7 @@ def _at_rest(rig: bpy.types.Object) -> Iterator[None]:
     finally:
         for bone, matrix in bases:
             bone.matrix_basis = matrix
+        top.parent = empty
         if animation:
             animation.use_nla = nla
             if action is not None:

@@ -14,7 +14,7 @@ from ..retarget.rig_source import RigSource
 from .build import BuildOptions, build_scene
 from .export import export, temporary_scene
 from .output_paths import check_output
-from .retarget import retarget
+from .retarget import RetargetOptions, retarget
 from .rig_file import bones_of, forgotten, load_rig
 
 
@@ -24,10 +24,12 @@ def export_on_rig(
     paths: Sequence[Path],
     source: RigSource,
     build_options: BuildOptions,
+    root: str = "bone",
     footage: Path | None = None,
 ) -> tuple[list[Path], list[str]]:
     """Put every person's motion on a rig of its own, write one file or several, and leave the session as it was.
 
+    :param root: where the way over the floor is kept, see ``RetargetOptions``.
     :return: the files written, and the warnings.
     :raises InputError, UsageError: the rig cannot be used; see ``load_rig``. :raises OutputError: cannot be written.
     """
@@ -42,9 +44,10 @@ def export_on_rig(
             bones = bones_of(source, rig)
             if number == 1 and any(c <= 0.5 for c in bones.confidence.values()):
                 warnings.append(f"the bones of '{rig.name}' were guessed by its rest pose alone; look at the result")
-            retarget(person.armature, body, person.motion.betas, rig, bones, result.frame_rate)
             if len(motions) > 1:
                 rig.name = f"{rig.name}_person{number}"
+            betas, options = person.motion.betas, RetargetOptions(root=root)
+            retarget(person.armature, body, betas, rig, bones, result.frame_rate, options)
         bpy.data.batch_remove([obj for person in result.people for obj in (person.armature, person.mesh)])
         for path in paths:
             written += export(path, [result.collection])

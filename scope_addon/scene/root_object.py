@@ -8,20 +8,79 @@ from __future__ import annotations
 
 import bpy
 import numpy as np
+from mathutils import Matrix
 
 from ...solver.body import Body
+from ...solver.errors import UsageError
+from ...solver.frames import transform_points
 from ..edit.clip import Clip
 from ..edit.root_motion import floor_path, relative_to_path, with_path
 from .actions import Channels, fcurves, read_keys
 from .keys import read_clip, write_clip
 
 ROOT_TAG = "scope_root"  # custom property of the empty
+_LEFT_OUT = "scope_path"  # of one whose armature stays in place: the way that it does not go
+
+
+def topmost(armature: bpy.types.Object) -> bpy.types.Object:
+    """The armature, or the uppermost of the user's own objects that it hangs on. It is what hangs on the empty."""
+    obj = armature
+    while obj.parent is not None and ROOT_TAG not in obj.parent:
+        obj = obj.parent
+    return obj
 
 
 def root_object(armature: bpy.types.Object) -> bpy.types.Object | None:
     """The empty that carries the armature's way, if it has one."""
-    parent = armature.parent
-    return parent if parent is not None and ROOT_TAG in parent else None
+    return topmost(armature).parent
+
+
+def hang_on_root(
+    armature: bpy.types.Object, frames: np.ndarray, positions: np.ndarray, angles: np.ndarray, *, in_place: bool = False
+) -> bpy.types.Object:
+    """Let an empty carry the armature along a way, in place of one that did so before.
+
+    :param frames: (T,) scene frames; positions: (T, 3) metres; angles: (T,) radians about the upright axis.
+    :param in_place: it stays where the way begins, and only remembers it.
+    :raises UsageError: what the armature hangs on carries another one too.
+    """
+    top, former = topmost(armature), root_object(armature)
+    others = [obj for obj in top.children_recursive if obj.type == "ARMATURE" and obj != armature]
+    if top != armature and others:
+        raise UsageError(
+            f"'{armature.name}' hangs on '{top.name}', which would take '{others[0].name}' along; clear its parent, "
+            "or keep the way in the bones"
+        )
+    empty = bpy.data.objects.new(f"{armature.name}_root", None)
+    empty.empty_display_type, empty.empty_display_size = "ARROWS", 0.3
+    empty[ROOT_TAG] = armature.name
+    for collection in armature.users_collection:
+        collection.objects.link(empty)
+    empty.location, empty.rotation_euler = positions[0], (0.0, 0.0, angles[0])
+    if in_place:
+        rows = np.concatenate([frames[:, None], positions[:, :2], angles[:, None]], axis=1)
+        empty[_LEFT_OUT] = rows.ravel().tolist()
+    else:
+        channels, still = Channels(empty, bpy.data.actions.new(empty.name)), np.zeros_like(angles)
+        channels.write("location", frames, positions)
+        channels.write("rotation_euler", frames, np.stack([still, still, angles], axis=1))
+    top.parent = empty
+    top.matrix_parent_inverse.identity()
+    if former is not None:
+        name = former[ROOT_TAG] + "_root"
+        _remove(former)
+        empty.name = name
+    return empty
+
+
+def drop_root(armature: bpy.types.Object) -> None:
+    """Remove the empty; the armature stays with what its bones hold."""
+    top, empty = topmost(armature), root_object(armature)
+    if empty is None:
+        return
+    top.parent = None
+    top.matrix_parent_inverse.identity()
+    _remove(empty)
 
 
 def to_root_object(armature: bpy.types.Object, body: Body, rate: float, *, in_place: bool, heading: bool) -> None:
@@ -30,62 +89,63 @@ def to_root_object(armature: bpy.types.Object, body: Body, rate: float, *, in_pl
     :param in_place: leave it out altogether: the person stays above the spot where the motion begins.
     :param heading: the turning about the upright axis goes with it.
     """
-    if root_object(armature) is not None:
-        to_bones(armature, body, rate)
     clip, frames = read_clip(armature, body, rate)
+    clip = whole_clip(armature, clip, frames)
     positions, angles = floor_path(clip, heading=heading)
     write_clip(armature, body, relative_to_path(clip, positions, angles), frames)
-    empty = bpy.data.objects.new(f"{armature.name}_root", None)
-    empty.empty_display_type, empty.empty_display_size = "ARROWS", 0.3
-    empty[ROOT_TAG] = armature.name
-    for collection in armature.users_collection:
-        collection.objects.link(empty)
-    empty.matrix_world = armature.matrix_world.copy()
-    armature.parent = empty
-    armature.matrix_parent_inverse.identity()
-    armature.matrix_basis.identity()
-    if in_place:
-        rows = np.concatenate([frames[:, None], positions[:, :2], angles[:, None]], axis=1)
-        empty["scope_path"] = rows.ravel().tolist()
-        empty.location, empty.rotation_euler = positions[0], (0.0, 0.0, angles[0])
-        return
-    action = bpy.data.actions.new(empty.name)
-    channels = Channels(empty, action)
-    channels.write("location", frames, positions)
-    channels.write("rotation_euler", frames, np.stack([np.zeros_like(angles), np.zeros_like(angles), angles], axis=1))
+    if root_object(armature) is None:  # where the user has put the armature now goes with the way
+        bpy.context.view_layer.update()
+        place, size = armature.matrix_world.copy(), armature.matrix_world.median_scale
+        armature.parent = None
+        armature.matrix_basis = Matrix.Scale(size, 4)
+        yaw = place.to_euler("ZYX").z
+        positions, angles = transform_points(np.array(place), positions), angles + yaw
+    hang_on_root(armature, frames, positions, angles, in_place=in_place)
 
 
 def to_bones(armature: bpy.types.Object, body: Body, rate: float) -> None:
     """Put the way back into the bones and remove the empty. A way that was left out comes back too."""
-    empty = root_object(armature)
-    if empty is None:
+    if root_object(armature) is None:
         return
     clip, frames = read_clip(armature, body, rate)
-    write_clip(armature, body, with_path(clip, *_path_of(empty, frames)), frames)
-    armature.parent = None
-    armature.matrix_parent_inverse.identity()
-    action = empty.animation_data.action if empty.animation_data else None
-    bpy.data.objects.remove(empty)
-    if action is not None and action.users == 0:
-        bpy.data.actions.remove(action)
+    write_clip(armature, body, whole_clip(armature, clip, frames), frames)
+    drop_root(armature)
 
 
-def path_clip(armature: bpy.types.Object, clip: Clip, frames: np.ndarray) -> Clip:
-    """The clip with the way of its root object, where it has one: the motion as it is seen."""
+def whole_clip(armature: bpy.types.Object, clip: Clip, frames: np.ndarray) -> Clip:
+    """The clip with the way of its root object, where it has one, also one that was left out."""
     empty = root_object(armature)
-    return clip if empty is None else with_path(clip, *_path_of(empty, frames))
+    if empty is None:
+        return clip
+    if _LEFT_OUT not in empty:
+        return with_path(clip, *_keyed_path(armature, empty, frames))
+    rows = np.array(list(empty[_LEFT_OUT])).reshape(-1, 4)
+    x, y, angle = (np.interp(frames, rows[:, 0], rows[:, k]) for k in (1, 2, 3))
+    positions = np.stack([x, y, np.full(len(x), empty.location.z)], axis=1)
+    return with_path(clip, positions / armature.matrix_basis.median_scale, angle)
 
 
-def _path_of(empty: bpy.types.Object, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Positions (T, 3) and angles (T,) at scene frames."""
-    if "scope_path" in empty:
-        rows = np.array(list(empty["scope_path"])).reshape(-1, 4)
-        x, y, angle = (np.interp(frames, rows[:, 0], rows[:, k]) for k in (1, 2, 3))
-        return np.stack([x, y, np.zeros_like(x)], axis=1), angle
+def seen_clip(armature: bpy.types.Object, clip: Clip, frames: np.ndarray) -> Clip:
+    """The clip as it is seen: where its root object goes, or stands where the way was left out."""
+    empty = root_object(armature)
+    return clip if empty is None else with_path(clip, *_keyed_path(armature, empty, frames))
+
+
+def _keyed_path(
+    armature: bpy.types.Object, empty: bpy.types.Object, frames: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Positions (T, 3) in the armature's units and angles (T,) at scene frames; where the empty stands without keys."""
     columns = {}
     for curve in fcurves(empty):
         keys = read_keys(curve)
         columns[curve.data_path, curve.array_index] = np.interp(frames, keys[:, 0], keys[:, 1])
-    zero = np.zeros(len(frames))
-    positions = np.stack([columns.get(("location", k), zero) for k in range(3)], axis=1)
-    return positions, columns.get(("rotation_euler", 2), zero)
+    columns = {("rotation_euler", 2): np.full(len(frames), empty.rotation_euler.z)} | columns
+    positions = [columns.get(("location", k), np.full(len(frames), empty.location[k])) for k in range(3)]
+    return np.stack(positions, axis=1) / armature.matrix_basis.median_scale, columns["rotation_euler", 2]
+
+
+def _remove(empty: bpy.types.Object) -> None:
+    action = empty.animation_data.action if empty.animation_data else None
+    bpy.data.objects.remove(empty)
+    if action is not None and action.users == 0:
+        bpy.data.actions.remove(action)

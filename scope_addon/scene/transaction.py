@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""All or nothing: what a failed or cancelled build made is removed, what it changed is put back."""
+"""All or nothing: what failed or cancelled work has made is removed, and what it has changed is put back.
+
+What is removed stays removed, so work removes last.
+"""
 
 from __future__ import annotations
 
@@ -7,44 +10,150 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 import bpy
+import numpy as np
 
-# Kinds of datablock that building a scene may create; shape keys go with their mesh.
+from .actions import fcurves_of, read_keys
+
+# Kinds of datablock that the work may create; shape keys go with their mesh.
 _KINDS = ("collections", "objects", "meshes", "armatures", "cameras", "actions", "materials", "movieclips", "images")
 _SCENE = ("frame_start", "frame_end", "frame_preview_start", "frame_preview_end", "camera")
 _RENDER = ("fps", "fps_base", "resolution_x", "resolution_y", "pixel_aspect_x", "pixel_aspect_y")
 
 
 @contextmanager
-def all_or_nothing(scene: bpy.types.Scene) -> Iterator[None]:
-    """Undo every new datablock and scene setting when the block raises, and raise on."""
+def all_or_nothing(scene: bpy.types.Scene, *objects: bpy.types.Object) -> Iterator[None]:
+    """Undo every new datablock, every scene setting and what was done to ``objects`` when the block raises; raise on.
+
+    :param objects: whose keys, action, parent, place and custom properties, their bones' too, the block may change.
+    """
+    each = list(dict.fromkeys(objects))
+    animated = [_KeptAnimation(obj) for obj in each]
     before = {kind: {block.session_uid for block in getattr(bpy.data, kind)} for kind in _KINDS}
-    settings = {name: getattr(scene, name) for name in _SCENE}
-    render = {name: getattr(scene.render, name) for name in _RENDER}
-    current = scene.frame_current, scene.frame_subframe
-    view_layer = bpy.context.view_layer
-    active = view_layer.objects.active
-    mode = active.mode if active else "OBJECT"
-    markers = set(scene.timeline_markers.values())
-    selected = [obj for obj in view_layer.objects if obj.select_get(view_layer=view_layer)]
+    settings = _KeptScene(scene)
+    places = [_KeptPlace(obj) for obj in each]
     try:
         yield
     except BaseException:
-        now = view_layer.objects.active
-        if now is not None and now.mode != "OBJECT":
-            bpy.ops.object.mode_set(mode="OBJECT")
+        settings.leave_edit_mode()
+        for place in places:
+            place.restore()
+        for kept in animated:
+            kept.restore()
         new = [b for kind in _KINDS for b in getattr(bpy.data, kind) if b.session_uid not in before[kind]]
         bpy.data.batch_remove(new)
-        for marker in [m for m in scene.timeline_markers if m not in markers]:
-            scene.timeline_markers.remove(marker)
-        for name, value in render.items():
-            setattr(scene.render, name, value)
-        scene.frame_end = max(settings["frame_end"], scene.frame_start)
-        for name, value in settings.items():
-            setattr(scene, name, value)
-        scene.frame_set(current[0], subframe=current[1])
-        for obj in view_layer.objects:
-            obj.select_set(obj in selected, view_layer=view_layer)
-        view_layer.objects.active = active
-        if active is not None and mode != active.mode:
-            bpy.ops.object.mode_set(mode=mode)
+        settings.restore()
         raise
+    for kept in animated:
+        kept.forget()
+
+
+class _KeptScene:
+    """The scene's settings and markers, what is selected, and the active object's mode."""
+
+    def __init__(self, scene: bpy.types.Scene) -> None:
+        self._scene, self._layer = scene, bpy.context.view_layer
+        self._settings = {name: getattr(scene, name) for name in _SCENE}
+        self._render = {name: getattr(scene.render, name) for name in _RENDER}
+        self._current = scene.frame_current, scene.frame_subframe
+        self._active = self._layer.objects.active
+        self._mode = self._active.mode if self._active else "OBJECT"
+        self._markers = set(scene.timeline_markers.values())
+        self._selected = [obj for obj in self._layer.objects if obj.select_get(view_layer=self._layer)]
+
+    def leave_edit_mode(self) -> None:
+        """What is being edited cannot be removed."""
+        now = self._layer.objects.active
+        if now is not None and now.mode != "OBJECT":
+            bpy.ops.object.mode_set(mode="OBJECT")
+
+    def restore(self) -> None:
+        """After the new objects have gone."""
+        scene = self._scene
+        for marker in [m for m in scene.timeline_markers if m not in self._markers]:
+            scene.timeline_markers.remove(marker)
+        for name, value in self._render.items():
+            setattr(scene.render, name, value)
+        scene.frame_end = max(self._settings["frame_end"], scene.frame_start)
+        for name, value in self._settings.items():
+            setattr(scene, name, value)
+        scene.frame_set(self._current[0], subframe=self._current[1])
+        for obj in self._layer.objects:
+            obj.select_set(obj in self._selected, view_layer=self._layer)
+        self._layer.objects.active = self._active
+        if self._active is not None and self._mode != self._active.mode:
+            bpy.ops.object.mode_set(mode=self._mode)
+
+
+class _KeptPlace:
+    """An object's parent, place and custom properties, and those of its bones."""
+
+    def __init__(self, obj: bpy.types.Object) -> None:
+        self._obj, self._parent = obj, obj.parent
+        self._matrices = obj.matrix_parent_inverse.copy(), obj.matrix_basis.copy()
+        owners = [obj, *(obj.pose.bones if obj.pose else ())]
+        self._properties = [(owner, _scalars(owner)) for owner in owners]
+
+    def restore(self) -> None:
+        obj = self._obj
+        obj.parent = self._parent
+        obj.matrix_parent_inverse, obj.matrix_basis = self._matrices
+        for owner, properties in self._properties:
+            for name in [name for name in _scalars(owner) if name not in properties]:
+                del owner[name]
+            for name, value in properties.items():
+                owner[name] = value
+        obj.update_tag()
+
+
+class _KeptAnimation:
+    """Which action animates an object, and a copy of it, in case the work changes the action itself."""
+
+    def __init__(self, obj: bpy.types.Object) -> None:
+        self._obj, data = obj, obj.animation_data
+        self._had_data = data is not None
+        self._action: bpy.types.Action | None = data.action if data else None
+        slot = getattr(data, "action_slot", None)
+        self._slot = slot.identifier if slot else None
+        self._fake_user = self._action.use_fake_user if self._action else False
+        self._copy = self._action.copy() if self._action else None
+
+    def restore(self) -> None:
+        """The action as it was, on everything that it animates."""
+        if not self._had_data:
+            self._obj.animation_data_clear()
+            return
+        data, action, copy = self._obj.animation_data, self._action, self._copy
+        if action is None or copy is None:
+            data.action = None
+            return
+        if _same_keys(action, copy):
+            bpy.data.actions.remove(copy)
+        else:
+            name = action.name
+            action.user_remap(copy)
+            bpy.data.actions.remove(action)
+            copy.name, action = name, copy
+        if data.action != action:
+            data.action = action
+        if self._slot is not None:
+            data.action_slot = next(slot for slot in action.slots if slot.identifier == self._slot)
+        action.use_fake_user = self._fake_user
+
+    def forget(self) -> None:
+        """The work is done."""
+        if self._copy is not None:
+            bpy.data.actions.remove(self._copy)
+
+
+def _scalars(owner: bpy.types.bpy_struct) -> dict[str, bool | int | float | str]:
+    return {name: owner[name] for name in owner.keys() if isinstance(owner[name], bool | int | float | str)}
+
+
+def _same_keys(a: bpy.types.Action, b: bpy.types.Action) -> bool:
+    """Whether two actions hold the same keys for the same properties."""
+    one, other = fcurves_of(a), fcurves_of(b)
+    return len(one) == len(other) and all(
+        (p.data_path, p.array_index, len(p.modifiers)) == (q.data_path, q.array_index, len(q.modifiers))
+        and np.array_equal(read_keys(p), read_keys(q))
+        for p, q in zip(one, other, strict=True)
+    )

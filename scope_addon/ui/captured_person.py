@@ -15,12 +15,18 @@ if TYPE_CHECKING:
     from ..motion import Motion
 
 
+PERSON = "scope_person"  # custom property of a rig: the name of the captured armature that it moves as
+
+
 def captured_armature(context: bpy.types.Context) -> bpy.types.Object | None:
     """The armature that is meant: the active object's, else the only one of the scene's last capture."""
     obj = context.view_layer.objects.active if context.view_layer else None
     while obj is not None:
         if "scope_source" in obj:
             return obj
+        person = context.scene.objects.get(obj.get(PERSON, ""))
+        if person is not None and "scope_source" in person:
+            return person
         found = [child for child in obj.children if "scope_source" in child]
         if len(found) == 1:
             return found[0]

@@ -8,8 +8,6 @@ the motion as it was solved, which the cache keeps. None of them looks at the fo
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 import bpy
@@ -41,10 +39,11 @@ class _Edit(TellingOperator):
     def work(self, context: bpy.types.Context) -> str:
         """Change the keys, or none of them."""
         from ..scene.timing import scene_rate
+        from ..scene.transaction import all_or_nothing
 
         armature = captured_armature(context)
         assert armature is not None  # poll has asked
-        with _kept_on_failure(armature):
+        with all_or_nothing(context.scene, armature):
             return self.edit(context, armature, body_of(armature), scene_rate(context.scene))
 
 
@@ -87,15 +86,15 @@ class SCOPE_OT_smooth(_Edit):
         """From the cached motion."""
         from ..edit.smooth import smoothed
         from ..scene.keys import bake_whole_frames, write_clip
-        from ..scene.root_object import to_bones
+        from ..scene.root_object import drop_root
         from ..scene.timing import key_frames
 
         motion = cached_motion(armature)
-        to_bones(armature, body, rate)
         clip = smoothed(body, motion, self.strength)
         write_clip(armature, body, clip, key_frames(motion.timestamps, rate, float(armature.get("scope_start", 0.0))))
         if armature.get("scope_resampled"):
             bake_whole_frames(armature, body, rate)
+        drop_root(armature)
         return ""
 
 
@@ -235,10 +234,10 @@ class SCOPE_OT_loop(_Span):
         from ..edit.loop import best_cycle, close_cycle
         from ..scene.actions import repeat_for_ever
         from ..scene.keys import location_path, read_clip, write_clip
-        from ..scene.root_object import to_bones
+        from ..scene.root_object import drop_root, whole_clip
 
-        to_bones(armature, body, rate)
         clip, frames = read_clip(armature, body, rate)
+        clip = whole_clip(armature, clip, frames)
         betas = betas_of(armature, body)
         cycle = best_cycle(clip, body, betas, self.start / rate, self.end / rate, self.shortest)
         closed: Clip = close_cycle(clip, cycle, self.blend)
@@ -247,6 +246,7 @@ class SCOPE_OT_loop(_Span):
         if self.repeat:
             repeat_for_ever(armature, onwards={(location_path(body), 0), (location_path(body), 1)})
         context.scene.frame_start, context.scene.frame_end = math.ceil(first), math.floor(last) - 1
+        drop_root(armature)
         return f"A cycle of {closed.times[-1]:.2f} s, its ends {100 * cycle.error_m:.1f} cm apart before closing"
 
 
@@ -309,30 +309,6 @@ class SCOPE_OT_bake_rate(_Edit):
         else:
             before, after = bake_whole_frames(armature, body, rate)
         return f"{before} keys became {after}"
-
-
-@contextmanager
-def _kept_on_failure(armature: bpy.types.Object) -> Iterator[None]:
-    """Restore the action when an operator fails halfway; the undo step of a cancelled operator is not written."""
-    animation = armature.animation_data
-    before = animation.action if animation else None
-    copy = before.copy() if before is not None else None
-    try:
-        yield
-    except BaseException:
-        if copy is not None and before is not None:
-            slot = getattr(animation, "action_slot", None)
-            identifier = slot.identifier if slot else None
-            animation.action = copy
-            if identifier is not None:
-                animation.action_slot = next(s for s in copy.slots if s.identifier == identifier)
-            name = before.name
-            before.user_remap(copy)
-            bpy.data.actions.remove(before)
-            copy.name = name
-        raise
-    if copy is not None:
-        bpy.data.actions.remove(copy)
 
 
 CLASSES = (

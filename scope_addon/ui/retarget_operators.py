@@ -8,11 +8,14 @@ from typing import TYPE_CHECKING
 import bpy
 from bpy.props import EnumProperty, StringProperty
 
-from .captured_person import betas_of, body_of, captured_armature
+from .captured_person import PERSON, betas_of, body_of, captured_armature
 from .telling import TellingOperator
 
 if TYPE_CHECKING:
     from ..retarget.bone_map import BoneMap
+
+
+_ASIDE = (1.5, 0.0, 0.0)  # metres: to the left of a person who faces the front view
 
 
 def chosen_source(context: bpy.types.Context) -> bpy.types.Object | None:
@@ -53,7 +56,8 @@ class SCOPE_OT_guess_bones(_OnRig):
 
 
 class SCOPE_OT_retarget(_OnRig):
-    """Move your rig as the captured person moves, as a new action. The rig's former action stays in the file"""
+    """Move your rig as the captured person moves, as a new action. The rig's former action stays in the file, but one
+    that this button has made and nobody has changed"""
 
     bl_idname = "scope.retarget"
     bl_label = "Retarget"
@@ -63,6 +67,7 @@ class SCOPE_OT_retarget(_OnRig):
         from ...solver.errors import UsageError
         from ..scene.retarget import RetargetOptions, guess_bone_map, retarget
         from ..scene.timing import scene_rate
+        from ..scene.visibility import hide, show
 
         settings, source = context.scene.scope_retarget, chosen_source(context)
         if source is None:
@@ -77,8 +82,16 @@ class SCOPE_OT_retarget(_OnRig):
             settings.rig,
             _map_of(context),
             scene_rate(context.scene),
-            RetargetOptions(feet=settings.feet, in_place=settings.in_place),
+            RetargetOptions(
+                feet=settings.feet, root=settings.root, offset=_ASIDE if settings.captured == "beside" else (0, 0, 0)
+            ),
         )
+        settings.rig[PERSON] = source.name
+        if settings.captured == "hide":
+            _choose(context, settings.rig)
+            hide(source, context.view_layer)
+        else:
+            show(source, context.view_layer)
         return f"'{settings.rig.name}' moves by the action '{action.name}'"
 
 
@@ -144,6 +157,16 @@ class SCOPE_OT_edit_bone_pair(_OnRig):
             settings.pairs.remove(settings.active)
             settings.active = max(0, min(settings.active, len(settings.pairs) - 1))
         return f"{len(settings.pairs)} bones"
+
+
+def _choose(context: bpy.types.Context, rig: bpy.types.Object) -> None:
+    """Make the rig active and the only one selected: what is hidden cannot be."""
+    active = context.view_layer.objects.active
+    if active is not None and active.mode != "OBJECT":
+        bpy.ops.object.mode_set(mode="OBJECT")
+    for obj in context.view_layer.objects:
+        obj.select_set(obj == rig, view_layer=context.view_layer)
+    context.view_layer.objects.active = rig
 
 
 def _show(context: bpy.types.Context, bone_map: BoneMap) -> None:

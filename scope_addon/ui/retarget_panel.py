@@ -52,7 +52,11 @@ class SCOPE_PT_retarget(Tab, bpy.types.Panel):
         column.operator("scope.edit_bone_pair", text="", icon="ADD").action = "ADD"
         column.operator("scope.edit_bone_pair", text="", icon="REMOVE").action = "REMOVE"
         layout.prop(settings, "feet")
-        layout.prop(settings, "in_place")
+        column = layout.column()
+        column.label(text="Way over the Floor")
+        column.row(align=True).prop(settings, "root", expand=True)
+        column.label(text="Captured Body")
+        column.row(align=True).prop(settings, "captured", expand=True)
         layout.operator("scope.retarget", icon="ARMATURE_DATA")
 
 

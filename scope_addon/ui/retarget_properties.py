@@ -4,7 +4,15 @@
 from __future__ import annotations
 
 import bpy
-from bpy.props import BoolProperty, CollectionProperty, FloatProperty, IntProperty, PointerProperty, StringProperty
+from bpy.props import (
+    BoolProperty,
+    CollectionProperty,
+    EnumProperty,
+    FloatProperty,
+    IntProperty,
+    PointerProperty,
+    StringProperty,
+)
 
 
 class SCOPE_PG_bone_pair(bpy.types.PropertyGroup):
@@ -32,8 +40,25 @@ class SCOPE_PG_retarget(bpy.types.PropertyGroup):
         default=True,
         description="Hold heel or ball where the captured ones stand, scaled to the rig, and never below the floor",
     )
-    in_place: BoolProperty(
-        name="In Place", default=False, description="Leave the way over the floor out: the character stays on the spot"
+    root: EnumProperty(
+        name="Way",
+        items=(
+            ("bone", "In Bones", "The pelvis moves through the scene", 0),
+            ("object", "On Object", "An empty carries the way and the heading, the rig moves on it: root motion", 1),
+            ("in-place", "In Place", "No way at all: the character stays on the spot", 2),
+        ),
+        default="bone",
+        description="Where the way over the floor is kept",
+    )
+    captured: EnumProperty(
+        name="Captured Body",
+        items=(
+            ("hide", "Hide", "Hide the captured person; comparing with the footage shows them again", 0),
+            ("beside", "Beside", "Show both, the rig to the left of the captured person", 1),
+            ("keep", "Leave", "Show both in the same place", 2),
+        ),
+        default="hide",
+        description="What becomes of the captured person when the rig moves instead",
     )
 
 

@@ -39,6 +39,8 @@ class SCOPE_OT_look_through(bpy.types.Operator):
 
     def _show_alone(self, context: bpy.types.Context, collection: bpy.types.Collection) -> None:
         """Local view: what else is in the scene would hide the footage or the body."""
+        from ..scene.visibility import show
+
         space, selected, active = context.space_data, context.selected_objects, context.view_layer.objects.active
         if active and active.mode != "OBJECT":
             bpy.ops.object.mode_set(mode="OBJECT")
@@ -46,6 +48,8 @@ class SCOPE_OT_look_through(bpy.types.Operator):
             bpy.ops.view3d.localview(frame_selected=False)
         bpy.ops.object.select_all(action="DESELECT")
         for obj in collection.all_objects:
+            if "scope_source" in obj:  # hidden while a rig moves instead
+                show(obj, context.view_layer)
             obj.select_set(True)
         bpy.ops.view3d.localview(frame_selected=False)
         bpy.ops.object.select_all(action="DESELECT")

@@ -225,7 +225,7 @@ def test_the_rigs_own_action_stays(source):
     assert before.use_fake_user
 
 
-@pytest.mark.parametrize("step", ["transfer", "_probe", "_channel"])
+@pytest.mark.parametrize("step", ["transfer", "_probe", "_channel", "drop_root"])
 def test_what_fails_leaves_the_rig_as_it_was(source, monkeypatch, step):
     rig, _ = build_rig("unreal")
     bone = rig.pose.bones[3]
@@ -247,7 +247,7 @@ def test_what_fails_leaves_the_rig_as_it_was(source, monkeypatch, step):
 
 def test_in_place_stays_on_the_spot(source):
     rig, bone_of = build_rig("unreal")
-    run(source, rig, in_place=True)
+    run(source, rig, root="in-place")
     assert np.ptp(seen(rig, [bone_of["pelvis"]])[:, 0, :2], axis=0).max() < 1e-3
 
 

@@ -155,6 +155,20 @@ def test_damaged_files_are_refused_in_one_sentence(tmp_path, suffix, damage):
     assert not bpy.data.armatures
 
 
+@pytest.mark.parametrize("kind", [".blend", ".fbx", ".glb"])
+def test_the_way_on_an_object_is_the_same_in_every_format(tmp_path, kind):
+    source = rig_source(save_rig(tmp_path / "rig.glb"))
+    paths = {}
+    for root in ("bone", "object"):
+        out = tmp_path / f"{root}{kind}"
+        export_on_rig([motion_of(walk(2.0))], BODY, [out], source, OPTIONS, root)
+        rigs = read(out)
+        bone = names_of("mixamo")["pelvis"]
+        local = [np.array(rigs[0].pose.bones[bone].head) for _ in [bpy.context.scene.frame_set(40)]]
+        paths[root] = seen(rigs[0], [bone], range(2, 60, 8))[:, 0], local[0]
+    np.testing.assert_allclose(paths["object"][0], paths["bone"][0], atol=5e-3)
+    assert np.ptp(paths["object"][0][:, 1]) > 1.0
+    assert np.abs(paths["object"][1][[0, 1]]).max() < 0.1 < np.abs(paths["bone"][1]).max()
 
 
 def shell(*arguments):
@@ -165,6 +179,7 @@ def shell(*arguments):
 def test_the_shell_retargets_a_capture(tmp_path):
     rig = save_rig(tmp_path / "rig.glb")
     argv = ["capture", SAMPLE, "--quality", "fast", "--end", "0.2", "--json", "--retarget", rig]
+    argv += ["--retarget-root", "object"]
     done = shell(*argv, "-o", tmp_path / "out.glb", "-o", tmp_path / "out.npz")
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout)["outputs"] == [str(tmp_path / "out.npz"), str(tmp_path / "out.glb")]
@@ -174,6 +189,9 @@ def test_the_shell_retargets_a_capture(tmp_path):
 
 
 def test_the_shell_refuses_before_it_captures(tmp_path):
+    done = shell("capture", SAMPLE, "--retarget-root", "object", "-o", tmp_path / "out.glb")
+    assert done.returncode == 2
+    assert "--retarget-root is about a rig" in done.stderr
     rig = save_rig(tmp_path / "rig.blend", armatures=2)
     done = shell("capture", SAMPLE, "--retarget", rig, "-o", tmp_path / "out.glb")
     assert done.returncode == 2
@@ -203,3 +221,5 @@ def test_a_batch_passes_the_rig_on(tmp_path):
     rig = tmp_path / "rig.glb"
     args = build_parser().parse_args(["batch", ".", "--out", ".", "--retarget", str(rig), "--rig-object", "Rig"])
     assert _given_options(args) == {"--retarget": str(rig), "--rig-object": "Rig"}
+    args = build_parser().parse_args(["batch", ".", "--out", ".", "--retarget", str(rig), "--retarget-root", "object"])
+    assert _given_options(args) == {"--retarget": str(rig), "--retarget-root": "object"}

@@ -136,6 +136,36 @@ def test_root_motion_looks_the_same_and_comes_back(rig, heading):
     assert not [o for o in bpy.data.objects if "scope_root" in o]
 
 
+def test_root_motion_of_an_armature_that_was_moved_looks_the_same(rig):
+    rig.location, rig.rotation_euler, rig.scale = (1.0, 2.0, 0.5), (0.0, 0.0, 0.8), (1.2,) * 3
+    rig.rotation_mode = "XYZ"
+    before = seen(rig)
+    for mode in ("OBJECT", "BONES"):
+        bpy.ops.scope.root_motion(mode=mode)
+        np.testing.assert_allclose(seen(rig), before, atol=3e-4)
+
+
+def test_what_fails_halfway_leaves_keys_and_root_as_they_were(rig, monkeypatch):
+    bpy.ops.scope.root_motion(mode="OBJECT")
+    before, empty, action = seen(rig), root_object(rig), rig.animation_data.action.name
+    blocks = (len(bpy.data.objects), len(bpy.data.actions))
+
+    def fail(*args, **keywords):
+        raise OSError("no room")
+
+    monkeypatch.setattr("scope.scope_addon.scene.root_object.Channels", fail)
+    with pytest.raises(RuntimeError, match="No room"):
+        bpy.ops.scope.root_motion(mode="OBJECT", heading=False)  # the bones are written by then
+    assert root_object(rig) == empty
+    assert (len(bpy.data.objects), len(bpy.data.actions)) == blocks
+    np.testing.assert_array_equal(seen(rig), before)
+    with pytest.raises(RuntimeError, match="no keys in the chosen frames"):
+        bpy.ops.scope.loop(start=500, end=600)
+    assert root_object(rig) == empty
+    np.testing.assert_array_equal(seen(rig), before)
+    assert rig.animation_data.action.name == action
+
+
 def test_a_loop_goes_on_for_ever_where_it_ended(rig):
     bpy.ops.scope.loop(start=5, end=85, shortest=0.8)
     scene = bpy.context.scene

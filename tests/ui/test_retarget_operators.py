@@ -5,6 +5,8 @@ import bpy
 import numpy as np
 import pytest
 from scope.scope_addon.scene.build import BuildOptions, build_scene
+from scope.scope_addon.scene.root_object import root_object
+from scope.scope_addon.ui.captured_person import captured_armature
 
 from ..edit.walking import BODY, RATE, motion_of, walk
 from ..scene.test_retarget import build_rig, seen
@@ -34,6 +36,45 @@ def test_guess_keep_and_retarget(rig, tmp_path):
     assert len(settings.pairs) == count
     bpy.ops.scope.retarget()
     assert np.ptp(seen(rig, ["pelvis"])[:, 0, 1]) > 1.0  # it walks
+
+
+def test_the_captured_body_is_hidden_beside_or_left(rig):
+    settings, scene = bpy.context.scene.scope_retarget, bpy.context.scene
+    source = next(obj for obj in scene.objects if "scope_source" in obj)
+    body = next(obj for obj in source.children if obj.type == "MESH")
+    bpy.ops.scope.retarget()
+    assert all(obj.hide_get() and obj.hide_render for obj in (source, body))
+    assert not rig.hide_get()
+    assert bpy.context.view_layer.objects.active == rig
+    assert captured_armature(bpy.context) == source  # so that it can be refined
+    there = seen(rig, ["pelvis"])
+    settings.captured = "beside"
+    bpy.ops.scope.retarget()
+    assert not any(obj.hide_get() or obj.hide_render for obj in (source, body))
+    np.testing.assert_allclose(seen(rig, ["pelvis"]) - there, np.broadcast_to([1.5, 0, 0], there.shape), atol=1e-4)
+    body.hide_render = True  # the user's own choice
+    settings.captured = "keep"
+    bpy.ops.scope.retarget()
+    np.testing.assert_allclose(seen(rig, ["pelvis"]), there, atol=1e-4)
+    assert body.hide_render
+
+
+def test_an_edit_and_the_same_button_again_update_the_rig(rig, tmp_path):
+    source = next(obj for obj in bpy.context.scene.objects if "scope_source" in obj)
+    motion_of(walk(2.0), noise=0.1).save(tmp_path / "person1.npz")
+    source["scope_motion"] = str(tmp_path / "person1.npz")
+    bpy.ops.scope.retarget()
+    before, count, name = seen(rig, ["upperarm_l", "hand_l"]), len(bpy.data.actions), rig.animation_data.action.name
+    bpy.ops.scope.smooth(strength=0.0)
+    bpy.ops.scope.retarget()
+    assert np.abs(seen(rig, ["upperarm_l", "hand_l"]) - before).max() > 0.02
+    bpy.ops.scope.smooth(strength=1.0)
+    bpy.ops.scope.retarget()
+    assert (len(bpy.data.actions), rig.animation_data.action.name) == (count, name)
+    bpy.context.scene.scope_retarget.root = "object"
+    bpy.ops.scope.retarget()
+    assert root_object(rig) is not None
+    assert np.ptp(seen(rig, ["pelvis"])[:, 0, 1]) > 1.0
 
 
 def test_a_list_without_legs_is_refused(rig):
