@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scope.scope_addon.capture.camera import choose_camera
 from scope.scope_addon.capture.fitting import ROBUST, WEIGHTS, cold_stages
 from scope.scope_addon.capture.hand_landmarks import HAND_POINTS
 from scope.scope_addon.capture.hand_measure import (
@@ -227,6 +228,6 @@ def test_tracks_keep_hands_in_their_rows_and_exchange_them_with_left_and_right()
     assert make_track([0], [0.0], [Tracklet()]).hands is None
     # the strong network says of both frames that left and right are exchanged
     judged = replace(track, judged_rows=np.array([1, 2]), judged_landmarks=track.world_landmarks[[1, 2]][:, SWAPPED])
-    repaired = repair_left_right(judged)
+    repaired = repair_left_right(judged, choose_camera(640, 480))
     assert repaired.hands[1, 1].max() == 1
     assert repaired.hands[1, 0].max() == 0
