@@ -5,26 +5,40 @@ from __future__ import annotations
 
 import bpy
 
-_HIDDEN = "scope_hidden"  # custom property of what was hidden here, so that what the user hides stays hidden
+# Custom property of what was hidden here, so that what the user hides stays hidden; its value says what is to come.
+_HIDDEN = "scope_hidden"
+_STAYS, _COMES_BACK = 1, 2
 
 
 def hide(armature: bpy.types.Object, view_layer: bpy.types.ViewLayer) -> None:
     """Hide a captured armature and its body, in viewports and in renders."""
-    for obj in _body(armature):
+    for obj in _person(armature):
         if not obj.hide_get(view_layer=view_layer) or not obj.hide_render:
-            obj[_HIDDEN] = True
+            obj[_HIDDEN] = _STAYS
         obj.hide_set(True, view_layer=view_layer)
         obj.hide_render = True
 
 
-def show(armature: bpy.types.Object, view_layer: bpy.types.ViewLayer) -> None:
-    """Show what ``hide`` has hidden."""
-    for obj in _body(armature):
-        if _HIDDEN in obj:
+def show(armature: bpy.types.Object, view_layer: bpy.types.ViewLayer, *, for_now: bool = False) -> None:
+    """Show what ``hide`` has hidden; ``for_now``: until ``hide_again``."""
+    for obj in _person(armature):
+        if _HIDDEN not in obj:
+            continue
+        if not for_now:
             del obj[_HIDDEN]
-            obj.hide_set(False, view_layer=view_layer)
-            obj.hide_render = False
+        elif obj.hide_get(view_layer=view_layer):
+            obj[_HIDDEN] = _COMES_BACK
+        obj.hide_set(False, view_layer=view_layer)
+        obj.hide_render = False
 
 
-def _body(armature: bpy.types.Object) -> list[bpy.types.Object]:
+def hide_again(armature: bpy.types.Object, view_layer: bpy.types.ViewLayer) -> None:
+    """Hide what was shown for now."""
+    if armature.get(_HIDDEN) == _COMES_BACK:
+        hide(armature, view_layer)
+        for obj in _person(armature):
+            obj[_HIDDEN] = _STAYS
+
+
+def _person(armature: bpy.types.Object) -> list[bpy.types.Object]:
     return [armature, *(obj for obj in armature.children if obj.type == "MESH")]

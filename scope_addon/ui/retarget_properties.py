@@ -53,7 +53,7 @@ class SCOPE_PG_retarget(bpy.types.PropertyGroup):
     captured: EnumProperty(
         name="Captured Body",
         items=(
-            ("hide", "Hide", "Hide the captured person; comparing with the footage shows them again", 0),
+            ("hide", "Hide", "Hide the captured person, but when comparing with the footage", 0),
             ("beside", "Beside", "Show both, the rig to the left of the captured person", 1),
             ("keep", "Leave", "Show both in the same place", 2),
         ),

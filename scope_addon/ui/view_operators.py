@@ -23,10 +23,14 @@ class SCOPE_OT_look_through(bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Set the scene's camera and resolution, and the viewport's view."""
+        from ..scene.visibility import hide_again
+
         scene, camera = context.scene, camera_of(context.scene)
         if is_looking_through(context):
             bpy.ops.view3d.localview(frame_selected=False)
             bpy.ops.view3d.view_camera()  # Blender's own toggle: it knows the view there was before
+            for obj in [obj for obj in scene.scope.result.collection.all_objects if "scope_source" in obj]:
+                hide_again(obj, context.view_layer)
             return {"FINISHED"}
         scene.camera = camera
         render, result = scene.render, scene.scope.result
@@ -47,9 +51,9 @@ class SCOPE_OT_look_through(bpy.types.Operator):
         if space.local_view:
             bpy.ops.view3d.localview(frame_selected=False)
         bpy.ops.object.select_all(action="DESELECT")
-        for obj in collection.all_objects:
-            if "scope_source" in obj:  # hidden while a rig moves instead
-                show(obj, context.view_layer)
+        for obj in list(collection.all_objects):  # which hiding and showing invalidates
+            if "scope_source" in obj:  # perhaps hidden while a rig moves instead
+                show(obj, context.view_layer, for_now=True)
             obj.select_set(True)
         bpy.ops.view3d.localview(frame_selected=False)
         bpy.ops.object.select_all(action="DESELECT")

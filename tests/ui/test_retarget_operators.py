@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scope.scope_addon.scene.build import BuildOptions, build_scene
 from scope.scope_addon.scene.root_object import root_object
+from scope.scope_addon.scene.visibility import hide_again, show
 from scope.scope_addon.ui.captured_person import captured_armature
 
 from ..edit.walking import BODY, RATE, motion_of, walk
@@ -57,6 +58,19 @@ def test_the_captured_body_is_hidden_beside_or_left(rig):
     bpy.ops.scope.retarget()
     np.testing.assert_allclose(seen(rig, ["pelvis"]), there, atol=1e-4)
     assert body.hide_render
+
+
+def test_what_is_hidden_is_shown_for_now_and_hidden_again(rig):
+    layer = bpy.context.view_layer
+    source = next(obj for obj in bpy.context.scene.objects if "scope_source" in obj)
+    bpy.ops.scope.retarget()
+    show(source, layer, for_now=True)
+    assert not source.hide_get()
+    hide_again(source, layer)
+    assert source.hide_get()
+    show(source, layer)
+    hide_again(source, layer)
+    assert not source.hide_get()
 
 
 def test_an_edit_and_the_same_button_again_update_the_rig(rig, tmp_path):
