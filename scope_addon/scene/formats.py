@@ -41,6 +41,7 @@ def write_glb(path: Path, camera: bool = False) -> None:
         export_leaf_bone=False,
         export_animations=True,
         export_animation_mode="ACTIVE_ACTIONS",
+        export_anim_single_armature=False,  # else Blender 4.2 mixes in the other actions of the file
         export_force_sampling=True,
         export_frame_range=False,
         export_optimize_animation_size=False,

@@ -161,7 +161,6 @@ def test_the_way_on_an_object_is_the_same_in_every_format(tmp_path, kind):
     paths = {}
     for root in ("bone", "object"):
         out = tmp_path / f"{root}{kind}"
-        bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
         export_on_rig([motion_of(walk(2.0))], BODY, [out], source, OPTIONS, root)
         rigs = read(out)
         bone = names_of("mixamo")["pelvis"]
