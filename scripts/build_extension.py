@@ -30,7 +30,7 @@ PLATFORMS = {
 PYTHONS = ("3.13", "3.11")  # Blender 5.1 and later; 4.2 to 5.0
 # Everything that is imported. onnxruntime's metadata asks for flatbuffers, packaging and protobuf too, but running a
 # network imports none of them. numpy is Blender's own, always.
-PACKAGES = ("numba", "llvmlite", "onnxruntime", "opencv-contrib-python-headless")
+PACKAGES = ("numba", "llvmlite", "onnxruntime", "opencv-contrib-python-headless", "av")
 CONTENT = ("__init__.py", "LICENSE", "THIRD_PARTY.md", "solver", "scope_addon", "assets")
 LEFT_OUT = ("__pycache__", "*.pyc", ".*", "sample_truth.npz", "pictures")
 

@@ -14,7 +14,6 @@ OpenCV says the frame rate as a float; ``video.fps`` is the rational the contain
 
 from __future__ import annotations
 
-import os
 import queue
 import threading
 from collections.abc import Iterator
@@ -23,16 +22,12 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from pathlib import Path
 
-# Read by OpenCV when it first opens a video. -8 silences ffmpeg's own notes: what matters is said in our words. A
-# playlist that calls itself .mp4 may not reach for the network: footage is read from files and from nowhere else.
-os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
-os.environ.setdefault("OPENCV_FFMPEG_CAPTURE_OPTIONS", "protocol_whitelist;file")
-
 import cv2
 import numpy as np
 
 from ...solver.errors import VideoError
 from .exif import read_exif
+from .frame_readers import FrameReader, open_reader
 from .image_sequence import PictureReader, find_pictures
 from .quicktime import focal_35mm
 from .video_range import VideoRange
@@ -41,9 +36,7 @@ cv2.setLogLevel(0)  # silent: failures are reported by exception, in one sentenc
 
 STILL_FPS = Fraction(30)  # a picture has no rate; one frame of the commonest does no harm in a scene
 _JPEG_STREAMS = (".mjpeg", ".mjpg")  # begin like a picture, but are many
-_WORTH_A_JUMP_S = 20.0
 _AHEAD = 4  # decoded frames waiting: a 4K frame takes 25 MB
-_TURN = {90: cv2.ROTATE_90_CLOCKWISE, 180: cv2.ROTATE_180, 270: cv2.ROTATE_90_COUNTERCLOCKWISE}
 _STANDARD_RATES = [Fraction(n) for n in (24, 25, 30, 48, 50, 60, 120, 240)]
 _STANDARD_RATES += [Fraction(n * 1000, 1001) for n in (24, 30, 48, 60, 120, 240)]
 
@@ -193,21 +186,13 @@ def _upright(image: np.ndarray, orientation: int) -> np.ndarray:
     return np.ascontiguousarray(image[:: -1 if vertical else 1, :: -1 if horizontal else 1])
 
 
-def _codec(reader: _Reader) -> str:
-    """Four letters that name the codec."""
-    code = int(reader.get(cv2.CAP_PROP_FOURCC)) & 0xFFFFFFFF
-    return code.to_bytes(4, "little").decode("ascii", "replace")
-
-
 def _open_moving(path: Path, wanted: VideoRange) -> Video:
-    with closing(_Reader(path)) as reader:
+    with closing(open_reader(path)) as reader:
         first = reader.read()
         if first is None:
-            if _codec(reader) in ("av01", "AV01"):
-                raise VideoError(f"{path} is AV1 video, which OpenCV cannot decode; convert it to H.264 .mp4 first")
             raise VideoError(f"{path} opens but no frame of it can be decoded; convert it to H.264 .mp4 and try again")
-        fps = exact_fps(reader.get(cv2.CAP_PROP_FPS)) or _fps_from_timestamps(reader)
-        count = reader.get(cv2.CAP_PROP_FRAME_COUNT)
+        fps = exact_fps(reader.rate) or _fps_from_timestamps(reader)
+        count = reader.frame_count
     height, width = first[1].shape[:2]
     frame_count = max(1, int(count)) if 0 < count < 1e9 else 1
     video = Video(path, width, height, fps, frame_count, focal_35mm(path), wanted=wanted)
@@ -243,7 +228,7 @@ def exact_fps(fps: float) -> Fraction | None:
     return Fraction(fps).limit_denominator(100_000)
 
 
-def _fps_from_timestamps(reader: _Reader) -> Fraction:
+def _fps_from_timestamps(reader: FrameReader) -> Fraction:
     """Rate from the first second or so of frames, for a container that does not say."""
     times: list[float] = []
     while len(times) < 30 and (got := reader.read()) is not None:
@@ -251,67 +236,6 @@ def _fps_from_timestamps(reader: _Reader) -> Fraction:
     steps = np.diff(times)
     steps = steps[steps > 0]
     return (exact_fps(round(1 / float(np.median(steps)), 2)) if len(steps) else None) or STILL_FPS
-
-
-class _Reader:
-    """cv2.VideoCapture with rotation and pixel aspect applied here: which backends do it varies between versions."""
-
-    def __init__(self, path: Path) -> None:
-        self._capture = cv2.VideoCapture(str(path.absolute()), cv2.CAP_FFMPEG)
-        if not self._capture.isOpened():
-            raise VideoError(f"{path} is not a video or picture that can be decoded; convert it to an H.264 .mp4")
-        self._capture.set(cv2.CAP_PROP_ORIENTATION_AUTO, 0)
-        self._turn = _TURN.get(round(self.get(cv2.CAP_PROP_ORIENTATION_META)) % 360)
-        num, den = self.get(cv2.CAP_PROP_SAR_NUM), self.get(cv2.CAP_PROP_SAR_DEN)
-        self._aspect = num / den if num > 0 and den > 0 else 1.0
-        self._grabbed = False
-
-    def get(self, prop: int) -> float:
-        return self._capture.get(prop)
-
-    def read(self) -> tuple[float, np.ndarray] | None:
-        """Next frame: seconds and upright RGB; None at the end, or where decoding stops."""
-        ok, image = self._capture.retrieve() if self._grabbed else self._capture.read()
-        self._grabbed = False
-        if not ok or image is None:
-            return None
-        if abs(self._aspect - 1) > 1e-3:  # stretch the shorter side, so that no detail is lost
-            height, width = image.shape[:2]
-            wide = self._aspect > 1
-            size = (round(width * self._aspect), height) if wide else (width, round(height / self._aspect))
-            image = cv2.resize(image, size, interpolation=cv2.INTER_LINEAR)
-        if self._turn is not None:
-            image = cv2.rotate(image, self._turn)
-        return self.get(cv2.CAP_PROP_POS_MSEC) / 1000, cv2.cvtColor(image, cv2.COLOR_BGR2RGB)
-
-    def skip_to(self, seconds: float, fps: Fraction) -> int:
-        """Go on to the first frame at or after that time; returns its index, or where the video ends.
-
-        A jump saves decoding what comes before, where the container knows where it leads; else frame by frame.
-        """
-        if seconds > _WORTH_A_JUMP_S:
-            early = seconds - _WORTH_A_JUMP_S / 2
-            self._capture.set(cv2.CAP_PROP_POS_FRAMES, int(early * fps))
-            index = round(self.get(cv2.CAP_PROP_POS_FRAMES))
-            landed = self._capture.grab()
-            time = self.get(cv2.CAP_PROP_POS_MSEC) / 1000
-            if landed and time < seconds and abs(time - index / fps) < 0.5 / fps:
-                return self._grab_to(seconds, index, time, fps)
-            self._capture.set(cv2.CAP_PROP_POS_FRAMES, 0)
-        if not self._capture.grab():
-            return 0
-        return self._grab_to(seconds, 0, self.get(cv2.CAP_PROP_POS_MSEC) / 1000, fps)
-
-    def _grab_to(self, seconds: float, index: int, time: float, fps: Fraction) -> int:
-        """From the frame that was just grabbed. The next ``read`` gives the frame whose index is returned."""
-        while time < seconds - 1e-6 and self._capture.grab():
-            stamp = self.get(cv2.CAP_PROP_POS_MSEC) / 1000
-            index, time = index + 1, stamp if stamp > time else time + float(1 / fps)
-        self._grabbed = True
-        return index
-
-    def close(self) -> None:
-        self._capture.release()
 
 
 class _Decoder:
@@ -353,14 +277,14 @@ class _Decoder:
     def _run(self) -> None:
         try:
             pictures = self._video._pictures
-            source = PictureReader(pictures, self._video.fps) if pictures else _Reader(self._video.path)
+            source = PictureReader(pictures, self._video.fps) if pictures else open_reader(self._video.path)
             with closing(source) as reader:
                 self._decode(reader)
             self._put(None)
         except Exception as error:  # carried to the thread that iterates, which raises it
             self._put(error)
 
-    def _decode(self, reader: _Reader | PictureReader) -> None:
+    def _decode(self, reader: FrameReader | PictureReader) -> None:
         video, index, time = self._video, 0, 0.0
         chooser = video.wanted.chooser()
         resized = False

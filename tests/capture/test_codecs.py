@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scope.scope_addon.capture.video import open_video
+from scope.scope_addon.capture.video_range import VideoRange
 from scope.solver.errors import VideoError
 
 WIDTH, HEIGHT, FRAMES, RATE = 640, 384, 12, 25
@@ -75,7 +76,7 @@ def colours(path):
     return np.array([f.timestamp_s for f in frames]), middle
 
 
-@pytest.mark.parametrize("name", [name for name in CODECS if name != "av1"])
+@pytest.mark.parametrize("name", CODECS)
 def test_every_frame_arrives_with_its_colour_and_its_time(encoded, name):
     folder, errors = encoded
     path = folder / f"{name}.{CODECS[name][2]}"
@@ -89,12 +90,27 @@ def test_every_frame_arrives_with_its_colour_and_its_time(encoded, name):
     assert np.ptp(seen[:, 1]) < 35
 
 
-def test_av1_is_refused_with_what_to_do(encoded):
-    """OpenCV's wheels know AV1's container and carry no decoder for it."""
+def test_av1_starts_and_ends_where_it_is_asked_to(encoded):
+    """OpenCV's wheels know AV1's container and carry no decoder for it, so another reader goes through the file."""
     path = encoded[0] / "av1.mp4"
     if not path.is_file() or not path.stat().st_size:
         pytest.skip(f"this Blender does not encode AV1: {encoded[1][-200:]}")
-    with pytest.raises(VideoError, match=r"AV1 video.*convert"):
+    with open_video(path, VideoRange(start_s=0.19, end_s=0.33)) as video:
+        assert (video.fps, video.frame_count) == (RATE, FRAMES)
+        frames = list(video)
+    assert [f.index for f in frames] == [5, 6, 7, 8]
+    damaged = path.with_name("damaged.mp4")
+    damaged.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+    with pytest.raises(VideoError, match="convert"), open_video(damaged) as video:
+        list(video)
+
+
+def test_av1_without_its_decoder_says_what_to_do(encoded, monkeypatch):
+    path = encoded[0] / "av1.mp4"
+    if not path.is_file() or not path.stat().st_size:
+        pytest.skip(f"this Blender does not encode AV1: {encoded[1][-200:]}")
+    monkeypatch.setitem(sys.modules, "av", None)
+    with pytest.raises(VideoError, match=r"AV1 video.*'av'.*convert"):
         colours(path)
 
 

@@ -14,6 +14,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from scope.scope_addon.capture.frame_readers import OpencvReader, PyavReader
 from scope.scope_addon.capture.video import exact_fps, open_video
 from scope.solver.errors import VideoError
 
@@ -187,6 +188,25 @@ def test_pixels_become_square(tmp_path, display_width, matrix, size):
     video = open_video(path)
     assert (video.width, video.height) == size
     assert next(iter(video)).image_rgb.shape == (size[1], size[0], 3)
+
+
+@pytest.mark.parametrize("matrix", [None, CLOCKWISE, HALF_TURN, COUNTERCLOCKWISE])
+@pytest.mark.parametrize("display_width", [W, 2 * W, W // 2])
+def test_both_readers_see_the_same(tmp_path, matrix, display_width):
+    path = write_video(tmp_path / "a.mp4", [corner_image(), 255 - corner_image()] * 10, fps=25)
+    patch_track_header(path, matrix, display_width)
+    readers = [OpencvReader(path), PyavReader(path)]
+    assert readers[0].rate == readers[1].rate == 25
+    assert readers[0].frame_count == readers[1].frame_count == 20
+    assert [reader.skip_to(0.2, Fraction(25)) for reader in readers] == [5, 5]
+    for k in range(5, 20):
+        (time_a, a), (time_b, b) = (reader.read() for reader in readers)
+        assert time_a == pytest.approx(0.04 * k)
+        assert time_b == pytest.approx(0.04 * k)
+        np.testing.assert_allclose(a.astype(int), b.astype(int), atol=6)
+    assert [reader.read() for reader in readers] == [None, None]
+    for reader in readers:
+        reader.close()
 
 
 def test_odd_sizes(tmp_path):
