@@ -12,10 +12,12 @@ from .bone_map import FINGERS, BoneMap
 from .fingers import find_fingers
 
 _SIDES = {"l": "left", "left": "left", "r": "right", "right": "right"}
+# What comes before the names proper: Biped, Valve's, VRoid's (with C for the centre), Character Creator's.
+_PREFIXES = {"bip", "valve", "biped", "j", "c", "cc", "base", "def", "bind", "jnt"}
 _CENTRE = {
     "pelvis": ("pelvis", "hips", "hip"),
     "spine": ("spine", "chest", "upperchest", "torso", "abdomen", "waist"),
-    "neck": ("neck",),
+    "neck": ("neck", "necktwist"),
     "head": ("head",),
 }
 _LIMBS = {
@@ -43,6 +45,8 @@ def tokens(name: str) -> tuple[str, str]:
     """The name without prefix, side, digits and case, and its side ('left', 'right' or '')."""
     words = re.findall(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+", name.rsplit(":", 1)[-1])
     words = [word.lower() for word in words]
+    while len(words) > 1 and words[0] in _PREFIXES:
+        words = words[1:]
     side = next((_SIDES[word] for word in words if word in _SIDES), "")
     return "".join(word for word in words if word not in _SIDES), side
 
@@ -75,7 +79,7 @@ def _rigify(bones: RestBones) -> dict[str, str] | None:
         found = {"torso": "pelvis", "spine_fk.002": "spine1", "spine_fk.003": "spine3"}
         found |= {"neck": "neck", "head": "head"}
         suffix = "_fk"
-    elif {"spine.001", "spine.003", "spine.006", "thigh.L"} <= names:
+    elif {"spine.001", "spine.003", "spine.006", "thigh.L"} <= {name.removeprefix("DEF-") for name in names}:
         found = {"spine": "pelvis", "spine.001": "spine1", "spine.002": "spine2", "spine.003": "spine3"}
         found |= {"spine.004": "neck", "spine.005": "neck", "spine.006": "head"}
         suffix = ""
@@ -89,7 +93,8 @@ def _rigify(bones: RestBones) -> dict[str, str] | None:
         for finger in FINGERS:
             bone = finger if finger == "thumb" else f"f_{finger}"
             found |= {f"{bone}.{k:02d}.{letter}": f"{side}_{finger}{k}" for k in (1, 2, 3)}
-    return {bone: part for bone, part in found.items() if bone in names}
+    prefix = "" if "thigh.L" in names or suffix else "DEF-"  # the metarig's names, or those of bones for a game alone
+    return {prefix + bone: part for bone, part in found.items() if prefix + bone in names}
 
 
 def by_name(bones: RestBones) -> dict[str, str]:

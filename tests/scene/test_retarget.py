@@ -57,6 +57,21 @@ SCHEMES = {
         SIDED,
         lambda name, side: f"{side}_{name}" if side else name,
     ),
+    "biped": (
+        ("Pelvis", "Spine", "Spine1", "Spine2", "Neck", "Head"),
+        ("Thigh", "Calf", "Foot", "Toe0", "Clavicle", "UpperArm", "Forearm", "Hand"),
+        lambda name, side: f"Bip01 {side[:1].upper()} {name}" if side else f"Bip01 {name}",
+    ),
+    "vroid": (
+        ("Hips", "Spine", "Chest", "UpperChest", "Neck", "Head"),
+        ("UpperLeg", "LowerLeg", "Foot", "ToeBase", "Shoulder", "UpperArm", "LowerArm", "Hand"),
+        lambda name, side: f"J_Bip_{side[:1].upper() or 'C'}_{name}",
+    ),
+    "character creator": (
+        ("Hip", "Waist", "Spine01", "Spine02", "NeckTwist01", "Head"),
+        ("Thigh", "Calf", "Foot", "ToeBase", "Clavicle", "Upperarm", "Forearm", "Hand"),
+        lambda name, side: f"CC_Base_{side[:1].upper()}_{name}" if side else f"CC_Base_{name}",
+    ),
     "nameless": (
         tuple("abcdef"),
         tuple("ghijklmn"),
@@ -205,6 +220,10 @@ def test_rigify(source):
         assert direction_error(rig, bone_of, ARMS + LEGS) < 1.0
         run(source, rig)
         assert direction_error(rig, bone_of, ARMS) < 1.0
+    before = guess_bone_map(metarig).parts
+    for bone in metarig.data.bones:  # the bones that a game gets
+        bone.name = f"DEF-{bone.name}"
+    assert guess_bone_map(metarig).parts == {f"DEF-{bone}": part for bone, part in before.items()}
 
 
 @pytest.mark.parametrize("scheme", sorted(SCHEMES))

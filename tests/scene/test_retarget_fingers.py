@@ -33,6 +33,9 @@ SPELL = {
     "unity": lambda f, k, side: f"{side.title()}{'Little' if f == 'pinky' else f.title()}{UNITY[k]}",
     "mpfb": lambda f, k, side: f"finger{FINGERS.index(f) + 1}-{k}.{side[0].upper()}",
     "smpl": lambda f, k, side: f"{side}_{f}{k}",
+    "biped": lambda f, k, side: f"Bip01 {side[0].upper()} Finger{FINGERS.index(f)}{k - 1 or ''}",
+    "vroid": lambda f, k, side: f"J_Bip_{side[0].upper()}_{'Little' if f == 'pinky' else f.title()}{k}",
+    "character creator": lambda f, k, side: f"CC_Base_{side[0].upper()}_{'Mid' if f == 'middle' else f.title()}{k}",
     "nameless": lambda f, k, side: f"{side[0]}{'qwert'[FINGERS.index(f)]}{'uvw'[k - 1]}",
 }
 PALM = {
