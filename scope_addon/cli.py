@@ -8,11 +8,14 @@ stderr; with ``--json`` stdout carries the report alone.
 from __future__ import annotations
 
 import argparse
+import ctypes
 import json
 import os
+import signal
 import sys
+import threading
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn, TextIO
@@ -135,7 +138,7 @@ def main(argv: Sequence[str] | None = None, program: Sequence[str] = PROGRAM) ->
     try:
         args = build_parser().parse_args(argv)
         args.program = list(program)
-        with _stdout_for_report() as stdout:
+        with _stopped_by_signals(), _stdout_for_report() as stdout:
             report = args.run(args)
             if args.json:
                 print(json.dumps(report), file=stdout, flush=True)
@@ -369,13 +372,39 @@ def _stdout_for_report() -> Iterator[TextIO]:
         yield sys.stdout
         return
     os.dup2(2, 1)
+    _flush_c()  # what waits there already, such as Blender's version, is no part of the report either
     try:
         with os.fdopen(os.dup(real), "w", encoding="utf-8") as stream:
             yield stream
     finally:
         sys.stdout.flush()
+        _flush_c()
         os.dup2(real, 1)
         os.close(real)
+
+
+def _flush_c() -> None:
+    """Write out what C libraries have buffered for stdout."""
+    with suppress(OSError, AttributeError):
+        ctypes.CDLL("ucrtbase" if os.name == "nt" else None).fflush(None)
+
+
+@contextmanager
+def _stopped_by_signals() -> Iterator[None]:
+    """Ctrl-C and a request to end raise KeyboardInterrupt, so that nothing half-written and no process stays behind.
+
+    Blender has a handler of its own for Ctrl-C, which only notes it: a batch would go on to its end.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = {number: signal.signal(number, signal.default_int_handler) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            if handler is not None:  # None: not Python's, so Python cannot put it back
+                signal.signal(number, handler)
 
 
 def run() -> NoReturn:

@@ -161,3 +161,20 @@ def test_hands_need_a_body_with_fingers(tmp_path, capsys):
     assert status == 2
     assert "no finger joints" in err
     assert not out.exists()
+
+
+@pytest.mark.skipif(os.name == "nt", reason="needs the C library by its POSIX name")
+def test_what_c_prints_before_and_meanwhile_is_no_part_of_the_report():
+    """Blender's version waits in C's buffer when the command begins."""
+    code = (
+        "import ctypes\n"
+        "from scope.scope_addon.cli import _stdout_for_report\n"
+        "c = ctypes.CDLL(None)\n"
+        "c.puts(b'Blender 9.9')\n"
+        "with _stdout_for_report() as stdout:\n"
+        "    c.puts(b'exporting')\n"
+        "    print('{}', file=stdout)\n"
+    )
+    buffered = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, env=buffered)
+    assert (done.stdout, done.stderr) == ("{}\n", "Blender 9.9\nexporting\n")

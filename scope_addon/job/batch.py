@@ -26,6 +26,7 @@ REPORT_NAME = "scope-batch.json"
 STATUSES = ("done", "skipped", "no_person", "failed")
 _ROOT = Path(__file__).resolve().parents[2]
 _OVERLAY = ".overlay"
+_GRACE_S = 5.0  # that a clip has to clean up when the batch is stopped
 
 
 class Batch:
@@ -169,9 +170,16 @@ class Batch:
 
     def _stop(self) -> None:
         self._stopped = True
-        for process in list(self._running):
+        running = list(self._running)
+        for process in running:
             with contextlib.suppress(OSError):
                 process.terminate()
+        end = time.monotonic() + _GRACE_S
+        for process in running:
+            try:
+                process.wait(max(0.0, end - time.monotonic()))
+            except subprocess.TimeoutExpired:
+                process.kill()
 
     def _key_basis(self) -> hashlib._Hash:
         """Of program and options, the same for every clip."""

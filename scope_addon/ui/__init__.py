@@ -22,6 +22,7 @@ from . import (
     retarget_operators,
     retarget_panel,
     retarget_properties,
+    view_after_undo,
     view_operators,
 )
 
@@ -43,6 +44,7 @@ def register() -> None:
         properties.attach()
         retarget_properties.attach()
         command.register()
+        view_after_undo.attach()
     except Exception:
         for cls in reversed(done):
             bpy.utils.unregister_class(cls)
@@ -52,6 +54,7 @@ def register() -> None:
 def unregister() -> None:
     """Take everything out of Blender again, a running capture included."""
     capture_operators.stop_everything()
+    view_after_undo.detach()
     command.unregister()
     retarget_properties.detach()
     properties.detach()

@@ -66,9 +66,14 @@ class SCOPE_OT_look_through(bpy.types.Operator):
 def is_looking_through(context: bpy.types.Context) -> bool:
     """Whether the viewport shows a capture alone through its camera."""
     space = context.space_data
-    if space is None or space.type != "VIEW_3D" or not space.local_view:
+    return space is not None and space.type == "VIEW_3D" and looks_through(context.scene, space)
+
+
+def looks_through(scene: bpy.types.Scene, space: bpy.types.SpaceView3D) -> bool:
+    """The same of a viewport that need not be the context's."""
+    if not space.local_view or space.region_3d.view_perspective != "CAMERA":
         return False
-    return space.region_3d.view_perspective == "CAMERA" and context.scene.camera == camera_of(context.scene)
+    return scene.camera is not None and scene.camera == camera_of(scene)
 
 
 def camera_of(scene: bpy.types.Scene) -> bpy.types.Object | None:

@@ -2,8 +2,12 @@
 """A folder of footage: nothing is done twice, nothing that fails stops the rest, whatever the clips do."""
 
 import json
+import os
 import shutil
+import signal
+import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -143,6 +147,38 @@ def test_an_interrupt_stops_the_running_clips_and_keeps_the_finished(folder, tmp
     calls(folder)
     batch(folder, out).run(1)
     assert "a.mp4" not in calls(folder)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no signals to send")
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_the_batch_and_its_clips_whoever_handled_it_before(folder, tmp_path, number):
+    """Blender handles Ctrl-C itself, and only takes a note of it."""
+    (tmp_path / "clip.py").write_text(
+        "import os, pathlib, sys, time\n"
+        "pathlib.Path(sys.argv[2] + '.pid').write_text(str(os.getpid()))\n"
+        "time.sleep(600)\n"
+    )
+    code = (
+        "import signal, sys\n"
+        "from scope.scope_addon.cli import main\n"
+        "for number in (signal.SIGINT, signal.SIGTERM):\n"
+        "    signal.signal(number, lambda *_: None)\n"
+        f"argv = ['batch', {str(folder)!r}, '--out', {str(tmp_path / 'out')!r}, '--jobs', '2', '--formats', 'npz']\n"
+        f"sys.exit(main(argv, program=[sys.executable, {str(tmp_path / 'clip.py')!r}]))\n"
+    )
+    process = subprocess.Popen([sys.executable, "-c", code], stderr=subprocess.PIPE, text=True, start_new_session=True)
+    end = time.monotonic() + 60
+    while len(pids := [p.read_text() for p in folder.glob("*.pid")]) < 2 or not all(pids):
+        assert time.monotonic() < end
+        assert process.poll() is None
+        time.sleep(0.02)
+    process.send_signal(number)
+    _, stderr = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert stderr.splitlines()[-1] == "scope: stopped; nothing was written"
+    for pid in pids:
+        with pytest.raises(ProcessLookupError):
+            os.kill(int(pid), 0)
 
 
 def test_nothing_to_do_is_said(tmp_path):

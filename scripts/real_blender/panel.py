@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Runs inside a Blender with a window: uses the panel as a person would, and takes a picture of every state.
+"""A capture through the panel in a Blender with a window, as a person does it, and a picture of every state.
 
-    blender --python blender_drive.py -- VIDEO OUT_FOLDER
+    blender --python panel.py -- VIDEO OUT_FOLDER
 """
 
 from __future__ import annotations
@@ -9,71 +9,19 @@ from __future__ import annotations
 import json
 import os
 import shutil
-import subprocess
 import sys
 import time
-import traceback
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import bpy
 
-VIDEO, OUT = sys.argv[sys.argv.index("--") + 1], Path(sys.argv[sys.argv.index("--") + 2])
+sys.path.insert(0, str(Path(__file__).parent))
+from session import FOOTAGE, OUT, addon, inventory, invoke, key, picture, press, run, show_tab, viewport
+
 # Where the panel's buttons are on a screen of 1600 x 1000, in pixels from its top left.
 FAST_BUTTON, CAPTURE_BUTTON = (1086, 151), (1174, 183)
 report: dict = {"blender": bpy.app.version_string, "python": sys.version.split()[0], "exports": []}
-
-
-def viewport() -> dict:
-    """Context of the 3D viewport's main region."""
-    window = bpy.context.window_manager.windows[0]
-    area = next(a for a in window.screen.areas if a.type == "VIEW_3D")
-    return {"window": window, "area": area, "region": next(r for r in area.regions if r.type == "WINDOW")}
-
-
-def picture(name: str) -> None:
-    """Of the whole screen."""
-    subprocess.run(["import", "-window", "root", str(OUT / f"{name}.png")], check=True)
-
-
-def key(name: str) -> None:
-    """Press a key over the viewport."""
-    subprocess.run(["xdotool", "mousemove", "500", "400", "key", name], check=True)
-
-
-def click(x: int, y: int) -> None:
-    """The left button, in the screen's pixels from its top left; as slowly as a hand, while Blender goes on."""
-    steps = ["mousemove", str(x), str(y), "sleep", "0.4", "mousedown", "1", "sleep", "0.1", "mouseup", "1"]
-    subprocess.Popen(["xdotool", *steps])
-
-
-def press(place: tuple[int, int], happened: Callable[[], bool]) -> Iterator[float]:
-    """Click until something has happened: a busy machine draws late, and a button that is not there takes no click."""
-    for _ in range(6):
-        click(*place)
-        for _ in range(40):
-            yield 0.1
-            if happened():
-                return
-    raise RuntimeError(f"the button at {place} took no click")
-
-
-def addon():
-    """The extension's module of operators, for looking at the job."""
-    name = next(n for n in sys.modules if n.startswith("bl_ext.") and n.endswith(".scope_addon.ui.capture_operators"))
-    return sys.modules[name]
-
-
-def invoke(operator, *arguments, **settings) -> None:
-    """Call an operator as a button does."""
-    with bpy.context.temp_override(**viewport()):
-        operator(*arguments, **settings)
-
-
-def inventory() -> dict:
-    """What the file holds; cancelling must not change it."""
-    kinds = ("objects", "meshes", "armatures", "cameras", "actions", "collections", "images", "movieclips", "materials")
-    return {kind: sorted(b.name for b in getattr(bpy.data, kind)) for kind in kinds}
 
 
 def steps() -> Iterator[float]:
@@ -82,16 +30,12 @@ def steps() -> Iterator[float]:
     area = viewport()["area"]
     area.spaces.active.show_region_ui = True
     yield 1.0
-    sidebar = next(r for r in area.regions if r.type == "UI")
-    try:
-        sidebar.active_panel_category = "Scope"
-    except AttributeError:
+    if not show_tab():
         report["tab"] = "could not be chosen by script"
-    area.tag_redraw()
     yield 2.0
     picture("1_new_scene")
 
-    bpy.ops.scope.choose_footage(filepath=VIDEO)
+    bpy.ops.scope.choose_footage(filepath=FOOTAGE)
     area.tag_redraw()
     yield 1.0
     yield from press(FAST_BUTTON, lambda: scene.scope.quality == "FAST")
@@ -213,28 +157,7 @@ def steps() -> Iterator[float]:
     bpy.ops.preferences.addon_expand(module=module)
     yield 3.0
     picture("11_preferences")
+    (OUT / "report.json").write_text(json.dumps(report))
 
 
-def run() -> None:
-    """Drive ``steps`` by Blender's timers and leave."""
-    session = steps()
-
-    def advance() -> float | None:
-        try:
-            return next(session)
-        except StopIteration:
-            (OUT / "report.json").write_text(json.dumps(report))
-            status = 0
-        except BaseException:
-            traceback.print_exc()
-            picture("failed")
-            status = 1
-        sys.stdout.flush()
-        sys.stderr.flush()
-        os._exit(status)  # Blender's own exit can hang
-
-    bpy.context.preferences.view.show_splash = False
-    bpy.app.timers.register(advance, first_interval=3.0)
-
-
-run()
+run(steps())

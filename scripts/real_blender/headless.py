@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""``blender --background --command scope``: one clip, a folder with clips that fail, stopped and gone on with.
+
+Runs in the Debian by its own Python, in /scope; what it wrote is compared with the shell's by ``compare.py``.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import time
+from pathlib import Path
+
+COMMAND = ("blender", "--background", "--command", "scope")
+OUT = Path("out")
+FAST = ("--quality", "fast")
+
+
+def command(*arguments: str, status: int) -> dict | None:
+    """Run it; returns the report, which must be all of stdout, where ``--json`` asks for one."""
+    print("scope", *arguments, flush=True)
+    done = subprocess.run([*COMMAND, *arguments], capture_output=True, text=True, check=False)
+    print(done.stderr, flush=True)
+    assert done.returncode == status, f"status {done.returncode}, not {status}: {done.stdout}"
+    return json.loads(done.stdout) if "--json" in arguments else None
+
+
+def statuses(report: dict) -> dict[str, str]:
+    """What became of each file of a batch."""
+    return {entry["file"]: entry["status"] for entry in report["files"]}
+
+
+def one_clip() -> None:
+    """A capture, and the ways it can fail."""
+    report = command(
+        "capture", "clips/walk.mp4", *FAST, "-o", "out/command.npz", "-o", "out/command.glb", "--json", status=0
+    )
+    assert report is not None
+    assert report["people"] == 1
+    assert report["outputs"] == ["out/command.npz", "out/command.glb"]
+    command("capture", "clips/broken.mp4", "-o", "out/broken.npz", status=1)
+    command("capture", "clips/walk.mp4", "--quality", "superb", status=2)
+    command("capture", "clips/wall.png", *FAST, "-o", "out/wall.npz", status=3)
+    assert not list(OUT.glob("broken*")) + list(OUT.glob("wall*"))
+
+
+def stopped(name: str) -> None:
+    """A batch that Ctrl-C, or a request to end, ends: with its clips, soon, and with nothing half-written."""
+    out = OUT / f"stopped_{name}"
+    arguments = ("batch", "clips", "--out", str(out), "--jobs", "2", "--formats", "npz", "--quality", "best")
+    print("scope", *arguments, name, flush=True)
+    process = subprocess.Popen([*COMMAND, *arguments], stderr=subprocess.PIPE, text=True)
+    time.sleep(4.0)
+    process.send_signal(getattr(signal, name))
+    began = time.monotonic()
+    _, stderr = process.communicate(timeout=60)
+    print(stderr, flush=True)
+    assert process.returncode == 130, process.returncode
+    assert time.monotonic() - began < 30
+    assert {p.name for p in out.iterdir()} <= {"scope-batch.json"}, list(out.iterdir())
+    left = [p for p in Path("/proc").glob("[0-9]*/cmdline") if b"--command\0scope" in p.read_bytes()]
+    assert not left, left
+
+
+def folder() -> None:
+    """A folder, one of whose clips fails and one of which shows nobody; the second time only that is tried again."""
+    arguments = ("batch", "clips", "--out", "out/batch", "--jobs", "2", *FAST, "--json")
+    first = command(*arguments, status=1)
+    assert first is not None
+    assert statuses(first) == {"broken.mp4": "failed", "walk.mp4": "done", "wall.png": "no_person"}, statuses(first)
+    assert first["exit_status"] == 1
+    made = {p.name: p.stat().st_mtime_ns for p in (OUT / "batch").iterdir() if p.suffix != ".json"}
+    assert set(made) == {"walk.npz", "walk.glb"}, made
+    second = command(*arguments, status=1)
+    assert second is not None
+    assert statuses(second) == {"broken.mp4": "failed", "walk.mp4": "skipped", "wall.png": "no_person"}
+    assert {name: (OUT / "batch" / name).stat().st_mtime_ns for name in made} == made
+    (OUT / "batch.json").write_text(json.dumps(first))
+
+
+if __name__ == "__main__":
+    subprocess.run(["convert", "-size", "320x240", "xc:gray", "clips/wall.png"], check=True)
+    os.environ.pop("DISPLAY", None)
+    one_clip()
+    folder()
+    stopped("SIGINT")
+    stopped("SIGTERM")

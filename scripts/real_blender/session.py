@@ -1,0 +1,123 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the parts with a window share: Blender's timers drive a session of steps, which looks, presses and asserts."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+import traceback
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import bpy
+
+ARGUMENTS = sys.argv[sys.argv.index("--") + 1 :]
+FOOTAGE, OUT = ARGUMENTS[0], Path(ARGUMENTS[1])
+
+
+def viewport() -> dict:
+    """Context of the 3D viewport's main region."""
+    window = bpy.context.window_manager.windows[0]
+    area = next(a for a in window.screen.areas if a.type == "VIEW_3D")
+    return {"window": window, "area": area, "region": next(r for r in area.regions if r.type == "WINDOW")}
+
+
+def show_tab() -> bool:
+    """Open the sidebar at our tab; False where a script cannot choose the tab."""
+    area = viewport()["area"]
+    area.spaces.active.show_region_ui = True
+    sidebar = next(r for r in area.regions if r.type == "UI")
+    try:
+        sidebar.active_panel_category = "Scope"
+    except AttributeError:
+        return False
+    area.tag_redraw()
+    return True
+
+
+def picture(name: str) -> None:
+    """Of the whole screen."""
+    subprocess.run(["import", "-window", "root", str(OUT / f"{name}.png")], check=True)
+
+
+def key(name: str) -> None:
+    """Press a key over the viewport."""
+    subprocess.run(["xdotool", "mousemove", "500", "400", "key", name], check=True)
+
+
+def click(x: int, y: int) -> None:
+    """The left button, in the screen's pixels from its top left; as slowly as a hand, while Blender goes on."""
+    steps = ["mousemove", str(x), str(y), "sleep", "0.4", "mousedown", "1", "sleep", "0.1", "mouseup", "1"]
+    subprocess.Popen(["xdotool", *steps])
+
+
+def press(place: tuple[int, int], happened: Callable[[], bool]) -> Iterator[float]:
+    """Click until something has happened: a busy machine draws late, and a button that is not there takes no click."""
+    for _ in range(6):
+        click(*place)
+        for _ in range(40):
+            yield 0.1
+            if happened():
+                return
+    raise RuntimeError(f"the button at {place} took no click")
+
+
+def addon():
+    """The extension's module of operators, for looking at the job."""
+    name = next(n for n in sys.modules if n.startswith("bl_ext.") and n.endswith(".scope_addon.ui.capture_operators"))
+    return sys.modules[name]
+
+
+def invoke(operator, *arguments, **settings) -> set[str]:
+    """Call an operator as a script does, without a step to undo."""
+    with bpy.context.temp_override(**viewport()):
+        return operator(*arguments, **settings)
+
+
+def use(operator, *arguments, **settings) -> set[str]:
+    """Call an operator as a button does, with a step to undo."""
+    return invoke(operator, *(arguments or ("EXEC_DEFAULT",)), True, **settings)
+
+
+def until(happened: Callable[[], bool], seconds: float, what: str) -> Iterator[float]:
+    """Wait for something."""
+    end = time.monotonic() + seconds
+    while not happened():
+        assert time.monotonic() < end, f"waited {seconds} s for {what}"
+        yield 0.05
+
+
+def captured(seconds: float = 600.0) -> Iterator[float]:
+    """Press Capture by its operator and wait for the end."""
+    use(bpy.ops.scope.capture, "INVOKE_DEFAULT")
+    yield from until(lambda: addon().state.job is None, seconds, "the capture to end")
+    yield 0.5
+
+
+def inventory() -> dict:
+    """What the file holds; cancelling must not change it."""
+    kinds = ("objects", "meshes", "armatures", "cameras", "actions", "collections", "images", "movieclips", "materials")
+    return {kind: sorted(b.name for b in getattr(bpy.data, kind)) for kind in kinds}
+
+
+def run(steps: Iterator[float]) -> None:
+    """Drive ``steps``, which yield seconds to wait, by Blender's timers, and leave."""
+
+    def advance() -> float | None:
+        status = 0
+        try:
+            return next(steps)
+        except StopIteration:
+            pass
+        except BaseException:
+            traceback.print_exc()
+            picture("failed")
+            status = 1
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(status)  # Blender's own exit can hang
+
+    bpy.context.preferences.view.show_splash = False
+    bpy.app.timers.register(advance, first_interval=3.0)

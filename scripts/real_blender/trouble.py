@@ -1,0 +1,176 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What goes wrong while a Blender with a window captures: nothing may stay behind, and the next capture must work.
+
+    blender --python trouble.py -- VIDEO OUT_FOLDER
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import bpy
+
+sys.path.insert(0, str(Path(__file__).parent))
+from session import FOOTAGE, OUT, addon, captured, inventory, invoke, picture, run, show_tab, until, use
+
+SMALL = Path("/scope/small")  # a disk of its own
+report: dict[str, str] = {}
+
+
+def cache():
+    """The keeper of the cache folder that the preferences name now."""
+    return sys.modules[addon().__name__.replace("capture_operators", "preferences")].cache()
+
+
+def preferences() -> bpy.types.AddonPreferences:
+    """The extension's."""
+    return next(a for a in bpy.context.preferences.addons if a.module.endswith(".scope")).preferences
+
+
+def workers() -> list[int]:
+    """Processes of captures, also of a Blender that is gone."""
+    found = []
+    for path in Path("/proc").glob("[0-9]*/cmdline"):
+        try:
+            found += [int(path.parent.name)] if b"start_worker.py" in path.read_bytes() else []
+        except OSError:
+            continue  # it has just ended
+    return found
+
+
+def nothing_left(when: str) -> None:
+    """No process and no unfinished file."""
+    assert not workers(), f"{when}, the worker still runs"
+    left = list((cache().root / "jobs").iterdir())
+    assert not left, f"{when}, {left} are left"
+
+
+def begun(steps: int = 5) -> Iterator[float]:
+    """Start a capture that is in no cache, and wait until it is at work."""
+    shutil.rmtree(cache().root / "captures", ignore_errors=True)
+    use(bpy.ops.scope.capture, "INVOKE_DEFAULT")
+    yield from until(lambda: addon().state.job is None or addon().state.job.progress.done > steps, 400, "the worker")
+    assert addon().state.job is not None, addon().state.message
+
+
+def ended() -> Iterator[float]:
+    """Wait until the capture is over, however it ends."""
+    yield from until(lambda: addon().state.job is None, 400, "the capture to end")
+    yield 0.5
+
+
+def failed(name: str, before: dict, says: str) -> None:
+    """The last capture failed, said so and left nothing."""
+    message = addon().state.message
+    assert says in message, f"{name}: {message!r} does not say {says!r}"
+    assert inventory() == before, f"{name} changed the file"
+    nothing_left(f"after {name}")
+    report[name] = message
+
+
+def killed_worker() -> Iterator[float]:
+    """The system ends the worker, as it does when memory runs out."""
+    before = inventory()
+    yield from begun()
+    os.kill(addon().state.job.worker.pid, signal.SIGKILL)
+    yield from ended()
+    failed("killed worker", before, "signal 9")
+    picture("14_killed_worker")
+
+
+def removed_footage() -> Iterator[float]:
+    """The video goes while it is being read."""
+    scene, video = bpy.context.scene, Path("/scope/gone.mp4")
+    shutil.copy(FOOTAGE, video)
+    scene.scope.footage = str(video)
+    yield from begun()
+    video.unlink()
+    yield from ended()
+    nothing_left("after removing the footage")
+    texts = [warning.text for warning in scene.scope.result.warnings] + [addon().state.message]
+    assert any("gone.mp4" in text for text in texts), texts
+    report["removed footage"] = next(text for text in texts if "gone.mp4" in text)
+    scene.scope.footage = FOOTAGE
+
+
+def full_disk() -> Iterator[float]:
+    """No room for what the worker writes, then none for an export."""
+    yield from captured()
+    kernels, size = cache().kernels, cache().size()
+    SMALL.mkdir(exist_ok=True)
+    subprocess.run(["mount", "-t", "tmpfs", "-o", f"size={2 * size + 2**20}", "tmpfs", str(SMALL)], check=True)
+    preferences().cache_folder = str(SMALL)
+    shutil.copytree(kernels, cache().kernels)
+    before = inventory()
+    fill(leave=2**16)  # enough to begin with, not enough for a motion
+    yield from begun(1)
+    yield from ended()
+    failed("full disk", before, "space")
+    picture("15_full_disk")
+    for suffix, kind in (("fbx", "FBX"), ("glb", "GLB"), ("bvh", "BVH")):
+        (SMALL / "all_of_it").unlink(missing_ok=True)
+        there = sorted(SMALL.iterdir())
+        fill()
+        try:
+            said = f"{invoke(bpy.ops.scope.export, filepath=str(SMALL / f'out.{suffix}'), format=kind)}"
+        except RuntimeError as error:
+            said = str(error).strip()
+        assert "space" in said, f"exporting {kind} to a full disk: {said}"
+        assert "\n" not in said, said
+        (SMALL / "all_of_it").unlink()
+        assert sorted(SMALL.iterdir()) == there, f"exporting {kind} left {sorted(SMALL.iterdir())}"
+        report[f"{kind} to a full disk"] = said
+    preferences().cache_folder = ""
+
+
+def fill(leave: int = 0) -> None:
+    """Take all the room there is, but for so many bytes."""
+    with (SMALL / "all_of_it").open("wb", buffering=0) as file:
+        try:
+            while file.write(b"x" * 4096):
+                pass
+        except OSError:
+            pass
+        file.truncate(file.tell() - leave)
+
+
+def closed(how: str) -> Iterator[float]:
+    """Another Blender is closed, or crashes, while it captures."""
+    shutil.rmtree(cache().root / "captures", ignore_errors=True)
+    script = str(Path(__file__).with_name("closed.py"))
+    other = subprocess.Popen(["blender", "--python", script, "--", FOOTAGE, str(OUT), how])
+    yield from until(lambda: other.poll() is not None, 300, "the other Blender to end")
+    assert (OUT / f"closed_{how}").read_text() == "capturing", "the other Blender did not capture"
+    assert other.returncode == (-9 if how == "crash" else 0), other.returncode
+    yield from until(lambda: not workers(), 10, "the worker to end")
+    nothing_left(f"after Blender's {how}")
+    report[f"Blender's {how}"] = "nothing left"
+
+
+def steps() -> Iterator[float]:
+    """The session; yields seconds to wait."""
+    show_tab()
+    yield 1.0
+    show_tab()
+    bpy.context.scene.scope.quality = "FAST"
+    bpy.ops.scope.choose_footage(filepath=FOOTAGE)
+    yield from killed_worker()
+    yield from removed_footage()
+    yield from full_disk()
+    yield from closed("quit")
+    yield from closed("crash")
+    before = len([c for c in bpy.data.collections if "scope_capture" in c])
+    yield from captured()
+    assert len([c for c in bpy.data.collections if "scope_capture" in c]) == before + 1, addon().state.message
+    report["afterwards"] = "captured as usual"
+    (OUT / "trouble.json").write_text(json.dumps(report))
+
+
+run(steps())
