@@ -92,7 +92,9 @@ class Motion:
             os.replace(name, path)
         except OSError as error:
             Path(name).unlink(missing_ok=True)
-            raise OutputError(f"cannot write {path}: {error.strerror}") from error
+            raise OutputError(
+                f"cannot write {path}: {error.strerror}; free some space or choose another folder"
+            ) from error
 
     @classmethod
     def load(cls, path: str | Path) -> Motion:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 import os
+import re
 import tempfile
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, nullcontext
@@ -227,9 +228,19 @@ def _write(path: Path, writer) -> None:
         os.chmod(temporary, 0o666 & ~_umask())
         os.replace(temporary, path)
     except (RuntimeError, OSError) as error:
-        raise OutputError(f"cannot write {path}: {error}") from error
+        raise OutputError(f"cannot write {path}: {_reason(error)}") from error
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def _reason(error: RuntimeError | OSError) -> str:
+    """One sentence, and what to do. Of an exporter that fails Blender hands on the whole traceback, and its place."""
+    if isinstance(error, OSError) and error.strerror:
+        return f"{error.strerror}; free some space or choose another folder"
+    lines = [line for line in str(error).splitlines() if line and not line[0].isspace() and "Location: " not in line]
+    last = lines[-1] if lines else type(error).__name__
+    said = re.sub(r"^(?:\w*Error: )*(?:\[Errno \d+\] )?", "", last)
+    return f"{said}; {'free some space or choose another folder' if '[Errno ' in last else 'try another format'}"
 
 
 def _umask() -> int:

@@ -3,8 +3,10 @@
 
 from __future__ import annotations
 
+import errno
 import io
 import os
+import struct
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stdout
@@ -100,6 +102,28 @@ def write_usd(path: Path, camera: bool = False) -> None:
         convert_world_material=False,
         root_prim_path="/root",
     )
+    # The exporter says nothing about what it could not write.
+    if path.suffix == ".usdc" and path.is_file() and not _is_whole_crate(path):
+        raise OSError(errno.ENOSPC, "the file could not be written to its end", str(path))
+
+
+def _is_whole_crate(path: Path) -> bool:
+    """Whether a USD crate file has its table of contents, whose place the head tells, and which is written last.
+
+    Source: OpenUSD, pxr/usd/usd/crateFile.h: identifier (8 bytes), version (8), offset of the table (8); the table is a
+    count (8) of sections of 32 bytes each.
+    """
+    size = path.stat().st_size
+    with path.open("rb") as file:
+        head = file.read(24)
+        if len(head) < 24 or head[:8] != b"PXR-USDC":
+            return False
+        (table,) = struct.unpack("<q", head[16:])
+        if not 24 <= table <= size - 8:
+            return False
+        file.seek(table)
+        (count,) = struct.unpack("<q", file.read(8))
+    return 0 < count <= (size - table - 8) // 32
 
 
 def write_blend(path: Path, scene: bpy.types.Scene) -> None:

@@ -353,6 +353,23 @@ def test_a_folder_that_takes_no_files_is_named(body, make_motion, suffix):
         export_motions([make_motion(body, 1)], body, f"/proc/walk{suffix}")
 
 
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no limit on a file's size that a process could set")
+@pytest.mark.parametrize("suffix", SCENE_SUFFIXES)
+def test_no_room_for_the_file_is_told_in_a_sentence_and_leaves_nothing(body, make_motion, tmp_path, suffix):
+    import resource
+
+    path, motion = tmp_path / f"walk{suffix}", make_motion(body, 200)
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, before[1]))
+    try:
+        with pytest.raises(OutputError, match="cannot write .*walk") as raised:
+            export_motions([motion], body, path)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    assert "\n" not in str(raised.value)
+    assert list(tmp_path.iterdir()) == []
+
+
 @pytest.mark.parametrize("suffix", SCENE_SUFFIXES)
 def test_a_failing_writer_leaves_the_old_file_and_no_other(body, make_motion, tmp_path, monkeypatch, suffix):
     path = tmp_path / f"walk{suffix}"
