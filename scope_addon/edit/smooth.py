@@ -39,8 +39,10 @@ def smoothed(body: Body, motion: Motion, strength: float) -> Clip:
     finished = clip_of(body, motion, raw=False)
     share = min(strength, 1.0)
     correction = np.swapaxes(plain.rotations, -1, -2) @ finished.rotations
-    part = between(np.broadcast_to(np.eye(3), correction.shape), correction, np.full(correction.shape[:2], share))
-    return Clip(raw.times, wanted.rotations @ part, wanted.root + share * (finished.root - plain.root))
+    if share < 1.0:
+        none = np.broadcast_to(np.eye(3), correction.shape)
+        correction = between(none, correction, np.full(correction.shape[:2], share))
+    return Clip(raw.times, wanted.rotations @ correction, wanted.root + share * (finished.root - plain.root))
 
 
 def _plain(raw: Clip, motion: Motion, strength: float) -> Clip:

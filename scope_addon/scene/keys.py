@@ -47,7 +47,7 @@ def read_at(armature: bpy.types.Object, body: Body, rate: float, frames: np.ndar
     q = np.stack([values[bone_path(name, ROTATION)] for name in body.joint_names], axis=1)
     B = matrix_from_quaternion(q / np.maximum(np.linalg.norm(q, axis=-1, keepdims=True), 1e-9))
     C = _axes(armature, body)
-    rotations = np.einsum("kji,tkjl,klm->tkim", C, B, C)
+    rotations = np.swapaxes(C, 1, 2) @ B @ C
     rotations[:, 0] = R_WORLD_MODEL @ rotations[:, 0]
     pelvis = values[location_path(body)] + _root_head(armature, body)
     return Clip(frames / rate, rotations, pelvis)
@@ -58,7 +58,7 @@ def channels(armature: bpy.types.Object, body: Body, clip: Clip) -> tuple[np.nda
     C = _axes(armature, body)
     rotations = clip.rotations.copy()
     rotations[:, 0] = R_WORLD_MODEL.T @ rotations[:, 0]
-    B = np.einsum("kij,tkjl,kml->tkim", C, rotations, C)
+    B = C @ rotations @ np.swapaxes(C, 1, 2)
     return on_one_hemisphere(quaternions(B)), clip.root - _root_head(armature, body)
 
 
