@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`./scripts/bench solver|perception [--quick] [--json FILE]`: measure, print the tables, write the figures."""
+"""`./scripts/bench solver|perception|blender [--quick] [--json FILE]`: measure, print the tables, write the figures."""
 
 from __future__ import annotations
 
@@ -66,12 +66,16 @@ def _real_frames(quick: bool) -> dict:
 def main() -> int:
     """Run the command line; return the exit status."""
     parser = argparse.ArgumentParser(prog="bench")
-    parser.add_argument("what", choices=["solver", "perception"])
+    parser.add_argument("what", choices=["solver", "perception", "blender"])
     parser.add_argument("--quick", action="store_true", help="fewer repetitions, the default preset alone")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures as JSON")
     args = parser.parse_args()
     if args.what == "solver":
         figures = solver(args.quick)
+    elif args.what == "blender":
+        from .blender import blender
+
+        figures = blender(args.quick)
     else:
         from .perception import perception
 

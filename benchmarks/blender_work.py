@@ -1,0 +1,117 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Writing keys and working on them again, by Blender's own module: run in a process of its own, prints JSON.
+
+python -m scope.benchmarks.blender_work MOTION ROUNDS    MOTION: a captured .npz, which is played to and fro
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import statistics
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import fields, replace
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from ..scope_addon.motion import Motion
+from ..scope_addon.scene.animation import animate_armature
+from ..scope_addon.scene.armature import build_armature, rest_pose
+from ..scope_addon.scene.build import BuildOptions, build_scene
+from ..solver.body import load_body
+
+WRITTEN = 10_000  # frames
+LENGTHS = {"half_a_minute": 900, "five_minutes": 9000}  # frames, at 30 a second
+
+
+def longer(motion: Motion, count: int) -> Motion:
+    """The motion played to and fro until it has so many frames."""
+    there = np.arange(len(motion))
+    rows = np.resize(np.concatenate([there, there[-2:0:-1]]), count)
+    arrays = {f.name: v for f in fields(motion) if isinstance(v := getattr(motion, f.name), np.ndarray)}
+    per_frame = {name: values[rows] for name, values in arrays.items() if len(values) == len(motion)}
+    numbers = np.arange(count)
+    return replace(motion, **per_frame | {"frames": numbers, "timestamps": numbers / motion.mocap_framerate})
+
+
+def median_s(rounds: int, work: Callable[[], object], before: Callable[[], object] = lambda: None) -> float:
+    """Median seconds of some work; what comes before it does not count."""
+    times = []
+    for _ in range(rounds):
+        before()
+        start = time.perf_counter()
+        work()
+        times.append(time.perf_counter() - start)
+    return round(statistics.median(times), 4)
+
+
+def fresh() -> None:
+    """An empty file at 30 frames a second."""
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    bpy.context.scene.render.fps, bpy.context.scene.render.fps_base = 30, 1.0
+
+
+def writing(motion: Motion, rounds: int) -> dict[str, float]:
+    """Keys alone, and the whole scene: body, shape keys, camera, confidence of every bone."""
+    body = load_body("scope")
+    long = longer(motion, WRITTEN)
+    rest = rest_pose(body, long.betas)
+    frames = np.arange(WRITTEN, dtype=float)
+    made: dict = {}
+
+    def prepare() -> None:
+        fresh()
+        made["rig"] = build_armature("rig", body, rest, bpy.context.scene.collection)
+        made["action"] = bpy.data.actions.new("rig")
+
+    keys = median_s(rounds, lambda: animate_armature(made["rig"], made["action"], body, long, rest, frames), prepare)
+    scene = median_s(rounds, lambda: build_scene([long], body, None, BuildOptions(start_frame=1.0)), fresh)
+    return {"keys_s": keys, "whole_scene_s": scene}
+
+
+def working_again(motion: Motion, rounds: int, folder: Path) -> dict[str, dict[str, float]]:
+    """The panel's operators on a capture whose motion is in the cache."""
+    body, figures = load_body("scope"), {}
+    for name, count in LENGTHS.items():
+        fresh()
+        long = longer(motion, count)
+        long.save(folder / "person1.npz")
+        rig = build_scene([long], body, None, BuildOptions(start_frame=1.0)).people[0].armature
+        rig["scope_motion"], rig["scope_body_file"] = str(folder / "person1.npz"), "scope"
+        own = bpy.data.objects.new("own", rig.data.copy())
+        bpy.context.scene.collection.objects.link(own)
+        own.scale = (1.2, 1.2, 1.2)
+        bpy.context.view_layer.objects.active = rig
+        bpy.context.scene.scope_retarget.rig = own
+        bpy.ops.scope.guess_bones()
+        figures[name] = {
+            "smooth": median_s(rounds, lambda: bpy.ops.scope.smooth(strength=2.0)),
+            "floor": median_s(rounds, bpy.ops.scope.refloor),
+            "retarget": median_s(rounds, bpy.ops.scope.retarget),
+        }
+    return figures
+
+
+def main(path: Path, rounds: int) -> None:
+    """Measure and print."""
+    from .. import register
+
+    register()
+    motion = Motion.load(path)
+    with tempfile.TemporaryDirectory() as folder:
+        figures = {
+            "blender": bpy.app.version_string,
+            "writing": writing(motion, rounds),
+            "working_again": working_again(motion, rounds, Path(folder)),
+        }
+    print(json.dumps(figures), flush=True)
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]), int(sys.argv[2]))
+    os._exit(0)  # Blender's module can hang at exit

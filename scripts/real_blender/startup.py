@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How long Blender takes to open with the extension enabled and without, in turns: ``startup.py ROUNDS``.
+
+Runs in the Debian by its own Python, in /scope. Both have the extension's files; only one has it enabled. A window is
+opened each time, on a screen of its own, and Blender's first timer, which runs once the window is there, ends it.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import statistics
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+HOMES = {"enabled": Path("/scope/home"), "without": Path("/scope/home_without")}
+DISABLE = (
+    "import bpy; bpy.ops.preferences.addon_disable(module='bl_ext.user_default.scope'); bpy.ops.wm.save_userpref()"
+)
+END = """
+import bpy, os, time
+def end():
+    enabled = any(a.module.endswith('.scope') for a in bpy.context.preferences.addons)
+    print('opened', time.monotonic(), enabled, flush=True)
+    os._exit(0)
+bpy.app.timers.register(end, first_interval=0.0)
+"""
+
+
+def opened(kind: str) -> float:
+    """Seconds from the start of the process to the window's first timer."""
+    began = time.monotonic()
+    done = subprocess.run(
+        ["blender", "--python-expr", END],
+        env=dict(os.environ, HOME=str(HOMES[kind])),
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    line = next(line for line in done.stdout.splitlines() if line.startswith("opened"))
+    assert (line.split()[2] == "True") == (kind == "enabled"), line
+    return float(line.split()[1]) - began
+
+
+def main(rounds: int) -> None:
+    """Measure and write out/startup.json."""
+    shutil.rmtree(HOMES["without"], ignore_errors=True)
+    shutil.copytree(HOMES["enabled"], HOMES["without"], copy_function=os.link, symlinks=True)
+    for preferences in HOMES["without"].rglob("userpref.blend"):
+        preferences.unlink()  # a link as yet: the copy is changed, not the original
+        shutil.copy(HOMES["enabled"] / preferences.relative_to(HOMES["without"]), preferences)
+    environment = dict(os.environ, HOME=str(HOMES["without"]))
+    command = ["blender", "--background", "--python-exit-code", "1", "--python-expr", DISABLE]
+    subprocess.run(command, env=environment, capture_output=True, check=True)
+    times: dict[str, list[float]] = {kind: [] for kind in HOMES}
+    for kind in HOMES:
+        opened(kind)  # its files read once
+    for turn in range(rounds):
+        for kind in sorted(HOMES, reverse=bool(turn % 2)):
+            times[kind].append(opened(kind))
+    figures = {f"{kind}_s": statistics.median(found) for kind, found in times.items()}
+    pairs = [1e3 * (a - b) for a, b in zip(times["enabled"], times["without"], strict=True)]
+    figures |= {"more_ms": 1e3 * (figures["enabled_s"] - figures["without_s"])}
+    figures |= {"median_of_differences_ms": statistics.median(pairs), "rounds": rounds}
+    Path("out/startup.json").write_text(json.dumps({name: round(value, 4) for name, value in figures.items()}))
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]))
