@@ -5,6 +5,10 @@ One camera sees directions well and depth badly. Where a foot stands, the floor 
 far away the person is, so the depth of every frame is corrected first (``correct_depth``). What is left of sliding is
 taken out by fitting each frame once more with the standing feet held at one place (``hold_feet``): the same solver, the
 smoothed motion as its prior.
+
+Not everything that carries a foot is the floor: somebody climbs stairs, or jumps off a wall. A foot that stands at
+height h is taken to stand on the floor with the share s(4(1 − |h|/h_l)), s the logistic: within the noise of depth
+nearly sure, beyond nearly never.
 """
 
 from __future__ import annotations
@@ -34,6 +38,7 @@ from .smoothing import gaussian_smooth, smooth_rotations
 CONTACT_SPEED_M_S = 0.3  # across the line of sight; a swinging foot moves at 1 m/s and more
 CONTACT_HEIGHT_M = 0.05  # above the frame's lowest sole point
 FLOOR_SIGMA_M = 0.03
+LEVEL_M = 0.25  # h_l: feet that stand farther above or below stand on something else
 DEPTH_SIGMA_M = 0.1  # how wrong a depth that fits the image may be
 DEPTH_RATE_SIGMA = 0.3  # and how fast that error changes, m/s
 SLIDE_SIGMA_M_S = 0.1  # a standing foot's horizontal speed
@@ -68,7 +73,8 @@ def stand_on_floor(
     R, t = T_world_camera[:3, :3], T_world_camera[:3, 3]
     held = anchors(soles_of(rotations, root_cam) @ R.T + t, contact)
     indices = np.arange(len(body_with_soles.keypoint_names) - held.shape[1], len(body_with_soles.keypoint_names))
-    floor = R[2], -float(t[2])
+    lowest = np.minimum(held[..., 2].min(axis=1), 0.0)
+    floor = R[2], lowest * (1 - on_floor(lowest)) - float(t[2])  # far below it, there is no floor
     targets = indices, (held - t) @ R, contact
     rotations, root_cam = hold_feet(body_with_soles, rotations, root_cam, betas, targets, floor)
     return smooth_rotations(rotations, times, STEP_CUTOFF_HZ, out=rotations), root_cam
@@ -104,18 +110,19 @@ def correct_depth(
 
     With the ray's upward and horizontal parts g and d (world), heights h and horizontal steps s of the soles,
     minimizes over δ
-        Σ_t c_t (h_t + g_t δ_t)²/σ_h² + δ_t²/σ_δ²
+        Σ_t c_t f_t (h_t + g_t δ_t)²/σ_h² + δ_t²/σ_δ²
         + Σ_t c_t |s_t + d_t (δ_t+1 − δ_t)|²/(σ_s Δt)² + (δ_t+1 − δ_t)²/(σ_r Δt)²,
-    a tridiagonal system, solved in O(T).
+    c_t the contact, f_t the share with which this height is the floor's: a tridiagonal system, solved in O(T).
 
     :param root_cam: (T, 3), about the camera's centre;  soles_cam: (T, F, 3);  contact: (T, F);  times: (T,).
     """
     T = len(times)
     R, height0 = T_world_camera[:3, :3], T_world_camera[2, 3]
-    sure = np.clip(2 * contact - 1, 0, 1)  # a foot in the air, doubtful as it may be, says nothing about the floor
     ray_world = along_sight(root_cam) @ R.T
     soles_world = soles_cam @ R.T
     height = soles_world[..., 2] + height0
+    # A foot in the air, doubtful as it may be, says nothing about the floor.
+    sure = np.clip(2 * contact - 1, 0, 1) * on_floor(height)
     g, d = ray_world[:, 2], ray_world[:, :2]
 
     diagonal = np.full(T, 1 / DEPTH_SIGMA_M**2) + sure.sum(1) * g**2 / FLOOR_SIGMA_M**2
@@ -143,13 +150,13 @@ def hold_feet(
     root_cam: np.ndarray,
     betas: np.ndarray,
     targets: tuple[np.ndarray, np.ndarray, np.ndarray],
-    floor: tuple[np.ndarray, float],
+    floor: tuple[np.ndarray, np.ndarray],
 ) -> tuple[np.ndarray, np.ndarray]:
     """Fit each frame once more with held points above a floor, everything else staying at the given motion.
 
     :param rotations: (T, K+1, 3, 3);  root_cam: (T, 3): the motion to stay at, camera frame.
     :param targets: keypoint indices (F,), positions (T, F, 3) in the camera frame, weights (T, F) 0..1.
-    :param floor: its unit normal (3,), upwards, and offset: normal . p = offset on it, camera frame.
+    :param floor: its unit normal (3,), upwards, and offset (T,): normal . p = offset on it, camera frame.
     :return: rotations and root positions as given.
     """
     tree = make_tree(body)
@@ -164,7 +171,7 @@ def hold_feet(
         state = State(rotations[t, 0], root_cam[t], rotations[t, 1:], betas)
         measurements = Measurements(
             foot_contacts=FootContacts(indices, positions[t], weights[t]),
-            floor=Floor(indices, *floor, free),
+            floor=Floor(indices, floor[0], float(floor[1][t]), free),
             pose_priors=PosePriors([0], rotations[t, :1], root_cam[t : t + 1], [1 / 0.01**2], [1 / 0.005**2]),
         )
         here: Priors = replace(priors, joint_mean=rotations[t, 1:])
@@ -184,7 +191,7 @@ def _leg_freedom(body: Body) -> np.ndarray:
 
 
 def anchors(soles_world: np.ndarray, contact: np.ndarray) -> np.ndarray:
-    """(T, F, 3) where each sole point stands: the mean of the span of contact it is in, on the floor.
+    """(T, F, 3) where each sole point stands: the mean of the span of contact it is in, on the floor if that is near.
 
     Frames outside any span get the sole's own position.
     """
@@ -195,7 +202,7 @@ def anchors(soles_world: np.ndarray, contact: np.ndarray) -> np.ndarray:
         for start, end in zip(edges[::2], edges[1::2], strict=True):
             w = contact[start:end, f, None]
             out[start:end, f] = (w * soles_world[start:end, f]).sum(0) / w.sum()
-            out[start:end, f, 2] = 0.0
+            out[start:end, f, 2] *= 1 - on_floor(out[start, f, 2])
     return out
 
 
@@ -212,6 +219,11 @@ def _solve_tridiagonal(diagonal: np.ndarray, off: np.ndarray, right: np.ndarray)
     for k in range(n - 2, -1, -1):
         x[k] -= c[k] * x[k + 1]
     return x
+
+
+def on_floor(height: np.ndarray) -> np.ndarray:
+    """The share with which a foot that stands at these heights stands on the floor, see above."""
+    return _logistic(4 * (1 - np.abs(height) / LEVEL_M))
 
 
 def _logistic(x: np.ndarray) -> np.ndarray:

@@ -96,6 +96,24 @@ def test_a_trembling_motion_stands_still_where_it_stands(step):
     assert np.abs(place(local, moved)[1] - place(shaken, shaken_root)[1]).max() < 0.2  # nobody was thrown about
 
 
+@pytest.mark.parametrize("level", [-1.8, -0.5, 0.6])
+def test_feet_on_another_level_are_not_drawn_to_the_floor(step, level):
+    """Half of the time the person stands on the floor, then on a wall or in a pit."""
+    soled, omega, root, place, T_world_camera, times = step
+    up = T_world_camera[2, :3]
+    other = root + np.where(times > 1.5, level, 0.0)[:, None] * up
+    soles = place(omega, other)[2]
+    contact = grounding.standing_probability(soles, up, times)
+    local, moved = grounding.stand_on_floor(
+        soled, omega, other, np.zeros(soled.P), lambda *m: place(*m)[2], contact, T_world_camera, times
+    )
+    after = transform_points(T_world_camera, place(local, moved)[2])
+    before = transform_points(T_world_camera, soles)
+    assert np.abs(after[:, 2:, 2] - before[:, 2:, 2]).max() < 0.06
+    assert np.abs(after[60:, 2, 2] - level).max() < 0.06
+    assert np.abs(after[:30, 2, 2]).max() < 0.03
+
+
 def test_a_still_and_a_single_frame_pass(step):
     soled, omega, root, place, T_world_camera, times = step
     contact = grounding.standing_probability(place(omega[:1], root[:1])[2], T_world_camera[2, :3], times[:1])
