@@ -92,7 +92,7 @@ def assemble_motion(
             placed.center,
         )  # fmt: skip
     poses, trans = by_blocks(in_world, local, root)
-    joints_cam = path.points_to_frames(placed.place(local, root)[0])
+    joints_cam = path.points_to_frames(placed.place(local, root)[0]).astype(np.float32, copy=False)
     return Motion(
         poses=poses,
         trans=trans,

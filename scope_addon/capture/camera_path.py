@@ -42,7 +42,9 @@ class CameraPath:
         return replace(fit, rotations=rotations, t_camera_root=root)
 
     def points_to_frames(self, points: np.ndarray) -> np.ndarray:
-        """(T, n, 3) points of the first frame's axes in each frame's camera."""
+        """(T, n, 3) points of the first frame's axes in each frame's camera; the points where it does not move."""
+        if self.is_static:
+            return points
         return np.einsum("tji,tkj->tki", self.R_first_camera, points - self.center[:, None])
 
     def world_from_frames(self, T_world_first: np.ndarray) -> np.ndarray:

@@ -166,7 +166,7 @@ def hold_feet(
     )
     options = Options(stages=(Stage(_HOLD, 1e-3, 8),))
     free = np.zeros(len(indices))  # contact decides where a sole is; the floor alone where it cannot be
-    rotations, root_cam = rotations.copy(), root_cam.copy()
+    rotations, root_cam = rotations.copy(), np.array(root_cam, float)
     for t in np.flatnonzero(weights.max(1) > 0.05):
         state = State(rotations[t, 0], root_cam[t], rotations[t, 1:], betas)
         measurements = Measurements(

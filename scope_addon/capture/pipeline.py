@@ -20,8 +20,9 @@ from .camera import Camera, choose_camera, estimated_camera
 from .camera_motion import BackgroundTracker
 from .camera_path import CameraPath
 from .camera_travel import camera_travel
+from .compact import compact
 from .execution import AUTO, Execution
-from .fitting import FittedTrack, fit_track, prepare_track, refit_track
+from .fitting import PreparedTrack, fit_track, prepare_track, refit_track
 from .focal_length import focal_from_edges
 from .hand_measure import require_fingers
 from .hand_tracker import HandTracker
@@ -131,7 +132,7 @@ def capture(
         camera = _better_known(camera, background, video)
         turning = background.motion(camera)
         turns = CameraPath.on_a_stand(frames) if turning.is_static else CameraPath.turning(turning.R_first_camera)
-        motions, fits, went = _solve(
+        motions, iterations, went = solve(
             body, tracks, camera, turns, background.lines(turning, camera), smoothing, options.parts, about, progress
         )
     for number, motion in enumerate(motions, 1):
@@ -162,7 +163,7 @@ def capture(
         "frame_rate": [video.fps.numerator, video.fps.denominator],
         "fps": clock.rates(frames),
         "reprojection_px": float(motions[0].residual_px[motions[0].valid].mean()),
-        "iterations": fits[0].iterations,
+        "iterations": iterations,
         "warnings": warnings,
     }
     return Capture(motions, report)
@@ -209,7 +210,7 @@ def _observe(
     return builder
 
 
-def _solve(
+def solve(
     body: Body,
     tracks: list[Track],
     camera: Camera,
@@ -219,14 +220,21 @@ def _solve(
     parts: Parts,
     about: dict,
     progress: Progress,
-) -> tuple[list[Motion], list[FittedTrack], CameraPath]:
+) -> tuple[list[Motion], float, CameraPath]:
     """Each person on their own, in one world: fitted in each frame's camera, all else in the first frame's axes.
 
+    :param tracks: is emptied, person by person: of an hour, everything takes hundreds of megabytes.
     :param path: how the camera turned; returned with how it travelled. lines: of the background, which tell up.
+    :return: motions, the most prominent person's mean iterations per frame, and the path.
     """
-    prepared = [prepare_track(body, track, camera, parts) for track in tracks]
-    fits = [fit_track(each, progress) for each in prepared]
     several = len(tracks) > 1
+    prepared: list[PreparedTrack] = []
+    for k, track in enumerate(tracks):
+        each = prepare_track(body, track, camera, parts)
+        tracks[k] = track = track.without_depth()
+        prepared.append(compact(replace(each, track=track, lifted=compact(each.lifted))))
+        del each
+    fits = [compact(fit_track(each, progress)) for each in prepared]
 
     def place() -> list[PlacedTrack]:
         return [place_track(body, track, fit, smoothing, path) for track, fit in zip(tracks, fits, strict=True)]
@@ -246,15 +254,16 @@ def _solve(
         roots = [root_on_floor(each, floor, lines)[:, None] for each, floor in zip(placed, floors, strict=True)]
         placed.clear()
         for k, root in enumerate(roots):
-            fits[k] = refit_track(prepared[k], fits[k], path.points_to_frames(root)[:, 0], progress)
+            fits[k] = compact(refit_track(prepared[k], fits[k], path.points_to_frames(root)[:, 0], progress))
         placed = place()
     prepared.clear()
     world = share_world(body, placed, lines) if several else None
+    iterations = fits[0].iterations
     motions = [
         assemble_motion(
             body,
-            tracks[k],
-            fits[k],
+            tracks.pop(0),
+            fits.pop(0),
             placed.pop(0),
             camera,
             smoothing=smoothing,
@@ -265,9 +274,9 @@ def _solve(
             lines=lines,
             **about,
         )
-        for k in range(len(tracks))
+        for k in range(len(placed))
     ]
-    return motions, fits, path
+    return motions, iterations, path
 
 
 def _better_known(camera: Camera, background: BackgroundTracker, video: Video) -> Camera:

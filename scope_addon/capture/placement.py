@@ -9,6 +9,7 @@ import numpy as np
 
 from ...solver.body import Body
 from .camera_path import CameraPath
+from .compact import compact
 from .fitting import FittedTrack
 from .frame_blocks import by_blocks
 from .smoothing import fill_gaps, fill_rotation_gaps, smooth_root, smooth_rotations
@@ -50,7 +51,7 @@ def place_track(
         root = path.center + smooth_root(root - path.center, times)
     soled = with_soles(body, betas)
     joints, soles = _place(soled, betas, rotations, root)
-    return PlacedTrack(soled, betas, times, valid, rotations, root, joints, soles, path.center)
+    return compact(PlacedTrack(soled, betas, times, valid, rotations, root, joints, soles, path.center))
 
 
 def raw_motion(track: Track, fitted: FittedTrack, path: CameraPath) -> tuple[np.ndarray, np.ndarray]:
@@ -67,7 +68,7 @@ def _place(
 
     def place(rotations: np.ndarray, root: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         R, t = soled.forward_kinematics(rotations, root - at_rest, betas)
-        return t, sole_points(soled, R, t)
+        return t.astype(np.float32), sole_points(soled, R, t).astype(np.float32)
 
     joints, soles = by_blocks(place, rotations, root)
     return joints, soles

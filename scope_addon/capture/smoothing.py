@@ -16,7 +16,7 @@ from ...solver.rotations import matrix_from_quaternion, quaternion_from_matrix
 # lets as much noise through as the 6 Hz Butterworth filter that is usual for marker data.
 ROTATION_CUTOFF_HZ = 4.5
 DEPTH_CUTOFF_HZ = 2.0  # a single camera measures depth an order worse than the image position
-_ROTATIONS_AT_ONCE = 200_000  # with what numpy needs in between, some 200 MB
+_ROTATIONS_AT_ONCE = 50_000  # with what numpy needs in between, some 50 MB; of one joint, as many as there are
 
 
 def fill_gaps(values: np.ndarray, valid: np.ndarray, times: np.ndarray) -> np.ndarray:
@@ -34,7 +34,7 @@ def fill_gaps(values: np.ndarray, valid: np.ndarray, times: np.ndarray) -> np.nd
 
 def continuous_quaternions(R: np.ndarray) -> np.ndarray:
     """(T, J, 3, 3) rotations -> (T, J, 4) unit quaternions (w, x, y, z) without sign jumps from frame to frame."""
-    q = quaternion_from_matrix(R)
+    q = quaternion_from_matrix(np.asarray(R, float))
     dots = (q[1:] * q[:-1]).sum(-1)
     signs = np.cumprod(np.where(dots < 0, -1.0, 1.0), axis=0)
     q[1:] *= signs[..., None]
@@ -46,10 +46,10 @@ def fill_rotation_gaps(R: np.ndarray, valid: np.ndarray, times: np.ndarray) -> n
     if valid.all():
         return R
     good = np.flatnonzero(valid)
-    held = R[good[np.clip(np.searchsorted(good, np.arange(len(R)), side="right") - 1, 0, None)]]
+    held = good[np.clip(np.searchsorted(good, np.arange(len(R)), side="right") - 1, 0, None)]
     out = np.empty_like(R)
     for joints in _some_joints(R):
-        q = fill_gaps(continuous_quaternions(held[:, joints]), valid, times)
+        q = fill_gaps(continuous_quaternions(R[held, joints]), valid, times)
         out[:, joints] = matrix_from_quaternion(q / np.linalg.norm(q, axis=-1, keepdims=True))
     return out
 
@@ -83,7 +83,7 @@ def smooth_rotations(
     R: np.ndarray, times: np.ndarray, cutoff_hz: float = ROTATION_CUTOFF_HZ, out: np.ndarray | None = None
 ) -> np.ndarray:
     """Zero-phase low-pass of rotations (T, J, 3, 3); ``out`` may be ``R`` itself."""
-    out = np.empty(R.shape) if out is None else out
+    out = np.empty_like(R) if out is None else out
     for joints in _some_joints(R):
         q = gaussian_smooth(continuous_quaternions(R[:, joints]), times, cutoff_hz)
         out[:, joints] = matrix_from_quaternion(q / np.linalg.norm(q, axis=-1, keepdims=True))

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -37,6 +37,11 @@ class Track:
     def knows_depth(self) -> bool:
         """Whether the landmark network told depth; a user's keypoint network does not."""
         return bool(self.world_landmarks.any())
+
+    def without_depth(self) -> Track:
+        """The same, the world landmarks forgotten: of an hour they take 43 MB."""
+        nothing = np.broadcast_to(np.float32(0.0), self.world_landmarks.shape)
+        return replace(self, world_landmarks=nothing, judged_rows=self.judged_rows[:0], judged_landmarks=nothing[:0])
 
 
 @dataclass
@@ -84,7 +89,7 @@ class Tracklet:
 
 def make_track(frames: Sequence[int], times: Sequence[float], tracklets: Sequence[Tracklet]) -> Track:
     """One person's track from tracklets that follow each other, in a clip of these frames."""
-    values = np.zeros((len(frames), KEYPOINT_COUNT, 6), np.float32)
+    keypoints, confidence, world = (np.zeros((len(frames), KEYPOINT_COUNT, n), np.float32) for n in (2, 1, 3))
     seen, acquired = np.zeros(len(frames), bool), np.zeros(len(frames), bool)
     judged: list[tuple[int, np.ndarray]] = []
     shapes = {hands.shape for tracklet in tracklets for hands in tracklet.hands[:1]}
@@ -92,7 +97,7 @@ def make_track(frames: Sequence[int], times: Sequence[float], tracklets: Sequenc
     for tracklet in tracklets:
         if tracklet.rows:
             for row, value in zip(tracklet.rows, tracklet.values, strict=True):
-                values[row] = value
+                keypoints[row], confidence[row], world[row] = np.split(value, (2, 3), axis=1)
             seen[tracklet.rows] = True
             acquired[tracklet.rows[0]] = True
             judged += tracklet.judged
@@ -102,9 +107,9 @@ def make_track(frames: Sequence[int], times: Sequence[float], tracklets: Sequenc
         frames=np.array(frames, np.int64),
         times=np.array(times, float),
         seen=seen,
-        keypoints_px=values[..., :2],
-        confidence=values[..., 2],
-        world_landmarks=values[..., 3:],
+        keypoints_px=keypoints,
+        confidence=confidence[..., 0],
+        world_landmarks=world,
         acquired=acquired,
         judged_rows=np.array([row for row, _ in judged], np.int64),
         judged_landmarks=np.array([w for _, w in judged], float).reshape(-1, KEYPOINT_COUNT, 3),
