@@ -76,7 +76,7 @@ def _record(video: Path, body: Body, path: Path) -> None:
     tracks = people.build(1)
     if not tracks:
         raise NoPersonError(f"no person was found in {video}: the benchmark needs the clips of ../shared")
-    prepared = prepare_track(body, repair_left_right(tracks[0]), camera)
+    prepared = prepare_track(body, repair_left_right(tracks[0], camera), camera)
     calls = [(prepared.measure(int(k)), prepared.priors) for k in np.flatnonzero(prepared.track.seen)]
     write(path, calls)
 
