@@ -36,6 +36,7 @@ ABLATION: dict[str, dict[str, Parts | bool]] = {
     "without the orientation field": {"parts": Parts(orientation_field=False)},
     "without the joint prior": {"parts": Parts(joint_prior=False)},
     "without left-right repair": {"parts": Parts(left_right=False)},
+    "without mended leaps": {"parts": Parts(leaps=False)},
     "without the second pass": {"parts": Parts(second_pass=False)},
     "without contact": {"parts": Parts(contact=False)},
     "without smoothing": {"smoothing": False},

@@ -20,12 +20,12 @@ from pathlib import Path
 from ..scope_addon.capture.camera import choose_camera
 from ..scope_addon.capture.camera_path import CameraPath
 from ..scope_addon.capture.left_right import repair_left_right
+from ..scope_addon.capture.line_segments import Lines
 from ..scope_addon.capture.observation import Observation
 from ..scope_addon.capture.parts import ALL_PARTS
 from ..scope_addon.capture.people import PeopleBuilder
 from ..scope_addon.capture.pipeline import CaptureOptions, solve
 from ..scope_addon.capture.tracker import PeopleTracker
-from ..scope_addon.capture.vertical_lines import Lines
 from ..scope_addon.capture.video import open_video
 from ..scope_addon.cli import SAMPLE
 from ..solver import load_body

@@ -35,14 +35,17 @@ from ...solver import (
 )
 from .smoothing import gaussian_smooth, smooth_rotations
 
-CONTACT_SPEED_M_S = 0.3  # across the line of sight; a swinging foot moves at 1 m/s and more
+CONTACT_SPEED_M_S = 0.35  # across the line of sight; a swinging foot moves at 1 m/s and more
 CONTACT_HEIGHT_M = 0.05  # above the frame's lowest sole point
+CONTACT_CUTOFF_HZ = 4.0  # of a sole's way, before its speed is asked: noise must not set a standing foot going
 FLOOR_SIGMA_M = 0.03
 LEVEL_M = 0.25  # h_l: feet that stand farther above or below stand on something else
 DEPTH_SIGMA_M = 0.1  # how wrong a depth that fits the image may be
 DEPTH_RATE_SIGMA = 0.3  # and how fast that error changes, m/s
 SLIDE_SIGMA_M_S = 0.1  # a standing foot's horizontal speed
-STEP_CUTOFF_HZ = 12.0  # takes off the edges where a foot begins and ceases to be held
+# They take off the edges where a foot begins and ceases to be held: from the legs, which do it, and from the rest.
+STEP_CUTOFF_HZ = 8.0
+REST_CUTOFF_HZ = 12.0
 
 
 SolesOf = Callable[[np.ndarray, np.ndarray], np.ndarray]
@@ -77,7 +80,10 @@ def stand_on_floor(
     floor = R[2], lowest * (1 - on_floor(lowest)) - float(t[2])  # far below it, there is no floor
     targets = indices, (held - t) @ R, contact
     rotations, root_cam = hold_feet(body_with_soles, rotations, root_cam, betas, targets, floor)
-    return smooth_rotations(rotations, times, STEP_CUTOFF_HZ, out=rotations), root_cam
+    holds = np.r_[True, _leg_freedom(body_with_soles) < 1]
+    for joints, cutoff_hz in ((holds, STEP_CUTOFF_HZ), (~holds, REST_CUTOFF_HZ)):
+        rotations[:, joints] = smooth_rotations(rotations[:, joints], times, cutoff_hz)
+    return rotations, root_cam
 
 
 def along_sight(root: np.ndarray) -> np.ndarray:
@@ -97,7 +103,7 @@ def standing_probability(soles_cam: np.ndarray, up: np.ndarray, times: np.ndarra
     height = height - height.min(axis=1, keepdims=True)
     speed = np.zeros(height.shape)
     if len(times) > 2:
-        velocity = np.gradient(gaussian_smooth(soles_cam, times, 6.0), times, axis=0)
+        velocity = np.gradient(gaussian_smooth(soles_cam, times, CONTACT_CUTOFF_HZ), times, axis=0)
         ray = soles_cam / np.linalg.norm(soles_cam, axis=-1, keepdims=True)
         speed = np.linalg.norm(velocity - ray * (velocity * ray).sum(-1, keepdims=True), axis=-1)
     return _logistic(4 * (1 - speed / CONTACT_SPEED_M_S)) * _logistic(4 * (1 - height / CONTACT_HEIGHT_M))

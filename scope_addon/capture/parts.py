@@ -19,6 +19,7 @@ class Parts:
     orientation_field: bool = True
     joint_prior: bool = True
     left_right: bool = True  # repair of left and right
+    leaps: bool = True  # repair of keypoints that leap away for a few frames
     second_pass: bool = True  # the fit again with the distance that floor and feet tell
     contact: bool = True  # feet held on the floor at the end
 

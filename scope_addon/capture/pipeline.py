@@ -26,6 +26,7 @@ from .fitting import PreparedTrack, fit_track, prepare_track, refit_track
 from .focal_length import focal_from_edges
 from .hand_measure import require_fingers
 from .hand_tracker import HandTracker
+from .leaps import mend_leaps
 from .left_right import repair_left_right
 from .line_segments import Lines
 from .observation import Observation
@@ -121,7 +122,8 @@ def capture(
         warnings = execution.warnings + list(video.warnings)
     frames = len(seen)
     with clock.stage("solver"):
-        tracks = [repair_left_right(t, camera) if options.parts.left_right else t for t in seen.build(most)]
+        camera = _better_known(camera, background, video)
+        tracks = [_repaired(track, camera, options.parts) for track in seen.build(most)]
         del tracker, seen  # of an hour they would keep half a gigabyte
         if frames == 0:
             raise VideoError(f"{path} has no frame in the time that was asked for; change the start or the end")
@@ -129,7 +131,6 @@ def capture(
             raise _nobody(path, frames)
         smoothing = options.smoothing and frames > 1
         about = {"fps": video.fps, "image_size": (video.width, video.height), "source": path.name}
-        camera = _better_known(camera, background, video)
         turning = background.motion(camera)
         turns = CameraPath.on_a_stand(frames) if turning.is_static else CameraPath.turning(turning.R_first_camera)
         motions, iterations, went = solve(
@@ -285,6 +286,13 @@ def _better_known(camera: Camera, background: BackgroundTracker, video: Video) -
         return camera
     found = focal_from_edges(background.segments, video.width, video.height, camera.intrinsics[0, 0])
     return estimated_camera(video.width, video.height, found.focal_px, found.deviation) if found else camera
+
+
+def _repaired(track: Track, camera: Camera, parts: Parts) -> Track:
+    """The track without what the networks are known to get wrong for a while."""
+    if parts.left_right:
+        track = repair_left_right(track, camera)
+    return mend_leaps(track) if parts.leaps else track
 
 
 def _about_person(motion: Motion) -> dict:
