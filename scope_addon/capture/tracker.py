@@ -59,6 +59,8 @@ _TURNED_SIZES = (1.0, 1.35)
 _TURNED_PRESENCE = 0.9
 _TURNED_LEAP = 0.35  # mean distance of the keypoints from where they were foretold, in sides of the region
 CURLED_SPREAD = 0.25
+LEAST_CONFIDENT, CONFIDENT = 4, 0.3  # keypoints that must be surer than this: less is left of somebody who has gone
+LEAVING_SHARE = 0.8  # with fewer of the keypoints in the picture, somebody who is lost has left it
 _VELOCITY_MEMORY = 0.7
 # How far the region that was foretold for a frame may lie from the one that the frame before gives: centre and size in
 # sides, turn in radians. The networks were trained on regions that are off by more.
@@ -218,11 +220,14 @@ class PeopleTracker:
         """Whoever was lost a moment ago is where motion foretold, but turned: a somersault, a fall, a handstand.
 
         A body that curls up or hangs upside down looks less like one, so what is found must lie where it was foretold.
-        Whoever has gone behind somebody else is not looked for: what shows there is somebody else.
+        Whoever has gone behind somebody else is not looked for: what shows there is somebody else. Nor is who walked
+        out of the picture.
         """
         for lost in [f for f in self._lost if f.lost <= EAGER_FRAMES and f.age > 5]:
             if len(self._live) >= self._most:
                 return
+            if _share_in_picture(lost.estimate, image_rgb) < LEAVING_SHARE:
+                continue
             if any(f.estimate.next_region.is_near(lost.foretold) for f in self._live):
                 continue
             turned = [
@@ -353,6 +358,7 @@ def believable(estimate: PoseEstimate, sure: bool = True) -> bool:
     """Whether landmarks are those of a body; ``sure``: there is good reason to expect one here."""
     return (
         estimate.presence >= PRESENCE_THRESHOLD
+        and (estimate.keypoints_confidence >= CONFIDENT).sum() >= LEAST_CONFIDENT
         and estimate.spread >= (SPREAD_THRESHOLD if sure else UNSURE_SPREAD_THRESHOLD)
         and estimate.disagreement <= (DISAGREEMENT_THRESHOLD if sure else UNSURE_DISAGREEMENT_THRESHOLD)
     )
@@ -374,6 +380,12 @@ def _shows(estimate: PoseEstimate, image_rgb: np.ndarray) -> bool:
     height, width = image_rgb.shape[:2]
     x, y = estimate.keypoints_px.mean(axis=0)
     return bool(0 <= x < width and 0 <= y < height)
+
+
+def _share_in_picture(estimate: PoseEstimate, image_rgb: np.ndarray) -> float:
+    """Share of the keypoints that lie in the image."""
+    height, width = image_rgb.shape[:2]
+    return float(((estimate.keypoints_px >= 0) & (estimate.keypoints_px < [width, height])).all(axis=1).mean())
 
 
 def _apart(a: np.ndarray, b: np.ndarray) -> float:

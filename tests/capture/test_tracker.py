@@ -109,3 +109,18 @@ def test_a_somersault_is_followed_all_the_way_round(shared):
     assert head_above_hips[150] > 0
     assert head_above_hips[170] < 0
     assert head_above_hips[186] > 0
+
+
+def test_who_walks_out_of_the_picture_is_gone(shared):
+    """The woman on the grass leaves at the left edge between frames 195 and 207, and nothing comes in her stead."""
+    tracker, seen = PeopleTracker("best", 2, 2), {}
+    with open_video(shared / "data/clips/walk_side_static.mp4") as video:
+        for frame in video:
+            if frame.index >= 185:
+                for tracklet, _ in tracker.step(frame.image_rgb):
+                    seen.setdefault(tracklet, []).append(frame.index)
+    # somebody is a person from a third of a second on
+    lasting = sorted((frames for frames in seen.values() if len(frames) >= 10), key=lambda frames: frames[-1])
+    woman, man = lasting
+    assert 195 <= woman[-1] <= 207
+    assert man[-1] > 220
