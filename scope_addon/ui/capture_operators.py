@@ -168,6 +168,7 @@ class SCOPE_OT_capture(bpy.types.Operator):
     def _fail(self, error: Exception | str) -> bool:
         state.message = sentence(error)
         stop_job()  # before the report, which raises when a script called us
+        redraw_twice(bpy.context)
         self.report({"ERROR"}, state.message)
         return False
 
@@ -178,7 +179,7 @@ class SCOPE_OT_capture(bpy.types.Operator):
             self._timer = None
         if context.workspace:
             context.workspace.status_text_set(None)
-        redraw(context)
+        redraw_twice(context)
         return outcome
 
 
@@ -214,6 +215,13 @@ def redraw(context: bpy.types.Context) -> None:
     areas = [a for window in context.window_manager.windows for a in window.screen.areas if a.type == "VIEW_3D"]
     for region in (r for area in areas for r in area.regions if r.type == "UI"):
         region.tag_redraw()
+
+
+def redraw_twice(context: bpy.types.Context) -> None:
+    """Now, and soon once more: panels below one whose height has changed move only when they are drawn again."""
+    redraw(context)
+    if not bpy.app.background:
+        bpy.app.timers.register(lambda: redraw(bpy.context), first_interval=0.3)
 
 
 CLASSES = (SCOPE_OT_choose_footage, SCOPE_OT_use_sample, SCOPE_OT_capture, SCOPE_OT_cancel)

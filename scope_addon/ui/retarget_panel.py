@@ -15,13 +15,15 @@ class SCOPE_UL_bone_pairs(bpy.types.UIList):
     def draw_item(self, context, layout, data, item, icon, active_data, active_property, index) -> None:  # type: ignore[no-untyped-def]
         """One line: part, bone, and a question mark where the guess is not sure."""
         rig = data.rig
-        row = layout.row(align=True)
+        row = layout.split(factor=0.42, align=True)
         row.prop(item, "part", text="", emboss=False)
+        row = row.row(align=True)
         known = rig is not None and item.bone in rig.data.bones
         row.alert = not known
         if rig is not None:
             row.prop_search(item, "bone", rig.data, "bones", text="")
-        row.label(text="", icon="ERROR" if not known else "CHECKMARK" if item.confidence > 0.6 else "QUESTION")
+        if not known or item.confidence <= 0.6:  # no room is wasted on what is sure
+            row.label(text="", icon="QUESTION" if known else "ERROR")
 
 
 class SCOPE_PT_retarget(Tab, bpy.types.Panel):
