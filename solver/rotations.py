@@ -229,3 +229,15 @@ def nearest_rotation(matrix: ArrayLike) -> Array:
     u, _, vt = np.linalg.svd(m)
     u[..., :, 2] *= np.linalg.det(u @ vt)[..., None]
     return u @ vt
+
+
+def shortest_turn(a: Array, b: Array) -> Array:
+    """Return the smallest rotations (..., 3, 3) that take directions a (..., 3) to b; half a turn if opposite."""
+    a = a / np.maximum(np.linalg.norm(a, axis=-1, keepdims=True), 1e-12)
+    b = b / np.maximum(np.linalg.norm(b, axis=-1, keepdims=True), 1e-12)
+    axis, cosine = np.cross(a, b), (a * b).sum(axis=-1)
+    sine = np.linalg.norm(axis, axis=-1)
+    aside = np.cross(a, np.eye(3)[np.abs(a).argmin(axis=-1)])  # any way across is the smallest for opposite ones
+    axis = np.where(((sine < 1e-9) & (cosine < 0))[..., None], aside, axis)
+    length = np.maximum(np.linalg.norm(axis, axis=-1), 1e-12)
+    return exp(axis * (np.arctan2(sine, cosine) / length)[..., None])

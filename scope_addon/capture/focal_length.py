@@ -22,6 +22,7 @@ import numpy as np
 
 from .camera import ASSUMED_DEVIATION
 from .line_segments import Segments
+from .vertical_lines import may_be_upright, meeting_directions
 
 EDGE_SIGMA = np.radians(1.0)
 KAPPA = 4.0
@@ -29,7 +30,6 @@ MOST_EDGES = 120
 CANDIDATES = 60  # edges of which each may be level, the longest ones
 UPRIGHTS = 16  # directions that may be up, the best by the edges
 UPRIGHTS_APART = np.radians(0.7)
-LARGEST_TILT = np.radians(25.0)  # between up and the picture's
 LOG_RANGE, COARSE_STEP, FINE_STEP = 0.7, 0.05, 0.0125  # of log(f / f_0)
 CERTAIN = 0.1  # deviation of log f: whatever is less certain is no better than what was assumed
 _BLOCK = 256
@@ -105,13 +105,7 @@ class _Edges:
     def _uprights(self, normals: np.ndarray, focal_px: float) -> list[np.ndarray]:
         """Directions near the picture's up in which pairs of edges meet, the best ones, all different."""
         up = np.array([0.0, -1.0, 0.0])
-        near = normals[np.abs(normals @ up) < np.sin(LARGEST_TILT)]
-        i, j = np.triu_indices(len(near), 1)
-        found = np.cross(near[i], near[j])
-        size = np.linalg.norm(found, axis=1)
-        found = found[size > 0.02] / size[size > 0.02, None]
-        found *= np.where(found @ up < 0, -1.0, 1.0)[:, None]
-        found = found[found @ up > np.cos(LARGEST_TILT)]
+        found = meeting_directions(normals[may_be_upright(normals, up)], up)
         if not len(found):
             return []
         parts = np.array_split(found, len(found) // _BLOCK + 1)

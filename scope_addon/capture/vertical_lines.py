@@ -18,7 +18,7 @@ import numpy as np
 
 from .line_segments import Lines
 
-LARGEST_TILT = np.radians(25.0)  # between what the body says and what lines may say
+LARGEST_TILT = np.radians(25.0)  # between what the body, or the picture, says and what lines may say
 BODY_SIGMA = np.radians(10.0)
 LINE_SIGMA = np.radians(0.8)
 KAPPA = 4.0
@@ -27,16 +27,9 @@ LEAST_SUPPORT = 0.4  # sides of the picture, all upright lines together: less ma
 
 def up_from_lines(lines: Lines, up: np.ndarray) -> np.ndarray | None:
     """(3,) the upright direction that lines say, near ``up``, what the body says; None where they do not say any."""
-    near = np.abs(lines.normals @ up) < np.sin(LARGEST_TILT + LINE_SIGMA)  # others cannot be upright
+    near = may_be_upright(lines.normals, up)
     normals, lengths = lines.normals[near], lines.lengths[near]
-    if len(normals) < 2:
-        return None
-    i, j = np.triu_indices(len(normals), 1)
-    v = np.cross(normals[i], normals[j])
-    size = np.linalg.norm(v, axis=1)
-    v = v[size > 0.02] / size[size > 0.02, None]
-    v *= np.where(v @ up < 0, -1.0, 1.0)[:, None]
-    v = v[v @ up > np.cos(LARGEST_TILT)]
+    v = meeting_directions(normals, up)
     if not len(v):
         return None
     parts = np.array_split(v, len(v) // 500 + 1)
@@ -47,6 +40,21 @@ def up_from_lines(lines: Lines, up: np.ndarray) -> np.ndarray | None:
         best = best if best @ up > 0 else -best
     support = float(_closeness(best[None], normals)[0] @ lengths)
     return best if support > LEAST_SUPPORT and best @ up > np.cos(LARGEST_TILT) else None
+
+
+def may_be_upright(normals: np.ndarray, up: np.ndarray) -> np.ndarray:
+    """(N,) whether lines with these normals (N, 3) can run along a direction near ``up``."""
+    return np.abs(normals @ up) < np.sin(LARGEST_TILT + LINE_SIGMA)
+
+
+def meeting_directions(normals: np.ndarray, up: np.ndarray) -> np.ndarray:
+    """(n, 3) the directions near ``up`` in which pairs of lines with these normals (N, 3) meet."""
+    i, j = np.triu_indices(len(normals), 1)
+    v = np.cross(normals[i], normals[j])
+    size = np.linalg.norm(v, axis=1)
+    v = v[size > 0.02] / size[size > 0.02, None]
+    v *= np.where(v @ up < 0, -1.0, 1.0)[:, None]
+    return v[v @ up > np.cos(LARGEST_TILT)]
 
 
 def _closeness(v: np.ndarray, normals: np.ndarray) -> np.ndarray:

@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...solver.body import Body
-from ...solver.rotations import exp
+from ...solver.rotations import shortest_turn
 from ..capture.grounding import standing_probability
 from ..capture.smoothing import gaussian_smooth
 from .clip import Clip
@@ -53,9 +53,6 @@ def _levelling(soles: np.ndarray, weight: np.ndarray) -> tuple[np.ndarray, np.nd
     if np.sqrt(max(values[1], 0.0)) < _SPREAD_M / 2:
         return np.eye(3), middle
     normal = vectors[:, 0] * (1.0 if vectors[2, 0] > 0 else -1.0)
-    axis = np.cross(normal, UP)
-    sine = float(np.linalg.norm(axis))
-    angle = np.arctan2(sine, float(normal @ UP))
-    if angle > _MOST_TILT or sine < 1e-9:
+    if np.arccos(np.clip(normal @ UP, -1.0, 1.0)) > _MOST_TILT:
         return np.eye(3), middle
-    return exp(axis / sine * angle), middle
+    return shortest_turn(normal, UP), middle

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...solver.rotations import exp
+from ...solver.rotations import exp, shortest_turn
 
 _STRAIGHT = 0.9999  # share of the leg's length that it may be stretched to: beyond it the knee would snap
 
@@ -37,15 +37,3 @@ def reach(world: np.ndarray, heads: np.ndarray, leg: tuple[int, int, int], goal:
     swing = shortest_turn(reached, goal - hip)
     world[:, thigh] = swing @ world[:, thigh]
     world[:, shin] = swing @ at_knee @ world[:, shin]
-
-
-def shortest_turn(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """(..., 3, 3) the smallest rotations that take directions a to directions b (..., 3); half a turn if opposite."""
-    a = a / np.maximum(np.linalg.norm(a, axis=-1, keepdims=True), 1e-12)
-    b = b / np.maximum(np.linalg.norm(b, axis=-1, keepdims=True), 1e-12)
-    axis, cosine = np.cross(a, b), (a * b).sum(axis=-1)
-    sine = np.linalg.norm(axis, axis=-1)
-    aside = np.cross(a, np.eye(3)[np.abs(a).argmin(axis=-1)])  # any way across is the smallest for opposite ones
-    axis = np.where(((sine < 1e-9) & (cosine < 0))[..., None], aside, axis)
-    length = np.maximum(np.linalg.norm(axis, axis=-1), 1e-12)
-    return exp(axis * (np.arctan2(sine, cosine) / length)[..., None])

@@ -21,11 +21,11 @@ import numpy as np
 
 from ...solver.body import Body
 from ...solver.frames import R_WORLD_MODEL
-from ...solver.rotations import exp
+from ...solver.rotations import exp, shortest_turn
 from ..edit.clip import Clip, between
 from .bone_map import FINGERS, SPINE, BoneMap
 from .feet import FootRest, ankle_goal, flat_toes, sinking
-from .legs import reach, shortest_turn
+from .legs import reach
 
 UP = np.array([0.0, 0.0, 1.0])
 _NEXT = {"hip": "knee", "knee": "ankle", "shoulder": "elbow", "elbow": "wrist", "wrist": "hand"}

@@ -100,3 +100,16 @@ def test_nearest_rotation_repairs_and_survives_anything():
 def test_shapes_are_checked():
     with pytest.raises(ShapeError, match=r"\(\.\.\., 3\), but got shape \(4,\)"):
         rotations.exp(np.zeros(4))
+
+
+def test_the_shortest_turn_takes_one_direction_to_the_other_about_what_is_across_both():
+    rng = np.random.default_rng(5)
+    a, b = rng.standard_normal((2, 50, 3))
+    a[0], b[0] = [1.0, 0, 0], [-2.0, 0, 0]  # opposite
+    a[1], b[1] = [0, 3.0, 0], [0, 1.0, 0]  # the same
+    R = rotations.shortest_turn(a, b)
+    unit = lambda v: v / np.linalg.norm(v, axis=-1, keepdims=True)  # noqa: E731
+    np.testing.assert_allclose(np.einsum("nij,nj->ni", R, unit(a)), unit(b), atol=1e-9)
+    angle = np.arccos(np.clip((unit(a) * unit(b)).sum(-1), -1, 1))
+    np.testing.assert_allclose(np.linalg.norm(rotations.log(R), axis=-1), angle, atol=1e-6)
+    np.testing.assert_allclose(R[1], np.eye(3), atol=1e-12)
