@@ -80,6 +80,8 @@ def write_overlay(
         finally:
             if writer is not None:
                 writer.release()
+        if not _is_readable(temporary):  # the encoder says nothing about what it could not write
+            raise OutputError(f"cannot write {path} to its end; free some space or choose another folder")
 
 
 def draw_overlay(
@@ -256,6 +258,15 @@ def _open_writer(temporary: Path, fps: float, width: int, height: int, path: Pat
     raise OutputError(f"cannot write {path}: no video encoder was found; choose a .png or .jpg overlay")
 
 
+def _is_readable(video: Path) -> bool:
+    """Whether a video has its table of contents, which is written last."""
+    reader = cv2.VideoCapture(str(video))
+    try:
+        return reader.isOpened() and reader.grab()
+    finally:
+        reader.release()
+
+
 @contextmanager
 def _written_beside(path: Path) -> Iterator[Path]:
     """A temporary file in the folder of ``path``, renamed to it at the end, removed if anything fails."""
@@ -267,8 +278,6 @@ def _written_beside(path: Path) -> Iterator[Path]:
     temporary = Path(name)
     try:
         yield temporary
-        if temporary.stat().st_size == 0:
-            raise OutputError(f"cannot write {path}: nothing could be encoded; is the disk full?")
         temporary.chmod(0o644)
         os.replace(temporary, path)
     except OSError as error:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import cv2
@@ -182,6 +183,21 @@ def test_odd_sizes_lose_a_row_and_large_ones_are_bounded(tmp_path, body):
 def test_what_cannot_be_written_is_said(tmp_path, footage, body, name):
     with pytest.raises(OutputError, match="cannot write"):
         write_overlay(tmp_path / name, footage, standing(body, [0]), body)
+    assert [p.name for p in tmp_path.iterdir()] == ["footage.mp4"]
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no limit on a file's size that a process could set")
+@pytest.mark.parametrize("name", ["overlay.mp4", "overlay.png"])
+def test_no_room_is_said_and_nothing_is_left(tmp_path, footage, body, name):
+    import resource
+
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (500, before[1]))
+    try:
+        with pytest.raises(OutputError, match=f"cannot write .*{name}.*free some space"):
+            write_overlay(tmp_path / name, footage, standing(body, [0]), body)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
     assert [p.name for p in tmp_path.iterdir()] == ["footage.mp4"]
 
 
