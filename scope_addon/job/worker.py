@@ -16,6 +16,7 @@ from typing import IO, NoReturn
 from ...solver.errors import ScopeError
 from .request import JobRequest
 
+_REMOVALS = 20  # attempts, each of which a file that was just being opened may foil
 _MIN_INTERVAL_S = 0.05  # between two progress lines of one stage
 
 
@@ -119,10 +120,22 @@ def _die_with_parent(job_folder: Path) -> None:
         with contextlib.suppress(OSError, ValueError):
             while sys.stdin.buffer.read(4096):
                 pass
-        shutil.rmtree(job_folder, ignore_errors=True)
+        _remove(job_folder)
         os._exit(1)
 
     threading.Thread(target=wait, name="scope-parent", daemon=True).start()
+
+
+def _remove(job_folder: Path) -> None:
+    """Remove the folder although the main thread writes there: what has another name it finds no more."""
+    gone = job_folder.with_name(f"{job_folder.name}.gone")
+    with contextlib.suppress(OSError):
+        job_folder.rename(gone)
+    for _ in range(_REMOVALS):
+        for folder in (gone, job_folder):
+            shutil.rmtree(folder, ignore_errors=True)
+        if not gone.exists() and not job_folder.exists():
+            return
 
 
 def _step_back() -> None:

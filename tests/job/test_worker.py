@@ -70,6 +70,29 @@ def test_the_worker_ends_when_its_parent_is_killed(folder):
     wait_for(lambda: not folder.exists())
 
 
+def test_an_orphan_that_goes_on_writing_leaves_nothing(tmp_path):
+    folder = tmp_path / "jobs" / "job-1"
+    folder.mkdir(parents=True)
+    code = (
+        "import sys\n"
+        "from pathlib import Path\n"
+        "from scope.scope_addon.job.worker import _die_with_parent\n"
+        f"folder, number = Path({str(folder)!r}), 0\n"
+        "_die_with_parent(folder)\n"
+        "while True:\n"
+        "    number += 1\n"
+        "    try:\n"
+        "        (folder / str(number % 500)).write_text('half of something')\n"
+        "    except OSError:\n"
+        "        pass\n"
+    )
+    process = subprocess.Popen([sys.executable, "-c", code], stdin=subprocess.PIPE)
+    wait_for(lambda: len(list(folder.iterdir())) > 100)
+    process.stdin.close()
+    assert process.wait(30) == 1
+    assert list((tmp_path / "jobs").iterdir()) == []
+
+
 def test_a_missing_library_is_told(folder, tmp_path, monkeypatch):
     (tmp_path / "cv2").mkdir()
     (tmp_path / "cv2" / "__init__.py").write_text("raise ImportError('wrong platform')")
