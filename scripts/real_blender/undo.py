@@ -35,6 +35,7 @@ def state() -> State:
             "action": obj.animation_data.action.name if obj.animation_data and obj.animation_data.action else None,
             "collections": sorted(c.name for c in obj.users_collection),
             "selected": obj.select_get(),
+            "hidden": (obj.hide_get(), obj.hide_viewport, obj.hide_render),
             "properties": {key: _plain(obj[key]) for key in obj.keys() if not key.startswith("scope_")},
             "ours": _digest({key: _plain(obj[key]) for key in obj.keys() if key.startswith("scope_")}),
         }
@@ -185,8 +186,16 @@ def edits() -> dict[str, Callable[[], object]]:
         "bake to rate": lambda: use(scope.bake_rate, rate=10.0),
         "guess bones": lambda: use(scope.guess_bones),
         "retarget": lambda: use(scope.retarget),
+        "retarget, way on an object, beside": retarget_beside,
         "footage to sequencer": lambda: use(scope.footage_to_sequencer),
     }
+
+
+def retarget_beside() -> None:
+    """With root motion, beside the captured person."""
+    settings = bpy.context.scene.scope_retarget
+    settings.root, settings.captured = "object", "beside"
+    use(bpy.ops.scope.retarget)
 
 
 def capturing() -> Iterator[float]:
