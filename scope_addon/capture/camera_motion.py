@@ -6,7 +6,8 @@ directions b in the present camera and a in an earlier key frame's satisfy b = R
 far away they are; R is the least-squares rotation of the directions that agree with it (two directions make a
 hypothesis, the one with most support is refined). Rotations are chained over key frames alone, a new one only where
 too few corners are left, so that errors add up over few links. A camera that also moves makes near corners disagree;
-the far ones, of which there are many, decide.
+the far ones, of which there are many, decide, and what is wrong with that is taken out by the edges of buildings
+(`compass`).
 
 Sources: Fischler and Bolles 1981 (random sample consensus), Kabsch 1976 (rotation between two sets of directions).
 """
@@ -22,6 +23,7 @@ import numpy as np
 
 from ...solver.rotations import exp, log
 from .camera import Camera
+from .compass import LOOKS_EVERY_S, Look, without_drift
 from .line_segments import Lines, Segments, find_segments
 from .smoothing import fill_rotation_gaps
 
@@ -63,7 +65,7 @@ class BackgroundTracker:
         self._scale = WORKING_SIDE_PX / max(width, height)
         self._step = max(1, int(0.5 / self._scale))
         self._size = (round(width * self._scale), round(height * self._scale))
-        self._camera = camera
+        self._camera, self._full_size = camera, (width, height)
         self._tolerance = AGREEING_PX / (self._scale * camera.intrinsics[0, 0])  # radians
         self._random = np.random.default_rng(0)
         self._times: list[float] = []
@@ -75,7 +77,7 @@ class BackgroundTracker:
         self._key_count = 0
         self._R_first_key = np.eye(3)
         self._R_key_last = np.eye(3)
-        self._segments, self._segments_row = Segments.none(), -1  # of the first frame in which somebody is seen
+        self._looks: list[Look] = []  # the first one at the first frame in which somebody is seen
 
     def add(self, image_rgb: np.ndarray, time_s: float, people: Sequence[np.ndarray]) -> None:
         """The next frame.
@@ -83,8 +85,8 @@ class BackgroundTracker:
         :param people: (n, 2) points of each person in pixels: the background is what lies outside their boxes.
         """
         self._times.append(time_s)
-        if people and self._segments_row < 0:
-            self._segments_row, self._segments = len(self._times) - 1, find_segments(image_rgb, people)
+        if people and not self._looks:
+            self._looks.append(Look(len(self._times) - 1, find_segments(image_rgb, people)))
         if time_s - self._last_used < 0.98 / SAMPLES_HZ:
             self._rotations.append(None)
             return
@@ -102,7 +104,10 @@ class BackgroundTracker:
             self._rotations.append(None)
             return
         self._R_key_last = R_camera_key.T
-        self._rotations.append(self._R_first_key @ self._R_key_last)
+        R_first_camera = self._R_first_key @ self._R_key_last
+        self._rotations.append(R_first_camera)
+        if self._looks and time_s - self._times[self._looks[-1].row] >= LOOKS_EVERY_S and _turns(R_first_camera):
+            self._looks.append(Look(len(self._times) - 1, find_segments(image_rgb, people)))
         self._picture = picture
         if len(self._points) < max(KEY_SHARE * self._key_count, FEWEST_CORNERS):
             self._R_first_key = self._R_first_key @ self._R_key_last
@@ -130,17 +135,18 @@ class BackgroundTracker:
         if len(late) and times[-1] - times[b] < 1.5 / SAMPLES_HZ:  # the camera goes on turning as it did
             rate = log(R[a].T @ R[b]) / (times[b] - times[a])
             filled[late] = R[b] @ exp((times[late] - times[b])[:, None] * rate)
-        return CameraMotion(filled[0].T @ filled, known)
+        width, height = self._full_size
+        return CameraMotion(without_drift(filled[0].T @ filled, times, self._looks, camera, width, height), known)
 
     @property
     def segments(self) -> Segments:
         """Straight edges of the background, in the first frame in which somebody is seen."""
-        return self._segments
+        return self._looks[0].segments if self._looks else Segments.none()
 
     def lines(self, motion: CameraMotion, camera: Camera) -> Lines:
         """The same in the first frame's axes."""
-        lines = self._segments.lines(camera)
-        return lines if motion.is_static else lines.turned(motion.R_first_camera[self._segments_row])
+        lines = self.segments.lines(camera)
+        return lines if motion.is_static or not self._looks else lines.turned(motion.R_first_camera[self._looks[0].row])
 
     def _follow(self, picture: np.ndarray, boxes: list[np.ndarray]) -> np.ndarray | None:
         """Rotation (3, 3) from the key frame's axes to the present camera's; None where it cannot be told."""
@@ -189,6 +195,11 @@ class BackgroundTracker:
         low, high = points.min(0) * self._scale, points.max(0) * self._scale
         margin = 0.1 * (high - low).max() + 4.0
         return np.concatenate([low - margin, high + margin])
+
+
+def _turns(R: np.ndarray) -> bool:
+    """Whether a rotation (3, 3) is more than that of a camera on a stand."""
+    return bool(np.degrees(np.linalg.norm(log(R))) >= STATIC_DEG)
 
 
 def consensus_rotation(

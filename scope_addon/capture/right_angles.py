@@ -1,0 +1,90 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The three directions at right angles of what people build: up u, and two level ones h and u × h.
+
+Edges along a direction d in space point, in the picture, at d's vanishing point f d_xy / d_z (from the middle). Three
+directions explain an edge i if one of the three points lies along it, within an angle ∠_i at the edge's middle:
+
+    score(f) = max over u, h of Σ_i w_i max_d exp(−sin² ∠_i / 2 s²)
+
+w_i the edge's length in sides of the picture. Angles are those in the picture, since those between planes through the
+camera's centre shrink when f grows.
+
+Source: Coughlan and Yuille 2003.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .line_segments import Segments
+from .vertical_lines import may_be_upright, meeting_directions
+
+EDGE_SIGMA = np.radians(1.0)
+MOST_EDGES = 120
+CANDIDATES = 60  # edges of which each may be level, the longest ones
+UPRIGHTS = 16  # directions that may be up, the best by the edges
+UPRIGHTS_APART = np.radians(0.7)
+_BLOCK = 256
+
+
+@dataclass(frozen=True)
+class Edges:
+    """The longest edges of a picture."""
+
+    ends: np.ndarray  # (N, 2, 2) pixels from the picture's middle
+    middle: np.ndarray  # (N, 2)
+    along: np.ndarray  # (N, 2) unit
+    weight: np.ndarray  # (N,)
+
+    @classmethod
+    def of(cls, segments: Segments, width: int, height: int) -> Edges:
+        """Of a picture of this size."""
+        ends = (segments.ends_px[:MOST_EDGES] - [width / 2, height / 2]).astype(np.float32)
+        along = ends[:, 1] - ends[:, 0]
+        along /= np.linalg.norm(along, axis=1, keepdims=True)
+        return cls(ends, ends.mean(axis=1), along, segments.lengths[:MOST_EDGES].astype(np.float32))
+
+    def axes(self, focal_px: float) -> tuple[float, np.ndarray]:
+        """Sides of the picture that the best three directions explain; these, (3, 3) rows u, h, u × h, camera frame."""
+        rays = np.concatenate([self.ends, np.full((*self.ends.shape[:2], 1), focal_px, np.float32)], axis=-1)
+        normals = np.cross(rays[:, 0], rays[:, 1])
+        normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
+        score, axes = 0.0, np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+        for up in self._uprights(normals, focal_px):
+            level = np.cross(normals[:CANDIDATES], up)  # along the edge, if it is level
+            size = np.linalg.norm(level, axis=1)
+            level = level[size > 0.1] / size[size > 0.1, None]
+            if not len(level):
+                continue
+            explained = np.maximum(self._explained(level, focal_px), self._explained(np.cross(up, level), focal_px))
+            explained = np.maximum(explained, self._explained(up[None], focal_px)) @ self.weight
+            best = int(explained.argmax())
+            if explained[best] > score:
+                score, axes = float(explained[best]), np.array([up, level[best], np.cross(up, level[best])], float)
+        return score, axes
+
+    def _uprights(self, normals: np.ndarray, focal_px: float) -> list[np.ndarray]:
+        """Directions near the picture's up in which pairs of edges meet, the best ones, all different."""
+        up = np.array([0.0, -1.0, 0.0])
+        found = meeting_directions(normals[may_be_upright(normals, up)], up)
+        if not len(found):
+            return []
+        parts = np.array_split(found, len(found) // _BLOCK + 1)
+        score = np.concatenate([self._explained(part, focal_px) @ self.weight for part in parts])
+        chosen: list[np.ndarray] = []
+        for candidate in found[np.argsort(-score)]:
+            if all(candidate @ other < np.cos(UPRIGHTS_APART) for other in chosen):
+                chosen.append(candidate)
+            if len(chosen) == UPRIGHTS:
+                break
+        return chosen
+
+    def _explained(self, directions: np.ndarray, focal_px: float) -> np.ndarray:
+        """(n, N) how well each edge points at the vanishing point of directions (n, 3): 1 exactly."""
+        d = directions.astype(np.float32)
+        x, y = (np.float32(focal_px) * d[:, k, None] - d[:, 2, None] * self.middle[:, k] for k in (0, 1))
+        across = x * self.along[:, 1] - y * self.along[:, 0]
+        sine2 = across * across / np.maximum(x * x + y * y, np.float32(1e-12))
+        return np.exp(np.float32(-0.5 / EDGE_SIGMA**2) * sine2)
