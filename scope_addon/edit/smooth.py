@@ -35,8 +35,10 @@ def smoothed(body: Body, motion: Motion, strength: float) -> Clip:
     raw = clip_of(body, motion, raw=True)
     if strength == 0 or len(raw) < 3:
         return raw
-    plain, wanted = _plain(raw, motion, 1.0), _plain(raw, motion, strength)
     finished = clip_of(body, motion, raw=False)
+    if strength == 1:
+        return finished
+    plain, wanted = _plain(raw, motion, 1.0), _plain(raw, motion, strength)
     share = min(strength, 1.0)
     correction = np.swapaxes(plain.rotations, -1, -2) @ finished.rotations
     if share < 1.0:
