@@ -21,7 +21,6 @@ from ...solver import (
     Stage,
     State,
     Status,
-    Tree,
     Weights,
     default_priors,
     fit_clip,
@@ -148,6 +147,7 @@ def _fit_frames(
     """Every seen frame in order: from the frame before, or from ``state(k)`` with its root as a prior."""
     body, track, priors = prepared.body, prepared.track, prepared.priors_with_shape(betas)
     T, tree = len(track), make_tree(body)
+    cold, warm = (replace(ROBUST, stages=stages(prepared.weights)) for stages in (cold_stages, warm_stages))
     rotations = np.tile(np.eye(3), (T, body.K + 1, 1, 1))
     root, valid, iterations = np.zeros((T, 3)), np.zeros(T, bool), 0
     last: Fit | None = None
@@ -160,7 +160,8 @@ def _fit_frames(
                 fresh = last is None or track.acquired[k] or track.times[k] - last_time > LONGEST_COAST_S
                 init = None if fresh or last is None else last.state
             known_root = init.t_camera_root if init is not None and state is not None else None
-            found = _fit_frame(tree, prepared.measure_with_hands(k, known_root), init, priors, prepared.weights)
+            measurements = prepared.measure_with_hands(k, known_root)
+            found = fit_tree(tree, measurements, init, priors, cold if init is None else warm)
             if found.status not in (Status.NO_MEASUREMENTS, Status.NON_FINITE):
                 last, last_time, valid[k] = found, track.times[k], True
                 iterations += found.iterations
@@ -182,11 +183,6 @@ def _fit_frames(
         joint_confidence=confidence * valid[:, None],
         iterations=iterations / max(int(valid.sum()), 1),
     )
-
-
-def _fit_frame(tree: Tree, measurements: Measurements, init: State | None, priors: Priors, weights: Weights) -> Fit:
-    options = replace(ROBUST, stages=cold_stages(weights) if init is None else warm_stages(weights))
-    return fit_tree(tree, measurements, init, priors, options)
 
 
 def _fit_shape(prepared: PreparedTrack, progress: Callable[[str, int, int], None]) -> np.ndarray:

@@ -83,6 +83,7 @@ class OpencvReader:
         num, den = self._get(cv2.CAP_PROP_SAR_NUM), self._get(cv2.CAP_PROP_SAR_DEN)
         self._aspect = num / den if num > 0 and den > 0 else 1.0
         self._grabbed = False
+        self._bgr: np.ndarray | None = None  # decoded into again and again: new memory takes time
         self.rate, self.frame_count = self._get(cv2.CAP_PROP_FPS), self._get(cv2.CAP_PROP_FRAME_COUNT)
 
     @property
@@ -96,10 +97,11 @@ class OpencvReader:
 
     def read(self) -> tuple[float, np.ndarray] | None:
         """See `FrameReader`."""
-        ok, image = self._capture.retrieve() if self._grabbed else self._capture.read()
+        ok, image = self._capture.retrieve(self._bgr) if self._grabbed else self._capture.read(self._bgr)
         self._grabbed = False
         if not ok or image is None:
             return None
+        self._bgr = image
         image = _upright(image, self._aspect, self._turn)
         return self._get(cv2.CAP_PROP_POS_MSEC) / 1000, cv2.cvtColor(image, cv2.COLOR_BGR2RGB)
 

@@ -183,7 +183,7 @@ def _observe(
 
     The background of a frame is looked at beside the people of the next one, in a thread of its own.
     """
-    builder = PeopleBuilder()
+    builder, expected = PeopleBuilder(), video.expected_frames
     frames = iter(video)
     with clock.stage("decode"):
         upcoming = next(frames, None)
@@ -205,7 +205,7 @@ def _observe(
                 people = [o.keypoints_px for _, o in observations]
                 looking = beside.submit(background.add, frame.image_rgb, frame.timestamp_s, people)
             watch(frame, max((o for _, o in observations), key=lambda o: o.region.side_px, default=None))
-            progress("finding the person", len(builder), max(video.expected_frames, len(builder)))
+            progress("finding the person", len(builder), max(expected, len(builder)))
         if looking is not None:
             looking.result()
     return builder

@@ -10,7 +10,7 @@ import numpy as np
 
 from .appearance import SIZE as APPEARANCE_SIZE
 from .landmark_network import KEYPOINT_COUNT
-from .observation import Observation
+from .observation import Judgement, Observation
 
 
 @dataclass
@@ -53,7 +53,7 @@ class Tracklet:
     centers_px: list[np.ndarray] = field(default_factory=list)  # (2,) middle of the trunk
     sides_px: list[float] = field(default_factory=list)  # of the region
     appearance: np.ndarray = field(default_factory=lambda: np.zeros(APPEARANCE_SIZE))  # sum over the frames
-    judged: list[tuple[int, np.ndarray]] = field(default_factory=list)
+    judged: list[tuple[int, Judgement]] = field(default_factory=list)
     hands: list[np.ndarray] = field(default_factory=list)  # (2, 21, 6) each; none when they are not looked for
 
     def add(self, row: int, observation: Observation) -> None:
@@ -100,7 +100,8 @@ def make_track(frames: Sequence[int], times: Sequence[float], tracklets: Sequenc
                 keypoints[row], confidence[row], world[row] = np.split(value, (2, 3), axis=1)
             seen[tracklet.rows] = True
             acquired[tracklet.rows[0]] = True
-            judged += tracklet.judged
+            results = [(row, look.result()) for row, look in tracklet.judged]
+            judged += [(row, landmarks) for row, landmarks in results if landmarks is not None]
         if hands is not None and tracklet.hands:
             hands[tracklet.rows] = tracklet.hands
     return Track(

@@ -9,7 +9,7 @@ after a leap. Which tracklets are one person is decided over the whole clip, see
 from __future__ import annotations
 
 import math
-from concurrent.futures import Future
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -25,7 +25,7 @@ from .execution import Execution
 from .landmark_network import LandmarkNetwork, PoseEstimate
 from .left_right import looks_swapped
 from .networks import landmark_network_name
-from .observation import Observation
+from .observation import Judgement, Observation
 from .person_detector import Detection, PersonDetector
 from .region import Region
 
@@ -52,6 +52,7 @@ RIVAL_SIDE = 0.5  # who is smaller than this share of the largest will not be th
 MOST_PEOPLE = 12
 JUDGE_FRAMES = 30  # between two looks of the strong network that tells left from right
 JUDGE_AGAIN_FRAMES = 8  # the same where left and right seem to have changed places
+MOST_JUDGED = 2  # looks of it that wait, each with its frame
 APPEARANCE_FRAMES = 4
 # How the region is turned and sized in which somebody who was just lost is looked for, and what is believed there.
 _TURNS = tuple(k * math.pi / 6 for k in range(12))
@@ -137,11 +138,13 @@ class PeopleTracker:
         if keypoints:
             self._landmarks = KeypointNetwork(keypoints, threads, execution)
             with suppress(SetupError):  # without ours, whichever reading is the steadiest
-                self._judge = LandmarkNetwork(strongest, threads, folder, execution)
+                self._judge = LandmarkNetwork(strongest, 1, folder, execution)
         else:
             self._landmarks = LandmarkNetwork(name, threads, folder, execution)
             if name != strongest:
-                self._judge = LandmarkNetwork(strongest, threads, folder, execution)
+                self._judge = LandmarkNetwork(strongest, 1, folder, execution)
+        self._judging: list[Judgement] = []
+        self._judges = ThreadPoolExecutor(1, "scope-judge")
         self._looks_ahead = not keypoints and self._judge is None
         self._largest_only = people is None
         self._most = 2 if people is None else min(people + 1, MOST_PEOPLE)
@@ -320,17 +323,32 @@ class PeopleTracker:
         followed.lost = 1
         self._lost.append(followed)
 
-    def _ask_judge(self, image_rgb: np.ndarray) -> dict[int, np.ndarray]:
-        """World landmarks of the strong network, by tracklet, for those whose left and right are due or in doubt."""
+    def _ask_judge(self, image_rgb: np.ndarray) -> dict[int, Judgement]:
+        """World landmarks of the strong network, by tracklet, for those whose left and right are due or in doubt.
+
+        Nothing here waits for them, so it looks in a thread of its own, beside the next frames.
+        """
         if self._judge is None:
             return {}
-        due = [f for f in self._live if f.since_judged >= (JUDGE_AGAIN_FRAMES if f.swapped else JUDGE_FRAMES)]
-        for followed in due:
+        looks = {}
+        for followed in self._live:
+            if followed.since_judged < (JUDGE_AGAIN_FRAMES if followed.swapped else JUDGE_FRAMES):
+                continue
             followed.since_judged, followed.swapped = 0, False
-        estimates = self._judge.estimate(image_rgb, [f.estimate.region for f in due])
-        return {f.tracklet: e.world_landmarks for f, e in zip(due, estimates, strict=True) if believable(e)}
+            self._judging = [look for look in self._judging if not look.done()]
+            if len(self._judging) >= MOST_JUDGED:
+                self._judging[0].result()
+            look = self._judges.submit(self._judgement, image_rgb, followed.estimate.region)
+            self._judging.append(look)
+            looks[followed.tracklet] = look
+        return looks
 
-    def _observe(self, image_rgb: np.ndarray, followed: _Followed, judged: np.ndarray | None) -> Observation:
+    def _judgement(self, image_rgb: np.ndarray, region: Region) -> np.ndarray | None:
+        assert self._judge is not None
+        (estimate,) = self._judge.estimate(image_rgb, [region])
+        return estimate.world_landmarks if believable(estimate) else None
+
+    def _observe(self, image_rgb: np.ndarray, followed: _Followed, judged: Judgement | None) -> Observation:
         e = followed.estimate
         look = followed.age % APPEARANCE_FRAMES == 0
         return Observation(

@@ -58,8 +58,10 @@ def accumulate(tree, ints, floats, weight, inv_sigma, triggs, pose, blocks):  # 
 def pack(parts: Array, R_camera_part: Array, t_camera_part: Array, w_R: Array, w_t: Array) -> tuple[Array, Array]:
     """Return the tables of `accumulate` from parts (n,), rotations (n, 3, 3), positions (n, 3) and weights (n,)."""
     n = len(parts)
-    columns = [np.reshape(R_camera_part, (n, 9)), np.reshape(t_camera_part, (n, 3)), np.c_[w_R], np.c_[w_t]]
-    return np.reshape(parts, (n, 1)).astype(np.int64), np.ascontiguousarray(np.hstack(columns), dtype=np.float64)
+    floats = np.empty((n, 14))
+    floats[:, :9], floats[:, 9:12] = np.reshape(R_camera_part, (n, 9)), t_camera_part
+    floats[:, 12], floats[:, 13] = w_R, w_t
+    return np.reshape(parts, (n, 1)).astype(np.int64), floats
 
 
 def evaluate(part: Part, R_hat: Array, t_hat: Array, w_R: float, w_t: float, weight: float = 1.0) -> Linearization:

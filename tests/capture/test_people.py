@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -10,7 +11,9 @@ import cv2
 import numpy as np
 import pytest
 from scope.scope_addon.capture import tracker as tracker_module
+from scope.scope_addon.capture.landmark_network import PoseEstimate
 from scope.scope_addon.capture.people import PeopleBuilder
+from scope.scope_addon.capture.region import Region
 from scope.scope_addon.capture.track import Track
 from scope.scope_addon.capture.tracker import PeopleTracker
 from scope.solver.errors import SetupError
@@ -142,6 +145,28 @@ def test_exchanged_left_and_right_are_judged(follow: Callable[..., list[Track]])
     repaired = repair_left_right(track, choose_camera(1200, 400))
     assert (repaired.keypoints_px[:, 11, 0] > repaired.keypoints_px[:, 12, 0]).all()
     assert len(track.judged_rows) <= 120 // 30 + 3
+
+
+def test_nobody_waits_for_the_judge(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its judgement of the first frame arrives after the last one."""
+    person, free = Person(lambda t: (300 + t, 200), BLUE), threading.Event()
+
+    class SlowJudge(FakeLandmarks):
+        def estimate(self, image: np.ndarray, regions: list[Region]) -> list[PoseEstimate]:
+            free.wait(60)
+            return super().estimate(image, regions)
+
+    networks = {True: SlowJudge([person], right=True), False: FakeLandmarks([person])}
+    monkeypatch.setattr(tracker_module, "LandmarkNetwork", lambda name, *_: networks["heavy" in name])
+    monkeypatch.setattr(tracker_module, "PersonDetector", lambda *_: FakeDetector([person]))
+    tracker, builder = PeopleTracker("fast", 1), PeopleBuilder()
+    for t, image in enumerate(pictures([person], 20)):
+        builder.add(t, t / FPS, tracker.step(image))
+    assert networks[True].batches == []
+    free.set()
+    (track,) = builder.build(1)
+    assert track.judged_rows.tolist() == [0]
+    np.testing.assert_allclose(track.judged_landmarks[0], person.body(0))
 
 
 def panels(shared: Path, camera: str) -> tuple[list[np.ndarray], np.ndarray]:
