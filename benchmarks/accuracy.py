@@ -38,6 +38,7 @@ ABLATION: dict[str, dict[str, Parts | bool]] = {
     "without left-right repair": {"parts": Parts(left_right=False)},
     "without mended leaps": {"parts": Parts(leaps=False)},
     "without the second pass": {"parts": Parts(second_pass=False)},
+    "without balance": {"parts": Parts(balance=False)},
     "without contact": {"parts": Parts(contact=False)},
     "without smoothing": {"smoothing": False},
 }

@@ -10,6 +10,7 @@ import numpy as np
 from ...solver import rotations
 from ...solver.body import Body
 from ..motion import Motion
+from .balance import turn_over_feet
 from .camera import Camera
 from .camera_path import CameraPath
 from .fitting import FittedTrack
@@ -23,12 +24,14 @@ from .track import Track
 from .world import estimate_world
 
 
-def root_on_floor(
-    placed: PlacedTrack, T_floor_camera: np.ndarray | None = None, lines: Lines | None = None
-) -> np.ndarray:
-    """(T, 3) smoothed pelvis positions in the camera frame, their distance corrected by the floor and standing feet.
+def corrected_stance(
+    placed: PlacedTrack, T_floor_camera: np.ndarray | None, lines: Lines | None, balanced: bool
+) -> tuple[np.ndarray, np.ndarray]:
+    """What floor, feet and balance say of how far away and how upright a body is, camera frame.
 
-    ``T_floor_camera`` (4, 4): the floor at z = 0; None: it is found from this person alone.
+    :param T_floor_camera: (4, 4) the floor at z = 0; None: it is found from this person alone.
+    :param balanced: whether weight has to be over feet that stand.
+    :return: smoothed pelvis positions (T, 3), and rotations (T, 3, 3) by which the body as a whole is to be turned.
     """
     valid, root = placed.valid, placed.root
     T = T_floor_camera
@@ -36,7 +39,11 @@ def root_on_floor(
         T = estimate_world(placed.body, placed.joints[valid], placed.soles[valid], lines)
     contact = standing_probability(placed.soles, T[2, :3], placed.times) * valid[:, None]
     away = correct_depth(root - placed.center, placed.soles, contact, T, placed.times)
-    return root + away[:, None] * along_sight(root - placed.center)
+    shift = away[:, None] * along_sight(root - placed.center)
+    if not balanced:
+        return root + shift, np.broadcast_to(np.eye(3), (len(root), 3, 3))
+    turn, pivot = turn_over_feet(placed, contact, T[2, :3])
+    return pivot + np.einsum("tij,tj->ti", turn, root - pivot) + shift, turn
 
 
 def assemble_motion(

@@ -47,6 +47,10 @@ class CameraPath:
             return points
         return np.einsum("tji,tkj->tki", self.R_first_camera, points - self.center[:, None])
 
+    def rotations_to_frames(self, R: np.ndarray) -> np.ndarray:
+        """(T, 3, 3) rotations about axes of the first frame in each frame's camera."""
+        return R if self.is_static else np.swapaxes(self.R_first_camera, 1, 2) @ R @ self.R_first_camera
+
     def world_from_frames(self, T_world_first: np.ndarray) -> np.ndarray:
         """(T, 4, 4) world_from_camera of each frame, from that of the first frame's axes (4, 4)."""
         out = np.tile(T_world_first, (len(self.center), 1, 1))

@@ -88,6 +88,12 @@ class PreparedTrack:
             return measured
         return self.hand_measurer.add(measured, self.hands[k])
 
+    def turned(self, R: np.ndarray) -> PreparedTrack:
+        """With what was lifted turned about the hips by (T, 3, 3), camera axes; the picture stays as it is."""
+        points = self.lifted.points
+        turned = (points @ np.swapaxes(R, 1, 2).astype(points.dtype)).astype(points.dtype)
+        return replace(self, lifted=replace(self.lifted, points=turned))
+
     def priors_with_shape(self, betas: np.ndarray) -> Priors:
         """The priors once the shape is known."""
         return replace(self.priors, shape_mean=betas, shape_information=np.eye(self.body.P) * SHAPE_CERTAINTY)

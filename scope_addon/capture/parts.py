@@ -21,6 +21,7 @@ class Parts:
     left_right: bool = True  # repair of left and right
     leaps: bool = True  # repair of keypoints that leap away for a few frames
     second_pass: bool = True  # the fit again with the distance that floor and feet tell
+    balance: bool = True  # in it, weight over feet that stand
     contact: bool = True  # feet held on the floor at the end
 
     def __post_init__(self) -> None:

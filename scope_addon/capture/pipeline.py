@@ -15,7 +15,7 @@ import numpy as np
 from ...solver.body import Body
 from ...solver.errors import NoPersonError, UsageError, VideoError
 from ..motion import Motion
-from .assemble import assemble_motion, root_on_floor
+from .assemble import assemble_motion, corrected_stance
 from .camera import Camera, choose_camera, estimated_camera
 from .camera_motion import BackgroundTracker
 from .camera_path import CameraPath
@@ -252,10 +252,12 @@ def solve(
     if smoothing and parts.second_pass:
         world = share_world(body, placed, lines) if several else None
         floors = [world.floor_from_camera(k) if world else None for k in range(len(tracks))]
-        roots = [root_on_floor(each, floor, lines)[:, None] for each, floor in zip(placed, floors, strict=True)]
+        balanced = parts.balance
+        stances = [corrected_stance(*each, lines, balanced) for each in zip(placed, floors, strict=True)]
         placed.clear()
-        for k, root in enumerate(roots):
-            fits[k] = compact(refit_track(prepared[k], fits[k], path.points_to_frames(root)[:, 0], progress))
+        for k, (root, turn) in enumerate(stances):
+            seen = prepared[k].turned(path.rotations_to_frames(turn))
+            fits[k] = compact(refit_track(seen, fits[k], path.points_to_frames(root[:, None])[:, 0], progress))
         placed = place()
     prepared.clear()
     world = share_world(body, placed, lines) if several else None

@@ -1,0 +1,88 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Weight presses on the soles that stand: how far a body must be turned for that, along the line of sight.
+
+How a body leans towards the camera or away is hardly seen in the picture. With c the centre of mass, h its height above
+the standing soles p_i, g gravity and s the level part of the line of sight, weight and inertia press on the floor at
+
+    x = s·(c − c̈ h / g),   min_i s·p_i ≤ x ≤ max_i s·p_i.
+
+What sticks out is taken back by turning the whole body about its standing soles. The faster somebody moves, the less
+is believed of this: there, c̈ is not known well enough.
+
+Sources: Vukobratović and Borovac 2004 (zero moment point); masses of body parts and their centres by Winter 2009.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...solver.body import Body
+from ...solver.rotations import exp
+from .placement import PlacedTrack
+from .smoothing import gaussian_smooth
+
+STANDING_M_S = 0.5  # speed of the centre of mass at which little is believed of this
+CUTOFF_HZ = 1.0
+# How far a sole reaches behind its heel point and beyond its toe point (`soles`), in distances between the two.
+BEHIND, BEYOND = 1.2, 0.4
+DOUBT = 0.2  # share of standing frames nearby that halves what is believed, roughly
+GRAVITY_M_S2 = 9.81
+LARGEST_TURN = np.radians(10.0)
+# Part of the mass, from joint, to joint, share of the way at which its centre lies.
+_LIMBS = (
+    (0.028, "shoulder", "elbow", 0.436),
+    (0.022, "elbow", "wrist", 0.68),  # with the hand
+    (0.100, "hip", "knee", 0.433),
+    (0.0465, "knee", "ankle", 0.433),
+    (0.0145, "ankle", "foot", 0.5),
+)
+_HEAD, _TRUNK = 0.081, 0.497
+
+
+def center_of_mass(body: Body, joints: np.ndarray) -> np.ndarray:
+    """(T, 3) of a body whose joints are at (T, K+1, 3)."""
+    at = {name: i for i, name in enumerate(body.joint_names)}
+    trunk = [at[f"{side}_{name}"] for side in ("left", "right") for name in ("hip", "shoulder")]
+    total = _HEAD * joints[:, at["head"]] + _TRUNK * joints[:, trunk].mean(axis=1)
+    for mass, start, end, share in _LIMBS:
+        for side in ("left", "right"):
+            a, b = joints[:, at[f"{side}_{start}"]], joints[:, at[f"{side}_{end}"]]
+            total = total + mass * ((1 - share) * a + share * b)
+    return total / (_HEAD + _TRUNK + 2 * sum(mass for mass, *_ in _LIMBS))
+
+
+def turn_over_feet(placed: PlacedTrack, contact: np.ndarray, up: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """By which rotations (T, 3, 3), about which points (T, 3), the weight comes over the feet; the camera's axes.
+
+    :param contact: (T, 4) probability that each sole stands;  up: (3,) unit.
+    """
+    soles, times = placed.soles, placed.times
+    mass = gaussian_smooth(center_of_mass(placed.body, placed.joints), times, CUTOFF_HZ)
+    share = contact / np.maximum(contact.sum(axis=1, keepdims=True), 1e-9)
+    pivot = (share[..., None] * soles).sum(axis=1)
+    sight = mass - placed.center
+    sight = sight - (sight @ up)[:, None] * up
+    sight /= np.maximum(np.linalg.norm(sight, axis=1, keepdims=True), 1e-9)
+    height = np.maximum((mass - pivot) @ up, 0.3)
+    stands = contact > 0.5
+    believed = stands.any(axis=1).astype(float)
+    pressing = mass
+    if len(times) > 2:
+        velocity = np.gradient(mass, times, axis=0)
+        believed *= np.exp(-np.square(np.linalg.norm(velocity, axis=1) / STANDING_M_S))
+        pressing = mass - np.gradient(velocity, times, axis=0) * (height / GRAVITY_M_S2)[:, None]
+    at, along = (pressing * sight).sum(axis=1), (_whole_soles(soles) * sight[:, None]).sum(axis=-1)
+    somewhere = stands.any(axis=1)
+    low = np.where(somewhere, np.where(stands, along, np.inf).min(axis=1), -np.inf)
+    high = np.where(somewhere, np.where(stands, along, -np.inf).max(axis=1), np.inf)
+    out = np.maximum(at - high, 0) - np.maximum(low - at, 0)
+    angle = gaussian_smooth(-believed * np.arctan2(out, height), times, CUTOFF_HZ)
+    angle /= gaussian_smooth(believed, times, CUTOFF_HZ) + DOUBT
+    angle = np.clip(angle, -LARGEST_TURN, LARGEST_TURN)
+    return exp(angle[:, None] * np.cross(up, sight)), pivot
+
+
+def _whole_soles(soles: np.ndarray) -> np.ndarray:
+    """(T, 4, 3) the ends of the soles whose heel and toe points are (T, 4, 3), in the same order."""
+    heel, toe = soles[:, 0::2], soles[:, 1::2]
+    return np.stack([heel - BEHIND * (toe - heel), toe + BEYOND * (toe - heel)], axis=2).reshape(soles.shape)

@@ -1,0 +1,92 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Weight over feet: bodies that lean away from the camera, and some that may."""
+
+import numpy as np
+import pytest
+from scope.scope_addon.capture.balance import center_of_mass, turn_over_feet
+from scope.scope_addon.capture.placement import PlacedTrack
+from scope.scope_addon.capture.soles import sole_points, with_soles
+from scope.solver import load_body, rotations
+
+UP = np.array([0.0, -1.0, 0.0])  # camera axes, level camera
+AWAY = np.array([0.0, 0.0, 1.0])
+T = 60
+TIMES = np.arange(T) / 30
+
+
+def standing(lean_deg=0.0, axis=(1.0, 0.0, 0.0), speed_m_s=0.0, arms_deg=60.0):
+    """A person who stands 4 m away with arms down, leaning as a whole about the feet; gliding along if so asked."""
+    body = load_body("scope")
+    soled = with_soles(body, np.zeros(body.P))
+    omega = np.tile(np.eye(3), (T, body.K + 1, 1, 1))
+    for side, sign in (("left", -1), ("right", 1)):
+        omega[:, body.joint_names.index(f"{side}_shoulder")] = rotations.exp([0, 0, sign * np.radians(arms_deg)])
+    upright = rotations.exp([np.pi, 0.0, 0.0])  # model y up to camera y down
+    lean = rotations.exp(np.radians(lean_deg) * np.array(axis))
+    omega[:, 0] = lean @ upright
+    J0 = body.rest_joints()[0]
+
+    def place(root):
+        R, t = body.forward_kinematics(omega, root - J0)
+        return t, sole_points(soled, R, t)
+
+    root = np.zeros((T, 3))
+    joints, soles = place(root)
+    root += np.array([0, 1.0, 4.0]) - soles.mean(axis=(0, 1)) + speed_m_s * TIMES[:, None] * [1.0, 0, 0]
+    joints, soles = place(root)
+    zeros = np.zeros((T, 3))
+    return PlacedTrack(soled, np.zeros(body.P), TIMES, np.ones(T, bool), omega, root, joints, soles, zeros)
+
+
+def turned_deg(turn):
+    """Degrees about the camera's x axis."""
+    return np.degrees(rotations.log(turn))[:, 0]
+
+
+def test_the_center_of_mass_is_that_of_the_volume():
+    body = load_body("scope")
+    placed = standing()
+    R, t = body.forward_kinematics(placed.rotations[0], placed.root[0] - body.rest_joints()[0])
+    v = body.skin(R, t)
+    a, b, c = (v[body.faces[:, k]] for k in range(3))
+    volume = np.einsum("ij,ij->i", a, np.cross(b, c)) / 6
+    centroid = (volume[:, None] * (a + b + c) / 4).sum(0) / volume.sum()
+    np.testing.assert_allclose(center_of_mass(body, placed.joints)[0], centroid, atol=0.05)
+
+
+@pytest.mark.parametrize("lean", [-20.0, 20.0])
+def test_who_would_fall_is_turned_back_over_the_feet(lean):
+    placed = standing(lean)
+    turn, pivot = turn_over_feet(placed, np.ones((T, 4)), UP)
+    angle = turned_deg(turn)[T // 2]
+    assert np.sign(angle) == -np.sign(lean)
+    assert 3.0 < abs(angle) < 10.5
+    np.testing.assert_allclose(pivot, placed.soles.mean(axis=1), atol=1e-9)
+    turned = pivot + np.einsum("tij,tj->ti", turn, center_of_mass(placed.body, placed.joints) - pivot)
+    before, after = ((c - pivot)[T // 2] @ AWAY for c in (center_of_mass(placed.body, placed.joints), turned))
+    assert abs(after) < 0.75 * abs(before)
+
+
+def test_who_stands_upright_is_left_alone():
+    assert np.abs(turned_deg(turn_over_feet(standing(), np.ones((T, 4)), UP)[0])).max() < 1.0
+
+
+def test_a_lean_across_the_line_of_sight_is_seen_and_left_alone():
+    turn, _ = turn_over_feet(standing(20.0, axis=(0.0, 0.0, 1.0)), np.ones((T, 4)), UP)
+    assert np.abs(rotations.log(turn)).max() < np.radians(1.0)
+
+
+def test_who_moves_or_flies_is_left_alone():
+    turn, _ = turn_over_feet(standing(20.0, speed_m_s=1.5), np.ones((T, 4)), UP)
+    assert np.abs(turned_deg(turn)[10:-10]).max() < 0.5  # the speed at the ends is not known well
+    turn, _ = turn_over_feet(standing(20.0), np.zeros((T, 4)), UP)
+    assert np.isfinite(turn).all()
+    assert np.abs(turned_deg(turn)).max() < 1e-6
+
+
+def test_a_still_is_judged_as_it_stands():
+    placed = standing(20.0)
+    one = PlacedTrack(*(getattr(placed, n) if n in ("body", "betas") else getattr(placed, n)[:1]
+                        for n in placed.__dataclass_fields__))  # fmt: skip
+    turn, _ = turn_over_feet(one, np.ones((1, 4)), UP)
+    assert turned_deg(turn)[0] < -3.0
