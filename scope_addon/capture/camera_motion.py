@@ -34,6 +34,7 @@ KEY_SHARE = 0.5  # of a key frame's corners; with fewer left, the next key frame
 AGREEING_PX = 1.2  # in the working picture
 TRUSTED_SHARE = 0.35  # of corners that must agree; a crowd or water that fills the picture says nothing
 SAMPLES_HZ = 12.0  # a hand trembles at up to 10 Hz, but by less than can be seen here
+TRAVELLING_SHARE = 0.8  # of corners that agree with a turn, on average; fewer: near ones pass by, and look like turning
 STATIC_DEG = 0.35  # turning less than this over the clip is a camera on a stand
 
 
@@ -77,6 +78,7 @@ class BackgroundTracker:
         self._key_count = 0
         self._R_first_key = np.eye(3)
         self._R_key_last = np.eye(3)
+        self._agreeing: list[float] = []  # share of the corners, where they were followed
         self._looks: list[Look] = []  # the first one at the first frame in which somebody is seen
 
     def add(self, image_rgb: np.ndarray, time_s: float, people: Sequence[np.ndarray]) -> None:
@@ -135,8 +137,10 @@ class BackgroundTracker:
         if len(late) and times[-1] - times[b] < 1.5 / SAMPLES_HZ:  # the camera goes on turning as it did
             rate = log(R[a].T @ R[b]) / (times[b] - times[a])
             filled[late] = R[b] @ exp((times[late] - times[b])[:, None] * rate)
-        width, height = self._full_size
-        return CameraMotion(without_drift(filled[0].T @ filled, times, self._looks, camera, width, height), known)
+        R = filled[0].T @ filled
+        if self._agreeing and np.mean(self._agreeing) < TRAVELLING_SHARE:
+            R = without_drift(R, times, self._looks, camera, *self._full_size)
+        return CameraMotion(R, known)
 
     @property
     def segments(self) -> Segments:
@@ -162,6 +166,7 @@ class BackgroundTracker:
             return None
         rays = self._rays(self._points)
         R, agree = consensus_rotation(self._key_rays, rays, self._tolerance, self._random)
+        self._agreeing.append(float(agree.mean()))
         if agree.mean() < TRUSTED_SHARE or agree.sum() < FEWEST_CORNERS // 2:
             return None
         return R
