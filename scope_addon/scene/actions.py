@@ -163,8 +163,18 @@ def repeat_for_ever(datablock: bpy.types.ID, onwards: set[tuple[str, int]] | Non
 
 
 def frame_range(datablocks: Iterable[bpy.types.ID]) -> tuple[float, float] | None:
-    """First and last key over the datablocks' curves; None when nothing is keyed."""
-    spans = [tuple(curve.range()) for datablock in datablocks for curve in fcurves(datablock)]
+    """First and last key over the datablocks' curves; None when nothing is keyed.
+
+    Where there are others, custom properties' curves do not count: of a loop that was cut out they are the longer ones.
+    """
+    curves = [curve for datablock in datablocks for curve in fcurves(datablock) if len(curve.keyframe_points)]
+    moving = [curve for curve in curves if not curve.data_path.endswith('"]')] or curves
+    spans = [tuple(curve.range()) for curve in moving]
     if not spans:
         return None
     return min(s[0] for s in spans), max(s[1] for s in spans)
+
+
+def repeats(datablocks: Iterable[bpy.types.ID]) -> bool:
+    """Whether their curves go on for ever."""
+    return any(m.type == "CYCLES" for datablock in datablocks for curve in fcurves(datablock) for m in curve.modifiers)

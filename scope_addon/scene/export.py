@@ -88,7 +88,7 @@ def export(
                 _write(target, lambda temporary, rig=rig: formats.write_bvh(temporary, scene, rig))
             return targets
         writers = {
-            ".glb": lambda temporary: formats.write_glb(temporary, options.camera),
+            ".glb": lambda temporary: formats.write_glb(temporary, options.camera, actions.repeats(_armatures(scene))),
             ".fbx": lambda temporary: formats.write_fbx(temporary, options.camera),
             ".usdc": lambda temporary: formats.write_usd(temporary, options.camera),
             ".blend": lambda temporary: formats.write_blend(temporary, scene),
@@ -176,8 +176,7 @@ def _scene_of(collections: Sequence[bpy.types.Collection]) -> Iterator[bpy.types
             scene.timeline_markers.new(marker.name, frame=marker.frame)
         cameras = [obj for obj in scene.objects if obj.type == "CAMERA"]
         scene.camera = source.camera if source.camera in cameras else next(iter(cameras), None)
-        animated = [obj for obj in scene.objects if obj.type == "ARMATURE"]
-        span = actions.frame_range(animated) or (source.frame_start, source.frame_end)
+        span = actions.frame_range(_armatures(scene)) or (source.frame_start, source.frame_end)
         scene.frame_end = math.ceil(span[1])
         scene.frame_start = math.floor(span[0])
         # Until the view layer is evaluated once, frame changes do not reach the objects that exporters read.
@@ -185,6 +184,10 @@ def _scene_of(collections: Sequence[bpy.types.Collection]) -> Iterator[bpy.types
         scene.frame_set(scene.frame_start)
         yield scene
     source.frame_set(source.frame_current, subframe=source.frame_subframe)
+
+
+def _armatures(scene: bpy.types.Scene) -> list[bpy.types.Object]:
+    return [obj for obj in scene.objects if obj.type == "ARMATURE"]
 
 
 @contextmanager

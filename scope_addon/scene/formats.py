@@ -20,7 +20,7 @@ from ...solver.errors import OutputError
 from . import bvh, timing
 
 
-def write_glb(path: Path, camera: bool = False) -> None:
+def write_glb(path: Path, camera: bool = False, loop: bool = False) -> None:
     """glTF binary: y up, metres, four influences a vertex, shape keys as morph targets, all motion in one animation."""
     need_addon("io_scene_gltf2")
     call_operator(
@@ -45,7 +45,8 @@ def write_glb(path: Path, camera: bool = False) -> None:
         export_animation_mode="ACTIVE_ACTIONS",
         export_anim_single_armature=False,  # else Blender 4.2 mixes in the other actions of the file
         export_force_sampling=True,
-        export_frame_range=False,
+        export_frame_range=True,
+        export_anim_slide_to_zero=loop,  # players begin at zero, and would wait for the first frame each time
         export_optimize_animation_size=False,
         export_optimize_disable_viewport=True,
     )

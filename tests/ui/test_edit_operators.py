@@ -178,6 +178,22 @@ def test_a_loop_goes_on_for_ever_where_it_ended(rig):
     np.testing.assert_allclose(next_time - next_time[:, :1], once - once[:, :1], atol=2e-3)
 
 
+@pytest.mark.parametrize("suffix", ["glb", "fbx", "bvh"])
+def test_a_loop_is_exported_alone(rig, tmp_path, suffix):
+    """Curves that loop for ever, and the confidence of the frames that were cut off, do not make the file longer."""
+    bpy.ops.scope.loop(start=5, end=85, shortest=0.8)
+    length = bpy.context.scene.frame_end + 1 - bpy.context.scene.frame_start
+    path = str(tmp_path / f"loop.{suffix}")
+    bpy.ops.scope.export(filepath=path, format=suffix.upper())
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    bpy.context.scene.render.fps = int(RATE)
+    operators = {"glb": bpy.ops.import_scene.gltf, "fbx": bpy.ops.import_scene.fbx, "bvh": bpy.ops.import_anim.bvh}
+    operators[suffix](filepath=path)
+    for action in bpy.data.actions:
+        assert action.frame_range[1] - action.frame_range[0] == pytest.approx(length, abs=0.01)
+        assert suffix != "glb" or action.frame_range[0] == 0  # players begin there
+
+
 @pytest.mark.parametrize("degrees", [0.3, 2.0])
 def test_reduced_keys_stay_within_what_was_asked(rig, degrees):
     before, dense = seen(rig, range(1, 91)), keys(rig)[0]
