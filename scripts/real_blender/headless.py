@@ -46,22 +46,36 @@ def one_clip() -> None:
     assert not list(OUT.glob("broken*")) + list(OUT.glob("wall*"))
 
 
+def running(what: bytes) -> list[str]:
+    """Processes of our command line that do this."""
+    found = []
+    for path in Path("/proc").glob("[0-9]*/cmdline"):
+        try:
+            found += [path.parent.name] if b"--command\0scope\0" + what in path.read_bytes() else []
+        except OSError:
+            continue  # it has just ended
+    return found
+
+
 def stopped(name: str) -> None:
     """A batch that Ctrl-C, or a request to end, ends: with its clips, soon, and with nothing half-written."""
     out = OUT / f"stopped_{name}"
     arguments = ("batch", "clips", "--out", str(out), "--jobs", "2", "--formats", "npz", "--quality", "best")
     print("scope", *arguments, name, flush=True)
     process = subprocess.Popen([*COMMAND, *arguments], stderr=subprocess.PIPE, text=True)
-    time.sleep(4.0)
+    end = time.monotonic() + 120.0
+    while not running(b"capture"):  # before that Blender itself takes the signals
+        assert process.poll() is None, process.returncode
+        assert time.monotonic() < end, "the batch began no clip"
+        time.sleep(0.1)
     process.send_signal(getattr(signal, name))
     began = time.monotonic()
     _, stderr = process.communicate(timeout=60)
     print(stderr, flush=True)
     assert process.returncode == 130, process.returncode
-    assert time.monotonic() - began < 30
+    assert time.monotonic() - began < 40
     assert {p.name for p in out.iterdir()} <= {"scope-batch.json"}, list(out.iterdir())
-    left = [p for p in Path("/proc").glob("[0-9]*/cmdline") if b"--command\0scope" in p.read_bytes()]
-    assert not left, left
+    assert not running(b""), running(b"")
 
 
 def folder() -> None:
