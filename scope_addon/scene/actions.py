@@ -173,8 +173,3 @@ def frame_range(datablocks: Iterable[bpy.types.ID]) -> tuple[float, float] | Non
     if not spans:
         return None
     return min(s[0] for s in spans), max(s[1] for s in spans)
-
-
-def repeats(datablocks: Iterable[bpy.types.ID]) -> bool:
-    """Whether their curves go on for ever."""
-    return any(m.type == "CYCLES" for datablock in datablocks for curve in fcurves(datablock) for m in curve.modifiers)

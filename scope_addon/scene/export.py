@@ -88,7 +88,7 @@ def export(
                 _write(target, lambda temporary, rig=rig: formats.write_bvh(temporary, scene, rig))
             return targets
         writers = {
-            ".glb": lambda temporary: formats.write_glb(temporary, options.camera, actions.repeats(_armatures(scene))),
+            ".glb": lambda temporary: formats.write_glb(temporary, options.camera),
             ".fbx": lambda temporary: formats.write_fbx(temporary, options.camera),
             ".usdc": lambda temporary: formats.write_usd(temporary, options.camera),
             ".blend": lambda temporary: formats.write_blend(temporary, scene),

@@ -20,7 +20,7 @@ from ...solver.errors import OutputError
 from . import bvh, timing
 
 
-def write_glb(path: Path, camera: bool = False, loop: bool = False) -> None:
+def write_glb(path: Path, camera: bool = False) -> None:
     """glTF binary: y up, metres, four influences a vertex, shape keys as morph targets, all motion in one animation."""
     need_addon("io_scene_gltf2")
     call_operator(
@@ -46,7 +46,7 @@ def write_glb(path: Path, camera: bool = False, loop: bool = False) -> None:
         export_anim_single_armature=False,  # else Blender 4.2 mixes in the other actions of the file
         export_force_sampling=True,
         export_frame_range=True,
-        export_anim_slide_to_zero=loop,  # players begin at zero, and would wait for the first frame each time
+        export_anim_slide_to_zero=True,  # players begin at zero, and would wait for the first frame each time
         export_optimize_animation_size=False,
         export_optimize_disable_viewport=True,
     )

@@ -205,6 +205,18 @@ def test_glb_holds_one_animation_one_skin_and_named_morphs(body, make_motion, tm
     assert max(times) == pytest.approx(4 / 25)
 
 
+def test_glb_of_a_part_of_the_footage_begins_at_once(body, make_motion, tmp_path):
+    motion = make_motion(body, 5, rate=25.0)
+    motion.frames += 250
+    motion.timestamps += 10.0
+    path = tmp_path / "late.glb"
+    export_motions([motion, motion], body, path)
+    gltf = glb_json(path)
+    inputs = [gltf["accessors"][s["input"]] for s in gltf["animations"][0]["samplers"]]
+    assert min(i["min"][0] for i in inputs) == 0.0
+    assert max(i["max"][0] for i in inputs) == pytest.approx(4 / 25)
+
+
 def test_glb_is_upright_in_its_y_up_frame(body, make_motion, tmp_path):
     path = tmp_path / "walk.glb"
     export_motions([make_motion(body, 2)], body, path)
