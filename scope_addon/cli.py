@@ -27,6 +27,7 @@ from .retarget.rig_source import ROOTS
 from .scene.output_paths import SUFFIXES, check_output, person_paths
 
 if TYPE_CHECKING:
+    from .capture.pipeline import CaptureOptions
     from .retarget.rig_source import RigSource
 
 SAMPLE = ASSETS / "sample" / "sample.mp4"
@@ -51,7 +52,11 @@ def build_parser() -> argparse.ArgumentParser:
     capture = commands.add_parser("capture", help="capture the people in a video or picture")
     capture.set_defaults(run=run_capture)
     capture.add_argument(
-        "video", nargs="?", type=Path, metavar="VIDEO", help="video, picture or folder of pictures (default: a sample)"
+        "video",
+        nargs="?",
+        type=Path,
+        metavar="VIDEO",
+        help="video, picture, or numbered pictures as a folder or walk_####.png (default: a sample)",
     )
     capture.add_argument(
         "-o",
@@ -97,7 +102,9 @@ def _add_options(capture: argparse.ArgumentParser) -> None:
     capture.add_argument("--start", metavar="TIME", help="from when: seconds, MM:SS or HH:MM:SS.mmm")
     capture.add_argument("--end", metavar="TIME", help="until when")
     capture.add_argument("--fps", metavar="N", help="use so many frames per second, such as 12 or 29.97")
-    capture.add_argument("--body", default="scope", help=f"{', '.join(BUILT_IN)} or a body .npz (default: scope)")
+    capture.add_argument(
+        "--body", default="scope", help=f"{', '.join(BUILT_IN)}, or your own .npz or .pkl (default: scope)"
+    )
     capture.add_argument("--hands", action="store_true", help="fingers too, on scope_h unless --body says otherwise")
     capture.add_argument("--focal-mm", type=float, metavar="MM", help="35 mm equivalent focal length of the camera")
     capture.add_argument("--fov", type=float, metavar="DEGREES", help="field of view along the longer side")
@@ -136,7 +143,10 @@ def main(argv: Sequence[str] | None = None, program: Sequence[str] = PROGRAM) ->
     :param program: how a process of its own is started that takes these arguments; a batch starts one per clip.
     """
     try:
-        args = build_parser().parse_args(argv)
+        args, unknown = build_parser().parse_known_args(argv)
+        if unknown:
+            several = "; a folder of clips is for scope batch" if not unknown[0].startswith("-") else ""
+            raise UsageError(f"cannot use {' '.join(unknown)} (see scope {args.command} --help{several})")
         args.program = list(program)
         with _stopped_by_signals(), _stdout_for_report() as stdout:
             report = args.run(args)
@@ -146,8 +156,8 @@ def main(argv: Sequence[str] | None = None, program: Sequence[str] = PROGRAM) ->
     except ScopeError as error:
         print(f"scope: {error}", file=sys.stderr)
         return error.exit_status
-    except KeyboardInterrupt:
-        print("scope: stopped; nothing was written", file=sys.stderr)
+    except KeyboardInterrupt as stop:
+        print(f"scope: stopped; {str(stop) or 'nothing was written'}", file=sys.stderr)
         return 130
     except (OSError, MemoryError) as error:
         print(f"scope: the system refused: {error}; free space or memory and try again", file=sys.stderr)
@@ -161,13 +171,48 @@ def run_capture(args: argparse.Namespace) -> dict:
     _check_outputs(outputs, args.overlay, video)
     rig = _rig_of(args, outputs)
 
+    body, options = _body_and_options(args)
     # Imported here, so that --help and a wrong argument answer at once.
-    from ..solver.body import load_body
     from .capture.overlay import write_overlay
-    from .capture.pipeline import CaptureOptions, capture
+    from .capture.pipeline import capture
+
+    with _ProgressBar(sys.stderr, show=sys.stderr.isatty() and not args.quiet) as progress:
+        result = capture(video, body, options, progress)
+        progress("writing", 0, 0)
+        with _interrupted("some results may be there already, each of them whole"):
+            written = _write(outputs, result.motions, body, video, args, rig)
+            if args.overlay:
+                write_overlay(
+                    args.overlay,
+                    video,
+                    result.motions,
+                    body,
+                    progress=lambda i, n: progress("overlay", i, n),
+                    wanted=options.wanted,
+                )
+                written.append(args.overlay)
+    report = dict(result.report, outputs=[str(p) for p in written])
+    for warning in report["warnings"]:
+        print(f"scope: warning: {warning}", file=sys.stderr)
+    if not args.json:
+        print(_summary(report), file=sys.stderr)
+    return report
+
+
+def _body_and_options(args: argparse.Namespace) -> tuple[Body, CaptureOptions]:
+    """What the arguments say about how to capture.
+
+    :raises ScopeError: an argument cannot be meant, or there is no such body.
+    """
+    from ..solver.body import load_body
+    from .capture.camera import choose_camera
+    from .capture.pipeline import CaptureOptions
     from .capture.video_range import VideoRange, parse_rate, parse_time
 
-    body = load_body(body_with_hands(args.body) if args.hands else args.body)
+    if args.threads < 0:
+        raise UsageError(f"--threads takes a number from 1 on, or 0 for all, not {args.threads}")
+    if args.focal_mm is not None or args.fov is not None:
+        choose_camera(1, 1, focal_mm=args.focal_mm, fov_deg=args.fov, calibration=args.calibration)
     options = CaptureOptions(
         quality=args.quality,
         people=_people(args.people),
@@ -181,31 +226,12 @@ def run_capture(args: argparse.Namespace) -> dict:
         calibration=args.calibration,
         smoothing=not args.no_smoothing,
         hands=args.hands,
-        threads=max(0, args.threads),
+        threads=args.threads,
         provider=args.provider,
         detector=args.detector,
         keypoints=args.keypoints,
     )
-    with _ProgressBar(sys.stderr, show=sys.stderr.isatty() and not args.quiet) as progress:
-        result = capture(video, body, options, progress)
-        progress("writing", 0, 0)
-        written = _write(outputs, result.motions, body, video, args, rig)
-        if args.overlay:
-            write_overlay(
-                args.overlay,
-                video,
-                result.motions,
-                body,
-                progress=lambda i, n: progress("overlay", i, n),
-                wanted=options.wanted,
-            )
-            written.append(args.overlay)
-    report = dict(result.report, outputs=[str(p) for p in written])
-    for warning in report["warnings"]:
-        print(f"scope: warning: {warning}", file=sys.stderr)
-    if not args.json:
-        print(_summary(report), file=sys.stderr)
-    return report
+    return load_body(body_with_hands(args.body) if args.hands else args.body), options
 
 
 def run_batch(args: argparse.Namespace) -> dict:
@@ -220,9 +246,11 @@ def run_batch(args: argparse.Namespace) -> dict:
     if args.jobs < 1:
         raise UsageError(f"--jobs takes a number from 1 on, not {args.jobs}")
     _rig_of(args, [args.out / f"clip{suffix}" for suffix in formats])
+    _body_and_options(args)  # what no clip can be captured with is said once, before the first
     batch = Batch(args.folder, args.out, args.program, _given_options(args), formats, args.overlays)
     with _ProgressBar(sys.stderr, show=sys.stderr.isatty() and not args.quiet) as progress:
-        report = batch.run(args.jobs, recursive=args.recursive, again=args.again, progress=progress, say=_say)
+        with _interrupted("clips that are done stay, called again it goes on"):
+            report = batch.run(args.jobs, recursive=args.recursive, again=args.again, progress=progress, say=_say)
     if not args.json:
         counts = ", ".join(f"{n} {what.replace('_', ' ')}" for what, n in report["counts"].items() if n)
         _say(f"{counts or 'nothing to capture'}; report in {batch.report_file}")
@@ -329,8 +357,9 @@ def _check_outputs(outputs: list[Path], overlay: Path | None, video: Path) -> No
 
 def _summary(report: dict) -> str:
     people = "1 person" if report["people"] == 1 else f"{report['people']} people"
+    frames = "1 frame" if report["frames"] == 1 else f"{report['frames']} frames"
     return (
-        f"{people}, {report['frames']} frames, {report['fps']['total']:.1f} frames/s, "
+        f"{people}, {frames}, {report['fps']['total']:.1f} frames/s, "
         f"reprojection error {report['reprojection_px']:.1f} px, networks on {report['execution']}; "
         f"wrote {', '.join(report['outputs'])}"
     )
@@ -381,6 +410,15 @@ def _stdout_for_report() -> Iterator[TextIO]:
         _flush_c()
         os.dup2(real, 1)
         os.close(real)
+
+
+@contextmanager
+def _interrupted(what: str) -> Iterator[None]:
+    """Have a Ctrl-C in here say what it left behind."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        raise KeyboardInterrupt(what) from None
 
 
 def _flush_c() -> None:

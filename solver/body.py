@@ -184,7 +184,7 @@ def load_body(which: str | Path = "scope") -> Body:
     path = BUILT_IN.get(str(which), Path(which))
     if not path.is_file():
         names = ", ".join(BUILT_IN)
-        raise ModelFileError(f"body '{which}' was not found: give one of {names}, or the path of a body .npz file")
+        raise ModelFileError(f"body '{which}' was not found: give one of {names}, or a body's .npz or .pkl file")
     from .loaders import is_user_model, load_model  # here, because the loaders build a Body
 
     if is_user_model(path):

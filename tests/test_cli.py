@@ -67,6 +67,10 @@ def test_bad_footage_gives_one_sentence_status_1_and_no_file(tmp_path, capsys, n
         (["capture", "--retarget", str(SAMPLE.parent / "LICENSE.md"), "-o", "{tmp}/a.glb"], 2, ".md"),
         (["capture", "--bone-map", "{tmp}/map.json", "-o", "{tmp}/a.glb"], 2, "--retarget"),
         (["capture", "--rig-object", "Rig", "-o", "{tmp}/a.glb"], 2, "--retarget"),
+        (["capture", str(SAMPLE), "second.mp4"], 2, "second.mp4 (see scope capture --help; a folder of clips"),
+        (["capture", "--frobnicate"], 2, "--frobnicate (see scope capture --help)"),
+        (["capture", "--threads", "-2", "-o", "{tmp}/a.npz"], 2, "--threads"),
+        (["capture", "https://example.com/walk.mp4", "-o", "{tmp}/a.npz"], 1, "download"),
         (["frobnicate"], 2, "frobnicate"),
         ([], 2, "COMMAND"),
     ],
@@ -108,6 +112,19 @@ def test_a_failing_writer_keeps_the_earlier_result(tmp_path, capsys, monkeypatch
     assert "No space left" in err
     assert (tmp_path / "out.npz").read_bytes() == b"earlier"
     assert files_below(tmp_path) == ["out.npz", "person.png"]
+
+
+def test_an_interrupt_while_the_overlay_is_drawn_leaves_whole_files_and_says_so(tmp_path, capsys, monkeypatch):
+    def interrupted(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("scope.scope_addon.capture.overlay.write_overlay", interrupted)
+    motion = tmp_path / "a.npz"
+    options = ["--end", "0.1", "--quality", "fast", "-o", motion, "--overlay", tmp_path / "a.mp4"]
+    status, _, err = run(capsys, "capture", SAMPLE, *options)
+    assert status == 130
+    assert err == "scope: stopped; some results may be there already, each of them whole\n"
+    assert files_below(tmp_path) == ["a.npz"]
 
 
 def test_a_picture_gives_a_motion_of_one_frame_and_json_alone_on_stdout(tmp_path):

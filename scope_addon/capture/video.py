@@ -15,6 +15,7 @@ OpenCV says the frame rate as a float; ``video.fps`` is the rational the contain
 from __future__ import annotations
 
 import queue
+import re
 import threading
 from collections.abc import Iterator
 from contextlib import closing
@@ -119,13 +120,18 @@ def open_video(path: str | Path, wanted: VideoRange | None = None) -> Video:
     if pictures:
         return _open_sequence(path, pictures, wanted)
     if path.is_dir():
-        raise VideoError(f"{path} is a folder without a picture; give a video, a picture or a folder of pictures")
+        raise VideoError(
+            f"{path} is a folder without a picture; give a video, a picture or a folder of pictures,"
+            " or capture a folder of videos with scope batch"
+        )
     try:
         size = path.stat().st_size
         with path.open("rb"):
             pass
     except FileNotFoundError as error:
-        raise VideoError(f"{path} does not exist; check the path") from error
+        web = re.match(r"\w{2,}:[/\\]", str(path))
+        what = "download it first, because footage is read from files" if web else "check the path"
+        raise VideoError(f"{path} does not exist; {what}") from error
     except OSError as error:
         raise VideoError(f"{path} cannot be read ({error.strerror}); check its permissions") from error
     if size == 0:

@@ -108,6 +108,9 @@ class Batch:
                         entry = entries[futures[future]] = future.result()
                         after = f": {entry['message']}" if entry.get("message") else ""
                         say(f"{len(entries)}/{len(clips)} {entry['file']} {entry['status'].replace('_', ' ')}{after}")
+                        if entry["status"] == "done":
+                            for warning in entry["report"].get("warnings", []):
+                                say(f"warning: {warning}")
                     report = self._report({name: entries[name] for name in clips if name in entries}, before)
                     progress("clips", len(entries), len(clips))
             except BaseException:

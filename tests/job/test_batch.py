@@ -22,6 +22,7 @@ clip = pathlib.Path(sys.argv[2])
 with open(clip.parent / "calls.log", "a") as log:
     log.write(json.dumps(sys.argv[1:]) + "\\n")
 text = clip.read_text() if clip.is_file() else "ok"
+warnings = ["too dark"] if text == "dark" else []
 outputs = [sys.argv[i + 1] for i, a in enumerate(sys.argv) if a == "-o"]
 if text == "nobody":
     print("scope: no person found", file=sys.stderr); sys.exit(3)
@@ -32,7 +33,7 @@ if text == "crash":
 print("Blender says something")
 for path in outputs:
     pathlib.Path(path).write_text("result of " + text)
-print(json.dumps({"frames": 3, "outputs": outputs}))
+print(json.dumps({"frames": 3, "outputs": outputs, "warnings": warnings}))
 """
 
 
@@ -71,6 +72,13 @@ def test_every_clip_has_its_own_fate(folder, tmp_path, jobs):
     assert messages["b.mov"] == "it is not a video"
     assert "status" in messages["d.avi"]
     assert sorted(p.name for p in out.iterdir()) == ["a.glb", "a.npz", "e.glb", "e.npz", REPORT_NAME]
+
+
+def test_what_a_clip_warns_of_is_said(folder, tmp_path):
+    (folder / "a.mp4").write_text("dark")
+    said = []
+    batch(folder, tmp_path / "out").run(1, say=said.append)
+    assert said.index("warning: too dark") == said.index("1/5 a.mp4 done") + 1
 
 
 def test_what_is_finished_is_not_done_again_and_what_changed_is(folder, tmp_path):
@@ -175,7 +183,7 @@ def test_a_signal_ends_the_batch_and_its_clips_whoever_handled_it_before(folder,
     process.send_signal(number)
     _, stderr = process.communicate(timeout=60)
     assert process.returncode == 130
-    assert stderr.splitlines()[-1] == "scope: stopped; nothing was written"
+    assert stderr.splitlines()[-1] == "scope: stopped; clips that are done stay, called again it goes on"
     for pid in pids:
         with pytest.raises(ProcessLookupError):
             os.kill(int(pid), 0)
@@ -190,7 +198,15 @@ def test_nothing_to_do_is_said(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("argv", "says"), [(["--formats", "xyz"], "xyz"), (["--formats", ","], "formats"), (["--jobs", "0"], "0")]
+    ("argv", "says"),
+    [
+        (["--formats", "xyz"], "xyz"),
+        (["--formats", ","], "formats"),
+        (["--jobs", "0"], "0"),
+        (["--people", "0"], "--people"),
+        (["--start", "soon"], "soon"),
+        (["--fov", "60", "--focal-mm", "26"], "contradict"),
+    ],
 )
 def test_bad_arguments(tmp_path, capsys, argv, says):
     assert main(["batch", str(tmp_path), "--out", str(tmp_path / "out"), *argv]) == 2
