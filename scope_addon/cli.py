@@ -36,6 +36,7 @@ SHAPE_MODES = ("keyed", "per_frame", "baked")
 OVERLAY_SUFFIXES = (".mp4", ".png", ".jpg")
 QUALITIES = ("fast", "balanced", "best")
 PROVIDERS = ("auto", "cpu", "cuda", "tensorrt", "directml", "coreml")
+_CLEAR_LINE = "\r\x1b[K"
 PROGRAM = (sys.executable, "-m", f"{__package__}.cli")
 
 
@@ -193,7 +194,7 @@ def run_capture(args: argparse.Namespace) -> dict:
                 written.append(args.overlay)
     report = dict(result.report, outputs=[str(p) for p in written])
     for warning in report["warnings"]:
-        print(f"scope: warning: {warning}", file=sys.stderr)
+        _say(f"warning: {warning}")
     if not args.json:
         print(_summary(report), file=sys.stderr)
     return report
@@ -270,7 +271,9 @@ def _given_options(args: argparse.Namespace) -> dict[str, str | None]:
 
 
 def _say(text: str) -> None:
-    print(f"scope: {text}", file=sys.stderr, flush=True)
+    """A line of its own, also while a progress bar stands on the terminal."""
+    clear = _CLEAR_LINE if sys.stderr.isatty() else ""
+    print(f"{clear}scope: {text}", file=sys.stderr, flush=True)
 
 
 def _people(text: str) -> int | str:
@@ -337,7 +340,7 @@ def _write(
             files, warnings = export_motions(motions, body, scene_files, footage=footage, build_options=options)
         written += files
         for warning in warnings:
-            print(f"scope: warning: {warning}", file=sys.stderr)
+            _say(f"warning: {warning}")
     return written
 
 
@@ -377,10 +380,10 @@ class _ProgressBar:
             return
         if total:
             filled = min(30, 30 * done // total)
-            text = f"{stage:<18} [{'#' * filled}{'.' * (30 - filled)}] {done}/{total}"
+            text = f"{stage:<20} [{'#' * filled}{'.' * (30 - filled)}] {done}/{total}"
         else:
-            text = f"{stage:<18} {done or ''}"
-        self.stream.write(f"\r\x1b[K{text[:100]}")
+            text = f"{stage:<20} {done or ''}"
+        self.stream.write(f"{_CLEAR_LINE}{text[:100]}")
         self.stream.flush()
 
     def __enter__(self) -> _ProgressBar:
@@ -388,7 +391,7 @@ class _ProgressBar:
 
     def __exit__(self, *_: object) -> None:
         if self.show:
-            self.stream.write("\r\x1b[K")
+            self.stream.write(_CLEAR_LINE)
 
 
 @contextmanager

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A folder of footage: nothing is done twice, nothing that fails stops the rest, whatever the clips do."""
 
+import io
 import json
 import os
 import shutil
@@ -79,6 +80,16 @@ def test_what_a_clip_warns_of_is_said(folder, tmp_path):
     said = []
     batch(folder, tmp_path / "out").run(1, say=said.append)
     assert said.index("warning: too dark") == said.index("1/5 a.mp4 done") + 1
+
+
+def test_on_a_terminal_no_line_hangs_on_the_progress_bar(folder, tmp_path, monkeypatch):
+    terminal = io.StringIO()
+    monkeypatch.setattr(terminal, "isatty", lambda: True)
+    monkeypatch.setattr(sys, "stderr", terminal)
+    argv = ["batch", str(folder), "--out", str(tmp_path / "out"), "--formats", "npz"]
+    assert main(argv, program=[sys.executable, "-c", PROGRAM]) == 1
+    lines = [line.split("\x1b[K")[-1] for line in terminal.getvalue().split("\n")[:-1]]
+    assert [line[:9] for line in lines] == [f"scope: {i}/" for i in range(1, 6)] + ["scope: 2 "]
 
 
 def test_what_is_finished_is_not_done_again_and_what_changed_is(folder, tmp_path):
