@@ -10,6 +10,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from ...solver.errors import VideoError
+
 _SUFFIXES = {".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".webp", ".exr"}
 _NUMBER_SIGN = re.compile(r"#+|%0?\d*d")
 _LAST_NUMBER = re.compile(r"(\d+)(?!.*\d)")
@@ -19,9 +21,18 @@ def find_pictures(path: Path, rate_given: bool) -> list[Path]:
     """The pictures of a sequence in order of their numbers; empty where the path is no sequence.
 
     A folder or a pattern is one. A single picture stands for itself, unless a rate is given and others follow it.
+
+    :raises VideoError: a folder's pictures differ in more than their last number.
     """
     if path.is_dir():
-        return sorted((p for p in path.iterdir() if p.is_file() and p.suffix.lower() in _SUFFIXES), key=_in_order)
+        found = sorted((p for p in path.iterdir() if p.is_file() and p.suffix.lower() in _SUFFIXES), key=_in_order)
+        kinds = {_LAST_NUMBER.sub("#", p.stem) + p.suffix.lower(): p.name for p in reversed(found)}
+        if len(kinds) > 1:
+            raise VideoError(
+                f"{path} holds pictures that are no numbered sequence ({', '.join(sorted(kinds.values())[:3])}, …); "
+                "give the pattern of the one that is meant, such as walk_####.png, or a single picture"
+            )
+        return found
     sign = _NUMBER_SIGN.search(path.name)
     if sign and not path.exists() and path.parent.is_dir():
         return _matching(path.parent, path.name[: sign.start()], path.name[sign.end() :], first=0)

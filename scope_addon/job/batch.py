@@ -12,6 +12,7 @@ import hashlib
 import json
 import os
 import subprocess
+import threading
 import time
 from collections import Counter
 from collections.abc import Callable, Sequence
@@ -58,6 +59,7 @@ class Batch:
         self._program, self._options, self._suffixes, self._overlays = list(program), options, suffixes, overlays
         self._basis = self._key_basis()
         self._running: set[subprocess.Popen] = set()
+        self._starting = threading.Lock()
         self._stopped = False
 
     def clips(self, recursive: bool) -> dict[str, Path]:
@@ -153,18 +155,19 @@ class Batch:
         return entry | {"status": "failed", "message": _sentence(stderr) or f"the process ended with status {status}"}
 
     def _call(self, arguments: list[str]) -> tuple[int, str, str]:
-        if self._stopped:
-            return 130, "", ""
-        process = subprocess.Popen(
-            arguments,
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-            encoding="utf-8",
-            errors="replace",
-        )
-        self._running.add(process)
+        with self._starting:  # who stops the batch knows of every process
+            if self._stopped:
+                return 130, "", ""
+            process = subprocess.Popen(
+                arguments,
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.PIPE,
+                text=True,
+                encoding="utf-8",
+                errors="replace",
+            )
+            self._running.add(process)
         try:
             stdout, stderr = process.communicate()
         finally:
@@ -172,8 +175,9 @@ class Batch:
         return process.returncode, stdout, stderr
 
     def _stop(self) -> None:
-        self._stopped = True
-        running = list(self._running)
+        with self._starting:
+            self._stopped = True
+            running = list(self._running)
         for process in running:
             with contextlib.suppress(OSError):
                 process.terminate()

@@ -66,3 +66,10 @@ def test_nothing_to_see(tmp_path: Path) -> None:
     for path, words in ((tmp_path / "empty", "folder without a picture"), (tmp_path / "x_##.png", "does not exist")):
         with pytest.raises(VideoError, match=words):
             open_video(path)
+
+
+def test_a_folder_of_unrelated_pictures_is_no_clip(folder: Path) -> None:
+    (folder / "holiday.png").write_bytes((folder / "walk_9.png").read_bytes())
+    with pytest.raises(VideoError, match=r"holiday\.png.*pattern"):
+        open_video(folder)
+    assert brightness(folder / "walk_####.png", VideoRange(fps=Fraction(10))) == NUMBERS
