@@ -13,6 +13,7 @@ from bpy.props import StringProperty
 from ..footage import FOOTAGE_SUFFIXES
 from . import preview_picture
 from .telling import sentence
+from .view_operators import frame_selected, hide_startup_cube
 
 if TYPE_CHECKING:
     from .capture_job import CaptureJob
@@ -179,6 +180,9 @@ class SCOPE_OT_capture(bpy.types.Operator):
             self._timer = None
         if context.workspace:
             context.workspace.status_text_set(None)
+        if "FINISHED" in outcome:
+            hide_startup_cube(context)
+            frame_selected(context)
         redraw_twice(context)
         return outcome
 

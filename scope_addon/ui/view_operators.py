@@ -5,8 +5,33 @@ from __future__ import annotations
 
 import bpy
 from bpy.props import IntProperty
+from mathutils import Matrix
 
 from .telling import sentence
+
+
+def hide_startup_cube(context: bpy.types.Context) -> None:
+    """The cube of a file that was never saved, if nobody has touched it: it stands where the person does."""
+    cube = context.scene.objects.get("Cube")
+    if bpy.data.filepath or cube is None or cube.type != "MESH" or len(cube.data.vertices) != 8:
+        return
+    touched = cube.animation_data or cube.modifiers or cube.constraints or cube.children
+    if not touched and cube.matrix_world == Matrix.Identity(4) and cube.name in context.view_layer.objects:
+        cube.hide_set(True)
+
+
+def frame_selected(context: bpy.types.Context) -> None:
+    """Turn to what is selected in the viewport that shows the panel; a camera's view stays as it is."""
+    area = context.area
+    if context.window is None or area is None or area.type != "VIEW_3D":
+        return
+    region = next((r for r in area.regions if r.type == "WINDOW"), None)
+    view = area.spaces.active.region_3d
+    if region is None or view is None or view.view_perspective == "CAMERA":
+        return
+    with context.temp_override(window=context.window, area=area, region=region):
+        if bpy.ops.view3d.view_selected.poll():
+            bpy.ops.view3d.view_selected()
 
 
 class SCOPE_OT_look_through(bpy.types.Operator):
