@@ -96,9 +96,9 @@ def choose_camera(
 
 
 def estimated_camera(width: int, height: int, focal_px: float, deviation: float) -> Camera:
-    """The camera with a focal length told by the picture itself, ``deviation`` its relative error."""
+    """The camera with a focal length told by the background's edges, ``deviation`` its relative error."""
     fov_deg = 2 * math.degrees(math.atan(max(width, height) / (2 * focal_px)))
-    source = f"estimated from edges in the background, {fov_deg:.0f} degrees, focal length ± {100 * deviation:.0f} %"
+    source = f"estimated, {fov_deg:.0f} degrees ± {100 * deviation:.0f} %"
     return Camera(pinhole(width, height, focal_px), np.zeros(5), source, deviation)
 
 

@@ -23,7 +23,7 @@ import numpy as np
 
 from ...solver.rotations import exp, log
 from .camera import Camera
-from .compass import LOOKS_EVERY_S, Look, without_drift
+from .compass import LOOK_SIDE_PX, LOOKS_EVERY_S, Look, without_drift
 from .line_segments import Lines, Segments, find_segments
 from .smoothing import fill_rotation_gaps
 
@@ -109,7 +109,7 @@ class BackgroundTracker:
         R_first_camera = self._R_first_key @ self._R_key_last
         self._rotations.append(R_first_camera)
         if self._looks and time_s - self._times[self._looks[-1].row] >= LOOKS_EVERY_S and _turns(R_first_camera):
-            self._looks.append(Look(len(self._times) - 1, find_segments(image_rgb, people)))
+            self._looks.append(Look(len(self._times) - 1, find_segments(image_rgb, people, LOOK_SIDE_PX)))
         self._picture = picture
         if len(self._points) < max(KEY_SHARE * self._key_count, FEWEST_CORNERS):
             self._R_first_key = self._R_first_key @ self._R_key_last

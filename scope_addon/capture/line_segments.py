@@ -55,13 +55,16 @@ class Segments:
         return Lines(normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12), self.lengths)
 
 
-def find_segments(image_rgb: np.ndarray, people: Sequence[np.ndarray]) -> Segments:
+def find_segments(
+    image_rgb: np.ndarray, people: Sequence[np.ndarray], working_side_px: int = WORKING_SIDE_PX
+) -> Segments:
     """The straight edges of a picture.
 
     :param people: (n, 2) points of each person in pixels; edges within their boxes are left out.
+    :param working_side_px: the longer side of the picture that is looked at; the time it takes grows with its square.
     """
     height, width = image_rgb.shape[:2]
-    scale = min(1.0, WORKING_SIDE_PX / max(width, height))
+    scale = min(1.0, working_side_px / max(width, height))
     grey = cv2.cvtColor(image_rgb, cv2.COLOR_RGB2GRAY)
     if scale < 1.0:
         grey = cv2.resize(grey, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
