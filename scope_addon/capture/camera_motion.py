@@ -25,6 +25,7 @@ from ...solver.rotations import exp, log
 from .camera import Camera
 from .compass import LOOK_SIDE_PX, LOOKS_EVERY_S, Look, without_drift
 from .line_segments import Lines, Segments, find_segments
+from .region import inside, surroundings
 from .smoothing import fill_rotation_gaps
 
 WORKING_SIDE_PX = 480  # the longer side of the picture that corners are followed in
@@ -160,7 +161,7 @@ class BackgroundTracker:
         moved, found = _flow(self._picture, picture, self._points)
         back, again = _flow(picture, self._picture, moved)
         good = found & again & (np.abs(back - self._points).max(1) < 0.7)
-        good &= ((moved >= 0) & (moved < self._size)).all(1) & ~_inside(moved, boxes)
+        good &= ((moved >= 0) & (moved < self._size)).all(1) & ~inside(moved, boxes)
         self._points, self._key_rays = moved[good], self._key_rays[good]
         if len(self._points) < FEWEST_CORNERS:
             return None
@@ -196,10 +197,8 @@ class BackgroundTracker:
         return rays / np.linalg.norm(rays, axis=1, keepdims=True)
 
     def _box(self, points: np.ndarray) -> np.ndarray:
-        """x0, y0, x1, y1 in the working picture, a tenth larger on every side."""
-        low, high = points.min(0) * self._scale, points.max(0) * self._scale
-        margin = 0.1 * (high - low).max() + 4.0
-        return np.concatenate([low - margin, high + margin])
+        """x0, y0, x1, y1 of a person's surroundings in the working picture, and some pixels more."""
+        return surroundings(points) * self._scale + [-4.0, -4.0, 4.0, 4.0]
 
 
 def _turns(R: np.ndarray) -> bool:
@@ -244,11 +243,3 @@ def _flow(before: np.ndarray, after: np.ndarray, points: np.ndarray) -> tuple[np
     start = points.astype(np.float32)
     moved, found, _ = cv2.calcOpticalFlowPyrLK(before, after, start, start.copy(), winSize=(15, 15), maxLevel=3)
     return np.array(moved, np.float32), np.array(found).ravel() == 1
-
-
-def _inside(points: np.ndarray, boxes: Sequence[np.ndarray]) -> np.ndarray:
-    """(n,) whether each point (n, 2) lies in one of the boxes."""
-    inside = np.zeros(len(points), bool)
-    for box in boxes:
-        inside |= ((points >= box[:2]) & (points <= box[2:])).all(1)
-    return inside

@@ -11,8 +11,9 @@ import cv2
 import numpy as np
 
 from ...solver.errors import VideoError
+from ..footage import PICTURE_SUFFIXES
 
-_SUFFIXES = {".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".webp", ".exr"}
+_SUFFIXES = {*PICTURE_SUFFIXES, ".exr"}
 _NUMBER_SIGN = re.compile(r"#+|%0?\d*d")
 _LAST_NUMBER = re.compile(r"(\d+)(?!.*\d)")
 

@@ -13,6 +13,7 @@ import cv2
 import numpy as np
 
 from .camera import Camera
+from .region import inside, surroundings
 
 WORKING_SIDE_PX = 960
 SHORTEST = 0.03  # of the longer side
@@ -50,9 +51,13 @@ class Segments:
 
     def lines(self, camera: Camera) -> Lines:
         """What they are to a camera, in its frame."""
-        rays = camera.rays(self.ends_px)
-        normals = np.cross(rays[:, 0], rays[:, 1])
-        return Lines(normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12), self.lengths)
+        return Lines(plane_normals(camera.rays(self.ends_px)), self.lengths)
+
+
+def plane_normals(rays: np.ndarray) -> np.ndarray:
+    """(N, 3) unit normals of the planes through the camera's centre that hold both rays (N, 2, 3) to an edge's ends."""
+    normals = np.cross(rays[:, 0], rays[:, 1])
+    return normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
 
 
 def find_segments(
@@ -75,10 +80,7 @@ def find_segments(
     lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) / max(width, height)
     keep = lengths > SHORTEST
     middle = ends.mean(axis=1)
-    for points in people:
-        low, high = points.min(axis=0), points.max(axis=0)
-        margin = 0.1 * (high - low).max()
-        keep &= ~((middle > low - margin) & (middle < high + margin)).all(axis=1)
+    keep &= ~inside(middle, [surroundings(points) for points in people])
     chosen = np.flatnonzero(keep)
     chosen = chosen[np.argsort(-lengths[chosen])[:MOST_SEGMENTS]]
     return Segments(ends[chosen].astype(float), lengths[chosen].astype(float))

@@ -8,6 +8,7 @@ Image coordinates are OpenCV's: the centre of the top left pixel is (0, 0), y ru
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -105,3 +106,18 @@ def region_from_points(center_px: np.ndarray, top_px: np.ndarray) -> Region:
     dx, dy = (np.asarray(top_px, float) - np.asarray(center_px, float)).tolist()
     side = 2.0 * MARGIN * math.hypot(dx, dy)
     return Region((float(center_px[0]), float(center_px[1])), side, math.atan2(dx, -dy))
+
+
+def surroundings(points: np.ndarray) -> np.ndarray:
+    """(4,) x0, y0, x1, y1 of the box about a person's points (n, 2), a tenth of its size larger on every side."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    margin = 0.1 * (high - low).max()
+    return np.concatenate([low - margin, high + margin])
+
+
+def inside(points: np.ndarray, boxes: Sequence[np.ndarray]) -> np.ndarray:
+    """(n,) whether each point (n, 2) lies in one of the boxes."""
+    found = np.zeros(len(points), bool)
+    for box in boxes:
+        found |= ((points >= box[:2]) & (points <= box[2:])).all(1)
+    return found

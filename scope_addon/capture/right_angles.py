@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .line_segments import Segments
+from .line_segments import Segments, plane_normals
 from .vertical_lines import may_be_upright, meeting_directions
 
 EDGE_SIGMA = np.radians(1.0)
@@ -49,8 +49,7 @@ class Edges:
     def axes(self, focal_px: float) -> tuple[float, np.ndarray]:
         """Sides of the picture that the best three directions explain; these, (3, 3) rows u, h, u × h, camera frame."""
         rays = np.concatenate([self.ends, np.full((*self.ends.shape[:2], 1), focal_px, np.float32)], axis=-1)
-        normals = np.cross(rays[:, 0], rays[:, 1])
-        normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
+        normals = plane_normals(rays)
         score, axes = 0.0, np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
         for up in self._uprights(normals, focal_px):
             level = np.cross(normals[:CANDIDATES], up)  # along the edge, if it is level

@@ -182,3 +182,16 @@ def joints_world():
         return np.einsum("tij,tkj->tki", T[:, :3, :3], motion.joints_cam) + T[:, None, :3, 3]
 
     return joints
+
+
+@pytest.fixture
+def rigify_rigs() -> list[tuple[bpy.types.Object, str]]:
+    """Rigify's metarig and the rig generated from it, each with what its deforming bones' names begin with."""
+    import addon_utils  # bpy puts it on the path
+
+    addon_utils.enable("rigify", default_set=True)
+    bpy.ops.object.armature_human_metarig_add()
+    metarig = bpy.context.object
+    bpy.ops.pose.rigify_generate()
+    generated = next(o for o in bpy.context.scene.objects if o.type == "ARMATURE" and "torso" in o.data.bones)
+    return [(metarig, ""), (generated, "ORG-")]

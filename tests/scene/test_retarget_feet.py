@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Feet that stand on the body stand on the rig: heel and ball, contact by contact, as the depsgraph shows them."""
 
-import addon_utils
 import bpy
 import numpy as np
 import pytest
@@ -108,12 +107,7 @@ def test_toes_that_were_not_seen_to_bend_stay_flat():
             assert np.degrees(np.arccos(np.clip(along @ rest, -1, 1))) < 2.0
 
 
-def test_feet_of_rigify_stand(source):
-    addon_utils.enable("rigify", default_set=True)
-    bpy.ops.object.armature_human_metarig_add()
-    metarig = bpy.context.object
-    bpy.ops.pose.rigify_generate()
-    generated = next(o for o in bpy.context.scene.objects if o.type == "ARMATURE" and "torso" in o.data.bones)
-    for rig, prefix in ((metarig, ""), (generated, "ORG-")):
+def test_feet_of_rigify_stand(source, rigify_rigs):
+    for rig, prefix in rigify_rigs:
         run(source, rig)
         check_contacts(rig, lambda side, part, prefix=prefix: f"{prefix}{part}.{side[0].upper()}")

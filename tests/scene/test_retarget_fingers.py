@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Fingers on other rigs: found by their names and by the hand's shape, pointing where the body's fingers point."""
 
-import addon_utils
 import bpy
 import numpy as np
 import pytest
@@ -152,13 +151,8 @@ def test_fingers_point_where_the_body_points(source, scheme, twist):
     check_hands(rig, bone_of)
 
 
-def test_fingers_of_rigify(source):
-    addon_utils.enable("rigify", default_set=True)
-    bpy.ops.object.armature_human_metarig_add()
-    metarig = bpy.context.object
-    bpy.ops.pose.rigify_generate()
-    generated = next(o for o in bpy.context.scene.objects if o.type == "ARMATURE" and "torso" in o.data.bones)
-    for rig, prefix in ((metarig, ""), (generated, "ORG-")):
+def test_fingers_of_rigify(source, rigify_rigs):
+    for rig, prefix in rigify_rigs:
         bone_of = {}
         for side in ("left", "right"):
             bone_of[f"{side}_wrist"] = f"{prefix}hand.{side[0].upper()}"
