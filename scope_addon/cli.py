@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING, NoReturn, TextIO
 
 from ..solver.body import ASSETS, BUILT_IN, Body, body_with_hands
 from ..solver.errors import ScopeError, UsageError
+from .job.parent import stop_with_parent
 from .motion import Motion
 from .retarget.rig_source import ROOTS
 from .scene.output_paths import SUFFIXES, check_output, person_paths
@@ -72,6 +73,7 @@ def build_parser() -> argparse.ArgumentParser:
     capture.add_argument(
         "--overlay", type=Path, metavar="FILE", help="draw the body over the footage: .mp4, .png, .jpg"
     )
+    capture.add_argument("--stop-with-stdin", action="store_true", help=argparse.SUPPRESS)  # as a batch starts it
     _add_options(capture)
     batch = commands.add_parser("batch", help="capture every video and picture of a folder")
     batch.set_defaults(run=run_batch)
@@ -150,6 +152,8 @@ def main(argv: Sequence[str] | None = None, program: Sequence[str] = PROGRAM) ->
             raise UsageError(f"cannot use {' '.join(unknown)} (see scope {args.command} --help{several})")
         args.program = list(program)
         with _stopped_by_signals(), _stdout_for_report() as stdout:
+            if getattr(args, "stop_with_stdin", False):
+                stop_with_parent()
             report = args.run(args)
             if args.json:
                 print(json.dumps(report), file=stdout, flush=True)

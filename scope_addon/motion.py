@@ -8,8 +8,6 @@ world frame and the others relative to their parents; ``trans`` is SMPL's: pelvi
 
 from __future__ import annotations
 
-import os
-import tempfile
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
@@ -18,6 +16,7 @@ import numpy as np
 
 from ..solver.errors import MotionFileError, OutputError
 from ..solver.npz import read_npz
+from .whole_file import written_beside
 
 
 @dataclass
@@ -82,16 +81,9 @@ class Motion:
         path = Path(path)
         arrays = {f.name: np.asarray(getattr(self, f.name)) for f in fields(self)}
         try:
-            handle, name = tempfile.mkstemp(prefix=f".{path.stem}.", suffix=".npz", dir=path.parent)
-        except OSError as error:
-            raise OutputError(f"cannot write {path}: {error.strerror}; choose a folder you can write to") from error
-        try:
-            with os.fdopen(handle, "wb") as file:
+            with written_beside(path) as temporary, temporary.open("wb") as file:
                 np.savez_compressed(file, **arrays)
-            os.chmod(name, 0o644)
-            os.replace(name, path)
         except OSError as error:
-            Path(name).unlink(missing_ok=True)
             raise OutputError(
                 f"cannot write {path}: {error.strerror}; free some space or choose another folder"
             ) from error

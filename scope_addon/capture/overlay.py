@@ -7,10 +7,7 @@ The mesh is posed in the world from the motion file and brought into each frame'
 
 from __future__ import annotations
 
-import os
-import tempfile
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import cv2
@@ -21,6 +18,7 @@ from ...solver.body import Body
 from ...solver.errors import OutputError, ShapeError
 from ...solver.rotations import exp
 from ..motion import Motion
+from ..whole_file import written_beside
 from .landmark_network import KEYPOINT_COUNT
 from .rasterizer import Canvas, rasterize
 from .video import Frame, Video, open_video
@@ -63,25 +61,18 @@ def write_overlay(
     if suffix not in VIDEO_SUFFIXES + STILL_SUFFIXES:
         known = ", ".join(VIDEO_SUFFIXES + STILL_SUFFIXES)
         raise OutputError(f"cannot write the overlay {path}: its suffix must be one of {known}")
-    with open_video(video_path, wanted) as video, _written_beside(path) as temporary:
+    with open_video(video_path, wanted) as video:
         painter = _Painter(people, body, video, opacity, even=suffix in VIDEO_SUFFIXES)
-        if suffix in STILL_SUFFIXES:
-            _write_still(temporary, painter, video, _first_seen(people))
-            return
-        writer = None
         try:
-            for frame in video:
-                image = painter.paint(frame)
-                if writer is None:
-                    writer = _open_writer(temporary, float(video.fps), image.shape[1], image.shape[0], path)
-                writer.write(cv2.cvtColor(image, cv2.COLOR_RGB2BGR))
-                if progress is not None:
-                    progress(frame.index + 1, max(video.frame_count, frame.index + 1))
-        finally:
-            if writer is not None:
-                writer.release()
-        if not _is_readable(temporary):  # the encoder says nothing about what it could not write
-            raise OutputError(f"cannot write {path} to its end; free some space or choose another folder")
+            with written_beside(path) as temporary:
+                if suffix in STILL_SUFFIXES:
+                    _write_still(temporary, painter, video, _first_seen(people))
+                else:
+                    _write_video(temporary, painter, video, path, progress)
+        except OSError as error:
+            raise OutputError(
+                f"cannot write {path}: {error.strerror}; free some space or choose another folder"
+            ) from error
 
 
 def draw_overlay(
@@ -248,6 +239,23 @@ def _write_still(path: Path, painter: _Painter, video: Video, index: int) -> Non
     path.write_bytes(data.tobytes())
 
 
+def _write_video(temporary: Path, painter: _Painter, video: Video, path: Path, progress: Progress | None) -> None:
+    writer = None
+    try:
+        for frame in video:
+            image = painter.paint(frame)
+            if writer is None:
+                writer = _open_writer(temporary, float(video.fps), image.shape[1], image.shape[0], path)
+            writer.write(cv2.cvtColor(image, cv2.COLOR_RGB2BGR))
+            if progress is not None:
+                progress(frame.index + 1, max(video.frame_count, frame.index + 1))
+    finally:
+        if writer is not None:
+            writer.release()
+    if not _is_readable(temporary):  # the encoder says nothing about what it could not write
+        raise OutputError(f"cannot write {path} to its end; free some space or choose another folder")
+
+
 def _open_writer(temporary: Path, fps: float, width: int, height: int, path: Path) -> cv2.VideoWriter:
     for codec, backend in _CODECS:
         fourcc = cv2.VideoWriter.fourcc(*codec)
@@ -265,22 +273,3 @@ def _is_readable(video: Path) -> bool:
         return reader.isOpened() and reader.grab()
     finally:
         reader.release()
-
-
-@contextmanager
-def _written_beside(path: Path) -> Iterator[Path]:
-    """A temporary file in the folder of ``path``, renamed to it at the end, removed if anything fails."""
-    try:
-        handle, name = tempfile.mkstemp(prefix=f".{path.stem}.", suffix=path.suffix.lower(), dir=path.parent)
-    except OSError as error:
-        raise OutputError(f"cannot write {path}: {error.strerror}; choose a folder you can write to") from error
-    os.close(handle)
-    temporary = Path(name)
-    try:
-        yield temporary
-        temporary.chmod(0o644)
-        os.replace(temporary, path)
-    except OSError as error:
-        raise OutputError(f"cannot write {path}: {error.strerror}; free some space or choose another folder") from error
-    finally:
-        temporary.unlink(missing_ok=True)

@@ -7,7 +7,6 @@ it was. A clip is finished when its content (SHA-256), the options, the program 
 
 from __future__ import annotations
 
-import contextlib
 import hashlib
 import json
 import os
@@ -18,16 +17,19 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from pathlib import Path
+from typing import IO
 
 from ...solver.errors import InputError, NoPersonError, OutputError, UsageError
 from ..footage import FOOTAGE_SUFFIXES, PICTURE_SUFFIXES, VIDEO_SUFFIXES
+from ..whole_file import written_beside
+from .parent import GRACE_S
 from .request import code_version
 
 REPORT_NAME = "scope-batch.json"
 STATUSES = ("done", "skipped", "no_person", "failed")
 _ROOT = Path(__file__).resolve().parents[2]
 _OVERLAY = ".overlay"
-_GRACE_S = 5.0  # that a clip has to clean up when the batch is stopped
+_GRACE_S = GRACE_S + 3.0  # that a clip has to clean up when the batch is stopped
 
 
 class Batch:
@@ -58,7 +60,7 @@ class Batch:
         self.report_file = out / REPORT_NAME
         self._program, self._options, self._suffixes, self._overlays = list(program), options, suffixes, overlays
         self._basis = self._key_basis()
-        self._running: set[subprocess.Popen] = set()
+        self._running: dict[subprocess.Popen, IO] = {}  # and what keeps it running while it is open
         self._starting = threading.Lock()
         self._stopped = False
 
@@ -132,7 +134,7 @@ class Batch:
         if earlier and earlier.get("key") == entry["key"] and self._is_finished(earlier):
             return earlier | {"file": entry["file"], "status": earlier["status"].replace("done", "skipped")}
         target = self.out / name
-        arguments = [*self._program, "capture", str(path), "--json", "--quiet"]
+        arguments = [*self._program, "capture", str(path), "--json", "--quiet", "--stop-with-stdin"]
         for suffix in self._suffixes:
             arguments += ["-o", f"{target}{suffix}"]
         if self._overlays:
@@ -160,27 +162,30 @@ class Batch:
                 return 130, "", ""
             process = subprocess.Popen(
                 arguments,
-                stdin=subprocess.DEVNULL,
+                stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=subprocess.PIPE,
                 text=True,
                 encoding="utf-8",
                 errors="replace",
             )
-            self._running.add(process)
+            assert process.stdin is not None
+            # Taken away from communicate(), which would close it at once.
+            lifeline, process.stdin = process.stdin, None
+            self._running[process] = lifeline
         try:
-            stdout, stderr = process.communicate()
+            with lifeline:
+                stdout, stderr = process.communicate()
         finally:
-            self._running.discard(process)
+            del self._running[process]
         return process.returncode, stdout, stderr
 
     def _stop(self) -> None:
         with self._starting:
             self._stopped = True
-            running = list(self._running)
-        for process in running:
-            with contextlib.suppress(OSError):
-                process.terminate()
+            running = dict(self._running)
+        for lifeline in running.values():
+            lifeline.close()
         end = time.monotonic() + _GRACE_S
         for process in running:
             try:
@@ -231,12 +236,10 @@ class Batch:
             "files": list(({n: e for n, e in before.items() if n not in entries} | entries).values()),
             "exit_status": status,
         }
-        beside = self.report_file.with_name(f".{REPORT_NAME}.{os.getpid()}")
         try:
-            beside.write_text(json.dumps(report, indent=1), encoding="utf-8")
-            os.replace(beside, self.report_file)
+            with written_beside(self.report_file) as temporary:
+                temporary.write_text(json.dumps(report, indent=1), encoding="utf-8")
         except OSError as error:
-            beside.unlink(missing_ok=True)
             raise OutputError(f"cannot write {self.report_file}: {error.strerror}; free some space") from error
         return report
 

@@ -8,12 +8,12 @@ import json
 import os
 import shutil
 import sys
-import threading
 import time
 from pathlib import Path
 from typing import IO, NoReturn
 
 from ...solver.errors import ScopeError
+from .parent import when_parent_ends
 from .request import JobRequest
 
 _REMOVALS = 20  # attempts, each of which a file that was just being opened may foil
@@ -94,6 +94,9 @@ def main(job_folder: Path) -> NoReturn:
     stream = os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(2, 1)
     line = sys.stdin.readline()
+    if not line:  # killed before it could ask
+        _remove(job_folder)
+        _leave(1)
     _die_with_parent(job_folder)
     _step_back()
     status = 1
@@ -114,16 +117,13 @@ def _leave(status: int) -> NoReturn:
 
 
 def _die_with_parent(job_folder: Path) -> None:
-    """End when stdin closes: the parent has gone, or no longer wants the result. Half-written files go too."""
+    """End when the parent has gone, or no longer wants the result. Half-written files go too."""
 
-    def wait() -> None:
-        with contextlib.suppress(OSError, ValueError):
-            while sys.stdin.buffer.read(4096):
-                pass
+    def end() -> NoReturn:
         _remove(job_folder)
         os._exit(1)
 
-    threading.Thread(target=wait, name="scope-parent", daemon=True).start()
+    when_parent_ends(end)
 
 
 def _remove(job_folder: Path) -> None:

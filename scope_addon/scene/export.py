@@ -8,9 +8,7 @@ along and nothing depends on selection or visibility. Files are written beside t
 from __future__ import annotations
 
 import math
-import os
 import re
-import tempfile
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, replace
@@ -21,6 +19,7 @@ import bpy
 from ...solver.body import Body
 from ...solver.errors import OutputError, UsageError
 from ..motion import Motion
+from ..whole_file import written_beside
 from . import actions, formats
 from .bone_display import remove_if_unused
 from .build import CAPTURE_TAG, NEW_SCENE, BuildOptions, BuildResult, Progress, build_scene
@@ -217,23 +216,14 @@ def _baked_meshes(scene: bpy.types.Scene) -> Iterator[None]:
 def _write(path: Path, writer) -> None:
     """Run ``writer(temporary path)`` and move its file into place; on failure nothing is left."""
     try:
-        handle, name = tempfile.mkstemp(prefix=f".{path.stem}.", suffix=path.suffix.lower(), dir=path.parent)
-        os.close(handle)
-    except OSError as error:
-        raise OutputError(f"cannot write {path}: {error.strerror}; choose a folder you can write to") from error
-    temporary = Path(name)
-    temporary.unlink()  # Blender's writers differ in what they do with an existing file
-    try:
-        with formats.quiet():
-            writer(temporary)
-        if not temporary.is_file():
-            raise OutputError(f"cannot write {path}: Blender wrote nothing")
-        os.chmod(temporary, 0o666 & ~_umask())
-        os.replace(temporary, path)
+        with written_beside(path) as temporary:
+            temporary.unlink()  # Blender's writers differ in what they do with an existing file
+            with formats.quiet():
+                writer(temporary)
+            if not temporary.is_file():
+                raise OutputError(f"cannot write {path}: Blender wrote nothing")
     except (RuntimeError, OSError) as error:
         raise OutputError(f"cannot write {path}: {_reason(error)}") from error
-    finally:
-        temporary.unlink(missing_ok=True)
 
 
 def _reason(error: RuntimeError | OSError) -> str:
@@ -244,9 +234,3 @@ def _reason(error: RuntimeError | OSError) -> str:
     last = lines[-1] if lines else type(error).__name__
     said = re.sub(r"^(?:\w*Error: )*(?:\[Errno \d+\] )?", "", last)
     return f"{said}; {'free some space or choose another folder' if '[Errno ' in last else 'try another format'}"
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask

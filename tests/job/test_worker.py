@@ -6,31 +6,16 @@ import os
 import signal
 import subprocess
 import sys
-import time
-from pathlib import Path
 
 import pytest
 from scope.scope_addon.job.process import START_SCRIPT, WorkerFailedError, WorkerProcess
 from scope.scope_addon.job.request import JobRequest, code_version
 from scope.solver.errors import SetupError, UsageError
 
+from .processes import runs, wait_for
+
 ROOT = START_SCRIPT.parents[2]
 SAMPLE = str(ROOT / "assets" / "sample" / "sample.mp4")
-
-
-def wait_for(condition, timeout_s=60.0):
-    end = time.monotonic() + timeout_s
-    while not condition():
-        assert time.monotonic() < end
-        time.sleep(0.02)
-
-
-def runs(pid):
-    """Whether a process exists and is not a zombie that nobody waited for."""
-    try:
-        return Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0] != "Z"
-    except OSError:
-        return False
 
 
 @pytest.fixture
@@ -68,6 +53,12 @@ def test_the_worker_ends_when_its_parent_is_killed(folder):
     parent.wait()
     wait_for(lambda: not runs(pid))
     wait_for(lambda: not folder.exists())
+
+
+def test_a_worker_whose_parent_died_before_it_asked_leaves_nothing(folder):
+    command = [sys.executable, str(START_SCRIPT), str(ROOT), str(folder), *(p for p in sys.path if p)]
+    assert subprocess.run(command, stdin=subprocess.DEVNULL, check=False).returncode == 1
+    assert not folder.exists()
 
 
 def test_an_orphan_that_goes_on_writing_leaves_nothing(tmp_path):

@@ -1,0 +1,80 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a process does when the one that started it is gone."""
+
+import subprocess
+import sys
+import threading
+import types
+
+import pytest
+from scope.scope_addon.job import parent
+
+# Writes half a file, and {meanwhile} until it is told to end.
+CHILD = """
+import sys, time
+from pathlib import Path
+from scope.scope_addon.job import parent
+from scope.scope_addon.whole_file import written_beside
+parent.GRACE_S = {grace}
+parent.stop_with_parent()
+with written_beside(Path(sys.argv[1])) as temporary:
+    temporary.write_text("half of something")
+    print("writing", flush=True)
+    while True:
+        try:
+            while True:
+                time.sleep(0.05)
+        except {swallowed}:
+            pass
+"""
+
+
+@pytest.mark.parametrize(("grace", "swallowed"), [(60.0, "ZeroDivisionError"), (0.2, "KeyboardInterrupt")])
+def test_nothing_half_written_stays_whether_the_main_thread_hears_of_it_or_not(tmp_path, grace, swallowed):
+    code = CHILD.format(grace=grace, swallowed=swallowed)
+    command = [sys.executable, "-c", code, str(tmp_path / "result.npz")]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL) as child:
+        assert child.stdin is not None
+        assert child.stdout is not None
+        assert child.stdout.readline().strip() == b"writing"
+        assert len(list(tmp_path.iterdir())) == 1
+        child.stdin.close()
+        assert child.wait(30) != 0
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(("error", "ends"), [(BrokenPipeError(), True), (OSError(9, "Bad file descriptor"), False)])
+def test_only_the_end_of_the_pipe_is_an_end(monkeypatch, error, ends):
+    def fails():
+        raise error
+
+    monkeypatch.setattr(parent, "_wait_for_end_of_stdin", fails)
+    ended = threading.Event()
+    parent.when_parent_ends(ended.set)
+    for thread in threading.enumerate():
+        if thread.name == "scope-parent":
+            thread.join()
+    assert ended.is_set() == ends
+
+
+def test_on_windows_the_pipe_is_looked_at_and_never_read(monkeypatch):
+    """A pending read would stop numpy's libraries from being loaded there."""
+    looks = []
+
+    def peek(handle, size):
+        looks.append((handle, size))
+        if len(looks) == 3:
+            raise BrokenPipeError
+        return 0, 0
+
+    def read(*_):
+        raise AssertionError
+
+    monkeypatch.setattr(sys, "platform", "win32")
+    monkeypatch.setattr(parent.os, "read", read)
+    monkeypatch.setattr(parent, "_PEEK_S", 0.0)
+    monkeypatch.setitem(sys.modules, "_winapi", types.SimpleNamespace(PeekNamedPipe=peek))
+    monkeypatch.setitem(sys.modules, "msvcrt", types.SimpleNamespace(get_osfhandle=lambda fd: 100 + fd))
+    with pytest.raises(BrokenPipeError):
+        parent._wait_for_end_of_stdin()
+    assert looks == [(100, 0)] * 3
