@@ -226,7 +226,10 @@ def test_a_signal_ends_the_batch_and_its_clips_whoever_handled_it_before(folder,
     process = subprocess.Popen([sys.executable, "-c", code], stderr=subprocess.PIPE, text=True, start_new_session=True)
     wait_for(lambda: len([p for p in folder.glob("*.pid") if p.read_text()]) == 2 or process.poll() is not None)
     pids = [p.read_text() for p in folder.glob("*.pid")]
-    process.send_signal(number)
+    if number == signal.SIGINT:
+        os.killpg(process.pid, number)  # as a terminal does
+    else:
+        process.send_signal(number)
     _, stderr = process.communicate(timeout=60)
     assert process.returncode == 130
     assert stderr.splitlines()[-1] == "scope: stopped; clips that are done stay, called again it goes on"
