@@ -11,11 +11,9 @@ import cv2
 import numpy as np
 
 from ...solver.errors import VideoError
-from ..footage import PICTURE_SUFFIXES
+from ..footage import LAST_NUMBER, PICTURE_SUFFIXES, is_sequence, pictures_in, sequence_pattern
 
-_SUFFIXES = {*PICTURE_SUFFIXES, ".exr"}
 _NUMBER_SIGN = re.compile(r"#+|%0?\d*d")
-_LAST_NUMBER = re.compile(r"(\d+)(?!.*\d)")
 
 
 def find_pictures(path: Path, rate_given: bool) -> list[Path]:
@@ -26,9 +24,9 @@ def find_pictures(path: Path, rate_given: bool) -> list[Path]:
     :raises VideoError: a folder's pictures differ in more than their last number.
     """
     if path.is_dir():
-        found = sorted((p for p in path.iterdir() if p.is_file() and p.suffix.lower() in _SUFFIXES), key=_in_order)
-        kinds = {_LAST_NUMBER.sub("#", p.stem) + p.suffix.lower(): p.name for p in reversed(found)}
-        if len(kinds) > 1:
+        found = pictures_in(path)
+        if len(found) > 1 and not is_sequence(found):
+            kinds = {sequence_pattern(p): p.name for p in reversed(found)}
             raise VideoError(
                 f"{path} holds pictures that are no numbered sequence ({', '.join(sorted(kinds.values())[:3])}, …); "
                 "give the pattern of the one that is meant, such as walk_####.png, or a single picture"
@@ -37,7 +35,7 @@ def find_pictures(path: Path, rate_given: bool) -> list[Path]:
     sign = _NUMBER_SIGN.search(path.name)
     if sign and not path.exists() and path.parent.is_dir():
         return _matching(path.parent, path.name[: sign.start()], path.name[sign.end() :], first=0)
-    number = _LAST_NUMBER.search(path.stem)
+    number = LAST_NUMBER.search(path.stem)
     if rate_given and number and path.is_file() and cv2.haveImageReader(str(path)):
         before, after = path.stem[: number.start()], path.stem[number.end() :] + path.suffix
         found = _matching(path.parent, before, after, first=int(number.group()))
@@ -76,9 +74,4 @@ class PictureReader:
 def _matching(folder: Path, before: str, after: str, first: int) -> list[Path]:
     name = re.compile(re.escape(before) + r"(\d+)" + re.escape(after))
     numbered = [(int(m.group(1)), p) for p in folder.iterdir() if (m := name.fullmatch(p.name))]
-    return [p for number, p in sorted(numbered) if number >= first and p.suffix.lower() in _SUFFIXES]
-
-
-def _in_order(path: Path) -> list[tuple[int, int, str]]:
-    """A key that puts frame 10 after frame 9."""
-    return [(0, int(part), "") if part.isdecimal() else (1, 0, part) for part in re.split(r"(\d+)", path.name)]
+    return [p for number, p in sorted(numbered) if number >= first and p.suffix.lower() in PICTURE_SUFFIXES]

@@ -11,7 +11,6 @@ import hashlib
 import json
 import os
 import subprocess
-import sys
 import threading
 import time
 from collections import Counter
@@ -21,7 +20,7 @@ from pathlib import Path
 from typing import IO
 
 from ...solver.errors import InputError, NoPersonError, OutputError, UsageError
-from ..footage import FOOTAGE_SUFFIXES, PICTURE_SUFFIXES, VIDEO_SUFFIXES
+from ..footage import FOOTAGE_SUFFIXES, PICTURE_SUFFIXES, VIDEO_SUFFIXES, is_sequence, pictures_in
 from ..whole_file import written_beside
 from .parent import GRACE_S
 from .request import code_version
@@ -31,9 +30,8 @@ STATUSES = ("done", "skipped", "no_person", "failed")
 _ROOT = Path(__file__).resolve().parents[2]
 _OVERLAY = ".overlay"
 # Ctrl-C on a terminal comes to the batch alone, which stops its clips once: twice would foil their cleaning up.
-_OWN_GROUP: dict = (
-    {"creationflags": subprocess.CREATE_NEW_PROCESS_GROUP} if sys.platform == "win32" else {"process_group": 0}
-)
+_NEW_GROUP = getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0)
+_OWN_GROUP: dict = {"creationflags": _NEW_GROUP} if _NEW_GROUP else {"process_group": 0}
 _GRACE_S = GRACE_S + 3.0  # that a clip has to clean up when the batch is stopped
 
 
@@ -259,7 +257,7 @@ class Batch:
             if path.name.startswith(".") or path == self.out or path.stem.endswith(_OVERLAY):
                 continue
             if path.is_dir():
-                if _is_sequence(path):
+                if _is_clip(path):
                     found.append(path)
                 elif recursive:
                     found += self._below(path, recursive)
@@ -273,15 +271,13 @@ def _add_content(digest: hashlib._Hash, file: Path) -> None:
         digest.update(hashlib.file_digest(stream, "sha256").digest())
 
 
-def _is_sequence(folder: Path) -> bool:
-    """Whether a folder holds the numbered pictures of one clip, and no other footage or folder."""
+def _is_clip(folder: Path) -> bool:
+    """Whether a folder is one numbered sequence, and holds no video or folder beside it."""
     try:
-        content = [p for p in folder.iterdir() if not p.name.startswith(".")]
+        others = [p for p in folder.iterdir() if p.is_dir() or p.suffix.lower() in VIDEO_SUFFIXES]
+        return is_sequence(pictures_in(folder)) and all(p.name.startswith(".") for p in others)
     except OSError:
         return False
-    pictures = [p for p in content if p.suffix.lower() in PICTURE_SUFFIXES and any(c.isdigit() for c in p.stem)]
-    others = [p for p in content if p.is_dir() or p.suffix.lower() in VIDEO_SUFFIXES]
-    return len(pictures) > 1 and not others
 
 
 def _last_object(text: str) -> dict | None:

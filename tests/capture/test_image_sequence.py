@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from scope.scope_addon.capture.video import open_video
 from scope.scope_addon.capture.video_range import VideoRange
+from scope.scope_addon.job.batch import Batch
 from scope.solver.errors import VideoError
 
 NUMBERS = [*range(7, 12), 100]
@@ -73,3 +74,31 @@ def test_a_folder_of_unrelated_pictures_is_no_clip(folder: Path) -> None:
     with pytest.raises(VideoError, match=r"holiday\.png.*pattern"):
         open_video(folder)
     assert brightness(folder / "walk_####.png", VideoRange(fps=Fraction(10))) == NUMBERS
+
+
+@pytest.mark.parametrize(
+    ("names", "numbered"),
+    [
+        (["a_1.png", "a_10.png", "a_2.PNG"], True),
+        (["take2_0001.jpg", "take2_0002.jpg"], True),
+        (["take1_0001.jpg", "take2_0001.jpg"], False),
+        (["a_1.png", "a_2.jpg"], False),
+        (["a_1.png", "b_1.png"], False),
+        (["a_1.png"], False),
+        (["one.png", "two.png"], False),
+    ],
+)
+def test_capture_and_batch_agree_on_what_a_sequence_is(tmp_path: Path, names: list[str], numbered: bool) -> None:
+    clips = tmp_path / "clips"
+    (clips / "folder").mkdir(parents=True)
+    for name in names:
+        ok, data = cv2.imencode(".png", np.zeros((20, 30, 3), np.uint8))
+        (clips / "folder" / name).write_bytes(data.tobytes())
+    found = Batch(clips, tmp_path / "out", [], {}, [".npz"]).clips(recursive=False)
+    assert list(found) == (["folder"] if numbered else [])
+    if numbered or len(names) == 1:
+        with open_video(clips / "folder", VideoRange(fps=Fraction(10))) as video:
+            assert len(list(video)) == len(names)
+    else:
+        with pytest.raises(VideoError, match="no numbered sequence"):
+            open_video(clips / "folder")

@@ -146,10 +146,14 @@ def test_names(tmp_path):
     out = clips / "out"
     out.mkdir()
     (out / "old.mp4").write_text("x")
+    (clips / "photos").mkdir()
+    for name in ("tree_1.png", "house_2.png"):
+        (clips / "photos" / name).write_text("x")
     flat = batch(clips, out).clips(recursive=False)
     assert list(flat) == ["a.mov", "a.mp4", "b", "walk"]
     assert flat["walk"] == clips / "walk"
-    assert list(batch(clips, out).clips(recursive=True)) == ["a.mov", "a.mp4", "b", "below/c", "below/deep/d", "walk"]
+    below = ["below/c", "below/deep/d", "photos/house_2", "photos/tree_1"]
+    assert list(batch(clips, out).clips(recursive=True)) == ["a.mov", "a.mp4", "b", *below, "walk"]
     report = batch(clips, out, suffixes=(".npz",)).run(1, recursive=True)
     assert report["exit_status"] == 0
     assert (out / "below" / "deep" / "d.npz").is_file()
