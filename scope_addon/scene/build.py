@@ -186,7 +186,7 @@ def _build_cameras(
         if camera.pixel_aspect(person.motion) != (1.0, 1.0) and options.resolution == "keep":
             warnings.append(
                 "the footage's pixels are not square, which Blender keeps with the scene, not the camera: "
-                "set the scene's resolution from the footage for an exact overlay"
+                "set the scene's resolution from the footage, as Compare with Footage does, for an exact overlay"
             )
         if footage is not None:
             warnings += camera.show_footage(person.camera, footage, person.motion, person.frames)

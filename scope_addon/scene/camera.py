@@ -6,8 +6,10 @@ OpenCV's pinhole ``u = fx x/z + cx, v = fy y/z + cy`` in a W × H picture is, wi
     lens / sensor_width = fx / W,     shift_x = 1/2 − cx / W,
     pixel_aspect_x / pixel_aspect_y = fy / fx,     shift_y = (cy − H/2) / W · fx / fy.
 
-Pixel aspect and resolution belong to the scene in Blender; the camera alone is exact for square pixels.
-Source: Blender's BKE_camera_params_compute_viewplane.
+Pixel aspect and resolution belong to the scene in Blender; the camera alone is exact for square pixels. The footage has
+a display aspect of its own, without which it would not fill the scene's picture, and its lens, which counts rows in
+units of columns, a third one: fy / fx. Source: Blender's BKE_camera_params_compute_viewplane, overlay_image.cc and
+tracking.cc.
 """
 
 from __future__ import annotations
@@ -116,6 +118,7 @@ def show_footage(camera: bpy.types.Object, footage: str | Path, motion: Motion, 
     if path.suffix.lower() in PICTURE_SUFFIXES and not motion.dist.any():
         background.source = "IMAGE"
         background.image = bpy.data.images.load(str(path), check_existing=True)
+        background.image.display_aspect = pixel_aspect(motion)
         size = tuple(background.image.size)
     else:
         clip = bpy.data.movieclips.load(str(path))  # its own: another capture may begin elsewhere or have another lens
@@ -128,6 +131,7 @@ def show_footage(camera: bpy.types.Object, footage: str | Path, motion: Motion, 
             )
         background.source = "MOVIE_CLIP"
         background.clip = clip
+        clip.display_aspect = pixel_aspect(motion)
         size = tuple(clip.size)
         _set_lens_distortion(clip, background, motion)
     if not min(size):
@@ -152,6 +156,7 @@ def _set_lens_distortion(
     lens.sensor_width = SENSOR_WIDTH
     lens.units = "MILLIMETERS"
     lens.focal_length = SENSOR_WIDTH * motion.intrinsics[0, 0] / width
+    lens.pixel_aspect = motion.intrinsics[1, 1] / motion.intrinsics[0, 0]
     # Blender counts the principal point's v from the bottom.
     lens.principal_point_pixels = motion.intrinsics[0, 2], height - motion.intrinsics[1, 2]
     lens.distortion_model = "BROWN"
