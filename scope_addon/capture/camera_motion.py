@@ -159,7 +159,7 @@ class BackgroundTracker:
             return None
         assert self._picture is not None
         moved, found = _flow(self._picture, picture, self._points)
-        back, again = _flow(picture, self._picture, moved)
+        back, again = _flow(picture, self._picture, moved, near=self._points)
         good = found & again & (np.abs(back - self._points).max(1) < 0.7)
         good &= ((moved >= 0) & (moved < self._size)).all(1) & ~inside(moved, boxes)
         self._points, self._key_rays = moved[good], self._key_rays[good]
@@ -238,8 +238,13 @@ def _kabsch(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return U @ Vt
 
 
-def _flow(before: np.ndarray, after: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Where corners (n, 2) have gone, and whether each was found."""
+def _flow(
+    before: np.ndarray, after: np.ndarray, points: np.ndarray, near: np.ndarray | None = None
+) -> tuple[np.ndarray, np.ndarray]:
+    """Where corners (n, 2) have gone, and whether each was found; ``near``: where they are looked for, and not far."""
     start = points.astype(np.float32)
-    moved, found, _ = cv2.calcOpticalFlowPyrLK(before, after, start, start.copy(), winSize=(15, 15), maxLevel=3)
+    guess, levels, flags = (start, 3, 0) if near is None else (near.astype(np.float32), 0, cv2.OPTFLOW_USE_INITIAL_FLOW)
+    moved, found, _ = cv2.calcOpticalFlowPyrLK(
+        before, after, start, guess.copy(), winSize=(15, 15), maxLevel=levels, flags=flags
+    )
     return np.array(moved, np.float32), np.array(found).ravel() == 1

@@ -3,8 +3,9 @@
 
 The smaller networks do so for dozens of frames at a stretch, for most of a clip even, when a person's face does not
 show. One frame does not tell, but the body does not turn round between two frames: at either end of such a stretch the
-labels jump. Which side of a jump is right, the largest network says, which looked at a few frames (`tracker`). Its
-judgement also corrects the landmarks in space round these frames, where the two networks are far apart.
+labels jump. Which side of a jump is right, the largest network says, which looked at a few frames, and stood in where
+labels jumped (`tracker`). Its judgement also corrects the landmarks in space round these frames, where the two networks
+are far apart.
 
 A network that tells nothing of depth is judged by what the lifting network makes of its keypoints, as said and with
 left and right exchanged: in the picture alone, seen from the side, exchanged legs are a step as good as any.

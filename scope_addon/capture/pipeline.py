@@ -5,11 +5,13 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import cv2
 import numpy as np
 
 from ...solver.body import Body
@@ -118,7 +120,8 @@ def capture(
         )
         background = BackgroundTracker(camera, video.width, video.height)
         hands = HandTracker(threads, execution=execution) if options.hands else None
-        seen = _observe(video, tracker, hands, background, clock, progress, watch)
+        with _opencv_in_one_thread():
+            seen = _observe(video, tracker, hands, background, clock, progress, watch)
         warnings = execution.warnings + list(video.warnings)
     frames = len(seen)
     with clock.stage("solver"):
@@ -209,6 +212,17 @@ def _observe(
         if looking is not None:
             looking.result()
     return builder
+
+
+@contextmanager
+def _opencv_in_one_thread() -> Iterator[None]:
+    """What runs side by side here are whole stages: OpenCV's own threads would wait for one another."""
+    before = cv2.getNumThreads()
+    cv2.setNumThreads(1)
+    try:
+        yield
+    finally:
+        cv2.setNumThreads(before)
 
 
 def solve(

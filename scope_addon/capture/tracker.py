@@ -52,6 +52,7 @@ RIVAL_SIDE = 0.5  # who is smaller than this share of the largest will not be th
 MOST_PEOPLE = 12
 JUDGE_FRAMES = 30  # between two looks of the strong network that tells left from right
 JUDGE_AGAIN_FRAMES = 8  # the same where left and right seem to have changed places
+DOUBT_FRAMES = 15  # how long the strong network stands in for a smaller one that has left and right changing places
 MOST_JUDGED = 2  # looks of it that wait, each with its frame
 APPEARANCE_FRAMES = 4
 # How the region is turned and sized in which somebody who was just lost is looked for, and what is believed there.
@@ -81,6 +82,7 @@ class _Followed:
     lost: int = 0
     since_judged: int = JUDGE_FRAMES
     swapped: bool = False  # whether left and right changed places since the strong network looked
+    in_doubt: int = 0  # for how many more frames the strong network stands in
     foreseen: Future[PoseEstimate] | None = None  # in the next frame, where it was expected
 
     @property
@@ -146,6 +148,7 @@ class PeopleTracker:
         self._judging: list[Judgement] = []
         self._judges = ThreadPoolExecutor(1, "scope-judge")
         self._looks_ahead = not keypoints and self._judge is None
+        self._stands_in = not keypoints  # the user's networks are the user's choice
         self._largest_only = people is None
         self._most = 2 if people is None else min(people + 1, MOST_PEOPLE)
         self.reset()
@@ -179,6 +182,7 @@ class PeopleTracker:
             lost.lost += 1
         self._lost = [lost for lost in self._lost if lost.lost <= MEMORY_FRAMES]
         found = self._look_ahead(image_rgb, upcoming_rgb)
+        found = [e and self._settled(image_rgb, f, e) for f, e in zip(self._live, found, strict=True)]
         seen = [(f, e, f.surprise(e)) for f, e in zip(self._live, found, strict=True) if e is not None]
         # Two on one body: somebody went behind somebody else. It belongs to whom it does not surprise; but of a body
         # that has long been followed and one that was found just now, the latter was a mistake.
@@ -218,6 +222,18 @@ class PeopleTracker:
         looked = self._look(image_rgb, [f.estimate.next_region for f in missing])
         found |= {f.tracklet: estimate for f, estimate in zip(missing, looked, strict=True)}
         return [found[f.tracklet] for f in self._live]
+
+    def _settled(self, image_rgb: np.ndarray, followed: _Followed, estimate: PoseEstimate) -> PoseEstimate:
+        """The estimate, or the strong network's for a while once a smaller one takes left for right."""
+        if self._judge is None or not self._stands_in:
+            return estimate
+        if looks_swapped(followed.estimate, estimate):
+            followed.in_doubt = DOUBT_FRAMES
+        if followed.in_doubt == 0:
+            return estimate
+        followed.in_doubt -= 1
+        (stronger,) = self._judge.estimate(image_rgb, [estimate.region])
+        return stronger if believable(stronger) else estimate
 
     def _look_round(self, image_rgb: np.ndarray) -> None:
         """Whoever was lost a moment ago is where motion foretold, but turned: a somersault, a fall, a handstand.

@@ -7,7 +7,7 @@ landmarks in a region are those of the visible person nearest to its middle, who
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from concurrent.futures import Future
 from dataclasses import dataclass
 
@@ -37,7 +37,7 @@ class Person:
     color: tuple[int, int, int]
     size_px: float = 100.0
     hidden: range = range(0)
-    swapped: range = range(0)
+    swapped: Collection[int] = ()
 
     def place(self, t: int) -> np.ndarray | None:
         center = self.center_px(t)

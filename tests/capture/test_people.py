@@ -134,14 +134,20 @@ def test_a_flicker_is_nobody(follow: Callable[..., list[Track]]) -> None:
     assert follow([blinks], 200, wanted=3) == []
 
 
+def test_the_strong_network_stands_in_where_left_and_right_change_places(follow: Callable[..., list[Track]]) -> None:
+    person = Person(lambda t: (300 + t, 200), BLUE, swapped=[*range(40, 70), 80])
+    (track,) = follow([person], 120)
+    assert (track.keypoints_px[:, 11, 0] > track.keypoints_px[:, 12, 0]).all()
+
+
 def test_exchanged_left_and_right_are_judged(follow: Callable[..., list[Track]]) -> None:
     from scope.scope_addon.capture.camera import choose_camera
     from scope.scope_addon.capture.left_right import repair_left_right
 
-    person = Person(lambda t: (300 + t, 200), BLUE, swapped=range(15, 110))
+    person = Person(lambda t: (300 + t, 200), BLUE, swapped=range(110))
     (track,) = follow([person], 120)
     left, right = (track.keypoints_px[:, k, 0] for k in (11, 12))
-    assert (left < right).sum() == 95
+    assert (left < right).sum() == 110
     repaired = repair_left_right(track, choose_camera(1200, 400))
     assert (repaired.keypoints_px[:, 11, 0] > repaired.keypoints_px[:, 12, 0]).all()
     assert len(track.judged_rows) <= 120 // 30 + 3
