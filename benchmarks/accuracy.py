@@ -14,6 +14,7 @@ import numpy as np
 
 from ..scope_addon.capture.parts import Parts
 from ..scope_addon.capture.pipeline import CaptureOptions, capture
+from ..scope_addon.motion import Motion
 from ..solver import Body
 from .frames import DATA
 
@@ -47,12 +48,22 @@ FLIPS = ("lr_swap", "mirror", "mirror_swap")
 
 def evaluate_camera(body: Body, camera: str, options: CaptureOptions) -> dict:
     """Return everything that the evaluation tool says about one camera."""
+    folder = DATA / "pose2sim"
+    return evaluate_clip(body, folder / f"{camera}.mp4", folder / f"truth_{camera}.npz", options)[1]
+
+
+def evaluate_clip(body: Body, video: Path, truth: Path, options: CaptureOptions) -> tuple[Motion, dict]:
+    """Capture a clip; return its motion and everything that the evaluation tool says about it.
+
+    :raises NoPersonError: nobody was found.
+    """
+    motion = capture(video, body, options).motions[0]
     with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # of means over nothing, in the tool
-        result = Path(folder) / f"{camera}.npz"
-        capture(DATA / "pose2sim" / f"{camera}.mp4", body, options).motions[0].save(result)
-        figures = _tool().evaluate(str(DATA / "pose2sim" / f"truth_{camera}.npz"), str(result))
-    return figures | {"flipped": max(figures[key] for key in FLIPS)}
+        result = Path(folder) / "result.npz"
+        motion.save(result)
+        figures = _tool().evaluate(str(truth), str(result))
+    return motion, figures | {"flipped": max(figures[key] for key in FLIPS)}
 
 
 def evaluate_all(body: Body, options: Callable[[str], CaptureOptions]) -> dict[str, dict]:
