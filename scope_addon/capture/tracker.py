@@ -52,7 +52,7 @@ RIVAL_SIDE = 0.5  # who is smaller than this share of the largest will not be th
 MOST_PEOPLE = 12
 JUDGE_FRAMES = 30  # between two looks of the strong network that tells left from right
 JUDGE_AGAIN_FRAMES = 8  # the same where left and right seem to have changed places
-DOUBT_FRAMES = 15  # how long the strong network stands in for a smaller one that has left and right changing places
+DOUBT_FRAMES = 15  # how long the strong network stands in for a smaller one that loses the person, or left and right
 MOST_JUDGED = 2  # looks of it that wait, each with its frame
 APPEARANCE_FRAMES = 4
 # How the region is turned and sized in which somebody who was just lost is looked for, and what is believed there.
@@ -182,7 +182,7 @@ class PeopleTracker:
             lost.lost += 1
         self._lost = [lost for lost in self._lost if lost.lost <= MEMORY_FRAMES]
         found = self._look_ahead(image_rgb, upcoming_rgb)
-        found = [e and self._settled(image_rgb, f, e) for f, e in zip(self._live, found, strict=True)]
+        found = [self._settled(image_rgb, f, e) for f, e in zip(self._live, found, strict=True)]
         seen = [(f, e, f.surprise(e)) for f, e in zip(self._live, found, strict=True) if e is not None]
         # Two on one body: somebody went behind somebody else. It belongs to whom it does not surprise; but of a body
         # that has long been followed and one that was found just now, the latter was a mistake.
@@ -223,16 +223,21 @@ class PeopleTracker:
         found |= {f.tracklet: estimate for f, estimate in zip(missing, looked, strict=True)}
         return [found[f.tracklet] for f in self._live]
 
-    def _settled(self, image_rgb: np.ndarray, followed: _Followed, estimate: PoseEstimate) -> PoseEstimate:
-        """The estimate, or the strong network's for a while once a smaller one takes left for right."""
+    def _settled(
+        self, image_rgb: np.ndarray, followed: _Followed, estimate: PoseEstimate | None
+    ) -> PoseEstimate | None:
+        """The estimate, or the strong network's for a while once a smaller one loses the person or left and right."""
         if self._judge is None or not self._stands_in:
             return estimate
-        if looks_swapped(followed.estimate, estimate):
+        if estimate is None or looks_swapped(followed.estimate, estimate):
             followed.in_doubt = DOUBT_FRAMES
         if followed.in_doubt == 0:
             return estimate
         followed.in_doubt -= 1
-        (stronger,) = self._judge.estimate(image_rgb, [estimate.region])
+        region = followed.estimate.next_region
+        if not _is_in_image(region, image_rgb):
+            return estimate
+        (stronger,) = self._judge.estimate(image_rgb, [region])
         return stronger if believable(stronger) else estimate
 
     def _look_round(self, image_rgb: np.ndarray) -> None:

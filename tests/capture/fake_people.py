@@ -31,13 +31,17 @@ _BODY = np.array([_joint(name) for name in KEYPOINT_NAMES])
 
 @dataclass
 class Person:
-    """``center_px(t)`` of the hips, None while out of the picture; ``size_px`` of a metre; hidden while t is in it."""
+    """``center_px(t)`` of the hips, None while out of the picture; ``size_px`` of a metre; hidden while t is in it.
+
+    In the frames ``swapped`` and ``lost``, the small network takes left for right, or sees nobody.
+    """
 
     center_px: Callable[[int], tuple[float, float] | None]
     color: tuple[int, int, int]
     size_px: float = 100.0
     hidden: range = range(0)
     swapped: Collection[int] = ()
+    lost: Collection[int] = ()
 
     def place(self, t: int) -> np.ndarray | None:
         center = self.center_px(t)
@@ -102,7 +106,7 @@ class FakeLandmarks:
             return np.inf if place is None else float(np.linalg.norm(place - region.center_px)) / region.side_px
 
         person = min(self.people, key=far)
-        seen = far(person) < 0.4
+        seen = far(person) < 0.4 and (self.right or t not in person.lost)
         place = person.place(t) if seen else np.asarray(region.center_px)
         body = person.body(t)
         if t in person.swapped and not self.right:

@@ -140,6 +140,12 @@ def test_the_strong_network_stands_in_where_left_and_right_change_places(follow:
     assert (track.keypoints_px[:, 11, 0] > track.keypoints_px[:, 12, 0]).all()
 
 
+def test_the_strong_network_stands_in_where_a_smaller_one_loses_somebody(follow: Callable[..., list[Track]]) -> None:
+    (track,) = follow([Person(lambda t: (300 + t, 200), BLUE, lost=range(40, 80))], 120)
+    assert track.seen.all()
+    assert track.acquired.sum() == 1
+
+
 def test_exchanged_left_and_right_are_judged(follow: Callable[..., list[Track]]) -> None:
     from scope.scope_addon.capture.camera import choose_camera
     from scope.scope_addon.capture.left_right import repair_left_right
