@@ -148,7 +148,7 @@ def steps() -> Iterator[float]:
         invoke(bpy.ops.scope.capture, "INVOKE_DEFAULT")
     except RuntimeError as error:
         report["missing_footage"] = str(error).strip()
-    yield 1.5
+    yield 5.0  # Blender moves the panels below to their new places by and by
     picture("10_missing_footage")
     bpy.ops.screen.userpref_show()
     bpy.context.preferences.active_section = "ADDONS"
