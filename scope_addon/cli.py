@@ -120,6 +120,9 @@ def _add_options(capture: argparse.ArgumentParser) -> None:
         help="keyed once, per_frame, or baked into the mesh for engines that clamp morphs (default: keyed)",
     )
     capture.add_argument(
+        "--file-per-person", action="store_true", help="a file for each of several people, in every format"
+    )
+    capture.add_argument(
         "--retarget", type=Path, metavar="RIG", help="put the motion on the rig in this .blend, .fbx or .glb instead"
     )
     capture.add_argument("--rig-object", default="", metavar="NAME", help="the armature, where RIG holds several")
@@ -332,16 +335,19 @@ def _write(
         written += targets
     if scene_files:
         from .scene.build import NEW_SCENE
-        from .scene.export import export_motions
+        from .scene.export import ExportOptions, export_motions
 
         footage = video if video.is_file() else None  # Blender's camera shows files, not folders of pictures
         options = replace(NEW_SCENE, name=video.stem, shape=args.shape_keys)
+        separate = ExportOptions(separate=args.file_per_person)
         if rig is not None:
             from .scene.rig_export import export_on_rig
 
-            files, warnings = export_on_rig(motions, body, scene_files, rig, options, args.retarget_root, footage)
+            files, warnings = export_on_rig(
+                motions, body, scene_files, rig, options, args.retarget_root, footage, separate
+            )
         else:
-            files, warnings = export_motions(motions, body, scene_files, footage=footage, build_options=options)
+            files, warnings = export_motions(motions, body, scene_files, footage, options, separate)
         written += files
         for warning in warnings:
             _say(f"warning: {warning}")

@@ -37,6 +37,7 @@ class ExportOptions:
     # "keys": morph targets whose value is the coefficient. "baked": a plain mesh of the fitted shape, for engines that
     # clamp morphs to 0..1. "auto": keys, but baked in .usdc, because USD importers (Blender's among them) clamp.
     shape: str = "auto"
+    separate: bool = False  # a file for each person, also in the formats that hold several
 
     def __post_init__(self) -> None:
         """Refuse values that are not offered."""
@@ -59,7 +60,7 @@ def export(
     motions: Sequence[Motion] = (),
     options: ExportOptions | None = None,
 ) -> list[Path]:
-    """Write captures to one file (.bvh and .npz: one per person) in the format of its suffix.
+    """Write captures to one file (.bvh and .npz, or where it is wanted: one per person) in the format of its suffix.
 
     :param collections: the captures; those of the active scene when not given.
     :param motions: needed for .npz, which holds what was captured rather than what the scene has become.
@@ -79,21 +80,63 @@ def export(
     if not chosen:
         raise UsageError(f"cannot write {path.name}: the scene holds no capture; capture a video first")
     options = options or ExportOptions()
-    with _scene_of(chosen) as scene, _baked_meshes(scene) if options.bakes(suffix) else nullcontext():
-        if suffix == ".bvh":
-            rigs = [obj for obj in scene.objects if obj.type == "ARMATURE"]
-            targets = person_paths(path, len(rigs))
-            for target, rig in zip(targets, rigs, strict=True):
-                _write(target, lambda temporary, rig=rig: formats.write_bvh(temporary, scene, rig))
-            return targets
+    rigs = list(dict.fromkeys(obj for c in chosen for obj in c.all_objects if obj.type == "ARMATURE"))
+    targets = person_paths(path, len(rigs), options.separate)
+    if len(targets) == 1:
+        _write_one(path, chosen, rigs, options)
+        return [path]
+    for number, (target, rig) in enumerate(zip(targets, rigs, strict=True), 1):
+        with _alone(rig, rigs, chosen, f"person{number}") as parts:
+            _write_one(target, parts, rigs, options)
+    return targets
+
+
+def _write_one(
+    path: Path,
+    collections: Sequence[bpy.types.Collection],
+    rigs: Sequence[bpy.types.Object],
+    options: ExportOptions,
+) -> None:
+    """Write these collections, as long as all of ``rigs`` move: files of several people begin at the same time."""
+    suffix = path.suffix.lower()
+    with (
+        _scene_of(collections, rigs) as scene,
+        _baked_meshes(scene) if options.bakes(suffix) else nullcontext(),
+        _actions_as_long_as(scene) if len(rigs) > 1 else nullcontext(),
+    ):
+        rig = next((obj for obj in scene.objects if obj.type == "ARMATURE"), None)
         writers = {
+            ".bvh": lambda temporary: formats.write_bvh(temporary, scene, rig),
             ".glb": lambda temporary: formats.write_glb(temporary, options.camera),
             ".fbx": lambda temporary: formats.write_fbx(temporary, options.camera),
             ".usdc": lambda temporary: formats.write_usd(temporary, options.camera),
             ".blend": lambda temporary: formats.write_blend(temporary, scene),
         }
         _write(path, writers[suffix])
-    return [path]
+
+
+@contextmanager
+def _alone(
+    rig: bpy.types.Object,
+    rigs: Sequence[bpy.types.Object],
+    collections: Sequence[bpy.types.Collection],
+    name: str,
+) -> Iterator[list[bpy.types.Collection]]:
+    """Collections, for a while, of what those hold but for the other people."""
+    others = {obj for other in rigs if other != rig for obj in (other, *other.children_recursive)}
+    parts = []
+    try:
+        for collection in collections:
+            part = bpy.data.collections.new(f"{collection.name}_{name}")
+            parts.append(part)
+            for key, value in collection.items():
+                part[key] = value
+            for obj in collection.all_objects:
+                if obj not in others:
+                    part.objects.link(obj)
+        yield parts
+    finally:
+        bpy.data.batch_remove(parts)
 
 
 def export_motions(
@@ -163,8 +206,13 @@ def temporary_scene(name: str) -> Iterator[bpy.types.Scene]:
 
 
 @contextmanager
-def _scene_of(collections: Sequence[bpy.types.Collection]) -> Iterator[bpy.types.Scene]:
-    """A scene that holds these collections alone, with the rate, picture and range of the scene they come from."""
+def _scene_of(
+    collections: Sequence[bpy.types.Collection], rigs: Sequence[bpy.types.Object]
+) -> Iterator[bpy.types.Scene]:
+    """A scene that holds these collections alone, with the rate and picture of the scene they come from.
+
+    It begins and ends with the motion of ``rigs``.
+    """
     source = bpy.context.scene
     with temporary_scene("Capture") as scene:
         for collection in collections:
@@ -175,7 +223,7 @@ def _scene_of(collections: Sequence[bpy.types.Collection]) -> Iterator[bpy.types
             scene.timeline_markers.new(marker.name, frame=marker.frame)
         cameras = [obj for obj in scene.objects if obj.type == "CAMERA"]
         scene.camera = source.camera if source.camera in cameras else next(iter(cameras), None)
-        span = actions.frame_range(_armatures(scene)) or (source.frame_start, source.frame_end)
+        span = actions.frame_range(list(rigs)) or (source.frame_start, source.frame_end)
         scene.frame_end = math.ceil(span[1])
         scene.frame_start = math.floor(span[0])
         # Until the view layer is evaluated once, frame changes do not reach the objects that exporters read.
@@ -185,8 +233,19 @@ def _scene_of(collections: Sequence[bpy.types.Collection]) -> Iterator[bpy.types
     source.frame_set(source.frame_current, subframe=source.frame_subframe)
 
 
-def _armatures(scene: bpy.types.Scene) -> list[bpy.types.Object]:
-    return [obj for obj in scene.objects if obj.type == "ARMATURE"]
+@contextmanager
+def _actions_as_long_as(scene: bpy.types.Scene) -> Iterator[None]:
+    """Let the actions of armatures last as long as the scene: one who comes late is late in a file of their own too."""
+    moving = [obj.animation_data for obj in scene.objects if obj.type == "ARMATURE" and obj.animation_data]
+    stretched = [a for a in {data.action for data in moving} if a is not None and not a.use_frame_range]
+    try:
+        for action in stretched:
+            action.use_frame_range = True
+            action.frame_start, action.frame_end = scene.frame_start, scene.frame_end
+        yield
+    finally:
+        for action in stretched:
+            action.use_frame_range = False
 
 
 @contextmanager

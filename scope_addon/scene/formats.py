@@ -18,6 +18,7 @@ import numpy as np
 
 from ...solver.errors import OutputError
 from . import bvh, timing
+from .fbx_units import metres_to_centimetres
 
 
 def write_glb(path: Path, camera: bool = False) -> None:
@@ -53,7 +54,7 @@ def write_glb(path: Path, camera: bool = False) -> None:
 
 
 def write_fbx(path: Path, camera: bool = False) -> None:
-    """FBX: y up, objects at scale 1 with the file's unit set to metres, no leaf bones, every frame keyed."""
+    """FBX: y up, centimetres, objects at scale 1, no leaf bones, every frame keyed."""
     need_addon("io_scene_fbx")
     call_operator(
         bpy.ops.export_scene.fbx,
@@ -80,6 +81,7 @@ def write_fbx(path: Path, camera: bool = False) -> None:
         bake_anim_simplify_factor=0.0,
         path_mode="AUTO",
     )
+    metres_to_centimetres(path)
 
 
 def write_usd(path: Path, camera: bool = False) -> None:

@@ -29,9 +29,12 @@ def check_output(path: str | Path, suffixes: tuple[str, ...] = SUFFIXES) -> Path
     return path
 
 
-def person_paths(path: str | Path, people: int) -> list[Path]:
-    """One path per person for the formats that hold one: OUT.bvh, or OUT.person1.bvh, OUT.person2.bvh, …"""
+def person_paths(path: str | Path, people: int, separate: bool = False) -> list[Path]:
+    """One path per person for the formats that hold one: OUT.bvh, or OUT.person1.bvh, OUT.person2.bvh, …
+
+    :param separate: for the others too.
+    """
     path = Path(path)
-    if people == 1 or path.suffix.lower() not in PER_PERSON:
+    if people == 1 or not (separate or path.suffix.lower() in PER_PERSON):
         return [path]
     return [path.with_name(f"{path.stem}.person{i + 1}{path.suffix}") for i in range(people)]

@@ -12,7 +12,7 @@ from ...solver.body import Body
 from ..motion import Motion
 from ..retarget.rig_source import RigSource
 from .build import BuildOptions, build_scene
-from .export import export, temporary_scene
+from .export import ExportOptions, export, temporary_scene
 from .output_paths import check_output
 from .retarget import RetargetOptions, retarget
 from .rig_file import bones_of, forgotten, load_rig
@@ -26,6 +26,7 @@ def export_on_rig(
     build_options: BuildOptions,
     root: str = "bone",
     footage: Path | None = None,
+    export_options: ExportOptions | None = None,
 ) -> tuple[list[Path], list[str]]:
     """Put every person's motion on a rig of its own, write one file or several, and leave the session as it was.
 
@@ -50,5 +51,5 @@ def export_on_rig(
             retarget(person.armature, body, betas, rig, bones, result.frame_rate, options)
         bpy.data.batch_remove([obj for person in result.people for obj in (person.armature, person.mesh)])
         for path in paths:
-            written += export(path, [result.collection])
+            written += export(path, [result.collection], options=export_options)
     return written, warnings

@@ -51,6 +51,9 @@ class SCOPE_OT_export(bpy.types.Operator):
         description="How the body's shape is written",
     )
     camera: BoolProperty(name="Camera", default=False, description="Write the footage's camera too")
+    separate: BoolProperty(
+        name="File per Person", default=False, description="Write a file for each of several people instead of one"
+    )
 
     @classmethod
     def description(cls, context: bpy.types.Context, properties: bpy.types.OperatorProperties) -> str:
@@ -89,6 +92,7 @@ class SCOPE_OT_export(bpy.types.Operator):
         if self.format != "BVH":
             layout.prop(self, "shape")
             layout.prop(self, "camera")
+            layout.prop(self, "separate")
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Write."""
@@ -104,7 +108,8 @@ class SCOPE_OT_export(bpy.types.Operator):
                 self.report({"ERROR"}, "The active object belongs to no capture; select one of a capture's objects")
                 return {"CANCELLED"}
         try:
-            written = export(path, collections, options=ExportOptions(camera=self.camera, shape=self.shape.lower()))
+            options = ExportOptions(camera=self.camera, shape=self.shape.lower(), separate=self.separate)
+            written = export(path, collections, options=options)
         except ScopeError as error:
             self.report({"ERROR"}, sentence(error))
             return {"CANCELLED"}

@@ -177,8 +177,41 @@ def test_fbx_objects_have_unit_scale_and_no_leaf_bones(body, make_motion, tmp_pa
     read_back(path)
     armature = blender.only("ARMATURE")
     assert len(armature.data.bones) == len(body.joint_names)
-    for obj in (armature, blender.only("MESH")):
-        np.testing.assert_allclose(obj.matrix_world.to_scale(), 1.0, atol=1e-5)
+
+
+def test_fbx_is_in_centimetres_without_any_scaling(body, make_motion, tmp_path):
+    """As read by Blender's own parser. Unreal takes the numbers for centimetres, whatever unit the file names."""
+    parser = pytest.importorskip("io_scene_fbx.parse_fbx")
+    path, motion = tmp_path / "walk.fbx", make_motion(body, 4)
+    export_motions([motion], body, path, export_options=ExportOptions(camera=True))
+    root, version = parser.parse(str(path))
+    assert version == 7400
+
+    def below(elem, *names):
+        return [e for e in elem.elems if e.id.decode() in names]
+
+    def properties(elem):
+        return {p.props[0].decode(): p.props[4:] for block in below(elem, "Properties70") for p in block.elems}
+
+    assert properties(below(root, "GlobalSettings")[0])["UnitScaleFactor"] == [1.0]
+    objects = below(root, "Objects")[0]
+    models = {e.props[1].split(b"\0")[0].decode(): properties(e) for e in below(objects, "Model")}
+    for name, values in models.items():
+        np.testing.assert_allclose(values.get("Lcl Scaling", [1, 1, 1]), 1.0, atol=1e-4, err_msg=name)
+    joints = body.rest_joints(motion.betas)
+    knee, hip = (body.joint_names.index(f"left_{part}") for part in ("knee", "hip"))
+    shin = np.linalg.norm(models["left_knee"]["Lcl Translation"])
+    assert shin == pytest.approx(100 * np.linalg.norm(joints[knee] - joints[hip]), rel=1e-4)
+    mesh = next(e for e in below(objects, "Geometry") if e.props[2] == b"Mesh")
+    heights = np.reshape(below(mesh, "Vertices")[0].props[0], (-1, 3))
+    assert 100 < np.ptp(heights, axis=0).max() < 250
+    shapes = [e for e in below(objects, "Geometry") if e.props[2] == b"Shape"]
+    largest = max(np.abs(below(e, "Vertices")[0].props[0]).max() for e in shapes)
+    assert largest == pytest.approx(100 * np.abs(body.shapedirs).max(), rel=1e-3)
+    places = [below(n, "Matrix")[0].props[0][12:15] for e in below(objects, "Pose") for n in below(e, "PoseNode")]
+    assert np.abs(places).max() > 50
+    camera = next(properties(e) for e in below(objects, "NodeAttribute") if e.props[2] == b"Camera")
+    assert camera["FarPlane"] == [pytest.approx(100 * 1000.0)]
 
 
 def glb_json(path: Path) -> dict:
@@ -252,6 +285,26 @@ def test_blend_opens_with_camera_rate_and_shape_keys(body, make_motion, tmp_path
     assert captures(scene)[0].name == "walk"
     keys = blender.only("MESH").data.shape_keys.key_blocks
     assert (keys["Shape001"].slider_min, keys["Shape001"].slider_max) == (-10, 10)
+
+
+@pytest.mark.parametrize("suffix", [".glb", ".fbx", ".usdc", ".blend"])
+def test_a_file_for_each_of_several_people(body, make_motion, tmp_path, blender, truth, suffix):
+    """Each with one armature and mesh, moving as the person does, and all of them beginning at the same time."""
+    late = make_motion(body, timestamps=np.arange(2, 6) / 30, seed=1)
+    motions = [make_motion(body, 6), late]
+    before = sorted(c.name for c in bpy.data.collections)
+    written, _ = export_motions(
+        motions, body, tmp_path / f"pair{suffix}", export_options=ExportOptions(separate=True, camera=True)
+    )
+    assert [p.name for p in written] == [f"pair.person{n}{suffix}" for n in (1, 2)]
+    assert sorted(c.name for c in bpy.data.collections) == before
+    for path, motion, first in zip(written, motions, (0, 2), strict=True):
+        start = read_back(path)
+        armature = blender.only("ARMATURE")
+        assert len([o for o in bpy.data.objects if o.type == "MESH" and o.users_scene and o.find_armature()]) == 1
+        blender.go_to(start + first + 1)
+        posed = blender.joints(armature, body.joint_names)
+        np.testing.assert_allclose(posed, truth(body, motion).joints[1], atol=2e-3)
 
 
 def test_bvh_is_y_up_in_metres_and_one_file_a_person(body, make_motion, tmp_path, truth):
