@@ -34,7 +34,7 @@ def mend_leaps(track: Track) -> Track:
     if len(track) < 3:
         return track
     step_s = float(np.median(np.diff(track.times)))
-    in_picture = find_leaps(track.keypoints_px / _metre_px(track)[:, None, None], track.seen, step_s)
+    in_picture = find_leaps(track.keypoints_px / metre_px(track)[:, None, None], track.seen, step_s)
     in_space = in_picture | find_leaps(track.world_landmarks, track.seen, step_s)
     if not in_space.any():
         return track
@@ -68,7 +68,7 @@ def find_leaps(points: np.ndarray, seen: np.ndarray, step_s: float) -> np.ndarra
     return leaps
 
 
-def _metre_px(track: Track) -> np.ndarray:
+def metre_px(track: Track) -> np.ndarray:
     """(T,) pixels that a metre takes at the person's distance, roughly."""
     size = np.where(track.seen, person_size(track.keypoints_px), 0.0)
     padded = np.pad(size, SPREAD_FRAMES, mode="edge")

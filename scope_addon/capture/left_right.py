@@ -7,6 +7,8 @@ labels jump. Which side of a jump is right, the largest network says, which look
 labels jumped (`tracker`). Its judgement also corrects the landmarks in space round these frames, where the two networks
 are far apart.
 
+Legs or arms alone that changed sides are the affair of `limb_exchange`.
+
 A network that tells nothing of depth is judged by what the lifting network makes of its keypoints, as said and with
 left and right exchanged: in the picture alone, seen from the side, exchanged legs are a step as good as any.
 """
@@ -35,8 +37,11 @@ _LIMBS = np.array([11, 12, 13, 14, 15, 16, 23, 24, 25, 26, 27, 28])
 FRAME_COST_M = 0.005
 FRAME_COST_UNJUDGED_M = 0.04
 TURN_COST_M = 0.005  # for reversing the depth on top
+CHANGE_COST_M = 0.025  # for every change of the labels: gaining less by it than this is chance
 # The same where both readings were lifted. Per second: whoever walks at a low rate makes long steps between frames.
 LIFTED_COST_M_S = 0.05
+# What is hidden stays hidden: how many metres of jump a keypoint that is sure and then not at all is as good as.
+M_PER_CONFIDENCE = 0.3
 # Where the judge's landmarks are further off than this, they pull on those of the frames near by.
 FAR_APART_M = 0.12
 REACH_S = 0.13
@@ -117,7 +122,7 @@ def find_labels(
 
     The labels x_t with the least
 
-        Σ_t cost(x_t) + Σ_t d(w_{t−1}(x_{t−1}), w_t(x_t)) + Σ_{t judged} d(w_t(x_t), judged_t),
+        Σ_t cost(x_t) + Σ_t (change·[x_t ≠ x_{t−1}] + d(w_{t−1}(x_{t−1}), w_t(x_t))) + Σ_{t judged} d(w_t(x_t), judged_t),
 
     d the mean distance of the shoulders, elbows, wrists, hips, knees and ankles; by dynamic programming (Viterbi).
     Without a judge a stretch that is wrong costs less than its two jumps only when most of the clip says otherwise, so
@@ -135,7 +140,8 @@ def find_labels(
 def _find_lifted_labels(track: Track, camera: Camera, judged: np.ndarray | None) -> np.ndarray:
     """Labels, (T,) AS_SAID or EXCHANGED, of a track without depth: those of `find_labels` for the lifted bodies.
 
-    The lifting network may move one reading less than the other, which says nothing: the mean counts.
+    The lifting network may move one reading less than the other, which says nothing: the mean counts. The confidences
+    count beside the positions.
     """
     rays, lifter = camera.rays(track.keypoints_px)[..., :2], Lifter()
     bodies = [
@@ -144,12 +150,17 @@ def _find_lifted_labels(track: Track, camera: Camera, judged: np.ndarray | None)
     ]
     step_s = float(np.median(np.diff(track.times))) if len(track) > 1 else 0.0
     costs = np.array([0.0, LIFTED_COST_M_S * step_s])
+    sureness = M_PER_CONFIDENCE * track.confidence.astype(np.float32)
+
+    def readings(t: int) -> np.ndarray:
+        orders = (sureness[t], sureness[t, SWAPPED])
+        return np.stack([np.c_[body[t], sure] for body, sure in zip(bodies, orders, strict=True)])
 
     def step(before: np.ndarray, after: np.ndarray) -> np.ndarray:
         distance = _steps(before, after)
         return (distance + distance[::-1, ::-1]) / 2
 
-    return _cheapest(lambda t: np.stack([body[t] for body in bodies]), step, track.seen, costs, track.acquired, judged)
+    return _cheapest(readings, step, track.seen, costs, track.acquired, judged)
 
 
 def _cheapest(
@@ -162,11 +173,13 @@ def _cheapest(
 ) -> np.ndarray:
     """(T,) labels of least cost, see `find_labels`.
 
-    :param readings: frame to its bodies (n, 33, 3) by label;  step: two frames' bodies to the (n, n) costs of going
-        from one label to another;  known: (T,) bool, frames that have any;  own_cost: (n,) of each label, per frame.
+    :param readings: frame to its bodies (n, 33, 3 or more: what else is compared) by label;  step: two frames' bodies
+        to the (n, n) costs of going from one label to another;  known: (T,) bool, frames that have any;
+        own_cost: (n,) of each label, per frame.
     """
     count = len(known)
     same = np.arange(len(own_cost))
+    change = CHANGE_COST_M * (1 - np.eye(len(own_cost)))
     cost = np.zeros(len(own_cost))
     came_from = np.zeros((count, len(own_cost)), np.int8)
     previous: np.ndarray | None = None
@@ -179,12 +192,12 @@ def _cheapest(
             came_from[t] = int(np.argmin(cost))
             cost = np.full(len(own_cost), cost.min())
         else:
-            total = cost[:, None] + step(previous, body)
+            total = cost[:, None] + step(previous, body) + change
             came_from[t] = total.argmin(axis=0)
             cost = total.min(axis=0)
         cost = cost + own_cost
         if judged is not None and np.isfinite(judged[t][_LIMBS]).all():
-            cost = cost + _distance(body, judged[t])
+            cost = cost + _distance(body[..., :3], judged[t])
         previous = body
     labels = np.zeros(count, int)
     state = int(np.argmin(cost))
@@ -195,7 +208,7 @@ def _cheapest(
 
 
 def _steps(before: np.ndarray, after: np.ndarray) -> np.ndarray:
-    """(n, n) distances of the bodies (n, 33, 3) of two successive frames."""
+    """(n, n) distances of the bodies (n, 33, 3 or more) of two successive frames."""
     return _distance(before[:, None], after[None])
 
 
@@ -241,5 +254,5 @@ def _pull(world: np.ndarray, track: Track) -> np.ndarray:
 
 
 def _distance(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Mean distance of the limbs' landmarks of bodies (..., 33, 3)."""
+    """Mean distance of the limbs' landmarks of bodies (..., 33, n)."""
     return np.linalg.norm((a - b)[..., _LIMBS, :], axis=-1).mean(axis=-1)

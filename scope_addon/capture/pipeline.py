@@ -30,6 +30,7 @@ from .hand_measure import require_fingers
 from .hand_tracker import HandTracker
 from .leaps import mend_leaps
 from .left_right import repair_left_right
+from .limb_exchange import repair_limbs
 from .line_segments import Lines
 from .observation import Observation
 from .parts import ALL_PARTS, Parts
@@ -307,7 +308,7 @@ def _better_known(camera: Camera, background: BackgroundTracker, video: Video) -
 def _repaired(track: Track, camera: Camera, parts: Parts) -> Track:
     """The track without what the networks are known to get wrong for a while."""
     if parts.left_right:
-        track = repair_left_right(track, camera)
+        track = repair_limbs(repair_left_right(track, camera))
     return mend_leaps(track) if parts.leaps else track
 
 
