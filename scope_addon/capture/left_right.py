@@ -122,7 +122,7 @@ def find_labels(
 
     The labels x_t with the least
 
-        Σ_t cost(x_t) + Σ_t (change·[x_t ≠ x_{t−1}] + d(w_{t−1}(x_{t−1}), w_t(x_t))) + Σ_{t judged} d(w_t(x_t), judged_t),
+        Σ_t cost(x_t) + Σ_t (d(w_{t−1}(x_{t−1}), w_t(x_t)) + change · [x_t ≠ x_{t−1}]) + Σ_{t judged} d(w_t, judged_t),
 
     d the mean distance of the shoulders, elbows, wrists, hips, knees and ankles; by dynamic programming (Viterbi).
     Without a judge a stretch that is wrong costs less than its two jumps only when most of the clip says otherwise, so
