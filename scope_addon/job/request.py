@@ -23,6 +23,7 @@ class JobRequest:
     people: int | str = "largest"  # how many at most, "all", or "largest": the most prominent one
     focal_mm: float | None = None  # 35 mm equivalent
     fov_deg: float | None = None  # along the longer side
+    calibration: str = ""  # a JSON file; empty: none
     start_s: float = 0.0  # of the video
     end_s: float | None = None  # None: to its end
     smoothing: bool = True
@@ -54,8 +55,9 @@ class JobRequest:
         del values["threads"], values["provider"], values["footage"]
         digest = hashlib.sha256(json.dumps([values, code_version], sort_keys=True).encode())
         _add_file(digest, Path(self.footage))
-        if Path(self.body).is_file():
-            _add_file(digest, Path(self.body))
+        for file in (Path(self.body), Path(self.calibration)):
+            if file.is_file():
+                _add_file(digest, file)
         for network in filter(None, (self.detector, self.keypoints)):
             for file in (Path(network), Path(network).with_suffix(".json")):
                 if file.is_file():  # the worker says what is wrong with one that is not there

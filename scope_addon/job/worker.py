@@ -56,6 +56,7 @@ def run(request: JobRequest, job_folder: Path, reporter: Reporter) -> int:
             people=request.people,
             focal_mm=request.focal_mm,
             fov_deg=request.fov_deg,
+            calibration=Path(request.calibration) if request.calibration else None,
             wanted=VideoRange(request.start_s, float("inf") if request.end_s is None else request.end_s),
             smoothing=request.smoothing,
             hands=request.hands,

@@ -139,6 +139,8 @@ def capture_request(scene: bpy.types.Scene) -> JobRequest:
         raise VideoError(f"{footage} does not exist; choose the video or picture again")
     if settings.use_range and settings.range_end <= settings.range_start:
         raise UsageError("the part of the video ends before it begins; change From or To")
+    if settings.lens == "FILE" and not settings.calibration_file:
+        raise UsageError("choose the file with the lens's calibration, or another lens")
     body = {"SCOPE": "scope", "SCOPE_H": "scope_h"}.get(settings.body)
     if body is None:
         path = settings.body_file or (chosen.body_file if chosen else "")
@@ -154,6 +156,7 @@ def capture_request(scene: bpy.types.Scene) -> JobRequest:
         people=settings.people_count if settings.people == "COUNT" else settings.people.lower(),
         focal_mm=settings.focal_mm if settings.lens == "FOCAL" else None,
         fov_deg=math.degrees(settings.fov) if settings.lens == "FOV" else None,
+        calibration=bpy.path.abspath(settings.calibration_file) if settings.lens == "FILE" else "",
         start_s=settings.range_start if settings.use_range else 0.0,
         end_s=settings.range_end if settings.use_range else None,
         smoothing=settings.smoothing,

@@ -90,6 +90,8 @@ class SCOPE_PT_person(Tab, bpy.types.Panel):
             layout.prop(settings, "focal_mm", text="35 mm Equivalent")
         elif settings.lens == "FOV":
             layout.prop(settings, "fov", text="Angle")
+        elif settings.lens == "FILE":
+            layout.prop(settings, "calibration_file", text="File")
         layout.prop(settings, "smoothing")
         layout.prop(settings, "use_range")
         if settings.use_range:

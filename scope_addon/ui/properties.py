@@ -42,6 +42,7 @@ LENSES = (
     ("AUTO", "Automatic", "Read from the file where the camera wrote it, assumed otherwise", 0),
     ("FOCAL", "Focal Length", "You know the focal length in 35 mm film terms", 1),
     ("FOV", "Field of View", "You know the field of view along the picture's longer side", 2),
+    ("FILE", "Calibration", "You have calibrated the camera: focal lengths, centre and distortion from a file", 3),
 )
 FRAME_RATES = (
     ("AUTO", "Automatic", "Set the scene's frame rate to the footage's while nothing in the scene is animated yet", 0),
@@ -134,6 +135,12 @@ class SCOPE_PG_settings(bpy.types.PropertyGroup):
         max=math.radians(170.0),
         options=_FIXED,
         description="Angle of view along the longer side of the picture",
+    )
+    calibration_file: StringProperty(
+        name="Calibration",
+        subtype="FILE_PATH",
+        options=_PATH,
+        description="JSON with OpenCV's intrinsics (3x3), and if need be dist (five numbers) and size (width, height)",
     )
     use_range: BoolProperty(
         name="Part of the Video",

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The capture job and its operators: results, failures, cancelling, the cache, several scenes."""
 
+import json
 import os
 import signal
 import time
@@ -207,6 +208,8 @@ def test_footage_that_went_while_capturing_is_missed_not_fatal(fake_worker, foot
         ({"footage": "/nowhere/walk.mp4"}, "walk.mp4 does not exist"),
         ({"body": "FILE"}, "body file"),
         ({"body": "FILE", "body_file": "/nowhere/smpl.npz"}, "smpl.npz"),
+        ({"lens": "FILE"}, "calibration"),
+        ({"lens": "FILE", "calibration_file": "/nowhere/lens.json"}, "lens.json"),
     ],
 )
 def test_wrong_settings_are_told(footage, settings, says, contents):
@@ -270,6 +273,27 @@ def test_real_worker_on_a_picture(footage):
     got = Motion.load(scene.scope.result.collection["scope_motions"][0])
     assert np.allclose(got.poses, expected.poses, atol=1e-4)
     assert np.allclose(got.trans, expected.trans, atol=1e-4)
+
+
+def test_real_worker_knows_a_calibrated_lens(footage, tmp_path):
+    import cv2
+
+    height, width = cv2.imread(str(footage)).shape[:2]
+    K, dist = [[700.0, 0, width / 2 + 3], [0, 720.0, height / 2], [0, 0, 1]], [-0.05, 0.01, 0.002, 0.0, 0.0]
+    lens, scene = tmp_path / "lens.json", bpy.context.scene
+    scene.scope.footage, scene.scope.quality = str(footage), "FAST"
+    scene.scope.lens, scene.scope.calibration_file = "FILE", str(lens)
+    found = []
+    for k1 in (dist[0], -0.1):  # what changed in the file is another capture
+        lens.write_text(json.dumps({"intrinsics": K, "dist": [k1, *dist[1:]]}))
+        assert bpy.ops.scope.capture() == {"FINISHED"}
+        found.append(Motion.load(scene.scope.result.collection["scope_motions"][0]))
+    assert np.allclose(found[0].intrinsics, K)
+    assert np.allclose(found[0].dist, dist)
+    assert found[1].dist[0] == -0.1
+    assert scene.scope.result.pixel_aspect[:] == pytest.approx((720 / 700, 1.0))
+    camera = next(o for o in captures()[0].objects if o.type == "CAMERA")
+    assert camera.data.background_images[0].clip_user.use_render_undistorted
 
 
 def test_real_worker_says_that_nobody_is_there(tmp_path):
