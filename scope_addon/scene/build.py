@@ -125,6 +125,12 @@ def _build(
             measurements.mark_low_confidence(scene, whose, person.motion, person.frames)
     if options.with_camera:
         warnings += _build_cameras(name, people, collection, footage, options)
+    unit = scene.unit_settings.scale_length
+    if abs(unit - 1.0) > 1e-6:
+        warnings.append(
+            f"the scene takes {unit:g} m for its unit, and the capture one for a metre: scale what was built by "
+            f"{1 / unit:g}, or set Unit Scale to 1 in the scene's properties; exported files have the true size"
+        )
     if options.resolution == "set":
         camera.set_resolution(scene, motions[0])
     if options.active_camera and people[0].camera is not None:

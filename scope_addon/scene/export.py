@@ -81,6 +81,8 @@ def export(
         raise UsageError(f"cannot write {path.name}: the scene holds no capture; capture a video first")
     options = options or ExportOptions()
     rigs = list(dict.fromkeys(obj for c in chosen for obj in c.all_objects if obj.type == "ARMATURE"))
+    if not rigs:
+        raise UsageError(f"cannot write {path.name}: the capture's armature was removed; undo that or capture again")
     targets = person_paths(path, len(rigs), options.separate)
     if len(targets) == 1:
         _write_one(path, chosen, rigs, options)

@@ -131,6 +131,14 @@ def test_a_new_scene_takes_rate_size_and_range(body, make_motion):
     assert scene.camera == result.people[0].camera
 
 
+def test_a_scene_that_counts_in_centimetres_is_told_of(body, make_motion):
+    assert build_scene([make_motion(body, 2)], body).warnings == []
+    bpy.context.scene.unit_settings.scale_length = 0.01
+    warnings = build_scene([make_motion(body, 2)], body).warnings
+    assert len(warnings) == 1
+    assert "by 100," in warnings[0]
+
+
 def test_one_collection_and_one_camera_for_the_people_of_a_capture(body, make_motion, truth, blender):
     motions = [make_motion(body, 6, betas=[-1.5] + [0.0] * 9), make_motion(body, 6, seed=1, offset=(1.0, 0, 0))]
     result = build_scene(motions, body)

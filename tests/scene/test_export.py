@@ -287,6 +287,16 @@ def test_blend_opens_with_camera_rate_and_shape_keys(body, make_motion, tmp_path
     assert (keys["Shape001"].slider_min, keys["Shape001"].slider_max) == (-10, 10)
 
 
+@pytest.mark.parametrize("separate", [False, True])
+@pytest.mark.parametrize("suffix", [".glb", ".fbx", ".bvh"])
+def test_a_capture_without_its_armature_is_told(body, make_motion, tmp_path, suffix, separate):
+    person = build_scene([make_motion(body, 2)], body).people[0]
+    bpy.data.objects.remove(person.armature)
+    with pytest.raises(UsageError, match="armature was removed"):
+        export(tmp_path / f"walk{suffix}", options=ExportOptions(separate=separate))
+    assert list(tmp_path.iterdir()) == []
+
+
 @pytest.mark.parametrize("suffix", [".glb", ".fbx", ".usdc", ".blend"])
 def test_a_file_for_each_of_several_people(body, make_motion, tmp_path, blender, truth, suffix):
     """Each with one armature and mesh, moving as the person does, and all of them beginning at the same time."""
