@@ -13,6 +13,7 @@ import numpy as np
 from .execution import Execution
 from .letterbox import fit_in
 from .networks import network_path, open_session
+from .overlap import overlap_clusters
 from .region import Region, region_from_points
 
 INPUT_SIZE = 224
@@ -132,21 +133,9 @@ def decode(
 def merge_overlapping(score: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Weighted non-maximum suppression: each cluster becomes its score-weighted mean with its best score.
 
-    A cluster is the best remaining box and all whose intersection over union with it exceeds 0.3. ``score`` descends.
+    See `overlap_clusters`; ``score`` descends.
     """
-    left, top, right, bottom = values[:, :4].T
-    area = np.maximum(right - left, 0) * np.maximum(bottom - top, 0)
-    remaining = np.arange(len(score))
-    scores, merged = [], []
-    while len(remaining):
-        best = remaining[0]
-        width = np.minimum(right[best], right[remaining]) - np.maximum(left[best], left[remaining])
-        height = np.minimum(bottom[best], bottom[remaining]) - np.maximum(top[best], top[remaining])
-        shared = np.maximum(width, 0) * np.maximum(height, 0)
-        same = shared > OVERLAP_THRESHOLD * (area[best] + area[remaining] - shared)
-        same[0] = True
-        cluster = remaining[same]
-        merged.append(score[cluster] @ values[cluster] / score[cluster].sum())
-        scores.append(score[best])
-        remaining = remaining[~same]
-    return np.array(scores), np.array(merged).reshape(-1, values.shape[1])
+    clusters = overlap_clusters(values[:, :4], OVERLAP_THRESHOLD)
+    merged = [score[cluster] @ values[cluster] / score[cluster].sum() for cluster in clusters]
+    best = np.array([cluster[0] for cluster in clusters], int)
+    return score[best], np.array(merged).reshape(-1, values.shape[1])

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..letterbox import Letterbox, fit_in
+from ..overlap import overlap_clusters
 
 _BORDER = 114  # the grey that the YOLO family is trained with
 OVERLAP_THRESHOLD = 0.5
@@ -41,13 +42,5 @@ def suppress(boxes: Boxes, threshold: float) -> Boxes:
     size = boxes.corners[:, 2:] - boxes.corners[:, :2]
     chosen = np.flatnonzero((boxes.scores >= threshold) & (size > 0).all(axis=1))
     order = chosen[np.argsort(-boxes.scores[chosen], kind="stable")]
-    kept: list[int] = []
-    while len(order):
-        best, rest = order[0], order[1:]
-        kept.append(int(best))
-        low = np.maximum(boxes.corners[best, :2], boxes.corners[rest, :2])
-        high = np.minimum(boxes.corners[best, 2:], boxes.corners[rest, 2:])
-        shared = np.maximum(high - low, 0).prod(axis=1)
-        union = size[best].prod() + size[rest].prod(axis=1) - shared
-        order = rest[shared <= OVERLAP_THRESHOLD * union]
+    kept = order[[cluster[0] for cluster in overlap_clusters(boxes.corners[order], OVERLAP_THRESHOLD)]]
     return Boxes(boxes.corners[kept], boxes.scores[kept])
