@@ -26,6 +26,8 @@ from ..motion import Motion
 from .actions import Channels
 from .animation import on_one_hemisphere, quaternion_from_matrix
 
+_IN_STEP = 0.6  # frames that footage may be off and counts as in step; half of one is rounding
+_LONG = 1_000_000  # frames, beyond which Blender would show the last one
 SENSOR_WIDTH = 36.0  # millimetres; only its ratio to the focal length matters
 
 
@@ -99,8 +101,8 @@ def show_footage(camera: bpy.types.Object, footage: str | Path, motion: Motion, 
     """Put the footage behind the scene when one looks through the camera.
 
     Blender shows one frame of a clip per frame of the scene, so it agrees with the motion where the scene's rate is
-    the footage's and constant. A picture stays, but that of a distorting lens: only a clip can be undistorted, and it
-    shows the picture in its own frame.
+    the footage's and constant. Elsewhere the footage is shown as an image, whose frame can be keyed. Only a clip can
+    be undistorted: that of a distorting lens drifts there, and a picture of one is a clip too, seen in its own frame.
 
     :param frames: (T,) scene frame of each pose.
     :return: warnings: what will not line up.
@@ -124,16 +126,22 @@ def show_footage(camera: bpy.types.Object, footage: str | Path, motion: Motion, 
         clip = bpy.data.movieclips.load(str(path))  # its own: another capture may begin elsewhere or have another lens
         clip.frame_start = round(frames[0] - motion.frames[0])
         drift = float(np.abs(frames - (clip.frame_start + motion.frames)).max())
-        if drift > 1.0:
-            warnings.append(
-                f"the picture behind the scene drifts from the motion by up to {drift:.0f} frames, because the scene "
-                "does not play at the footage's constant frame rate; the motion keeps its speed"
-            )
-        background.source = "MOVIE_CLIP"
-        background.clip = clip
-        clip.display_aspect = pixel_aspect(motion)
         size = tuple(clip.size)
-        _set_lens_distortion(clip, background, motion)
+        if drift > _IN_STEP and min(size) and not motion.dist.any():
+            rate = clip.fps
+            bpy.data.movieclips.remove(clip)
+            _show_in_step(camera.data, background, path, motion, frames, rate)
+        else:
+            background.source = "MOVIE_CLIP"
+            background.clip = clip
+            clip.display_aspect = pixel_aspect(motion)
+            _set_lens_distortion(clip, background, motion)
+            if drift > 1.0:
+                warnings.append(
+                    f"the picture behind the scene drifts from the motion by up to {drift:.0f} frames, because the "
+                    "scene does not play at the footage's constant frame rate and the lens distorts; the motion keeps "
+                    "its speed"
+                )
     if not min(size):
         warnings = [f"Blender cannot decode {path.name}, so the camera shows no footage"]
     elif tuple(motion.image_size) != size:
@@ -142,6 +150,35 @@ def show_footage(camera: bpy.types.Object, footage: str | Path, motion: Motion, 
             f"{motion.image_size[1]}: turn or scale the camera's background picture"
         )
     return warnings
+
+
+def _show_in_step(
+    camera: bpy.types.Camera,
+    background: bpy.types.CameraBackgroundImage,
+    footage: Path,
+    motion: Motion,
+    frames: np.ndarray,
+    rate: float,
+) -> None:
+    """Show a video as an image whose frame is keyed, so that it keeps step with the motion at any frame rate.
+
+    At scene frame s Blender shows frame s − frame_start + frame_offset of an image, counted from 0.
+
+    :param rate: frames a second by which Blender numbers the video's frames.
+    """
+    background.source = "IMAGE"
+    background.image = image = bpy.data.images.load(str(footage), check_existing=True)
+    image.display_aspect = pixel_aspect(motion)
+    scene_frames = np.arange(np.floor(frames[0]), np.ceil(frames[-1]) + 1)
+    shown = np.round(np.interp(scene_frames, frames, motion.timestamps) * rate)
+    user = background.image_user
+    user.frame_start, user.frame_duration = int(scene_frames[0]), _LONG
+    user.use_auto_refresh, user.use_cyclic = True, False
+    offsets = shown - (scene_frames - scene_frames[0])
+    changes = np.flatnonzero(np.diff(offsets, prepend=np.inf))
+    path = f"background_images[{len(camera.background_images) - 1}].image_user.frame_offset"
+    channels = Channels(camera, bpy.data.actions.new(f"{camera.name}_footage"))
+    channels.write(path, scene_frames[changes], offsets[changes], "CONSTANT")
 
 
 def _set_lens_distortion(

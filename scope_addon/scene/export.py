@@ -182,6 +182,7 @@ def _remove(result: BuildResult) -> None:
     objects = list(result.collection.objects)
     data = {obj.data for obj in objects}
     owners = [*objects, *(obj.data.shape_keys for obj in objects if obj.type == "MESH")]
+    owners += [obj.data for obj in objects if obj.type == "CAMERA"]
     used = {owner.animation_data.action for owner in owners if owner and owner.animation_data} - {None}
     materials = {m for block in data for m in getattr(block, "materials", ())}
     shown = {footage for block in data for picture in getattr(block, "background_images", ())

@@ -214,9 +214,33 @@ def test_captures_of_the_same_footage_do_not_disturb_each_other(body, make_motio
     assert shown == [1, 50]
 
 
-def test_footage_at_another_rate_than_the_scene_is_warned_about(body, make_motion, clip):
+def frame_shown(camera: bpy.types.Object, scene_frame: int) -> int:
+    """Which frame of a video Blender shows, counted from 0: BKE_image_user_frame_get."""
+    bpy.context.scene.frame_set(scene_frame)
+    user = camera.evaluated_get(bpy.context.evaluated_depsgraph_get()).data.background_images[0].image_user
+    count = min(max(scene_frame - user.frame_start + 1, 0), user.frame_duration)
+    return count + user.frame_offset - 1
+
+
+@pytest.mark.parametrize("rate", [24, 12, 60])
+@pytest.mark.parametrize("start", [1.0, -20.0])
+def test_footage_keeps_step_at_another_rate_than_the_scenes(body, make_motion, clip, rate, start):
+    scene = bpy.context.scene
+    scene.render.fps = rate
+    motion = make_motion(body, 20, rate=30.0, image_size=(64, 48))
+    for options in (BuildOptions(start_frame=start), BuildOptions(frame_rate="resample", start_frame=start)):
+        result = build_scene([motion], body, footage=clip, options=options)
+        assert result.warnings == []
+        camera, frames = result.people[0].camera, result.people[0].frames
+        for f in range(int(np.ceil(frames[0])), int(np.floor(frames[-1])) + 1):
+            assert abs(frame_shown(camera, f) - (f - start) / rate * 30) <= 0.5 + 1e-3
+    assert not bpy.data.movieclips
+
+
+def test_footage_of_a_distorting_lens_at_another_rate_is_warned_about(body, make_motion, clip):
     bpy.context.scene.render.fps = 24
     motion = make_motion(body, 20, rate=30.0, image_size=(64, 48))
+    motion.dist[0] = -0.1
     result = build_scene([motion], body, footage=clip)
     assert len(result.warnings) == 1
     assert "drifts from the motion by up to 4 frames" in result.warnings[0]
