@@ -16,7 +16,8 @@ from ..tools.train_lifter.split import is_held_out
 
 SEED = 7
 SIZE = (640, 480)
-SECONDS = 1.5
+SECONDS, LEAST_SECONDS = 1.5, 0.7
+SUNK_M = 0.12  # under the floor as recorded: the fit left a hand of our body there, which the performer's model lacks
 MOST_BETA = 2.5  # of a standard normal distribution
 FOCAL_PX = (470.0, 1000.0)  # of the width 0.73 to 1.56: a phone's main camera to twice that
 HEIGHT_M, DISTANCE_M, TILT_DEG = (0.8, 2.0), (3.0, 6.5), (0.0, 15.0)  # of the camera; it looks down
@@ -25,7 +26,7 @@ MARGIN_PX = 12.0  # around everything that the person does
 FARTHEST_M = 1.7  # behind it stand bench and wall
 NEAREST_M = 1.2  # to the camera
 FEW = 40  # points of the skin to one that is looked at first
-FLOOR_QUANTILE = 0.05  # of the frames, ordered by the height of the lowest point of the skin
+FLOOR_QUANTILE = 0.05  # of the frames, ordered by the height of the lowest point of the feet's skin
 STILL_M_PER_S, STANDS_BELOW_M = 0.15, 0.1  # middle of heel and toe
 TRIES = 20000
 
@@ -64,7 +65,7 @@ def draw_shot(body: Body, take: Take, seed: int = SEED) -> Shot:
     :raises ValueError: no such camera was found, or the take has no sound stretch.
     """
     rng = np.random.default_rng([seed, take.number])
-    frames = _stretch(rng, take)
+    frames = _stretch(rng, body, take)
     betas = np.clip(rng.standard_normal(body.P), -MOST_BETA, MOST_BETA)
     states = exp(take.poses[frames].reshape(len(frames), -1, 3).astype(float))
     states[:, 0] = R_WORLD_MODEL @ states[:, 0]
@@ -75,7 +76,8 @@ def draw_shot(body: Body, take: Take, seed: int = SEED) -> Shot:
     shot = Shot(states, trans, betas, np.eye(3), np.eye(4), SIZE, take.fps, stands)
     skin = np.array([shot.vertices_world(body, k) for k in range(len(shot))])
     low, high = skin.min((0, 1)), skin.max((0, 1))
-    offset = np.append(-(low + high)[:2] / 2, -np.quantile(skin[..., 2].min(1), FLOOR_QUANTILE))
+    floor = np.quantile(skin[:, _skin_of_feet(body), 2].min(axis=1), FLOOR_QUANTILE)
+    offset = np.append(-(low + high)[:2] / 2, -floor)
     shot, R_heading = _draw_camera(rng, shot, skin + offset)
     states[:, 0] = R_heading @ states[:, 0]
     shot = replace(shot, trans=(pelvis + offset) @ R_heading.T - body.rest_joints(betas)[0])
@@ -97,20 +99,30 @@ def feet_world(body: Body, rotations: np.ndarray, trans: np.ndarray, betas: np.n
     return points[:, sides].mean(axis=2)
 
 
-def _stretch(rng: np.random.Generator, take: Take) -> np.ndarray:
-    """Consecutive sound frames, as many as a shot has or the take offers."""
-    count = min(round(SECONDS * take.fps), len(take.valid))
-    unsound = np.concatenate([[0], np.cumsum(~take.valid)])
-    starts = np.flatnonzero(unsound[count:] == unsound[: len(unsound) - count])
-    if not len(starts):
-        raise ValueError(f"take {take.name} has no {count} sound frames in a row")
-    return rng.choice(starts) + np.arange(count)
+def _stretch(rng: np.random.Generator, body: Body, take: Take) -> np.ndarray:
+    """Consecutive sound frames of the take, as many as a shot has or, failing that, as many as there are."""
+    states = exp(take.poses.reshape(len(take.poses), -1, 3).astype(float))
+    points = body.keypoints(*body.forward_kinematics(states, take.trans, take.betas), take.betas)
+    unsound = np.concatenate([[0], np.cumsum(~take.valid | (points[..., 1].min(axis=1) < -SUNK_M))])
+    least, most = (round(seconds * take.fps) for seconds in (LEAST_SECONDS, SECONDS))
+    for count in range(min(most, len(take.valid)), least - 1, -1):
+        starts = np.flatnonzero(unsound[count:] == unsound[: len(unsound) - count])
+        if len(starts):
+            return rng.choice(starts) + np.arange(count)
+    raise ValueError(f"take {take.name} has no {least} sound frames in a row")
 
 
 def _leg_length(body: Body, betas: np.ndarray) -> float:
     J = body.rest_joints(betas)
     chain = [body.joint_names.index(f"left_{part}") for part in ("hip", "knee", "ankle")]
     return float(np.linalg.norm(np.diff(J[chain], axis=0), axis=1).sum())
+
+
+def _skin_of_feet(body: Body) -> np.ndarray:
+    """The vertices that follow a foot more than anything else."""
+    part = np.take_along_axis(body.skin_joints, body.skin_weights.argmax(axis=1)[:, None], axis=1)[:, 0]
+    feet = [k for k, name in enumerate(body.joint_names) if name.endswith(("_ankle", "_foot"))]
+    return np.flatnonzero(np.isin(part, feet))
 
 
 def _draw_camera(rng: np.random.Generator, shot: Shot, skin: np.ndarray) -> tuple[Shot, np.ndarray]:
