@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Motions on the user's own rig, to files: the rig takes the captured body's place, the camera stays."""
+"""The user's own rig to files: one out of a file in the captured body's place, or one that moves in the scene."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from .build import BuildOptions, build_scene
 from .export import ExportOptions, export, temporary_scene
 from .output_paths import check_output
 from .retarget import RetargetOptions, retarget
-from .rig_file import bones_of, forgotten, load_rig
+from .rig_file import bones_of, forgotten, load_rig, with_meshes
 
 
 def export_on_rig(
@@ -53,3 +53,17 @@ def export_on_rig(
         for path in paths:
             written += export(path, [result.collection], options=export_options)
     return written, warnings
+
+
+def export_rig(path: Path, rig: bpy.types.Object, options: ExportOptions) -> list[Path]:
+    """Write a rig of the scene as it moves there, with the meshes that it moves; returns the files written.
+
+    :raises UsageError: unknown suffix. :raises OutputError: cannot be written.
+    """
+    collection = bpy.data.collections.new(rig.name)
+    try:
+        for obj in with_meshes(rig, bpy.context.scene.objects):
+            collection.objects.link(obj)
+        return export(path, [collection], options=options)
+    finally:
+        bpy.data.collections.remove(collection)

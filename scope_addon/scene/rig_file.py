@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -31,12 +31,7 @@ def load_rig(source: RigSource, collection: bpy.types.Collection) -> bpy.types.O
     path = source.path
     loaded = _append(path) if path.suffix.lower() == ".blend" else _import(path)
     rig = _choose(path, [obj for obj in loaded if obj.type == "ARMATURE"], source.armature)
-    meshes = [obj for obj in loaded if obj.type == "MESH" and obj not in _widgets(rig) and _moved_by(obj, rig)]
-    keep = [rig, *meshes]
-    for obj in keep:
-        while obj.parent is not None and obj.parent not in keep:
-            keep.append(obj.parent)
-            obj = obj.parent
+    keep = with_meshes(rig, loaded)
     for obj in loaded:
         for other in obj.users_collection:
             other.objects.unlink(obj)
@@ -46,6 +41,17 @@ def load_rig(source: RigSource, collection: bpy.types.Collection) -> bpy.types.O
         _still(obj)
     bpy.context.view_layer.update()
     return rig
+
+
+def with_meshes(rig: bpy.types.Object, objects: Iterable[bpy.types.Object]) -> list[bpy.types.Object]:
+    """The rig, the meshes among some objects that it moves, and what these hang on."""
+    keep = [rig]
+    keep += [obj for obj in objects if obj.type == "MESH" and obj not in _widgets(rig) and _moved_by(obj, rig)]
+    for obj in keep:
+        while obj.parent is not None and obj.parent not in keep:
+            keep.append(obj.parent)
+            obj = obj.parent
+    return keep
 
 
 def check_rig(source: RigSource) -> None:

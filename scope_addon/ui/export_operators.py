@@ -36,6 +36,7 @@ class SCOPE_OT_export(bpy.types.Operator):
         items=(
             ("ALL", "All in the Scene", "Every capture of the scene, with all its people", 0),
             ("ACTIVE", "Active", "The capture that the active object belongs to", 1),
+            ("RIG", "My Rig", "The rig chosen under Retarget as it moves now, with its meshes", 2),
         ),
         default="ALL",
         description="What to write",
@@ -91,16 +92,22 @@ class SCOPE_OT_export(bpy.types.Operator):
         layout.prop(self, "which")
         if self.format != "BVH":
             layout.prop(self, "shape")
-            layout.prop(self, "camera")
-            layout.prop(self, "separate")
+            if self.which != "RIG":
+                layout.prop(self, "camera")
+                layout.prop(self, "separate")
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Write."""
         from ...solver.errors import ScopeError
         from ..scene.export import ExportOptions, captures, export
+        from ..scene.rig_export import export_rig
 
-        path = bpy.path.ensure_ext(bpy.path.abspath(self.filepath), _SUFFIX[self.format])
-        collections = captures(context.scene)
+        path = Path(bpy.path.ensure_ext(bpy.path.abspath(self.filepath), _SUFFIX[self.format]))
+        options = ExportOptions(camera=self.camera, shape=self.shape.lower(), separate=self.separate)
+        collections, rig = captures(context.scene), context.scene.scope_retarget.rig
+        if self.which == "RIG" and rig is None:
+            self.report({"ERROR"}, "No rig is chosen under Retarget; choose yours there and press Retarget first")
+            return {"CANCELLED"}
         if self.which == "ACTIVE":
             active = context.view_layer.objects.active
             collections = [c for c in collections if active and active.name in c.all_objects]
@@ -108,8 +115,10 @@ class SCOPE_OT_export(bpy.types.Operator):
                 self.report({"ERROR"}, "The active object belongs to no capture; select one of a capture's objects")
                 return {"CANCELLED"}
         try:
-            options = ExportOptions(camera=self.camera, shape=self.shape.lower(), separate=self.separate)
-            written = export(path, collections, options=options)
+            if self.which == "RIG":
+                written = export_rig(path, rig, options)
+            else:
+                written = export(path, collections, options=options)
         except ScopeError as error:
             self.report({"ERROR"}, sentence(error))
             return {"CANCELLED"}

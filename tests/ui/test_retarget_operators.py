@@ -10,6 +10,7 @@ from scope.scope_addon.scene.visibility import hide_again, show
 from scope.scope_addon.ui.captured_person import captured_armature
 
 from ..edit.walking import BODY, RATE, motion_of, walk
+from ..scene.test_export import read_back
 from ..scene.test_retarget import build_rig, seen
 
 
@@ -114,3 +115,32 @@ def test_undo_takes_the_motion_away(rig):
     assert len(bpy.context.scene.scope_retarget.pairs) == 22
     bpy.ops.ed.redo()
     assert bpy.data.objects[name].animation_data.action is not None
+
+
+@pytest.mark.parametrize("kind", ["fbx", "glb", "bvh"])
+def test_the_rig_is_exported_as_it_moves_with_its_mesh_alone(rig, tmp_path, kind):
+    """The captured body stays behind; in the scene nothing changes."""
+    mesh = bpy.data.meshes.new("skin")
+    mesh.from_pydata([(0, 0, 1), (0.1, 0, 1), (0, 0.1, 1)], [], [(0, 1, 2)])
+    skin = bpy.data.objects.new("skin", mesh)
+    bpy.context.scene.collection.objects.link(skin)
+    skin.modifiers.new("rig", "ARMATURE").object = rig
+    skin.vertex_groups.new(name="pelvis").add([0, 1, 2], 1.0, "REPLACE")
+    bpy.ops.scope.retarget()
+    there, before = seen(rig, ["pelvis"])[:, 0], sorted(c.name for c in bpy.data.collections)
+    path = tmp_path / f"hero.{kind}"
+    assert bpy.ops.scope.export(filepath=str(path), format=kind.upper(), which="RIG") == {"FINISHED"}
+    assert sorted(c.name for c in bpy.data.collections) == before
+    read_back(path, RATE)
+    moved = [obj for obj in bpy.data.objects if obj.type == "ARMATURE"]
+    assert len(moved) == 1
+    meshes = [obj for obj in bpy.data.objects if obj.type == "MESH" and obj.find_armature()]
+    assert len(meshes) == (0 if kind == "bvh" else 1)
+    way = seen(moved[0], ["pelvis"])[:, 0]
+    assert np.ptp(way, axis=0).max() == pytest.approx(np.ptp(there, axis=0).max(), rel=0.05)
+
+
+def test_without_a_rig_its_export_says_what_to_do(rig, tmp_path):
+    bpy.context.scene.scope_retarget.rig = None
+    with pytest.raises(RuntimeError, match="choose yours"):
+        bpy.ops.scope.export(filepath=str(tmp_path / "hero.fbx"), format="FBX", which="RIG")
