@@ -62,8 +62,5 @@ def cached_motion(armature: bpy.types.Object) -> Motion:
 
     path = armature.get("scope_motion", "")
     if not path or not Path(path).is_file():
-        raise UsageError(
-            "the motion as it was solved is no longer in the cache, so it cannot be smoothed anew; capture the footage "
-            "again"
-        )
+        raise UsageError("the motion as it was solved is no longer in the cache; capture the footage again")
     return Motion.load(path)

@@ -8,6 +8,7 @@ from pathlib import Path
 import bpy
 from bpy.props import BoolProperty, EnumProperty, StringProperty
 
+from .captured_person import cached_motion
 from .telling import sentence
 
 FORMATS = (
@@ -15,8 +16,9 @@ FORMATS = (
     ("GLB", "glTF", "For the web, Godot and other engines: one .glb file with everything", 1),
     ("BVH", "BVH", "The skeleton's motion alone, one file per person", 2),
     ("USDC", "USD", "For Omniverse, Houdini and other studio tools", 3),
+    ("NPZ", "NPZ", "For research: SMPL-style arrays of what was captured, before any editing; one file per person", 4),
 )
-_SUFFIX = {"FBX": ".fbx", "GLB": ".glb", "BVH": ".bvh", "USDC": ".usdc"}
+_SUFFIX = {"FBX": ".fbx", "GLB": ".glb", "BVH": ".bvh", "USDC": ".usdc", "NPZ": ".npz"}
 
 
 class SCOPE_OT_export(bpy.types.Operator):
@@ -90,7 +92,7 @@ class SCOPE_OT_export(bpy.types.Operator):
         layout.use_property_split = True
         layout.use_property_decorate = False
         layout.prop(self, "which")
-        if self.format != "BVH":
+        if self.format not in ("BVH", "NPZ"):
             layout.prop(self, "shape")
             if self.which != "RIG":
                 layout.prop(self, "camera")
@@ -105,6 +107,9 @@ class SCOPE_OT_export(bpy.types.Operator):
         path = Path(bpy.path.ensure_ext(bpy.path.abspath(self.filepath), _SUFFIX[self.format]))
         options = ExportOptions(camera=self.camera, shape=self.shape.lower(), separate=self.separate)
         collections, rig = captures(context.scene), context.scene.scope_retarget.rig
+        if self.which == "RIG" and self.format == "NPZ":
+            self.report({"ERROR"}, "A motion file holds what was captured, not a rig; choose another format")
+            return {"CANCELLED"}
         if self.which == "RIG" and rig is None:
             self.report({"ERROR"}, "No rig is chosen under Retarget; choose yours there and press Retarget first")
             return {"CANCELLED"}
@@ -115,7 +120,10 @@ class SCOPE_OT_export(bpy.types.Operator):
                 self.report({"ERROR"}, "The active object belongs to no capture; select one of a capture's objects")
                 return {"CANCELLED"}
         try:
-            if self.which == "RIG":
+            if self.format == "NPZ":
+                people = [obj for c in collections for obj in c.all_objects if "scope_motion" in obj]
+                written = export(path, motions=[cached_motion(obj) for obj in people])
+            elif self.which == "RIG":
                 written = export_rig(path, rig, options)
             else:
                 written = export(path, collections, options=options)

@@ -5,9 +5,11 @@ import time
 from types import SimpleNamespace
 
 import bpy
+import numpy as np
 import pytest
 from scope.scope_addon import cli
 from scope.scope_addon.job.progress import JobProgress, duration
+from scope.scope_addon.motion import Motion
 from scope.scope_addon.scene.footage_strip import strips_of
 from scope.scope_addon.ui import capture_job, drop, preferences
 from scope.scope_addon.ui.capture_operators import state, stop_everything
@@ -68,7 +70,7 @@ def test_buttons_wait_for_what_they_need(fake_worker, footage):
     assert bpy.ops.scope.look_through.poll()
 
 
-@pytest.mark.parametrize(("kind", "suffix"), [("FBX", ".fbx"), ("GLB", ".glb"), ("BVH", ".bvh"), ("USDC", ".usdc")])
+@pytest.mark.parametrize(("kind", "suffix"), [(k, f".{k.lower()}") for k in ("FBX", "GLB", "BVH", "USDC", "NPZ")])
 def test_export_buttons_write_and_leave_the_file_alone(fake_worker, footage, tmp_path, contents, kind, suffix):
     if kind == "USDC" and "usd_export" not in dir(bpy.ops.wm):
         pytest.skip("this Blender was built without USD")
@@ -77,6 +79,19 @@ def test_export_buttons_write_and_leave_the_file_alone(fake_worker, footage, tmp
     assert bpy.ops.scope.export(filepath=str(tmp_path / "walk"), format=kind) == {"FINISHED"}
     assert (tmp_path / f"walk{suffix}").stat().st_size > 1000
     assert contents() == before
+
+
+def test_a_motion_file_holds_what_was_captured(fake_worker, footage, tmp_path):
+    captured(fake_worker, footage)
+    armature = next(o for o in bpy.data.objects if "scope_motion" in o)
+    bpy.context.view_layer.objects.active = armature
+    bpy.ops.scope.refloor()
+    bpy.ops.scope.export(filepath=str(tmp_path / "walk.npz"), format="NPZ")
+    got, kept = Motion.load(tmp_path / "walk.npz"), Motion.load(armature["scope_motion"])
+    assert np.array_equal(got.poses, kept.poses)
+    bpy.ops.scope.clear_cache()
+    with pytest.raises(RuntimeError, match="no longer in the cache"):
+        bpy.ops.scope.export(filepath=str(tmp_path / "again.npz"), format="NPZ")
 
 
 def test_export_of_the_active_capture_alone(fake_worker, footage, tmp_path):
