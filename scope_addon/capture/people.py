@@ -16,6 +16,7 @@ SHORTEST_S = 0.3  # the same for the longest time without interruption
 LEAST_PROMINENCE = 0.05  # of the most prominent person's
 MERGED = 0.25  # mean distance of the keypoints, in sides of the region, of somebody who is becoming somebody else
 LONGEST_MERGER = 12  # frames
+SHORTEST_AGAIN_S = 0.1  # who was lost, seen again for less than this and lost again, was somebody or something else
 
 
 class PeopleBuilder:
@@ -46,6 +47,7 @@ class PeopleBuilder:
             return []
         tracklets = list(self._tracklets.values())
         for tracklet in tracklets:
+            trim_flickering_end(tracklet, self._times)
             trim_merged_end(tracklet, tracklets)
         people = [[tracklets[k] for k in chain] for chain in link(tracklets, self._times)]
         people.sort(key=_prominence, reverse=True)
@@ -84,6 +86,22 @@ def trim_merged_end(tracklet: Tracklet, others: Sequence[Tracklet]) -> None:
                 break
             keep = min(keep, k)
     tracklet.cut(keep)
+
+
+def trim_flickering_end(tracklet: Tracklet, times: Sequence[float]) -> None:
+    """Take off the last frames of a tracklet that come after a gap and are too few to be believed.
+
+    Their place would mislead those who ask where the person went.
+    """
+    end = len(tracklet.rows)
+    while end:
+        start = end - 1
+        while start and tracklet.rows[start] == tracklet.rows[start - 1] + 1:
+            start -= 1
+        if not start or times[tracklet.rows[end - 1]] - times[tracklet.rows[start]] >= SHORTEST_AGAIN_S:
+            break
+        end = start
+    tracklet.cut(end)
 
 
 def _prominence(person: list[Tracklet]) -> float:

@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 from scope.scope_addon.capture import tracker as tracker_module
 from scope.scope_addon.capture.landmark_network import PoseEstimate
-from scope.scope_addon.capture.people import PeopleBuilder
+from scope.scope_addon.capture.people import PeopleBuilder, trim_flickering_end
 from scope.scope_addon.capture.region import Region
-from scope.scope_addon.capture.track import Track
+from scope.scope_addon.capture.track import Track, Tracklet
 from scope.scope_addon.capture.tracker import PeopleTracker
 from scope.solver.errors import SetupError
 
@@ -179,6 +179,23 @@ def test_nobody_waits_for_the_judge(monkeypatch: pytest.MonkeyPatch) -> None:
     (track,) = builder.build(1)
     assert track.judged_rows.tolist() == [0]
     np.testing.assert_allclose(track.judged_landmarks[0], person.body(0))
+
+
+@pytest.mark.parametrize(
+    ("rows", "kept"),
+    [
+        (range(20), 20),
+        ([*range(20), 30, 31], 20),
+        ([*range(20), 30, 31, 40], 20),
+        ([*range(20), *range(30, 34)], 24),  # a tenth of a second
+        ([0, 1], 2),
+        ([], 0),
+    ],
+)
+def test_who_is_seen_again_for_a_moment_only_ends_before_it(rows: list[int], kept: int) -> None:
+    tracklet = Tracklet(rows=list(rows), values=[np.zeros((33, 6), np.float32)] * len(rows))
+    trim_flickering_end(tracklet, np.arange(60) / FPS)
+    assert tracklet.rows == list(rows)[:kept]
 
 
 def panels(shared: Path, camera: str) -> tuple[list[np.ndarray], np.ndarray]:
