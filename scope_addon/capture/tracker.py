@@ -46,6 +46,7 @@ LEAP = 0.25  # the same, from where motion foretold: more in one frame may be an
 SEARCH_FRAMES = 8  # between two looks for others who have come into the picture
 SEARCH_FRAMES_LARGEST = 20
 ESTABLISHED_FRAMES = 10
+NEW_SURPRISE = 0.05  # what being new is as good as, see LEAP
 EAGER_FRAMES = 15  # how long a lost person is looked for in every frame
 MEMORY_FRAMES = 60  # how long in every fourth, and preferred over a stronger one
 RIVAL_SIDE = 0.5  # who is smaller than this share of the largest will not be the most prominent person
@@ -185,8 +186,8 @@ class PeopleTracker:
         found = [self._settled(image_rgb, f, e) for f, e in zip(self._live, found, strict=True)]
         seen = [(f, e, f.surprise(e)) for f, e in zip(self._live, found, strict=True) if e is not None]
         # Two on one body: somebody went behind somebody else. It belongs to whom it does not surprise; but of a body
-        # that has long been followed and one that was found just now, the latter was a mistake.
-        seen.sort(key=lambda entry: (entry[2] > LEAP, -min(entry[0].age, ESTABLISHED_FRAMES), entry[2]))
+        # that has long been followed and one that was found just now, as little surprised, the latter was a mistake.
+        seen.sort(key=lambda entry: (entry[2] > LEAP, entry[2] + _newness(entry[0])))
         kept: list[_Followed] = []
         accepted: list[PoseEstimate] = []
         for followed, estimate, surprise in seen:
@@ -429,6 +430,11 @@ def _share_in_picture(estimate: PoseEstimate, image_rgb: np.ndarray) -> float:
 
 def _apart(a: np.ndarray, b: np.ndarray) -> float:
     return float(np.linalg.norm(a - b, axis=-1).mean())
+
+
+def _newness(followed: _Followed) -> float:
+    """Falls from NEW_SURPRISE to 0 while somebody becomes established."""
+    return NEW_SURPRISE * (1 - min(followed.age / ESTABLISHED_FRAMES, 1.0))
 
 
 def _same_place(a: Region, b: Region) -> bool:

@@ -63,6 +63,14 @@ def test_a_crossing(follow: Callable[..., list[Track]], colors: tuple, hidden: i
     assert tracks[1].seen.sum() >= 120 - hidden - 22  # not while the two bodies cannot be told apart
 
 
+def test_overtaken_by_somebody_just_found(follow: Callable[..., list[Track]]) -> None:
+    """Whom the newcomer hides slides onto them, and is not them because of having been followed for longer."""
+    stands = Person(lambda t: (500, 200), RED, hidden=range(46, 56))
+    passes = Person(lambda t: (540 - 12.0 * (t - 46), 205) if t >= 40 else None, RED, size_px=110)
+    tracks = follow([stands, passes], 80, wanted=3)
+    assert sorted(tuple(who(track, [stands, passes])) for track in tracks) == [(0,), (1,)]
+
+
 def test_a_person_who_comes_and_goes(follow: Callable[..., list[Track]]) -> None:
     stays = Person(lambda t: (300, 200), BLUE)
     visits = Person(lambda t: (1100 - 4.0 * (t - 40), 200) if 40 <= t < 100 else None, RED)
