@@ -11,11 +11,12 @@ from scope.scope_addon.job import parent
 
 # Writes half a file, and {meanwhile} until it is told to end.
 CHILD = """
-import sys, time
+import signal, sys, time
 from pathlib import Path
 from scope.scope_addon.job import parent
 from scope.scope_addon.whole_file import written_beside
 parent.GRACE_S = {grace}
+signal.signal(signal.SIGINT, signal.default_int_handler)  # as the command line does: a shell's background jobs ignore it
 parent.stop_with_parent()
 with written_beside(Path(sys.argv[1])) as temporary:
     temporary.write_text("half of something")
