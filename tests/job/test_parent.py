@@ -16,7 +16,8 @@ from pathlib import Path
 from scope.scope_addon.job import parent
 from scope.scope_addon.whole_file import written_beside
 parent.GRACE_S = {grace}
-signal.signal(signal.SIGINT, signal.default_int_handler)  # as the command line does: a shell's background jobs ignore it
+# As the command line does; background jobs of a shell ignore it.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 parent.stop_with_parent()
 with written_beside(Path(sys.argv[1])) as temporary:
     temporary.write_text("half of something")
