@@ -90,3 +90,25 @@ def test_two_people_stay_themselves(networks: tuple[Path, Path], frames: Frames)
         seen = dict(tracker.step(image))
         assert sorted(seen) == [0, 1]
     assert abs(seen[0].region.center_px[0] - seen[1].region.center_px[0]) > 200
+
+
+def test_a_runner_is_followed_at_a_low_rate(networks: tuple[Path, Path], frames: Frames) -> None:
+    """Without auxiliary points to go by: at 7.5 frames a second, every limb stays in the region that was foretold."""
+    tracker, numbers = PeopleTracker("fast", 2, detector=networks[0], keypoints=networks[1]), set()
+    for image in frames("clips/run_moving_camera", every=4):
+        ((number, seen),) = tracker.step(image)
+        numbers.add(number)
+        in_region = seen.region.crop_from_image(seen.keypoints_px[[0, *range(11, 17), *range(23, 29)]])
+        assert ((in_region > 0.03) & (in_region < 0.97)).all()
+    assert numbers == {0}
+
+
+def test_who_walks_out_of_the_picture_is_let_go(networks: tuple[Path, Path], frames: Frames) -> None:
+    """The woman on the grass leaves at the left edge between frames 195 and 207."""
+    tracker, woman = PeopleTracker("fast", 2, people=2, keypoints=networks[1]), []
+    for index, image in enumerate(frames("clips/walk_side_static", stop=215)):
+        if index >= 185:
+            seen = tracker.step(image)
+            woman += [index for _, observation in seen if observation.keypoints_px[:, 0].mean() < 200]
+    assert len(woman) >= 10
+    assert 195 <= woman[-1] <= 207
