@@ -154,7 +154,7 @@ class SCOPE_PT_result(Tab, bpy.types.Panel):
                 layout.prop(background, "alpha", text="Footage Opacity", slider=True)
             layout.operator("scope.footage_to_sequencer", icon="SEQUENCE")
         layout.label(text="Export")
-        grid = layout.grid_flow(columns=2, even_columns=True, align=True)
+        grid = layout.grid_flow(columns=2, row_major=True, even_columns=True, align=True)
         for key, label, _, _ in FORMATS:
             cell = grid.column()
             cell.enabled = key != "USDC" or "usd_export" in dir(bpy.ops.wm)  # some systems build Blender without USD
