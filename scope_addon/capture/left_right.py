@@ -56,7 +56,7 @@ def repair_left_right(track: Track, camera: Camera) -> Track:
         judged = np.full(track.world_landmarks.shape, np.nan, np.float32)
         judged[track.judged_rows] = track.judged_landmarks
     if not track.knows_depth:
-        return _exchanged(track, _find_lifted_labels(track, camera, judged) != AS_SAID)
+        return exchanged(track, _find_lifted_labels(track, camera, judged) != AS_SAID)
     world = np.where(track.seen[:, None, None], track.world_landmarks, np.nan)
     labels = find_labels(world, track.acquired, judged, FRAME_COST_UNJUDGED_M if judged is None else FRAME_COST_M)
     del judged
@@ -65,36 +65,34 @@ def repair_left_right(track: Track, camera: Camera) -> Track:
     repaired = labelled(world, labels)
     repaired += _pull(repaired, track)
     return replace(
-        _exchanged(track, labels != AS_SAID), world_landmarks=np.where(track.seen[:, None, None], repaired, 0.0)
+        exchanged(track, labels != AS_SAID), world_landmarks=np.where(track.seen[:, None, None], repaired, 0.0)
     )
 
 
-def _exchanged(track: Track, where: np.ndarray) -> Track:
-    """The track with left and right of keypoints and hands exchanged in the frames ``where`` (T,) says so."""
+def exchanged(track: Track, where: np.ndarray, order: np.ndarray = SWAPPED, *, with_hands: bool = True) -> Track:
+    """The track with keypoints in another order in the frames ``where`` (T,) says so, and the hands exchanged.
+
+    :param order: (33,) which keypoint each one is.
+    """
     if not where.any():
         return track
-
-    def exchange(values: np.ndarray) -> np.ndarray:
-        out = values.copy()
-        out[where] = values[where][:, SWAPPED]
-        return out
-
-    return replace(
-        track,
-        keypoints_px=exchange(track.keypoints_px),
-        confidence=exchange(track.confidence),
-        hands=None if track.hands is None else _exchange_hands(track.hands, where),
-    )
+    hands = track.hands
+    if hands is not None and with_hands:
+        hands = np.where(where[:, None, None, None], hands[:, ::-1], hands)
+    keypoints_px, confidence = (reordered(v, where, order) for v in (track.keypoints_px, track.confidence))
+    return replace(track, keypoints_px=keypoints_px, confidence=confidence, hands=hands)
 
 
-def _exchange_hands(hands: np.ndarray, exchanged: np.ndarray) -> np.ndarray:
-    return np.where(exchanged[:, None, None, None], hands[:, ::-1], hands)
+def reordered(values: np.ndarray, where: np.ndarray, order: np.ndarray) -> np.ndarray:
+    """Values (T, 33, ...) with the keypoints in another order in the frames ``where`` (T,) says so."""
+    out = values.copy()
+    out[where] = values[where][:, order]
+    return out
 
 
 def labelled(world_landmarks: np.ndarray, labels: np.ndarray) -> np.ndarray:
     """World landmarks (T, 33, 3) with the labels (T,) of `find_labels` applied."""
-    out = world_landmarks.copy()
-    out[labels != AS_SAID] = world_landmarks[labels != AS_SAID][:, SWAPPED]
+    out = reordered(world_landmarks, labels != AS_SAID, SWAPPED)
     out[labels == TURNED] *= [1.0, 1.0, -1.0]
     return out
 

@@ -26,7 +26,7 @@ import numpy as np
 
 from .landmark_network import KEYPOINT_NAMES
 from .leaps import metre_px
-from .left_right import SWAPPED
+from .left_right import SWAPPED, exchanged, reordered
 from .track import Track
 
 SIGMA_M, SIGMA_M_S = 0.02, 0.35  # σ₀ and σ₁: of what a limb does against expectation
@@ -70,22 +70,10 @@ def repair_limbs(track: Track) -> Track:
 def _exchange(track: Track, limbs: _Limbs, where: np.ndarray) -> Track:
     order = np.arange(len(KEYPOINT_NAMES))
     order[limbs.all_points] = SWAPPED[limbs.all_points]
-
-    def exchanged(values: np.ndarray) -> np.ndarray:
-        out = values.copy()
-        out[where] = values[where][:, order]
-        return out
-
-    hands = track.hands
-    if hands is not None and limbs is ARMS:
-        hands = np.where(where[:, None, None, None], hands[:, ::-1], hands)
-    return replace(
-        track,
-        keypoints_px=exchanged(track.keypoints_px),
-        confidence=exchanged(track.confidence),
-        world_landmarks=exchanged(track.world_landmarks) if track.knows_depth else track.world_landmarks,
-        hands=hands,
-    )
+    track = exchanged(track, where, order, with_hands=limbs is ARMS)
+    if not track.knows_depth:
+        return track
+    return replace(track, world_landmarks=reordered(track.world_landmarks, where, order))
 
 
 def find_exchanged(track: Track, limbs: _Limbs) -> np.ndarray:

@@ -149,7 +149,7 @@ class PeopleTracker:
         self._judging: list[Judgement] = []
         self._judges = ThreadPoolExecutor(1, "scope-judge")
         self._looks_ahead = not keypoints and self._judge is None
-        self._stands_in = not keypoints  # the user's networks are the user's choice
+        self._stand_in = None if keypoints else self._judge  # the user's networks are the user's choice
         self._largest_only = people is None
         self._most = 2 if people is None else min(people + 1, MOST_PEOPLE)
         self.reset()
@@ -228,7 +228,7 @@ class PeopleTracker:
         self, image_rgb: np.ndarray, followed: _Followed, estimate: PoseEstimate | None
     ) -> PoseEstimate | None:
         """The estimate, or the strong network's for a while once a smaller one loses the person or left and right."""
-        if self._judge is None or not self._stands_in:
+        if self._stand_in is None:
             return estimate
         if estimate is None or looks_swapped(followed.estimate, estimate):
             followed.in_doubt = DOUBT_FRAMES
@@ -238,7 +238,7 @@ class PeopleTracker:
         region = followed.estimate.next_region
         if not _is_in_image(region, image_rgb):
             return estimate
-        (stronger,) = self._judge.estimate(image_rgb, [region])
+        (stronger,) = self._stand_in.estimate(image_rgb, [region])
         return stronger if believable(stronger) else estimate
 
     def _look_round(self, image_rgb: np.ndarray) -> None:
