@@ -111,9 +111,14 @@ def region_from_points(center_px: np.ndarray, top_px: np.ndarray) -> Region:
     return Region((float(center_px[0]), float(center_px[1])), side, math.atan2(dx, -dy))
 
 
+def bounds(points: np.ndarray) -> np.ndarray:
+    """(4,) x0, y0, x1, y1 of the box about points (n, 2)."""
+    return np.concatenate([points.min(axis=0), points.max(axis=0)])
+
+
 def surroundings(points: np.ndarray) -> np.ndarray:
-    """(4,) x0, y0, x1, y1 of the box about a person's points (n, 2), a tenth of its size larger on every side."""
-    low, high = points.min(axis=0), points.max(axis=0)
+    """The same about a person's points, a tenth of its size larger on every side."""
+    low, high = np.split(bounds(points), 2)
     margin = 0.1 * (high - low).max()
     return np.concatenate([low - margin, high + margin])
 

@@ -27,7 +27,7 @@ from .left_right import looks_swapped
 from .networks import landmark_network_name
 from .observation import Judgement, Observation
 from .person_detector import Detection, PersonDetector
-from .region import Region
+from .region import Region, bounds, inside
 
 PRESENCE_THRESHOLD = 0.5
 # See PoseEstimate.spread and .disagreement. Hands fool the detector with scores up to 0.86 and the landmark networks
@@ -105,11 +105,12 @@ class _Followed:
         foretold = self.estimate.keypoints_px + self.velocity_px * max(self.lost, 1)
         return _apart(estimate.keypoints_px, foretold) / self.estimate.region.side_px
 
-    def go_on(self, estimate: PoseEstimate) -> None:
+    def go_on(self, estimate: PoseEstimate, swapped: bool) -> None:
+        """Be there in this frame; ``swapped``: left and right changed places since the one before."""
         step = (estimate.keypoints_px - self.estimate.keypoints_px).mean(axis=0)
         memory = min(_VELOCITY_MEMORY, self.age / (self.age + 1))
         self.velocity_px = memory * self.velocity_px + (1 - memory) * step
-        self.swapped |= looks_swapped(self.estimate, estimate)
+        self.swapped |= swapped
         self.estimate, self.age, self.since_judged = estimate, self.age + 1, self.since_judged + 1
 
 
@@ -183,14 +184,14 @@ class PeopleTracker:
             lost.lost += 1
         self._lost = [lost for lost in self._lost if lost.lost <= MEMORY_FRAMES]
         found = self._look_ahead(image_rgb, upcoming_rgb)
-        found = [self._settled(image_rgb, f, e) for f, e in zip(self._live, found, strict=True)]
-        seen = [(f, e, f.surprise(e)) for f, e in zip(self._live, found, strict=True) if e is not None]
+        settled = [self._settled(image_rgb, f, e) for f, e in zip(self._live, found, strict=True)]
+        seen = [(f, e, swap, f.surprise(e)) for f, (e, swap) in zip(self._live, settled, strict=True) if e is not None]
         # Two on one body: somebody went behind somebody else. It belongs to whom it does not surprise; but of a body
         # that has long been followed and one that was found just now, as little surprised, the latter was a mistake.
-        seen.sort(key=lambda entry: (entry[2] > LEAP, entry[2] + _newness(entry[0])))
+        seen.sort(key=lambda entry: (entry[3] > LEAP, entry[3] + _newness(entry[0])))
         kept: list[_Followed] = []
         accepted: list[PoseEstimate] = []
-        for followed, estimate, surprise in seen:
+        for followed, estimate, swapped, surprise in seen:
             if any(same_body(estimate, other) for other in accepted):
                 continue
             accepted.append(estimate)
@@ -198,7 +199,7 @@ class PeopleTracker:
                 kept.append(self._start(estimate))
                 self._lose(followed)
             else:
-                followed.go_on(estimate)
+                followed.go_on(estimate, swapped)
                 kept.append(followed)
         for followed in self._live:
             if followed not in kept and followed not in self._lost:
@@ -226,20 +227,26 @@ class PeopleTracker:
 
     def _settled(
         self, image_rgb: np.ndarray, followed: _Followed, estimate: PoseEstimate | None
-    ) -> PoseEstimate | None:
-        """The estimate, or the strong network's for a while once a smaller one loses the person or left and right."""
+    ) -> tuple[PoseEstimate | None, bool]:
+        """The estimate, or the strong network's for a while once a smaller one loses the person or left and right.
+
+        And whether left and right changed places in it.
+        """
+        swapped = estimate is not None and looks_swapped(followed.estimate, estimate)
         if self._stand_in is None:
-            return estimate
-        if estimate is None or looks_swapped(followed.estimate, estimate):
+            return estimate, swapped
+        if estimate is None or swapped:
             followed.in_doubt = DOUBT_FRAMES
         if followed.in_doubt == 0:
-            return estimate
+            return estimate, swapped
         followed.in_doubt -= 1
         region = followed.estimate.next_region
         if not _is_in_image(region, image_rgb):
-            return estimate
+            return estimate, swapped
         (stronger,) = self._stand_in.estimate(image_rgb, [region])
-        return stronger if believable(stronger) else estimate
+        if not believable(stronger):
+            return estimate, swapped
+        return stronger, looks_swapped(followed.estimate, stronger)
 
     def _look_round(self, image_rgb: np.ndarray) -> None:
         """Whoever was lost a moment ago is where motion foretold, but turned: a somersault, a fall, a handstand.
@@ -266,7 +273,7 @@ class PeopleTracker:
             found = [e for e in found if _shows(e, image_rgb) and not any(same_body(e, f.estimate) for f in self._live)]
             nearest = min(found, key=lost.surprise, default=None)
             if nearest is not None and lost.surprise(nearest) <= _TURNED_LEAP:
-                lost.go_on(nearest)
+                lost.go_on(nearest, looks_swapped(lost.estimate, nearest))
                 lost.lost = 0
                 self._lost.remove(lost)
                 self._live.append(lost)
@@ -322,7 +329,7 @@ class PeopleTracker:
             return
         # The legs of somebody who is followed, or they and what is behind them, can look like somebody of their own.
         others = [f.estimate for f in self._live]
-        if not sure and any(max(share_within(estimate, e), share_within(e, estimate)) > MOST_WITHIN for e in others):
+        if not sure and any(max(_share_within(estimate, e), _share_within(e, estimate)) > MOST_WITHIN for e in others):
             return
         if len(self._live) >= self._most:
             weakest = min(self._live, key=lambda f: f.estimate.region.side_px)
@@ -409,10 +416,9 @@ def same_body(a: PoseEstimate, b: PoseEstimate) -> bool:
     return _apart(a.keypoints_px, b.keypoints_px) < SAME_BODY * min(a.region.side_px, b.region.side_px)
 
 
-def share_within(a: PoseEstimate, b: PoseEstimate) -> float:
+def _share_within(a: PoseEstimate, b: PoseEstimate) -> float:
     """Share of a's keypoints that lie in the box round b's."""
-    low, high = b.keypoints_px.min(axis=0), b.keypoints_px.max(axis=0)
-    return float(((a.keypoints_px >= low) & (a.keypoints_px <= high)).all(axis=1).mean())
+    return float(inside(a.keypoints_px, [bounds(b.keypoints_px)]).mean())
 
 
 def _shows(estimate: PoseEstimate, image_rgb: np.ndarray) -> bool:
