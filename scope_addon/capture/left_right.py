@@ -15,12 +15,12 @@ left and right exchanged: in the picture alone, seen from the side, exchanged le
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
 from .camera import Camera
+from .cheapest_path import cheapest_path
 from .landmark_network import KEYPOINT_NAMES, PoseEstimate
 from .lifter import Lifter
 from .track import Track
@@ -122,7 +122,7 @@ def find_labels(
 
         Σ_t cost(x_t) + Σ_t (d(w_{t−1}(x_{t−1}), w_t(x_t)) + change · [x_t ≠ x_{t−1}]) + Σ_{t judged} d(w_t, judged_t),
 
-    d the mean distance of the shoulders, elbows, wrists, hips, knees and ankles; by dynamic programming (Viterbi).
+    d the mean distance of the shoulders, elbows, wrists, hips, knees and ankles.
     Without a judge a stretch that is wrong costs less than its two jumps only when most of the clip says otherwise, so
     the majority of frames decides.
 
@@ -131,8 +131,11 @@ def find_labels(
     :param judged: (T, 33, 3) the same as a better network sees it; rows of NaN where it did not look.
     """
     known = np.isfinite(world_landmarks[:, _LIMBS]).all(axis=(1, 2))
+    exchanged = world_landmarks[known][:, SWAPPED[_LIMBS]]
+    turned = exchanged * np.array([1, 1, -1], exchanged.dtype)
+    readings = np.stack([world_landmarks[known][:, _LIMBS], exchanged, turned])
     costs = np.array([0.0, frame_cost_m, frame_cost_m + TURN_COST_M])
-    return _cheapest(lambda t: _variants(world_landmarks[t]), _steps, known, costs, starts, judged)
+    return _cheapest(readings, _steps(readings), known, costs, starts, judged)
 
 
 def _find_lifted_labels(track: Track, camera: Camera, judged: np.ndarray | None) -> np.ndarray:
@@ -142,78 +145,46 @@ def _find_lifted_labels(track: Track, camera: Camera, judged: np.ndarray | None)
     count beside the positions.
     """
     rays, lifter = camera.rays(track.keypoints_px)[..., :2], Lifter()
-    bodies = [
-        lifter.lift(rays[:, order], track.confidence[:, order], None).points.astype(np.float32)
-        for order in (np.arange(len(SWAPPED)), SWAPPED)
-    ]
+    readings = []
+    for order in (np.arange(len(SWAPPED)), SWAPPED):
+        body = lifter.lift(rays[:, order], track.confidence[:, order], None).points
+        sureness = M_PER_CONFIDENCE * track.confidence[:, order, None]
+        readings.append(np.concatenate([body, sureness], axis=-1)[track.seen][:, _LIMBS].astype(np.float32))
     step_s = float(np.median(np.diff(track.times))) if len(track) > 1 else 0.0
     costs = np.array([0.0, LIFTED_COST_M_S * step_s])
-    sureness = M_PER_CONFIDENCE * track.confidence.astype(np.float32)
-
-    def readings(t: int) -> np.ndarray:
-        orders = (sureness[t], sureness[t, SWAPPED])
-        return np.stack([np.c_[body[t], sure] for body, sure in zip(bodies, orders, strict=True)])
-
-    def step(before: np.ndarray, after: np.ndarray) -> np.ndarray:
-        distance = _steps(before, after)
-        return (distance + distance[::-1, ::-1]) / 2
-
-    return _cheapest(readings, step, track.seen, costs, track.acquired, judged)
+    steps = _steps(np.stack(readings))
+    steps = (steps + steps[:, ::-1, ::-1]) / 2
+    return _cheapest(np.stack(readings), steps, track.seen, costs, track.acquired, judged)
 
 
 def _cheapest(
-    readings: Callable[[int], np.ndarray],
-    step: Callable[[np.ndarray, np.ndarray], np.ndarray],
+    readings: np.ndarray,
+    steps: np.ndarray,
     known: np.ndarray,
     own_cost: np.ndarray,
     starts: np.ndarray | None,
     judged: np.ndarray | None,
 ) -> np.ndarray:
-    """(T,) labels of least cost, see `find_labels`.
+    """(T,) labels of least cost, see `find_labels`; AS_SAID in frames that are not ``known`` (T,).
 
-    :param readings: frame to its bodies (n, 33, 3 or more: what else is compared) by label;  step: two frames' bodies
-        to the (n, n) costs of going from one label to another;  known: (T,) bool, frames that have any;
-        own_cost: (n,) of each label, per frame.
+    :param readings: (n, N, 12, 3 or more: what else is compared) the limbs in the N known frames, by label.
+    :param steps: (N−1, n, n) what it costs that one label follows another.  own_cost: (n,) of each label, per frame.
     """
-    count = len(known)
-    same = np.arange(len(own_cost))
-    change = CHANGE_COST_M * (1 - np.eye(len(own_cost)))
-    cost = np.zeros(len(own_cost))
-    came_from = np.zeros((count, len(own_cost)), np.int8)
-    previous: np.ndarray | None = None
-    for t in range(count):
-        if not known[t]:
-            came_from[t] = same
-            continue
-        body = readings(t)
-        if previous is None or (starts is not None and starts[t]):
-            came_from[t] = int(np.argmin(cost))
-            cost = np.full(len(own_cost), cost.min())
-        else:
-            total = cost[:, None] + step(previous, body) + change
-            came_from[t] = total.argmin(axis=0)
-            cost = total.min(axis=0)
-        cost = cost + own_cost
-        if judged is not None and np.isfinite(judged[t][_LIMBS]).all():
-            cost = cost + _distance(body[..., :3], judged[t])
-        previous = body
-    labels = np.zeros(count, int)
-    state = int(np.argmin(cost))
-    for t in range(count - 1, -1, -1):
-        labels[t] = state if known[t] else AS_SAID
-        state = int(came_from[t, state])
+    switching = steps + CHANGE_COST_M * (1 - np.eye(len(own_cost)))
+    if starts is not None:
+        switching[starts[known][1:]] = 0.0
+    costs = np.tile(own_cost, (readings.shape[1], 1))
+    if judged is not None:
+        far = _apart(readings[..., :3], judged[known][:, _LIMBS]).T
+        costs += np.where(np.isfinite(far), far, 0.0)
+    labels = np.full(len(known), AS_SAID)
+    labels[known] = cheapest_path(costs, switching)
     return labels
 
 
-def _steps(before: np.ndarray, after: np.ndarray) -> np.ndarray:
-    """(n, n) distances of the bodies (n, 33, 3 or more) of two successive frames."""
-    return _distance(before[:, None], after[None])
-
-
-def _variants(world_landmarks: np.ndarray) -> np.ndarray:
-    """(3, 33, 3) one frame's landmarks as said, exchanged, turned."""
-    exchanged = world_landmarks[SWAPPED]
-    return np.stack([world_landmarks, exchanged, exchanged * [1.0, 1.0, -1.0]])
+def _steps(readings: np.ndarray) -> np.ndarray:
+    """(N−1, n, n) mean distances of the readings (n, N, 12, ...) of each frame and the next."""
+    return np.array([[_apart(before[:-1], after[1:]) for after in readings] for before in readings]).transpose(2, 0, 1)
 
 
 def _pull(world: np.ndarray, track: Track) -> np.ndarray:
@@ -253,4 +224,9 @@ def _pull(world: np.ndarray, track: Track) -> np.ndarray:
 
 def _distance(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Mean distance of the limbs' landmarks of bodies (..., 33, n)."""
-    return np.linalg.norm((a - b)[..., _LIMBS, :], axis=-1).mean(axis=-1)
+    return _apart(a[..., _LIMBS, :], b[..., _LIMBS, :])
+
+
+def _apart(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """(...) mean distance of points (..., n, 3 or more)."""
+    return np.linalg.norm(a - b, axis=-1).mean(axis=-1)

@@ -12,7 +12,7 @@ exchanged), the labels are those with the least
     r_t = mean over the joints of min(most, |f_t − p_t| / (σ₀ + σ₁ Δt)),   p_t = f_{t−1} + a (f_{t−1} − f_{t−2}),
 
 a = max(0, 1 − Δt / τ) times the ratio of the two frames' durations, for at a low rate a limb turns back before the next
-frame; j_t the same for the distance from what the judge saw, over σ_j. By dynamic programming over pairs of labels.
+frame; j_t the same for the distance from what the judge saw, over σ_j. By the cheapest path through pairs of labels.
 
 An exchange has to pay for two changes and for every frame: a wrong repair is worse than none. At ten frames a second
 walking legs leave so much doubt that half of what is exchanged stays so, below seven everything.
@@ -24,6 +24,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from .cheapest_path import cheapest_path
 from .landmark_network import KEYPOINT_NAMES
 from .leaps import metre_px
 from .left_right import SWAPPED, exchanged, reordered
@@ -132,16 +133,12 @@ def _going_on(f: np.ndarray, times: np.ndarray, acquired: np.ndarray) -> np.ndar
 
 
 def _cheapest(cost: np.ndarray, own: np.ndarray) -> np.ndarray:
-    """(N,) bool labels with the least sum of ``cost`` (N, 2, 2, 2) by three labels in a row and ``own`` (N, 2)."""
-    total = own[0][:, None] + own[1] + cost[1].mean(axis=0)
-    came_from = np.zeros((len(own), 2, 2), np.int8)
-    for k in range(2, len(own)):
-        ways = total[:, :, None] + cost[k]
-        came_from[k] = ways.argmin(axis=0)
-        total = ways.min(axis=0) + own[k]
-    labels = np.zeros(len(own), bool)
-    last, this = (int(v) for v in np.unravel_index(total.argmin(), (2, 2)))
-    for k in range(len(own) - 1, 1, -1):
-        labels[k], last, this = this, int(came_from[k, last, this]), last
-    labels[1], labels[0] = this, last
-    return labels
+    """(N,) bool labels with the least sum of ``cost`` (N, 2, 2, 2) by three labels in a row and ``own`` (N, 2).
+
+    A state of the path is two labels in a row, so the first of one state is the second of the one before.
+    """
+    pairs = np.repeat(own[1:, None], 2, axis=1)  # (N−1, 2, 2)
+    pairs[0] += own[0][:, None] + cost[1].mean(axis=0)
+    switching = np.where(np.eye(2, dtype=bool)[:, :, None], cost[2:, :, :, None], np.inf)  # (N−2, a, b, b', c)
+    path = cheapest_path(pairs.reshape(-1, 4), switching.reshape(-1, 4, 4))
+    return np.concatenate([path[:1] // 2, path % 2]).astype(bool)
