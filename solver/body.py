@@ -12,6 +12,7 @@ File format: a .npz of plain arrays, see ``load_body``.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -150,10 +151,12 @@ class Body:
         blended = np.einsum("vs,vsa->va", self.skin_weights, A[self.skin_joints]).reshape(-1, 3, 4)
         return np.einsum("vij,vj->vi", blended[:, :, :3], self.rest_vertices(betas)) + blended[:, :, 3]
 
-    def keypoints(self, R: np.ndarray, t: np.ndarray, betas: np.ndarray | None = None) -> np.ndarray:
-        """(..., M, 3) keypoints for part poses (..., K+1, 3, 3), (..., K+1, 3)."""
-        local = self.v_bar if betas is None else self.v_bar + self.V @ self._betas(betas)
-        part = self.keypoint_part
+    def keypoints(
+        self, R: np.ndarray, t: np.ndarray, betas: np.ndarray | None = None, which: Sequence[int] | slice = slice(None)
+    ) -> np.ndarray:
+        """(..., M, 3) keypoints, or those of these numbers, for part poses (..., K+1, 3, 3), (..., K+1, 3)."""
+        local = self.v_bar[which] if betas is None else self.v_bar[which] + self.V[which] @ self._betas(betas)
+        part = self.keypoint_part[which]
         return np.einsum("...mij,mj->...mi", R[..., part, :, :], local) + t[..., part, :]
 
     def triangles(self) -> np.ndarray:

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from .errors import ShapeError
 from .learned_prior import load_joint_prior
-from .measurements import as_array
+from .measurements import all_finite, all_within, as_array
 from .residuals import joint_limits, joint_prior
 from .residuals.part import Array
 from .residuals.registry import FIRST_TABLE, RESIDUALS
@@ -143,13 +143,13 @@ class Priors:
         weights = np.ones(K) if self.joint_weights is None else self.joint_weights
         mean = as_array(mean, (K, 3, 3), "Means of the joint prior")
         weights = as_array(weights, (K,), "Weights of the joint prior")
-        if not (np.isfinite(mean).all() and np.isfinite(weights).all()):
+        if not (all_finite(mean.ravel()) and all_finite(weights)):
             raise ShapeError("The joint prior must be finite.")
         tables = {"joint_prior": joint_prior.pack(np.arange(1, K + 1), mean, weights)}
         for name, table, least in (("limits", self.limits, 1), ("flow", self.flow, 0)):
             if table is None:
                 continue
-            if len(table[0]) and not least <= np.min(table[0]) <= np.max(table[0]) <= K:
+            if not all_within(np.ravel(np.asarray(table[0], dtype=np.int64)), least, K + 1):
                 raise ShapeError(f"Joints of {name} must lie in 1..{K}, but got {np.ravel(table[0]).tolist()}.")
             tables[f"joint_{name}"] = table
         return tables
@@ -159,7 +159,7 @@ class Priors:
         mean = as_array(np.zeros(P) if self.shape_mean is None else self.shape_mean, (P,), "Mean of the shape prior")
         information = np.eye(P) if self.shape_information is None else self.shape_information
         information = as_array(information, (P, P), "Information of the shape prior")
-        if not (np.isfinite(mean).all() and np.isfinite(information).all()):
+        if not (all_finite(mean) and all_finite(information.ravel())):
             raise ShapeError("The shape prior must be finite.")
         return mean, 0.5 * (information + information.T)
 

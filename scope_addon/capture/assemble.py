@@ -161,7 +161,7 @@ def reprojection_error(
         R_first_camera: np.ndarray,
         center: np.ndarray,
     ) -> tuple[np.ndarray]:
-        points = body.keypoints(*body.forward_kinematics(rotation, root - J0, betas), betas)[:, order]
+        points = body.keypoints(*body.forward_kinematics(rotation, root - J0, betas), betas, order)
         points = CameraPath(R_first_camera, center).points_to_frames(points)
         depth = np.maximum(points[..., 2:], 1e-3)
         projected = points[..., :2] / depth * [K[0, 0], K[1, 1]] + K[:2, 2]

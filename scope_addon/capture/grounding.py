@@ -172,13 +172,14 @@ def hold_feet(
     )
     options = Options(stages=(Stage(_HOLD, 1e-3, 8),))
     free = np.zeros(len(indices))  # contact decides where a sole is; the floor alone where it cannot be
+    pelvis, turn_weight, place_weight = np.zeros(1, int), np.array([1 / 0.01**2]), np.array([1 / 0.005**2])
     rotations, root_cam = rotations.copy(), np.array(root_cam, float)
     for t in np.flatnonzero(weights.max(1) > 0.05):
         state = State(rotations[t, 0], root_cam[t], rotations[t, 1:], betas)
         measurements = Measurements(
             foot_contacts=FootContacts(indices, positions[t], weights[t]),
             floor=Floor(indices, floor[0], float(floor[1][t]), free),
-            pose_priors=PosePriors([0], rotations[t, :1], root_cam[t : t + 1], [1 / 0.01**2], [1 / 0.005**2]),
+            pose_priors=PosePriors(pelvis, rotations[t, :1], root_cam[t : t + 1], turn_weight, place_weight),
         )
         here: Priors = replace(priors, joint_mean=rotations[t, 1:])
         found = fit_tree(tree, measurements, state, here, options).state

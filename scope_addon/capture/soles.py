@@ -42,4 +42,4 @@ def sole_points(body_with_soles: Body, R: np.ndarray, t: np.ndarray) -> np.ndarr
 
     :param R, t: (T, K+1, 3, 3), (T, K+1, 3) part poses in any frame; the result is in that frame.
     """
-    return body_with_soles.keypoints(R, t)[..., -len(SOLES) :, :]
+    return body_with_soles.keypoints(R, t, which=slice(-len(SOLES), None))

@@ -44,9 +44,10 @@ def accumulate(tree, ints, floats, weight, inv_sigma, triggs, pose, blocks):  # 
 def pack(points: Array, normal: Array, offset: float, w_below: Array, w_above: Array) -> tuple[Array, Array]:
     """Return the tables of `accumulate` from points (n,), the plane's unit normal (3,) and offset, and weights (n,)."""
     n = len(points)
-    plane = np.tile(np.append(normal, offset), (n, 1))
-    floats = np.hstack([plane, np.reshape(w_below, (n, 1)), np.reshape(w_above, (n, 1))])
-    return np.reshape(points, (n, 1)).astype(np.int64), np.ascontiguousarray(floats, dtype=np.float64)
+    floats = np.empty((n, 6))
+    floats[:, :3], floats[:, 3] = normal, offset
+    floats[:, 4], floats[:, 5] = w_below, w_above
+    return np.reshape(points, (n, 1)).astype(np.int64), floats
 
 
 def evaluate(

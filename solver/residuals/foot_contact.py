@@ -39,8 +39,9 @@ def accumulate(tree, ints, floats, weight, inv_sigma, triggs, pose, blocks):  # 
 def pack(points: Array, p_stand: Array, weights: Array) -> tuple[Array, Array]:
     """Return the tables of `accumulate` from points (n,), positions (n, 3) and weights (n,)."""
     n = len(points)
-    floats = np.hstack([np.reshape(p_stand, (n, 3)), np.reshape(weights, (n, 1))])
-    return np.reshape(points, (n, 1)).astype(np.int64), np.ascontiguousarray(floats, dtype=np.float64)
+    floats = np.empty((n, 4))
+    floats[:, :3], floats[:, 3] = p_stand, weights
+    return np.reshape(points, (n, 1)).astype(np.int64), floats
 
 
 def evaluate(part: Part, v_bar: Array, V: Array, p_stand: Array, weight: float = 1.0) -> Linearization:

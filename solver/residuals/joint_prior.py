@@ -54,8 +54,9 @@ def accumulate(tree, ints, floats, weight, inv_sigma, triggs, pose, blocks):  # 
 def pack(joints: Array, Omega_mean: Array, weights: Array) -> tuple[Array, Array]:
     """Return the tables of `accumulate` from joints (n,) in 1..K, means (n, 3, 3) and weights (n,)."""
     n = len(joints)
-    floats = np.hstack([np.reshape(Omega_mean, (n, 9)), np.reshape(weights, (n, 1))])
-    return np.reshape(joints, (n, 1)).astype(np.int64), np.ascontiguousarray(floats, dtype=np.float64)
+    floats = np.empty((n, 10))
+    floats[:, :9], floats[:, 9] = np.reshape(Omega_mean, (n, 9)), weights
+    return np.reshape(joints, (n, 1)).astype(np.int64), floats
 
 
 def evaluate(part: Part, Omega_mean: Array, weight: float = 1.0) -> Linearization:

@@ -93,6 +93,8 @@ def test_keypoints_turn_with_their_part(pair):
     x, y, z = (expected[on_head] - pivot).T
     expected[on_head] = pivot + np.column_stack([z, y, -x])
     np.testing.assert_allclose(moved, expected, atol=1e-12)
+    some = [7, 3]
+    np.testing.assert_allclose(loaded.keypoints(R, t, which=some), expected[some], atol=1e-12)
     assert on_head.sum() == 16  # 11 of BlazePose, 5 of COCO
 
 
