@@ -54,6 +54,11 @@ def pinhole(width: int, height: int, focal_px: float) -> np.ndarray:
     return np.array([[focal_px, 0.0, width / 2], [0.0, focal_px, height / 2], [0.0, 0.0, 1.0]])
 
 
+def scaled_intrinsics(intrinsics: np.ndarray, scale: float) -> np.ndarray:
+    """(3, 3) of the same picture made smaller or larger; pixel centres are whole numbers, its corner is at -1/2."""
+    return np.array([[scale, 0, (scale - 1) / 2], [0, scale, (scale - 1) / 2], [0, 0, 1]]) @ intrinsics
+
+
 def choose_camera(
     width: int,
     height: int,

@@ -144,6 +144,11 @@ class BackgroundTracker:
         return CameraMotion(R, known)
 
     @property
+    def has_looked(self) -> bool:
+        """Whether somebody was seen, and with that, straight edges were looked for."""
+        return bool(self._looks)
+
+    @property
     def segments(self) -> Segments:
         """Straight edges of the background, in the first frame in which somebody is seen."""
         return self._looks[0].segments if self._looks else Segments.none()

@@ -14,6 +14,7 @@ import numpy as np
 
 from ...solver import (
     Body,
+    ClipFit,
     Fit,
     Measurements,
     Options,
@@ -29,7 +30,7 @@ from ...solver import (
 )
 from .camera import Camera
 from .hand_measure import HandMeasurer, calm_fingers, with_finger_limits
-from .lifter import Lifted, Lifter
+from .lifter import Lifted, our_lifter
 from .measure import DEPTH_SIGMA_M, Measurer
 from .parts import ALL_PARTS, Parts
 from .track import Track
@@ -118,13 +119,20 @@ def _lift(measurer: Measurer, track: Track, pixels: np.ndarray, parts: Parts) ->
         return Lifted(track.world_landmarks, sigma, sigma)
     rays = measurer.rays(pixels)
     if not (parts.world_landmarks and track.knows_depth):
-        return Lifter().lift(rays, track.confidence, None)
-    return Lifter().lift_both_ways(rays, track.confidence, track.world_landmarks)
+        return our_lifter().lift(rays, track.confidence, None)
+    return our_lifter().lift_both_ways(rays, track.confidence, track.world_landmarks)
 
 
 def fit_track(prepared: PreparedTrack, progress: Callable[[str, int, int], None]) -> FittedTrack:
     """Fit the body to a track of which at least one frame was seen."""
-    return _fit_frames(prepared, _fit_shape(prepared, progress), None, progress)
+    progress("finding the shape", 0, 0)
+    return _fit_frames(prepared, _fit_shape(prepared).beta, None, progress)
+
+
+def fit_picture(prepared: PreparedTrack) -> State | None:
+    """Fit the body to a track of one frame that was seen, with a shape of its own; None if that says nothing."""
+    (found,) = _fit_shape(prepared).frames
+    return None if found.status in (Status.NO_MEASUREMENTS, Status.NON_FINITE) else found.state
 
 
 def refit_track(
@@ -191,17 +199,16 @@ def _fit_frames(
     )
 
 
-def _fit_shape(prepared: PreparedTrack, progress: Callable[[str, int, int], None]) -> np.ndarray:
-    """(P,) the one shape that these frames share.
+def _fit_shape(prepared: PreparedTrack) -> ClipFit:
+    """The one shape that all frames share, from some of them.
 
     The detector misplaces a keypoint in the same way in every frame, so all frames together say as much about the
     shape as one: the prior counts once a frame.
     """
-    progress("finding the shape", 0, 0)
     measurements = [prepared.measure(k) for k in _spread(np.flatnonzero(prepared.track.seen), SHAPE_FRAMES)]
     weights = replace(prepared.weights, shape=WEIGHTS.shape * len(measurements))
     options = replace(ROBUST, stages=cold_stages(weights))
-    return fit_clip(prepared.body, measurements, priors=prepared.priors, options=options).beta
+    return fit_clip(prepared.body, measurements, priors=prepared.priors, options=options)
 
 
 def cold_stages(weights: Weights) -> tuple[Stage, ...]:

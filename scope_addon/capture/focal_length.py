@@ -17,7 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .camera import ASSUMED_DEVIATION
+from .camera import ASSUMED_DEVIATION, Camera, estimated_camera
 from .line_segments import Segments
 from .right_angles import Edges
 
@@ -32,6 +32,14 @@ class FocalLength:
 
     focal_px: float
     deviation: float
+
+
+def with_focal_from_edges(camera: Camera, segments: Segments, width: int, height: int) -> Camera:
+    """The camera, with the focal length that edges tell, if they tell any and it was only assumed."""
+    if camera.focal_deviation == 0.0:
+        return camera
+    found = focal_from_edges(segments, width, height, camera.intrinsics[0, 0])
+    return estimated_camera(width, height, found.focal_px, found.deviation) if found else camera
 
 
 def focal_from_edges(segments: Segments, width: int, height: int, assumed_px: float) -> FocalLength | None:

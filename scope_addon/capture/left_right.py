@@ -22,7 +22,7 @@ import numpy as np
 from .camera import Camera
 from .cheapest_path import cheapest_path
 from .landmark_network import KEYPOINT_NAMES, PoseEstimate
-from .lifter import Lifter
+from .lifter import our_lifter
 from .track import Track
 
 _PARTNERS = {"left": "right", "right": "left"}
@@ -144,7 +144,7 @@ def _find_lifted_labels(track: Track, camera: Camera, judged: np.ndarray | None)
     The lifting network may move one reading less than the other, which says nothing: the mean counts. The confidences
     count beside the positions.
     """
-    rays, lifter = camera.rays(track.keypoints_px)[..., :2], Lifter()
+    rays, lifter = camera.rays(track.keypoints_px)[..., :2], our_lifter()
     readings = []
     for order in (np.arange(len(SWAPPED)), SWAPPED):
         body = lifter.lift(rays[:, order], track.confidence[:, order], None).points

@@ -16,6 +16,7 @@ along the line of sight; the positions are turned back into camera axes.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -105,8 +106,14 @@ def mixture(ways: list[Lifted], shares: list[float], R_virtual_camera: np.ndarra
     return Lifted(points, np.sqrt(across), np.sqrt(along))
 
 
+@cache
+def our_lifter() -> Lifter:
+    """The lifting network of the repository, opened once."""
+    return Lifter()
+
+
 class Lifter:
-    """The lifting network on the CPU; keeps nothing between calls."""
+    """The lifting network on the CPU; keeps nothing between calls, and may be used by several threads at once."""
 
     def __init__(self, path: Path | None = None, threads: int = 1) -> None:
         self.path = path or LIFTER_FILE

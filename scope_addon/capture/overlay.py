@@ -19,6 +19,7 @@ from ...solver.errors import OutputError, ShapeError
 from ...solver.rotations import exp
 from ..motion import Motion
 from ..whole_file import written_beside
+from .camera import scaled_intrinsics
 from .landmark_network import KEYPOINT_COUNT
 from .rasterizer import Canvas, rasterize
 from .video import Frame, Video, open_video
@@ -198,7 +199,7 @@ class _Painter:
             image,
             [camera_vertices(self._people[i], self._body, row) for i, row in shown],
             self._body.faces,
-            self._scaled(motion.intrinsics),
+            scaled_intrinsics(motion.intrinsics, self._scale),
             motion.dist,
             [self._colors[i] for i, _ in shown],
             [self._opacity * (1.0 if self._people[i].valid[row] else _FAINT) for i, row in shown],
@@ -208,11 +209,6 @@ class _Painter:
             if self._people[i].valid[row]:
                 self._dots(image, self._people[i].keypoints2d[row], tint(i))
         return image
-
-    def _scaled(self, intrinsics: np.ndarray) -> np.ndarray:
-        """Intrinsics of the smaller picture; pixel centres are whole numbers, so its corner lies at -1/2."""
-        s = self._scale
-        return np.array([[s, 0, (s - 1) / 2], [0, s, (s - 1) / 2], [0, 0, 1]]) @ intrinsics
 
     def _dots(self, image: np.ndarray, keypoints: np.ndarray, color: np.ndarray) -> None:
         radius = max(1, round(max(image.shape[:2]) / 500))

@@ -6,7 +6,6 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable, Iterator
-from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -18,20 +17,20 @@ from ...solver.body import Body
 from ...solver.errors import NoPersonError, UsageError, VideoError
 from ..motion import Motion
 from .assemble import assemble_motion, corrected_stance
-from .camera import Camera, choose_camera, estimated_camera
-from .camera_motion import BackgroundTracker
+from .beside import BesideTracking
+from .camera import Camera, choose_camera
 from .camera_path import CameraPath
 from .camera_travel import camera_travel
 from .compact import compact
 from .execution import AUTO, Execution
 from .fitting import PreparedTrack, fit_track, prepare_track, refit_track
-from .focal_length import focal_from_edges
 from .hand_measure import require_fingers
 from .hand_tracker import HandTracker
 from .leaps import mend_leaps
 from .left_right import repair_left_right
 from .limb_exchange import repair_limbs
 from .line_segments import Lines
+from .live_body import LiveBody
 from .observation import Observation
 from .parts import ALL_PARTS, Parts
 from .people import PeopleBuilder
@@ -45,8 +44,8 @@ from .world import estimate_world
 
 # Called with the stage's name, what is done and the total (0: unknown). May raise CancelledError.
 Progress = Callable[[str, int, int], None]
-# Called with each decoded frame and the largest person seen in it.
-Watch = Callable[[Frame, Observation | None], None]
+# Called with each decoded frame, the largest person seen in it, and what fits the body to such a person.
+Watch = Callable[[Frame, Observation | None, LiveBody], None]
 
 LARGEST = "largest"
 ALL = "all"
@@ -111,22 +110,22 @@ def capture(
         )
         threads = options.threads or os.cpu_count() or 1
         execution = Execution(options.provider)
-        tracker = PeopleTracker(
-            options.quality,
-            threads,
-            None if options.people == LARGEST else most,
-            detector=options.detector,
-            keypoints=options.keypoints,
-            execution=execution,
-        )
-        background = BackgroundTracker(camera, video.width, video.height)
-        hands = HandTracker(threads, execution=execution) if options.hands else None
-        with _opencv_in_one_thread():
-            seen = _observe(video, tracker, hands, background, clock, progress, watch)
+        live = LiveBody(body, camera, options.parts)
+        with BesideTracking(camera, video.width, video.height, live) as beside, _opencv_in_one_thread():
+            tracker = PeopleTracker(
+                options.quality,
+                threads,
+                None if options.people == LARGEST else most,
+                detector=options.detector,
+                keypoints=options.keypoints,
+                execution=execution,
+            )
+            hands = HandTracker(threads, execution=execution) if options.hands else None
+            seen = _observe(video, tracker, hands, beside, live, clock, progress, watch)
         warnings = execution.warnings + list(video.warnings)
     frames = len(seen)
     with clock.stage("solver"):
-        camera = _better_known(camera, background, video)
+        camera, background = beside.camera(), beside.background
         tracks = [_repaired(track, camera, options.parts) for track in seen.build(most)]
         del tracker, seen  # of an hour they would keep half a gigabyte
         if frames == 0:
@@ -178,40 +177,33 @@ def _observe(
     video: Video,
     tracker: PeopleTracker,
     hands: HandTracker | None,
-    background: BackgroundTracker,
+    beside: BesideTracking,
+    live: LiveBody,
     clock: _Clock,
     progress: Progress,
     watch: Watch,
 ) -> PeopleBuilder:
-    """Everybody in every frame, and what is behind them. No picture is kept: an hour takes no more than a minute.
-
-    The background of a frame is looked at beside the people of the next one, in a thread of its own.
-    """
+    """Everybody in every frame. No picture is kept: an hour takes no more than a minute."""
     builder, expected = PeopleBuilder(), video.expected_frames
     frames = iter(video)
     with clock.stage("decode"):
         upcoming = next(frames, None)
-    with ThreadPoolExecutor(1, "scope-background") as beside:
-        looking: Future[None] | None = None
-        while upcoming is not None:
-            frame = upcoming
-            with clock.stage("decode"):
-                upcoming = next(frames, None)
-            with clock.stage("networks"):
-                observations = tracker.step(frame.image_rgb, upcoming.image_rgb if upcoming else None)
-            if hands is not None:
-                with clock.stage("hands"):
-                    observations = hands.step(frame.image_rgb, observations)
-            builder.add(frame.index, frame.timestamp_s, observations)
-            with clock.stage("background"):
-                if looking is not None:
-                    looking.result()
-                people = [o.keypoints_px for _, o in observations]
-                looking = beside.submit(background.add, frame.image_rgb, frame.timestamp_s, people)
-            watch(frame, max((o for _, o in observations), key=lambda o: o.region.side_px, default=None))
-            progress("finding the person", len(builder), max(expected, len(builder)))
-        if looking is not None:
-            looking.result()
+    while upcoming is not None:
+        frame = upcoming
+        with clock.stage("decode"):
+            upcoming = next(frames, None)
+        with clock.stage("networks"):
+            observations = tracker.step(frame.image_rgb, upcoming.image_rgb if upcoming else None)
+        if hands is not None:
+            with clock.stage("hands"):
+                observations = hands.step(frame.image_rgb, observations)
+        builder.add(frame.index, frame.timestamp_s, observations)
+        people = [o for _, o in observations]
+        with clock.stage("background"):
+            beside.add(frame, people)
+        watch(frame, max(people, key=lambda o: o.region.side_px, default=None), live)
+        progress("finding the person", len(builder), max(expected, len(builder)))
+    beside.wait()
     return builder
 
 
@@ -295,14 +287,6 @@ def solve(
         for k in range(len(placed))
     ]
     return motions, iterations, path
-
-
-def _better_known(camera: Camera, background: BackgroundTracker, video: Video) -> Camera:
-    """The camera, with the focal length that the background tells if it was only assumed."""
-    if camera.focal_deviation == 0.0:
-        return camera
-    found = focal_from_edges(background.segments, video.width, video.height, camera.intrinsics[0, 0])
-    return estimated_camera(video.width, video.height, found.focal_px, found.deviation) if found else camera
 
 
 def _repaired(track: Track, camera: Camera, parts: Parts) -> Track:

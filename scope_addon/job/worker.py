@@ -8,6 +8,7 @@ import json
 import os
 import shutil
 import sys
+import threading
 import time
 from pathlib import Path
 from typing import IO, NoReturn
@@ -26,11 +27,14 @@ class Reporter:
     def __init__(self, stream: IO[str]) -> None:
         self._stream = stream
         self._last_stage, self._last_time = "", 0.0
+        self._writing = threading.Lock()
 
     def send(self, event: str, **values: object) -> None:
-        """One line, at once."""
-        self._stream.write(json.dumps({"event": event, **values}) + "\n")
-        self._stream.flush()
+        """One line, at once, from any thread."""
+        line = json.dumps({"event": event, **values}) + "\n"
+        with self._writing:
+            self._stream.write(line)
+            self._stream.flush()
 
     def progress(self, stage: str, done: int, total: int) -> None:
         """As ``capture`` calls it: often. The parent hears of every new stage, of its end, and some steps between."""
@@ -49,7 +53,7 @@ def run(request: JobRequest, job_folder: Path, reporter: Reporter) -> int:
         from ...solver.body import load_body
         from ..capture.pipeline import CaptureOptions, capture
         from ..capture.video_range import VideoRange
-        from .preview import FILE, PreviewWriter
+        from .preview import PreviewWriter
 
         options = CaptureOptions(
             quality=request.quality,
@@ -65,9 +69,8 @@ def run(request: JobRequest, job_folder: Path, reporter: Reporter) -> int:
             detector=Path(request.detector) if request.detector else None,
             keypoints=Path(request.keypoints) if request.keypoints else None,
         )
-        watch = PreviewWriter(job_folder, reporter.send)
-        result = capture(request.footage, load_body(request.body), options, reporter.progress, watch)
-        (job_folder / FILE).unlink(missing_ok=True)
+        with PreviewWriter(job_folder, reporter.send) as watch:
+            result = capture(request.footage, load_body(request.body), options, reporter.progress, watch)
         names = [f"person{i + 1}.npz" for i in range(len(result.motions))]
         reporter.progress("writing", 0, 0)
         for name, motion in zip(names, result.motions, strict=True):

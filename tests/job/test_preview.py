@@ -1,12 +1,19 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The picture of the current frame: whole, small, upside down for Blender, the skeleton where the person is."""
+"""The picture of the current frame: whole, small, upside down for Blender, skeleton or body where the person is."""
+
+import time
 
 import numpy as np
 from scope.scope_addon.capture.landmark_network import KEYPOINT_NAMES
+from scope.scope_addon.capture.pipeline import CaptureOptions, capture
 from scope.scope_addon.capture.region import Region
 from scope.scope_addon.capture.tracker import Observation
 from scope.scope_addon.capture.video import Frame
-from scope.scope_addon.job.preview import FILE, PreviewWriter, draw
+from scope.scope_addon.capture.video_range import VideoRange
+from scope.scope_addon.cli import SAMPLE
+from scope.scope_addon.job import preview
+from scope.scope_addon.job.preview import FILE, LONGER_SIDE, PreviewWriter, draw
+from scope.solver.body import load_body
 
 
 def observation(pixels, confidence=1.0):
@@ -29,22 +36,78 @@ def test_lines_join_the_keypoints():
     assert draw(image, None)[..., :3].max() == 0
 
 
+class NotReady:
+    """A live body that has still to be loaded."""
+
+    is_ready = False
+
+
+def wait_for(condition):
+    deadline = time.monotonic() + 30
+    while not condition() and time.monotonic() < deadline:
+        time.sleep(0.01)
+    assert condition()
+
+
 def test_the_file_is_whole_and_lowest_row_first(tmp_path):
     image = np.zeros((100, 50, 3), np.uint8)
     image[50:] = 200  # the lower half
     told = []
-    writer = PreviewWriter(tmp_path, lambda event, **values: told.append((event, values)))
-    writer(Frame(7, 0.1, image), None)
-    writer(Frame(8, 0.2, image), None)  # too soon
-    assert told == [("preview", {"file": FILE, "width": 128, "height": 256, "frame": 7})]
-    pixels = np.frombuffer((tmp_path / FILE).read_bytes(), np.uint8).reshape(256, 128, 4)
-    assert pixels[0, 0, 0] == 200
-    assert pixels[-1, 0, 0] == 0
-    assert [p.name for p in tmp_path.iterdir()] == [FILE]
+    with PreviewWriter(tmp_path, lambda event, **values: told.append((event, values))) as writer:
+        writer(Frame(7, 0.1, image), None, NotReady())
+        writer(Frame(8, 0.2, image), None, NotReady())  # too soon
+        wait_for(lambda: told)
+        assert told == [("preview", {"file": FILE, "width": 128, "height": 256, "frame": 7})]
+        pixels = np.frombuffer((tmp_path / FILE).read_bytes(), np.uint8).reshape(256, 128, 4)
+        assert pixels[0, 0, 0] == 200
+        assert pixels[-1, 0, 0] == 0
+        assert [p.name for p in tmp_path.iterdir()] == [FILE]
+    assert not list(tmp_path.iterdir())
 
 
-def test_a_full_disk_does_not_stop_the_capture(tmp_path):
+def test_a_full_disk_does_not_stop_the_capture(tmp_path, monkeypatch):
+    monkeypatch.setattr(preview, "INTERVAL_S", 0.0)
+    told, image = [], np.zeros((10, 10, 3), np.uint8)
+    with PreviewWriter(tmp_path / "gone", lambda event, **values: told.append(event)) as writer:
+        writer(Frame(0, 0.0, image), None, NotReady())
+        wait_for(writer._drawing.done)
+        assert told == []
+        (tmp_path / "gone").mkdir()
+        writer(Frame(1, 0.1, image), None, NotReady())
+        wait_for(lambda: told == ["preview"])
+
+
+def test_a_body_that_cannot_be_fitted_gives_way_to_the_skeleton(tmp_path):
+    class Broken:
+        is_ready = True
+
+        def fit(self, observation):
+            raise ArithmeticError("a defect")
+
     told = []
-    writer = PreviewWriter(tmp_path / "gone", lambda event, **values: told.append(event))
-    writer(Frame(0, 0.0, np.zeros((10, 10, 3), np.uint8)), None)
-    assert told == []
+    with PreviewWriter(tmp_path, lambda event, **values: told.append(event)) as writer:
+        writer(Frame(0, 0.0, np.zeros((50, 50, 3), np.uint8)), observation(np.full((33, 2), 20.0)), Broken())
+        wait_for(lambda: told == ["preview"])
+
+
+def test_the_picture_shows_the_body_where_the_truth_has_it():
+    """At the joints the picture takes on the body's colour, and it stays as it is away from them."""
+    truth, checked = np.load(SAMPLE.with_name("sample_truth.npz")), []
+
+    def watch(frame, seen, live):
+        bare, shown = draw(frame.image_rgb, None), draw(frame.image_rgb, None, live.fit(seen))
+        changed = (bare != shown).any(axis=2)
+        pixels = truth["joints_cam"][frame.index] @ truth["intrinsics"].T
+        pixels = pixels[:, :2] / pixels[:, 2:] * (LONGER_SIDE / max(frame.image_rgb.shape))
+        left, top = np.floor(pixels.min(axis=0)).astype(int) - 12
+        right, bottom = np.ceil(pixels.max(axis=0)).astype(int) + 12
+        near = [changed[max(v - 2, 0) : v + 3, max(u - 2, 0) : u + 3].any() for u, v in pixels.round().astype(int)]
+        outside = changed.copy()
+        outside[max(top, 0) : bottom + 1, max(left, 0) : right + 1] = False
+        checked.append((np.mean(near), outside.sum() / changed.sum()))
+
+    capture(SAMPLE, load_body("scope"), CaptureOptions(quality="fast", wanted=VideoRange(0.0, 1.0)), watch=watch)
+    assert len(checked) >= 20
+    met, strayed = np.array(checked).T
+    assert met.mean() > 0.95
+    assert strayed.max() < 0.05
