@@ -27,6 +27,7 @@ from ..scope_addon.capture.people import PeopleBuilder
 from ..scope_addon.capture.tracker import PeopleTracker
 from ..scope_addon.capture.video import open_video
 from ..scope_addon.capture.video_range import VideoRange
+from ..scope_addon.whole_file import written_beside
 from ..solver import Body, Fit, FrameSolver, Options, Priors, Stage, State, fit_batch, load_body
 from ..solver.errors import NoPersonError
 from ..solver.measurements import Keypoints2D, Keypoints3D, Measurements, OrientationField
@@ -89,9 +90,8 @@ def write(path: Path, calls: Sequence[tuple[Measurements, Priors]]) -> None:
     fixed = (m.intrinsics, m.keypoints2d.indices, m.orientation_field.starts, m.orientation_field.ends)
     arrays |= dict(zip(FIXED, (*fixed, priors.joint_weights), strict=True))
     path.parent.mkdir(parents=True, exist_ok=True)
-    part = path.with_suffix(".part.npz")
-    np.savez(part, **arrays)
-    part.replace(path)
+    with written_beside(path) as temporary:
+        np.savez(temporary, **arrays)
 
 
 def _values(m: Measurements) -> tuple:

@@ -4,11 +4,11 @@
 from __future__ import annotations
 
 import json
-import os
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from ...solver.errors import InputError
+from ..whole_file import written_beside
 
 SIDED = ("hip", "knee", "ankle", "foot", "collar", "shoulder", "elbow", "wrist")
 SPINE = ("spine1", "spine2", "spine3")
@@ -52,14 +52,9 @@ class BoneMap:
 
 def save_bone_map(bone_map: BoneMap, path: str | Path) -> None:
     """Write JSON, whole or not at all."""
-    path = Path(path)
-    beside = path.with_name(path.name + ".part")
     text = json.dumps({"format": _FORMAT, "version": 1, "bones": bone_map.parts}, indent=2, ensure_ascii=False)
-    try:
-        beside.write_text(text + "\n", encoding="utf-8")
-        os.replace(beside, path)
-    finally:
-        beside.unlink(missing_ok=True)
+    with written_beside(Path(path)) as temporary:
+        temporary.write_text(text + "\n", encoding="utf-8")
 
 
 def load_bone_map(path: str | Path) -> BoneMap:

@@ -9,7 +9,7 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, StringProperty
 
 from .captured_person import cached_motion
-from .telling import sentence
+from .telling import TellingOperator
 
 FORMATS = (
     ("FBX", "FBX", "For Unreal Engine, Unity, Maya and MotionBuilder: armature, mesh and animation", 0),
@@ -21,11 +21,12 @@ FORMATS = (
 _SUFFIX = {"FBX": ".fbx", "GLB": ".glb", "BVH": ".bvh", "USDC": ".usdc", "NPZ": ".npz"}
 
 
-class SCOPE_OT_export(bpy.types.Operator):
+class SCOPE_OT_export(TellingOperator):
     """Write captures to a file"""
 
     bl_idname = "scope.export"
     bl_label = "Export Capture"
+    bl_options = {"REGISTER"}
 
     filepath: StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"})
     filter_glob: StringProperty(default="*.fbx", options={"HIDDEN", "SKIP_SAVE"})
@@ -98,9 +99,9 @@ class SCOPE_OT_export(bpy.types.Operator):
                 layout.prop(self, "camera")
                 layout.prop(self, "separate")
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def work(self, context: bpy.types.Context) -> str:
         """Write."""
-        from ...solver.errors import ScopeError
+        from ...solver.errors import UsageError
         from ..scene.export import ExportOptions, captures, export
         from ..scene.rig_export import export_rig
 
@@ -108,30 +109,22 @@ class SCOPE_OT_export(bpy.types.Operator):
         options = ExportOptions(camera=self.camera, shape=self.shape.lower(), separate=self.separate)
         collections, rig = captures(context.scene), context.scene.scope_retarget.rig
         if self.which == "RIG" and self.format == "NPZ":
-            self.report({"ERROR"}, "A motion file holds what was captured, not a rig; choose another format")
-            return {"CANCELLED"}
+            raise UsageError("a motion file holds what was captured, not a rig; choose another format")
         if self.which == "RIG" and rig is None:
-            self.report({"ERROR"}, "No rig is chosen under Retarget; choose yours there and press Retarget first")
-            return {"CANCELLED"}
+            raise UsageError("no rig is chosen under Retarget; choose yours there and press Retarget first")
         if self.which == "ACTIVE":
             active = context.view_layer.objects.active
             collections = [c for c in collections if active and active.name in c.all_objects]
             if not collections:
-                self.report({"ERROR"}, "The active object belongs to no capture; select one of a capture's objects")
-                return {"CANCELLED"}
-        try:
-            if self.format == "NPZ":
-                people = [obj for c in collections for obj in c.all_objects if "scope_motion" in obj]
-                written = export(path, motions=[cached_motion(obj) for obj in people])
-            elif self.which == "RIG":
-                written = export_rig(path, rig, options)
-            else:
-                written = export(path, collections, options=options)
-        except ScopeError as error:
-            self.report({"ERROR"}, sentence(error))
-            return {"CANCELLED"}
-        self.report({"INFO"}, f"Wrote {', '.join(p.name for p in written)} in {written[0].parent}")
-        return {"FINISHED"}
+                raise UsageError("the active object belongs to no capture; select one of a capture's objects")
+        if self.format == "NPZ":
+            people = [obj for c in collections for obj in c.all_objects if "scope_motion" in obj]
+            written = export(path, motions=[cached_motion(obj) for obj in people])
+        elif self.which == "RIG":
+            written = export_rig(path, rig, options)
+        else:
+            written = export(path, collections, options=options)
+        return f"Wrote {', '.join(p.name for p in written)} in {written[0].parent}"
 
 
 CLASSES = (SCOPE_OT_export,)

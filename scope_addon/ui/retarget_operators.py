@@ -95,19 +95,24 @@ class SCOPE_OT_retarget(_OnRig):
         return f"'{settings.rig.name}' moves by the action '{action.name}'"
 
 
-class SCOPE_OT_save_bone_map(_OnRig):
-    """Save the list of bones as a JSON file for rigs of the same kind"""
+class _BoneMapFile(_OnRig):
+    """What saving and loading the list share: the file is asked for."""
 
-    bl_idname = "scope.save_bone_map"
-    bl_label = "Save Bone Map"
-
-    filepath: StringProperty(subtype="FILE_PATH", default="bones.json")
     filter_glob: StringProperty(default="*.json", options={"HIDDEN"})
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         """Ask for the file."""
         context.window_manager.fileselect_add(self)
         return {"RUNNING_MODAL"}
+
+
+class SCOPE_OT_save_bone_map(_BoneMapFile):
+    """Save the list of bones as a JSON file for rigs of the same kind"""
+
+    bl_idname = "scope.save_bone_map"
+    bl_label = "Save Bone Map"
+
+    filepath: StringProperty(subtype="FILE_PATH", default="bones.json")
 
     def work(self, context: bpy.types.Context) -> str:
         """Write."""
@@ -117,19 +122,13 @@ class SCOPE_OT_save_bone_map(_OnRig):
         return f"Saved {self.filepath}"
 
 
-class SCOPE_OT_load_bone_map(_OnRig):
+class SCOPE_OT_load_bone_map(_BoneMapFile):
     """Read a list of bones that was saved as JSON"""
 
     bl_idname = "scope.load_bone_map"
     bl_label = "Load Bone Map"
 
     filepath: StringProperty(subtype="FILE_PATH")
-    filter_glob: StringProperty(default="*.json", options={"HIDDEN"})
-
-    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        """Ask for the file."""
-        context.window_manager.fileselect_add(self)
-        return {"RUNNING_MODAL"}
 
     def work(self, context: bpy.types.Context) -> str:
         """Fill the list."""

@@ -7,7 +7,7 @@ import bpy
 from bpy.props import IntProperty
 from mathutils import Matrix
 
-from .telling import sentence
+from .telling import TellingOperator
 
 
 def hide_startup_cube(context: bpy.types.Context) -> None:
@@ -122,7 +122,7 @@ class SCOPE_OT_go_to_frame(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class SCOPE_OT_footage_to_sequencer(bpy.types.Operator):
+class SCOPE_OT_footage_to_sequencer(TellingOperator):
     """Put the footage, picture and sound, into the video sequencer, in time with the motion"""
 
     bl_idname = "scope.footage_to_sequencer"
@@ -134,20 +134,15 @@ class SCOPE_OT_footage_to_sequencer(bpy.types.Operator):
         """Something was captured."""
         return context.scene.scope.result.collection is not None
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def work(self, context: bpy.types.Context) -> str:
         """Add the strips."""
-        from ...solver.errors import ScopeError
         from ..scene.footage_strip import add_footage_strips
         from ..scene.timing import scene_rate
 
         scene, result = context.scene, context.scene.scope.result
         armatures = (o for o in result.collection.all_objects if "scope_start" in o)
         start = next((float(o["scope_start"]) for o in armatures), 0.0)
-        try:
-            strips = add_footage_strips(scene, bpy.path.abspath(result.footage), start)
-        except ScopeError as error:
-            self.report({"ERROR"}, sentence(error))
-            return {"CANCELLED"}
+        strips = add_footage_strips(scene, bpy.path.abspath(result.footage), start)
         rate = getattr(strips[-1], "fps", 0.0)
         if rate and abs(rate - scene_rate(scene)) > 0.01:
             self.report(
@@ -155,7 +150,7 @@ class SCOPE_OT_footage_to_sequencer(bpy.types.Operator):
                 f"The scene plays at {scene_rate(scene):.5g} frames/s and the footage at {rate:.5g}: the strip drifts "
                 "from the motion",
             )
-        return {"FINISHED"}
+        return ""
 
 
 CLASSES = (SCOPE_OT_look_through, SCOPE_OT_go_to_frame, SCOPE_OT_footage_to_sequencer)

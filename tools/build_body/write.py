@@ -3,10 +3,11 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import numpy as np
+
+from ...scope_addon.whole_file import written_beside
 
 LICENSE = (
     "Default body derived from the MakeHuman/MPFB2 hm08 base mesh, macro targets, rig and weights (Data Collection AB, "
@@ -19,9 +20,8 @@ def write_body(path: Path, arrays: dict[str, np.ndarray]) -> None:
     """Write beside ``path``, then put in place; the bytes depend on the arrays alone."""
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
-    beside = path.with_suffix(".partial.npz")
-    np.savez_compressed(beside, **arrays)
-    os.replace(beside, path)
+    with written_beside(path) as temporary:
+        np.savez_compressed(temporary, **arrays)
 
 
 def lengths(values: np.ndarray) -> np.ndarray:

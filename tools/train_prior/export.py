@@ -3,12 +3,12 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
+from ...scope_addon.whole_file import written_beside
 from ...solver.residuals import joint_flow as jf
 from ...solver.rotations import nearest_rotation
 from .data import MIRROR, PAIRED, TRUNK, WITHOUT_DATA, Samples
@@ -67,13 +67,12 @@ def save(path: Path, joints: Mapping[str, np.ndarray], joint_names: Sequence[str
     """Write the parameters by joint, in the order of a body's ``joint_names`` (K+1,)."""
     names = [name for name in joint_names if name in joints]
     path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_suffix(".part.npz")
-    np.savez_compressed(
-        temporary,
-        joint_names=np.array(names),
-        parameters=np.array([joints[name] for name in names]),
-        layers=jf.LAYERS,
-        hidden=jf.HIDDEN,
-        license=LICENSE,
-    )
-    os.replace(temporary, path)
+    with written_beside(path) as temporary:
+        np.savez_compressed(
+            temporary,
+            joint_names=np.array(names),
+            parameters=np.array([joints[name] for name in names]),
+            layers=jf.LAYERS,
+            hidden=jf.HIDDEN,
+            license=LICENSE,
+        )
