@@ -6,8 +6,12 @@ from __future__ import annotations
 import os
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
+
+if TYPE_CHECKING:
+    from scope.solver.body import Body
 
 ROOT = Path(__file__).resolve().parent.parent
 SHARED = ROOT.parent / "shared"
@@ -21,6 +25,14 @@ def shared() -> Path:
             pytest.fail(f"{SHARED}/data must be there in CI: the tests on real clips may not be skipped")
         pytest.skip("../shared/data is not beside this checkout: the tests on real clips need it")
     return SHARED
+
+
+@pytest.fixture(scope="session")
+def body() -> Body:
+    """The built-in body without fingers."""
+    from scope.solver.body import load_body
+
+    return load_body("scope")
 
 
 @pytest.hookimpl(trylast=True)

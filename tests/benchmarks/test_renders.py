@@ -11,16 +11,11 @@ import numpy as np
 import pytest
 from scope.benchmarks.held_out import MARGIN_PX, SIZE, Take, draw_shot, held_out_takes, standing_feet
 from scope.benchmarks.renders import against_world, mean_of
-from scope.solver.body import ASSETS, Body, load_body
+from scope.solver.body import ASSETS
 from scope.solver.frames import R_WORLD_MODEL
 from scope.solver.rotations import log
 from scope.tools.render_sample.choreography import choreograph
 from scope.tools.render_sample.truth import sample_shot
-
-
-@pytest.fixture(scope="module")
-def body() -> Body:
-    return load_body("scope")
 
 
 @pytest.fixture(scope="module")

@@ -12,18 +12,15 @@ import pytest
 from scope.scope_addon.capture.overlay import body_colors, camera_vertices, draw_overlay, write_overlay
 from scope.scope_addon.capture.video import open_video
 from scope.scope_addon.motion import Motion
-from scope.solver.body import Body, load_body
+from scope.solver.body import Body
 from scope.solver.errors import CancelledError, OutputError, ShapeError, VideoError
 from scope.solver.frames import R_WORLD_MODEL, world_from_level_camera
+
+from ..made_motion import made_motion
 
 W, H = 160, 120
 K = np.array([[130.0, 0, 80.0], [0, 130.0, 60.0], [0, 0, 1]])
 GREY = 90
-
-
-@pytest.fixture(scope="module")
-def body() -> Body:
-    return load_body("scope")
 
 
 def standing(body: Body, frames: list[int], x: float = 0.0, y: float = 3.0, size=(W, H), intrinsics=K) -> Motion:
@@ -32,28 +29,14 @@ def standing(body: Body, frames: list[int], x: float = 0.0, y: float = 3.0, size
     poses = np.zeros((T, K1, 3), np.float32)
     poses[:, 0] = cv2.Rodrigues(R_WORLD_MODEL)[0].ravel()
     trans = np.tile(np.array([x, y, 0.95]) - body.J_template[0], (T, 1))
-    keypoints = np.zeros((T, 1, 3), np.float32)
-    return Motion(
-        poses=poses.reshape(T, -1),
-        trans=trans,
-        poses_raw=poses.reshape(T, -1),
-        trans_raw=trans,
-        betas=np.zeros(body.P),
-        body_model="scope",
-        gender="neutral",
-        mocap_framerate=30.0,
+    return made_motion(
+        body,
+        poses,
+        trans,
         frames=np.array(frames),
         timestamps=np.array(frames) / 30,
-        valid=np.ones(T, bool),
-        joints_cam=np.zeros((T, K1, 3)),
-        keypoints2d=keypoints,
-        keypoints2d_names=np.array(["nose"]),
         intrinsics=intrinsics,
-        dist=np.zeros(5),
-        joint_confidence=np.ones((T, K1)),
         world_from_camera=np.tile(world_from_level_camera(np.array([0, -1.0, 0]), 1.0), (T, 1, 1)),
-        foot_contact=np.zeros((T, 4)),
-        residual_px=np.zeros(T),
         image_size=np.array(size),
     )
 

@@ -11,13 +11,7 @@ import pytest
 from scope.scope_addon.capture.pipeline import CaptureOptions, capture
 from scope.scope_addon.cli import SAMPLE
 from scope.scope_addon.motion import Motion
-from scope.solver.body import load_body
 from scope.solver.errors import CancelledError, NoPersonError
-
-
-@pytest.fixture(scope="module")
-def body():
-    return load_body("scope")
 
 
 @pytest.fixture(scope="module")

@@ -3,10 +3,11 @@
 
 import numpy as np
 from scope.scope_addon.edit.clip import Clip
-from scope.scope_addon.motion import Motion
 from scope.solver import load_body
 from scope.solver.frames import R_WORLD_MODEL
 from scope.solver.rotations import exp, log
+
+from ..made_motion import level_camera, made_motion
 
 BODY = load_body("scope")
 NAMES = list(BODY.joint_names)
@@ -35,31 +36,16 @@ def motion_of(clip, noise=0.0, seed=0, body=BODY):
     rng = np.random.default_rng(seed)
     T, K1 = clip.rotations.shape[:2]
     shaken = clip.rotations @ exp(noise * rng.standard_normal((T, K1, 3)))
-    camera = np.tile(np.eye(4), (T, 1, 1))
-    camera[:, :3] = [[1, 0, 0, 0], [0, 0, 1, -4], [0, -1, 0, 1]]
+    camera = level_camera(T)
     J0 = body.rest_joints(np.zeros(body.P))[0]
     joints = clip.joints(body, np.zeros(body.P))
-    return Motion(
-        poses=log(clip.rotations).reshape(T, -1),
-        trans=clip.root - J0,
+    return made_motion(
+        body,
+        log(clip.rotations),
+        clip.root - J0,
+        RATE,
         poses_raw=log(shaken).reshape(T, -1),
         trans_raw=clip.root - J0 + 0.1 * noise * rng.standard_normal((T, 3)),
-        betas=np.zeros(body.P),
-        body_model=body.name,
-        gender="neutral",
-        mocap_framerate=RATE,
-        frames=np.arange(T),
         timestamps=clip.times,
-        valid=np.ones(T, bool),
         joints_cam=(joints - camera[0, :3, 3]) @ camera[0, :3, :3],
-        keypoints2d=np.zeros((T, 1, 3)),
-        keypoints2d_names=np.array(["nose"]),
-        intrinsics=np.array([[600.0, 0, 320], [0, 600.0, 240], [0, 0, 1]]),
-        dist=np.zeros(5),
-        joint_confidence=np.ones((T, K1)),
-        world_from_camera=camera,
-        foot_contact=np.zeros((T, 4)),
-        residual_px=np.zeros(T),
-        image_size=np.array([640, 480]),
-        source="walk.mp4",
     )

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A fresh Blender for every test, a body, and motions whose truth is computed here."""
+"""A fresh Blender for every test, and motions whose truth is computed here."""
 
 from __future__ import annotations
 
@@ -15,7 +15,9 @@ import numpy as np
 import pytest
 from mathutils import Quaternion, Vector
 from scope.scope_addon.motion import Motion
-from scope.solver.body import Body, load_body
+from scope.solver.body import Body
+
+from ..made_motion import made_motion
 
 BETAS = [1.7, -2.3, 0.5, -0.8, 1.2, 0.0, 0.3, -1.1, 0.9, -0.4]
 
@@ -23,11 +25,6 @@ BETAS = [1.7, -2.3, 0.5, -0.8, 1.2, 0.0, 0.3, -1.1, 0.9, -0.4]
 @pytest.fixture(autouse=True)
 def fresh_blender() -> None:
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-
-
-@pytest.fixture(scope="session")
-def body() -> Body:
-    return load_body("scope")
 
 
 def rotation_matrix(rotation_vector: np.ndarray) -> np.ndarray:
@@ -95,31 +92,18 @@ def dance(
         intrinsics = np.array([[600.0, 0, width / 2], [0, 600.0, height / 2], [0, 0, 1]])
     chosen = np.zeros(body.P)
     chosen[:] = (BETAS + [0.0] * body.P)[: body.P] if betas is None else betas
-    blank = {
-        "poses": w.reshape(count, -1),
-        "trans": trans,
-        "poses_raw": w.reshape(count, -1),
-        "trans_raw": trans,
-        "betas": chosen,
-        "body_model": body.name,
-        "gender": "neutral",
-        "mocap_framerate": rate,
-        "frames": np.arange(count),
-        "timestamps": timestamps,
-        "valid": np.ones(count, bool),
-        "joints_cam": np.zeros((count, n, 3)),
-        "keypoints2d": np.zeros((count, 1, 3)),
-        "keypoints2d_names": np.array(["blazepose/nose"]),
-        "intrinsics": intrinsics,
-        "dist": np.zeros(5),
-        "joint_confidence": np.ones((count, n)),
-        "world_from_camera": world_from_camera,
-        "foot_contact": np.zeros((count, 4)),
-        "residual_px": np.zeros(count),
-        "image_size": np.array(image_size),
-        "source": source,
-    }
-    motion = Motion(**blank)
+    motion = made_motion(
+        body,
+        w,
+        trans,
+        rate,
+        betas=chosen,
+        timestamps=timestamps,
+        intrinsics=intrinsics,
+        world_from_camera=world_from_camera,
+        image_size=np.array(image_size),
+        source=source,
+    )
     joints = truth_of(body, motion).joints
     R, c = world_from_camera[:, :3, :3], world_from_camera[:, :3, 3]
     motion.joints_cam = np.einsum("tji,tkj->tki", R, joints - c[:, None]).astype(np.float32)

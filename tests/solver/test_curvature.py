@@ -13,7 +13,6 @@ from scope.solver import (
     Weights,
     default_priors,
     fit,
-    load_body,
     make_tree,
     rotations,
 )
@@ -121,11 +120,6 @@ def test_residuals_that_couple_joint_and_part_teach_nothing(small):
     blocks.cross[0] = 1
     learn(tree, pose, 0.1 * ones, trial, blocks, True, curvature)
     assert not curvature.S.any()
-
-
-@pytest.fixture(scope="module")
-def body():
-    return load_body("scope")
 
 
 def noisy(body, seed):

@@ -12,18 +12,12 @@ from scope.solver import (
     State,
     default_priors,
     fit,
-    load_body,
     load_joint_prior,
     rotations,
 )
 from scope.solver.errors import ModelFileError
 from scope.solver.learned_prior import BUILT_IN
 from scope.solver.residuals import joint_flow
-
-
-@pytest.fixture(scope="module")
-def body():
-    return load_body("scope")
 
 
 def test_default_priors_use_the_flow_for_known_joints_and_the_rest_pose_for_others(body):

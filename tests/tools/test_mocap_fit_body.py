@@ -3,16 +3,10 @@
 
 import numpy as np
 import pytest
-from scope.solver.body import load_body
 from scope.solver.errors import ShapeError
 from scope.solver.rotations import exp
 from scope.tools.mocap import fit_body, library, retarget
 from scope.tools.mocap.take import Take
-
-
-@pytest.fixture(scope="module")
-def body():
-    return load_body("scope")
 
 
 @pytest.fixture(scope="module")

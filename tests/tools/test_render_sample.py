@@ -7,17 +7,12 @@ import cv2
 import numpy as np
 import pytest
 from scope.scope_addon.capture.video import open_video
-from scope.solver.body import ASSETS, Body, load_body
+from scope.solver.body import ASSETS, Body
 from scope.tools.render_sample.choreography import choreograph, standing_feet
 from scope.tools.render_sample.leg import solve_leg
 from scope.tools.render_sample.truth import sample_shot, write_truth
 
 FPS = 30
-
-
-@pytest.fixture(scope="module")
-def body() -> Body:
-    return load_body("scope")
 
 
 @pytest.fixture(scope="module")

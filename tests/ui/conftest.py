@@ -20,6 +20,8 @@ from scope.scope_addon.job.process import WorkerProcess
 from scope.scope_addon.motion import Motion
 from scope.solver.body import load_body
 
+from ..made_motion import made_motion
+
 ROOT = Path(scope.__file__).resolve().parent
 
 
@@ -61,35 +63,18 @@ def footage(tmp_path) -> Path:
 def standing() -> Motion:
     """A body that stands still for ten frames, three of which nobody saw."""
     body, count = load_body("scope"), 10
-    K1 = body.K + 1
-    poses = np.zeros((count, 3 * K1))
+    poses = np.zeros((count, 3 * (body.K + 1)))
     poses[:, 0] = np.pi / 2
-    camera = np.tile(np.eye(4), (count, 1, 1))
-    camera[:, :3] = [[1, 0, 0, 0], [0, 0, 1, -4], [0, -1, 0, 1]]
     valid = np.ones(count, bool)
     valid[[3, 4, 7]] = False
-    return Motion(
-        poses=poses,
-        trans=np.tile([0, 0, 1.0], (count, 1)),
-        poses_raw=poses,
-        trans_raw=np.tile([0, 0, 1.0], (count, 1)),
-        betas=np.zeros(body.P),
-        body_model="scope",
-        gender="neutral",
-        mocap_framerate=25.0,
-        frames=np.arange(count),
-        timestamps=np.arange(count) / 25.0,
+    return made_motion(
+        body,
+        poses,
+        np.tile([0, 0, 1.0], (count, 1)),
+        25.0,
         valid=valid,
-        joints_cam=np.ones((count, K1, 3)),
-        keypoints2d=np.zeros((count, 1, 3)),
-        keypoints2d_names=np.array(["blazepose/nose"]),
-        intrinsics=np.array([[500.0, 0, 320], [0, 500.0, 240], [0, 0, 1]]),
-        dist=np.zeros(5),
-        joint_confidence=np.ones((count, K1)),
-        world_from_camera=camera,
-        foot_contact=np.zeros((count, 4)),
+        joints_cam=np.ones((count, body.K + 1, 3)),
         residual_px=np.full(count, 2.0),
-        image_size=np.array([640, 480]),
         source="person.png",
     )
 

@@ -1,0 +1,49 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A motion as a capture gives it, of which a test says what matters to it."""
+
+from __future__ import annotations
+
+import numpy as np
+from scope.scope_addon.motion import Motion
+from scope.solver.body import Body
+
+
+def made_motion(body: Body, poses: np.ndarray, trans: np.ndarray, rate: float = 30.0, **given) -> Motion:
+    """Poses (T, 3(K+1)) or (T, K+1, 3) and trans (T, 3) of the mean shape, seen in every frame by a VGA camera.
+
+    :param given: other fields of `Motion`, in place of what stands below.
+    """
+    T, K1 = len(poses), body.K + 1
+    poses = poses.reshape(T, 3 * K1)
+    fields = {
+        "poses": poses,
+        "trans": trans,
+        "poses_raw": poses,
+        "trans_raw": trans,
+        "betas": np.zeros(body.P),
+        "body_model": body.name,
+        "gender": "neutral",
+        "mocap_framerate": rate,
+        "frames": np.arange(T),
+        "timestamps": np.arange(T) / rate,
+        "valid": np.ones(T, bool),
+        "joints_cam": np.zeros((T, K1, 3)),
+        "keypoints2d": np.zeros((T, 1, 3)),
+        "keypoints2d_names": np.array(["nose"]),
+        "intrinsics": np.array([[600.0, 0, 320], [0, 600.0, 240], [0, 0, 1]]),
+        "dist": np.zeros(5),
+        "joint_confidence": np.ones((T, K1)),
+        "world_from_camera": level_camera(T),
+        "foot_contact": np.zeros((T, 4)),
+        "residual_px": np.zeros(T),
+        "image_size": np.array([640, 480]),
+        "source": "walk.mp4",
+    }
+    return Motion(**(fields | given))
+
+
+def level_camera(T: int) -> np.ndarray:
+    """(T, 4, 4) world_from_camera of a camera at (0, -4, 1) that looks along y."""
+    out = np.tile(np.eye(4), (T, 1, 1))
+    out[:, :3] = [[1, 0, 0, 0], [0, 0, 1, -4], [0, -1, 0, 1]]
+    return out
