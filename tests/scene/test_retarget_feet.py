@@ -4,24 +4,18 @@
 import bpy
 import numpy as np
 import pytest
-from scope.scope_addon.scene.build import BuildOptions, build_scene
 
 from ..edit.rolling import STRIDE, joint, rolling_walk
-from ..edit.walking import BODY, RATE, motion_of
-from .test_retarget import FBX, build_rig, run
+from ..edit.walking import motion_of
+from .made_rigs import FBX, build_rig, captured
+from .test_retarget import run
 
 PART = {"thigh": "hip", "shin": "knee", "foot": "ankle", "toe": "foot"}
 
 
 @pytest.fixture
 def source():
-    return captured(rolling_walk()[0])
-
-
-def captured(clip):
-    scene = bpy.context.scene
-    scene.render.fps, scene.render.fps_base = int(RATE), 1.0
-    return build_scene([motion_of(clip)], BODY, None, BuildOptions(start_frame=1.0)).people[0].armature
+    return captured(motion_of(rolling_walk()[0]))
 
 
 def contacts(stands):
@@ -85,7 +79,7 @@ def test_feet_of_a_capture_below_the_floor_stay_on_it():
     clip, stands = rolling_walk()
     clip.root[:, 2] -= 0.05
     rig, bone_of = build_rig("mixamo")
-    run(captured(clip), rig)
+    run(captured(motion_of(clip)), rig)
     for side in ("left", "right"):
         seen, rest = points(rig, bone_of[f"{side}_ankle"], bone_of[f"{side}_foot"])
         assert (seen[..., 2] - rest[:, 2]).min() > -0.01
@@ -94,7 +88,7 @@ def test_feet_of_a_capture_below_the_floor_stay_on_it():
 
 def test_toes_that_were_not_seen_to_bend_stay_flat():
     rig, bone_of = build_rig("mixamo")
-    run(captured(rolling_walk(stiff_toes=True)[0]), rig)
+    run(captured(motion_of(rolling_walk(stiff_toes=True)[0])), rig)
     _, stands = rolling_walk()
     bpy.context.view_layer.update()
     for side in ("left", "right"):

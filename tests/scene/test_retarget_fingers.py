@@ -13,7 +13,7 @@ from scope.solver.body import load_body
 from scope.solver.rotations import exp
 
 from ..edit.walking import BODY, RATE, motion_of, walk
-from .test_retarget import FBX, FRAMES, build_rig, seen, truth
+from .made_rigs import FBX, FRAMES, build_rig, captured, seen, truth
 
 HANDS = load_body("scope_h")
 FINGERS = ("thumb", "index", "middle", "ring", "pinky")
@@ -101,10 +101,7 @@ def gesture():
 
 @pytest.fixture
 def source():
-    scene = bpy.context.scene
-    scene.render.fps, scene.render.fps_base = int(RATE), 1.0
-    motion = motion_of(gesture(), body=HANDS)
-    return build_scene([motion], HANDS, None, BuildOptions(start_frame=1.0)).people[0].armature
+    return captured(motion_of(gesture(), body=HANDS), HANDS)
 
 
 def run(source, rig, body=HANDS):
@@ -164,9 +161,7 @@ def test_fingers_of_rigify(source, rigify_rigs):
 
 
 def test_a_capture_without_fingers_leaves_them_as_they_are():
-    scene = bpy.context.scene
-    scene.render.fps, scene.render.fps_base = int(RATE), 1.0
-    source = build_scene([motion_of(walk(2.0))], BODY, None, BuildOptions(start_frame=1.0)).people[0].armature
+    source = captured(motion_of(walk(2.0)))
     rig, bone_of = build_hands("unreal")
     bent = [bone_of[f"left_{finger}2"] for finger in FINGERS]
     for name in bent:
@@ -174,7 +169,7 @@ def test_a_capture_without_fingers_leaves_them_as_they_are():
     before = {name: rig.pose.bones[name].matrix_basis.copy() for name in bent}
     action = run(source, rig, BODY)
     for frame in (1, 30):
-        scene.frame_set(frame)
+        bpy.context.scene.frame_set(frame)
         for name in bent:
             assert np.allclose(rig.pose.bones[name].matrix_basis, before[name], atol=1e-5)
     paths = {curve.data_path for curve in fcurves(rig)}

@@ -8,13 +8,12 @@ import numpy as np
 import pytest
 from mathutils import Matrix
 from scope.scope_addon.edit.root_motion import with_path
-from scope.scope_addon.scene.build import BuildOptions, build_scene
 from scope.scope_addon.scene.retarget import RetargetOptions, guess_bone_map, retarget
 from scope.scope_addon.scene.root_object import root_object, to_bones, to_root_object
 from scope.solver.errors import UsageError
 
 from ..edit.walking import BODY, RATE, motion_of, walk
-from .test_retarget import FBX, build_rig, seen
+from .made_rigs import FBX, build_rig, captured, seen
 
 TURNED = Matrix.LocRotScale((2.0, 1.0, 0.0), Matrix.Rotation(math.pi, 3, "Z").to_quaternion(), (1.0,) * 3)
 
@@ -22,11 +21,9 @@ TURNED = Matrix.LocRotScale((2.0, 1.0, 0.0), Matrix.Rotation(math.pi, 3, "Z").to
 @pytest.fixture
 def source():
     """A walk that begins somewhere and takes a bend."""
-    scene = bpy.context.scene
-    scene.render.fps, scene.render.fps_base = int(RATE), 1.0
     clip = walk(2.0)
     bent = with_path(clip, np.tile([0.7, -0.4, 0.0], (len(clip), 1)), 0.3 + 0.8 * clip.times)
-    return build_scene([motion_of(bent)], BODY, None, BuildOptions(start_frame=1.0)).people[0].armature
+    return captured(motion_of(bent))
 
 
 def run(source, rig, **options):

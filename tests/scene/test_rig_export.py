@@ -18,8 +18,8 @@ from scope.scope_addon.scene.rig_export import export_on_rig
 from scope.scope_addon.scene.rig_file import check_rig
 from scope.solver.errors import InputError, UsageError
 
-from ..edit.walking import BODY, motion_of, walk
-from .test_retarget import ARMS, FRAMES, NAMES, build_rig, names_of, seen, truth
+from ..edit.walking import BODY, NAMES, motion_of, walk
+from .made_rigs import ARMS, FRAMES, build_rig, names_of, seen, truth
 
 
 def save_rig(path, scheme="mixamo", armatures=1, animated=False):

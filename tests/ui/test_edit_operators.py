@@ -10,6 +10,8 @@ from scope.scope_addon.scene.root_object import root_object
 from scope.solver.rotations import exp, log
 
 from ..edit.walking import BODY, NAMES, RATE, motion_of, walk
+from ..scene import made_rigs
+from ..scene.made_rigs import captured
 
 SECONDS = 3.0
 
@@ -17,11 +19,8 @@ SECONDS = 3.0
 @pytest.fixture
 def rig(tmp_path):
     """A captured walk, its armature active, with the motion file that the cache would keep."""
-    scene = bpy.context.scene
-    scene.render.fps, scene.render.fps_base = int(RATE), 1.0
     motion = motion_of(walk(SECONDS), noise=0.05)
-    result = build_scene([motion], BODY, None, BuildOptions(start_frame=1.0))
-    armature = result.people[0].armature
+    armature = captured(motion)
     path = tmp_path / "person1.npz"
     motion.save(path)
     armature["scope_motion"], armature["scope_body_file"] = str(path), "scope"
@@ -29,13 +28,8 @@ def rig(tmp_path):
 
 
 def seen(rig, frames=range(1, 80, 7)):
-    """(T, K+1, 3) heads of all bones in the world, as Blender evaluates them."""
-    out = []
-    for frame in frames:
-        bpy.context.scene.frame_set(frame)
-        posed = rig.evaluated_get(bpy.context.evaluated_depsgraph_get())
-        out.append([np.array(posed.matrix_world @ posed.pose.bones[name].head) for name in NAMES])
-    return np.array(out)
+    """(T, K+1, 3) heads of all bones in the world."""
+    return made_rigs.seen(rig, NAMES, frames)
 
 
 def keys(rig):

@@ -4,21 +4,18 @@
 import bpy
 import numpy as np
 import pytest
-from scope.scope_addon.scene.build import BuildOptions, build_scene
 from scope.scope_addon.scene.root_object import root_object
 from scope.scope_addon.scene.visibility import hide_again, show
 from scope.scope_addon.ui.captured_person import captured_armature
 
-from ..edit.walking import BODY, RATE, motion_of, walk
+from ..edit.walking import RATE, motion_of, walk
+from ..scene.made_rigs import build_rig, captured, seen
 from ..scene.test_export import read_back
-from ..scene.test_retarget import build_rig, seen
 
 
 @pytest.fixture
 def rig():
-    scene = bpy.context.scene
-    scene.render.fps, scene.render.fps_base = int(RATE), 1.0
-    source = build_scene([motion_of(walk(2.0))], BODY, None, BuildOptions(start_frame=1.0)).people[0].armature
+    source = captured(motion_of(walk(2.0)))
     source["scope_body_file"] = "scope"
     rig, _ = build_rig("unreal")
     bpy.context.scene.scope_retarget.rig = rig
