@@ -12,6 +12,7 @@ from pathlib import Path
 for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ[_name] = "1"  # before numpy: everything is measured in one thread
 
+from ..scope_addon.whole_file import written_beside  # noqa: E402
 from . import frames, peers, plots, report, startup, steps  # noqa: E402
 
 OUT = frames.CACHE
@@ -85,9 +86,8 @@ def main() -> int:
 
         figures = perception(args.quick)
     if args.json:
-        part = args.json.with_suffix(".part")
-        part.write_text(json.dumps(figures, indent=1))
-        part.replace(args.json)
+        with written_beside(args.json) as temporary:
+            temporary.write_text(json.dumps(figures, indent=1))
     return 0
 
 

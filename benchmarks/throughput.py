@@ -7,7 +7,6 @@ Ours and MediaPipe's take turns, so that what else the machine does falls on bot
 
 from __future__ import annotations
 
-import os
 import subprocess
 import tarfile
 import tempfile
@@ -20,6 +19,7 @@ import numpy as np
 from ..scope_addon.capture.pipeline import Capture, CaptureOptions, capture
 from ..scope_addon.capture.video import open_video
 from ..scope_addon.capture.video_range import VideoRange
+from ..scope_addon.whole_file import written_beside
 from ..solver import Body
 from .frames import CACHE, DATA, ROOT
 from .peers import make_environment
@@ -39,13 +39,12 @@ def looped(clip: str, frames: int) -> Path:
     pictures = []
     while (got := source.read())[0]:
         pictures.append(got[1])
-    part = target.with_suffix(".part.mp4")
     size = pictures[0].shape[1::-1]
-    writer = cv2.VideoWriter(str(part), cv2.VideoWriter.fourcc(*"mp4v"), source.get(cv2.CAP_PROP_FPS), size)
-    for k in range(frames):
-        writer.write(pictures[k % len(pictures)])
-    writer.release()
-    os.replace(part, target)
+    with written_beside(target) as temporary:
+        writer = cv2.VideoWriter(str(temporary), cv2.VideoWriter.fourcc(*"mp4v"), source.get(cv2.CAP_PROP_FPS), size)
+        for k in range(frames):
+            writer.write(pictures[k % len(pictures)])
+        writer.release()
     return target
 
 
