@@ -21,11 +21,6 @@ LIMBS = [1, 2, 4, 5, 7, 8, 16, 17, 18, 19, 20, 21]
 
 
 @pytest.fixture(scope="module")
-def body():
-    return load_body("scope")
-
-
-@pytest.fixture(scope="module")
 def watched(body):
     """The sample's capture, and the live pose of every tenth frame: (frame index, picture, pose)."""
     seen = []

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The picture of the current frame: whole, small, upside down for Blender, skeleton or body where the person is."""
 
-import time
-
 import numpy as np
 from scope.scope_addon.capture.landmark_network import KEYPOINT_NAMES
 from scope.scope_addon.capture.pipeline import CaptureOptions, capture
@@ -13,7 +11,8 @@ from scope.scope_addon.capture.video_range import VideoRange
 from scope.scope_addon.cli import SAMPLE
 from scope.scope_addon.job import preview
 from scope.scope_addon.job.preview import FILE, LONGER_SIDE, PreviewWriter, draw
-from scope.solver.body import load_body
+
+from .processes import wait_for
 
 
 def observation(pixels, confidence=1.0):
@@ -40,13 +39,6 @@ class NotReady:
     """A live body that has still to be loaded."""
 
     is_ready = False
-
-
-def wait_for(condition):
-    deadline = time.monotonic() + 30
-    while not condition() and time.monotonic() < deadline:
-        time.sleep(0.01)
-    assert condition()
 
 
 def test_the_file_is_whole_and_lowest_row_first(tmp_path):
@@ -90,7 +82,7 @@ def test_a_body_that_cannot_be_fitted_gives_way_to_the_skeleton(tmp_path):
         wait_for(lambda: told == ["preview"])
 
 
-def test_the_picture_shows_the_body_where_the_truth_has_it():
+def test_the_picture_shows_the_body_where_the_truth_has_it(body):
     """At the joints the picture takes on the body's colour, and it stays as it is away from them."""
     truth, checked = np.load(SAMPLE.with_name("sample_truth.npz")), []
 
@@ -106,7 +98,7 @@ def test_the_picture_shows_the_body_where_the_truth_has_it():
         outside[max(top, 0) : bottom + 1, max(left, 0) : right + 1] = False
         checked.append((np.mean(near), outside.sum() / changed.sum()))
 
-    capture(SAMPLE, load_body("scope"), CaptureOptions(quality="fast", wanted=VideoRange(0.0, 1.0)), watch=watch)
+    capture(SAMPLE, body, CaptureOptions(quality="fast", wanted=VideoRange(0.0, 1.0)), watch=watch)
     assert len(checked) >= 20
     met, strayed = np.array(checked).T
     assert met.mean() > 0.95
