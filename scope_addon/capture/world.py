@@ -18,7 +18,8 @@ UP_NOISE_RAD = np.radians(5.0)  # scatter of the body's own up direction over a 
 def up_from_standing(body: Body, joints_cam: np.ndarray) -> np.ndarray:
     """Up direction in the camera frame from the body itself: ankles to neck while the person stands.
 
-    Frames count by how straight legs and trunk are; without any such frame the trunk alone decides, and a prior of one
+    Frames count by how straight legs and trunk are and, since who lies or does push-ups is straight as well, by how
+    upright they are in the picture; without any such frame the trunk alone decides, as far as it is upright, and a prior of one
     frame's weight says that cameras are held level.
 
     :param joints_cam: (T, K+1, 3) metres, camera frame, valid frames only.
@@ -42,8 +43,9 @@ def up_from_standing(body: Body, joints_cam: np.ndarray) -> np.ndarray:
     body_up /= np.maximum(np.linalg.norm(body_up, axis=1, keepdims=True), 1e-9)
     weight *= np.clip(((legs / 2) * trunk).sum(1), 0, 1) ** 8
     level = np.array([0.0, -1.0, 0.0])
+    weight *= np.maximum(body_up @ level, 0.0) ** 4
     if weight.sum() < 1.0:
-        total = level + trunk.mean(0)
+        total = level + (np.maximum(trunk @ level, 0.0)[:, None] ** 2 * trunk).mean(0)
     else:
         total = level + (weight[:, None] * body_up).sum(0)
     if np.linalg.norm(total) < 1e-6:

@@ -4,7 +4,7 @@
 import numpy as np
 import pytest
 from scope.scope_addon.capture.soles import sole_points, with_soles
-from scope.scope_addon.capture.world import estimate_world
+from scope.scope_addon.capture.world import estimate_world, up_from_standing
 from scope.solver import rotations
 from scope.solver.body import load_body
 from scope.solver.frames import R_WORLD_MODEL, transform_points, world_from_level_camera
@@ -42,6 +42,21 @@ def test_up_and_floor_are_recovered_from_a_walk(pitch_deg, roll_deg):
     assert abs(got[2, 3] - 1.6) < 0.01 + 6.5 * np.sin(np.radians(angle))
     assert abs(np.median(transform_points(got, soles_cam)[..., 2].min(1))) < 1e-6
     assert np.allclose(transform_points(got, joints_cam[:1, 0])[0, :2], 0)
+
+
+@pytest.mark.parametrize("standing", [0, 20])
+def test_who_lies_on_the_floor_does_not_tilt_the_world(standing):
+    """Lies for 60 frames, straight, and then stands, or does not: a camera 10 degrees from level."""
+    body = load_body("scope")
+    R, t = walk(body, T=60 + standing)
+    up = rotations.exp(np.radians([10.0, 0, 0])) @ [0, -1.0, 0]
+    truth = world_from_level_camera(up, height=1.6)
+    camera_from_world = np.linalg.inv(truth)
+    fallen = rotations.exp(np.radians([0, -85.0, 0]))
+    R[:60], t[:60] = fallen @ R[:60], t[:60] @ fallen.T
+    joints_cam = transform_points(camera_from_world, t + np.array([0, 5.0, 0]))
+    angle = np.degrees(np.arccos(up_from_standing(body, joints_cam) @ up))
+    assert angle < (5 if standing else 12)  # with nothing else to go by, cameras are taken for level
 
 
 def test_soles_lie_under_the_ankles_on_the_ground():
