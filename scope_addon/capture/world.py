@@ -19,8 +19,8 @@ def up_from_standing(body: Body, joints_cam: np.ndarray) -> np.ndarray:
     """Up direction in the camera frame from the body itself: ankles to neck while the person stands.
 
     Frames count by how straight legs and trunk are and, since who lies or does push-ups is straight as well, by how
-    upright they are in the picture; without any such frame the trunk alone decides, as far as it is upright, and a prior
-    of one frame's weight says that cameras are held level.
+    upright they are in the picture; without any such frame the trunk alone decides, as far as it is upright, and a
+    prior of one frame's weight says that cameras are held level.
 
     :param joints_cam: (T, K+1, 3) metres, camera frame, valid frames only.
     :return: (3,) unit vector.
