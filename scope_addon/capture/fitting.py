@@ -31,6 +31,7 @@ from ...solver import (
 from .camera import Camera
 from .hand_measure import HandMeasurer, calm_fingers, with_finger_limits
 from .lifter import Lifted, our_lifter
+from .lifter_window import windows_around
 from .measure import DEPTH_SIGMA_M, Measurer
 from .parts import ALL_PARTS, Parts
 from .track import Track
@@ -117,10 +118,10 @@ def _lift(measurer: Measurer, track: Track, pixels: np.ndarray, parts: Parts) ->
     if not parts.lifter:
         sigma = np.full(track.confidence.shape, DEPTH_SIGMA_M)
         return Lifted(track.world_landmarks, sigma, sigma)
-    rays = measurer.rays(pixels)
+    rays, windows = measurer.rays(pixels), windows_around(track.times, track.seen)
     if not (parts.world_landmarks and track.knows_depth):
-        return our_lifter().lift(rays, track.confidence, None)
-    return our_lifter().lift_both_ways(rays, track.confidence, track.world_landmarks)
+        return our_lifter().lift(rays, track.confidence, None, windows)
+    return our_lifter().lift_both_ways(rays, track.confidence, track.world_landmarks, windows)
 
 
 def fit_track(prepared: PreparedTrack, progress: Callable[[str, int, int], None]) -> FittedTrack:

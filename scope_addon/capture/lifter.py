@@ -8,9 +8,10 @@ picture nor size changes its input. With x̂_j the keypoint's ray (x/z, y/z, 1) 
     u_j = project(R_virtual_camera x̂_j),  s = rms_j |u_j − ū| over the limbs
     input = [u_j / s, confidence_j, W_j / 0.5 m · known, known, log s]
 
-with W the world landmarks (known = 1) or zeros (known = 0). The output, in the virtual camera's axes, are the
-keypoints of our body relative to the middle of its hips and the logarithm of their standard deviations across and
-along the line of sight; the positions are turned back into camera axes.
+with W the world landmarks (known = 1) or zeros (known = 0). It sees a window of such inputs around the frame (see
+`lifter_window`), each through the virtual camera of its own moment. The output, in the axes of the middle's virtual
+camera, are the keypoints of our body relative to the middle of its hips and the logarithm of their standard deviations
+across and along the line of sight; the positions are turned back into camera axes.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ import numpy as np
 
 from ...solver.errors import ModelFileError, SetupError, ShapeError
 from .frame_blocks import by_blocks
+from .lifter_window import WINDOW, Windows, standing_still
 from .networks import open_session
 
 LIFTER_FILE = Path(__file__).resolve().parents[2] / "assets" / "lifter" / "lifter.onnx"
@@ -36,7 +38,7 @@ LIMBS = np.array([0, *range(11, 17), *range(23, 29)])  # nose, arms, legs: what 
 # pictures: poses, builds and detector errors there are not those of the training.
 SIGMA_ON_PICTURES = np.array([1.0, 1.3])
 WORLD_SHARE = 0.75  # of the estimate that knows the world landmarks, when both are mixed
-_BATCH = 4096
+_BATCH = 1024
 
 
 @dataclass(frozen=True)
@@ -121,46 +123,58 @@ class Lifter:
             raise SetupError(f"{self.path} is missing, which belongs to the repository: restore it.")
         self._session = open_session(self.path, threads)
         shapes = [s.shape[1:] for s in (*self._session.get_inputs(), *self._session.get_outputs())]
-        if shapes != [[INPUT_SIZE], [KEYPOINT_COUNT, 3], [KEYPOINT_COUNT, 2]]:
+        if shapes != [[WINDOW, INPUT_SIZE], [KEYPOINT_COUNT, 3], [KEYPOINT_COUNT, 2]]:
             raise ModelFileError(f"{self.path} is not a lifting network of this version: its shapes are {shapes}.")
 
-    def lift(self, rays: np.ndarray, confidence: np.ndarray, world: np.ndarray | None) -> Lifted:
+    def lift(
+        self, rays: np.ndarray, confidence: np.ndarray, world: np.ndarray | None, windows: Windows | None = None
+    ) -> Lifted:
         """Lift T frames at once.
 
         :param rays: (T, 33, 2) image coordinates without lens distortion, over the focal length;
-            confidence: (T, 33) 0..1;  world: (T, 33, 3) metres, hip-centred, or None to do without.
+            confidence: (T, 33) 0..1;  world: (T, 33, 3) metres, hip-centred, or None to do without;
+            windows: which frames lie around each; None: each frame is a picture of its own.
         """
         T = len(rays)
         for name, value, shape in (("rays", rays, (T, 33, 2)), ("confidence", confidence, (T, 33))):
             if value.shape != shape:
                 raise ShapeError(f"{name} must have shape {shape}, but has {value.shape}")
-        if world is None:
-            return Lifted(*by_blocks(lambda r, c: self._lift(r, c, None), rays, confidence))
-        return Lifted(*by_blocks(self._lift, rays, confidence, world))
+        around = standing_still(T) if windows is None else windows
 
-    def _lift(self, rays: np.ndarray, confidence: np.ndarray, world: np.ndarray | None) -> tuple[np.ndarray, ...]:
+        def lift(rows: np.ndarray) -> tuple[np.ndarray, ...]:
+            first, end = around.span(rows) if len(rows) else (0, 0)
+            given = None if world is None else world[first:end]
+            x, R = self._see(rays[first:end], confidence[first:end], given)
+            points, log_sigma = self.run(around.of(x, rows, first))
+            points = points - points[:, HIPS].mean(axis=1, keepdims=True)
+            sigma = np.exp(log_sigma) * SIGMA_ON_PICTURES
+            return points @ R[rows - first], sigma[..., 0], sigma[..., 1]
+
+        return Lifted(*by_blocks(lift, np.arange(T)))
+
+    def _see(self, rays: np.ndarray, confidence: np.ndarray, world: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
         if world is None:
             world, known = np.zeros((len(rays), KEYPOINT_COUNT, 3)), np.zeros(len(rays))
         else:
             known = np.ones(len(rays))
         x, R = network_input(rays, confidence, world, known)
-        points, log_sigma = self.run(x.astype(np.float32))
-        points = points - points[:, HIPS].mean(axis=1, keepdims=True)
-        sigma = np.exp(log_sigma) * SIGMA_ON_PICTURES
-        return points @ R, sigma[..., 0], sigma[..., 1]
+        return x.astype(np.float32), R
 
-    def lift_both_ways(self, rays: np.ndarray, confidence: np.ndarray, world: np.ndarray) -> Lifted:
+    def lift_both_ways(
+        self, rays: np.ndarray, confidence: np.ndarray, world: np.ndarray, windows: Windows | None = None
+    ) -> Lifted:
         """What the network finds with the world landmarks and without them, mixed: better than either on real clips."""
+        ways = [self.lift(rays, confidence, given, windows) for given in (world, None)]
 
-        def lift(rays: np.ndarray, confidence: np.ndarray, world: np.ndarray) -> tuple[np.ndarray, ...]:
-            ways = [self.lift(rays, confidence, given) for given in (world, None)]
-            mean = mixture(ways, [WORLD_SHARE, 1 - WORLD_SHARE], virtual_camera(rays))
+        def mix(R: np.ndarray, *values: np.ndarray) -> tuple[np.ndarray, ...]:
+            mean = mixture([Lifted(*values[:3]), Lifted(*values[3:])], [WORLD_SHARE, 1 - WORLD_SHARE], R)
             return mean.points, mean.sigma_across, mean.sigma_along
 
-        return Lifted(*by_blocks(lift, rays, confidence, world))
+        values = (value for way in ways for value in (way.points, way.sigma_across, way.sigma_along))
+        return Lifted(*by_blocks(mix, virtual_camera(rays), *values))
 
     def run(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The bare network: input (T, 200) -> points (T, 33, 3) and log σ (T, 33, 2), virtual camera's axes."""
+        """The bare network: input (T, 9, 200) -> points (T, 33, 3) and log σ (T, 33, 2), virtual camera's axes."""
         name = self._session.get_inputs()[0].name
         runs = [self._session.run(None, {name: x[k : k + _BATCH]}) for k in range(0, max(len(x), 1), _BATCH)]
         points, log_sigma = (np.concatenate([r[i] for r in runs]).astype(float) for i in (0, 1))

@@ -14,6 +14,7 @@ from scope.scope_addon.capture.lifter import (
     network_input,
     virtual_camera,
 )
+from scope.scope_addon.capture.lifter_window import windows_around
 from scope.scope_addon.capture.person_detector import PersonDetector
 from scope.solver.body import load_body
 from scope.solver.errors import ModelFileError, SetupError, ShapeError
@@ -45,6 +46,26 @@ def people():
     return np.array(out)
 
 
+@pytest.fixture(scope="module")
+def walkers(body):
+    """(T, 33, 3) keypoints as ``people``, of a walk on the spot that turns once, 4 s, 30 frames a second; and times."""
+    at, times = list(body.keypoint_set("blazepose").values()), np.arange(120) / 30
+    out = []
+    for t in times:
+        pose = np.zeros((body.K + 1, 3))
+        swing = 0.5 * np.sin(2 * np.pi * 0.9 * t)
+        turns = {"left_hip": -swing, "right_hip": swing, "left_shoulder": swing, "right_shoulder": -swing}
+        for name, angle in (turns | {"left_knee": 0.3, "right_knee": 0.3}).items():
+            pose[body.joint_names.index(name), 0] += angle
+        R = exp(pose)
+        for name, side in (("left_shoulder", -1), ("right_shoulder", 1)):
+            k = body.joint_names.index(name)
+            R[k] = R[k] @ exp(np.array([0, 0, 1.2 * side]))
+        R[0] = np.diag([1.0, -1.0, -1.0]) @ exp(np.array([0, 2 * np.pi * t / 4, 0])) @ R[0]
+        out.append(body.keypoints(*body.forward_kinematics(R, np.array([0.3, 0.1, 5.0])))[at])
+    return np.array(out), times
+
+
 def relative(points):
     return points - points[:, HIPS].mean(axis=1, keepdims=True)
 
@@ -66,6 +87,34 @@ def test_true_world_landmarks_make_it_better(lifter, people):
     without, informed = lifter.lift(rays, ones, None), lifter.lift(rays, ones, given)
     error = [np.linalg.norm(x.points - relative(people), axis=-1).mean() for x in (without, informed)]
     assert error[1] < error[0]
+
+
+def test_what_lies_around_a_frame_makes_it_better(lifter, walkers):
+    """With errors of the image that change from frame to frame, three seeds: nearer to the truth, and calmer."""
+    points, times = walkers
+    truth, ones = relative(points), np.ones(points.shape[:2])
+    windows = windows_around(times, np.ones(len(times), bool))
+    for seed in range(3):
+        noise = np.random.default_rng(seed).normal(0, 0.004, points[..., :2].shape)
+        rays = points[..., :2] / points[..., 2:] + noise
+        error, unrest = [], []
+        for around in (None, windows):
+            lifted = lifter.lift(rays, ones, None, around).points
+            error.append(np.linalg.norm(lifted - truth, axis=-1).mean())
+            unrest.append(np.linalg.norm(np.diff(lifted - truth, axis=0), axis=-1).mean())
+        assert error[1] < error[0]
+        assert unrest[1] < 0.8 * unrest[0]
+
+
+def test_long_clips_are_lifted_in_blocks_that_know_their_neighbours(lifter, walkers, monkeypatch):
+    points, times = walkers
+    rays, ones = points[..., :2] / points[..., 2:], np.ones(points.shape[:2])
+    windows = windows_around(times, np.ones(len(times), bool))
+    whole = lifter.lift_both_ways(rays, ones, relative(points), windows)
+    monkeypatch.setattr("scope.scope_addon.capture.frame_blocks.BLOCK_FRAMES", 17)
+    blocks = lifter.lift_both_ways(rays, ones, relative(points), windows)
+    assert np.allclose(blocks.points, whole.points, atol=1e-5)
+    assert np.allclose(blocks.sigma_along, whole.sigma_along, atol=1e-5)
 
 
 def test_errors_are_as_large_as_foretold(lifter, people):

@@ -5,23 +5,19 @@ import numpy as np
 import pytest
 from scope.scope_addon.capture.landmark_network import KEYPOINT_NAMES
 from scope.scope_addon.capture.lifter import HIPS, Lifter
-from scope.solver.body import load_body
+from scope.scope_addon.capture.lifter_window import MIDDLE, OFFSETS_S, SPACING_S, WINDOW
 from scope.solver.rotations import exp
 from scope.tools.train_lifter import detector_noise
 from scope.tools.train_lifter.augment import Motions, PoseSampler, small_rotations
-from scope.tools.train_lifter.dataset import Dataset, cameras, lines_of_sight, pitches
-
-
-@pytest.fixture(scope="module")
-def body():
-    return load_body("scope")
+from scope.tools.train_lifter.dataset import Dataset, cameras, cut_short, lines_of_sight, pitches
+from scope.tools.train_lifter.detector_noise import Persistence
 
 
 @pytest.fixture(scope="module")
 def motions(body):
     rng = np.random.default_rng(3)
     Omega = exp(rng.normal(0, 0.2, (40, body.K + 1, 3))).astype(np.float32)
-    return Motions(Omega, np.repeat(np.arange(4), 10))
+    return Motions(Omega, np.repeat(np.arange(4), 10), np.full(40, 30.0))
 
 
 @pytest.fixture(scope="module")
@@ -37,9 +33,12 @@ def test_small_rotations_are_the_exponential():
 def test_keypoints_are_those_of_the_body(body, dataset, motions):
     at = list(body.keypoint_set("blazepose").values())
     bones, local = body.l[None].astype(np.float32), body.v_bar[at][None].astype(np.float32)
-    ours, _ = dataset.keypoints(motions.Omega[:1], bones, local)
-    R, t = body.forward_kinematics(motions.Omega[0].astype(float), -body.rest_joints()[0])
-    assert np.allclose(ours[0], body.keypoints(R, t)[at], atol=1e-5)
+    displaced = np.random.default_rng(0).normal(0, 0.1, (1, len(at), 3)).astype(np.float32)
+    ours, seen = dataset.keypoints(motions.Omega[None, :2], bones, local, displaced)
+    for k in range(2):
+        R, t = body.forward_kinematics(motions.Omega[k].astype(float), -body.rest_joints()[0])
+        assert np.allclose(ours[0, k], body.keypoints(R, t)[at], atol=1e-5)
+        assert np.allclose(seen[0, k] - ours[0, k], np.einsum("kij,kj->ki", R[dataset.part], displaced[0]), atol=1e-5)
 
 
 def test_proportions_without_spread_are_the_body_with_its_shapes(body, motions, monkeypatch):
@@ -58,11 +57,11 @@ def test_a_mirrored_pose_has_mirrored_keypoints(body, dataset, motions):
     symmetric[detector_noise.SWAPPED] = (symmetric[detector_noise.SWAPPED] + symmetric * [-1, 1, 1]) / 2
     symmetric = (symmetric + symmetric[detector_noise.SWAPPED] * [-1, 1, 1]) / 2
     bones = (body.l + body.l[dataset.sampler.partner] * [-1, 1, 1]) / 2
-    give = [np.repeat(a[None], 5, 0).astype(np.float32) for a in (bones, symmetric)]
-    Omega = motions.Omega[:5]
+    give = [np.repeat(a[None], 5, 0).astype(np.float32) for a in (bones, symmetric, 0 * symmetric)]
+    Omega = motions.Omega[:5, None]
     plain, _ = dataset.keypoints(Omega, *give)
     mirrored, _ = dataset.keypoints(dataset.sampler.mirror(Omega), *give)
-    assert np.allclose(mirrored, plain[:, detector_noise.SWAPPED] * [-1, 1, 1], atol=1e-5)
+    assert np.allclose(mirrored, plain[:, :, detector_noise.SWAPPED] * [-1, 1, 1], atol=1e-5)
 
 
 def test_left_and_right_are_exchanged_by_name():
@@ -92,7 +91,7 @@ def test_input_without_noise_is_the_projection_of_the_target(dataset, monkeypatc
     monkeypatch.setattr(detector_noise, "SWAP_SHARE", 0.0)
     monkeypatch.setattr(detector_noise, "FOCAL_SPREAD", 0.0)
     batch = dataset.batch((0, 0), 20)
-    for x, P in zip(batch.input.astype(float), batch.points.astype(float), strict=True):
+    for x, P in zip(batch.input[:, MIDDLE].astype(float), batch.points.astype(float), strict=True):
         u = x[:66].reshape(33, 2) * np.exp(x[-1])
         # u (P_z + t_z) = P_xy + t_xy, linear in t
         A = np.zeros((66, 3))
@@ -113,12 +112,57 @@ def test_a_batch_depends_on_its_seed_alone(dataset):
 
 
 def test_world_landmarks_are_hip_centred_and_distorted_as_much_as_landmark_networks_do(dataset):
-    scene = dataset.scene(np.random.default_rng(0), 500)
-    truth = scene.points - scene.points[:, HIPS].mean(axis=1, keepdims=True)
-    world = detector_noise.world_landmarks(np.random.default_rng(1), truth)
-    assert np.abs(world[:, HIPS].mean(axis=1)).max() < 1e-5
-    error = np.linalg.norm(world - truth, axis=-1)[:, 11:].mean()
+    rng = np.random.default_rng(0)
+    scene = dataset.scene(rng, 500)
+    truth = scene.points - scene.points[:, :, HIPS].mean(axis=2, keepdims=True)
+    world = detector_noise.world_landmarks(rng, truth, Persistence.draw(rng, 500))
+    assert np.abs(world[:, :, HIPS].mean(axis=2)).max() < 1e-5
+    error = np.linalg.norm(world - truth, axis=-1)[..., 11:].mean()
     assert 0.06 < error < 0.2
+
+
+def test_a_window_is_a_recording_at_the_lifter_s_moments(body, monkeypatch):
+    """A root that turns by 1 rad/s, recorded 30 times a second: from moment to moment it turns by the spacing."""
+    monkeypatch.setattr("scope.tools.train_lifter.augment.SPEED_SPREAD", 0.0)
+    pose = np.zeros((300, body.K + 1, 3))
+    pose[:, 0, 1] = np.arange(300) / 30
+    motions = Motions(exp(pose).astype(np.float32), np.zeros(300, int), np.full(300, 30.0))
+    Omega = PoseSampler(body, motions).motion_windows(np.random.default_rng(0), 200)[:, :, 0]
+    steps = np.linalg.norm(Omega[:, 1:] - Omega[:, :-1], axis=(-2, -1)) / np.sqrt(2)  # 2 sin(θ/2)
+    expected = 2 * np.sin(SPACING_S / 2)
+    assert steps.max() < expected + 1e-3
+    assert np.isclose(steps, expected, atol=1e-3).mean() > 0.9  # the others lie at the ends of the recording
+
+
+def test_windows_do_not_run_into_the_next_take(body):
+    pose = np.zeros((20, body.K + 1, 3))
+    pose[10:, 1:, 0] = 1.0
+    motions = Motions(exp(pose).astype(np.float32), np.repeat([4, 7], 10), np.full(20, 10.0))
+    Omega = PoseSampler(body, motions)._windows(np.random.default_rng(0), 50)
+    assert np.array_equal(Omega, np.repeat(Omega[:, MIDDLE : MIDDLE + 1], WINDOW, axis=1))
+
+
+def test_errors_last_as_they_do_on_footage():
+    """Correlation with themselves 0.1, 0.2 and 0.4 s later: ρ + (1 − ρ) a^k, for constant ρ and a exactly so."""
+    rng, n = np.random.default_rng(0), 20000
+    errors = Persistence(np.full(n, 0.5, np.float32), np.full(n, 0.6, np.float32)).normal(rng, 2)
+    assert errors.shape == (n, WINDOW, 2)
+    assert np.allclose(errors.std(axis=0), 1, atol=0.03)
+    for lag in (1, 2, 4):
+        assert np.isclose((errors[:, lag] * errors[:, 0]).mean(), 0.5 + 0.5 * 0.6**lag, atol=0.03)
+    drawn = Persistence.draw(rng, n).normal(rng)
+    found = [(drawn[:, lag] * drawn[:, 0]).mean() for lag in (1, 2, 4)]
+    assert np.allclose(found, [0.8, 0.7, 0.6], atol=0.1)  # as measured, see `detector_noise`
+
+
+def test_some_windows_are_cut_short_and_some_stand_still():
+    x = np.tile(OFFSETS_S, (5000, 1))
+    cut = cut_short(np.random.default_rng(0), x)
+    assert np.array_equal(cut[:, MIDDLE], x[:, MIDDLE])
+    still = (np.ptp(cut, axis=1) == 0).mean()
+    whole = (cut == x).all(axis=1).mean()
+    assert 0.03 < still < 0.1
+    assert 0.75 < whole < 0.95
 
 
 def test_held_cameras_look_down_on_hips_below_them_and_less_so_from_afar():
@@ -144,7 +188,7 @@ def test_the_exported_network_is_the_trained_one(tmp_path):
     network.spread.uniform_(0.5, 2)
     network.sigma_offset.normal_(0, 0.1)
     export(network, tmp_path / "lifter.onnx")
-    x = np.random.default_rng(0).normal(0, 1, (7, 200)).astype(np.float32)
+    x = np.random.default_rng(0).normal(0, 1, (7, WINDOW, 200)).astype(np.float32)
     with torch.no_grad():
         points, log_sigma = (a.numpy() for a in network(torch.from_numpy(x)))
     ours, sigma = Lifter(tmp_path / "lifter.onnx").run(x)

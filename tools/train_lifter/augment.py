@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Many poses and proportions from few recordings.
+"""Many motions and proportions from few recordings.
 
-A pose is a state of each joint, Ω (24, 3, 3), and a root rotation into a world with y up. Torso, arms and legs come
-from different frames now and then, joints are turned at random, the body leans, and half of everything is mirrored.
+A pose is a state of each joint, Ω (24, 3, 3), and a root rotation into a world with y up; a motion is a window of poses
+at the lifter's moments. Torso, arms and legs come from different recordings now and then, joints are turned at random
+by what stays the same through the window, the body leans, some motions run slower, faster or backwards, and half of
+everything is mirrored.
 """
 
 from __future__ import annotations
@@ -12,7 +14,9 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
+from numba import njit
 
+from ...scope_addon.capture.lifter_window import OFFSETS_S, WINDOW
 from ...solver.body import Body
 from ...solver.rotations import exp
 
@@ -24,6 +28,7 @@ JOINT_NOISE = {"shoulder": 0.45, "collar": 0.1, "elbow": 0.25, "wrist": 0.3, "ha
 JOINT_NOISE |= {"ankle": 0.2, "foot": 0.1, "spine": 0.08, "neck": 0.15, "head": 0.2}
 LEAN, STRONG_LEAN, STRONG_LEAN_SHARE = np.radians(7.0), np.radians(45.0), 0.1
 AS_RECORDED = 0.25  # share of samples whose joints are not turned
+SPEED_SPREAD = 0.2  # of the logarithm of how fast a motion is played
 SHAPE_SPREAD, SHAPE_LIMIT = 1.0, 2.5
 BONE_SPREAD = 0.04  # of the logarithm of each bone's length, left and right alike
 CLUSTERS = 256
@@ -31,17 +36,26 @@ CLUSTERS = 256
 
 @dataclass(frozen=True)
 class Motions:
-    """Frames of all takes: ``Omega`` (F, 24, 3, 3) f32, row 0 the root into the world; ``take`` (F,) its take."""
+    """Frames of all takes: ``Omega`` (F, 24, 3, 3) f32, row 0 the root into the world; (F,) ``take``, and ``fps``."""
 
     Omega: np.ndarray
     take: np.ndarray
+    fps: np.ndarray
 
     def __len__(self) -> int:
         return len(self.Omega)
 
     def select(self, frames: np.ndarray) -> Motions:
         """Only these frames (mask or indices)."""
-        return Motions(self.Omega[frames], self.take[frames])
+        return Motions(self.Omega[frames], self.take[frames], self.fps[frames])
+
+    @cached_property
+    def ends(self) -> tuple[np.ndarray, np.ndarray]:
+        """(F,) the first and (F,) the last frame of each frame's take."""
+        change = np.flatnonzero(np.diff(self.take)) + 1
+        starts, ends = np.append(0, change), np.append(change, len(self)) - 1
+        which = np.searchsorted(starts, np.arange(len(self)), side="right") - 1
+        return starts[which], ends[which]
 
     @cached_property
     def share(self) -> np.ndarray:
@@ -64,10 +78,10 @@ class Motions:
 def load_motions(path: Path) -> Motions:
     """The sound frames of a file written by ``tools.mocap.fit_body``."""
     with np.load(path) as data:
-        poses, valid, start = data["poses"], data["valid"], data["take_start"]
+        poses, valid, start, fps = data["poses"], data["valid"], data["take_start"], data["take_fps"]
     take = np.repeat(np.arange(len(start) - 1), np.diff(start))
     Omega = exp(poses.reshape(len(poses), -1, 3).astype(float)).astype(np.float32)
-    return Motions(Omega[valid], take[valid])
+    return Motions(Omega[valid], take[valid], fps[take[valid]])
 
 
 class PoseSampler:
@@ -96,30 +110,42 @@ class PoseSampler:
         signs = np.outer(np.diag(_MIRROR), np.diag(_MIRROR)).astype(Omega.dtype)
         return (Omega * signs)[..., self.partner, :, :]
 
-    def _frames(self, rng: np.random.Generator, n: int) -> np.ndarray:
+    def _windows(self, rng: np.random.Generator, n: int) -> np.ndarray:
+        """(n, WINDOW, 24, 3, 3) of one recording each."""
         drawn = np.searchsorted(self._cumulative, rng.random(n) * self._cumulative[-1])
-        Omega = self.motions.Omega[np.minimum(drawn, len(self.motions) - 1)]
+        middle = np.minimum(drawn, len(self.motions) - 1)
+        speed = np.exp(SPEED_SPREAD * rng.standard_normal(n)) * np.where(rng.random(n) < 0.5, 1, -1)
+        frames = np.round(OFFSETS_S * self.motions.fps[middle][:, None] * speed[:, None]).astype(int)
+        first, last = (ends[middle][:, None] for ends in self.motions.ends)
+        Omega = self.motions.Omega[np.clip(middle[:, None] + frames, first, last)]
         flip = rng.random(n) < 0.5
         Omega[flip] = self.mirror(Omega[flip])
         return Omega
 
-    def poses(self, rng: np.random.Generator, n: int) -> np.ndarray:
-        """(n, 24, 3, 3) f32; row 0 turns the root into a world with y up, heading at random."""
-        Omega = self._frames(rng, n)
+    def motion_windows(self, rng: np.random.Generator, n: int) -> np.ndarray:
+        """(n, WINDOW, 24, 3, 3) f32; row 0 of a pose turns the root into a world with y up, heading at random."""
+        Omega = self._windows(rng, n)
         for joints, share in zip(self._parts, (SWAP_UPPER, SWAP_ARM, SWAP_ARM, SWAP_LEG, SWAP_LEG), strict=True):
             rows = np.flatnonzero(rng.random(n) < share)
-            Omega[np.ix_(rows, joints)] = self._frames(rng, len(rows))[:, joints]
+            other = self._windows(rng, len(rows))
+            for joint in joints:
+                Omega[rows, :, joint] = other[:, :, joint]
         strength = np.abs(rng.standard_normal((n, 1, 1), np.float32)) * (rng.random((n, 1, 1)) > AS_RECORDED)
         turn = rng.standard_normal((n, len(self._noise), 3), np.float32) * self._noise[:, None] * strength
-        Omega = Omega @ small_rotations(turn.astype(np.float32))
+        _turn_joints(Omega, small_rotations(turn.astype(np.float32)))
         heading, direction = rng.uniform(0, 2 * np.pi, (2, n))
         lean = rng.standard_normal(n) * np.where(rng.random(n) < STRONG_LEAN_SHARE, STRONG_LEAN, LEAN)
         axis = np.stack([np.cos(direction), np.zeros(n), np.sin(direction)], axis=1)
         about_y = np.stack([np.zeros(n), heading, np.zeros(n)], axis=1)
-        Omega[:, 0] = small_rotations((axis * lean[:, None]).astype(np.float32)) @ (
-            small_rotations(about_y.astype(np.float32)) @ Omega[:, 0]
+        turned = small_rotations((axis * lean[:, None]).astype(np.float32)) @ small_rotations(
+            about_y.astype(np.float32)
         )
+        Omega[:, :, 0] = turned[:, None] @ Omega[:, :, 0]
         return Omega
+
+    def pose(self, rng: np.random.Generator) -> np.ndarray:
+        """(24, 3, 3) of one moment."""
+        return self.motion_windows(rng, 1)[0, WINDOW // 2]
 
     def proportions(self, rng: np.random.Generator, n: int) -> tuple[np.ndarray, np.ndarray]:
         """Random bodies: joints from their parents (n, 24, 3), BlazePose keypoints from their joints (n, 33, 3)."""
@@ -130,6 +156,18 @@ class PoseSampler:
         bones = (body.l + np.einsum("ijp,np->nij", body.S, betas)) * factor[..., None]
         keypoints = body.v_bar[at] + np.einsum("ijp,np->nij", body.V[at], betas)
         return bones.astype(np.float32), keypoints.astype(np.float32)
+
+
+@njit(fastmath=True)
+def _turn_joints(Omega: np.ndarray, turn: np.ndarray) -> None:
+    """Omega[a, w, k] @ turn[a, k], in place."""
+    for a in range(Omega.shape[0]):
+        for w in range(Omega.shape[1]):
+            for k in range(Omega.shape[2]):
+                for i in range(3):
+                    x, y, z = Omega[a, w, k, i, 0], Omega[a, w, k, i, 1], Omega[a, w, k, i, 2]
+                    for j in range(3):
+                        Omega[a, w, k, i, j] = x * turn[a, k, 0, j] + y * turn[a, k, 1, j] + z * turn[a, k, 2, j]
 
 
 def small_rotations(phi: np.ndarray) -> np.ndarray:

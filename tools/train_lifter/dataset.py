@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Training batches: our body in front of a random camera, as the detector would report it.
+"""Training batches: our body moving in front of a random camera, as the detector would report it.
 
 A batch is a function of its seed alone, so that any number of processes can make them in any order.
 """
@@ -9,11 +9,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 
-from ...scope_addon.capture.lifter import HIPS, network_input, person_size, virtual_camera
+from ...scope_addon.capture.lifter import HIPS, KEYPOINT_COUNT, network_input, person_size, virtual_camera
+from ...scope_addon.capture.lifter_window import MIDDLE, OFFSETS_S, WINDOW
 from ...solver.body import Body
 from . import detector_noise
 from .augment import Motions, PoseSampler, small_rotations
+from .detector_noise import Persistence
 
 NEAREST_M, FARTHEST_M = 1.8, 12.0
 PITCH_LEVEL, PITCH_SPREAD = np.radians(8.0), np.radians(9.0)
@@ -22,11 +25,15 @@ PITCH_LOWEST, PITCH_HIGHEST = np.radians(-15.0), np.radians(45.0)
 HELD_SHARE, HELD_HEIGHT_M, HELD_SPREAD_M, LOWEST_M = 0.7, 1.3, 0.4, 0.1
 ROLL_SPREAD = np.radians(3.0)
 FIELD = (0.5, 0.4)  # |x/z| and |y/z| of the person's place in the picture
+DRIFT_PER_S = (0.1, 0.03, 0.08)  # one standard deviation, of x/z, y/z and the logarithm of the distance
+# Windows that a clip's start, or its end, cuts short, and windows of pictures.
+CUT_SHORT_SHARE, STILL_SHARE = 0.06, 0.06
 
 
 @dataclass(frozen=True)
 class Batch:
-    """n samples: ``input`` (n, 200) and ``points`` (n, 33, 3) metres, hips' middle at 0, virtual camera's axes."""
+    """n samples: ``input`` (n, WINDOW, 200) and, of the middle, ``points`` (n, 33, 3): metres, hips' middle at 0,
+    virtual camera's axes."""
 
     input: np.ndarray
     points: np.ndarray
@@ -34,8 +41,8 @@ class Batch:
 
 @dataclass(frozen=True)
 class Scene:
-    """n people before a camera: ``points`` (n, 33, 3) true keypoints and ``seen`` (n, 33, 3) where the detector looks
-    for them, metres, camera axes; ``focal_ratio`` (n,) assumed focal length over the true one."""
+    """n people before a camera: ``points`` (n, WINDOW, 33, 3) true keypoints and ``seen`` (n, WINDOW, 33, 3) where the
+    detector looks for them, metres, camera axes; ``focal_ratio`` (n,) assumed focal length over the true one."""
 
     points: np.ndarray
     seen: np.ndarray
@@ -47,33 +54,40 @@ class Dataset:
 
     def __init__(self, body: Body, motions: Motions) -> None:
         self.body, self.sampler = body, PoseSampler(body, motions)
-        self.part = body.keypoint_part[list(body.keypoint_set("blazepose").values())]
+        self.part = body.keypoint_part[list(body.keypoint_set("blazepose").values())].astype(np.int64)
+        self._parents = np.asarray(body.parents, np.int64)
 
-    def keypoints(self, Omega: np.ndarray, bones: np.ndarray, local: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """BlazePose keypoints (n, 33, 3) in the axes of the root's parent, root joint at 0, and R of their parts."""
-        R, t = Omega.copy(), np.zeros(bones.shape, np.float32)
-        for i in range(1, self.body.K + 1):
-            p = self.body.parents[i]
-            R[:, i] = R[:, p] @ Omega[:, i]
-            t[:, i] = t[:, p] + np.einsum("nij,nj->ni", R[:, p], bones[:, i])
-        R = R[:, self.part]
-        return np.einsum("nkij,nkj->nki", R, local) + t[:, self.part], R
+    def keypoints(
+        self, Omega: np.ndarray, bones: np.ndarray, local: np.ndarray, displaced: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """BlazePose keypoints of windows of poses, and the same displaced in the axes of their parts.
+
+        :param Omega: (n, W, 24, 3, 3);  bones: (n, 24, 3), local: (n, 33, 3) as of `PoseSampler.proportions`;
+            displaced: (n, 33, 3) metres.  All f32.
+        :return: (n, W, 33, 3) twice, in the axes of the root's parent, root joint at 0.
+        """
+        points, seen = (np.empty((*Omega.shape[:2], KEYPOINT_COUNT, 3), np.float32) for _ in range(2))
+        K = Omega.shape[2]
+        R, t = np.empty((K, 3, 3), np.float32), np.empty((K, 3), np.float32)
+        _forward(Omega, bones, local, displaced, self._parents, self.part, R, t, points, seen)
+        return points, seen
 
     def scene(self, rng: np.random.Generator, n: int) -> Scene:
-        """n people of random pose, shape and place."""
-        Omega = self.sampler.poses(rng, n)
+        """n people of random motion, shape and place."""
+        Omega = self.sampler.motion_windows(rng, n)
         bones, local = self.sampler.proportions(rng, n)
-        points, R = self.keypoints(Omega, bones, local)
-        displaced = detector_noise.PLACEMENT[:, None] * rng.standard_normal((n, 33, 3))
-        seen = points + np.einsum("nkij,nkj->nki", R, displaced.astype(np.float32))
-        middle = points[:, HIPS].mean(axis=1, keepdims=True)
+        displaced = detector_noise.PLACEMENT[:, None] * rng.standard_normal((n, KEYPOINT_COUNT, 3))
+        points, seen = self.keypoints(Omega, bones, local, displaced.astype(np.float32))
+        middle = points[:, :, HIPS].mean(axis=2, keepdims=True)
         x, y = rng.uniform(-1, 1, (2, n)) * np.array(FIELD)[:, None]
-        ray = np.stack([x, y, np.ones(n)], axis=1)
         distance = np.exp(rng.uniform(np.log(NEAREST_M), np.log(FARTHEST_M), n))
-        place = (ray / np.linalg.norm(ray, axis=1, keepdims=True) * distance[:, None]).astype(np.float32)[:, None]
-        above_floor = middle[:, 0, 1] - points[..., 1].min(axis=1)
+        above_floor = middle[:, MIDDLE, 0, 1] - points[:, MIDDLE, :, 1].min(axis=1)
         down = lines_of_sight(rng, above_floor, distance)
-        into = np.swapaxes(cameras(rng, n, down - np.arctan2(y, np.hypot(x, 1))), 1, 2)
+        into = np.swapaxes(cameras(rng, n, down - np.arctan2(y, np.hypot(x, 1))), 1, 2)[:, None]
+        drift = [OFFSETS_S * (speed * rng.standard_normal((n, 1))) for speed in DRIFT_PER_S]
+        ray = np.stack([x[:, None] + drift[0], y[:, None] + drift[1], np.ones((n, WINDOW))], axis=-1)
+        away = (distance[:, None] * np.exp(drift[2]))[..., None]
+        place = (ray / np.linalg.norm(ray, axis=-1, keepdims=True) * away).astype(np.float32)[:, :, None]
         focal_ratio = np.exp(detector_noise.FOCAL_SPREAD * rng.standard_normal(n)).astype(np.float32)
         return Scene((points - middle) @ into + place, (seen - middle) @ into + place, focal_ratio)
 
@@ -81,21 +95,76 @@ class Dataset:
         """n samples that depend on the seed alone."""
         rng = np.random.default_rng(seed)
         scene = self.scene(rng, n)
+        persistence = Persistence.draw(rng, n)
         rays = scene.seen[..., :2] / np.maximum(scene.seen[..., 2:], 0.3)
-        size = person_size(rays)[:, None, None]
-        errors, confidence = detector_noise.image_errors(rng, n)
-        relative = scene.seen - scene.seen[:, HIPS].mean(axis=1, keepdims=True)
+        flat = (n * WINDOW, KEYPOINT_COUNT)
+        size = person_size(rays.reshape(*flat, 2)).reshape(n, WINDOW, 1, 1)
+        errors, confidence = detector_noise.image_errors(rng, persistence)
+        relative = scene.seen - scene.seen[:, :, HIPS].mean(axis=2, keepdims=True)
         # Landmark networks look at a crop, as if the camera looked straight at the person.
-        straight = np.swapaxes(virtual_camera(rays), 1, 2)
-        world = detector_noise.world_landmarks(rng, relative @ straight)
+        straight = np.swapaxes(virtual_camera(rays.reshape(*flat, 2)), 1, 2).reshape(n, WINDOW, 3, 3)
+        relative = (relative @ straight.astype(np.float32)).astype(np.float32)
+        world = detector_noise.world_landmarks(rng, relative, persistence)
         rays = (rays + errors * size).astype(np.float32)
-        detector_noise.cut_by_edge(rng, rays, confidence)
+        detector_noise.cut_by_edge(rng, rays, confidence, persistence)
         detector_noise.swap_sides(rng, rays)
-        rays = rays / scene.focal_ratio[:, None, None]
-        known = rng.random(n) >= detector_noise.UNKNOWN_SHARE
-        x, R = network_input(rays, confidence.astype(np.float32), world, known)
-        points = (scene.points - scene.points[:, HIPS].mean(axis=1, keepdims=True)) @ np.swapaxes(R, 1, 2)
+        rays = rays / scene.focal_ratio[:, None, None, None]
+        known = np.repeat(rng.random(n) >= detector_noise.UNKNOWN_SHARE, WINDOW)
+        x, R = network_input(
+            rays.reshape(*flat, 2), confidence.reshape(flat).astype(np.float32), world.reshape(*flat, 3), known
+        )
+        x = cut_short(rng, x.reshape(n, WINDOW, -1))
+        points = scene.points[:, MIDDLE]
+        R = R.reshape(n, WINDOW, 3, 3)[:, MIDDLE]
+        points = (points - points[:, HIPS].mean(axis=1, keepdims=True)) @ np.swapaxes(R, 1, 2)
         return Batch(x.astype(np.float32), points.astype(np.float32))
+
+
+def cut_short(rng: np.random.Generator, x: np.ndarray) -> np.ndarray:
+    """Windows (n, WINDOW, ...) of which a clip's ends cut some short, so that moments repeat; some are of pictures."""
+    n = len(x)
+    first = np.where(rng.random(n) < CUT_SHORT_SHARE, rng.integers(0, MIDDLE + 1, n), 0)
+    last = np.where(rng.random(n) < CUT_SHORT_SHARE, rng.integers(MIDDLE, WINDOW, n), WINDOW - 1)
+    still = rng.random(n) < STILL_SHARE
+    first[still] = last[still] = MIDDLE
+    return x[np.arange(n)[:, None], np.clip(np.arange(WINDOW), first[:, None], last[:, None])]
+
+
+@njit(fastmath=True)
+def _forward(
+    Omega: np.ndarray,
+    bones: np.ndarray,
+    local: np.ndarray,
+    displaced: np.ndarray,
+    parents: np.ndarray,
+    part: np.ndarray,
+    R: np.ndarray,
+    t: np.ndarray,
+    points: np.ndarray,
+    seen: np.ndarray,
+) -> None:
+    """Forward kinematics of `Dataset.keypoints`; ``R`` (24, 3, 3) and ``t`` (24, 3) are room to work in."""
+    for a in range(Omega.shape[0]):
+        for w in range(Omega.shape[1]):
+            R[0], t[0] = Omega[a, w, 0], 0.0
+            for k in range(1, len(parents)):
+                p = parents[k]
+                for i in range(3):
+                    t[k, i] = t[p, i]
+                    for j in range(3):
+                        t[k, i] += R[p, i, j] * bones[a, k, j]
+                        R[k, i, j] = 0.0
+                        for m in range(3):
+                            R[k, i, j] += R[p, i, m] * Omega[a, w, k, m, j]
+            for j in range(local.shape[1]):
+                p = part[j]
+                for i in range(3):
+                    points[a, w, j, i] = t[p, i]
+                    seen[a, w, j, i] = 0.0
+                    for m in range(3):
+                        points[a, w, j, i] += R[p, i, m] * local[a, j, m]
+                        seen[a, w, j, i] += R[p, i, m] * displaced[a, j, m]
+                    seen[a, w, j, i] += points[a, w, j, i]
 
 
 def lines_of_sight(rng: np.random.Generator, above_floor: np.ndarray, distance: np.ndarray) -> np.ndarray:

@@ -4,12 +4,19 @@
 The detector's keypoints are not our body's: each lies at a constant offset in its body part (people differ in build
 and clothes, detectors in what they call a hip). To this come errors of the image and, in the world landmarks, a whole
 that is tilted, scaled and flattened, limbs that point elsewhere in depth, and now and then a limb mirrored in depth.
+
+Errors last. Those of the depth of bones, as `pose_landmark_heavy` sees them on footage and renders with known truth, go
+with themselves 0.1, 0.2, 0.4 and 0.8 seconds later by 0.8, 0.65, 0.5 and 0.5: half of an error is the same through the
+window, most of the rest changes within a few tenths of a second, see `Persistence`.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
+from ...scope_addon.capture.lifter_window import WINDOW
 from .augment import small_rotations
 
 # Metres, one standard deviation per coordinate, of where the detector sees a keypoint of a body part.
@@ -20,6 +27,8 @@ CONFIDENT_SHARE = 0.8
 UNSURE_FACTOR = 3.5  # on the image noise of a keypoint with no confidence
 SWAP_SHARE = 0.01  # samples in which the arms, or the legs, have left and right exchanged
 CUT_SHARE = 0.12  # samples in which part of the body lies outside the picture
+SWAP_LASTS = 0.7  # of the window's moments
+CONFIDENCE_LASTS = 0.7  # of the keypoints keep theirs through the window
 FOCAL_SPREAD = 0.1  # of the logarithm of the focal length assumed over the true one
 # World landmarks. Depth is mostly too shallow: on renders the slope of arms is right by 0.3, of trunk and legs by 0.6.
 UNKNOWN_SHARE = 0.3
@@ -30,6 +39,8 @@ LIMB_DEPTH = 0.25  # error of a bone's slope in depth, over its length
 LIMB_ACROSS = 0.1
 WORLD_NOISE_M = 0.012
 FLIP_SHARE = 0.05  # per limb: its depth relative to shoulder or hip has the wrong sign
+FLIP_LASTS = 0.8  # of the window's moments
+CONSTANT_SHARE, KEPT = (0.2, 0.8), (0.4, 0.9)  # see `Persistence`
 
 # Each limb from the trunk outwards with what hangs on its ends.
 LIMBS = (
@@ -43,8 +54,55 @@ _ARMS = np.arange(11, 23)
 _LEGS = np.arange(23, 33)
 
 
-def image_errors(rng: np.random.Generator, n: int) -> tuple[np.ndarray, np.ndarray]:
-    """Errors of 2D keypoints (n, 33, 2) in units of the person's size s, and confidences (n, 33)."""
+@dataclass(frozen=True)
+class Persistence:
+    """How the errors of n people last through a window of WINDOW moments, standard normal at each of them.
+
+        e_t = √ρ c + √(1 − ρ) z_t,   z_t = a z_{t−1} + √(1 − a²) w_t
+
+    with c and w_t independent; ``constant`` (n,) is ρ, ``kept`` (n,) is a.
+    """
+
+    constant: np.ndarray
+    kept: np.ndarray
+
+    @staticmethod
+    def draw(rng: np.random.Generator, n: int) -> Persistence:
+        """Some errors hold still, some flicker."""
+        return Persistence(*(rng.uniform(*limits, n).astype(np.float32) for limits in (CONSTANT_SHARE, KEPT)))
+
+    def of(self, rows: np.ndarray) -> Persistence:
+        """Of some of the people."""
+        return Persistence(self.constant[rows], self.kept[rows])
+
+    def mix(self, constant: np.ndarray, white: np.ndarray) -> np.ndarray:
+        """e_t of c (n, 1, ...) and w_t (n, WINDOW, ...); overwrites the latter."""
+        a = self.kept.reshape(-1, *[1] * (white.ndim - 2))
+        b = np.sqrt(1 - a * a)
+        for t in range(1, white.shape[1]):
+            white[:, t] = a * white[:, t - 1] + b * white[:, t]
+        rho = self.constant.reshape(-1, *[1] * (white.ndim - 1))
+        return np.sqrt(rho) * constant + np.sqrt(1 - rho) * white
+
+    def normal(self, rng: np.random.Generator, *shape: int) -> np.ndarray:
+        """e_t, (n, WINDOW, *shape)."""
+        n = len(self.constant)
+        constant = rng.standard_normal((n, 1, *shape), np.float32)
+        return self.mix(constant, rng.standard_normal((n, WINDOW, *shape), np.float32))
+
+
+def image_errors(rng: np.random.Generator, persistence: Persistence) -> tuple[np.ndarray, np.ndarray]:
+    """Errors of 2D keypoints (n, WINDOW, 33, 2) in units of the person's size s, and confidences (n, WINDOW, 33)."""
+    n = len(persistence.constant)
+    constant, lasting = moment_errors(rng, n)
+    white, passing = (x.reshape(n, WINDOW, *x.shape[1:]) for x in moment_errors(rng, n * WINDOW))
+    errors = persistence.mix(constant[:, None], white)
+    confidence = np.where(rng.random((n, 1, 33)) < CONFIDENCE_LASTS, lasting[:, None], passing)
+    return errors, confidence
+
+
+def moment_errors(rng: np.random.Generator, n: int) -> tuple[np.ndarray, np.ndarray]:
+    """Errors of 2D keypoints (n, 33, 2) in units of the person's size s, and confidences (n, 33), of single moments."""
     unsure = rng.random((n, 33)) > CONFIDENT_SHARE + 0.18 * rng.random((n, 1))
     confidence = np.where(unsure, rng.random((n, 33)) ** 0.7, 1 - 0.1 * rng.random((n, 33)) ** 2)
     # Half of the error of a hand or foot is that of the joint before it.
@@ -58,53 +116,59 @@ def image_errors(rng: np.random.Generator, n: int) -> tuple[np.ndarray, np.ndarr
     return own * level * (1 + (UNSURE_FACTOR - 1) * (1 - confidence[..., None])), confidence
 
 
-def cut_by_edge(rng: np.random.Generator, rays: np.ndarray, confidence: np.ndarray) -> None:
+def cut_by_edge(rng: np.random.Generator, rays: np.ndarray, confidence: np.ndarray, persistence: Persistence) -> None:
     """Let the picture's edge cut some people, in place: beyond it, the network guesses with low confidence."""
     cut = np.flatnonzero(rng.random(len(rays)) < CUT_SHARE)
     angle = rng.choice(4, len(cut), p=[0.5, 0.1, 0.2, 0.2]) * np.pi / 2
     normal = np.stack([np.sin(angle), np.cos(angle)], axis=1)
-    height = np.einsum("njd,nd->nj", rays[cut], normal)
-    low, high = height.min(axis=1), height.max(axis=1)
+    height = np.einsum("nwjd,nd->nwj", rays[cut], normal)
+    low, high = height[:, WINDOW // 2].min(axis=1), height[:, WINDOW // 2].max(axis=1)
     edge = low + rng.uniform(0.35, 1.0, len(cut)) * (high - low)
-    beyond = np.maximum(height - edge[:, None], 0.0)
-    pulled = rng.uniform(0.0, 0.7, (len(cut), 1)) * beyond
-    guess = rng.standard_normal((len(cut), 33, 2)) * (0.5 * beyond[..., None])
-    rays[cut] += guess - pulled[..., None] * normal[:, None]
-    confidence[cut] *= np.where(beyond > 0, rng.uniform(0, 0.3, (len(cut), 33)), 1.0)
+    beyond = np.maximum(height - edge[:, None, None], 0.0)
+    pulled = rng.uniform(0.0, 0.7, (len(cut), 1, 1)) * beyond
+    guess = persistence.of(cut).normal(rng, 33, 2) * (0.5 * beyond[..., None])
+    rays[cut] += (guess - pulled[..., None] * normal[:, None, None]).astype(rays.dtype)
+    confidence[cut] *= np.where(beyond > 0, rng.uniform(0, 0.3, (len(cut), WINDOW, 33)), 1.0)
 
 
 def swap_sides(rng: np.random.Generator, rays: np.ndarray) -> None:
-    """Exchange left and right of the arms or the legs of some people, in place."""
+    """Exchange left and right of the arms or the legs of some people (n, WINDOW, 33, 2), in place."""
+    n = len(rays)
     for group in (_ARMS, _LEGS):
-        rows = np.flatnonzero(rng.random(len(rays)) < SWAP_SHARE)
-        rays[np.ix_(rows, group)] = rays[np.ix_(rows, SWAPPED[group])]
+        people, moments = np.nonzero((rng.random(n) < SWAP_SHARE)[:, None] & (rng.random((n, WINDOW)) < SWAP_LASTS))
+        rays[people[:, None], moments[:, None], group] = rays[people[:, None], moments[:, None], SWAPPED[group]]
 
 
-def world_landmarks(rng: np.random.Generator, points: np.ndarray) -> np.ndarray:
-    """Distorted landmarks (n, 33, 3) of true keypoints (n, 33, 3), metres, in axes that look straight at the person."""
-    n = len(points)
+def world_landmarks(rng: np.random.Generator, points: np.ndarray, persistence: Persistence) -> np.ndarray:
+    """Distorted landmarks (n, WINDOW, 33, 3) of true keypoints, metres, in axes that look straight at the person."""
+    n, W = points.shape[:2]
 
     def normal(*shape: int) -> np.ndarray:
-        return rng.standard_normal((n, *shape), np.float32)
+        return rng.standard_normal((n, 1, *shape), np.float32)
+
+    def lasting(*shape: int) -> np.ndarray:
+        return persistence.normal(rng, *shape)
 
     strength = np.exp(0.4 * normal(1, 1))
     out = points.copy()
     # The trunk leans to and fro in depth as one, shoulders turn less than they should.
-    hips = points[:, [23, 24]].mean(axis=1, keepdims=True)
-    upper = points[:, :23] - hips
-    middle = upper[:, [11, 12]].mean(axis=1, keepdims=True)[..., 2]
-    depth = (upper[..., 2] - middle) * rng.uniform(*SHOULDER_GAIN, (n, 1)) + middle * rng.uniform(*TRUNK_GAIN, (n, 1))
-    out[:, :23, 2] = hips[..., 2] + depth + 0.1 * normal(1) * upper[..., 1]
+    hips = points[:, :, [23, 24]].mean(axis=2, keepdims=True)
+    upper = points[:, :, :23] - hips
+    middle = upper[:, :, [11, 12]].mean(axis=2)[..., 2:]
+    shoulders, trunk = (rng.uniform(*gain, (n, 1, 1)) for gain in (SHOULDER_GAIN, TRUNK_GAIN))
+    depth = (upper[..., 2] - middle) * shoulders + middle * trunk
+    out[:, :, :23, 2] = hips[..., 2] + depth + 0.1 * lasting(1) * upper[..., 1]
     for number, limb in enumerate(LIMBS):
-        gain = rng.uniform(*(ARM_GAIN if number < 2 else LEG_GAIN), n) * np.where(rng.random(n) < FLIP_SHARE, -1.0, 1.0)
-        scale = np.stack([np.ones(n), np.ones(n), gain], axis=1).astype(np.float32)
+        flipped = (rng.random((n, 1)) < FLIP_SHARE) & (rng.random((n, W)) < FLIP_LASTS)
+        gain = rng.uniform(*(ARM_GAIN if number < 2 else LEG_GAIN), (n, 1)) * np.where(flipped, -1.0, 1.0)
+        scale = np.stack([np.ones((n, W)), np.ones((n, W)), gain], axis=-1).astype(np.float32)
         for parent, child in limb:
-            bone = points[:, child] - points[:, parent]
-            length = np.linalg.norm(bone, axis=1, keepdims=True)
-            error = normal(3) * np.array([LIMB_ACROSS, LIMB_ACROSS, LIMB_DEPTH], np.float32) * strength[:, 0]
-            out[:, child] = out[:, parent] + bone * scale + error * length
-    turn = np.stack([TILT * normal(), TURN * normal(), 0.3 * TURN * normal()], axis=1)
+            bone = points[:, :, child] - points[:, :, parent]
+            length = np.linalg.norm(bone, axis=-1, keepdims=True)
+            error = lasting(3) * np.array([LIMB_ACROSS, LIMB_ACROSS, LIMB_DEPTH], np.float32) * strength[..., 0]
+            out[:, :, child] = out[:, :, parent] + bone * scale + error * length
+    turn = np.stack([TILT * lasting(), TURN * lasting(), 0.3 * TURN * lasting()], axis=-1)
     out = out @ small_rotations(turn.astype(np.float32))
     out *= np.exp(SCALE_SPREAD * normal(1, 1))
-    out += WORLD_NOISE_M * normal(33, 3)
-    return (out - out[:, [23, 24]].mean(axis=1, keepdims=True)).astype(np.float32)
+    out += WORLD_NOISE_M * lasting(33, 3)
+    return (out - out[:, :, [23, 24]].mean(axis=2, keepdims=True)).astype(np.float32)

@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from ...scope_addon.capture.lifter import HIPS, LIFTER_FILE, Lifter, virtual_camera
+from ...scope_addon.capture.lifter_window import MIDDLE
 from ...solver.body import load_body
 from .augment import load_motions
 from .dataset import Dataset
@@ -43,7 +44,7 @@ def measure_takes(lifter: Lifter, motions: Path, n: int = 8192) -> dict:
     """Millimetres on held-out takes with imitated errors, all of them and those with known world landmarks."""
     batch = Dataset(load_body("scope"), held_out_frames(load_motions(motions))).batch((2, 0), n)
     points, _ = lifter.run(batch.input)
-    error, known = points - batch.points, batch.input[:, -2] > 0.5
+    error, known = points - batch.points, batch.input[:, MIDDLE, -2] > 0.5
     return {"takes": n, "with_world_mm": _limb_error(error[known]), "without_world_mm": _limb_error(error[~known])}
 
 

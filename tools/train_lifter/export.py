@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +12,8 @@ import torch
 from onnx import TensorProto, helper, numpy_helper
 
 from ...scope_addon.capture.lifter import INPUT_SIZE, KEYPOINT_COUNT
+from ...scope_addon.capture.lifter_window import WINDOW
+from ...scope_addon.whole_file import written_beside
 from .network import LOG_SIGMA_RANGE, LiftingNetwork
 
 OPSET = 17
@@ -24,7 +25,7 @@ class _Graph:
         self.weights: list[onnx.TensorProto] = []
 
     def constant(self, name: str, value: np.ndarray) -> str:
-        self.weights.append(numpy_helper.from_array(np.ascontiguousarray(value), name))
+        self.weights.append(numpy_helper.from_array(np.asarray(value, order="C"), name))
         return name
 
     def add(self, kind: str, inputs: list[str], output: str, **attributes: Any) -> str:
@@ -35,6 +36,9 @@ class _Graph:
         half = self.constant(f"{name}.weight", weight.astype(np.float16))
         single = self.add("Cast", [half], f"{name}.weight32", to=TensorProto.FLOAT)
         return self.add("Gemm", [x, single, self.constant(f"{name}.bias", bias)], name, transB=1)
+
+    def reshape(self, x: str, name: str, *shape: int) -> str:
+        return self.add("Reshape", [x, self.constant(f"{name}.shape", np.array(shape, np.int64))], name)
 
     def norm(self, x: str, name: str, layer: torch.nn.LayerNorm) -> str:
         scale, bias = (self.constant(f"{name}.{k}", getattr(layer, k).detach().numpy()) for k in ("weight", "bias"))
@@ -48,7 +52,21 @@ def export(network: LiftingNetwork, path: Path) -> None:
     array = lambda tensor: tensor.detach().numpy().astype(np.float32)  # noqa: E731
     x = g.add("Sub", ["input", g.constant("mean", array(network.mean))], "centred")
     x = g.add("Div", [x, g.constant("spread", array(network.spread))], "normalized")
+    width, moments = network.leave.in_features, WINDOW
+    x = g.reshape(x, "rows", -1, INPUT_SIZE)
     x = g.linear(x, "enter", array(network.enter.weight), array(network.enter.bias))
+    for k, merge in enumerate(network.merges):
+        y = g.norm(x, f"merge_norm{k}", merge.norm)
+        y = g.reshape(y, f"together{k}", -1, 3 * width)
+        y = g.linear(y, f"merge_first{k}", array(merge.first.weight), array(merge.first.bias))
+        y = g.add("Relu", [y], f"merge_relu{k}")
+        y = g.linear(y, f"merge_second{k}", array(merge.second.weight), array(merge.second.bias))
+        x = g.reshape(x, f"threes{k}", -1, 3, width)
+        middle = g.constant(f"middle{k}", np.array(1, np.int64))
+        x = g.add("Gather", [x, middle], f"middles{k}", axis=1)
+        x = g.add("Add", [x, y], f"merged{k}")
+        moments //= 3
+    assert moments == 1
     for k, block in enumerate(network.blocks):
         y = g.norm(x, f"norm{k}", block.norm)
         y = g.linear(y, f"first{k}", array(block.first.weight), array(block.first.bias))
@@ -67,7 +85,7 @@ def export(network: LiftingNetwork, path: Path) -> None:
     graph = helper.make_graph(
         g.nodes,
         "lifter",
-        [helper.make_tensor_value_info("input", TensorProto.FLOAT, ["n", INPUT_SIZE])],
+        [helper.make_tensor_value_info("input", TensorProto.FLOAT, ["n", WINDOW, INPUT_SIZE])],
         [
             helper.make_tensor_value_info("points", TensorProto.FLOAT, ["n", KEYPOINT_COUNT, 3]),
             helper.make_tensor_value_info("log_sigma", TensorProto.FLOAT, ["n", KEYPOINT_COUNT, 2]),
@@ -78,6 +96,5 @@ def export(network: LiftingNetwork, path: Path) -> None:
     model = helper.make_model(graph, producer_name="scope", opset_imports=opset, ir_version=8)
     onnx.checker.check_model(model, full_check=True)
     path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_suffix(".part")
-    onnx.save(model, str(temporary))
-    os.replace(temporary, path)
+    with written_beside(path) as temporary:
+        onnx.save(model, str(temporary))

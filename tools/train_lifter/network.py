@@ -7,8 +7,11 @@ import torch
 from torch import Tensor, nn
 
 from ...scope_addon.capture.lifter import INPUT_SIZE, KEYPOINT_COUNT
+from ...scope_addon.capture.lifter_window import WINDOW
 
 WIDTH, BLOCKS = 512, 2
+MERGES = 2  # 9 moments, 3, 1
+assert 3**MERGES == WINDOW
 DIRECTION_WEIGHT = 0.5
 LOG_SIGMA_RANGE = (-5.5, 0.5)  # 4 mm .. 1.6 m
 _ARMS, _LEGS = [(11, 13), (13, 15), (12, 14), (14, 16)], [(23, 25), (25, 27), (24, 26), (26, 28)]
@@ -28,8 +31,29 @@ class Block(nn.Module):
         return x + self.second(torch.relu(self.first(self.norm(x))))
 
 
+class Merge(nn.Module):
+    """Three moments into one: x_middle + W₂ relu(W₁ [norm(x_before), norm(x_middle), norm(x_after)])."""
+
+    def __init__(self, width: int) -> None:
+        super().__init__()
+        self.norm, self.first, self.second = nn.LayerNorm(width), nn.Linear(3 * width, width), nn.Linear(width, width)
+        nn.init.zeros_(self.second.weight)
+
+    def forward(self, x: Tensor) -> Tensor:
+        """(n, 3 m, width) -> (n, m, width)."""
+        n, moments, width = x.shape
+        together = self.norm(x).reshape(n, moments // 3, 3 * width)
+        return x[:, 1::3] + self.second(torch.relu(self.first(together)))
+
+
 class LiftingNetwork(nn.Module):
-    """(n, 200) -> points (n, 33, 3) metres and log σ (n, 33, 2), across and along the line of sight."""
+    """(n, 9, 200) -> points (n, 33, 3) metres and log σ (n, 33, 2), across and along the line of sight.
+
+    After VideoPose3D (Pavllo et al., CVPR 2019): a residual network whose convolutions over time, three moments wide,
+    shrink the window to its middle; the strided form, since each window has moments of its own. What differs: layer
+    normalization before each layer instead of batch normalization behind it, further residual blocks once the window
+    is one moment, and deviations beside the points.
+    """
 
     def __init__(self, width: int = WIDTH, blocks: int = BLOCKS) -> None:
         super().__init__()
@@ -37,13 +61,15 @@ class LiftingNetwork(nn.Module):
         self.register_buffer("spread", torch.ones(INPUT_SIZE))
         self.register_buffer("sigma_offset", torch.zeros(KEYPOINT_COUNT, 2))
         self.enter = nn.Linear(INPUT_SIZE, width)
+        self.merges = nn.Sequential(*(Merge(width) for _ in range(MERGES)))
         self.blocks = nn.Sequential(*(Block(width) for _ in range(blocks)))
         self.norm = nn.LayerNorm(width)
         self.leave = nn.Linear(width, KEYPOINT_COUNT * 5)
 
     def forward(self, x: Tensor) -> tuple[Tensor, Tensor]:
         """Points and log σ."""
-        out = self.leave(self.norm(self.blocks(self.enter((x - self.mean) / self.spread)))).float()
+        moments = self.merges(self.enter((x - self.mean) / self.spread))
+        out = self.leave(self.norm(self.blocks(moments[:, 0]))).float()
         points, log_sigma = out[:, : KEYPOINT_COUNT * 3], out[:, KEYPOINT_COUNT * 3 :]
         log_sigma = log_sigma.reshape(-1, KEYPOINT_COUNT, 2) - 3.0
         return points.reshape(-1, KEYPOINT_COUNT, 3), log_sigma.clamp(*LOG_SIGMA_RANGE) + self.sigma_offset

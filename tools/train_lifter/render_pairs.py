@@ -8,7 +8,6 @@ each picture the true keypoints and what the network reports. This is how the de
 from __future__ import annotations
 
 import argparse
-import os
 from pathlib import Path
 
 import cv2
@@ -17,6 +16,7 @@ import numpy as np
 from ...scope_addon.capture.landmark_network import LandmarkNetwork
 from ...scope_addon.capture.rasterizer import Canvas, rasterize
 from ...scope_addon.capture.region import region_from_points
+from ...scope_addon.whole_file import written_beside
 from ...solver.body import Body, load_body
 from .augment import PoseSampler, load_motions
 from .dataset import cameras, pitches
@@ -74,7 +74,7 @@ def observe(
 ) -> dict | None:
     """One picture: true points and the network's report (``KEYS``), or None if the person stands too close."""
     body, at = sampler.body, np.array(list(sampler.body.keypoint_set("blazepose").values()))
-    Omega = sampler.poses(rng, 1)[0].astype(float)
+    Omega = sampler.pose(rng).astype(float)
     betas = np.clip(rng.standard_normal(body.P), -2.5, 2.5)
     R, t = body.forward_kinematics(Omega, np.zeros(3), betas)
     vertices, points = body.skin(R, t, betas), body.keypoints(R, t, betas)[at]
@@ -104,9 +104,8 @@ def observe(
 def save(path: Path, pairs: list[dict]) -> None:
     """Write the pairs, replacing what is there."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_suffix(".part.npz")
-    np.savez_compressed(temporary, **{key: np.array([pair[key] for pair in pairs], np.float32) for key in KEYS})
-    os.replace(temporary, path)
+    with written_beside(path) as temporary:
+        np.savez_compressed(temporary, **{key: np.array([pair[key] for pair in pairs], np.float32) for key in KEYS})
 
 
 def main() -> None:

@@ -2,7 +2,8 @@
 """Train the lifting network: ``python -m scope.tools.train_lifter.train MOTIONS PAIRS -o assets/lifter``.
 
 AdamW with a cosine schedule in bfloat16; what is exported is the exponential mean of the weights. Every tenth take
-is held out, to measure and to calibrate the uncertainties; renders that the landmark network saw only measure.
+is held out, to measure and to calibrate the uncertainties; renders that the landmark network saw only measure. The
+weights are kept beside the exported network, for another training to go on from (``--start``).
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ import numpy as np
 import torch
 
 from ...scope_addon.capture.lifter import HIPS, network_input
+from ...scope_addon.capture.lifter_window import MIDDLE, WINDOW
 from ...solver.body import load_body
 from .augment import load_motions
 from .dataset import Batch, Dataset
@@ -32,6 +34,7 @@ from .split import held_out_frames, training_frames
 BATCH = 1024
 PEAK_RATE, WARM_UP, DECAY = 1e-3, 200, 0.01
 MEAN_DECAY = 0.997
+CHECKPOINT = "lifter.pt"
 AHEAD = 16  # batches made before they are needed
 _TRAINING, _VALIDATION = 0, 1  # first number of a batch's seed
 
@@ -64,11 +67,12 @@ def held_out_batch(motions: Path, n: int = 8192) -> Batch:
 
 
 def renders(pairs: Path) -> Batch:
-    """What the landmark network saw of renders of our body; world landmarks known."""
+    """What the landmark network saw of renders of our body, pictures that do not move; world landmarks known."""
     points, rays, confidence, world = load_pairs(pairs)
     x, R = network_input(rays, confidence, world, np.ones(len(rays)))
     relative = points - points[:, HIPS].mean(axis=1, keepdims=True)
-    return Batch(x.astype(np.float32), (relative @ np.swapaxes(R, 1, 2)).astype(np.float32))
+    windows = np.repeat(x.astype(np.float32)[:, None], WINDOW, axis=1)
+    return Batch(windows, (relative @ np.swapaxes(R, 1, 2)).astype(np.float32))
 
 
 @torch.no_grad()
@@ -78,7 +82,7 @@ def measure(network: LiftingNetwork, batch: Batch) -> dict:
     error = (points - torch.from_numpy(batch.points)).numpy()
     z = error / np.exp(log_sigma.numpy())[..., [0, 0, 1]]
     limbs = np.linalg.norm(error, axis=-1)[:, [11, 12, 13, 14, 15, 16, 25, 26, 27, 28]]
-    known = batch.input[:, -2] > 0.5
+    known = batch.input[:, MIDDLE, -2] > 0.5
     result = {
         "mpjpe_with_world_mm": float(1000 * limbs[known].mean()),
         "depth_rms_mm": float(1000 * np.sqrt(np.square(error[..., 2]).mean())),
@@ -103,20 +107,36 @@ def calibrate(network: LiftingNetwork, batch: Batch) -> None:
         network.sigma_offset[:, k] = torch.from_numpy(np.log(np.sqrt(np.square(part).mean(axis=1))).astype(np.float32))
 
 
-def train(motions: Path, pairs: Path, folder: Path, seed: int, steps: int, workers: int, minutes: float) -> None:
-    """Train and export. The schedule follows the steps or the time, ``minutes``, whichever ends first."""
+def train(
+    motions: Path,
+    pairs: Path,
+    folder: Path,
+    seed: int,
+    steps: int,
+    workers: int,
+    minutes: float,
+    rate: float = PEAK_RATE,
+    start_from: Path | None = None,
+) -> None:
+    """Train and export. The schedule follows the steps or the time, ``minutes``, whichever ends first.
+
+    :param rate: the highest learning rate;  start_from: weights of an earlier training (`CHECKPOINT`).
+    """
     torch.manual_seed(seed)
     torch.set_num_threads(1)
     validation = held_out_batch(motions)
     rendered = renders(pairs)
     network = LiftingNetwork()
-    x = torch.from_numpy(validation.input)
+    x = torch.from_numpy(validation.input[:, MIDDLE])
     network.mean.copy_(x.mean(0))
     network.spread.copy_(x.std(0) + 1e-3)
+    if start_from:
+        network.load_state_dict(torch.load(start_from, weights_only=True))
+        network.sigma_offset.zero_()
     mean = copy.deepcopy(network)
     matrices = {"params": [p for p in network.parameters() if p.ndim > 1], "weight_decay": DECAY}
     others = {"params": [p for p in network.parameters() if p.ndim == 1], "weight_decay": 0.0}
-    optimizer = torch.optim.AdamW([matrices, others], PEAK_RATE, (0.9, 0.98))
+    optimizer = torch.optim.AdamW([matrices, others], rate, (0.9, 0.98))
     log: list[dict] = []
     start, total = time.perf_counter(), 0.0
     for step, batch in enumerate(batches(motions, seed, steps, workers)):
@@ -124,7 +144,7 @@ def train(motions: Path, pairs: Path, folder: Path, seed: int, steps: int, worke
         if done >= 1:
             break
         for group in optimizer.param_groups:
-            group["lr"] = PEAK_RATE * min((step + 1) / WARM_UP, 0.5 + 0.5 * math.cos(math.pi * done))
+            group["lr"] = rate * min((step + 1) / WARM_UP, 0.5 + 0.5 * math.cos(math.pi * done))
         with torch.autocast("cpu", torch.bfloat16):
             points, log_sigma = network(torch.from_numpy(batch.input))
         value = loss(points, log_sigma, torch.from_numpy(batch.points))
@@ -144,9 +164,11 @@ def train(motions: Path, pairs: Path, folder: Path, seed: int, steps: int, worke
             total = 0.0
             log.append({k: round(v, 4) for k, v in row.items()})
             print(json.dumps(log[-1]), flush=True)
+            folder.mkdir(parents=True, exist_ok=True)
+            torch.save(mean.state_dict(), folder / CHECKPOINT)
     calibrate(mean, validation)
     measured = {"held_out": measure(mean, validation), "renders": measure(mean, rendered)}
-    summary = {"seed": seed, "steps": step, "batch": BATCH, **measured, "log": log}
+    summary = {"seed": seed, "steps": step, "rate": rate, "batch": BATCH, **measured, "log": log}
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "log.json").write_text(json.dumps(summary, indent=1) + "\n")
     export(mean, folder / "lifter.onnx")
@@ -160,11 +182,13 @@ def main() -> None:
     parser.add_argument("pairs", type=Path, help="file written by scope.tools.train_lifter.render_pairs")
     parser.add_argument("-o", "--output", type=Path, default=Path("assets/lifter"))
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--steps", type=int, default=10000)
-    parser.add_argument("--minutes", type=float, default=30.0)
+    parser.add_argument("--steps", type=int, default=6000)
+    parser.add_argument("--minutes", type=float, default=60.0)
     parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--rate", type=float, default=PEAK_RATE, help="the highest learning rate")
+    parser.add_argument("--start", type=Path, help="weights of an earlier training to go on from")
     a = parser.parse_args()
-    train(a.motions, a.pairs, a.output, a.seed, a.steps, a.workers, a.minutes)
+    train(a.motions, a.pairs, a.output, a.seed, a.steps, a.workers, a.minutes, a.rate, a.start)
 
 
 if __name__ == "__main__":
