@@ -51,16 +51,19 @@ def windows_around(times: np.ndarray, seen: np.ndarray) -> Windows:
         rows = np.arange(len(times))
     known = times[rows]
     run = np.concatenate([[0], np.cumsum(np.diff(known) > LONGEST_GAP_S)])
-    starts = np.searchsorted(run, np.arange(run[-1] + 1))
-    ends = np.append(starts[1:], len(rows)) - 1
-    of_frame = run[np.clip(np.searchsorted(rows, np.arange(len(times)), side="right") - 1, 0, None)]
-    low, high = starts[of_frame][:, None], ends[of_frame][:, None]
+    own = np.maximum(np.searchsorted(rows, np.arange(len(times)), side="right") - 1, 0)  # the last one seen
+    low, high = (ends[own, None] for ends in ends_of_runs(run))
     moments = times[:, None] + OFFSETS_S
     after = np.clip(np.searchsorted(known, moments), low, high)
     before = np.maximum(after - 1, low)
     length = known[after] - known[before]
     share = np.clip((moments - known[before]) / np.maximum(length, 1e-9), 0.0, 1.0) * (length > 0)
     return Windows(rows[before], rows[after], share.astype(np.float32))
+
+
+def ends_of_runs(numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Places of the first and of the last equal number, of each of (n,) numbers that never fall."""
+    return np.searchsorted(numbers, numbers), np.searchsorted(numbers, numbers, side="right") - 1
 
 
 def standing_still(count: int) -> Windows:

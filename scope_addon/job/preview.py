@@ -7,7 +7,6 @@ Until the solver is ready, and where it finds no body, the found skeleton is dra
 from __future__ import annotations
 
 import logging
-import os
 import threading
 import time
 from collections.abc import Callable
@@ -24,6 +23,7 @@ from ..capture.live_body import LiveBody, LivePose
 from ..capture.overlay import body_colors, draw_overlay
 from ..capture.tracker import Observation
 from ..capture.video import Frame
+from ..whole_file import written_beside
 
 _LOG = logging.getLogger(__name__)
 
@@ -74,13 +74,12 @@ class PreviewWriter:
     def _show(self, frame: Frame, observation: Observation | None, live: LiveBody) -> None:
         picture = draw(frame.image_rgb, observation, _pose(observation, live))
         height, width = picture.shape[:2]
-        beside = self._path.with_suffix(".part")
         with self._writing:
             if not self._open:
                 return
             try:
-                beside.write_bytes(picture[::-1].tobytes())
-                os.replace(beside, self._path)
+                with written_beside(self._path) as temporary:
+                    temporary.write_bytes(picture[::-1].tobytes())
             except OSError:
                 return  # a full disk, or Windows while the other side reads: a capture does not fail for its picture
             self._send("preview", file=FILE, width=width, height=height, frame=frame.index)

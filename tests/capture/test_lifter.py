@@ -16,7 +16,6 @@ from scope.scope_addon.capture.lifter import (
 )
 from scope.scope_addon.capture.lifter_window import windows_around
 from scope.scope_addon.capture.person_detector import PersonDetector
-from scope.solver.body import load_body
 from scope.solver.errors import ModelFileError, SetupError, ShapeError
 from scope.solver.rotations import exp
 
@@ -26,12 +25,17 @@ def lifter():
     return Lifter()
 
 
+def before_camera(body, R, heading):
+    """(33, 3) keypoints in the camera frame of a pose (24, 3, 3) 5 m away."""
+    R[0] = np.diag([1.0, -1.0, -1.0]) @ exp(np.array([0, heading, 0])) @ R[0]
+    keypoints = body.keypoints(*body.forward_kinematics(R, np.array([0.3, 0.1, 5.0])))
+    return keypoints[list(body.keypoint_set("blazepose").values())]
+
+
 @pytest.fixture(scope="module")
-def people():
+def people(body):
     """(T, 33, 3) keypoints of the body in the camera frame: walking-like poses, every heading, a camera 5 m away."""
-    body, rng = load_body("scope"), np.random.default_rng(0)
-    at = list(body.keypoint_set("blazepose").values())
-    out = []
+    rng, out = np.random.default_rng(0), []
     for k in range(48):
         pose = rng.normal(0, 0.05, (body.K + 1, 3))
         swing = 0.5 * np.sin(k)
@@ -40,17 +44,14 @@ def people():
         for name, side in (("left_shoulder", -1), ("right_shoulder", 1)):
             pose[body.joint_names.index(name), 2] += 1.2 * side
         R = exp(pose)
-        R[0] = np.diag([1.0, -1.0, -1.0]) @ exp(np.array([0, 2 * np.pi * k / 48, 0])) @ R[0]
-        parts = body.forward_kinematics(R, np.array([0.3, 0.1, 5.0]))
-        out.append(body.keypoints(*parts)[at])
+        out.append(before_camera(body, R, 2 * np.pi * k / 48))
     return np.array(out)
 
 
 @pytest.fixture(scope="module")
 def walkers(body):
     """(T, 33, 3) keypoints as ``people``, of a walk on the spot that turns once, 4 s, 30 frames a second; and times."""
-    at, times = list(body.keypoint_set("blazepose").values()), np.arange(120) / 30
-    out = []
+    times, out = np.arange(120) / 30, []
     for t in times:
         pose = np.zeros((body.K + 1, 3))
         swing = 0.5 * np.sin(2 * np.pi * 0.9 * t)
@@ -61,8 +62,7 @@ def walkers(body):
         for name, side in (("left_shoulder", -1), ("right_shoulder", 1)):
             k = body.joint_names.index(name)
             R[k] = R[k] @ exp(np.array([0, 0, 1.2 * side]))
-        R[0] = np.diag([1.0, -1.0, -1.0]) @ exp(np.array([0, 2 * np.pi * t / 4, 0])) @ R[0]
-        out.append(body.keypoints(*body.forward_kinematics(R, np.array([0.3, 0.1, 5.0])))[at])
+        out.append(before_camera(body, R, 2 * np.pi * t / 4))
     return np.array(out), times
 
 

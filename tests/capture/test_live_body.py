@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The body in single frames, on our own clip with exact truth; and what is done beside tracking ends with it."""
+"""The body in single frames, on our own clip with exact truth."""
 
 from __future__ import annotations
 
-import threading
 import time
 
 import numpy as np
@@ -76,19 +75,6 @@ def test_the_result_does_not_depend_on_how_fast_the_threads_are(watched, body, m
     slowly = capture(SAMPLE, body, CaptureOptions(quality="fast")).motions[0]
     for name in ("poses", "trans", "betas", "joints_cam", "intrinsics"):
         np.testing.assert_array_equal(getattr(slowly, name), getattr(watched[0].motions[0], name))
-
-
-def test_a_cancel_leaves_no_thread(body):
-    def cancel(stage, done, total):
-        if done >= 3:
-            raise CancelledError("stopped")
-
-    with pytest.raises(CancelledError):
-        capture(SAMPLE, body, CaptureOptions(quality="fast"), cancel)
-    deadline = time.monotonic() + 60  # a solver that is not compiled yet is compiled to the end
-    while time.monotonic() < deadline and (left := [t.name for t in threading.enumerate() if "beside" in t.name]):
-        time.sleep(0.02)
-    assert not left
 
 
 def test_a_failure_beside_is_not_lost(body, monkeypatch):

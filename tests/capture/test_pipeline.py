@@ -4,6 +4,8 @@
 import json
 import subprocess
 import sys
+import threading
+import time
 
 import cv2
 import numpy as np
@@ -128,13 +130,17 @@ def test_nobody_is_said_so(body, tmp_path):
         capture(tmp_path / "grey.png", body, CaptureOptions(quality="fast"))
 
 
-def test_cancel_comes_through(body):
+def test_a_cancel_comes_through_and_leaves_no_thread(body):
     def cancel(stage, done, total):
         if done >= 3:
             raise CancelledError("stopped")
 
     with pytest.raises(CancelledError):
         capture(SAMPLE, body, CaptureOptions(quality="fast"), cancel)
+    deadline = time.monotonic() + 60  # a solver that is not compiled yet is compiled to the end
+    while time.monotonic() < deadline and (left := [t.name for t in threading.enumerate() if "beside" in t.name]):
+        time.sleep(0.02)
+    assert not left
 
 
 def test_a_motion_survives_its_file(sample, tmp_path):

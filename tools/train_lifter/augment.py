@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 from numba import njit
 
-from ...scope_addon.capture.lifter_window import OFFSETS_S, WINDOW
+from ...scope_addon.capture.lifter_window import OFFSETS_S, WINDOW, ends_of_runs
 from ...solver.body import Body
 from ...solver.rotations import exp
 
@@ -52,10 +52,7 @@ class Motions:
     @cached_property
     def ends(self) -> tuple[np.ndarray, np.ndarray]:
         """(F,) the first and (F,) the last frame of each frame's take."""
-        change = np.flatnonzero(np.diff(self.take)) + 1
-        starts, ends = np.append(0, change), np.append(change, len(self)) - 1
-        which = np.searchsorted(starts, np.arange(len(self)), side="right") - 1
-        return starts[which], ends[which]
+        return ends_of_runs(self.take)
 
     @cached_property
     def share(self) -> np.ndarray:
