@@ -38,6 +38,7 @@ LIMBS = np.array([0, *range(11, 17), *range(23, 29)])  # nose, arms, legs: what 
 # pictures: poses, builds and detector errors there are not those of the training.
 SIGMA_ON_PICTURES = np.array([1.0, 1.3])
 WORLD_SHARE = 0.75  # of the estimate that knows the world landmarks, when both are mixed
+_WORLD_AND_KNOWN = slice(KEYPOINT_COUNT * 3, KEYPOINT_COUNT * 6 + 1)  # of the input
 _BATCH = 1024
 
 
@@ -135,43 +136,34 @@ class Lifter:
             confidence: (T, 33) 0..1;  world: (T, 33, 3) metres, hip-centred, or None to do without;
             windows: which frames lie around each; None: each frame is a picture of its own.
         """
-        T = len(rays)
-        for name, value, shape in (("rays", rays, (T, 33, 2)), ("confidence", confidence, (T, 33))):
-            if value.shape != shape:
-                raise ShapeError(f"{name} must have shape {shape}, but has {value.shape}")
-        around = standing_still(T) if windows is None else windows
+        around = _windows(rays, confidence, windows)
 
         def lift(rows: np.ndarray) -> tuple[np.ndarray, ...]:
-            first, end = around.span(rows) if len(rows) else (0, 0)
-            given = None if world is None else world[first:end]
-            x, R = self._see(rays[first:end], confidence[first:end], given)
-            points, log_sigma = self.run(around.of(x, rows, first))
-            points = points - points[:, HIPS].mean(axis=1, keepdims=True)
-            sigma = np.exp(log_sigma) * SIGMA_ON_PICTURES
-            return points @ R[rows - first], sigma[..., 0], sigma[..., 1]
+            way = self._lift(*_see(rows, rays, confidence, world, around))
+            return way.points, way.sigma_across, way.sigma_along
 
-        return Lifted(*by_blocks(lift, np.arange(T)))
-
-    def _see(self, rays: np.ndarray, confidence: np.ndarray, world: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
-        if world is None:
-            world, known = np.zeros((len(rays), KEYPOINT_COUNT, 3)), np.zeros(len(rays))
-        else:
-            known = np.ones(len(rays))
-        x, R = network_input(rays, confidence, world, known)
-        return x.astype(np.float32), R
+        return Lifted(*by_blocks(lift, np.arange(len(rays))))
 
     def lift_both_ways(
         self, rays: np.ndarray, confidence: np.ndarray, world: np.ndarray, windows: Windows | None = None
     ) -> Lifted:
         """What the network finds with the world landmarks and without them, mixed: better than either on real clips."""
-        ways = [self.lift(rays, confidence, given, windows) for given in (world, None)]
+        around = _windows(rays, confidence, windows)
 
-        def mix(R: np.ndarray, *values: np.ndarray) -> tuple[np.ndarray, ...]:
-            mean = mixture([Lifted(*values[:3]), Lifted(*values[3:])], [WORLD_SHARE, 1 - WORLD_SHARE], R)
+        def lift(rows: np.ndarray) -> tuple[np.ndarray, ...]:
+            x, R = _see(rows, rays, confidence, world, around)
+            informed = self._lift(x, R)
+            x[..., _WORLD_AND_KNOWN] = 0.0
+            mean = mixture([informed, self._lift(x, R)], [WORLD_SHARE, 1 - WORLD_SHARE], R)
             return mean.points, mean.sigma_across, mean.sigma_along
 
-        values = (value for way in ways for value in (way.points, way.sigma_across, way.sigma_along))
-        return Lifted(*by_blocks(mix, virtual_camera(rays), *values))
+        return Lifted(*by_blocks(lift, np.arange(len(rays))))
+
+    def _lift(self, x: np.ndarray, R_virtual_camera: np.ndarray) -> Lifted:
+        points, log_sigma = self.run(x)
+        points = points - points[:, HIPS].mean(axis=1, keepdims=True)
+        sigma = np.exp(log_sigma) * SIGMA_ON_PICTURES
+        return Lifted(points @ R_virtual_camera, sigma[..., 0], sigma[..., 1])
 
     def run(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The bare network: input (T, 9, 200) -> points (T, 33, 3) and log σ (T, 33, 2), virtual camera's axes."""
@@ -179,3 +171,23 @@ class Lifter:
         runs = [self._session.run(None, {name: x[k : k + _BATCH]}) for k in range(0, max(len(x), 1), _BATCH)]
         points, log_sigma = (np.concatenate([r[i] for r in runs]).astype(float) for i in (0, 1))
         return points, log_sigma
+
+
+def _windows(rays: np.ndarray, confidence: np.ndarray, windows: Windows | None) -> Windows:
+    """The windows, once the arrays fit each other."""
+    T = len(rays)
+    for name, value, shape in (("rays", rays, (T, 33, 2)), ("confidence", confidence, (T, 33))):
+        if value.shape != shape:
+            raise ShapeError(f"{name} must have shape {shape}, but has {value.shape}")
+    return standing_still(T) if windows is None else windows
+
+
+def _see(
+    rows: np.ndarray, rays: np.ndarray, confidence: np.ndarray, world: np.ndarray | None, around: Windows
+) -> tuple[np.ndarray, np.ndarray]:
+    """What the network sees of the frames ``rows`` (t,): input (t, 9, 200) f32 and R_virtual_camera (t, 3, 3)."""
+    first, end = around.span(rows) if len(rows) else (0, 0)
+    n = end - first
+    given = np.zeros((n, KEYPOINT_COUNT, 3)) if world is None else world[first:end]
+    x, R = network_input(rays[first:end], confidence[first:end], given, np.full(n, world is not None, float))
+    return around.of(x.astype(np.float32), rows, first), R[rows - first]
