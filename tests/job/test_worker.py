@@ -28,8 +28,8 @@ def test_an_isolated_worker_starts_and_reports(folder):
     """-I drops PYTHONPATH, the script's and the current folder, as inside Blender."""
     worker = WorkerProcess(JobRequest(SAMPLE, quality="fast"), folder, None, [sys.executable, "-I"])
     messages = []
-    wait_for(lambda: messages.extend(worker.poll()) or any(m.get("done", 0) > 2 for m in messages))
-    assert {m["event"] for m in messages} == {"progress", "preview"}
+    wait_for(lambda: messages.extend(worker.poll()) or {"progress", "preview"} <= {m["event"] for m in messages})
+    assert all(m["event"] in {"progress", "preview"} for m in messages)
     assert worker.alive
     worker.close()
     assert not worker.alive
