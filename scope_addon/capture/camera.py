@@ -3,14 +3,14 @@
 
 from __future__ import annotations
 
-import json
 import math
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from ...solver.errors import InputError, UsageError
+from ...solver.errors import UsageError
+from .calibration import read_calibration
 
 # Without any better knowledge: a field of view of 60 degrees along the longer side, between a phone's main camera
 # (65-70 degrees, less the crop of its video stabilization) and a camera's standard lens (40-54 degrees).
@@ -72,9 +72,10 @@ def choose_camera(
 
     :param focal_mm: 35 mm equivalent focal length along the longer side, f_px = f_mm / 36 · max(width, height).
     :param fov_deg: field of view along the longer side, f_px = max(width, height) / (2 tan(fov / 2)).
-    :param calibration: JSON with ``intrinsics`` (3, 3), optional ``dist`` (5,) and ``size`` (width, height).
+    :param calibration: JSON file; see `calibration`.
     :param metadata_focal_mm: as ``focal_mm``, from the file's own metadata.
     :raises UsageError: more than one of the user's ways at once, or an impossible value.
+    :raises InputError: the calibration cannot be used for footage of this size.
     """
     ways = {"--focal-mm": focal_mm, "--fov": fov_deg, "--calibration": calibration}
     given = [name for name, value in ways.items() if value is not None]
@@ -82,7 +83,8 @@ def choose_camera(
         raise UsageError(f"{' and '.join(given)} contradict each other: give one of them")
     longer = max(width, height)
     if calibration is not None:
-        return _read_calibration(Path(calibration), width, height)
+        known = read_calibration(Path(calibration))
+        return Camera(known.intrinsics_for(width, height), known.dist, f"calibration {known.path.name}")
     if focal_mm is not None:
         if not 1.0 <= focal_mm <= 2000.0:
             raise UsageError(f"--focal-mm {focal_mm:g} is not a focal length: give 35 mm equivalent ones, such as 26")
@@ -109,23 +111,3 @@ def estimated_camera(width: int, height: int, focal_px: float, deviation: float)
 
 def _focal_from_fov(longer: int, fov_deg: float) -> float:
     return longer / (2 * math.tan(math.radians(fov_deg) / 2))
-
-
-def _read_calibration(path: Path, width: int, height: int) -> Camera:
-    try:
-        data = json.loads(path.read_text())
-        K = np.asarray(data["intrinsics"], float)
-        dist = np.asarray(data.get("dist", np.zeros(5)), float).ravel()
-        size = data.get("size", [width, height])
-        known_width, known_height = float(size[0]), float(size[1])
-    except OSError as error:
-        raise InputError(f"cannot read the calibration {path}: {error.strerror}") from error
-    except (ValueError, KeyError, TypeError, IndexError) as error:
-        raise InputError(
-            f'{path} is not a calibration: it needs "intrinsics" (3x3), if need be "dist", "size"'
-        ) from error
-    good = K.shape == (3, 3) and dist.size <= 5 and np.isfinite(K).all() and np.isfinite(dist).all()
-    if not good or K[0, 0] <= 0 or K[1, 1] <= 0 or known_width <= 0 or known_height <= 0:
-        raise InputError(f"{path}: intrinsics must be 3x3 with positive focal lengths, dist at most 5 finite numbers")
-    scale = np.diag([width / known_width, height / known_height, 1.0])
-    return Camera(scale @ K, np.concatenate([dist, np.zeros(5 - dist.size)]), f"calibration {path.name}")

@@ -93,13 +93,23 @@ def test_yolov8(tmp_path: Path) -> None:
     assert_finds_the_person(fixed(tmp_path / "m.onnx", WIDTH, HEIGHT, {"output0": columns[None]}), "yolov8")
 
 
-def test_yolov4(tmp_path: Path) -> None:
+@pytest.mark.parametrize("order", [("boxes", "confs"), ("confs", "boxes")])
+def test_yolov4(tmp_path: Path, order: tuple[str, str]) -> None:
     boxes, scores = np.zeros((1, 40, 1, 4), np.float32), np.zeros((1, 40, 80), np.float32)
     boxes[0, 5, 0] = PERSON / [333, 251, 333, 251]
     scores[0, 5, 0] = 0.9
     boxes[0, 6, 0], scores[0, 6, 2] = [0.1, 0.1, 0.2, 0.2], 0.99
-    path = fixed(tmp_path / "m.onnx", WIDTH, HEIGHT, {"boxes": boxes, "confs": scores})
+    outputs = {"boxes": boxes, "confs": scores}
+    path = fixed(tmp_path / "m.onnx", WIDTH, HEIGHT, {name: outputs[name] for name in order})
     assert_finds_the_person(path, "yolov4")
+
+
+def test_as_many_boxes_as_scores(tmp_path: Path) -> None:
+    outputs = {"boxes": np.zeros((1, 40, 1, 4), np.float32), "confs": np.zeros((1, 39, 80), np.float32)}
+    path = fixed(tmp_path / "m.onnx", WIDTH, HEIGHT, outputs)
+    (tmp_path / "m.json").write_text('{"type": "yolov4"}')
+    with pytest.raises(ModelFileError, match=r"does not give what a yolov4 detector.*m\.json"):
+        BoxDetector(path, threads=1)
 
 
 def test_end_to_end(tmp_path: Path) -> None:

@@ -58,7 +58,10 @@ class BoxDetector:
 
     def _boxes(self, outputs: list[np.ndarray]) -> Boxes:
         try:
-            return self._decode(outputs, self._graph, self._said)
+            boxes = self._decode(outputs, self._graph, self._said)
+            if boxes.corners.shape != (*boxes.scores.shape, 4):
+                raise ValueError("as many boxes as scores are needed")
+            return boxes
         except (IndexError, ValueError) as error:
             raise ModelFileError(
                 f"{self._graph.path} does not give what a {self.type} detector with class {self._said.person_class} "
