@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The picture that the panel shows while a capture runs: the current frame, small, with the solved body over it.
 
-Until the solver is ready, and where it finds no body, the found skeleton is drawn instead.
+Until the solver and the rasterizer are ready, and where no body is found, the found skeleton is drawn instead.
 """
 
 from __future__ import annotations
@@ -43,18 +43,20 @@ for _side, _color in (("left", _LEFT), ("right", _RIGHT)):
 class PreviewWriter:
     """Writes the preview now and then, and tells of it: ``send("preview", file, width, height, frame)``.
 
-    The file holds RGBA bytes, the lowest row first, as Blender wants them. Fitting, drawing and writing happen in a
-    thread of its own, beside the networks; while that is busy, frames are passed over. Leaving it removes the file.
+    The file holds RGBA bytes, the lowest row first, as Blender wants them. Fitting, drawing and writing happen in
+    threads of their own, beside the networks; while that is busy, frames are passed over. Leaving it removes the file.
     """
 
     def __init__(self, folder: Path, send: Callable[..., None]) -> None:
         self._path, self._send = folder / FILE, send
         self._last = -np.inf
-        self._pool = ThreadPoolExecutor(1, "scope-preview")
+        self._pool = ThreadPoolExecutor(2, "scope-preview")
+        self._rasterizer: Future[None] | None = None
         self._drawing: Future[None] | None = None
         self._open, self._writing = True, threading.Lock()
 
     def __enter__(self) -> PreviewWriter:
+        self._rasterizer = self._pool.submit(_load_rasterizer)
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
@@ -72,7 +74,9 @@ class PreviewWriter:
         self._drawing = self._pool.submit(self._show, frame, observation, live)
 
     def _show(self, frame: Frame, observation: Observation | None, live: LiveBody) -> None:
-        picture = draw(frame.image_rgb, observation, _pose(observation, live))
+        # On a new machine the rasterizer compiles for a while, and pictures do not wait for it.
+        can_draw = self._rasterizer is not None and self._rasterizer.done()
+        picture = draw(frame.image_rgb, observation, _pose(observation, live) if can_draw else None)
         height, width = picture.shape[:2]
         with self._writing:
             if not self._open:
@@ -83,6 +87,11 @@ class PreviewWriter:
             except OSError:
                 return  # a full disk, or Windows while the other side reads: a capture does not fail for its picture
             self._send("preview", file=FILE, width=width, height=height, frame=frame.index)
+
+
+def _load_rasterizer() -> None:
+    corners = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]])
+    draw_overlay(np.zeros((8, 8, 3), np.uint8), corners, np.array([[0, 1, 2]]), np.diag([4.0, 4.0, 1.0]), np.zeros(5))
 
 
 def _pose(observation: Observation | None, live: LiveBody) -> LivePose | None:

@@ -8,7 +8,7 @@ import cv2
 # Name in the guide: screenshot, and the part of it to show: left, top, right, bottom in pixels.
 PICTURES = {
     "footage": ("2_footage_chosen", (1000, 60, 1330, 330)),
-    "capturing": ("5_finding_the_person", (700, 60, 1330, 560)),
+    "capturing": ("9_body_over_footage", (700, 60, 1330, 560)),
     "result": ("6_result", (1000, 60, 1330, 900)),
     "compared": ("7_compared_with_footage", (0, 25, 1330, 900)),
     "export": ("8_export_window", (0, 0, 1600, 1000)),

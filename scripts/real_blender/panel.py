@@ -17,7 +17,7 @@ from pathlib import Path
 import bpy
 
 sys.path.insert(0, str(Path(__file__).parent))
-from session import FOOTAGE, OUT, addon, inventory, invoke, key, picture, press, run, show_tab, viewport
+from session import FOOTAGE, OUT, addon, inventory, invoke, key, picture, press, run, show_tab, until, viewport
 
 # Where the panel's buttons are on a screen of 1600 x 1000, in pixels from its top left.
 FAST_BUTTON, CAPTURE_BUTTON = (1086, 151), (1174, 183)
@@ -60,14 +60,10 @@ def steps() -> Iterator[float]:
 
     yield from press(CAPTURE_BUTTON, lambda: addon().state.job is not None)
     began, last, gaps = time.monotonic(), time.monotonic(), []
-    pictures, preview = 0, False
+    pictures = 0
     while addon().state.job is not None:
         yield 0.02
         now = time.monotonic()
-        if not preview and addon().state.job is not None and addon().state.job.progress.done > 20:
-            preview = True
-            picture("5_finding_the_person")
-            last = now = time.monotonic()
         building = addon().state.job is None or addon().state.job.progress.stage == "building the scene"
         if not building:
             gaps.append(now - last)
@@ -143,6 +139,14 @@ def steps() -> Iterator[float]:
     picture("9_undone")
 
     scene = bpy.context.scene
+    scene.scope.quality = "BALANCED"  # captured anew, now that the solver is compiled: the preview shows the body
+    invoke(bpy.ops.scope.capture, "INVOKE_DEFAULT")
+    yield from until(lambda: addon().state.job.progress.done > 40, 120, "the preview of the body")
+    picture("9_body_over_footage")
+    key("Escape")
+    yield 2.0
+    scene.scope.quality = "FAST"
+
     scene.scope.footage = "/scope/gone.mp4"
     try:
         invoke(bpy.ops.scope.capture, "INVOKE_DEFAULT")

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The picture of the current frame: whole, small, upside down for Blender, skeleton or body where the person is."""
 
+import threading
+
 import numpy as np
 from scope.scope_addon.capture.landmark_network import KEYPOINT_NAMES
 from scope.scope_addon.capture.pipeline import CaptureOptions, capture
@@ -78,8 +80,28 @@ def test_a_body_that_cannot_be_fitted_gives_way_to_the_skeleton(tmp_path):
 
     told = []
     with PreviewWriter(tmp_path, lambda event, **values: told.append(event)) as writer:
+        writer._rasterizer.result()
         writer(Frame(0, 0.0, np.zeros((50, 50, 3), np.uint8)), observation(np.full((33, 2), 20.0)), Broken())
         wait_for(lambda: told == ["preview"])
+
+
+def test_pictures_do_not_wait_for_a_rasterizer_that_compiles(tmp_path, monkeypatch):
+    class Ready:
+        is_ready = True
+
+        def fit(self, observation):
+            told.append("fitted")
+
+    told, compiled = [], threading.Event()
+    monkeypatch.setattr(preview, "INTERVAL_S", 0.0)
+    monkeypatch.setattr(preview, "_load_rasterizer", compiled.wait)
+    with PreviewWriter(tmp_path, lambda event, **values: told.append(event)) as writer:
+        for k, expected in ((0, ["preview"]), (1, ["preview", "fitted", "preview"])):
+            writer(Frame(k, 0.0, np.zeros((50, 50, 3), np.uint8)), observation(np.full((33, 2), 20.0)), Ready())
+            writer._drawing.result()
+            assert told == expected
+            compiled.set()
+            writer._rasterizer.result()
 
 
 def test_the_picture_shows_the_body_where_the_truth_has_it(body):
