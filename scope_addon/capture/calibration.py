@@ -3,8 +3,8 @@
 
     {"intrinsics": [[fx, 0, cx], [0, fy, cy], [0, 0, 1]], "dist": [k1, k2, p1, p2, k3], "size": [width, height]}
 
-Nothing in it that tells of the lens is ignored: what cannot be meant is refused, because a wrong lens looks like a wrong
-person. Other keys, such as a name or a date, do no harm.
+Nothing in it that tells of the lens is ignored: what cannot be meant is refused, because a wrong lens looks like a
+wrong person. Other keys, such as a name or a date, do no harm.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ _ONE_PIXEL = 1.0  # by which a size may be rounded
 
 @dataclass(frozen=True)
 class Calibration:
-    """What the file says. ``size`` is (width, height) of the pictures the camera was calibrated with, None: not said."""
+    """What the file says. ``size`` is (width, height) of the pictures it was made with, None: not said."""
 
     path: Path
     intrinsics: np.ndarray  # (3, 3)
@@ -153,7 +153,7 @@ def _distortion(path: Path, value: Any) -> np.ndarray:
         dist = dist[:_BROWN]
     if dist.size > _BROWN:
         raise InputError(
-            f"{path}: dist has {dist.size} numbers, but a motion file and Blender's lens know k1, k2, p1, p2, k3 alone; "
+            f"{path}: dist has {dist.size} numbers, but motion files and Blender's lens know k1, k2, p1, p2, k3 alone; "
             "calibrate again with these five (OpenCV's calibrateCamera without flags), or undistort the video first"
         )
     return np.concatenate([dist, np.zeros(_BROWN - dist.size)])
