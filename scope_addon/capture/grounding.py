@@ -4,7 +4,7 @@
 One camera sees directions well and depth badly. Where a foot stands, the floor and the foot's own stillness say how
 far away the person is, so the depth of every frame is corrected first (``correct_depth``). What is left of sliding is
 taken out by fitting each frame once more with the standing feet held at one place (``hold_feet``): the same solver, the
-smoothed motion as its prior.
+smoothed motion as its prior, and its picture as what is seen.
 
 Not everything that carries a foot is the floor: somebody climbs stairs, or jumps off a wall. A foot that stands at
 height h is taken to stand on the floor with the share s(4(1 − |h|/h_l)), s the logistic: within the noise of depth
@@ -22,6 +22,7 @@ from ...solver import (
     Body,
     Floor,
     FootContacts,
+    Keypoints2D,
     Measurements,
     Options,
     PosePriors,
@@ -33,6 +34,7 @@ from ...solver import (
     fit_tree,
     make_tree,
 )
+from ...solver.rotations import exp
 from .smoothing import gaussian_smooth, smooth_rotations
 
 CONTACT_SPEED_M_S = 0.35  # across the line of sight; a swinging foot moves at 1 m/s and more
@@ -43,6 +45,7 @@ LEVEL_M = 0.25  # h_l: feet that stand farther above or below stand on something
 DEPTH_SIGMA_M = 0.1  # how wrong a depth that fits the image may be
 DEPTH_RATE_SIGMA = 0.3  # and how fast that error changes, m/s
 SLIDE_SIGMA_M_S = 0.1  # a standing foot's horizontal speed
+PICTURE_SIGMA_M = 0.003  # by how much held feet may move a keypoint in the picture, at the person's distance
 # They take off the edges where a foot begins and ceases to be held: from the legs, which do it, and from the rest.
 STEP_CUTOFF_HZ = 8.0
 REST_CUTOFF_HZ = 12.0
@@ -79,7 +82,7 @@ def stand_on_floor(
     lowest = np.minimum(held[..., 2].min(axis=1), 0.0)
     floor = R[2], lowest * (1 - on_floor(lowest)) - float(t[2])  # far below it, there is no floor
     targets = indices, (held - t) @ R, contact
-    rotations, root_cam = hold_feet(body_with_soles, rotations, root_cam, betas, targets, floor)
+    rotations, root_cam = hold_feet(body_with_soles, rotations, root_cam, betas, targets, floor, center)
     names = body_with_soles.joint_names
     holds = np.array([k == 0 or any(part in name for part in _LEG) for k, name in enumerate(names)])
     for joints, cutoff_hz in ((holds, STEP_CUTOFF_HZ), (~holds, REST_CUTOFF_HZ)):
@@ -158,16 +161,26 @@ def hold_feet(
     betas: np.ndarray,
     targets: tuple[np.ndarray, np.ndarray, np.ndarray],
     floor: tuple[np.ndarray, np.ndarray],
+    center: np.ndarray | float = 0.0,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Fit each frame once more with held points above a floor, everything else staying at the given motion.
+
+    What the camera saw of head, arms, hips and knees stays where it was in the picture: a body gives way along the
+    line of sight, whose length is known worst, rather than across it. Each frame is fitted in the axes of a camera
+    that looks straight at the pelvis.
 
     :param rotations: (T, K+1, 3, 3);  root_cam: (T, 3): the motion to stay at, camera frame.
     :param targets: keypoint indices (F,), positions (T, F, 3) in the camera frame, weights (T, F) 0..1.
     :param floor: its unit normal (3,), upwards, and offset (T,): normal . p = offset on it, camera frame.
+    :param center: (T, 3) of the camera, where it travels.
     :return: rotations and root positions as given.
     """
     tree = make_tree(body)
     indices, positions, weights = targets
+    center = np.broadcast_to(center, root_cam.shape)
+    turns = _looking_at(root_cam - center)
+    seen = np.array([body.keypoint_set("blazepose")[name] for name in _SEEN])
+    J0 = body.rest_joints(betas)[0]
     priors = replace(
         default_priors(body),
         shape_mean=betas,
@@ -176,25 +189,54 @@ def hold_feet(
     )
     options = Options(stages=(Stage(_HOLD, 1e-3, 8),))
     free = np.zeros(len(indices))  # contact decides where a sole is; the floor alone where it cannot be
-    pelvis, turn_weight, place_weight = np.zeros(1, int), np.array([1 / 0.01**2]), np.array([1 / 0.005**2])
+    pelvis, turn_weight, place_weight = np.zeros(1, int), np.array([1 / 0.01**2]), np.array([1 / 0.02**2])
     rotations, root_cam = rotations.copy(), np.array(root_cam, float)
     for t in np.flatnonzero(weights.max(1) > 0.05):
-        state = State(rotations[t, 0], root_cam[t], rotations[t, 1:], betas)
+        turn = turns[t]
+        root = turn @ (root_cam[t] - center[t])
+        state = State(turn @ rotations[t, 0], root, rotations[t, 1:], betas)
+        whole = np.concatenate([state.R_camera_root[None], state.Omega])
+        points = body.keypoints(*body.forward_kinematics(whole, root - J0, betas), betas, seen)
+        ahead = np.maximum(points[:, 2:], _NEAREST_M)
+        certain = np.full(len(seen), np.square(root[2] / PICTURE_SIGMA_M))
         measurements = Measurements(
-            foot_contacts=FootContacts(indices, positions[t], weights[t]),
-            floor=Floor(indices, floor[0], float(floor[1][t]), free),
-            pose_priors=PosePriors(pelvis, rotations[t, :1], root_cam[t : t + 1], turn_weight, place_weight),
+            intrinsics=np.eye(3),
+            keypoints2d=Keypoints2D(seen, points[:, :2] / ahead, certain),
+            foot_contacts=FootContacts(indices, (positions[t] - center[t]) @ turn.T, weights[t]),
+            floor=Floor(indices, turn @ floor[0], float(floor[1][t] - floor[0] @ center[t]), free),
+            pose_priors=PosePriors(pelvis, state.R_camera_root[None], root[None], turn_weight, place_weight),
         )
         here: Priors = replace(priors, joint_mean=rotations[t, 1:])
         found = fit_tree(tree, measurements, state, here, options).state
-        rotations[t, 0], rotations[t, 1:], root_cam[t] = found.R_camera_root, found.Omega, found.t_camera_root
+        rotations[t, 0], rotations[t, 1:] = turn.T @ found.R_camera_root, found.Omega
+        root_cam[t] = turn.T @ found.t_camera_root + center[t]
     return rotations, root_cam
 
 
-# A standing foot is held to 5 mm, no sole may be far below the floor; the pelvis may give 5 mm and half a degree, every
-# joint alike two degrees. Legs that give more follow a sole's every error: with ten times the freedom, knees and ankles
-# are 1 to 2 mm worse on footage and renders with known truth, and feet slide no less.
-_HOLD = Weights(foot_contact=1 / 0.005**2, floor=1 / 0.02**2, joint_prior=1 / 0.03**2, joint_limits=2000.0, shape=1.0)
+def _looking_at(points: np.ndarray) -> np.ndarray:
+    """(T, 3, 3) rotations that turn positions (T, 3) about a camera's centre onto its z axis, by the shortest way."""
+    z = along_sight(points)
+    axis = np.stack([z[:, 1], -z[:, 0], np.zeros(len(z))], axis=1)
+    angle = np.arctan2(np.linalg.norm(axis, axis=1), z[:, 2])
+    return exp(axis / np.maximum(np.linalg.norm(axis, axis=1, keepdims=True), 1e-9) * angle[:, None])
+
+
+# A standing foot is held to 5 mm, no sole may be far below the floor; the pelvis may give 2 cm and half a degree, every
+# joint alike two degrees, what is seen 3 mm across the line of sight. Legs that give more follow a sole's every error:
+# with ten times the freedom, knees and ankles are 1 to 2 mm worse on footage and renders with known truth, and feet
+# slide no less. A pelvis that is held to 5 mm in every direction, and nothing seen beside it, draws the whole body off
+# the footage, by 2 cm where the floor is wrong.
+_HOLD = Weights(
+    foot_contact=1 / 0.005**2,
+    floor=1 / 0.02**2,
+    keypoints2d=1.0,
+    joint_prior=1 / 0.03**2,
+    joint_limits=2000.0,
+    shape=1.0,
+)
+_SIDED = ("shoulder", "elbow", "wrist", "hip", "knee")
+_SEEN = ("nose", *(f"{side}_{name}" for side in ("left", "right") for name in _SIDED))
+_NEAREST_M = 0.1
 _LEG = ("hip", "knee", "ankle")
 
 
