@@ -32,12 +32,13 @@ from .camera import Camera
 from .hand_measure import HandMeasurer, calm_fingers, with_finger_limits
 from .lifter import Lifted, our_lifter
 from .lifter_window import windows_around
-from .measure import DEPTH_SIGMA_M, Measurer
+from .measure import DEPTH_SIGMA_M, NEAREST_M, Measurer
 from .parts import ALL_PARTS, Parts
 from .track import Track
 
 SHAPE_FRAMES = 64  # frames that decide the shape; more of them are more of the same
 LONGEST_COAST_S = 0.5  # an earlier pose says little about a person who was away for longer
+RESIZE = 0.03  # how wrong a distance must have been, relatively, to look at the size once more
 SHAPE_CERTAINTY = 1e6  # information (1/σ² per coefficient) that holds the shape once it is known
 
 # Inverse variances: 5 px at a focal length of 1600 px (normalized 0.003) for the image, 0.35 m for depth where the
@@ -143,15 +144,21 @@ def refit_track(
     """Fit every frame again, from its first fit, with the pelvis known to be at ``root_cam`` (T, 3), camera frame.
 
     A pose and a distance that explain the same image can both be wrong together; once the floor has told the distance,
-    the pose follows.
+    the pose follows, and so does the size where the whole clip is farther or nearer than it seemed: who stands on
+    the same floor as others must be as large as that floor says.
     """
+    betas = first.betas
+    if first.valid.any():
+        far, near = (np.linalg.norm(at[first.valid], axis=1) for at in (root_cam, first.t_camera_root))
+        if abs(np.log(np.median(far / np.maximum(near, NEAREST_M)))) > RESIZE:
+            betas = _fit_shape(prepared, root_cam).beta
 
     def state(k: int) -> State | None:
         if not first.valid[k]:
             return None
-        return State(first.rotations[k, 0], root_cam[k], first.rotations[k, 1:], first.betas)
+        return State(first.rotations[k, 0], root_cam[k], first.rotations[k, 1:], betas)
 
-    return _fit_frames(prepared, first.betas, state, progress)
+    return _fit_frames(prepared, betas, state, progress)
 
 
 def _fit_frames(
@@ -201,13 +208,14 @@ def _fit_frames(
     )
 
 
-def _fit_shape(prepared: PreparedTrack) -> ClipFit:
-    """The one shape that all frames share, from some of them.
+def _fit_shape(prepared: PreparedTrack, root_cam: np.ndarray | None = None) -> ClipFit:
+    """The one shape that all frames share, from some of them; ``root_cam`` (T, 3): where the pelvis is known to be.
 
     The detector misplaces a keypoint in the same way in every frame, so all frames together say as much about the
     shape as one: the prior counts once a frame.
     """
-    measurements = [prepared.measure(k) for k in _spread(np.flatnonzero(prepared.track.seen), SHAPE_FRAMES)]
+    at = (lambda k: None) if root_cam is None else root_cam.__getitem__
+    measurements = [prepared.measure(k, at(k)) for k in _spread(np.flatnonzero(prepared.track.seen), SHAPE_FRAMES)]
     weights = replace(prepared.weights, shape=WEIGHTS.shape * len(measurements))
     options = replace(ROBUST, stages=cold_stages(weights))
     return fit_clip(prepared.body, measurements, priors=prepared.priors, options=options)

@@ -57,3 +57,19 @@ def test_the_lifting_network_runs_once_for_both_fits(monkeypatch):
     placed = place_track(body, track, second, smoothing=False)
     np.testing.assert_allclose(placed.joints[:, 0], second.t_camera_root, atol=1e-9)
     assert abs(placed.joints[:, 0, 2].mean() - 4.0) < 0.6  # metres; one view tells the distance by the body's size
+
+
+def test_who_is_nearer_than_it_seemed_is_smaller():
+    """A floor that others stand on tells the distance, and with it the size: the picture stays the same."""
+    body, camera = load_body("scope"), choose_camera(1080, 1920)
+    prepared = fitting.prepare_track(body, _standing_track(body, camera), camera)
+    first = fitting.fit_track(prepared, lambda *_: None)
+
+    def height(fit):
+        return np.ptp(body.rest_vertices(fit.betas)[:, 1])
+
+    for nearer in (0.85, 1.1):
+        second = fitting.refit_track(prepared, first, nearer * first.t_camera_root, lambda *_: None)
+        moved = second.t_camera_root[:, 2].mean() / first.t_camera_root[:, 2].mean()
+        assert abs(moved / nearer - 1) < 0.05
+        assert abs(height(second) / height(first) / moved - 1) < 0.04
