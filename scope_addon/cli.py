@@ -112,7 +112,7 @@ def _add_options(capture: argparse.ArgumentParser) -> None:
     capture.add_argument("--focal-mm", type=float, metavar="MM", help="35 mm equivalent focal length of the camera")
     capture.add_argument("--fov", type=float, metavar="DEGREES", help="field of view along the longer side")
     capture.add_argument("--calibration", type=Path, metavar="FILE", help="JSON with intrinsics, dist and size")
-    capture.add_argument("--no-smoothing", action="store_true", help="keep every frame as it was solved")
+    capture.add_argument("--no-smoothing", action="store_true", help="every frame as it was solved, feet not held")
     capture.add_argument(
         "--shape-keys",
         choices=SHAPE_MODES,

@@ -179,7 +179,7 @@ def hold_feet(
     indices, positions, weights = targets
     center = np.broadcast_to(center, root_cam.shape)
     turns = _looking_at(root_cam - center)
-    seen = np.array([body.keypoint_set("blazepose")[name] for name in _SEEN])
+    seen = [body.keypoint_set("blazepose")[name] for name in _SEEN]
     J0 = body.rest_joints(betas)[0]
     priors = replace(
         default_priors(body),

@@ -235,7 +235,7 @@ def solve(
     :param path: how the camera turned; returned with how it travelled. lines: of the background, which tell up.
     :return: motions, the most prominent person's mean iterations per frame, and the path.
     """
-    several = len(tracks) > 1
+    several, picture = len(tracks) > 1, len(tracks[0]) == 1
     prepared: list[PreparedTrack] = []
     for k, track in enumerate(tracks):
         each = prepare_track(body, track, camera, parts)
@@ -244,19 +244,19 @@ def solve(
         del each
     fits = [compact(fit_track(each, progress)) for each in prepared]
 
-    def place() -> list[PlacedTrack]:
+    def place(smoothing: bool = True) -> list[PlacedTrack]:
         return [place_track(body, track, fit, smoothing, path) for track, fit in zip(tracks, fits, strict=True)]
 
     # Of an hour, each of these lists takes hundreds of megabytes: none stays for longer than it is needed.
     placed = place()
-    if smoothing and not path.is_static:
+    if not (path.is_static or picture):
         first = placed[0]
         up = estimate_world(body, first.joints[first.valid], first.soles[first.valid], lines)[2, :3]
         path = replace(path, center=camera_travel(first.soles, first.valid, up, first.times))
         del first
         placed.clear()
         placed = place()
-    if smoothing and parts.second_pass:
+    if parts.second_pass and not picture:
         world = share_world(body, placed, lines) if several else None
         floors = [world.floor_from_camera(k) if world else None for k in range(len(tracks))]
         balanced = parts.balance
@@ -266,6 +266,8 @@ def solve(
             seen = prepared[k].turned(path.rotations_to_frames(turn))
             fits[k] = compact(refit_track(seen, fits[k], path.points_to_frames(root[:, None])[:, 0], progress))
         placed = place()
+    if not smoothing:
+        placed = place(smoothing)
     prepared.clear()
     world = share_world(body, placed, lines) if several else None
     iterations = fits[0].iterations

@@ -174,7 +174,7 @@ class SCOPE_PG_settings(bpy.types.PropertyGroup):
         name="Smooth",
         default=True,
         options=_FIXED,
-        description="Take the jitter out of the motion; off keeps every frame as it was solved",
+        description="Take the jitter out of the motion; off keeps every frame as it was solved, feet not held",
     )
     frame_rate: EnumProperty(
         name="Frame Rate",

@@ -6,6 +6,9 @@ import pytest
 from scope.scope_addon.capture.camera_path import CameraPath
 from scope.scope_addon.capture.camera_travel import camera_travel
 from scope.scope_addon.capture.fitting import FittedTrack
+from scope.scope_addon.capture.pipeline import CaptureOptions, capture
+from scope.scope_addon.capture.video_range import VideoRange
+from scope.solver import load_body
 from scope.solver.rotations import exp
 
 UP = np.array([0.0, -1.0, 0.0])  # OpenCV's axes, a level camera
@@ -82,3 +85,18 @@ def test_there_and_back_along_a_path():
     np.testing.assert_allclose(through, points @ T_world_first[:3, :3].T + T_world_first[:3, 3], atol=1e-12)
     assert CameraPath.on_a_stand(3).is_static
     assert not path.is_static
+
+
+def test_without_smoothing_the_camera_travels_as_far(shared):
+    """What is left out is smoothing over time and held feet, not what else tells where somebody is."""
+    body, clip = load_body("scope"), shared / "data/clips/run_moving_camera.mp4"
+    wanted = VideoRange(end_s=1.5)
+    smooth, raw = (
+        capture(clip, body, CaptureOptions(quality="fast", wanted=wanted, smoothing=smoothing)).motions[0]
+        for smoothing in (True, False)
+    )
+    way = np.linalg.norm(raw.trans[-1] - raw.trans[0])
+    assert way > 0.8
+    assert abs(way - np.linalg.norm(smooth.trans[-1] - smooth.trans[0])) < 0.1
+    np.testing.assert_array_equal(raw.trans, raw.trans_raw)
+    assert np.abs(smooth.trans - smooth.trans_raw).max() > 0.001
