@@ -102,8 +102,8 @@ def _add_options(capture: argparse.ArgumentParser) -> None:
         metavar="N|all|largest",
         help="how many people at most; largest: the most prominent one over the clip (default: largest)",
     )
-    capture.add_argument("--start", metavar="TIME", help="from when: seconds, MM:SS or HH:MM:SS.mmm")
-    capture.add_argument("--end", metavar="TIME", help="until when")
+    capture.add_argument("--start", metavar="TIME", help="from when: seconds, MM:SS, HH:MM:SS.mmm or HH:MM:SS:FF")
+    capture.add_argument("--end", metavar="TIME", help="until when, inclusive")
     capture.add_argument("--fps", metavar="N", help="use so many frames per second, such as 12 or 29.97")
     capture.add_argument(
         "--body", default="scope", help=f"{', '.join(BUILT_IN)}, or your own .npz or .pkl (default: scope)"
@@ -215,7 +215,7 @@ def _body_and_options(args: argparse.Namespace) -> tuple[Body, CaptureOptions]:
     from ..solver.body import load_body
     from .capture.camera import choose_camera
     from .capture.pipeline import CaptureOptions
-    from .capture.video_range import VideoRange, parse_rate, parse_time
+    from .capture.video_range import parse_range
 
     if args.threads < 0:
         raise UsageError(f"--threads takes a number from 1 on, or 0 for all, not {args.threads}")
@@ -224,11 +224,7 @@ def _body_and_options(args: argparse.Namespace) -> tuple[Body, CaptureOptions]:
     options = CaptureOptions(
         quality=args.quality,
         people=_people(args.people),
-        wanted=VideoRange(
-            parse_time(args.start) if args.start else 0.0,
-            parse_time(args.end) if args.end else float("inf"),
-            parse_rate(args.fps) if args.fps else None,
-        ),
+        wanted=parse_range(args.start, args.end, args.fps),
         focal_mm=args.focal_mm,
         fov_deg=args.fov,
         calibration=args.calibration,

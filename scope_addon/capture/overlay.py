@@ -23,7 +23,7 @@ from .camera import scaled_intrinsics
 from .landmark_network import KEYPOINT_COUNT
 from .rasterizer import Canvas, rasterize
 from .video import Frame, Video, open_video
-from .video_range import VideoRange
+from .video_range import Wanted
 
 VIDEO_SUFFIXES = (".mp4", ".mov", ".mkv")
 STILL_SUFFIXES = (".png", ".jpg", ".jpeg", ".webp")
@@ -45,7 +45,7 @@ def write_overlay(
     *,
     opacity: float = 0.6,
     progress: Progress | None = None,
-    wanted: VideoRange | None = None,
+    wanted: Wanted | None = None,
 ) -> None:
     """Write the footage with every person's body over it.
 

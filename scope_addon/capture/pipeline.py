@@ -39,7 +39,7 @@ from .shared_world import share_world
 from .track import Track
 from .tracker import MOST_PEOPLE, PeopleTracker
 from .video import Frame, Video, open_video
-from .video_range import VideoRange
+from .video_range import VideoRange, Wanted
 from .world import estimate_world
 
 # Called with the stage's name, what is done and the total (0: unknown). May raise CancelledError.
@@ -60,7 +60,7 @@ class CaptureOptions:
     focal_mm: float | None = None
     fov_deg: float | None = None
     calibration: Path | None = None
-    wanted: VideoRange = VideoRange()  # which frames
+    wanted: Wanted = VideoRange()  # which frames
     smoothing: bool = True
     threads: int = 0  # 0: as many as there are cores
     hands: bool = False  # fingers too; the body needs finger joints

@@ -31,7 +31,7 @@ from .exif import read_exif
 from .frame_readers import FrameReader, open_reader
 from .image_sequence import PictureReader, find_pictures
 from .quicktime import focal_35mm
-from .video_range import VideoRange
+from .video_range import VideoRange, Wanted
 
 cv2.setLogLevel(0)  # silent: failures are reported by exception, in one sentence
 
@@ -107,7 +107,7 @@ class Video:
         self.close()
 
 
-def open_video(path: str | Path, wanted: VideoRange | None = None) -> Video:
+def open_video(path: str | Path, wanted: Wanted | None = None) -> Video:
     """Open a video or a picture (JPEG, PNG, WebP, TIFF, BMP, ...; 16-bit and alpha too) and decode its first frame.
 
     Numbered pictures are a video as well (`image_sequence`); what is wanted then says their rate, else it is 30.
@@ -140,8 +140,9 @@ def open_video(path: str | Path, wanted: VideoRange | None = None) -> Video:
     return _open_still(path) if picture else _open_moving(path, wanted)
 
 
-def _open_sequence(path: Path, pictures: list[Path], wanted: VideoRange) -> Video:
-    fps = wanted.fps or STILL_FPS
+def _open_sequence(path: Path, pictures: list[Path], asked: Wanted) -> Video:
+    fps = asked.fps or STILL_FPS
+    wanted = asked.at_rate(fps)
     first = PictureReader(pictures, fps).read()
     if first is None:
         raise VideoError(f"{pictures[0]} is a picture that cannot be decoded; it may be damaged, so export it again")
@@ -192,7 +193,7 @@ def _upright(image: np.ndarray, orientation: int) -> np.ndarray:
     return np.ascontiguousarray(image[:: -1 if vertical else 1, :: -1 if horizontal else 1])
 
 
-def _open_moving(path: Path, wanted: VideoRange) -> Video:
+def _open_moving(path: Path, asked: Wanted) -> Video:
     with closing(open_reader(path)) as reader:
         first = reader.read()
         if first is None:
@@ -201,6 +202,7 @@ def _open_moving(path: Path, wanted: VideoRange) -> Video:
         count = reader.frame_count
     height, width = first[1].shape[:2]
     frame_count = max(1, int(count)) if 0 < count < 1e9 else 1
+    wanted = asked.at_rate(fps)
     video = Video(path, width, height, fps, frame_count, focal_35mm(path), wanted=wanted)
     if wanted.start_s > 0 and count > 0 and wanted.start_s * fps > frame_count + fps:
         raise VideoError(

@@ -3,18 +3,18 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import TYPE_CHECKING
 
 from ...solver.errors import UsageError
+from .timecode import Timecode, parse_time
 
 if TYPE_CHECKING:
     from .video import Frame
 
-_TIMECODE = re.compile(r"(?:(?:(\d+):)?(\d{1,2}):)?(\d+(?:[.,]\d*)?)")
+_MARGIN = Fraction(1, 4)  # of a frame, for containers that round the times of their frames
 
 
 @dataclass(frozen=True)
@@ -33,9 +33,37 @@ class VideoRange:
         if self.fps is not None and not 0 < self.fps <= 1000:
             raise UsageError(f"frames per second must be above 0 and at most 1000, but are {float(self.fps):g}")
 
+    def at_rate(self, fps: Fraction) -> VideoRange:
+        """Itself: seconds are the same at any rate."""
+        return self
+
     def chooser(self) -> FrameChooser:
         """A new choice of frames, for one pass over the video."""
         return FrameChooser(self.fps)
+
+
+@dataclass(frozen=True)
+class TimecodeRange:
+    """As `VideoRange`, but an end that is a timecode means a frame, whose time follows from the footage's rate."""
+
+    start: float | Timecode = 0.0
+    end: float | Timecode = float("inf")
+    fps: Fraction | None = None
+
+    def at_rate(self, fps: Fraction) -> VideoRange:
+        """The same in footage of this rate.
+
+        :raises UsageError: there is no such timecode at this rate, or the end does not come after the start.
+        """
+        start, end = self.start, self.end
+        if isinstance(start, Timecode):
+            start = max(0.0, float((start.frame(fps) - _MARGIN) / fps))
+        if isinstance(end, Timecode):
+            end = float((end.frame(fps) + _MARGIN) / fps)
+        return VideoRange(start, end, self.fps)
+
+
+Wanted = VideoRange | TimecodeRange
 
 
 class FrameChooser:
@@ -84,19 +112,17 @@ class FrameChooser:
         self._next = max(self._next + 1, int((time - self._start) * float(self._fps) + 0.5) + 1)
 
 
-def parse_time(text: str) -> float:
-    """Seconds of "12.5", "MM:SS", "MM:SS.mmm", "HH:MM:SS" or "HH:MM:SS.mmm".
+def parse_range(start: str | None, end: str | None, fps: str | None) -> Wanted:
+    """What ``--start``, ``--end`` and ``--fps`` say; None: from the beginning, to the end, all frames.
 
-    :raises UsageError: it is none of these.
+    :raises UsageError: one of them is none, or the end does not come after the start.
     """
-    match = _TIMECODE.fullmatch(text.strip())
-    if match is None:
-        raise UsageError(f"{text!r} is no time; give seconds (12.5) or a timecode (MM:SS or HH:MM:SS.mmm)")
-    hours, minutes, seconds = match.groups()
-    value = float(seconds.replace(",", "."))
-    if minutes is not None and value >= 60 or hours is not None and int(minutes) >= 60:
-        raise UsageError(f"{text!r} is no time: minutes and seconds go up to 59")
-    return 3600.0 * int(hours or 0) + 60.0 * int(minutes or 0) + value
+    first = 0.0 if start is None else parse_time(start)
+    last = float("inf") if end is None else parse_time(end)
+    rate = None if fps is None else parse_rate(fps)
+    if isinstance(first, Timecode) or isinstance(last, Timecode):
+        return TimecodeRange(first, last, rate)
+    return VideoRange(first, last, rate)
 
 
 def parse_rate(text: str) -> Fraction:

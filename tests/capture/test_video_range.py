@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 import pytest
 from scope.scope_addon.capture.video import Frame, open_video
-from scope.scope_addon.capture.video_range import FrameChooser, VideoRange, parse_rate, parse_time
+from scope.scope_addon.capture.video_range import FrameChooser, VideoRange, parse_range, parse_rate
 from scope.solver.errors import UsageError, VideoError
 
 FPS = 25
@@ -20,8 +20,12 @@ FPS = 25
 def long_video(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """60 s at 25 fps with a key frame now and then; the number of the frame in 12 black or white squares."""
     path = tmp_path_factory.mktemp("range") / "long.mp4"
-    writer = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*"mp4v"), FPS, (192, 32))
-    for number in range(60 * FPS):
+    return write_numbers(path, FPS, 60 * FPS, "mp4v")
+
+
+def write_numbers(path: Path, fps: float, count: int, codec: str) -> Path:
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*codec), fps, (192, 32))
+    for number in range(count):
         bits = [(number >> b & 1) * 255 for b in range(12)]
         row = np.repeat(np.array(bits, np.uint8), 16)
         writer.write(np.repeat(np.tile(row, (32, 1))[..., None], 3, axis=2))
@@ -68,20 +72,6 @@ def test_nearest_frames_of_a_variable_rate() -> None:
     assert chosen == [0.0, 0.11, 0.3, 0.39, 0.52, 0.6]  # for 0.0, 0.1, (0.2: nothing near), 0.3, 0.4, 0.5, 0.6
 
 
-@pytest.mark.parametrize(
-    ("text", "seconds"),
-    [("0", 0), ("12.5", 12.5), ("90", 90), ("01:30", 90), ("1:02:03", 3723), ("00:00:01.250", 1.25), ("1:00,5", 60.5)],
-)
-def test_times(text: str, seconds: float) -> None:
-    assert parse_time(text) == pytest.approx(seconds)
-
-
-@pytest.mark.parametrize("text", ["", "-1", "1:60", "1:60:00", "one", "1:2:3:4", "nan"])
-def test_what_is_no_time(text: str) -> None:
-    with pytest.raises(UsageError):
-        parse_time(text)
-
-
 def test_rates() -> None:
     assert parse_rate("25") == 25
     assert parse_rate("29.97") == Fraction(30000, 1001)
@@ -97,3 +87,35 @@ def test_an_impossible_range() -> None:
     for start, end in ((-1, 5), (5, 5), (6, 5), (float("nan"), 5)):
         with pytest.raises(UsageError):
             VideoRange(start, end)
+
+
+@pytest.fixture(scope="module")
+def rounded_video(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """12 s of the same at 29.97 frames a second, from a container that rounds times to milliseconds."""
+    return write_numbers(tmp_path_factory.mktemp("range") / "rounded.mkv", 30000 / 1001, 360, "MJPG")
+
+
+@pytest.mark.parametrize(("name", "nominal"), [("long_video", 25), ("rounded_video", 30)])
+def test_timecodes_mean_frames(name: str, nominal: int, request: pytest.FixtureRequest) -> None:
+    """From 3 s and 12 frames to 4 s and 7 frames, both included."""
+    path, first, last = request.getfixturevalue(name), 3 * nominal + 12, 4 * nominal + 7
+    with open_video(path, parse_range("00:00:03:12", "00:00:04:07", None)) as video:
+        assert [shown(f) for f in video] == list(range(first, last + 1))
+        assert video.expected_frames == pytest.approx(last + 1 - first, abs=1)
+    for frame in (first, first + 1, first + 2):
+        one = f"00:00:03:{frame - 3 * nominal}"
+        with open_video(path, parse_range(one, one, None)) as video:
+            assert [shown(f) for f in video] == [frame]
+
+
+def test_a_range_by_seconds_and_timecode(long_video: Path) -> None:
+    with open_video(long_video, parse_range("1.5", "00:00:02:00", "5")) as video:
+        assert [shown(f) for f in video] == [38, 43, 48]
+    assert parse_range(None, None, None) == VideoRange()
+    with pytest.raises(UsageError, match="must come after"):
+        open_video(long_video, parse_range("00:00:03:12", "2", None))
+    with pytest.raises(UsageError, match="up to 24"):
+        open_video(long_video, parse_range("00:00:03:25", None, None))
+    for nothing in (("", None, None), (None, "", None), (None, None, "")):
+        with pytest.raises(UsageError, match="''"):
+            parse_range(*nothing)
