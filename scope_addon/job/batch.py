@@ -203,8 +203,10 @@ class Batch:
         values = {k: v for k, v in self._options.items() if k != "--threads"}
         digest.update(json.dumps([sorted(values.items()), list(self._suffixes), self._overlays]).encode())
         for value in values.values():
-            if value and Path(value).is_file():  # a body, a calibration, a network
-                _add_content(digest, Path(value))
+            named = [Path(value)] if value else []  # a body, a calibration, a network, which may have a JSON beside it
+            named += [path.with_suffix(".json") for path in named if path.suffix == ".onnx"]
+            for file in filter(Path.is_file, named):
+                _add_content(digest, file)
         return digest
 
     def _key(self, path: Path) -> str:

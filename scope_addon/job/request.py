@@ -76,10 +76,11 @@ def _add_file(digest: hashlib._Hash, path: Path) -> None:
 
 
 def code_version(root: Path) -> str:
-    """Of the installed program: newest change and total size of its sources and networks."""
-    folders = [root / "solver", root / "scope_addon" / "capture"]
-    files = [f for folder in folders for f in folder.rglob("*.py")]
-    files += [root / "assets" / "networks" / "built.json", *(root / "assets" / "body").glob("*.npz")]
-    status = {f.relative_to(root).as_posix(): f.stat() for f in files if f.is_file()}
+    """Of the installed program: names, sizes and times of change of its sources, networks, bodies and priors."""
+    files = [*(root / "solver").rglob("*.py"), *(root / "scope_addon").rglob("*.py")]
+    files += [f for kind in ("*.onnx", "*.npz", "*.json") for f in (root / "assets").rglob(kind)]
+    # The panel does not decide what is captured, nor does the sample, which is footage like any other.
+    apart = (root / "scope_addon" / "ui", root / "assets" / "sample")
+    status = {f.relative_to(root).as_posix(): f.stat() for f in files if not any(map(f.is_relative_to, apart))}
     stamps = sorted((name, s.st_size, s.st_mtime_ns) for name, s in status.items())
     return hashlib.sha256(json.dumps(stamps).encode()).hexdigest()

@@ -1,20 +1,30 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The real worker process without Blender: its search path, its words, and its end when the parent is gone."""
 
+import inspect
 import json
 import os
 import signal
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
+from scope.scope_addon.capture import pipeline
+from scope.scope_addon.capture.lifter import LIFTER_FILE
+from scope.scope_addon.capture.networks import LANDMARK_NETWORK_OF_QUALITY, network_path
 from scope.scope_addon.job.process import START_SCRIPT, WorkerFailedError, WorkerProcess
 from scope.scope_addon.job.request import JobRequest, code_version
+from scope.scope_addon.motion import Motion
+from scope.scope_addon.scene import export
+from scope.solver import learned_prior
+from scope.solver.body import BUILT_IN
 from scope.solver.errors import SetupError, UsageError
 
 from .processes import runs, wait_for
 
 ROOT = START_SCRIPT.parents[2]
+OTHER_NETWORKS = ("pose_detection", "palm_detection", "hand_landmark")
 SAMPLE = str(ROOT / "assets" / "sample" / "sample.mp4")
 
 
@@ -122,6 +132,24 @@ def test_keys_tell_what_changes_the_result(tmp_path):
     os.utime(clip, ns=(status.st_atime_ns, status.st_mtime_ns))
     assert request.key("1") != key
     assert code_version(ROOT) == code_version(ROOT)
+
+
+def test_the_program_is_another_one_when_anything_changes_that_decides_the_result(tmp_path):
+    networks = [network_path(name) for name in (*LANDMARK_NETWORK_OF_QUALITY.values(), *OTHER_NETWORKS)]
+    deciding = [*networks, *BUILT_IN.values(), LIFTER_FILE, learned_prior.BUILT_IN]
+    deciding += [Path(inspect.getfile(part)) for part in (learned_prior, pipeline, export, Motion)]
+    others = [SAMPLE, ROOT / "README.md", ROOT / "scope_addon" / "ui" / "panel.py"]
+    copies = [tmp_path / Path(file).relative_to(ROOT) for file in (*deciding, *others)]
+    for copy in copies:
+        copy.parent.mkdir(parents=True, exist_ok=True)
+        copy.write_bytes(b"before")
+    versions = [code_version(tmp_path)]
+    for copy in copies:
+        copy.write_bytes(b"after!")
+        os.utime(copy, ns=(1, 1))  # as long as before, and written at another time
+        versions.append(code_version(tmp_path))
+    assert len(set(versions)) == 1 + len(deciding)
+    assert len(set(versions[len(deciding) :])) == 1
 
 
 def test_compiled_code_goes_where_it_is_told(folder, tmp_path):
