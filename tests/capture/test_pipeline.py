@@ -89,7 +89,7 @@ def test_the_report_can_be_written_as_json_and_counts_right(sample):
 
 
 def test_real_footage_with_truth_beats_the_raw_landmarks(shared, body, tmp_path):
-    """Raw BlazePose-heavy has 129.7 mm MPJPE-root and 89 mm PA-MPJPE on this camera."""
+    """Raw BlazePose-heavy has 129.7 mm MPJPE-root and 89 mm PA-MPJPE here, and we 73.7, 54.7 and a jitter of 14.9."""
     result = capture(shared / "data/pose2sim/cam3.mp4", body, CaptureOptions(quality="best"))
     result.motions[0].save(tmp_path / "cam3.npz")
     truth = shared / "data/pose2sim/truth_cam3.npz"
@@ -97,12 +97,12 @@ def test_real_footage_with_truth_beats_the_raw_landmarks(shared, body, tmp_path)
     figures = json.loads(subprocess.run(list(map(str, argv)), capture_output=True, text=True, check=True).stdout)
     assert "warnings" not in figures
     assert figures["coverage"] == 1.0
-    assert figures["mpjpe_root"] < 100
-    assert figures["pa_mpjpe"] < 75
-    assert figures["mpjpe_root"] < 0.8 * figures["mpjpe_root_flat"]
+    assert figures["mpjpe_root"] < 83
+    assert figures["pa_mpjpe"] < 62
+    assert figures["mpjpe_root"] < 0.4 * figures["mpjpe_root_flat"]
     assert figures["lr_swap"] + figures["mirror"] + figures["mirror_swap"] <= 0.02
     assert figures["best_offset"] == 0
-    assert figures["jitter_rel"] < 150
+    assert figures["jitter_rel"] < 17
 
 
 def test_frames_without_the_person_are_filled_and_marked(body, tmp_path):
