@@ -35,6 +35,8 @@ from ...solver import (
     make_tree,
 )
 from ...solver.rotations import exp
+from .frame_blocks import by_blocks
+from .measure import NEAREST_M
 from .smoothing import gaussian_smooth, smooth_rotations
 
 CONTACT_SPEED_M_S = 0.35  # across the line of sight; a swinging foot moves at 1 m/s and more
@@ -180,7 +182,12 @@ def hold_feet(
     center = np.broadcast_to(center, root_cam.shape)
     turns = _looking_at(root_cam - center)
     seen = [body.keypoint_set("blazepose")[name] for name in _SEEN]
-    J0 = body.rest_joints(betas)[0]
+    at_rest = body.rest_joints(betas)[0]
+
+    def shown(rotations: np.ndarray, root_cam: np.ndarray) -> tuple[np.ndarray]:
+        return (body.keypoints(*body.forward_kinematics(rotations, root_cam - at_rest, betas), betas, seen),)
+
+    (points,) = by_blocks(shown, rotations, root_cam)
     priors = replace(
         default_priors(body),
         shape_mean=betas,
@@ -195,13 +202,11 @@ def hold_feet(
         turn = turns[t]
         root = turn @ (root_cam[t] - center[t])
         state = State(turn @ rotations[t, 0], root, rotations[t, 1:], betas)
-        whole = np.concatenate([state.R_camera_root[None], state.Omega])
-        points = body.keypoints(*body.forward_kinematics(whole, root - J0, betas), betas, seen)
-        ahead = np.maximum(points[:, 2:], _NEAREST_M)
+        ahead = (points[t] - center[t]) @ turn.T
         certain = np.full(len(seen), np.square(root[2] / PICTURE_SIGMA_M))
         measurements = Measurements(
             intrinsics=np.eye(3),
-            keypoints2d=Keypoints2D(seen, points[:, :2] / ahead, certain),
+            keypoints2d=Keypoints2D(seen, ahead[:, :2] / np.maximum(ahead[:, 2:], NEAREST_M), certain),
             foot_contacts=FootContacts(indices, (positions[t] - center[t]) @ turn.T, weights[t]),
             floor=Floor(indices, turn @ floor[0], float(floor[1][t] - floor[0] @ center[t]), free),
             pose_priors=PosePriors(pelvis, state.R_camera_root[None], root[None], turn_weight, place_weight),
@@ -236,7 +241,6 @@ _HOLD = Weights(
 )
 _SIDED = ("shoulder", "elbow", "wrist", "hip", "knee")
 _SEEN = ("nose", *(f"{side}_{name}" for side in ("left", "right") for name in _SIDED))
-_NEAREST_M = 0.1
 _LEG = ("hip", "knee", "ankle")
 
 
