@@ -11,6 +11,7 @@ import argparse
 import ctypes
 import json
 import os
+import re
 import signal
 import sys
 import threading
@@ -213,14 +214,11 @@ def _body_and_options(args: argparse.Namespace) -> tuple[Body, CaptureOptions]:
     :raises ScopeError: an argument cannot be meant, or there is no such body.
     """
     from ..solver.body import load_body
-    from .capture.camera import choose_camera
-    from .capture.pipeline import CaptureOptions
+    from .capture.pipeline import CaptureOptions, check_options
     from .capture.video_range import parse_range
 
     if args.threads < 0:
         raise UsageError(f"--threads takes a number from 1 on, or 0 for all, not {args.threads}")
-    if args.focal_mm is not None or args.fov is not None:
-        choose_camera(1, 1, focal_mm=args.focal_mm, fov_deg=args.fov, calibration=args.calibration)
     options = CaptureOptions(
         quality=args.quality,
         people=_people(args.people),
@@ -235,11 +233,14 @@ def _body_and_options(args: argparse.Namespace) -> tuple[Body, CaptureOptions]:
         detector=args.detector,
         keypoints=args.keypoints,
     )
-    return load_body(body_with_hands(args.body) if args.hands else args.body), options
+    body = load_body(body_with_hands(args.body) if args.hands else args.body)
+    check_options(body, options)
+    return body, options
 
 
 def run_batch(args: argparse.Namespace) -> dict:
     """``scope batch``: one process per clip, so that none can harm another; returns the report of all."""
+    from .capture.pipeline import check_networks
     from .job.batch import Batch
 
     formats = [f".{f.strip().lstrip('.').lower()}" for f in args.formats.split(",") if f.strip()]
@@ -250,7 +251,8 @@ def run_batch(args: argparse.Namespace) -> dict:
     if args.jobs < 1:
         raise UsageError(f"--jobs takes a number from 1 on, not {args.jobs}")
     _rig_of(args, [args.out / f"clip{suffix}" for suffix in formats])
-    _body_and_options(args)  # what no clip can be captured with is said once, before the first
+    _, options = _body_and_options(args)
+    check_networks(options)  # what no clip can be captured with is said once, before the first
     batch = Batch(args.folder, args.out, args.program, _given_options(args), formats, args.overlays)
     with _ProgressBar(sys.stderr, show=sys.stderr.isatty() and not args.quiet) as progress:
         with _interrupted("clips that are done stay, called again it goes on"):
@@ -283,7 +285,7 @@ def _people(text: str) -> int | str:
     """``--people``: a number, "all" or "largest"."""
     if text in ("all", "largest"):
         return text
-    if not text.isdecimal() or int(text) < 1:
+    if not re.fullmatch("[0-9]{1,6}", text) or int(text) < 1:
         raise UsageError(f"--people takes a number from 1 on, all or largest, not {text!r}")
     return int(text)
 

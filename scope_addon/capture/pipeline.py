@@ -16,8 +16,11 @@ import numpy as np
 from ...solver.body import Body
 from ...solver.errors import NoPersonError, UsageError, VideoError
 from ..motion import Motion
+from .adapters.box_detector import BoxDetector
+from .adapters.keypoint_network import KeypointNetwork
 from .assemble import assemble_motion, corrected_stance
 from .beside import BesideTracking
+from .calibration import read_calibration
 from .camera import Camera, choose_camera
 from .camera_path import CameraPath
 from .camera_travel import camera_travel
@@ -31,6 +34,7 @@ from .left_right import repair_left_right
 from .limb_exchange import repair_limbs
 from .line_segments import Lines
 from .live_body import LiveBody
+from .networks import landmark_network_name
 from .observation import Observation
 from .parts import ALL_PARTS, Parts
 from .people import PeopleBuilder
@@ -93,12 +97,9 @@ def capture(
     :raises CancelledError: raised by ``progress`` itself, passed on.
     """
     path = Path(path)
-    if options.keypoints and not options.parts.lifter:
-        raise UsageError("the lifter cannot be left out with a keypoint file: such a network tells nothing of depth")
+    check_options(body, options)
     clock = _Clock()
     most = _most_people(options.people)
-    if options.hands:
-        require_fingers(body)
     with open_video(path, options.wanted) as video:
         camera = choose_camera(
             video.width,
@@ -108,8 +109,11 @@ def capture(
             calibration=options.calibration,
             metadata_focal_mm=video.focal_35mm,
         )
-        threads = options.threads or os.cpu_count() or 1
+        cores = os.cpu_count() or 1
+        threads = min(options.threads or cores, cores)  # more would wait for each other
         execution = Execution(options.provider)
+        if options.threads > cores:
+            execution.warnings.append(f"{options.threads} threads were asked for, but there are {cores} cores")
         live = LiveBody(body, camera, options.parts)
         with BesideTracking(camera, video.width, video.height, live) as beside, _opencv_in_one_thread():
             tracker = PeopleTracker(
@@ -171,6 +175,36 @@ def capture(
         "warnings": warnings,
     }
     return Capture(motions, report)
+
+
+def check_options(body: Body, options: CaptureOptions) -> None:
+    """Refuse what no footage can be captured with, as far as it is known without opening a network.
+
+    :raises UsageError: an option has an impossible value, contradicts another one or does not suit the body.
+    :raises InputError: the calibration cannot be used.
+    """
+    _most_people(options.people)
+    landmark_network_name(options.quality)
+    Execution(options.provider)
+    if options.keypoints and not options.parts.lifter:
+        raise UsageError("the lifter cannot be left out with a keypoint file: such a network tells nothing of depth")
+    if options.hands:
+        require_fingers(body)
+    if options.focal_mm is not None or options.fov_deg is not None:
+        choose_camera(1, 1, focal_mm=options.focal_mm, fov_deg=options.fov_deg, calibration=options.calibration)
+    elif options.calibration:
+        read_calibration(options.calibration)
+
+
+def check_networks(options: CaptureOptions) -> None:
+    """Open the user's networks once, for a batch to refuse them before its first clip.
+
+    :raises ModelFileError: one of them cannot be used.
+    """
+    if options.detector:
+        BoxDetector(options.detector, threads=1)
+    if options.keypoints:
+        KeypointNetwork(options.keypoints, threads=1)
 
 
 def _observe(

@@ -2,6 +2,7 @@
 """The main job on real footage with 3D truth and on our own clip with exact truth."""
 
 import json
+import os
 import subprocess
 import sys
 import threading
@@ -128,6 +129,16 @@ def test_nobody_is_said_so(body, tmp_path):
     cv2.imwrite(str(tmp_path / "grey.png"), np.full((300, 400, 3), 100, np.uint8))
     with pytest.raises(NoPersonError, match="grey.png"):
         capture(tmp_path / "grey.png", body, CaptureOptions(quality="fast"))
+
+
+def test_threads_are_no_more_than_the_cores(body, tmp_path):
+    ok, frame = cv2.VideoCapture(str(SAMPLE)).read()
+    assert ok
+    cv2.imwrite(str(tmp_path / "person.png"), frame)
+    report = capture(tmp_path / "person.png", body, CaptureOptions(quality="fast", threads=1000)).report
+    cores = os.cpu_count()
+    assert report["execution"].startswith(f"CPU, {cores} thread")
+    assert [w for w in report["warnings"] if f"1000 threads were asked for, but there are {cores} cores" in w]
 
 
 def test_a_cancel_comes_through_and_leaves_no_thread(body):

@@ -14,6 +14,7 @@ import pytest
 from scope.scope_addon.cli import SAMPLE, main
 from scope.scope_addon.job.batch import REPORT_NAME, Batch
 from scope.scope_addon.motion import Motion
+from scope.solver.body import BUILT_IN
 from scope.solver.errors import InputError, UsageError
 
 from .processes import runs, wait_for
@@ -264,6 +265,30 @@ def test_bad_arguments(tmp_path, capsys, argv, says):
     err = capsys.readouterr().err
     assert says in err
     assert err.count("\n") == 1
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("argv", "status", "says"),
+    [
+        (["--people", "40"], 2, "1 to 12"),
+        (["--people", "9" * 9999], 2, "--people takes a number"),
+        (["--calibration", "{tmp}/lens.json"], 1, "lens.json is not a calibration"),
+        (["--detector", "{tmp}/net.onnx"], 1, "net.onnx is not an ONNX model"),
+        (["--keypoints", "{tmp}/net.onnx"], 1, "net.onnx is not an ONNX model"),
+        (["--hands", "--body", str(BUILT_IN["scope"])], 2, "no finger joints"),
+    ],
+)
+def test_what_no_clip_can_be_captured_with_is_said_once_before_the_first(folder, tmp_path, capsys, argv, status, says):
+    (tmp_path / "lens.json").write_text("{}")
+    (tmp_path / "net.onnx").write_bytes(b"no network")
+    given = [a.format(tmp=tmp_path) for a in argv]
+    program = [sys.executable, "-c", PROGRAM]
+    assert main(["batch", str(folder), "--out", str(tmp_path / "out"), *given], program) == status
+    err = capsys.readouterr().err
+    assert says in err
+    assert err.count("\n") == 1
+    assert calls(folder) == []
     assert not (tmp_path / "out").exists()
 
 
