@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`./scripts/bench solver|perception|renders|blender [--quick] [--json FILE]`: measure, print tables, write figures."""
+"""`./scripts/bench solver|perception|choices|renders|blender [--quick] [--json FILE]`: measure, print, write figures."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def _real_frames(quick: bool) -> dict:
 def main() -> int:
     """Run the command line; return the exit status."""
     parser = argparse.ArgumentParser(prog="bench")
-    parser.add_argument("what", choices=["solver", "perception", "renders", "blender"])
+    parser.add_argument("what", choices=["solver", "perception", "choices", "renders", "blender"])
     parser.add_argument("--quick", action="store_true", help="fewer repetitions, the default preset alone")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures as JSON")
     args = parser.parse_args()
@@ -77,6 +77,10 @@ def main() -> int:
         from .blender import blender
 
         figures = blender(args.quick)
+    elif args.what == "choices":
+        from .choices import choices
+
+        figures = choices(args.quick)
     elif args.what == "renders":
         from .renders import renders
 

@@ -71,12 +71,14 @@ def _accuracy(body: Body) -> dict:
 
 
 def _ablation(body: Body) -> dict:
-    found, rows = {}, []
+    found, rows, by_camera = {}, [], []
     for name, options in ABLATION.items():
-        mean = evaluate_all(body, lambda _, options=options: CaptureOptions(**options))["mean"]
-        found[name] = mean
-        rows.append([name, *_row(mean)])
+        each = evaluate_all(body, lambda _, options=options: CaptureOptions(**options))
+        found[name] = each["mean"]
+        rows.append([name, *_row(each["mean"])])
+        by_camera.append([name, *(f"{f['mpjpe_root']:.1f} / {f['pa_mpjpe']:.1f}" for f in (each[c] for c in CAMERAS))])
     print(table(("mean of four cameras", *(heading for heading, _ in SHOWN.values())), rows), end="\n\n", flush=True)
+    print(table(("MPJPE-root / PA-MPJPE mm", *CAMERAS), by_camera), end="\n\n", flush=True)
     return found
 
 
