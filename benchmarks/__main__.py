@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`./scripts/bench solver|perception|choices|renders|blender [--quick] [--json FILE]`: measure, print, write figures."""
+"""`./scripts/bench solver|perception|choices|renders|blender [--quick] [--json FILE]`: measure, print, write."""
 
 from __future__ import annotations
 
