@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the README's pictures are drawn with: views, sticks, and that the README shows what lies there."""
+
+import re
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scope.solver.body import ASSETS
+from scope.tools.readme_pictures.__main__ import LARGEST_BYTES, PICTURES
+from scope.tools.readme_pictures.panel import GROUND, Panel
+from scope.tools.readme_pictures.shapes import stick_figure
+from scope.tools.readme_pictures.view import from_around, from_the_camera
+
+ALONG_Y = np.array([[1.0, 0, 0, 0], [0, 0, 1, -4], [0, -1, 0, 1], [0, 0, 0, 1]])  # looks along +y from y = -4, z = 1
+FILMED = SimpleNamespace(intrinsics=np.array([[800.0, 0, 320], [0, 800, 240], [0, 0, 1]]), world_from_camera=[ALONG_Y])
+FILMED.world_from_camera = np.array(FILMED.world_from_camera)
+
+
+def test_the_cameras_crop_shows_the_points_in_its_middle_and_as_large_as_asked():
+    points = np.random.default_rng(0).uniform([0.2, -0.3, 0], [0.9, 0.3, 1.8], (50, 3))
+    pixels = from_the_camera(FILMED, 0, points, (300, 400), 0.8).project(points)
+    assert np.allclose((pixels.min(0) + pixels.max(0)) / 2, [150, 200])
+    assert np.ptp(pixels[:, 1]) == pytest.approx(320)
+
+
+def test_a_view_from_the_cameras_right_has_what_is_near_the_camera_on_its_left():
+    center = np.array([0, 0, 1.0])
+    view = from_around(FILMED, 0, center, (300, 400), 90, 2.0, pitch=0)
+    near, middle, above = view.project(np.array([[0, -0.5, 1], center, [0, 0, 1.5]]))
+    assert np.allclose(middle, [150, 200])
+    assert np.allclose(near, [50, 200])
+    assert np.allclose(above, [150, 100])
+
+
+def test_a_rod_is_closed_and_turned_outwards():
+    a, b = np.array([0.1, 0.2, 0.3]), np.array([0.5, -0.1, 1.0])
+    vertices, triangles = stick_figure({"LElbow": a, "LWrist": b}, 0.05)
+    p, q, r = (vertices[triangles[:, k]] for k in range(3))
+    volume = np.einsum("ij,ij->i", p, np.cross(q, r)).sum() / 6
+    exact = np.pi * 0.05**2 * np.linalg.norm(b - a) + 4 / 3 * np.pi * 0.05**3
+    assert volume == pytest.approx(exact, rel=0.08)  # of twelve sides
+
+
+def test_sticks_are_drawn_where_they_project():
+    view = from_around(FILMED, 0, np.array([0, 0, 1.0]), (60, 80), 0, 2.0)
+    panel = Panel(view, np.zeros(3))
+    panel.sticks({"LElbow": np.array([0, 0, 0.9]), "LWrist": np.array([0, 0, 1.1])})
+    picture = panel.finished().astype(int)
+    red = picture[..., 0] - picture[..., 2] > 60
+    assert red[40, 30]
+    assert not red[:, :25].any()
+    assert np.abs(picture[5, 5] - GROUND).max() < 5
+
+
+def test_the_readme_shows_every_picture_and_each_is_small():
+    shown = re.findall(r"assets/pictures/(\w+)\.jpg", (ASSETS.parent / "README.md").read_text(encoding="utf-8"))
+    assert sorted(shown) == sorted(PICTURES)
+    for name in PICTURES:
+        assert 0 < (ASSETS / "pictures" / f"{name}.jpg").stat().st_size <= LARGEST_BYTES

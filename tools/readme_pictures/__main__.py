@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""``python -m scope.tools.readme_pictures``: make the README's pictures anew. Needs ../shared/data."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from ...scope_addon.whole_file import written_beside
+from ...solver.body import ASSETS
+from . import pictures
+
+PICTURES = {
+    "capture": pictures.sample,
+    "against_truth": pictures.against_truth,
+    "in_motion": pictures.in_motion,
+    "along_the_view": pictures.along_the_view,
+    "front_or_behind": pictures.front_or_behind,
+    "two_floors": pictures.two_floors,
+}
+LARGEST_BYTES = 60_000
+
+
+def main() -> int:
+    """Make all pictures, or those that are named."""
+    parser = argparse.ArgumentParser(prog="readme_pictures", description=__doc__)
+    parser.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join(PICTURES)}; default: all")
+    parser.add_argument("-o", "--out", type=Path, default=ASSETS / "pictures", help="folder (default: assets/pictures)")
+    arguments = parser.parse_args()
+    unknown = set(arguments.names) - set(PICTURES)
+    if unknown:
+        parser.error(f"there is no picture {', '.join(sorted(unknown))}; choose of {', '.join(PICTURES)}")
+    if not pictures.DATA.is_dir():
+        print(f"{pictures.DATA} is not beside this checkout: the pictures show what its clips give", file=sys.stderr)
+        return 1
+    arguments.out.mkdir(parents=True, exist_ok=True)
+    for name in arguments.names or PICTURES:
+        _write(arguments.out / f"{name}.jpg", PICTURES[name]())
+    return 0
+
+
+def _write(path: Path, picture: np.ndarray) -> None:
+    """Write a JPEG, as good as its size allows."""
+    bgr = cv2.cvtColor(picture, cv2.COLOR_RGB2BGR)
+    for quality in range(90, 30, -4):
+        data = cv2.imencode(".jpg", bgr, [cv2.IMWRITE_JPEG_QUALITY, quality])[1].tobytes()
+        if len(data) <= LARGEST_BYTES:
+            break
+    with written_beside(path) as temporary:
+        temporary.write_bytes(data)
+    print(f"{path}: {picture.shape[1]} x {picture.shape[0]}, {len(data) / 1000:.0f} kB, quality {quality}")
+
+
+if __name__ == "__main__":
+    status = main()
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(status)  # footage and onnxruntime's threads may hang at exit

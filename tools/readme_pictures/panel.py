@@ -1,0 +1,124 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""One panel of a picture: a light ground, the floor's grid, shadows, bodies, sticks, measures and a heading."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+from ...scope_addon.capture.overlay import draw_overlay
+from ...scope_addon.capture.rasterizer import Canvas, rasterize
+from ...solver import Body
+from .shapes import stick_figure
+from .view import View
+
+FINER = 3  # everything is drawn so many times larger, and made smaller at the end
+GROUND, GRID, INK = (246, 247, 249), (203, 208, 215), (52, 58, 66)
+OURS, TRUTH = (0.42, 0.62, 0.90), (0.88, 0.22, 0.16)
+_FONT = cv2.FONT_HERSHEY_SIMPLEX
+_HIDDEN = 0.55  # how far a stick shows through the body
+_STEP, _REACH = 0.5, 5.0  # the grid's step and how far around the middle it goes, metres
+
+
+class Panel:
+    """A picture in the making. Points are metres in the view's world; the floor is z = 0."""
+
+    def __init__(self, view: View, middle: np.ndarray) -> None:
+        scale = np.diag([FINER, FINER, 1.0])
+        width, height = view.size
+        self.view = View(scale @ view.intrinsics, view.world_from_camera, (FINER * width, FINER * height))
+        self.image = np.full((FINER * height, FINER * width, 3), GROUND, np.uint8)
+        self._depth = np.full(self.image.shape[:2], np.inf, np.float32)
+        self._grid(middle)
+
+    def body(self, body: Body, vertices: np.ndarray, color: tuple = OURS) -> None:
+        """Draw a body and its shadow, as of a sun in the zenith."""
+        triangles = np.concatenate([body.faces[:, [0, 1, 2]], body.faces[:, [0, 2, 3]]])
+        self._shadow(vertices, triangles)
+        seen = self.view.to_camera(vertices)
+        self.image = draw_overlay(self.image, seen, triangles, self.view.intrinsics, colors=np.array(color), opacity=1)
+        self._depth = np.minimum(self._depth, self._rasterized(seen, triangles, color).depth)
+
+    def sticks(self, points: dict[str, np.ndarray], color: tuple = TRUTH, radius: float = 0.014) -> None:
+        """Draw a stick figure; what lies within or behind a body shines through it."""
+        vertices, triangles = stick_figure(points, radius)
+        canvas = self._rasterized(self.view.to_camera(vertices), triangles, color)
+        alpha = np.where(canvas.depth < self._depth, 1.0, _HIDDEN) * canvas.coverage
+        alpha = cv2.blur(alpha, (3, 3))[..., None]
+        mixed = self.image * (1 - alpha) + cv2.blur(canvas.rgba[..., :3], (3, 3)) * alpha
+        self.image = (mixed + 0.5).astype(np.uint8)
+
+    def line(self, a: np.ndarray, b: np.ndarray, color: tuple = INK, dashed: bool = False, width: float = 1.2) -> None:
+        """Draw a line between two points, over everything."""
+        count = 41 if dashed else 2
+        points = self.view.project(np.linspace(a, b, count))
+        for k in range(0, count - 1, 2):
+            self._stroke(points[k], points[k + 1], color, width)
+
+    def note(self, text: str, at: np.ndarray, offset: tuple[float, float], size: float = 0.46) -> None:
+        """Write beside a point, ``offset`` pixels of the finished picture away, a thin line leading there."""
+        point = self.view.project(at)
+        place = point + FINER * np.array(offset)
+        (width, _), _ = cv2.getTextSize(text, _FONT, FINER * size, FINER)
+        self._stroke(point, place, INK, 0.8)
+        cv2.circle(self.image, _pixel(point), round(2.2 * FINER), INK, -1, cv2.LINE_AA)
+        left = place[0] + (FINER * 4 if offset[0] >= 0 else -width - FINER * 4)
+        self._write(text, np.array([left, place[1] + FINER * 5]), size)
+
+    def heading(self, text: str) -> None:
+        """Write what the panel shows into its upper left corner."""
+        self._write(text, FINER * np.array([12.0, 24.0]), 0.5)
+
+    def legend(self, entries: list[tuple[str, tuple]]) -> None:
+        """Name colours in the lower left corner."""
+        left, top = FINER * 12, self.image.shape[0] - FINER * 12
+        for text, color in entries:
+            rgb = tuple(int(255 * c) for c in color)
+            cv2.rectangle(self.image, (left, top - FINER * 10), (left + FINER * 10, top), rgb, -1)
+            self._write(text, np.array([left + FINER * 16, top]), 0.44)
+            left += FINER * 28 + cv2.getTextSize(text, _FONT, FINER * 0.44, FINER)[0][0]
+
+    def finished(self) -> np.ndarray:
+        """(H, W, 3) RGB."""
+        return cv2.resize(self.image, None, fx=1 / FINER, fy=1 / FINER, interpolation=cv2.INTER_AREA)
+
+    def _grid(self, middle: np.ndarray) -> None:
+        """Lines on the floor that fade with their distance from the middle."""
+        center = np.round(np.asarray(middle)[:2] / _STEP) * _STEP
+        across = np.arange(-_REACH, _REACH + 1e-6, _STEP)
+        along = np.linspace(-_REACH, _REACH, 101)
+        for axis in (0, 1):
+            for offset in across:
+                points = np.zeros((len(along), 3))
+                points[:, axis], points[:, 1 - axis] = along, offset
+                points[:, :2] += center
+                pixels = self.view.project(points)
+                fade = np.clip(1.3 - np.linalg.norm(points[:, :2] - middle[:2], axis=1) / _REACH * 1.3, 0, 1)
+                for k in range(len(along) - 1):
+                    color = fade[k] * np.array(GRID) + (1 - fade[k]) * np.array(GROUND)
+                    self._stroke(pixels[k], pixels[k + 1], tuple(color), 1.0)
+
+    def _shadow(self, vertices: np.ndarray, triangles: np.ndarray) -> None:
+        flat = vertices * [1, 1, 0]
+        both = np.concatenate([triangles, triangles[:, ::-1]])
+        covered = self._rasterized(self.view.to_camera(flat), both, (0.0, 0.0, 0.0)).coverage
+        covered &= ~np.isfinite(self._depth)  # a body that stands there hides it
+        soft = cv2.GaussianBlur(covered.astype(np.float32), (0, 0), 3.0 * FINER)[..., None]
+        self.image = (self.image * (1 - 0.28 * soft) + 0.5).astype(np.uint8)
+
+    def _rasterized(self, points_camera: np.ndarray, triangles: np.ndarray, color: tuple) -> Canvas:
+        canvas = Canvas.blank(*self.view.size)
+        rasterize(canvas, points_camera, triangles, np.array(color, np.float32), self.view.intrinsics)
+        return canvas
+
+    def _stroke(self, a: np.ndarray, b: np.ndarray, color: tuple, width: float) -> None:
+        if np.isfinite([a, b]).all() and np.abs([a, b]).max() < 1e5:
+            cv2.line(self.image, _pixel(a), _pixel(b), color, max(1, round(width * FINER)), cv2.LINE_AA)
+
+    def _write(self, text: str, at: np.ndarray, size: float) -> None:
+        cv2.putText(self.image, text, _pixel(at), _FONT, FINER * size, GROUND, 5 * FINER, cv2.LINE_AA)
+        cv2.putText(self.image, text, _pixel(at), _FONT, FINER * size, INK, round(1.4 * FINER), cv2.LINE_AA)
+
+
+def _pixel(at: np.ndarray) -> tuple[int, int]:
+    return round(float(at[0])), round(float(at[1]))

@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What stands in the pictures: the posed body of a motion, and a stick figure of true joints."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from ...scope_addon.capture.overlay import camera_vertices
+from ...scope_addon.motion import Motion
+from ...solver import Body
+
+STICKS = (
+    ("LShoulder", "RShoulder"), ("LHip", "RHip"), ("LShoulder", "LHip"), ("RShoulder", "RHip"),
+    ("LShoulder", "LElbow"), ("LElbow", "LWrist"), ("RShoulder", "RElbow"), ("RElbow", "RWrist"),
+    ("LHip", "LKnee"), ("LKnee", "LAnkle"), ("RHip", "RKnee"), ("RKnee", "RAnkle"),
+    ("LAnkle", "LHeel"), ("LHeel", "LBigToe"), ("RAnkle", "RHeel"), ("RHeel", "RBigToe"),
+    ("Neck", "Head"),
+)  # fmt: skip
+HIPS = (1, 2)  # SMPL's joints
+_SIDES = 12  # of a stick
+
+
+def posed(motion: Motion, body: Body, row: int) -> np.ndarray:
+    """(V, 3) the body's vertices at a row, metres, world."""
+    return to_world(motion, row, camera_vertices(motion, body, row))
+
+
+def joints(motion: Motion, row: int) -> np.ndarray:
+    """(K+1, 3) metres, world."""
+    return to_world(motion, row, motion.joints_cam[row])
+
+
+def to_world(motion: Motion, row: int, points_camera: np.ndarray) -> np.ndarray:
+    """Points of a row's camera frame in the motion's world."""
+    T = motion.world_from_camera[row]
+    return np.asarray(points_camera, float) @ T[:3, :3].T + T[:3, 3]
+
+
+def true_joints(motion: Motion, row: int, truth: Path) -> dict[str, np.ndarray]:
+    """Where the joints truly were, by name, the hips' middle laid on the captured one; world, metres.
+
+    The same alignment as MPJPE-root's: nothing is turned or scaled.
+
+    :raises ValueError: the truth does not have this frame.
+    """
+    with np.load(truth) as file:
+        rows = np.flatnonzero(file["frame_index"] == motion.frames[row])
+        if len(rows) == 0:
+            raise ValueError(f"{truth.name} does not have frame {motion.frames[row]}; choose another one")
+        found = dict(zip(map(str, file["names"]), file["joints"][rows[0]].astype(float), strict=True))
+    shift = motion.joints_cam[row, HIPS, :].mean(0) - (found["LHip"] + found["RHip"]) / 2
+    return {name: to_world(motion, row, p + shift) for name, p in found.items() if np.isfinite(p).all()}
+
+
+def stick_figure(points: dict[str, np.ndarray], radius: float) -> tuple[np.ndarray, np.ndarray]:
+    """A mesh of rods between joints: (V, 3) vertices and (F, 3) triangles, counter-clockwise from outside."""
+    rods = [_rod(points[a], points[b], radius) for a, b in STICKS if a in points and b in points]
+    vertices = np.concatenate([v for v, _ in rods])
+    first = np.cumsum([0] + [len(v) for v, _ in rods[:-1]])
+    return vertices, np.concatenate([t + k for (_, t), k in zip(rods, first, strict=True)])
+
+
+def _rod(a: np.ndarray, b: np.ndarray, radius: float) -> tuple[np.ndarray, np.ndarray]:
+    """A rod with round ends: rings of vertices whose radius follows a half circle at either end."""
+    length = np.linalg.norm(b - a)
+    axis = (b - a) / max(length, 1e-9)
+    across = np.cross(axis, np.eye(3)[np.argmin(abs(axis))])
+    across /= np.linalg.norm(across)
+    other = np.cross(axis, across)
+    round_end = np.linspace(0, np.pi / 2, 5)
+    along = np.concatenate([-np.cos(round_end) * radius, length + np.sin(round_end) * radius])
+    wide = np.concatenate([np.sin(round_end), np.cos(round_end)]) * radius
+    turn = 2 * np.pi * np.arange(_SIDES) / _SIDES
+    ring = np.cos(turn)[:, None] * across + np.sin(turn)[:, None] * other
+    vertices = a + along[:, None, None] * axis + wide[:, None, None] * ring
+    k, n = np.arange(_SIDES), np.roll(np.arange(_SIDES), -1)
+    quads = [np.stack([k, n, n + _SIDES, k + _SIDES], 1) + _SIDES * i for i in range(len(along) - 1)]
+    faces = np.concatenate(quads)
+    return vertices.reshape(-1, 3), np.concatenate([faces[:, [0, 1, 2]], faces[:, [0, 2, 3]]])

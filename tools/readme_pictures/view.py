@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Where a picture is taken from: the footage's own camera, cropped to the person, or one that looks from elsewhere."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...scope_addon.motion import Motion
+
+_FAR = 14.0  # metres from which level views are taken, so that lines along the view hardly converge
+
+
+@dataclass(frozen=True)
+class View:
+    """A pinhole camera in the motion's world (z up): K in pixels of a picture of ``size`` (width, height)."""
+
+    intrinsics: np.ndarray
+    world_from_camera: np.ndarray
+    size: tuple[int, int]
+
+    def to_camera(self, points_world: np.ndarray) -> np.ndarray:
+        """(..., 3) metres, OpenCV's axes."""
+        R, t = self.world_from_camera[:3, :3], self.world_from_camera[:3, 3]
+        return (points_world - t) @ R
+
+    def project(self, points_world: np.ndarray) -> np.ndarray:
+        """(..., 2) pixels; NaN behind the camera."""
+        points = self.to_camera(np.asarray(points_world, float))
+        depth = np.where(points[..., 2:] > 0.1, points[..., 2:], np.nan)
+        return (points / depth @ self.intrinsics.T)[..., :2]
+
+
+def from_the_camera(motion: Motion, row: int, points_world: np.ndarray, size: tuple[int, int], fill: float) -> View:
+    """The footage's camera at a row of the motion, cropped so that the points' image takes ``fill`` of the height."""
+    whole = View(motion.intrinsics, motion.world_from_camera[row], size)
+    pixels = whole.project(points_world)
+    low, high = pixels.min(0), pixels.max(0)
+    scale = min(fill * size[1] / (high[1] - low[1]), fill * size[0] / (high[0] - low[0]))
+    crop = np.array([[scale, 0, size[0] / 2], [0, scale, size[1] / 2], [0, 0, 1.0]])
+    crop[:2, 2] -= scale * (low + high) / 2
+    return View(crop @ motion.intrinsics, whole.world_from_camera, size)
+
+
+def from_around(
+    motion: Motion, row: int, center: np.ndarray, size: tuple[int, int], turn: float, height: float, pitch: float = 7.0
+) -> View:
+    """A camera that looks at ``center`` from far away.
+
+    :param turn: degrees around the vertical, away from the footage's camera; 90 sees the person from that camera's
+        right, -90 from its left.
+    :param height: metres that fill the picture's height at the center.
+    :param pitch: degrees by which it looks down.
+    """
+    toward = motion.world_from_camera[row, :3, 2] * [1, 1, 0]
+    toward = toward / np.linalg.norm(toward)
+    a, p = np.radians(turn), np.radians(pitch)
+    toward = np.array([[np.cos(a), -np.sin(a), 0], [np.sin(a), np.cos(a), 0], [0, 0, 1]]) @ toward
+    forward = np.cos(p) * toward - np.sin(p) * np.array([0, 0, 1.0])
+    right = np.cross(forward, [0, 0, 1.0])
+    right /= np.linalg.norm(right)
+    T = np.eye(4)
+    T[:3, :3] = np.stack([right, np.cross(forward, right), forward], axis=1)
+    T[:3, 3] = center - _FAR * forward
+    focal = size[1] * _FAR / height
+    return View(np.array([[focal, 0, size[0] / 2], [0, focal, size[1] / 2], [0, 0, 1.0]]), T, size)
