@@ -73,7 +73,7 @@ def _record(video: Path, body: Body, path: Path) -> None:
     with open_video(video, VideoRange()) as footage:
         camera = choose_camera(footage.width, footage.height, metadata_focal_mm=footage.focal_35mm)
         for frame in footage:
-            people.add(frame.index, frame.timestamp_s, tracker.step(frame.image_rgb))
+            people.add(frame.index, frame.timestamp_s, tracker.step(frame.image_rgb, time_s=frame.timestamp_s))
     tracks = people.build(1)
     if not tracks:
         raise NoPersonError(f"no person was found in {video}: the benchmark needs the clips of ../shared")

@@ -41,7 +41,7 @@ def replay(frames: int, people: int) -> dict[str, float]:
     with open_video(SAMPLE) as video:
         camera, size = choose_camera(video.width, video.height), (video.width, video.height)
         for frame in video:
-            seen.append([o for _, o in tracker.step(frame.image_rgb)][0])
+            seen.append([o for _, o in tracker.step(frame.image_rgb, time_s=frame.timestamp_s)][0])
     builder, fps = PeopleBuilder(), 30
     peaks["networks"] = peak_mib()
     for k in range(frames):

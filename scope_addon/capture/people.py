@@ -15,7 +15,7 @@ SHORTEST_SHARE = 0.02  # seen in fewer frames than this, a "person" is a mistake
 SHORTEST_S = 0.3  # the same for the longest time without interruption
 LEAST_PROMINENCE = 0.05  # of the most prominent person's
 MERGED = 0.25  # mean distance of the keypoints, in sides of the region, of somebody who is becoming somebody else
-LONGEST_MERGER = 12  # frames
+LONGEST_MERGER_S = 0.38
 SHORTEST_AGAIN_S = 0.1  # who was lost, seen again for less than this and lost again, was somebody or something else
 
 
@@ -48,7 +48,7 @@ class PeopleBuilder:
         tracklets = list(self._tracklets.values())
         for tracklet in tracklets:
             trim_flickering_end(tracklet, self._times)
-            trim_merged_end(tracklet, tracklets)
+            trim_merged_end(tracklet, tracklets, self._times)
         people = [[tracklets[k] for k in chain] for chain in link(tracklets, self._times)]
         people.sort(key=_prominence, reverse=True)
         counted = [person for person in people if self._is_believable(person)][:most]
@@ -63,7 +63,7 @@ class PeopleBuilder:
         return often and longest >= min(SHORTEST_S, 0.5 * span)
 
 
-def trim_merged_end(tracklet: Tracklet, others: Sequence[Tracklet]) -> None:
+def trim_merged_end(tracklet: Tracklet, others: Sequence[Tracklet], times: Sequence[float]) -> None:
     """Take off the last frames of a tracklet that slid onto somebody who goes on to be seen after its end.
 
     That is how a tracklet ends when its person goes behind somebody else: for some frames the network already sees a
@@ -77,9 +77,9 @@ def trim_merged_end(tracklet: Tracklet, others: Sequence[Tracklet]) -> None:
         if other is tracklet or not other.rows or other.rows[-1] <= end or other.rows[0] > end:
             continue
         at = {row: k for k, row in enumerate(other.rows)}
-        for k in range(len(tracklet.rows) - 1, max(len(tracklet.rows) - 1 - LONGEST_MERGER, 0), -1):
+        for k in range(len(tracklet.rows) - 1, 0, -1):
             j = at.get(tracklet.rows[k])
-            if j is None:
+            if j is None or times[end] - times[tracklet.rows[k]] > LONGEST_MERGER_S:
                 break
             apart = np.linalg.norm(tracklet.values[k][:, :2] - other.values[j][:, :2], axis=1).mean()
             if apart > MERGED * min(tracklet.sides_px[k], other.sides_px[j]):

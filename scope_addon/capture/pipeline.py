@@ -227,7 +227,7 @@ def _observe(
         with clock.stage("decode"):
             upcoming = next(frames, None)
         with clock.stage("networks"):
-            observations = tracker.step(frame.image_rgb, upcoming.image_rgb if upcoming else None)
+            observations = tracker.step(frame.image_rgb, upcoming.image_rgb if upcoming else None, frame.timestamp_s)
         if hands is not None:
             with clock.stage("hands"):
                 observations = hands.step(frame.image_rgb, observations)

@@ -43,19 +43,22 @@ LARGEST_SIDE = 6.0  # in longer sides of the image
 SAME_BODY = 0.1  # mean distance of the keypoints, in sides of the region, below which two bodies are one
 MOST_WITHIN = 0.5  # share of keypoints that somebody found with little certainty may have in another's box
 LEAP = 0.25  # the same, from where motion foretold: more in one frame may be another person
-SEARCH_FRAMES = 8  # between two looks for others who have come into the picture
-SEARCH_FRAMES_LARGEST = 20
-ESTABLISHED_FRAMES = 10
+FRAME_S = 1 / 30  # from one frame to the next where their times are not told
+SEARCH_S = 8 * FRAME_S  # between two looks for others who have come into the picture
+SEARCH_LARGEST_S = 20 * FRAME_S
+SEARCH_MISSED_S = 4 * FRAME_S  # while somebody is remembered who was lost
+ESTABLISHED_S = 10 * FRAME_S
 NEW_SURPRISE = 0.05  # what being new is as good as, see LEAP
-EAGER_FRAMES = 15  # how long a lost person is looked for in every frame
-MEMORY_FRAMES = 60  # how long in every fourth, and preferred over a stronger one
+EAGER_S = 15 * FRAME_S  # how long a lost person is looked for in every frame
+MEMORY_S = 60 * FRAME_S  # how long now and then, and preferred over a stronger one
 RIVAL_SIDE = 0.5  # who is smaller than this share of the largest will not be the most prominent person
 MOST_PEOPLE = 12
-JUDGE_FRAMES = 30  # between two looks of the strong network that tells left from right
-JUDGE_AGAIN_FRAMES = 8  # the same where left and right seem to have changed places
-DOUBT_FRAMES = 15  # how long the strong network stands in for a smaller one that loses the person, or left and right
+JUDGE_S = 30 * FRAME_S  # between two looks of the strong network that tells left from right
+JUDGE_AGAIN_S = 8 * FRAME_S  # the same where left and right seem to have changed places
+# How long the strong network stands in for a smaller one that loses the person, or left and right.
+DOUBT_S = 15 * FRAME_S
 MOST_JUDGED = 2  # looks of it that wait, each with its frame
-APPEARANCE_FRAMES = 4
+APPEARANCE_S = 4 * FRAME_S  # between two looks at the clothes
 # How the region is turned and sized in which somebody who was just lost is looked for, and what is believed there.
 _TURNS = tuple(k * math.pi / 6 for k in range(12))
 _TURNED_SIZES = (1.0, 1.35)
@@ -74,16 +77,24 @@ FORETOLD_CENTER, FORETOLD_SIDE, FORETOLD_TURN = 0.08, 0.12, 0.15
 
 @dataclass
 class _Followed:
-    """Somebody who was seen in the last frame, or lost ``lost`` frames ago."""
+    """Somebody who was seen in the last frame, or lost ``lost`` frames ago.
+
+    ``seen_s`` is the time of the frame in which they were seen last; ``followed_s`` for how long they were seen so far,
+    and on that clock are ``judged_s``, when the strong network looked, and ``clothes_s``, when their clothes were
+    looked at.
+    """
 
     tracklet: int
     estimate: PoseEstimate
     velocity_px: np.ndarray  # (2,) per frame, smoothed
-    age: int = 0
+    seen_s: float
+    age: int = 0  # frames
     lost: int = 0
-    since_judged: int = JUDGE_FRAMES
+    followed_s: float = 0.0
+    judged_s: float = -math.inf
+    clothes_s: float = -math.inf
     swapped: bool = False  # whether left and right changed places since the strong network looked
-    in_doubt: int = 0  # for how many more frames the strong network stands in
+    doubt_s: float = -math.inf  # the time since which the strong network stands in
     foreseen: Future[PoseEstimate] | None = None  # in the next frame, where it was expected
 
     @property
@@ -105,13 +116,14 @@ class _Followed:
         foretold = self.estimate.keypoints_px + self.velocity_px * max(self.lost, 1)
         return _apart(estimate.keypoints_px, foretold) / self.estimate.region.side_px
 
-    def go_on(self, estimate: PoseEstimate, swapped: bool) -> None:
+    def go_on(self, estimate: PoseEstimate, swapped: bool, time_s: float, step_s: float) -> None:
         """Be there in this frame; ``swapped``: left and right changed places since the one before."""
         step = (estimate.keypoints_px - self.estimate.keypoints_px).mean(axis=0)
         memory = min(_VELOCITY_MEMORY, self.age / (self.age + 1))
         self.velocity_px = memory * self.velocity_px + (1 - memory) * step
         self.swapped |= swapped
-        self.estimate, self.age, self.since_judged = estimate, self.age + 1, self.since_judged + 1
+        self.estimate, self.age = estimate, self.age + 1
+        self.seen_s, self.followed_s = time_s, self.followed_s + step_s
 
 
 class PeopleTracker:
@@ -160,17 +172,22 @@ class PeopleTracker:
         self._live: list[_Followed] = []
         self._lost: list[_Followed] = []
         self._tracklets = 0
-        self._since_search = 10**9
+        self._time_s, self._step_s = -math.inf, FRAME_S
+        self._searched_s = -math.inf
 
-    def step(self, image_rgb: np.ndarray, upcoming_rgb: np.ndarray | None = None) -> list[tuple[int, Observation]]:
+    def step(
+        self, image_rgb: np.ndarray, upcoming_rgb: np.ndarray | None = None, time_s: float | None = None
+    ) -> list[tuple[int, Observation]]:
         """Everybody in the next frame, (H, W, 3) uint8 RGB, each with the number of the tracklet.
 
-        The detector runs when somebody was lost and, for those who come in, every few frames. With ``upcoming_rgb``,
-        the frame after it, people are looked for in both at once, in parallel, in the second one where motion foretells
-        them: what is found there counts only if this frame then says to look at the same place.
+        The detector runs when somebody was lost and, for those who come in, now and then. With ``upcoming_rgb``, the
+        frame after it, people are looked for in both at once, in parallel, in the second one where motion foretells
+        them: what is found there counts only if this frame then says to look at the same place. ``time_s``: when the
+        frame is shown; without it, a thirtieth of a second after the one before.
         """
         if image_rgb.ndim != 3 or image_rgb.shape[2] != 3 or image_rgb.dtype != np.uint8:
             raise ShapeError(f"A frame must be (H, W, 3) uint8 RGB, but got {image_rgb.shape} {image_rgb.dtype}.")
+        self._go_to(time_s)
         self._follow(image_rgb, upcoming_rgb)
         self._look_round(image_rgb)
         if self._search_is_due():
@@ -178,17 +195,34 @@ class PeopleTracker:
         judged = self._ask_judge(image_rgb)
         return [(f.tracklet, self._observe(image_rgb, f, judged.get(f.tracklet))) for f in self._live]
 
+    def _go_to(self, time_s: float | None) -> None:
+        """The clock, to the frame at hand."""
+        before, is_first = self._time_s, self._time_s == -math.inf
+        if time_s is None:
+            time_s = 0.0 if is_first else before + FRAME_S
+        if not is_first and time_s > before:
+            self._step_s = time_s - before
+        self._time_s = time_s
+
+    def _has_passed(self, interval_s: float, elapsed_s: float) -> bool:
+        """Whether this frame is the one nearest to the end of an interval, or a later one."""
+        return elapsed_s + self._step_s / 2 >= interval_s
+
+    def _is_missed(self, lost: _Followed, for_s: float) -> bool:
+        """Whether somebody was lost so short a time ago; the frame nearest to the end counts."""
+        return self._time_s - lost.seen_s - self._step_s / 2 <= for_s
+
     def _follow(self, image_rgb: np.ndarray, upcoming_rgb: np.ndarray | None) -> None:
         """Move everybody who was seen in the frame before on to this one; the others are lost."""
         for lost in self._lost:
             lost.lost += 1
-        self._lost = [lost for lost in self._lost if lost.lost <= MEMORY_FRAMES]
+        self._lost = [lost for lost in self._lost if self._is_missed(lost, MEMORY_S)]
         found = self._look_ahead(image_rgb, upcoming_rgb)
         settled = [self._settled(image_rgb, f, e) for f, e in zip(self._live, found, strict=True)]
         seen = [(f, e, swap, f.surprise(e)) for f, (e, swap) in zip(self._live, settled, strict=True) if e is not None]
         # Two on one body: somebody went behind somebody else. It belongs to whom it does not surprise; but of a body
         # that has long been followed and one that was found just now, as little surprised, the latter was a mistake.
-        seen.sort(key=lambda entry: (entry[3] > LEAP, entry[3] + _newness(entry[0])))
+        seen.sort(key=lambda entry: (entry[3] > LEAP, entry[3] + self._newness(entry[0])))
         kept: list[_Followed] = []
         accepted: list[PoseEstimate] = []
         for followed, estimate, swapped, surprise in seen:
@@ -199,12 +233,16 @@ class PeopleTracker:
                 kept.append(self._start(estimate))
                 self._lose(followed)
             else:
-                followed.go_on(estimate, swapped)
+                followed.go_on(estimate, swapped, self._time_s, self._step_s)
                 kept.append(followed)
         for followed in self._live:
             if followed not in kept and followed not in self._lost:
                 self._lose(followed)
         self._live = sorted(kept, key=lambda f: f.tracklet)
+
+    def _newness(self, followed: _Followed) -> float:
+        """Falls from NEW_SURPRISE to 0 while somebody becomes established."""
+        return NEW_SURPRISE * (1 - min(followed.followed_s / ESTABLISHED_S, 1.0))
 
     def _look_ahead(self, image_rgb: np.ndarray, upcoming_rgb: np.ndarray | None) -> list[PoseEstimate | None]:
         """Everybody who is followed in this frame, while the looks at the upcoming one begin."""
@@ -236,10 +274,9 @@ class PeopleTracker:
         if self._stand_in is None:
             return estimate, swapped
         if estimate is None or swapped:
-            followed.in_doubt = DOUBT_FRAMES
-        if followed.in_doubt == 0:
+            followed.doubt_s = self._time_s
+        if self._has_passed(DOUBT_S, self._time_s - followed.doubt_s):
             return estimate, swapped
-        followed.in_doubt -= 1
         region = followed.estimate.next_region
         if not _is_in_image(region, image_rgb):
             return estimate, swapped
@@ -255,7 +292,7 @@ class PeopleTracker:
         Whoever has gone behind somebody else is not looked for: what shows there is somebody else. Nor is who walked
         out of the picture.
         """
-        for lost in [f for f in self._lost if f.lost <= EAGER_FRAMES and f.age > 5]:
+        for lost in [f for f in self._lost if self._is_missed(f, EAGER_S) and f.age > 5]:
             if len(self._live) >= self._most:
                 return
             if _share_in_picture(lost.estimate, image_rgb) < LEAVING_SHARE:
@@ -273,25 +310,23 @@ class PeopleTracker:
             found = [e for e in found if _shows(e, image_rgb) and not any(same_body(e, f.estimate) for f in self._live)]
             nearest = min(found, key=lost.surprise, default=None)
             if nearest is not None and lost.surprise(nearest) <= _TURNED_LEAP:
-                lost.go_on(nearest, looks_swapped(lost.estimate, nearest))
+                lost.go_on(nearest, looks_swapped(lost.estimate, nearest), self._time_s, self._step_s)
                 lost.lost = 0
                 self._lost.remove(lost)
                 self._live.append(lost)
 
     def _search_is_due(self) -> bool:
-        self._since_search += 1
-        missed = [f.lost for f in self._lost]
-        if not self._live or any(n <= EAGER_FRAMES for n in missed):
+        if not self._live or any(self._is_missed(f, EAGER_S) for f in self._lost):
             return True
-        every = SEARCH_FRAMES_LARGEST if self._largest_only else SEARCH_FRAMES
-        return self._since_search >= (min(every, 4) if missed else every)
+        every_s = SEARCH_LARGEST_S if self._largest_only else SEARCH_S
+        return self._has_passed(SEARCH_MISSED_S if self._lost else every_s, self._time_s - self._searched_s)
 
     def _search(self, image_rgb: np.ndarray) -> None:
         """Start a tracklet for every believable body that the detector finds and that is not followed yet.
 
         Each is looked at twice: the landmarks know better than the detector where the body lies.
         """
-        self._since_search = 0
+        self._searched_s = self._time_s
         detections = [d for d in self._ranked(self._detect(image_rgb)) if self._may_be_new(d.region)]
         detections = detections[: 3 if self._largest_only else 2 * self._most]
         if not detections:
@@ -346,7 +381,7 @@ class PeopleTracker:
 
     def _start(self, estimate: PoseEstimate) -> _Followed:
         self._tracklets += 1
-        return _Followed(self._tracklets - 1, estimate, np.zeros(2))
+        return _Followed(self._tracklets - 1, estimate, np.zeros(2), self._time_s)
 
     def _lose(self, followed: _Followed) -> None:
         followed.lost = 1
@@ -361,9 +396,10 @@ class PeopleTracker:
             return {}
         looks = {}
         for followed in self._live:
-            if followed.since_judged < (JUDGE_AGAIN_FRAMES if followed.swapped else JUDGE_FRAMES):
+            every_s = JUDGE_AGAIN_S if followed.swapped else JUDGE_S
+            if not self._has_passed(every_s, followed.followed_s - followed.judged_s):
                 continue
-            followed.since_judged, followed.swapped = 0, False
+            followed.judged_s, followed.swapped = followed.followed_s, False
             self._judging = [look for look in self._judging if not look.done()]
             if len(self._judging) >= MOST_JUDGED:
                 self._judging[0].result()
@@ -379,7 +415,9 @@ class PeopleTracker:
 
     def _observe(self, image_rgb: np.ndarray, followed: _Followed, judged: Judgement | None) -> Observation:
         e = followed.estimate
-        look = followed.age % APPEARANCE_FRAMES == 0
+        look = self._has_passed(APPEARANCE_S, followed.followed_s - followed.clothes_s)
+        if look:
+            followed.clothes_s = followed.followed_s
         return Observation(
             e.keypoints_px,
             e.keypoints_confidence,
@@ -436,11 +474,6 @@ def _share_in_picture(estimate: PoseEstimate, image_rgb: np.ndarray) -> float:
 
 def _apart(a: np.ndarray, b: np.ndarray) -> float:
     return float(np.linalg.norm(a - b, axis=-1).mean())
-
-
-def _newness(followed: _Followed) -> float:
-    """Falls from NEW_SURPRISE to 0 while somebody becomes established."""
-    return NEW_SURPRISE * (1 - min(followed.age / ESTABLISHED_FRAMES, 1.0))
 
 
 def _same_place(a: Region, b: Region) -> bool:

@@ -26,14 +26,14 @@ FPS = 30
 
 @pytest.fixture
 def follow(monkeypatch: pytest.MonkeyPatch) -> Callable[..., list[Track]]:
-    """``follow(people, count, wanted=None)``: the tracks of the invented people."""
+    """``follow(people, count, wanted=None, fps=30)``: the tracks of the invented people."""
 
-    def run(people: list[Person], count: int, wanted: int | None = None) -> list[Track]:
+    def run(people: list[Person], count: int, wanted: int | None = None, fps: float = FPS) -> list[Track]:
         monkeypatch.setattr(tracker_module, "LandmarkNetwork", lambda name, *_: FakeLandmarks(people, "heavy" in name))
         monkeypatch.setattr(tracker_module, "PersonDetector", lambda *_: FakeDetector(people))
         tracker, builder = PeopleTracker("fast", 1, wanted), PeopleBuilder()
         for t, image in enumerate(pictures(people, count)):
-            builder.add(t, t / FPS, tracker.step(image))
+            builder.add(t, t / fps, tracker.step(image, time_s=t / fps))
         return builder.build(wanted or 1)
 
     return run
@@ -78,8 +78,36 @@ def test_a_person_who_comes_and_goes(follow: Callable[..., list[Track]]) -> None
     assert len(tracks) == 2
     assert [who(track, [stays, visits]) for track in tracks] == [{0}, {1}]
     seen = np.flatnonzero(tracks[1].seen)
-    assert 40 <= seen[0] <= 49  # the others are looked for every eighth frame
+    assert 40 <= seen[0] <= 49  # the others are looked for every 0.27 s
     assert seen[-1] == 99
+
+
+@pytest.mark.parametrize("fps", [5, 24, 30, 60, 120])
+@pytest.mark.parametrize(("wanted", "within_s"), [(4, 0.27), (None, 0.67)], ids=["all", "largest"])
+def test_a_newcomer_is_found_as_soon_at_any_rate(
+    follow: Callable[..., list[Track]], fps: int, wanted: int | None, within_s: float
+) -> None:
+    """Half a frame later at most."""
+    first = Person(lambda t: (300, 200), BLUE, size_px=70)
+    second = Person(lambda t: (900, 200) if t >= fps else None, RED)
+    tracks = follow([first, second], 6 * fps, wanted, fps)
+    (track,) = (track for track in tracks if who(track, [first, second]) == {1})
+    comes, found = np.ceil(fps) / fps, track.times[track.seen][0]
+    assert comes <= found <= 1 + within_s + 0.5 / fps
+
+
+@pytest.mark.parametrize("fps", [5, 24, 30, 60, 120])
+def test_the_networks_look_as_often_at_any_rate(monkeypatch: pytest.MonkeyPatch, fps: int) -> None:
+    """For newcomers every 0.27 s, or in every frame; left and right once a second; the clothes every 0.13 s."""
+    people = [Person(lambda t: (300, 200), BLUE)]
+    detector = FakeDetector(people)
+    monkeypatch.setattr(tracker_module, "LandmarkNetwork", lambda name, *_: FakeLandmarks(people, "heavy" in name))
+    monkeypatch.setattr(tracker_module, "PersonDetector", lambda *_: detector)
+    tracker = PeopleTracker("fast", 1, 2)
+    seen = [tracker.step(image, time_s=t / fps)[0][1] for t, image in enumerate(pictures(people, 4 * fps))]
+    assert abs(detector.calls - 4 * fps / max(1, round(fps * 8 / 30))) <= 1
+    assert [t / fps for t, o in enumerate(seen) if o.judged_landmarks is not None] == [0.0, 1.0, 2.0, 3.0]
+    assert abs(sum(o.appearance is not None for o in seen) - 4 * fps / max(1, round(fps * 4 / 30))) <= 1
 
 
 def test_known_again_by_the_clothes_after_a_long_time(follow: Callable[..., list[Track]]) -> None:
@@ -231,6 +259,25 @@ def composite(shared: Path, cameras: tuple[str, str], crossing: bool) -> Iterato
         yield image, places, bool(x[1] < places[0, 0] < x[1] + 400)
 
 
+@pytest.mark.parametrize("every", [2, 12], ids=["30 fps", "5 fps"])
+def test_a_real_newcomer_is_found_as_soon_at_any_rate(shared: Path, every: int) -> None:
+    try:
+        tracker = PeopleTracker("fast", threads=2, people=4)
+    except SetupError as error:
+        pytest.skip(f"the networks are not built: {error}")
+    comes_s, found_s = 0.5, None
+    for t, (image, places, _) in enumerate(composite(shared, ("cam1", "cam3"), crossing=False)):
+        if t / 60 < comes_s:
+            image[:, 700:] = 140
+        if t % every or found_s is not None:
+            continue
+        hips = [o.keypoints_px[[23, 24]].mean(axis=0) for _, o in tracker.step(image, time_s=t / 60)]
+        if any(np.linalg.norm(place - places[1]) < 80 for place in hips):
+            found_s = t / 60
+    assert found_s is not None
+    assert comes_s <= found_s <= comes_s + 0.27 + every / 60
+
+
 @pytest.mark.parametrize(
     ("cameras", "crossing"), [(("cam2", "cam3"), True), (("cam4", "cam1"), True), (("cam1", "cam3"), False)]
 )
@@ -242,7 +289,7 @@ def test_real_people_are_never_mixed_up(shared: Path, cameras: tuple[str, str], 
         pytest.skip(f"the networks are not built: {error}")
     places, hidden = [], []
     for t, (image, at, is_hidden) in enumerate(composite(shared, cameras, crossing)):
-        builder.add(t, t / 60, tracker.step(image))
+        builder.add(t, t / 60, tracker.step(image, time_s=t / 60))
         places.append(at)
         hidden.append(is_hidden)
     truth, visible = np.array(places), ~np.array(hidden)
