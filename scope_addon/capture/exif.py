@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What capture needs from a picture's EXIF data: which way is up, and the focal length.
+"""What capture needs to know of a picture's file: which way is up, the focal length, and whether it is an animation.
 
 EXIF is a TIFF directory wherever it lies: the whole of a .tif, the APP1 segment of a JPEG, the eXIf chunk of a PNG,
 the EXIF chunk of a WebP. Anything damaged counts as absent: a picture without EXIF is still a picture.
@@ -8,6 +8,7 @@ the EXIF chunk of a WebP. Anything damaged counts as absent: a picture without E
 from __future__ import annotations
 
 import struct
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 _ORIENTATION, _EXIF_DIRECTORY, _FOCAL_35MM = 0x0112, 0x8769, 0xA405  # tag numbers of the EXIF 2.3 standard
@@ -31,13 +32,23 @@ def read_exif(data: bytes) -> Exif:
         return Exif()
 
 
+def animation_length(data: bytes) -> int:
+    """How many pictures follow each other in an animated PNG or WebP; 1 for every other picture."""
+    if data[:8] == b"\x89PNG\r\n\x1a\n":
+        control = next((d for name, d in _png_chunks(data) if name == b"acTL"), b"")
+        return max(1, int.from_bytes(control[:4], "big"))
+    if data[:4] == b"RIFF" and data[8:12] == b"WEBP":
+        return max(1, sum(name == b"ANMF" for name, _ in _riff_chunks(data)))
+    return 1
+
+
 def _find_tiff(data: bytes) -> bytes:
     if data[:2] == b"\xff\xd8":
         return _jpeg_app1(data)
     if data[:8] == b"\x89PNG\r\n\x1a\n":
-        return _chunk(data, 8, b"eXIf", ">", name_first=False, trailer=4)
+        return next((d for name, d in _png_chunks(data) if name == b"eXIf"), b"")
     if data[:4] == b"RIFF" and data[8:12] == b"WEBP":
-        found = _chunk(data, 12, b"EXIF", "<", name_first=True, trailer=0)
+        found = next((d for name, d in _riff_chunks(data) if name == b"EXIF"), b"")
         return found[6:] if found[:6] == b"Exif\0\0" else found
     return data if data[:4] in (b"II*\0", b"MM\0*") else b""
 
@@ -52,15 +63,22 @@ def _jpeg_app1(data: bytes) -> bytes:
     return b""
 
 
-def _chunk(data: bytes, at: int, name: bytes, endian: str, name_first: bool, trailer: int) -> bytes:
-    """First chunk called ``name``: PNG writes (size, name, data, checksum), RIFF (name, size, data, pad to even)."""
-    name_at, size_at = (0, 4) if name_first else (4, 0)
+def _png_chunks(data: bytes) -> Iterator[tuple[bytes, bytes]]:
+    """Name and content of each chunk: (size, name, data, checksum)."""
+    at = 8
     while at + 8 <= len(data):
-        size = struct.unpack_from(endian + "I", data, at + size_at)[0]
-        if data[at + name_at : at + name_at + 4] == name:
-            return data[at + 8 : at + 8 + size]
-        at += 8 + size + trailer + (size % 2 if name_first else 0)
-    return b""
+        size = int.from_bytes(data[at : at + 4], "big")
+        yield data[at + 4 : at + 8], data[at + 8 : at + 8 + size]
+        at += 12 + size
+
+
+def _riff_chunks(data: bytes) -> Iterator[tuple[bytes, bytes]]:
+    """The same of a WebP: (name, size, data, padding to an even size)."""
+    at = 12
+    while at + 8 <= len(data):
+        size = int.from_bytes(data[at + 4 : at + 8], "little")
+        yield data[at : at + 4], data[at + 8 : at + 8 + size]
+        at += 8 + size + size % 2
 
 
 def _parse(tiff: bytes) -> Exif:

@@ -3,26 +3,61 @@
 
 from __future__ import annotations
 
+import math
 import re
+from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 
-import cv2
 import numpy as np
 
 from ...solver.errors import VideoError
 from ..footage import LAST_NUMBER, PICTURE_SUFFIXES, is_sequence, pictures_in, sequence_pattern
+from .picture import read_picture
 
 _NUMBER_SIGN = re.compile(r"#+|%0?\d*d")
 
 
-def find_pictures(path: Path, rate_given: bool) -> list[Path]:
-    """The pictures of a sequence in order of their numbers; empty where the path is no sequence.
+@dataclass(frozen=True)
+class PictureSequence:
+    """Numbered pictures in order, and the place of each in time: picture k is shown at ``places[k]`` / fps seconds.
+
+    Places follow from the numbers, so that time goes on where pictures are missing; numbers in steps of ten are taken
+    for ones in steps of one. Where more than half are missing the numbers count something else, and are only an order.
+    """
+
+    paths: list[Path]
+    places: list[int]
+    warnings: list[str]
+
+    @classmethod
+    def of(cls, paths: list[Path], name: str) -> PictureSequence:
+        """Of pictures in order of their last numbers; ``name`` is what warnings call them."""
+        found = [LAST_NUMBER.search(path.stem) for path in paths]
+        numbers = [int(match.group()) if match else 0 for match in found]
+        step = math.gcd(*(number - numbers[0] for number in numbers)) or 1
+        places = [(number - numbers[0]) // step for number in numbers]
+        missing = places[-1] + 1 - len(paths)
+        if missing <= 0:
+            return cls(paths, places, [])
+        between = f"{name}: {missing} numbers between {numbers[0]} and {numbers[-1]} have no picture"
+        if 2 * missing > places[-1] + 1:
+            return cls(paths, list(range(len(paths))), [f"{between}, so the pictures were taken one after the other"])
+        return cls(paths, places, [f"{between}; the time that they would take is left for them"])
+
+    def time(self, index: int, fps: Fraction) -> float:
+        """Seconds at which a picture is shown."""
+        return float(self.places[index] / fps)
+
+
+def find_sequence(path: Path, rate_given: bool) -> PictureSequence | None:
+    """The pictures of a sequence; None where the path is no sequence.
 
     A folder or a pattern is one. A single picture stands for itself, unless a rate is given and others follow it.
 
     :raises VideoError: a folder's pictures differ in more than their last number.
     """
+    found: list[Path] = []
     if path.is_dir():
         found = pictures_in(path)
         if len(found) > 1 and not is_sequence(found):
@@ -31,39 +66,35 @@ def find_pictures(path: Path, rate_given: bool) -> list[Path]:
                 f"{path} holds pictures that are no numbered sequence ({', '.join(sorted(kinds.values())[:3])}, …); "
                 "give the pattern of the one that is meant, such as walk_####.png, or a single picture"
             )
-        return found
-    sign = _NUMBER_SIGN.search(path.name)
-    if sign and not path.exists() and path.parent.is_dir():
-        return _matching(path.parent, path.name[: sign.start()], path.name[sign.end() :], first=0)
-    number = LAST_NUMBER.search(path.stem)
-    if rate_given and number and path.is_file() and cv2.haveImageReader(str(path)):
+    elif (sign := _NUMBER_SIGN.search(path.name)) and not path.exists() and path.parent.is_dir():
+        found = _matching(path.parent, path.name[: sign.start()], path.name[sign.end() :], first=0)
+    elif rate_given and (number := LAST_NUMBER.search(path.stem)) and path.is_file():
         before, after = path.stem[: number.start()], path.stem[number.end() :] + path.suffix
-        found = _matching(path.parent, before, after, first=int(number.group()))
-        return found if len(found) > 1 else []
-    return []
+        following = _matching(path.parent, before, after, first=int(number.group()))
+        found = following if len(following) > 1 else []
+    return PictureSequence.of(found, path.name) if found else None
 
 
-class PictureReader:
+class SequenceReader:
     """The pictures one after the other, as ``video`` reads a file: ``read``, ``skip_to``, ``close``."""
 
-    def __init__(self, pictures: list[Path], fps: Fraction) -> None:
-        self._pictures, self._fps, self._next = pictures, fps, 0
+    def __init__(self, sequence: PictureSequence, fps: Fraction) -> None:
+        self._sequence, self._fps, self._next = sequence, fps, 0
 
     def read(self) -> tuple[float, np.ndarray] | None:
         """Next picture: seconds and RGB; None after the last one, or where one cannot be decoded."""
-        if self._next >= len(self._pictures):
+        if self._next >= len(self._sequence.paths):
             return None
-        data = np.frombuffer(self._pictures[self._next].read_bytes(), np.uint8)
-        image = cv2.imdecode(data, cv2.IMREAD_COLOR) if len(data) else None
-        if image is None:
+        picture = read_picture(self._sequence.paths[self._next])
+        if picture is None:
             return None
-        time = float(self._next / self._fps)
+        time = self._sequence.time(self._next, self._fps)
         self._next += 1
-        return time, cv2.cvtColor(image, cv2.COLOR_BGR2RGB)
+        return time, picture.rgb
 
     def skip_to(self, seconds: float, fps: Fraction) -> int:
         """Go to the first picture at or after that time; returns its index."""
-        while self._next < len(self._pictures) and float(self._next / fps) < seconds - 1e-6:
+        while self._next < len(self._sequence.paths) and self._sequence.time(self._next, fps) < seconds - 1e-6:
             self._next += 1
         return self._next
 

@@ -27,16 +27,15 @@ import cv2
 import numpy as np
 
 from ...solver.errors import VideoError
-from .exif import read_exif
 from .frame_readers import FrameReader, open_reader
-from .image_sequence import PictureReader, find_pictures
+from .image_sequence import PictureSequence, SequenceReader, find_sequence
+from .picture import is_picture, read_picture
 from .quicktime import focal_35mm
 from .video_range import VideoRange, Wanted
 
 cv2.setLogLevel(0)  # silent: failures are reported by exception, in one sentence
 
 STILL_FPS = Fraction(30)  # a picture has no rate; one frame of the commonest does no harm in a scene
-_JPEG_STREAMS = (".mjpeg", ".mjpg")  # begin like a picture, but are many
 _AHEAD = 4  # decoded frames waiting: a 4K frame takes 25 MB
 _STANDARD_RATES = [Fraction(n) for n in (24, 25, 30, 48, 50, 60, 120, 240)]
 _STANDARD_RATES += [Fraction(n * 1000, 1001) for n in (24, 30, 48, 60, 120, 240)]
@@ -70,7 +69,7 @@ class Video:
     warnings: list[str] = field(default_factory=list)
     wanted: VideoRange = field(default_factory=VideoRange)
     _source_fps: Fraction | None = field(default=None, repr=False)
-    _pictures: list[Path] = field(default_factory=list, repr=False)
+    _sequence: PictureSequence | None = field(default=None, repr=False)
     _still: np.ndarray | None = field(default=None, repr=False)
     _decoders: list[_Decoder] = field(default_factory=list, repr=False)
 
@@ -82,6 +81,9 @@ class Video:
     @property
     def expected_frames(self) -> int:
         """How many frames an iteration gives, as far as the container is right."""
+        if self._sequence is not None:
+            times = [self._sequence.time(k, self.fps) for k in range(self.frame_count)]
+            return max(1, sum(self.wanted.start_s - 1e-6 <= t <= self.wanted.end_s + 1e-6 for t in times))
         length = self.frame_count / self.source_fps
         start, end = Fraction(self.wanted.start_s), Fraction(min(self.wanted.end_s, float(length)))
         return max(1, round((min(end, length) - start) * self.fps))
@@ -108,7 +110,7 @@ class Video:
 
 
 def open_video(path: str | Path, wanted: Wanted | None = None) -> Video:
-    """Open a video or a picture (JPEG, PNG, WebP, TIFF, BMP, ...; 16-bit and alpha too) and decode its first frame.
+    """Open a video or a picture (JPEG, PNG, WebP, TIFF, AVIF, ...; 16-bit and alpha too) and decode its first frame.
 
     Numbered pictures are a video as well (`image_sequence`); what is wanted then says their rate, else it is 30.
 
@@ -116,9 +118,9 @@ def open_video(path: str | Path, wanted: Wanted | None = None) -> Video:
     """
     path = Path(path)
     wanted = wanted or VideoRange()
-    pictures = find_pictures(path, wanted.fps is not None)
-    if pictures:
-        return _open_sequence(path, pictures, wanted)
+    sequence = find_sequence(path, wanted.fps is not None)
+    if sequence:
+        return _open_sequence(path, sequence, wanted)
     if path.is_dir():
         raise VideoError(
             f"{path} is a folder without a picture; give a video, a picture or a folder of pictures,"
@@ -136,61 +138,46 @@ def open_video(path: str | Path, wanted: Wanted | None = None) -> Video:
         raise VideoError(f"{path} cannot be read ({error.strerror}); check its permissions") from error
     if size == 0:
         raise VideoError(f"{path} is empty (0 bytes); export or download it again")
-    picture = cv2.haveImageReader(str(path)) and path.suffix.lower() not in _JPEG_STREAMS
-    return _open_still(path) if picture else _open_moving(path, wanted)
+    return _open_still(path, wanted) if is_picture(path) else _open_moving(path, wanted)
 
 
-def _open_sequence(path: Path, pictures: list[Path], asked: Wanted) -> Video:
+def _open_sequence(path: Path, sequence: PictureSequence, asked: Wanted) -> Video:
     fps = asked.fps or STILL_FPS
     wanted = asked.at_rate(fps)
-    first = PictureReader(pictures, fps).read()
+    first = read_picture(sequence.paths[0])
     if first is None:
-        raise VideoError(f"{pictures[0]} is a picture that cannot be decoded; it may be damaged, so export it again")
-    height, width = first[1].shape[:2]
-    focal_mm = read_exif(pictures[0].read_bytes()).focal_35mm
-    video = Video(path, width, height, fps, len(pictures), focal_mm, wanted=replace(wanted, fps=None))
-    video._pictures = pictures
-    if wanted.fps is None and len(pictures) > 1:
-        video.warnings.append(f"{path.name}: pictures have no frame rate, so 30 a second were taken; say --fps")
+        raise _damaged(sequence.paths[0])
+    height, width = first.rgb.shape[:2]
+    count = len(sequence.paths)
+    video = Video(path, width, height, fps, count, first.focal_35mm, wanted=replace(wanted, fps=None))
+    video._sequence = sequence
+    video.warnings += sequence.warnings
+    if asked.fps is None and count > 1:
+        video.warnings.append(
+            f"{path.name}: pictures have no frame rate, so 30 a second were taken; another is said by --fps on the "
+            "command line"
+        )
     return video
 
 
-def _open_still(path: Path) -> Video:
-    data = path.read_bytes()
-    try:
-        image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
-    except cv2.error:
-        image = None
-    if image is None:
-        raise VideoError(f"{path} is a picture that cannot be decoded; it may be damaged, so export it again")
-    exif = read_exif(data)
-    rgb = _as_rgb8(image)
-    if data[:4] not in (b"II*\0", b"MM\0*"):  # OpenCV turns a TIFF upright even when told not to
-        rgb = _upright(rgb, exif.orientation)
-    height, width = rgb.shape[:2]
-    return Video(path, width, height, STILL_FPS, 1, exif.focal_35mm, is_still=True, _still=rgb)
+def _open_still(path: Path, asked: Wanted) -> Video:
+    picture = read_picture(path)
+    if picture is None:
+        raise _damaged(path)
+    height, width = picture.rgb.shape[:2]
+    video = Video(path, width, height, STILL_FPS, 1, picture.focal_35mm, is_still=True, _still=picture.rgb)
+    if asked != VideoRange():
+        video.warnings.append(f"{path.name} is a single picture: a start, an end or a frame rate changes nothing")
+    if picture.length > 1:
+        video.warnings.append(
+            f"{path.name} is an animation of {picture.length} pictures, of which the first alone was captured; "
+            "convert it to an .mp4 or a .gif for all of them"
+        )
+    return video
 
 
-def _as_rgb8(image: np.ndarray) -> np.ndarray:
-    """Grey, BGR or BGRA of any depth -> RGB uint8; what is transparent shows white."""
-    if image.dtype == np.uint16:
-        image = cv2.convertScaleAbs(image, alpha=1 / 257)
-    elif image.dtype != np.uint8:
-        image = (np.clip(np.nan_to_num(image), 0, 1) * 255 + 0.5).astype(np.uint8)
-    if image.ndim == 2:
-        return cv2.cvtColor(image, cv2.COLOR_GRAY2RGB)
-    if image.shape[2] == 4:
-        alpha = image[:, :, 3:].astype(np.float32) / 255
-        image = (image[:, :, :3] * alpha + 255 * (1 - alpha) + 0.5).astype(np.uint8)
-    return cv2.cvtColor(image, cv2.COLOR_BGR2RGB)
-
-
-def _upright(image: np.ndarray, orientation: int) -> np.ndarray:
-    """Undo an EXIF orientation (1..8)."""
-    if orientation in (5, 6, 7, 8):
-        image = image.transpose(1, 0, 2)
-    vertical, horizontal = orientation in (3, 4, 7, 8), orientation in (2, 3, 6, 7)
-    return np.ascontiguousarray(image[:: -1 if vertical else 1, :: -1 if horizontal else 1])
+def _damaged(picture: Path) -> VideoError:
+    return VideoError(f"{picture} is a picture that cannot be decoded; it may be damaged, so export it again")
 
 
 def _open_moving(path: Path, asked: Wanted) -> Video:
@@ -284,15 +271,15 @@ class _Decoder:
 
     def _run(self) -> None:
         try:
-            pictures = self._video._pictures
-            source = PictureReader(pictures, self._video.fps) if pictures else open_reader(self._video.path)
+            sequence = self._video._sequence
+            source = SequenceReader(sequence, self._video.fps) if sequence else open_reader(self._video.path)
             with closing(source) as reader:
                 self._decode(reader)
             self._put(None)
         except Exception as error:  # carried to the thread that iterates, which raises it
             self._put(error)
 
-    def _decode(self, reader: FrameReader | PictureReader) -> None:
+    def _decode(self, reader: FrameReader | SequenceReader) -> None:
         video, index, time = self._video, 0, 0.0
         chooser = video.wanted.chooser()
         resized = False

@@ -20,7 +20,14 @@ from pathlib import Path
 from typing import IO
 
 from ...solver.errors import InputError, NoPersonError, OutputError, UsageError
-from ..footage import FOOTAGE_SUFFIXES, PICTURE_SUFFIXES, VIDEO_SUFFIXES, is_sequence, pictures_in
+from ..footage import (
+    FOOTAGE_SUFFIXES,
+    PICTURE_SUFFIXES,
+    UNREAD_SUFFIXES,
+    VIDEO_SUFFIXES,
+    is_sequence,
+    pictures_in,
+)
 from ..whole_file import written_beside
 from .parent import GRACE_S
 from .request import code_version
@@ -263,7 +270,7 @@ class Batch:
                     found.append(path)
                 elif recursive:
                     found += self._below(path, recursive)
-            elif suffix in FOOTAGE_SUFFIXES:
+            elif suffix in FOOTAGE_SUFFIXES + UNREAD_SUFFIXES:
                 found.append(path)
         return found
 

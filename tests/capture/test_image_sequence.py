@@ -39,7 +39,8 @@ def test_in_the_order_of_their_numbers(folder: Path, name: str) -> None:
         frames = list(video)
         assert (video.fps, video.frame_count, video.width, video.height) == (12, 6, 30, 20)
         assert [f.timestamp_s for f in frames] == pytest.approx([k / 12 for k in range(6)])
-        assert not video.warnings
+        (warning,) = video.warnings
+        assert "88 numbers between 7 and 100 have no picture" in warning
 
 
 def test_a_part_of_them(folder: Path) -> None:
@@ -52,14 +53,50 @@ def test_without_a_rate(folder: Path) -> None:
         assert video.is_still
     with open_video(folder) as video:
         assert video.fps == 30
-        assert "--fps" in video.warnings[0]
+        assert any("--fps on the command line" in warning for warning in video.warnings)
+
+
+@pytest.mark.parametrize(
+    ("numbers", "times", "says"),
+    [
+        ([3, 4, 5, 6], [0, 1, 2, 3], None),
+        ([0, 10, 20, 30], [0, 1, 2, 3], None),
+        ([0, 1, 4, 5, 6], [0, 1, 4, 5, 6], "2 numbers between 0 and 6"),
+        ([0, 10, 30, 40], [0, 1, 3, 4], "1 numbers between 0 and 40"),
+        ([0, 1, 9], [0, 1, 2], "one after the other"),
+        ([1690000000033, 1690000000067, 1690000000100], [0, 1, 2], "one after the other"),
+    ],
+)
+def test_missing_pictures_leave_their_time_and_are_told(
+    tmp_path: Path, numbers: list[int], times: list[int], says: str | None
+) -> None:
+    for number in numbers:
+        cv2.imwrite(str(tmp_path / f"a_{number:04}.png"), np.zeros((20, 30, 3), np.uint8))
+    with open_video(tmp_path, VideoRange(fps=Fraction(10))) as video:
+        assert video.expected_frames == len(numbers)
+        assert [f.timestamp_s for f in video] == pytest.approx([t / 10 for t in times])
+        assert [f.index for f in video] == list(range(len(numbers)))
+        assert [says in warning for warning in video.warnings] == [True] if says else not video.warnings
+    with open_video(tmp_path, VideoRange(0.1, 0.45, Fraction(10))) as video:
+        wanted = [t / 10 for t in times if 1 <= t <= 4]
+        assert [f.timestamp_s for f in video] == pytest.approx(wanted)
+        assert video.expected_frames == len(wanted)
+
+
+def test_pictures_of_a_sequence_look_as_they_do_alone(tmp_path: Path) -> None:
+    clear = np.zeros((20, 30, 4), np.uint8)
+    deep = np.full((20, 30, 3), 70 * 257, np.uint16)
+    for number, image in enumerate((clear, deep)):
+        cv2.imwrite(str(tmp_path / f"a_{number}.png"), image)
+    assert brightness(tmp_path, VideoRange(fps=Fraction(10))) == [255, 70]
+    assert [brightness(tmp_path / f"a_{k}.png") for k in (0, 1)] == [[255], [70]]
 
 
 def test_a_damaged_picture_ends_it_with_a_warning(folder: Path) -> None:
     (folder / "walk_9.png").write_bytes(b"no picture any more")
     with open_video(folder, VideoRange(fps=Fraction(10))) as video:
         assert [int(f.image_rgb[0, 0, 0]) for f in video] == [7, 8]
-        assert "stopped after 2" in video.warnings[0]
+        assert any("stopped after 2" in warning for warning in video.warnings)
 
 
 def test_nothing_to_see(tmp_path: Path) -> None:

@@ -117,6 +117,13 @@ def test_what_is_finished_is_not_done_again_and_what_changed_is(folder, tmp_path
     assert calls(folder) == ["a.mp4", "b.mov", "c.png", "e.webm"]
 
 
+def test_pictures_that_cannot_be_read_are_not_passed_over(tmp_path):
+    (tmp_path / "IMG_0001.HEIC").write_bytes(b"heic")
+    (tmp_path / "IMG_0002.avif").write_bytes(b"avif")
+    found = Batch(tmp_path, tmp_path / "out", [], {}, [".npz"]).clips(recursive=False)
+    assert sorted(found) == ["IMG_0001", "IMG_0002"]
+
+
 def test_a_moved_folder_of_footage_is_still_finished(folder, tmp_path):
     batch(folder, tmp_path / "out").run(1)
     moved = tmp_path / "moved"
