@@ -144,8 +144,8 @@ class PyavReader:
             import av
         except ImportError as error:
             raise VideoError(
-                f"{path} is AV1 video, which needs the package 'av' that is not installed; install it, or convert the "
-                "video to H.264 .mp4"
+                f"{path} is AV1, which needs the package 'av' that is not installed; install it, or convert a video to "
+                "H.264 .mp4, a picture to JPEG"
             ) from error
         self._failure = av.error.FFmpegError
         try:

@@ -6,6 +6,8 @@ OpenCV reads JPEG, PNG, WebP, TIFF, BMP and others; AVIF, which its packages lea
 
 from __future__ import annotations
 
+import re
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,6 +21,9 @@ from .frame_readers import PyavReader
 _JPEG_STREAMS = (".mjpeg", ".mjpg")  # begin like a picture, but are many
 _HEIC_BRANDS = {b"heic", b"heix", b"heim", b"heis", b"hevc", b"hevx"}  # ISO 23008-12's names for HEVC inside
 _AVIF_BRAND = b"avif"
+# An item of type "grid" in a file's list of items: a picture made of tiles, of which PyAV would give the first.
+_TILED = re.compile(rb"infe.{8}(..)?grid", re.S)
+_META_BYTES = 1 << 16
 _OPENEXR, _GIF = b"v/1\x01", b"GIF8"
 
 
@@ -56,10 +61,12 @@ def is_picture(path: Path) -> bool:
 def read_picture(path: Path) -> Picture | None:
     """The picture in a file, None where it cannot be decoded; what is transparent shows white.
 
-    :raises VideoError: it is AVIF, and PyAV is missing or cannot read it.
+    :raises VideoError: it is AVIF, and PyAV is missing, or it is made of tiles.
     """
     data = path.read_bytes()
     if _AVIF_BRAND in _brands(data[:64]):
+        if _TILED.search(data[:_META_BYTES]):
+            raise VideoError(f"{path} is an AVIF picture made of tiles, which cannot be read here; export it as JPEG")
         return _read_avif(path)
     try:
         image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
@@ -83,11 +90,13 @@ def _brands(head: bytes) -> set[bytes]:
 
 
 def _read_avif(path: Path) -> Picture | None:
-    reader = PyavReader(path)
     try:
-        got = reader.read()
-    finally:
-        reader.close()
+        with closing(PyavReader(path)) as reader:
+            got = reader.read()
+    except VideoError as error:
+        if isinstance(error.__cause__, ImportError):
+            raise
+        return None
     return None if got is None else Picture(got[1])
 
 

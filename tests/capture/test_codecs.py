@@ -110,7 +110,7 @@ def test_av1_without_its_decoder_says_what_to_do(encoded, monkeypatch):
     if not path.is_file() or not path.stat().st_size:
         pytest.skip(f"this Blender does not encode AV1: {encoded[1][-200:]}")
     monkeypatch.setitem(sys.modules, "av", None)
-    with pytest.raises(VideoError, match=r"AV1 video.*'av'.*convert"):
+    with pytest.raises(VideoError, match=r"AV1.*'av'.*convert"):
         colours(path)
 
 
