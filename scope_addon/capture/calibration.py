@@ -34,6 +34,10 @@ _OF_THE_LENS = re.compile(
 _OPENCV_COUNTS = (0, 4, 5, 8, 12, 14)
 _BROWN = 5  # k1, k2, p1, p2, k3: what a motion file holds
 _FOCAL_RANGE = (0.01, 100.0)  # in longer sides of the picture: fields of view of 178 and 0.6 degrees
+_LARGEST_PIXEL_ASPECT = 4.0
+_FARTHEST = 10.0  # tangent of the angle, 84 degrees, by which the picture's middle may lie off the optical axis
+_LARGEST_TANGENTIAL = 0.5
+_LARGEST_MAGNIFICATION = 3.0  # that distortion may make at half the shorter side
 _LARGEST_SKEW = 1e-3  # of the focal length; less than a pixel at the picture's edge
 _LARGEST_SIDE = 1e6
 _ONE_PIXEL = 1.0  # by which a size may be rounded
@@ -73,6 +77,19 @@ class Calibration:
             raise InputError(
                 f"{self.path}: no lens has focal lengths of {K[0, 0]:g} and {K[1, 1]:g} pixels in pictures of "
                 f"{known_width:g} x {known_height:g}; give them in pixels, and the size they belong to"
+            )
+        if not 1 / _LARGEST_PIXEL_ASPECT <= K[0, 0] / K[1, 1] <= _LARGEST_PIXEL_ASPECT:
+            raise InputError(f"{self.path}: focal lengths of {K[0, 0]:g} and {K[1, 1]:g} pixels do not go together")
+        off_axis = (np.array([known_width, known_height]) / 2 - K[:2, 2]) / K[[0, 1], [0, 1]]
+        if np.abs(off_axis).max() > _FARTHEST:
+            raise InputError(
+                f"{self.path}: the principal point ({K[0, 2]:g}, {K[1, 2]:g}) is too far from pictures of "
+                f"{known_width:g} x {known_height:g}; give it in pixels from their top left corner"
+            )
+        if not _can_be_undistorted(self.dist, min(known_width, known_height) / (K[0, 0] + K[1, 1])):
+            raise InputError(
+                f"{self.path}: dist {self.dist.tolist()} folds or tears the picture; give OpenCV's k1, k2, p1, p2, k3, "
+                "in this order, that belong to these intrinsics"
             )
         return np.diag([width / known_width, height / known_height, 1.0]) @ K
 
@@ -166,6 +183,25 @@ def _size(path: Path, value: Any) -> tuple[float, float] | None:
     if size is None or size.shape != (2,) or not ((size >= 1) & (size <= _LARGEST_SIDE)).all():
         raise InputError(f"{path}: size must be [width, height] in pixels, but is {json.dumps(value)[:80]}")
     return float(size[0]), float(size[1])
+
+
+def _can_be_undistorted(dist: np.ndarray, radius: float) -> bool:
+    """Whether the picture's points up to a radius, as tangent of the angle, each come from one direction nearby.
+
+    Those of r come to lie at r (1 + k1 r² + k2 r⁴ + k3 r⁶), which has to grow with r and to reach the radius.
+    """
+    k1, k2, p1, p2, k3 = dist
+    if max(abs(p1), abs(p2)) > _LARGEST_TANGENTIAL:
+        return False
+    r = np.linspace(0.0, _LARGEST_MAGNIFICATION * radius, 1000)
+    with np.errstate(all="ignore"):
+        seen = r * (1 + k1 * r**2 + k2 * r**4 + k3 * r**6)
+    there = np.flatnonzero(~(seen < radius))
+    return (
+        len(there) > 0
+        and bool((np.diff(seen[: there[0] + 1]) > 0).all())
+        and bool(r[there[0]] * _LARGEST_MAGNIFICATION >= radius)
+    )
 
 
 def _same_proportions(a: tuple[float, float], b: tuple[float, float]) -> bool:

@@ -83,6 +83,19 @@ def test_coefficients_in_a_row_and_those_that_are_zero(path):
     assert camera(path, KNOWN | {"dist": [0.1, 0.2, 0, 0, 0.3, 0, 0, 0]}).dist.tolist() == [0.1, 0.2, 0, 0, 0.3]
 
 
+@pytest.mark.parametrize(
+    ("focal", "dist"),
+    [
+        (780, [-0.27, 0.1, 0.001, -0.002, -0.02]),  # an action camera
+        (1400, [0.12, -0.3, 0, 0, 0.2]),
+        (9000, [-0.5, 30, 0, 0, 900]),  # a long lens, whose radii are small
+    ],
+)
+def test_lenses_that_there_are(path, focal, dist):
+    content = {"intrinsics": [[focal, 0, 960], [0, focal, 540], [0, 0, 1]], "dist": dist}
+    assert camera(path, content, 1920, 1080).dist.tolist() == dist
+
+
 def test_another_shape_of_the_picture_is_refused(path):
     refused(path, KNOWN | {"size": [1920, 1080]}, "1920 x 1080.*576 x 576.*same mode", 576, 576)
     refused(path, KNOWN | {"size": [1920, 1080]}, "1920 x 1080.*1080 x 1920.*rotated", 1080, 1920)
@@ -98,6 +111,9 @@ def test_another_shape_of_the_picture_is_refused(path):
         ({"intrinsics": [[1000, 40, 500], [0, 1100, 300], [0, 0, 1]]}, "skew"),
         ({"intrinsics": [[0, 0, 0], [0, 0, 0], [0, 0, 1]]}, "above 0"),
         ({"intrinsics": [[0.9, 0, 0.5], [0, 0.9, 0.5], [0, 0, 1]]}, "in pixels"),
+        ({"intrinsics": [[10000, 0, 500], [0, 1100, 300], [0, 0, 1]]}, "do not go together"),
+        ({"intrinsics": [[1000, 0, 1e300], [0, 1100, 300], [0, 0, 1]]}, "too far"),
+        ({"intrinsics": [[1000, 0, 500], [0, 1100, -12000], [0, 0, 1]]}, "too far"),
         ({"intrinsics": [[1e300, 0, 500], [0, 1100, 300], [0, 0, 1]]}, "no lens"),
         ({"intrinsics": [[1000, 0, float("nan")], [0, 1100, 300], [0, 0, 1]]}, "three numbers"),
         ({"intrinsics": 1}, "three numbers"),
@@ -108,6 +124,10 @@ def test_another_shape_of_the_picture_is_refused(path):
         ({"dist": [[0.1, 0], [0, 0]]}, "list of numbers"),
         ({"dist": ["much"]}, "list of numbers"),
         ({"dist": [float("inf")]}, "list of numbers"),
+        ({"dist": [1e6]}, "folds or tears"),
+        ({"dist": [-1e300, 1e300]}, "folds or tears"),
+        ({"dist": [-5, 2]}, "folds or tears"),
+        ({"dist": [0, 0, 0.9, 0]}, "folds or tears"),
         ({"distortion": [0.1]}, "twice, as dist and distortion"),
         ({"distorsion": [0.1]}, "'distorsion' is not known"),
         ({"k1": 0.1}, "'k1' is not known"),
