@@ -242,7 +242,7 @@ def test_a_signal_ends_the_batch_and_its_clips_whoever_handled_it_before(folder,
         os.killpg(process.pid, number)  # as a terminal does
     else:
         process.send_signal(number)
-    _, stderr = process.communicate(timeout=60)
+    _, stderr = process.communicate(timeout=300)
     assert process.returncode == 130
     assert stderr.splitlines()[-1] == "scope: stopped; clips that are done stay, called again it goes on"
     assert not any(runs(int(pid)) for pid in pids)

@@ -30,7 +30,7 @@ def run_to_end(job, timeout_s=120.0):
         time.sleep(0.01)
 
 
-def wait_for(condition, timeout_s=20.0):
+def wait_for(condition, timeout_s=120.0):
     end = time.monotonic() + timeout_s
     while not condition():
         assert time.monotonic() < end
