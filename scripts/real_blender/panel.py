@@ -141,7 +141,7 @@ def steps() -> Iterator[float]:
     scene = bpy.context.scene
     scene.scope.quality = "BALANCED"  # captured anew, now that the solver is compiled: the preview shows the body
     invoke(bpy.ops.scope.capture, "INVOKE_DEFAULT")
-    yield from until(lambda: addon().state.job.progress.done > 40, 120, "the preview of the body")
+    yield from until(lambda: addon().state.job.progress.done > 100, 120, "the preview of the body")
     picture("9_body_over_footage")
     key("Escape")
     yield 2.0
