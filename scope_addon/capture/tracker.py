@@ -9,9 +9,9 @@ after a leap. Which tracklets are one person is decided over the whole clip, see
 from __future__ import annotations
 
 import math
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import cast
 
@@ -22,6 +22,7 @@ from .adapters.box_detector import BoxDetector
 from .adapters.keypoint_network import KeypointNetwork
 from .appearance import appearance
 from .execution import Execution
+from .followed import SETTLED_FRAMES, Followed, apart
 from .landmark_network import LandmarkNetwork, PoseEstimate
 from .left_right import looks_swapped
 from .networks import landmark_network_name
@@ -67,63 +68,10 @@ _TURNED_LEAP = 0.35  # mean distance of the keypoints from where they were foret
 CURLED_SPREAD = 0.25
 LEAST_CONFIDENT, CONFIDENT = 4, 0.3  # keypoints that must be surer than this: less is left of somebody who has gone
 LEAVING_SHARE = 0.8  # with fewer of the keypoints in the picture, somebody who is lost has left it
-_VELOCITY_MEMORY = 0.7
 # How far the region that was foretold for a frame may lie from the one that the frame before gives: centre and size in
 # sides, turn in radians. The networks were trained on regions that are off by more.
 # The strong network alone looks ahead: the others are less steady where the region is foretold, and gain less.
-SETTLED_FRAMES = 2
 FORETOLD_CENTER, FORETOLD_SIDE, FORETOLD_TURN = 0.08, 0.12, 0.15
-
-
-@dataclass
-class _Followed:
-    """Somebody who was seen in the last frame, or lost ``lost`` frames ago.
-
-    ``seen_s`` is the time of the frame in which they were seen last; ``followed_s`` for how long they were seen so far,
-    and on that clock are ``judged_s``, when the strong network looked, and ``clothes_s``, when their clothes were
-    looked at.
-    """
-
-    tracklet: int
-    estimate: PoseEstimate
-    velocity_px: np.ndarray  # (2,) per frame, smoothed
-    seen_s: float
-    age: int = 0  # frames
-    lost: int = 0
-    followed_s: float = 0.0
-    judged_s: float = -math.inf
-    clothes_s: float = -math.inf
-    swapped: bool = False  # whether left and right changed places since the strong network looked
-    doubt_s: float = -math.inf  # the time since which the strong network stands in
-    foreseen: Future[PoseEstimate] | None = None  # in the next frame, where it was expected
-
-    @property
-    def expected(self) -> Region:
-        """Where to look in the frame after the next one, before the next one is known."""
-        region = self.estimate.next_region
-        x, y = np.asarray(region.center_px) + self.velocity_px
-        return replace(region, center_px=(float(x), float(y)))
-
-    @property
-    def foretold(self) -> Region:
-        """Where to look ``lost`` frames later: the middle goes on as it went."""
-        region = self.estimate.next_region
-        x, y = np.asarray(region.center_px) + self.velocity_px * self.lost
-        return replace(region, center_px=(float(x), float(y)))
-
-    def surprise(self, estimate: PoseEstimate) -> float:
-        """Mean distance of the keypoints from where motion foretold them, in sides of the region."""
-        foretold = self.estimate.keypoints_px + self.velocity_px * max(self.lost, 1)
-        return _apart(estimate.keypoints_px, foretold) / self.estimate.region.side_px
-
-    def go_on(self, estimate: PoseEstimate, swapped: bool, time_s: float, step_s: float) -> None:
-        """Be there in this frame; ``swapped``: left and right changed places since the one before."""
-        step = (estimate.keypoints_px - self.estimate.keypoints_px).mean(axis=0)
-        memory = min(_VELOCITY_MEMORY, self.age / (self.age + 1))
-        self.velocity_px = memory * self.velocity_px + (1 - memory) * step
-        self.swapped |= swapped
-        self.estimate, self.age = estimate, self.age + 1
-        self.seen_s, self.followed_s = time_s, self.followed_s + step_s
 
 
 class PeopleTracker:
@@ -169,8 +117,8 @@ class PeopleTracker:
 
     def reset(self) -> None:
         """Forget everybody: the next frame starts with a detection."""
-        self._live: list[_Followed] = []
-        self._lost: list[_Followed] = []
+        self._live: list[Followed] = []
+        self._lost: list[Followed] = []
         self._tracklets = 0
         self._time_s, self._step_s = -math.inf, FRAME_S
         self._searched_s = -math.inf
@@ -208,7 +156,7 @@ class PeopleTracker:
         """Whether this frame is the one nearest to the end of an interval, or a later one."""
         return elapsed_s + self._step_s / 2 >= interval_s
 
-    def _is_missed(self, lost: _Followed, for_s: float) -> bool:
+    def _is_missed(self, lost: Followed, for_s: float) -> bool:
         """Whether somebody was lost so short a time ago; the frame nearest to the end counts."""
         return self._time_s - lost.seen_s - self._step_s / 2 <= for_s
 
@@ -219,11 +167,15 @@ class PeopleTracker:
         self._lost = [lost for lost in self._lost if self._is_missed(lost, MEMORY_S)]
         found = self._look_ahead(image_rgb, upcoming_rgb)
         settled = [self._settled(image_rgb, f, e) for f, e in zip(self._live, found, strict=True)]
-        seen = [(f, e, swap, f.surprise(e)) for f, (e, swap) in zip(self._live, settled, strict=True) if e is not None]
+        seen = []
+        for f, (e, swap) in zip(self._live, settled, strict=True):
+            f.is_hidden = e is not None and f.goes_behind(e)
+            if e is not None and not f.is_hidden:
+                seen.append((f, e, swap, f.surprise(e)))
         # Two on one body: somebody went behind somebody else. It belongs to whom it does not surprise; but of a body
         # that has long been followed and one that was found just now, as little surprised, the latter was a mistake.
         seen.sort(key=lambda entry: (entry[3] > LEAP, entry[3] + self._newness(entry[0])))
-        kept: list[_Followed] = []
+        kept: list[Followed] = []
         accepted: list[PoseEstimate] = []
         for followed, estimate, swapped, surprise in seen:
             if any(same_body(estimate, other) for other in accepted):
@@ -240,7 +192,7 @@ class PeopleTracker:
                 self._lose(followed)
         self._live = sorted(kept, key=lambda f: f.tracklet)
 
-    def _newness(self, followed: _Followed) -> float:
+    def _newness(self, followed: Followed) -> float:
         """Falls from NEW_SURPRISE to 0 while somebody becomes established."""
         return NEW_SURPRISE * (1 - min(followed.followed_s / ESTABLISHED_S, 1.0))
 
@@ -264,7 +216,7 @@ class PeopleTracker:
         return [found[f.tracklet] for f in self._live]
 
     def _settled(
-        self, image_rgb: np.ndarray, followed: _Followed, estimate: PoseEstimate | None
+        self, image_rgb: np.ndarray, followed: Followed, estimate: PoseEstimate | None
     ) -> tuple[PoseEstimate | None, bool]:
         """The estimate, or the strong network's for a while once a smaller one loses the person or left and right.
 
@@ -273,7 +225,7 @@ class PeopleTracker:
         swapped = estimate is not None and looks_swapped(followed.estimate, estimate)
         if self._stand_in is None:
             return estimate, swapped
-        if estimate is None or swapped:
+        if estimate is None or swapped or followed.goes_behind(estimate):
             followed.doubt_s = self._time_s
         if self._has_passed(DOUBT_S, self._time_s - followed.doubt_s):
             return estimate, swapped
@@ -289,13 +241,13 @@ class PeopleTracker:
         """Whoever was lost a moment ago is where motion foretold, but turned: a somersault, a fall, a handstand.
 
         A body that curls up or hangs upside down looks less like one, so what is found must lie where it was foretold.
-        Whoever has gone behind somebody else is not looked for: what shows there is somebody else. Nor is who walked
-        out of the picture.
+        Whoever has gone behind somebody or something is not looked for: what shows there is somebody or something else.
+        Nor is who walked out of the picture.
         """
         for lost in [f for f in self._lost if self._is_missed(f, EAGER_S) and f.age > 5]:
             if len(self._live) >= self._most:
                 return
-            if _share_in_picture(lost.estimate, image_rgb) < LEAVING_SHARE:
+            if lost.is_hidden or _share_in_picture(lost.estimate, image_rgb) < LEAVING_SHARE:
                 continue
             if any(f.estimate.next_region.is_near(lost.foretold) for f in self._live):
                 continue
@@ -362,6 +314,8 @@ class PeopleTracker:
         """Start a tracklet, unless the body is followed already or there are enough of at least its size."""
         if any(same_body(estimate, f.estimate) for f in self._live):
             return
+        if any(f.is_hidden_by(estimate) for f in self._lost):
+            return
         # The legs of somebody who is followed, or they and what is behind them, can look like somebody of their own.
         others = [f.estimate for f in self._live]
         if not sure and any(max(_share_within(estimate, e), _share_within(e, estimate)) > MOST_WITHIN for e in others):
@@ -379,11 +333,11 @@ class PeopleTracker:
     def _largest_side(self) -> float:
         return max(f.estimate.region.side_px for f in self._live)
 
-    def _start(self, estimate: PoseEstimate) -> _Followed:
+    def _start(self, estimate: PoseEstimate) -> Followed:
         self._tracklets += 1
-        return _Followed(self._tracklets - 1, estimate, np.zeros(2), self._time_s)
+        return Followed(self._tracklets - 1, estimate, np.zeros(2), self._time_s)
 
-    def _lose(self, followed: _Followed) -> None:
+    def _lose(self, followed: Followed) -> None:
         followed.lost = 1
         self._lost.append(followed)
 
@@ -413,7 +367,7 @@ class PeopleTracker:
         (estimate,) = self._judge.estimate(image_rgb, [region])
         return estimate.world_landmarks if believable(estimate) else None
 
-    def _observe(self, image_rgb: np.ndarray, followed: _Followed, judged: Judgement | None) -> Observation:
+    def _observe(self, image_rgb: np.ndarray, followed: Followed, judged: Judgement | None) -> Observation:
         e = followed.estimate
         look = self._has_passed(APPEARANCE_S, followed.followed_s - followed.clothes_s)
         if look:
@@ -451,7 +405,7 @@ def believable(estimate: PoseEstimate, sure: bool = True) -> bool:
 
 def same_body(a: PoseEstimate, b: PoseEstimate) -> bool:
     """Whether two estimates describe one body in the image."""
-    return _apart(a.keypoints_px, b.keypoints_px) < SAME_BODY * min(a.region.side_px, b.region.side_px)
+    return apart(a.keypoints_px, b.keypoints_px) < SAME_BODY * min(a.region.side_px, b.region.side_px)
 
 
 def _share_within(a: PoseEstimate, b: PoseEstimate) -> float:
@@ -470,10 +424,6 @@ def _share_in_picture(estimate: PoseEstimate, image_rgb: np.ndarray) -> float:
     """Share of the keypoints that lie in the image."""
     height, width = image_rgb.shape[:2]
     return float(((estimate.keypoints_px >= 0) & (estimate.keypoints_px < [width, height])).all(axis=1).mean())
-
-
-def _apart(a: np.ndarray, b: np.ndarray) -> float:
-    return float(np.linalg.norm(a - b, axis=-1).mean())
 
 
 def _same_place(a: Region, b: Region) -> bool:

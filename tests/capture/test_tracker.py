@@ -112,7 +112,10 @@ def test_a_somersault_is_followed_all_the_way_round(shared):
 
 
 def test_who_walks_out_of_the_picture_is_gone(shared):
-    """The woman on the grass leaves at the left edge between frames 195 and 207, and nothing comes in her stead."""
+    """The woman on the grass leaves at the left edge between frames 195 and 207, and nothing comes in her stead.
+
+    The man runs behind a tree between frames 223 and 229, and is not seen in its bark.
+    """
     tracker, seen = PeopleTracker("best", 2, 2), {}
     with open_video(shared / "data/clips/walk_side_static.mp4") as video:
         for frame in video:
@@ -123,4 +126,4 @@ def test_who_walks_out_of_the_picture_is_gone(shared):
     lasting = sorted((frames for frames in seen.values() if len(frames) >= 10), key=lambda frames: frames[-1])
     woman, man = lasting
     assert 195 <= woman[-1] <= 207
-    assert man[-1] > 220
+    assert 223 <= man[-1] <= 226  # behind a tree, where nobody is made out any more
