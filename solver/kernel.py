@@ -74,7 +74,14 @@ def is_compiled(dispatcher: Any) -> bool:
         return False
 
 
+_announced: set[Any] = set()
+
+
 def announce_compilation(dispatcher: Any) -> None:
-    """Tell the log, which goes to stderr unless somebody arranged otherwise, why the coming call takes long."""
-    if not is_compiled(dispatcher):
+    """Tell the log, which goes to stderr unless somebody arranged otherwise, why the coming call takes long.
+
+    Once in a process: further threads that come meanwhile wait for the same machine code.
+    """
+    if not is_compiled(dispatcher) and dispatcher not in _announced:
+        _announced.add(dispatcher)
         _LOG.warning("Compiling the solver for this machine, once: 10 to 20 seconds.")

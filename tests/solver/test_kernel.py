@@ -42,7 +42,7 @@ def test_compiling_is_announced_once(tmp_path):
     code = """
 from package.kernel import announce_compilation
 from package.outer import outer
-announce_compilation(outer); outer(0.0); announce_compilation(outer)
+announce_compilation(outer); announce_compilation(outer); outer(0.0); announce_compilation(outer)
 """
 
     def said():
