@@ -3,6 +3,9 @@
 
 1. Some frames, spread over the clip, are fitted on their own and then together with one shape (``fit_clip``).
 2. Every frame is fitted in order with this shape, starting from the frame before; after a gap it starts afresh.
+3. A limb that is bent towards the camera looks in the picture as one that is bent away, and a fit that starts from the
+   frame before stays with the one however sure the lifting network becomes of the other. Such a frame is fitted from
+   further off, and the frames before it from there, as far back as that costs less than it brought.
 """
 
 from __future__ import annotations
@@ -172,9 +175,31 @@ def _fit_frames(
     T, tree = len(track), make_tree(body)
     cold, warm = (replace(ROBUST, stages=stages(prepared.weights)) for stages in (cold_stages, warm_stages))
     rotations = np.tile(np.eye(3), (T, body.K + 1, 1, 1))
-    root, valid, iterations = np.zeros((T, 3)), np.zeros(T, bool), 0
+    root, valid, cost, iterations = np.zeros((T, 3)), np.zeros(T, bool), np.zeros(T), 0
     last: Fit | None = None
     last_time = -np.inf
+
+    def keep(k: int, fit: Fit) -> None:
+        rotations[k, 0], rotations[k, 1:] = fit.state.R_camera_root, fit.state.Omega
+        root[k], cost[k] = fit.state.t_camera_root, fit.cost
+
+    def go_back(k: int, gain: float) -> int:
+        """Frames before ``k`` once more, each from the one after it, as long as it costs less than was gained there.
+
+        :return: how many iterations that took.
+        """
+        later, count = State(rotations[k, 0], root[k], rotations[k, 1:], betas), 0
+        while k > 0 and valid[k - 1] and not track.acquired[k]:
+            k -= 1
+            found = fit_tree(tree, prepared.measure_with_hands(k), later, priors, warm)
+            count += found.iterations
+            sound = found.status not in (Status.NO_MEASUREMENTS, Status.NON_FINITE)
+            if not sound or found.cost - cost[k] > gain or _as_before(found.state.Omega, rotations[k, 1:]):
+                break
+            keep(k, found)
+            later = found.state
+        return count
+
     for k in range(T):
         if track.seen[k]:
             if state is not None:
@@ -188,9 +213,15 @@ def _fit_frames(
             if found.status not in (Status.NO_MEASUREMENTS, Status.NON_FINITE):
                 last, last_time, valid[k] = found, track.times[k], True
                 iterations += found.iterations
+                if init is not None and prepared.measurer.contradicts(measurements, found.t_camera_part):
+                    freed = fit_tree(tree, measurements, init, priors, cold)
+                    iterations += freed.iterations
+                    if freed.cost < found.cost:
+                        last = freed
+                        keep(k, freed)
+                        iterations += go_back(k, found.cost - freed.cost) if state is None else 0
         if last is not None:
-            rotations[k, 0], rotations[k, 1:] = last.state.R_camera_root, last.state.Omega
-            root[k] = last.state.t_camera_root
+            keep(k, last)
         if k % 16 == 0 or k == T - 1:
             progress("solving" if state is None else "solving on the floor", k + 1, T)
     confidence = prepared.measurer.joint_confidence(track.confidence)
@@ -206,6 +237,11 @@ def _fit_frames(
         joint_confidence=confidence * valid[:, None],
         iterations=iterations / max(int(valid.sum()), 1),
     )
+
+
+def _as_before(a: np.ndarray, b: np.ndarray) -> bool:
+    """Whether no joint's rotation (K, 3, 3) is turned by more than 10 degrees against the other's."""
+    return bool((np.einsum("kij,kij->k", a, b) > 1 + 2 * np.cos(np.radians(10.0))).all())
 
 
 def _fit_shape(prepared: PreparedTrack, root_cam: np.ndarray | None = None) -> ClipFit:

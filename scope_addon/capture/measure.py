@@ -23,6 +23,7 @@ _BONES = ("shoulder", "elbow"), ("elbow", "wrist"), ("hip", "knee"), ("knee", "a
 DEPTH_SIGMA_M = 0.1  # standard deviation of a 3D keypoint of confidence 1
 DIRECTION_SIGMA = 0.3  # the same of a bone's direction
 MOST_CONFIDENCE = 2.0  # of a direction
+SURE_CONFIDENCE, CONTRADICTION = 0.3, np.cos(np.radians(60.0))  # of a direction, and of the angle to what is fitted
 ROOT_SIGMA_M = 0.12  # of a pelvis above feet that stand on the floor
 NEAREST_M = 0.3  # a person closer to the camera than this is a mistake
 
@@ -86,6 +87,16 @@ class Measurer:
             ),
             pose_priors=None if root_cam is None else _root_prior(root_cam),
         )
+
+    def contradicts(self, measurements: Measurements, joints_cam: np.ndarray) -> bool:
+        """Whether some bone of a fit, joints (K+1, 3), points elsewhere than it was lifted to, for sure."""
+        field, first_joint = measurements.orientation_field, len(self.body.keypoint_names)
+        if field is None:
+            return False
+        bones = joints_cam[self.bone_ends - first_joint] - joints_cam[self.bone_starts - first_joint]
+        lengths = np.linalg.norm(bones, axis=1) * np.linalg.norm(field.directions, axis=1)
+        away = (bones * field.directions).sum(axis=1) < CONTRADICTION * lengths
+        return bool((away & (np.asarray(field.confidence) > SURE_CONFIDENCE)).any())
 
     def joint_confidence(self, confidence: np.ndarray) -> np.ndarray:
         """(T, 33) landmark confidences -> (T, K+1): how far landmarks, not priors, fix each joint's rotation.

@@ -3,23 +3,28 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from scope.scope_addon.capture import fitting
 from scope.scope_addon.capture.camera import choose_camera
 from scope.scope_addon.capture.landmark_network import KEYPOINT_NAMES
-from scope.scope_addon.capture.lifter import Lifter
+from scope.scope_addon.capture.lifter import Lifted, Lifter
 from scope.scope_addon.capture.placement import place_track
 from scope.scope_addon.capture.track import Track
 from scope.solver import load_body
+from scope.solver.rotations import exp
 
 FRAMES = 4
 
 
-def _standing_track(body, camera) -> Track:
-    """A person in the rest pose, upright, 4 m in front of the camera."""
+def _standing_track(body, camera, bent=()) -> Track:
+    """A person in the rest pose, but for ``bent`` (joint, radians about x), upright, 4 m in front of the camera."""
     flip = np.diag([1.0, -1.0, -1.0])  # body y up, OpenCV y down
     rotations = np.tile(np.eye(3), (1, body.K + 1, 1, 1))
     rotations[:, 0] = flip
+    for joint, angle in bent:
+        rotations[:, body.joint_names.index(joint)] = exp(np.array([angle, 0.0, 0.0]))
     R, t = body.forward_kinematics(rotations, np.array([[0.0, 0.0, 4.0]]), np.zeros(body.P))
     at = body.keypoint_set("blazepose")
     points = body.keypoints(R, t, np.zeros(body.P))[0, [at[name] for name in KEYPOINT_NAMES]]
@@ -73,3 +78,26 @@ def test_who_is_nearer_than_it_seemed_is_smaller():
         moved = second.t_camera_root[:, 2].mean() / first.t_camera_root[:, 2].mean()
         assert abs(moved / nearer - 1) < 0.05
         assert abs(height(second) / height(first) / moved - 1) < 0.04
+
+
+def test_a_limb_goes_where_it_is_seen_to_go_for_sure_and_was_there_before():
+    """A leg before the body looks as one behind it, and the first frames are believed to show the wrong one."""
+    body, camera = load_body("scope"), choose_camera(1080, 1920)
+    track = _standing_track(body, camera, (("right_hip", 0.3), ("right_knee", 0.9)))
+    prepared = fitting.prepare_track(body, track, camera)
+    leg = [KEYPOINT_NAMES.index(f"right_{name}") for name in ("knee", "ankle", "heel", "foot_index")]
+    hip = KEYPOINT_NAMES.index("right_hip")
+    truth, sigma = track.world_landmarks.copy(), np.full((FRAMES, len(KEYPOINT_NAMES)), 0.1)
+    lifted = truth.copy()
+    lifted[:2, leg, 2] = 2 * truth[:2, hip, None, 2] - truth[:2, leg, 2]  # the leg's mirror image in depth
+    sigma[:2, leg] = 0.25
+    prepared = replace(prepared, lifted=Lifted(lifted, sigma, sigma))
+
+    first = fitting.fit_track(prepared, lambda *_: None)
+    for fit in (first, fitting.refit_track(prepared, first, first.t_camera_root, lambda *_: None)):
+        joints = place_track(body, track, fit, smoothing=False).joints
+        for joint in ("knee", "ankle"):
+            k, at_hip = (body.joint_names.index(f"right_{name}") for name in (joint, "hip"))
+            i = KEYPOINT_NAMES.index(f"right_{joint}")
+            there = truth[:, i, 2] - truth[:, hip, 2]
+            np.testing.assert_allclose(joints[:, k, 2] - joints[:, at_hip, 2], there, atol=0.2)
