@@ -101,7 +101,8 @@ def _add_options(capture: argparse.ArgumentParser) -> None:
         "--people",
         default="largest",
         metavar="N|all|largest",
-        help="how many people at most; largest: the most prominent one over the clip (default: largest)",
+        help="how many people at most; largest: the one who fills the picture most over the clip, but nobody less than"
+        " half as large as somebody beside them (default: largest)",
     )
     capture.add_argument("--start", metavar="TIME", help="from when: seconds, MM:SS, HH:MM:SS.mmm or HH:MM:SS:FF")
     capture.add_argument("--end", metavar="TIME", help="until when, inclusive")

@@ -47,7 +47,8 @@ LEAP = 0.25  # the same, from where motion foretold: more in one frame may be an
 FRAME_S = 1 / 30  # from one frame to the next where their times are not told
 SEARCH_S = 8 * FRAME_S  # between two looks for others who have come into the picture
 SEARCH_LARGEST_S = 20 * FRAME_S
-SEARCH_MISSED_S = 4 * FRAME_S  # while somebody is remembered who was lost
+OPENING_S = 2.0  # of the clip: who is there from the start may well be the most prominent person over all of it
+SEARCH_MISSED_S = 4 * FRAME_S  # while somebody is remembered who was lost, and for rivals in the opening
 ESTABLISHED_S = 10 * FRAME_S
 NEW_SURPRISE = 0.05  # what being new is as good as, see LEAP
 EAGER_S = 15 * FRAME_S  # how long a lost person is looked for in every frame
@@ -121,6 +122,7 @@ class PeopleTracker:
         self._lost: list[Followed] = []
         self._tracklets = 0
         self._time_s, self._step_s = -math.inf, FRAME_S
+        self._begun_s = 0.0
         self._searched_s = -math.inf
 
     def step(
@@ -148,7 +150,9 @@ class PeopleTracker:
         before, is_first = self._time_s, self._time_s == -math.inf
         if time_s is None:
             time_s = 0.0 if is_first else before + FRAME_S
-        if not is_first and time_s > before:
+        if is_first:
+            self._begun_s = time_s
+        elif time_s > before:
             self._step_s = time_s - before
         self._time_s = time_s
 
@@ -271,7 +275,14 @@ class PeopleTracker:
         if not self._live or any(self._is_missed(f, EAGER_S) for f in self._lost):
             return True
         every_s = SEARCH_LARGEST_S if self._largest_only else SEARCH_S
-        return self._has_passed(SEARCH_MISSED_S if self._lost else every_s, self._time_s - self._searched_s)
+        if self._lost or self._is_opening:
+            every_s = SEARCH_MISSED_S
+        return self._has_passed(every_s, self._time_s - self._searched_s)
+
+    @property
+    def _is_opening(self) -> bool:
+        """Whether rivals of the most prominent person are looked for eagerly and closely."""
+        return self._largest_only and self._time_s < self._begun_s + OPENING_S
 
     def _search(self, image_rgb: np.ndarray) -> None:
         """Start a tracklet for every believable body that the detector finds and that is not followed yet.
@@ -292,7 +303,8 @@ class PeopleTracker:
                     self._add(estimate, sure)
 
     def _detect(self, image_rgb: np.ndarray) -> list[Detection]:
-        return self._detector.detect(image_rgb, closely=not self._largest_only)
+        looks_for_rivals = self._is_opening and bool(self._live)
+        return self._detector.detect(image_rgb, closely=looks_for_rivals or not self._largest_only)
 
     def _ranked(self, detections: list[Detection]) -> list[Detection]:
         """Whoever may have been lost a moment ago first, then by score times size."""

@@ -4,20 +4,21 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
-import cv2
 import numpy as np
 import pytest
 from scope.scope_addon.capture import tracker as tracker_module
 from scope.scope_addon.capture.landmark_network import PoseEstimate
 from scope.scope_addon.capture.people import PeopleBuilder, trim_flickering_end
+from scope.scope_addon.capture.person_detector import Detection
 from scope.scope_addon.capture.region import Region
 from scope.scope_addon.capture.track import Track, Tracklet
 from scope.scope_addon.capture.tracker import PeopleTracker
 from scope.solver.errors import SetupError
 
+from .composites import composite
 from .fake_people import FakeDetector, FakeLandmarks, Person, pictures
 
 RED, BLUE, GREEN = (200, 40, 40), (40, 60, 200), (40, 160, 60)
@@ -132,6 +133,28 @@ def test_the_most_prominent_one_is_chosen_over_the_clip_and_kept(follow: Callabl
     assert track.seen[112:].all()
 
 
+@pytest.mark.parametrize("comes_s", [0, 3])
+def test_a_rival_from_the_start_is_looked_for_closely(monkeypatch: pytest.MonkeyPatch, comes_s: int) -> None:
+    """Who is hard to detect may be the most prominent person too, if they are there before the clip has settled."""
+    leaves = Person(lambda t: (300, 200) if t < 150 else None, BLUE)
+    stays = Person(lambda t: (900, 200) if t >= comes_s * FPS else None, RED, size_px=80)
+
+    class Detector(FakeDetector):
+        def detect(self, image: np.ndarray, threshold: float = 0.5, closely: bool = False) -> list[Detection]:
+            return super().detect(image, threshold)[: None if closely else 1]
+
+    people = [leaves, stays]
+    monkeypatch.setattr(tracker_module, "LandmarkNetwork", lambda name, *_: FakeLandmarks(people))
+    monkeypatch.setattr(tracker_module, "PersonDetector", lambda *_: Detector(people))
+    tracker, builder = PeopleTracker("best", 1), PeopleBuilder()
+    for t, image in enumerate(pictures(people, 240)):
+        builder.add(t, t / FPS, tracker.step(image, time_s=t / FPS))
+    (track,) = builder.build(1)
+    assert who(track, people) == ({1} if comes_s == 0 else {0})
+    if comes_s == 0:
+        assert track.seen[4:].all()
+
+
 def test_someone_small_beside_the_most_prominent_one_costs_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     people = [Person(lambda t: (300, 200), BLUE), Person(lambda t: (900, 200), RED, size_px=40)]
     networks = FakeLandmarks(people)
@@ -232,31 +255,6 @@ def test_who_is_seen_again_for_a_moment_only_ends_before_it(rows: list[int], kep
     tracklet = Tracklet(rows=list(rows), values=[np.zeros((33, 6), np.float32)] * len(rows))
     trim_flickering_end(tracklet, np.arange(60) / FPS)
     assert tracklet.rows == list(rows)[:kept]
-
-
-def panels(shared: Path, camera: str) -> tuple[list[np.ndarray], np.ndarray]:
-    """The middle of a clip, 500 pixels high, and the true middle of the trunk in each frame, (100, 2) pixels."""
-    truth = np.load(shared / f"data/pose2sim/truth_{camera}.npz")
-    names = [str(n) for n in truth["names"]]
-    trunk = [names.index(n) for n in ("LShoulder", "RShoulder", "LHip", "RHip")]
-    at = np.full((100, 2), np.nan)
-    at[truth["frame_index"]] = np.nanmean(truth["uv"][:, trunk], axis=1)
-    left, top, right, bottom = 60, 330, 860, 1330
-    video = cv2.VideoCapture(str(shared / f"data/pose2sim/{camera}.mp4"))
-    images = [video.read()[1][top:bottom, left:right, ::-1] for _ in range(100)]
-    return [cv2.resize(i, (400, 500), interpolation=cv2.INTER_AREA) for i in images], (at - [left, top]) / 2
-
-
-def composite(shared: Path, cameras: tuple[str, str], crossing: bool) -> Iterator[tuple[np.ndarray, np.ndarray, bool]]:
-    """Frames, the true places (2, 2) and whether the first one is hidden; the second clip passes in front."""
-    (back, back_at), (front, front_at) = (panels(shared, camera) for camera in cameras)
-    for t in range(100):
-        x = [round(11 * t), round(11 * (99 - t))] if crossing else [0, 700]
-        image = np.full((520, 1500, 3), 140, np.uint8)
-        for offset, panel in zip(x, (back[t], front[t]), strict=True):
-            image[:500, offset : offset + 400] = panel
-        places = np.stack([back_at[t] + [x[0], 0], front_at[t] + [x[1], 0]])
-        yield image, places, bool(x[1] < places[0, 0] < x[1] + 400)
 
 
 @pytest.mark.parametrize("every", [2, 12], ids=["30 fps", "5 fps"])

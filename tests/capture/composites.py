@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Videos of two people, put together from real clips of one man whose true places are known."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+FPS = 60  # of the clips
+
+
+def panels(shared: Path, camera: str) -> tuple[list[np.ndarray], np.ndarray]:
+    """The middle of a clip, 500 pixels high, and the true middle of the trunk in each frame, (100, 2) pixels."""
+    truth = np.load(shared / f"data/pose2sim/truth_{camera}.npz")
+    names = [str(n) for n in truth["names"]]
+    trunk = [names.index(n) for n in ("LShoulder", "RShoulder", "LHip", "RHip")]
+    at = np.full((100, 2), np.nan)
+    at[truth["frame_index"]] = np.nanmean(truth["uv"][:, trunk], axis=1)
+    left, top, right, bottom = 60, 330, 860, 1330
+    video = cv2.VideoCapture(str(shared / f"data/pose2sim/{camera}.mp4"))
+    images = [video.read()[1][top:bottom, left:right, ::-1] for _ in range(100)]
+    return [cv2.resize(i, (400, 500), interpolation=cv2.INTER_AREA) for i in images], (at - [left, top]) / 2
+
+
+def composite(shared: Path, cameras: tuple[str, str], crossing: bool) -> Iterator[tuple[np.ndarray, np.ndarray, bool]]:
+    """Frames, the true places (2, 2) and whether the first one is hidden; the second clip passes in front."""
+    (back, back_at), (front, front_at) = (panels(shared, camera) for camera in cameras)
+    for t in range(100):
+        x = [round(11 * t), round(11 * (99 - t))] if crossing else [0, 700]
+        image = np.full((520, 1500, 3), 140, np.uint8)
+        for offset, panel in zip(x, (back[t], front[t]), strict=True):
+            image[:500, offset : offset + 400] = panel
+        places = np.stack([back_at[t] + [x[0], 0], front_at[t] + [x[1], 0]])
+        yield image, places, bool(x[1] < places[0, 0] < x[1] + 400)
+
+
+def visit(shared: Path) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Frames, and the true places (2, 2): the first one stays; the second comes in at the right edge, and leaves there.
+
+    Before a background with enough in it to tell that the camera stands still.
+    """
+    (stays, stays_at), (visits, visits_at) = (panels(shared, camera) for camera in ("cam3", "cam2"))
+    noise = np.random.default_rng(3).integers(60, 200, (26, 60, 3), np.uint8)
+    background = cv2.resize(noise, (1200, 520), interpolation=cv2.INTER_CUBIC)
+    for t in range(100):
+        x = round(1200 - 520 * np.sin(np.pi * max(t - 10, 0) / 80)) if t < 90 else 1200
+        image = background.copy()
+        image[:500, :400] = stays[t]
+        width = max(min(400, 1200 - x), 0)
+        image[:500, x : x + width] = visits[t][:, :width]
+        yield image, np.stack([stays_at[t], visits_at[t] + [x, 0]])
