@@ -20,7 +20,7 @@ PICTURES = {
     "against_truth": pictures.against_truth,
     "in_motion": pictures.in_motion,
     "along_the_view": pictures.along_the_view,
-    "front_or_behind": pictures.front_or_behind,
+    "from_behind": pictures.from_behind,
     "two_floors": pictures.two_floors,
 }
 LARGEST_BYTES = 60_000
