@@ -48,6 +48,7 @@ FRAME_S = 1 / 30  # from one frame to the next where their times are not told
 SEARCH_S = 8 * FRAME_S  # between two looks for others who have come into the picture
 SEARCH_LARGEST_S = 20 * FRAME_S
 OPENING_S = 2.0  # of the clip: who is there from the start may well be the most prominent person over all of it
+SMALL_SHARE = 0.39  # of the picture's longer side
 SEARCH_MISSED_S = 4 * FRAME_S  # while somebody is remembered who was lost, and for rivals in the opening
 ESTABLISHED_S = 10 * FRAME_S
 NEW_SURPRISE = 0.05  # what being new is as good as, see LEAP
@@ -140,7 +141,7 @@ class PeopleTracker:
         self._go_to(time_s)
         self._follow(image_rgb, upcoming_rgb)
         self._look_round(image_rgb)
-        if self._search_is_due():
+        if self._search_is_due(image_rgb):
             self._search(image_rgb)
         judged = self._ask_judge(image_rgb)
         return [(f.tracklet, self._observe(image_rgb, f, judged.get(f.tracklet))) for f in self._live]
@@ -271,18 +272,20 @@ class PeopleTracker:
                 self._lost.remove(lost)
                 self._live.append(lost)
 
-    def _search_is_due(self) -> bool:
+    def _search_is_due(self, image_rgb: np.ndarray) -> bool:
         if not self._live or any(self._is_missed(f, EAGER_S) for f in self._lost):
             return True
         every_s = SEARCH_LARGEST_S if self._largest_only else SEARCH_S
-        if self._lost or self._is_opening:
+        if self._lost or self._looks_for_rivals(image_rgb):
             every_s = SEARCH_MISSED_S
         return self._has_passed(every_s, self._time_s - self._searched_s)
 
-    @property
-    def _is_opening(self) -> bool:
-        """Whether rivals of the most prominent person are looked for eagerly and closely."""
-        return self._largest_only and self._time_s < self._begun_s + OPENING_S
+    def _looks_for_rivals(self, image_rgb: np.ndarray) -> bool:
+        """Whether somebody half as large as the most prominent person would be too small for a plain look just now."""
+        if not self._largest_only or self._time_s >= self._begun_s + OPENING_S:
+            return False
+        sides = [f.estimate.next_region.side_px for f in self._live]
+        return bool(sides) and max(sides) < SMALL_SHARE * max(image_rgb.shape[:2])
 
     def _search(self, image_rgb: np.ndarray) -> None:
         """Start a tracklet for every believable body that the detector finds and that is not followed yet.
@@ -303,8 +306,8 @@ class PeopleTracker:
                     self._add(estimate, sure)
 
     def _detect(self, image_rgb: np.ndarray) -> list[Detection]:
-        looks_for_rivals = self._is_opening and bool(self._live)
-        return self._detector.detect(image_rgb, closely=looks_for_rivals or not self._largest_only)
+        closely = not self._largest_only or self._looks_for_rivals(image_rgb)
+        return self._detector.detect(image_rgb, closely=closely)
 
     def _ranked(self, detections: list[Detection]) -> list[Detection]:
         """Whoever may have been lost a moment ago first, then by score times size."""
