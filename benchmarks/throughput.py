@@ -29,9 +29,9 @@ NETWORKS = {"fast": "lite", "balanced": "full", "best": "heavy"}
 PEER = "mediapipe==0.10.14"
 
 
-def looped(clip: str, frames: int) -> Path:
-    """Return the clip repeated to at least so many frames; written once, to build/bench."""
-    target = CACHE / f"{Path(clip).stem}_{frames}.mp4"
+def looped(clip: str, frames: int, fps: float | None = None) -> Path:
+    """Return the clip repeated to at least so many frames, at its own or another rate; written once, to build/bench."""
+    target = CACHE / f"{Path(clip).stem}_{frames}{'' if fps is None else f'_{fps:g}fps'}.mp4"
     if target.exists():
         return target
     CACHE.mkdir(parents=True, exist_ok=True)
@@ -41,7 +41,8 @@ def looped(clip: str, frames: int) -> Path:
         pictures.append(got[1])
     size = pictures[0].shape[1::-1]
     with written_beside(target) as temporary:
-        writer = cv2.VideoWriter(str(temporary), cv2.VideoWriter.fourcc(*"mp4v"), source.get(cv2.CAP_PROP_FPS), size)
+        rate = fps or source.get(cv2.CAP_PROP_FPS)
+        writer = cv2.VideoWriter(str(temporary), cv2.VideoWriter.fourcc(*"mp4v"), rate, size)
         for k in range(frames):
             writer.write(pictures[k % len(pictures)])
         writer.release()

@@ -124,7 +124,7 @@ class PeopleTracker:
         self._tracklets = 0
         self._time_s, self._step_s = -math.inf, FRAME_S
         self._begun_s = 0.0
-        self._searched_s = -math.inf
+        self._searched_s = self._closely_s = -math.inf
 
     def step(
         self, image_rgb: np.ndarray, upcoming_rgb: np.ndarray | None = None, time_s: float | None = None
@@ -275,10 +275,12 @@ class PeopleTracker:
     def _search_is_due(self, image_rgb: np.ndarray) -> bool:
         if not self._live or any(self._is_missed(f, EAGER_S) for f in self._lost):
             return True
-        every_s = SEARCH_LARGEST_S if self._largest_only else SEARCH_S
+        return self._has_passed(self._search_every_s(image_rgb), self._time_s - self._searched_s)
+
+    def _search_every_s(self, image_rgb: np.ndarray) -> float:
         if self._lost or self._looks_for_rivals(image_rgb):
-            every_s = SEARCH_MISSED_S
-        return self._has_passed(every_s, self._time_s - self._searched_s)
+            return SEARCH_MISSED_S
+        return SEARCH_LARGEST_S if self._largest_only else SEARCH_S
 
     def _looks_for_rivals(self, image_rgb: np.ndarray) -> bool:
         """Whether somebody half as large as the most prominent person would be too small for a plain look just now."""
@@ -306,7 +308,13 @@ class PeopleTracker:
                     self._add(estimate, sure)
 
     def _detect(self, image_rgb: np.ndarray) -> list[Detection]:
+        """Closely, if somebody small may be there; where frames are few, a little less often, for what each costs."""
         closely = not self._largest_only or self._looks_for_rivals(image_rgb)
+        if closely and self._live:
+            every_s = self._search_every_s(image_rgb) * max(1.0, math.sqrt(self._step_s / FRAME_S))
+            closely = self._has_passed(every_s, self._time_s - self._closely_s)
+        if closely:
+            self._closely_s = self._time_s
         return self._detector.detect(image_rgb, closely=closely)
 
     def _ranked(self, detections: list[Detection]) -> list[Detection]:
