@@ -55,13 +55,15 @@ def _speed(body: Body, quick: bool) -> dict:
         for q, f in presets.items()
     ]  # fmt: skip
     rows += [
-        [f"fast, two people, {name}", f["end_to_end"], 35.0, f["networks"], f["solver"], f["cpu_ms_per_frame"], None, None]
+        [f"fast, two people, {name}", f["end_to_end"], 35.0, f["networks"], f["solver"], f["cpu_ms_per_frame"], None,
+         None]
         for name, f in pairs.items()
-    ]
+    ]  # fmt: skip
     head = ("preset", "end to end", "target", "networks", "solver", "CPU ms/frame", "MediaPipe", "ratio, target 1.5")
     print(f"Frames per second, {frames} frames of 1080p; decoding alone {fps['decode']:.0f}; default: {default}\n")
     print(table(head, rows), end="\n\n", flush=True)
-    return {"fps": fps, "fps_presets": presets | {"two_people_fast": pair, "two_people_fast_12": pairs["12 a second"]}, "default": default}
+    presets |= {"two_people_fast": pair, "two_people_fast_12": pairs["12 a second"]}
+    return {"fps": fps, "fps_presets": presets, "default": default}
 
 
 def _accuracy(body: Body) -> dict:
