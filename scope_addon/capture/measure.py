@@ -93,10 +93,12 @@ class Measurer:
         field, first_joint = measurements.orientation_field, len(self.body.keypoint_names)
         if field is None:
             return False
+        own = slice(len(self.bone_starts))  # those of the fingers follow, where hands are looked for
+        directions, confidence = np.asarray(field.directions)[own], np.asarray(field.confidence)[own]
         bones = joints_cam[self.bone_ends - first_joint] - joints_cam[self.bone_starts - first_joint]
-        lengths = np.linalg.norm(bones, axis=1) * np.linalg.norm(field.directions, axis=1)
-        away = (bones * field.directions).sum(axis=1) < CONTRADICTION * lengths
-        return bool((away & (np.asarray(field.confidence) > SURE_CONFIDENCE)).any())
+        lengths = np.linalg.norm(bones, axis=1) * np.linalg.norm(directions, axis=1)
+        away = (bones * directions).sum(axis=1) < CONTRADICTION * lengths
+        return bool((away & (confidence > SURE_CONFIDENCE)).any())
 
     def joint_confidence(self, confidence: np.ndarray) -> np.ndarray:
         """(T, 33) landmark confidences -> (T, K+1): how far landmarks, not priors, fix each joint's rotation.
