@@ -24,6 +24,12 @@ FAST_BUTTON, CAPTURE_BUTTON = (1086, 151), (1174, 183)
 report: dict = {"blender": bpy.app.version_string, "python": sys.version.split()[0], "exports": []}
 
 
+def tracked_half() -> bool:
+    """Whether half of the frames of the running capture have been looked at, or it has ended."""
+    job = addon().state.job
+    return job is None or (job.progress.total > 0 and job.progress.done >= 0.5 * job.progress.total)
+
+
 def steps() -> Iterator[float]:
     """The session; yields seconds to wait."""
     scene = bpy.context.scene
@@ -141,7 +147,7 @@ def steps() -> Iterator[float]:
     scene = bpy.context.scene
     scene.scope.quality = "BALANCED"  # captured anew, now that the solver is compiled: the preview shows the body
     invoke(bpy.ops.scope.capture, "INVOKE_DEFAULT")
-    yield from until(lambda: addon().state.job.progress.done > 100, 120, "the preview of the body")
+    yield from until(tracked_half, 120, "the preview of the body")
     picture("9_body_over_footage")
     key("Escape")
     yield 2.0
