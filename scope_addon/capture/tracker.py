@@ -273,11 +273,12 @@ class PeopleTracker:
                 self._live.append(lost)
 
     def _search_is_due(self, image_rgb: np.ndarray) -> bool:
-        if not self._live or any(self._is_missed(f, EAGER_S) for f in self._lost):
-            return True
         return self._has_passed(self._search_every_s(image_rgb), self._time_s - self._searched_s)
 
     def _search_every_s(self, image_rgb: np.ndarray) -> float:
+        """Seconds between two looks for others, just now; 0: in every frame."""
+        if not self._live or any(self._is_missed(f, EAGER_S) for f in self._lost):
+            return 0.0
         if self._lost or self._looks_for_rivals(image_rgb):
             return SEARCH_MISSED_S
         return SEARCH_LARGEST_S if self._largest_only else SEARCH_S
@@ -310,7 +311,7 @@ class PeopleTracker:
     def _detect(self, image_rgb: np.ndarray) -> list[Detection]:
         """Closely, if somebody small may be there; where frames are few, a little less often, for what each costs."""
         closely = not self._largest_only or self._looks_for_rivals(image_rgb)
-        if closely and self._live:
+        if closely:
             every_s = self._search_every_s(image_rgb) * max(1.0, math.sqrt(self._step_s / FRAME_S))
             closely = self._has_passed(every_s, self._time_s - self._closely_s)
         if closely:

@@ -72,10 +72,11 @@ def _time(image: np.ndarray) -> int:
 
 class FakeDetector:
     def __init__(self, people: list[Person]) -> None:
-        self.people, self.calls = people, 0
+        self.people, self.calls, self.close_calls = people, 0, 0
 
     def detect(self, image: np.ndarray, threshold: float = 0.5, closely: bool = False) -> list[Detection]:
         self.calls += 1
+        self.close_calls += closely
         found = []
         for person in self.people:
             place = person.place(_time(image))

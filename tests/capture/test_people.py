@@ -111,6 +111,23 @@ def test_the_networks_look_as_often_at_any_rate(monkeypatch: pytest.MonkeyPatch,
     assert abs(sum(o.appearance is not None for o in seen) - 4 * fps / max(1, round(fps * 4 / 30))) <= 1
 
 
+def test_every_look_for_somebody_just_lost_is_close(monkeypatch: pytest.MonkeyPatch) -> None:
+    """At 30 frames a second all others too; where frames are few, some of the others look at the whole picture."""
+    stays = Person(lambda t: (300, 200), BLUE)
+    for fps, close_alone in ((30, True), (6, False)):
+        leaves = Person(lambda t, fps=fps: (900, 200) if t < fps else None, RED)
+        detector = FakeDetector([stays, leaves])
+        monkeypatch.setattr(tracker_module, "LandmarkNetwork", lambda *_, d=detector: FakeLandmarks(d.people))
+        monkeypatch.setattr(tracker_module, "PersonDetector", lambda *_, d=detector: d)
+        tracker, looks = PeopleTracker("fast", 1, 2), []
+        for t, image in enumerate(pictures([stays, leaves], 2 * fps)):
+            before = detector.calls, detector.close_calls
+            tracker.step(image, time_s=t / fps)
+            looks.append((detector.calls - before[0], detector.close_calls - before[1]))
+        assert looks[fps : fps + fps // 2] == [(1, 1)] * (fps // 2)  # lost for less than half a second
+        assert all(look == close for look, close in looks[:fps]) == close_alone
+
+
 def test_known_again_by_the_clothes_after_a_long_time(follow: Callable[..., list[Track]]) -> None:
     red = Person(lambda t: (200, 200) if not 40 <= t < 140 else None, RED)
     blue = Person(lambda t: (700, 200) if not 30 <= t < 160 else None, BLUE)
