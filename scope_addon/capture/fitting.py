@@ -138,7 +138,7 @@ def fit_track(prepared: PreparedTrack, progress: Callable[[str, int, int], None]
 def fit_picture(prepared: PreparedTrack) -> State | None:
     """Fit the body to a track of one frame that was seen, with a shape of its own; None if that says nothing."""
     (found,) = _fit_shape(prepared).frames
-    return None if found.status in (Status.NO_MEASUREMENTS, Status.NON_FINITE) else found.state
+    return found.state if _is_usable(found) else None
 
 
 def refit_track(
@@ -183,18 +183,17 @@ def _fit_frames(
         rotations[k, 0], rotations[k, 1:] = fit.state.R_camera_root, fit.state.Omega
         root[k], cost[k] = fit.state.t_camera_root, fit.cost
 
-    def go_back(k: int, gain: float) -> int:
-        """Frames before ``k`` once more, each from the one after it, as long as it costs less than was gained there.
+    def go_back(k: int, later: State, gain: float) -> int:
+        """Frames before ``k`` from its state ``later``, each from the one after it, if that costs less than was gained.
 
         :return: how many iterations that took.
         """
-        later, count = State(rotations[k, 0], root[k], rotations[k, 1:], betas), 0
+        count = 0
         while k > 0 and valid[k - 1] and not track.acquired[k]:
             k -= 1
             found = fit_tree(tree, prepared.measure_with_hands(k), later, priors, warm)
             count += found.iterations
-            sound = found.status not in (Status.NO_MEASUREMENTS, Status.NON_FINITE)
-            if not sound or found.cost - cost[k] > gain or _as_before(found.state.Omega, rotations[k, 1:]):
+            if not _is_usable(found) or found.cost - cost[k] > gain or _as_before(found.state.Omega, rotations[k, 1:]):
                 break
             keep(k, found)
             later = found.state
@@ -210,7 +209,7 @@ def _fit_frames(
             known_root = init.t_camera_root if init is not None and state is not None else None
             measurements = prepared.measure_with_hands(k, known_root)
             found = fit_tree(tree, measurements, init, priors, cold if init is None else warm)
-            if found.status not in (Status.NO_MEASUREMENTS, Status.NON_FINITE):
+            if _is_usable(found):
                 last, last_time, valid[k] = found, track.times[k], True
                 iterations += found.iterations
                 if init is not None and prepared.measurer.contradicts(measurements, found.t_camera_part):
@@ -218,8 +217,7 @@ def _fit_frames(
                     iterations += freed.iterations
                     if freed.cost < found.cost:
                         last = freed
-                        keep(k, freed)
-                        iterations += go_back(k, found.cost - freed.cost) if state is None else 0
+                        iterations += go_back(k, freed.state, found.cost - freed.cost) if state is None else 0
         if last is not None:
             keep(k, last)
         if k % 16 == 0 or k == T - 1:
@@ -237,6 +235,10 @@ def _fit_frames(
         joint_confidence=confidence * valid[:, None],
         iterations=iterations / max(int(valid.sum()), 1),
     )
+
+
+def _is_usable(fit: Fit) -> bool:
+    return fit.status not in (Status.NO_MEASUREMENTS, Status.NON_FINITE)
 
 
 def _as_before(a: np.ndarray, b: np.ndarray) -> bool:

@@ -34,7 +34,7 @@ from ...solver import (
     fit_tree,
     make_tree,
 )
-from ...solver.rotations import exp
+from ...solver.rotations import shortest_turn
 from .frame_blocks import by_blocks
 from .measure import NEAREST_M
 from .smoothing import gaussian_smooth, smooth_rotations
@@ -180,7 +180,7 @@ def hold_feet(
     tree = make_tree(body)
     indices, positions, weights = targets
     center = np.broadcast_to(center, root_cam.shape)
-    turns = _looking_at(root_cam - center)
+    turns = shortest_turn(root_cam - center, np.array([0.0, 0.0, 1.0]))
     seen = [body.keypoint_set("blazepose")[name] for name in _SEEN]
     at_rest = body.rest_joints(betas)[0]
 
@@ -216,14 +216,6 @@ def hold_feet(
         rotations[t, 0], rotations[t, 1:] = turn.T @ found.R_camera_root, found.Omega
         root_cam[t] = turn.T @ found.t_camera_root + center[t]
     return rotations, root_cam
-
-
-def _looking_at(points: np.ndarray) -> np.ndarray:
-    """(T, 3, 3) rotations that turn positions (T, 3) about a camera's centre onto its z axis, by the shortest way."""
-    z = along_sight(points)
-    axis = np.stack([z[:, 1], -z[:, 0], np.zeros(len(z))], axis=1)
-    angle = np.arctan2(np.linalg.norm(axis, axis=1), z[:, 2])
-    return exp(axis / np.maximum(np.linalg.norm(axis, axis=1, keepdims=True), 1e-9) * angle[:, None])
 
 
 # A standing foot is held to 5 mm, no sole may be far below the floor; the pelvis may give 2 cm and half a degree, every

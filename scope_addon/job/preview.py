@@ -51,12 +51,11 @@ class PreviewWriter:
         self._path, self._send = folder / FILE, send
         self._last = -np.inf
         self._pool = ThreadPoolExecutor(2, "scope-preview")
-        self._rasterizer: Future[None] | None = None
+        self._rasterizer = self._pool.submit(_load_rasterizer)
         self._drawing: Future[None] | None = None
         self._open, self._writing = True, threading.Lock()
 
     def __enter__(self) -> PreviewWriter:
-        self._rasterizer = self._pool.submit(_load_rasterizer)
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
@@ -75,8 +74,8 @@ class PreviewWriter:
 
     def _show(self, frame: Frame, observation: Observation | None, live: LiveBody) -> None:
         # On a new machine the rasterizer compiles for a while, and pictures do not wait for it.
-        can_draw = self._rasterizer is not None and self._rasterizer.done()
-        picture = draw(frame.image_rgb, observation, _pose(observation, live) if can_draw else None)
+        pose = _pose(observation, live) if self._rasterizer.done() else None
+        picture = draw(frame.image_rgb, observation, pose)
         height, width = picture.shape[:2]
         with self._writing:
             if not self._open:
