@@ -20,6 +20,7 @@ from .hand_measure import HAND_KEYPOINT_NAMES
 from .landmark_network import KEYPOINT_NAMES
 from .line_segments import Lines
 from .placement import PlacedTrack, raw_motion
+from .seen_keypoints import as_seen
 from .track import Track
 from .world import estimate_world
 
@@ -148,6 +149,7 @@ def reprojection_error(
 
     :param rotation, root: (T, K+1, 3, 3), (T, 3) the body in the first frame's camera axes.
     """
+    body = as_seen(body)
     at = body.keypoint_set("blazepose")
     order = [at[name] for name in KEYPOINT_NAMES]
     K, J0 = camera.intrinsics, body.rest_joints(betas)[0]

@@ -37,6 +37,7 @@ from .lifter import Lifted, our_lifter
 from .lifter_window import windows_around
 from .measure import DEPTH_SIGMA_M, NEAREST_M, Measurer
 from .parts import ALL_PARTS, Parts
+from .seen_keypoints import as_seen
 from .track import Track
 
 SHAPE_FRAMES = 64  # frames that decide the shape; more of them are more of the same
@@ -73,7 +74,7 @@ class FittedTrack:
 class PreparedTrack:
     """What every pass over a track needs, computed once: undistorted keypoints, the lifter's points, priors."""
 
-    body: Body
+    body: Body  # with keypoints where they are seen
     track: Track
     measurer: Measurer
     pixels: np.ndarray  # (T, J, 2) keypoints as an ideal pinhole would see them
@@ -108,6 +109,8 @@ class PreparedTrack:
 
 def prepare_track(body: Body, track: Track, camera: Camera, parts: Parts = ALL_PARTS) -> PreparedTrack:
     """Undistort and lift a track; the lifting network runs here and nowhere else."""
+    if parts.placement:
+        body = as_seen(body)
     measurer, pixels = Measurer(body, camera.intrinsics), camera.undistort(track.keypoints_px)
     lifted = _lift(measurer, track, pixels, parts)
     priors = replace(default_priors(body), joint_weights=_joint_weights(body))

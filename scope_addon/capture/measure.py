@@ -38,6 +38,9 @@ class Measurer:
         self.trust = np.array([_trust(name) for name in KEYPOINT_NAMES])
         pairs = [(f"{s}_{a}", f"{s}_{b}") for s in ("left", "right") for a, b in _BONES] + [("right_hip", "left_hip")]
         first_joint = len(body.keypoint_names)  # the solver numbers the joints after the keypoints
+        # What is lifted lies at the joint itself, wherever the picture shows it.
+        joints = {name: first_joint + k for k, name in enumerate(body.joint_names)}
+        self.lifted_indices = np.array([joints.get(name, at[name]) for name in KEYPOINT_NAMES])
         self.bone_starts, self.bone_ends = (
             np.array([first_joint + body.joint_names.index(pair[k]) for pair in pairs]) for k in (0, 1)
         )
@@ -78,7 +81,7 @@ class Measurer:
         return Measurements(
             intrinsics=self.intrinsics,
             keypoints2d=Keypoints2D(self.indices, pixels, confidence * self.trust),
-            keypoints3d=Keypoints3D(self.indices, placed, (DEPTH_SIGMA_M / sigma) ** 2),
+            keypoints3d=Keypoints3D(self.lifted_indices, placed, (DEPTH_SIGMA_M / sigma) ** 2),
             orientation_field=OrientationField(
                 self.bone_starts,
                 self.bone_ends,

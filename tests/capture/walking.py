@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import numpy as np
+from scope.scope_addon.capture.seen_keypoints import as_seen
 from scope.scope_addon.capture.track import Track
 from scope.solver.body import load_body
 from scope.solver.rotations import exp
@@ -12,7 +13,7 @@ from scope.solver.rotations import exp
 def someone_walking(frames: int, rate: float, heading: float, turn: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
     """(T, 33, 2) pixels and (T, 33, 3) world landmarks of the body as it walks, a step of each foot in a second."""
     body = load_body("scope")
-    at = list(body.keypoint_set("blazepose").values())
+    seen, at = as_seen(body), list(body.keypoint_set("blazepose").values())
     pixels, world = [], []
     for k in range(frames):
         swing, pose = 0.5 * np.sin(2 * np.pi * k / rate), np.zeros((body.K + 1, 3))
@@ -29,7 +30,7 @@ def someone_walking(frames: int, rate: float, heading: float, turn: float = 0.0)
             pose[body.joint_names.index(name), axis] += angle
         R = exp(pose)
         R[0] = np.diag([1.0, -1.0, -1.0]) @ exp(np.array([0, heading + turn * k / rate, 0])) @ R[0]
-        points = body.keypoints(*body.forward_kinematics(R, np.array([0.3, 0.1, 4.0])))[at]
+        points = seen.keypoints(*body.forward_kinematics(R, np.array([0.3, 0.1, 4.0])))[at]
         world.append(points - points[[23, 24]].mean(axis=0))
         pixels.append(points[:, :2] / points[:, 2:] * 1100.0 + [640.0, 360.0])
     return np.array(pixels), np.array(world)

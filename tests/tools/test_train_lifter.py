@@ -86,6 +86,7 @@ def test_a_camera_that_looks_down_sees_the_world_s_up_tip_towards_it():
 def test_input_without_noise_is_the_projection_of_the_target(dataset, monkeypatch):
     """With the detector's errors off, the virtual camera at the right distance projects the target onto the input."""
     monkeypatch.setattr(detector_noise, "PLACEMENT", np.zeros(33))
+    monkeypatch.setattr(detector_noise, "offset", lambda name: np.zeros(3))
     monkeypatch.setattr(detector_noise, "IMAGE_NOISE", 0.0)
     monkeypatch.setattr(detector_noise, "CUT_SHARE", 0.0)
     monkeypatch.setattr(detector_noise, "SWAP_SHARE", 0.0)
@@ -118,7 +119,7 @@ def test_world_landmarks_are_hip_centred_and_distorted_as_much_as_landmark_netwo
     world = detector_noise.world_landmarks(rng, truth, Persistence.draw(rng, 500))
     assert np.abs(world[:, :, HIPS].mean(axis=2)).max() < 1e-5
     error = np.linalg.norm(world - truth, axis=-1)[..., 11:].mean()
-    assert 0.06 < error < 0.2
+    assert 0.06 < error < 0.21  # metres; hands, which are off most, hang on arms of 0.6 m
 
 
 def test_a_window_is_a_recording_at_the_lifter_s_moments(body, monkeypatch):

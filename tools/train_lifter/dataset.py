@@ -76,8 +76,8 @@ class Dataset:
         """n people of random motion, shape and place."""
         Omega = self.sampler.motion_windows(rng, n)
         bones, local = self.sampler.proportions(rng, n)
-        displaced = detector_noise.PLACEMENT[:, None] * rng.standard_normal((n, KEYPOINT_COUNT, 3))
-        points, seen = self.keypoints(Omega, bones, local, displaced.astype(np.float32))
+        displaced = detector_noise.placements(rng, n)
+        points, seen = self.keypoints(Omega, bones, local, displaced)
         middle = points[:, :, HIPS].mean(axis=2, keepdims=True)
         x, y = rng.uniform(-1, 1, (2, n)) * np.array(FIELD)[:, None]
         distance = np.exp(rng.uniform(np.log(NEAREST_M), np.log(FARTHEST_M), n))

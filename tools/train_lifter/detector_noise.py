@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What a detector makes of true keypoints: displaced and uncertain 2D keypoints, distorted world landmarks.
 
-The detector's keypoints are not our body's: each lies at a constant offset in its body part (people differ in build
-and clothes, detectors in what they call a hip). To this come errors of the image and, in the world landmarks, a whole
-that is tilted, scaled and flattened, limbs that point elsewhere in depth, and now and then a limb mirrored in depth.
+The detector's keypoints are not our body's: each lies at a constant offset in its body part, the one of
+`seen_keypoints` and another of each person's own (people differ in build and clothes). To this come errors of the image
+and, in the world landmarks, a whole that is tilted, scaled and flattened, limbs that point elsewhere in depth, and now
+and then a limb mirrored in depth.
 
 Errors last. Those of the depth of bones, as `pose_landmark_heavy` sees them on footage and renders with known truth, go
 with themselves 0.1, 0.2, 0.4 and 0.8 seconds later by 0.8, 0.65, 0.5 and 0.5: half of an error is the same through the
@@ -16,10 +17,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...scope_addon.capture.landmark_network import KEYPOINT_NAMES
 from ...scope_addon.capture.lifter_window import WINDOW
+from ...scope_addon.capture.seen_keypoints import offset
 from .augment import small_rotations
 
-# Metres, one standard deviation per coordinate, of where the detector sees a keypoint of a body part.
+# Metres, one standard deviation per coordinate, of where the detector sees a keypoint of one person's body part.
 PLACEMENT = np.full(33, 0.012)
 PLACEMENT[[11, 12]], PLACEMENT[[23, 24]], PLACEMENT[25:33] = 0.02, 0.025, 0.015
 IMAGE_NOISE = 0.03  # of the person's size s (see lifter.py), times a factor per sample of exp(N(0, 0.5))
@@ -89,6 +92,12 @@ class Persistence:
         n = len(self.constant)
         constant = rng.standard_normal((n, 1, *shape), np.float32)
         return self.mix(constant, rng.standard_normal((n, WINDOW, *shape), np.float32))
+
+
+def placements(rng: np.random.Generator, n: int) -> np.ndarray:
+    """(n, 33, 3) f32 metres: where n people's keypoints are seen, beside our body's, in the axes of their parts."""
+    own = PLACEMENT[:, None] * rng.standard_normal((n, len(PLACEMENT), 3))
+    return (np.array([offset(name) for name in KEYPOINT_NAMES]) + own).astype(np.float32)
 
 
 def image_errors(rng: np.random.Generator, persistence: Persistence) -> tuple[np.ndarray, np.ndarray]:
