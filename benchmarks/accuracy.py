@@ -33,7 +33,7 @@ ABLATION: dict[str, dict[str, Parts | bool]] = {
     "all parts": {},
     "without the lifter": {"parts": Parts(lifter=False)},
     "lifter without world landmarks": {"parts": Parts(world_landmarks=False)},
-    "keypoints at the joints": {"parts": Parts(placement=False)},
+    "keypoints at the joints": {"parts": Parts(seen_keypoints=False)},
     "without 3D keypoints": {"parts": Parts(keypoints3d=False)},
     "without the orientation field": {"parts": Parts(orientation_field=False)},
     "without the joint prior": {"parts": Parts(joint_prior=False)},

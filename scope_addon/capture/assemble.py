@@ -20,7 +20,6 @@ from .hand_measure import HAND_KEYPOINT_NAMES
 from .landmark_network import KEYPOINT_NAMES
 from .line_segments import Lines
 from .placement import PlacedTrack, raw_motion
-from .seen_keypoints import as_seen
 from .track import Track
 from .world import estimate_world
 
@@ -58,6 +57,7 @@ def assemble_motion(
     image_size: tuple[int, int],
     source: str,
     smoothing: bool,
+    seen: Body | None = None,
     hold_feet: bool = True,
     T_world_camera: np.ndarray | None = None,
     floor_m: float = 0.0,
@@ -66,7 +66,8 @@ def assemble_motion(
 ) -> Motion:
     """The motion file's content for one person, from ``fitted`` and the same as ``placed``.
 
-    ``path``: where each frame's camera was (None: on a stand); "the camera" below is the first frame's.
+    ``seen``: the body with its keypoints where the network sees them (None: at its own), for what is left over in the
+    picture.  ``path``: where each frame's camera was (None: on a stand); "the camera" below is the first frame's.
     ``lines``: of the background, in its axes.
 
     ``T_world_camera`` (4, 4): the world that several people share, and ``floor_m``, the height in it of what this
@@ -121,7 +122,7 @@ def assemble_motion(
         joint_confidence=fitted.joint_confidence,
         world_from_camera=path.world_from_frames(T_world_camera),
         foot_contact=contact,
-        residual_px=reprojection_error(body, local, root, betas, track, camera, valid, path),
+        residual_px=reprojection_error(seen or body, local, root, betas, track, camera, valid, path),
         image_size=np.array(image_size),
         source=source,
     )
@@ -149,7 +150,6 @@ def reprojection_error(
 
     :param rotation, root: (T, K+1, 3, 3), (T, 3) the body in the first frame's camera axes.
     """
-    body = as_seen(body)
     at = body.keypoint_set("blazepose")
     order = [at[name] for name in KEYPOINT_NAMES]
     K, J0 = camera.intrinsics, body.rest_joints(betas)[0]

@@ -49,7 +49,7 @@ SHAPE_CERTAINTY = 1e6  # information (1/σ² per coefficient) that holds the sha
 # lifter is sure to 0.1 m (its errors go the same way in all points), 2.6 degrees for directions, 0.5 rad for a joint
 # about its rest state. Chosen on real clips with 3D truth and on renders of recorded motion; 25 to 50 % more or less of
 # any hardly matters. 3D keypoints, whose errors are those of the directions once more, weigh little: with 25, 8, 2.5
-# and 0, real clips have 75.9, 74.5, 73.6 and 72.9 mm, and renders up to 1 mm more with less.
+# and 0, real clips have 75.2, 73.8, 73.1 and 72.4 mm; the sample clip has 1 mm more with 4.
 WEIGHTS = Weights(
     keypoints2d=1e5, keypoints3d=8.0, orientation_field=500.0, joint_prior=4.0, joint_limits=2000.0, shape=10.0
 )
@@ -74,7 +74,7 @@ class FittedTrack:
 class PreparedTrack:
     """What every pass over a track needs, computed once: undistorted keypoints, the lifter's points, priors."""
 
-    body: Body  # with keypoints where they are seen
+    body: Body  # with keypoints where the network sees them
     track: Track
     measurer: Measurer
     pixels: np.ndarray  # (T, J, 2) keypoints as an ideal pinhole would see them
@@ -109,7 +109,7 @@ class PreparedTrack:
 
 def prepare_track(body: Body, track: Track, camera: Camera, parts: Parts = ALL_PARTS) -> PreparedTrack:
     """Undistort and lift a track; the lifting network runs here and nowhere else."""
-    if parts.placement:
+    if parts.seen_keypoints and track.knows_depth:  # a network that tells depth is BlazePose's
         body = as_seen(body)
     measurer, pixels = Measurer(body, camera.intrinsics), camera.undistort(track.keypoints_px)
     lifted = _lift(measurer, track, pixels, parts)

@@ -16,7 +16,7 @@ from ...solver import Body, Keypoints2D, Keypoints3D, Measurements, OrientationF
 from .landmark_network import KEYPOINT_NAMES
 
 # How far a landmark is trusted beside a wrist or knee: the face and fingers lie close together and say little about
-# the body, and what the network calls hip is not quite the body's hip joint.
+# the body, and what the network calls hip lies elsewhere from person to person.
 _TRUST = {"hip": 0.7, "nose": 0.5, "ear": 0.5, "heel": 0.5, "foot": 0.5}
 _TRUST |= {"pinky": 0.3, "index": 0.3, "thumb": 0.3, "eye": 0.2, "mouth": 0.2}
 _BONES = ("shoulder", "elbow"), ("elbow", "wrist"), ("hip", "knee"), ("knee", "ankle")
@@ -38,8 +38,9 @@ class Measurer:
         self.trust = np.array([_trust(name) for name in KEYPOINT_NAMES])
         pairs = [(f"{s}_{a}", f"{s}_{b}") for s in ("left", "right") for a, b in _BONES] + [("right_hip", "left_hip")]
         first_joint = len(body.keypoint_names)  # the solver numbers the joints after the keypoints
-        # What is lifted lies at the joint itself, wherever the picture shows it.
+        # Limbs are lifted to their joints, wherever the picture shows them; face, hands and feet to where it does.
         joints = {name: first_joint + k for k, name in enumerate(body.joint_names)}
+        self.is_joint = np.array([name in joints for name in KEYPOINT_NAMES])
         self.lifted_indices = np.array([joints.get(name, at[name]) for name in KEYPOINT_NAMES])
         self.bone_starts, self.bone_ends = (
             np.array([first_joint + body.joint_names.index(pair[k]) for pair in pairs]) for k in (0, 1)
@@ -110,11 +111,11 @@ class Measurer:
         nearest parts below it. A part with neither is fixed by priors alone: 0.
         """
         body = self.body
-        part, lever = body.keypoint_part[self.indices], np.linalg.norm(body.v_bar[self.indices], axis=1)
+        part = body.keypoint_part[self.indices]
         children = [np.flatnonzero(body.parents == i) for i in range(body.K + 1)]
         out = np.zeros((len(confidence), body.K + 1))
         for i in range(body.K + 1):
-            fixing = np.flatnonzero((part == i) & (lever > 0.01))
+            fixing = np.flatnonzero((part == i) & ~self.is_joint)
             below = children[i]
             while len(fixing) == 0 and len(below):
                 fixing = np.flatnonzero(np.isin(part, below))

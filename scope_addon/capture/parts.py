@@ -15,7 +15,7 @@ class Parts:
 
     lifter: bool = True  # else the landmark network's own world landmarks stand in for it
     world_landmarks: bool = True  # as input of the lifter
-    placement: bool = True  # keypoints where the networks see them on a body, instead of at its joints
+    seen_keypoints: bool = True  # keypoints where the networks see them on a body, instead of at its joints
     keypoints3d: bool = True
     orientation_field: bool = True
     joint_prior: bool = True

@@ -302,6 +302,7 @@ def solve(
         placed = place()
     if not smoothing:
         placed = place(smoothing)
+    shown = [each.body for each in prepared]
     prepared.clear()
     world = share_world(body, placed, lines) if several else None
     iterations = fits[0].iterations
@@ -312,6 +313,7 @@ def solve(
             fits.pop(0),
             placed.pop(0),
             camera,
+            seen=shown.pop(0),
             smoothing=smoothing,
             hold_feet=parts.contact,
             T_world_camera=world.T_world_camera if world else None,

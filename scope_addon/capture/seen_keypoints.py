@@ -3,14 +3,14 @@
 
     p_seen = R_i (v̄_j + V_j β + d_j) + t_i
 
-What a network calls a hip lies 2 cm below the hip joint, what it calls an ankle 1 cm above, on everybody alike. d_j is
-what the picture left over, on average, of fits without it, symmetric, by the least squares
+What BlazePose calls a hip lies 2 cm below the default body's hip joint, what it calls an ankle 1 cm above, on everybody
+alike; other networks are not known to. d_j is what the picture left over, on average, of fits without it, symmetric, by
+the least squares
 
-    min Σ_clips mean_t Σ_j c_jt |Π (R_i(t) d_j) − r_jt|² + 0.3 |d|²
+    min Σ_people mean_t Σ_j c_jt |Π (R_i(t) d_j) − r_jt|² + 0.3 |d|²
 
-with Π the two coordinates across the line of sight and r_jt the distance in metres between keypoint and body there;
-seven people of five clips, none of those that accuracy is measured on
-(`python -m scope.tools.train_lifter.place_keypoints`).
+with Π the camera's x and y, and r_jt the distance in metres between keypoint and body there; seven people of five
+clips, none of those that accuracy is measured on (`python -m scope.tools.train_lifter.place_keypoints`).
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...solver import Body
+from .landmark_network import KEYPOINT_NAMES
 
 # Millimetres in the axes of the rest pose: to the person's left, up, forwards. The right side is the mirror image.
 OFFSETS_MM = {
@@ -46,8 +47,9 @@ OFFSETS_MM = {
 def as_seen(body: Body) -> Body:
     """The body with BlazePose's keypoints where the landmark networks see them; all else, its joints too, stays."""
     template = body.keypoint_template.copy()
-    for name, index in body.keypoint_set("blazepose").items():
-        template[index] += offset(name)
+    at = body.keypoint_set("blazepose")
+    for name in KEYPOINT_NAMES:
+        template[at[name]] += offset(name)
     return replace(body, keypoint_template=template)
 
 

@@ -6,6 +6,8 @@ import pytest
 from scope.scope_addon.capture.landmark_network import KEYPOINT_NAMES
 from scope.scope_addon.capture.lifter import HIPS, Lifter
 from scope.scope_addon.capture.lifter_window import MIDDLE, OFFSETS_S, SPACING_S, WINDOW
+from scope.scope_addon.capture.seen_keypoints import offset
+from scope.solver.names import BLAZEPOSE
 from scope.solver.rotations import exp
 from scope.tools.train_lifter import detector_noise
 from scope.tools.train_lifter.augment import Motions, PoseSampler, small_rotations
@@ -103,6 +105,13 @@ def test_input_without_noise_is_the_projection_of_the_target(dataset, monkeypatc
         assert np.abs(A @ t - b).max() < 2e-3
         assert 1.5 < t[2] < 13
         assert np.abs(P[HIPS].mean(axis=0)).max() < 1e-5
+
+
+def test_keypoints_are_placed_around_where_networks_see_them():
+    placed = detector_noise.placements(np.random.default_rng(0), 4000)
+    expected = np.array([offset(name) for name in BLAZEPOSE])
+    assert np.allclose(placed.mean(axis=0), expected, atol=0.002)
+    assert np.allclose(placed.std(axis=0), detector_noise.PLACEMENT[:, None], rtol=0.05)
 
 
 def test_a_batch_depends_on_its_seed_alone(dataset):

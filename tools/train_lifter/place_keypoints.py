@@ -64,7 +64,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description="Find where the landmark network sees keypoints.")
     parser.add_argument("clips", type=Path, help="folder of the clips")
     folder: Path = parser.parse_args().clips
-    body, parts = load_body("scope"), Parts(placement=False)
+    body, parts = load_body("scope"), Parts(seen_keypoints=False)
     everybody = []
     for clip in CLIPS:
         found = capture(folder / f"{clip}.mp4", body, CaptureOptions(people=ALL, parts=parts))
