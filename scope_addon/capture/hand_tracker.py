@@ -15,6 +15,7 @@ from .hand_region import HAND_LENGTH_M, SIDES, WRISTS, pixels_per_metre, region_
 from .observation import Observation
 from .palm_detector import PalmDetector
 from .region import Region
+from .tracker import FRAME_S
 
 PRESENCE_THRESHOLD = 0.5
 UNAIDED_PRESENCE = 0.8  # where neither a palm was detected nor the hand seen before
@@ -23,8 +24,9 @@ UNSURE_WRIST_APART = 1.2  # where the body's wrist is uncertain
 SURE_WRIST = 0.5
 SAME_HAND = 0.35  # mean distance of the keypoints, in sizes of the hand, below which two hands are one
 SEARCH_SCALE = 2.3  # side of the square in which a palm is looked for, over the region that the body foretells
-EAGER_FRAMES = 10  # how long a lost hand is looked for in every frame
-PATIENT_FRAMES = 4  # afterwards, every so many frames
+EAGER_S = 10 * FRAME_S  # how long a lost hand is looked for in every frame
+PATIENT_S = 4 * FRAME_S  # afterwards, so long after the look before
+SOON_S = 0.005  # what a frame's time may be off
 SMALLEST_HAND_PX = 12.0
 DISAGREEMENT_THRESHOLD = 0.3
 STRANGER = 0.15  # probability of the right side below which a hand is not the one that is wanted
@@ -32,10 +34,11 @@ STRANGER = 0.15  # probability of the right side below which a hand is not the o
 
 @dataclass
 class _Hand:
-    """One hand of one person: where it was seen in the frame before, or for how long it was not."""
+    """One hand of one person: where it was seen in the frame before, if it was."""
 
-    estimate: HandEstimate | None = None
-    lost: int = 0
+    estimate: HandEstimate | None
+    seen_s: float  # when it was seen last; of one that never was, when it was first looked for
+    looked_s: float  # when it was last looked for
 
 
 class HandTracker:
@@ -45,19 +48,26 @@ class HandTracker:
         self._network = HandNetwork(threads, folder, execution)
         self._palms = PalmDetector(threads, folder, execution)
         self._hands: dict[tuple[int, int], _Hand] = {}
+        self._time_s = 0.0
 
     def step(
-        self, image_rgb: np.ndarray, observations: Sequence[tuple[int, Observation]]
+        self, image_rgb: np.ndarray, observations: Sequence[tuple[int, Observation]], time_s: float | None = None
     ) -> list[tuple[int, Observation]]:
-        """The observations of one frame, each with the person's ``hands``."""
+        """The observations of one frame, each with the person's ``hands``.
+
+        ``time_s``: when the frame is shown; without it, a thirtieth of a second after the one before.
+        """
+        self._time_s = now = self._time_s + FRAME_S if time_s is None else time_s
         keys = [(number, side) for number, _ in observations for side in range(len(SIDES))]
-        self._hands = {key: self._hands.get(key, _Hand()) for key in keys}
+        self._hands = {key: self._hands.get(key) or _Hand(None, now, now - PATIENT_S) for key in keys}
         people = dict(observations)
         found = {key: self._find(image_rgb, self._hands[key], people[key[0]], key[1]) for key in keys}
         _settle_rivals(found, people)
         for key, estimate in found.items():
             hand = self._hands[key]
-            hand.estimate, hand.lost = estimate, 0 if estimate is not None else hand.lost + 1
+            hand.estimate = estimate
+            if estimate is not None:
+                hand.seen_s = now
         return [(n, replace(o, hands=_as_array([found[n, s] for s in range(len(SIDES))]))) for n, o in observations]
 
     def _find(self, image_rgb: np.ndarray, hand: _Hand, person: Observation, side: int) -> HandEstimate | None:
@@ -67,8 +77,9 @@ class HandTracker:
             followed = self._network.estimate(image_rgb, hand.estimate.next_region)
             if followed.presence >= PRESENCE_THRESHOLD and belongs(followed, person, scale, side):
                 return followed
-        elif hand.lost > EAGER_FRAMES and hand.lost % PATIENT_FRAMES:
+        elif self._time_s - hand.seen_s > EAGER_S + SOON_S and self._time_s - hand.looked_s < PATIENT_S - SOON_S:
             return None
+        hand.looked_s = self._time_s
         foretold = region_from_body(person.keypoints_px, scale, side)
         if HAND_LENGTH_M * scale < SMALLEST_HAND_PX or not _is_in_image(foretold, image_rgb):
             return None

@@ -230,7 +230,7 @@ def _observe(
             observations = tracker.step(frame.image_rgb, upcoming.image_rgb if upcoming else None, frame.timestamp_s)
         if hands is not None:
             with clock.stage("hands"):
-                observations = hands.step(frame.image_rgb, observations)
+                observations = hands.step(frame.image_rgb, observations, frame.timestamp_s)
         builder.add(frame.index, frame.timestamp_s, observations)
         people = [o for _, o in observations]
         with clock.stage("background"):

@@ -107,7 +107,19 @@ def test_a_hand_is_found_again_after_it_was_gone_and_zeros_stand_for_it_meanwhil
     for _ in range(30):
         assert not seen(tracker, person()).any()
     hands.append(gone)
-    assert any(seen(tracker, person())[0] for _ in range(hand_tracker.PATIENT_FRAMES))
+    assert any(seen(tracker, person())[0] for _ in range(4))
+
+
+@pytest.mark.parametrize("rate", [12, 30, 60])
+def test_a_hand_that_stays_away_is_looked_for_as_often_at_any_frame_rate(follow, rate):
+    """In every frame for a third of a second, then six to eight times a second, each hand."""
+    tracker = follow([])
+    looks = []
+    for k in range(3 * rate):
+        tracker.step(IMAGE, [(0, person())], k / rate)
+        looks.append(tracker._palms.looks)
+    assert looks[rate // 3] == 2 * (rate // 3 + 1)
+    assert 22 <= looks[3 * rate - 1] - looks[rate - 1] <= 32  # in two seconds, both hands
 
 
 def test_a_hand_far_from_the_bodys_wrist_is_let_go(follow):
