@@ -71,7 +71,11 @@ def build_shape_space(source: SourceMesh, body: np.ndarray, area: np.ndarray) ->
     base = source.vertices - source.vertices[pelvis].mean(axis=0)
     moves -= moves[:, pelvis].mean(axis=1, keepdims=True)
 
-    gains = {name: _gain(source, base, moves[row], name) for row, name in enumerate(names) if _is_length(name)}
+    gains = {
+        name: _gain(source, base, move, name)
+        for name, move in zip(names, moves, strict=True)
+        if name.rpartition("-")[0] in LENGTHS
+    }
     coefficients = _draw_people(names, gains, base[body], moves[:, body])
     centre = coefficients.mean(axis=0)
     scatter = np.linalg.cholesky(np.cov(coefficients.T) + 1e-12 * np.eye(len(names)))  # Σ = L Lᵀ
@@ -86,10 +90,6 @@ def build_shape_space(source: SourceMesh, body: np.ndarray, area: np.ndarray) ->
     components *= np.where(taller < 0.0, -1.0, 1.0)[:, None, None]  # positive β is taller
     variance = singular**2 / np.sum(singular**2)
     return ShapeSpace(np.concatenate([mean[None], components]), variance[:COMPONENTS])
-
-
-def _is_length(name: str) -> bool:
-    return name.rpartition("-")[0] in LENGTHS
 
 
 def _gain(source: SourceMesh, base: np.ndarray, move: np.ndarray, name: str) -> float:
@@ -119,29 +119,24 @@ def _draw_people(names: list[str], gains: dict[str, float], base: np.ndarray, mo
     spread = np.where(male, STATURE["male"][1], STATURE["female"][1])
     wanted = rng.normal(mean, spread)
     longer = {name: rng.normal(*LENGTHENING[name], PEOPLE) for name in LENGTHS}
-
-    def coefficients(sliders: dict[str, np.ndarray]) -> np.ndarray:
-        out = _macro_coefficients(names, sliders)
-        for column, name in enumerate(names):
-            if name in gains:
-                out[:, column] = (longer[name.rpartition("-")[0]] / gains[name]).clip(0.0)
-        return out
+    lengths = {name: (longer[name.rpartition("-")[0]] / gain).clip(0.0) for name, gain in gains.items()}
 
     top, bottom = base[:, 1].argmax(), base[:, 1].argmin()
     span = moves[:, top, 1] - moves[:, bottom, 1]
 
     def stature(height: float) -> np.ndarray:
         sliders["height"] = np.full(PEOPLE, height)
-        return base[top, 1] - base[bottom, 1] + coefficients(sliders) @ span
+        return base[top, 1] - base[bottom, 1] + _coefficients(names, sliders, lengths) @ span
 
     low, middle, high = stature(0.0), stature(0.5), stature(1.0)
     below = 0.5 * (wanted - low) / (middle - low)
     above = 0.5 + 0.5 * (wanted - middle) / (high - middle)
     sliders["height"] = np.where(wanted < middle, below, above).clip(0.0, 1.0)
-    return coefficients(sliders)
+    return _coefficients(names, sliders, lengths)
 
 
-def _macro_coefficients(names: list[str], sliders: dict[str, np.ndarray]) -> np.ndarray:
+def _coefficients(names: list[str], sliders: dict[str, np.ndarray], lengths: dict[str, np.ndarray]) -> np.ndarray:
+    """(PEOPLE, targets): ``lengths`` are known by target, all others follow from the sliders."""
     weight = {}
     for factor, levels in FACTORS.items():
         knots = np.linspace(0.0, 1.0, len(levels))
@@ -150,8 +145,8 @@ def _macro_coefficients(names: list[str], sliders: dict[str, np.ndarray]) -> np.
     weight |= dict.fromkeys(RACES, np.full(PEOPLE, 1.0 / len(RACES)))
     weight["universal"] = np.ones(PEOPLE)
     columns = [
-        np.zeros(PEOPLE)
-        if _is_length(name)
+        lengths[name]
+        if name in lengths
         else np.prod([weight[word] for word in name.split("/")[-1].split("-")], axis=0)
         for name in names
     ]

@@ -18,19 +18,13 @@ from ...scope_addon.capture.pipeline import ALL, CaptureOptions, capture
 from ...scope_addon.motion import Motion
 from ...solver import Body, load_body
 from ...solver.rotations import exp
+from .detector_noise import SWAPPED
 
 CLIPS = ("walk_side_static", "run_moving_camera", "squats_5fps", "gesture_square", "two_people_portrait")
 LEAST_FRAMES = 20  # of a person who counts
 REGULARIZATION = 0.3
 FARTHEST_M = 0.12  # a keypoint that is further off is a mistake
 REFLECTION = np.diag([-1.0, 1.0, 1.0])
-
-
-def _other_side(name: str) -> str:
-    return name.replace("left", "right") if "left" in name else name.replace("right", "left")
-
-
-MIRRORED = np.array([KEYPOINT_NAMES.index(_other_side(name)) for name in KEYPOINT_NAMES])
 
 
 def normal_equations(body: Body, motion: Motion) -> tuple[np.ndarray, np.ndarray]:
@@ -41,7 +35,7 @@ def normal_equations(body: Body, motion: Motion) -> tuple[np.ndarray, np.ndarray
     rotations = exp(motion.poses.reshape(len(motion), -1, 3).astype(float))
     rotations[:, 0] = np.swapaxes(motion.world_from_camera[:, :3, :3], 1, 2) @ rotations[:, 0]
     R, t = body.forward_kinematics(rotations, motion.joints_cam[:, 0] - body.rest_joints(betas)[0], betas)
-    points = body.keypoints(R, t, betas)[:, indices]
+    points = body.keypoints(R, t, betas, indices)
     order = [motion.keypoints2d_names.tolist().index(name) for name in KEYPOINT_NAMES]
     pixels, confidence = motion.keypoints2d[:, order, :2], motion.keypoints2d[:, order, 2]
     K, depth = motion.intrinsics, points[..., 2:]
@@ -51,7 +45,7 @@ def normal_equations(body: Body, motion: Motion) -> tuple[np.ndarray, np.ndarray
     across = R[:, part, :2]
     A = np.einsum("tk,tkia,tkib->kab", weight, across, across)
     b = np.einsum("tk,tkia,tki->ka", weight, across, left_over)
-    return A + REFLECTION @ A[MIRRORED] @ REFLECTION, b + b[MIRRORED] @ REFLECTION
+    return A + REFLECTION @ A[SWAPPED] @ REFLECTION, b + b[SWAPPED] @ REFLECTION
 
 
 def offsets(A: np.ndarray, b: np.ndarray) -> np.ndarray:
