@@ -8,6 +8,8 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
+_HALVED_FROM = 4.0  # times the size
+
 
 @dataclass(frozen=True)
 class Letterbox:
@@ -33,9 +35,15 @@ def fit_in(
         scale = min(width / columns, height / rows)
         size = max(1, round(columns * scale)), max(1, round(rows * scale))
     left, top = ((width - size[0]) // 2, (height - size[1]) // 2) if centered else (0, 0)
-    shrinks = size[0] < columns
     picture = np.full((height, width, 3), border, np.uint8)
-    picture[top : top + size[1], left : left + size[0]] = cv2.resize(
-        image_rgb, size, interpolation=cv2.INTER_AREA if shrinks else cv2.INTER_LINEAR
-    )
+    picture[top : top + size[1], left : left + size[0]] = _resized(image_rgb, *size)
     return Letterbox(picture, np.array([size[0] / columns, size[1] / rows]), np.array([left, top], float))
+
+
+def _resized(image: np.ndarray, width: int, height: int) -> np.ndarray:
+    """Of that size, without aliasing. By halves first, which OpenCV averages several times as fast as other shares."""
+    if width >= image.shape[1]:
+        return cv2.resize(image, (width, height), interpolation=cv2.INTER_LINEAR)
+    while min(image.shape[1] / width, image.shape[0] / height) >= _HALVED_FROM:
+        image = cv2.resize(image, (image.shape[1] // 2, image.shape[0] // 2), interpolation=cv2.INTER_AREA)
+    return cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA)

@@ -111,7 +111,8 @@ class PeopleTracker:
                 self._judge = LandmarkNetwork(strongest, 1, folder, execution)
         self._judging: list[Judgement] = []
         self._judges = ThreadPoolExecutor(1, "scope-judge")
-        self._looks_ahead = not keypoints and self._judge is None
+        self._begins_early = not keypoints
+        self._looks_ahead = self._begins_early and self._judge is None
         self._stand_in = None if keypoints else self._judge  # the user's networks are the user's choice
         self._largest_only = people is None
         self._most = 2 if people is None else min(people + 1, MOST_PEOPLE)
@@ -132,14 +133,16 @@ class PeopleTracker:
         """Everybody in the next frame, (H, W, 3) uint8 RGB, each with the number of the tracklet.
 
         The detector runs when somebody was lost and, for those who come in, now and then. With ``upcoming_rgb``, the
-        frame after it, people are looked for in both at once, in parallel, in the second one where motion foretells
-        them: what is found there counts only if this frame then says to look at the same place. ``time_s``: when the
-        frame is shown; without it, a thirtieth of a second after the one before.
+        frame after it, the look at that one begins before this call ends. The strong network looks at both at once, in
+        the second one where motion foretells people: what is found there counts only if this frame then says to look
+        at the same place. ``time_s``: when the frame is shown; without it, a thirtieth of a second after the one
+        before.
         """
         if image_rgb.ndim != 3 or image_rgb.shape[2] != 3 or image_rgb.dtype != np.uint8:
             raise ShapeError(f"A frame must be (H, W, 3) uint8 RGB, but got {image_rgb.shape} {image_rgb.dtype}.")
         self._go_to(time_s)
         self._follow(image_rgb, upcoming_rgb)
+        self._begin_upcoming(upcoming_rgb)
         self._look_round(image_rgb)
         if self._search_is_due(image_rgb):
             self._search(image_rgb)
@@ -220,6 +223,14 @@ class PeopleTracker:
         found |= {f.tracklet: estimate for f, estimate in zip(missing, looked, strict=True)}
         return [found[f.tracklet] for f in self._live]
 
+    def _begin_upcoming(self, upcoming_rgb: np.ndarray | None) -> None:
+        """Begin to look at everybody in the next frame, where they will be looked for, beside the rest of this one."""
+        if upcoming_rgb is None or not self._begins_early:
+            return
+        for f in self._live:
+            if f.foreseen is None and _is_in_image(f.estimate.next_region, upcoming_rgb):
+                f.foreseen = cast(LandmarkNetwork, self._landmarks).begin(upcoming_rgb, f.estimate.next_region)
+
     def _settled(
         self, image_rgb: np.ndarray, followed: Followed, estimate: PoseEstimate | None
     ) -> tuple[PoseEstimate | None, bool]:
@@ -281,7 +292,11 @@ class PeopleTracker:
             return 0.0
         if self._lost or self._looks_for_rivals(image_rgb):
             return SEARCH_MISSED_S
-        return SEARCH_LARGEST_S if self._largest_only else SEARCH_S
+        if self._largest_only:
+            return SEARCH_LARGEST_S
+        # As many as are wanted are followed: whoever comes in now counts only if they are larger.
+        complete = len(self._live) >= self._most - 1 and self._time_s >= self._begun_s + OPENING_S
+        return SEARCH_LARGEST_S if complete else SEARCH_S
 
     def _looks_for_rivals(self, image_rgb: np.ndarray) -> bool:
         """Whether somebody half as large as the most prominent person would be too small for a plain look just now."""
@@ -362,7 +377,7 @@ class PeopleTracker:
         return Followed(self._tracklets - 1, estimate, np.zeros(2), self._time_s)
 
     def _lose(self, followed: Followed) -> None:
-        followed.lost = 1
+        followed.lost, followed.foreseen = 1, None
         self._lost.append(followed)
 
     def _ask_judge(self, image_rgb: np.ndarray) -> dict[int, Judgement]:

@@ -111,6 +111,22 @@ def test_the_networks_look_as_often_at_any_rate(monkeypatch: pytest.MonkeyPatch,
     assert abs(sum(o.appearance is not None for o in seen) - 4 * fps / max(1, round(fps * 4 / 30))) <= 1
 
 
+def test_newcomers_are_looked_for_less_often_beside_all_who_are_wanted(monkeypatch: pytest.MonkeyPatch) -> None:
+    """After the opening of two seconds, every 0.67 s, as beside the most prominent one; at once when one is lost."""
+    people = [Person(lambda t: (300, 200), BLUE), Person(lambda t: (900, 200) if t < 180 else None, RED)]
+    detector = FakeDetector(people)
+    monkeypatch.setattr(tracker_module, "LandmarkNetwork", lambda name, *_: FakeLandmarks(people))
+    monkeypatch.setattr(tracker_module, "PersonDetector", lambda *_: detector)
+    tracker, calls = PeopleTracker("fast", 1, people=2), []
+    for t, image in enumerate(pictures(people, 184)):
+        before = detector.calls
+        tracker.step(image, time_s=t / FPS)
+        calls += [t] if detector.calls > before else []
+    assert [t for t in calls if t < 60] == list(range(0, 60, 8))
+    assert [t for t in calls if 60 <= t < 180] == list(range(76, 180, 20))
+    assert [t for t in calls if t >= 180] == [180, 181, 182, 183]
+
+
 def test_every_look_for_somebody_just_lost_is_close(monkeypatch: pytest.MonkeyPatch) -> None:
     """At 30 frames a second all others too; where frames are few, some of the others look at the whole picture."""
     stays = Person(lambda t: (300, 200), BLUE)
@@ -187,14 +203,22 @@ def test_someone_small_beside_the_most_prominent_one_costs_nothing(monkeypatch: 
 
 
 @pytest.mark.parametrize("leap", [0, 90], ids=["steady", "leaps"])
-def test_looking_ahead_changes_nothing_but_the_order(monkeypatch: pytest.MonkeyPatch, leap: int) -> None:
-    """What was foretold is used where the person goes on as before, and looked at again where not."""
+@pytest.mark.parametrize(("quality", "again"), [("best", 8), ("fast", 0)])
+def test_looking_ahead_changes_nothing_but_the_order(
+    monkeypatch: pytest.MonkeyPatch, quality: str, again: int, leap: int
+) -> None:
+    """What was foretold is used where the person goes on as before, and looked at again where not.
+
+    The small networks look ahead only once they know where: nothing is looked at twice.
+    """
     people = [Person(lambda t: (200 + 3.0 * t + (leap if t >= 20 else 0), 200), BLUE)]
-    networks = FakeLandmarks(people)
-    monkeypatch.setattr(tracker_module, "LandmarkNetwork", lambda name, *_: networks)
+    networks, strong = FakeLandmarks(people), FakeLandmarks(people)
+    if quality == "best":
+        strong = networks
+    monkeypatch.setattr(tracker_module, "LandmarkNetwork", lambda name, *_: strong if "heavy" in name else networks)
     monkeypatch.setattr(tracker_module, "PersonDetector", lambda *_: FakeDetector(people))
     images = list(pictures(people, 60))
-    plain, ahead = PeopleTracker("best", 1), PeopleTracker("best", 1)
+    plain, ahead = PeopleTracker(quality, 1), PeopleTracker(quality, 1)
     expected = [plain.step(image) for image in images]
     networks.batches.clear()
     found = [ahead.step(image, upcoming) for image, upcoming in zip(images, [*images[1:], None], strict=True)]
@@ -202,7 +226,7 @@ def test_looking_ahead_changes_nothing_but_the_order(monkeypatch: pytest.MonkeyP
         np.testing.assert_allclose(one[0][1].keypoints_px, other[0][1].keypoints_px)
         assert [number for number, _ in one] == [number for number, _ in other]
     assert networks.ahead >= 50
-    assert sum(networks.batches) <= (8 if leap == 0 else 16)
+    assert sum(networks.batches) <= 8 + (again if leap else 0)
 
 
 def test_a_flicker_is_nobody(follow: Callable[..., list[Track]]) -> None:
