@@ -11,9 +11,10 @@ from __future__ import annotations
 from concurrent.futures import Future, ThreadPoolExecutor
 from types import TracebackType
 
+from .black_bars import longer_side_between
 from .camera import Camera
 from .camera_motion import BackgroundTracker
-from .focal_length import with_focal_from_edges
+from .focal_length import better_camera
 from .live_body import LiveBody
 from .observation import Observation
 from .video import Frame
@@ -57,4 +58,5 @@ class BesideTracking:
         return self._camera.result() if self._camera is not None else self._given_camera
 
     def _better_camera(self) -> Camera:
-        return with_focal_from_edges(self._given_camera, self.background.segments, *self._size)
+        longer_px = longer_side_between(self.background.bars, *self._size)
+        return better_camera(self._given_camera, self.background.segments, *self._size, longer_px)

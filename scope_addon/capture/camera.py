@@ -99,17 +99,27 @@ def choose_camera(
     if metadata_focal_mm:
         focal_px = metadata_focal_mm / FILM_WIDTH_MM * longer
         return Camera(pinhole(width, height, focal_px), np.zeros(5), f"the file's metadata, {metadata_focal_mm:g} mm")
-    focal_px = _focal_from_fov(longer, DEFAULT_FOV_DEG)
+    return assumed_camera(width, height, longer)
+
+
+def assumed_camera(width: int, height: int, longer_px: float) -> Camera:
+    """The most likely camera; ``longer_px``: the longer side of what it saw, less than the picture's between bars."""
     source = f"assumed, {DEFAULT_FOV_DEG:g} degrees"
+    if longer_px < max(width, height):
+        source += " between the black bars"
+    focal_px = _focal_from_fov(longer_px, DEFAULT_FOV_DEG)
     return Camera(pinhole(width, height, focal_px), np.zeros(5), source, ASSUMED_DEVIATION)
 
 
-def estimated_camera(width: int, height: int, focal_px: float, deviation: float) -> Camera:
-    """The camera with a focal length told by the background's edges, ``deviation`` its relative error."""
-    fov_deg = 2 * math.degrees(math.atan(max(width, height) / (2 * focal_px)))
+def estimated_camera(width: int, height: int, focal_px: float, deviation: float, longer_px: float) -> Camera:
+    """The camera with a focal length told by the background's edges, ``deviation`` its relative error.
+
+    ``longer_px``: as for `assumed_camera`.
+    """
+    fov_deg = 2 * math.degrees(math.atan(longer_px / (2 * focal_px)))
     source = f"estimated, {fov_deg:.0f} degrees ± {100 * deviation:.0f} %"
     return Camera(pinhole(width, height, focal_px), np.zeros(5), source, deviation)
 
 
-def _focal_from_fov(longer: int, fov_deg: float) -> float:
+def _focal_from_fov(longer: float, fov_deg: float) -> float:
     return longer / (2 * math.tan(math.radians(fov_deg) / 2))

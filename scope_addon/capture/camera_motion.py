@@ -22,6 +22,7 @@ import cv2
 import numpy as np
 
 from ...solver.rotations import exp, log
+from .black_bars import find_bars
 from .camera import Camera
 from .compass import LOOK_SIDE_PX, LOOKS_EVERY_S, Look, without_drift
 from .line_segments import Lines, Segments, find_segments
@@ -81,6 +82,7 @@ class BackgroundTracker:
         self._R_key_last = np.eye(3)
         self._agreeing: list[float] = []  # share of the corners, where they were followed
         self._looks: list[Look] = []  # the first one at the first frame in which somebody is seen
+        self.bars: list[np.ndarray] = []  # black, in that frame
 
     def add(self, image_rgb: np.ndarray, time_s: float, people: Sequence[np.ndarray]) -> None:
         """The next frame.
@@ -89,13 +91,14 @@ class BackgroundTracker:
         """
         self._times.append(time_s)
         if people and not self._looks:
-            self._looks.append(Look(len(self._times) - 1, find_segments(image_rgb, people)))
+            self.bars = find_bars(image_rgb)
+            self._looks.append(Look(len(self._times) - 1, find_segments(image_rgb, people, bars=self.bars)))
         if time_s - self._last_used < 0.98 / SAMPLES_HZ:
             self._rotations.append(None)
             return
         self._last_used = time_s
         picture = self._shrink(image_rgb)
-        boxes = [self._box(points) for points in people]
+        boxes = [self._box(surroundings(points)) for points in people] + [self._box(bar) for bar in self.bars]
         if self._picture is None:
             self._begin_key(picture, boxes)
             self._rotations.append(np.eye(3))
@@ -110,7 +113,7 @@ class BackgroundTracker:
         R_first_camera = self._R_first_key @ self._R_key_last
         self._rotations.append(R_first_camera)
         if self._looks and time_s - self._times[self._looks[-1].row] >= LOOKS_EVERY_S and _turns(R_first_camera):
-            self._looks.append(Look(len(self._times) - 1, find_segments(image_rgb, people, LOOK_SIDE_PX)))
+            self._looks.append(Look(len(self._times) - 1, find_segments(image_rgb, people, LOOK_SIDE_PX, self.bars)))
         self._picture = picture
         if len(self._points) < max(KEY_SHARE * self._key_count, FEWEST_CORNERS):
             self._R_first_key = self._R_first_key @ self._R_key_last
@@ -201,9 +204,9 @@ class BackgroundTracker:
         rays = self._camera.rays(full)
         return rays / np.linalg.norm(rays, axis=1, keepdims=True)
 
-    def _box(self, points: np.ndarray) -> np.ndarray:
-        """x0, y0, x1, y1 of a person's surroundings in the working picture, and some pixels more."""
-        return surroundings(points) * self._scale + [-4.0, -4.0, 4.0, 4.0]
+    def _box(self, box_px: np.ndarray) -> np.ndarray:
+        """x0, y0, x1, y1 in the working picture, and some pixels more."""
+        return box_px * self._scale + [-4.0, -4.0, 4.0, 4.0]
 
 
 def _turns(R: np.ndarray) -> bool:

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .camera import ASSUMED_DEVIATION, Camera, estimated_camera
+from .camera import ASSUMED_DEVIATION, Camera, assumed_camera, estimated_camera
 from .line_segments import Segments
 from .right_angles import Edges
 
@@ -34,12 +34,16 @@ class FocalLength:
     deviation: float
 
 
-def with_focal_from_edges(camera: Camera, segments: Segments, width: int, height: int) -> Camera:
-    """The camera, with the focal length that edges tell, if they tell any and it was only assumed."""
+def better_camera(camera: Camera, segments: Segments, width: int, height: int, longer_px: float) -> Camera:
+    """The camera, with the focal length that edges tell, if they tell any and it was only assumed.
+
+    ``longer_px``: the longer side of what the camera saw, for what is assumed; see `black_bars`.
+    """
     if camera.focal_deviation == 0.0:
         return camera
+    camera = assumed_camera(width, height, longer_px)
     found = focal_from_edges(segments, width, height, camera.intrinsics[0, 0])
-    return estimated_camera(width, height, found.focal_px, found.deviation) if found else camera
+    return estimated_camera(width, height, found.focal_px, found.deviation, longer_px) if found else camera
 
 
 def focal_from_edges(segments: Segments, width: int, height: int, assumed_px: float) -> FocalLength | None:

@@ -18,6 +18,7 @@ from .region import inside, surroundings
 WORKING_SIDE_PX = 960
 SHORTEST = 0.03  # of the longer side
 MOST_SEGMENTS = 250
+BAR_MARGIN_PX = 6.0  # by which the edge of a black bar may be off
 
 
 @dataclass(frozen=True)
@@ -61,11 +62,15 @@ def plane_normals(rays: np.ndarray) -> np.ndarray:
 
 
 def find_segments(
-    image_rgb: np.ndarray, people: Sequence[np.ndarray], working_side_px: int = WORKING_SIDE_PX
+    image_rgb: np.ndarray,
+    people: Sequence[np.ndarray],
+    working_side_px: int = WORKING_SIDE_PX,
+    bars: Sequence[np.ndarray] = (),
 ) -> Segments:
     """The straight edges of a picture.
 
     :param people: (n, 2) points of each person in pixels; edges within their boxes are left out.
+    :param bars: black ones, see `black_bars`; their edges are left out.
     :param working_side_px: the longer side of the picture that is looked at; the time it takes grows with its square.
     """
     height, width = image_rgb.shape[:2]
@@ -80,7 +85,8 @@ def find_segments(
     lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) / max(width, height)
     keep = lengths > SHORTEST
     middle = ends.mean(axis=1)
-    keep &= ~inside(middle, [surroundings(points) for points in people])
+    margin = BAR_MARGIN_PX * np.array([-1, -1, 1, 1])
+    keep &= ~inside(middle, [*(surroundings(points) for points in people), *(bar + margin for bar in bars)])
     chosen = np.flatnonzero(keep)
     chosen = chosen[np.argsort(-lengths[chosen])[:MOST_SEGMENTS]]
     return Segments(ends[chosen].astype(float), lengths[chosen].astype(float))
