@@ -7,8 +7,7 @@ from pathlib import Path
 VIDEO_SUFFIXES = (
     *(".mp4", ".mov", ".m4v", ".avi", ".mkv", ".webm", ".mpg", ".mpeg", ".wmv", ".mts", ".m2ts", ".ts", ".3gp", ".gif"),
 )
-PICTURE_SUFFIXES = (".jpg", ".jpeg", ".png", ".webp", ".tif", ".tiff", ".bmp", ".avif")
-UNREAD_SUFFIXES = (".heic", ".heif")  # footage that cannot be read, which is to be said and not passed over
+PICTURE_SUFFIXES = (".jpg", ".jpeg", ".png", ".webp", ".tif", ".tiff", ".bmp", ".avif", ".heic", ".heif")
 FOOTAGE_SUFFIXES = VIDEO_SUFFIXES + PICTURE_SUFFIXES
 LAST_NUMBER = re.compile(r"(\d+)(?!.*\d)")
 

@@ -1,17 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Frames of a video file one after the other, upright and with square pixels, by whatever can decode it.
 
-OpenCV reads nearly everything; its packages carry no decoder for AV1, which PyAV reads.
+OpenCV reads nearly everything; its packages carry no decoder for AV1, which PyAV reads, as it does pictures of phones.
 """
 
 from __future__ import annotations
 
 import itertools
 import os
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Protocol, cast
 
 # Read by OpenCV when it first opens a video. -8 silences ffmpeg's own notes: what matters is said in our words. A
 # playlist that calls itself .mp4 may not reach for the network: footage is read from files and from nowhere else.
@@ -25,6 +25,7 @@ from ...solver.errors import VideoError
 
 if TYPE_CHECKING:
     import av
+    from av.container import InputContainer
 
 _PROTOCOLS = {"protocol_whitelist": "file"}
 _WORTH_A_JUMP_S = 20.0
@@ -136,22 +137,53 @@ class OpencvReader:
         self._capture.release()
 
 
+def _open_with_pyav(path: Path) -> tuple[type[Exception], InputContainer | None]:
+    """What PyAV raises, and the file, opened; None where it is nothing that it knows.
+
+    :raises VideoError: PyAV is missing.
+    """
+    try:
+        import av
+    except ImportError as error:
+        raise VideoError(
+            f"{path} is AV1 or HEIC, which needs the package 'av' that is not installed; install it, or convert a "
+            "video to H.264 .mp4, a picture to JPEG"
+        ) from error
+    try:
+        container = av.open(str(path.absolute()), options=_PROTOCOLS, container_options=_PROTOCOLS)
+    except (av.error.FFmpegError, OSError, ValueError):
+        return av.error.FFmpegError, None
+    return av.error.FFmpegError, container
+
+
+def decode_items(path: Path, numbers: Collection[int]) -> dict[int, np.ndarray]:
+    """The coded pictures of a HEIF file (`heif`) by item, (h, w, 3) RGB; without those that cannot be decoded.
+
+    :raises VideoError: PyAV is missing.
+    """
+    pictures: dict[int, np.ndarray] = {}
+    failure, container = _open_with_pyav(path)
+    if container is None:
+        return pictures
+    with container:
+        streams = [stream for stream in container.streams.video if stream.id in numbers]
+        try:
+            for packet in container.demux(streams) if streams else ():
+                for frame in cast("list[av.VideoFrame]", packet.decode()):
+                    pictures.setdefault(packet.stream.id, frame.to_ndarray(format="rgb24"))
+        except (failure, OSError, ValueError):  # damaged: what is whole counts
+            pass
+    return pictures
+
+
 class PyavReader:
     """PyAV, imported when it is needed: few files are AV1."""
 
     def __init__(self, path: Path) -> None:
-        try:
-            import av
-        except ImportError as error:
-            raise VideoError(
-                f"{path} is AV1, which needs the package 'av' that is not installed; install it, or convert a video to "
-                "H.264 .mp4, a picture to JPEG"
-            ) from error
-        self._failure = av.error.FFmpegError
-        try:
-            self._container = av.open(str(path.absolute()), options=_PROTOCOLS, container_options=_PROTOCOLS)
-        except (self._failure, OSError, ValueError) as error:
-            raise VideoError(f"{path} is not a video that can be decoded; convert it to an H.264 .mp4") from error
+        self._failure, container = _open_with_pyav(path)
+        if container is None:
+            raise VideoError(f"{path} is not a video that can be decoded; convert it to an H.264 .mp4")
+        self._container = container
         self._stream = self._container.streams.video[0]
         self._stream.thread_type = "AUTO"
         self._frames: Iterator[av.VideoFrame] = self._container.decode(self._stream)

@@ -1,13 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """One picture's file as upright 8-bit RGB, whether it is footage by itself or one of a sequence.
 
-OpenCV reads JPEG, PNG, WebP, TIFF, BMP and others; AVIF, which its packages leave out, is AV1 and goes to PyAV.
+OpenCV reads JPEG, PNG, WebP, TIFF, BMP and others; AVIF and HEIC, which its packages leave out, go to PyAV.
 """
 
 from __future__ import annotations
 
-import re
-from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,14 +14,11 @@ import numpy as np
 
 from ...solver.errors import VideoError
 from .exif import animation_length, read_exif
-from .frame_readers import PyavReader
+from .frame_readers import decode_items
+from .heif import assemble, read_layout
 
 _JPEG_STREAMS = (".mjpeg", ".mjpg")  # begin like a picture, but are many
-_HEIC_BRANDS = {b"heic", b"heix", b"heim", b"heis", b"hevc", b"hevx"}  # ISO 23008-12's names for HEVC inside
-_AVIF_BRAND = b"avif"
-# An item of type "grid" in a file's list of items: a picture made of tiles, of which PyAV would give the first.
-_TILED = re.compile(rb"infe.{8}(..)?grid", re.S)
-_META_BYTES = 1 << 16
+_HEIF_BRANDS = {b"mif1", b"heic", b"heix", b"heim", b"heis", b"avif"}  # ISO 23008-12's, and AVIF's
 _OPENEXR, _GIF = b"v/1\x01", b"GIF8"
 
 
@@ -43,14 +38,8 @@ def is_picture(path: Path) -> bool:
     """
     with path.open("rb") as file:
         head = file.read(64)
-    brands = _brands(head)
-    if _AVIF_BRAND in brands:
+    if _brands(head) & _HEIF_BRANDS:
         return True
-    if brands & _HEIC_BRANDS:
-        raise VideoError(
-            f"{path} is a HEIC picture, which cannot be read here; export it as JPEG (an iPhone takes JPEG itself with "
-            "Settings > Camera > Formats > Most Compatible)"
-        )
     if head.startswith(_OPENEXR):
         raise VideoError(f"{path} is an OpenEXR picture, which cannot be read here; export it as PNG or TIFF")
     if head.startswith(_GIF) or path.suffix.lower() in _JPEG_STREAMS:
@@ -61,13 +50,11 @@ def is_picture(path: Path) -> bool:
 def read_picture(path: Path) -> Picture | None:
     """The picture in a file, None where it cannot be decoded; what is transparent shows white.
 
-    :raises VideoError: it is AVIF, and PyAV is missing, or it is made of tiles.
+    :raises VideoError: it is AVIF or HEIC, and PyAV is missing.
     """
     data = path.read_bytes()
-    if _AVIF_BRAND in _brands(data[:64]):
-        if _TILED.search(data[:_META_BYTES]):
-            raise VideoError(f"{path} is an AVIF picture made of tiles, which cannot be read here; export it as JPEG")
-        return _read_avif(path)
+    if _brands(data[:64]) & _HEIF_BRANDS:
+        return _read_heif(path, data)
     try:
         image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
     except cv2.error:  # an empty file, or one too large
@@ -89,15 +76,12 @@ def _brands(head: bytes) -> set[bytes]:
     return {head[at : at + 4] for at in (8, *range(16, size - 3, 4))}
 
 
-def _read_avif(path: Path) -> Picture | None:
-    try:
-        with closing(PyavReader(path)) as reader:
-            got = reader.read()
-    except VideoError as error:
-        if isinstance(error.__cause__, ImportError):
-            raise
+def _read_heif(path: Path, data: bytes) -> Picture | None:
+    layout = read_layout(data)
+    if layout is None:
         return None
-    return None if got is None else Picture(got[1])
+    whole = assemble(layout, decode_items(path, set(layout.tiles.ravel().tolist())))
+    return None if whole is None else Picture(whole, read_exif(layout.exif).focal_35mm)
 
 
 def _as_rgb8(image: np.ndarray) -> np.ndarray:

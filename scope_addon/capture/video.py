@@ -110,7 +110,7 @@ class Video:
 
 
 def open_video(path: str | Path, wanted: Wanted | None = None) -> Video:
-    """Open a video or a picture (JPEG, PNG, WebP, TIFF, AVIF, ...; 16-bit and alpha too) and decode its first frame.
+    """Open a video or a picture (JPEG, HEIC, PNG, WebP, TIFF, ...; 16-bit and alpha too) and decode its first frame.
 
     Numbered pictures are a video as well (`image_sequence`); what is wanted then says their rate, else it is 30.
 

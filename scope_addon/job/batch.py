@@ -23,7 +23,6 @@ from ...solver.errors import InputError, NoPersonError, OutputError, UsageError
 from ..footage import (
     FOOTAGE_SUFFIXES,
     PICTURE_SUFFIXES,
-    UNREAD_SUFFIXES,
     VIDEO_SUFFIXES,
     is_sequence,
     pictures_in,
@@ -270,7 +269,7 @@ class Batch:
                     found.append(path)
                 elif recursive:
                     found += self._below(path, recursive)
-            elif suffix in FOOTAGE_SUFFIXES + UNREAD_SUFFIXES:
+            elif suffix in FOOTAGE_SUFFIXES:
                 found.append(path)
         return found
 
