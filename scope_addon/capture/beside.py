@@ -11,7 +11,7 @@ from __future__ import annotations
 from concurrent.futures import Future, ThreadPoolExecutor
 from types import TracebackType
 
-from .black_bars import longer_side_between
+from .bars import longer_side_between
 from .camera import Camera
 from .camera_motion import BackgroundTracker
 from .focal_length import better_camera

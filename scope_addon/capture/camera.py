@@ -106,7 +106,7 @@ def assumed_camera(width: int, height: int, longer_px: float) -> Camera:
     """The most likely camera; ``longer_px``: the longer side of what it saw, less than the picture's between bars."""
     source = f"assumed, {DEFAULT_FOV_DEG:g} degrees"
     if longer_px < max(width, height):
-        source += " between the black bars"
+        source += " between the bars"
     focal_px = _focal_from_fov(longer_px, DEFAULT_FOV_DEG)
     return Camera(pinhole(width, height, focal_px), np.zeros(5), source, ASSUMED_DEVIATION)
 

@@ -22,7 +22,7 @@ import cv2
 import numpy as np
 
 from ...solver.rotations import exp, log
-from .black_bars import find_bars
+from .bars import find_bars
 from .camera import Camera
 from .compass import LOOK_SIDE_PX, LOOKS_EVERY_S, Look, without_drift
 from .line_segments import Lines, Segments, find_segments
@@ -82,7 +82,7 @@ class BackgroundTracker:
         self._R_key_last = np.eye(3)
         self._agreeing: list[float] = []  # share of the corners, where they were followed
         self._looks: list[Look] = []  # the first one at the first frame in which somebody is seen
-        self.bars: list[np.ndarray] = []  # black, in that frame
+        self.bars: list[np.ndarray] = []  # in that frame
 
     def add(self, image_rgb: np.ndarray, time_s: float, people: Sequence[np.ndarray]) -> None:
         """The next frame.

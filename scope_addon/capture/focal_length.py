@@ -37,7 +37,7 @@ class FocalLength:
 def better_camera(camera: Camera, segments: Segments, width: int, height: int, longer_px: float) -> Camera:
     """The camera, with the focal length that edges tell, if they tell any and it was only assumed.
 
-    ``longer_px``: the longer side of what the camera saw, for what is assumed; see `black_bars`.
+    ``longer_px``: the longer side of what the camera saw, for what is assumed; see `bars`.
     """
     if camera.focal_deviation == 0.0:
         return camera

@@ -18,7 +18,7 @@ from .region import inside, surroundings
 WORKING_SIDE_PX = 960
 SHORTEST = 0.03  # of the longer side
 MOST_SEGMENTS = 250
-BAR_MARGIN_PX = 6.0  # by which the edge of a black bar may be off
+BAR_MARGIN_PX = 6.0  # by which the edge of a bar may be off
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,7 @@ def find_segments(
     """The straight edges of a picture.
 
     :param people: (n, 2) points of each person in pixels; edges within their boxes are left out.
-    :param bars: black ones, see `black_bars`; their edges are left out.
+    :param bars: see `bars`; their edges are left out.
     :param working_side_px: the longer side of the picture that is looked at; the time it takes grows with its square.
     """
     height, width = image_rgb.shape[:2]

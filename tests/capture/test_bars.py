@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Black bars: found where they are, not in dark scenes, and what the camera is then taken to be."""
+"""Bars: found where they are, not in dark scenes or doorways, and what the camera is then taken to be."""
 
 from fractions import Fraction
 
+import cv2
 import numpy as np
 import pytest
-from scope.scope_addon.capture.black_bars import find_bars, longer_side_between
+from scope.scope_addon.capture.bars import find_bars, longer_side_between
 from scope.scope_addon.capture.camera import choose_camera
 from scope.scope_addon.capture.camera_motion import BackgroundTracker
 from scope.scope_addon.capture.focal_length import better_camera
@@ -39,6 +40,32 @@ def test_bars_are_found(sides: tuple[int, int, int, int]) -> None:
     assert longer_side_between(bars, WIDTH, HEIGHT) == pytest.approx(longer, abs=4)
 
 
+@pytest.mark.parametrize("upright", [False, True])
+@pytest.mark.parametrize("kind", ["blurred", "white"])
+def test_bars_of_other_kinds_are_found(kind: str, upright: bool) -> None:
+    """An upright clip before its own blurred copy, as broadcasters show it; or beside a colour."""
+    clip = cv2.resize(scene(30, 54), (300, 540), interpolation=cv2.INTER_CUBIC)
+    picture = np.full((540, 960, 3), 235, np.uint8)
+    if kind == "blurred":
+        picture = cv2.resize(cv2.GaussianBlur(cv2.resize(clip, (96, 172)), (0, 0), 5)[60:114], (960, 540))
+    picture[:, 330:630] = clip
+    if upright:
+        picture = picture.transpose(1, 0, 2).copy()
+    bars = find_bars(cv2.imdecode(cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, 80])[1], cv2.IMREAD_COLOR))
+    sizes = [bar[[3, 2]] if upright else bar[[2, 3]] for bar in bars]
+    assert sizes[0][0] == pytest.approx(330, abs=2)
+    assert longer_side_between(bars, *picture.shape[1::-1]) == pytest.approx(540)
+
+
+@pytest.mark.parametrize("detail", [40, 0], ids=["a pattern on the wall", "a plain wall, a door off the middle"])
+def test_a_door_frame_is_no_picture_between_bars(detail: int) -> None:
+    picture = np.full((HEIGHT, WIDTH, 3), 160, np.uint8)
+    picture += np.random.default_rng(0).integers(0, detail + 1, picture.shape, dtype=np.uint8)
+    left = 300 if detail else 340
+    picture[:, left:660] = scene(660 - left, HEIGHT) // 4
+    assert find_bars(picture) == []
+
+
 @pytest.mark.parametrize(
     "picture",
     [
@@ -66,7 +93,7 @@ def test_the_assumed_angle_is_that_of_what_lies_between() -> None:
     found = better_camera(camera, Segments.none(), WIDTH, HEIGHT, float(HEIGHT))
     assert found.intrinsics[0, 0] == pytest.approx(choose_camera(HEIGHT, 300).intrinsics[0, 0])
     assert found.intrinsics[:2, 2] == pytest.approx([WIDTH / 2, HEIGHT / 2])
-    assert "black bars" in found.source
+    assert "between the bars" in found.source
     given = choose_camera(WIDTH, HEIGHT, fov_deg=60)
     assert better_camera(given, Segments.none(), WIDTH, HEIGHT, float(HEIGHT)) is given
 
