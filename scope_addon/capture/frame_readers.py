@@ -138,7 +138,7 @@ class OpencvReader:
 
 
 def _open_with_pyav(path: Path) -> tuple[type[Exception], InputContainer | None]:
-    """What PyAV raises, and the file, opened; None where it is nothing that it knows.
+    """What PyAV raises, and the file, opened; None where it is nothing that it knows. Imported here: few files need it.
 
     :raises VideoError: PyAV is missing.
     """
@@ -156,8 +156,11 @@ def _open_with_pyav(path: Path) -> tuple[type[Exception], InputContainer | None]
     return av.error.FFmpegError, container
 
 
-def decode_items(path: Path, numbers: Collection[int]) -> dict[int, np.ndarray]:
-    """The coded pictures of a HEIF file (`heif`) by item, (h, w, 3) RGB; without those that cannot be decoded.
+def decode_items(path: Path, numbers: Collection[int], most_pixels: int) -> dict[int, np.ndarray]:
+    """The coded pictures of a HEIF file (`heif`) by item, (h, w, 3) RGB; of a damaged file, those that were decoded.
+
+    Gives up at ``most_pixels`` in all. PyAV's streams bear the numbers of the items, of which the first counts: what
+    moves in an animation has a number of its own, which may be the same.
 
     :raises VideoError: PyAV is missing.
     """
@@ -166,18 +169,26 @@ def decode_items(path: Path, numbers: Collection[int]) -> dict[int, np.ndarray]:
     if container is None:
         return pictures
     with container:
-        streams = [stream for stream in container.streams.video if stream.id in numbers]
+        streams = {stream.id: stream for stream in reversed(container.streams.video) if stream.id in numbers}
+        for stream in streams.values():
+            stream.codec_context.thread_count = 1  # each has threads of its own, and there are hundreds of streams
         try:
-            for packet in container.demux(streams) if streams else ():
+            for packet in container.demux(list(streams.values())) if streams else ():
                 for frame in cast("list[av.VideoFrame]", packet.decode()):
-                    pictures.setdefault(packet.stream.id, frame.to_ndarray(format="rgb24"))
-        except (failure, OSError, ValueError):  # damaged: what is whole counts
+                    most_pixels -= frame.width * frame.height
+                    if most_pixels < 0:
+                        return {}
+                    if packet.stream.id not in pictures:
+                        pictures[packet.stream.id] = frame.to_ndarray(format="rgb24")
+                if len(pictures) == len(streams):
+                    break
+        except (failure, OSError, ValueError):
             pass
     return pictures
 
 
 class PyavReader:
-    """PyAV, imported when it is needed: few files are AV1."""
+    """PyAV's decoders: AV1 and more."""
 
     def __init__(self, path: Path) -> None:
         self._failure, container = _open_with_pyav(path)

@@ -17,8 +17,11 @@ from dataclasses import dataclass, field
 import numpy as np
 
 CODED = (b"hvc1", b"av01")
-MOST_TILES, MOST_PIXELS = 4096, 1 << 28
+MOST_TILES = 1000  # as many as ffmpeg opens
+MOST_PIXELS = 1 << 28  # more than any camera has; a few bytes of a hostile file can ask for any number
 _MOST_BOXES = 10_000  # of one level; a file that has more is not a picture
+_MOST_PARTS = 20_000  # in which the items of a file lie, together
+_MOST_TURNS = 16
 
 
 @dataclass(frozen=True)
@@ -45,18 +48,20 @@ def read_layout(data: bytes) -> Layout | None:
 
 def assemble(layout: Layout, pictures: Mapping[int, np.ndarray]) -> np.ndarray | None:
     """The upright picture (H, W, 3) of decoded items (h, w, 3); None where they do not fit each other."""
-    numbers = layout.tiles.ravel().tolist()
-    if any(number not in pictures for number in numbers):
+    if any(number not in pictures for number in layout.tiles.ravel().tolist()):
         return None
-    first = pictures[numbers[0]]
-    if any(pictures[number].shape != first.shape for number in numbers):
+    shape = pictures[int(layout.tiles[0, 0])].shape
+    tall, wide = shape[:2]
+    rows, columns = layout.tiles.shape
+    width, height = (wide, tall) if layout.size is None else layout.size
+    if not ((rows - 1) * tall < height <= rows * tall and (columns - 1) * wide < width <= columns * wide):
         return None
-    whole = np.concatenate([np.concatenate([pictures[n] for n in row], axis=1) for row in layout.tiles.tolist()])
-    if layout.size is not None:
-        width, height = layout.size
-        if height > whole.shape[0] or width > whole.shape[1]:
+    whole = np.empty((height, width, 3), np.uint8)
+    for (row, column), number in np.ndenumerate(layout.tiles):
+        if pictures[number].shape != shape:
             return None
-        whole = whole[:height, :width]
+        place = whole[row * tall : (row + 1) * tall, column * wide : (column + 1) * wide]
+        place[:] = pictures[number][: place.shape[0], : place.shape[1]]
     for kind, value in layout.turns:
         whole = np.rot90(whole, value) if kind == "irot" else np.flip(whole, axis=value)
     return np.ascontiguousarray(whole)
@@ -68,7 +73,6 @@ class _Item:
     parts: list[tuple[int, int]] = field(default_factory=list)  # offset and length
     is_inside: bool = False  # offsets count from the idat box
     tiles: list[int] = field(default_factory=list)
-    turns: list[tuple[str, int]] = field(default_factory=list)
 
 
 class _Items:
@@ -85,6 +89,7 @@ class _Items:
         self._read_kinds(*boxes[b"iinf"])
         self._read_places(_Reader(data, *boxes[b"iloc"]))
         self._about: list[tuple[int, int]] = []  # which item tells about which
+        self._turns: list[tuple[str, int]] = []  # of the primary item
         if b"iref" in boxes:
             self._read_references(*boxes[b"iref"])
         if b"iprp" in boxes:
@@ -94,12 +99,13 @@ class _Items:
         """Of the primary item."""
         item = self._items[self._primary]
         exif = b""
-        for teller, told in self._about:
-            if told == self._primary and self._items[teller].kind == b"Exif":
-                content = self._content(self._items[teller])
-                exif = content[4 + int.from_bytes(content[:4], "big") :]
+        tellers = [self._items.get(teller, _Item()) for teller, told in self._about if told == self._primary]
+        teller = next((item for item in tellers if item.kind == b"Exif"), None)
+        if teller is not None:
+            content = self._content(teller)
+            exif = content[4 + int.from_bytes(content[:4], "big") :]
         if item.kind in CODED:
-            return Layout(np.array([[self._primary]]), None, tuple(item.turns), exif)
+            return Layout(np.array([[self._primary]]), None, tuple(self._turns), exif)
         if item.kind != b"grid":
             raise ValueError(item.kind)
         grid = self._content(item)
@@ -110,7 +116,7 @@ class _Items:
         tiles = np.array(item.tiles).reshape(rows, columns)
         if any(self._items[number].kind not in CODED for number in item.tiles):
             raise ValueError("tiles of another kind")
-        return Layout(tiles, (width, height), tuple(item.turns), exif)
+        return Layout(tiles, (width, height), tuple(self._turns), exif)
 
     def _boxes(self, start: int, end: int) -> Iterator[tuple[bytes, int, int]]:
         """Name, start and end of the content of each box of a level."""
@@ -139,13 +145,17 @@ class _Items:
     def _read_places(self, read: _Reader) -> None:
         sizes = read.integer(2)
         offset, length, base, index = (sizes >> shift & 15 for shift in (12, 8, 4, 0))
-        wide = read.version == 2
+        wide, parts = read.version == 2, 0
         for _ in range(read.integer(4 if wide else 2)):
             item = self._items.setdefault(read.integer(4 if wide else 2), _Item())
             item.is_inside = bool(read.version and read.integer(2) & 15 == 1)
             read.integer(2)
             begin = read.integer(base)
-            for _ in range(read.integer(2)):
+            count = read.integer(2)
+            parts += count
+            if parts > _MOST_PARTS:
+                raise ValueError("too many parts")
+            for _ in range(count):
                 read.integer(index if read.version else 0)
                 item.parts.append((begin + read.integer(offset), read.integer(length)))
 
@@ -172,11 +182,13 @@ class _Items:
                 for _ in range(read.integer(1)):
                     which = read.integer(2) & 0x7FFF if read.flags & 1 else read.integer(1) & 0x7F
                     turn = properties[which - 1] if which else None
-                    if turn is not None and number in self._items:
+                    if turn is not None and number == self._primary and len(self._turns) < _MOST_TURNS:
                         name, value = turn
-                        self._items[number].turns.append((name.decode(), value & (3 if name == b"irot" else 1)))
+                        self._turns.append((name.decode(), value & (3 if name == b"irot" else 1)))
 
     def _content(self, item: _Item) -> bytes:
+        if sum(length for _, length in item.parts) > len(self._data):
+            raise ValueError("an item is larger than the file")
         start, end = self._inside if item.is_inside else (0, len(self._data))
         return b"".join(self._data[start + at : min(start + at + length, end)] for at, length in item.parts)
 

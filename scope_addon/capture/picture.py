@@ -15,7 +15,7 @@ import numpy as np
 from ...solver.errors import VideoError
 from .exif import animation_length, read_exif
 from .frame_readers import decode_items
-from .heif import assemble, read_layout
+from .heif import MOST_PIXELS, assemble, read_layout
 
 _JPEG_STREAMS = (".mjpeg", ".mjpg")  # begin like a picture, but are many
 _HEIF_BRANDS = {b"mif1", b"heic", b"heix", b"heim", b"heis", b"avif"}  # ISO 23008-12's, and AVIF's
@@ -48,7 +48,7 @@ def is_picture(path: Path) -> bool:
 
 
 def read_picture(path: Path) -> Picture | None:
-    """The picture in a file, None where it cannot be decoded; what is transparent shows white.
+    """The picture in a file, None where it cannot be decoded; what is transparent shows white, but in AVIF and HEIC.
 
     :raises VideoError: it is AVIF or HEIC, and PyAV is missing.
     """
@@ -80,7 +80,7 @@ def _read_heif(path: Path, data: bytes) -> Picture | None:
     layout = read_layout(data)
     if layout is None:
         return None
-    whole = assemble(layout, decode_items(path, set(layout.tiles.ravel().tolist())))
+    whole = assemble(layout, decode_items(path, set(layout.tiles.ravel().tolist()), MOST_PIXELS))
     return None if whole is None else Picture(whole, read_exif(layout.exif).focal_35mm)
 
 

@@ -115,6 +115,7 @@ class PeopleTracker:
         self._looks_ahead = self._begins_early and self._judge is None
         self._stand_in = None if keypoints else self._judge  # the user's networks are the user's choice
         self._largest_only = people is None
+        self._wanted = people or 1
         self._most = 2 if people is None else min(people + 1, MOST_PEOPLE)
         self.reset()
 
@@ -294,8 +295,8 @@ class PeopleTracker:
             return SEARCH_MISSED_S
         if self._largest_only:
             return SEARCH_LARGEST_S
-        # As many as are wanted are followed: whoever comes in now counts only if they are larger.
-        complete = len(self._live) >= self._most - 1 and self._time_s >= self._begun_s + OPENING_S
+        # As many as are wanted are followed: whoever comes in now counts only if they become more prominent.
+        complete = len(self._live) >= self._wanted and self._time_s >= self._begun_s + OPENING_S
         return SEARCH_LARGEST_S if complete else SEARCH_S
 
     def _looks_for_rivals(self, image_rgb: np.ndarray) -> bool:

@@ -177,7 +177,7 @@ def _open_still(path: Path, asked: Wanted) -> Video:
 
 
 def _damaged(picture: Path) -> VideoError:
-    return VideoError(f"{picture} is a picture that cannot be decoded; it may be damaged, so export it again")
+    return VideoError(f"{picture} is a picture that cannot be decoded; it may be damaged, so export it again, as JPEG")
 
 
 def _open_moving(path: Path, asked: Wanted) -> Video:

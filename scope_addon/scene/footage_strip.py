@@ -36,12 +36,12 @@ def add_footage_strips(scene: bpy.types.Scene, footage: str | Path, start_frame:
             sound = _sound(strips, path, channel, start)
             added += [sound] if sound else []
             added.append(strips.new_movie(path.stem, str(path), channel + len(added), start))
-            if not added[-1].elements[0].orig_width:  # how Blender tells of a film that it cannot open
-                raise RuntimeError
+        if not added[-1].elements[0].orig_width:  # how Blender tells of what it cannot open
+            raise RuntimeError
     except RuntimeError as error:
         for strip in added:
             strips.remove(strip)
-        raise VideoError(f"Blender cannot read {path}; convert it to MP4 (H.264)") from error
+        raise VideoError(f"Blender cannot read {path}; convert a video to MP4 (H.264), a picture to JPEG") from error
     return added
 
 

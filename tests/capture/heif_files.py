@@ -50,8 +50,12 @@ def heic(
     focal_mm: int | None = None,
     brands: bytes = b"heic\0\0\0\0mif1heic",
     grid: bytes | None = None,
+    is_inside: bool = False,
 ) -> bytes:
-    """A file. ``tile``: side of the tiles; a thumbnail comes first. ``grid``: what is said of the grid instead."""
+    """A file. ``tile``: side of the tiles; a thumbnail comes first.
+
+    ``grid``: what is said of the grid instead; ``is_inside``: in the idat box.
+    """
     height, width = picture_rgb.shape[:2]
     if tile is None:
         rows, columns, pieces = 1, 1, [picture_rgb]
@@ -101,27 +105,33 @@ def heic(
         for number, kind in zip(numbers, kinds, strict=True)
     )
 
+    inside = [is_inside and kind == b"grid" for kind in kinds]
+    idat = b"".join(content for content, within in zip(contents, inside, strict=True) if within)
+
     def meta(places: Sequence[tuple[int, int]]) -> bytes:
         located = b"".join(
-            struct.pack(">HHHII", number, 0, 1, at, length)
-            for number, (at, length) in zip(numbers, places, strict=True)
+            struct.pack(">HHHHII", number, within, 0, 1, at, length)
+            for number, within, (at, length) in zip(numbers, inside, places, strict=True)
         )
         return full_box(
             b"meta",
             full_box(b"hdlr", bytes(4) + b"pict" + bytes(13))
             + full_box(b"pitm", struct.pack(">H", primary))
-            + full_box(b"iloc", struct.pack(">HH", 0x4400, len(numbers)) + located)
+            + full_box(b"iloc", struct.pack(">HH", 0x4400, len(numbers)) + located, version=1)
             + full_box(b"iinf", kinds_box)
             + full_box(b"iref", references)
             + box(
                 b"iprp",
                 box(b"ipco", b"".join(properties)) + full_box(b"ipma", struct.pack(">I", len(associations)) + said),
-            ),
+            )
+            + box(b"idat", idat),
         )
 
     begin = box(b"ftyp", brands)
     at, places = len(begin) + len(meta([(0, 0)] * len(numbers))) + 8, []
-    for content in contents:
-        places.append((at, len(content)))
-        at += len(content)
-    return begin + meta(places) + box(b"mdat", b"".join(contents))
+    for content, within in zip(contents, inside, strict=True):
+        places.append((0 if within else at, len(content)))
+        at += 0 if within else len(content)
+    return begin + meta(places) + box(
+        b"mdat", b"".join(content for content, within in zip(contents, inside, strict=True) if not within)
+    )

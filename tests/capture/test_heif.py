@@ -4,11 +4,13 @@
 from __future__ import annotations
 
 import struct
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
 import pytest
+from scope.scope_addon.capture.frame_readers import decode_items
 from scope.scope_addon.capture.heif import assemble, read_layout
 from scope.scope_addon.capture.picture import read_picture
 from scope.scope_addon.capture.video import open_video
@@ -119,7 +121,43 @@ def test_damage_is_told_and_never_anything_else(tmp_path: Path) -> None:
         assert picture is None or picture.rgb.ndim == 3
 
 
-def test_a_box_in_itself_ends(tmp_path: Path) -> None:
+def patched(data: bytes, name: bytes, content: bytes) -> bytes:
+    """A file whose first box of this name has another content of the same length, or less."""
+    at = data.index(name) + 4
+    return data[:at] + content + data[at + len(content) :]
+
+
+def test_a_small_file_cannot_ask_for_much() -> None:
+    """Places without a length, repeated; one place that is the whole file, many times."""
+    whole = heic(slopes(64, 48), 32, focal_mm=26)
+    at = whole.index(b"iloc")
+    for sizes, parts in ((0x0000, 5 * struct.pack(">HHH", 1, 0, 65535)), (0x4400, b"")):
+        places = parts or struct.pack(">HHH", 5, 0, 9) + 9 * struct.pack(">II", 0, len(whole))
+        content = struct.pack(">IHH", 0, sizes, 5 if parts else 1) + places
+        assert len(content) <= int.from_bytes(whole[at - 4 : at], "big") - 8
+        assert read_layout(patched(whole, b"iloc", content)) is None
+
+
+def test_no_more_pixels_are_decoded_than_are_allowed(tmp_path: Path) -> None:
+    path = tmp_path / "a.heic"
+    path.write_bytes(heic(slopes(), 64))
+    assert len(decode_items(path, {2, 3, 4}, 3 * 64 * 64)) == 3
+    assert decode_items(path, {2, 3, 4}, 3 * 64 * 64 - 1) == {}
+
+
+def test_tiles_that_a_grid_has_no_use_for_are_refused() -> None:
+    layout = replace(read_layout(heic(slopes(), 64)), size=(64, 64))
+    assert assemble(layout, {n: np.zeros((64, 64, 3), np.uint8) for n in range(2, 8)}) is None
+
+
+def test_a_grid_within_the_boxes_is_found(tmp_path: Path) -> None:
+    """As phones write it: the grid in the idat box."""
+    (tmp_path / "a.heic").write_bytes(heic(slopes(), 64, is_inside=True))
+    with open_video(tmp_path / "a.heic") as video:
+        assert (video.width, video.height) == (W, H)
+
+
+def test_a_box_in_itself_ends() -> None:
     whole = heic(slopes(64, 48), 32)
     at = whole.index(b"dimg") + 4
     # the grid's first tile is the grid itself

@@ -127,6 +127,17 @@ def test_newcomers_are_looked_for_less_often_beside_all_who_are_wanted(monkeypat
     assert [t for t in calls if t >= 180] == [180, 181, 182, 183]
 
 
+def test_nobody_of_all_is_complete(monkeypatch: pytest.MonkeyPatch) -> None:
+    people = [Person(lambda t, k=k: (90 * k + 60, 200), BLUE, size_px=30) for k in range(11)]
+    detector = FakeDetector(people)
+    monkeypatch.setattr(tracker_module, "LandmarkNetwork", lambda name, *_: FakeLandmarks(people))
+    monkeypatch.setattr(tracker_module, "PersonDetector", lambda *_: detector)
+    tracker = PeopleTracker("fast", 1, people=12)
+    for t, image in enumerate(pictures(people, 120)):
+        assert len(tracker.step(image, time_s=t / FPS)) == 11
+    assert detector.calls == 120 // 8
+
+
 def test_every_look_for_somebody_just_lost_is_close(monkeypatch: pytest.MonkeyPatch) -> None:
     """At 30 frames a second all others too; where frames are few, some of the others look at the whole picture."""
     stays = Person(lambda t: (300, 200), BLUE)
