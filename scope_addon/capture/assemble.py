@@ -23,6 +23,8 @@ from .placement import PlacedTrack, raw_motion
 from .track import Track
 from .world import estimate_world
 
+LONGEST_STEP_S = 1.0  # between two frames of one scene
+
 
 def corrected_stance(
     placed: PlacedTrack, T_floor_camera: np.ndarray | None, lines: Lines | None, balanced: bool
@@ -37,13 +39,23 @@ def corrected_stance(
     T = T_floor_camera
     if T is None:
         T = estimate_world(placed.body, placed.joints[valid], placed.soles[valid], lines)
-    contact = standing_probability(placed.soles, T[2, :3], placed.times) * valid[:, None]
+    contact = _contact(placed, T[2, :3])
     away = correct_depth(root - placed.center, placed.soles, contact, T, placed.times)
     shift = away[:, None] * along_sight(root - placed.center)
     if not balanced:
         return root + shift, np.broadcast_to(np.eye(3), (len(root), 3, 3))
     turn, pivot = turn_over_feet(placed, contact, T[2, :3])
     return pivot + np.einsum("tij,tj->ti", turn, root - pivot) + shift, turn
+
+
+def _contact(placed: PlacedTrack, up: np.ndarray) -> np.ndarray:
+    """(T, 4) probability that each sole stands, as far as it is seen: imagined feet would hold the body that is not.
+
+    Nothing stands from one scene into the next.
+    """
+    contact = standing_probability(placed.soles, up, placed.times) * placed.soles_seen * placed.valid[:, None]
+    contact[1:][np.diff(placed.times) > LONGEST_STEP_S] = 0.0
+    return contact
 
 
 def assemble_motion(
@@ -85,7 +97,7 @@ def assemble_motion(
     T_floor_camera = T_world_camera.copy()
     T_floor_camera[2, 3] -= floor_m
     R_world_camera, t_world_camera = T_world_camera[:3, :3], T_world_camera[:3, 3]
-    contact = standing_probability(placed.soles, R_world_camera[2], times) * valid[:, None]
+    contact = _contact(placed, R_world_camera[2])
     J0 = body.rest_joints(betas)[0]
 
     def in_world(rotation: np.ndarray, position: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

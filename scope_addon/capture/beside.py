@@ -40,11 +40,14 @@ class BesideTracking:
         # Not waited for: on a new machine the solver compiles for a while, and whoever needs it then waits by himself.
         self._pool.shutdown(wait=False, cancel_futures=kind is not None)
 
-    def add(self, frame: Frame, people: list[Observation]) -> None:
-        """Begin with this frame; waits for the background of the one before, and raises what went wrong there."""
+    def add(self, frame: Frame, people: list[Observation], is_cut: bool = False) -> None:
+        """Begin with this frame, the first of a scene if ``is_cut``.
+
+        Waits for the background of the one before, and raises what went wrong there.
+        """
         self.wait()
         points = [o.keypoints_px for o in people]
-        self._looking = self._pool.submit(self.background.add, frame.image_rgb, frame.timestamp_s, points)
+        self._looking = self._pool.submit(self.background.add, frame.image_rgb, frame.timestamp_s, points, is_cut)
 
     def wait(self) -> None:
         """Until the frames so far have been looked at."""

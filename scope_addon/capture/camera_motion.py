@@ -84,16 +84,17 @@ class BackgroundTracker:
         self._looks: list[Look] = []  # the first one at the first frame in which somebody is seen
         self.bars: list[np.ndarray] = []  # in that frame
 
-    def add(self, image_rgb: np.ndarray, time_s: float, people: Sequence[np.ndarray]) -> None:
+    def add(self, image_rgb: np.ndarray, time_s: float, people: Sequence[np.ndarray], is_cut: bool = False) -> None:
         """The next frame.
 
         :param people: (n, 2) points of each person in pixels: the background is what lies outside their boxes.
+        :param is_cut: another scene begins, in which the camera counts as where it was last.
         """
         self._times.append(time_s)
         if people and not self._looks:
             self.bars = find_bars(image_rgb)
             self._looks.append(Look(len(self._times) - 1, find_segments(image_rgb, people, bars=self.bars)))
-        if time_s - self._last_used < 0.98 / SAMPLES_HZ:
+        if time_s - self._last_used < 0.98 / SAMPLES_HZ and not is_cut:
             self._rotations.append(None)
             return
         self._last_used = time_s
@@ -103,7 +104,7 @@ class BackgroundTracker:
             self._begin_key(picture, boxes)
             self._rotations.append(np.eye(3))
             return
-        R_camera_key = self._follow(picture, boxes)
+        R_camera_key = None if is_cut else self._follow(picture, boxes)
         if R_camera_key is None:  # a cut, or nothing to see: begin anew where the camera was last
             self._R_first_key = self._R_first_key @ self._R_key_last
             self._begin_key(picture, boxes)

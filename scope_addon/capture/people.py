@@ -16,6 +16,7 @@ SHORTEST_S = 0.3  # the same for the longest time without interruption
 LEAST_PROMINENCE = 0.05  # of the most prominent person's
 MERGED = 0.25  # mean distance of the keypoints, in sides of the region, of somebody who is becoming somebody else
 LONGEST_MERGER_S = 0.38
+BETWEEN_SCENES_S = 10.0
 SHORTEST_AGAIN_S = 0.1  # who was lost, seen again for less than this and lost again, was somebody or something else
 
 
@@ -26,14 +27,24 @@ class PeopleBuilder:
         self._frames: list[int] = []
         self._times: list[float] = []
         self._tracklets: dict[int, Tracklet] = {}
+        self._away_s = 0.0
+        self.timestamps: list[float] = []  # when each frame is shown
 
     def add(self, frame: int, time_s: float, observations: Sequence[tuple[int, Observation]]) -> None:
         """Append one frame: everybody who was seen in it, with the number of the tracklet."""
         row = len(self._frames)
         self._frames.append(frame)
-        self._times.append(time_s)
+        self.timestamps.append(time_s)
+        self._times.append(time_s + self._away_s)
         for number, observation in observations:
             self._tracklets.setdefault(number, Tracklet()).add(row, observation)
+
+    def cut(self) -> None:
+        """Another scene begins with the next frame: it counts as long after, so that nothing is drawn from one into it.
+
+        The tracks' times say so; ``timestamps`` do not.
+        """
+        self._away_s += BETWEEN_SCENES_S
 
     def __len__(self) -> int:
         return len(self._frames)

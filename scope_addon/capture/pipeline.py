@@ -26,6 +26,7 @@ from .camera_path import CameraPath
 from .camera_travel import camera_travel
 from .compact import compact
 from .execution import AUTO, Execution
+from .exposure import Exposure
 from .fitting import PreparedTrack, fit_track, prepare_track, refit_track
 from .hand_measure import require_fingers
 from .hand_tracker import HandTracker
@@ -39,6 +40,7 @@ from .observation import Observation
 from .parts import ALL_PARTS, Parts
 from .people import PeopleBuilder
 from .placement import PlacedTrack, place_track
+from .scene_cuts import SceneCuts
 from .shared_world import share_world
 from .track import Track
 from .tracker import MOST_PEOPLE, PeopleTracker
@@ -50,6 +52,8 @@ from .world import estimate_world
 Progress = Callable[[str, int, int], None]
 # Called with each decoded frame, the largest person seen in it, and what fits the body to such a person.
 Watch = Callable[[Frame, Observation | None, LiveBody], None]
+
+MOST_TOLD = 4  # cuts of which the time is told
 
 LARGEST = "largest"
 ALL = "all"
@@ -125,9 +129,10 @@ def capture(
                 execution=execution,
             )
             hands = HandTracker(threads, execution=execution) if options.hands else None
-            seen = _observe(video, tracker, hands, beside, live, clock, progress, watch)
+            cuts = SceneCuts()
+            seen = _observe(video, tracker, hands, beside, cuts, live, clock, progress, watch)
         warnings = execution.warnings + list(video.warnings)
-    frames = len(seen)
+    frames, timestamps = len(seen), np.array(seen.timestamps)
     with clock.stage("solver"):
         camera, background = beside.camera(), beside.background
         tracks = [_repaired(track, camera, options.parts) for track in seen.build(most)]
@@ -142,6 +147,11 @@ def capture(
         turns = CameraPath.on_a_stand(frames) if turning.is_static else CameraPath.turning(turning.R_first_camera)
         motions, iterations, went = solve(
             body, tracks, camera, turns, background.lines(turning, camera), smoothing, options.parts, about, progress
+        )
+        motions = [replace(motion, timestamps=timestamps) for motion in motions]
+    if cuts.times_s:
+        warnings.append(
+            f"{path.name} cuts to another scene {_at(cuts.times_s)}: capture each scene by itself, by its start and end"
         )
     for number, motion in enumerate(motions, 1):
         missing = int((~motion.valid).sum())
@@ -172,6 +182,7 @@ def capture(
         "fps": clock.rates(frames),
         "reprojection_px": float(motions[0].residual_px[motions[0].valid].mean()),
         "iterations": iterations,
+        "cuts_s": [round(t, 3) for t in cuts.times_s],
         "warnings": warnings,
     }
     return Capture(motions, report)
@@ -212,29 +223,36 @@ def _observe(
     tracker: PeopleTracker,
     hands: HandTracker | None,
     beside: BesideTracking,
+    cuts: SceneCuts,
     live: LiveBody,
     clock: _Clock,
     progress: Progress,
     watch: Watch,
 ) -> PeopleBuilder:
     """Everybody in every frame. No picture is kept: an hour takes no more than a minute."""
-    builder, expected = PeopleBuilder(), video.expected_frames
+    builder, expected, exposure = PeopleBuilder(), video.expected_frames, Exposure()
     frames = iter(video)
     with clock.stage("decode"):
         upcoming = next(frames, None)
-    while upcoming is not None:
-        frame = upcoming
+        upcoming_lit = exposure.brightened(upcoming.image_rgb) if upcoming else None
+    while upcoming is not None and upcoming_lit is not None:
+        frame, lit = upcoming, upcoming_lit
         with clock.stage("decode"):
             upcoming = next(frames, None)
+            upcoming_lit = exposure.brightened(upcoming.image_rgb) if upcoming else None
         with clock.stage("networks"):
-            observations = tracker.step(frame.image_rgb, upcoming.image_rgb if upcoming else None, frame.timestamp_s)
+            is_cut = cuts.is_cut(frame.image_rgb, upcoming.image_rgb if upcoming else None, frame.timestamp_s)
+            if is_cut:
+                tracker.forget()
+                builder.cut()
+            observations = tracker.step(lit, upcoming_lit, frame.timestamp_s)
         if hands is not None:
             with clock.stage("hands"):
-                observations = hands.step(frame.image_rgb, observations, frame.timestamp_s)
+                observations = hands.step(lit, observations, frame.timestamp_s)
         builder.add(frame.index, frame.timestamp_s, observations)
         people = [o for _, o in observations]
         with clock.stage("background"):
-            beside.add(frame, people)
+            beside.add(frame, people, is_cut)
         watch(frame, max(people, key=lambda o: o.region.side_px, default=None), live)
         progress("finding the person", len(builder), max(expected, len(builder)))
     beside.wait()
@@ -361,6 +379,14 @@ def _most_people(people: int | str) -> int:
     if isinstance(people, str) or not 1 <= people <= MOST_PEOPLE:
         raise UsageError(f"people must be {LARGEST}, {ALL} or 1 to {MOST_PEOPLE}, but is {people!r}")
     return people
+
+
+def _at(times_s: list[float]) -> str:
+    """When, in words: "at 2.0 s and at 4.1 s"; of many, the first few."""
+    said = [f"at {t:.1f} s" for t in times_s[:MOST_TOLD]]
+    more = len(times_s) - len(said)
+    said += [f"{more} times more"] if more else []
+    return said[0] if len(said) == 1 else f"{', '.join(said[:-1])} and {said[-1]}"
 
 
 def _nobody(path: Path, frames: int) -> NoPersonError:

@@ -13,8 +13,11 @@ from .compact import compact
 from .fitting import FittedTrack
 from .frame_blocks import by_blocks
 from .smoothing import fill_gaps, fill_rotation_gaps, smooth_root, smooth_rotations
-from .soles import sole_points, with_soles
+from .soles import FOOT_PARTS, sole_points, with_soles
 from .track import Track
+
+# From here on a foot is seen, if badly; behind something it has 0.1 and more, beside the picture less than 0.01.
+SEEN_CONFIDENCE = 0.1
 
 
 @dataclass(frozen=True)
@@ -29,6 +32,7 @@ class PlacedTrack:
     root: np.ndarray  # (T, 3) the pelvis
     joints: np.ndarray  # (T, K+1, 3)
     soles: np.ndarray  # (T, 4, 3)
+    soles_seen: np.ndarray  # (T, 4) 0..1
     center: np.ndarray  # (T, 3) of the camera
 
     def place(self, rotations: np.ndarray, root: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -51,7 +55,9 @@ def place_track(
         root = path.center + smooth_root(root - path.center, times)
     soled = with_soles(body, betas)
     joints, soles = _place(soled, betas, rotations, root)
-    return compact(PlacedTrack(soled, betas, times, valid, rotations, root, joints, soles, path.center))
+    feet = [body.joint_names.index(name) for name in FOOT_PARTS]
+    seen = np.clip(fitted.joint_confidence[:, feet] / SEEN_CONFIDENCE, 0.0, 1.0)
+    return compact(PlacedTrack(soled, betas, times, valid, rotations, root, joints, soles, seen, path.center))
 
 
 def raw_motion(track: Track, fitted: FittedTrack, path: CameraPath) -> tuple[np.ndarray, np.ndarray]:

@@ -34,8 +34,8 @@ def standing(lean_deg=0.0, axis=(1.0, 0.0, 0.0), speed_m_s=0.0, arms_deg=60.0):
     joints, soles = place(root)
     root += np.array([0, 1.0, 4.0]) - soles.mean(axis=(0, 1)) + speed_m_s * TIMES[:, None] * [1.0, 0, 0]
     joints, soles = place(root)
-    zeros = np.zeros((T, 3))
-    return PlacedTrack(soled, np.zeros(body.P), TIMES, np.ones(T, bool), omega, root, joints, soles, zeros)
+    seen, center = np.ones((T, 4)), np.zeros((T, 3))
+    return PlacedTrack(soled, np.zeros(body.P), TIMES, np.ones(T, bool), omega, root, joints, soles, seen, center)
 
 
 def turned_deg(turn):

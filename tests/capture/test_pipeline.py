@@ -170,3 +170,18 @@ def test_a_cancel_comes_through_and_leaves_no_thread(body):
 def test_a_motion_survives_its_file(sample, tmp_path):
     sample.motions[0].save(tmp_path / "m.npz")
     assert np.array_equal(Motion.load(tmp_path / "m.npz").poses, sample.motions[0].poses)
+
+
+def test_feet_beside_the_picture_hold_nobody(shared, body, tmp_path):
+    """Squats, cut off at the hips: what is seen of her moves up and down, as in the picture."""
+    clip = tmp_path / "hips.mp4"
+    video = cv2.VideoCapture(str(shared / "data" / "clips" / "squats_5fps.mp4"))
+    writer = cv2.VideoWriter(str(clip), cv2.VideoWriter.fourcc(*"mp4v"), 5, (720, 600))
+    for _ in range(25):
+        writer.write(video.read()[1][:600])
+    writer.release()
+    motion = capture(clip, body, CaptureOptions(quality="fast")).motions[0]
+    feet = [k for k, name in enumerate(body.joint_names) if "foot" in name or "ankle" in name]
+    assert motion.joint_confidence[:, feet].max() < 0.05
+    assert motion.foot_contact.max() < 0.5
+    assert motion.residual_px[motion.valid].max() < 10
