@@ -123,13 +123,13 @@ class PeopleTracker:
         """Begin anew: the next frame starts with a detection, and numbers with 0."""
         self._tracklets = 0
         self._time_s, self._step_s = -math.inf, FRAME_S
+        self._begun_s = 0.0
         self.forget()
 
     def forget(self) -> None:
         """Forget everybody, for the next frame shows another scene. Numbers go on."""
         self._live: list[Followed] = []
         self._lost: list[Followed] = []
-        self._begun_s = max(self._time_s, 0.0)
         self._searched_s = self._closely_s = -math.inf
 
     def step(
