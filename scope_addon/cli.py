@@ -19,6 +19,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
+from types import FrameType
 from typing import TYPE_CHECKING, NoReturn, TextIO
 
 from ..solver.body import ASSETS, BUILT_IN, Body, body_with_hands
@@ -39,6 +40,7 @@ OVERLAY_SUFFIXES = (".mp4", ".png", ".jpg")
 QUALITIES = ("fast", "balanced", "best")
 PROVIDERS = ("auto", "cpu", "cuda", "tensorrt", "directml", "coreml")
 _CLEAR_LINE = "\r\x1b[K"
+_signals: list[int] = []  # that asked to stop
 PROGRAM = (sys.executable, "-m", f"{__package__}.cli")
 
 
@@ -378,13 +380,18 @@ def _summary(report: dict) -> str:
 
 
 class _ProgressBar:
-    """A one-line bar on a terminal; silent elsewhere."""
+    """A one-line bar on a terminal; silent elsewhere. Stops whoever works on after a signal."""
 
     def __init__(self, stream: TextIO, *, show: bool) -> None:
         self.stream, self.show = stream, show
 
     def __call__(self, stage: str, done: int, total: int) -> None:
-        """Show ``done`` of ``total`` (0: unknown) of a stage."""
+        """Show ``done`` of ``total`` (0: unknown) of a stage.
+
+        :raises KeyboardInterrupt: a signal said so, and nobody heard it.
+        """
+        if _signals:
+            raise KeyboardInterrupt
         if not self.show:
             return
         if total:
@@ -439,16 +446,23 @@ def _flush_c() -> None:
         ctypes.CDLL("ucrtbase" if os.name == "nt" else None).fflush(None)
 
 
+def _interrupt(number: int, _: FrameType | None) -> None:
+    """Note it as well: what is raised within a callback of the interpreter's own is lost."""
+    _signals.append(number)
+    raise KeyboardInterrupt
+
+
 @contextmanager
 def _stopped_by_signals() -> Iterator[None]:
     """Ctrl-C and a request to end raise KeyboardInterrupt, so that nothing half-written and no process stays behind.
 
     Blender has a handler of its own for Ctrl-C, which only notes it: a batch would go on to its end.
     """
+    _signals.clear()
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    before = {number: signal.signal(number, signal.default_int_handler) for number in (signal.SIGINT, signal.SIGTERM)}
+    before = {number: signal.signal(number, _interrupt) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
         yield
     finally:

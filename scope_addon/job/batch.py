@@ -34,6 +34,7 @@ from .request import code_version
 REPORT_NAME = "scope-batch.json"
 STATUSES = ("done", "skipped", "no_person", "failed")
 _ROOT = Path(__file__).resolve().parents[2]
+_TURN_S = 1.0
 _OVERLAY = ".overlay"
 # Ctrl-C on a terminal comes to the batch alone, which stops its clips once: twice would foil their cleaning up.
 _NEW_GROUP = getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0)
@@ -116,7 +117,11 @@ class Batch:
                 progress("clips", 0, len(clips))
                 pending = set(futures)
                 while pending:
-                    finished, pending = wait(pending, return_when=FIRST_COMPLETED)
+                    # In turns: a signal that another thread is given wakes this one no sooner.
+                    finished, pending = wait(pending, timeout=_TURN_S, return_when=FIRST_COMPLETED)
+                    if not finished:
+                        progress("clips", len(entries), len(clips))
+                        continue
                     for future in finished:
                         entry = entries[futures[future]] = future.result()
                         after = f": {entry['message']}" if entry.get("message") else ""

@@ -8,9 +8,11 @@ import shutil
 import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
+from scope.scope_addon import cli
 from scope.scope_addon.cli import SAMPLE, main
 from scope.scope_addon.job.batch import REPORT_NAME, Batch
 from scope.scope_addon.motion import Motion
@@ -246,6 +248,19 @@ def test_a_signal_ends_the_batch_and_its_clips_whoever_handled_it_before(folder,
     assert process.returncode == 130
     assert stderr.splitlines()[-1] == "scope: stopped; clips that are done stay, called again it goes on"
     assert not any(runs(int(pid)) for pid in pids)
+
+
+def test_a_signal_that_nobody_heard_ends_the_batch_too(folder, tmp_path, monkeypatch, capsys):
+    """Its exception is lost, as within a weak reference's callback, while clips run."""
+
+    def runs_on(batch, name, *_):
+        cli._signals.append(signal.SIGINT)
+        time.sleep(3)
+        return {"status": "failed", "file": name, "message": ""}
+
+    monkeypatch.setattr(Batch, "_one", runs_on)
+    assert main(["batch", str(folder), "--out", str(tmp_path / "out"), "--jobs", "2"]) == 130
+    assert "stopped; clips that are done stay" in capsys.readouterr().err
 
 
 def test_nothing_to_do_is_said(tmp_path):
