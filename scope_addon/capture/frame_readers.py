@@ -78,7 +78,10 @@ class OpencvReader:
     def __init__(self, path: Path) -> None:
         self._capture = cv2.VideoCapture(str(path.absolute()), cv2.CAP_FFMPEG)
         if not self._capture.isOpened():
-            raise VideoError(f"{path} is not a video or picture that can be decoded; convert it to an H.264 .mp4")
+            raise VideoError(
+                f"{path} is not a video or picture that can be decoded; copy it again if it may be incomplete, or "
+                "convert it to an H.264 .mp4"
+            )
         self._capture.set(cv2.CAP_PROP_ORIENTATION_AUTO, 0)
         self._turn = round(self._get(cv2.CAP_PROP_ORIENTATION_META))
         num, den = self._get(cv2.CAP_PROP_SAR_NUM), self._get(cv2.CAP_PROP_SAR_DEN)

@@ -85,7 +85,7 @@ def find_segments(
     lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) / max(width, height)
     keep = lengths > SHORTEST
     middle = ends.mean(axis=1)
-    margin = BAR_MARGIN_PX * np.array([-1, -1, 1, 1])
+    margin = max(BAR_MARGIN_PX, 1.5 / scale) * np.array([-1, -1, 1, 1])
     keep &= ~inside(middle, [*(surroundings(points) for points in people), *(bar + margin for bar in bars)])
     chosen = np.flatnonzero(keep)
     chosen = chosen[np.argsort(-lengths[chosen])[:MOST_SEGMENTS]]

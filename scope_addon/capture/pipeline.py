@@ -15,6 +15,7 @@ import numpy as np
 
 from ...solver.body import Body
 from ...solver.errors import NoPersonError, UsageError, VideoError
+from ...solver.names import BODY_JOINTS
 from ..motion import Motion
 from .adapters.box_detector import BoxDetector
 from .adapters.keypoint_network import KeypointNetwork
@@ -53,6 +54,7 @@ Progress = Callable[[str, int, int], None]
 # Called with each decoded frame, the largest person seen in it, and what fits the body to such a person.
 Watch = Callable[[Frame, Observation | None, LiveBody], None]
 
+UNSEEN_LEGS = 0.05  # confidence below which nothing is seen of the shanks
 MOST_TOLD = 4  # cuts of which the time is told
 
 LARGEST = "largest"
@@ -155,11 +157,13 @@ def capture(
         )
     for number, motion in enumerate(motions, 1):
         missing = int((~motion.valid).sum())
+        who = "the person" if len(motions) == 1 else f"person {number}"
         if missing:
-            who = "the person" if len(motions) == 1 else f"person {number}"
             warnings.append(
                 f"{path.name}: {who} was not seen in {missing} of {len(motion)} frames; these are filled in"
             )
+        if _legs_confidence(motion) < UNSEEN_LEGS:
+            warnings.append(f"{path.name}: the legs of {who} were not seen, so what they do is a guess")
         if options.hands and not any(hand_frames(motion).values()):
             warnings.append(f"{path.name}: no hands were found; come closer, or show the palms more to the camera")
     report = {
@@ -361,6 +365,12 @@ def _about_person(motion: Motion) -> dict:
         "last_frame": int(seen[-1]),
         "reprojection_px": float(motion.residual_px[motion.valid].mean()),
     }
+
+
+def _legs_confidence(motion: Motion) -> float:
+    """Of the better seen leg, mean over the frames in which the person was seen."""
+    shanks = [BODY_JOINTS.index(f"{side}_knee") for side in ("left", "right")]
+    return float(motion.joint_confidence[motion.valid][:, shanks].mean(axis=0).max())
 
 
 def hand_frames(motion: Motion) -> dict[str, int]:
