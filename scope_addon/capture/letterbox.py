@@ -41,9 +41,14 @@ def fit_in(
 
 
 def _resized(image: np.ndarray, width: int, height: int) -> np.ndarray:
-    """Of that size, without aliasing. By halves first, which OpenCV averages several times as fast as other shares."""
+    """Of that size, without aliasing."""
     if width >= image.shape[1]:
         return cv2.resize(image, (width, height), interpolation=cv2.INTER_LINEAR)
     while min(image.shape[1] / width, image.shape[0] / height) >= _HALVED_FROM:
-        image = cv2.resize(image, (image.shape[1] // 2, image.shape[0] // 2), interpolation=cv2.INTER_AREA)
+        image = halved(image)
     return cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA)
+
+
+def halved(image: np.ndarray) -> np.ndarray:
+    """Two by two pixels in one, which OpenCV averages several times as fast as any other number."""
+    return cv2.resize(image, (image.shape[1] // 2, image.shape[0] // 2), interpolation=cv2.INTER_AREA)

@@ -235,17 +235,16 @@ def _observe(
 ) -> PeopleBuilder:
     """Everybody in every frame. No picture is kept: an hour takes no more than a minute."""
     builder, expected, exposure = PeopleBuilder(), video.expected_frames, Exposure()
-    frames = iter(video)
+    frames = ((frame, exposure.brightened(frame.image_rgb)) for frame in video)
     with clock.stage("decode"):
         upcoming = next(frames, None)
-        upcoming_lit = exposure.brightened(upcoming.image_rgb) if upcoming else None
-    while upcoming is not None and upcoming_lit is not None:
-        frame, lit = upcoming, upcoming_lit
+    while upcoming is not None:
+        frame, lit = upcoming
         with clock.stage("decode"):
             upcoming = next(frames, None)
-            upcoming_lit = exposure.brightened(upcoming.image_rgb) if upcoming else None
+        upcoming_rgb, upcoming_lit = (upcoming[0].image_rgb, upcoming[1]) if upcoming else (None, None)
         with clock.stage("networks"):
-            is_cut = cuts.is_cut(frame.image_rgb, upcoming.image_rgb if upcoming else None, frame.timestamp_s)
+            is_cut = cuts.is_cut(frame.image_rgb, upcoming_rgb, frame.timestamp_s)
             if is_cut:
                 tracker.forget()
                 builder.cut()

@@ -14,6 +14,8 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
+from .letterbox import halved
+
 MARGIN = 1.25  # the square is this much larger than twice the distance between the two points
 
 
@@ -79,8 +81,7 @@ class Region:
 def _shrink(image: np.ndarray, A: np.ndarray, size: int, halvings: int) -> tuple[np.ndarray, np.ndarray]:
     """Halve what is under the square first, so that a large square is sampled without aliasing.
 
-    Returns the smaller picture and the affine map onto it. Two by two pixels, again and again, since OpenCV averages
-    these several times as fast as any other number.
+    Returns the smaller picture and the affine map onto it.
     """
     step = 1 << halvings
     height, width = image.shape[:2]
@@ -93,7 +94,7 @@ def _shrink(image: np.ndarray, A: np.ndarray, size: int, halvings: int) -> tuple
     part = image[low[1] : low[1] + rows * step, low[0] : low[0] + columns * step]
     small = part
     for _ in range(halvings):
-        small = cv2.resize(small, (small.shape[1] // 2, small.shape[0] // 2), interpolation=cv2.INTER_AREA)
+        small = halved(small)
     # the centre of small pixel i covers the pixels low + step·i … low + step·i + step − 1
     B = A / step
     B[:, 2] = (A[:, 2] - low - (step - 1) / 2) / step
