@@ -174,70 +174,105 @@ def _fit_frames(
     progress: Callable[[str, int, int], None],
 ) -> FittedTrack:
     """Every seen frame in order: from the frame before, or from ``state(k)`` with its root as a prior."""
-    body, track, priors = prepared.body, prepared.track, prepared.priors_with_shape(betas)
-    T, tree = len(track), make_tree(body)
-    cold, warm = (replace(ROBUST, stages=stages(prepared.weights)) for stages in (cold_stages, warm_stages))
-    rotations = np.tile(np.eye(3), (T, body.K + 1, 1, 1))
-    root, valid, cost, iterations = np.zeros((T, 3)), np.zeros(T, bool), np.zeros(T), 0
-    last: Fit | None = None
-    last_time = -np.inf
-
-    def keep(k: int, fit: Fit) -> None:
-        rotations[k, 0], rotations[k, 1:] = fit.state.R_camera_root, fit.state.Omega
-        root[k], cost[k] = fit.state.t_camera_root, fit.cost
-
-    def go_back(k: int, later: State, gain: float) -> int:
-        """Frames before ``k`` from its state ``later``, each from the one after it, if that costs less than was gained.
-
-        :return: how many iterations that took.
-        """
-        count = 0
-        while k > 0 and valid[k - 1] and not track.acquired[k]:
-            k -= 1
-            found = fit_tree(tree, prepared.measure_with_hands(k), later, priors, warm)
-            count += found.iterations
-            if not _is_usable(found) or found.cost - cost[k] > gain or _as_before(found.state.Omega, rotations[k, 1:]):
-                break
-            keep(k, found)
-            later = found.state
-        return count
-
+    frames, track = _Frames(prepared, betas), prepared.track
+    T = len(track)
     for k in range(T):
         if track.seen[k]:
-            if state is not None:
-                init = state(k)
+            if state is None:
+                frames.follow(k)
             else:
-                fresh = last is None or track.acquired[k] or track.times[k] - last_time > LONGEST_COAST_S
-                init = None if fresh or last is None else last.state
-            known_root = init.t_camera_root if init is not None and state is not None else None
-            measurements = prepared.measure_with_hands(k, known_root)
-            found = fit_tree(tree, measurements, init, priors, cold if init is None else warm)
-            if _is_usable(found):
-                last, last_time, valid[k] = found, track.times[k], True
-                iterations += found.iterations
-                if init is not None and prepared.measurer.contradicts(measurements, found.t_camera_part):
-                    freed = fit_tree(tree, measurements, init, priors, cold)
-                    iterations += freed.iterations
-                    if freed.cost < found.cost:
-                        last = freed
-                        iterations += go_back(k, freed.state, found.cost - freed.cost) if state is None else 0
-        if last is not None:
-            keep(k, last)
+                frames.fit(k, state(k), known_root=True)
+        frames.hold(k)
         if k % 16 == 0 or k == T - 1:
             progress("solving" if state is None else "solving on the floor", k + 1, T)
-    confidence = prepared.measurer.joint_confidence(track.confidence)
-    if prepared.hand_measurer is not None and prepared.hands is not None:
-        confidence = np.maximum(confidence, prepared.hand_measurer.joint_confidence(prepared.hands))
-        seen = (prepared.hands[:, :, 0, 2] > 0) & valid[:, None]
-        rotations = calm_fingers(rotations, prepared.hand_measurer.fingers, seen, track.times)
-    return FittedTrack(
-        rotations=rotations,
-        t_camera_root=root,
-        betas=betas,
-        valid=valid,
-        joint_confidence=confidence * valid[:, None],
-        iterations=iterations / max(int(valid.sum()), 1),
-    )
+    return frames.fitted()
+
+
+class _Frames:
+    """The frames of a track as they are fitted one by one with the clip's shape; those without a fit hold the last."""
+
+    def __init__(self, prepared: PreparedTrack, betas: np.ndarray) -> None:
+        T, body = len(prepared.track), prepared.body
+        self._prepared, self._betas = prepared, betas
+        self._tree, self._priors = make_tree(body), prepared.priors_with_shape(betas)
+        self._cold, self._warm = (
+            replace(ROBUST, stages=stages(prepared.weights)) for stages in (cold_stages, warm_stages)
+        )
+        self._rotations = np.tile(np.eye(3), (T, body.K + 1, 1, 1))
+        self._root, self._valid, self._cost = np.zeros((T, 3)), np.zeros(T, bool), np.zeros(T)
+        self._iterations = 0
+        self._last: Fit | None = None
+        self._last_s = -np.inf
+
+    def follow(self, k: int) -> None:
+        """Fit frame ``k`` from the frame before, or afresh where that is long ago; and those before it, if it tells."""
+        track, last = self._prepared.track, self._last
+        is_fresh = track.acquired[k] or track.times[k] - self._last_s > LONGEST_COAST_S
+        gain = self.fit(k, None if last is None or is_fresh else last.state)
+        if gain > 0.0 and self._last is not None:
+            self._go_back(k, self._last.state, gain)
+
+    def fit(self, k: int, init: State | None, known_root: bool = False) -> float:
+        """Fit frame ``k`` from a state, whose root is known or not, or afresh; from further off where it should.
+
+        :return: by how much it costs less for having been fitted from further off.
+        """
+        prepared = self._prepared
+        measurements = prepared.measure_with_hands(k, init.t_camera_root if init is not None and known_root else None)
+        found = self._solve(measurements, init, self._cold if init is None else self._warm)
+        if not _is_usable(found):
+            return 0.0
+        self._last, self._last_s, self._valid[k] = found, prepared.track.times[k], True
+        if init is None or not prepared.measurer.contradicts(measurements, found.t_camera_part):
+            return 0.0
+        freed = self._solve(measurements, init, self._cold)
+        if freed.cost < found.cost:
+            self._last = freed
+            return found.cost - freed.cost
+        return 0.0
+
+    def hold(self, k: int) -> None:
+        """Frame ``k`` is as the last one that was fitted."""
+        if self._last is not None:
+            self._keep(k, self._last)
+
+    def fitted(self) -> FittedTrack:
+        """All frames."""
+        prepared, rotations, valid = self._prepared, self._rotations, self._valid
+        confidence = prepared.measurer.joint_confidence(prepared.track.confidence)
+        if prepared.hand_measurer is not None and prepared.hands is not None:
+            confidence = np.maximum(confidence, prepared.hand_measurer.joint_confidence(prepared.hands))
+            seen = (prepared.hands[:, :, 0, 2] > 0) & valid[:, None]
+            rotations = calm_fingers(rotations, prepared.hand_measurer.fingers, seen, prepared.track.times)
+        return FittedTrack(
+            rotations=rotations,
+            t_camera_root=self._root,
+            betas=self._betas,
+            valid=valid,
+            joint_confidence=confidence * valid[:, None],
+            iterations=self._iterations / max(int(valid.sum()), 1),
+        )
+
+    def _go_back(self, k: int, later: State, gain: float) -> None:
+        """Frames before ``k`` from its state, each from the one after it, while that costs less than was gained."""
+        track = self._prepared.track
+        while k > 0 and self._valid[k - 1] and not track.acquired[k]:
+            k -= 1
+            found = self._solve(self._prepared.measure_with_hands(k), later, self._warm)
+            is_worth_it = _is_usable(found) and found.cost - self._cost[k] <= gain
+            if not is_worth_it or _as_before(found.state.Omega, self._rotations[k, 1:]):
+                return
+            self._keep(k, found)
+            later = found.state
+
+    def _solve(self, measurements: Measurements, init: State | None, options: Options) -> Fit:
+        found = fit_tree(self._tree, measurements, init, self._priors, options)
+        self._iterations += found.iterations
+        return found
+
+    def _keep(self, k: int, fit: Fit) -> None:
+        self._rotations[k, 0], self._rotations[k, 1:] = fit.state.R_camera_root, fit.state.Omega
+        self._root[k], self._cost[k] = fit.state.t_camera_root, fit.cost
 
 
 def _is_usable(fit: Fit) -> bool:
