@@ -41,6 +41,7 @@ ABLATION: dict[str, dict[str, Parts | bool]] = {
     "without mended leaps": {"parts": Parts(leaps=False)},
     "without the second pass": {"parts": Parts(second_pass=False)},
     "without balance": {"parts": Parts(balance=False)},
+    "without the floor in it": {"parts": Parts(floor=False)},
     "without contact": {"parts": Parts(contact=False)},
     "without smoothing": {"smoothing": False},
 }

@@ -13,27 +13,28 @@ from ..motion import Motion
 from .balance import turn_over_feet
 from .camera import Camera
 from .camera_path import CameraPath
-from .fitting import FittedTrack
+from .fitting import FittedTrack, Stance
 from .frame_blocks import by_blocks
-from .grounding import along_sight, correct_depth, stand_on_floor, standing_probability
+from .grounding import along_sight, correct_depth, on_floor, stand_on_floor, standing_probability
 from .hand_measure import HAND_KEYPOINT_NAMES
 from .landmark_network import KEYPOINT_NAMES
 from .line_segments import Lines
 from .placement import PlacedTrack, raw_motion
+from .smoothing import gaussian_smooth
 from .track import Track
 from .world import estimate_world
 
 LONGEST_STEP_S = 1.0  # between two frames of one scene
+STANDING_CUTOFF_HZ = 1.0  # a leg that the floor begins or ceases to bend must not jerk
 
 
 def corrected_stance(
     placed: PlacedTrack, T_floor_camera: np.ndarray | None, lines: Lines | None, balanced: bool
-) -> tuple[np.ndarray, np.ndarray]:
-    """What floor, feet and balance say of how far away and how upright a body is, camera frame.
+) -> Stance:
+    """What floor, feet and balance say of how far away and how upright a body is, in the first frame's camera axes.
 
     :param T_floor_camera: (4, 4) the floor at z = 0; None: it is found from this person alone.
     :param balanced: whether weight has to be over feet that stand.
-    :return: smoothed pelvis positions (T, 3), and rotations (T, 3, 3) by which the body as a whole is to be turned.
     """
     valid, root = placed.valid, placed.root
     T = T_floor_camera
@@ -42,10 +43,14 @@ def corrected_stance(
     contact = _contact(placed, T[2, :3])
     away = correct_depth(root - placed.center, placed.soles, contact, T, placed.times)
     shift = away[:, None] * along_sight(root - placed.center)
-    if not balanced:
-        return root + shift, np.broadcast_to(np.eye(3), (len(root), 3, 3))
-    turn, pivot = turn_over_feet(placed, contact, T[2, :3])
-    return pivot + np.einsum("tij,tj->ti", turn, root - pivot) + shift, turn
+    turn = np.broadcast_to(np.eye(3), (len(root), 3, 3))
+    if balanced:
+        turn, pivot = turn_over_feet(placed, contact, T[2, :3])
+        root = pivot + np.einsum("tij,tj->ti", turn, root - pivot)
+    height = (placed.soles + shift[:, None]) @ T[2, :3] + T[2, 3]
+    standing = gaussian_smooth(contact * on_floor(height), placed.times, STANDING_CUTOFF_HZ)
+    T_frames = np.broadcast_to(T, (len(root), 4, 4))
+    return Stance(root + shift, turn, T_frames[:, 2, :3], -T_frames[:, 2, 3], standing)
 
 
 def _contact(placed: PlacedTrack, up: np.ndarray) -> np.ndarray:
@@ -53,7 +58,8 @@ def _contact(placed: PlacedTrack, up: np.ndarray) -> np.ndarray:
 
     Nothing stands from one scene into the next.
     """
-    contact = standing_probability(placed.soles, up, placed.times) * placed.soles_seen * placed.valid[:, None]
+    contact = standing_probability(placed.soles, up, placed.times, placed.center)
+    contact *= placed.soles_seen * placed.valid[:, None]
     contact[1:][np.diff(placed.times) > LONGEST_STEP_S] = 0.0
     return contact
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .fitting import FittedTrack
+from .fitting import FittedTrack, Stance
 
 
 @dataclass(frozen=True)
@@ -47,9 +47,17 @@ class CameraPath:
             return points
         return np.einsum("tji,tkj->tki", self.R_first_camera, points - self.center[:, None])
 
-    def rotations_to_frames(self, R: np.ndarray) -> np.ndarray:
-        """(T, 3, 3) rotations about axes of the first frame in each frame's camera."""
-        return R if self.is_static else np.swapaxes(self.R_first_camera, 1, 2) @ R @ self.R_first_camera
+    def stance_to_frames(self, stance: Stance) -> Stance:
+        """A stance in the first frame's axes, in each frame's camera; the stance itself where that does not move."""
+        if self.is_static:
+            return stance
+        return Stance(
+            self.points_to_frames(stance.root_cam[:, None])[:, 0],
+            np.swapaxes(self.R_first_camera, 1, 2) @ stance.turn @ self.R_first_camera,
+            np.einsum("tji,tj->ti", self.R_first_camera, stance.floor_normal),
+            stance.floor_offset - (stance.floor_normal * self.center).sum(axis=1),
+            stance.contact,
+        )
 
     def world_from_frames(self, T_world_first: np.ndarray) -> np.ndarray:
         """(T, 4, 4) world_from_camera of each frame, from that of the first frame's axes (4, 4)."""

@@ -31,6 +31,7 @@ from ...solver import (
     fit_tree,
     make_tree,
 )
+from ...solver.residuals import floor
 from .camera import Camera
 from .hand_measure import HandMeasurer, calm_fingers, with_finger_limits
 from .lifter import Lifted, our_lifter
@@ -38,6 +39,7 @@ from .lifter_window import windows_around
 from .measure import DEPTH_SIGMA_M, NEAREST_M, Measurer
 from .parts import ALL_PARTS, Parts
 from .seen_keypoints import as_seen
+from .soles import SOLES, with_soles
 from .track import Track
 
 SHAPE_FRAMES = 64  # frames that decide the shape; more of them are more of the same
@@ -49,9 +51,16 @@ SHAPE_CERTAINTY = 1e6  # information (1/σ² per coefficient) that holds the sha
 # lifter is sure to 0.1 m (its errors go the same way in all points), 2.6 degrees for directions, 0.5 rad for a joint
 # about its rest state. Chosen on real clips with 3D truth and on renders of recorded motion; 25 to 50 % more or less of
 # any hardly matters. 3D keypoints, whose errors are those of the directions once more, weigh little: with 25, 8, 2.5
-# and 0, real clips have 75.2, 73.8, 73.1 and 72.4 mm; the sample clip has 1 mm more with 4.
+# and 0, real clips have 75.2, 73.8, 73.1 and 72.4 mm; the sample clip has 1 mm more with 4. A sole that stands
+# is within 1 cm of the floor: more certainty suits real clips better, and renders whose floor is wrong worse.
 WEIGHTS = Weights(
-    keypoints2d=1e5, keypoints3d=8.0, orientation_field=500.0, joint_prior=4.0, joint_limits=2000.0, shape=10.0
+    keypoints2d=1e5,
+    keypoints3d=8.0,
+    orientation_field=500.0,
+    joint_prior=4.0,
+    joint_limits=2000.0,
+    floor=1e4,
+    shape=10.0,
 )
 # Joints that no pair of landmarks fixes on their own stay closer to rest.
 _STIFF_JOINTS = {"spine": 5.0, "collar": 5.0, "foot": 5.0, "hand": 5.0, "neck": 3.0, "head": 3.0}
@@ -71,6 +80,25 @@ class FittedTrack:
 
 
 @dataclass(frozen=True)
+class Stance:
+    """What floor, feet and balance say of T frames, in each frame's camera or in the first frame's axes, metres."""
+
+    root_cam: np.ndarray  # (T, 3) the pelvis
+    turn: np.ndarray  # (T, 3, 3) rotations by which the body as a whole is to be turned
+    floor_normal: np.ndarray  # (T, 3) unit, upwards
+    floor_offset: np.ndarray  # (T,) normal . p on the floor
+    contact: np.ndarray  # (T, 4) probability that each sole stands on it
+
+    def floor(self, k: int, soles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Frame ``k``'s rows of the solver's residual ``floor``; soles (4,): their keypoint indices.
+
+        Feet that do not stand are as free below the floor as above it: they may be on a stair.
+        """
+        contact = self.contact[k]
+        return floor.pack(soles, self.floor_normal[k], float(self.floor_offset[k]), contact, contact)
+
+
+@dataclass(frozen=True)
 class PreparedTrack:
     """What every pass over a track needs, computed once: undistorted keypoints, the lifter's points, priors."""
 
@@ -83,15 +111,22 @@ class PreparedTrack:
     weights: Weights
     hand_measurer: HandMeasurer | None = None
     hands: np.ndarray | None = None  # (T, 2, 21, 6) as the track's, without distortion; None: not looked for
+    stance: Stance | None = None  # in each frame's camera; the body's last keypoints are its soles
 
     def measure(self, k: int, root_cam: np.ndarray | None = None) -> Measurements:
         """Frame ``k`` for the solver; ``root_cam`` (3,): where the pelvis is known to be, camera frame, metres."""
         points, sigma = self.lifted.points[k], self.lifted.sigma_along[k]
         return self.measurer.measure(self.pixels[k], self.track.confidence[k], points, sigma, root_cam)
 
-    def measure_with_hands(self, k: int, root_cam: np.ndarray | None = None) -> Measurements:
-        """The same with the hands, where these were looked for. The shape is found without: it says little of hands."""
+    def measure_all(self, k: int, root_cam: np.ndarray | None = None) -> Measurements:
+        """The same with the floor, where it is known, and the hands, where these were looked for.
+
+        The shape is found without: they say little of it.
+        """
         measured = self.measure(k, root_cam)
+        if self.stance is not None:
+            soles = np.arange(len(SOLES)) + len(self.body.keypoint_names) - len(SOLES)
+            measured = replace(measured, tables={"floor": self.stance.floor(k, soles)})
         if self.hand_measurer is None or self.hands is None:
             return measured
         return self.hand_measurer.add(measured, self.hands[k])
@@ -101,6 +136,12 @@ class PreparedTrack:
         points = self.lifted.points
         turned = (points @ np.swapaxes(R, 1, 2).astype(points.dtype)).astype(points.dtype)
         return replace(self, lifted=replace(self.lifted, points=turned))
+
+    def on_floor(self, stance: Stance, betas: np.ndarray) -> PreparedTrack:
+        """With the floor, and soles on a body of this shape."""
+        body, K = with_soles(self.body, betas), self.measurer.intrinsics
+        hands = None if self.hand_measurer is None else HandMeasurer(body, K)
+        return replace(self, body=body, measurer=Measurer(body, K), hand_measurer=hands, stance=stance)
 
     def priors_with_shape(self, betas: np.ndarray) -> Priors:
         """The priors once the shape is known."""
@@ -145,19 +186,23 @@ def fit_picture(prepared: PreparedTrack) -> State | None:
 
 
 def refit_track(
-    prepared: PreparedTrack, first: FittedTrack, root_cam: np.ndarray, progress: Callable[[str, int, int], None]
+    prepared: PreparedTrack, first: FittedTrack, stance: Stance, progress: Callable[[str, int, int], None]
 ) -> FittedTrack:
-    """Fit every frame again, from its first fit, with the pelvis known to be at ``root_cam`` (T, 3), camera frame.
+    """Fit every frame again, from its first fit, with the pelvis and the floor known to be where the stance says.
 
     A pose and a distance that explain the same image can both be wrong together; once the floor has told the distance,
     the pose follows, and so does the size where the whole clip is farther or nearer than it seemed: who stands on
     the same floor as others must be as large as that floor says.
+
+    :param stance: in each frame's camera.
     """
-    betas = first.betas
+    prepared, betas, root_cam = prepared.turned(stance.turn), first.betas, stance.root_cam
     if first.valid.any():
         far, near = (np.linalg.norm(at[first.valid], axis=1) for at in (root_cam, first.t_camera_root))
         if abs(np.log(np.median(far / np.maximum(near, NEAREST_M)))) > RESIZE:
             betas = _fit_shape(prepared, root_cam).beta
+    if prepared.weights.floor > 0.0:
+        prepared = prepared.on_floor(stance, betas)
 
     def state(k: int) -> State | None:
         if not first.valid[k]:
@@ -218,7 +263,7 @@ class _Frames:
         :return: by how much it costs less for having been fitted from further off.
         """
         prepared = self._prepared
-        measurements = prepared.measure_with_hands(k, init.t_camera_root if init is not None and known_root else None)
+        measurements = prepared.measure_all(k, init.t_camera_root if init is not None and known_root else None)
         found = self._solve(measurements, init, self._cold if init is None else self._warm)
         if not _is_usable(found):
             return 0.0
@@ -258,7 +303,7 @@ class _Frames:
         track = self._prepared.track
         while k > 0 and self._valid[k - 1] and not track.acquired[k]:
             k -= 1
-            found = self._solve(self._prepared.measure_with_hands(k), later, self._warm)
+            found = self._solve(self._prepared.measure_all(k), later, self._warm)
             is_worth_it = _is_usable(found) and found.cost - self._cost[k] <= gain
             if not is_worth_it or _as_before(found.state.Omega, self._rotations[k, 1:]):
                 return

@@ -42,6 +42,10 @@ from .smoothing import gaussian_smooth, smooth_rotations
 CONTACT_SPEED_M_S = 0.35  # across the line of sight; a swinging foot moves at 1 m/s and more
 CONTACT_HEIGHT_M = 0.05  # above the frame's lowest sole point
 CONTACT_CUTOFF_HZ = 4.0  # of a sole's way, before its speed is asked: noise must not set a standing foot going
+# A foot in the air does not keep still: one that does for a second or so may be higher than the lowest because it was
+# put to a wrong distance, up or down its line of sight.
+STILL_M_S, STILL_CUTOFF_HZ = 0.12, 0.6
+WRONG_DEPTH_M = 0.4
 FLOOR_SIGMA_M = 0.03
 LEVEL_M = 0.25  # h_l: feet that stand farther above or below stand on something else
 DEPTH_SIGMA_M = 0.1  # how wrong a depth that fits the image may be
@@ -97,22 +101,33 @@ def along_sight(root: np.ndarray) -> np.ndarray:
     return root / np.maximum(np.linalg.norm(root, axis=1, keepdims=True), 1e-9)
 
 
-def standing_probability(soles_cam: np.ndarray, up: np.ndarray, times: np.ndarray) -> np.ndarray:
-    """(T, F) probability that each sole point stands: slow across the line of sight and lowest of its frame.
+def standing_probability(
+    soles: np.ndarray, up: np.ndarray, times: np.ndarray, center: np.ndarray | None = None
+) -> np.ndarray:
+    """(T, F) probability that each sole point stands: slow and lowest of its frame.
 
-    p = s(4(1 − v/v₀)) s(4(1 − h/h₀)) with the logistic s. Depth, the noisy direction, takes no part in the speed v, and
-    the height h is measured from the frame's lowest sole point, not from a floor that is not known yet.
+    p = s(4(1 − v/v₀)) s(4(1 − h/(h₀ + |g| d s(4(1 − v̄/v₁))))) with the logistic s. The height h is measured from the
+    frame's lowest sole point, not from a floor that is not known yet. Where a camera saw the points, depth, the noisy
+    direction, takes no part in the speed v; and as far as a point keeps still, it may be higher than the lowest by what
+    a wrong depth d explains, g the upward part of its line of sight: v̄ is the root mean square of v over a second.
 
-    :param soles_cam: (T, F, 3) metres, camera frame;  up: (3,) unit;  times: (T,) seconds.
+    :param soles: (T, F, 3) metres;  up: (3,) unit;  times: (T,) seconds.
+    :param center: (T, 3) or (3,) the camera's, in the same axes; None: no camera is known.
     """
-    height = soles_cam @ up
+    height = soles @ up
     height = height - height.min(axis=1, keepdims=True)
-    speed = np.zeros(height.shape)
+    speed, allowed = np.zeros(height.shape), np.full(height.shape, CONTACT_HEIGHT_M)
     if len(times) > 2:
-        velocity = np.gradient(gaussian_smooth(soles_cam, times, CONTACT_CUTOFF_HZ), times, axis=0)
-        ray = soles_cam / np.linalg.norm(soles_cam, axis=-1, keepdims=True)
-        speed = np.linalg.norm(velocity - ray * (velocity * ray).sum(-1, keepdims=True), axis=-1)
-    return _logistic(4 * (1 - speed / CONTACT_SPEED_M_S)) * _logistic(4 * (1 - height / CONTACT_HEIGHT_M))
+        velocity = np.gradient(gaussian_smooth(soles, times, CONTACT_CUTOFF_HZ), times, axis=0)
+        if center is not None:
+            sight = soles - np.expand_dims(center, -2)
+            sight = sight / np.maximum(np.linalg.norm(sight, axis=-1, keepdims=True), 1e-9)
+            velocity = velocity - sight * (velocity * sight).sum(-1, keepdims=True)
+        speed = np.linalg.norm(velocity, axis=-1)
+        if center is not None:
+            mean_speed = np.sqrt(gaussian_smooth(np.square(speed), times, STILL_CUTOFF_HZ))
+            allowed += WRONG_DEPTH_M * np.abs(sight @ up) * _logistic(4 * (1 - mean_speed / STILL_M_S))
+    return _logistic(4 * (1 - speed / CONTACT_SPEED_M_S)) * _logistic(4 * (1 - height / allowed))
 
 
 def correct_depth(

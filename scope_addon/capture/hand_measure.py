@@ -174,7 +174,9 @@ def calm_fingers(rotations: np.ndarray, fingers: list[list[int]], seen: np.ndarr
         if not there.any():
             out[:, joints] = np.eye(3)
             continue
-        away = np.abs(times[:, None] - times[there][None]).min(axis=1)
+        known = np.concatenate([[-np.inf], times[there], [np.inf]])
+        after = np.searchsorted(times[there], times)
+        away = np.minimum(times - known[after], known[after + 1] - times)
         share = np.clip((away - SHORT_GAP_S) / (LONG_GAP_S - SHORT_GAP_S), 0.0, 1.0)
         keep = 1.0 - share * share * (3.0 - 2.0 * share)
         between = fill_rotation_gaps(rotations[:, joints], there, times)

@@ -23,6 +23,7 @@ class Parts:
     leaps: bool = True  # repair of keypoints that leap away for a few frames
     second_pass: bool = True  # the fit again with the distance that floor and feet tell
     balance: bool = True  # in it, weight over feet that stand
+    floor: bool = True  # in it, feet that stand on the floor
     contact: bool = True  # feet held on the floor at the end
 
     def __post_init__(self) -> None:
@@ -37,6 +38,7 @@ class Parts:
             keypoints3d=weights.keypoints3d * self.keypoints3d,
             orientation_field=weights.orientation_field * self.orientation_field,
             joint_prior=weights.joint_prior * self.joint_prior,
+            floor=weights.floor * self.floor,
         )
 
 

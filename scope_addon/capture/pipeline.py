@@ -317,9 +317,8 @@ def solve(
         balanced = parts.balance
         stances = [corrected_stance(*each, lines, balanced) for each in zip(placed, floors, strict=True)]
         placed.clear()
-        for k, (root, turn) in enumerate(stances):
-            seen = prepared[k].turned(path.rotations_to_frames(turn))
-            fits[k] = compact(refit_track(seen, fits[k], path.points_to_frames(root[:, None])[:, 0], progress))
+        for k, stance in enumerate(stances):
+            fits[k] = compact(refit_track(prepared[k], fits[k], path.stance_to_frames(stance), progress))
         placed = place()
     if not smoothing:
         placed = place(smoothing)

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scope.scope_addon.capture.camera_path import CameraPath
 from scope.scope_addon.capture.camera_travel import camera_travel
-from scope.scope_addon.capture.fitting import FittedTrack
+from scope.scope_addon.capture.fitting import FittedTrack, Stance
 from scope.scope_addon.capture.pipeline import CaptureOptions, capture
 from scope.scope_addon.capture.video_range import VideoRange
 from scope.solver import load_body
@@ -85,6 +85,31 @@ def test_there_and_back_along_a_path():
     np.testing.assert_allclose(through, points @ T_world_first[:3, :3].T + T_world_first[:3, 3], atol=1e-12)
     assert CameraPath.on_a_stand(3).is_static
     assert not path.is_static
+
+
+def test_a_stance_is_the_same_in_every_camera():
+    """Heights over the floor, the pelvis and what turns do to directions, whichever axes they are told in."""
+    rng = np.random.default_rng(3)
+    path = CameraPath(exp(0.3 * rng.standard_normal((5, 3))), rng.standard_normal((5, 3)))
+    up = exp([0.1, 0.2, 0.3]) @ [0.0, -1.0, 0.0]
+    first = Stance(
+        root_cam=rng.standard_normal((5, 3)),
+        turn=exp(0.1 * rng.standard_normal((5, 3))),
+        floor_normal=np.tile(up, (5, 1)),
+        floor_offset=np.full(5, -1.4),
+        contact=rng.uniform(size=(5, 4)),
+    )
+    frames = path.stance_to_frames(first)
+    points = rng.standard_normal((5, 1, 3))
+    seen = path.points_to_frames(points)[:, 0]
+    height = (seen * frames.floor_normal).sum(axis=1) - frames.floor_offset
+    np.testing.assert_allclose(height, points[:, 0] @ up + 1.4, atol=1e-12)
+    np.testing.assert_allclose(path.points_to_frames(first.root_cam[:, None])[:, 0], frames.root_cam)
+    turned = np.einsum("tij,tj->ti", path.R_first_camera, np.einsum("tij,tj->ti", frames.turn, seen - frames.root_cam))
+    expected = np.einsum("tij,tj->ti", first.turn, points[:, 0] - first.root_cam)
+    np.testing.assert_allclose(turned, expected, atol=1e-12)
+    np.testing.assert_array_equal(frames.contact, first.contact)
+    assert CameraPath.on_a_stand(5).stance_to_frames(first) is first
 
 
 def test_without_smoothing_the_camera_travels_as_far(shared):

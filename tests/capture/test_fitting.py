@@ -43,6 +43,17 @@ def _standing_track(body, camera, bent=()) -> Track:
     )
 
 
+def _stance(fit: fitting.FittedTrack, contact: float = 0.0, floor_m: float = 0.0) -> fitting.Stance:
+    """The pelvis where it was fitted; feet that stand so surely on a level floor so far below the camera."""
+    return fitting.Stance(
+        root_cam=fit.t_camera_root,
+        turn=np.tile(np.eye(3), (FRAMES, 1, 1)),
+        floor_normal=np.tile([0.0, -1.0, 0.0], (FRAMES, 1)),
+        floor_offset=np.full(FRAMES, -floor_m),
+        contact=np.full((FRAMES, 4), contact),
+    )
+
+
 def test_the_lifting_network_runs_once_for_both_fits(monkeypatch):
     body, camera = load_body("scope"), choose_camera(1080, 1920)
     track = _standing_track(body, camera)
@@ -57,7 +68,7 @@ def test_the_lifting_network_runs_once_for_both_fits(monkeypatch):
     monkeypatch.setattr(Lifter, "lift_both_ways", counted)
     prepared = fitting.prepare_track(body, track, camera)
     first = fitting.fit_track(prepared, lambda *_: None)
-    second = fitting.refit_track(prepared, first, first.t_camera_root, lambda *_: None)
+    second = fitting.refit_track(prepared, first, _stance(first), lambda *_: None)
     assert len(lifts) == 1
     np.testing.assert_array_equal(second.betas, first.betas)
     placed = place_track(body, track, second, smoothing=False)
@@ -76,7 +87,8 @@ def test_who_is_nearer_than_it_seemed_is_smaller():
         return np.linalg.norm(J[body.joint_names.index("left_hip")] - J[body.joint_names.index("left_ankle")])
 
     for nearer in (0.85, 1.1):
-        second = fitting.refit_track(prepared, first, nearer * first.t_camera_root, lambda *_: None)
+        stance = replace(_stance(first), root_cam=nearer * first.t_camera_root)
+        second = fitting.refit_track(prepared, first, stance, lambda *_: None)
         moved = second.t_camera_root[:, 2].mean() / first.t_camera_root[:, 2].mean()
         assert abs(moved / nearer - 1) < 0.05
         assert abs(leg(second) / leg(first) / moved - 1) < 0.03
@@ -96,10 +108,51 @@ def test_a_limb_goes_where_it_is_seen_to_go_for_sure_and_was_there_before():
     prepared = replace(prepared, lifted=Lifted(lifted, sigma, sigma))
 
     first = fitting.fit_track(prepared, lambda *_: None)
-    for fit in (first, fitting.refit_track(prepared, first, first.t_camera_root, lambda *_: None)):
+    for fit in (first, fitting.refit_track(prepared, first, _stance(first), lambda *_: None)):
         joints = place_track(body, track, fit, smoothing=False).joints
         for joint in ("knee", "ankle"):
             k, at_hip = (body.joint_names.index(f"right_{name}") for name in (joint, "hip"))
             i = KEYPOINT_NAMES.index(f"right_{joint}")
             there = truth[:, i, 2] - truth[:, hip, 2]
             np.testing.assert_allclose(joints[:, k, 2] - joints[:, at_hip, 2], there, atol=0.2)
+
+
+def test_a_leg_at_a_wrong_depth_is_drawn_to_the_floor_where_it_stands_and_only_there():
+    """Seen from above, a foot that was lifted too near hangs in the air; the picture alone does not tell."""
+    body, camera = load_body("scope"), choose_camera(1080, 1920)
+    down = exp(np.array([0.35, 0.0, 0.0]))  # the camera looks down on the person
+    level = _standing_track(body, camera)
+    points = level.world_landmarks[0] + [0.0, 0.0, 4.0]
+    points = (points - [0.0, 0.0, 4.0]) @ down.T + [0.0, 0.0, 4.0]
+    pixels = points[:, :2] / points[:, 2:] * camera.intrinsics[0, 0] + camera.intrinsics[:2, 2]
+    world = points - [0.0, 0.0, 4.0]
+    track = replace(
+        level,
+        keypoints_px=np.tile(pixels, (FRAMES, 1, 1)),
+        world_landmarks=np.tile(world, (FRAMES, 1, 1)),
+    )
+    up = down @ [0.0, -1.0, 0.0]
+    prepared = fitting.prepare_track(body, track, camera)
+    leg = [KEYPOINT_NAMES.index(f"right_{name}") for name in ("knee", "ankle", "heel", "foot_index")]
+    lifted, sigma = track.world_landmarks.copy(), np.full((FRAMES, len(KEYPOINT_NAMES)), 0.1)
+    good = fitting.fit_track(replace(prepared, lifted=Lifted(lifted.copy(), sigma, sigma)), lambda *_: None)
+    floor_m = (place_track(body, track, good, smoothing=False).soles @ up).min(axis=1)
+    lifted[:, leg, 2] -= [0.15, 0.3, 0.3, 0.3]
+    prepared = replace(prepared, lifted=Lifted(lifted, sigma, sigma))
+    first = fitting.fit_track(prepared, lambda *_: None)
+
+    def heights(fit):
+        return (place_track(body, track, fit, smoothing=False).soles @ up - floor_m[:, None])[:, 2:]
+
+    assert heights(first).min() > 0.05
+    stance = replace(_stance(good), floor_normal=np.tile(up, (FRAMES, 1)), floor_offset=floor_m)
+    free = fitting.refit_track(prepared, first, stance, lambda *_: None)
+    assert heights(free).min() > 0.05
+    standing = replace(stance, contact=np.full((FRAMES, 4), 0.9))
+    held = fitting.refit_track(prepared, first, standing, lambda *_: None)
+    assert np.abs(heights(held)).max() < 0.025
+    placed, true = (place_track(body, track, fit, smoothing=False).joints for fit in (held, good))
+    ankle = body.joint_names.index("right_ankle")
+    before = place_track(body, track, first, smoothing=False).joints
+    wrong = np.abs(before - true)[:, ankle, 2]
+    assert (np.abs(placed - true)[:, ankle, 2] < 0.6 * wrong).all()

@@ -10,6 +10,7 @@ from scope.solver.body import load_body
 from scope.solver.frames import transform_points, world_from_level_camera
 
 FPS = 30.0
+CAMERA = np.zeros(3)
 
 
 @pytest.fixture(scope="module")
@@ -43,11 +44,37 @@ def step():
 
 def test_the_raised_foot_is_known_from_the_standing_one(step):
     _, omega, root, place, T_world_camera, times = step
-    p = grounding.standing_probability(place(omega, root)[2], T_world_camera[2, :3], times)
+    p = grounding.standing_probability(place(omega, root)[2], T_world_camera[2, :3], times, CAMERA)
     assert (p[:, 2:] > 0.8).all()  # right
     assert (p[:20, :2] > 0.8).all()
     assert (p[36:54, :2] < 0.3).all()
     assert (p[75:, :2] > 0.8).all()
+
+
+def test_a_still_foot_at_a_wrong_distance_stands_and_a_raised_one_does_not(step):
+    """A foot that is seen too near, or too far, along its line of sight seems to be below the floor, or above it."""
+    _, omega, root, place, T_world_camera, times = step
+    up = T_world_camera[2, :3]
+    soles = place(omega[:1], root[:1])[2].repeat(len(times), axis=0)
+    sight = soles[:, :2] / np.linalg.norm(soles[:, :2], axis=-1, keepdims=True)
+    far = soles.copy()
+    far[:, :2] -= 0.35 * sight  # the left one: nearer to the camera, so higher
+    higher = ((far[:, :2] - soles[:, :2]) @ up).mean()
+    assert higher > 0.1
+    assert (grounding.standing_probability(far, up, times, CAMERA)[:, :2] > 0.5).all()
+    assert (grounding.standing_probability(far, up, times)[:, :2] < 0.1).all()  # nobody knows where the sight is
+
+    raised = soles.copy()
+    raised[:, :2] += 0.35 * up
+    assert (grounding.standing_probability(raised, up, times, CAMERA)[:, :2] < 0.1).all()
+
+    moving = far.copy()
+    moving[:, :2, 0] += 0.06 * np.sin(2 * np.pi * times)[:, None]  # up to 0.38 m/s, and slow where it turns round
+    assert (grounding.standing_probability(moving, up, times, CAMERA)[:, :2] < 0.3).all()
+    at = np.array([2.0, -1.0, 3.0])
+    for center in (at, np.tile(at, (len(times), 1))):
+        elsewhere = grounding.standing_probability(far + at, up, times, center)
+        np.testing.assert_allclose(elsewhere, grounding.standing_probability(far, up, times, CAMERA), atol=1e-9)
 
 
 def test_wrong_depth_is_found_again_by_the_floor(step):
@@ -55,7 +82,7 @@ def test_wrong_depth_is_found_again_by_the_floor(step):
     unit = root / np.linalg.norm(root, axis=1, keepdims=True)
     wrong = 0.15 * np.sin(2 * np.pi * 0.4 * times)
     seen = place(omega, root + wrong[:, None] * unit)[2]
-    contact = grounding.standing_probability(seen, T_world_camera[2, :3], times)
+    contact = grounding.standing_probability(seen, T_world_camera[2, :3], times, CAMERA)
     away = grounding.correct_depth(root + wrong[:, None] * unit, seen, contact, T_world_camera, times)
     assert np.abs(away + wrong).mean() < 0.25 * np.abs(wrong).mean()
     left = np.diff(wrong + away)[:28]  # while both feet stand
@@ -65,7 +92,7 @@ def test_wrong_depth_is_found_again_by_the_floor(step):
 def test_right_depth_is_left_alone(step):
     _, omega, root, place, T_world_camera, times = step
     soles = place(omega, root)[2]
-    contact = grounding.standing_probability(soles, T_world_camera[2, :3], times)
+    contact = grounding.standing_probability(soles, T_world_camera[2, :3], times, CAMERA)
     assert np.abs(grounding.correct_depth(root, soles, contact, T_world_camera, times)).max() < 0.05
 
 
@@ -87,7 +114,7 @@ def test_a_trembling_motion_stands_still_where_it_stands(step):
     sight = grounding.along_sight(root)
     trembling = grounding.gaussian_smooth(rng.normal(size=root.shape), times, 4.5)
     shaken_root = root + 0.003 * trembling + 0.02 * trembling[:, :1] * sight
-    contact = grounding.standing_probability(place(omega, root)[2], T_world_camera[2, :3], times)
+    contact = grounding.standing_probability(place(omega, root)[2], T_world_camera[2, :3], times, CAMERA)
     local, moved = grounding.stand_on_floor(
         soled, shaken, shaken_root, np.zeros(soled.P), lambda *m: place(*m)[2], contact, T_world_camera, times
     )
@@ -128,7 +155,7 @@ def test_feet_on_another_level_are_not_drawn_to_the_floor(step, level):
     up = T_world_camera[2, :3]
     other = root + np.where(times > 1.5, level, 0.0)[:, None] * up
     soles = place(omega, other)[2]
-    contact = grounding.standing_probability(soles, up, times)
+    contact = grounding.standing_probability(soles, up, times, CAMERA)
     local, moved = grounding.stand_on_floor(
         soled, omega, other, np.zeros(soled.P), lambda *m: place(*m)[2], contact, T_world_camera, times
     )
@@ -141,7 +168,7 @@ def test_feet_on_another_level_are_not_drawn_to_the_floor(step, level):
 
 def test_a_still_and_a_single_frame_pass(step):
     soled, omega, root, place, T_world_camera, times = step
-    contact = grounding.standing_probability(place(omega[:1], root[:1])[2], T_world_camera[2, :3], times[:1])
+    contact = grounding.standing_probability(place(omega[:1], root[:1])[2], T_world_camera[2, :3], times[:1], CAMERA)
     local, moved = grounding.stand_on_floor(
         soled, omega[:1], root[:1], np.zeros(soled.P), lambda *m: place(*m)[2], contact, T_world_camera, times[:1]
     )

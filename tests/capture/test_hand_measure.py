@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import tracemalloc
 from dataclasses import replace
 
 import numpy as np
@@ -198,6 +199,18 @@ def test_unseen_fingers_are_carried_over_short_gaps_and_rest_in_long_ones(body):
     assert np.allclose(calm[:, fingers[1]], np.eye(3))
     others = np.setdiff1d(np.arange(body.K + 1), sum(fingers, []))
     assert np.array_equal(calm[:, others], rotations[:, others])
+
+
+def test_fingers_of_a_long_clip_take_no_more_memory_than_the_clip(body):
+    T = 4000
+    rotations = np.tile(np.eye(3), (T, body.K + 1, 1, 1))
+    seen = np.tile((np.arange(T) % 2 == 0)[:, None], (1, 2))
+    fingers = [finger_joints(body, side) for side in SIDES]
+    tracemalloc.start()
+    calm_fingers(rotations, fingers, seen, np.arange(T) / 30.0)
+    most = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert most < 4 * rotations.nbytes
 
 
 def test_confidence_of_fingers_is_that_of_the_hand_and_nothing_elsewhere(body):

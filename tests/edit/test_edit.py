@@ -105,8 +105,8 @@ def test_feet_come_back_to_the_floor():
 
 
 def test_a_sloping_world_is_levelled():
-    clip = walk(6.0, speed=0.8)
-    clip.root[:, 0] = np.sin(clip.times)
+    clip = walk(6.0, speed=0.2)  # so slow that a foot which is down counts as standing
+    clip.root[:, 0] = 0.4 * np.sin(0.5 * clip.times)
     clip.root[:, 2] -= clip.soles(BODY, BETAS)[..., 2].min(axis=1)
     tilt = exp([0.1, 0.05, 0.0])
     tilted = Clip(clip.times, clip.rotations.copy(), clip.root @ tilt.T)
