@@ -127,7 +127,7 @@ def assemble_motion(
         trans_raw=trans_raw,
         betas=betas,
         body_model=body.name,
-        gender="neutral",
+        gender=body.gender,
         mocap_framerate=float(fps),
         frames=track.frames,
         timestamps=times,

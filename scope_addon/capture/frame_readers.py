@@ -159,6 +159,26 @@ def _open_with_pyav(path: Path) -> tuple[type[Exception], InputContainer | None]
     return av.error.FFmpegError, container
 
 
+def presented_s(path: Path) -> float | None:
+    """How long a video is shown: less than it holds where it was cut without being coded anew; None if it is not known.
+
+    OpenCV counts frames that an edit list leaves out, and in Matroska those before the first one.
+    """
+    try:
+        _, container = _open_with_pyav(path)
+    except VideoError:
+        return None
+    if container is None:
+        return None
+    with container:
+        stream = next(iter(container.streams.video), None)
+        if stream is not None and stream.duration and stream.time_base:
+            return float(stream.duration * stream.time_base)
+        if container.duration is None:
+            return None
+        return (container.duration - (container.start_time or 0)) / 1e6
+
+
 def decode_items(path: Path, numbers: Collection[int], most_pixels: int) -> dict[int, np.ndarray]:
     """The coded pictures of a HEIF file (`heif`) by item, (h, w, 3) RGB; of a damaged file, those that were decoded.
 

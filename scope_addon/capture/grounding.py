@@ -137,9 +137,10 @@ def correct_depth(
 
     With the ray's upward and horizontal parts g and d (world), heights h and horizontal steps s of the soles,
     minimizes over δ
-        Σ_t c_t f_t (h_t + g_t δ_t)²/σ_h² + δ_t²/σ_δ²
+        Σ_t max(2 c_t − 1, 0) f_t (h_t + g_t δ_t)²/σ_h² + δ_t²/σ_δ²
         + Σ_t c_t |s_t + d_t (δ_t+1 − δ_t)|²/(σ_s Δt)² + (δ_t+1 − δ_t)²/(σ_r Δt)²,
-    c_t the contact, f_t the share with which this height is the floor's: a tridiagonal system, solved in O(T).
+    c_t the contact (of a step, the smaller one of its ends), f_t the share with which this height is the floor's: a
+    tridiagonal system, solved in O(T).
 
     :param root_cam: (T, 3), about the camera's centre;  soles_cam: (T, F, 3);  contact: (T, F);  times: (T,).
     """

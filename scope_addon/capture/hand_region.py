@@ -80,7 +80,7 @@ def region_from_landmarks(keypoints_px: np.ndarray) -> Region:
     Up is from the wrist to the middle of the index's, middle's and ring's first joints (weights ¼, ½, ¼); the box is
     that of the palm and the fingers' bases in these axes, so that fingers that move do not move the region.
     """
-    up = 0.25 * (keypoints_px[6] + keypoints_px[14]) + 0.5 * keypoints_px[10] - keypoints_px[0]
+    up = 0.25 * (keypoints_px[5] + keypoints_px[13]) + 0.5 * keypoints_px[9] - keypoints_px[0]
     rotation = _rotation(up)
     R_image_crop = Region((0.0, 0.0), 1.0, rotation).R_image_crop
     turned = keypoints_px[_STEADY] @ R_image_crop

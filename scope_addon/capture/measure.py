@@ -132,7 +132,7 @@ def place(world: np.ndarray, rays: np.ndarray, weight: np.ndarray) -> np.ndarray
     A[:n, 0] = A[n:, 1] = 1.0
     A[:n, 2], A[n:, 2] = -rays[:, 0], -rays[:, 1]
     b = np.concatenate([rays[:, 0] * world[:, 2] - world[:, 0], rays[:, 1] * world[:, 2] - world[:, 1]])
-    w = np.tile(weight, 2)
+    w = np.tile(np.sqrt(weight), 2)
     return np.linalg.lstsq(A * w[:, None], b * w, rcond=None)[0]
 
 

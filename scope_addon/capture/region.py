@@ -41,10 +41,6 @@ class Region:
         """Crop points of pixels (..., 2), the inverse of `image_from_crop`."""
         return (np.asarray(points) - np.asarray(self.center_px)) @ self.R_image_crop / self.side_px + 0.5
 
-    def corners_px(self) -> np.ndarray:
-        """(4, 2) pixels of the corners: top left, top right, bottom right, bottom left of the upright square."""
-        return self.image_from_crop(np.array([[0, 0], [1, 0], [1, 1], [0, 1]], float))
-
     def cut(self, image_rgb: np.ndarray, size: int) -> np.ndarray:
         """The square as a (size, size, 3) picture; beyond the image's edge, its outermost pixels go on.
 

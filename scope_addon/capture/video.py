@@ -27,7 +27,7 @@ import cv2
 import numpy as np
 
 from ...solver.errors import VideoError
-from .frame_readers import FrameReader, open_reader
+from .frame_readers import FrameReader, open_reader, presented_s
 from .image_sequence import PictureSequence, SequenceReader, find_sequence
 from .picture import is_picture, read_picture
 from .quicktime import focal_35mm
@@ -65,7 +65,6 @@ class Video:
     fps: Fraction
     frame_count: int
     focal_35mm: float | None = None
-    is_still: bool = False
     warnings: list[str] = field(default_factory=list)
     wanted: VideoRange = field(default_factory=VideoRange)
     _source_fps: Fraction | None = field(default=None, repr=False)
@@ -165,7 +164,7 @@ def _open_still(path: Path, asked: Wanted) -> Video:
     if picture is None:
         raise _damaged(path)
     height, width = picture.rgb.shape[:2]
-    video = Video(path, width, height, STILL_FPS, 1, picture.focal_35mm, is_still=True, _still=picture.rgb)
+    video = Video(path, width, height, STILL_FPS, 1, picture.focal_35mm, _still=picture.rgb)
     if asked != VideoRange():
         video.warnings.append(f"{path.name} is a single picture: a start, an end or a frame rate changes nothing")
     if picture.length > 1:
@@ -188,7 +187,10 @@ def _open_moving(path: Path, asked: Wanted) -> Video:
         fps = exact_fps(reader.rate) or _fps_from_timestamps(reader)
         count = reader.frame_count
     height, width = first[1].shape[:2]
-    frame_count = max(1, int(count)) if 0 < count < 1e9 else 1
+    claimed = int(count) if 0 < count < 1e9 else None
+    shown_s = presented_s(path) if claimed != 1 else None
+    counts = [claimed, round(shown_s * fps) if shown_s else None]
+    frame_count = max(1, min((n for n in counts if n is not None), default=1))
     wanted = asked.at_rate(fps)
     video = Video(path, width, height, fps, frame_count, focal_35mm(path), wanted=wanted)
     if wanted.start_s > 0 and count > 0 and wanted.start_s * fps > frame_count + fps:

@@ -56,7 +56,7 @@ def up_from_standing(body: Body, joints_cam: np.ndarray) -> np.ndarray:
 def up_from_floor(feet_cam: np.ndarray, up: np.ndarray) -> np.ndarray:
     """Turns ``up`` so that the supporting feet lie in one level plane, as far as they are spread over the floor.
 
-    Minimizes Σ_k (n·p̃_k)²/σ_floor² + N ‖n − up‖²/σ_up² over n, p̃ the lowest foot point of each frame less their mean.
+    Minimizes Σ_k (n·p̃_k)²/σ_floor² + N ‖n − up‖²/σ_up² over n, p̃ the lowest foot point of each frame less their median.
 
     :param feet_cam: (T, F, 3) points of the soles in the camera frame.
     """

@@ -88,6 +88,9 @@ def test_bent_fingers_leave_the_region_where_it_is():
     open_hand, fist = flat_hand() * 100, flat_hand() * 100
     fist[[8, 12, 16, 20]] = fist[[5, 9, 13, 17]]
     assert region_from_landmarks(fist) == region_from_landmarks(open_hand)
+    askew = open_hand.copy()
+    askew[[6, 7, 8, 10, 11, 12, 14, 15, 16]] += [30.0, 0.0]  # all that lies beyond the knuckles
+    assert region_from_landmarks(askew).rotation == region_from_landmarks(open_hand).rotation
 
 
 def test_a_palm_tells_the_region_also_when_it_was_looked_for_in_a_turned_square():

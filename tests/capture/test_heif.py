@@ -32,7 +32,7 @@ def read(path: Path, data: bytes) -> np.ndarray:
     path.write_bytes(data)
     with open_video(path) as video:
         (frame,) = video
-    assert video.is_still
+    assert video.frame_count == 1
     return frame.image_rgb.astype(int)
 
 

@@ -50,7 +50,7 @@ def test_a_part_of_them(folder: Path) -> None:
 
 def test_without_a_rate(folder: Path) -> None:
     with open_video(folder / "walk_9.png") as video:
-        assert video.is_still
+        assert video.frame_count == 1
     with open_video(folder) as video:
         assert video.fps == 30
         assert any("--fps on the command line" in warning for warning in video.warnings)

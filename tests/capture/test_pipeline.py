@@ -7,11 +7,13 @@ import subprocess
 import sys
 import threading
 import time
+from dataclasses import replace
 
 import cv2
 import numpy as np
 import pytest
 from scope.scope_addon.capture.pipeline import CaptureOptions, capture
+from scope.scope_addon.capture.video_range import VideoRange
 from scope.scope_addon.cli import SAMPLE
 from scope.scope_addon.motion import Motion
 from scope.solver.errors import CancelledError, NoPersonError
@@ -81,6 +83,11 @@ def test_the_motion_is_complete_and_its_values_are_sane(sample):
     R = m.world_from_camera[:, :3, :3]
     assert np.allclose(R @ np.swapaxes(R, -1, -2), np.eye(3), atol=1e-9)
     assert not np.array_equal(m.poses, m.poses_raw)
+
+
+def test_the_motion_says_which_gender_its_body_is_of(body):
+    options = CaptureOptions(quality="fast", wanted=VideoRange(end_s=0.05))
+    assert capture(SAMPLE, replace(body, gender="female"), options).motions[0].gender == "female"
 
 
 def test_the_report_can_be_written_as_json_and_counts_right(sample):

@@ -11,6 +11,7 @@ import zlib
 from fractions import Fraction
 from pathlib import Path
 
+import av
 import cv2
 import numpy as np
 import pytest
@@ -108,7 +109,7 @@ def test_frames_come_in_order_as_rgb_with_their_times(tmp_path):
     with open_video(path) as video:
         frames = list(video)
     assert (video.width, video.height, video.fps, video.frame_count) == (W, H, Fraction(25), 12)
-    assert not video.is_still
+    assert video.frame_count > 1
     assert not video.warnings
     assert [f.index for f in frames] == list(range(12))
     np.testing.assert_allclose([f.timestamp_s for f in frames], np.arange(12) / 25, atol=1e-6)
@@ -278,7 +279,7 @@ def test_a_picture_is_one_frame(tmp_path, suffix):
     path.write_bytes(encode(suffix, corner_image(65, 49)))
     with open_video(path) as video:
         frames = list(video)
-    assert video.is_still
+    assert video.frame_count == 1
     assert (video.width, video.height, video.frame_count, video.focal_35mm) == (65, 49, 1, None)
     assert [(f.index, f.timestamp_s) for f in frames] == [(0, 0.0)]
     assert corners(frames[0].image_rgb) == "rgbw"
@@ -398,6 +399,26 @@ def test_decoding_that_stops_early_gives_what_there_is_and_a_warning(tmp_path, c
     assert len(video.warnings) == 1
     assert "stopped after" in video.warnings[0]
     assert capfd.readouterr().err == ""
+
+
+@pytest.mark.parametrize(("suffix", "shift_s"), [(".mp4", -0.8), (".mkv", 20.0)])
+def test_a_clip_cut_without_coding_it_anew_is_whole(tmp_path, suffix, shift_s):
+    """An edit list leaves its beginning out, or its times begin late: both are no damage."""
+    cut = tmp_path / f"cut{suffix}"
+    with av.open(str(write_video(tmp_path / "a.mp4", ramp(60)))) as source, av.open(str(cut), "w") as out:
+        stream = source.streams.video[0]
+        copy = out.add_stream_from_template(stream)
+        for packet in source.demux(stream):
+            if packet.dts is not None:
+                packet.pts += int(shift_s / stream.time_base)
+                packet.dts += int(shift_s / stream.time_base)
+                packet.stream = copy
+                out.mux(packet)
+    video = open_video(cut)
+    count = len(list(video))
+    assert video.warnings == []
+    assert count == (60 if shift_s > 0 else 36)
+    assert abs(video.expected_frames - count) <= 1
 
 
 # Real clips: sizes, rates and counts of ../shared/data/README.md
