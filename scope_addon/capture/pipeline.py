@@ -400,7 +400,8 @@ def _at(times_s: list[float]) -> str:
 def _nobody(path: Path, frames: int) -> NoPersonError:
     looked = f"in the {frames} frames of {path.name}" if frames > 1 else f"in {path.name}"
     return NoPersonError(
-        f"no person was found {looked}: the footage needs one person of whom most of the body is in the picture"
+        f"no person was found {looked}: the footage needs one person who is mostly in the picture and measures "
+        "at least a fifth of its shorter side; if somebody there is smaller, crop it"
     )
 
 
