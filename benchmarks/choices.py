@@ -58,9 +58,11 @@ CHOICES = (
     Choice("weight of the orientation field", fitting, "WEIGHTS", (250.0, 1000.0), "orientation_field"),
     Choice("weight of the joint prior", fitting, "WEIGHTS", (2.0, 8.0), "joint_prior"),
     Choice("weight of the shape prior", fitting, "WEIGHTS", (5.0, 20.0), "shape"),
+    Choice("weight of the floor under feet that stand", fitting, "WEIGHTS", (5e3, 2e4), "floor"),
     Choice("share lifted with world landmarks", lifter, "WORLD_SHARE", (0.5, 1.0)),
     Choice("speed at which balance is doubted, m/s", balance, "STANDING_M_S", (0.25, 1.0)),
     Choice("deviation of feet from the floor, m", grounding, "FLOOR_SIGMA_M", (0.015, 0.06)),
+    Choice("wrong depth that a still foot may have, m", grounding, "WRONG_DEPTH_M", (0.2, 0.8)),
     Choice("what held feet may move in the picture, m", grounding, "PICTURE_SIGMA_M", (0.001, 0.01)),
 )
 
