@@ -17,7 +17,7 @@ import numpy as np
 from mathutils import Matrix, Quaternion
 
 from ...solver.body import Body
-from ...solver.errors import UsageError
+from ...solver.errors import InputError, UsageError
 from ...solver.rotations import quaternion_from_matrix
 from ..edit.root_motion import about_z, floor_path
 from ..retarget.bone_map import PHALANGES, BoneMap
@@ -32,6 +32,7 @@ from .transaction import all_or_nothing
 
 # Rigify's switches: limbs by FK, neck and head with the chest.
 _SWITCHES = ("IK_FK", "neck_follow", "head_follow")
+_TURNS = 0.1  # of a rotation matrix's numbers, which the probe changes by more than 0.3
 _WRITTEN = "scope_keys"  # custom property of an action: what its keys were when they were written
 
 
@@ -70,10 +71,10 @@ def retarget(
     """Key the mapped bones of ``rig`` so that it moves as the captured ``source``; returns the new action.
 
     The rig's former action stays in the file, but one that came of retargeting and is as it was written. Fingers stay
-    as they are where none were captured.
+    as they are where none were captured. The rig leaves Edit Mode and Rest Position, in which it would not move.
 
     :raises UsageError: the rig is the source, or has no such bones.
-    :raises InputError: the map cannot be used.
+    :raises InputError: the map cannot be used, or the rig does not move with its bones.
     """
     options = options or RetargetOptions()
     bone_map.check()
@@ -107,9 +108,16 @@ def retarget(
             drop_root(rig)
         else:
             hang_on_root(rig, frames, *way)
+        rig.data.pose_position = "POSE"
         _put_by(former)
         action.name = f"{rig.name}_{source.name}"
     return action
+
+
+def check_turning(rig: bpy.types.Object, bone_map: BoneMap) -> None:
+    """Whether the mapped bones can be turned. :raises InputError: one of them cannot."""
+    with _at_rest(rig):
+        _probe(rig, bone_map.parts)
 
 
 def _where_seen(
@@ -197,7 +205,7 @@ def _channel(mode: str, R: np.ndarray) -> tuple[str, np.ndarray]:
 
 
 def _probe(rig: bpy.types.Object, parts: dict[str, str]) -> Skeleton:
-    """The mapped bones at rest, ordered, with what each one follows."""
+    """The mapped bones at rest, ordered, with what each one follows. :raises InputError: one of them does not turn."""
     names = list(parts)
     rest = _matrices(rig, names)
     follows = np.zeros((len(names), len(names)), bool)
@@ -206,6 +214,7 @@ def _probe(rig: bpy.types.Object, parts: dict[str, str]) -> Skeleton:
             turn = Quaternion((0.6, 0.48, 0.64), 0.5 + 0.15 * k)
             rig.pose.bones[names[a]].matrix_basis = turn.to_matrix().to_4x4()
         turned = _rotations(_matrices(rig, names)) @ np.swapaxes(_rotations(rest), 1, 2)
+        _check_turned(rig, [names[a] for a in group], turned[group])
         for a in group:
             rig.pose.bones[names[a]].matrix_basis = Matrix()
             follows[:, a] = np.abs(turned - turned[a]).max(axis=(1, 2)) < 0.02
@@ -223,6 +232,19 @@ def _probe(rig: bpy.types.Object, parts: dict[str, str]) -> Skeleton:
     return Skeleton(
         [names[b] for b in order], np.array(parents), matrices[:, :3, 3], ends, _rotations(matrices), float(floor)
     )
+
+
+def _check_turned(rig: bpy.types.Object, names: list[str], turned: np.ndarray) -> None:
+    """Of a bone that stays where it is, every other one that stays would seem to follow it.
+
+    :param turned: (B, 3, 3) by how much each of these bones did turn.
+    """
+    held = [name for name, R in zip(names, turned, strict=True) if np.abs(R - np.eye(3)).max() < _TURNS]
+    if held:
+        raise InputError(
+            f"'{held[0]}' of '{rig.name}' does not move when it is turned: show the rig in the viewport, mute the "
+            "constraint or driver that holds the bone, or take it out of the list"
+        )
 
 
 def _independent(parts: dict[str, str]) -> list[list[int]]:
@@ -250,7 +272,15 @@ def _rotations(matrices: np.ndarray) -> np.ndarray:
 
 @contextmanager
 def _at_rest(rig: bpy.types.Object) -> Iterator[None]:
-    """The rig without animation, pose and root object, limbs switched to FK; all comes back, but the switches stay."""
+    """The rig without animation, pose and root object, limbs switched to FK, where Blender evaluates it.
+
+    All comes back, but the switches and Edit Mode.
+    """
+    if rig.mode == "EDIT":
+        bpy.ops.object.mode_set(mode="OBJECT")
+    shown = bpy.context.scene.collection.objects  # which cannot be hidden or excluded, as others can
+    hidden, linked = rig.hide_viewport, rig in shown.values()
+    position = rig.data.pose_position
     animation = rig.animation_data
     action = animation.action if animation else None
     slot = getattr(animation, "action_slot", None)
@@ -258,6 +288,9 @@ def _at_rest(rig: bpy.types.Object) -> Iterator[None]:
     bases = [(bone, bone.matrix_basis.copy()) for bone in rig.pose.bones]
     top, empty = topmost(rig), root_object(rig)
     try:
+        if not linked:
+            shown.link(rig)
+        rig.hide_viewport, rig.data.pose_position = False, "POSE"
         top.parent = None
         if animation:
             animation.action, animation.use_nla = None, False
@@ -272,6 +305,9 @@ def _at_rest(rig: bpy.types.Object) -> Iterator[None]:
         for bone, matrix in bases:
             bone.matrix_basis = matrix
         top.parent = empty
+        rig.hide_viewport, rig.data.pose_position = hidden, position
+        if not linked:
+            shown.unlink(rig)
         if animation:
             animation.use_nla = nla
             if action is not None:

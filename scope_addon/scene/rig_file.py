@@ -14,7 +14,7 @@ from ..retarget.bone_map import BoneMap
 from ..retarget.rig_source import RigSource
 from . import formats
 from .export import temporary_scene
-from .retarget import guess_bone_map
+from .retarget import check_turning, guess_bone_map
 
 # What a file may bring along, users before what they use.
 _KINDS = (
@@ -35,6 +35,7 @@ def load_rig(source: RigSource, collection: bpy.types.Collection) -> bpy.types.O
     for obj in loaded:
         for other in obj.users_collection:
             other.objects.unlink(obj)
+    rig.data.pose_position = "POSE"
     for obj in keep:
         collection.objects.link(obj)
         obj.hide_viewport = obj.hide_render = False
@@ -57,10 +58,11 @@ def with_meshes(rig: bpy.types.Object, objects: Iterable[bpy.types.Object]) -> l
 def check_rig(source: RigSource) -> None:
     """Whether a motion can be put on the rig, before one is captured.
 
-    :raises InputError, UsageError: as ``load_rig``, and when its bones cannot be mapped.
+    :raises InputError, UsageError: as ``load_rig``, and when its bones cannot be mapped or turned.
     """
     with forgotten(), temporary_scene("Looking at a rig") as scene:
-        bones_of(source, load_rig(source, scene.collection))
+        rig = load_rig(source, scene.collection)
+        check_turning(rig, bones_of(source, rig))
 
 
 def bones_of(source: RigSource, rig: bpy.types.Object) -> BoneMap:

@@ -46,6 +46,51 @@ def test_limbs_point_where_the_body_points(source, scheme, feet):
         assert direction_error(rig, bone_of, LEGS) < 1.0
 
 
+def _in_edit_mode(rig):
+    bpy.context.view_layer.objects.active = rig
+    bpy.ops.object.mode_set(mode="EDIT")
+
+
+def _in_a_hidden_collection(rig):
+    hidden = bpy.data.collections.new("Hidden")
+    bpy.context.scene.collection.children.link(hidden)
+    hidden.objects.link(rig)
+    bpy.context.scene.collection.objects.unlink(rig)
+    hidden.hide_viewport = True
+
+
+def _in_rest_position(rig):
+    rig.data.pose_position = "REST"
+
+
+def _disabled_in_viewports(rig):
+    rig.hide_viewport = True
+
+
+@pytest.mark.parametrize("hide", [_in_rest_position, _in_edit_mode, _disabled_in_viewports, _in_a_hidden_collection])
+def test_a_rig_that_does_not_react_moves_all_the_same(source, hide):
+    rig, bone_of = build_rig("mixamo")
+    hide(rig)
+    collections, hidden = rig.users_collection, rig.hide_viewport
+    run(source, rig, feet=False)
+    assert (rig.users_collection, rig.hide_viewport) == (collections, hidden)
+    assert (rig.mode, rig.data.pose_position) == ("OBJECT", "POSE")  # it would not be seen to move otherwise
+    rig.hide_viewport = collections[0].hide_viewport = False
+    assert direction_error(rig, bone_of, ARMS + LEGS) < 1.0
+
+
+def test_a_bone_that_is_held_is_named_and_nothing_changes(source):
+    rig, bone_of = build_rig("mixamo")
+    target = bpy.data.objects.new("target", None)
+    bpy.context.scene.collection.objects.link(target)
+    rig.pose.bones[bone_of["left_elbow"]].constraints.new("COPY_ROTATION").target = target
+    rig.data.pose_position = "REST"
+    with pytest.raises(InputError, match="'mixamorig:LeftForeArm' of 'mixamo' does not move"):
+        run(source, rig)
+    assert rig.data.pose_position == "REST"
+    assert rig.animation_data is None
+
+
 def test_rigify(source, rigify_rigs):
     limbs = ("thigh", "shin", "foot", "upper_arm", "forearm", "hand")
     parts = ("hip", "knee", "ankle", "shoulder", "elbow", "wrist")

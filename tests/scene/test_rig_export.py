@@ -36,6 +36,7 @@ def save_rig(path, scheme="mixamo", armatures=1, animated=False):
             skin.vertex_groups.new(name=name).add([i], 1.0, "REPLACE")
         skin.parent = rig
         skin.modifiers.new("Armature", "ARMATURE").object = rig
+        rig.data.pose_position = "REST"  # as it may well have been saved
         if animated:
             rig.pose.bones[0].location = (0, 9, 0)
             rig.pose.bones[0].keyframe_insert("location", frame=3)
@@ -128,6 +129,17 @@ def test_several_armatures_need_a_name(tmp_path):
 def test_a_file_without_an_armature_is_refused(tmp_path):
     save_rig(tmp_path / "rig.blend", armatures=0)
     with pytest.raises(InputError, match="no armature"):
+        check_rig(rig_source(tmp_path / "rig.blend"))
+
+
+def test_a_rig_whose_bones_are_held_is_refused_before_the_work(tmp_path):
+    rig, bone_of = build_rig("mixamo")
+    limit = rig.pose.bones[bone_of["left_knee"]].constraints.new("LIMIT_ROTATION")
+    limit.owner_space = "LOCAL"
+    limit.use_limit_x = limit.use_limit_y = limit.use_limit_z = True
+    formats.write_blend(tmp_path / "rig.blend", bpy.context.scene)
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    with pytest.raises(InputError, match="'mixamorig:LeftLeg' of 'mixamo' does not move"):
         check_rig(rig_source(tmp_path / "rig.blend"))
 
 
