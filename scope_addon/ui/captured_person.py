@@ -36,6 +36,16 @@ def captured_armature(context: bpy.types.Context) -> bpy.types.Object | None:
     return found[0] if len(found) == 1 else None
 
 
+def library_of(armature: bpy.types.Object) -> bpy.types.Library | None:
+    """The file that the armature or its action is linked from, overridden or not; None: both are this file's own."""
+    blocks = [armature, armature.animation_data.action if armature.animation_data else None]
+    for block in filter(None, blocks):
+        original = block.override_library.reference if block.override_library else block
+        if original is not None and original.library is not None:
+            return original.library
+    return None
+
+
 def body_of(armature: bpy.types.Object) -> Body:
     """The body that the person was captured with. :raises ModelFileError: its file has gone."""
     from ...solver.body import load_body

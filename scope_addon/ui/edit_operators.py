@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
 
-from .captured_person import betas_of, body_of, cached_motion, captured_armature
+from .captured_person import betas_of, body_of, cached_motion, captured_armature, library_of
 from .telling import TellingOperator
 
 if TYPE_CHECKING:
@@ -25,9 +25,17 @@ class _Edit(TellingOperator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """A captured armature is meant."""
-        if captured_armature(context) is None:
+        """A captured armature is meant, whose keys this file keeps."""
+        armature = captured_armature(context)
+        if armature is None:
             cls.poll_message_set("Select the armature of a capture first")
+            return False
+        library = library_of(armature)
+        if library is not None:
+            cls.poll_message_set(
+                f"'{armature.name}' or its motion is linked from {library.filepath}, and changes would be lost: make "
+                "both local (Object > Relations > Make Local > All), or work on them in that file"
+            )
             return False
         return True
 

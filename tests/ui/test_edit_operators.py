@@ -217,6 +217,33 @@ def test_edits_need_a_captured_armature_and_find_the_only_one():
     assert not bpy.ops.scope.refloor.poll()
 
 
+@pytest.mark.parametrize("overridden", [False, True])
+def test_a_linked_capture_is_not_edited_until_it_is_local(rig, tmp_path, overridden):
+    name, file = rig.users_collection[0].name, tmp_path / "capture.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(file))
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    scene, layer = bpy.context.scene, bpy.context.view_layer
+    scene.render.fps = int(RATE)
+    with bpy.data.libraries.load(str(file), link=True) as (_, here):
+        here.collections = [name]
+    if overridden:
+        here.collections[0].override_hierarchy_create(scene, layer)
+    else:
+        scene.collection.children.link(here.collections[0])
+    linked = layer.objects.active = next(obj for obj in scene.objects if obj.type == "ARMATURE")
+    before = seen(linked)
+    for operator in (bpy.ops.scope.refloor, bpy.ops.scope.root_motion):
+        with pytest.raises(RuntimeError, match=r"linked from .*capture\.blend.*Make Local"):
+            operator()
+    np.testing.assert_array_equal(seen(linked), before)
+    for obj in layer.objects:
+        obj.select_set(True)
+    bpy.ops.object.make_local(type="ALL")
+    local = layer.objects.active = next(obj for obj in scene.objects if obj.type == "ARMATURE")
+    assert bpy.ops.scope.root_motion() == {"FINISHED"}
+    np.testing.assert_allclose(seen(local), before, atol=2e-4)
+
+
 def test_lost_keys_are_told_and_change_nothing(rig):
     from scope.scope_addon.scene.actions import fcurves
 
