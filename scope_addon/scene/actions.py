@@ -8,10 +8,12 @@ Writing whole coordinate arrays is 20 to 30 times faster than one ``keyframe_ins
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 
 import bpy
 import numpy as np
+from bpy_extras import anim_utils
 
 # Values of Blender's keyframe interpolation enum, which foreach_set takes as integers.
 INTERPOLATION = {"CONSTANT": 0, "LINEAR": 1, "BEZIER": 2}
@@ -162,14 +164,60 @@ def repeat_for_ever(datablock: bpy.types.ID, onwards: set[tuple[str, int]] | Non
         modifier.mode_before = modifier.mode_after = "REPEAT_OFFSET" if going else "REPEAT"
 
 
+def nla_strips(datablock: bpy.types.ID) -> list[bpy.types.NlaStrip]:
+    """The strips of the NLA that play for a datablock; none while one is open for editing and plays alone."""
+    animation = datablock.animation_data
+    if animation is None or not animation.use_nla or animation.use_tweak_mode:
+        return []
+    return [strip for track in animation.nla_tracks if not track.mute for strip in track.strips if not strip.mute]
+
+
+@contextmanager
+def nla_as_actions(scene: bpy.types.Scene) -> Iterator[None]:
+    """Let the scene's objects do by an action for a while what they do by their NLA, on whole frames."""
+    options = anim_utils.BakeOptions(
+        only_selected=False,
+        do_pose=True,
+        do_object=True,
+        do_visual_keying=False,
+        do_constraint_clear=False,
+        do_parents_clear=False,
+        do_clean=False,
+        do_location=True,
+        do_rotation=True,
+        do_scale=True,
+        do_bbone=False,
+        do_custom_props=False,
+    )
+    blended = [obj for obj in scene.objects if nla_strips(obj)]
+    kept = [(a, a.action, getattr(a, "action_slot", None)) for a in (obj.animation_data for obj in blended)]
+    baked: list[bpy.types.Action] = []
+    try:
+        if blended:
+            frames = range(scene.frame_start, scene.frame_end + 1)
+            pairs = [(obj, None) for obj in blended]
+            baked += anim_utils.bake_action_objects(pairs, frames=frames, bake_options=options)
+        for animation, _, _ in kept:
+            animation.use_nla = False
+        yield
+    finally:
+        for animation, action, slot in kept:
+            animation.use_nla, animation.action = True, action
+            if slot is not None:
+                animation.action_slot = slot
+        bpy.data.batch_remove([action for action in baked if action is not None])
+
+
 def frame_range(datablocks: Iterable[bpy.types.ID]) -> tuple[float, float] | None:
-    """First and last key over the datablocks' curves; None when nothing is keyed.
+    """First and last key over the datablocks' curves and NLA strips; None when nothing is keyed.
 
     Where there are others, custom properties' curves do not count: of a loop that was cut out they are the longer ones.
     """
+    datablocks = list(datablocks)
     curves = [curve for datablock in datablocks for curve in fcurves(datablock) if len(curve.keyframe_points)]
     moving = [curve for curve in curves if not curve.data_path.endswith('"]')] or curves
     spans = [tuple(curve.range()) for curve in moving]
+    spans += [(strip.frame_start, strip.frame_end) for datablock in datablocks for strip in nla_strips(datablock)]
     if not spans:
         return None
     return min(s[0] for s in spans), max(s[1] for s in spans)

@@ -104,6 +104,7 @@ def _write_one(
     with (
         _scene_of(collections, rigs) as scene,
         _baked_meshes(scene) if options.bakes(suffix) else nullcontext(),
+        actions.nla_as_actions(scene) if suffix == ".glb" else nullcontext(),  # that exporter reads actions alone
         _actions_as_long_as(scene) if len(rigs) > 1 else nullcontext(),
     ):
         rig = next((obj for obj in scene.objects if obj.type == "ARMATURE"), None)
@@ -217,7 +218,7 @@ def _scene_of(
     It begins and ends with the motion of ``rigs``.
     """
     source = bpy.context.scene
-    with temporary_scene("Capture") as scene:
+    with _all_evaluated(collections), temporary_scene("Capture") as scene:
         for collection in collections:
             scene.collection.children.link(collection)
         for name in ("fps", "fps_base", "resolution_x", "resolution_y", "pixel_aspect_x", "pixel_aspect_y"):
@@ -234,6 +235,34 @@ def _scene_of(
         scene.frame_set(scene.frame_start)
         yield scene
     source.frame_set(source.frame_current, subframe=source.frame_subframe)
+
+
+@contextmanager
+def _all_evaluated(collections: Sequence[bpy.types.Collection]) -> Iterator[None]:
+    """Hide nothing in these collections for a while, and let their armatures move.
+
+    Viewports, renders, Edit Mode and Rest Position each keep some exporter from what moves.
+    """
+    groups = {group for collection in collections for group in (collection, *collection.children_recursive)}
+    objects = {obj for collection in collections for obj in collection.all_objects}
+    hidden = [(each, each.hide_viewport, each.hide_render) for each in (*groups, *objects)]
+    positions = [(armature, armature.pose_position) for armature in {o.data for o in objects if o.type == "ARMATURE"}]
+    edited = any(obj.mode == "EDIT" for obj in objects)
+    try:
+        if edited:
+            bpy.ops.object.mode_set(mode="OBJECT")
+        for each, _, _ in hidden:
+            each.hide_viewport = each.hide_render = False
+        for armature, _ in positions:
+            armature.pose_position = "POSE"
+        yield
+    finally:
+        for armature, position in positions:
+            armature.pose_position = position
+        for each, in_viewports, in_renders in hidden:
+            each.hide_viewport, each.hide_render = in_viewports, in_renders
+        if edited:
+            bpy.ops.object.mode_set(mode="EDIT")
 
 
 @contextmanager

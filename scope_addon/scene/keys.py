@@ -143,6 +143,12 @@ def _curves(armature: bpy.types.Object, body: Body) -> dict[str, list[bpy.types.
         if curve.data_path in found and len(curve.keyframe_points):
             found[curve.data_path][curve.array_index] = curve
     missing = [path for path, count in wanted.items() if len(found[path]) != count]
+    animation = armature.animation_data
+    if missing and animation is not None and animation.action is None and len(animation.nla_tracks):
+        raise UsageError(
+            f"'{armature.name}' moves by the NLA track '{animation.nla_tracks[0].name}', not by an action of its own: "
+            "enter Tweak Mode on the track's strip (Tab), or choose the action in the Action Editor again"
+        )
     if missing:
         raise UsageError(
             f"'{armature.name}' has lost the keys of {missing[0]}; undo what removed them, or capture again"

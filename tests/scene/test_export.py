@@ -387,6 +387,68 @@ def test_only_the_capture_leaves_a_users_scene(body, make_motion, tmp_path, suff
     np.testing.assert_allclose(joints, truth(body, motion).joints[0], atol=JOINT_TOLERANCE)
 
 
+def _in_rest_position(person, collection):
+    person.armature.data.pose_position = "REST"
+
+
+def _in_edit_mode(person, collection):
+    bpy.context.view_layer.objects.active = person.armature
+    bpy.ops.object.mode_set(mode="EDIT")
+
+
+def _out_of_viewports(person, collection):
+    collection.hide_viewport = person.armature.hide_viewport = person.mesh.hide_viewport = True
+
+
+def _out_of_renders(person, collection):
+    collection.hide_render = person.armature.hide_render = person.mesh.hide_render = True
+
+
+@pytest.mark.parametrize("suffix", [".glb", ".fbx", ".usdc", ".bvh"])
+@pytest.mark.parametrize("hide", [_in_rest_position, _in_edit_mode, _out_of_viewports, _out_of_renders])
+def test_what_does_not_move_in_the_viewport_moves_in_the_file(
+    body, make_motion, tmp_path, blender, truth, suffix, hide
+):
+    motion = make_motion(body, 4)
+    result = build_scene([motion], body, options=BuildOptions(frame_rate="set"))
+    person, collection = result.people[0], result.collection
+    hide(person, collection)
+
+    def state():
+        hidden = [(o.hide_viewport, o.hide_render) for o in (collection, person.armature, person.mesh)]
+        return hidden, person.armature.data.pose_position, person.armature.mode
+
+    before, path = state(), tmp_path / f"walk{suffix}"
+    export(path)
+    assert state() == before
+    first = read_back(path)
+    blender.go_to(first + 3)
+    joints = blender.joints(blender.only("ARMATURE"), body.joint_names)
+    np.testing.assert_allclose(joints, truth(body, motion).joints[3], atol=JOINT_TOLERANCE)
+
+
+@pytest.mark.parametrize("suffix", [".glb", ".fbx", ".bvh"])
+def test_a_motion_in_the_nla_is_exported_as_it_is_seen(body, make_motion, tmp_path, blender, truth, suffix):
+    motion = make_motion(body, 5)
+    person = build_scene([motion], body, options=BuildOptions(frame_rate="set")).people[0]
+    animation = person.armature.animation_data
+    action, slot = animation.action, getattr(animation, "action_slot", None)
+    animation.action = None
+    strip = animation.nla_tracks.new().strips.new("late", 40, action)
+    if slot is not None:
+        strip.action_slot = slot
+    actions_before, path = set(bpy.data.actions), tmp_path / f"walk{suffix}"
+    export(path)
+    assert (animation.action, animation.use_nla, set(bpy.data.actions)) == (None, True, actions_before)
+    read_back(path)
+    armature = blender.only("ARMATURE")
+    first, last = actions.frame_range([armature])
+    assert last - first == pytest.approx(4, abs=0.01)
+    blender.go_to(first + 3)
+    joints = blender.joints(armature, body.joint_names)
+    np.testing.assert_allclose(joints, truth(body, motion).joints[3], atol=JOINT_TOLERANCE)
+
+
 def test_a_users_edit_is_exported(body, make_motion, tmp_path, blender):
     motion = make_motion(body, 4)
     person = build_scene([motion], body, options=BuildOptions(frame_rate="set")).people[0]

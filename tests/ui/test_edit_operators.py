@@ -255,6 +255,21 @@ def test_lost_keys_are_told_and_change_nothing(rig):
         bpy.ops.scope.refloor()
 
 
+def test_a_motion_in_the_nla_is_not_taken_for_lost(rig):
+    animation = rig.animation_data
+    action, slot = animation.action, getattr(animation, "action_slot", None)
+    animation.action = None
+    track = animation.nla_tracks.new()
+    strip = track.strips.new("walk", 1, action)
+    if slot is not None:
+        strip.action_slot = slot
+    with pytest.raises(RuntimeError, match="NLA track '.*', not by an action of its own: enter Tweak Mode"):
+        bpy.ops.scope.refloor()
+    animation.nla_tracks.active, strip.select = track, True
+    animation.use_tweak_mode = True
+    assert bpy.ops.scope.refloor() == {"FINISHED"}
+
+
 def test_an_edit_can_be_undone_by_hand_made_changes_too(rig):
     """The keys are the truth: a pose changed by hand survives another edit."""
     clip, _ = keys(rig)
