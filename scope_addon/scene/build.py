@@ -113,6 +113,7 @@ def _build(
     rate = timing.scene_rate(scene)
     collection = bpy.data.collections.new(name)
     collection[CAPTURE_TAG] = motions[0].source or name
+    camera.remember_resolution(collection, motions[0])
     scene.collection.children.link(collection)
     people: list[Person] = []
     for index, motion in enumerate(motions):
@@ -132,7 +133,7 @@ def _build(
             f"{1 / unit:g}, or set Unit Scale to 1 in the scene's properties; exported files have the true size"
         )
     if options.resolution == "set":
-        camera.set_resolution(scene, motions[0])
+        camera.set_resolution(scene, collection)
     if options.active_camera and people[0].camera is not None:
         scene.camera = people[0].camera
     first = float(min(person.frames[0] for person in people))

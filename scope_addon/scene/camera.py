@@ -28,6 +28,8 @@ from .animation import on_one_hemisphere, quaternion_from_matrix
 
 _IN_STEP = 0.6  # frames that footage may be off and counts as in step; half of one is rounding
 _LONG = 1_000_000  # frames, beyond which Blender would show the last one
+# Custom property of a capture's collection: columns, rows and pixel aspect of the footage.
+_PICTURE = "scope_picture"
 SENSOR_WIDTH = 36.0  # millimetres; only its ratio to the focal length matters
 
 
@@ -40,11 +42,19 @@ def pixel_aspect(motion: Motion) -> tuple[float, float]:
     return (float(ratio), 1.0) if ratio > 1 else (1.0, float(1 / ratio))
 
 
-def set_resolution(scene: bpy.types.Scene, motion: Motion) -> None:
-    """Give the scene's picture the size and pixel aspect of the footage."""
-    scene.render.resolution_x, scene.render.resolution_y = (int(n) for n in motion.image_size)
+def remember_resolution(collection: bpy.types.Collection, motion: Motion) -> None:
+    """Have a capture's collection tell the size and pixel aspect of the footage."""
+    collection[_PICTURE] = [*(float(n) for n in motion.image_size), *pixel_aspect(motion)]
+
+
+def set_resolution(scene: bpy.types.Scene, collection: bpy.types.Collection) -> None:
+    """Give the scene's picture the size and pixel aspect of the footage, where the capture's collection tells them."""
+    if _PICTURE not in collection:
+        return
+    width, height, aspect_x, aspect_y = collection[_PICTURE]
+    scene.render.resolution_x, scene.render.resolution_y = int(width), int(height)
     scene.render.resolution_percentage = 100
-    scene.render.pixel_aspect_x, scene.render.pixel_aspect_y = pixel_aspect(motion)
+    scene.render.pixel_aspect_x, scene.render.pixel_aspect_y = aspect_x, aspect_y
 
 
 def build_camera(

@@ -23,6 +23,7 @@ from ..whole_file import written_beside
 from . import actions, formats
 from .bone_display import remove_if_unused
 from .build import CAPTURE_TAG, NEW_SCENE, BuildOptions, BuildResult, Progress, build_scene
+from .camera import set_resolution
 from .output_paths import check_output, person_paths
 from .shape_keys import mixed_vertices
 
@@ -102,7 +103,7 @@ def _write_one(
     """Write these collections, as long as all of ``rigs`` move: files of several people begin at the same time."""
     suffix = path.suffix.lower()
     with (
-        _scene_of(collections, rigs) as scene,
+        _scene_of(collections, rigs, options.camera) as scene,
         _baked_meshes(scene) if options.bakes(suffix) else nullcontext(),
         actions.nla_as_actions(scene) if suffix == ".glb" else nullcontext(),  # that exporter reads actions alone
         _actions_as_long_as(scene) if len(rigs) > 1 else nullcontext(),
@@ -211,11 +212,13 @@ def temporary_scene(name: str) -> Iterator[bpy.types.Scene]:
 
 @contextmanager
 def _scene_of(
-    collections: Sequence[bpy.types.Collection], rigs: Sequence[bpy.types.Object]
+    collections: Sequence[bpy.types.Collection], rigs: Sequence[bpy.types.Object], with_camera: bool
 ) -> Iterator[bpy.types.Scene]:
     """A scene that holds these collections alone, with the rate and picture of the scene they come from.
 
     It begins and ends with the motion of ``rigs``.
+
+    :param with_camera: the picture is the footage's, by which exporters tell the camera's vertical field of view.
     """
     source = bpy.context.scene
     with _all_evaluated(collections), temporary_scene("Capture") as scene:
@@ -227,6 +230,8 @@ def _scene_of(
             scene.timeline_markers.new(marker.name, frame=marker.frame)
         cameras = [obj for obj in scene.objects if obj.type == "CAMERA"]
         scene.camera = source.camera if source.camera in cameras else next(iter(cameras), None)
+        if with_camera and scene.camera is not None:
+            set_resolution(scene, next(c for c in collections if scene.camera in c.all_objects.values()))
         span = actions.frame_range(list(rigs)) or (source.frame_start, source.frame_end)
         scene.frame_end = math.ceil(span[1])
         scene.frame_start = math.floor(span[0])

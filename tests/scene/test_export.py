@@ -270,6 +270,28 @@ def test_the_footages_camera_comes_along_on_request(body, make_motion, tmp_path,
     np.testing.assert_allclose(camera.matrix_world.translation, motion.world_from_camera[0, :3, 3], atol=1e-5)
 
 
+@pytest.mark.parametrize("suffix", [".glb", ".fbx", ".usdc"])
+@pytest.mark.parametrize(("fx", "fy"), [(600.0, 600.0), (600.0, 900.0)])
+def test_the_camera_keeps_its_field_of_view_in_a_scene_of_another_shape(
+    body, make_motion, tmp_path, blender, suffix, fx, fy
+):
+    motion = make_motion(body, 2, intrinsics=np.array([[fx, 0, 320], [0, fy, 240], [0, 0, 1]]))
+    bpy.context.scene.render.resolution_x, bpy.context.scene.render.resolution_y = 1920, 1080
+    build_scene([motion], body)
+    path = tmp_path / f"walk{suffix}"
+    export(path, options=ExportOptions(camera=True))
+    assert bpy.context.scene.render.resolution_x == 1920
+    expected = 2 * np.arctan([320 / fx, 240 / fy])
+    if suffix == ".glb":
+        lens = glb_json(path)["cameras"][0]["perspective"]
+        found = 2 * np.arctan(np.tan(lens["yfov"] / 2) * lens["aspectRatio"]), lens["yfov"]
+    else:
+        read_back(path)
+        lens = blender.only("CAMERA").data
+        found = 2 * np.arctan(np.array([lens.sensor_width, lens.sensor_height]) / 2 / lens.lens)
+    np.testing.assert_allclose(found, expected, rtol=1e-4)
+
+
 def test_blend_opens_with_camera_rate_and_shape_keys(body, make_motion, tmp_path, blender):
     path = tmp_path / "walk.blend"
     motion = make_motion(body, 6, rate=29.97, image_size=(1080, 1920))
