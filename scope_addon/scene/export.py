@@ -218,6 +218,7 @@ def _scene_of(
 
     It begins and ends with the motion of ``rigs``.
 
+    :raises UsageError: the motion begins before frame 0.
     :param with_camera: the picture is the footage's, by which exporters tell the camera's vertical field of view.
     """
     source = bpy.context.scene
@@ -233,6 +234,11 @@ def _scene_of(
         if with_camera and scene.camera is not None:
             set_resolution(scene, next(c for c in collections if scene.camera in c.all_objects.values()))
         span = actions.frame_range(list(rigs)) or (source.frame_start, source.frame_end)
+        if math.floor(span[0]) < 0:  # a scene begins at 0 or later, and what lies before would be lost
+            raise UsageError(
+                f"the motion begins at frame {math.floor(span[0])}, but exports at 0: move its keys later, or capture "
+                "again with a First Frame of 0 or more"
+            )
         scene.frame_end = math.ceil(span[1])
         scene.frame_start = math.floor(span[0])
         # Until the view layer is evaluated once, frame changes do not reach the objects that exporters read.

@@ -184,7 +184,7 @@ class SCOPE_PG_settings(bpy.types.PropertyGroup):
         description="What happens to the scene's frame rate",
     )
     start_frame: IntProperty(
-        name="First Frame", default=1, options=_FIXED, description="Scene frame on which the footage begins"
+        name="First Frame", default=1, min=0, options=_FIXED, description="Scene frame on which the footage begins"
     )
     set_frame_range: BoolProperty(
         name="Set Frame Range",

@@ -487,6 +487,14 @@ def test_a_users_edit_is_exported(body, make_motion, tmp_path, blender):
     assert before[0, 0] == pytest.approx(5.0 + motion.trans[3, 0] + body.rest_joints(motion.betas)[0, 0], abs=1e-3)
 
 
+def test_a_motion_that_begins_before_frame_0_is_not_cut_off(body, make_motion, tmp_path):
+    build_scene([make_motion(body, 60)], body, options=BuildOptions(start_frame=-20))
+    with pytest.raises(UsageError, match="begins at frame -20"):
+        export(tmp_path / "walk.glb")
+    assert list(tmp_path.iterdir()) == []
+    assert [s.name for s in bpy.data.scenes] == ["Scene"]
+
+
 def test_an_unknown_suffix_lists_the_valid_ones(body, make_motion, tmp_path):
     with pytest.raises(UsageError, match=r"\.glb, \.fbx, \.blend, \.bvh, \.usdc, \.npz"):
         export_motions([make_motion(body, 1)], body, tmp_path / "walk.obj")

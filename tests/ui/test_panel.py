@@ -134,6 +134,13 @@ def test_warnings_lead_to_their_frames(fake_worker, footage):
     assert [m.frame for m in scene.timeline_markers] == [4]  # both spans: they lie near each other
 
 
+def test_the_footage_begins_at_frame_0_at_the_earliest():
+    """Where scenes do, and exports with them."""
+    settings = bpy.context.scene.scope
+    settings.start_frame = -50
+    assert settings.start_frame == 0
+
+
 def test_the_footage_goes_to_the_sequencer(fake_worker, footage):
     assert not bpy.ops.scope.footage_to_sequencer.poll()
     bpy.context.scene.scope.start_frame = 11
