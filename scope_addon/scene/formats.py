@@ -6,6 +6,7 @@ from __future__ import annotations
 import errno
 import io
 import os
+import re
 import struct
 import sys
 from collections.abc import Iterator
@@ -218,9 +219,17 @@ def need_addon(module: str) -> None:
 
 
 def call_operator(operator, **settings) -> None:
-    """Call an exporter or importer with those of our settings that this Blender's version of it has."""
+    """Call an exporter or importer with those of our settings that this Blender's version of it has.
+
+    :raises RuntimeError: it failed. :raises KeyboardInterrupt: somebody pressed Ctrl-C.
+    """
     try:
         known = operator.get_rna_type().properties.keys()
     except KeyError as error:
         raise OutputError("this Blender was built without the format; use one from blender.org") from error
-    operator(**{name: value for name, value in settings.items() if name in known})
+    try:
+        operator(**{name: value for name, value in settings.items() if name in known})
+    except RuntimeError as error:
+        if re.search(r"^KeyboardInterrupt\b", str(error), re.MULTILINE):  # Blender makes one error of all
+            raise KeyboardInterrupt from None
+        raise

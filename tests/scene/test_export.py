@@ -555,6 +555,27 @@ def test_a_failing_writer_leaves_the_old_file_and_no_other(body, make_motion, tm
     assert [s.name for s in bpy.data.scenes] == ["Scene"]
 
 
+class StoppedExporter(bpy.types.Operator):
+    """An exporter in Python, in which somebody presses Ctrl-C."""
+
+    bl_idname, bl_label = "scope_test.stopped", "Stopped"
+
+    def execute(self, context):
+        raise KeyboardInterrupt
+
+
+def test_ctrl_c_in_an_exporter_stops_and_is_no_failure(body, make_motion, tmp_path, monkeypatch):
+    monkeypatch.setattr(formats, "write_glb", lambda *rest: formats.call_operator(bpy.ops.scope_test.stopped))
+    bpy.utils.register_class(StoppedExporter)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            export_motions([make_motion(body, 1)], body, tmp_path / "walk.glb")
+    finally:
+        bpy.utils.unregister_class(StoppedExporter)
+    assert list(tmp_path.iterdir()) == []
+    assert [s.name for s in bpy.data.scenes] == ["Scene"]
+
+
 def test_a_scene_without_captures_cannot_be_exported(tmp_path):
     with pytest.raises(UsageError, match="no capture"):
         export(tmp_path / "walk.glb")
