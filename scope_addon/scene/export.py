@@ -301,7 +301,9 @@ def _baked_meshes(scene: bpy.types.Scene) -> Iterator[None]:
             vertices = mixed_vertices(obj)
             plain = bpy.data.meshes.new_from_object(obj)
             baked.append(plain)
-            mesh.name, plain.name = f"{name} shaped", name
+            if mesh.library is None:  # else the name is another file's, and free in this one
+                mesh.name = f"{name} shaped"
+            plain.name = name
             plain.vertices.foreach_set("co", vertices.ravel())
             plain.update()
             obj.data = plain
@@ -312,7 +314,8 @@ def _baked_meshes(scene: bpy.types.Scene) -> Iterator[None]:
             obj.data = mesh
         bpy.data.batch_remove(baked)
         for _, mesh, name in shaped:
-            mesh.name = name
+            if mesh.library is None:
+                mesh.name = name
 
 
 def _write(path: Path, writer) -> None:

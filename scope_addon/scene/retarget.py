@@ -51,8 +51,10 @@ class RetargetOptions:
 
 
 def guess_bone_map(rig: bpy.types.Object) -> BoneMap:
-    """Guess by the rig's names and rest pose."""
+    """Guess by the rig's names and rest pose. :raises InputError: it has no bones."""
     bones = list(rig.data.bones)
+    if not bones:
+        raise InputError(f"'{rig.name}' has no bones; choose another armature as the rig")
     names = [bone.name for bone in bones]
     parents = np.array([names.index(bone.parent.name) if bone.parent else -1 for bone in bones], int)
     heads = np.array([rig.matrix_world @ bone.head_local for bone in bones]).reshape(-1, 3)
@@ -205,9 +207,14 @@ def _channel(mode: str, R: np.ndarray) -> tuple[str, np.ndarray]:
 
 
 def _probe(rig: bpy.types.Object, parts: dict[str, str]) -> Skeleton:
-    """The mapped bones at rest, ordered, with what each one follows. :raises InputError: one of them does not turn."""
+    """The mapped bones at rest, ordered, with what each one follows.
+
+    :raises InputError: one of them does not turn, or the rig has no size.
+    """
     names = list(parts)
     rest = _matrices(rig, names)
+    if min(map(abs, rig.matrix_world.to_scale())) < 1e-9:
+        raise InputError(f"'{rig.name}' is scaled to 0; give it a size (S, or Scale in the sidebar)")
     follows = np.zeros((len(names), len(names)), bool)
     for group in _independent(parts):
         for k, a in enumerate(group):  # by another angle each, so that one sees whom a bone follows
@@ -226,8 +233,8 @@ def _probe(rig: bpy.types.Object, parts: dict[str, str]) -> Skeleton:
         parents.append(order.index(above[-1]) if above else -1)
     matrices = rest[order]
     ends = np.array([rig.matrix_world @ rig.pose.bones[names[b]].tail for b in order])
-    lowest = min((rig.matrix_world @ bone.head_local).z for bone in rig.data.bones if bone.use_deform)
-    lowest = min(lowest, min((rig.matrix_world @ b.tail_local).z for b in rig.data.bones if b.use_deform))
+    deforming = [bone for bone in rig.data.bones if bone.use_deform] or rig.data.bones
+    lowest = min((rig.matrix_world @ end).z for bone in deforming for end in (bone.head_local, bone.tail_local))
     floor = rig.matrix_world.translation.z if abs(lowest - rig.matrix_world.translation.z) < 0.3 else lowest
     return Skeleton(
         [names[b] for b in order], np.array(parents), matrices[:, :3, 3], ends, _rotations(matrices), float(floor)

@@ -409,6 +409,30 @@ def test_only_the_capture_leaves_a_users_scene(body, make_motion, tmp_path, suff
     np.testing.assert_allclose(joints, truth(body, motion).joints[0], atol=JOINT_TOLERANCE)
 
 
+@pytest.mark.parametrize("overridden", [False, True])
+def test_a_linked_capture_is_exported_with_its_shape_baked(body, make_motion, tmp_path, blender, truth, overridden):
+    motion, file, path = make_motion(body, 4), tmp_path / "capture.blend", tmp_path / "walk.usdc"
+    name = build_scene([motion], body, options=BuildOptions(frame_rate="set")).collection.name
+    bpy.ops.wm.save_as_mainfile(filepath=str(file))
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    bpy.context.scene.render.fps = 30
+    with bpy.data.libraries.load(str(file), link=True) as (_, here):
+        here.collections = [name]
+    if overridden:
+        here.collections[0].override_hierarchy_create(bpy.context.scene, bpy.context.view_layer)
+    else:
+        bpy.context.scene.collection.children.link(here.collections[0])
+    before = sorted(mesh.name for mesh in bpy.data.meshes)
+    export(path)
+    assert sorted(mesh.name for mesh in bpy.data.meshes) == before
+    first = read_back(path)
+    blender.go_to(first + 3)
+    mesh = blender.only("MESH")
+    assert mesh.data.name == "walk_body"
+    match = corresponding(mesh, body, motion.betas)
+    np.testing.assert_allclose(blender.vertices(mesh), truth(body, motion).vertices(3)[match], atol=SKIN_TOLERANCE)
+
+
 def _in_rest_position(person, collection):
     person.armature.data.pose_position = "REST"
 

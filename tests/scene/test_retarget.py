@@ -91,6 +91,27 @@ def test_a_bone_that_is_held_is_named_and_nothing_changes(source):
     assert rig.animation_data is None
 
 
+@pytest.mark.parametrize("scale", [(0, 0, 0), (1, 1, 0)])
+def test_a_rig_without_size_or_bones_is_refused(source, scale):
+    rig, _ = build_rig("mixamo")
+    rig.scale = scale
+    with pytest.raises(InputError, match="'mixamo' is scaled to 0"):
+        run(source, rig)
+    empty = bpy.data.objects.new("Empty", bpy.data.armatures.new("Empty"))
+    with pytest.raises(InputError, match="'Empty' has no bones"):
+        guess_bone_map(empty)
+
+
+def test_a_rig_of_controls_alone_stands_on_its_lowest_bone(source):
+    rig, bone_of = build_rig("mixamo")
+    run(source, rig)
+    before = seen(rig, bone_of.values())
+    for bone in rig.data.bones:
+        bone.use_deform = False
+    run(source, rig)
+    np.testing.assert_allclose(seen(rig, bone_of.values()), before, atol=1e-5)
+
+
 def test_rigify(source, rigify_rigs):
     limbs = ("thigh", "shin", "foot", "upper_arm", "forearm", "hand")
     parts = ("hip", "knee", "ankle", "shoulder", "elbow", "wrist")
