@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import queue
 import re
+import stat
 import threading
 from collections.abc import Iterator
 from contextlib import closing
@@ -126,7 +127,9 @@ def open_video(path: str | Path, wanted: Wanted | None = None) -> Video:
             " or capture a folder of videos with scope batch"
         )
     try:
-        size = path.stat().st_size
+        found = path.stat()
+        if not stat.S_ISREG(found.st_mode):  # opening a pipe would wait for a writer
+            raise VideoError(f"{path} is a pipe or a device, and footage is read from files; save it as one first")
         with path.open("rb"):
             pass
     except FileNotFoundError as error:
@@ -135,7 +138,7 @@ def open_video(path: str | Path, wanted: Wanted | None = None) -> Video:
         raise VideoError(f"{path} does not exist; {what}") from error
     except OSError as error:
         raise VideoError(f"{path} cannot be read ({error.strerror}); check its permissions") from error
-    if size == 0:
+    if found.st_size == 0:
         raise VideoError(f"{path} is empty (0 bytes); export or download it again")
     return _open_still(path, wanted) if is_picture(path) else _open_moving(path, wanted)
 

@@ -274,7 +274,8 @@ class Batch:
                     found.append(path)
                 elif recursive:
                     found += self._below(path, recursive)
-            elif suffix in FOOTAGE_SUFFIXES:
+            # Opening a pipe would wait for a writer; a link that leads nowhere is told as a clip that fails.
+            elif suffix in FOOTAGE_SUFFIXES and (path.is_file() or not path.exists()):
                 found.append(path)
         return found
 

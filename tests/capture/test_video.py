@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import os
 import struct
 import threading
 import time
@@ -374,6 +375,18 @@ def test_what_cannot_be_used_gives_one_clear_sentence(tmp_path, capfd, name, mak
     assert name in str(caught.value)
     assert "\n" not in str(caught.value)
     assert capfd.readouterr().err == ""
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="Windows keeps its pipes in no folder")
+def test_a_pipe_is_refused_and_not_waited_for(tmp_path):
+    path = tmp_path / "pipe.mp4"
+    os.mkfifo(path)
+    both_ends = os.open(path, os.O_RDWR)  # so that nothing waits here whatever is done with it
+    try:
+        with pytest.raises(VideoError, match="pipe.mp4 is a pipe or a device"):
+            open_video(path)
+    finally:
+        os.close(both_ends)
 
 
 def test_no_decodable_frame_is_an_error(tmp_path):

@@ -126,6 +126,14 @@ def test_pictures_that_cannot_be_read_are_not_passed_over(tmp_path):
     assert sorted(found) == ["IMG_0001", "IMG_0002"]
 
 
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="Windows keeps its pipes in no folder")
+def test_a_pipe_is_no_clip_and_a_link_that_leads_nowhere_is_told(tmp_path):
+    os.mkfifo(tmp_path / "pipe.mp4")
+    (tmp_path / "gone.mp4").symlink_to(tmp_path / "nowhere.mp4")
+    found = Batch(tmp_path, tmp_path / "out", [], {}, [".npz"]).clips(recursive=False)
+    assert sorted(found) == ["gone.mp4"]
+
+
 def test_a_moved_folder_of_footage_is_still_finished(folder, tmp_path):
     batch(folder, tmp_path / "out").run(1)
     moved = tmp_path / "moved"
