@@ -16,7 +16,7 @@ import numpy as np
 
 from ..solver.errors import MotionFileError, OutputError
 from ..solver.npz import read_npz
-from .whole_file import written_beside
+from .whole_file import reason, written_beside
 
 
 @dataclass
@@ -84,9 +84,7 @@ class Motion:
             with written_beside(path) as temporary, temporary.open("wb") as file:
                 np.savez_compressed(file, **arrays)
         except OSError as error:
-            raise OutputError(
-                f"cannot write {path}: {error.strerror}; free some space or choose another folder"
-            ) from error
+            raise OutputError(f"cannot write {path}: {reason(error)}") from error
 
     @classmethod
     def load(cls, path: str | Path) -> Motion:

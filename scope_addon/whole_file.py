@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Files that are written whole or not at all: beside their place, and renamed into it."""
+"""Files that are written whole or not at all: beside their place, and renamed into it; and why one could not be."""
 
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
 import tempfile
 from collections.abc import Iterator
@@ -21,7 +22,8 @@ def written_beside(path: Path) -> Iterator[Path]:
 
     :raises OSError: it cannot be made or renamed.
     """
-    handle, name = tempfile.mkstemp(prefix=f".{path.stem}.", suffix=path.suffix.lower(), dir=path.parent)
+    start = path.stem[:40]  # whatever its letters take, room is left for the rest
+    handle, name = tempfile.mkstemp(prefix=f".{start}.", suffix=path.suffix.lower(), dir=path.parent)
     temporary = Path(name)
     _unfinished.add(temporary)
     try:
@@ -32,6 +34,15 @@ def written_beside(path: Path) -> Iterator[Path]:
     finally:
         temporary.unlink(missing_ok=True)
         _unfinished.discard(temporary)
+
+
+def reason(error: OSError) -> str:
+    """Why a file could not be written, and what to do."""
+    if error.errno == errno.ENAMETOOLONG:
+        return f"{error.strerror}; choose a shorter name"
+    if error.errno == errno.ENOENT:
+        return "its folder does not exist; create it or choose another"
+    return f"{error.strerror or error}; free some space or choose another folder"
 
 
 def remove_unfinished() -> None:

@@ -18,7 +18,7 @@ from fractions import Fraction
 
 from ...solver.errors import UsageError
 
-_CLOCK = re.compile(r"(?:(?:(\d{1,4}):)?(\d{1,2}):)?(\d{1,9}(?:[.,]\d*)?)", re.A)
+_CLOCK = re.compile(r"(?:(?:(\d{1,4}):)?(\d{1,2}):)?(\d{1,9}(?:[.,]\d*)?|(?<!:)[.,]\d+)", re.A)
 _FRAMES = re.compile(r"(\d{1,4})([:;])(\d\d)([:;])(\d\d)([:;])(\d{2,3})", re.A)
 _SEPARATORS = (":::", "::;", ";;;")  # the last as some editors write drop-frame timecode
 _DROP_RATES = (30, 60)

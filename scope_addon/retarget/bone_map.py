@@ -7,8 +7,8 @@ import json
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from ...solver.errors import InputError
-from ..whole_file import written_beside
+from ...solver.errors import InputError, OutputError
+from ..whole_file import reason, written_beside
 
 SIDED = ("hip", "knee", "ankle", "foot", "collar", "shoulder", "elbow", "wrist")
 SPINE = ("spine1", "spine2", "spine3")
@@ -51,10 +51,14 @@ class BoneMap:
 
 
 def save_bone_map(bone_map: BoneMap, path: str | Path) -> None:
-    """Write JSON, whole or not at all."""
+    """Write JSON, whole or not at all. :raises OutputError: it cannot be written."""
+    path = Path(path)
     text = json.dumps({"format": _FORMAT, "version": 1, "bones": bone_map.parts}, indent=2, ensure_ascii=False)
-    with written_beside(Path(path)) as temporary:
-        temporary.write_text(text + "\n", encoding="utf-8")
+    try:
+        with written_beside(path) as temporary:
+            temporary.write_text(text + "\n", encoding="utf-8")
+    except OSError as error:
+        raise OutputError(f"cannot write {path}: {reason(error)}") from error
 
 
 def load_bone_map(path: str | Path) -> BoneMap:

@@ -19,7 +19,7 @@ import bpy
 from ...solver.body import Body
 from ...solver.errors import OutputError, UsageError
 from ..motion import Motion
-from ..whole_file import written_beside
+from ..whole_file import reason, written_beside
 from . import actions, formats
 from .bone_display import remove_if_unused
 from .build import CAPTURE_TAG, NEW_SCENE, BuildOptions, BuildResult, Progress, build_scene
@@ -70,9 +70,7 @@ def export(
     """
     path = check_output(path)
     suffix = path.suffix.lower()
-    if suffix == ".npz":
-        if not motions:
-            raise UsageError(f"cannot write {path.name}: a motion file holds what was captured, so pass the motions")
+    if suffix == ".npz" and motions:
         targets = person_paths(path, len(motions))
         for target, motion in zip(targets, motions, strict=True):
             motion.save(target)
@@ -84,6 +82,8 @@ def export(
     rigs = list(dict.fromkeys(obj for c in chosen for obj in c.all_objects if obj.type == "ARMATURE"))
     if not rigs:
         raise UsageError(f"cannot write {path.name}: the capture's armature was removed; undo that or capture again")
+    if suffix == ".npz":
+        raise UsageError(f"cannot write {path.name}: a motion file holds what was captured, so pass the motions")
     targets = person_paths(path, len(rigs), options.separate)
     if len(targets) == 1:
         _write_one(path, chosen, rigs, options)
@@ -334,7 +334,7 @@ def _write(path: Path, writer) -> None:
 def _reason(error: RuntimeError | OSError) -> str:
     """One sentence, and what to do. Of an exporter that fails Blender hands on the whole traceback, and its place."""
     if isinstance(error, OSError) and error.strerror:
-        return f"{error.strerror}; free some space or choose another folder"
+        return reason(error)
     lines = [line for line in str(error).splitlines() if line and not line[0].isspace() and "Location: " not in line]
     last = lines[-1] if lines else type(error).__name__
     said = re.sub(r"^(?:\w*Error: )*(?:\[Errno \d+\] )?", "", last)

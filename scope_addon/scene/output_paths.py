@@ -3,10 +3,12 @@
 
 from __future__ import annotations
 
+import errno
 import os
 from pathlib import Path
 
 from ...solver.errors import OutputError, UsageError
+from ..whole_file import reason
 
 SUFFIXES = (".glb", ".fbx", ".blend", ".bvh", ".usdc", ".npz")
 PER_PERSON = (".bvh", ".npz")  # formats that hold one person a file
@@ -15,7 +17,8 @@ PER_PERSON = (".bvh", ".npz")  # formats that hold one person a file
 def check_output(path: str | Path, suffixes: tuple[str, ...] = SUFFIXES) -> Path:
     """The path, when a file of a known format can be written there.
 
-    :raises UsageError: unknown suffix. :raises OutputError: the folder is missing or cannot be written to.
+    :raises UsageError: unknown suffix.
+    :raises OutputError: the folder is missing or cannot be written to, or the name is too long.
     """
     path = Path(path)
     if path.suffix.lower() not in suffixes:
@@ -23,6 +26,11 @@ def check_output(path: str | Path, suffixes: tuple[str, ...] = SUFFIXES) -> Path
     folder = path.parent
     if not folder.is_dir():
         raise OutputError(f"cannot write {path}: the folder {folder} does not exist; create it or choose another")
+    try:
+        path.lstat()
+    except OSError as error:
+        if error.errno == errno.ENAMETOOLONG:
+            raise OutputError(f"cannot write {path}: {reason(error)}") from error
     if path.is_dir() or not os.access(folder, os.W_OK):
         what = "a folder of that name is there" if path.is_dir() else f"the folder {folder} is not writable"
         raise OutputError(f"cannot write {path}: {what}; choose another place")

@@ -136,7 +136,8 @@ def capture_request(scene: bpy.types.Scene) -> JobRequest:
         raise UsageError("choose a video or picture first")
     footage = Path(bpy.path.abspath(settings.footage))
     if not footage.is_file():
-        raise VideoError(f"{footage} does not exist; choose the video or picture again")
+        what = "is no file" if footage.exists() else "does not exist"
+        raise VideoError(f"{footage} {what}; choose the video or picture again")
     if settings.use_range and settings.range_end <= settings.range_start:
         raise UsageError("the part of the video ends before it begins; change From or To")
     if settings.lens == "FILE" and not settings.calibration_file:

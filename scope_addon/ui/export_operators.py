@@ -118,8 +118,8 @@ class SCOPE_OT_export(TellingOperator):
             if not collections:
                 raise UsageError("the active object belongs to no capture; select one of a capture's objects")
         if self.format == "NPZ":
-            people = [obj for c in collections for obj in c.all_objects if "scope_motion" in obj]
-            written = export(path, motions=[cached_motion(obj) for obj in people])
+            people = [obj for c in collections for obj in c.all_objects if "scope_source" in obj]
+            written = export(path, collections, [cached_motion(obj) for obj in people])
         elif self.which == "RIG":
             written = export_rig(path, rig, options)
         else:

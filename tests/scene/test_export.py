@@ -530,6 +530,19 @@ def test_a_missing_folder_is_named(body, make_motion, tmp_path):
         export_motions([make_motion(body, 1)], body, tmp_path / "nowhere" / "walk.glb")
 
 
+@pytest.mark.skipif(os.name == "nt", reason="Windows counts letters, and those of the whole path")
+@pytest.mark.parametrize("suffix", [".bvh", ".npz"])
+def test_names_may_be_as_long_as_the_system_lets_them(body, make_motion, tmp_path, suffix):
+    longest = tmp_path / ("ä" * 125 + suffix)  # 254 bytes
+    export_motions([make_motion(body, 1)], body, longest)
+    assert list(tmp_path.iterdir()) == [longest]
+    for people in (1, 2):
+        too_long = tmp_path / ("x" * (252 if people == 1 else 245) + suffix)
+        with pytest.raises(OutputError, match=f"cannot write .*x(.person1)?{suffix}: .*; choose a shorter name"):
+            export_motions([make_motion(body, 1)] * people, body, too_long)
+    assert list(tmp_path.iterdir()) == [longest]
+
+
 @pytest.mark.skipif(os.name == "nt" or os.geteuid() == 0, reason="root and Windows write where the mode bits forbid it")
 def test_an_unwritable_folder_is_named(body, make_motion, tmp_path):
     tmp_path.chmod(0o500)

@@ -206,6 +206,7 @@ def test_footage_that_went_while_capturing_is_missed_not_fatal(fake_worker, foot
     ("settings", "says"),
     [
         ({"footage": "/nowhere/walk.mp4"}, "walk.mp4 does not exist"),
+        ({"footage": "/"}, "/ is no file"),
         ({"body": "FILE"}, "body file"),
         ({"body": "FILE", "body_file": "/nowhere/smpl.npz"}, "smpl.npz"),
         ({"lens": "FILE"}, "calibration"),

@@ -188,6 +188,13 @@ def test_a_loop_is_exported_alone(rig, tmp_path, suffix):
         assert suffix != "glb" or action.frame_range[0] == 0  # players begin there
 
 
+def test_a_motion_file_of_a_capture_without_its_armature_is_not_promised(rig, tmp_path):
+    bpy.data.objects.remove(rig)
+    with pytest.raises(RuntimeError, match="armature was removed; undo that or capture again"):
+        bpy.ops.scope.export(filepath=str(tmp_path / "walk.npz"), format="NPZ")
+    assert not (tmp_path / "walk.npz").exists()
+
+
 @pytest.mark.parametrize("degrees", [0.3, 2.0])
 def test_reduced_keys_stay_within_what_was_asked(rig, degrees):
     before, dense = seen(rig, range(1, 91)), keys(rig)[0]

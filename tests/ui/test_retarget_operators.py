@@ -137,6 +137,12 @@ def test_the_rig_is_exported_as_it_moves_with_its_mesh_alone(rig, tmp_path, kind
     assert np.ptp(way, axis=0).max() == pytest.approx(np.ptp(there, axis=0).max(), rel=0.05)
 
 
+def test_a_bone_map_that_cannot_be_saved_names_its_place(rig, tmp_path):
+    bpy.ops.scope.guess_bones()
+    with pytest.raises(RuntimeError, match=r"Cannot write .*nowhere/bones\.json: its folder does not exist"):
+        bpy.ops.scope.save_bone_map(filepath=str(tmp_path / "nowhere" / "bones.json"))
+
+
 def test_without_a_rig_its_export_says_what_to_do(rig, tmp_path):
     bpy.context.scene.scope_retarget.rig = None
     with pytest.raises(RuntimeError, match="choose yours"):
