@@ -18,7 +18,7 @@ from ...solver.body import Body
 from ...solver.errors import OutputError, ShapeError
 from ...solver.rotations import exp
 from ..motion import Motion
-from ..whole_file import written_beside
+from ..whole_file import reason, written_beside
 from .camera import scaled_intrinsics
 from .landmark_network import KEYPOINT_COUNT
 from .rasterizer import Canvas, rasterize
@@ -71,9 +71,7 @@ def write_overlay(
                 else:
                     _write_video(temporary, painter, video, path, progress)
         except OSError as error:
-            raise OutputError(
-                f"cannot write {path}: {error.strerror}; free some space or choose another folder"
-            ) from error
+            raise OutputError(f"cannot write {path}: {reason(error)}") from error
 
 
 def draw_overlay(

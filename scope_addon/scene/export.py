@@ -218,8 +218,8 @@ def _scene_of(
 
     It begins and ends with the motion of ``rigs``.
 
-    :raises UsageError: the motion begins before frame 0.
     :param with_camera: the picture is the footage's, by which exporters tell the camera's vertical field of view.
+    :raises UsageError: the motion begins before frame 0.
     """
     source = bpy.context.scene
     with _all_evaluated(collections), temporary_scene("Capture") as scene:
