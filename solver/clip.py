@@ -25,7 +25,7 @@ from .residuals.part import Array, Blocks, Pose
 from .residuals.registry import SHAPE_PRIOR
 from .state import ClipFit, Fit, State, Status
 from .temporal import Temporal, with_previous
-from .terms import Terms, make_terms, usable
+from .terms import Terms, fill_terms, pack_priors, usable
 from .tree import BodyArrays, Tree, make_tree, with_fixed_shape
 
 
@@ -74,7 +74,10 @@ def fit_clip(
         pulled = [with_previous(m, s, temporal) for m, s in zip(measurements[1:], init, strict=False)]
         measurements = [measurements[0], *pulled]
     clip_tree = make_tree(body, focal)
-    frames = [_Frame(clip_tree, make_terms(clip_tree, m, priors), s) for m, s in zip(measurements, init, strict=True)]
+    packed = pack_priors(clip_tree, priors)
+    frames = [
+        _Frame(clip_tree, fill_terms(clip_tree, m, packed, None)[0], s) for m, s in zip(measurements, init, strict=True)
+    ]
     seen = [k for k, frame in enumerate(frames) if frame.count]
     chosen = seen
     if len(seen) > shape_frames > 0:

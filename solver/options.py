@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from .errors import ShapeError
 from .learned_prior import load_joint_prior
-from .measurements import all_finite, all_within, as_array
+from .measurements import all_finite, as_array
 from .residuals import joint_limits, joint_prior
 from .residuals.part import Array
 from .residuals.registry import FIRST_TABLE, RESIDUALS
@@ -146,12 +146,10 @@ class Priors:
         if not (all_finite(mean.ravel()) and all_finite(weights)):
             raise ShapeError("The joint prior must be finite.")
         tables = {"joint_prior": joint_prior.pack(np.arange(1, K + 1), mean, weights)}
-        for name, table, least in (("limits", self.limits, 1), ("flow", self.flow, 0)):
-            if table is None:
-                continue
-            if not all_within(np.ravel(np.asarray(table[0], dtype=np.int64)), least, K + 1):
-                raise ShapeError(f"Joints of {name} must lie in 1..{K}, but got {np.ravel(table[0]).tolist()}.")
-            tables[f"joint_{name}"] = table
+        if self.limits is not None:
+            tables["joint_limits"] = self.limits
+        if self.flow is not None:
+            tables["joint_flow"] = self.flow
         return tables
 
     def packed_shape(self, P: int) -> tuple[Array, Array]:

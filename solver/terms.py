@@ -7,15 +7,18 @@ import numpy as np
 
 from .errors import ShapeError
 from .kernel import allocating_kernel, kernel
+from .measurements import Measurements, all_within
 from .residuals.part import Array
-from .residuals.registry import RESIDUALS, empty_tables
+from .residuals.registry import RESIDUALS, empty_tables, registered
 from .tree import Tree
 
 if TYPE_CHECKING:
-    from .measurements import Measurements
     from .options import Priors
 
 HAS_SHAPE, HAS_2D, HAS_3D, HAS_DIRECTION = 1, 2, 4, 8
+# The least that a residual's whole numbers may be, by its INDEXES, and the array of `Tree` that has one row for each.
+_RANGES = {"points": (0, "point_part"), "parts": (0, "parents"), "joints": (1, "parents"), "indices": (0, None)}
+_UNLIMITED = np.iinfo(np.int64).max
 
 
 class Terms(NamedTuple):
@@ -207,7 +210,8 @@ class PackedPriors(NamedTuple):
 def pack_priors(tree: Tree, priors: "Priors") -> PackedPriors:
     """Check and lay out the priors. Raises ShapeError."""
     tables = empty_tables()
-    tables.update(priors.packed_tables(len(tree.parents) - 1))
+    for name, table in priors.packed_tables(len(tree.parents) - 1).items():
+        tables[name] = _checked_table(tree, name, table)
     W = tree.S.shape[2]
     mean, information = priors.packed_shape(tree.shape)
     return PackedPriors(tables, _padded(mean, (W,)), _padded(information, (W, W)))
@@ -219,27 +223,31 @@ def _padded(a: Array, shape: tuple[int, ...]) -> Array:
     return out
 
 
-def _checked_table(name: str, table: tuple[Array, Array]) -> tuple[Array, Array]:
-    """Return the rows of a registered residual, or raise ShapeError."""
-    if name not in RESIDUALS:
-        raise ShapeError(f"There is no residual named {name!r}; the registered ones are {', '.join(RESIDUALS)}.")
+def _checked_table(tree: Tree, name: str, table: tuple[Array, Array]) -> tuple[Array, Array]:
+    """Return the rows of a registered residual, or raise ShapeError where kernels would read beyond the arrays."""
+    module = registered(name)
     ints, floats = np.asarray(table[0], dtype=np.int64), np.asarray(table[1], dtype=np.float64)
-    expected = (RESIDUALS[name].INTS, RESIDUALS[name].FLOATS)
-    if (ints.shape[1:], floats.shape[1:], len(ints)) != ((expected[0],), (expected[1],), len(floats)):
+    if (ints.shape[1:], floats.shape[1:]) != ((module.INTS,), (module.FLOATS,)) or len(ints) != len(floats):
         raise ShapeError(
-            f"Tables of {name!r} must have shapes (n, {expected[0]}) and (n, {expected[1]}), "
+            f"Tables of {name!r} must have shapes (n, {module.INTS}) and (n, {module.FLOATS}), "
             f"but got {ints.shape} and {floats.shape}."
         )
+    counted = getattr(module, "INDEXES", "indices")
+    least, of_what = _RANGES[counted]
+    limit = _UNLIMITED if of_what is None else len(getattr(tree, of_what))
+    if not all_within(ints.ravel(), least, limit):
+        wanted = "not be negative" if of_what is None else f"lie in {least}..{limit - 1}"
+        raise ShapeError(f"{counted.capitalize()} of {name!r} must {wanted}, but go from {ints.min()} to {ints.max()}.")
     return ints, floats
 
 
-def make_terms(tree: Tree, measurements: "Measurements", priors: "Priors") -> Terms:
+def make_terms(tree: Tree, measurements: Measurements, priors: "Priors") -> Terms:
     """Pack one frame's measurements and priors. Raises ShapeError naming the array that does not fit the body."""
     return fill_terms(tree, measurements, pack_priors(tree, priors), None)[0]
 
 
 def fill_terms(
-    tree: Tree, measurements: "Measurements", priors: PackedPriors, layout: Layout | None
+    tree: Tree, measurements: Measurements, priors: PackedPriors, layout: Layout | None
 ) -> tuple[Terms, int, Layout]:
     """Return the terms, how many slots are in use, and the layout, whose arrays the terms share.
 
@@ -259,7 +267,7 @@ def fill_terms(
     if own or m.tables:
         tables = {**tables, **own}
         for name, table in m.tables.items():
-            more = _checked_table(name, table)
+            more = _checked_table(tree, name, table)
             tables[name] = np.concatenate([tables[name][0], more[0]]), np.concatenate([tables[name][1], more[1]])
     ints = tuple([np.ascontiguousarray(tables[name][0], dtype=np.int64) for name in RESIDUALS])
     floats = tuple([np.ascontiguousarray(tables[name][1], dtype=np.float64) for name in RESIDUALS])

@@ -17,6 +17,7 @@ from .part import Array, Linearization, Part, point_jacobian
 
 INTS = 1  # point, numbered as in the measurements
 FLOATS = 6  # n (3), a unit vector, d, w_below, w_above
+INDEXES = "points"
 
 
 @kernel

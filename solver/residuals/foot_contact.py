@@ -16,6 +16,7 @@ from .part import Array, Linearization, Part, point_jacobian
 
 INTS = 1  # point, numbered as in the measurements
 FLOATS = 4  # p_stand (3), w
+INDEXES = "points"
 
 
 @kernel

@@ -46,6 +46,7 @@ SIZE = LAST + 14  # of a joint's parameters
 
 INTS = LANES  # joints, 0 for none: one row holds several
 FLOATS = LANES * (SIZE + 2)  # their parameters, then w and h, each as LANES values
+INDEXES = "parts"
 _W = SIZE
 NEAREST = 1e-4  # radians to pi
 _LEAST_TRACE = 4.0 * math.sin(0.5 * NEAREST) ** 2  # of 1 + tr MᵀOmega = 4 cos^2(angle / 2)

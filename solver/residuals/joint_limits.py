@@ -22,6 +22,7 @@ from .part import Array, Linearization, Part
 
 INTS = 1  # joint
 FLOATS = 8  # axis (3), lower, upper, swing_limit, w, w_swing
+INDEXES = "joints"
 
 # Axis in the parent's rest axes of SMPL's T-pose (x to the person's left, y up, z forward), lower, upper, swing limit.
 # A knee bends the shin backwards; an elbow brings the forearm forwards, and carries some of the forearm's twist.

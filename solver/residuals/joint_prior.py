@@ -16,6 +16,7 @@ from .part import Array, Linearization, Part
 
 INTS = 1  # joint
 FLOATS = 10  # Omega_mean (9) by rows, w
+INDEXES = "joints"
 
 
 @kernel

@@ -17,6 +17,7 @@ from .part import GRADIENT, Array, Linearization, Part, hat_identity
 
 INTS = 1  # part
 FLOATS = 14  # R^ (9) by rows, t^ (3), w_R, w_t
+INDEXES = "parts"
 
 
 @kernel

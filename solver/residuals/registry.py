@@ -3,11 +3,13 @@
 
 A residual r_i(T_i, Omega_i, beta) beside the measurements is a module with
     INTS, FLOATS                             columns of its two tables, one row for each term
+    INDEXES                                  what all its whole numbers count: "points" as in the measurements, "parts"
+                                             0..K or "joints" 1..K. Rows outside are refused; without it, negative ones
     accumulate(tree, ints, floats, weight, inv_sigma, triggs, pose, blocks) -> cost
                                              compiled with @kernel; adds JᵀJ and Jᵀr to `Blocks` (see part.py)
     evaluate(part, ...) -> Linearization     the same in plain numpy, for the derivative test
-To register it: one line, its module in RESIDUALS. Its tables come in through `Measurements.tables[name]`, its weight
-through `Weights.tables[name]`. A residual with no rows costs one call.
+To register it: its import, and one line, its module in RESIDUALS. Its tables come in through
+`Measurements.tables[name]`, its weight through `Weights.tables[name]`. A residual with no rows costs one call.
 
 The three measurements (keypoint2d, keypoint3d, orientation_field) are not here: the hot path in linearize.py merges
 those of one point into one term.
@@ -17,6 +19,7 @@ from typing import Any
 
 import numpy as np
 
+from ..errors import ShapeError
 from ..kernel import inlined_kernel
 from . import floor, foot_contact, joint_flow, joint_limits, joint_prior, pose_prior
 from .part import Array
@@ -57,6 +60,13 @@ def _followed_by(before: Any, index: int, accumulate: Any) -> Any:
 accumulate_tables = _nothing
 for _index, _module in enumerate(RESIDUALS.values()):
     accumulate_tables = _followed_by(accumulate_tables, _index, _module.accumulate)
+
+
+def registered(name: str) -> Any:
+    """Return the module of the residual with that name. Raises ShapeError."""
+    if name not in RESIDUALS:
+        raise ShapeError(f"There is no residual named {name!r}; the registered ones are {', '.join(RESIDUALS)}.")
+    return RESIDUALS[name]
 
 
 def empty_tables() -> dict[str, tuple[Array, Array]]:

@@ -24,6 +24,7 @@ from scope.solver import (
 )
 from scope.solver.linearize import linearize, make_blocks, make_pose
 from scope.solver.recursion import make_workspace, retract, step
+from scope.solver.residuals.registry import RESIDUALS
 from scope.solver.terms import make_terms
 
 from .synthetic import INTRINSICS, forward, project, random_body, random_state
@@ -351,6 +352,40 @@ def test_wrong_shapes_are_refused_with_what_was_expected(measurements, message):
     body, _ = scene(10)
     with pytest.raises(ShapeError, match=message):
         fit(body, measurements)
+
+
+INDICES = {
+    "pose_prior": ([-1, K + 1], f"Parts of 'pose_prior' must lie in 0..{K}"),
+    "joint_prior": ([0, K + 1], f"Joints of 'joint_prior' must lie in 1..{K}"),
+    "joint_limits": ([0, K + 1], f"Joints of 'joint_limits' must lie in 1..{K}"),
+    "joint_flow": ([-1, K + 1], f"Parts of 'joint_flow' must lie in 0..{K}"),
+    "foot_contact": ([-1, M + K + 1], f"Points of 'foot_contact' must lie in 0..{M + K}"),
+    "floor": ([-1, M + K + 1], f"Points of 'floor' must lie in 0..{M + K}"),
+}
+
+
+@pytest.mark.parametrize("name", INDICES)
+def test_rows_of_tables_that_point_outside_the_body_are_refused(name):
+    body, state = scene(10)
+    module, (outside, message) = RESIDUALS[name], INDICES[name]
+    for index in outside:
+        table = np.full((1, module.INTS), index), np.ones((1, module.FLOATS))
+        with pytest.raises(ShapeError, match=f"{message}, but go from {index} to {index}"):
+            fit(body, replace(measured(body, state), tables={name: table}))
+        if name in ("joint_limits", "joint_flow"):
+            with pytest.raises(ShapeError, match=message):
+                fit(body, measured(body, state), priors=Priors(**{name.removeprefix("joint_"): table}))
+
+
+@pytest.mark.parametrize("prior", ["limits", "flow"])
+def test_tables_of_priors_of_other_widths_are_refused(prior):
+    body, state = scene(10)
+    module = RESIDUALS[f"joint_{prior}"]
+    message = rf"'joint_{prior}' must have shapes \(n, {module.INTS}\) and \(n, {module.FLOATS}\)"
+    right = np.ones((1, module.INTS), int), np.ones((1, module.FLOATS))
+    for table in ((right[0], np.ones((1, 3))), (right[0][0], right[1]), (right[0], np.ones((2, module.FLOATS)))):
+        with pytest.raises(ShapeError, match=message):
+            fit(body, measured(body, state), priors=Priors(**{prior: table}))
 
 
 def test_wrong_states_priors_and_trees_are_refused():

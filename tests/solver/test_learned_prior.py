@@ -9,6 +9,7 @@ from scope.solver import (
     Keypoints3D,
     Measurements,
     Priors,
+    ShapeError,
     State,
     default_priors,
     fit,
@@ -18,6 +19,8 @@ from scope.solver import (
 from scope.solver.errors import ModelFileError
 from scope.solver.learned_prior import BUILT_IN
 from scope.solver.residuals import joint_flow
+
+from .synthetic import random_body
 
 
 def test_default_priors_use_the_flow_for_known_joints_and_the_rest_pose_for_others(body):
@@ -81,7 +84,6 @@ def test_a_missing_or_foreign_file_is_named(tmp_path):
 
 
 def test_flow_tables_of_another_body_are_refused(body):
-    from scope.solver import ShapeError
-
-    with pytest.raises(ShapeError, match="flow"):
-        Priors(flow=default_priors(body).flow).packed_tables(5)
+    another = random_body(np.random.default_rng(0), K=5)
+    with pytest.raises(ShapeError, match=r"'joint_flow' must lie in 0\.\.5"):
+        fit(another, Measurements(), priors=Priors(flow=default_priors(body).flow))

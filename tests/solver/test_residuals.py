@@ -135,6 +135,7 @@ def test_every_registered_residual_is_in_these_tests():
     others = {"keypoint2d", "keypoint3d", "orientation_field", "shape_prior", "joint_flow_log_det", "floor_above"}
     assert set(registry.RESIDUALS) | others == set(CASES)
     for module in registry.RESIDUALS.values():
+        assert module.INDEXES in ("points", "parts", "joints")
         assert list(inspect.signature(module.accumulate.py_func).parameters) == [
             "tree", "ints", "floats", "weight", "inv_sigma", "triggs", "pose", "blocks",
         ]  # fmt: skip
