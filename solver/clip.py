@@ -58,7 +58,10 @@ def fit_clip(
 
     First every frame is fitted in order, from the frame before and with the shape's information carried along (not if
     `init` is given); then all poses and the shape are optimized together. `temporal` adds the pull towards the frame
-    before, as it came out of the first pass. `focal_weight` is a prior on the squared logarithm of the focal scale.
+    before, as it came out of the first pass. A frame in which nothing was measured holds the pose of the last one
+    before it in which something was, or of the first one after it; its status says so. With `temporal` the pull is a
+    measurement of its own: see `Fit.measurements`.
+    `focal_weight` is a prior on the squared logarithm of the focal scale.
     At most `shape_frames` frames, evenly spaced, decide the shape; the others are then fitted with it fixed.
     Raises ShapeError for arrays that do not fit the body.
     """
@@ -69,7 +72,7 @@ def fit_clip(
     priors = default_priors(body) if priors is None else priors
     tree = make_tree(body)
     if init is None:
-        init = [f.state for f in _fit_in_order(tree, measurements, priors, options, temporal)]
+        init = _fit_in_order(tree, measurements, priors, options, temporal)
     if temporal is not None:
         pulled = [with_previous(m, s, temporal) for m, s in zip(measurements[1:], init, strict=False)]
         measurements = [measurements[0], *pulled]
@@ -99,22 +102,28 @@ def fit_clip(
 
 def _fit_in_order(
     tree: Tree, measurements: Sequence[Measurements], priors: Priors, options: Options, temporal: Temporal | None
-) -> list[Fit]:
-    """Fit each frame from the one before, carrying the shape's information; a lost person starts afresh."""
-    fits: list[Fit] = []
+) -> list[State]:
+    """Fit each frame from the one before, carrying the shape's information; a lost person starts afresh.
+
+    Frames without measurements hold the last state that was measured, before the first the first.
+    """
+    states: list[State] = []
     last: State | None = None
+    seen = False
     weight = (options.stages or WARM_STAGES)[-1].weights.shape
     for m in measurements:
         pulled = m if temporal is None or last is None else with_previous(m, last, temporal)
         fitted = fit_tree(tree, pulled, last, priors, options)
-        if fitted.status is Status.NO_MEASUREMENTS and fits:
-            fitted = replace(fitted, state=replace(fits[-1].state, beta=fitted.state.beta))
+        if fitted.status is Status.NO_MEASUREMENTS:
+            states.append(states[-1] if seen else fitted.state)
             last = None
-        else:
-            last = fitted.state
-            priors = carry(priors, fitted, weight)
-        fits.append(fitted)
-    return fits
+            continue
+        if not seen:
+            states, seen = [fitted.state] * len(states), True
+        last = fitted.state
+        priors = carry(priors, fitted, weight)
+        states.append(last)
+    return states
 
 
 def _fit_with_shape(

@@ -20,11 +20,13 @@ from scope.solver import (
     carry,
     fit,
     fit_clip,
+    load_body,
     make_tree,
     rotations,
     with_previous,
 )
 from scope.solver.clip import _Frame, _Joint
+from scope.solver.examples import somebody
 from scope.solver.terms import make_terms
 
 from .dense import jacobian, residuals, robust_factors
@@ -210,6 +212,29 @@ def test_a_gap_and_a_clip_without_measurements_end_well():
     assert empty.status is Status.NO_MEASUREMENTS
     assert empty.focal_scale == 1.0
     np.testing.assert_array_equal(empty.beta, np.zeros(P))
+
+
+def from_behind():
+    """The default body with its back to the camera, where a start from the rest pose ends a metre beside the truth."""
+    body = load_body("scope")
+    state = somebody.pose(body, seed=3, bend=0.1)
+    turn = np.diag([1.0, -1.0, -1.0]) @ rotations.exp([0.0, np.pi - 0.3, 0.0])
+    R, t = somebody.place(body, replace(state, R_camera_root=turn))
+    index = np.array(list(body.keypoint_set("blazepose").values()))
+    points, ones = body.keypoints(R, t, state.beta)[index], np.ones(len(index))
+    image, space = Keypoints2D(index, somebody.project(points), ones), Keypoints3D(index, points, ones)
+    return body, t, Measurements(somebody.INTRINSICS, image, space)
+
+
+@pytest.mark.parametrize("temporal", [None, Temporal()])
+@pytest.mark.parametrize("unseen", [1, 3])
+def test_whoever_appears_later_is_fitted_as_from_the_first_frame(unseen, temporal):
+    body, joints, seen = from_behind()
+    found = fit_clip(body, [*[Measurements()] * unseen, seen, seen, seen], temporal=temporal)
+    before, after = found.frames[: 1 if temporal else unseen], found.frames[unseen:]
+    for f in [*before, *after]:  # those before hold the pose in which the person appears
+        assert np.linalg.norm(f.t_camera_part - joints, axis=1).mean() < 0.02
+    assert {f.status for f in before} == {Status.NO_MEASUREMENTS}
 
 
 def test_a_clip_is_deterministic_and_refuses_nonsense():
