@@ -59,6 +59,15 @@ def all_finite(values: Array) -> bool:
 
 
 @kernel
+def _all_weigh(w_R: Array, w_t: Array) -> bool:
+    """Whether of each row of (n,) at least one is positive."""
+    for k in range(w_R.shape[0]):
+        if not (w_R[k] > 0.0 or w_t[k] > 0.0):
+            return False
+    return True
+
+
+@kernel
 def _normalize(K: Array, pixels: Array, confidence: Array, out: Array) -> bool:
     """Write normalized image coordinates and confidence; False if the intrinsics K are not usable."""
     total = 0.0
@@ -109,7 +118,10 @@ class OrientationField:
 
 @dataclass
 class PosePriors:
-    """Known estimates of part poses in the camera frame: parts (n,), R (n, 3, 3), t (n, 3), weights (n,) each."""
+    """Known estimates of part poses in the camera frame: parts (n,), R (n, 3, 3), t (n, 3), weights (n,) each.
+
+    A row of which neither weight is positive is left out.
+    """
 
     parts: ArrayLike
     R_camera_part: ArrayLike
@@ -218,7 +230,11 @@ def _pose_prior_rows(m: PosePriors, K: int) -> tuple[Array, Array]:
     t = as_array(m.t_camera_part, (n, 3), "Positions of pose priors")
     w_R = as_array(m.weight_rotation, (n,), "Rotation weights of pose priors")
     w_t = as_array(m.weight_translation, (n,), "Translation weights of pose priors")
-    return _finite_rows(pose_prior.pack(parts, R, t, w_R, w_t))
+    ints, floats = pose_prior.pack(parts, R, t, w_R, w_t)
+    if not _all_weigh(w_R, w_t):
+        weigh = (w_R > 0.0) | (w_t > 0.0)
+        ints, floats = ints[weigh], floats[weigh]
+    return _finite_rows((ints, floats))
 
 
 def _foot_contact_rows(m: FootContacts, points: int) -> tuple[Array, Array]:

@@ -19,7 +19,7 @@ class Status(Enum):
     CONVERGED = 0  # the last stage's relative decrease fell below its tolerance
     MAX_ITERATIONS = 1  # the last stage ran out of iterations
     STALLED = 2  # no damping, however large, found a lower cost: a minimum to rounding, or a contradiction
-    NO_MEASUREMENTS = 3  # nothing usable was measured: the state is the initial one
+    NO_MEASUREMENTS = 3  # nothing that `Fit.measurements` counts was usable: the state is the initial one
     NON_FINITE = 4  # the cost of the initial state is not finite: the state is the initial one
 
 
@@ -66,7 +66,9 @@ class Fit:
     R_camera_part: Array  # (K+1, 3, 3)
     t_camera_part: Array  # (K+1, 3), the joints
     beta_information: Array  # (P, P), of this frame's measurements alone, pose eliminated; shape prior not included
-    measurements: int  # usable points and directions
+    # usable points, directions and rows of pose priors, such as the pull of `Temporal`; contacts, the floor and further
+    # tables add to a fit, but alone they are no measurements
+    measurements: int
     rejected: int = 0  # of the iterations, those whose step did not lower the cost
     cost_by_term: dict[str, float] = field(default_factory=dict)  # adds up to `cost`; with Options.report only
 

@@ -17,10 +17,12 @@ from scope.solver import (
     Stage,
     State,
     Status,
+    Temporal,
     Weights,
     fit,
     make_tree,
     rotations,
+    with_previous,
 )
 from scope.solver.linearize import linearize, make_blocks, make_pose
 from scope.solver.recursion import make_workspace, retract, step
@@ -315,6 +317,16 @@ def test_no_measurement_can_break_it(spoil, warm, priors, robust):
     if BAD[spoil] == {Status.NO_MEASUREMENTS}:
         allowed = BAD[spoil]
     assert found.status in allowed
+
+
+@pytest.mark.parametrize("temporal", [Temporal(0.0, 0.0), Temporal(0.0, 1e4), Temporal(1e4, 0.0)])
+def test_a_pose_prior_counts_where_it_weighs_something(temporal):
+    body, state = scene(9)
+    pulled = with_previous(Measurements(), State(*state), temporal)
+    found = fit(body, pulled, init=State.rest(K, P))
+    weighs = temporal.root_rotation > 0.0 or temporal.root_position > 0.0
+    assert found.measurements == int(weighs)
+    assert (found.status is Status.NO_MEASUREMENTS) != weighs
 
 
 def test_nothing_measured_returns_the_initial_state():
