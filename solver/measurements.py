@@ -2,7 +2,8 @@
 """What was measured in one frame. Camera frame: OpenCV's (x right, y down, z forward), metres; image in pixels.
 
 Points are numbered as in the body's keypoints, 0..M-1, followed by the joints: M + i is the origin of part i.
-A confidence multiplies the squared residual; zero or a value that is not finite leaves the measurement out.
+A confidence multiplies the squared residual; zero, or a value that is not finite or beyond `LARGEST`, leaves the
+measurement out.
 """
 
 import math
@@ -16,6 +17,10 @@ from .errors import ShapeError
 from .kernel import kernel
 from .residuals import floor, foot_contact, pose_prior
 from .residuals.part import Array
+
+# No length, coordinate or confidence is as large. What the solver multiplies of smaller ones stays finite; one pixel
+# whose square does not would else make the cost of a whole clip infinite.
+LARGEST = 1e30
 
 
 def as_array(value: ArrayLike, shape: tuple[int | None, ...], name: str) -> Array:
@@ -56,6 +61,15 @@ def all_finite(values: Array) -> bool:
     for k in range(values.shape[0]):
         total += 0.0 * values[k]
     return total == 0.0
+
+
+@kernel
+def _all_usable(values: Array) -> bool:
+    """Whether all of (n,) are numbers below `LARGEST`."""
+    for k in range(values.shape[0]):
+        if not abs(values[k]) < LARGEST:
+            return False
+    return True
 
 
 @kernel
@@ -212,7 +226,7 @@ class Measurements:
         return starts, ends, out
 
     def packed_tables(self, K: int, points: int) -> dict[str, tuple[Array, Array]]:
-        """Return the tables of the residuals that have their own field; rows that are not finite are left out."""
+        """Return the tables of the residuals that have their own field; rows that are not usable are left out."""
         tables = {}
         if self.pose_priors is not None:
             tables["pose_prior"] = _pose_prior_rows(self.pose_priors, K)
@@ -234,7 +248,7 @@ def _pose_prior_rows(m: PosePriors, K: int) -> tuple[Array, Array]:
     if not _all_weigh(w_R, w_t):
         weigh = (w_R > 0.0) | (w_t > 0.0)
         ints, floats = ints[weigh], floats[weigh]
-    return _finite_rows((ints, floats))
+    return _usable_rows((ints, floats))
 
 
 def _foot_contact_rows(m: FootContacts, points: int) -> tuple[Array, Array]:
@@ -242,7 +256,7 @@ def _foot_contact_rows(m: FootContacts, points: int) -> tuple[Array, Array]:
     n = len(indices)
     stand = as_array(m.points, (n, 3), "Points of foot contacts")
     weight = as_array(m.probability, (n,), "Probability of foot contacts")
-    return _finite_rows(foot_contact.pack(indices, stand, weight))
+    return _usable_rows(foot_contact.pack(indices, stand, weight))
 
 
 def _floor_rows(m: Floor, points: int) -> tuple[Array, Array]:
@@ -255,13 +269,13 @@ def _floor_rows(m: Floor, points: int) -> tuple[Array, Array]:
             f"The floor needs a finite offset and a normal of length 1, but got offset {m.offset} and a normal of "
             f"length {length:.6g}; divide both by that length."
         )
-    return _finite_rows(floor.pack(indices, normal, float(m.offset), np.ones(len(indices)), contact))
+    return _usable_rows(floor.pack(indices, normal, float(m.offset), np.ones(len(indices)), contact))
 
 
-def _finite_rows(table: tuple[Array, Array]) -> tuple[Array, Array]:
-    """The rows of a residual's table in which everything is finite."""
+def _usable_rows(table: tuple[Array, Array]) -> tuple[Array, Array]:
+    """The rows of a residual's table in which everything is a number below `LARGEST`."""
     ints, floats = table
-    if all_finite(floats.ravel()):
+    if _all_usable(floats.ravel()):
         return table
-    keep = np.isfinite(floats).all(axis=1)
+    keep = (np.abs(floats) < LARGEST).all(axis=1)
     return ints[keep], floats[keep]

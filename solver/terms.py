@@ -7,7 +7,7 @@ import numpy as np
 
 from .errors import ShapeError
 from .kernel import allocating_kernel, kernel
-from .measurements import Measurements, all_within
+from .measurements import LARGEST, Measurements, all_within
 from .residuals.part import Array
 from .residuals.registry import RESIDUALS, empty_tables, registered
 from .tree import Tree
@@ -124,13 +124,13 @@ def _lay_out(tree: Tree, i2, i3, i_start, i_end) -> tuple:  # type: ignore[no-un
 
 
 @kernel
-def _finite(values, k: int) -> bool:  # type: ignore[no-untyped-def]
-    """Whether row k is finite and its confidence, the last, is positive."""
+def _usable(values, k: int) -> bool:  # type: ignore[no-untyped-def]
+    """Whether all of row k are numbers below `LARGEST` and its confidence, the last, is positive."""
     last = values.shape[1] - 1
-    total = 0.0
     for r in range(last + 1):
-        total += 0.0 * values[k, r]
-    return total == 0.0 and values[k, last] > 0.0
+        if not abs(values[k, r]) < LARGEST:
+            return False
+    return bool(values[k, last] > 0.0)
 
 
 @kernel
@@ -141,20 +141,20 @@ def _fill(  # type: ignore[no-untyped-def]
     for k in range(flags.shape[0]):
         flags[k] = shaped[k]
     for k in range(slots2.shape[0]):
-        if _finite(m2, k):
+        if _usable(m2, k):
             at = slots2[k]
             flags[at] |= HAS_2D
             for r in range(3):
                 image[at, r] = m2[k, r]
     for k in range(slots3.shape[0]):
-        if _finite(m3, k):
+        if _usable(m3, k):
             at = slots3[k]
             flags[at] |= HAS_3D
             for r in range(4):
                 point[at, r] = m3[k, r]
     for k in range(slots_d.shape[0]):
         norm = np.sqrt(md[k, 0] ** 2 + md[k, 1] ** 2 + md[k, 2] ** 2)
-        if _finite(md, k) and norm >= 1e-9:
+        if _usable(md, k) and norm >= 1e-9:
             at = slots_d[k]
             flags[at] |= HAS_DIRECTION
             for r in range(3):

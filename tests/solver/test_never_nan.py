@@ -11,12 +11,15 @@ from scope.solver import (
     Keypoints2D,
     Keypoints3D,
     Measurements,
+    Options,
     PosePriors,
     ShapeError,
     State,
     Status,
     fit,
+    fit_clip,
 )
+from scope.solver.measurements import LARGEST
 
 from .synthetic import random_body, random_state
 from .test_fit import INTRINSICS, measured
@@ -100,7 +103,7 @@ def test_any_body_ends_in_a_finite_pose(scene, spoiled, warm):
     assert (found.cost, found.status, found.iterations) == (again.cost, again.status, again.iterations)
 
 
-@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf, 1e160, -1e40])
 def test_one_bad_value_masks_its_own_measurement_and_nothing_else(bad):
     rng = np.random.default_rng(4)
     body = random_body(rng, 23, 10, 48)
@@ -114,6 +117,34 @@ def test_one_bad_value_masks_its_own_measurement_and_nothing_else(bad):
     a, b = fit(body, spoiled), fit(body, without)
     assert a.measurements == b.measurements
     np.testing.assert_array_equal(a.t_camera_part, b.t_camera_part)
+
+
+@pytest.mark.parametrize("size", [1e29, 1e30, 1e160])
+def test_no_value_however_large_spoils_the_frames_of_a_clip(size):
+    """Robust or not; below the largest they may draw a frame away, but leave the cost finite."""
+    rng = np.random.default_rng(5)
+    body = random_body(rng, 23, 10, 48)
+    m = measured(body, random_state(rng, 23, 10, 0.4))
+    ones, far = np.ones(1), np.array([[size, 0.0, size]])
+    image, space = np.array(m.keypoints2d.pixels), np.array(m.keypoints3d.points)
+    image[3], space[4] = size * INTRINSICS[0, 0], size
+    spoiled = replace(
+        m,
+        keypoints2d=replace(m.keypoints2d, pixels=image),
+        keypoints3d=replace(m.keypoints3d, points=space),
+        foot_contacts=FootContacts([0], far, ones),
+        pose_priors=PosePriors([0], np.eye(3)[None], far, ones, ones),
+        floor=Floor([0], [0.0, -1.0, 0.0], size, ones),
+    )
+    for robust in (0.01, np.inf):
+        options = Options(robust_keypoints2d=robust, robust_keypoints3d=robust)
+        found = fit_clip(body, [m, spoiled, m], options=options)
+        assert found.status in STOPPED
+        assert np.isfinite(found.cost)
+        if size >= LARGEST:
+            assert found.iterations > 0
+            assert found.frames[1].measurements == found.frames[0].measurements
+            np.testing.assert_allclose(found.frames[1].t_camera_part, found.frames[0].t_camera_part, atol=0.05)
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf])
