@@ -35,16 +35,6 @@ def steps(count, tree, terms, stage, damping, root_scale, bank, pose, blocks, wo
 
 
 @kernel
-def linearizations(count, tree, terms, stage, bank, pose, blocks, work):  # type: ignore[no-untyped-def]
-    """Linearize `count` times."""
-    total = 0.0
-    for k in range(count):
-        put(bank, k, pose)
-        total += linearize(tree, terms, stage, 0.0, pose, blocks, work.scratch)
-    return total
-
-
-@kernel
 def iterations(  # type: ignore[no-untyped-def]
     count, tree, terms, stage, damping, root_scale, bank, pose, trial, blocks, other, curvature, work
 ):
