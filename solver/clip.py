@@ -18,7 +18,7 @@ from .frame_solver import fit_tree
 from .linearize import linearize, make_blocks, make_pose
 from .measurements import Measurements
 from .optimizer import CONVERGED, DAMPING_LEAST, DAMPING_MOST, MAX_ITERATIONS, NON_FINITE, STALLED
-from .options import WARM_STAGES, Options, Priors, default_priors
+from .options import Options, Priors, default_priors
 from .recursion import Workspace, eliminate, make_workspace, retract, solve_globals, substitute
 from .report import cost_by_term
 from .residuals.part import Array, Blocks, Pose
@@ -110,7 +110,7 @@ def _fit_in_order(
     states: list[State] = []
     last: State | None = None
     seen = False
-    weight = (options.stages or WARM_STAGES)[-1].weights.shape
+    weight = options.schedule(cold=False)[-1].weights.shape
     for m in measurements:
         pulled = m if temporal is None or last is None else with_previous(m, last, temporal)
         fitted = fit_tree(tree, pulled, last, priors, options)
@@ -175,7 +175,7 @@ class _Joint:
         self.tree, self.options = tree, options
         self.P, self.focal_weight = tree.shape, focal_weight
         self.mean, self.prior = priors.packed_shape(tree.shape)
-        self.table, self.tolerances, self.limits = options.stage_table(options.stages or WARM_STAGES)
+        self.table, self.tolerances, self.limits = options.stage_table(options.schedule(cold=False))
         self.shape_weights = self.table[:, 0, SHAPE_PRIOR].copy()
         self.table[:, 0, SHAPE_PRIOR] = 0.0  # once for the clip, not in every frame
         self.root_scale = 1.0 / options.root_length

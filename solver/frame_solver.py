@@ -12,7 +12,7 @@ from .kernel import announce_compilation, kernel
 from .linearize import make_blocks, make_pose
 from .measurements import Measurements, as_array
 from .optimizer import optimize
-from .options import COLD_STAGES, WARM_STAGES, Options, Priors, Stage, default_priors
+from .options import Options, Priors, Stage, default_priors
 from .recursion import make_workspace
 from .report import cost_by_term
 from .residuals.part import Array
@@ -36,8 +36,8 @@ def fit(
     minimize 1/2 sum_i |r_i(T_i, Omega_i, beta)|^2 over T_0, Omega_1..K and beta (section 3 of the paper).
 
     With `init` (camera frame, metres) the fit starts there, in one stage; without, from a guess by `initial_state`,
-    in several. `priors` default to the body's joint limits and the population's shape. Raises ShapeError for arrays
-    that do not fit the body; never for values: see Status.
+    in several. `priors` are `default_priors(body)` unless given: the learned joint prior, joint limits and the
+    population's shape. Raises ShapeError for arrays that do not fit the body; never for measured values: see Status.
     """
     return FrameSolver(body, priors, options).fit(measurements, init)
 
@@ -117,7 +117,7 @@ class FrameSolver:
         return self._packed[1]
 
     def _schedule(self, options: Options, cold: bool) -> tuple[Array, Array, Array]:
-        stages = options.stages or (COLD_STAGES if cold else WARM_STAGES)
+        stages = options.schedule(cold)
         for known, its_stages, table in self._schedules:
             if its_stages is stages and known == options:
                 return table

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """How to fit: weights, stages, robust kernels, damping, and the priors on joints and shape."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -12,7 +13,7 @@ from .learned_prior import load_joint_prior
 from .measurements import all_finite, as_array
 from .residuals import joint_limits, joint_prior
 from .residuals.part import Array
-from .residuals.registry import FIRST_TABLE, RESIDUALS
+from .residuals.registry import FIRST_TABLE, RESIDUALS, registered
 
 
 @dataclass(frozen=True)
@@ -21,7 +22,7 @@ class Weights:
 
     Units: per squared normalized image coordinate (pixels over focal length), per metre^2, per squared difference of
     unit vectors, per radian^2; joint_flow multiplies a density's exponent, so that 1 is what was learned; the pose
-    prior's and the tables' weigh what their rows say.
+    prior's and the tables' weigh what their rows say. `tables`: of further registered residuals by name, 1 if left out.
     """
 
     keypoints2d: float = 1e6
@@ -35,6 +36,11 @@ class Weights:
     floor: float = 4e4
     shape: float = 100.0
     tables: Mapping[str, float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Refuse weights of no residual. Raises ShapeError."""
+        for name in self.tables:
+            registered(name)
 
     def row(self) -> list[float]:
         """Return the weights in the registry's order."""
@@ -90,7 +96,8 @@ class Options:
     damping: Levenberg-Marquardt lambda at the start, on joint rotations in radians; root_length: metres of pelvis
     motion that are damped like one radian.
     stages: replaces the default schedule, which depends on whether an initial state is given.
-    report: also tell what the cost is made of (`Fit.cost_by_term`), which takes another eleven evaluations.
+    report: also tell what the cost is made of (`Fit.cost_by_term`), which takes another evaluation for each kind of
+    residual.
     """
 
     stages: Sequence[Stage] | None = None
@@ -102,10 +109,25 @@ class Options:
     root_length: float = 0.3
     report: bool = False
 
+    def __post_init__(self) -> None:
+        """Refuse values that no fit could use. Raises ShapeError."""
+        for name in ("damping", "root_length"):
+            value = getattr(self, name)
+            if not 0.0 < value < math.inf:
+                raise ShapeError(f"Options.{name} must be positive and finite, but is {value}.")
+        if not 0.0 <= self.triggs <= 1.0:
+            raise ShapeError(f"Options.triggs must lie in 0..1, but is {self.triggs}.")
+
+    def schedule(self, cold: bool) -> Sequence[Stage]:
+        """Return the stages of a fit, `cold` without an initial state. Raises ShapeError where there are none."""
+        if self.stages is None:
+            return COLD_STAGES if cold else WARM_STAGES
+        if not self.stages:
+            raise ShapeError("A fit needs at least one stage, but Options.stages is empty; None is the default.")
+        return self.stages
+
     def stage_table(self, stages: Sequence[Stage]) -> tuple[Array, Array, Array]:
         """Return (S, 2, weights) of weights and 1/sigma, tolerances (S,) and iteration limits (S,)."""
-        if not stages:
-            raise ShapeError("A fit needs at least one stage, but the schedule is empty.")
         table = np.zeros((len(stages), 2, FIRST_TABLE + len(RESIDUALS)))
         sigmas = np.array([self.robust_keypoints2d, self.robust_keypoints3d, self.robust_orientation_field])
         if not (sigmas > 0).all():

@@ -20,11 +20,13 @@ from scope.solver import (
     Temporal,
     Weights,
     fit,
+    fit_clip,
     make_tree,
     rotations,
     with_previous,
 )
 from scope.solver.linearize import linearize, make_blocks, make_pose
+from scope.solver.options import COLD_STAGES, WARM_STAGES
 from scope.solver.recursion import make_workspace, retract, step
 from scope.solver.residuals.registry import RESIDUALS
 from scope.solver.terms import make_terms
@@ -400,6 +402,39 @@ def test_tables_of_priors_of_other_widths_are_refused(prior):
             fit(body, measured(body, state), priors=Priors(**{prior: table}))
 
 
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: Weights(tables={"nosuch": 5.0}), "no residual named 'nosuch'; the registered ones are pose_prior"),
+        (lambda: Weights(tables={"keypoints2d": 5.0}), "no residual named 'keypoints2d'"),
+        (lambda: Options(damping=np.nan), "damping must be positive and finite, but is nan"),
+        (lambda: Options(damping=0.0), "damping must be positive"),
+        (lambda: Options(root_length=0), "root_length must be positive and finite, but is 0"),
+        (lambda: Options(root_length=np.inf), "root_length must be positive and finite, but is inf"),
+        (lambda: Options(triggs=5), "triggs must lie in 0..1, but is 5"),
+        (lambda: Options(triggs=np.nan), "triggs must lie in 0..1, but is nan"),
+    ],
+)
+def test_options_that_no_fit_could_use_are_refused(make, message):
+    with pytest.raises(ShapeError, match=message):
+        make()
+
+
+@pytest.mark.parametrize("warm", [True, False])
+def test_an_empty_schedule_is_refused_and_none_is_the_default(warm):
+    body, state = scene(10)
+    m = measured(body, state)
+    init = State.rest(K, P) if warm else None
+    for stages in ([], ()):
+        with pytest.raises(ShapeError, match="at least one stage"):
+            fit(body, m, init=init, options=Options(stages=stages))
+        with pytest.raises(ShapeError, match="at least one stage"):
+            fit_clip(body, [m], init=[init] if warm else None, options=Options(stages=stages))
+    default = WARM_STAGES if warm else COLD_STAGES
+    costs = [fit(body, m, init=init, options=Options(stages=stages)).cost for stages in (None, default)]
+    assert costs[0] == costs[1]
+
+
 def test_wrong_states_priors_and_trees_are_refused():
     body, state = scene(11)
     m = measured(body, state)
@@ -407,8 +442,6 @@ def test_wrong_states_priors_and_trees_are_refused():
         fit(body, m, init=State(state[0], state[1], state[2][1:], state[3]))
     with pytest.raises(ShapeError, match="shape prior"):
         fit(body, m, priors=Priors(shape_mean=np.zeros(3)))
-    with pytest.raises(ShapeError, match="stage"):
-        Options().stage_table([])
     body.parents = np.array([-1, 2, 1, *range(2, 23)])
     with pytest.raises(ShapeError, match="before their children"):
         fit(body, m)
