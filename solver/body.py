@@ -12,7 +12,7 @@ File format: a .npz of plain arrays, see ``load_body``.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -47,14 +47,14 @@ class Body:
     shapedirs: np.ndarray  # (V, 3, P)
     skin_joints: np.ndarray  # (V, 4) int
     skin_weights: np.ndarray  # (V, 4)
-    faces: np.ndarray  # (F, 4) int32
+    faces: np.ndarray  # (F, 4) int32, or (F, 3)
     keypoint_names: tuple[str, ...] = ()
     keypoint_part: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int32))  # (M,)
     keypoint_template: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))  # (M, 3)
     keypoint_shapedirs: np.ndarray = field(default_factory=lambda: np.zeros((0, 3, 0)))  # (M, 3, P)
     uv: np.ndarray | None = None  # (U, 2)
-    uv_faces: np.ndarray | None = None  # (F, 4)
-    face_material: np.ndarray | None = None  # (F,)
+    uv_faces: np.ndarray | None = None  # as faces, into uv
+    face_material: np.ndarray | None = None  # (F,), into material_names
     material_names: tuple[str, ...] = ()
     material_colors: np.ndarray | None = None  # (C, 4) linear RGBA
     license: str = ""
@@ -167,10 +167,34 @@ class Body:
         return np.concatenate([f[:, [0, 1, 2]], f[:, [0, 2, 3]]]).astype(np.int32)
 
 
-_REQUIRED = (
-    *("joint_names", "kintree_table", "v_template", "shapedirs", "J_template", "J_shapedirs", "skin_joints"),
-    *("skin_weights", "faces", "keypoint_names", "keypoint_part", "keypoint_template", "keypoint_shapedirs"),
-)
+# What a file's array must hold, and its shape; None is any extent.
+Form = tuple[str, tuple[int | None, ...]]
+_KINDS = {"numbers": "iuf", "whole numbers": "iu", "text": "U"}
+
+_REQUIRED: dict[str, Form] = {
+    "joint_names": ("text", (None,)),
+    "kintree_table": ("whole numbers", (2, None)),
+    "v_template": ("numbers", (None, 3)),
+    "shapedirs": ("numbers", (None, 3, None)),
+    "J_template": ("numbers", (None, 3)),
+    "J_shapedirs": ("numbers", (None, 3, None)),
+    "skin_joints": ("whole numbers", (None, 4)),
+    "skin_weights": ("numbers", (None, 4)),
+    "faces": ("whole numbers", (None, None)),
+    "keypoint_names": ("text", (None,)),
+    "keypoint_part": ("whole numbers", (None,)),
+    "keypoint_template": ("numbers", (None, 3)),
+    "keypoint_shapedirs": ("numbers", (None, 3, None)),
+}
+_OPTIONAL: dict[str, Form] = {
+    "uv": ("numbers", (None, 2)),
+    "uv_faces": ("whole numbers", (None, None)),
+    "face_material": ("whole numbers", (None,)),
+    "material_names": ("text", (None,)),
+    "material_colors": ("numbers", (None, 4)),
+    "name": ("text", ()),
+    "license": ("text", ()),
+}
 
 
 def load_body(which: str | Path = "scope") -> Body:
@@ -196,8 +220,10 @@ def load_body(which: str | Path = "scope") -> Body:
     missing = [k for k in _REQUIRED if k not in data]
     if missing:
         raise ModelFileError(f"{path} lacks {', '.join(missing)}: it is not a Scope body file")
-    for key in list(data):
-        if data[key].dtype == np.float32:
+    forms = _REQUIRED | _OPTIONAL
+    check_arrays(data, forms, path)
+    for key, (kind, _) in forms.items():
+        if key in data and kind == "numbers":
             data[key] = data[key].astype(np.float64)
     body = Body(
         name=str(data.get("name", path.stem)),
@@ -225,9 +251,29 @@ def load_body(which: str | Path = "scope") -> Body:
     return body
 
 
+def check_arrays(arrays: Mapping[str, np.ndarray], forms: Mapping[str, Form], path: Path) -> None:
+    """What the arrays of a file hold, and their shapes, at the door. Those that are not there may be left out.
+
+    :raises ModelFileError: an array of another kind or shape.
+    """
+    for key, (kind, shape) in forms.items():
+        if key not in arrays:
+            continue
+        array = arrays[key]
+        no_names = kind == "text" and array.size == 0  # which numpy writes as numbers
+        if array.dtype.kind not in _KINDS[kind] and not no_names:
+            raise ModelFileError(f"{path}: {key} must hold {kind}, but holds {array.dtype}")
+        if array.ndim != len(shape) or any(b not in (None, a) for a, b in zip(array.shape, shape, strict=True)):
+            wanted = ", ".join("any" if b is None else str(b) for b in shape)
+            raise ModelFileError(f"{path}: {key} must have shape ({wanted}), but has {array.shape}")
+
+
 def _check(body: Body, path: Path) -> None:
     """Shapes and index ranges of a file that may be hostile."""
     n, p, v, m = len(body.parents), body.P, len(body.v_template), len(body.keypoint_names)
+    materials = max(1, len(body.material_names))
+    if body.faces.shape[1] not in (3, 4):
+        raise ModelFileError(f"{path}: faces must be triangles or quads, but have {body.faces.shape[1]} corners")
     expected = {
         "J_template": (n, 3),
         "J_shapedirs": (n, 3, p),
@@ -238,19 +284,26 @@ def _check(body: Body, path: Path) -> None:
         "keypoint_part": (m,),
         "keypoint_template": (m, 3),
         "keypoint_shapedirs": (m, 3, p),
+        "uv_faces": body.faces.shape,
+        "face_material": (len(body.faces),),
+        "material_colors": (materials, 4),
     }
     for key, shape in expected.items():
-        got = getattr(body, key).shape
-        if got != shape:
-            raise ModelFileError(f"{path}: {key} must have shape {shape}, but has {got}")
+        array = getattr(body, key)
+        if array is not None and array.shape != shape:
+            raise ModelFileError(f"{path}: {key} must have shape {shape}, but has {array.shape}")
     if len(body.joint_names) != n:
         raise ModelFileError(f"{path}: {len(body.joint_names)} joint names for {n} joints")
-    if body.parents[0] != -1 or (body.parents[1:] < 0).any() or (body.parents[1:] >= np.arange(1, n)).any():
+    if n == 0 or body.parents[0] != -1 or (body.parents[1:] < 0).any() or (body.parents[1:] >= np.arange(1, n)).any():
         raise ModelFileError(f"{path}: kintree_table must list each joint after its parent, the root first")
-    for key, top in (("skin_joints", n), ("faces", v), ("keypoint_part", n)):
+    tops = {"skin_joints": n, "faces": v, "keypoint_part": n, "face_material": materials}
+    if body.uv is not None:
+        tops["uv_faces"] = len(body.uv)
+    for key, top in tops.items():
         index = getattr(body, key)
-        if index.size and (index.min() < 0 or index.max() >= top):
+        if index is not None and index.size and (index.min() < 0 or index.max() >= top):
             raise ModelFileError(f"{path}: {key} points outside 0..{top - 1}")
-    for key in ("J_template", "J_shapedirs", "v_template", "shapedirs", "skin_weights", "keypoint_template"):
-        if not np.isfinite(getattr(body, key)).all():
+    for key in (key for key, (kind, _) in (_REQUIRED | _OPTIONAL).items() if kind == "numbers"):
+        array = getattr(body, key)
+        if array is not None and not np.isfinite(array).all():
             raise ModelFileError(f"{path}: {key} contains NaN or infinity")

@@ -18,7 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..body import Body, _check
+from ..body import Body, Form, _check, check_arrays
 from ..errors import ModelFileError
 from .archive import npz_keys, read_members
 from .keypoints import derive_keypoints
@@ -98,30 +98,19 @@ def _read_tables(path: Path) -> Tables:
 
 def _check_tables(arrays: dict[str, np.ndarray], path: Path) -> None:
     """Types and shapes, at the door."""
-    vertices, joints = len(np.atleast_1d(arrays["v_template"])), arrays["kintree_table"].shape[-1:]
-    n = joints[0] if joints else 0
+    check_arrays(arrays, {"kintree_table": ("whole numbers", (2, None)), "v_template": ("numbers", (None, 3))}, path)
+    vertices, n = len(arrays["v_template"]), arrays["kintree_table"].shape[1]
+    if 0 in (vertices, n):
+        raise ModelFileError(f"{path}: {vertices} vertices and {n} joints are no body; choose another")
     if vertices > MOST_VERTICES or n > MOST_JOINTS or vertices * n > MOST_WEIGHTS:
         raise ModelFileError(f"{path}: {vertices} vertices and {n} joints are too many for a body; choose another")
-    expected: dict[str, tuple[int | None, ...]] = {
-        "v_template": (vertices, 3),
-        "weights": (vertices, n),
-        "J_regressor": (n, vertices),
-        "kintree_table": (2, n),
-        "f": (None, 3),
-        "shapedirs": (vertices, 3, None),
+    forms: dict[str, Form] = {
+        "weights": ("numbers", (vertices, n)),
+        "J_regressor": ("numbers", (n, vertices)),
+        "f": ("whole numbers", (None, 3)),
+        "shapedirs": ("numbers", (vertices, 3, None)),
     }
-    for key, shape in expected.items():
-        if key not in arrays:
-            continue
-        array = arrays[key]
-        kinds = "iu" if key in ("kintree_table", "f") else "iuf"
-        if array.dtype.kind not in kinds:
-            wanted = "whole numbers" if kinds == "iu" else "numbers"
-            raise ModelFileError(f"{path}: {key} must hold {wanted}, but holds {array.dtype}")
-        fits = array.ndim == len(shape) and all(b in (None, a) for a, b in zip(array.shape, shape, strict=True))
-        if not fits or 0 in (vertices, n):
-            wanted = ", ".join("any" if b is None else str(b) for b in shape)
-            raise ModelFileError(f"{path}: {key} must have shape ({wanted}), but has {array.shape}")
+    check_arrays(arrays, forms, path)
 
 
 def _make_body(tables: Tables, path: Path, max_betas: int) -> Body:
