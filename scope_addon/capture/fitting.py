@@ -226,7 +226,7 @@ def _fit_frames(
             if state is None:
                 frames.follow(k)
             else:
-                frames.fit(k, state(k), known_root=True)
+                frames.refit(k, state(k))
         frames.hold(k)
         if k % 16 == 0 or k == T - 1:
             progress("solving" if state is None else "solving on the floor", k + 1, T)
@@ -246,16 +246,31 @@ class _Frames:
         self._rotations = np.tile(np.eye(3), (T, body.K + 1, 1, 1))
         self._root, self._valid, self._cost = np.zeros((T, 3)), np.zeros(T, bool), np.zeros(T)
         self._iterations = 0
+        self._first: State | None = None  # what the frame before was refitted from
         self._last: Fit | None = None
         self._last_s = -np.inf
 
     def follow(self, k: int) -> None:
         """Fit frame ``k`` from the frame before, or afresh where that is long ago; and those before it, if it tells."""
-        track, last = self._prepared.track, self._last
-        is_fresh = track.acquired[k] or track.times[k] - self._last_s > LONGEST_COAST_S
-        gain = self.fit(k, None if last is None or is_fresh else last.state)
+        gain = self.fit(k, self._last.state if self._last is not None and self._goes_on(k) else None)
         if gain > 0.0 and self._last is not None:
             self._go_back(k, self._last.state, gain)
+
+    def refit(self, k: int, first: State | None) -> None:
+        """Fit frame ``k`` from its first fit, turned as the frame before was, or afresh.
+
+        Two poses may explain a frame as well as each other: it goes on with the one that the frame before has.
+        """
+        before, self._first = self._first, first
+        init = first
+        if first is not None and before is not None and self._last is not None and self._goes_on(k):
+            init = turned_alike(first, before, self._last.state)
+        self.fit(k, init, known_root=True)
+
+    def _goes_on(self, k: int) -> bool:
+        """Whether the last fit tells anything of frame ``k``."""
+        track = self._prepared.track
+        return not track.acquired[k] and track.times[k] - self._last_s <= LONGEST_COAST_S
 
     def fit(self, k: int, init: State | None, known_root: bool = False) -> float:
         """Fit frame ``k`` from a state, whose root is known or not, or afresh; from further off where it should.
@@ -322,6 +337,13 @@ class _Frames:
 
 def _is_usable(fit: Fit) -> bool:
     return fit.status not in (Status.NO_MEASUREMENTS, Status.NON_FINITE)
+
+
+def turned_alike(state: State, before: State, after: State) -> State:
+    """A state whose joints are turned as those of a frame close by were, from ``before`` to ``after``."""
+    R = after.R_camera_root @ before.R_camera_root.T @ state.R_camera_root
+    Omega = after.Omega @ np.swapaxes(before.Omega, 1, 2) @ state.Omega
+    return replace(state, R_camera_root=R, Omega=Omega)
 
 
 def _as_before(a: np.ndarray, b: np.ndarray) -> bool:

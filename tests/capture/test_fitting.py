@@ -13,7 +13,7 @@ from scope.scope_addon.capture.lifter import Lifted, Lifter
 from scope.scope_addon.capture.placement import place_track
 from scope.scope_addon.capture.seen_keypoints import as_seen
 from scope.scope_addon.capture.track import Track
-from scope.solver import load_body
+from scope.solver import State, load_body
 from scope.solver.rotations import exp
 
 FRAMES = 4
@@ -115,6 +115,55 @@ def test_a_limb_goes_where_it_is_seen_to_go_for_sure_and_was_there_before():
             i = KEYPOINT_NAMES.index(f"right_{joint}")
             there = truth[:, i, 2] - truth[:, hip, 2]
             np.testing.assert_allclose(joints[:, k, 2] - joints[:, at_hip, 2], there, atol=0.2)
+
+
+def test_a_frame_is_turned_as_the_one_before_was():
+    rng = np.random.default_rng(0)
+    body = load_body("scope")
+
+    def state() -> State:
+        return State(
+            exp(rng.standard_normal(3)), rng.standard_normal(3), exp(rng.standard_normal((body.K, 3))), np.zeros(body.P)
+        )
+
+    before, now, after = state(), state(), state()
+    same = fitting.turned_alike(now, before, before)
+    np.testing.assert_allclose(same.Omega, now.Omega, atol=1e-12)
+    there = fitting.turned_alike(before, before, after)
+    np.testing.assert_allclose(there.Omega, after.Omega, atol=1e-12)
+    np.testing.assert_allclose(there.R_camera_root, after.R_camera_root, atol=1e-12)
+    np.testing.assert_array_equal(there.t_camera_root, before.t_camera_root)
+    turned = fitting.turned_alike(now, before, after)  # by the same rotation, in the parent's axes
+    by = turned.Omega @ np.swapaxes(now.Omega, 1, 2)
+    np.testing.assert_allclose(by, after.Omega @ np.swapaxes(before.Omega, 1, 2), atol=1e-12)
+
+
+def test_of_two_ways_to_bend_a_leg_frames_go_on_with_that_of_the_frame_before():
+    """All first fits have it on the wrong side; the first frame is then told better, the others nothing of depth."""
+    body, camera = load_body("scope"), choose_camera(1080, 1920)
+    track = _standing_track(body, camera, (("right_hip", 0.3), ("right_knee", 0.9)))
+    prepared = fitting.prepare_track(body, track, camera)
+    leg = [KEYPOINT_NAMES.index(f"right_{name}") for name in ("knee", "ankle", "heel", "foot_index")]
+    hip, ankle = (KEYPOINT_NAMES.index(f"right_{name}") for name in ("hip", "ankle"))
+    truth, sure = track.world_landmarks, np.full((FRAMES, len(KEYPOINT_NAMES)), 0.1)
+    mirrored = truth.copy()
+    mirrored[:, leg, 2] = 2 * truth[:, hip, None, 2] - truth[:, leg, 2]
+    first = fitting.fit_track(replace(prepared, lifted=Lifted(mirrored, sure, sure)), lambda *_: None)
+    sigma = sure.copy()
+    sigma[1:, leg] = 3.0
+    second = fitting.refit_track(
+        replace(prepared, lifted=Lifted(truth, sigma, sigma)), first, _stance(first), lambda *_: None
+    )
+
+    def ahead(fit):
+        joints = place_track(body, track, fit, smoothing=False).joints
+        at_ankle, at_hip = (body.joint_names.index(f"right_{name}") for name in ("ankle", "hip"))
+        return joints[:, at_ankle, 2] - joints[:, at_hip, 2]
+
+    there = truth[0, ankle, 2] - truth[0, hip, 2]
+    assert abs(there) > 0.2
+    assert (np.sign(ahead(first)) == -np.sign(there)).all()
+    np.testing.assert_allclose(ahead(second), there, atol=0.2)
 
 
 def test_a_leg_at_a_wrong_depth_is_drawn_to_the_floor_where_it_stands_and_only_there():
