@@ -313,7 +313,7 @@ def _rig_of(args: argparse.Namespace, outputs: list[Path]) -> RigSource | None:
             raise UsageError(f"{path} is the rig's own file; choose another name")
     from .scene.rig_file import check_rig
 
-    check_rig(rig)
+    check_rig(rig, fingers=args.hands)
     return rig
 
 

@@ -174,9 +174,9 @@ def presented_s(path: Path) -> float | None:
         stream = next(iter(container.streams.video), None)
         if stream is not None and stream.duration and stream.time_base:
             return float(stream.duration * stream.time_base)
-        if container.duration is None:
-            return None
-        return (container.duration - (container.start_time or 0)) / 1e6
+        late = (container.start_time or 0) if "matroska" in container.format.name else 0
+        length_s = ((container.duration or 0) - late) / 1e6
+        return length_s if length_s > 0 else None
 
 
 def decode_items(path: Path, numbers: Collection[int], most_pixels: int) -> dict[int, np.ndarray]:

@@ -190,10 +190,9 @@ def _open_moving(path: Path, asked: Wanted) -> Video:
         fps = exact_fps(reader.rate) or _fps_from_timestamps(reader)
         count = reader.frame_count
     height, width = first[1].shape[:2]
-    claimed = int(count) if 0 < count < 1e9 else None
-    shown_s = presented_s(path) if claimed != 1 else None
-    counts = [claimed, round(shown_s * fps) if shown_s else None]
-    frame_count = max(1, min((n for n in counts if n is not None), default=1))
+    shown_s = presented_s(path)
+    claimed = shown_s * fps if shown_s else count
+    frame_count = max(1, round(claimed)) if 0 < claimed < 1e9 else 1
     wanted = asked.at_rate(fps)
     video = Video(path, width, height, fps, frame_count, focal_35mm(path), wanted=wanted)
     if wanted.start_s > 0 and count > 0 and wanted.start_s * fps > frame_count + fps:

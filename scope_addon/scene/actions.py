@@ -169,7 +169,9 @@ def nla_strips(datablock: bpy.types.ID) -> list[bpy.types.NlaStrip]:
     animation = datablock.animation_data
     if animation is None or not animation.use_nla or animation.use_tweak_mode:
         return []
-    return [strip for track in animation.nla_tracks if not track.mute for strip in track.strips if not strip.mute]
+    alone = any(track.is_solo for track in animation.nla_tracks)
+    tracks = [track for track in animation.nla_tracks if (track.is_solo if alone else not track.mute)]
+    return [strip for track in tracks for strip in track.strips if not strip.mute]
 
 
 @contextmanager
@@ -190,21 +192,24 @@ def nla_as_actions(scene: bpy.types.Scene) -> Iterator[None]:
         do_custom_props=False,
     )
     blended = [obj for obj in scene.objects if nla_strips(obj)]
-    kept = [(a, a.action, getattr(a, "action_slot", None)) for a in (obj.animation_data for obj in blended)]
+    animations = [obj.animation_data for obj in blended]
+    kept = [(a, a.action, getattr(a, "action_slot", None), a.action_blend_type) for a in animations]
     baked: list[bpy.types.Action] = []
     try:
-        if blended:
-            frames = range(scene.frame_start, scene.frame_end + 1)
-            pairs = [(obj, None) for obj in blended]
-            baked += anim_utils.bake_action_objects(pairs, frames=frames, bake_options=options)
-        for animation, _, _ in kept:
+        frames = range(scene.frame_start, scene.frame_end + 1)
+        for posed in (True, False):  # an object without bones turns do_pose off for all that share the options
+            pairs = [(obj, None) for obj in blended if (obj.pose is not None) is posed]
+            if pairs:
+                baked += anim_utils.bake_action_objects(pairs, frames=frames, bake_options=options)
+        for animation in animations:
             animation.use_nla = False
         yield
     finally:
-        for animation, action, slot in kept:
+        for animation, action, slot, blend_type in kept:
             animation.use_nla, animation.action = True, action
             if slot is not None:
                 animation.action_slot = slot
+            animation.action_blend_type = blend_type
         bpy.data.batch_remove([action for action in baked if action is not None])
 
 

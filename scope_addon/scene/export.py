@@ -103,6 +103,8 @@ def _write_one(
     """Write these collections, as long as all of ``rigs`` move: files of several people begin at the same time."""
     suffix = path.suffix.lower()
     with (
+        _out_of_edit_mode(collections),
+        nullcontext() if suffix == ".blend" else _all_evaluated(collections),  # a scene keeps what is hidden in it
         _scene_of(collections, rigs, options.camera) as scene,
         _baked_meshes(scene) if options.bakes(suffix) else nullcontext(),
         actions.nla_as_actions(scene) if suffix == ".glb" else nullcontext(),  # that exporter reads actions alone
@@ -222,7 +224,7 @@ def _scene_of(
     :raises UsageError: the motion begins before frame 0.
     """
     source = bpy.context.scene
-    with _all_evaluated(collections), temporary_scene("Capture") as scene:
+    with temporary_scene("Capture") as scene:
         for collection in collections:
             scene.collection.children.link(collection)
         for name in ("fps", "fps_base", "resolution_x", "resolution_y", "pixel_aspect_x", "pixel_aspect_y"):
@@ -249,19 +251,29 @@ def _scene_of(
 
 
 @contextmanager
+def _out_of_edit_mode(collections: Sequence[bpy.types.Collection]) -> Iterator[None]:
+    """Leave Edit Mode for a while if something in these collections is edited: it would be written as it was before."""
+    edited = any(obj.mode == "EDIT" for collection in collections for obj in collection.all_objects)
+    try:
+        if edited:
+            bpy.ops.object.mode_set(mode="OBJECT")
+        yield
+    finally:
+        if edited:
+            bpy.ops.object.mode_set(mode="EDIT")
+
+
+@contextmanager
 def _all_evaluated(collections: Sequence[bpy.types.Collection]) -> Iterator[None]:
     """Hide nothing in these collections for a while, and let their armatures move.
 
-    Viewports, renders, Edit Mode and Rest Position each keep some exporter from what moves.
+    Viewports, renders and Rest Position each keep some exporter from what moves.
     """
     groups = {group for collection in collections for group in (collection, *collection.children_recursive)}
     objects = {obj for collection in collections for obj in collection.all_objects}
     hidden = [(each, each.hide_viewport, each.hide_render) for each in (*groups, *objects)]
     positions = [(armature, armature.pose_position) for armature in {o.data for o in objects if o.type == "ARMATURE"}]
-    edited = any(obj.mode == "EDIT" for obj in objects)
     try:
-        if edited:
-            bpy.ops.object.mode_set(mode="OBJECT")
         for each, _, _ in hidden:
             each.hide_viewport = each.hide_render = False
         for armature, _ in positions:
@@ -272,8 +284,6 @@ def _all_evaluated(collections: Sequence[bpy.types.Collection]) -> Iterator[None
             armature.pose_position = position
         for each, in_viewports, in_renders in hidden:
             each.hide_viewport, each.hide_render = in_viewports, in_renders
-        if edited:
-            bpy.ops.object.mode_set(mode="EDIT")
 
 
 @contextmanager

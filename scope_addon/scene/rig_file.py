@@ -10,7 +10,7 @@ from pathlib import Path
 import bpy
 
 from ...solver.errors import InputError, UsageError
-from ..retarget.bone_map import BoneMap
+from ..retarget.bone_map import PHALANGES, BoneMap
 from ..retarget.rig_source import RigSource
 from . import formats
 from .export import temporary_scene
@@ -55,14 +55,17 @@ def with_meshes(rig: bpy.types.Object, objects: Iterable[bpy.types.Object]) -> l
     return keep
 
 
-def check_rig(source: RigSource) -> None:
+def check_rig(source: RigSource, *, fingers: bool = True) -> None:
     """Whether a motion can be put on the rig, before one is captured.
 
+    :param fingers: whether that motion will have any: those of the rig stay as they are otherwise.
     :raises InputError, UsageError: as ``load_rig``, and when its bones cannot be mapped or turned.
     """
     with forgotten(), temporary_scene("Looking at a rig") as scene:
         rig = load_rig(source, scene.collection)
-        check_turning(rig, bones_of(source, rig))
+        bones = bones_of(source, rig)
+        moved = {b: part for b, part in bones.parts.items() if fingers or part.partition("_")[2] not in PHALANGES}
+        check_turning(rig, BoneMap(moved))
 
 
 def bones_of(source: RigSource, rig: bpy.types.Object) -> BoneMap:

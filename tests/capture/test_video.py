@@ -18,6 +18,7 @@ import numpy as np
 import pytest
 from scope.scope_addon.capture.frame_readers import OpencvReader, PyavReader
 from scope.scope_addon.capture.video import exact_fps, open_video
+from scope.scope_addon.capture.video_range import VideoRange
 from scope.solver.errors import VideoError
 
 W, H = 64, 48
@@ -432,6 +433,28 @@ def test_a_clip_cut_without_coding_it_anew_is_whole(tmp_path, suffix, shift_s):
     assert video.warnings == []
     assert count == (60 if shift_s > 0 else 36)
     assert abs(video.expected_frames - count) <= 1
+
+
+@pytest.mark.parametrize(
+    ("name", "codec", "start_s", "options"),
+    [("late.flv", "flv1", 100.0, {}), ("pieces.mp4", "mpeg4", 0.0, {"movflags": "frag_keyframe"})],
+)
+def test_a_container_that_counts_oddly_can_be_entered_in_its_middle(tmp_path, name, codec, start_s, options):
+    """Times that begin late in a file whose length leaves that out; pieces of which the first alone is counted."""
+    path = tmp_path / name
+    with av.open(str(path), "w", options=options) as out:
+        stream = out.add_stream(codec, rate=25)
+        stream.width, stream.height, stream.pix_fmt, stream.gop_size = 64, 48, "yuv420p", 25
+        stream.time_base = Fraction(1, 25)
+        for k in range(100):
+            frame = av.VideoFrame.from_ndarray(np.full((48, 64, 3), 2 * k, np.uint8), format="rgb24")
+            frame.pts, frame.time_base = k + round(25 * start_s), Fraction(1, 25)
+            out.mux(stream.encode(frame))
+        out.mux(stream.encode(None))
+    video = open_video(path, VideoRange(start_s=2.0))
+    assert abs(video.frame_count - 100) <= 1
+    assert len(list(video)) == 50
+    assert video.warnings == []
 
 
 # Real clips: sizes, rates and counts of ../shared/data/README.md

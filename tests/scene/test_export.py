@@ -495,6 +495,61 @@ def test_a_motion_in_the_nla_is_exported_as_it_is_seen(body, make_motion, tmp_pa
     np.testing.assert_allclose(joints, truth(body, motion).joints[3], atol=JOINT_TOLERANCE)
 
 
+def test_what_has_no_bones_may_be_in_the_nla_too(body, make_motion, tmp_path, blender, truth):
+    motion = make_motion(body, 5)
+    person = build_scene([motion], body, options=BuildOptions(frame_rate="set")).people[0]
+    layered = None
+    for obj in (person.armature, person.camera):
+        animation = obj.animation_data or obj.animation_data_create()
+        action, slot = animation.action, getattr(animation, "action_slot", None)
+        if action is None:
+            action, slot = bpy.data.actions.new("still"), None
+            obj.keyframe_insert("location", frame=1)
+            action, slot = animation.action, getattr(animation, "action_slot", None)
+        animation.action = None
+        strip = animation.nla_tracks.new().strips.new("moved", 1, action)
+        if slot is not None:
+            strip.action_slot = slot
+        if obj is person.camera:
+            obj.keyframe_insert("location", frame=1)  # an action of its own over the strip
+            animation.action_blend_type, layered = "ADD", animation
+    action = layered.action
+    export(tmp_path / "walk.glb")
+    assert (layered.action, layered.action_blend_type, layered.use_nla) == (action, "ADD", True)
+    first = read_back(tmp_path / "walk.glb")
+    blender.go_to(first + 3)
+    joints = blender.joints(blender.only("ARMATURE"), body.joint_names)
+    np.testing.assert_allclose(joints, truth(body, motion).joints[3], atol=JOINT_TOLERANCE)
+
+
+def test_a_track_that_plays_solo_lasts_as_long_as_it_does(body, make_motion):
+    person = build_scene([make_motion(body, 5)], body, options=BuildOptions(frame_rate="set")).people[0]
+    animation = person.armature.animation_data
+    action, slot = animation.action, getattr(animation, "action_slot", None)
+    animation.action = None
+    for start in (1, 1000):
+        track = animation.nla_tracks.new()
+        strip = track.strips.new(f"from {start}", start, action)
+        if slot is not None:
+            strip.action_slot = slot
+    assert actions.frame_range([person.armature])[1] > 1000
+    animation.nla_tracks[0].is_solo = True
+    assert actions.frame_range([person.armature])[1] < 10
+
+
+def test_a_scene_keeps_what_is_hidden_in_it(body, make_motion, tmp_path):
+    result = build_scene([make_motion(body, 4)], body, options=BuildOptions(frame_rate="set"))
+    person = result.people[0]
+    person.armature.data.pose_position = "REST"
+    person.armature.hide_render = person.mesh.hide_viewport = person.mesh.hide_render = True
+    name = person.mesh.name
+    export(tmp_path / "walk.blend")
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "walk.blend"))
+    mesh = bpy.data.objects[name]
+    assert (mesh.hide_viewport, mesh.hide_render, mesh.parent.hide_render) == (True, True, True)
+    assert mesh.parent.data.pose_position == "REST"
+
+
 def test_a_users_edit_is_exported(body, make_motion, tmp_path, blender):
     motion = make_motion(body, 4)
     person = build_scene([motion], body, options=BuildOptions(frame_rate="set")).people[0]

@@ -143,6 +143,31 @@ def test_a_rig_whose_bones_are_held_is_refused_before_the_work(tmp_path):
         check_rig(rig_source(tmp_path / "rig.blend"))
 
 
+def test_fingers_that_follow_one_another_matter_only_where_fingers_are_captured(tmp_path):
+    rig, bone_of = build_rig("mixamo")
+    bpy.context.view_layer.objects.active = rig
+    bpy.ops.object.mode_set(mode="EDIT")
+    hand = rig.data.edit_bones[bone_of["left_wrist"]]
+    parent, along = hand, (hand.tail - hand.head).normalized() * 0.03
+    for k in (1, 2, 3):
+        bone = rig.data.edit_bones.new(f"mixamorig:LeftHandIndex{k}")
+        bone.head, bone.tail, bone.parent = parent.tail, parent.tail + along, parent
+        parent = bone
+    bpy.ops.object.mode_set(mode="OBJECT")
+    held = rig.pose.bones["mixamorig:LeftHandIndex2"].constraints.new("COPY_ROTATION")
+    held.target, held.subtarget = rig, "mixamorig:LeftHandIndex1"
+    held.target_space = held.owner_space = "LOCAL"
+    formats.write_blend(tmp_path / "rig.blend", bpy.context.scene)
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    parts = {bone: part for part, bone in names_of("mixamo").items()}
+    parts |= {f"mixamorig:LeftHandIndex{k}": f"left_index{k}" for k in (1, 2, 3)}
+    save_bone_map(BoneMap(parts), tmp_path / "map.json")
+    source = rig_source(tmp_path / "rig.blend", bone_map=tmp_path / "map.json")
+    check_rig(source, fingers=False)
+    with pytest.raises(InputError, match="LeftHandIndex2.*does not move"):
+        check_rig(source)
+
+
 def test_a_map_of_another_rig_is_refused(tmp_path):
     path = save_rig(tmp_path / "rig.glb")
     save_bone_map(BoneMap({bone: part for part, bone in names_of("unreal").items()}), tmp_path / "map.json")
