@@ -50,12 +50,12 @@ def focal_from_edges(segments: Segments, width: int, height: int, assumed_px: fl
     """The focal length that a picture's edges tell; None where they do not tell any."""
     edges = Edges.of(segments, width, height)
     coarse = np.arange(-LOG_RANGE, LOG_RANGE + 1e-9, COARSE_STEP)
-    scores = [edges.axes(assumed_px * np.exp(x))[0] for x in coarse]
+    scores = [edges.support(assumed_px * np.exp(x)) for x in coarse]
     best = float(coarse[_log_posterior(coarse, scores).argmax()])
     fine = np.arange(best - COARSE_STEP, best + COARSE_STEP + 1e-9, FINE_STEP)
     log_ratio = np.concatenate([coarse[np.abs(coarse - best) > COARSE_STEP + 1e-6], fine])
     known = dict(zip(coarse.tolist(), scores, strict=True))
-    scores = [known.get(x) or edges.axes(assumed_px * np.exp(x))[0] for x in log_ratio.tolist()]
+    scores = [known.get(x) or edges.support(assumed_px * np.exp(x)) for x in log_ratio.tolist()]
     mean, deviation = _moments(log_ratio, scores)
     return FocalLength(assumed_px * float(np.exp(mean)), deviation) if deviation < CERTAIN else None
 

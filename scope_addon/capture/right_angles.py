@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .line_segments import Segments, plane_normals
-from .vertical_lines import may_be_upright, meeting_directions
+from .vertical_lines import LARGEST_TILT, may_be_upright, meeting_directions
 
 EDGE_SIGMA = np.radians(1.0)
 MOST_EDGES = 120
@@ -27,6 +27,8 @@ CANDIDATES = 60  # edges of which each may be level, the longest ones
 UPRIGHTS = 16  # directions that may be up, the best by the edges
 UPRIGHTS_APART = np.radians(0.7)
 _BLOCK = 256
+_TILTS = np.arange(-LARGEST_TILT, LARGEST_TILT + 1e-9, np.radians(1.0))
+_TILTED = np.stack([np.zeros_like(_TILTS), -np.cos(_TILTS), np.sin(_TILTS)], axis=1)  # of a camera that is not rolled
 
 
 @dataclass(frozen=True)
@@ -48,10 +50,26 @@ class Edges:
 
     def axes(self, focal_px: float) -> tuple[float, np.ndarray]:
         """Sides of the picture that the best three directions explain; these, (3, 3) rows u, h, u × h, camera frame."""
-        rays = np.concatenate([self.ends, np.full((*self.ends.shape[:2], 1), focal_px, np.float32)], axis=-1)
-        normals = plane_normals(rays)
+        normals = self._normals(focal_px)
+        return self._best(self._uprights(normals, focal_px), normals, focal_px)
+
+    def support(self, focal_px: float) -> float:
+        """Sides of the picture that the best three directions explain, whether any edge is upright or not.
+
+        With a focal length at which no two edges meet upright, the level ones alone may be explained as well as with
+        another at which two happen to meet: by a camera that is only tilted.
+        """
+        normals = self._normals(focal_px)
+        return self._best(self._uprights(normals, focal_px) or list(_TILTED), normals, focal_px)[0]
+
+    def _normals(self, focal_px: float) -> np.ndarray:
+        """(N, 3) of the planes through the camera's centre."""
+        return plane_normals(np.concatenate([self.ends, np.full((*self.ends.shape[:2], 1), focal_px, np.float32)], -1))
+
+    def _best(self, uprights: list[np.ndarray], normals: np.ndarray, focal_px: float) -> tuple[float, np.ndarray]:
+        """As `axes`, of those with one of these directions up."""
         score, axes = 0.0, np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
-        for up in self._uprights(normals, focal_px):
+        for up in uprights:
             level = np.cross(normals[:CANDIDATES], up)  # along the edge, if it is level
             size = np.linalg.norm(level, axis=1)
             level = level[size > 0.1] / size[size > 0.1, None]

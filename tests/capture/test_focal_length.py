@@ -9,6 +9,7 @@ import pytest
 from scope.scope_addon.capture.camera import choose_camera, pinhole
 from scope.scope_addon.capture.focal_length import focal_from_edges
 from scope.scope_addon.capture.line_segments import Segments, find_segments
+from scope.scope_addon.capture.right_angles import Edges
 from scope.solver.rotations import exp
 
 WIDTH, HEIGHT = 1280, 720
@@ -59,6 +60,20 @@ def test_a_wall_seen_straight_on_tells_nothing():
         cv2.line(wall, (60 + 100 * k, 80), (60 + 100 * k, 640), (30, 30, 30), 3)
         cv2.line(wall, (60, 80 + 50 * k), (1200, 80 + 50 * k), (220, 220, 220), 3)
     assert found(wall) is None
+
+
+@pytest.mark.parametrize("ratio", [0.5, 1.0, 2.0])
+def test_level_edges_count_at_every_focal_length_where_none_is_upright(ratio):
+    """Else a focal length at which two edges happen to meet straight above would have nothing to compare with."""
+    floor = np.full((HEIGHT, WIDTH, 3), 120, np.uint8)
+    for y in (380, 400, 470, 690):
+        cv2.line(floor, (40, y), (1240, y), (30, 30, 30), 3)
+    for side in (-1, 1):  # a mat's, which meet at the horizon
+        cv2.line(floor, (640 + side * 260, 470), (640 + side * 640, 690), (220, 220, 220), 3, cv2.LINE_AA)
+    edges = Edges.of(find_segments(floor, []), WIDTH, HEIGHT)
+    level = np.abs(edges.along[:, 1]) < 0.01
+    assert level.sum() >= 4
+    assert edges.support(ratio * ASSUMED) > 0.95 * edges.weight[level].sum()
 
 
 def test_nothing_and_rubbish_tell_nothing_far_from_what_was_assumed():
