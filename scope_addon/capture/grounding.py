@@ -96,9 +96,9 @@ def stand_on_floor(
     return rotations, root_cam
 
 
-def along_sight(root: np.ndarray) -> np.ndarray:
-    """(T, 3) unit vectors from the camera's centre to positions (T, 3) about it."""
-    return root / np.maximum(np.linalg.norm(root, axis=1, keepdims=True), 1e-9)
+def along_sight(position: np.ndarray) -> np.ndarray:
+    """(..., 3) unit vectors from the camera's centre to positions (..., 3) about it."""
+    return position / np.maximum(np.linalg.norm(position, axis=-1, keepdims=True), 1e-9)
 
 
 def standing_probability(
@@ -119,12 +119,11 @@ def standing_probability(
     speed, allowed = np.zeros(height.shape), np.full(height.shape, CONTACT_HEIGHT_M)
     if len(times) > 2:
         velocity = np.gradient(gaussian_smooth(soles, times, CONTACT_CUTOFF_HZ), times, axis=0)
-        if center is not None:
-            sight = soles - np.expand_dims(center, -2)
-            sight = sight / np.maximum(np.linalg.norm(sight, axis=-1, keepdims=True), 1e-9)
-            velocity = velocity - sight * (velocity * sight).sum(-1, keepdims=True)
-        speed = np.linalg.norm(velocity, axis=-1)
-        if center is not None:
+        if center is None:
+            speed = np.linalg.norm(velocity, axis=-1)
+        else:
+            sight = along_sight(soles - np.expand_dims(center, -2))
+            speed = np.linalg.norm(velocity - sight * (velocity * sight).sum(-1, keepdims=True), axis=-1)
             mean_speed = np.sqrt(gaussian_smooth(np.square(speed), times, STILL_CUTOFF_HZ))
             allowed += WRONG_DEPTH_M * np.abs(sight @ up) * _logistic(4 * (1 - mean_speed / STILL_M_S))
     return _logistic(4 * (1 - speed / CONTACT_SPEED_M_S)) * _logistic(4 * (1 - height / allowed))

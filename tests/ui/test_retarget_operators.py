@@ -9,8 +9,8 @@ from scope.scope_addon.scene.visibility import hide_again, show
 from scope.scope_addon.ui.captured_person import captured_armature
 
 from ..edit.walking import RATE, motion_of, walk
+from ..scene.exported import read_back
 from ..scene.made_rigs import build_rig, captured, seen
-from ..scene.test_export import read_back
 
 
 @pytest.fixture
