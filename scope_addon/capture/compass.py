@@ -22,7 +22,7 @@ import numpy as np
 from ...solver.rotations import exp, log
 from .camera import Camera
 from .line_segments import Lines, Segments
-from .right_angles import Edges
+from .right_angles import Edges, line_pull
 from .smoothing import gaussian_smooth
 
 LOOKS_EVERY_S = 0.5
@@ -80,16 +80,8 @@ def without_drift(
 def _drift(lines: Lines, axes: np.ndarray, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """δ (3, 3) from ``start``, and how much each of the directions ``axes`` (3, 3) explains, in sides."""
     E = start.T
-    row = np.arange(len(lines.normals))
     supports: np.ndarray = np.zeros(3)
     for sigma in NARROWING:
-        directions = axes @ E.T
-        off = lines.normals @ directions.T
-        nearest = np.abs(off).argmin(axis=1)
-        residual = off[row, nearest]
-        weight = lines.lengths * np.exp(-0.5 * (residual / sigma) ** 2)
-        supports = np.bincount(nearest, weight, minlength=3)
-        J = np.cross(directions[nearest], lines.normals)
-        step = np.linalg.solve((weight[:, None] * J).T @ J + 1e-3 * np.eye(3), -(weight * residual) @ J)
-        E = exp(step) @ E
+        H, g, supports = line_pull(lines, axes @ E.T, sigma)
+        E = exp(np.linalg.solve(H + 1e-3 * np.eye(3), g)) @ E
     return E.T, supports

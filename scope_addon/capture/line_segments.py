@@ -23,7 +23,7 @@ BAR_MARGIN_PX = 6.0  # by which the edge of a bar may be off
 
 @dataclass(frozen=True)
 class Lines:
-    """Straight lines as a camera sees them."""
+    """Straight lines as a camera sees them, the longest first."""
 
     normals: np.ndarray  # (N, 3) of the planes that they span with the camera's centre
     lengths: np.ndarray  # (N,) in sides of the picture

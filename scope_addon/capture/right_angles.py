@@ -7,7 +7,8 @@ directions explain an edge i if one of the three points lies along it, within an
     score(f) = max over u, h of Σ_i w_i max_d exp(−sin² ∠_i / 2 s²)
 
 w_i the edge's length in sides of the picture. Angles are those in the picture, since those between planes through the
-camera's centre shrink when f grows.
+camera's centre shrink when f grows. Where f is known, such planes are simpler (`line_pull`): with unit normals n_i,
+edges along d have n_i·d = 0.
 
 Source: Coughlan and Yuille 2003.
 """
@@ -18,9 +19,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .line_segments import Segments, plane_normals
-from .vertical_lines import LARGEST_TILT, may_be_upright, meeting_directions
+from .line_segments import Lines, Segments, plane_normals
 
+LARGEST_TILT = np.radians(25.0)  # between the picture's up and what edges may say
+NEARLY = np.radians(0.8)  # by which an edge's plane may miss a direction that it has
 EDGE_SIGMA = np.radians(1.0)
 MOST_EDGES = 120
 CANDIDATES = 60  # edges of which each may be level, the longest ones
@@ -105,3 +107,38 @@ class Edges:
         across = x * self.along[:, 1] - y * self.along[:, 0]
         sine2 = across * across / np.maximum(x * x + y * y, np.float32(1e-12))
         return np.exp(np.float32(-0.5 / EDGE_SIGMA**2) * sine2)
+
+
+def may_be_upright(normals: np.ndarray, up: np.ndarray) -> np.ndarray:
+    """(N,) whether lines with these normals (N, 3) can run along a direction near ``up``."""
+    return np.abs(normals @ up) < np.sin(LARGEST_TILT + NEARLY)
+
+
+def meeting_directions(normals: np.ndarray, up: np.ndarray) -> np.ndarray:
+    """(n, 3) the directions near ``up`` in which pairs of lines with these normals (N, 3) meet."""
+    i, j = np.triu_indices(len(normals), 1)
+    v = np.cross(normals[i], normals[j])
+    size = np.linalg.norm(v, axis=1)
+    v = v[size > 0.02] / size[size > 0.02, None]
+    v *= np.where(v @ up < 0, -1.0, 1.0)[:, None]
+    return v[v @ up > np.cos(LARGEST_TILT)]
+
+
+def line_pull(
+    lines: Lines, directions: np.ndarray, sigma: float, worth: np.ndarray | float = 1.0
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """What lines ask of a small turn ω of three directions, each line of the direction that is nearest to it.
+
+    With r_i = min_d n_i·d and J_i = d × n_i, the Gauss-Newton step of max Σ_i v_d w_i exp(−r_i² / 2σ²) is ω = H⁻¹ g:
+    H = Σ_i ρ_i J_i J_iᵀ and g = −Σ_i ρ_i r_i J_i with ρ_i = v_d w_i exp(−r_i² / 2σ²).
+
+    :param directions: (3, 3) unit rows;  worth: v, of each direction (3,) or of all.
+    :return: H (3, 3), g (3,), and (3,) how much each direction explains, Σ w_i exp(−r_i² / 2σ²), in sides.
+    """
+    off = lines.normals @ directions.T
+    nearest = np.abs(off).argmin(axis=1)
+    residual = off[np.arange(len(off)), nearest]
+    explained = lines.lengths * np.exp(-0.5 * np.square(residual / sigma))
+    weight = explained * np.broadcast_to(worth, 3)[nearest]
+    J = np.cross(directions[nearest], lines.normals)
+    return (weight[:, None] * J).T @ J, -(weight * residual) @ J, np.bincount(nearest, explained, minlength=3)

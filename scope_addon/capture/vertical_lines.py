@@ -1,68 +1,107 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which way is up by the edges of what people build: walls, doors, posts, which meet at the vertical vanishing point.
+"""Which way is up by the edges of what people build: walls, doors and posts are upright, the rest is level.
 
-A line in the picture and the camera's centre span a plane with unit normal n; an edge along direction v has n·v = 0.
-With u what the body says is up, v maximizes over unit vectors
+A line in the picture and the camera's centre span a plane with unit normal n; an edge along direction d has n·d = 0.
+With u_0 what the body says is up, up u and two level directions h and u × h, all at right angles, maximize
 
-    −∠(v, u)² / 2σ² + κ Σ_i w_i exp(−∠_i² / 2s²),   sin ∠_i = n_i·v,
+    −∠(u, u_0)² / 2σ² + κ Σ_i w_i max(2 c_i(u), c_i(h), c_i(u × h)),   c_i(d) = exp(−(n_i·d)² / 2s²),
 
-w_i the line's length in sides of the picture. The sum's best directions are those of pairs of lines; of these the best
-one is refined. Where too little that is upright is to be seen, nothing is said.
+w_i the line's length in sides of the picture. Lines that agree by chance are more often level than upright, where two
+directions are to choose from. Directions around u_0 are tried, the best of them refined. Nothing is said where three
+directions would explain as much of lines drawn at random, or where too little that is upright is to be seen, unless
+both level directions are, and no other ones do nearly as well: then they tell what is upright to both.
 
-Source: vanishing points by Barnard 1983.
+Source: Coughlan and Yuille 2003.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
+from ...solver.rotations import exp
 from .line_segments import Lines
+from .right_angles import NEARLY, line_pull
 
-LARGEST_TILT = np.radians(25.0)  # between what the body, or the picture, says and what lines may say
+LARGEST_LEAN = np.radians(35.0)  # between what the body says and what lines may say
 BODY_SIGMA = np.radians(10.0)
-LINE_SIGMA = np.radians(0.8)
 KAPPA = 4.0
-LEAST_SUPPORT = 0.4  # sides of the picture, all upright lines together: less may be chance
+WORTH = np.array([2.0, 1.0, 1.0])  # of a line along u, h and u × h
+MOST_LINES = 120
+LEVEL_LINES = 40  # of which each may be level, the longest ones
+STEP = np.radians(2.0)  # between the directions that are tried
+TRIED_SIGMA = np.radians(1.6)  # s while they are
+REFINED = 20
+STEPS = 8
+CHANCE_SHARE, CHANCE_SIGMAS = 0.25, 1.5  # of the lines that three directions explain by chance, and how certainly more
+LEAST_UPRIGHT = 0.25  # sides of the picture, all upright lines together
+LEAST_LEVEL = 1.0  # likewise, along each level direction, where less is upright
+LEAST_MARGIN = 3.0  # and by how much any other up must be worse
+OTHER = np.radians(4.0)  # at least so far off
+
+
+@dataclass(frozen=True)
+class _Axes:
+    directions: np.ndarray  # (3, 3) rows u, h, u × h
+    supports: np.ndarray  # (3,) sides along each
+    score: float
 
 
 def up_from_lines(lines: Lines, up: np.ndarray) -> np.ndarray | None:
     """(3,) the upright direction that lines say, near ``up``, what the body says; None where they do not say any."""
-    near = may_be_upright(lines.normals, up)
-    normals, lengths = lines.normals[near], lines.lengths[near]
-    v = meeting_directions(normals, up)
-    if not len(v):
+    if not len(lines.lengths):
         return None
-    parts = np.array_split(v, len(v) // 500 + 1)
-    best = v[int(np.concatenate([_score(part, normals, lengths, up) for part in parts]).argmax())]
-    for _ in range(5):
-        weight = lengths * _closeness(best[None], normals)[0]
-        best = np.linalg.eigh((weight[:, None] * normals).T @ normals)[1][:, 0]
-        best = best if best @ up > 0 else -best
-    support = float(_closeness(best[None], normals)[0] @ lengths)
-    return best if support > LEAST_SUPPORT and best @ up > np.cos(LARGEST_TILT) else None
+    lines = Lines(lines.normals[:MOST_LINES], lines.lengths[:MOST_LINES])
+    began = [_about(u, lines, up) for u in _around(up)]
+    began = sorted(began, key=lambda axes: -axes.score)[:REFINED]
+    best, *others = sorted((_refined(axes, lines, up) for axes in began), key=lambda axes: -axes.score)
+    found = best.directions[0]
+    share = best.supports.sum() / lines.lengths.sum()
+    count = np.square(lines.lengths.sum()) / np.square(lines.lengths).sum()
+    if share < CHANCE_SHARE + CHANCE_SIGMAS / np.sqrt(count) or found @ up < np.cos(LARGEST_LEAN):
+        return None
+    if best.supports[0] >= LEAST_UPRIGHT:
+        return found
+    second = max((o.score for o in others if o.directions[0] @ found < np.cos(OTHER)), default=-np.inf)
+    is_clear = best.supports[1:].min() >= LEAST_LEVEL and best.score - second > LEAST_MARGIN
+    return found if is_clear else None
 
 
-def may_be_upright(normals: np.ndarray, up: np.ndarray) -> np.ndarray:
-    """(N,) whether lines with these normals (N, 3) can run along a direction near ``up``."""
-    return np.abs(normals @ up) < np.sin(LARGEST_TILT + LINE_SIGMA)
+def _around(up: np.ndarray) -> np.ndarray:
+    """(n, 3) unit vectors about one."""
+    across = np.linalg.svd(up[None])[2][1:]
+    steps = np.tan(np.arange(-LARGEST_LEAN, LARGEST_LEAN + 1e-9, STEP))
+    v = up + (steps[:, None, None] * across[0] + steps[:, None] * across[1]).reshape(-1, 3)
+    v /= np.linalg.norm(v, axis=1, keepdims=True)
+    return v[v @ up > np.cos(LARGEST_LEAN)]
 
 
-def meeting_directions(normals: np.ndarray, up: np.ndarray) -> np.ndarray:
-    """(n, 3) the directions near ``up`` in which pairs of lines with these normals (N, 3) meet."""
-    i, j = np.triu_indices(len(normals), 1)
-    v = np.cross(normals[i], normals[j])
-    size = np.linalg.norm(v, axis=1)
-    v = v[size > 0.02] / size[size > 0.02, None]
-    v *= np.where(v @ up < 0, -1.0, 1.0)[:, None]
-    return v[v @ up > np.cos(LARGEST_TILT)]
+def _about(u: np.ndarray, lines: Lines, up: np.ndarray) -> _Axes:
+    """The best axes with this up, roughly."""
+    level = np.cross(np.concatenate([lines.normals[:LEVEL_LINES], np.eye(3)]), u)  # along the line, if it is level
+    size = np.linalg.norm(level, axis=1)
+    level = level[size > 0.1] / size[size > 0.1, None]
+    across = np.cross(u, level)
+    off2 = np.minimum(np.square(level @ lines.normals.T), np.square(across @ lines.normals.T))
+    explained = np.exp(-0.5 / TRIED_SIGMA**2 * off2)
+    explained = np.maximum(explained, WORTH[0] * np.exp(-0.5 / TRIED_SIGMA**2 * np.square(lines.normals @ u)))
+    support = explained @ lines.lengths
+    best = int(support.argmax())
+    return _Axes(np.array([u, level[best], across[best]]), np.zeros(3), _score(float(support[best]), u, up))
 
 
-def _closeness(v: np.ndarray, normals: np.ndarray) -> np.ndarray:
-    """(n, N) how well lines agree with directions (n, 3): 1 at no angle."""
-    return np.exp(-0.5 * (v @ normals.T / LINE_SIGMA) ** 2)
+def _refined(axes: _Axes, lines: Lines, up: np.ndarray) -> _Axes:
+    directions = axes.directions
+    for _ in range(STEPS):
+        H, g, _ = line_pull(lines, directions, NEARLY, WORTH)
+        u = directions[0]
+        H = KAPPA / NEARLY**2 * H + (np.eye(3) - np.outer(u, u)) / BODY_SIGMA**2 + 1e-9 * np.eye(3)
+        g = KAPPA / NEARLY**2 * g + np.cross(u, up) / BODY_SIGMA**2
+        directions = directions @ exp(np.linalg.solve(H, g)).T
+    supports = line_pull(lines, directions, NEARLY)[2]
+    return _Axes(directions, supports, _score(float(WORTH @ supports), directions[0], up))
 
 
-def _score(v: np.ndarray, normals: np.ndarray, lengths: np.ndarray, up: np.ndarray) -> np.ndarray:
-    """(n,) of directions (n, 3): see above."""
-    angle = np.arccos(np.clip(v @ up, -1.0, 1.0))
-    return KAPPA * (_closeness(v, normals) @ lengths) - 0.5 * (angle / BODY_SIGMA) ** 2
+def _score(support: float, u: np.ndarray, up: np.ndarray) -> float:
+    return KAPPA * support - 0.5 * float(np.arccos(np.clip(u @ up, -1.0, 1.0)) / BODY_SIGMA) ** 2

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Up by upright edges: drawn rooms whose camera is known, and real pictures whose true up is."""
+"""Up by upright and level edges: drawn rooms whose camera is known, and real pictures whose true up is."""
 
 import cv2
 import numpy as np
 import pytest
 from scope.scope_addon.capture.camera import Camera, choose_camera, pinhole
-from scope.scope_addon.capture.line_segments import Lines, find_segments
+from scope.scope_addon.capture.line_segments import Lines, Segments, find_segments
 from scope.scope_addon.capture.vertical_lines import up_from_lines
 from scope.solver.rotations import exp
 
@@ -15,8 +15,8 @@ CAMERA = Camera(K, np.zeros(5), "given")
 LEVEL_UP = np.array([0.0, -1.0, 0.0])
 
 
-def room(R_camera_level, posts=14, clutter=0, seed=0):
-    """A picture of posts and of level edges, with clutter, by a camera that is turned from level."""
+def room(R_camera_level, posts=14, clutter=0, seed=0, across=10, tiles=0):
+    """A picture of posts, of level edges across it, of a tiled floor, and clutter, by a camera turned from level."""
     rng = np.random.default_rng(seed)
     picture = np.full((HEIGHT, WIDTH, 3), 120, np.uint8)
 
@@ -30,9 +30,13 @@ def room(R_camera_level, posts=14, clutter=0, seed=0):
     for _ in range(posts):
         x, z = rng.uniform(-4, 4), rng.uniform(4, 9)
         line([x, -1.5, z], [x, 1.2, z], (30, 30, 30))
-    for _ in range(10):
+    for _ in range(across):
         y, z = rng.uniform(-1.5, 1.2), rng.uniform(4, 9)
         line([-4, y, z], [4, y, z], (220, 220, 220))
+    for k in range(tiles):
+        x = 8 * (k + 0.5) / tiles
+        line([x - 4, 1.2, 3], [x - 4, 1.2, 9], (220, 220, 220))
+        line([-4, 1.2, x + 2], [4, 1.2, x + 2], (220, 220, 220))
     for _ in range(clutter):
         a = rng.uniform([-4, -1.5, 4], [4, 1.2, 9])
         line(a, a + rng.uniform(-0.7, 0.7, 3), (60, 60, 200))
@@ -54,6 +58,40 @@ def test_posts_correct_a_body_that_leans(turn):
     assert angle_deg(found, truth) < 1.0
 
 
+@pytest.mark.parametrize("turn", [[0, 0, 0], [0.25, 0, 0.0], [-0.1, 0.3, 0.2], [0.2, -0.5, -0.2]])
+def test_a_tiled_floor_tells_up_without_anything_upright(turn):
+    R = exp(turn)
+    truth = R @ LEVEL_UP
+    picture = room(R, posts=0, across=0, tiles=8, clutter=10)
+    leaning = exp([0.12, 0.0, 0.15]) @ truth
+    assert angle_deg(up_from_lines(find_segments(picture, []).lines(CAMERA), leaning), truth) < 1.0
+
+
+def test_a_body_that_leans_by_half_a_right_angle_and_less_is_corrected():
+    """As bodies seem to before a camera that looks down steeply."""
+    truth = LEVEL_UP
+    lines = find_segments(room(np.eye(3), tiles=4), []).lines(CAMERA)
+    assert angle_deg(up_from_lines(lines, exp([np.radians(30), 0.0, 0.0]) @ truth), truth) < 1.0
+
+
+def test_few_posts_are_believed_where_level_edges_agree():
+    R = exp([0.2, 0.1, 0.1])
+    lines = find_segments(room(R, posts=3, across=12, tiles=4), []).lines(CAMERA)
+    truth = R @ LEVEL_UP
+    assert angle_deg(up_from_lines(lines, exp([0.15, 0.0, 0.1]) @ truth), truth) < 1.0
+
+
+@pytest.mark.parametrize("count", [12, 60, 200])
+@pytest.mark.parametrize("seed", range(4))
+def test_lines_at_random_say_nothing(count, seed):
+    rng = np.random.default_rng(seed)
+    middle, angle = rng.uniform([0, 0], [WIDTH, HEIGHT], (count, 2)), rng.uniform(0, np.pi, count)
+    lengths = np.sort(0.03 + rng.exponential(0.08, count))[::-1]
+    half = 0.5 * WIDTH * lengths[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    lines = Segments(np.stack([middle - half, middle + half], axis=1), lengths).lines(CAMERA)
+    assert up_from_lines(lines, LEVEL_UP) is None
+
+
 def test_a_picture_without_anything_upright_says_nothing():
     assert up_from_lines(Lines.none(), LEVEL_UP) is None
     blank = np.full((HEIGHT, WIDTH, 3), 90, np.uint8)
@@ -66,7 +104,7 @@ def test_a_picture_without_anything_upright_says_nothing():
 def test_leaves_and_rubbish_do_not_turn_the_world(seed):
     rubbish = room(np.eye(3), posts=0, clutter=60, seed=seed)
     found = up_from_lines(find_segments(rubbish, []).lines(CAMERA), LEVEL_UP)
-    assert found is None or angle_deg(found, LEVEL_UP) < 6.0
+    assert found is None or angle_deg(found, LEVEL_UP) < 2.0
 
 
 def test_the_lines_of_people_do_not_count():
@@ -96,4 +134,4 @@ def test_real_cameras_that_are_rolled_and_pitched(shared, number):
     rng = np.random.default_rng(number)
     for _ in range(3):
         leaning = exp(np.radians(7) * rng.standard_normal(3)) @ truth
-        assert angle_deg(up_from_lines(lines, leaning), truth) < 6.0
+        assert angle_deg(up_from_lines(lines, leaning), truth) < 2.0
