@@ -15,7 +15,7 @@ from .camera import Camera
 from .camera_path import CameraPath
 from .fitting import FittedTrack, Stance
 from .frame_blocks import by_blocks
-from .grounding import along_sight, correct_depth, on_floor, stand_on_floor, standing_probability
+from .grounding import along_sight, correct_depth, on_floor, stand_on_floor
 from .hand_measure import HAND_KEYPOINT_NAMES
 from .landmark_network import KEYPOINT_NAMES
 from .line_segments import Lines
@@ -24,7 +24,6 @@ from .smoothing import gaussian_smooth
 from .track import Track
 from .world import estimate_world
 
-LONGEST_STEP_S = 1.0  # between two frames of one scene
 STANDING_CUTOFF_HZ = 1.0  # a leg that the floor begins or ceases to bend must not jerk
 
 
@@ -36,11 +35,11 @@ def corrected_stance(
     :param T_floor_camera: (4, 4) the floor at z = 0; None: it is found from this person alone.
     :param balanced: whether weight has to be over feet that stand.
     """
-    valid, root = placed.valid, placed.root
+    root = placed.root
     T = T_floor_camera
     if T is None:
-        T = estimate_world(placed.body, placed.joints[valid], placed.soles[valid], lines)
-    contact = _contact(placed, T[2, :3])
+        T = estimate_world(placed, lines)
+    contact = placed.contact(T[2, :3])
     away = correct_depth(root - placed.center, placed.soles, contact, T, placed.times)
     shift = away[:, None] * along_sight(root - placed.center)
     turn = np.broadcast_to(np.eye(3), (len(root), 3, 3))
@@ -51,17 +50,6 @@ def corrected_stance(
     standing = gaussian_smooth(contact * on_floor(height), placed.times, STANDING_CUTOFF_HZ)
     T_frames = np.broadcast_to(T, (len(root), 4, 4))
     return Stance(root + shift, turn, T_frames[:, 2, :3], -T_frames[:, 2, 3], standing)
-
-
-def _contact(placed: PlacedTrack, up: np.ndarray) -> np.ndarray:
-    """(T, 4) probability that each sole stands, as far as it is seen: imagined feet would hold the body that is not.
-
-    Nothing stands from one scene into the next.
-    """
-    contact = standing_probability(placed.soles, up, placed.times, placed.center)
-    contact *= placed.soles_seen * placed.valid[:, None]
-    contact[1:][np.diff(placed.times) > LONGEST_STEP_S] = 0.0
-    return contact
 
 
 def assemble_motion(
@@ -99,11 +87,11 @@ def assemble_motion(
     path = path or CameraPath.on_a_stand(len(track))
     local, root = placed.rotations, placed.root
     if T_world_camera is None:
-        T_world_camera = estimate_world(body, placed.joints[valid], placed.soles[valid], lines)
+        T_world_camera = estimate_world(placed, lines)
     T_floor_camera = T_world_camera.copy()
     T_floor_camera[2, 3] -= floor_m
     R_world_camera, t_world_camera = T_world_camera[:3, :3], T_world_camera[:3, 3]
-    contact = _contact(placed, R_world_camera[2])
+    contact = placed.contact(R_world_camera[2])
     J0 = body.rest_joints(betas)[0]
 
     def in_world(rotation: np.ndarray, position: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

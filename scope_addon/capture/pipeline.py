@@ -306,7 +306,7 @@ def solve(
     placed = place()
     if not (path.is_static or picture):
         first = placed[0]
-        up = estimate_world(body, first.joints[first.valid], first.soles[first.valid], lines)[2, :3]
+        up = estimate_world(first, lines)[2, :3]
         path = replace(path, center=camera_travel(first.soles, first.valid, up, first.times))
         del first
         placed.clear()

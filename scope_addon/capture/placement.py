@@ -12,12 +12,14 @@ from .camera_path import CameraPath
 from .compact import compact
 from .fitting import FittedTrack
 from .frame_blocks import by_blocks
+from .grounding import standing_probability
 from .smoothing import fill_gaps, fill_rotation_gaps, smooth_root, smooth_rotations
 from .soles import FOOT_PARTS, sole_points, with_soles
 from .track import Track
 
 # From here on a foot is seen, if badly; behind something it has 0.1 and more, beside the picture less than 0.01.
 SEEN_CONFIDENCE = 0.1
+LONGEST_STEP_S = 1.0  # between two frames of one scene
 
 
 @dataclass(frozen=True)
@@ -38,6 +40,16 @@ class PlacedTrack:
     def place(self, rotations: np.ndarray, root: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Joints (T, K+1, 3) and soles (T, 4, 3) of another motion of this body, camera frame."""
         return _place(self.body, self.betas, rotations, root)
+
+    def contact(self, up: np.ndarray) -> np.ndarray:
+        """(T, 4) probability that each sole stands, as far as it is seen: imagined feet hold nobody.
+
+        Nothing stands from one scene into the next.
+        """
+        contact = standing_probability(self.soles, up, self.times, self.center)
+        contact *= self.soles_seen * self.valid[:, None]
+        contact[1:][np.diff(self.times) > LONGEST_STEP_S] = 0.0
+        return contact
 
 
 def place_track(

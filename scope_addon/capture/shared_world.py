@@ -11,7 +11,7 @@ from ...solver.body import Body
 from ...solver.frames import world_from_level_camera
 from .line_segments import Lines
 from .placement import PlacedTrack
-from .world import up_from_standing, upright
+from .world import floor_height, up_from_standing, upright
 
 SAME_FLOOR_M = 0.4  # how far apart, for their distances are not known well, the feet of people on one floor may seem
 
@@ -43,7 +43,8 @@ def share_world(body: Body, placed: list[PlacedTrack], lines: Lines | None = Non
     up = up_from_standing(body, np.concatenate(all_joints))
     centered = [soles - _lowest(soles, up).mean(axis=0) for soles in all_soles]
     up = upright(up, np.concatenate(centered), lines)
-    heights = [float(np.median(_lowest(soles, up) @ up)) for soles in all_soles]
+    stands = [person.contact(up)[rows] for person, rows in zip(placed, seen, strict=True)]
+    heights = [floor_height(soles, contact, up) for soles, contact in zip(all_soles, stands, strict=True)]
     T_world_camera = world_from_level_camera(up, height=-heights[0])
     start = T_world_camera[:3, :3] @ all_joints[0][0, 0] + T_world_camera[:3, 3]
     T_world_camera[:2, 3] -= start[:2]

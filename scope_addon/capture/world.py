@@ -8,10 +8,12 @@ import numpy as np
 from ...solver.body import Body
 from ...solver.frames import transform_points, world_from_level_camera
 from .line_segments import Lines
+from .placement import PlacedTrack
 from .vertical_lines import up_from_lines
 
 STANDING_KNEE_COS = np.cos(np.radians(30.0))  # thigh and shank within 30 degrees of one line
 FLOOR_NOISE_M = 0.05  # scatter of a supporting foot's depth-borne height
+LEAST_CONTACT = 1e-3  # of a frame, beside the probability that a foot stands
 UP_NOISE_RAD = np.radians(5.0)  # scatter of the body's own up direction over a clip
 
 
@@ -76,18 +78,31 @@ def upright(up_body: np.ndarray, feet_cam: np.ndarray, lines: Lines | None) -> n
     return up_from_floor(feet_cam, up_body) if by_lines is None else by_lines
 
 
-def estimate_world(
-    body: Body, joints_cam: np.ndarray, soles_cam: np.ndarray, lines: Lines | None = None
-) -> np.ndarray:
+def floor_height(soles_cam: np.ndarray, contact: np.ndarray, up: np.ndarray) -> float:
+    """Height, along ``up`` from the camera, of what a person stands on: of each frame's lowest sole, the median.
+
+    Frames count as far as anything stands in them: who jumps or hangs by the hands for most of a clip is not on the
+    floor then. Where nothing ever stands, all frames count alike.
+
+    :param soles_cam, contact: (T, F, 3) and (T, F) the probability that each stands.
+    """
+    lowest = (soles_cam @ up).min(axis=1)
+    weight = contact.max(axis=1) + LEAST_CONTACT
+    order = np.argsort(lowest)
+    sums = np.cumsum(weight[order])
+    return float(lowest[order[np.searchsorted(sums, 0.5 * sums[-1])]])
+
+
+def estimate_world(placed: PlacedTrack, lines: Lines | None = None) -> np.ndarray:
     """World of a static camera: z up, the floor at z = 0, the person's first position above the origin.
 
-    :param joints_cam, soles_cam: (T, K+1, 3) and (T, 4, 3) of the valid frames.
     :param lines: of the background, which know better than a body that leans.
     :return: (4, 4) world_from_camera.
     """
-    up = upright(up_from_standing(body, joints_cam), soles_cam, lines)
-    lowest = (soles_cam @ up).min(1)
-    T_world_camera = world_from_level_camera(up, height=-float(np.median(lowest)))
-    start = transform_points(T_world_camera, joints_cam[:1, 0])[0]
+    seen = placed.valid
+    joints, soles = placed.joints[seen], placed.soles[seen]
+    up = upright(up_from_standing(placed.body, joints), soles, lines)
+    T_world_camera = world_from_level_camera(up, height=-floor_height(soles, placed.contact(up)[seen], up))
+    start = transform_points(T_world_camera, joints[:1, 0])[0]
     T_world_camera[:2, 3] -= start[:2]
     return T_world_camera

@@ -3,6 +3,7 @@
 
 import numpy as np
 import pytest
+from scope.scope_addon.capture.placement import PlacedTrack
 from scope.scope_addon.capture.soles import sole_points, with_soles
 from scope.scope_addon.capture.world import estimate_world, up_from_standing
 from scope.solver import rotations
@@ -24,6 +25,18 @@ def walk(body, T=60, lean_deg=0.0):
     return R, t
 
 
+def seen_by(body, R, t, camera_from_world):
+    """The motion of part poses in the world before a camera, 30 frames a second, everything seen."""
+    soled, T = with_soles(body, np.zeros(body.P)), len(t)
+    joints, R_camera = transform_points(camera_from_world, t), camera_from_world[:3, :3] @ R
+    soles = sole_points(soled, R_camera, joints)
+    every = np.ones(T, bool)
+    return PlacedTrack(
+        soled, np.zeros(body.P), np.arange(T) / 30, every, R_camera, joints[:, 0], joints, soles, np.ones((T, 4)),
+        np.zeros((T, 3)),
+    )  # fmt: skip
+
+
 @pytest.mark.parametrize("pitch_deg", [-20.0, 0.0, 15.0])
 @pytest.mark.parametrize("roll_deg", [0.0, 8.0])
 def test_up_and_floor_are_recovered_from_a_walk(pitch_deg, roll_deg):
@@ -33,15 +46,27 @@ def test_up_and_floor_are_recovered_from_a_walk(pitch_deg, roll_deg):
     truth = world_from_level_camera(up, height=1.6)
     truth[:3, 3] += truth[:3, :3] @ [0, 0, -5.0] * [1, 1, 0]
     camera_from_world = np.linalg.inv(truth)
-    joints_cam = transform_points(camera_from_world, t)
-    soles_cam = sole_points(with_soles(body, np.zeros(body.P)), camera_from_world[:3, :3] @ R, joints_cam)
-    got = estimate_world(body, joints_cam, soles_cam)
+    placed = seen_by(body, R, t, camera_from_world)
+    got = estimate_world(placed)
     angle = np.degrees(np.arccos(np.clip(got[2, :3] @ truth[2, :3], -1, 1)))
     assert angle < 2.0
     # The person is up to 6.5 m away: the camera's height above the floor is as uncertain as the angle makes it.
     assert abs(got[2, 3] - 1.6) < 0.01 + 6.5 * np.sin(np.radians(angle))
-    assert abs(np.median(transform_points(got, soles_cam)[..., 2].min(1))) < 1e-6
-    assert np.allclose(transform_points(got, joints_cam[:1, 0])[0, :2], 0)
+    assert abs(np.median(transform_points(got, placed.soles)[..., 2].min(1))) < 0.01
+    assert np.allclose(transform_points(got, placed.joints[:1, 0])[0, :2], 0)
+
+
+def test_who_leaps_for_most_of_a_clip_stands_on_the_floor_between():
+    """Leaps of half a second, 0.3 m high, and a fifth of a second on the floor after each."""
+    body = load_body("scope")
+    R, t = (np.repeat(each[:1], 84, axis=0) for each in walk(body))
+    since = np.arange(84) % 21 / 30
+    t[..., 2] += np.where(since < 0.5, 4.9 * since * (0.5 - since), 0.0)[:, None]
+    truth = world_from_level_camera(np.array([0, -1.0, 0]), height=1.6)
+    placed = seen_by(body, R, t + np.array([0, 5.0, 0]), np.linalg.inv(truth))
+    lowest = transform_points(estimate_world(placed), placed.soles)[..., 2].min(axis=1)
+    assert abs(lowest.min()) < 0.01
+    assert np.median(lowest) > 0.1
 
 
 @pytest.mark.parametrize("standing", [0, 20])
