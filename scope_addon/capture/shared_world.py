@@ -11,7 +11,7 @@ from ...solver.body import Body
 from ...solver.frames import world_from_level_camera
 from .line_segments import Lines
 from .placement import PlacedTrack
-from .world import floor_height, up_from_standing, upright
+from .world import floor_height, up_from_bodies, upright
 
 SAME_FLOOR_M = 0.4  # how far apart, for their distances are not known well, the feet of people on one floor may seem
 
@@ -40,7 +40,7 @@ def share_world(body: Body, placed: list[PlacedTrack], lines: Lines | None = Non
     seen = [slice(None) if person.valid.all() else person.valid for person in placed]
     all_soles = [person.soles[rows] for person, rows in zip(placed, seen, strict=True)]
     all_joints = [person.joints[rows] for person, rows in zip(placed, seen, strict=True)]
-    up = up_from_standing(body, np.concatenate(all_joints))
+    up = up_from_bodies(placed)
     centered = [soles - _lowest(soles, up).mean(axis=0) for soles in all_soles]
     up = upright(up, np.concatenate(centered), lines)
     stands = [person.contact(up)[rows] for person, rows in zip(placed, seen, strict=True)]

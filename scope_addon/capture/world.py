@@ -3,16 +3,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from ...solver.body import Body
 from ...solver.frames import transform_points, world_from_level_camera
+from .balance import center_of_mass
 from .line_segments import Lines
 from .placement import PlacedTrack
 from .vertical_lines import up_from_lines
 
 STANDING_KNEE_COS = np.cos(np.radians(30.0))  # thigh and shank within 30 degrees of one line
 FLOOR_NOISE_M = 0.05  # scatter of a supporting foot's depth-borne height
+STANCE_M = 0.2  # what a frame's stance tells of up, as far as the centre of mass of one who stands is over the feet
+ROUNDS = 2
 LEAST_CONTACT = 1e-3  # of a frame, beside the probability that a foot stands
 UP_NOISE_RAD = np.radians(5.0)  # scatter of the body's own up direction over a clip
 
@@ -55,6 +60,29 @@ def up_from_standing(body: Body, joints_cam: np.ndarray) -> np.ndarray:
     return total / np.linalg.norm(total)
 
 
+def up_from_bodies(people: Sequence[PlacedTrack]) -> np.ndarray:
+    """Up direction in the camera frame from people who stand, walk or bend: their weight is over their feet.
+
+    With d_t from the middle of the soles that stand to the centre of mass, w_t the probability that any stands, and u_0
+    what the bodies' own axes say (`up_from_standing`), Σ_t (a u_0 + w_t (y·d_t / |d_t|)² d_t) points up: forces average
+    out over a clip. Those who lie have feet that keep still as well; y, up in the picture, leaves them out.
+
+    :return: (3,) unit vector.
+    """
+    start = up_from_standing(people[0].body, np.concatenate([each.joints[each.valid] for each in people]))
+    level, up = np.array([0.0, -1.0, 0.0]), start
+    for _ in range(ROUNDS):
+        total = np.zeros(3)
+        for each in people:
+            contact = each.contact(up)
+            share = contact / np.maximum(contact.sum(axis=1, keepdims=True), 1e-9)
+            above = center_of_mass(each.body, each.joints) - (share[..., None] * each.soles).sum(axis=1)
+            upright = np.maximum(above @ level, 0.0) / np.maximum(np.linalg.norm(above, axis=1), 1e-9)
+            total += STANCE_M * each.valid.sum() * start + (contact.max(axis=1) * upright**2) @ above
+        up = total / np.linalg.norm(total)
+    return up
+
+
 def up_from_floor(feet_cam: np.ndarray, up: np.ndarray) -> np.ndarray:
     """Turns ``up`` so that the supporting feet lie in one level plane, as far as they are spread over the floor.
 
@@ -73,7 +101,7 @@ def up_from_floor(feet_cam: np.ndarray, up: np.ndarray) -> np.ndarray:
 
 
 def upright(up_body: np.ndarray, feet_cam: np.ndarray, lines: Lines | None) -> np.ndarray:
-    """(3,) up, from the body's own: by the lines of the background, or else by where the feet were."""
+    """(3,) up, from what bodies say: by the lines of the background, or else by where the feet were."""
     by_lines = up_from_lines(lines, up_body) if lines is not None else None
     return up_from_floor(feet_cam, up_body) if by_lines is None else by_lines
 
@@ -101,7 +129,7 @@ def estimate_world(placed: PlacedTrack, lines: Lines | None = None) -> np.ndarra
     """
     seen = placed.valid
     joints, soles = placed.joints[seen], placed.soles[seen]
-    up = upright(up_from_standing(placed.body, joints), soles, lines)
+    up = upright(up_from_bodies([placed]), soles, lines)
     T_world_camera = world_from_level_camera(up, height=-floor_height(soles, placed.contact(up)[seen], up))
     start = transform_points(T_world_camera, joints[:1, 0])[0]
     T_world_camera[:2, 3] -= start[:2]

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scope.scope_addon.capture.placement import PlacedTrack
 from scope.scope_addon.capture.soles import sole_points, with_soles
-from scope.scope_addon.capture.world import estimate_world, up_from_standing
+from scope.scope_addon.capture.world import estimate_world, up_from_bodies, up_from_standing
 from scope.solver import rotations
 from scope.solver.body import load_body
 from scope.solver.frames import R_WORLD_MODEL, transform_points, world_from_level_camera
@@ -67,6 +67,36 @@ def test_who_leaps_for_most_of_a_clip_stands_on_the_floor_between():
     lowest = transform_points(estimate_world(placed), placed.soles)[..., 2].min(axis=1)
     assert abs(lowest.min()) < 0.01
     assert np.median(lowest) > 0.1
+
+
+def centroid(vertices, faces):
+    """Of the volume within a closed surface: tetrahedra from the origin."""
+    a, b, c = (vertices[faces[:, k]] for k in range(3))
+    volume = np.einsum("ij,ij->i", a, np.cross(b, c))
+    return (volume[:, None] * (a + b + c)).sum(0) / (4 * volume.sum())
+
+
+@pytest.mark.parametrize("pitch_deg", [-25.0, 0.0, 20.0])
+def test_who_bends_over_is_upright_by_the_weight(pitch_deg):
+    """Knees and hips bent, so that no axis of the body is upright, the mesh's centre of volume over the soles."""
+    body = load_body("scope")
+    omega = np.tile(np.eye(3), (body.K + 1, 1, 1))
+    omega[0] = R_WORLD_MODEL
+    for name, degrees in (("hip", -80.0), ("knee", 50.0)):
+        for side in ("left", "right"):
+            omega[body.joint_names.index(f"{side}_{name}")] = rotations.exp(np.radians([degrees, 0, 0]))
+    soled = with_soles(body, np.zeros(body.P))
+    for _ in range(30):
+        R, t = body.forward_kinematics(omega, np.zeros(3))
+        soles = sole_points(soled, R[None], t[None])[0]
+        off = centroid(body.skin(R, t), body.triangles()) - soles.mean(axis=0)
+        omega[0] = rotations.exp([0.5 * off[1] / off[2], -0.5 * off[0] / off[2], 0]) @ omega[0]
+    assert np.hypot(off[0], off[1]) < 0.005
+    R, t = (np.repeat(each[None], 60, axis=0) for each in (R, t + [0.0, 4.0, -soles[:, 2].min()]))
+    up = rotations.exp(np.radians([pitch_deg, 0, 0])) @ [0, -1.0, 0]
+    placed = seen_by(body, R, t, np.linalg.inv(world_from_level_camera(up, height=1.6)))
+    assert np.degrees(np.arccos(up_from_standing(body, placed.joints) @ up)) > 10.0
+    assert np.degrees(np.arccos(up_from_bodies([placed]) @ up)) < 8.0
 
 
 @pytest.mark.parametrize("standing", [0, 20])
