@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`./scripts/bench renders`: captures of rendered clips, whose truth is exact, with the focal length unknown and given.
+"""`./scripts/bench renders`: captures of rendered clips, whose truth is exact, with and without focal length or height.
 
 The clips are `held_out`'s shots, and the sample clip, which no mean contains.
 """
@@ -38,8 +38,11 @@ SHOWN = {
 }
 
 
+KNOWN = ("nothing given", "focal length given", "height given")
+
+
 def renders(quick: bool) -> dict:
-    """Render what is missing, measure, print the tables as they come, return the figures by preset and focal length."""
+    """Render what is missing, measure, print the tables as they come, return the figures by preset and by ``KNOWN``."""
     if not DATA.is_dir():
         print(f"{DATA} is not beside this checkout: nothing was measured", file=sys.stderr)
         return {}
@@ -52,31 +55,33 @@ def renders(quick: bool) -> dict:
     figures: dict = {}
     for quality in (CaptureOptions().quality,) if quick else PRESETS:
         figures[quality] = {}
-        for focal in ("estimated", "given"):
-            found = {
-                name: evaluate_render(body, video, truth, quality, focal == "given")
-                for name, (video, truth) in clips.items()
-            }
+        for known in KNOWN:
+            found = {name: evaluate_render(body, *files, quality, known) for name, files in clips.items()}
             mean = mean_of([row for name, row in found.items() if name != "sample"])
-            figures[quality][focal] = found | {"mean": mean}
-            rows = [[name, *(row.get(key) for key in SHOWN)] for name, row in figures[quality][focal].items()]
-            print(table((f"{quality}, focal length {focal}", *SHOWN.values()), rows), end="\n\n", flush=True)
+            figures[quality][known] = found | {"mean": mean}
+            rows = [[name, *(row.get(key) for key in SHOWN)] for name, row in figures[quality][known].items()]
+            print(table((f"{quality}, {known}", *SHOWN.values()), rows), end="\n\n", flush=True)
     return figures
 
 
-def evaluate_render(body: Body, video: Path, truth: Path, quality: str, focal_given: bool) -> dict:
+def evaluate_render(body: Body, video: Path, truth: Path, quality: str, known: str) -> dict:
     """Return what the evaluation tool says about one clip, ``size``, and what ``against_world`` says.
 
-    Where nobody was found, ``coverage`` alone. ``size``: the result's over the truth's, median of the frames.
+    ``known``: one of ``KNOWN``. Where nobody was found, ``coverage`` alone. ``size``: the result's over the truth's,
+    median of the frames.
     """
     with np.load(truth) as data:
-        known = {key: data[key] for key in data.files}
-    options = CaptureOptions(quality=quality, fov_deg=_field_of_view(known) if focal_given else None)
+        true = {key: data[key] for key in data.files}
+    options = CaptureOptions(
+        quality=quality,
+        fov_deg=_field_of_view(true) if known == "focal length given" else None,
+        heights_m=(body.stature(true["betas"].astype(float)),) if known == "height given" else (),
+    )
     try:
         motion, figures = evaluate_clip(body, video, truth, options)
     except NoPersonError:
         return {"coverage": 0.0}
-    return figures | {"size": 1 / figures["pa_scale"]} | against_world(body, motion, known)
+    return figures | {"size": 1 / figures["pa_scale"]} | against_world(body, motion, true)
 
 
 def against_world(body: Body, motion: Motion, truth: dict[str, np.ndarray]) -> dict[str, float | None]:

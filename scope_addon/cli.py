@@ -113,6 +113,11 @@ def _add_options(capture: argparse.ArgumentParser) -> None:
         "--body", default="scope", help=f"{', '.join(BUILT_IN)}, or your own .npz or .pkl (default: scope)"
     )
     capture.add_argument("--hands", action="store_true", help="fingers too, on scope_h unless --body says otherwise")
+    capture.add_argument(
+        "--height",
+        metavar="CM[,CM...]",
+        help="how tall the people are, the most prominent one first: sets the size of everything (default: found)",
+    )
     capture.add_argument("--focal-mm", type=float, metavar="MM", help="35 mm equivalent focal length of the camera")
     capture.add_argument("--fov", type=float, metavar="DEGREES", help="field of view along the longer side")
     capture.add_argument("--calibration", type=Path, metavar="FILE", help="JSON with intrinsics, dist and size")
@@ -226,6 +231,7 @@ def _body_and_options(args: argparse.Namespace) -> tuple[Body, CaptureOptions]:
         quality=args.quality,
         people=_people(args.people),
         wanted=parse_range(args.start, args.end, args.fps),
+        heights_m=_heights(args.height),
         focal_mm=args.focal_mm,
         fov_deg=args.fov,
         calibration=args.calibration,
@@ -291,6 +297,14 @@ def _people(text: str) -> int | str:
     if not re.fullmatch("[0-9]{1,6}", text) or int(text) < 1:
         raise UsageError(f"--people takes a number from 1 on, all or largest, not {text!r}")
     return int(text)
+
+
+def _heights(text: str | None) -> tuple[float, ...]:
+    """``--height``: centimetres, one number for each person."""
+    try:
+        return tuple(float(number) / 100 for number in text.split(",")) if text is not None else ()
+    except ValueError as error:
+        raise UsageError(f"--height takes centimetres, say 175, or 175,162 for two people, not {text!r}") from error
 
 
 def _rig_of(args: argparse.Namespace, outputs: list[Path]) -> RigSource | None:

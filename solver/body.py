@@ -111,6 +111,10 @@ class Body:
         """v̄(β): (V, 3) metres, model frame."""
         return self.v_template if betas is None else self.v_template + self.shapedirs @ self._betas(betas)
 
+    def stature(self, betas: np.ndarray | None = None) -> float:
+        """Height of who stands: from the lowest to the highest vertex of v̄(β), metres."""
+        return float(np.ptp(self.rest_vertices(betas)[:, 1]))
+
     def _betas(self, betas: np.ndarray) -> np.ndarray:
         betas = np.asarray(betas, float)
         if betas.shape != (self.P,):

@@ -40,6 +40,7 @@ from .measure import DEPTH_SIGMA_M, NEAREST_M, Measurer
 from .parts import ALL_PARTS, Parts
 from .seen_keypoints import as_seen
 from .soles import SOLES, with_soles
+from .stature import with_stature
 from .track import Track
 
 SHAPE_FRAMES = 64  # frames that decide the shape; more of them are more of the same
@@ -148,13 +149,17 @@ class PreparedTrack:
         return replace(self.priors, shape_mean=betas, shape_information=np.eye(self.body.P) * SHAPE_CERTAINTY)
 
 
-def prepare_track(body: Body, track: Track, camera: Camera, parts: Parts = ALL_PARTS) -> PreparedTrack:
+def prepare_track(
+    body: Body, track: Track, camera: Camera, parts: Parts = ALL_PARTS, height_m: float | None = None
+) -> PreparedTrack:
     """Undistort and lift a track; the lifting network runs here and nowhere else."""
     if parts.seen_keypoints and track.knows_depth:  # a network that tells depth is BlazePose's
         body = as_seen(body)
     measurer, pixels = Measurer(body, camera.intrinsics), camera.undistort(track.keypoints_px)
     lifted = _lift(measurer, track, pixels, parts)
     priors = replace(default_priors(body), joint_weights=_joint_weights(body))
+    if height_m is not None:
+        priors = with_stature(priors, body, height_m)
     prepared = PreparedTrack(body, track, measurer, pixels, lifted, priors, parts.weights(WEIGHTS))
     if track.hands is None:
         return prepared

@@ -34,8 +34,10 @@ class LivePose:
 class LiveBody:
     """Fits one body to single observations, in whatever thread asks."""
 
-    def __init__(self, body: Body, camera: Camera, parts: Parts = ALL_PARTS) -> None:
-        self._body, self._camera, self._parts = body, camera, parts
+    def __init__(
+        self, body: Body, camera: Camera, parts: Parts = ALL_PARTS, height_m: float | None = None
+    ) -> None:
+        self._body, self._camera, self._parts, self._height_m = body, camera, parts, height_m
         self.is_ready = False  # whether everything is loaded, and a fit takes some milliseconds
 
     def load(self) -> None:
@@ -56,7 +58,9 @@ class LiveBody:
         tracklet = Tracklet()
         tracklet.add(0, observation)
         track = make_track([0], [0.0], [tracklet])
-        return fit_picture(prepare_track(self._body, track, self._camera, self._parts)) if track.seen[0] else None
+        if not track.seen[0]:
+            return None
+        return fit_picture(prepare_track(self._body, track, self._camera, self._parts, self._height_m))
 
 
 def _placed(body: Body, state: State) -> tuple[np.ndarray, np.ndarray]:

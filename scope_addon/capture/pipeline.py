@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -43,6 +43,7 @@ from .people import PeopleBuilder
 from .placement import PlacedTrack, place_track
 from .scene_cuts import SceneCuts
 from .shared_world import share_world
+from .stature import require_stature
 from .track import Track
 from .tracker import MOST_PEOPLE, PeopleTracker
 from .video import Frame, Video, open_video
@@ -67,6 +68,7 @@ class CaptureOptions:
 
     quality: str = "best"  # fast, balanced, best
     people: int | str = LARGEST  # how many at most; "all"; "largest": the most prominent one over the clip
+    heights_m: Sequence[float] = ()  # of the people, the most prominent one first; of further ones it is found
     focal_mm: float | None = None
     fov_deg: float | None = None
     calibration: Path | None = None
@@ -120,7 +122,7 @@ def capture(
         execution = Execution(options.provider)
         if options.threads > cores:
             execution.warnings.append(f"{options.threads} threads were asked for, but there are {cores} cores")
-        live = LiveBody(body, camera, options.parts)
+        live = LiveBody(body, camera, options.parts, next(iter(options.heights_m), None))
         with BesideTracking(camera, video.width, video.height, live) as beside, _opencv_in_one_thread():
             tracker = PeopleTracker(
                 options.quality,
@@ -148,7 +150,16 @@ def capture(
         turning = background.motion(camera)
         turns = CameraPath.on_a_stand(frames) if turning.is_static else CameraPath.turning(turning.R_first_camera)
         motions, iterations, went = solve(
-            body, tracks, camera, turns, background.lines(turning, camera), smoothing, options.parts, about, progress
+            body,
+            tracks,
+            camera,
+            turns,
+            background.lines(turning, camera),
+            smoothing,
+            options.parts,
+            about,
+            progress,
+            options.heights_m,
         )
         motions = [replace(motion, timestamps=timestamps) for motion in motions]
     if cuts.times_s:
@@ -171,7 +182,7 @@ def capture(
         "frames": frames,
         "people": len(motions),
         "valid_frames": int(motions[0].valid.sum()),
-        "per_person": [_about_person(motion) for motion in motions],
+        "per_person": [_about_person(body, motion) for motion in motions],
         "quality": options.quality,
         "detector": str(options.detector or "built-in"),
         "keypoints": str(options.keypoints or "built-in"),
@@ -205,6 +216,8 @@ def check_options(body: Body, options: CaptureOptions) -> None:
         raise UsageError("the lifter cannot be left out with a keypoint file: such a network tells nothing of depth")
     if options.hands:
         require_fingers(body)
+    for height_m in options.heights_m:
+        require_stature(body, height_m)
     if options.focal_mm is not None or options.fov_deg is not None:
         choose_camera(1, 1, focal_mm=options.focal_mm, fov_deg=options.fov_deg, calibration=options.calibration)
     elif options.calibration:
@@ -283,17 +296,19 @@ def solve(
     parts: Parts,
     about: dict,
     progress: Progress,
+    heights_m: Sequence[float] = (),
 ) -> tuple[list[Motion], float, CameraPath]:
     """Each person on their own, in one world: fitted in each frame's camera, all else in the first frame's axes.
 
     :param tracks: is emptied, person by person: of an hour, everything takes hundreds of megabytes.
     :param path: how the camera turned; returned with how it travelled. lines: of the background, which tell up.
+    :param heights_m: of the first people, where they are known.
     :return: motions, the most prominent person's mean iterations per frame, and the path.
     """
     several, picture = len(tracks) > 1, len(tracks[0]) == 1
     prepared: list[PreparedTrack] = []
     for k, track in enumerate(tracks):
-        each = prepare_track(body, track, camera, parts)
+        each = prepare_track(body, track, camera, parts, heights_m[k] if k < len(heights_m) else None)
         tracks[k] = track = track.without_depth()
         prepared.append(compact(replace(each, track=track, lifted=compact(each.lifted))))
         del each
@@ -354,7 +369,7 @@ def _repaired(track: Track, camera: Camera, parts: Parts) -> Track:
     return mend_leaps(track) if parts.leaps else track
 
 
-def _about_person(motion: Motion) -> dict:
+def _about_person(body: Body, motion: Motion) -> dict:
     """What the report says of one person."""
     seen = motion.frames[motion.valid]
     return hand_frames(motion) | {
@@ -362,6 +377,7 @@ def _about_person(motion: Motion) -> dict:
         "first_frame": int(seen[0]),
         "last_frame": int(seen[-1]),
         "reprojection_px": float(motion.residual_px[motion.valid].mean()),
+        "height_m": round(body.stature(motion.betas), 3),
     }
 
 

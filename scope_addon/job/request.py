@@ -21,6 +21,7 @@ class JobRequest:
     body: str = "scope"  # a built-in body's name or a file
     quality: str = "best"
     people: int | str = "largest"  # how many at most, "all", or "largest": the most prominent one
+    height_m: float | None = None  # of the most prominent person; None: it is found
     focal_mm: float | None = None  # 35 mm equivalent
     fov_deg: float | None = None  # along the longer side
     calibration: str = ""  # a JSON file; empty: none

@@ -58,6 +58,7 @@ def run(request: JobRequest, job_folder: Path, reporter: Reporter) -> int:
         options = CaptureOptions(
             quality=request.quality,
             people=request.people,
+            heights_m=() if request.height_m is None else (request.height_m,),
             focal_mm=request.focal_mm,
             fov_deg=request.fov_deg,
             calibration=Path(request.calibration) if request.calibration else None,

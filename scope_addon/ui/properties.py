@@ -111,6 +111,18 @@ class SCOPE_PG_settings(bpy.types.PropertyGroup):
         options=_FIXED,
         description="Capture the fingers too, on the body with hands; takes longer",
     )
+    height: FloatProperty(
+        name="Height",
+        subtype="DISTANCE",
+        unit="LENGTH",
+        default=0.0,
+        min=0.0,
+        max=2.6,
+        precision=2,
+        options=_FIXED,
+        description="How tall the person is, of several the most prominent one, so that all sizes and ways are right; "
+        "0: found from the footage, which can be a tenth off",
+    )
     lens: EnumProperty(
         name="Lens",
         items=LENSES,

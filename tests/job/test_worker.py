@@ -127,6 +127,7 @@ def test_keys_tell_what_changes_the_result(tmp_path):
     assert request.key("1") != request.key("2")
     assert request.key("1") != JobRequest(str(clip), quality="fast").key("1")
     assert request.key("1") != JobRequest(str(clip), hands=True).key("1")
+    assert request.key("1") != JobRequest(str(clip), height_m=1.8).key("1")
     key, status = request.key("1"), clip.stat()
     clip.write_bytes(b"x" * 99 + b"y")
     os.utime(clip, ns=(status.st_atime_ns, status.st_mtime_ns))

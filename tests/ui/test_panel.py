@@ -30,6 +30,7 @@ def test_settings_and_result_survive_the_file(fake_worker, footage, tmp_path):
     wanted = {"quality": "FAST", "body": "FILE", "body_file": "//smpl.npz", "lens": "FOCAL", "focal_mm": 35.0}
     wanted |= {"smoothing": False, "frame_rate": "KEEP", "start_frame": 101, "shape": "BAKED", "with_camera": False}
     wanted |= {"people": "ALL", "people_count": 5, "use_range": True, "range_start": 2.5, "with_markers": False}
+    wanted |= {"height": 1.75}
     for name, value in wanted.items():
         setattr(settings, name, value)
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "saved.blend"))
