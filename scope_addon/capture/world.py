@@ -16,6 +16,7 @@ from .vertical_lines import up_from_lines
 
 STANDING_KNEE_COS = np.cos(np.radians(30.0))  # thigh and shank within 30 degrees of one line
 FLOOR_NOISE_M = 0.05  # scatter of a supporting foot's depth-borne height
+RESTING_KNEE_COS, CARRYING_KNEE_COS = np.cos(np.radians([75.0, 60.0]))  # bent more, less than that
 STANCE_M = 0.2  # what a frame's stance tells of up, as far as the centre of mass of one who stands is over the feet
 ROUNDS = 2
 LEAST_CONTACT = 1e-3  # of a frame, beside the probability that a foot stands
@@ -32,17 +33,10 @@ def up_from_standing(body: Body, joints_cam: np.ndarray) -> np.ndarray:
     :param joints_cam: (T, K+1, 3) metres, camera frame, valid frames only.
     :return: (3,) unit vector.
     """
-    at = {name: i for i, name in enumerate(body.joint_names)}
-
-    def unit(a: str, b: str) -> np.ndarray:
-        d = joints_cam[:, at[b]] - joints_cam[:, at[a]]
-        return d / np.maximum(np.linalg.norm(d, axis=1, keepdims=True), 1e-9)
-
-    trunk = unit("pelvis", "neck")
+    trunk = _along(body, joints_cam, "pelvis", "neck")
     weight = np.ones(len(joints_cam))
     legs = np.zeros_like(trunk)
-    for side in ("left", "right"):
-        shank, thigh = unit(f"{side}_ankle", f"{side}_knee"), unit(f"{side}_knee", f"{side}_hip")
+    for shank, thigh in _legs(body, joints_cam):
         straight = (shank * thigh).sum(1)
         weight *= np.clip((straight - STANDING_KNEE_COS) / (1 - STANDING_KNEE_COS), 0, 1)
         legs += 0.5 * (shank + thigh)
@@ -64,8 +58,9 @@ def up_from_bodies(people: Sequence[PlacedTrack]) -> np.ndarray:
     """Up direction in the camera frame from people who stand, walk or bend: their weight is over their feet.
 
     With d_t from the middle of the soles that stand to the centre of mass, w_t the probability that any stands, and u_0
-    what the bodies' own axes say (`up_from_standing`), Σ_t (a u_0 + w_t (y·d_t / |d_t|)² d_t) points up: forces average
-    out over a clip. Those who lie have feet that keep still as well; y, up in the picture, leaves them out.
+    what the bodies' own axes say (`up_from_standing`), Σ_t (a u_0 + w_t k_t max(y·d_t / |d_t|, 0)² d_t) points up, a a
+    length (`STANCE_M`): forces average out over a clip. Those who sit, kneel or lie have feet that keep still as well:
+    k_t, which falls from 1 to 0 where both knees bend by 60 to 75 degrees, and y, up in the picture, leave them out.
 
     :return: (3,) unit vector.
     """
@@ -78,9 +73,30 @@ def up_from_bodies(people: Sequence[PlacedTrack]) -> np.ndarray:
             share = contact / np.maximum(contact.sum(axis=1, keepdims=True), 1e-9)
             above = center_of_mass(each.body, each.joints) - (share[..., None] * each.soles).sum(axis=1)
             upright = np.maximum(above @ level, 0.0) / np.maximum(np.linalg.norm(above, axis=1), 1e-9)
-            total += STANCE_M * each.valid.sum() * start + (contact.max(axis=1) * upright**2) @ above
+            weight = contact.max(axis=1) * _carrying(each.body, each.joints) * upright**2
+            total += STANCE_M * each.valid.sum() * start + weight @ above
         up = total / np.linalg.norm(total)
     return up
+
+
+def _carrying(body: Body, joints: np.ndarray) -> np.ndarray:
+    """(T,) how far a leg is straight enough to bear the weight, which may rest on a chair or the shins otherwise."""
+    straight = np.max([(shank * thigh).sum(1) for shank, thigh in _legs(body, joints)], axis=0)
+    return np.clip((straight - RESTING_KNEE_COS) / (CARRYING_KNEE_COS - RESTING_KNEE_COS), 0.0, 1.0)
+
+
+def _legs(body: Body, joints: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Of the left leg and the right one, shank and thigh, (T, 3) unit vectors upwards."""
+    return [
+        (_along(body, joints, f"{side}_ankle", f"{side}_knee"), _along(body, joints, f"{side}_knee", f"{side}_hip"))
+        for side in ("left", "right")
+    ]
+
+
+def _along(body: Body, joints: np.ndarray, a: str, b: str) -> np.ndarray:
+    """(T, 3) unit vectors from joint a to joint b."""
+    d = joints[:, body.joint_names.index(b)] - joints[:, body.joint_names.index(a)]
+    return d / np.maximum(np.linalg.norm(d, axis=1, keepdims=True), 1e-9)
 
 
 def up_from_floor(feet_cam: np.ndarray, up: np.ndarray) -> np.ndarray:

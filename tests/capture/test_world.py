@@ -99,6 +99,22 @@ def test_who_bends_over_is_upright_by_the_weight(pitch_deg):
     assert np.degrees(np.arccos(up_from_bodies([placed]) @ up)) < 8.0
 
 
+@pytest.mark.parametrize("bends", [{"hip": -85.0, "knee": 85.0}, {"knee": 90.0, "ankle": 50.0}], ids=["sits", "kneels"])
+@pytest.mark.parametrize("turned_deg", [0.0, 90.0, 180.0])
+def test_who_sits_or_kneels_does_not_tilt_the_world(bends, turned_deg):
+    """Their feet keep still as well, but the weight is on a chair or the shins: a trunk that is upright tells up."""
+    body = load_body("scope")
+    omega = np.tile(np.eye(3), (body.K + 1, 1, 1))
+    omega[0] = rotations.exp(np.radians([0, 0, turned_deg])) @ R_WORLD_MODEL
+    for name, degrees in bends.items():
+        for side in ("left", "right"):
+            omega[body.joint_names.index(f"{side}_{name}")] = rotations.exp(np.radians([degrees, 0, 0]))
+    R, t = (np.repeat(each[None], 60, axis=0) for each in body.forward_kinematics(omega, np.zeros(3)))
+    up = np.array([0, -1.0, 0])
+    placed = seen_by(body, R, t + [0.0, 4.0, 0.0], np.linalg.inv(world_from_level_camera(up, height=1.6)))
+    assert np.degrees(np.arccos(estimate_world(placed)[2, :3] @ up)) < 2.0
+
+
 @pytest.mark.parametrize("standing", [0, 20])
 def test_who_lies_on_the_floor_does_not_tilt_the_world(standing):
     """Lies for 60 frames, straight, and then stands, or does not: a camera 10 degrees from level."""
