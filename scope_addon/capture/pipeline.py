@@ -327,7 +327,7 @@ def solve(
         placed.clear()
         placed = place()
     if parts.second_pass and not picture:
-        world = share_world(body, placed, lines) if several else None
+        world = share_world(placed, lines) if several else None
         floors = [world.floor_from_camera(k) if world else None for k in range(len(tracks))]
         balanced = parts.balance
         stances = [corrected_stance(*each, lines, balanced) for each in zip(placed, floors, strict=True)]
@@ -339,7 +339,7 @@ def solve(
         placed = place(smoothing)
     shown = [each.body for each in prepared]
     prepared.clear()
-    world = share_world(body, placed, lines) if several else None
+    world = share_world(placed, lines) if several else None
     iterations = fits[0].iterations
     motions = [
         assemble_motion(

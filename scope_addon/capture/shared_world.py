@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...solver.body import Body
-from ...solver.frames import world_from_level_camera
+from ...solver.frames import transform_points, world_from_level_camera
 from .line_segments import Lines
 from .placement import PlacedTrack
 from .world import floor_height, up_from_bodies, upright
@@ -30,23 +29,20 @@ class SharedWorld:
         return T
 
 
-def share_world(body: Body, placed: list[PlacedTrack], lines: Lines | None = None) -> SharedWorld:
+def share_world(placed: list[PlacedTrack], lines: Lines | None = None) -> SharedWorld:
     """Up from the background's lines, or from all bodies and floors together; the floor and the origin from the first,
     most prominent person.
 
     Each person's feet count from their own mean place, so that neither a step nor a wrong distance tilts the world.
     """
-    # without a copy where nothing is to be left out: of an hour, joints take 31 MB for each person
-    seen = [slice(None) if person.valid.all() else person.valid for person in placed]
-    all_soles = [person.soles[rows] for person, rows in zip(placed, seen, strict=True)]
-    all_joints = [person.joints[rows] for person, rows in zip(placed, seen, strict=True)]
+    all_soles = [person.soles[person.valid] for person in placed]
     up = up_from_bodies(placed)
     centered = [soles - _lowest(soles, up).mean(axis=0) for soles in all_soles]
     up = upright(up, np.concatenate(centered), lines)
-    stands = [person.contact(up)[rows] for person, rows in zip(placed, seen, strict=True)]
+    stands = [person.contact(up)[person.valid] for person in placed]
     heights = [floor_height(soles, contact, up) for soles, contact in zip(all_soles, stands, strict=True)]
     T_world_camera = world_from_level_camera(up, height=-heights[0])
-    start = T_world_camera[:3, :3] @ all_joints[0][0, 0] + T_world_camera[:3, 3]
+    start = transform_points(T_world_camera, placed[0].joints[placed[0].valid.argmax(), :1])[0]
     T_world_camera[:2, 3] -= start[:2]
     own = [height - heights[0] for height in heights]
     return SharedWorld(T_world_camera, [h if abs(h) > SAME_FLOOR_M else 0.0 for h in own])

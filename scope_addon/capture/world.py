@@ -144,9 +144,9 @@ def estimate_world(placed: PlacedTrack, lines: Lines | None = None) -> np.ndarra
     :return: (4, 4) world_from_camera.
     """
     seen = placed.valid
-    joints, soles = placed.joints[seen], placed.soles[seen]
+    soles = placed.soles[seen]
     up = upright(up_from_bodies([placed]), soles, lines)
     T_world_camera = world_from_level_camera(up, height=-floor_height(soles, placed.contact(up)[seen], up))
-    start = transform_points(T_world_camera, joints[:1, 0])[0]
+    start = transform_points(T_world_camera, placed.joints[seen.argmax(), :1])[0]
     T_world_camera[:2, 3] -= start[:2]
     return T_world_camera

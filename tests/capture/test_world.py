@@ -1,9 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Up and floor on bodies placed in a known world."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scope.scope_addon.capture.placement import PlacedTrack
+from scope.scope_addon.capture.shared_world import share_world
 from scope.scope_addon.capture.soles import sole_points, with_soles
 from scope.scope_addon.capture.world import estimate_world, up_from_bodies, up_from_standing
 from scope.solver import rotations
@@ -67,6 +70,26 @@ def test_who_leaps_for_most_of_a_clip_stands_on_the_floor_between():
     lowest = transform_points(estimate_world(placed), placed.soles)[..., 2].min(axis=1)
     assert abs(lowest.min()) < 0.01
     assert np.median(lowest) > 0.1
+
+
+def test_people_share_a_world_and_each_has_a_floor():
+    """One who is seen from the tenth frame on, one who walks 1 m higher, one who seems to be 4 % farther away."""
+    body = load_body("scope")
+    R, t = walk(body)
+    up = rotations.exp(np.radians([-12.0, 0, 5.0])) @ [0, -1.0, 0]
+    camera_from_world = np.linalg.inv(world_from_level_camera(up, height=1.6))
+    walker, climber = (seen_by(body, R, t + [0.0, 5.0, z], camera_from_world) for z in (0.0, 1.0))
+    farther = replace(walker, joints=1.04 * walker.joints, soles=1.04 * walker.soles)
+    valid = np.arange(len(t)) >= 10
+    walker = replace(walker, valid=valid, soles=np.where(valid[:, None, None], walker.soles, walker.soles[10]))
+    world = share_world([walker, climber, farther])
+    assert np.degrees(np.arccos(world.T_world_camera[2, :3] @ up)) < 2.0
+    assert abs(world.T_world_camera[2, 3] - 1.6) < 0.25
+    np.testing.assert_allclose(transform_points(world.T_world_camera, walker.joints[10, :1])[0, :2], 0, atol=1e-9)
+    assert world.floors_m[0] == world.floors_m[2] == 0.0
+    assert abs(world.floors_m[1] - 1.0) < 0.1
+    soles = transform_points(world.floor_from_camera(1), climber.soles)[..., 2].min(axis=1)
+    assert abs(np.median(soles)) < 0.02
 
 
 def centroid(vertices, faces):
