@@ -7,9 +7,10 @@ With u_0 what the body says is up, up u and two level directions h and u × h, a
     −∠(u, u_0)² / 2σ² + κ Σ_i w_i max(2 c_i(u), c_i(h), c_i(u × h)),   c_i(d) = exp(−(n_i·d)² / 2s²),
 
 w_i the line's length in sides of the picture. Lines that agree by chance are more often level than upright, where two
-directions are to choose from. Directions around u_0 are tried, the best of them refined. Nothing is said where three
-directions would explain as much of lines drawn at random, or where too little that is upright is to be seen, unless
-both level directions are, and no other ones do nearly as well: then they tell what is upright to both.
+directions are to choose from. Directions around u_0 are tried, the best of them refined, each line then counted of the
+direction that is nearest to it (`line_pull`). Nothing is said where three directions would explain as much of lines
+drawn at random, or where too little that is upright is to be seen, unless both level directions are, and no other ones
+do nearly as well: then they tell what is upright to both.
 
 Source: Coughlan and Yuille 2003.
 """

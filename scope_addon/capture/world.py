@@ -125,8 +125,9 @@ def upright(up_body: np.ndarray, feet_cam: np.ndarray, lines: Lines | None) -> n
 def floor_height(soles_cam: np.ndarray, contact: np.ndarray, up: np.ndarray) -> float:
     """Height, along ``up`` from the camera, of what a person stands on: of each frame's lowest sole, the median.
 
-    Frames count as far as anything stands in them: who jumps or hangs by the hands for most of a clip is not on the
-    floor then. Where nothing ever stands, all frames count alike.
+    Frames count as far as anything stands in them: who jumps or climbs for most of a clip is not on the floor then.
+    Feet that keep still in the air, of one who hangs by the hands, seem to stand. Where nothing ever stands, all
+    frames count alike.
 
     :param soles_cam, contact: (T, F, 3) and (T, F) the probability that each stands.
     """
