@@ -67,11 +67,33 @@ def test_a_tiled_floor_tells_up_without_anything_upright(turn):
     assert angle_deg(up_from_lines(find_segments(picture, []).lines(CAMERA), leaning), truth) < 1.0
 
 
-def test_a_body_that_leans_by_half_a_right_angle_and_less_is_corrected():
+def test_a_body_that_leans_by_thirty_degrees_is_corrected():
     """As bodies seem to before a camera that looks down steeply."""
     truth = LEVEL_UP
     lines = find_segments(room(np.eye(3), tiles=4), []).lines(CAMERA)
     assert angle_deg(up_from_lines(lines, exp([np.radians(30), 0.0, 0.0]) @ truth), truth) < 1.0
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_ramp_beside_a_floor_leaves_open_which_is_level(seed):
+    """Edges across both, and as many along the one as along the other: either alone tells, both together do not."""
+    rng = np.random.default_rng(seed)
+    up_of = {"floor": LEVEL_UP, "ramp": exp([np.radians(16), 0, 0]) @ LEVEL_UP}
+    R = exp([0.0, 0.5, 0.0])
+    between = exp([np.radians(8), 0, 0]) @ LEVEL_UP
+
+    def edges(direction, count):
+        through = np.stack([rng.uniform(-0.5, 0.5, count), rng.uniform(-0.3, 0.3, count), np.ones(count)], axis=1)
+        normals = np.cross(through, direction)
+        return normals / np.linalg.norm(normals, axis=1, keepdims=True)
+
+    across = edges(R @ [1.0, 0, 0], 16)
+    along = {name: edges(R @ np.cross(up, [1.0, 0, 0]), 16) for name, up in up_of.items()}
+    for name, up in up_of.items():
+        normals = np.concatenate([across, along[name]])
+        assert angle_deg(up_from_lines(Lines(normals, np.full(len(normals), 0.1)), R @ between), R @ up) < 1.0
+    normals = np.concatenate([across, *along.values()])
+    assert up_from_lines(Lines(normals, np.full(len(normals), 0.1)), R @ between) is None
 
 
 def test_few_posts_are_believed_where_level_edges_agree():
