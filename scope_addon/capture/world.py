@@ -19,6 +19,7 @@ FLOOR_NOISE_M = 0.05  # scatter of a supporting foot's depth-borne height
 RESTING_KNEE_COS, CARRYING_KNEE_COS = np.cos(np.radians([75.0, 60.0]))  # bent more, less than that
 STANCE_M = 0.2  # what a frame's stance tells of up, as far as the centre of mass of one who stands is over the feet
 ROUNDS = 2
+MOMENT_S = 0.1  # length of a clip that halves what its stances tell
 LEAST_CONTACT = 1e-3  # of a frame, beside the probability that a foot stands
 UP_NOISE_RAD = np.radians(5.0)  # scatter of the body's own up direction over a clip
 
@@ -58,9 +59,10 @@ def up_from_bodies(people: Sequence[PlacedTrack]) -> np.ndarray:
     """Up direction in the camera frame from people who stand, walk or bend: their weight is over their feet.
 
     With d_t from the middle of the soles that stand to the centre of mass, w_t the probability that any stands, and u_0
-    what the bodies' own axes say (`up_from_standing`), Σ_t (a u_0 + w_t k_t max(y·d_t / |d_t|, 0)² d_t) points up, a a
-    length (`STANCE_M`): forces average out over a clip. Those who sit, kneel or lie have feet that keep still as well:
-    k_t, which falls from 1 to 0 where both knees bend by 60 to 75 degrees, and y, up in the picture, leave them out.
+    what the bodies' own axes say (`up_from_standing`), Σ_t (a u_0 + b w_t k_t max(y·d_t / |d_t|, 0)² d_t) points up, a
+    being a length (`STANCE_M`). Forces average out over a clip, not in a moment: b grows from 0 to 1 with its length.
+    Those who sit, kneel or lie have feet that keep still as well: k_t, which falls from 1 to 0 where both knees bend by
+    60 to 75 degrees, and y, up in the picture, leave them out as far as they can.
 
     :return: (3,) unit vector.
     """
@@ -74,7 +76,8 @@ def up_from_bodies(people: Sequence[PlacedTrack]) -> np.ndarray:
             above = center_of_mass(each.body, each.joints) - (share[..., None] * each.soles).sum(axis=1)
             upright = np.maximum(above @ level, 0.0) / np.maximum(np.linalg.norm(above, axis=1), 1e-9)
             weight = contact.max(axis=1) * _carrying(each.body, each.joints) * upright**2
-            total += STANCE_M * each.valid.sum() * start + weight @ above
+            lasts_s = float(np.ptp(each.times))
+            total += STANCE_M * each.valid.sum() * start + lasts_s / (lasts_s + MOMENT_S) * (weight @ above)
         up = total / np.linalg.norm(total)
     return up
 
