@@ -24,26 +24,16 @@ LEAST_CONTACT = 1e-3  # of a frame, beside the probability that a foot stands
 UP_NOISE_RAD = np.radians(5.0)  # scatter of the body's own up direction over a clip
 
 
-def up_from_standing(body: Body, joints_cam: np.ndarray) -> np.ndarray:
-    """Up direction in the camera frame from the body itself: ankles to neck while the person stands.
+def up_from_standing(people: Sequence[PlacedTrack]) -> np.ndarray:
+    """Up direction in the camera frame from the bodies themselves: ankles to neck while they stand.
 
     Frames count by how straight legs and trunk are and, since who lies or does push-ups is straight as well, by how
     upright they are in the picture; without any such frame the trunk alone decides, as far as it is upright, and a
     prior of one frame's weight says that cameras are held level.
 
-    :param joints_cam: (T, K+1, 3) metres, camera frame, valid frames only.
     :return: (3,) unit vector.
     """
-    trunk = _along(body, joints_cam, "pelvis", "neck")
-    weight = np.ones(len(joints_cam))
-    legs = np.zeros_like(trunk)
-    for shank, thigh in _legs(body, joints_cam):
-        straight = (shank * thigh).sum(1)
-        weight *= np.clip((straight - STANDING_KNEE_COS) / (1 - STANDING_KNEE_COS), 0, 1)
-        legs += 0.5 * (shank + thigh)
-    body_up = legs + trunk
-    body_up /= np.maximum(np.linalg.norm(body_up, axis=1, keepdims=True), 1e-9)
-    weight *= np.clip(((legs / 2) * trunk).sum(1), 0, 1) ** 8
+    trunk, body_up, weight = (np.concatenate(each) for each in zip(*map(_straightness, people), strict=True))
     level = np.array([0.0, -1.0, 0.0])
     weight *= np.maximum(body_up @ level, 0.0) ** 4
     if weight.sum() < 1.0:
@@ -53,6 +43,21 @@ def up_from_standing(body: Body, joints_cam: np.ndarray) -> np.ndarray:
     if np.linalg.norm(total) < 1e-6:
         total = level
     return total / np.linalg.norm(total)
+
+
+def _straightness(person: PlacedTrack) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Directions (T, 3) of trunk and body, and how straight the body is (T,), in the frames in which it was seen."""
+    trunk = _along(person.body, person.joints, "pelvis", "neck")
+    straightness = np.ones(len(trunk))
+    legs = np.zeros_like(trunk)
+    for shank, thigh in _legs(person.body, person.joints):
+        straight = (shank * thigh).sum(1)
+        straightness *= np.clip((straight - STANDING_KNEE_COS) / (1 - STANDING_KNEE_COS), 0, 1)
+        legs += 0.5 * (shank + thigh)
+    body_up = legs + trunk
+    body_up /= np.maximum(np.linalg.norm(body_up, axis=1, keepdims=True), 1e-9)
+    straightness *= np.clip(((legs / 2) * trunk).sum(1), 0, 1) ** 8
+    return trunk[person.valid], body_up[person.valid], straightness[person.valid]
 
 
 def up_from_bodies(people: Sequence[PlacedTrack]) -> np.ndarray:
@@ -66,7 +71,7 @@ def up_from_bodies(people: Sequence[PlacedTrack]) -> np.ndarray:
 
     :return: (3,) unit vector.
     """
-    start = up_from_standing(people[0].body, np.concatenate([each.joints[each.valid] for each in people]))
+    start = up_from_standing(people)
     level, up = np.array([0.0, -1.0, 0.0]), start
     for _ in range(ROUNDS):
         total = np.zeros(3)
