@@ -155,7 +155,7 @@ def capture_request(scene: bpy.types.Scene) -> JobRequest:
         body=body,
         quality=settings.quality.lower(),
         people=settings.people_count if settings.people == "COUNT" else settings.people.lower(),
-        height_m=settings.height or None,
+        height_m=settings.height_cm / 100 or None,
         focal_mm=settings.focal_mm if settings.lens == "FOCAL" else None,
         fov_deg=math.degrees(settings.fov) if settings.lens == "FOV" else None,
         calibration=bpy.path.abspath(settings.calibration_file) if settings.lens == "FILE" else "",

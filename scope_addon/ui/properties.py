@@ -111,17 +111,17 @@ class SCOPE_PG_settings(bpy.types.PropertyGroup):
         options=_FIXED,
         description="Capture the fingers too, on the body with hands; takes longer",
     )
-    height: FloatProperty(
-        name="Height",
-        subtype="DISTANCE",
-        unit="LENGTH",
+    # Not of unit LENGTH: a scene in other units would show, and take, something else than people's heights.
+    height_cm: FloatProperty(
+        name="Height (cm)",
         default=0.0,
         min=0.0,
-        max=2.6,
-        precision=2,
+        max=260.0,
+        step=100,
+        precision=0,
         options=_FIXED,
-        description="How tall the person is, of several the most prominent one, so that all sizes and ways are right; "
-        "0: found from the footage, which can be a tenth off",
+        description="How tall the person is in centimetres, of several people the most prominent one: all sizes and "
+        "ways follow from it. 0: found from the footage, often off by a tenth",
     )
     lens: EnumProperty(
         name="Lens",

@@ -87,7 +87,7 @@ def test_other_options_are_another_capture(fake_worker, footage):
     bpy.ops.scope.capture()
     fake_worker("send('error', message='asked again')")
     others = {"quality": "FAST", "lens": "FOV", "smoothing": False, "body": "SCOPE_H", "people": "ALL", "hands": True}
-    others |= {"height": 1.8}
+    others |= {"height_cm": 180.0}
     for name, value in others.items():
         before = getattr(scene.scope, name)
         setattr(scene.scope, name, value)

@@ -30,7 +30,7 @@ def test_settings_and_result_survive_the_file(fake_worker, footage, tmp_path):
     wanted = {"quality": "FAST", "body": "FILE", "body_file": "//smpl.npz", "lens": "FOCAL", "focal_mm": 35.0}
     wanted |= {"smoothing": False, "frame_rate": "KEEP", "start_frame": 101, "shape": "BAKED", "with_camera": False}
     wanted |= {"people": "ALL", "people_count": 5, "use_range": True, "range_start": 2.5, "with_markers": False}
-    wanted |= {"height": 1.75}
+    wanted |= {"height_cm": 175.0}
     for name, value in wanted.items():
         setattr(settings, name, value)
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "saved.blend"))
@@ -42,6 +42,15 @@ def test_settings_and_result_survive_the_file(fake_worker, footage, tmp_path):
     assert settings.result.frames == 10
     assert settings.result.collection.name == "person"
     assert len(settings.result.warnings) == 2
+
+
+def test_a_height_is_asked_for_in_centimetres_and_none_is_none(footage):
+    scene = bpy.context.scene
+    scene.scope.footage = str(footage)
+    assert capture_job.capture_request(scene).height_m is None
+    scene.unit_settings.system, scene.unit_settings.scale_length = "METRIC", 0.01
+    scene.scope.height_cm = 182.0
+    assert capture_job.capture_request(scene).height_m == pytest.approx(1.82)
 
 
 def test_each_scene_has_its_own_settings():
