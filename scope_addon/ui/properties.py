@@ -121,7 +121,7 @@ class SCOPE_PG_settings(bpy.types.PropertyGroup):
         precision=0,
         options=_FIXED,
         description="How tall the person is in centimetres, of several people the most prominent one: all sizes and "
-        "ways follow from it. 0: found from the footage, often off by a tenth",
+        "ways follow from it. 0: found from the footage, usually within a tenth",
     )
     lens: EnumProperty(
         name="Lens",
