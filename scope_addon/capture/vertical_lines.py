@@ -40,6 +40,7 @@ LEAST_UPRIGHT = 0.25  # sides of the picture, all upright lines together
 LEAST_LEVEL = 1.0  # likewise, along each level direction, where less is upright
 LEAST_MARGIN = 3.0  # and by how much any other up must be worse
 OTHER = np.radians(4.0)  # at least so far off
+LARGEST_SLOPE = np.radians(15.0)  # of level edges, by what the body says is up: steeper ones may be stairs
 
 
 @dataclass(frozen=True)
@@ -51,22 +52,42 @@ class _Axes:
 
 def up_from_lines(lines: Lines, up: np.ndarray) -> np.ndarray | None:
     """(3,) the upright direction that lines say, near ``up``, what the body says; None where they do not say any."""
-    if not len(lines.lengths):
+    best, second = _best_axes(lines, up)
+    if best is None:
         return None
+    if best.supports[0] >= LEAST_UPRIGHT:
+        return best.directions[0]
+    is_clear = best.supports[1:].min() >= LEAST_LEVEL and best.score - second > LEAST_MARGIN
+    return best.directions[0] if is_clear else None
+
+
+def level_from_lines(lines: Lines, up: np.ndarray) -> np.ndarray | None:
+    """(3,) a level direction that lines say, such as a wall's or a fence's, where up is about ``up``; None for none.
+
+    It is right where up itself is not clear: that may still turn about it.
+    """
+    best, _ = _best_axes(lines, up)
+    if best is None:
+        return None
+    which = 1 + int(best.supports[1:].argmax())
+    level = best.directions[which]
+    return level if best.supports[which] >= LEAST_LEVEL and abs(level @ up) < np.sin(LARGEST_SLOPE) else None
+
+
+def _best_axes(lines: Lines, up: np.ndarray) -> tuple[_Axes | None, float]:
+    """The best axes, None where lines at random had as good ones; and the score of the best ones with another up."""
+    if not len(lines.lengths):
+        return None, -np.inf
     lines = Lines(lines.normals[:MOST_LINES], lines.lengths[:MOST_LINES])
     began = [_about(u, lines, up) for u in _around(up)]
     began = sorted(began, key=lambda axes: -axes.score)[:REFINED]
     best, *others = sorted((_refined(axes, lines, up) for axes in began), key=lambda axes: -axes.score)
-    found = best.directions[0]
     share = best.supports.sum() / lines.lengths.sum()
     count = np.square(lines.lengths.sum()) / np.square(lines.lengths).sum()
+    found = best.directions[0]
     if share < CHANCE_SHARE + CHANCE_SIGMAS / np.sqrt(count) or found @ up < np.cos(LARGEST_LEAN):
-        return None
-    if best.supports[0] >= LEAST_UPRIGHT:
-        return found
-    second = max((o.score for o in others if o.directions[0] @ found < np.cos(OTHER)), default=-np.inf)
-    is_clear = best.supports[1:].min() >= LEAST_LEVEL and best.score - second > LEAST_MARGIN
-    return found if is_clear else None
+        return None, -np.inf
+    return best, max((o.score for o in others if o.directions[0] @ found < np.cos(OTHER)), default=-np.inf)
 
 
 def _around(up: np.ndarray) -> np.ndarray:

@@ -12,7 +12,7 @@ from ...solver.frames import transform_points, world_from_level_camera
 from .balance import center_of_mass
 from .line_segments import Lines
 from .placement import PlacedTrack
-from .vertical_lines import up_from_lines
+from .vertical_lines import level_from_lines, up_from_lines
 
 STANDING_KNEE_COS = np.cos(np.radians(30.0))  # thigh and shank within 30 degrees of one line
 FLOOR_NOISE_M = 0.05  # scatter of a supporting foot's depth-borne height
@@ -125,9 +125,18 @@ def up_from_floor(feet_cam: np.ndarray, up: np.ndarray) -> np.ndarray:
 
 
 def upright(up_body: np.ndarray, feet_cam: np.ndarray, lines: Lines | None) -> np.ndarray:
-    """(3,) up, from what bodies say: by the lines of the background, or else by where the feet were."""
+    """(3,) up, from what bodies say: by the lines of the background, or else by where the feet were.
+
+    Lines that only tell what is level in one direction, such as a fence's, take out what is not upright to it.
+    """
     by_lines = up_from_lines(lines, up_body) if lines is not None else None
-    return up_from_floor(feet_cam, up_body) if by_lines is None else by_lines
+    if by_lines is not None:
+        return by_lines
+    up = up_from_floor(feet_cam, up_body)
+    level = level_from_lines(lines, up_body) if lines is not None else None
+    if level is not None:
+        up = up - (up @ level) * level
+    return up / np.linalg.norm(up)
 
 
 def floor_height(soles_cam: np.ndarray, contact: np.ndarray, up: np.ndarray) -> float:

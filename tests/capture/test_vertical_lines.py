@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from scope.scope_addon.capture.camera import Camera, choose_camera, pinhole
 from scope.scope_addon.capture.line_segments import Lines, Segments, find_segments
-from scope.scope_addon.capture.vertical_lines import up_from_lines
+from scope.scope_addon.capture.vertical_lines import level_from_lines, up_from_lines
+from scope.scope_addon.capture.world import upright
 from scope.solver.rotations import exp
 
 WIDTH, HEIGHT = 1280, 720
@@ -96,6 +97,24 @@ def test_a_ramp_beside_a_floor_leaves_open_which_is_level(seed):
     assert up_from_lines(Lines(normals, np.full(len(normals), 0.1)), R @ between) is None
 
 
+@pytest.mark.parametrize("turn", [[0, 0, 0.12], [-0.1, 0.1, -0.1]])
+def test_a_fence_tells_what_is_level_though_not_what_is_up(turn):
+    R = exp(turn)
+    lines = find_segments(room(R, posts=0, clutter=10), []).lines(CAMERA)
+    leaning = exp([0.1, 0.0, 0.15]) @ R @ LEVEL_UP
+    assert up_from_lines(lines, leaning) is None
+    assert abs(90 - angle_deg(level_from_lines(lines, leaning), R @ LEVEL_UP)) < 0.5
+    feet = np.zeros((5, 4, 3))
+    off_deg = angle_deg(upright(leaning, feet, lines), R @ LEVEL_UP)
+    assert off_deg < 0.8 * angle_deg(leaning, R @ LEVEL_UP)
+    assert off_deg == pytest.approx(np.degrees(0.1), abs=1.2)  # the pitch, which no edge tells, stays
+
+
+def test_a_banister_is_not_level():
+    R = exp([0.0, 0.0, 0.5])  # of the edges, not of the camera
+    assert level_from_lines(find_segments(room(R, posts=0), []).lines(CAMERA), LEVEL_UP) is None
+
+
 def test_few_posts_are_believed_where_level_edges_agree():
     R = exp([0.2, 0.1, 0.1])
     lines = find_segments(room(R, posts=3, across=12, tiles=4), []).lines(CAMERA)
@@ -112,6 +131,7 @@ def test_lines_at_random_say_nothing(count, seed):
     half = 0.5 * WIDTH * lengths[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
     lines = Segments(np.stack([middle - half, middle + half], axis=1), lengths).lines(CAMERA)
     assert up_from_lines(lines, LEVEL_UP) is None
+    assert level_from_lines(lines, LEVEL_UP) is None
 
 
 def test_a_picture_without_anything_upright_says_nothing():
