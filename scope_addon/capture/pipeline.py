@@ -166,6 +166,9 @@ def capture(
         warnings.append(
             f"{path.name} cuts to another scene {_at(cuts.times_s)}: capture each scene by itself, by its start and end"
         )
+    if len(options.heights_m) > len(motions):
+        found = f"{len(motions)} people were found" if len(motions) > 1 else "one person was found"
+        warnings.append(f"{path.name}: {len(options.heights_m)} heights were given, but {found}")
     for number, motion in enumerate(motions, 1):
         missing = int((~motion.valid).sum())
         who = "the person" if len(motions) == 1 else f"person {number}"

@@ -41,10 +41,11 @@ def test_a_known_height_sets_size_and_distance():
     body = load_body("scope")
     found = {}
     for height_m in (1.5, 1.9):
-        options = CaptureOptions(quality="fast", heights_m=(height_m,), wanted=VideoRange(0, 0.5))
+        options = CaptureOptions(quality="fast", heights_m=(height_m, 1.6), wanted=VideoRange(0, 0.5))
         result = capture(SAMPLE, body, options)
         motion = result.motions[0]
         assert body.stature(motion.betas) == pytest.approx(height_m, abs=0.015)
         assert result.report["per_person"][0]["height_m"] == pytest.approx(height_m, abs=0.015)
+        assert any("2 heights were given, but one person was found" in text for text in result.report["warnings"])
         found[height_m] = np.linalg.norm(motion.joints_cam[:, 0], axis=1).mean()
     assert found[1.9] / found[1.5] == pytest.approx(1.9 / 1.5, rel=0.05)
