@@ -12,6 +12,8 @@ direction that is nearest to it (`line_pull`). Nothing is said where three direc
 drawn at random, or where too little that is upright is to be seen, unless both level directions are, and no other ones
 do nearly as well: then they tell what is upright to both.
 
+What is level in one direction is told wherever long lines agree on it, for up may be unclear about it alone.
+
 Source: Coughlan and Yuille 2003.
 """
 
