@@ -58,8 +58,7 @@ def turn_over_feet(placed: PlacedTrack, contact: np.ndarray, up: np.ndarray) -> 
     """
     soles, times = placed.soles, placed.times
     mass = gaussian_smooth(center_of_mass(placed.body, placed.joints), times, CUTOFF_HZ)
-    share = contact / np.maximum(contact.sum(axis=1, keepdims=True), 1e-9)
-    pivot = (share[..., None] * soles).sum(axis=1)
+    pivot = placed.stands_at(contact)
     sight = mass - placed.center
     sight = sight - (sight @ up)[:, None] * up
     sight /= np.maximum(np.linalg.norm(sight, axis=1, keepdims=True), 1e-9)

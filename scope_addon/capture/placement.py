@@ -41,6 +41,11 @@ class PlacedTrack:
         """Joints (T, K+1, 3) and soles (T, 4, 3) of another motion of this body, camera frame."""
         return _place(self.body, self.betas, rotations, root)
 
+    def stands_at(self, contact: np.ndarray) -> np.ndarray:
+        """(T, 3) the middle of the soles, weighted by ``contact`` (T, 4); 0 where none stands."""
+        share = contact / np.maximum(contact.sum(axis=1, keepdims=True), 1e-9)
+        return (share[..., None] * self.soles).sum(axis=1)
+
     def contact(self, up: np.ndarray) -> np.ndarray:
         """(T, 4) probability that each sole stands, as far as it is seen: imagined feet hold nobody.
 

@@ -20,13 +20,12 @@ def with_stature(priors: Priors, body: Body, height_m: float) -> Priors:
     """The priors with the shape of a person of this height: of all shapes so tall, the most common ones.
 
     The population's N(0, I) of β, given that the height h(β) of the rest pose's highest vertex over its lowest is
-    known: Λ = I + g gᵀ/σ² and mean Λ⁻¹ g (H − h₀)/σ², with h(β) = h₀ + g·β while these two vertices stay the same.
-
-    :raises UsageError: the body has no such shape.
+    known: Λ = I + g gᵀ/σ² and mean Λ⁻¹ g (H − h₀)/σ² = g (H − h₀) / (σ² + g·g), with h(β) = h₀ + g·β while these two
+    vertices stay the same.
     """
     _, h0, g = _shape_of(body, height_m)
     information = np.eye(body.P) + np.outer(g, g) / SIGMA_M**2
-    mean = np.linalg.solve(information, g * (height_m - h0) / SIGMA_M**2)
+    mean = g * (height_m - h0) / (SIGMA_M**2 + g @ g)
     return replace(priors, shape_mean=mean, shape_information=information)
 
 

@@ -46,50 +46,38 @@ LARGEST_SLOPE = np.radians(15.0)  # of level edges, by what the body says is up:
 
 
 @dataclass(frozen=True)
+class Told:
+    """What lines say. Where ``up`` is not clear, ``level`` may be right nevertheless: up may still turn about it."""
+
+    up: np.ndarray | None = None  # (3,) the upright direction
+    level: np.ndarray | None = None  # (3,) the level one that most lines have, such as a wall's or a fence's
+
+
+@dataclass(frozen=True)
 class _Axes:
     directions: np.ndarray  # (3, 3) rows u, h, u × h
     supports: np.ndarray  # (3,) sides along each
     score: float
 
 
-def up_from_lines(lines: Lines, up: np.ndarray) -> np.ndarray | None:
-    """(3,) the upright direction that lines say, near ``up``, what the body says; None where they do not say any."""
-    best, second = _best_axes(lines, up)
-    if best is None:
-        return None
-    if best.supports[0] >= LEAST_UPRIGHT:
-        return best.directions[0]
-    is_clear = best.supports[1:].min() >= LEAST_LEVEL and best.score - second > LEAST_MARGIN
-    return best.directions[0] if is_clear else None
-
-
-def level_from_lines(lines: Lines, up: np.ndarray) -> np.ndarray | None:
-    """(3,) a level direction that lines say, such as a wall's or a fence's, where up is about ``up``; None for none.
-
-    It is right where up itself is not clear: that may still turn about it.
-    """
-    best, _ = _best_axes(lines, up)
-    if best is None:
-        return None
-    which = 1 + int(best.supports[1:].argmax())
-    level = best.directions[which]
-    return level if best.supports[which] >= LEAST_LEVEL and abs(level @ up) < np.sin(LARGEST_SLOPE) else None
-
-
-def _best_axes(lines: Lines, up: np.ndarray) -> tuple[_Axes | None, float]:
-    """The best axes, None where lines at random had as good ones; and the score of the best ones with another up."""
+def told_by_lines(lines: Lines, up: np.ndarray) -> Told:
+    """What lines say of up and level, near ``up``, what the body says; None for what they do not say."""
     if not len(lines.lengths):
-        return None, -np.inf
+        return Told()
     lines = Lines(lines.normals[:MOST_LINES], lines.lengths[:MOST_LINES])
-    began = [_about(u, lines, up) for u in _around(up)]
-    began = sorted(began, key=lambda axes: -axes.score)[:REFINED]
-    best, *others = sorted((_refined(axes, lines, up) for axes in began), key=lambda axes: -axes.score)
+    tried = sorted((_about(u, lines, up) for u in _around(up)), key=lambda scored: -scored[0])[:REFINED]
+    best, *others = sorted((_refined(axes, lines, up) for _, axes in tried), key=lambda axes: -axes.score)
     share = best.supports.sum() / lines.lengths.sum()
     count = np.square(lines.lengths.sum()) / np.square(lines.lengths).sum()
     found = best.directions[0]
     if share < CHANCE_SHARE + CHANCE_SIGMAS / np.sqrt(count) or found @ up < np.cos(LARGEST_LEAN):
-        return None, -np.inf
-    return best, max((o.score for o in others if o.directions[0] @ found < np.cos(OTHER)), default=-np.inf)
+        return Told()
+    second = max((o.score for o in others if o.directions[0] @ found < np.cos(OTHER)), default=-np.inf)
+    is_clear = best.supports[1:].min() >= LEAST_LEVEL and best.score - second > LEAST_MARGIN
+    which = 1 + int(best.supports[1:].argmax())
+    level = best.directions[which]
+    is_level = best.supports[which] >= LEAST_LEVEL and abs(level @ up) < np.sin(LARGEST_SLOPE)
+    return Told(found if best.supports[0] >= LEAST_UPRIGHT or is_clear else None, level if is_level else None)
 
 
 def _around(up: np.ndarray) -> np.ndarray:
@@ -101,8 +89,8 @@ def _around(up: np.ndarray) -> np.ndarray:
     return v[v @ up > np.cos(LARGEST_LEAN)]
 
 
-def _about(u: np.ndarray, lines: Lines, up: np.ndarray) -> _Axes:
-    """The best axes with this up, roughly."""
+def _about(u: np.ndarray, lines: Lines, up: np.ndarray) -> tuple[float, np.ndarray]:
+    """The best directions (3, 3) with this up, roughly, after their score."""
     level = np.cross(np.concatenate([lines.normals[:LEVEL_LINES], np.eye(3)]), u)  # along the line, if it is level
     size = np.linalg.norm(level, axis=1)
     level = level[size > 0.1] / size[size > 0.1, None]
@@ -112,11 +100,10 @@ def _about(u: np.ndarray, lines: Lines, up: np.ndarray) -> _Axes:
     explained = np.maximum(explained, WORTH[0] * np.exp(-0.5 / TRIED_SIGMA**2 * np.square(lines.normals @ u)))
     support = explained @ lines.lengths
     best = int(support.argmax())
-    return _Axes(np.array([u, level[best], across[best]]), np.zeros(3), _score(float(support[best]), u, up))
+    return _score(float(support[best]), u, up), np.array([u, level[best], across[best]])
 
 
-def _refined(axes: _Axes, lines: Lines, up: np.ndarray) -> _Axes:
-    directions = axes.directions
+def _refined(directions: np.ndarray, lines: Lines, up: np.ndarray) -> _Axes:
     for _ in range(STEPS):
         H, g, _ = line_pull(lines, directions, NEARLY, WORTH)
         u = directions[0]

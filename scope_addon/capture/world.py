@@ -12,7 +12,7 @@ from ...solver.frames import transform_points, world_from_level_camera
 from .balance import center_of_mass
 from .line_segments import Lines
 from .placement import PlacedTrack
-from .vertical_lines import level_from_lines, up_from_lines
+from .vertical_lines import told_by_lines
 
 STANDING_KNEE_COS = np.cos(np.radians(30.0))  # thigh and shank within 30 degrees of one line
 FLOOR_NOISE_M = 0.05  # scatter of a supporting foot's depth-borne height
@@ -73,14 +73,15 @@ def up_from_bodies(people: Sequence[PlacedTrack]) -> np.ndarray:
     """
     start = up_from_standing(people)
     level, up = np.array([0.0, -1.0, 0.0]), start
+    masses = [center_of_mass(each.body, each.joints) for each in people]
+    carrying = [_carrying(each.body, each.joints) for each in people]
     for _ in range(ROUNDS):
         total = np.zeros(3)
-        for each in people:
+        for each, mass, carries in zip(people, masses, carrying, strict=True):
             contact = each.contact(up)
-            share = contact / np.maximum(contact.sum(axis=1, keepdims=True), 1e-9)
-            above = center_of_mass(each.body, each.joints) - (share[..., None] * each.soles).sum(axis=1)
+            above = mass - each.stands_at(contact)
             upright = np.maximum(above @ level, 0.0) / np.maximum(np.linalg.norm(above, axis=1), 1e-9)
-            weight = contact.max(axis=1) * _carrying(each.body, each.joints) * upright**2
+            weight = contact.max(axis=1) * carries * upright**2
             lasts_s = float(np.ptp(each.times))
             total += STANCE_M * each.valid.sum() * start + lasts_s / (lasts_s + MOMENT_S) * (weight @ above)
         up = total / np.linalg.norm(total)
@@ -129,13 +130,12 @@ def upright(up_body: np.ndarray, feet_cam: np.ndarray, lines: Lines | None) -> n
 
     Lines that only tell what is level in one direction, such as a fence's, take out what is not upright to it.
     """
-    by_lines = up_from_lines(lines, up_body) if lines is not None else None
-    if by_lines is not None:
-        return by_lines
+    told = told_by_lines(lines or Lines.none(), up_body)
+    if told.up is not None:
+        return told.up
     up = up_from_floor(feet_cam, up_body)
-    level = level_from_lines(lines, up_body) if lines is not None else None
-    if level is not None:
-        up = up - (up @ level) * level
+    if told.level is not None:
+        up = up - (up @ told.level) * told.level
     return up / np.linalg.norm(up)
 
 
