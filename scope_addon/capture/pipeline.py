@@ -42,13 +42,12 @@ from .parts import ALL_PARTS, Parts
 from .people import PeopleBuilder
 from .placement import PlacedTrack, place_track
 from .scene_cuts import SceneCuts
-from .shared_world import share_world
 from .stature import require_stature
 from .track import Track
 from .tracker import MOST_PEOPLE, PeopleTracker
 from .video import Frame, Video, open_video
 from .video_range import VideoRange, Wanted
-from .world import estimate_world
+from .world import estimate_world, share_world
 
 # Called with the stage's name, what is done and the total (0: unknown). May raise CancelledError.
 Progress = Callable[[str, int, int], None]

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The world of a camera: which way is up, and where the floor is."""
+"""The world of a camera, one for all people: which way is up, where the floor is, and who stands on something else."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -21,6 +22,7 @@ STANCE_M = 0.2  # what a frame's stance tells of up, as far as the centre of mas
 ROUNDS = 2
 MOMENT_S = 0.1  # length of a clip that halves what its stances tell
 LEAST_CONTACT = 1e-3  # of a frame, beside the probability that a foot stands
+SAME_FLOOR_M = 0.4  # how far apart, for their distances are not known well, the feet of people on one floor may seem
 UP_NOISE_RAD = np.radians(5.0)  # scatter of the body's own up direction over a clip
 
 
@@ -115,8 +117,7 @@ def up_from_floor(feet_cam: np.ndarray, up: np.ndarray) -> np.ndarray:
 
     :param feet_cam: (T, F, 3) points of the soles in the camera frame.
     """
-    heights = feet_cam @ up
-    lowest = feet_cam[np.arange(len(feet_cam)), heights.argmin(1)]
+    lowest = _lowest(feet_cam, up)
     p = lowest - np.median(lowest, axis=0)
     off = np.abs(p @ up)
     p = p[off <= max(3 * np.median(off), 1e-3)]  # jumps and misses do not support anybody
@@ -156,15 +157,43 @@ def floor_height(soles_cam: np.ndarray, contact: np.ndarray, up: np.ndarray) -> 
 
 
 def estimate_world(placed: PlacedTrack, lines: Lines | None = None) -> np.ndarray:
-    """World of a static camera: z up, the floor at z = 0, the person's first position above the origin.
+    """(4, 4) world_from_camera of one person alone, see `share_world`."""
+    return share_world([placed], lines).T_world_camera
 
-    :param lines: of the background, which know better than a body that leans.
-    :return: (4, 4) world_from_camera.
+
+@dataclass(frozen=True)
+class SharedWorld:
+    """``T_world_camera`` (4, 4) for everybody, and the height of each person's own floor in it, metres."""
+
+    T_world_camera: np.ndarray
+    floors_m: list[float]
+
+    def floor_from_camera(self, person: int) -> np.ndarray:
+        """(4, 4) as ``T_world_camera``, with the person's own floor at z = 0."""
+        T = self.T_world_camera.copy()
+        T[2, 3] -= self.floors_m[person]
+        return T
+
+
+def share_world(placed: list[PlacedTrack], lines: Lines | None = None) -> SharedWorld:
+    """World of a static camera: z up, from the background's lines, or from all bodies and floors together; the floor at
+    z = 0 and the origin below the first position of the first, most prominent person.
+
+    Each person's feet count from their own mean place, so that neither a step nor a wrong distance tilts the world.
     """
-    seen = placed.valid
-    soles = placed.soles[seen]
-    up = upright(up_from_bodies([placed]), soles, lines)
-    T_world_camera = world_from_level_camera(up, height=-floor_height(soles, placed.contact(up)[seen], up))
-    start = transform_points(T_world_camera, placed.joints[seen.argmax(), :1])[0]
+    all_soles = [person.soles[person.valid] for person in placed]
+    up = up_from_bodies(placed)
+    centered = [soles - _lowest(soles, up).mean(axis=0) for soles in all_soles]
+    up = upright(up, np.concatenate(centered), lines)
+    stands = [person.contact(up)[person.valid] for person in placed]
+    heights = [floor_height(soles, contact, up) for soles, contact in zip(all_soles, stands, strict=True)]
+    T_world_camera = world_from_level_camera(up, height=-heights[0])
+    start = transform_points(T_world_camera, placed[0].joints[placed[0].valid.argmax(), :1])[0]
     T_world_camera[:2, 3] -= start[:2]
-    return T_world_camera
+    own = [height - heights[0] for height in heights]
+    return SharedWorld(T_world_camera, [h if abs(h) > SAME_FLOOR_M else 0.0 for h in own])
+
+
+def _lowest(soles_cam: np.ndarray, up: np.ndarray) -> np.ndarray:
+    """(T, 3) the lowest sole point of each frame."""
+    return soles_cam[np.arange(len(soles_cam)), (soles_cam @ up).argmin(axis=1)]

@@ -6,9 +6,8 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 from scope.scope_addon.capture.placement import PlacedTrack
-from scope.scope_addon.capture.shared_world import share_world
 from scope.scope_addon.capture.soles import sole_points, with_soles
-from scope.scope_addon.capture.world import estimate_world, up_from_bodies, up_from_standing
+from scope.scope_addon.capture.world import estimate_world, share_world, up_from_bodies, up_from_standing
 from scope.solver import rotations
 from scope.solver.body import load_body
 from scope.solver.frames import R_WORLD_MODEL, transform_points, world_from_level_camera
