@@ -14,13 +14,11 @@ from .calibration import read_calibration
 
 # Without any better knowledge: a field of view of 60 degrees along the longer side, between a phone's main camera
 # (65-70 degrees, less the crop of its video stabilization) and a camera's standard lens (40-54 degrees).
-# Where the background has edges, these tell more (focal_length.py). The person does not: in 19 clips of known focal
-# length (four calibrated cameras, fifteen renders) the fit's cost, at an image noise of 5 px, had its minimum a factor
-# of 1.5 off (root mean square of the logarithm 0.41, where the default itself has 0.32), since the lifted points lean
-# on the assumed focal length themselves. At the temperature that is best for these clips, cost and default together
-# have 0.30: renders 0.34 instead of 0.37, cameras, of 59.4 to 60.1 degrees, 0.07 instead of 0.01. Assuming 50 or 70
-# degrees for these put the person 0.6 to 0.8 m wrong in the camera frame, but changed the error relative to the pelvis
-# by 7 mm at most.
+# Where the background has edges, these tell more (focal_length.py). The body says a little (focal_fits.py), for it
+# leans on the lifted points, and these on the assumed focal length: in 19 clips of known focal length (four calibrated
+# cameras, of 59.4 to 60.1 degrees, fifteen renders) the default is off by 0.33 (root mean square of the logarithm),
+# both together by 0.30; renders 0.33 instead of 0.37, cameras 0.06 instead of 0.01. Assuming 50 or 70 degrees for these
+# put the person 0.6 to 0.8 m wrong in the camera frame, but changed the error relative to the pelvis by 7 mm at most.
 DEFAULT_FOV_DEG = 60.0
 ASSUMED_DEVIATION = 0.25  # relative error of the default, one standard deviation: 48 to 74 degrees
 FILM_WIDTH_MM = 36.0  # "35 mm equivalent" focal lengths refer to this width along the longer side

@@ -184,10 +184,10 @@ def fit_track(prepared: PreparedTrack, progress: Callable[[str, int, int], None]
     return _fit_frames(prepared, _fit_shape(prepared).beta, None, progress)
 
 
-def fit_picture(prepared: PreparedTrack) -> State | None:
+def fit_picture(prepared: PreparedTrack) -> Fit | None:
     """Fit the body to a track of one frame that was seen, with a shape of its own; None if that says nothing."""
     (found,) = _fit_shape(prepared).frames
-    return found.state if _is_usable(found) else None
+    return found if _is_usable(found) else None
 
 
 def refit_track(

@@ -18,11 +18,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from .camera import ASSUMED_DEVIATION, Camera, assumed_camera, estimated_camera
+from .focal_fits import log_likelihood
 from .line_segments import Segments
 from .right_angles import Edges
 
 KAPPA = 4.0
 LOG_RANGE, COARSE_STEP, FINE_STEP = 0.7, 0.05, 0.0125  # of log(f / f_0)
+FITTED_STEP = 0.0025  # where trying one costs nothing
 CERTAIN = 0.1  # deviation of log f: whatever is less certain is no better than what was assumed
 
 
@@ -34,16 +36,29 @@ class FocalLength:
     deviation: float
 
 
-def better_camera(camera: Camera, segments: Segments, width: int, height: int, longer_px: float) -> Camera:
-    """The camera, with the focal length that edges tell, if they tell any and it was only assumed.
+def camera_by_edges(segments: Segments, width: int, height: int, longer_px: float) -> Camera:
+    """The camera with the focal length that edges tell, if they tell any, else the assumed one.
 
-    ``longer_px``: the longer side of what the camera saw, for what is assumed; see `bars`.
+    ``longer_px``: the longer side of what the camera saw; see `bars`.
     """
-    if camera.focal_deviation == 0.0:
-        return camera
     camera = assumed_camera(width, height, longer_px)
     found = focal_from_edges(segments, width, height, camera.intrinsics[0, 0])
     return estimated_camera(width, height, found.focal_px, found.deviation, longer_px) if found else camera
+
+
+def camera_by_fits(camera: Camera, assumed: Camera, costs: list[np.ndarray], longer_px: float) -> Camera:
+    """The camera with what fits to pictures say of its focal length as well.
+
+    ``costs``: of the fits, about ``assumed``; see `focal_fits`.
+    """
+    if not costs:
+        return camera
+    assumed_px = assumed.intrinsics[0, 0]
+    log_ratio = np.arange(-LOG_RANGE, LOG_RANGE + 1e-9, FITTED_STEP)
+    off = (log_ratio - np.log(camera.intrinsics[0, 0] / assumed_px)) / camera.focal_deviation
+    mean, deviation = _moments(log_ratio, log_likelihood(costs, log_ratio) - 0.5 * np.square(off))
+    width, height = 2 * camera.intrinsics[:2, 2]
+    return estimated_camera(width, height, assumed_px * float(np.exp(mean)), deviation, longer_px)
 
 
 def focal_from_edges(segments: Segments, width: int, height: int, assumed_px: float) -> FocalLength | None:
@@ -56,7 +71,7 @@ def focal_from_edges(segments: Segments, width: int, height: int, assumed_px: fl
     log_ratio = np.concatenate([coarse[np.abs(coarse - best) > COARSE_STEP + 1e-6], fine])
     known = dict(zip(coarse.tolist(), scores, strict=True))
     scores = [known.get(x) or edges.support(assumed_px * np.exp(x)) for x in log_ratio.tolist()]
-    mean, deviation = _moments(log_ratio, scores)
+    mean, deviation = _moments(log_ratio, _log_posterior(log_ratio, scores))
     return FocalLength(assumed_px * float(np.exp(mean)), deviation) if deviation < CERTAIN else None
 
 
@@ -64,10 +79,10 @@ def _log_posterior(log_ratio: np.ndarray, scores: list[float]) -> np.ndarray:
     return KAPPA * np.array(scores) - 0.5 * np.square(log_ratio / ASSUMED_DEVIATION)
 
 
-def _moments(log_ratio: np.ndarray, scores: list[float]) -> tuple[float, float]:
+def _moments(log_ratio: np.ndarray, log_p: np.ndarray) -> tuple[float, float]:
     """Mean and standard deviation of log(f / f_0), by trapezoids over unevenly spaced values."""
     order = np.argsort(log_ratio)
-    x, log_p = log_ratio[order], _log_posterior(log_ratio, scores)[order]
+    x, log_p = log_ratio[order], log_p[order]
     p = np.exp(log_p - log_p.max()) * np.gradient(x)
     p /= p.sum()
     mean = float(p @ x)

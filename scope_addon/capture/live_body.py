@@ -7,7 +7,7 @@ are looked at cost anything, and the motion does not depend on which these were.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -19,7 +19,7 @@ from .lifter import HIPS
 from .observation import Observation
 from .parts import ALL_PARTS, Parts
 from .region import Region
-from .track import Tracklet, make_track
+from .track import track_of_one
 
 
 @dataclass(frozen=True)
@@ -47,20 +47,18 @@ class LiveBody:
 
     def fit(self, observation: Observation) -> LivePose | None:
         """The body in the frame of this observation; None where it says too little."""
-        # without the judgement, which is still awaited, and the fingers, which a preview is too small for
-        state = self._solve(replace(observation, judged_landmarks=None, hands=None))
+        state = self._solve(observation)
         if state is None:
             return None
         R, t = _placed(self._body, state)
         return LivePose(self._body.skin(R, t, state.beta), self._body, self._camera)
 
     def _solve(self, observation: Observation) -> State | None:
-        tracklet = Tracklet()
-        tracklet.add(0, observation)
-        track = make_track([0], [0.0], [tracklet])
+        track = track_of_one(observation)
         if not track.seen[0]:
             return None
-        return fit_picture(prepare_track(self._body, track, self._camera, self._parts, self._height_m))
+        found = fit_picture(prepare_track(self._body, track, self._camera, self._parts, self._height_m))
+        return None if found is None else found.state
 
 
 def _placed(body: Body, state: State) -> tuple[np.ndarray, np.ndarray]:

@@ -29,6 +29,7 @@ from .compact import compact
 from .execution import AUTO, Execution
 from .exposure import Exposure
 from .fitting import PreparedTrack, fit_track, prepare_track, refit_track
+from .focal_fits import FocalFits
 from .hand_measure import require_fingers
 from .hand_tracker import HandTracker
 from .leaps import mend_leaps
@@ -121,8 +122,10 @@ def capture(
         execution = Execution(options.provider)
         if options.threads > cores:
             execution.warnings.append(f"{options.threads} threads were asked for, but there are {cores} cores")
-        live = LiveBody(body, camera, options.parts, next(iter(options.heights_m), None))
-        with BesideTracking(camera, video.width, video.height, live) as beside, _opencv_in_one_thread():
+        height_m = next(iter(options.heights_m), None)
+        live = LiveBody(body, camera, options.parts, height_m)
+        fits = FocalFits(body, options.parts, height_m)
+        with BesideTracking(camera, video.width, video.height, live, fits) as beside, _opencv_in_one_thread():
             tracker = PeopleTracker(
                 options.quality,
                 threads,

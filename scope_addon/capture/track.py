@@ -116,3 +116,10 @@ def make_track(frames: Sequence[int], times: Sequence[float], tracklets: Sequenc
         judged_landmarks=np.array([w for _, w in judged], float).reshape(-1, KEYPOINT_COUNT, 3),
         hands=hands,
     )
+
+
+def track_of_one(observation: Observation) -> Track:
+    """A track of one frame, without the judgement, which may still be awaited, and without fingers."""
+    tracklet = Tracklet()
+    tracklet.add(0, replace(observation, judged_landmarks=None, hands=None))
+    return make_track([0], [0.0], [tracklet])

@@ -9,7 +9,7 @@ import pytest
 from scope.scope_addon.capture.bars import find_bars, longer_side_between
 from scope.scope_addon.capture.camera import choose_camera
 from scope.scope_addon.capture.camera_motion import BackgroundTracker
-from scope.scope_addon.capture.focal_length import better_camera
+from scope.scope_addon.capture.focal_length import camera_by_edges
 from scope.scope_addon.capture.line_segments import Segments, find_segments
 
 WIDTH, HEIGHT = 960, 540
@@ -89,13 +89,10 @@ def test_somebody_in_a_spotlight_is_no_picture_between_bars() -> None:
 
 
 def test_the_assumed_angle_is_that_of_what_lies_between() -> None:
-    camera = choose_camera(WIDTH, HEIGHT)
-    found = better_camera(camera, Segments.none(), WIDTH, HEIGHT, float(HEIGHT))
+    found = camera_by_edges(Segments.none(), WIDTH, HEIGHT, float(HEIGHT))
     assert found.intrinsics[0, 0] == pytest.approx(choose_camera(HEIGHT, 300).intrinsics[0, 0])
     assert found.intrinsics[:2, 2] == pytest.approx([WIDTH / 2, HEIGHT / 2])
     assert "between the bars" in found.source
-    given = choose_camera(WIDTH, HEIGHT, fov_deg=60)
-    assert better_camera(given, Segments.none(), WIDTH, HEIGHT, float(HEIGHT)) is given
 
 
 def test_their_edges_are_neither_lines_nor_corners() -> None:

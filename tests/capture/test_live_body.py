@@ -64,14 +64,14 @@ def test_the_result_does_not_depend_on_how_fast_the_threads_are(watched, body, m
             time.sleep(0.5)
             super().load()
 
-    focal = beside.better_camera
+    focal = beside.camera_by_edges
 
     def slow_focal(*arguments):
         time.sleep(0.5)
         return focal(*arguments)
 
     monkeypatch.setattr("scope.scope_addon.capture.pipeline.LiveBody", Slow)
-    monkeypatch.setattr(beside, "better_camera", slow_focal)
+    monkeypatch.setattr(beside, "camera_by_edges", slow_focal)
     slowly = capture(SAMPLE, body, CaptureOptions(quality="fast")).motions[0]
     for name in ("poses", "trans", "betas", "joints_cam", "intrinsics"):
         np.testing.assert_array_equal(getattr(slowly, name), getattr(watched[0].motions[0], name))
@@ -81,7 +81,7 @@ def test_a_failure_beside_is_not_lost(body, monkeypatch):
     def broken(*_):
         raise ValueError("no edges today")
 
-    monkeypatch.setattr(beside, "better_camera", broken)
+    monkeypatch.setattr(beside, "camera_by_edges", broken)
     with pytest.raises(ValueError, match="no edges today"):
         capture(SAMPLE, body, CaptureOptions(quality="fast"))
 
