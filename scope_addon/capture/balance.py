@@ -7,7 +7,7 @@ the standing soles p_i, g gravity and s the level part of the line of sight, wei
     x = s·(c − c̈ h / g),   min_i s·p_i ≤ x ≤ max_i s·p_i.
 
 What sticks out is taken back by turning the whole body about its standing soles. The faster somebody moves, the less
-is believed of this: there, c̈ is not known well enough.
+is believed of this: there, c̈ is not known well enough. Nor is it of those who may sit or kneel, see `carrying`.
 
 Sources: Vukobratović and Borovac 2004 (zero moment point); masses of body parts and their centres by Winter 2009.
 """
@@ -37,6 +37,7 @@ _LIMBS = (
     (0.0145, "ankle", "foot", 0.5),
 )
 _HEAD, _TRUNK = 0.081, 0.497
+RESTING_KNEE_COS, CARRYING_KNEE_COS = np.cos(np.radians([75.0, 60.0]))  # bent more, less than that
 
 
 def center_of_mass(body: Body, joints: np.ndarray) -> np.ndarray:
@@ -49,6 +50,26 @@ def center_of_mass(body: Body, joints: np.ndarray) -> np.ndarray:
             a, b = joints[:, at[f"{side}_{start}"]], joints[:, at[f"{side}_{end}"]]
             total = total + mass * ((1 - share) * a + share * b)
     return total / (_HEAD + _TRUNK + 2 * sum(mass for mass, *_ in _LIMBS))
+
+
+def carrying(body: Body, joints: np.ndarray) -> np.ndarray:
+    """(T,) how far a leg is straight enough to bear the weight, which may rest on a chair or the shins otherwise."""
+    straight = np.max([(shank * thigh).sum(1) for shank, thigh in legs(body, joints)], axis=0)
+    return np.clip((straight - RESTING_KNEE_COS) / (CARRYING_KNEE_COS - RESTING_KNEE_COS), 0.0, 1.0)
+
+
+def legs(body: Body, joints: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Of the left leg and the right one, shank and thigh, (T, 3) unit vectors upwards."""
+    return [
+        (along(body, joints, f"{side}_ankle", f"{side}_knee"), along(body, joints, f"{side}_knee", f"{side}_hip"))
+        for side in ("left", "right")
+    ]
+
+
+def along(body: Body, joints: np.ndarray, a: str, b: str) -> np.ndarray:
+    """(T, 3) unit vectors from joint a to joint b."""
+    d = joints[:, body.joint_names.index(b)] - joints[:, body.joint_names.index(a)]
+    return d / np.maximum(np.linalg.norm(d, axis=1, keepdims=True), 1e-9)
 
 
 def turn_over_feet(placed: PlacedTrack, contact: np.ndarray, up: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -64,16 +85,16 @@ def turn_over_feet(placed: PlacedTrack, contact: np.ndarray, up: np.ndarray) -> 
     sight /= np.maximum(np.linalg.norm(sight, axis=1, keepdims=True), 1e-9)
     height = np.maximum((mass - pivot) @ up, 0.3)
     stands = contact > 0.5
-    believed = stands.any(axis=1).astype(float)
+    believed = stands.any(axis=1) * carrying(placed.body, placed.joints)
     pressing = mass
     if len(times) > 2:
         velocity = np.gradient(mass, times, axis=0)
         believed *= np.exp(-np.square(np.linalg.norm(velocity, axis=1) / STANDING_M_S))
         pressing = mass - np.gradient(velocity, times, axis=0) * (height / GRAVITY_M_S2)[:, None]
-    at, along = (pressing * sight).sum(axis=1), (_whole_soles(soles) * sight[:, None]).sum(axis=-1)
+    at, reach = (pressing * sight).sum(axis=1), (_whole_soles(soles) * sight[:, None]).sum(axis=-1)
     somewhere = stands.any(axis=1)
-    low = np.where(somewhere, np.where(stands, along, np.inf).min(axis=1), -np.inf)
-    high = np.where(somewhere, np.where(stands, along, -np.inf).max(axis=1), np.inf)
+    low = np.where(somewhere, np.where(stands, reach, np.inf).min(axis=1), -np.inf)
+    high = np.where(somewhere, np.where(stands, reach, -np.inf).max(axis=1), np.inf)
     out = np.maximum(at - high, 0) - np.maximum(low - at, 0)
     angle = gaussian_smooth(-believed * np.arctan2(out, height), times, CUTOFF_HZ)
     angle /= gaussian_smooth(believed, times, CUTOFF_HZ) + DOUBT

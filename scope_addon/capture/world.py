@@ -10,14 +10,13 @@ import numpy as np
 
 from ...solver.body import Body
 from ...solver.frames import transform_points, world_from_level_camera
-from .balance import center_of_mass
+from .balance import along, carrying, center_of_mass, legs
 from .line_segments import Lines
 from .placement import PlacedTrack
 from .vertical_lines import told_by_lines
 
 STANDING_KNEE_COS = np.cos(np.radians(30.0))  # thigh and shank within 30 degrees of one line
 FLOOR_NOISE_M = 0.05  # scatter of a supporting foot's depth-borne height
-RESTING_KNEE_COS, CARRYING_KNEE_COS = np.cos(np.radians([75.0, 60.0]))  # bent more, less than that
 STANCE_M = 0.2  # what a frame's stance tells of up, as far as the centre of mass of one who stands is over the feet
 ROUNDS = 2
 MOMENT_S = 0.1  # length of a clip that halves what its stances tell
@@ -49,16 +48,16 @@ def up_from_standing(people: Sequence[PlacedTrack]) -> np.ndarray:
 
 def _straightness(person: PlacedTrack) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Directions (T, 3) of trunk and body, and how straight the body is (T,), in the frames in which it was seen."""
-    trunk = _along(person.body, person.joints, "pelvis", "neck")
+    trunk = along(person.body, person.joints, "pelvis", "neck")
     straightness = np.ones(len(trunk))
-    legs = np.zeros_like(trunk)
-    for shank, thigh in _legs(person.body, person.joints):
+    lower = np.zeros_like(trunk)
+    for shank, thigh in legs(person.body, person.joints):
         straight = (shank * thigh).sum(1)
         straightness *= np.clip((straight - STANDING_KNEE_COS) / (1 - STANDING_KNEE_COS), 0, 1)
-        legs += 0.5 * (shank + thigh)
-    body_up = legs + trunk
+        lower += 0.5 * (shank + thigh)
+    body_up = lower + trunk
     body_up /= np.maximum(np.linalg.norm(body_up, axis=1, keepdims=True), 1e-9)
-    straightness *= np.clip(((legs / 2) * trunk).sum(1), 0, 1) ** 8
+    straightness *= np.clip(((lower / 2) * trunk).sum(1), 0, 1) ** 8
     return trunk[person.valid], body_up[person.valid], straightness[person.valid]
 
 
@@ -76,10 +75,10 @@ def up_from_bodies(people: Sequence[PlacedTrack]) -> np.ndarray:
     start = up_from_standing(people)
     level, up = np.array([0.0, -1.0, 0.0]), start
     masses = [center_of_mass(each.body, each.joints) for each in people]
-    carrying = [_carrying(each.body, each.joints) for each in people]
+    carried = [carrying(each.body, each.joints) for each in people]
     for _ in range(ROUNDS):
         total = np.zeros(3)
-        for each, mass, carries in zip(people, masses, carrying, strict=True):
+        for each, mass, carries in zip(people, masses, carried, strict=True):
             contact = each.contact(up)
             above = mass - each.stands_at(contact)
             upright = np.maximum(above @ level, 0.0) / np.maximum(np.linalg.norm(above, axis=1), 1e-9)
@@ -88,26 +87,6 @@ def up_from_bodies(people: Sequence[PlacedTrack]) -> np.ndarray:
             total += STANCE_M * each.valid.sum() * start + lasts_s / (lasts_s + MOMENT_S) * (weight @ above)
         up = total / np.linalg.norm(total)
     return up
-
-
-def _carrying(body: Body, joints: np.ndarray) -> np.ndarray:
-    """(T,) how far a leg is straight enough to bear the weight, which may rest on a chair or the shins otherwise."""
-    straight = np.max([(shank * thigh).sum(1) for shank, thigh in _legs(body, joints)], axis=0)
-    return np.clip((straight - RESTING_KNEE_COS) / (CARRYING_KNEE_COS - RESTING_KNEE_COS), 0.0, 1.0)
-
-
-def _legs(body: Body, joints: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Of the left leg and the right one, shank and thigh, (T, 3) unit vectors upwards."""
-    return [
-        (_along(body, joints, f"{side}_ankle", f"{side}_knee"), _along(body, joints, f"{side}_knee", f"{side}_hip"))
-        for side in ("left", "right")
-    ]
-
-
-def _along(body: Body, joints: np.ndarray, a: str, b: str) -> np.ndarray:
-    """(T, 3) unit vectors from joint a to joint b."""
-    d = joints[:, body.joint_names.index(b)] - joints[:, body.joint_names.index(a)]
-    return d / np.maximum(np.linalg.norm(d, axis=1, keepdims=True), 1e-9)
 
 
 def up_from_floor(feet_cam: np.ndarray, up: np.ndarray) -> np.ndarray:

@@ -14,13 +14,18 @@ T = 60
 TIMES = np.arange(T) / 30
 
 
-def standing(lean_deg=0.0, axis=(1.0, 0.0, 0.0), speed_m_s=0.0, arms_deg=60.0):
-    """A person who stands 4 m away with arms down, leaning as a whole about the feet; gliding along if so asked."""
+def standing(lean_deg=0.0, axis=(1.0, 0.0, 0.0), speed_m_s=0.0, arms_deg=60.0, bends=()):
+    """A person who stands 4 m away with arms down, leaning as a whole about the feet; gliding along if so asked.
+
+    ``bends``: of both hips, knees and so on, degrees about the joint's x axis.
+    """
     body = load_body("scope")
     soled = with_soles(body, np.zeros(body.P))
     omega = np.tile(np.eye(3), (T, body.K + 1, 1, 1))
     for side, sign in (("left", -1), ("right", 1)):
         omega[:, body.joint_names.index(f"{side}_shoulder")] = rotations.exp([0, 0, sign * np.radians(arms_deg)])
+        for name, degrees in bends:
+            omega[:, body.joint_names.index(f"{side}_{name}")] = rotations.exp(np.radians([degrees, 0, 0]))
     upright = rotations.exp([np.pi, 0.0, 0.0])  # model y up to camera y down
     lean = rotations.exp(np.radians(lean_deg) * np.array(axis))
     omega[:, 0] = lean @ upright
@@ -82,6 +87,21 @@ def test_who_moves_or_flies_is_left_alone():
     turn, _ = turn_over_feet(standing(20.0), np.zeros((T, 4)), UP)
     assert np.isfinite(turn).all()
     assert np.abs(turned_deg(turn)).max() < 1e-6
+
+
+SITS, KNEELS, BENDS = (("hip", -85), ("knee", 85)), (("knee", 90), ("ankle", 50)), (("hip", -20), ("knee", 40))
+
+
+@pytest.mark.parametrize("bends", [SITS, KNEELS], ids=["sits", "kneels"])
+@pytest.mark.parametrize("lean", [-10.0, 0.0, 10.0])
+def test_who_rests_on_a_chair_or_the_shins_is_left_alone(bends, lean):
+    turn, _ = turn_over_feet(standing(lean, bends=bends), np.ones((T, 4)), UP)
+    assert np.abs(turned_deg(turn)).max() < 0.1
+
+
+def test_who_goes_down_a_little_has_to_keep_balance():
+    turn, _ = turn_over_feet(standing(20.0, bends=BENDS), np.ones((T, 4)), UP)
+    assert turned_deg(turn)[T // 2] < -3.0
 
 
 def test_a_still_is_judged_as_it_stands():
