@@ -67,8 +67,8 @@ def gaussian_smooth(values: np.ndarray, times: np.ndarray, cutoff_hz: float) -> 
     if T < 3 or cutoff_hz <= 0:
         return values.copy()
     sigma = np.sqrt(np.log(2)) / (2 * np.pi * cutoff_hz)
-    step = np.median(np.diff(times))
-    reach = min(int(np.ceil(4 * sigma / max(step, 1e-6))), T - 1)
+    near = np.searchsorted(times, times + 4 * sigma, side="right") - np.arange(T)  # where frames lie closest, the most
+    reach = min(int(near.max()), T - 1)
     flat = values.reshape(T, -1)
     total, weight = np.zeros_like(flat, float), np.zeros(T)
     for shift in range(-reach, reach + 1):

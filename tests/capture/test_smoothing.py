@@ -45,6 +45,15 @@ def test_uneven_times_count_as_they_are():
     assert abs((smooth @ wave[200:-200]) / (wave[200:-200] @ wave[200:-200]) - expected) < 0.03
 
 
+def test_a_stretch_of_many_frames_a_second_is_smoothed_as_if_all_of_it_were_such():
+    """As telephones film: most of a clip at 24 frames a second, a part of it at 120."""
+    dense = np.arange(10, 12, 1 / 120)
+    noise = np.random.default_rng(3).normal(size=len(dense))
+    times = np.concatenate([np.arange(0, 10, 1 / 24), dense])
+    smooth = gaussian_smooth(np.concatenate([np.zeros(len(times) - len(dense)), noise]), times, 2.0)
+    assert np.allclose(smooth[-120:], gaussian_smooth(noise, dense, 2.0)[-120:], atol=1e-3)
+
+
 def test_rotations_stay_rotations_and_cross_pi_without_a_jump():
     times = np.arange(240) / 60
     R = turn(np.linspace(0, 4 * np.pi, 240) + 0.05 * np.random.default_rng(1).normal(size=240))[:, None]
