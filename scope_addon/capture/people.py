@@ -9,6 +9,7 @@ import numpy as np
 
 from .association import link
 from .observation import Observation
+from .scene_cuts import BETWEEN_SCENES_S
 from .track import Track, Tracklet, make_track
 
 SHORTEST_SHARE = 0.02  # seen in fewer frames than this, a "person" is a mistake of the detector
@@ -16,7 +17,6 @@ SHORTEST_S = 0.3  # the same for the longest time without interruption
 LEAST_PROMINENCE = 0.05  # of the most prominent person's
 MERGED = 0.25  # mean distance of the keypoints, in sides of the region, of somebody who is becoming somebody else
 LONGEST_MERGER_S = 0.38
-BETWEEN_SCENES_S = 10.0
 SHORTEST_AGAIN_S = 0.1  # who was lost, seen again for less than this and lost again, was somebody or something else
 
 

@@ -13,13 +13,14 @@ from .compact import compact
 from .fitting import FittedTrack
 from .frame_blocks import by_blocks
 from .grounding import standing_probability
+from .scene_cuts import BETWEEN_SCENES_S
 from .smoothing import fill_gaps, fill_rotation_gaps, smooth_root, smooth_rotations
 from .soles import FOOT_PARTS, sole_points, with_soles
 from .track import Track
 
 # From here on a foot is seen, if badly; behind something it has 0.1 and more, beside the picture less than 0.01.
 SEEN_CONFIDENCE = 0.1
-LONGEST_STEP_S = 1.0  # between two frames of one scene
+LONGEST_STEP_S, LONGEST_STEP = 1.0, 1.5  # between two frames of one scene; in usual steps, where these are long
 
 
 @dataclass(frozen=True)
@@ -49,11 +50,14 @@ class PlacedTrack:
     def contact(self, up: np.ndarray) -> np.ndarray:
         """(T, 4) probability that each sole stands, as far as it is seen: imagined feet hold nobody.
 
-        Nothing stands from one scene into the next.
+        Nothing stands from one scene into the next, or over a pause much longer than from frame to frame.
         """
         contact = standing_probability(self.soles, up, self.times, self.center)
         contact *= self.soles_seen * self.valid[:, None]
-        contact[1:][np.diff(self.times) > LONGEST_STEP_S] = 0.0
+        steps = np.diff(self.times)
+        if len(steps):
+            longest = max(LONGEST_STEP_S, LONGEST_STEP * float(np.median(steps)))
+            contact[1:][steps > min(longest, BETWEEN_SCENES_S)] = 0.0
         return contact
 
 
