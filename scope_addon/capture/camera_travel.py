@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from .scene_cuts import BETWEEN_SCENES_S
 from .smoothing import gaussian_smooth
 
 LEAST_M_S = 0.25  # slower sliding is the error of one camera's depth
@@ -51,5 +52,7 @@ def camera_travel(soles: np.ndarray, valid: np.ndarray, up: np.ndarray, times: n
     weight = carries.astype(float)
     total = gaussian_smooth(weight[:, None] * v + 0.02 * middle, times, SMOOTH_HZ)
     speed = total / (gaussian_smooth(weight[:, None], times, SMOOTH_HZ) + 0.02)
-    steps = 0.5 * (speed[1:] + speed[:-1]) * np.diff(times)[:, None]
+    lasts = np.diff(times)
+    lasts[lasts > BETWEEN_SCENES_S] = 0.0  # a cut: the camera counts as where it was last
+    steps = 0.5 * (speed[1:] + speed[:-1]) * lasts[:, None]
     return np.concatenate([np.zeros((1, 3)), -np.cumsum(steps, axis=0)])

@@ -48,6 +48,14 @@ def test_a_camera_that_speeds_up():
     assert np.abs(found - center)[:, 0].max() < 0.15 * center[-1, 0]
 
 
+def test_a_camera_does_not_travel_from_one_scene_into_the_next():
+    center = np.stack([1.4 * TIMES, 0 * TIMES, 0 * TIMES], axis=1)
+    times = TIMES + np.where(np.arange(T) < T // 2, 0.0, 10.0)
+    found = camera_travel(seen_from(steps(1.4), center), np.ones(T, bool), UP, times)
+    assert np.linalg.norm(np.diff(found, axis=0), axis=1).max() < 2 * 1.4 / FPS
+    assert abs(found[-1, 0] - center[-1, 0]) < 0.1 * center[-1, 0]
+
+
 def test_feet_that_stand_still_are_a_camera_that_stands_still():
     found = camera_travel(seen_from(steps(1.4), np.zeros((T, 3)), 0.004), np.ones(T, bool), UP, TIMES)
     np.testing.assert_array_equal(found, 0.0)
