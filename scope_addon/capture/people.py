@@ -67,11 +67,11 @@ class PeopleBuilder:
         return [make_track(self._frames, self._times, person) for person in counted if _prominence(person) >= least]
 
     def _is_believable(self, person: list[Tracklet]) -> bool:
-        """Seen often enough, and for long enough without interruption."""
+        """Seen often enough, and for long enough without interruption: at a low rate a single frame lasts so long."""
         span = self._times[-1] - self._times[0]
         longest = max(self._times[t.rows[-1]] - self._times[t.rows[0]] for t in person)
         often = sum(len(t.rows) for t in person) >= SHORTEST_SHARE * len(self)
-        return often and longest >= min(SHORTEST_S, 0.5 * span)
+        return often and (longest >= min(SHORTEST_S, 0.5 * span) or np.median(np.diff(self._times)) >= SHORTEST_S)
 
 
 def trim_merged_end(tracklet: Tracklet, others: Sequence[Tracklet], times: Sequence[float]) -> None:

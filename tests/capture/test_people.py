@@ -64,6 +64,14 @@ def test_a_crossing(follow: Callable[..., list[Track]], colors: tuple, hidden: i
     assert tracks[1].seen.sum() >= 120 - hidden - 22  # not while the two bodies cannot be told apart
 
 
+@pytest.mark.parametrize("count", [2, 8])
+@pytest.mark.parametrize("fps", [1, 2])
+def test_who_is_elsewhere_in_each_frame_at_a_low_rate(follow: Callable[..., list[Track]], fps: int, count: int) -> None:
+    walks = Person(lambda t: (100 + 90.0 * t, 200), RED)
+    (track,) = follow([walks], count, fps=fps)
+    assert track.seen.all()
+
+
 def test_overtaken_by_somebody_just_found(follow: Callable[..., list[Track]]) -> None:
     """Whom the newcomer hides slides onto them, and is not them because of having been followed for longer."""
     stands = Person(lambda t: (500, 200), RED, hidden=range(46, 56))
