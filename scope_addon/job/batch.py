@@ -164,7 +164,7 @@ class Batch:
         entry["seconds"] = round(time.monotonic() - start, 2)
         report = _last_object(stdout)
         if status == 0 and report is not None:
-            outputs = [Path(p).resolve().relative_to(self.out).as_posix() for p in report.pop("outputs")]
+            outputs = [Path(p).relative_to(self.out).as_posix() for p in report.pop("outputs")]
             return entry | {"status": "done", "outputs": outputs, "report": report}
         if status == NoPersonError.exit_status:
             return entry | {"status": "no_person", "outputs": [], "message": _sentence(stderr)}

@@ -134,6 +134,23 @@ def test_a_pipe_is_no_clip_and_a_link_that_leads_nowhere_is_told(tmp_path):
     assert sorted(found) == ["gone.mp4"]
 
 
+def test_results_may_lie_on_another_disk(folder, tmp_path):
+    """A folder of the results is a link to elsewhere, as who runs out of space makes it."""
+    (folder / "later").mkdir()
+    (folder / "later" / "f.mp4").write_text("ok")
+    out, elsewhere = tmp_path / "out", tmp_path / "elsewhere"
+    out.mkdir()
+    elsewhere.mkdir()
+    (out / "later").symlink_to(elsewhere)
+    report = batch(folder, out).run(1, recursive=True)
+    (entry,) = (e for e in report["files"] if e["name"] == "later/f")
+    assert entry["status"] == "done"
+    assert (elsewhere / "f.npz").is_file()
+    calls(folder / "later")
+    batch(folder, out).run(1, recursive=True)
+    assert calls(folder / "later") == []
+
+
 def test_a_moved_folder_of_footage_is_still_finished(folder, tmp_path):
     batch(folder, tmp_path / "out").run(1)
     moved = tmp_path / "moved"
