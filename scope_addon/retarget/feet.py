@@ -22,7 +22,7 @@ import numpy as np
 from ...solver.rotations import exp
 
 _SOFT_M = 0.004  # over this difference in height, heel and ball share the foot
-_PULL_FRAMES = 4  # over so many frames on both sides a pelvis that has to sink does so
+_PULL_S = 4 / 30  # over so long a time on both sides a pelvis that has to sink does so
 
 
 @dataclass(frozen=True)
@@ -78,10 +78,10 @@ def flat_toes(toe: np.ndarray, rest: np.ndarray, ball: np.ndarray, ball_rest: fl
     return exp(side * lift[:, None]) @ toe
 
 
-def sinking(hips: np.ndarray, goals: np.ndarray, lengths: np.ndarray) -> np.ndarray:
+def sinking(hips: np.ndarray, goals: np.ndarray, lengths: np.ndarray, times: np.ndarray) -> np.ndarray:
     """(T,) metres by which the pelvis has to come down for the legs to reach the ankles' places, smoothly.
 
-    :param hips, goals: (T, L, 3) of L legs; lengths: (L,) stretched.
+    :param hips, goals: (T, L, 3) of L legs; lengths: (L,) stretched; times: (T,) seconds.
     """
     level = np.linalg.norm((goals - hips)[..., :2], axis=-1)
     upright = np.sqrt(np.maximum(lengths**2 - level**2, (0.5 * lengths) ** 2))
@@ -89,9 +89,10 @@ def sinking(hips: np.ndarray, goals: np.ndarray, lengths: np.ndarray) -> np.ndar
     if not needed.any() or len(needed) == 1:
         return needed
     # The largest of the neighbourhood, then its mean over the same: nowhere less than needed, and no corner.
-    width = np.arange(-_PULL_FRAMES, _PULL_FRAMES + 1)
+    frames = round(_PULL_S / float(np.median(np.diff(times))))
+    width = np.arange(-frames, frames + 1)
     near = np.clip(np.arange(len(needed))[:, None] + width, 0, len(needed) - 1)
-    weight = 1 + np.cos(np.pi * width / (_PULL_FRAMES + 1))
+    weight = 1 + np.cos(np.pi * width / (frames + 1))
     return needed[near].max(axis=1)[near] @ (weight / weight.sum())
 
 

@@ -99,7 +99,7 @@ def transfer(
     lift[2] = (rig.heads[hips, 2].mean() - rig.floor) - scale * rested
     heads += (scale * source_hips + lift - heads[:, hips].mean(axis=1))[:, None]
     if feet:
-        _stand(rig, row, world, heads, turns, A @ F, body, betas, joints, scale)
+        _stand(rig, row, world, heads, turns, A @ F, body, betas, joints, scale, clip.times)
     return Pose(world, heads, float(np.arctan2(F[1, 0], F[0, 0])))
 
 
@@ -114,6 +114,7 @@ def _stand(
     betas: np.ndarray,
     joints: np.ndarray,
     scale: float,
+    times: np.ndarray,
 ) -> None:
     """Bring the ankles, and with them heels and balls, to where the body's are; in place."""
     index = {part: k for k, part in enumerate(body.joint_names)}
@@ -136,7 +137,8 @@ def _stand(
         return
     hips = [leg[0] for leg in legs]
     rested = [[np.linalg.norm(rig.heads[b] - rig.heads[a]) for a, b in zip(leg, leg[1:], strict=False)] for leg in legs]
-    heads[..., 2] -= sinking(heads[:, hips], np.stack(goals, 1), 0.9995 * np.array(rested).sum(1))[:, None]
+    lengths = 0.9995 * np.array(rested).sum(1)
+    heads[..., 2] -= sinking(heads[:, hips], np.stack(goals, 1), lengths, times)[:, None]
     first = heads[:, hips[0]].copy()
     for leg, goal in zip(legs, goals, strict=True):
         reach(world, heads, leg, goal)
