@@ -26,7 +26,7 @@ LONGEST_S = 0.12
 LONGEST_FRAMES = 8  # at a high frame rate
 CONFIDENCE = 0.3  # share that is left
 SPREAD_M = 0.5  # root mean square distance of a standing adult's limbs from their middle
-SPREAD_FRAMES = 30  # people who bend for a moment do not shrink
+SPREAD_S = 1.0  # people who bend for a moment do not shrink
 
 
 def mend_leaps(track: Track) -> Track:
@@ -71,8 +71,9 @@ def find_leaps(points: np.ndarray, seen: np.ndarray, step_s: float) -> np.ndarra
 def metre_px(track: Track) -> np.ndarray:
     """(T,) pixels that a metre takes at the person's distance, roughly."""
     size = np.where(track.seen, person_size(track.keypoints_px), 0.0)
-    padded = np.pad(size, SPREAD_FRAMES, mode="edge")
-    largest = np.lib.stride_tricks.sliding_window_view(padded, 2 * SPREAD_FRAMES + 1).max(axis=1)
+    near = round(SPREAD_S / max(float(np.median(np.diff(track.times))), 1e-3)) if len(track) > 1 else 0
+    padded = np.pad(size, near, mode="edge")
+    largest = np.lib.stride_tricks.sliding_window_view(padded, 2 * near + 1).max(axis=1)
     return np.maximum(largest / SPREAD_M, 1e-3)
 
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scope.scope_addon.capture.landmark_network import KEYPOINT_NAMES
-from scope.scope_addon.capture.leaps import CONFIDENCE, find_leaps, mend_leaps
+from scope.scope_addon.capture.leaps import CONFIDENCE, find_leaps, mend_leaps, metre_px
 from scope.scope_addon.capture.track import Track
 
 WRIST, ANKLE = KEYPOINT_NAMES.index("left_wrist"), KEYPOINT_NAMES.index("right_ankle")
@@ -67,6 +67,16 @@ def test_what_a_body_can_do_is_left_alone(rate: float) -> None:
         values[:, WRIST, 1] += metre * punch
         values[:, ANKLE, 0] += metre * 0.3 * (1 - np.cos(np.pi * np.clip((time - 1.6) / 0.15, 0, 1)))
     assert mend_leaps(track) is track
+
+
+@pytest.mark.parametrize("rate", [1.0, 30.0, 240.0])
+def test_who_crouches_for_a_moment_does_not_shrink(rate: float) -> None:
+    track = standing(max(2, int(4 * rate)), rate)
+    usual = metre_px(track)
+    crouches = np.abs(track.times - 2.0) < 0.4
+    middle = track.keypoints_px.mean(axis=1, keepdims=True)
+    track.keypoints_px[crouches] = (middle + 0.4 * (track.keypoints_px - middle))[crouches]
+    np.testing.assert_allclose(metre_px(track), usual, rtol=0.05)
 
 
 def test_gaps_and_ends() -> None:
