@@ -35,7 +35,7 @@ class Camera:
 
     def undistort(self, points_px: np.ndarray) -> np.ndarray:
         """Pixels (..., 2) as an ideal pinhole with the same intrinsics would see them."""
-        if not self.dist.any():
+        if not self.dist.any() or not points_px.size:  # OpenCV refuses to undistort nothing
             return points_px
         import cv2
 

@@ -3,7 +3,8 @@
 
 import numpy as np
 import pytest
-from scope.scope_addon.capture.camera import choose_camera
+from scope.scope_addon.capture.camera import Camera, choose_camera, pinhole
+from scope.scope_addon.capture.camera_motion import BackgroundTracker
 from scope.solver.errors import UsageError
 
 
@@ -30,3 +31,15 @@ def test_metadata_counts_only_without_the_users_word():
 def test_contradictory_or_impossible_values_are_refused(options):
     with pytest.raises(UsageError):
         choose_camera(640, 480, **options)
+
+
+def test_a_lens_that_distorts_before_a_black_picture_and_a_bare_wall():
+    """Neither has corners or edges: no points are undistorted to none, and nothing is said of how the camera turns."""
+    camera = Camera(pinhole(320, 240, 300.0), np.array([-0.2, 0.05, 0.0, 0.0, 0.0]), "calibration")
+    assert camera.rays(np.zeros((0, 2))).shape == (0, 3)
+    background = BackgroundTracker(camera, 320, 240)
+    for k, grey in enumerate((0, 0, 128, 128)):
+        background.add(np.full((240, 320, 3), grey, np.uint8), k / 10, [np.array([[100.0, 60.0], [160.0, 200.0]])])
+    motion = background.motion(camera)
+    assert motion.is_static
+    assert len(background.lines(motion, camera).lengths) == 0
