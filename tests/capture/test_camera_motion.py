@@ -100,6 +100,15 @@ def test_nothing_to_see_is_static_and_said_to_be_unknown():
     assert follow(iter([])).R_first_camera.shape == (0, 3, 3)
 
 
+@pytest.mark.parametrize(("width", "height"), [(2000, 2), (2, 2000), (1, 1)])
+def test_the_narrowest_pictures_tell_nothing(width, height):
+    camera = Camera(pinhole(width, height, 1000.0), np.zeros(5), "given")
+    tracker = BackgroundTracker(camera, width, height)
+    for k in range(3):
+        tracker.add(np.full((height, width, 3), 128, np.uint8), k / FPS, [])
+    assert tracker.motion(camera).is_static
+
+
 def test_a_moment_without_sight_is_bridged(panorama):
     T = 60
     truth = exp(np.linspace(0, 0.3, T)[:, None] * [0.0, 1.0, 0.0])
