@@ -11,7 +11,6 @@ import argparse
 import ctypes
 import json
 import os
-import re
 import signal
 import sys
 import threading
@@ -22,23 +21,20 @@ from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING, NoReturn, TextIO
 
-from ..solver.body import ASSETS, BUILT_IN, Body, body_with_hands
+from ..solver.body import ASSETS, Body
 from ..solver.errors import ScopeError, UsageError
+from .cli_options import add_options, body_and_options, given_options
 from .job.parent import stop_with_parent
 from .motion import Motion
 from .retarget.rig_source import ROOTS
 from .scene.output_paths import SUFFIXES, check_output, person_paths
 
 if TYPE_CHECKING:
-    from .capture.pipeline import CaptureOptions
     from .retarget.rig_source import RigSource
 
 SAMPLE = ASSETS / "sample" / "sample.mp4"
 MOTION_SUFFIXES = (".npz",)
-SHAPE_MODES = ("keyed", "per_frame", "baked")
 OVERLAY_SUFFIXES = (".mp4", ".png", ".jpg")
-QUALITIES = ("fast", "balanced", "best")
-PROVIDERS = ("auto", "cpu", "cuda", "tensorrt", "directml", "coreml")
 _CLEAR_LINE = "\r\x1b[K"
 _signals: list[int] = []  # that asked to stop
 PROGRAM = (sys.executable, "-m", f"{__package__}.cli")
@@ -77,7 +73,7 @@ def build_parser() -> argparse.ArgumentParser:
         "--overlay", type=Path, metavar="FILE", help="draw the body over the footage: .mp4, .png, .jpg"
     )
     capture.add_argument("--stop-with-stdin", action="store_true", help=argparse.SUPPRESS)  # as a batch starts it
-    _add_options(capture)
+    add_options(capture)
     batch = commands.add_parser("batch", help="capture every video and picture of a folder")
     batch.set_defaults(run=run_batch)
     batch.add_argument("folder", type=Path, metavar="FOLDER", help="folder of videos, pictures and picture sequences")
@@ -92,64 +88,8 @@ def build_parser() -> argparse.ArgumentParser:
     batch.add_argument("--recursive", action="store_true", help="folders below too")
     batch.add_argument("--jobs", type=int, default=1, metavar="N", help="clips captured at once (default: 1)")
     batch.add_argument("--again", action="store_true", help="also what was captured before and has not changed")
-    _add_options(batch)
+    add_options(batch)
     return parser
-
-
-def _add_options(capture: argparse.ArgumentParser) -> None:
-    """How to capture: the same for one clip and for a folder of them."""
-    capture.add_argument("--quality", choices=QUALITIES, default="best", help="speed against accuracy (default: best)")
-    capture.add_argument(
-        "--people",
-        default="largest",
-        metavar="N|all|largest",
-        help="how many people at most; largest: the one who fills the picture most over the clip, but nobody less than"
-        " half as large as somebody beside them (default: largest)",
-    )
-    capture.add_argument("--start", metavar="TIME", help="from when: seconds, MM:SS, HH:MM:SS.mmm or HH:MM:SS:FF")
-    capture.add_argument("--end", metavar="TIME", help="until when, inclusive")
-    capture.add_argument("--fps", metavar="N", help="use so many frames per second, such as 12 or 29.97")
-    capture.add_argument(
-        "--body", default="scope", help=f"{', '.join(BUILT_IN)}, or your own .npz or .pkl (default: scope)"
-    )
-    capture.add_argument("--hands", action="store_true", help="fingers too, on scope_h unless --body says otherwise")
-    capture.add_argument(
-        "--height",
-        metavar="CM[,CM...]",
-        help="how tall the people are, the most prominent one first: sets the size of everything (default: found)",
-    )
-    capture.add_argument("--focal-mm", type=float, metavar="MM", help="35 mm equivalent focal length of the camera")
-    capture.add_argument("--fov", type=float, metavar="DEGREES", help="field of view along the longer side")
-    capture.add_argument("--calibration", type=Path, metavar="FILE", help="JSON with intrinsics, dist and size")
-    capture.add_argument("--no-smoothing", action="store_true", help="every frame as it was solved, feet not held")
-    capture.add_argument(
-        "--shape-keys",
-        choices=SHAPE_MODES,
-        default="keyed",
-        help="keyed once, per_frame, or baked into the mesh for engines that clamp morphs (default: keyed)",
-    )
-    capture.add_argument(
-        "--file-per-person", action="store_true", help="a file for each of several people, in every format"
-    )
-    capture.add_argument(
-        "--retarget", type=Path, metavar="RIG", help="put the motion on the rig in this .blend, .fbx or .glb instead"
-    )
-    capture.add_argument("--rig-object", default="", metavar="NAME", help="the armature, where RIG holds several")
-    capture.add_argument("--bone-map", type=Path, metavar="FILE", help="which bone is which: JSON saved in the panel")
-    capture.add_argument(
-        "--retarget-root",
-        choices=ROOTS,
-        default=ROOTS[0],
-        help="where the rig keeps the way over the floor (default: bone)",
-    )
-    capture.add_argument("--detector", type=Path, metavar="FILE", help="your own person detector, an .onnx file")
-    capture.add_argument("--keypoints", type=Path, metavar="FILE", help="your own keypoint network, an .onnx file")
-    capture.add_argument(
-        "--provider", choices=PROVIDERS, default="auto", help="what the networks run on (default: the best there is)"
-    )
-    capture.add_argument("--threads", type=int, default=0, metavar="N", help="threads for the networks (default: all)")
-    capture.add_argument("--json", action="store_true", help="print a machine-readable report on stdout")
-    capture.add_argument("--quiet", action="store_true", help="no progress bar")
 
 
 def main(argv: Sequence[str] | None = None, program: Sequence[str] = PROGRAM) -> int:
@@ -188,7 +128,7 @@ def run_capture(args: argparse.Namespace) -> dict:
     _check_outputs(outputs, args.overlay, video)
     rig = _rig_of(args, outputs)
 
-    body, options = _body_and_options(args)
+    body, options = body_and_options(args)
     # Imported here, so that --help and a wrong argument answer at once.
     from .capture.overlay import write_overlay
     from .capture.pipeline import capture
@@ -216,37 +156,6 @@ def run_capture(args: argparse.Namespace) -> dict:
     return report
 
 
-def _body_and_options(args: argparse.Namespace) -> tuple[Body, CaptureOptions]:
-    """What the arguments say about how to capture.
-
-    :raises ScopeError: an argument cannot be meant, or there is no such body.
-    """
-    from ..solver.body import load_body
-    from .capture.pipeline import CaptureOptions, check_options
-    from .capture.video_range import parse_range
-
-    if args.threads < 0:
-        raise UsageError(f"--threads takes a number from 1 on, or 0 for all, not {args.threads}")
-    options = CaptureOptions(
-        quality=args.quality,
-        people=_people(args.people),
-        wanted=parse_range(args.start, args.end, args.fps),
-        heights_m=_heights(args.height),
-        focal_mm=args.focal_mm,
-        fov_deg=args.fov,
-        calibration=args.calibration,
-        smoothing=not args.no_smoothing,
-        hands=args.hands,
-        threads=args.threads,
-        provider=args.provider,
-        detector=args.detector,
-        keypoints=args.keypoints,
-    )
-    body = load_body(body_with_hands(args.body) if args.hands else args.body)
-    check_options(body, options)
-    return body, options
-
-
 def run_batch(args: argparse.Namespace) -> dict:
     """``scope batch``: one process per clip, so that none can harm another; returns the report of all."""
     from .capture.pipeline import check_networks
@@ -260,9 +169,9 @@ def run_batch(args: argparse.Namespace) -> dict:
     if args.jobs < 1:
         raise UsageError(f"--jobs takes a number from 1 on, not {args.jobs}")
     _rig_of(args, [args.out / f"clip{suffix}" for suffix in formats])
-    _, options = _body_and_options(args)
+    _, options = body_and_options(args)
     check_networks(options)  # what no clip can be captured with is said once, before the first
-    batch = Batch(args.folder, args.out, args.program, _given_options(args), formats, args.overlays)
+    batch = Batch(args.folder, args.out, args.program, given_options(args), formats, args.overlays)
     with _ProgressBar(sys.stderr, show=sys.stderr.isatty() and not args.quiet) as progress:
         with _interrupted("clips that are done stay, called again it goes on"):
             report = batch.run(args.jobs, recursive=args.recursive, again=args.again, progress=progress, say=_say)
@@ -272,39 +181,10 @@ def run_batch(args: argparse.Namespace) -> dict:
     return report
 
 
-def _given_options(args: argparse.Namespace) -> dict[str, str | None]:
-    """The options of a capture that differ from their defaults, as a command line has them; None: no value."""
-    parser = _Parser(add_help=False)
-    _add_options(parser)
-    given: dict[str, str | None] = {}
-    for action in parser._actions:
-        value = getattr(args, action.dest)
-        if value != action.default and action.dest not in ("json", "quiet"):
-            given[action.option_strings[-1]] = None if action.nargs == 0 else str(value)
-    return given
-
-
 def _say(text: str) -> None:
     """A line of its own, also while a progress bar stands on the terminal."""
     clear = _CLEAR_LINE if sys.stderr.isatty() else ""
     print(f"{clear}scope: {text}", file=sys.stderr, flush=True)
-
-
-def _people(text: str) -> int | str:
-    """``--people``: a number, "all" or "largest"."""
-    if text in ("all", "largest"):
-        return text
-    if not re.fullmatch("[0-9]{1,6}", text) or int(text) < 1:
-        raise UsageError(f"--people takes a number from 1 on, all or largest, not {text!r}")
-    return int(text)
-
-
-def _heights(text: str | None) -> tuple[float, ...]:
-    """``--height``: centimetres, one number for each person."""
-    try:
-        return tuple(float(number) / 100 for number in text.split(",")) if text is not None else ()
-    except ValueError as error:
-        raise UsageError(f"--height takes centimetres, say 175, or 175,162 for two people, not {text!r}") from error
 
 
 def _rig_of(args: argparse.Namespace, outputs: list[Path]) -> RigSource | None:

@@ -8,7 +8,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-from scope.scope_addon import cli
+from scope.scope_addon import cli_options
 from scope.scope_addon.capture import networks
 from scope.scope_addon.capture.execution import CHOICES, CPU, PROVIDERS, Execution, OneAtATime
 from scope.scope_addon.capture.networks import network_path, open_session
@@ -124,7 +124,7 @@ def test_the_line_that_says_it() -> None:
 
 
 def test_the_command_line_offers_the_same() -> None:
-    assert sorted(cli.PROVIDERS) == sorted(CHOICES)
+    assert sorted(cli_options.PROVIDERS) == sorted(CHOICES)
 
 
 def test_the_real_processor() -> None:

@@ -9,7 +9,7 @@ from dataclasses import replace
 import bpy
 import numpy as np
 import pytest
-from scope.scope_addon.cli import SAMPLE, _given_options, build_parser
+from scope.scope_addon.cli import SAMPLE
 from scope.scope_addon.retarget.bone_map import BoneMap, save_bone_map
 from scope.scope_addon.retarget.rig_source import rig_source
 from scope.scope_addon.scene import formats
@@ -251,11 +251,3 @@ def test_a_batch_refuses_a_bad_rig_once(tmp_path):
     assert sum(line.startswith("scope:") for line in done.stderr.splitlines()) == 1
     assert "rig.fbx" in done.stderr
     assert not (tmp_path / "out").exists()
-
-
-def test_a_batch_passes_the_rig_on(tmp_path):
-    rig = tmp_path / "rig.glb"
-    args = build_parser().parse_args(["batch", ".", "--out", ".", "--retarget", str(rig), "--rig-object", "Rig"])
-    assert _given_options(args) == {"--retarget": str(rig), "--rig-object": "Rig"}
-    args = build_parser().parse_args(["batch", ".", "--out", ".", "--retarget", str(rig), "--retarget-root", "object"])
-    assert _given_options(args) == {"--retarget": str(rig), "--retarget-root": "object"}

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import bpy
 import numpy as np
 import pytest
-from scope.scope_addon import cli
+from scope.scope_addon import cli_options
 from scope.scope_addon.job.progress import JobProgress, duration
 from scope.scope_addon.motion import Motion
 from scope.scope_addon.scene.footage_strip import strips_of
@@ -187,7 +187,7 @@ def test_the_preferences_reach_the_worker(fake_worker, footage, monkeypatch):
 
 def test_the_preferences_offer_what_the_command_line_does():
     assert [number for *_, number in preferences.PROVIDERS] == list(range(6))
-    assert {name.lower() for name, *_ in preferences.PROVIDERS} == set(cli.PROVIDERS)
+    assert {name.lower() for name, *_ in preferences.PROVIDERS} == set(cli_options.PROVIDERS)
 
 
 def test_clearing_the_cache_leaves_the_scene(fake_worker, footage):

@@ -1,0 +1,44 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the options of a capture mean, and how a batch passes them on."""
+
+from __future__ import annotations
+
+import pytest
+from scope.scope_addon.cli import build_parser
+from scope.scope_addon.cli_options import body_and_options, given_options
+from scope.solver.errors import UsageError
+
+
+def options(*argv):
+    """What a capture's arguments mean."""
+    return body_and_options(build_parser().parse_args(["capture", *argv]))[1]
+
+
+@pytest.mark.parametrize(("said", "meant"), [("2", 2), ("all", "all"), ("largest", "largest")])
+def test_how_many_people(said, meant):
+    assert options("--people", said).people == meant
+
+
+@pytest.mark.parametrize("said", ["0", "-1", "1.5", "two", "", "9999999", "\u0663"])
+def test_what_is_no_number_of_people(said):
+    with pytest.raises(UsageError, match="people"):
+        options(f"--people={said}")
+
+
+@pytest.mark.parametrize(("said", "meant"), [("175", (1.75,)), ("175,162.5", (1.75, 1.625)), ("180, 170", (1.8, 1.7))])
+def test_heights_are_centimetres(said, meant):
+    assert options("--height", said).heights_m == pytest.approx(meant)
+
+
+@pytest.mark.parametrize("said", ["", "175,", "1,75", "tall", "nan", "inf", "175;162"])
+def test_what_is_no_height(said):
+    with pytest.raises(UsageError):
+        options(f"--height={said}")
+
+
+def test_a_batch_passes_the_rig_on(tmp_path):
+    rig = tmp_path / "rig.glb"
+    args = build_parser().parse_args(["batch", ".", "--out", ".", "--retarget", str(rig), "--rig-object", "Rig"])
+    assert given_options(args) == {"--retarget": str(rig), "--rig-object": "Rig"}
+    args = build_parser().parse_args(["batch", ".", "--out", ".", "--retarget", str(rig), "--retarget-root", "object"])
+    assert given_options(args) == {"--retarget": str(rig), "--retarget-root": "object"}
