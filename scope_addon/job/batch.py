@@ -77,12 +77,12 @@ class Batch:
     def clips(self, recursive: bool) -> dict[str, Path]:
         """Name of the result without suffix, to the footage; in order. Results of an earlier batch are not footage."""
         found = sorted(self._below(self.folder, recursive))
-        stems = Counter(self._relative(path).with_suffix("") for path in found)
+        stems = Counter(self._stem(path) for path in found)
         named = {}
         for path in found:
             relative = self._relative(path)
             stem = relative.with_suffix("") if path.is_file() else relative
-            named[(relative if stems[relative.with_suffix("")] > 1 else stem).as_posix()] = path
+            named[(relative if stems[self._stem(path)] > 1 else stem).as_posix()] = path
         return named
 
     def run(
@@ -262,6 +262,10 @@ class Batch:
 
     def _relative(self, path: Path) -> Path:
         return path.relative_to(self.folder)
+
+    def _stem(self, path: Path) -> str:
+        """What two clips must not share: many systems take a.npz and A.npz for one file."""
+        return self._relative(path).with_suffix("").as_posix().casefold()
 
     def _below(self, folder: Path, recursive: bool) -> list[Path]:
         found: list[Path] = []

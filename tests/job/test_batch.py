@@ -194,6 +194,14 @@ def test_names(tmp_path):
     assert (out / "below" / "deep" / "d.npz").is_file()
 
 
+def test_names_that_differ_in_case_alone_are_the_same_to_many_systems(tmp_path):
+    clips = tmp_path / "clips"
+    clips.mkdir()
+    for name in ("Walk.mov", "walk.mp4", "Run.mp4"):
+        (clips / name).write_text("x")
+    assert list(batch(clips, tmp_path / "out").clips(recursive=False)) == ["Run", "Walk.mov", "walk.mp4"]
+
+
 def test_an_interrupt_stops_the_running_clips_and_keeps_the_finished(folder, tmp_path):
     def interrupt(stage, done, total):
         if done == 2:
