@@ -20,6 +20,7 @@ from .track import Track
 
 # From here on a foot is seen, if badly; behind something it has 0.1 and more, beside the picture less than 0.01.
 SEEN_CONFIDENCE = 0.1
+LEAST_CONTACT = 1e-9
 LONGEST_STEP_S, LONGEST_STEP = 1.0, 1.5  # between two frames of one scene; in usual steps, where these are long
 
 
@@ -43,8 +44,9 @@ class PlacedTrack:
         return _place(self.body, self.betas, rotations, root)
 
     def stands_at(self, contact: np.ndarray) -> np.ndarray:
-        """(T, 3) the middle of the soles, weighted by ``contact`` (T, 4); 0 where none stands."""
-        share = contact / np.maximum(contact.sum(axis=1, keepdims=True), 1e-9)
+        """(T, 3) the middle of the soles, weighted by ``contact`` (T, 4); of all alike where none stands."""
+        weight = contact + LEAST_CONTACT
+        share = weight / weight.sum(axis=1, keepdims=True)
         return (share[..., None] * self.soles).sum(axis=1)
 
     def contact(self, up: np.ndarray) -> np.ndarray:

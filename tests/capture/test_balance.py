@@ -110,3 +110,11 @@ def test_a_still_is_judged_as_it_stands():
                         for n in placed.__dataclass_fields__))  # fmt: skip
     turn, _ = turn_over_feet(one, np.ones((1, 4)), UP)
     assert turned_deg(turn)[0] < -3.0
+
+
+def test_a_frame_in_which_nothing_stands_is_turned_about_its_own_feet_too():
+    """As the first one after a cut: those beside it say by how much, and far away is not where it is turned about."""
+    placed, contact = standing(20.0), np.ones((T, 4))
+    contact[T // 2] = 0.0
+    _, pivot = turn_over_feet(placed, contact, UP)
+    np.testing.assert_allclose(pivot, placed.soles.mean(axis=1), atol=1e-6)
