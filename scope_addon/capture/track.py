@@ -93,7 +93,7 @@ def make_track(frames: Sequence[int], times: Sequence[float], tracklets: Sequenc
     seen, acquired = np.zeros(len(frames), bool), np.zeros(len(frames), bool)
     judged: list[tuple[int, np.ndarray]] = []
     shapes = {hands.shape for tracklet in tracklets for hands in tracklet.hands[:1]}
-    hands = np.zeros((len(frames), *shapes.pop())) if shapes else None
+    hands = np.zeros((len(frames), *shapes.pop()), np.float32) if shapes else None
     for tracklet in tracklets:
         if tracklet.rows:
             for row, value in zip(tracklet.rows, tracklet.values, strict=True):
