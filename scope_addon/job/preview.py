@@ -11,6 +11,7 @@ import threading
 import time
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 
@@ -61,7 +62,8 @@ class PreviewWriter:
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
         with self._writing:
             self._open = False
-            self._path.unlink(missing_ok=True)
+            with suppress(OSError):  # Windows, while the other side reads: it goes with its folder, or is kept there
+                self._path.unlink(missing_ok=True)
         self._pool.shutdown(wait=False, cancel_futures=True)
 
     def __call__(self, frame: Frame, observation: Observation | None, live: LiveBody) -> None:

@@ -71,6 +71,16 @@ def test_a_full_disk_does_not_stop_the_capture(tmp_path, monkeypatch):
         wait_for(lambda: told == ["preview"])
 
 
+def test_a_picture_that_is_being_read_does_not_stop_the_capture_at_its_end(tmp_path, monkeypatch):
+    """Windows removes no file that somebody has open."""
+
+    def in_use(self, missing_ok=False):
+        raise PermissionError(13, "it is being used by another process")
+
+    with PreviewWriter(tmp_path, lambda event, **values: None):
+        monkeypatch.setattr(preview.Path, "unlink", in_use)
+
+
 def test_a_body_that_cannot_be_fitted_gives_way_to_the_skeleton(tmp_path):
     class Broken:
         is_ready = True
