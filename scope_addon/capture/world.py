@@ -8,7 +8,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...solver.body import Body
 from ...solver.frames import transform_points, world_from_level_camera
 from .balance import along, carrying, center_of_mass, legs
 from .line_segments import Lines
