@@ -62,16 +62,22 @@ class PeopleBuilder:
             trim_merged_end(tracklet, tracklets, self._times)
         people = [[tracklets[k] for k in chain] for chain in link(tracklets, self._times)]
         people.sort(key=_prominence, reverse=True)
-        counted = [person for person in people if self._is_believable(person)][:most]
+        counted = self._believable(people)[:most]
         least = LEAST_PROMINENCE * _prominence(counted[0]) if counted else 0.0
         return [make_track(self._frames, self._times, person) for person in counted if _prominence(person) >= least]
 
-    def _is_believable(self, person: list[Tracklet]) -> bool:
-        """Seen often enough, and for long enough without interruption: at a low rate a single frame lasts so long."""
-        span = self._times[-1] - self._times[0]
-        longest = max(self._times[t.rows[-1]] - self._times[t.rows[0]] for t in person)
-        often = sum(len(t.rows) for t in person) >= SHORTEST_SHARE * len(self)
-        return often and (longest >= min(SHORTEST_S, 0.5 * span) or np.median(np.diff(self._times)) >= SHORTEST_S)
+    def _believable(self, people: list[list[Tracklet]]) -> list[list[Tracklet]]:
+        """Those who were seen often enough, and for long enough without interruption.
+
+        At a low rate, where a single frame lasts so long, somebody may be elsewhere in every one: where nobody was
+        followed from frame to frame, one is enough.
+        """
+        often = [person for person in people if sum(len(t.rows) for t in person) >= SHORTEST_SHARE * len(self)]
+        lasts = [max(self._times[t.rows[-1]] - self._times[t.rows[0]] for t in person) for person in often]
+        least = min(SHORTEST_S, 0.5 * (self._times[-1] - self._times[0]))
+        if max(lasts, default=0.0) < least and np.median(np.diff(self._times)) >= SHORTEST_S:
+            least = 0.0
+        return [person for person, s in zip(often, lasts, strict=True) if s >= least]
 
 
 def trim_merged_end(tracklet: Tracklet, others: Sequence[Tracklet], times: Sequence[float]) -> None:

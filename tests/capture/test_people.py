@@ -72,6 +72,13 @@ def test_who_is_elsewhere_in_each_frame_at_a_low_rate(follow: Callable[..., list
     assert track.seen.all()
 
 
+def test_a_single_frame_is_not_enough_beside_somebody_who_was_followed(follow: Callable[..., list[Track]]) -> None:
+    stands = Person(lambda t: (300, 200), BLUE)
+    flickers = Person(lambda t: (900, 200) if t == 4 else None, RED)
+    (track,) = follow([stands, flickers], 8, wanted=3, fps=2)
+    assert who(track, [stands, flickers]) == {0}
+
+
 def test_overtaken_by_somebody_just_found(follow: Callable[..., list[Track]]) -> None:
     """Whom the newcomer hides slides onto them, and is not them because of having been followed for longer."""
     stands = Person(lambda t: (500, 200), RED, hidden=range(46, 56))
