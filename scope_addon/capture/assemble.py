@@ -21,6 +21,7 @@ from .landmark_network import KEYPOINT_NAMES
 from .line_segments import Lines
 from .placement import PlacedTrack, raw_motion
 from .smoothing import gaussian_smooth
+from .supports import SOLES
 from .track import Track
 from .world import estimate_world
 
@@ -40,13 +41,13 @@ def corrected_stance(
     if T is None:
         T = estimate_world(placed, lines)
     contact = placed.contact(T[2, :3])
-    away = correct_depth(root - placed.center, placed.soles, contact, T, placed.times)
+    away = correct_depth(root - placed.center, placed.supports, contact, T, placed.times)
     shift = away[:, None] * along_sight(root - placed.center)
     turn = np.broadcast_to(np.eye(3), (len(root), 3, 3))
     if balanced:
         turn, pivot = turn_over_feet(placed, contact, T[2, :3])
         root = pivot + np.einsum("tij,tj->ti", turn, root - pivot)
-    height = (placed.soles + shift[:, None]) @ T[2, :3] + T[2, 3]
+    height = (placed.supports + shift[:, None]) @ T[2, :3] + T[2, 3]
     standing = gaussian_smooth(contact * on_floor(height), placed.times, STANDING_CUTOFF_HZ)
     T_frames = np.broadcast_to(T, (len(root), 4, 4))
     return Stance(root + shift, turn, T_frames[:, 2, :3], -T_frames[:, 2, 3], standing)
@@ -127,7 +128,7 @@ def assemble_motion(
         dist=camera.dist,
         joint_confidence=fitted.joint_confidence,
         world_from_camera=path.world_from_frames(T_world_camera),
-        foot_contact=contact,
+        foot_contact=contact[:, : len(SOLES)],
         residual_px=reprojection_error(seen or body, local, root, betas, track, camera, valid, path),
         image_size=np.array(image_size),
         source=source,

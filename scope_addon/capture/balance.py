@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Weight presses on the soles that stand: how far a body must be turned for that, along the line of sight.
+"""Weight presses on what stands: how far a body must be turned for that, along the line of sight.
 
 How a body leans towards the camera or away is hardly seen in the picture. With c the centre of mass, h its height above
-the standing soles p_i, g gravity and s the level part of the line of sight, weight and inertia press on the floor at
+the soles and palms p_i that stand, g gravity and s the level part of the line of sight, weight and inertia press on the
+floor at
 
     x = s·(c − c̈ h / g),   min_i s·p_i ≤ x ≤ max_i s·p_i.
 
-What sticks out is taken back by turning the whole body about its standing soles. The faster somebody moves, the less
+What sticks out is taken back by turning the whole body about the middle of these. The faster somebody moves, the less
 is believed of this: there, c̈ is not known well enough. Nor is it of those who may sit or kneel, see `carrying`.
 
 Sources: Vukobratović and Borovac 2004 (zero moment point); masses of body parts and their centres by Winter 2009.
@@ -20,10 +21,11 @@ from ...solver.body import Body
 from ...solver.rotations import exp
 from .placement import PlacedTrack
 from .smoothing import gaussian_smooth
+from .supports import SOLES
 
 STANDING_M_S = 0.5  # speed of the centre of mass at which little is believed of this
 CUTOFF_HZ = 1.0
-# How far a sole reaches behind its heel point and beyond its toe point (`soles`), in distances between the two.
+# How far a sole reaches behind its heel point and beyond its toe point (`supports`), in distances between the two.
 BEHIND, BEYOND = 1.2, 0.4
 DOUBT = 0.2  # share of standing frames nearby that halves what is believed, roughly
 GRAVITY_M_S2 = 9.81
@@ -75,9 +77,9 @@ def along(body: Body, joints: np.ndarray, a: str, b: str) -> np.ndarray:
 def turn_over_feet(placed: PlacedTrack, contact: np.ndarray, up: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """By which rotations (T, 3, 3), about which points (T, 3), the weight comes over the feet; the camera's axes.
 
-    :param contact: (T, 4) probability that each sole stands;  up: (3,) unit.
+    :param contact: (T, 6) probability that each sole and palm rests on the floor;  up: (3,) unit.
     """
-    soles, times = placed.soles, placed.times
+    times = placed.times
     mass = gaussian_smooth(center_of_mass(placed.body, placed.joints), times, CUTOFF_HZ)
     pivot = placed.stands_at(contact)
     sight = mass - placed.center
@@ -91,7 +93,7 @@ def turn_over_feet(placed: PlacedTrack, contact: np.ndarray, up: np.ndarray) -> 
         velocity = np.gradient(mass, times, axis=0)
         believed *= np.exp(-np.square(np.linalg.norm(velocity, axis=1) / STANDING_M_S))
         pressing = mass - np.gradient(velocity, times, axis=0) * (height / GRAVITY_M_S2)[:, None]
-    at, reach = (pressing * sight).sum(axis=1), (_whole_soles(soles) * sight[:, None]).sum(axis=-1)
+    at, reach = (pressing * sight).sum(axis=1), (_reaches(placed.supports) * sight[:, None]).sum(axis=-1)
     somewhere = stands.any(axis=1)
     low = np.where(somewhere, np.where(stands, reach, np.inf).min(axis=1), -np.inf)
     high = np.where(somewhere, np.where(stands, reach, -np.inf).max(axis=1), np.inf)
@@ -102,7 +104,9 @@ def turn_over_feet(placed: PlacedTrack, contact: np.ndarray, up: np.ndarray) -> 
     return exp(angle[:, None] * np.cross(up, sight)), pivot
 
 
-def _whole_soles(soles: np.ndarray) -> np.ndarray:
-    """(T, 4, 3) the ends of the soles whose heel and toe points are (T, 4, 3), in the same order."""
+def _reaches(supports: np.ndarray) -> np.ndarray:
+    """(T, 6, 3) the ends of the soles, whose heel and toe points come first, in the same order, and the palms."""
+    soles, palms = np.split(supports, [len(SOLES)], axis=1)
     heel, toe = soles[:, 0::2], soles[:, 1::2]
-    return np.stack([heel - BEHIND * (toe - heel), toe + BEYOND * (toe - heel)], axis=2).reshape(soles.shape)
+    ends = np.stack([heel - BEHIND * (toe - heel), toe + BEYOND * (toe - heel)], axis=2).reshape(soles.shape)
+    return np.concatenate([ends, palms], axis=1)

@@ -39,8 +39,8 @@ from .lifter_window import windows_around
 from .measure import DEPTH_SIGMA_M, NEAREST_M, Measurer
 from .parts import ALL_PARTS, Parts
 from .seen_keypoints import as_seen
-from .soles import SOLES, with_soles
 from .stature import with_stature
+from .supports import SUPPORTS, with_supports
 from .track import Track
 
 SHAPE_FRAMES = 64  # frames that decide the shape; more of them are more of the same
@@ -88,15 +88,15 @@ class Stance:
     turn: np.ndarray  # (T, 3, 3) rotations by which the body as a whole is to be turned
     floor_normal: np.ndarray  # (T, 3) unit, upwards
     floor_offset: np.ndarray  # (T,) normal . p on the floor
-    contact: np.ndarray  # (T, 4) probability that each sole stands on it
+    contact: np.ndarray  # (T, 6) probability that each sole and palm rests on it
 
-    def floor(self, k: int, soles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Frame ``k``'s rows of the solver's residual ``floor``; soles (4,): their keypoint indices.
+    def floor(self, k: int, supports: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Frame ``k``'s rows of the solver's residual ``floor``; supports (6,): their keypoint indices.
 
         Feet that do not stand are as free below the floor as above it: they may be on a stair.
         """
         contact = self.contact[k]
-        return floor.pack(soles, self.floor_normal[k], float(self.floor_offset[k]), contact, contact)
+        return floor.pack(supports, self.floor_normal[k], float(self.floor_offset[k]), contact, contact)
 
 
 @dataclass(frozen=True)
@@ -112,7 +112,7 @@ class PreparedTrack:
     weights: Weights
     hand_measurer: HandMeasurer | None = None
     hands: np.ndarray | None = None  # (T, 2, 21, 6) as the track's, without distortion; None: not looked for
-    stance: Stance | None = None  # in each frame's camera; the body's last keypoints are its soles
+    stance: Stance | None = None  # in each frame's camera; the body's last keypoints rest on it
 
     def measure(self, k: int, root_cam: np.ndarray | None = None) -> Measurements:
         """Frame ``k`` for the solver; ``root_cam`` (3,): where the pelvis is known to be, camera frame, metres."""
@@ -126,8 +126,8 @@ class PreparedTrack:
         """
         measured = self.measure(k, root_cam)
         if self.stance is not None:
-            soles = np.arange(len(SOLES)) + len(self.body.keypoint_names) - len(SOLES)
-            measured = replace(measured, tables={"floor": self.stance.floor(k, soles)})
+            supports = np.arange(len(SUPPORTS)) + len(self.body.keypoint_names) - len(SUPPORTS)
+            measured = replace(measured, tables={"floor": self.stance.floor(k, supports)})
         if self.hand_measurer is None or self.hands is None:
             return measured
         return self.hand_measurer.add(measured, self.hands[k])
@@ -139,8 +139,8 @@ class PreparedTrack:
         return replace(self, lifted=replace(self.lifted, points=turned))
 
     def on_floor(self, stance: Stance, betas: np.ndarray) -> PreparedTrack:
-        """With the floor, and soles on a body of this shape."""
-        body, K = with_soles(self.body, betas), self.measurer.intrinsics
+        """With the floor, and what rests on it on a body of this shape."""
+        body, K = with_supports(self.body, betas), self.measurer.intrinsics
         hands = None if self.hand_measurer is None else HandMeasurer(body, K)
         return replace(self, body=body, measurer=Measurer(body, K), hand_measurer=hands, stance=stance)
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A fitted track as a motion in the first frame's camera axes: gaps filled, smoothed, with its joints and soles."""
+"""A fitted track as a motion in the first frame's camera axes: gaps filled, smoothed, with its joints and supports."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from .camera_path import CameraPath
 from .compact import compact
 from .fitting import FittedTrack
 from .frame_blocks import by_blocks
-from .grounding import standing_probability
+from .grounding import resting_probability
 from .scene_cuts import BETWEEN_SCENES_S
 from .smoothing import fill_gaps, fill_rotation_gaps, smooth_root, smooth_rotations
-from .soles import FOOT_PARTS, sole_points, with_soles
+from .supports import FOOT_PARTS, SOLES, support_points, with_supports
 from .track import Track
 
 # From here on a foot is seen, if badly; behind something it has 0.1 and more, beside the picture less than 0.01.
@@ -28,34 +28,40 @@ LONGEST_STEP_S, LONGEST_STEP = 1.0, 1.5  # between two frames of one scene; in u
 class PlacedTrack:
     """T frames without gaps, smoothed if so asked, in the first frame's camera axes, metres."""
 
-    body: Body  # with soles for these betas
+    body: Body  # with supports for these betas
     betas: np.ndarray  # (P,)
     times: np.ndarray  # (T,) seconds
     valid: np.ndarray  # (T,) bool: measured, not filled in
     rotations: np.ndarray  # (T, K+1, 3, 3); part 0 R_camera_root, the others relative to their parents
     root: np.ndarray  # (T, 3) the pelvis
     joints: np.ndarray  # (T, K+1, 3)
-    soles: np.ndarray  # (T, 4, 3)
-    soles_seen: np.ndarray  # (T, 4) 0..1
+    supports: np.ndarray  # (T, 6, 3) soles and palms
+    supports_seen: np.ndarray  # (T, 6) 0..1
     center: np.ndarray  # (T, 3) of the camera
 
+    @property
+    def soles(self) -> np.ndarray:
+        """(T, 4, 3) of the supports."""
+        return self.supports[:, : len(SOLES)]
+
     def place(self, rotations: np.ndarray, root: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Joints (T, K+1, 3) and soles (T, 4, 3) of another motion of this body, camera frame."""
+        """Joints (T, K+1, 3) and supports (T, 6, 3) of another motion of this body, camera frame."""
         return _place(self.body, self.betas, rotations, root)
 
     def stands_at(self, contact: np.ndarray) -> np.ndarray:
-        """(T, 3) the middle of the soles, weighted by ``contact`` (T, 4); of all alike where none stands."""
-        weight = contact + LEAST_CONTACT
+        """(T, 3) the middle of the supports, weighted by ``contact`` (T, 6); of the soles where nothing stands."""
+        weight = contact.copy()
+        weight[:, : len(SOLES)] += LEAST_CONTACT
         share = weight / weight.sum(axis=1, keepdims=True)
-        return (share[..., None] * self.soles).sum(axis=1)
+        return (share[..., None] * self.supports).sum(axis=1)
 
     def contact(self, up: np.ndarray) -> np.ndarray:
-        """(T, 4) probability that each sole stands, as far as it is seen: imagined feet hold nobody.
+        """(T, 6) probability that each support stands, as far as it is seen: imagined feet hold nobody.
 
         Nothing stands from one scene into the next, or over a pause much longer than from frame to frame.
         """
-        contact = standing_probability(self.soles, up, self.times, self.center)
-        contact *= self.soles_seen * self.valid[:, None]
+        contact = resting_probability(self.supports, up, self.times, self.center)
+        contact *= self.supports_seen * self.valid[:, None]
         steps = np.diff(self.times)
         if len(steps):
             longest = max(LONGEST_STEP_S, LONGEST_STEP * float(np.median(steps)))
@@ -76,11 +82,11 @@ def place_track(
     if smoothing:
         rotations = smooth_rotations(rotations, times)
         root = path.center + smooth_root(root - path.center, times)
-    soled = with_soles(body, betas)
-    joints, soles = _place(soled, betas, rotations, root)
-    feet = [body.joint_names.index(name) for name in FOOT_PARTS]
-    seen = np.clip(fitted.joint_confidence[:, feet] / SEEN_CONFIDENCE, 0.0, 1.0)
-    return compact(PlacedTrack(soled, betas, times, valid, rotations, root, joints, soles, seen, path.center))
+    supported = with_supports(body, betas)
+    joints, supports = _place(supported, betas, rotations, root)
+    parts = [body.joint_names.index(name) for name in (*FOOT_PARTS, "left_wrist", "right_wrist")]
+    seen = np.clip(fitted.joint_confidence[:, parts] / SEEN_CONFIDENCE, 0.0, 1.0)
+    return compact(PlacedTrack(supported, betas, times, valid, rotations, root, joints, supports, seen, path.center))
 
 
 def raw_motion(track: Track, fitted: FittedTrack, path: CameraPath) -> tuple[np.ndarray, np.ndarray]:
@@ -91,13 +97,13 @@ def raw_motion(track: Track, fitted: FittedTrack, path: CameraPath) -> tuple[np.
 
 
 def _place(
-    soled: Body, betas: np.ndarray, rotations: np.ndarray, root: np.ndarray
+    supported: Body, betas: np.ndarray, rotations: np.ndarray, root: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    at_rest = soled.rest_joints(betas)[0]
+    at_rest = supported.rest_joints(betas)[0]
 
     def place(rotations: np.ndarray, root: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        R, t = soled.forward_kinematics(rotations, root - at_rest, betas)
-        return t.astype(np.float32), sole_points(soled, R, t).astype(np.float32)
+        R, t = supported.forward_kinematics(rotations, root - at_rest, betas)
+        return t.astype(np.float32), support_points(supported, R, t).astype(np.float32)
 
-    joints, soles = by_blocks(place, rotations, root)
-    return joints, soles
+    joints, supports = by_blocks(place, rotations, root)
+    return joints, supports

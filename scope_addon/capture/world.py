@@ -12,6 +12,7 @@ from ...solver.frames import transform_points, world_from_level_camera
 from .balance import along, carrying, center_of_mass, legs
 from .line_segments import Lines
 from .placement import PlacedTrack
+from .supports import SOLES
 from .vertical_lines import told_by_lines
 
 STANDING_KNEE_COS = np.cos(np.radians(30.0))  # thigh and shank within 30 degrees of one line
@@ -63,9 +64,13 @@ def _straightness(person: PlacedTrack) -> tuple[np.ndarray, np.ndarray, np.ndarr
 def up_from_bodies(people: Sequence[PlacedTrack]) -> np.ndarray:
     """Up direction in the camera frame from people who stand, walk or bend: their weight is over their feet.
 
-    With d_t from the middle of the soles that stand to the centre of mass, w_t the probability that any stands, and u_0
-    what the bodies' own axes say (`up_from_standing`), Σ_t (a u_0 + b w_t k_t max(y·d_t / |d_t|, 0)² d_t) points up, a
-    being a length (`STANCE_M`). Forces average out over a clip, not in a moment: b grows from 0 to 1 with its length.
+    With d_t from the middle of what stands to the centre of mass, w_t the probability that a sole stands and no palm
+    rests, and u_0 what the bodies' own axes say (`up_from_standing`),
+
+        Σ_t (a u_0 + b w_t k_t max(y·d_t / |d_t|, 0)² d_t)
+
+    points up, a being a length (`STANCE_M`). Forces average out over a clip, not in a moment: b grows from 0 to 1 with
+    its length.
     Those who sit, kneel or lie have feet that keep still as well: k_t, which falls from 1 to 0 where both knees bend by
     60 to 75 degrees, and y, up in the picture, leave them out as far as they can.
 
@@ -81,7 +86,8 @@ def up_from_bodies(people: Sequence[PlacedTrack]) -> np.ndarray:
             contact = each.contact(up)
             above = mass - each.stands_at(contact)
             upright = np.maximum(above @ level, 0.0) / np.maximum(np.linalg.norm(above, axis=1), 1e-9)
-            weight = contact.max(axis=1) * carries * upright**2
+            on_hands = contact[:, len(SOLES) :].max(axis=1, initial=0.0)
+            weight = contact[:, : len(SOLES)].max(axis=1) * (1 - on_hands) * carries * upright**2
             lasts_s = float(np.ptp(each.times))
             total += STANCE_M * each.valid.sum() * start + lasts_s / (lasts_s + MOMENT_S) * (weight @ above)
         up = total / np.linalg.norm(total)
@@ -163,7 +169,7 @@ def share_world(placed: list[PlacedTrack], lines: Lines | None = None) -> Shared
     up = up_from_bodies(placed)
     centered = [soles - _lowest(soles, up).mean(axis=0) for soles in all_soles]
     up = upright(up, np.concatenate(centered), lines)
-    stands = [person.contact(up)[person.valid] for person in placed]
+    stands = [person.contact(up)[person.valid, : len(SOLES)] for person in placed]
     heights = [floor_height(soles, contact, up) for soles, contact in zip(all_soles, stands, strict=True)]
     T_world_camera = world_from_level_camera(up, height=-heights[0])
     start = transform_points(T_world_camera, placed[0].joints[placed[0].valid.argmax(), :1])[0]

@@ -11,7 +11,7 @@ from ...solver.body import Body
 from ...solver.errors import UsageError
 from ...solver.rotations import exp, log
 from ..capture.smoothing import smooth_rotations
-from ..capture.soles import sole_points, with_soles
+from ..capture.supports import SOLES, support_points, with_supports
 
 
 @dataclass
@@ -28,7 +28,7 @@ class Clip:
     def soles(self, body: Body, betas: np.ndarray) -> np.ndarray:
         """(T, 4, 3) left heel, left toe, right heel, right toe on the floor's side of the foot, world frame."""
         R, t = body.forward_kinematics(self.rotations, self.root - body.rest_joints(betas)[0], betas)
-        return sole_points(with_soles(body, betas), R, t)
+        return support_points(with_supports(body, betas), R, t)[:, : len(SOLES)]
 
     def joints(self, body: Body, betas: np.ndarray) -> np.ndarray:
         """(T, K+1, 3) joints, world frame."""

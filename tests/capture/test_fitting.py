@@ -17,6 +17,7 @@ from scope.solver import State, load_body
 from scope.solver.rotations import exp
 
 FRAMES = 4
+FEET = np.array([1.0, 1.0, 1.0, 1.0, 0.0, 0.0])  # stand, and hands do not
 
 
 def _standing_track(body, camera, bent=()) -> Track:
@@ -50,7 +51,7 @@ def _stance(fit: fitting.FittedTrack, contact: float = 0.0, floor_m: float = 0.0
         turn=np.tile(np.eye(3), (FRAMES, 1, 1)),
         floor_normal=np.tile([0.0, -1.0, 0.0], (FRAMES, 1)),
         floor_offset=np.full(FRAMES, -floor_m),
-        contact=np.full((FRAMES, 4), contact),
+        contact=np.full((FRAMES, 6), contact) * FEET,
     )
 
 
@@ -197,7 +198,7 @@ def test_a_leg_at_a_wrong_depth_is_drawn_to_the_floor_where_it_stands_and_only_t
     stance = replace(_stance(good), floor_normal=np.tile(up, (FRAMES, 1)), floor_offset=floor_m)
     free = fitting.refit_track(prepared, first, stance, lambda *_: None)
     assert heights(free).min() > 0.05
-    standing = replace(stance, contact=np.full((FRAMES, 4), 0.9))
+    standing = replace(stance, contact=np.full((FRAMES, 6), 0.9) * FEET)
     held = fitting.refit_track(prepared, first, standing, lambda *_: None)
     assert np.abs(heights(held)).max() < 0.025
     placed, true = (place_track(body, track, fit, smoothing=False).joints for fit in (held, good))

@@ -6,7 +6,7 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 from scope.scope_addon.capture.placement import PlacedTrack
-from scope.scope_addon.capture.soles import sole_points, with_soles
+from scope.scope_addon.capture.supports import support_points, with_supports
 from scope.scope_addon.capture.world import estimate_world, share_world, up_from_bodies, up_from_standing
 from scope.solver import rotations
 from scope.solver.body import load_body
@@ -22,19 +22,19 @@ def walk(body, T=60, lean_deg=0.0):
         omega[:, body.joint_names.index(f"{side}_hip")] = rotations.exp(sign * swing[:, None] * x)
     omega[:, 0] = R_WORLD_MODEL @ rotations.exp(np.radians(lean_deg) * x)
     R, t = body.forward_kinematics(omega, np.zeros((T, 3)))
-    soles = sole_points(with_soles(body, np.zeros(body.P)), R, t)
+    soles = support_points(with_supports(body, np.zeros(body.P)), R, t)
     t = t + np.stack([np.linspace(-1, 1, T), np.linspace(0, 1.5, T), -soles[..., 2].min(1)], 1)[:, None]
     return R, t
 
 
 def seen_by(body, R, t, camera_from_world):
     """The motion of part poses in the world before a camera, 30 frames a second, everything seen."""
-    soled, T = with_soles(body, np.zeros(body.P)), len(t)
+    soled, T = with_supports(body, np.zeros(body.P)), len(t)
     joints, R_camera = transform_points(camera_from_world, t), camera_from_world[:3, :3] @ R
-    soles = sole_points(soled, R_camera, joints)
+    supports = support_points(soled, R_camera, joints)
     every = np.ones(T, bool)
     return PlacedTrack(
-        soled, np.zeros(body.P), np.arange(T) / 30, every, R_camera, joints[:, 0], joints, soles, np.ones((T, 4)),
+        soled, np.zeros(body.P), np.arange(T) / 30, every, R_camera, joints[:, 0], joints, supports, np.ones((T, 6)),
         np.zeros((T, 3)),
     )  # fmt: skip
 
@@ -78,9 +78,9 @@ def test_people_share_a_world_and_each_has_a_floor():
     up = rotations.exp(np.radians([-12.0, 0, 5.0])) @ [0, -1.0, 0]
     camera_from_world = np.linalg.inv(world_from_level_camera(up, height=1.6))
     walker, climber = (seen_by(body, R, t + [0.0, 5.0, z], camera_from_world) for z in (0.0, 1.0))
-    farther = replace(walker, joints=1.04 * walker.joints, soles=1.04 * walker.soles)
+    farther = replace(walker, joints=1.04 * walker.joints, supports=1.04 * walker.supports)
     valid = np.arange(len(t)) >= 10
-    walker = replace(walker, valid=valid, soles=np.where(valid[:, None, None], walker.soles, walker.soles[10]))
+    walker = replace(walker, valid=valid, supports=np.where(valid[:, None, None], walker.supports, walker.supports[10]))
     world = share_world([walker, climber, farther])
     assert np.degrees(np.arccos(world.T_world_camera[2, :3] @ up)) < 2.0
     assert abs(world.T_world_camera[2, 3] - 1.6) < 0.25
@@ -107,10 +107,10 @@ def test_who_bends_over_is_upright_by_the_weight(pitch_deg):
     for name, degrees in (("hip", -80.0), ("knee", 50.0)):
         for side in ("left", "right"):
             omega[body.joint_names.index(f"{side}_{name}")] = rotations.exp(np.radians([degrees, 0, 0]))
-    soled = with_soles(body, np.zeros(body.P))
+    soled = with_supports(body, np.zeros(body.P))
     for _ in range(30):
         R, t = body.forward_kinematics(omega, np.zeros(3))
-        soles = sole_points(soled, R[None], t[None])[0]
+        soles = support_points(soled, R[None], t[None])[0, :4]
         off = centroid(body.skin(R, t), body.triangles()) - soles.mean(axis=0)
         omega[0] = rotations.exp([0.5 * off[1] / off[2], -0.5 * off[0] / off[2], 0]) @ omega[0]
     assert np.hypot(off[0], off[1]) < 0.005
@@ -166,7 +166,7 @@ def test_who_lies_on_the_floor_does_not_tilt_the_world(standing):
 def test_soles_lie_under_the_ankles_on_the_ground():
     body = load_body("scope")
     R, t = body.forward_kinematics(np.tile(np.eye(3), (1, body.K + 1, 1, 1)), np.zeros((1, 3)))
-    soles = sole_points(with_soles(body, np.zeros(body.P)), R, t)[0]
+    soles = support_points(with_supports(body, np.zeros(body.P)), R, t)[0, :4]
     lowest = body.v_template[:, 1].min()
     assert np.abs(soles[:, 1] - lowest).max() < 0.02
     assert (soles[:2, 0] > 0).all()  # left
@@ -179,4 +179,17 @@ def test_soles_of_another_shape_are_on_its_own_ground():
     betas = np.array([1.5, -1.0, *np.zeros(body.P - 2)])
     R, t = body.forward_kinematics(np.tile(np.eye(3), (1, body.K + 1, 1, 1)), np.zeros((1, 3)), betas)
     lowest = body.skin(R[0], t[0], betas)[:, 1].min()
-    assert np.abs(sole_points(with_soles(body, betas), R, t)[0, :, 1] - lowest).max() < 0.02
+    assert np.abs(support_points(with_supports(body, betas), R, t)[0, :4, 1] - lowest).max() < 0.02
+
+
+@pytest.mark.parametrize("name", ["scope", "scope_h"])
+def test_palms_lie_under_the_hands_that_are_held_down(name):
+    body = load_body(name)
+    R, t = body.forward_kinematics(np.tile(np.eye(3), (1, body.K + 1, 1, 1)), np.zeros((1, 3)))
+    palms = support_points(with_supports(body, np.zeros(body.P)), R, t)[0, 4:]
+    wrists = t[0, [body.joint_names.index(f"{side}_wrist") for side in ("left", "right")]]
+    assert np.sign(palms[:, 0]).tolist() == [1.0, -1.0]
+    assert (np.abs(palms[:, 0]) > np.abs(wrists[:, 0]) + 0.02).all()  # further out
+    below = wrists[:, 1] - palms[:, 1]
+    assert (below > 0.005).all()
+    assert (below < 0.06).all()
