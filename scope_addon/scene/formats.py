@@ -25,6 +25,7 @@ from .fbx_units import metres_to_centimetres
 def write_glb(path: Path, camera: bool = False) -> None:
     """glTF binary: y up, metres, four influences a vertex, shape keys as morph targets, all motion in one animation."""
     need_addon("io_scene_gltf2")
+    moving = [obj for obj in bpy.context.scene.objects if obj.animation_data]
     call_operator(
         bpy.ops.export_scene.gltf,
         filepath=str(path),
@@ -50,7 +51,7 @@ def write_glb(path: Path, camera: bool = False) -> None:
         export_frame_range=True,
         export_anim_slide_to_zero=True,  # players begin at zero, and would wait for the first frame each time
         export_optimize_animation_size=False,
-        export_optimize_disable_viewport=True,
+        export_optimize_disable_viewport=len(moving) < 2,  # faster, but hides all except the first one, which then rest
     )
 
 

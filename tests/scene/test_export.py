@@ -281,6 +281,20 @@ def test_a_file_for_each_of_several_people(body, make_motion, tmp_path, blender,
         np.testing.assert_allclose(posed, truth(body, motion).joints[1], atol=2e-3)
 
 
+@pytest.mark.parametrize("suffix", [".glb", ".fbx", ".usdc", ".blend"])
+def test_several_people_in_one_file_all_move(body, make_motion, tmp_path, blender, truth, suffix):
+    motions = [make_motion(body, 6), make_motion(body, 6, seed=1), make_motion(body, 6, seed=2)]
+    path = tmp_path / f"three{suffix}"
+    export_motions(motions, body, path)
+    first = read_back(path)
+    armatures = sorted((obj for obj in bpy.data.objects if obj.type == "ARMATURE"), key=lambda obj: obj.name)
+    for t in (0, 3, 5):
+        blender.go_to(first + t)
+        for armature, motion in zip(armatures, motions, strict=True):
+            joints = blender.joints(armature, body.joint_names)
+            np.testing.assert_allclose(joints, truth(body, motion).joints[t], atol=2e-3, err_msg=armature.name)
+
+
 def test_bvh_is_y_up_in_metres_and_one_file_a_person(body, make_motion, tmp_path, truth):
     motions = [make_motion(body, 3), make_motion(body, 3, seed=1)]
     written, _ = export_motions(motions, body, tmp_path / "pair.bvh")
