@@ -20,39 +20,43 @@ import numpy as np
 from ...solver.errors import OutputError
 from . import bvh, timing
 from .fbx_units import metres_to_centimetres
+from .glb_times import true_times
 
 
 def write_glb(path: Path, camera: bool = False) -> None:
     """glTF binary: y up, metres, four influences a vertex, shape keys as morph targets, all motion in one animation."""
     need_addon("io_scene_gltf2")
-    moving = [obj for obj in bpy.context.scene.objects if obj.animation_data]
-    call_operator(
-        bpy.ops.export_scene.gltf,
-        filepath=str(path),
-        export_format="GLB",
-        use_selection=False,
-        use_active_scene=True,
-        export_yup=True,
-        export_apply=False,
-        export_cameras=camera,
-        export_skins=True,
-        export_influence_nb=4,
-        export_all_influences=False,
-        export_morph=True,
-        export_morph_normal=True,
-        export_morph_animation=True,
-        export_rest_position_armature=True,
-        export_def_bones=False,
-        export_leaf_bone=False,
-        export_animations=True,
-        export_animation_mode="ACTIVE_ACTIONS",
-        export_anim_single_armature=False,  # else Blender 4.2 mixes in the other actions of the file
-        export_force_sampling=True,
-        export_frame_range=True,
-        export_anim_slide_to_zero=True,  # players begin at zero, and would wait for the first frame each time
-        export_optimize_animation_size=False,
-        export_optimize_disable_viewport=len(moving) < 2,  # faster, but hides all except the first one, which then rest
-    )
+    scene = bpy.context.scene
+    moving = [obj for obj in scene.objects if obj.animation_data]
+    with true_times(path, scene):
+        call_operator(
+            bpy.ops.export_scene.gltf,
+            filepath=str(path),
+            export_format="GLB",
+            use_selection=False,
+            use_active_scene=True,
+            export_yup=True,
+            export_apply=False,
+            export_cameras=camera,
+            export_skins=True,
+            export_influence_nb=4,
+            export_all_influences=False,
+            export_morph=True,
+            export_morph_normal=True,
+            export_morph_animation=True,
+            export_rest_position_armature=True,
+            export_def_bones=False,
+            export_leaf_bone=False,
+            export_animations=True,
+            export_animation_mode="ACTIVE_ACTIONS",
+            export_anim_single_armature=False,  # else Blender 4.2 mixes in the other actions of the file
+            export_force_sampling=True,
+            export_frame_range=True,
+            export_anim_slide_to_zero=True,  # players begin at zero, and would wait for the first frame each time
+            export_optimize_animation_size=False,
+            # Faster, but it hides all that moves except for the first one, and then the others rest.
+            export_optimize_disable_viewport=len(moving) < 2,
+        )
 
 
 def write_fbx(path: Path, camera: bool = False) -> None:

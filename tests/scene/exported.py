@@ -17,7 +17,9 @@ def read_back(path: Path, rate: float = 30.0) -> float:
     render = bpy.context.scene.render
     render.fps, render.fps_base = round(rate), round(rate) / rate
     if path.suffix == ".glb":
+        render.fps_base = rate / round(rate)  # whose inverse the importer takes
         bpy.ops.import_scene.gltf(filepath=str(path))
+        render.fps_base = round(rate) / rate
         # The importer adds a ball that displays bones; it is no part of the file.
         for obj in [o for o in bpy.data.objects if o.name.startswith("Icosphere")]:
             bpy.data.objects.remove(obj)

@@ -180,6 +180,23 @@ def test_glb_holds_one_animation_one_skin_and_named_morphs(body, make_motion, tm
     assert max(times) == pytest.approx(4 / 25)
 
 
+@pytest.mark.parametrize("rate", [12.5, 24000 / 1001, 30000 / 1001, 24.449])
+def test_glb_tells_the_seconds_of_the_footage(body, make_motion, tmp_path, rate):
+    """As they stand in the file: Blender's importer would take back what its exporter does to them."""
+    motion, path = make_motion(body, 7, rate=rate), tmp_path / "walk.glb"
+    export_motions([motion], body, path, export_options=ExportOptions(camera=True))
+    gltf, data = glb_json(path), path.read_bytes()
+    assert len(data) == struct.unpack("<I", data[8:12])[0]
+    binary = data[28 + struct.unpack("<I", data[12:16])[0] :]
+    for index in {sampler["input"] for sampler in gltf["animations"][0]["samplers"]}:
+        accessor = gltf["accessors"][index]
+        start = gltf["bufferViews"][accessor["bufferView"]]["byteOffset"]
+        times = np.frombuffer(binary, "<f4", accessor["count"], start)
+        np.testing.assert_allclose(times, motion.timestamps[: len(times)], atol=1e-6)
+        assert (accessor["min"], accessor["max"]) == ([times[0]], [times[-1]])
+        assert len(times) in (2, 7)  # constant shapes have their ends alone
+
+
 def test_glb_of_a_part_of_the_footage_begins_at_once(body, make_motion, tmp_path):
     motion = make_motion(body, 5, rate=25.0)
     motion.frames += 250

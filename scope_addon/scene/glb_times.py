@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Keeps the time of a binary glTF true at frame rates such as 29.97.
+
+Blender's exporter takes the scene's ``fps`` times ``fps_base`` for its rate, which is fps / fps_base: 29.97 becomes
+30.03, and a capture runs away from its footage's sound. So a scene is written at its whole ``fps``, and the seconds in
+the file are stretched afterwards. (Blender's importer counts as its exporter does.)
+"""
+
+from __future__ import annotations
+
+import json
+import struct
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+_HEADER, _CHUNK_HEADER = 12, 8  # bytes; of the file: magic, version, length; of a chunk: length, type
+
+
+@contextmanager
+def true_times(path: Path, scene: bpy.types.Scene) -> Iterator[None]:
+    """Have a .glb of the scene that is written here tell the seconds that the scene means."""
+    base = scene.render.fps_base
+    scene.render.fps_base = 1.0
+    try:
+        yield
+    finally:
+        scene.render.fps_base = base
+    if base != 1.0 and path.is_file():
+        _stretch_times(path, base)
+
+
+def _stretch_times(path: Path, factor: float) -> None:
+    """Multiply the times of all keys in the file."""
+    data = path.read_bytes()
+    (length,) = struct.unpack_from("<I", data, _HEADER)
+    begin = _HEADER + _CHUNK_HEADER
+    gltf = json.loads(data[begin : begin + length])
+    binary = bytearray(data[begin + length :])
+    for index in {sampler["input"] for animation in gltf.get("animations", ()) for sampler in animation["samplers"]}:
+        accessor = gltf["accessors"][index]
+        start = gltf["bufferViews"][accessor["bufferView"]].get("byteOffset", 0) + accessor.get("byteOffset", 0)
+        times = np.frombuffer(binary, "<f4", accessor["count"], _CHUNK_HEADER + start)
+        times *= np.float32(factor)
+        accessor["min"], accessor["max"] = [float(times.min())], [float(times.max())]
+    text = json.dumps(gltf, separators=(",", ":"), ensure_ascii=False).encode()
+    text += b" " * (-len(text) % 4)
+    total = begin + len(text) + len(binary)
+    head = data[:8] + struct.pack("<II", total, len(text)) + data[16:begin]
+    path.write_bytes(head + text + binary)
