@@ -108,7 +108,7 @@ def _write_one(
         _scene_of(collections, rigs, options.camera) as scene,
         _baked_meshes(scene) if options.bakes(suffix) else nullcontext(),
         actions.nla_as_actions(scene) if suffix == ".glb" else nullcontext(),  # that exporter reads actions alone
-        _actions_as_long_as(scene) if len(rigs) > 1 else nullcontext(),
+        _actions_as_long_as(scene),
     ):
         rig = next((obj for obj in scene.objects if obj.type == "ARMATURE"), None)
         writers = {
@@ -288,7 +288,10 @@ def _all_evaluated(collections: Sequence[bpy.types.Collection]) -> Iterator[None
 
 @contextmanager
 def _actions_as_long_as(scene: bpy.types.Scene) -> Iterator[None]:
-    """Let the actions of armatures last as long as the scene: one who comes late is late in a file of their own too."""
+    """Let the actions of armatures last as long as the scene.
+
+    One who comes late is late in a file of their own too, and exporters do not stop before keys between whole frames.
+    """
     moving = [obj.animation_data for obj in scene.objects if obj.type == "ARMATURE" and obj.animation_data]
     stretched = [a for a in {data.action for data in moving} if a is not None and not a.use_frame_range]
     try:

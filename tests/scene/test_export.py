@@ -79,6 +79,16 @@ def test_variable_frame_rate_keeps_its_timing(body, make_motion, truth, blender,
         np.testing.assert_allclose(joints, expected.joints[t], atol=JOINT_TOLERANCE)
 
 
+@pytest.mark.parametrize("suffix", SCENE_SUFFIXES)
+def test_a_last_pose_between_whole_frames_is_reached(body, make_motion, truth, blender, tmp_path, suffix):
+    motion = make_motion(body, timestamps=np.array([0, 1, 2, 3.9]) / 30, rate=30.0)
+    path = tmp_path / f"walk{suffix}"
+    export_motions([motion], body, path)
+    blender.go_to(read_back(path) + 4)
+    joints = blender.joints(blender.only("ARMATURE"), body.joint_names)
+    np.testing.assert_allclose(joints, truth(body, motion).joints[3], atol=2e-3)
+
+
 @pytest.mark.parametrize("suffix", [".fbx", ".blend", ".bvh"])
 @pytest.mark.parametrize("rate", [24000 / 1001, 25.0, 30000 / 1001, 60000 / 1001])
 def test_formats_that_store_a_frame_rate_store_the_right_one(body, make_motion, tmp_path, suffix, rate):
