@@ -66,7 +66,7 @@ class BackgroundTracker:
 
     def __init__(self, camera: Camera, width: int, height: int) -> None:
         self._scale = WORKING_SIDE_PX / max(width, height)
-        self._step = max(1, int(0.5 / self._scale))
+        self._step = min(max(1, int(0.5 / self._scale)), width, height)
         self._size = (max(1, round(width * self._scale)), max(1, round(height * self._scale)))
         self._camera, self._full_size = camera, (width, height)
         self._tolerance = AGREEING_PX / (self._scale * camera.intrinsics[0, 0])  # radians

@@ -100,7 +100,7 @@ def test_nothing_to_see_is_static_and_said_to_be_unknown():
     assert follow(iter([])).R_first_camera.shape == (0, 3, 3)
 
 
-@pytest.mark.parametrize(("width", "height"), [(2000, 2), (2, 2000), (1, 1)])
+@pytest.mark.parametrize(("width", "height"), [(2000, 2), (2, 2000), (9000, 4), (1, 1)])
 def test_the_narrowest_pictures_tell_nothing(width, height):
     camera = Camera(pinhole(width, height, 1000.0), np.zeros(5), "given")
     tracker = BackgroundTracker(camera, width, height)
