@@ -181,7 +181,9 @@ def capture(
         if _legs_confidence(motion) < UNSEEN_LEGS:
             warnings.append(f"{path.name}: the legs of {who} were not seen, so what they do is a guess")
         if options.hands and not any(hand_frames(motion).values()):
-            warnings.append(f"{path.name}: no hands were found; come closer, or show the palms more to the camera")
+            warnings.append(
+                f"{path.name}: no hands of {who} were found; come closer, or show the palms more to the camera"
+            )
     report = {
         "source": str(path),
         "frames": frames,

@@ -16,6 +16,7 @@ from scope.scope_addon.capture.pipeline import CaptureOptions, capture
 from scope.scope_addon.capture.video_range import VideoRange
 from scope.scope_addon.cli import SAMPLE
 from scope.scope_addon.motion import Motion
+from scope.solver.body import load_body
 from scope.solver.errors import CancelledError, NoPersonError
 
 
@@ -195,3 +196,15 @@ def test_feet_beside_the_picture_hold_nobody(shared, body, tmp_path):
     assert motion.joint_confidence[:, feet].max() < 0.05
     assert motion.foot_contact.max() < 0.5
     assert motion.residual_px[motion.valid].max() < 10
+
+
+def test_whose_hands_were_not_found_is_told(shared):
+    clip, body = shared / "data" / "clips" / "two_people_portrait.mp4", load_body("scope_h")
+    options = CaptureOptions(quality="fast", people=2, hands=True, wanted=VideoRange(0.0, 0.5, None))
+    report = capture(clip, body, options).report
+    without = [n for n, person in enumerate(report["per_person"], 1)
+               if not person["left_hand_frames"] + person["right_hand_frames"]]  # fmt: skip
+    told = [warning for warning in report["warnings"] if "hands" in warning]
+    assert len(without) == 1
+    assert len(told) == 1
+    assert f"no hands of person {without[0]} were found" in told[0]
