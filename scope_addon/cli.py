@@ -229,10 +229,12 @@ def _write(
             motion.save(target)
         written += targets
     if scene_files:
+        from .capture.image_sequence import find_sequence
         from .scene.build import NEW_SCENE
         from .scene.export import ExportOptions, export_motions
 
-        footage = video if video.is_file() else None  # Blender's camera shows files, not folders of pictures
+        sequence = find_sequence(video, args.fps is not None)
+        footage = sequence.paths[0] if sequence else video
         options = replace(NEW_SCENE, name=video.stem, shape=args.shape_keys)
         separate = ExportOptions(separate=args.file_per_person)
         if rig is not None:

@@ -28,5 +28,21 @@ def is_sequence(pictures: list[Path]) -> bool:
     return len(pictures) > 1 and len({sequence_pattern(p) for p in pictures}) == 1
 
 
+def numbered(folder: Path, before: str, after: str, first: int = 0) -> list[Path]:
+    """The pictures in a folder whose names are a number from ``first`` on between these, in its order."""
+    name = re.compile(re.escape(before) + r"(\d+)" + re.escape(after))
+    found = [(int(m.group(1)), p) for p in folder.iterdir() if (m := name.fullmatch(p.name))]
+    return [p for number, p in sorted(found) if number >= first and p.suffix.lower() in PICTURE_SUFFIXES]
+
+
+def numbered_from(first: Path) -> list[Path]:
+    """A picture and those of the same name but for a higher last number; nothing where it has no number."""
+    number = LAST_NUMBER.search(first.stem)
+    if number is None:
+        return []
+    before, after = first.stem[: number.start()], first.stem[number.end() :] + first.suffix
+    return numbered(first.parent, before, after, int(number.group()))
+
+
 def _in_order(path: Path) -> list[tuple[int, int, str]]:
     return [(0, int(part), "") if part.isdecimal() else (1, 0, part) for part in re.split(r"(\d+)", path.name)]

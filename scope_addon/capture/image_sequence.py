@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from ...solver.errors import VideoError
-from ..footage import LAST_NUMBER, PICTURE_SUFFIXES, is_sequence, pictures_in, sequence_pattern
+from ..footage import LAST_NUMBER, is_sequence, numbered, numbered_from, pictures_in, sequence_pattern
 from .picture import read_picture
 
 _NUMBER_SIGN = re.compile(r"#+|%0?\d*d")
@@ -67,10 +67,9 @@ def find_sequence(path: Path, rate_given: bool) -> PictureSequence | None:
                 "give the pattern of the one that is meant, such as walk_####.png, or a single picture"
             )
     elif (sign := _NUMBER_SIGN.search(path.name)) and not path.exists() and path.parent.is_dir():
-        found = _matching(path.parent, path.name[: sign.start()], path.name[sign.end() :], first=0)
-    elif rate_given and (number := LAST_NUMBER.search(path.stem)) and path.is_file():
-        before, after = path.stem[: number.start()], path.stem[number.end() :] + path.suffix
-        following = _matching(path.parent, before, after, first=int(number.group()))
+        found = numbered(path.parent, path.name[: sign.start()], path.name[sign.end() :])
+    elif rate_given and path.is_file():
+        following = numbered_from(path)
         found = following if len(following) > 1 else []
     return PictureSequence.of(found, path.name) if found else None
 
@@ -100,9 +99,3 @@ class SequenceReader:
 
     def close(self) -> None:
         """Nothing is open between two pictures."""
-
-
-def _matching(folder: Path, before: str, after: str, first: int) -> list[Path]:
-    name = re.compile(re.escape(before) + r"(\d+)" + re.escape(after))
-    numbered = [(int(m.group(1)), p) for p in folder.iterdir() if (m := name.fullmatch(p.name))]
-    return [p for number, p in sorted(numbered) if number >= first and p.suffix.lower() in PICTURE_SUFFIXES]

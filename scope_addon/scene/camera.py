@@ -21,7 +21,7 @@ import numpy as np
 
 from ...solver.errors import VideoError
 from ...solver.frames import blender_brown_distortion, blender_camera_matrix
-from ..footage import PICTURE_SUFFIXES
+from ..footage import LAST_NUMBER, PICTURE_SUFFIXES, numbered_from
 from ..motion import Motion
 from .actions import Channels
 from .animation import on_one_hemisphere, quaternion_from_matrix
@@ -114,6 +114,7 @@ def show_footage(camera: bpy.types.Object, footage: str | Path, motion: Motion, 
     the footage's and constant. Elsewhere the footage is shown as an image, whose frame can be keyed. Only a clip can
     be undistorted: that of a distorting lens drifts there, and a picture of one is a clip too, seen in its own frame.
 
+    :param footage: video or picture; of numbered pictures the first one.
     :param frames: (T,) scene frame of each pose.
     :return: warnings: what will not line up.
     :raises VideoError: the file is missing.
@@ -132,6 +133,8 @@ def show_footage(camera: bpy.types.Object, footage: str | Path, motion: Motion, 
         background.image = bpy.data.images.load(str(path), check_existing=True)
         background.image.display_aspect = pixel_aspect(motion)
         size = tuple(background.image.size)
+        if len(motion.frames) > 1:
+            warnings += _show_pictures_in_step(camera.data, background, path, motion, frames)
     else:
         clip = bpy.data.movieclips.load(str(path))  # its own: another capture may begin elsewhere or have another lens
         clip.frame_start = round(frames[0] - motion.frames[0])
@@ -180,7 +183,38 @@ def _show_in_step(
     background.image = image = bpy.data.images.load(str(footage), check_existing=True)
     image.display_aspect = pixel_aspect(motion)
     scene_frames = np.arange(np.floor(frames[0]), np.ceil(frames[-1]) + 1)
-    shown = np.round(np.interp(scene_frames, frames, motion.timestamps) * rate)
+    _key_footage(camera, background, scene_frames, np.round(np.interp(scene_frames, frames, motion.timestamps) * rate))
+
+
+def _show_pictures_in_step(
+    camera: bpy.types.Camera,
+    background: bpy.types.CameraBackgroundImage,
+    first: Path,
+    motion: Motion,
+    frames: np.ndarray,
+) -> list[str]:
+    """Go on from the first of numbered pictures to those of the other poses; returns warnings."""
+    found = [LAST_NUMBER.search(picture.stem) for picture in numbered_from(first)]
+    numbers = np.array([int(match.group()) for match in found if match])
+    if len(numbers) == 0:  # a picture by itself
+        return []
+    if len(numbers) <= motion.frames.max() or numbers[-1] >= _LONG:
+        return [f"Blender cannot count as the pictures from {first.name} on do, so the camera shows that one alone"]
+    background.image.source = "SEQUENCE"
+    scene_frames = np.arange(np.floor(frames[0]), np.ceil(frames[-1]) + 1)
+    poses = np.round(np.interp(scene_frames, frames, np.arange(len(frames)))).astype(int)
+    # Blender counts a video's frames from 0, but names pictures by the count from 1.
+    _key_footage(camera, background, scene_frames, numbers[motion.frames[poses]] - 1)
+    return []
+
+
+def _key_footage(
+    camera: bpy.types.Camera,
+    background: bpy.types.CameraBackgroundImage,
+    scene_frames: np.ndarray,
+    shown: np.ndarray,
+) -> None:
+    """Have the image behind the scene show these of its frames, counted from 0, at these frames of the scene."""
     user = background.image_user
     user.frame_start, user.frame_duration = int(scene_frames[0]), _LONG
     user.use_auto_refresh, user.use_cyclic = True, False

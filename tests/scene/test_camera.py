@@ -258,6 +258,36 @@ def test_a_picture_shows_behind_the_scene(body, make_motion, tmp_path):
     assert result.warnings == []
 
 
+def test_numbered_pictures_go_on_behind_the_scene(body, make_motion, tmp_path):
+    numbers = [7, 8, 10, 11]  # one is missing
+    for number in numbers:
+        image = bpy.data.images.new("picture", 64, 48)
+        image.filepath_raw, image.file_format = str(tmp_path / f"walk_{number:04d}.png"), "PNG"
+        image.save()
+    motion = make_motion(body, timestamps=np.array([0, 1, 3, 4]) / 24, rate=24.0, image_size=(64, 48))
+    result = build_scene([motion], body, footage=tmp_path / "walk_0007.png", options=NEW_SCENE)
+    assert result.warnings == []
+    camera = result.people[0].camera
+    assert camera.data.background_images[0].image.source == "SEQUENCE"
+    assert camera.data.background_images[0].image.filepath.endswith("walk_0007.png")
+    # Pictures are named by a count from 1.
+    shown = [frame_shown(camera, f) + 1 for f in range(5)]
+    assert shown[:2] + shown[3:] == numbers
+    assert shown[2] in (8, 10)
+
+
+def test_pictures_numbered_beyond_blenders_frames_are_warned_about(body, make_motion, tmp_path):
+    for number in (20261122101500, 20261122101501):
+        image = bpy.data.images.new("picture", 64, 48)
+        image.filepath_raw, image.file_format = str(tmp_path / f"{number}.png"), "PNG"
+        image.save()
+    motion = make_motion(body, 2, image_size=(64, 48))
+    result = build_scene([motion], body, footage=tmp_path / "20261122101500.png", options=NEW_SCENE)
+    assert result.people[0].camera.data.background_images[0].image.source == "FILE"
+    assert len(result.warnings) == 1
+    assert "the camera shows that one alone" in result.warnings[0]
+
+
 def test_a_picture_of_another_size_is_warned_about(body, make_motion, tmp_path):
     picture = tmp_path / "still.png"
     image = bpy.data.images.new("still", 32, 48)
