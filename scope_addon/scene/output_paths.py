@@ -17,11 +17,14 @@ PER_PERSON = (".bvh", ".npz")  # formats that hold one person a file
 def check_output(path: str | Path, suffixes: tuple[str, ...] = SUFFIXES) -> Path:
     """The path, when a file of a known format can be written there.
 
-    :raises UsageError: unknown suffix.
+    :raises UsageError: unknown suffix, or a folder.
     :raises OutputError: the folder is missing or cannot be written to, or the name is too long.
     """
     path = Path(path)
     if path.suffix.lower() not in suffixes:
+        if path.is_dir():
+            known = ", ".join(suffixes)
+            raise UsageError(f"cannot write {path}: it is a folder; name a file in it, whose suffix is one of {known}")
         raise UsageError(f"cannot write '{path.name}': its suffix must be one of {', '.join(suffixes)}")
     folder = path.parent
     if not folder.is_dir():

@@ -367,6 +367,11 @@ def test_a_caller_without_a_window_can_export(body, make_motion, tmp_path):
     assert all(path.is_file() for path in written)
 
 
+def test_a_folder_is_told_from_a_name_without_suffix(body, make_motion, tmp_path):
+    with pytest.raises(UsageError, match="it is a folder; name a file in it"):
+        export_motions([make_motion(body, 1)], body, tmp_path)
+
+
 def test_an_unknown_suffix_lists_the_valid_ones(body, make_motion, tmp_path):
     with pytest.raises(UsageError, match=r"\.glb, \.fbx, \.blend, \.bvh, \.usdc, \.npz"):
         export_motions([make_motion(body, 1)], body, tmp_path / "walk.obj")
