@@ -117,7 +117,7 @@ def retarget(
 
 
 def check_turning(rig: bpy.types.Object, bone_map: BoneMap) -> None:
-    """Whether the mapped bones can be turned. :raises InputError: one of them cannot."""
+    """Whether the mapped bones can be turned, and the pelvis moved. :raises InputError: one of them cannot."""
     with _at_rest(rig):
         _probe(rig, bone_map.parts)
 
@@ -209,7 +209,7 @@ def _channel(mode: str, R: np.ndarray) -> tuple[str, np.ndarray]:
 def _probe(rig: bpy.types.Object, parts: dict[str, str]) -> Skeleton:
     """The mapped bones at rest, ordered, with what each one follows.
 
-    :raises InputError: one of them does not turn, or the rig has no size.
+    :raises InputError: one of them does not turn, the pelvis does not move, or the rig has no size.
     """
     names = list(parts)
     rest = _matrices(rig, names)
@@ -226,13 +226,14 @@ def _probe(rig: bpy.types.Object, parts: dict[str, str]) -> Skeleton:
             rig.pose.bones[names[a]].matrix_basis = Matrix()
             follows[:, a] = np.abs(turned - turned[a]).max(axis=(1, 2)) < 0.02
             follows[a, a] = False
+    _check_moved(rig, next((bone for bone, part in parts.items() if part == "pelvis"), names[0]))
     order = sorted(range(len(names)), key=lambda b: int(follows[b].sum()))
     parents = []
     for b in order:
         above = [a for a in order if follows[b, a]]
         parents.append(order.index(above[-1]) if above else -1)
     matrices = rest[order]
-    ends = np.array([rig.matrix_world @ rig.pose.bones[names[b]].tail for b in order])
+    ends = matrices[:, :3, 3] + matrices[:, :3, 1] * [[rig.pose.bones[names[b]].length] for b in order]
     deforming = [bone for bone in rig.data.bones if bone.use_deform] or rig.data.bones
     lowest = min((rig.matrix_world @ end).z for bone in deforming for end in (bone.head_local, bone.tail_local))
     floor = rig.matrix_world.translation.z if abs(lowest - rig.matrix_world.translation.z) < 0.3 else lowest
@@ -252,6 +253,28 @@ def _check_turned(rig: bpy.types.Object, names: list[str], turned: np.ndarray) -
             f"'{held[0]}' of '{rig.name}' does not move when it is turned: show the rig in the viewport, mute the "
             "constraint or driver that holds the bone, or take it out of the list"
         )
+
+
+def _check_moved(rig: bpy.types.Object, name: str) -> None:
+    """The pelvis carries the way over the floor, so it has to go where its location says. Leaves it at rest.
+
+    :raises InputError: it stays where it is.
+    """
+    bone, rest = rig.pose.bones[name], _matrices(rig, [name])
+    bone.matrix_basis = Matrix.Translation((bone.length,) * 3)
+    moved = np.linalg.norm(np.linalg.solve(np.array(rig.matrix_world), _matrices(rig, [name]) - rest)[0, :3, 3])
+    bone.matrix_basis = Matrix()
+    if moved > 0.1 * bone.length:
+        return
+    if bone.bone.use_connect:
+        raise InputError(
+            f"'{name}' of '{rig.name}' is connected to '{bone.parent.name}' and cannot leave it: in Edit Mode, "
+            "disconnect the bone (Alt P)"
+        )
+    raise InputError(
+        f"'{name}' of '{rig.name}' does not move when its location changes: mute the constraint or driver that holds "
+        "the bone, or choose another one for the pelvis in the list"
+    )
 
 
 def _independent(parts: dict[str, str]) -> list[list[int]]:

@@ -202,3 +202,24 @@ def test_what_cannot_be_retargeted_is_said(source):
         run(source, source, guess_bone_map(rig))
     with pytest.raises(InputError, match="pelvis"):
         run(source, rig, BoneMap({"head": "head"}))
+
+
+def test_a_pelvis_that_cannot_be_moved_is_told(source):
+    rig, bone_of = build_rig("unreal")
+    bpy.context.view_layer.objects.active = rig
+    bpy.ops.object.mode_set(mode="EDIT")
+    root, pelvis = rig.data.edit_bones.new("root"), rig.data.edit_bones[bone_of["pelvis"]]
+    root.head, root.tail = (0, 0, 0), pelvis.head
+    pelvis.parent, pelvis.use_connect = root, True
+    bpy.ops.object.mode_set(mode="OBJECT")
+    with pytest.raises(InputError, match="'pelvis' of 'unreal' is connected to 'root'"):
+        run(source, rig)
+    bpy.ops.object.mode_set(mode="EDIT")
+    rig.data.edit_bones["pelvis"].use_connect = False
+    bpy.ops.object.mode_set(mode="OBJECT")
+    run(source, rig)
+    assert np.ptp(seen(rig, ["pelvis"])[:, 0, 1]) > 1.0
+    held = rig.pose.bones["pelvis"].constraints.new("COPY_LOCATION")
+    held.target, held.subtarget = rig, "root"
+    with pytest.raises(InputError, match="'pelvis' of 'unreal' does not move"):
+        run(source, rig)
