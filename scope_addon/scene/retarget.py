@@ -73,7 +73,8 @@ def retarget(
     """Key the mapped bones of ``rig`` so that it moves as the captured ``source``; returns the new action.
 
     The rig's former action stays in the file, but one that came of retargeting and is as it was written. Fingers stay
-    as they are where none were captured. The rig leaves Edit Mode and Rest Position, in which it would not move.
+    as they are where none were captured. The rig leaves Edit Mode, Rest Position and its NLA's Tweak Mode, in which it
+    would not move; tracks of its NLA stay, below the new action.
 
     :raises UsageError: the rig is the source, or has no such bones.
     :raises InputError: the map cannot be used, or the rig does not move with its bones.
@@ -88,6 +89,8 @@ def retarget(
     bone_map = BoneMap({bone: part for bone, part in bone_map.parts.items() if part in body.joint_names})
     clip, frames = read_clip(source, body, rate)
     clip = seen_clip(source, clip, frames)
+    if rig.animation_data and rig.animation_data.use_tweak_mode:  # in which no action can be set
+        rig.animation_data.use_tweak_mode = False
     with all_or_nothing(bpy.context.scene, rig, topmost(rig)):
         with _at_rest(rig):
             skeleton, place = _probe(rig, bone_map.parts), np.array(rig.matrix_world, float)
@@ -111,6 +114,7 @@ def retarget(
         else:
             hang_on_root(rig, frames, *way)
         rig.data.pose_position = "POSE"
+        _above_nla(rig.animation_data)
         _put_by(former)
         action.name = f"{rig.name}_{source.name}"
     return action
@@ -169,6 +173,13 @@ def _write(
     channels.write(bone_path(bone.name, "location"), frames, moved, group=bone.name)
     action[_WRITTEN] = _checksum(action)
     return action
+
+
+def _above_nla(animation: bpy.types.AnimData) -> None:
+    """Let the action replace what the tracks below it do to the same bones, whatever the one before was meant for."""
+    animation.action_blend_type, animation.action_influence = "REPLACE", 1.0
+    for track in animation.nla_tracks:
+        track.is_solo = False  # alone, it would silence the action
 
 
 def _put_by(former: bpy.types.Action | None) -> None:

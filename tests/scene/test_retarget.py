@@ -150,6 +150,40 @@ def test_the_rigs_own_action_stays(source):
     assert before.use_fake_user
 
 
+def _tweaked(animation):
+    animation.nla_tracks[0].strips[0].select = animation.nla_tracks[0].select = True
+    animation.use_tweak_mode = True
+
+
+def _added(animation):
+    animation.action_blend_type = "ADD"
+
+
+def _faint(animation):
+    animation.action_influence = 0.3
+
+
+def _solo(animation):
+    animation.nla_tracks[0].is_solo = True
+
+
+@pytest.mark.parametrize("prepare", [_tweaked, _added, _faint, _solo])
+def test_a_rig_whose_nla_plays_moves_as_captured(source, prepare):
+    rig, bone_of = build_rig("unreal")
+    knee = rig.pose.bones[bone_of["left_knee"]]
+    knee.rotation_mode, knee.rotation_quaternion = "QUATERNION", (0.7, 0.7, 0, 0)
+    knee.keyframe_insert("rotation_quaternion", frame=1)
+    animation = rig.animation_data
+    own = animation.action
+    track = animation.nla_tracks.new()
+    track.strips.new("own", 1, own)
+    animation.action = None
+    prepare(animation)
+    run(source, rig, feet=False)
+    assert direction_error(rig, bone_of, ARMS + LEGS) < 1.0
+    assert [strip.action for strip in track.strips] == [own]
+
+
 @pytest.mark.parametrize("step", ["transfer", "_probe", "_channel", "drop_root"])
 def test_what_fails_leaves_the_rig_as_it_was(source, monkeypatch, step):
     rig, _ = build_rig("unreal")
