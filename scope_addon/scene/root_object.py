@@ -54,7 +54,8 @@ def hang_on_root(
     empty = bpy.data.objects.new(f"{armature.name}_root", None)
     empty.empty_display_type, empty.empty_display_size = "ARROWS", 0.3
     empty[ROOT_TAG] = armature.name
-    for collection in armature.users_collection:
+    own = [c for c in armature.users_collection if c.library is None and c.override_library is None]
+    for collection in own or [bpy.context.scene.collection]:  # to another file's collections nothing can be added
         collection.objects.link(empty)
     empty.location, empty.rotation_euler = positions[0], (0.0, 0.0, angles[0])
     if in_place:

@@ -147,3 +147,33 @@ def test_without_a_rig_its_export_says_what_to_do(rig, tmp_path):
     bpy.context.scene.scope_retarget.rig = None
     with pytest.raises(RuntimeError, match="choose yours"):
         bpy.ops.scope.export(filepath=str(tmp_path / "hero.fbx"), format="FBX", which="RIG")
+
+
+def _linked_character(folder):
+    """A rig in a collection that is linked from another file."""
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    rig, _ = build_rig("unreal")
+    character = bpy.data.collections.new("Character")
+    character.objects.link(rig)
+    bpy.data.libraries.write(str(folder / "hero.blend"), {character})
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    captured(motion_of(walk(2.0)))["scope_body_file"] = "scope"
+    with bpy.data.libraries.load(str(folder / "hero.blend"), link=True) as (_, here):
+        here.collections = ["Character"]
+    bpy.context.scene.collection.children.link(here.collections[0])
+    bpy.context.view_layer.update()
+    return here.collections[0]
+
+
+@pytest.mark.parametrize("root", ["bone", "object"])
+def test_a_library_override_moves_and_is_saved(tmp_path, root):
+    _linked_character(tmp_path).override_hierarchy_create(bpy.context.scene, bpy.context.view_layer)
+    settings = bpy.context.scene.scope_retarget
+    settings.rig = next(obj for obj in bpy.context.scene.objects if obj.override_library)
+    settings.root = root
+    bpy.ops.scope.retarget()
+    moving = seen(settings.rig, ["pelvis", "hand_l"])
+    assert np.ptp(moving[:, 0, 1]) > 1.0
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "shot.blend"))
+    np.testing.assert_allclose(seen(bpy.context.scene.scope_retarget.rig, ["pelvis", "hand_l"]), moving, atol=1e-4)
