@@ -34,8 +34,14 @@ class _OnRig(TellingOperator):
     def poll(cls, context: bpy.types.Context) -> bool:
         """A rig is chosen."""
         rig = context.scene.scope_retarget.rig
-        if rig is None or rig.name not in context.view_layer.objects:
+        if rig is None:
             cls.poll_message_set("Choose your rig first")
+            return False
+        if rig.name not in context.view_layer.objects:
+            cls.poll_message_set(
+                f"'{rig.name}' is not in the scene's view layer: put it into the scene, or tick its collection in the "
+                "Outliner"
+            )
             return False
         return True
 
@@ -61,6 +67,20 @@ class SCOPE_OT_retarget(_OnRig):
 
     bl_idname = "scope.retarget"
     bl_label = "Retarget"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """A rig is chosen that this file can animate."""
+        if not super().poll(context):
+            return False
+        rig = context.scene.scope_retarget.rig
+        if rig.library is not None:
+            cls.poll_message_set(
+                f"'{rig.name}' is linked from {rig.library.filepath}, and its motion would be lost when this file is "
+                "saved: make an override of it (Object > Library Override > Make)"
+            )
+            return False
+        return True
 
     def work(self, context: bpy.types.Context) -> str:
         """Key the rig."""

@@ -165,6 +165,12 @@ def _linked_character(folder):
     return here.collections[0]
 
 
+def test_on_a_linked_rig_the_button_says_what_to_do(tmp_path):
+    bpy.context.scene.scope_retarget.rig = _linked_character(tmp_path).objects["unreal"]
+    with pytest.raises(RuntimeError, match=r"linked from .*hero\.blend.*make an override"):
+        bpy.ops.scope.retarget()
+
+
 @pytest.mark.parametrize("root", ["bone", "object"])
 def test_a_library_override_moves_and_is_saved(tmp_path, root):
     _linked_character(tmp_path).override_hierarchy_create(bpy.context.scene, bpy.context.view_layer)
@@ -177,3 +183,13 @@ def test_a_library_override_moves_and_is_saved(tmp_path, root):
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot.blend"))
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "shot.blend"))
     np.testing.assert_allclose(seen(bpy.context.scene.scope_retarget.rig, ["pelvis", "hand_l"]), moving, atol=1e-4)
+
+
+def test_a_rig_that_is_out_of_the_view_layer_is_said_to_be(rig):
+    aside = bpy.data.collections.new("Aside")
+    bpy.context.scene.collection.children.link(aside)
+    aside.objects.link(rig)
+    bpy.context.scene.collection.objects.unlink(rig)
+    bpy.context.view_layer.layer_collection.children["Aside"].exclude = True
+    with pytest.raises(RuntimeError, match="'unreal' is not in the scene's view layer"):
+        bpy.ops.scope.retarget()
