@@ -12,7 +12,7 @@ _STAYS, _COMES_BACK = 1, 2
 
 def hide(armature: bpy.types.Object, view_layer: bpy.types.ViewLayer) -> None:
     """Hide a captured armature and its body, in viewports and in renders."""
-    for obj in _person(armature):
+    for obj in _person(armature, view_layer):
         if not obj.hide_get(view_layer=view_layer) or not obj.hide_render:
             obj[_HIDDEN] = _STAYS
         obj.hide_set(True, view_layer=view_layer)
@@ -21,7 +21,7 @@ def hide(armature: bpy.types.Object, view_layer: bpy.types.ViewLayer) -> None:
 
 def show(armature: bpy.types.Object, view_layer: bpy.types.ViewLayer, *, for_now: bool = False) -> None:
     """Show what ``hide`` has hidden; ``for_now``: until ``hide_again``."""
-    for obj in _person(armature):
+    for obj in _person(armature, view_layer):
         if _HIDDEN not in obj:
             continue
         if not for_now:
@@ -36,9 +36,11 @@ def hide_again(armature: bpy.types.Object, view_layer: bpy.types.ViewLayer) -> N
     """Hide what was shown for now."""
     if armature.get(_HIDDEN) == _COMES_BACK:
         hide(armature, view_layer)
-        for obj in _person(armature):
+        for obj in _person(armature, view_layer):
             obj[_HIDDEN] = _STAYS
 
 
-def _person(armature: bpy.types.Object) -> list[bpy.types.Object]:
-    return [armature, *(obj for obj in armature.children if obj.type == "MESH")]
+def _person(armature: bpy.types.Object, view_layer: bpy.types.ViewLayer) -> list[bpy.types.Object]:
+    """Armature and body, but for what the view layer leaves out: that is not seen, nor can it be hidden."""
+    person = [armature, *(obj for obj in armature.children if obj.type == "MESH")]
+    return [obj for obj in person if obj.name in view_layer.objects]

@@ -58,6 +58,17 @@ def test_the_captured_body_is_hidden_beside_or_left(rig):
     assert body.hide_render
 
 
+@pytest.mark.parametrize("captured", ["hide", "beside"])
+def test_the_captured_persons_collection_may_be_left_out_of_the_view_layer(rig, captured):
+    source = next(obj for obj in bpy.context.scene.objects if "scope_source" in obj)
+    layers = bpy.context.view_layer.layer_collection.children
+    next(c for c in layers if c.collection in source.users_collection).exclude = True
+    bpy.context.scene.scope.result.collection = source.users_collection[0]
+    bpy.context.scene.scope_retarget.captured = captured
+    assert bpy.ops.scope.retarget() == {"FINISHED"}
+    assert np.ptp(seen(rig, ["pelvis"])[:, 0, 1]) > 1.0
+
+
 def test_what_is_hidden_is_shown_for_now_and_hidden_again(rig):
     layer = bpy.context.view_layer
     source = next(obj for obj in bpy.context.scene.objects if "scope_source" in obj)
