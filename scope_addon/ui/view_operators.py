@@ -43,8 +43,15 @@ class SCOPE_OT_look_through(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """The last capture has a camera."""
-        return camera_of(context.scene) is not None
+        """The last capture has a camera, and can be seen."""
+        if camera_of(context.scene) is None:
+            cls.poll_message_set("Capture something first, with its camera: the scene has none of a capture")
+            return False
+        collection = context.scene.scope.result.collection
+        if not is_looking_through(context) and not _is_shown(collection, context.view_layer.layer_collection):
+            cls.poll_message_set(f"The collection '{collection.name}' is hidden; show it in the Outliner")
+            return False
+        return True
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Set the scene's camera and resolution, and the viewport's view."""
@@ -86,6 +93,12 @@ class SCOPE_OT_look_through(bpy.types.Operator):
             obj.select_set(True)
         if space.region_3d.view_perspective != "CAMERA":
             bpy.ops.view3d.view_camera()
+
+
+def _is_shown(collection: bpy.types.Collection, layer: bpy.types.LayerCollection) -> bool:
+    """Whether a collection is shown, in this layer collection or below it."""
+    here = layer.collection == collection and layer.is_visible
+    return here or any(_is_shown(collection, child) for child in layer.children)
 
 
 def is_looking_through(context: bpy.types.Context) -> bool:

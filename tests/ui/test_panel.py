@@ -131,6 +131,20 @@ def test_looking_through_the_camera_sets_camera_and_resolution(fake_worker, foot
     assert (scene.render.resolution_x, scene.render.resolution_y) == (640, 480)
 
 
+@pytest.mark.parametrize("way", ["exclude", "hide_viewport"])
+def test_a_hidden_capture_is_not_compared_with_its_footage(fake_worker, footage, way):
+    captured(fake_worker, footage)
+    shown = bpy.context.scene.scope.result.collection
+    layer = next(c for c in bpy.context.view_layer.layer_collection.children if c.collection == shown)
+    setattr(layer, way, True)
+    bpy.context.view_layer.update()
+    with pytest.raises(RuntimeError, match=f"'{shown.name}' is hidden; show it in the Outliner"):
+        bpy.ops.scope.look_through()
+    setattr(layer, way, False)
+    bpy.context.view_layer.update()
+    assert bpy.ops.scope.look_through() == {"FINISHED"}
+
+
 def test_warnings_lead_to_their_frames(fake_worker, footage):
     from scope.scope_addon.ui.panel import first_frame
 
