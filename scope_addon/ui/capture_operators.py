@@ -36,6 +36,7 @@ state = _State()
 def stop_everything() -> None:
     """End a running capture: the extension is being disabled, or a test begins."""
     stop_job()
+    clear_status_bar()
     state.message = ""
 
 
@@ -178,8 +179,7 @@ class SCOPE_OT_capture(bpy.types.Operator):
         if (timer := getattr(self, "_timer", None)) is not None:
             context.window_manager.event_timer_remove(timer)
             self._timer = None
-        if context.workspace:
-            context.workspace.status_text_set(None)
+        clear_status_bar()
         if "FINISHED" in outcome:
             hide_startup_cube(context)
             frame_selected(context)
@@ -212,6 +212,13 @@ def stop_job() -> None:
         state.job.close()
     state.job = None
     preview_picture.clear()
+
+
+def clear_status_bar() -> None:
+    """In every workspace: each keeps its own text, and the user may have gone from one to another meanwhile."""
+    for workspace in bpy.data.workspaces:
+        with bpy.context.temp_override(workspace=workspace):  # Blender sets the context's, whichever it is told to
+            workspace.status_text_set(None)
 
 
 def redraw(context: bpy.types.Context) -> None:

@@ -163,6 +163,18 @@ def test_cancel_operator_ends_the_worker_at_once(fake_worker, footage):
     assert bpy.ops.scope.capture.poll()
 
 
+def test_no_workspace_goes_on_telling_of_a_capture_that_has_ended(monkeypatch):
+    told = {}
+
+    def tell(_, text):  # as Blender does it: the workspace is the context's
+        told[bpy.context.workspace.name] = text
+
+    monkeypatch.setattr(bpy.types.WorkSpace, "status_text_set", tell)
+    capture_operators.stop_everything()
+    assert len(told) > 1
+    assert told == dict.fromkeys((workspace.name for workspace in bpy.data.workspaces), None)
+
+
 def test_disabling_the_extension_ends_the_worker(fake_worker, footage):
     import scope
 
