@@ -64,7 +64,10 @@ class SCOPE_OT_look_through(bpy.types.Operator):
             for obj in [obj for obj in scene.scope.result.collection.all_objects if "scope_source" in obj]:
                 hide_again(obj, context.view_layer)
             return {"FINISHED"}
+        assert camera is not None  # poll has asked
         scene.camera = camera
+        camera.hide_viewport = False  # a hidden one shows no footage
+        camera.hide_set(False, view_layer=context.view_layer)
         render, result = scene.render, scene.scope.result
         render.resolution_x, render.resolution_y = result.resolution
         render.pixel_aspect_x, render.pixel_aspect_y = result.pixel_aspect

@@ -131,6 +131,15 @@ def test_looking_through_the_camera_sets_camera_and_resolution(fake_worker, foot
     assert (scene.render.resolution_x, scene.render.resolution_y) == (640, 480)
 
 
+def test_a_hidden_camera_is_shown_since_it_shows_the_footage(fake_worker, footage):
+    captured(fake_worker, footage)
+    camera = next(obj for obj in bpy.context.scene.scope.result.collection.objects if obj.type == "CAMERA")
+    camera.hide_viewport = True
+    camera.hide_set(True)
+    bpy.ops.scope.look_through()
+    assert camera.visible_get()
+
+
 @pytest.mark.parametrize("way", ["exclude", "hide_viewport"])
 def test_a_hidden_capture_is_not_compared_with_its_footage(fake_worker, footage, way):
     captured(fake_worker, footage)
