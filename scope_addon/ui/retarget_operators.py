@@ -18,11 +18,16 @@ if TYPE_CHECKING:
 _ASIDE = (1.5, 0.0, 0.0)  # metres: to the left of a person who faces the front view
 
 
+def captured_people(context: bpy.types.Context) -> list[bpy.types.Object]:
+    """The captured armatures of the scene."""
+    return [obj for obj in context.scene.objects if obj.type == "ARMATURE" and "scope_source" in obj]
+
+
 def chosen_source(context: bpy.types.Context) -> bpy.types.Object | None:
     """The captured armature that is meant; the rig itself may well be the active object."""
     found = captured_armature(context)
     if found is None:
-        captured = [obj for obj in context.scene.objects if obj.type == "ARMATURE" and "scope_source" in obj]
+        captured = captured_people(context)
         found = captured[0] if len(captured) == 1 else None
     return found
 
@@ -70,7 +75,7 @@ class SCOPE_OT_retarget(_OnRig):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """A rig is chosen that this file can animate."""
+        """A rig is chosen that this file can animate, and whose motion it takes."""
         if not super().poll(context):
             return False
         rig = context.scene.scope_retarget.rig
@@ -80,18 +85,23 @@ class SCOPE_OT_retarget(_OnRig):
                 "saved: make an override of it (Object > Library Override > Make)"
             )
             return False
+        if chosen_source(context) is None:
+            cls.poll_message_set(
+                "Several people are captured: select the armature of the one whose motion the rig takes"
+                if captured_people(context)
+                else "The scene holds no capture yet"
+            )
+            return False
         return True
 
     def work(self, context: bpy.types.Context) -> str:
         """Key the rig."""
-        from ...solver.errors import UsageError
         from ..scene.retarget import RetargetOptions, guess_bone_map, retarget
         from ..scene.timing import scene_rate
         from ..scene.visibility import hide, show
 
         settings, source = context.scene.scope_retarget, chosen_source(context)
-        if source is None:
-            raise UsageError("select the armature of a capture: there is none, or more than one")
+        assert source is not None  # poll has asked
         if not len(settings.pairs):
             _show(context, guess_bone_map(settings.rig))
         body = body_of(source)

@@ -6,7 +6,7 @@ from __future__ import annotations
 import bpy
 
 from .panel import Tab
-from .retarget_operators import chosen_source
+from .retarget_operators import captured_people, chosen_source
 
 
 class SCOPE_UL_bone_pairs(bpy.types.UIList):
@@ -15,8 +15,12 @@ class SCOPE_UL_bone_pairs(bpy.types.UIList):
     def draw_item(self, context, layout, data, item, icon, active_data, active_property, index) -> None:  # type: ignore[no-untyped-def]
         """One line: part, bone, and a question mark where the guess is not sure."""
         rig = data.rig
-        row = layout.split(factor=0.42, align=True)
-        row.prop(item, "part", text="", emboss=False)
+        chosen = index == getattr(active_data, active_property)
+        row = layout.split(factor=0.5 if chosen else 0.42, align=True)
+        if chosen or not item.part:
+            row.prop(item, "part", text="", placeholder="Body Part")
+        else:  # without the field's frame and button the longest names fit
+            row.label(text=item.part)
         row = row.row(align=True)
         known = rig is not None and item.bone in rig.data.bones
         row.alert = not known
@@ -36,11 +40,14 @@ class SCOPE_PT_retarget(Tab, bpy.types.Panel):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """There is a captured person."""
-        return chosen_source(context) is not None
+        return chosen_source(context) is not None or bool(captured_people(context))
 
     def draw(self, context: bpy.types.Context) -> None:
         """Draw the panel."""
         layout, settings = self.layout, context.scene.scope_retarget
+        source = chosen_source(context)
+        text = source.name if source else "Select a captured person"
+        layout.label(text=text, icon="OUTLINER_OB_ARMATURE" if source else "INFO")
         layout.prop(settings, "rig")
         if settings.rig is None:
             return

@@ -15,11 +15,20 @@ from bpy.props import (
 )
 
 
+def offered_parts(_pair: bpy.types.PropertyGroup | None, _context: bpy.types.Context, typed: str) -> list[str]:
+    """The body parts that a name may be of, for Blender to offer while it is typed."""
+    from ..retarget.bone_map import PARTS
+
+    return [part for part in PARTS if typed.lower() in part]
+
+
 class SCOPE_PG_bone_pair(bpy.types.PropertyGroup):
     """One bone of the user's rig and the body part that it follows."""
 
     bone: StringProperty(name="Bone", description="Bone of your rig")
-    part: StringProperty(name="Body Part", description="Part of the captured body that this bone follows")
+    part: StringProperty(
+        name="Body Part", search=offered_parts, description="Part of the captured body that this bone follows"
+    )
     confidence: FloatProperty(name="Confidence", min=0.0, max=1.0, description="How sure the guess is")
 
 

@@ -4,9 +4,11 @@
 import bpy
 import numpy as np
 import pytest
+from scope.scope_addon.retarget.bone_map import PARTS
 from scope.scope_addon.scene.root_object import root_object
 from scope.scope_addon.scene.visibility import hide_again, show
 from scope.scope_addon.ui.captured_person import captured_armature
+from scope.scope_addon.ui.retarget_properties import offered_parts
 
 from ..edit.walking import RATE, motion_of, walk
 from ..scene.exported import read_back
@@ -98,6 +100,28 @@ def test_an_edit_and_the_same_button_again_update_the_rig(rig, tmp_path):
     bpy.ops.scope.retarget()
     assert root_object(rig) is not None
     assert np.ptp(seen(rig, ["pelvis"])[:, 0, 1]) > 1.0
+
+
+def test_with_several_people_the_panel_stays_and_asks_for_one(rig):
+    people = [next(obj for obj in bpy.context.scene.objects if "scope_source" in obj), captured(motion_of(walk(2.0)))]
+    people[1]["scope_body_file"] = "scope"
+    panel, layer = bpy.types.SCOPE_PT_retarget, bpy.context.view_layer
+    layer.objects.active = rig
+    assert panel.poll(bpy.context)
+    with pytest.raises(RuntimeError, match="Several people are captured: select the armature"):
+        bpy.ops.scope.retarget()
+    layer.objects.active = people[1]
+    bpy.ops.scope.retarget()
+    assert people[1].hide_get()
+    assert not people[0].hide_get()
+    for person in people:
+        bpy.data.objects.remove(person)
+    assert not panel.poll(bpy.context)
+
+
+def test_body_parts_are_offered_while_they_are_typed():
+    assert offered_parts(None, bpy.context, "LEFT_h") == ["left_hip"]
+    assert offered_parts(None, bpy.context, "") == list(PARTS)
 
 
 def test_a_list_without_legs_is_refused(rig):
