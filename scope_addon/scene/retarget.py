@@ -33,6 +33,7 @@ from .transaction import all_or_nothing
 # Rigify's switches: limbs by FK, neck and head with the chest.
 _SWITCHES = ("IK_FK", "neck_follow", "head_follow")
 _TURNS = 0.1  # of a rotation matrix's numbers, which the probe changes by more than 0.3
+_LOOKS, _HELD = 5, np.radians(20)  # at so many frames a bone may be off by so much
 _WRITTEN = "scope_keys"  # custom property of an action: what its keys were when they were written
 
 
@@ -48,6 +49,14 @@ class RetargetOptions:
         """Refuse values that are not offered."""
         if self.root not in ROOTS:
             raise UsageError(f"root must be one of {', '.join(ROOTS)}, but is '{self.root}'")
+
+
+@dataclass(frozen=True)
+class Retargeted:
+    """What ``retarget`` did: the rig's new action, and what the user should know of it."""
+
+    action: bpy.types.Action
+    warnings: list[str]
 
 
 def guess_bone_map(rig: bpy.types.Object) -> BoneMap:
@@ -69,8 +78,8 @@ def retarget(
     bone_map: BoneMap,
     rate: float,
     options: RetargetOptions | None = None,
-) -> bpy.types.Action:
-    """Key the mapped bones of ``rig`` so that it moves as the captured ``source``; returns the new action.
+) -> Retargeted:
+    """Key the mapped bones of ``rig`` so that it moves as the captured ``source``, in a new action.
 
     The rig's former action stays in the file, but one that came of retargeting and is as it was written. Fingers stay
     as they are where none were captured. The rig leaves Edit Mode, Rest Position and its NLA's Tweak Mode, in which it
@@ -94,21 +103,23 @@ def retarget(
     with all_or_nothing(bpy.context.scene, rig, topmost(rig)):
         with _at_rest(rig):
             skeleton, place = _probe(rig, bone_map.parts), np.array(rig.matrix_world, float)
-        pose = transfer(clip, body, betas, skeleton, bone_map, feet=options.feet)
-        root = skeleton.names.index(bone_map.bone("pelvis") or "")
-        rotations, heads, yaw = _where_seen(source, pose.rotations, pose.heads[:, root])
-        heads += options.offset
-        way = None
-        if options.root == "in-place":
-            heads[:, :2] = skeleton.heads[root, :2]
-        elif options.root == "object":
-            positions, angles = heads * [1.0, 1.0, 0.0], floor_path(clip)[1] + yaw + pose.facing
-            turn, origin = about_z(angles), place[:3, 3] * [1.0, 1.0, 0.0]
-            rotations = np.swapaxes(turn, 1, 2)[:, None] @ rotations
-            heads = np.einsum("tji,tj->ti", turn, heads - positions) + origin
-            way = positions - turn @ origin, angles
+            pose = transfer(clip, body, betas, skeleton, bone_map, feet=options.feet)
+            root = skeleton.names.index(bone_map.bone("pelvis") or "")
+            rotations, heads, yaw = _where_seen(source, pose.rotations, pose.heads[:, root])
+            heads += options.offset
+            way = None
+            if options.root == "in-place":
+                heads[:, :2] = skeleton.heads[root, :2]
+            elif options.root == "object":
+                positions, angles = heads * [1.0, 1.0, 0.0], floor_path(clip)[1] + yaw + pose.facing
+                turn, origin = about_z(angles), place[:3, 3] * [1.0, 1.0, 0.0]
+                rotations = np.swapaxes(turn, 1, 2)[:, None] @ rotations
+                heads = np.einsum("tji,tj->ti", turn, heads - positions) + origin
+                way = positions - turn @ origin, angles
+            turns = basis(skeleton, rotations)
+            warnings = _held_back(rig, skeleton.names, turns, rotations)
         former = rig.animation_data.action if rig.animation_data else None
-        action = _write(rig, place, skeleton, basis(skeleton, rotations), root, heads, frames)
+        action = _write(rig, place, skeleton, turns, root, heads, frames)
         if way is None:
             drop_root(rig)
         else:
@@ -117,7 +128,7 @@ def retarget(
         _above_nla(rig.animation_data)
         _put_by(former)
         action.name = f"{rig.name}_{source.name}"
-    return action
+    return Retargeted(action, warnings)
 
 
 def check_turning(rig: bpy.types.Object, bone_map: BoneMap) -> None:
@@ -286,6 +297,28 @@ def _check_moved(rig: bpy.types.Object, name: str) -> None:
         f"'{name}' of '{rig.name}' does not move when its location changes: mute the constraint or driver that holds "
         "the bone, or choose another one for the pelvis in the list"
     )
+
+
+def _held_back(rig: bpy.types.Object, names: list[str], turns: np.ndarray, wanted: np.ndarray) -> list[str]:
+    """Warns of bones that do not go where they should though they can be turned, as those of a leg by IK.
+
+    :param turns: (T, B, 3, 3) rotations of the channels; wanted: (T, B, 3, 3) where they should turn the bones to.
+    """
+    off = np.zeros(len(names))
+    for t in np.unique(np.linspace(0, len(turns) - 1, _LOOKS).astype(int)):
+        for name, turn in zip(names, turns[t], strict=True):
+            rig.pose.bones[name].matrix_basis = Matrix(turn.tolist()).to_4x4()
+        seen = _rotations(_matrices(rig, names))
+        cosine = (np.einsum("bij,bij->b", seen, wanted[t]) - 1) / 2
+        off = np.maximum(off, np.arccos(np.clip(cosine, -1, 1)))
+    held = [name for name, angle in zip(names, off, strict=True) if angle > _HELD]
+    if not held:
+        return []
+    others = {1: "", 2: f" and '{held[-1]}'"}.get(len(held), f" and {len(held) - 1} other bones")
+    return [
+        f"'{held[0]}'{others} of '{rig.name}' cannot follow: mute the constraints or drivers that hold them, such as "
+        "IK, or put the bones that control them into the list"
+    ]
 
 
 def _independent(parts: dict[str, str]) -> list[list[int]]:

@@ -48,7 +48,7 @@ def export_on_rig(
             if len(motions) > 1:
                 rig.name = f"{rig.name}_person{number}"
             betas, options = person.motion.betas, RetargetOptions(root=root)
-            retarget(person.armature, body, betas, rig, bones, result.frame_rate, options)
+            warnings += retarget(person.armature, body, betas, rig, bones, result.frame_rate, options).warnings
         bpy.data.batch_remove([obj for person in result.people for obj in (person.armature, person.mesh)])
         for path in paths:
             written += export(path, [result.collection], options=export_options)

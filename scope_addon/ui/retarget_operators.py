@@ -9,7 +9,7 @@ import bpy
 from bpy.props import EnumProperty, StringProperty
 
 from .captured_person import PERSON, betas_of, body_of, captured_armature
-from .telling import TellingOperator
+from .telling import TellingOperator, sentence
 
 if TYPE_CHECKING:
     from ..retarget.bone_map import BoneMap
@@ -105,7 +105,7 @@ class SCOPE_OT_retarget(_OnRig):
         if not len(settings.pairs):
             _show(context, guess_bone_map(settings.rig))
         body = body_of(source)
-        action = retarget(
+        done = retarget(
             source,
             body,
             betas_of(source, body),
@@ -122,7 +122,10 @@ class SCOPE_OT_retarget(_OnRig):
             hide(source, context.view_layer)
         else:
             show(source, context.view_layer)
-        return f"'{settings.rig.name}' moves by the action '{action.name}'"
+        if done.warnings:
+            self.report({"WARNING"}, sentence(done.warnings[0]))
+            return ""
+        return f"'{settings.rig.name}' moves by the action '{done.action.name}'"
 
 
 class _BoneMapFile(_OnRig):

@@ -121,9 +121,9 @@ def test_rigify(source, rigify_rigs):
             for side in ("left", "right")
             for part, limb in zip(parts, limbs, strict=True)
         }
-        run(source, rig, feet=False)
+        assert run(source, rig, feet=False).warnings == []
         assert direction_error(rig, bone_of, ARMS + LEGS) < 1.0
-        run(source, rig)
+        assert run(source, rig).warnings == []
         assert direction_error(rig, bone_of, ARMS) < 1.0
     metarig = rigify_rigs[0][0]
     before = guess_bone_map(metarig).parts
@@ -257,3 +257,19 @@ def test_a_pelvis_that_cannot_be_moved_is_told(source):
     held.target, held.subtarget = rig, "root"
     with pytest.raises(InputError, match="'pelvis' of 'unreal' does not move"):
         run(source, rig)
+
+
+def test_bones_that_a_constraint_holds_are_told(source):
+    rig, bone_of = build_rig("unreal")
+    assert run(source, rig).warnings == []
+    target = bpy.data.objects.new("target", None)
+    bpy.context.scene.collection.objects.link(target)
+    target.location = (0.2, 0.0, 0.2)
+    held = rig.pose.bones[bone_of["left_knee"]].constraints.new("IK")
+    held.target, held.chain_count = target, 2
+    (warning,) = run(source, rig).warnings
+    assert "'thigh_l'" in warning
+    assert "cannot follow: mute the constraints" in warning
+    held.mute = True
+    assert run(source, rig).warnings == []
+    assert direction_error(rig, bone_of, ARMS) < 1.0

@@ -167,14 +167,14 @@ def test_a_capture_without_fingers_leaves_them_as_they_are():
     for name in bent:
         rig.pose.bones[name].matrix_basis = Matrix.Rotation(0.7, 4, "X")
     before = {name: rig.pose.bones[name].matrix_basis.copy() for name in bent}
-    action = run(source, rig, BODY)
+    done = run(source, rig, BODY)
     for frame in (1, 30):
         bpy.context.scene.frame_set(frame)
         for name in bent:
             assert np.allclose(rig.pose.bones[name].matrix_basis, before[name], atol=1e-5)
     paths = {curve.data_path for curve in fcurves(rig)}
     assert not any(bone_path(name, "rotation_quaternion") in paths for name in bent)
-    assert rig.animation_data.action == action
+    assert rig.animation_data.action == done.action
 
 
 def test_a_rig_of_the_same_shape_gets_the_same_flesh(source, blender):

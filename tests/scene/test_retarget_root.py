@@ -102,9 +102,9 @@ def test_the_rig_follows_where_the_user_puts_the_captured_armature(source, root)
 
 def test_what_is_re_run_replaces_its_own_action_but_not_a_changed_one(source):
     rig, _ = build_rig("unreal")
-    name, actions = run(source, rig).name, len(bpy.data.actions)
+    name, actions = run(source, rig).action.name, len(bpy.data.actions)
     for root in ("object", "object", "in-place", "bone"):
-        assert run(source, rig, root=root).name == name
+        assert run(source, rig, root=root).action.name == name
     assert len(bpy.data.actions) == actions
     rig.pose.bones[3].keyframe_insert("location", frame=7)
     changed = rig.animation_data.action
