@@ -156,12 +156,18 @@ def repeat_for_ever(datablock: bpy.types.ID, onwards: set[tuple[str, int]] | Non
 
     :param onwards: data paths and indices of the curves that go on from where a repetition ended.
     """
+    repeat_no_more(datablock)
     for curve in fcurves(datablock):
-        for modifier in [m for m in curve.modifiers if m.type == "CYCLES"]:
-            curve.modifiers.remove(modifier)
         modifier = curve.modifiers.new("CYCLES")
         going = (curve.data_path, curve.array_index) in (onwards or set())
         modifier.mode_before = modifier.mode_after = "REPEAT_OFFSET" if going else "REPEAT"
+
+
+def repeat_no_more(datablock: bpy.types.ID) -> None:
+    """Let every curve of a datablock go from its first key to its last, once."""
+    for curve in fcurves(datablock):
+        for modifier in [m for m in curve.modifiers if m.type == "CYCLES"]:
+            curve.modifiers.remove(modifier)
 
 
 def nla_strips(datablock: bpy.types.ID) -> list[bpy.types.NlaStrip]:

@@ -93,6 +93,7 @@ class SCOPE_OT_smooth(_Edit):
     def edit(self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float) -> str:
         """From the cached motion."""
         from ..edit.smooth import smoothed
+        from ..scene.actions import repeat_no_more
         from ..scene.keys import bake_whole_frames, write_clip
         from ..scene.root_object import drop_root
         from ..scene.timing import key_frames
@@ -100,6 +101,7 @@ class SCOPE_OT_smooth(_Edit):
         motion = cached_motion(armature)
         clip = smoothed(body, motion, self.strength)
         write_clip(armature, body, clip, key_frames(motion.timestamps, rate, float(armature.get("scope_start", 0.0))))
+        repeat_no_more(armature)  # what was a loop is the whole motion again
         if armature.get("scope_resampled"):
             bake_whole_frames(armature, body, rate)
         drop_root(armature)

@@ -172,6 +172,15 @@ def test_a_loop_goes_on_for_ever_where_it_ended(rig):
     np.testing.assert_allclose(next_time - next_time[:, :1], once - once[:, :1], atol=2e-3)
 
 
+def test_a_loop_that_is_smoothed_again_is_the_whole_motion_once_more(rig):
+    last = 1 + round(SECONDS * RATE)
+    bpy.ops.scope.smooth()
+    before = seen(rig, [1, last, last + 20])
+    bpy.ops.scope.loop(start=5, end=85, shortest=0.8)
+    bpy.ops.scope.smooth()
+    np.testing.assert_allclose(seen(rig, [1, last, last + 20]), before, atol=1e-5)
+
+
 @pytest.mark.parametrize("suffix", ["glb", "fbx", "bvh"])
 def test_a_loop_is_exported_alone(rig, tmp_path, suffix):
     """Curves that loop for ever, and the confidence of the frames that were cut off, do not make the file longer."""
