@@ -105,6 +105,8 @@ class SCOPE_OT_export(TellingOperator):
         from ..scene.export import ExportOptions, captures, export
         from ..scene.rig_export import export_rig
 
+        if not bpy.path.basename(self.filepath).removesuffix(_SUFFIX[self.format]):
+            raise UsageError("give the file to write a name")
         path = Path(bpy.path.ensure_ext(bpy.path.abspath(self.filepath), _SUFFIX[self.format]))
         options = ExportOptions(camera=self.camera, shape=self.shape.lower(), separate=self.separate)
         collections, rig = captures(context.scene), context.scene.scope_retarget.rig

@@ -122,6 +122,15 @@ def test_an_export_that_cannot_be_written_is_told(fake_worker, footage, tmp_path
         bpy.ops.scope.export(filepath=str(tmp_path / "none" / "walk.glb"), format="GLB")
 
 
+@pytest.mark.parametrize("name", ["", ".glb"])
+def test_an_export_without_a_name_asks_for_one(fake_worker, footage, tmp_path, name):
+    captured(fake_worker, footage)
+    with pytest.raises(RuntimeError, match="Give the file to write a name"):
+        bpy.ops.scope.export(filepath=f"{tmp_path}/{name}", format="GLB")
+    with pytest.raises(RuntimeError, match="Give the file to write a name"):
+        bpy.ops.scope.export(format="GLB")
+
+
 def test_looking_through_the_camera_sets_camera_and_resolution(fake_worker, footage):
     captured(fake_worker, footage)
     scene = bpy.context.scene
