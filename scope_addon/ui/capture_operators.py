@@ -64,7 +64,6 @@ class SCOPE_OT_choose_footage(bpy.types.Operator):
             self.report({"ERROR"}, f"{path} is not a file; choose a video or picture")
             return {"CANCELLED"}
         context.scene.scope.footage = str(path)
-        state.message = ""
         return {"FINISHED"}
 
 

@@ -18,6 +18,8 @@ from bpy.props import (
     StringProperty,
 )
 
+from .capture_operators import state
+
 _FIXED: set[str] = set()  # not animatable: a keyframe on a setting would only confuse
 # Paths may begin with "//", the .blend's folder; since 4.5 Blender wants to be told.
 _PATH = {"PATH_SUPPORTS_BLEND_RELATIVE"} if bpy.app.version >= (4, 5, 0) else set()
@@ -57,6 +59,11 @@ SHAPES = (
 )
 
 
+def _forget_failure(_settings: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
+    """What went wrong with other footage is no news of this one."""
+    state.message = ""
+
+
 class SCOPE_PG_warning(bpy.types.PropertyGroup):
     """One line of the result."""
 
@@ -85,7 +92,11 @@ class SCOPE_PG_settings(bpy.types.PropertyGroup):
     """What the user chose."""
 
     footage: StringProperty(
-        name="Footage", subtype="FILE_PATH", options=_PATH, description="Video or picture of a person to capture"
+        name="Footage",
+        subtype="FILE_PATH",
+        options=_PATH,
+        update=_forget_failure,
+        description="Video or picture of a person to capture",
     )
     quality: EnumProperty(
         name="Quality", items=QUALITIES, default="BEST", options=_FIXED, description="Speed against accuracy"

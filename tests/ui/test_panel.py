@@ -131,6 +131,22 @@ def test_an_export_without_a_name_asks_for_one(fake_worker, footage, tmp_path, n
         bpy.ops.scope.export(format="GLB")
 
 
+@pytest.mark.parametrize("way", ["sample", "chosen", "typed"])
+def test_other_footage_leaves_an_earlier_failure_behind(footage, tmp_path, way):
+    settings = bpy.context.scene.scope
+    settings.footage = str(tmp_path / "gone.mp4")
+    with pytest.raises(RuntimeError, match="does not exist"):
+        bpy.ops.scope.capture()
+    assert state.message
+    if way == "sample":
+        bpy.ops.scope.use_sample()
+    elif way == "chosen":
+        bpy.ops.scope.choose_footage(filepath=str(footage))
+    else:
+        settings.footage = str(footage)
+    assert not state.message
+
+
 def test_looking_through_the_camera_sets_camera_and_resolution(fake_worker, footage):
     captured(fake_worker, footage)
     scene = bpy.context.scene
