@@ -10,7 +10,9 @@ With c(f) the pictures' mean cost,
 f_0 and σ what is known without the fit: assumed, or told by edges. All pictures together count as a < 1 of them
 (`SHARE`), since keypoints are misplaced, and depths mistaken, alike in all pictures of a person.
 
-It tells little: see `camera` for how much.
+It tells little: see `camera` for how much. Nor does it tell more of people whose height is known: with preset fast, the
+mean over fourteen renders of the ratio to the true focal length falls from 0.78 to 0.68 with their heights, since
+other proportions come with these.
 """
 
 from __future__ import annotations
@@ -34,8 +36,8 @@ FIRST_GAP_S = 0.2  # between pictures; each further gap is twice as long, so tha
 class FocalFits:
     """Fits single observations of a clip, in whatever thread asks."""
 
-    def __init__(self, body: Body, parts: Parts = ALL_PARTS, height_m: float | None = None) -> None:
-        self._body, self._parts, self._height_m = body, parts, height_m
+    def __init__(self, body: Body, parts: Parts = ALL_PARTS) -> None:
+        self._body, self._parts = body, parts
         self._next_s, self._gap_s = -np.inf, FIRST_GAP_S
 
     def is_due(self, timestamp_s: float) -> bool:
@@ -56,7 +58,7 @@ class FocalFits:
         K, costs = camera.intrinsics, []
         for ratio in np.exp(LOG_RATIOS):
             tried = replace(camera, intrinsics=pinhole(2 * K[0, 2], 2 * K[1, 2], ratio * K[0, 0]))
-            prepared = prepare_track(self._body, track, tried, self._parts, self._height_m)
+            prepared = prepare_track(self._body, track, tried, self._parts)
             weights = replace(prepared.weights, keypoints2d=prepared.weights.keypoints2d * ratio**2)
             found = fit_picture(replace(prepared, weights=weights))
             if found is None:

@@ -122,9 +122,8 @@ def capture(
         execution = Execution(options.provider)
         if options.threads > cores:
             execution.warnings.append(f"{options.threads} threads were asked for, but there are {cores} cores")
-        height_m = next(iter(options.heights_m), None)
-        live = LiveBody(body, camera, options.parts, height_m)
-        fits = FocalFits(body, options.parts, height_m if most == 1 else None)  # of several, who is who is not known yet
+        live = LiveBody(body, camera, options.parts, next(iter(options.heights_m), None))
+        fits = FocalFits(body, options.parts)
         with BesideTracking(camera, video.width, video.height, live, fits) as beside, _opencv_in_one_thread():
             tracker = PeopleTracker(
                 options.quality,
