@@ -13,6 +13,8 @@ import os
 import shutil
 import tempfile
 import time
+from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -42,7 +44,7 @@ class Cache:
     @property
     def has_kernels(self) -> bool:
         """Whether a capture has compiled the solver here before."""
-        return next(self.kernels.rglob("*.nbi"), None) is not None
+        return any(file.suffix == ".nbi" for file in _files(self.kernels))
 
     def find(self, key: str) -> CachedCapture | None:
         """A finished capture, or None."""
@@ -55,10 +57,8 @@ class Cache:
             return None
         if not motions or not all(m.is_file() for m in motions):
             return None
-        try:
+        with suppress(OSError):
             os.utime(folder)  # used now: the last to be pruned
-        except OSError:
-            pass
         return CachedCapture(motions, report)
 
     def new_job_folder(self) -> Path:
@@ -70,8 +70,8 @@ class Cache:
         try:
             jobs.mkdir(parents=True, exist_ok=True)
             self.kernels.mkdir(exist_ok=True)
-            for folder in jobs.iterdir():
-                if time.time() - folder.stat().st_mtime > _ABANDONED_S:
+            for folder, used in _by_time(jobs):
+                if time.time() - used > _ABANDONED_S:
                     shutil.rmtree(folder, ignore_errors=True)
             return Path(tempfile.mkdtemp(prefix="job-", dir=jobs))
         except OSError as error:
@@ -106,10 +106,8 @@ class Cache:
 
     def prune(self, limit: int) -> None:
         """Remove the captures that were used longest ago until all of them fit into ``limit`` bytes."""
-        captures = self.root / "captures"
-        entries = sorted(captures.iterdir(), key=lambda f: f.stat().st_mtime, reverse=True) if captures.is_dir() else []
         total = 0
-        for index, folder in enumerate(entries):
+        for index, (folder, _) in enumerate(_by_time(self.root / "captures")):
             total += _size(folder)
             if index and total > limit:  # the newest stays: it was captured just now
                 shutil.rmtree(folder, ignore_errors=True)
@@ -127,11 +125,26 @@ class Cache:
         return [self.root / "captures", self.kernels]
 
 
+def _by_time(folder: Path) -> list[tuple[Path, float]]:
+    """What is in a folder and when it was used, the newest first; without what another process removes meanwhile."""
+    found = []
+    with suppress(OSError):
+        for path in folder.iterdir():
+            with suppress(OSError):
+                found.append((path, path.stat().st_mtime))
+    return sorted(found, key=lambda entry: entry[1], reverse=True)
+
+
+def _files(folder: Path) -> Iterator[Path]:
+    """Every file below a folder. Folders that another process removes meanwhile count as empty."""
+    for below, _, names in os.walk(folder):
+        for name in names:
+            yield Path(below, name)
+
+
 def _size(folder: Path) -> int:
     total = 0
-    for path in folder.rglob("*"):
-        try:
-            total += path.stat().st_size if path.is_file() else 0
-        except OSError:
-            continue  # removed meanwhile
+    for path in _files(folder):
+        with suppress(OSError):  # removed meanwhile
+            total += path.stat().st_size
     return total

@@ -2,7 +2,9 @@
 """Finished captures are found again, half-finished ones never, and the oldest go first."""
 
 import os
+import shutil
 import time
+from pathlib import Path
 
 import pytest
 from scope.scope_addon.job.cache import Cache
@@ -56,6 +58,33 @@ def test_pruning_removes_what_was_used_longest_ago(cache):
     cache.prune(1)
     assert cache.find("new") is None or cache.find("middle") is None
     assert cache.size() > 0
+
+
+@pytest.fixture
+def vanishing(monkeypatch):
+    """A folder of that name is listed, and gone when it is looked at: another Blender has removed it."""
+    before = Path.stat
+
+    def stat(path, **how):
+        if path.name.endswith("vanishing"):
+            shutil.rmtree(path, ignore_errors=True)
+        return before(path, **how)
+
+    monkeypatch.setattr(Path, "stat", stat)
+    return "job-vanishing"
+
+
+def test_another_blender_may_prune_at_the_same_time(cache, vanishing):
+    add(cache, "new")
+    (cache.root / "captures" / vanishing).mkdir()
+    cache.prune(1)
+    assert cache.find("new")
+
+
+def test_another_blenders_job_may_end_at_the_same_time(cache, vanishing):
+    add(cache, "new")
+    (cache.root / "jobs" / vanishing).mkdir()
+    assert cache.new_job_folder().is_dir()
 
 
 def test_abandoned_jobs_are_removed_and_running_ones_left(cache):
