@@ -78,12 +78,14 @@ class Batch:
         """Name of the result without suffix, to the footage; in order. Results of an earlier batch are not footage."""
         found = sorted(self._below(self.folder, recursive))
         stems = Counter(self._stem(path) for path in found)
-        named = {}
+        names = {}
         for path in found:
             relative = self._relative(path)
-            stem = relative.with_suffix("") if path.is_file() else relative
-            named[(relative if stems[self._stem(path)] > 1 else stem).as_posix()] = path
-        return named
+            short = path.is_file() and stems[self._stem(path)] == 1
+            names[path] = (relative.with_suffix("") if short else relative).as_posix()
+        while shared := self._shared(names):  # the whole name of one may be what another is called without suffix
+            names |= shared
+        return {name: path for path, name in names.items()}
 
     def run(
         self,
@@ -262,6 +264,12 @@ class Batch:
 
     def _relative(self, path: Path) -> Path:
         return path.relative_to(self.folder)
+
+    def _shared(self, names: dict[Path, str]) -> dict[Path, str]:
+        """The whole names of those that share a shortened one with another clip."""
+        counts = Counter(name.casefold() for name in names.values())
+        whole = {path: self._relative(path).as_posix() for path, name in names.items() if counts[name.casefold()] > 1}
+        return {path: name for path, name in whole.items() if name != names[path]}
 
     def _stem(self, path: Path) -> str:
         """What two clips must not share: many systems take a.npz and A.npz for one file."""

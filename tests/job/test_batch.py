@@ -202,6 +202,20 @@ def test_names_that_differ_in_case_alone_are_the_same_to_many_systems(tmp_path):
     assert list(batch(clips, tmp_path / "out").clips(recursive=False)) == ["Run", "Walk.mov", "walk.mp4"]
 
 
+def test_every_clip_has_a_name_of_its_own_where_one_is_called_as_another_without_suffix(tmp_path):
+    clips = tmp_path / "clips"
+    (clips / "b.mp4").mkdir(parents=True)
+    for i in range(3):
+        (clips / "b.mp4" / f"frame{i:03}.png").write_text("x")
+    names = ["A.mp4.mp4.mov", "a.mov", "a.mp4", "a.mp4.mp4", "b.mp4.mov", "c.mp4.mov"]
+    for name in names:
+        (clips / name).write_text("x")
+    found = batch(clips, tmp_path / "out").clips(recursive=False)
+    assert {name: path.name for name, path in found.items()} == {n: n for n in [*names[:5], "b.mp4"]} | {
+        "c.mp4": "c.mp4.mov"
+    }
+
+
 def test_an_interrupt_stops_the_running_clips_and_keeps_the_finished(folder, tmp_path):
     def interrupt(stage, done, total):
         if done == 2:
