@@ -157,7 +157,7 @@ class Batch:
             suffix = ".png" if path.suffix.lower() in PICTURE_SUFFIXES else ".mp4"
             arguments += ["--overlay", f"{target}{_OVERLAY}{suffix}"]
         for option, value in (threads | self._options).items():
-            arguments += [option] if value is None else [option, value]
+            arguments.append(option if value is None else f"{option}={value}")  # one argument: a value may begin with -
         try:
             target.parent.mkdir(parents=True, exist_ok=True)
             status, stdout, stderr = self._call(arguments)

@@ -231,6 +231,14 @@ def test_an_interrupt_stops_the_running_clips_and_keeps_the_finished(folder, tmp
     assert "a.mp4" not in calls(folder)
 
 
+def test_an_option_may_have_a_value_that_begins_with_a_hyphen(folder, tmp_path):
+    options = {"--rig-object": "-Rig", "--quality": "fast", "--hands": None}
+    batch(folder, tmp_path / "out", options).run(1)
+    passed = json.loads((folder / "calls.log").read_text().splitlines()[0])
+    args = cli.build_parser().parse_args(passed)
+    assert (args.rig_object, args.quality, args.hands) == ("-Rig", "fast", True)
+
+
 @pytest.mark.skipif(os.name == "nt", reason="looks at /proc")
 @pytest.mark.parametrize("at", ["finding the person", "overlay"])
 def test_the_clips_of_a_killed_batch_end_and_leave_nothing_unfinished(tmp_path, at):
