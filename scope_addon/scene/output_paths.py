@@ -8,7 +8,7 @@ import os
 from pathlib import Path
 
 from ...solver.errors import OutputError, UsageError
-from ..whole_file import reason
+from ..whole_file import file_behind, reason
 
 SUFFIXES = (".glb", ".fbx", ".blend", ".bvh", ".usdc", ".npz")
 PER_PERSON = (".bvh", ".npz")  # formats that hold one person a file
@@ -18,7 +18,8 @@ def check_output(path: str | Path, suffixes: tuple[str, ...] = SUFFIXES) -> Path
     """The path, when a file of a known format can be written there.
 
     :raises UsageError: unknown suffix, or a folder.
-    :raises OutputError: the folder is missing or cannot be written to, or the name is too long.
+    :raises OutputError: the folder is missing or cannot be written to, the name is too long, or what is there is no
+        ordinary file.
     """
     path = Path(path)
     if path.suffix.lower() not in suffixes:
@@ -34,9 +35,13 @@ def check_output(path: str | Path, suffixes: tuple[str, ...] = SUFFIXES) -> Path
     except OSError as error:
         if error.errno == errno.ENAMETOOLONG:
             raise OutputError(f"cannot write {path}: {reason(error)}") from error
-    if path.is_dir() or not os.access(folder, os.W_OK):
-        what = "a folder of that name is there" if path.is_dir() else f"the folder {folder} is not writable"
-        raise OutputError(f"cannot write {path}: {what}; choose another place")
+    if path.is_dir():
+        raise OutputError(f"cannot write {path}: a folder of that name is there; choose another place")
+    folder = file_behind(path).parent
+    if not folder.is_dir():
+        raise OutputError(f"cannot write {path}: it is a link into {folder}, which does not exist; choose another name")
+    if not os.access(folder, os.W_OK):
+        raise OutputError(f"cannot write {path}: the folder {folder} is not writable; choose another place")
     return path
 
 
