@@ -124,7 +124,7 @@ def main(argv: Sequence[str] | None = None, program: Sequence[str] = PROGRAM) ->
 def run_capture(args: argparse.Namespace) -> dict:
     """``scope capture``: check the arguments, capture, write every output; returns the report."""
     video = args.video or SAMPLE
-    outputs = args.output or [video.with_suffix(".npz"), video.with_suffix(".glb")]
+    outputs = _each_once(args.output) or [video.with_suffix(".npz"), video.with_suffix(".glb")]
     _check_outputs(outputs, args.overlay, video)
     rig = _rig_of(args, outputs)
 
@@ -261,8 +261,14 @@ def _check_outputs(outputs: list[Path], overlay: Path | None, video: Path) -> No
     for path in paths:
         if path.exists() and video.exists() and path.samefile(video):
             raise UsageError(f"{path} is the footage itself; choose another name")
-    if len({str(p) for p in paths}) < len(paths):
-        raise UsageError("two outputs have the same name; give each its own")
+
+
+def _each_once(outputs: list[Path]) -> list[Path]:
+    """Without further names of the same file, such as ``out/case.npz`` and ``out/x/../case.npz``."""
+    named: dict[str, Path] = {}
+    for path in outputs:
+        named.setdefault(os.path.normcase(os.path.realpath(path)), path)
+    return list(named.values())
 
 
 def _summary(report: dict) -> str:
