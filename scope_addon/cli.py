@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, NoReturn, TextIO
 
 from ..solver.body import ASSETS, Body
 from ..solver.errors import ScopeError, UsageError
-from .cli_options import add_options, body_and_options, given_options
+from .cli_options import add_options, body_and_options, given_options, named_path
 from .job.parent import stop_with_parent
 from .motion import Motion
 from .retarget.rig_source import ROOTS
@@ -55,7 +55,7 @@ def build_parser() -> argparse.ArgumentParser:
     capture.add_argument(
         "video",
         nargs="?",
-        type=Path,
+        type=named_path,
         metavar="VIDEO",
         help="video, picture, or numbered pictures as a folder or walk_####.png (default: a sample)",
     )
@@ -63,21 +63,23 @@ def build_parser() -> argparse.ArgumentParser:
         "-o",
         "--output",
         action="append",
-        type=Path,
+        type=named_path,
         default=[],
         metavar="OUT",
         help=f"result file, may be repeated; the suffix says what: {', '.join(SUFFIXES)}"
         " (default: .npz and .glb beside the video)",
     )
     capture.add_argument(
-        "--overlay", type=Path, metavar="FILE", help="draw the body over the footage: .mp4, .png, .jpg"
+        "--overlay", type=named_path, metavar="FILE", help="draw the body over the footage: .mp4, .png, .jpg"
     )
     capture.add_argument("--stop-with-stdin", action="store_true", help=argparse.SUPPRESS)  # as a batch starts it
     add_options(capture)
     batch = commands.add_parser("batch", help="capture every video and picture of a folder")
     batch.set_defaults(run=run_batch)
-    batch.add_argument("folder", type=Path, metavar="FOLDER", help="folder of videos, pictures and picture sequences")
-    batch.add_argument("--out", type=Path, required=True, metavar="FOLDER", help="where the results go")
+    batch.add_argument(
+        "folder", type=named_path, metavar="FOLDER", help="folder of videos, pictures and picture sequences"
+    )
+    batch.add_argument("--out", type=named_path, required=True, metavar="FOLDER", help="where the results go")
     batch.add_argument(
         "--formats",
         default="npz,glb",

@@ -20,6 +20,16 @@ QUALITIES = ("fast", "balanced", "best")
 PROVIDERS = ("auto", "cpu", "cuda", "tensorrt", "directml", "coreml")
 
 
+def named_path(text: str) -> Path:
+    """A path as an argument has it. What is empty, such as a variable of the shell that is not set, is no name.
+
+    :raises ArgumentTypeError: it is empty; else it would be the current folder.
+    """
+    if not text:
+        raise argparse.ArgumentTypeError("the name is empty; give that of a file or folder")
+    return Path(text)
+
+
 def add_options(capture: argparse.ArgumentParser) -> None:
     """Declare them all."""
     capture.add_argument("--quality", choices=QUALITIES, default="best", help="speed against accuracy (default: best)")
@@ -44,7 +54,7 @@ def add_options(capture: argparse.ArgumentParser) -> None:
     )
     capture.add_argument("--focal-mm", type=float, metavar="MM", help="35 mm equivalent focal length of the camera")
     capture.add_argument("--fov", type=float, metavar="DEGREES", help="field of view along the longer side")
-    capture.add_argument("--calibration", type=Path, metavar="FILE", help="JSON with intrinsics, dist and size")
+    capture.add_argument("--calibration", type=named_path, metavar="FILE", help="JSON with intrinsics, dist and size")
     capture.add_argument("--no-smoothing", action="store_true", help="every frame as it was solved, feet not held")
     capture.add_argument(
         "--shape-keys",
@@ -56,18 +66,25 @@ def add_options(capture: argparse.ArgumentParser) -> None:
         "--file-per-person", action="store_true", help="a file for each of several people, in every format"
     )
     capture.add_argument(
-        "--retarget", type=Path, metavar="RIG", help="put the motion on the rig in this .blend, .fbx or .glb instead"
+        "--retarget",
+        type=named_path,
+        metavar="RIG",
+        help="put the motion on the rig in this .blend, .fbx or .glb instead",
     )
     capture.add_argument("--rig-object", default="", metavar="NAME", help="the armature, where RIG holds several")
-    capture.add_argument("--bone-map", type=Path, metavar="FILE", help="which bone is which: JSON saved in the panel")
+    capture.add_argument(
+        "--bone-map", type=named_path, metavar="FILE", help="which bone is which: JSON saved in the panel"
+    )
     capture.add_argument(
         "--retarget-root",
         choices=ROOTS,
         default=ROOTS[0],
         help="where the rig keeps the way over the floor (default: bone)",
     )
-    capture.add_argument("--detector", type=Path, metavar="FILE", help="your own person detector, an .onnx file")
-    capture.add_argument("--keypoints", type=Path, metavar="FILE", help="your own keypoint network, an .onnx file")
+    capture.add_argument("--detector", type=named_path, metavar="FILE", help="your own person detector, an .onnx file")
+    capture.add_argument(
+        "--keypoints", type=named_path, metavar="FILE", help="your own keypoint network, an .onnx file"
+    )
     capture.add_argument(
         "--provider", choices=PROVIDERS, default="auto", help="what the networks run on (default: the best there is)"
     )
