@@ -213,13 +213,15 @@ def load_body(which: str | Path = "scope") -> Body:
     :raises ModelFileError: the file is missing, not a body, or contradicts itself.
     """
     path = BUILT_IN.get(str(which), Path(which))
+    choice = f"give one of {', '.join(BUILT_IN)}, or a body's .npz or .pkl file"
     if not path.is_file():
-        names = ", ".join(BUILT_IN)
-        raise ModelFileError(f"body '{which}' was not found: give one of {names}, or a body's .npz or .pkl file")
-    from .loaders import is_user_model, load_model  # here, because the loaders build a Body
+        raise ModelFileError(f"body '{which}' was not found: {choice}")
+    from .loaders import is_motion, is_user_model, load_model  # here, because the loaders build a Body
 
     if is_user_model(path):
         return load_model(path)
+    if is_motion(path):
+        raise ModelFileError(f"{path} is a motion file, which holds how a body moves and not the body: {choice}")
     data = read_npz(path, ModelFileError, "body file")
     missing = [k for k in _REQUIRED if k not in data]
     if missing:

@@ -10,6 +10,6 @@
     landmarks.py          face, foot and fingertip points from vertex numbers or from geometry
 """
 
-from .model_file import is_user_model, load_model
+from .model_file import is_motion, is_user_model, load_model
 
-__all__ = ["is_user_model", "load_model"]
+__all__ = ["is_motion", "is_user_model", "load_model"]

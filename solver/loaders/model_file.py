@@ -50,6 +50,12 @@ def is_user_model(path: Path) -> bool:
     return path.suffix.lower() in (".pkl", ".pickle") or "J_regressor" in npz_keys(path)
 
 
+def is_motion(path: Path) -> bool:
+    """Whether a .npz holds poses and no body, as AMASS's files and our own motions do. Cheap; reads no array."""
+    keys = npz_keys(path)
+    return {"poses", "trans"} <= keys and "v_template" not in keys
+
+
 def load_model(path: str | Path, max_betas: int = MAX_BETAS) -> Body:
     """Load a user's SMPL, SMPL+H, SMPL-X or STAR file, .npz or .pkl. The file may be hostile; nothing in it is run.
 

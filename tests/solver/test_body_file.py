@@ -95,3 +95,9 @@ def test_a_body_without_joints_is_refused(tmp_path):
     arrays |= {"J_template": np.zeros((0, 3)), "J_shapedirs": np.zeros((0, 3, P))}
     with pytest.raises(ModelFileError, match="root first"):
         load_body(saved(tmp_path / "body.npz", arrays))
+
+
+def test_a_motion_is_told_from_a_body(tmp_path):
+    motion = {"poses": np.zeros((4, 72)), "trans": np.zeros((4, 3)), "betas": np.zeros(10), "gender": np.array("male")}
+    with pytest.raises(ModelFileError, match="walk.npz is a motion file, .* give one of scope, scope_h, or a body's"):
+        load_body(saved(tmp_path / "walk.npz", motion))
