@@ -32,7 +32,7 @@ PYTHONS = ("3.13", "3.11")  # Blender 5.1 and later; 4.2 to 5.0
 # network imports none of them. numpy is Blender's own, always.
 PACKAGES = ("numba", "llvmlite", "onnxruntime", "opencv-contrib-python-headless", "av")
 CONTENT = ("__init__.py", "LICENSE", "THIRD_PARTY.md", "solver", "scope_addon", "assets")
-LEFT_OUT = ("__pycache__", "*.pyc", ".*", "sample_truth.npz", "pictures")
+LEFT_OUT = ("__pycache__", "*.pyc", ".*", "sample_truth.npz", "pictures", "guide", "examples")
 
 
 def main() -> int:
@@ -168,7 +168,9 @@ def check(archive: Path) -> None:
     networks += ("palm_detection", "hand_landmark")
     wanted = [f"assets/networks/{n}.onnx" for n in networks]
     wanted += ["assets/networks/LICENSE-mediapipe.txt", "assets/body/scope.npz", "assets/body/scope_h.npz"]
-    wanted += ["assets/body/LICENSE.md", "assets/sample/sample.mp4", "LICENSE", "__init__.py"]
+    wanted += ["assets/lifter/lifter.onnx", "assets/prior/joint_prior.npz", "assets/sample/sample.mp4"]
+    wanted += [f"assets/{folder}/LICENSE.md" for folder in ("body", "lifter", "sample")]
+    wanted += ["LICENSE", "THIRD_PARTY.md", "scope_addon/ui/__init__.py"]
     problems += [f"{w} is missing" for w in wanted if not any(n.endswith(w) for n in names)]
     if len(generated["platforms"]) != 1:
         problems.append(f"made for {', '.join(generated['platforms'])}, not for one platform")

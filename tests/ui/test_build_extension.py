@@ -2,6 +2,7 @@
 """The built extension: Blender's own tool accepts it, and every Blender takes the wheels of its Python."""
 
 import importlib.util
+import tomllib
 import zipfile
 from pathlib import Path
 
@@ -60,6 +61,15 @@ def fake_wheels(folder, names):
     return [folder / name for name in names]
 
 
+def without(target, archive, name):
+    """A copy of an archive that lacks a file."""
+    with zipfile.ZipFile(archive) as source, zipfile.ZipFile(target, "w") as file:
+        for entry in source.infolist():
+            if not entry.filename.endswith(name):
+                file.writestr(entry, source.read(entry))
+    return target
+
+
 def test_a_build_with_empty_wheels(builder, root, tmp_path, monkeypatch, capsys):
     if not list((root / "assets" / "networks").glob("*.onnx")):
         pytest.skip("the networks are not built")
@@ -79,6 +89,13 @@ def test_a_build_with_empty_wheels(builder, root, tmp_path, monkeypatch, capsys)
     with zipfile.ZipFile(builder.DIST / archives[0]) as file:
         names = file.namelist()
     assert not any("numpy" in n or "/tests/" in n or n.startswith(("tests/", "tools/", ".")) for n in names)
+    manifest = tomllib.loads((root / "blender_manifest.toml").read_text())
+    for folder in (p.strip("/") for p in manifest["build"]["paths_exclude_pattern"] if p.endswith("/")):
+        assert not any(n.startswith(f"{folder}/") or f"/{folder}/" in n for n in names), folder
+    for name in ("assets/lifter/lifter.onnx", "assets/prior/joint_prior.npz", "THIRD_PARTY.md"):
+        short = without(tmp_path / "short.zip", builder.DIST / archives[0], name)
+        with pytest.raises(SystemExit, match=f"{name} is missing"):
+            builder.check(short)
     monkeypatch.setattr(builder, "PACKAGES", (*builder.PACKAGES, "forgotten"))
     with pytest.raises(SystemExit, match="0 wheels of forgotten for Python 3.13"):
         builder.check(builder.DIST / archives[0])
