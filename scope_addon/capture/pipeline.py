@@ -18,6 +18,7 @@ from ...solver.errors import NoPersonError, UsageError, VideoError
 from ...solver.names import BODY_JOINTS
 from ..motion import Motion
 from .adapters.box_detector import BoxDetector
+from .adapters.description import description_path
 from .adapters.keypoint_network import KeypointNetwork
 from .assemble import assemble_motion, corrected_stance
 from .beside import BesideTracking
@@ -145,7 +146,7 @@ def capture(
         if frames == 0:
             raise VideoError(f"{path} has no frame in the time that was asked for; change the start or the end")
         if not tracks:
-            raise _nobody(path, frames)
+            raise _nobody(path, frames, [own for own in (options.detector, options.keypoints) if own])
         smoothing = options.smoothing and frames > 1
         about = {"fps": video.fps, "image_size": (video.width, video.height), "source": path.name}
         turning = background.motion(camera)
@@ -419,11 +420,15 @@ def _at(times_s: list[float]) -> str:
     return said[0] if len(said) == 1 else f"{', '.join(said[:-1])} and {said[-1]}"
 
 
-def _nobody(path: Path, frames: int) -> NoPersonError:
+def _nobody(path: Path, frames: int, own_networks: list[Path]) -> NoPersonError:
     looked = f"in the {frames} frames of {path.name}" if frames > 1 else f"in {path.name}"
+    networks = "".join(
+        f"; if somebody is found without {own.name}, write into {description_path(own).name} which colours it expects"
+        for own in own_networks
+    )
     return NoPersonError(
         f"no person was found {looked}: the footage needs one person who is mostly in the picture and measures "
-        "at least a fifth of its shorter side; if somebody there is smaller, crop it"
+        f"at least a fifth of its shorter side; if somebody there is smaller, crop it{networks}"
     )
 
 

@@ -19,8 +19,9 @@ from scope.scope_addon.capture.tracker import PeopleTracker
 from scope.scope_addon.capture.video_range import VideoRange
 from scope.scope_addon.cli import SAMPLE
 from scope.solver.body import load_body
-from scope.solver.errors import SetupError
+from scope.solver.errors import NoPersonError, SetupError
 
+from .small_graphs import fixed
 from .wrapped_networks import box_rows, coco_simcc
 
 Frames = Callable[..., Iterator[np.ndarray]]
@@ -55,6 +56,12 @@ def test_a_capture_with_both_is_as_good_as_ours(networks: tuple[Path, Path]) -> 
         errors.append(np.linalg.norm(a - b, axis=-1).mean())
     assert errors[1] < 1.25 * errors[0] + 0.01
     assert not motion.keypoints2d[:, [1, 9, 17, 31], 2].any()  # what COCO lacks: eye corner, mouth, finger, toe
+
+
+def test_a_network_that_sees_nobody_is_named(tmp_path: Path) -> None:
+    blind = fixed(tmp_path / "blind.onnx", 640, 640, {"output0": np.zeros((1, 84, 8400), np.float32)})
+    with pytest.raises(NoPersonError, match=r"crop it; if .* without blind\.onnx, write into blind\.json"):
+        captured(detector=blind)
 
 
 def test_lost_and_found_again(networks: tuple[Path, Path]) -> None:
