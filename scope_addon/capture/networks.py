@@ -80,7 +80,7 @@ def _cannot_load(path: Path, error: Exception) -> str:
     text = f"{path}: onnxruntime cannot load this network ({' '.join(str(error).split())})."
     if path.parent == NETWORKS_FOLDER:
         return f"{text} Build it again with: python -m scope.tools.convert_networks --force"
-    return f"{text} Give an ONNX file that uses standard operators alone."
+    return f"{text} Export it again, with standard operators alone, an opset that is not newer, and all its weights."
 
 
 @cache

@@ -111,6 +111,15 @@ def test_operators_of_its_own(tmp_path: Path, opens: Open) -> None:
 
 
 @OPENERS
+def test_an_opset_that_is_too_new(tmp_path: Path, opens: Open) -> None:
+    path = fixed(tmp_path / "m.onnx", 32, 32, {"out": np.zeros((1, 17, 8, 8), np.float32)})
+    model = onnx.load(path)
+    model.opset_import[0].version = 99
+    onnx.save(model, path)
+    refused(opens, path, "onnxruntime cannot load.*Export it again, .* an opset that is not newer")
+
+
+@OPENERS
 @pytest.mark.parametrize(
     ("shape", "kind", "says"),
     [
