@@ -10,6 +10,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import re
 import subprocess
 import threading
 import time
@@ -36,6 +37,7 @@ STATUSES = ("done", "skipped", "no_person", "failed")
 _ROOT = Path(__file__).resolve().parents[2]
 _TURN_S = 1.0
 _OVERLAY = ".overlay"
+_PERSON = re.compile(r"(.+)\.person[0-9]+")  # as person_paths names the results of one of several people
 # Ctrl-C on a terminal comes to the batch alone, which stops its clips once: twice would foil their cleaning up.
 _NEW_GROUP = getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0)
 _OWN_GROUP: dict = {"creationflags": _NEW_GROUP} if _NEW_GROUP else {"process_group": 0}
@@ -266,10 +268,16 @@ class Batch:
         return path.relative_to(self.folder)
 
     def _shared(self, names: dict[Path, str]) -> dict[Path, str]:
-        """The whole names of those that share a shortened one with another clip."""
-        counts = Counter(name.casefold() for name in names.values())
-        whole = {path: self._relative(path).as_posix() for path, name in names.items() if counts[name.casefold()] > 1}
-        return {path: name for path, name in whole.items() if name != names[path]}
+        """The whole names of those whose shortened one is another clip's, or that of one of its people's results."""
+        folded = {path: name.casefold() for path, name in names.items()}
+        counts = Counter(folded.values())
+        several = self._options.get("--people") not in (None, "1", "largest")
+        shared = {}
+        for path, name in folded.items():
+            person = _PERSON.fullmatch(name) if several else None
+            if counts[name] > 1 or (person and person[1] in counts):
+                shared[path] = self._relative(path).as_posix()
+        return {path: name for path, name in shared.items() if name != names[path]}
 
     def _stem(self, path: Path) -> str:
         """What two clips must not share: many systems take a.npz and A.npz for one file."""

@@ -216,6 +216,17 @@ def test_every_clip_has_a_name_of_its_own_where_one_is_called_as_another_without
     }
 
 
+def test_a_clip_called_as_one_of_anothers_people_keeps_its_result(tmp_path):
+    clips = tmp_path / "clips"
+    clips.mkdir()
+    for name in ("walk.mp4", "walk.person2.mp4", "run.person1.mp4"):
+        (clips / name).write_text("x")
+    short = ["run.person1", "walk", "walk.person2"]
+    assert list(batch(clips, tmp_path / "out").clips(recursive=False)) == short
+    several = batch(clips, tmp_path / "out", {"--people": "all"}).clips(recursive=False)
+    assert list(several) == [*short[:2], "walk.person2.mp4"]
+
+
 def test_an_interrupt_stops_the_running_clips_and_keeps_the_finished(folder, tmp_path):
     def interrupt(stage, done, total):
         if done == 2:
