@@ -59,6 +59,7 @@ class Body:
     material_colors: np.ndarray | None = None  # (C, 4) linear RGBA
     license: str = ""
     gender: str = "neutral"
+    file: str = ""  # of the user's, absolute; empty for a built-in body
 
     @property
     def K(self) -> int:
@@ -252,6 +253,7 @@ def load_body(which: str | Path = "scope") -> Body:
         uv_faces=data.get("uv_faces"),
         face_material=data.get("face_material"),
         material_colors=data.get("material_colors"),
+        file="" if str(which) in BUILT_IN else str(path.resolve()),
     )
     _check(body, path)
     return body

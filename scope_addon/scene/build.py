@@ -170,6 +170,7 @@ def _build_person(
     body_mesh.skin_to_armature(mesh, rig, body)
     rig["scope_source"] = motion.source
     rig["scope_body"] = body.name
+    rig["scope_body_file"] = body.file
     rig["scope_start"] = options.start_frame
     rig["scope_betas"] = [float(b) for b in motion.betas]
     return Person(rig, mesh, None, motion, frames)

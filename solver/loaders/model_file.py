@@ -77,8 +77,7 @@ def load_model(path: str | Path, max_betas: int = MAX_BETAS) -> Body:
     except MemoryError as cause:
         raise ModelFileError(f"{path} is too large for this computer's memory; choose a smaller body file") from cause
     _check(body, path)
-    body = replace(body, gender=read_gender(tables.arrays.get("gender"), path))
-    return body
+    return replace(body, gender=read_gender(tables.arrays.get("gender"), path), file=str(path.resolve()))
 
 
 def _read_tables(path: Path) -> Tables:

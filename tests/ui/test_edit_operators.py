@@ -7,6 +7,8 @@ import pytest
 from scope.scope_addon.scene.build import BuildOptions, build_scene
 from scope.scope_addon.scene.keys import read_clip
 from scope.scope_addon.scene.root_object import root_object
+from scope.scope_addon.ui.captured_person import body_of
+from scope.solver.body import BUILT_IN, load_body
 from scope.solver.rotations import exp, log
 
 from ..edit.walking import BODY, NAMES, RATE, motion_of, walk
@@ -47,6 +49,22 @@ def test_the_keys_are_read_as_they_were_written(rig):
     np.testing.assert_allclose(clip.root, truth.root, atol=1e-5)
     np.testing.assert_allclose(frames, 1 + np.arange(len(truth)))
     np.testing.assert_allclose(clip.joints(BODY, np.zeros(BODY.P))[0], seen(rig, [1])[0], atol=1e-4)
+
+
+def test_a_scene_of_the_users_own_body_knows_its_file(tmp_path, monkeypatch):
+    """As the command line makes it, which knows of no cache."""
+    monkeypatch.chdir(tmp_path)
+    with np.load(BUILT_IN["scope"]) as arrays:
+        np.savez("hero.npz", **dict(arrays, name="hero"))
+    body = load_body("hero.npz")
+    captured(motion_of(walk(SECONDS)), body)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "walk.blend"))
+    monkeypatch.chdir(tmp_path.parent)
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "walk.blend"))
+    armature = next(obj for obj in bpy.data.objects if "scope_source" in obj)
+    bpy.context.view_layer.objects.active = armature
+    assert bpy.ops.scope.refloor() == {"FINISHED"}
+    assert body_of(armature).name == "hero"
 
 
 def test_smoothing_from_raw_and_back(rig):
