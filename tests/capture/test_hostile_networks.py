@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import os
 from collections.abc import Callable
 from pathlib import Path
 
@@ -45,6 +46,27 @@ def test_missing_and_folder(tmp_path: Path, opens: Open) -> None:
     refused(opens, tmp_path / "m.onnx", "cannot be read")
     (tmp_path / "m.onnx").mkdir()
     refused(opens, tmp_path / "m.onnx", "cannot be read")
+
+
+@OPENERS
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="Windows keeps its pipes in no folder")
+def test_what_would_be_read_forever(tmp_path: Path, opens: Open) -> None:
+    pipe = tmp_path / "m.onnx"
+    os.mkfifo(pipe)
+    keeps_open = os.open(pipe, os.O_RDWR | os.O_NONBLOCK)
+    os.write(keeps_open, b"text")
+    try:
+        refused(opens, pipe, "m.onnx is no ordinary file")
+    finally:
+        os.close(keeps_open)
+
+
+@OPENERS
+def test_more_than_a_protocol_buffer_can_hold(tmp_path: Path, opens: Open) -> None:
+    path = tmp_path / "m.onnx"
+    with path.open("wb") as file:
+        file.truncate((2 << 30) + 1)
+    refused(opens, path, "larger than the 2 GiB")
 
 
 @OPENERS

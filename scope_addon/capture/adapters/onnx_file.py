@@ -24,6 +24,7 @@ _FIELDS = {
 }
 _GRAPH = 7
 _DEEPEST = 64
+_LARGEST_BYTES = 2 << 30  # of a protocol buffer
 
 
 def check_onnx_file(path: Path) -> None:
@@ -32,6 +33,10 @@ def check_onnx_file(path: Path) -> None:
     :raises ModelFileError: with the reason and what to do.
     """
     try:
+        if path.exists() and not (path.is_file() or path.is_dir()):  # reading a device or a pipe may never end
+            raise ModelFileError(f"{path} is no ordinary file; choose an ONNX file")
+        if path.stat().st_size > _LARGEST_BYTES:
+            raise ModelFileError(f"{path} is larger than the 2 GiB of an ONNX file; export its weights beside it")
         data = memoryview(path.read_bytes())
     except OSError as error:
         raise ModelFileError(f"{path} cannot be read ({error.strerror}); choose an ONNX file") from error
