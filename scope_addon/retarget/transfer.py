@@ -38,11 +38,13 @@ _SOLE_M, _HEEL_M = 0.015, 0.02  # the sole's thickness, and how long a piece of 
 class Skeleton:
     """The mapped bones of a rig in its rest pose, in the world (z up, metres), parents before children.
 
-    ``parents`` are the mapped bones that each one follows rigidly, -1 where it follows none.
+    ``parents`` are the mapped bones with which each one turns, -1 where it turns with none; ``carriers`` those with
+    which its head goes, which are others where a bone does not inherit rotation.
     """
 
     names: list[str]
     parents: np.ndarray  # (B,)
+    carriers: np.ndarray  # (B,)
     heads: np.ndarray  # (B, 3)
     tails: np.ndarray  # (B, 3)
     rotations: np.ndarray  # (B, 3, 3) bone to world
@@ -190,12 +192,12 @@ def basis(rig: Skeleton, world: np.ndarray) -> np.ndarray:
 def _positions(rig: Skeleton, world: np.ndarray) -> np.ndarray:
     """(T, B, 3) heads where nothing has been moved."""
     heads = np.empty((*world.shape[:2], 3))
-    for b, parent in enumerate(rig.parents):
-        if parent < 0:
+    for b, carrier in enumerate(rig.carriers):
+        if carrier < 0:
             heads[:, b] = rig.heads[b]
         else:
-            offset = rig.rotations[parent].T @ (rig.heads[b] - rig.heads[parent])
-            heads[:, b] = heads[:, parent] + world[:, parent] @ offset
+            offset = rig.rotations[carrier].T @ (rig.heads[b] - rig.heads[carrier])
+            heads[:, b] = heads[:, carrier] + world[:, carrier] @ offset
     return heads
 
 
@@ -212,7 +214,7 @@ def _rest_alignment(
     A = np.tile(np.eye(3), (len(part_of), 1, 1))
     for b, part in enumerate(part_of):
         side, _, kind = part.partition("_")
-        parent = int(rig.parents[b])
+        parent = int(rig.carriers[b])
         if kind in ("ankle", "foot"):
             end = row.get(f"{side}_foot") if kind == "ankle" else None
             along = F @ ((rig.heads[end] if end is not None else rig.tails[b]) - rig.heads[b])

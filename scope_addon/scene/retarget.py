@@ -32,6 +32,7 @@ from .transaction import all_or_nothing
 
 # Rigify's switches: limbs by FK, neck and head with the chest.
 _SWITCHES = ("IK_FK", "neck_follow", "head_follow")
+_CARRIED = 0.02  # of its distance from the bone that carries it a head may be elsewhere
 _TURNS = 0.1  # of a rotation matrix's numbers, which the probe changes by more than 0.3
 _LOOKS, _HELD = 5, np.radians(20)  # at so many frames a bone may be off by so much
 _WRITTEN = "scope_keys"  # custom property of an action: what its keys were when they were written
@@ -237,31 +238,44 @@ def _probe(rig: bpy.types.Object, parts: dict[str, str]) -> Skeleton:
     rest = _matrices(rig, names)
     if min(map(abs, rig.matrix_world.to_scale())) < 1e-9:
         raise InputError(f"'{rig.name}' is scaled to 0; give it a size (S, or Scale in the sidebar)")
-    follows = np.zeros((len(names), len(names)), bool)
+    follows = np.zeros((len(names), len(names)), bool)  # row by column: turns with it
+    carried = follows.copy()  # its head goes with it
+    heads = rest[:, :3, 3]
     for group in _independent(parts):
         for k, a in enumerate(group):  # by another angle each, so that one sees whom a bone follows
             turn = Quaternion((0.6, 0.48, 0.64), 0.5 + 0.15 * k)
             rig.pose.bones[names[a]].matrix_basis = turn.to_matrix().to_4x4()
-        turned = _rotations(_matrices(rig, names)) @ np.swapaxes(_rotations(rest), 1, 2)
+        posed = _matrices(rig, names)
+        turned = _rotations(posed) @ np.swapaxes(_rotations(rest), 1, 2)
         _check_turned(rig, [names[a] for a in group], turned[group])
         for a in group:
             rig.pose.bones[names[a]].matrix_basis = Matrix()
             follows[:, a] = np.abs(turned - turned[a]).max(axis=(1, 2)) < 0.02
-            follows[a, a] = False
+            away = heads - heads[a]
+            expected = away @ turned[a].T
+            off, moved = (np.linalg.norm(expected - now, axis=1) for now in (posed[:, :3, 3] - heads[a], away))
+            carried[:, a] = (off < _CARRIED * np.linalg.norm(away, axis=1)) & (off < moved)
+            follows[a, a] = carried[a, a] = False
     _check_moved(rig, next((bone for bone, part in parts.items() if part == "pelvis"), names[0]))
-    order = sorted(range(len(names)), key=lambda b: int(follows[b].sum()))
-    parents = []
-    for b in order:
-        above = [a for a in order if follows[b, a]]
-        parents.append(order.index(above[-1]) if above else -1)
+    order: list[int] = []
+    while rows := [b for b in range(len(names)) if b not in order]:
+        above = {b: sum(a not in order for a in np.flatnonzero(follows[b] | carried[b])) for b in rows}
+        order.append(min(rows, key=above.__getitem__))
+    parents, carriers = (_nearest(above[np.ix_(order, order)]) for above in (follows, carried))
+    carriers = np.where(carriers < 0, parents, carriers)
     matrices = rest[order]
     ends = matrices[:, :3, 3] + matrices[:, :3, 1] * [[rig.pose.bones[names[b]].length] for b in order]
     deforming = [bone for bone in rig.data.bones if bone.use_deform] or rig.data.bones
     lowest = min((rig.matrix_world @ end).z for bone in deforming for end in (bone.head_local, bone.tail_local))
     floor = rig.matrix_world.translation.z if abs(lowest - rig.matrix_world.translation.z) < 0.3 else lowest
     return Skeleton(
-        [names[b] for b in order], np.array(parents), matrices[:, :3, 3], ends, _rotations(matrices), float(floor)
+        [names[b] for b in order], parents, carriers, matrices[:, :3, 3], ends, _rotations(matrices), float(floor)
     )
+
+
+def _nearest(above: np.ndarray) -> np.ndarray:
+    """(B,) the last of the bones before that each one goes with, -1 without any; ``above``: (B, B), row by column."""
+    return np.array([max(np.flatnonzero(row[:b]), default=-1) for b, row in enumerate(above)], int)
 
 
 def _check_turned(rig: bpy.types.Object, names: list[str], turned: np.ndarray) -> None:

@@ -4,10 +4,11 @@
 import bpy
 import numpy as np
 import pytest
+from scope.solver.rotations import exp
 
 from ..edit.rolling import STRIDE, joint, rolling_walk
-from ..edit.walking import motion_of
-from .made_rigs import FBX, build_rig, captured
+from ..edit.walking import motion_of, walk
+from .made_rigs import FBX, build_rig, captured, seen
 from .test_retarget import run
 
 PART = {"thigh": "hip", "shin": "knee", "foot": "ankle", "toe": "foot"}
@@ -73,6 +74,20 @@ def test_feet_stand(source, scheme, size):
     rig, bone_of = build_rig(scheme, size=size, matrix=FBX if scheme == "mixamo" else None)
     run(source, rig)
     check_contacts(rig, lambda side, part: bone_of[f"{side}_{PART[part]}"])
+
+
+@pytest.mark.parametrize("loose", [("thigh",), ("",)], ids=["thighs", "every bone"])
+def test_a_rig_whose_bones_do_not_inherit_rotation_moves_as_one_whose_bones_do(loose):
+    clip, frames = walk(2.0), range(1, 60, 6)
+    clip.rotations[:, 0] = exp(0.4 * np.sin(5 * clip.times)[:, None] * [0.3, 1.0, 0.5]) @ clip.rotations[:, 0]
+    source = captured(motion_of(clip))
+    rig, bone_of = build_rig("unreal")
+    run(source, rig)
+    wanted = seen(rig, bone_of.values(), frames)
+    for bone in rig.data.bones:
+        bone.use_inherit_rotation = not bone.name.startswith(loose)
+    run(source, rig)
+    np.testing.assert_allclose(seen(rig, bone_of.values(), frames), wanted, atol=1e-3)
 
 
 def test_feet_of_a_capture_below_the_floor_stay_on_it():
