@@ -27,7 +27,7 @@ from ..retarget.transfer import Skeleton, basis, transfer
 from .actions import Channels, bone_path, fcurves_of, read_keys
 from .animation import on_one_hemisphere
 from .keys import read_clip
-from .root_object import drop_root, hang_on_root, root_object, seen_clip, topmost
+from .root_object import carried, drop_root, hang_on_root, root_object, seen_clip, topmost
 from .transaction import all_or_nothing
 
 # Rigify's switches: limbs by FK, neck and head with the chest.
@@ -121,10 +121,13 @@ def retarget(
             warnings = _held_back(rig, skeleton.names, turns, rotations)
         former = rig.animation_data.action if rig.animation_data else None
         action = _write(rig, place, skeleton, turns, root, heads, frames)
+        hanging = topmost(rig)
         if way is None:
             drop_root(rig)
         else:
-            hang_on_root(rig, frames, *way)
+            hanging = hang_on_root(rig, frames, *way)
+        if hanging.parent is not None:  # the keys say where in the world it is
+            hanging.matrix_parent_inverse = hanging.matrix_parent_inverse @ carried(hanging).inverted_safe()
         rig.data.pose_position = "POSE"
         _above_nla(rig.animation_data)
         _put_by(former)
@@ -143,14 +146,14 @@ def _where_seen(
 ) -> tuple[np.ndarray, np.ndarray, float]:
     """Moved and turned as the user has moved and turned the captured armature; and by how much about the upright axis.
 
-    A root object's way is in the motion already. How large the armature is drawn says nothing of the rig.
+    A root object's way is in the motion already, but not where its parent takes it. How large the armature is drawn
+    says nothing of the rig.
 
     :param rotations: (T, B, 3, 3); heads: (T, 3).
     """
-    if root_object(source) is not None:
-        return rotations, heads.copy(), 0.0
     bpy.context.view_layer.update()
-    place, turn, _ = source.matrix_world.decompose()
+    empty = root_object(source)
+    place, turn, _ = (source.matrix_world if empty is None else carried(empty)).decompose()
     R = np.array(turn.to_matrix())
     return R @ rotations, heads @ R.T + np.array(place), float(turn.to_euler("ZYX").z)
 

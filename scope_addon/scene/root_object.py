@@ -2,6 +2,7 @@
 """A person's way over the floor on an object of its own, and back into the bones.
 
 The armature hangs below an empty that carries the path; the pelvis keeps what is left. What is seen stays the same.
+What the user has hung a captured armature on, the empty hangs on meanwhile.
 """
 
 from __future__ import annotations
@@ -36,15 +37,23 @@ def root_object(armature: bpy.types.Object) -> bpy.types.Object | None:
 
 
 def hang_on_root(
-    armature: bpy.types.Object, frames: np.ndarray, positions: np.ndarray, angles: np.ndarray, *, in_place: bool = False
+    armature: bpy.types.Object,
+    frames: np.ndarray,
+    positions: np.ndarray,
+    angles: np.ndarray,
+    *,
+    in_place: bool = False,
+    below_parent: bool = False,
 ) -> bpy.types.Object:
-    """Let an empty carry the armature along a way, in place of one that did so before.
+    """Let an empty carry the armature along a way, in place of one that did so before, whose parent it takes.
 
     :param frames: (T,) scene frames; positions: (T, 3) metres; angles: (T,) radians about the upright axis.
     :param in_place: it stays where the way begins, and only remembers it.
-    :raises UsageError: what the armature hangs on carries another one too.
+    :param below_parent: what the armature hangs on carries the empty, instead of being carried along.
+    :raises UsageError: what the armature hangs on would be carried along and carries another one too.
     """
-    top, former = topmost(armature), root_object(armature)
+    former = root_object(armature)
+    top = armature if below_parent else topmost(armature)
     others = [obj for obj in top.children_recursive if obj.type == "ARMATURE" and obj != armature]
     if top != armature and others:
         raise UsageError(
@@ -65,7 +74,8 @@ def hang_on_root(
         channels, still = Channels(empty, bpy.data.actions.new(empty.name)), np.zeros_like(angles)
         channels.write("location", frames, positions)
         channels.write("rotation_euler", frames, np.stack([still, still, angles], axis=1))
-    top.parent = empty
+    _hang_alike(empty, former or top)
+    top.parent, top.parent_type = empty, "OBJECT"
     top.matrix_parent_inverse.identity()
     if former is not None:
         name = former[ROOT_TAG] + "_root"
@@ -75,13 +85,20 @@ def hang_on_root(
 
 
 def drop_root(armature: bpy.types.Object) -> None:
-    """Remove the empty; the armature stays with what its bones hold."""
+    """Remove the empty; the armature stays with what its bones hold, and hangs on what the empty hung on."""
     top, empty = topmost(armature), root_object(armature)
     if empty is None:
         return
-    top.parent = None
-    top.matrix_parent_inverse.identity()
+    _hang_alike(top, empty)
     _remove(empty)
+
+
+def carried(obj: bpy.types.Object) -> Matrix:
+    """Where the object's parent takes it at the current frame; without one nowhere."""
+    if obj.parent is None:
+        return Matrix()
+    bpy.context.view_layer.update()
+    return obj.matrix_world @ obj.matrix_basis.inverted_safe()
 
 
 def to_root_object(armature: bpy.types.Object, body: Body, rate: float, *, in_place: bool, heading: bool) -> None:
@@ -96,12 +113,13 @@ def to_root_object(armature: bpy.types.Object, body: Body, rate: float, *, in_pl
     write_clip(armature, body, relative_to_path(clip, positions, angles), frames)
     if root_object(armature) is None:  # where the user has put the armature now goes with the way
         bpy.context.view_layer.update()
-        place, size = armature.matrix_world.copy(), armature.matrix_world.median_scale
-        armature.parent = None
-        armature.matrix_basis = Matrix.Scale(size, 4)
+        place = armature.matrix_world.copy()
+        if armature.parent is not None:  # which stays and goes on carrying it
+            place = armature.matrix_parent_inverse.inverted_safe() @ armature.matrix_local
+        armature.matrix_basis = Matrix.Scale(place.median_scale, 4)
         yaw = place.to_euler("ZYX").z
         positions, angles = transform_points(np.array(place), positions), angles + yaw
-    hang_on_root(armature, frames, positions, angles, in_place=in_place)
+    hang_on_root(armature, frames, positions, angles, in_place=in_place, below_parent=True)
 
 
 def to_bones(armature: bpy.types.Object, body: Body, rate: float) -> None:
@@ -143,6 +161,16 @@ def _keyed_path(
     columns = {("rotation_euler", 2): np.full(len(frames), empty.rotation_euler.z)} | columns
     positions = [columns.get(("location", k), np.full(len(frames), empty.location[k])) for k in range(3)]
     return np.stack(positions, axis=1) / armature.matrix_basis.median_scale, columns["rotation_euler", 2]
+
+
+def _hang_alike(obj: bpy.types.Object, other: bpy.types.Object) -> None:
+    """Let an object hang on what another one hangs on, in the same way."""
+    obj.parent = other.parent
+    obj.matrix_parent_inverse.identity()
+    if other.parent is not None:
+        obj.parent_type = other.parent_type
+        obj.parent_bone, obj.parent_vertices = other.parent_bone, other.parent_vertices
+        obj.matrix_parent_inverse = other.matrix_parent_inverse
 
 
 def _remove(empty: bpy.types.Object) -> None:

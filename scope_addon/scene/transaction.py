@@ -89,6 +89,7 @@ class _KeptPlace:
 
     def __init__(self, obj: bpy.types.Object) -> None:
         self._obj, self._parent = obj, obj.parent
+        self._hangs = obj.parent_type, obj.parent_bone
         self._matrices = obj.matrix_parent_inverse.copy(), obj.matrix_basis.copy()
         owners = [obj, *(obj.pose.bones if obj.pose else ())]
         self._properties = [(owner, _scalars(owner)) for owner in owners]
@@ -96,6 +97,7 @@ class _KeptPlace:
     def restore(self) -> None:
         obj = self._obj
         obj.parent = self._parent
+        obj.parent_type, obj.parent_bone = self._hangs
         obj.matrix_parent_inverse, obj.matrix_basis = self._matrices
         for owner, properties in self._properties:
             for name in [name for name in _scalars(owner) if name not in properties]:

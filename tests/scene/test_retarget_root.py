@@ -137,6 +137,28 @@ def test_a_rig_that_hangs_on_something_takes_it_along(source):
     np.testing.assert_allclose(seen(rig, bones), before, atol=1e-3)
 
 
+@pytest.mark.parametrize("hung", ["capture", "rig"])
+def test_a_root_object_stays_hung_where_the_user_hangs_it(source, hung):
+    rig, bone_of = build_rig("unreal")
+    bones = list(bone_of.values())
+    run(source, rig, root="object")
+    before = seen(rig, bones)
+    to_root_object(source, BODY, RATE, in_place=False, heading=True)
+    stage = bpy.data.objects.new("Stage", None)
+    bpy.context.scene.collection.objects.link(stage)
+    turn = Matrix.Rotation(1.1, 3, "Z").to_quaternion()
+    place = stage.matrix_world = Matrix.LocRotScale((3.0, -1.0, 0.5), turn, None)
+    root_object(source if hung == "capture" else rig).parent = stage
+    wanted = before
+    if hung == "capture":
+        wanted = before @ np.array(place)[:3, :3].T + np.array(place.translation)
+    for root in ("object", "bone"):
+        run(source, rig, root=root)
+        np.testing.assert_allclose(seen(rig, bones), wanted, atol=2e-3)
+        if hung == "rig":
+            assert (root_object(rig) or rig).parent == stage
+
+
 def test_a_choice_that_is_not_offered_is_refused():
     with pytest.raises(UsageError, match="bone, object, in-place"):
         RetargetOptions(root="pelvis")

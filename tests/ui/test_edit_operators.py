@@ -4,6 +4,7 @@
 import bpy
 import numpy as np
 import pytest
+from mathutils import Matrix
 from scope.scope_addon.scene.build import BuildOptions, build_scene
 from scope.scope_addon.scene.keys import read_clip
 from scope.scope_addon.scene.root_object import root_object
@@ -155,6 +156,51 @@ def test_root_motion_of_an_armature_that_was_moved_looks_the_same(rig):
     for mode in ("OBJECT", "BONES"):
         bpy.ops.scope.root_motion(mode=mode)
         np.testing.assert_allclose(seen(rig), before, atol=3e-4)
+
+
+@pytest.fixture
+def stage():
+    """An object of the user's own, moved, turned, tilted and scaled, that goes somewhere."""
+    obj = bpy.data.objects.new("Stage", None)
+    bpy.context.scene.collection.objects.link(obj)
+    obj.rotation_euler, obj.scale = (0.2, -0.1, 0.7), (1.5,) * 3
+    for frame, x in ((1, 2.0), (90, 5.0)):
+        obj.location = (x, -1.0, 0.3)
+        obj.keyframe_insert("location", frame=frame)
+    return obj
+
+
+def test_root_motion_keeps_what_the_user_has_hung_the_armature_on(rig, stage):
+    rig.parent, rig.location, rig.rotation_euler, rig.rotation_mode = stage, (0.4, 0, 0), (0, 0, 0.5), "XYZ"
+    rig.matrix_parent_inverse = Matrix.Translation((0, 0.2, 0)) @ Matrix.Scale(0.8, 4)
+    before = seen(rig)
+    for mode in ("OBJECT", "OBJECT", "IN_PLACE", "BONES", "OBJECT", "BONES"):
+        bpy.ops.scope.root_motion(mode=mode)
+        if mode == "BONES":
+            assert rig.parent == stage
+        else:
+            assert (root_object(rig).parent, rig.parent) == (stage, root_object(rig))
+        if mode == "IN_PLACE":
+            np.testing.assert_allclose(seen(rig)[0], before[0], atol=3e-4)
+        else:
+            np.testing.assert_allclose(seen(rig), before, atol=3e-4)
+    assert not [o for o in bpy.data.objects if "scope_root" in o]
+
+
+def test_root_motion_below_a_bone_of_the_users(rig, stage):
+    crane = bpy.data.objects.new("Crane", bpy.data.armatures.new("Crane"))
+    bpy.context.scene.collection.objects.link(crane)
+    bpy.context.view_layer.objects.active = crane
+    bpy.ops.object.mode_set(mode="EDIT")
+    crane.data.edit_bones.new("hook").tail = (0.3, 0.0, 0.9)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    bpy.context.view_layer.objects.active = rig
+    rig.parent, rig.parent_type, rig.parent_bone = crane, "BONE", "hook"
+    before = seen(rig)
+    for mode in ("OBJECT", "BONES"):
+        bpy.ops.scope.root_motion(mode=mode)
+        np.testing.assert_allclose(seen(rig), before, atol=3e-4)
+    assert (rig.parent, rig.parent_type, rig.parent_bone) == (crane, "BONE", "hook")
 
 
 def test_what_fails_halfway_leaves_keys_and_root_as_they_were(rig, monkeypatch):
