@@ -19,7 +19,7 @@ PERSON = "scope_person"  # custom property of a rig: the name of the captured ar
 
 
 def captured_armature(context: bpy.types.Context) -> bpy.types.Object | None:
-    """The armature that is meant: the active object's, else the only one of the scene's last capture."""
+    """The armature that is meant: the active object's, else the only one of the last capture or of the whole scene."""
     obj = context.view_layer.objects.active if context.view_layer else None
     while obj is not None:
         if "scope_source" in obj:
@@ -32,8 +32,14 @@ def captured_armature(context: bpy.types.Context) -> bpy.types.Object | None:
             return found[0]
         obj = obj.parent
     collection = context.scene.scope.result.collection
-    found = [o for o in collection.all_objects if "scope_source" in o] if collection else []
-    return found[0] if len(found) == 1 else None
+    found = captured_people(context)
+    last = [o for o in found if o.name in collection.all_objects] if collection else []
+    return last[0] if len(last) == 1 else found[0] if len(found) == 1 else None
+
+
+def captured_people(context: bpy.types.Context) -> list[bpy.types.Object]:
+    """The captured armatures of the scene."""
+    return [obj for obj in context.scene.objects if obj.type == "ARMATURE" and "scope_source" in obj]
 
 
 def library_of(armature: bpy.types.Object) -> bpy.types.Library | None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import bpy
 from bpy.props import EnumProperty, StringProperty
 
-from .captured_person import PERSON, betas_of, body_of, captured_armature
+from .captured_person import PERSON, betas_of, body_of, captured_armature, captured_people
 from .telling import TellingOperator, sentence
 
 if TYPE_CHECKING:
@@ -16,20 +16,6 @@ if TYPE_CHECKING:
 
 
 _ASIDE = (1.5, 0.0, 0.0)  # metres: to the left of a person who faces the front view
-
-
-def captured_people(context: bpy.types.Context) -> list[bpy.types.Object]:
-    """The captured armatures of the scene."""
-    return [obj for obj in context.scene.objects if obj.type == "ARMATURE" and "scope_source" in obj]
-
-
-def chosen_source(context: bpy.types.Context) -> bpy.types.Object | None:
-    """The captured armature that is meant; the rig itself may well be the active object."""
-    found = captured_armature(context)
-    if found is None:
-        captured = captured_people(context)
-        found = captured[0] if len(captured) == 1 else None
-    return found
 
 
 class _OnRig(TellingOperator):
@@ -85,7 +71,7 @@ class SCOPE_OT_retarget(_OnRig):
                 "saved: make an override of it (Object > Library Override > Make)"
             )
             return False
-        if chosen_source(context) is None:
+        if captured_armature(context) is None:
             cls.poll_message_set(
                 "Several people are captured: select the armature of the one whose motion the rig takes"
                 if captured_people(context)
@@ -100,7 +86,7 @@ class SCOPE_OT_retarget(_OnRig):
         from ..scene.timing import scene_rate
         from ..scene.visibility import hide, show
 
-        settings, source = context.scene.scope_retarget, chosen_source(context)
+        settings, source = context.scene.scope_retarget, captured_armature(context)
         assert source is not None  # poll has asked
         if not len(settings.pairs):
             _show(context, guess_bone_map(settings.rig))

@@ -5,8 +5,8 @@ from __future__ import annotations
 
 import bpy
 
+from .captured_person import captured_armature, captured_people
 from .panel import Tab
-from .retarget_operators import captured_people, chosen_source
 
 
 class SCOPE_UL_bone_pairs(bpy.types.UIList):
@@ -40,12 +40,12 @@ class SCOPE_PT_retarget(Tab, bpy.types.Panel):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """There is a captured person."""
-        return chosen_source(context) is not None or bool(captured_people(context))
+        return captured_armature(context) is not None or bool(captured_people(context))
 
     def draw(self, context: bpy.types.Context) -> None:
         """Draw the panel."""
         layout, settings = self.layout, context.scene.scope_retarget
-        source = chosen_source(context)
+        source = captured_armature(context)
         text = source.name if source else "Select a captured person"
         layout.label(text=text, icon="OUTLINER_OB_ARMATURE" if source else "INFO")
         layout.prop(settings, "rig")

@@ -102,12 +102,12 @@ def test_an_edit_and_the_same_button_again_update_the_rig(rig, tmp_path):
     assert np.ptp(seen(rig, ["pelvis"])[:, 0, 1]) > 1.0
 
 
-def test_with_several_people_the_panel_stays_and_asks_for_one(rig):
+def test_with_several_people_the_panels_stay_and_ask_for_one(rig):
     people = [next(obj for obj in bpy.context.scene.objects if "scope_source" in obj), captured(motion_of(walk(2.0)))]
     people[1]["scope_body_file"] = "scope"
-    panel, layer = bpy.types.SCOPE_PT_retarget, bpy.context.view_layer
+    panels, layer = (bpy.types.SCOPE_PT_retarget, bpy.types.SCOPE_PT_edit), bpy.context.view_layer
     layer.objects.active = rig
-    assert panel.poll(bpy.context)
+    assert all(panel.poll(bpy.context) for panel in panels)
     with pytest.raises(RuntimeError, match="Several people are captured: select the armature"):
         bpy.ops.scope.retarget()
     layer.objects.active = people[1]
@@ -115,8 +115,9 @@ def test_with_several_people_the_panel_stays_and_asks_for_one(rig):
     assert people[1].hide_get()
     assert not people[0].hide_get()
     for person in people:
+        assert all(panel.poll(bpy.context) for panel in panels)
         bpy.data.objects.remove(person)
-    assert not panel.poll(bpy.context)
+    assert not any(panel.poll(bpy.context) for panel in panels)
 
 
 def test_body_parts_are_offered_while_they_are_typed():
