@@ -21,6 +21,7 @@ TOLERANCE = 0.005
 BROADCAST = tuple(Fraction(n * 1000, 1001) for n in (24, 30, 48, 60, 72, 96, 120, 240))
 POLICIES = ("keep", "set")
 RATE_POLICIES = (*POLICIES, "resample")
+_CYCLE = "scope_cycle"  # custom property of an armature: the cycle's first and last frame, and the scene's before it
 
 
 def blender_rate(frames_per_second: float) -> tuple[int, float]:
@@ -74,3 +75,27 @@ def set_frame_range(scene: bpy.types.Scene, first: float, last: float) -> None:
     scene.frame_end = max(end, scene.frame_start)  # Blender keeps start <= end at every step
     scene.frame_start = start
     scene.frame_end = end
+
+
+def play_cycle(scene: bpy.types.Scene, armature: bpy.types.Object, first: int, last: int) -> None:
+    """Let the scene play a cycle that was cut out of an armature's motion, and remember what it played before."""
+    cycle, before = _remembered(armature)
+    if cycle != (scene.frame_start, scene.frame_end):
+        before = scene.frame_start, scene.frame_end
+    scene.frame_start, scene.frame_end = first, last
+    armature[_CYCLE] = f"{scene.frame_start} {scene.frame_end} {before[0]} {before[1]}"
+
+
+def play_whole(scene: bpy.types.Scene, armature: bpy.types.Object) -> None:
+    """Let the scene play again what it played before the cycle, unless other frames have been chosen meanwhile."""
+    cycle, before = _remembered(armature)
+    if _CYCLE in armature:
+        del armature[_CYCLE]
+    if cycle == (scene.frame_start, scene.frame_end):
+        set_frame_range(scene, *before)
+
+
+def _remembered(armature: bpy.types.Object) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    """The cycle's frames and those before, empty without a cycle."""
+    frames = tuple(int(frame) for frame in armature.get(_CYCLE, "").split())
+    return frames[:2], frames[2:]

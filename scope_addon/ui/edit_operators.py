@@ -96,7 +96,7 @@ class SCOPE_OT_smooth(_Edit):
         from ..scene.actions import repeat_no_more
         from ..scene.keys import bake_whole_frames, write_clip
         from ..scene.root_object import drop_root
-        from ..scene.timing import key_frames
+        from ..scene.timing import key_frames, play_whole
 
         motion = cached_motion(armature)
         clip = smoothed(body, motion, self.strength)
@@ -104,6 +104,7 @@ class SCOPE_OT_smooth(_Edit):
         repeat_no_more(armature)  # what was a loop is the whole motion again
         if armature.get("scope_resampled"):
             bake_whole_frames(armature, body, rate)
+        play_whole(context.scene, armature)
         drop_root(armature)
         return ""
 
@@ -245,6 +246,7 @@ class SCOPE_OT_loop(_Span):
         from ..scene.actions import repeat_for_ever
         from ..scene.keys import location_path, read_clip, write_clip
         from ..scene.root_object import drop_root, whole_clip
+        from ..scene.timing import play_cycle
 
         clip, frames = read_clip(armature, body, rate)
         clip = whole_clip(armature, clip, frames)
@@ -255,7 +257,7 @@ class SCOPE_OT_loop(_Span):
         write_clip(armature, body, closed, frames[cycle.first : cycle.last + 1])
         if self.repeat:
             repeat_for_ever(armature, onwards={(location_path(body), 0), (location_path(body), 1)})
-        context.scene.frame_start, context.scene.frame_end = math.ceil(first), math.floor(last) - 1
+        play_cycle(context.scene, armature, math.ceil(first), math.floor(last) - 1)
         drop_root(armature)
         return f"A cycle of {closed.times[-1]:.2f} s, its ends {100 * cycle.error_m:.1f} cm apart before closing"
 

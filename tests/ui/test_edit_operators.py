@@ -245,6 +245,20 @@ def test_a_loop_that_is_smoothed_again_is_the_whole_motion_once_more(rig):
     np.testing.assert_allclose(seen(rig, [1, last, last + 20]), before, atol=1e-5)
 
 
+def test_a_loop_that_is_smoothed_again_is_played_as_a_whole(rig):
+    scene = bpy.context.scene
+    scene.frame_start, scene.frame_end = 2, 120
+    bpy.ops.scope.loop(start=5, end=85, shortest=0.8)
+    cycle = scene.frame_start, scene.frame_end
+    bpy.ops.scope.loop(start=cycle[0], end=cycle[1] + 1, shortest=0.5)  # once more, within the first one
+    bpy.ops.scope.smooth()
+    assert (scene.frame_start, scene.frame_end) == (2, 120)
+    bpy.ops.scope.loop(start=5, end=85, shortest=0.8)
+    scene.frame_start = 1  # the user's own choice stays
+    bpy.ops.scope.smooth()
+    assert (scene.frame_start, scene.frame_end) == (1, cycle[1])
+
+
 @pytest.mark.parametrize("suffix", ["glb", "fbx", "bvh"])
 def test_a_loop_is_exported_alone(rig, tmp_path, suffix):
     """Curves that loop for ever, and the confidence of the frames that were cut off, do not make the file longer."""
