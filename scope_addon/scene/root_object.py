@@ -133,15 +133,20 @@ def to_bones(armature: bpy.types.Object, body: Body, rate: float) -> None:
 
 def whole_clip(armature: bpy.types.Object, clip: Clip, frames: np.ndarray) -> Clip:
     """The clip with the way of its root object, where it has one, also one that was left out."""
+    return with_path(clip, *whole_path(armature, frames))
+
+
+def whole_path(armature: bpy.types.Object, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Positions (T, 3) and angles (T,) of the way that is not in the bones, also of one that was left out."""
     empty = root_object(armature)
     if empty is None:
-        return clip
+        return np.zeros((len(frames), 3)), np.zeros(len(frames))
     if _LEFT_OUT not in empty:
-        return with_path(clip, *_keyed_path(armature, empty, frames))
+        return _keyed_path(armature, empty, frames)
     rows = np.array(list(empty[_LEFT_OUT])).reshape(-1, 4)
     x, y, angle = (np.interp(frames, rows[:, 0], rows[:, k]) for k in (1, 2, 3))
     positions = np.stack([x, y, np.full(len(x), empty.location.z)], axis=1)
-    return with_path(clip, positions / armature.matrix_basis.median_scale, angle)
+    return positions / armature.matrix_basis.median_scale, angle
 
 
 def seen_clip(armature: bpy.types.Object, clip: Clip, frames: np.ndarray) -> Clip:

@@ -153,7 +153,7 @@ class SCOPE_OT_swap_sides(_Span):
 
 
 class SCOPE_OT_refloor(_Edit):
-    """Put the standing feet on the floor (the grid, z = 0)"""
+    """Put the standing feet on the floor: at the height of the armature's origin, so on the grid unless you moved it"""
 
     bl_idname = "scope.refloor"
     bl_label = "Feet to Floor"
@@ -170,11 +170,15 @@ class SCOPE_OT_refloor(_Edit):
     def edit(self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float) -> str:
         """All keys."""
         from ..edit.floor import refloor
+        from ..edit.root_motion import relative_to_path, with_path
         from ..scene.keys import read_clip, write_clip
+        from ..scene.root_object import whole_path
 
         clip, frames = read_clip(armature, body, rate)
-        floored = refloor(clip, body, betas_of(armature, body), level=self.level, lift=self.lift)
-        write_clip(armature, body, floored, frames)
+        positions, angles = whole_path(armature, frames)
+        path = positions * [1.0, 1.0, 0.0], angles  # feet that stand are still only where the person goes
+        floored = refloor(with_path(clip, *path), body, betas_of(armature, body), level=self.level, lift=self.lift)
+        write_clip(armature, body, relative_to_path(floored, *path), frames)
         return ""
 
 

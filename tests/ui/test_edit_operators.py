@@ -129,6 +129,33 @@ def test_feet_to_floor(rig):
     assert lowest.min() > -1e-4
 
 
+def test_the_floor_is_where_the_armature_was_put(rig):
+    rig.location.z = 0.5
+    bpy.ops.scope.refloor()
+    assert keys(rig)[0].soles(BODY, np.zeros(BODY.P))[..., 2].min() == pytest.approx(0.0, abs=1e-4)
+    assert "the height of the armature's origin" in bpy.ops.scope.refloor.get_rna_type().description
+
+
+@pytest.mark.parametrize("mode", ["OBJECT", "IN_PLACE"])
+def test_feet_of_one_whose_way_is_not_in_the_bones_come_to_the_same_floor(rig, mode):
+    from scope.scope_addon.scene.keys import write_clip
+
+    clip, frames = keys(rig)
+    tilt = exp([0.1, 0.0, 0.0])
+    clip.root = clip.root @ tilt.T
+    clip.rotations[:, 0] = tilt @ clip.rotations[:, 0]
+    write_clip(rig, BODY, clip, frames)
+    bpy.ops.scope.root_motion(mode=mode)
+    bpy.ops.scope.refloor()
+    bpy.ops.scope.root_motion(mode="BONES")
+    there = keys(rig)[0]
+    write_clip(rig, BODY, clip, frames)
+    bpy.ops.scope.refloor()
+    wanted = keys(rig)[0]
+    np.testing.assert_allclose(there.root, wanted.root, atol=1e-3)
+    assert turned(there.rotations, wanted.rotations) < 0.1
+
+
 @pytest.mark.parametrize("heading", [True, False])
 def test_root_motion_looks_the_same_and_comes_back(rig, heading):
     before, clip = seen(rig), keys(rig)[0]
