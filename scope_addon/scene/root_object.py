@@ -13,7 +13,6 @@ from mathutils import Matrix
 
 from ...solver.body import Body
 from ...solver.errors import UsageError
-from ...solver.frames import transform_points
 from ..edit.clip import Clip
 from ..edit.root_motion import floor_path, relative_to_path, with_path
 from .actions import Channels, fcurves, read_keys
@@ -108,17 +107,20 @@ def to_root_object(armature: bpy.types.Object, body: Body, rate: float, *, in_pl
     :param heading: the turning about the upright axis goes with it.
     """
     clip, frames = read_clip(armature, body, rate)
-    clip = whole_clip(armature, clip, frames)
-    positions, angles = floor_path(clip, heading=heading)
-    write_clip(armature, body, relative_to_path(clip, positions, angles), frames)
+    clip, height = whole_clip(armature, clip, frames), 0.0
     if root_object(armature) is None:  # where the user has put the armature now goes with the way
         bpy.context.view_layer.update()
         place = armature.matrix_world.copy()
         if armature.parent is not None:  # which stays and goes on carrying it
             place = armature.matrix_parent_inverse.inverted_safe() @ armature.matrix_local
-        armature.matrix_basis = Matrix.Scale(place.median_scale, 4)
-        yaw = place.to_euler("ZYX").z
-        positions, angles = transform_points(np.array(place), positions), angles + yaw
+        size, R = place.median_scale, np.array(place.to_quaternion().to_matrix())
+        root = clip.root @ R.T + [place.translation.x / size, place.translation.y / size, 0.0]
+        clip = Clip(clip.times, np.concatenate([R @ clip.rotations[:, :1], clip.rotations[:, 1:]], axis=1), root)
+        height = place.translation.z
+        armature.matrix_basis = Matrix.Scale(size, 4)
+    positions, angles = floor_path(clip, heading=heading)
+    write_clip(armature, body, relative_to_path(clip, positions, angles), frames)
+    positions = armature.matrix_basis.median_scale * positions + [0.0, 0.0, height]
     hang_on_root(armature, frames, positions, angles, in_place=in_place, below_parent=True)
 
 

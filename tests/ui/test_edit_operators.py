@@ -176,13 +176,17 @@ def test_root_motion_looks_the_same_and_comes_back(rig, heading):
     assert not [o for o in bpy.data.objects if "scope_root" in o]
 
 
-def test_root_motion_of_an_armature_that_was_moved_looks_the_same(rig):
-    rig.location, rig.rotation_euler, rig.scale = (1.0, 2.0, 0.5), (0.0, 0.0, 0.8), (1.2,) * 3
+@pytest.mark.parametrize("tilt", [0.0, 0.5])
+def test_root_motion_of_an_armature_that_was_moved_looks_the_same(rig, tilt):
+    rig.location, rig.rotation_euler, rig.scale = (1.0, 2.0, 0.5), (tilt, -0.4 * tilt, 0.8), (1.2,) * 3
     rig.rotation_mode = "XYZ"
     before = seen(rig)
-    for mode in ("OBJECT", "BONES"):
+    for mode in ("OBJECT", "OBJECT", "IN_PLACE", "OBJECT", "BONES"):
         bpy.ops.scope.root_motion(mode=mode)
-        np.testing.assert_allclose(seen(rig), before, atol=3e-4)
+        if mode == "IN_PLACE":
+            np.testing.assert_allclose(seen(rig)[0], before[0], atol=3e-4)
+        else:
+            np.testing.assert_allclose(seen(rig), before, atol=3e-4)
 
 
 @pytest.fixture
