@@ -106,6 +106,7 @@ def _write_one(
         _out_of_edit_mode(collections),
         nullcontext() if suffix == ".blend" else _all_evaluated(collections),  # a scene keeps what is hidden in it
         _scene_of(collections, rigs, options.camera) as scene,
+        _with_carriers(scene) if suffix == ".glb" else nullcontext(),  # that exporter leaves out what hangs on others
         _baked_meshes(scene) if options.bakes(suffix) else nullcontext(),
         actions.nla_as_actions(scene) if suffix == ".glb" else nullcontext(),  # that exporter reads actions alone
         _actions_as_long_as(scene),
@@ -248,6 +249,21 @@ def _scene_of(
         scene.frame_set(scene.frame_start)
         yield scene
     source.frame_set(source.frame_current, subframe=source.frame_subframe)
+
+
+@contextmanager
+def _with_carriers(scene: bpy.types.Scene) -> Iterator[None]:
+    """Put what the scene's objects hang on into it for a while."""
+    carriers: list[bpy.types.Object] = []
+    for obj in scene.objects:
+        while obj.parent is not None:
+            obj = obj.parent
+            if obj not in carriers and obj not in scene.objects.values():
+                carriers.append(obj)
+    for obj in carriers:
+        scene.collection.objects.link(obj)
+    bpy.context.view_layer.update()
+    yield
 
 
 @contextmanager

@@ -113,6 +113,25 @@ def _to_nla(datablock, *starts):
     return animation
 
 
+@pytest.mark.parametrize("suffix", [".glb", ".fbx", ".usdc", ".bvh"])
+def test_what_hangs_on_something_of_the_users_goes_where_that_takes_it(body, make_motion, tmp_path, blender, suffix):
+    person = build_scene([make_motion(body, 4)], body, options=BuildOptions(frame_rate="set")).people[0]
+    stage = bpy.data.objects.new("Stage", None)
+    bpy.context.scene.collection.objects.link(stage)
+    stage.rotation_euler, person.armature.parent = (0.2, -0.1, 0.7), stage
+    for frame, x in ((0, 2.0), (3, 2.5)):
+        stage.location = (x, -1.0, 0.3)
+        stage.keyframe_insert("location", frame=frame)
+    blender.go_to(3)
+    wanted = blender.joints(person.armature, body.joint_names)
+    export(tmp_path / f"walk{suffix}")
+    assert list(stage.users_collection) == [bpy.context.scene.collection]
+    first = read_back(tmp_path / f"walk{suffix}")
+    blender.go_to(first + 3)
+    seen = blender.joints(blender.only("ARMATURE"), body.joint_names)
+    np.testing.assert_allclose(seen, wanted, atol=JOINT_TOLERANCE)
+
+
 @pytest.mark.parametrize("suffix", [".glb", ".fbx", ".bvh"])
 def test_a_motion_in_the_nla_is_exported_as_it_is_seen(body, make_motion, tmp_path, blender, truth, suffix):
     motion = make_motion(body, 5)
