@@ -70,7 +70,7 @@ def load_bone_map(path: str | Path) -> BoneMap:
     try:
         if path.stat().st_size > _LARGEST_BYTES:
             raise InputError(f"{path}: too large for a bone map; choose a file that Scope has saved")
-        content = json.loads(path.read_text(encoding="utf-8"))
+        content = json.loads(path.read_text(encoding="utf-8-sig"))  # editors may have put a mark first
     except OSError as error:
         raise InputError(f"{path}: the bone map cannot be read ({error.strerror}); choose another file") from error
     except (ValueError, RecursionError) as error:
@@ -78,7 +78,7 @@ def load_bone_map(path: str | Path) -> BoneMap:
     bones = content.get("bones") if isinstance(content, dict) else None
     if not isinstance(content, dict) or content.get("format") != _FORMAT or content.get("version") != 1:
         raise InputError(f"{path}: this JSON is no bone map of Scope, version 1; choose another file")
-    if not isinstance(bones, dict) or not all(isinstance(part, str) and bone for bone, part in bones.items()):
+    if not isinstance(bones, dict) or not all(_is_name(bone) and _is_name(part) for bone, part in bones.items()):
         raise InputError(f"{path}: 'bones' must pair names of bones with body parts")
     out = BoneMap(dict(bones))
     try:
@@ -86,3 +86,8 @@ def load_bone_map(path: str | Path) -> BoneMap:
     except InputError as error:
         raise InputError(f"{path}: {error}") from error
     return out
+
+
+def _is_name(text: object) -> bool:
+    """Whether Blender can hold it: JSON may escape zeros and halves of letters."""
+    return isinstance(text, str) and text != "" and not any(c == "\0" or "\ud800" <= c <= "\udfff" for c in text)

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Retargeting, judged by what Blender's depsgraph shows of the rig and by forward kinematics of our own."""
 
+import json
 
 import bpy
 import numpy as np
@@ -217,11 +218,24 @@ def test_a_map_is_read_as_it_was_saved(tmp_path):
     assert load_bone_map(tmp_path / "map.json").parts == found.parts
 
 
+def _legs_and(pelvis):
+    """A map with all that is needed."""
+    bones = {"a": "left_hip", "b": "left_knee", "c": "right_hip", "d": "right_knee", "PELVIS": "pelvis"}
+    text = json.dumps({"format": "scope bone map", "version": 1, "bones": bones})
+    return text.replace("PELVIS", pelvis)
+
+
+def test_a_map_that_an_editor_has_marked_as_unicode_is_read(tmp_path):
+    (tmp_path / "map.json").write_text(_legs_and("Hüfte"), encoding="utf-8-sig")
+    assert load_bone_map(tmp_path / "map.json").bone("pelvis") == "Hüfte"
+
+
 @pytest.mark.parametrize(
     "text",
     ["", "[]", "{" * 5000, "[" * 100000, '{"format": "scope bone map", "version": 1, "bones": {"a": 3}}',
      '{"format": "scope bone map", "version": 1, "bones": {"a": "tail"}}',
-     '{"format": "scope bone map", "version": 1, "bones": {}}', '{"format": 1}'],
+     '{"format": "scope bone map", "version": 1, "bones": {}}', '{"format": 1}', _legs_and(r"\ud800"),
+     _legs_and(r"a\u0000")],
 )  # fmt: skip
 def test_hostile_maps_are_refused(tmp_path, text):
     path = tmp_path / "map.json"
