@@ -128,8 +128,8 @@ class SCOPE_PT_result(Tab, bpy.types.Panel):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Something was captured and is still there."""
-        return context.scene.scope.result.collection is not None
+        """Something was captured and is still there; of another scene whose settings this one has, it is not."""
+        return context.scene.scope.result.collection in context.scene.collection.children_recursive
 
     def draw(self, context: bpy.types.Context) -> None:
         """Draw the panel."""

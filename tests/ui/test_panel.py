@@ -59,6 +59,17 @@ def test_each_scene_has_its_own_settings():
     assert second.scope.quality == "BEST"
 
 
+def test_a_scene_that_took_over_the_settings_alone_shows_no_result(fake_worker, footage):
+    captured(fake_worker, footage)
+    panel = bpy.types.SCOPE_PT_result
+    assert panel.poll(bpy.context)
+    bpy.ops.scene.new(type="EMPTY")
+    assert bpy.context.scene.scope.footage == str(footage)
+    assert not panel.poll(bpy.context)
+    bpy.ops.scene.new(type="FULL_COPY")
+    assert not panel.poll(bpy.context)
+
+
 def test_dropped_files_become_the_footage(footage):
     suffixes = drop.SCOPE_FH_footage.bl_file_extensions.split(";")
     assert {".mp4", ".mov", ".png", ".jpg"} <= set(suffixes)
