@@ -20,6 +20,7 @@ from .keys import read_clip, write_clip
 
 ROOT_TAG = "scope_root"  # custom property of the empty
 _LEFT_OUT = "scope_path"  # of one whose armature stays in place: the way that it does not go
+_PLACE = "scope_place"  # where the armature stood before its place went with the way: a rigid matrix, row by row
 
 
 def topmost(armature: bpy.types.Object) -> bpy.types.Object:
@@ -84,10 +85,12 @@ def hang_on_root(
 
 
 def drop_root(armature: bpy.types.Object) -> None:
-    """Remove the empty; the armature stays with what its bones hold, and hangs on what the empty hung on."""
+    """Remove the empty; the armature stays with what its bones hold, and stands and hangs as it did before."""
     top, empty = topmost(armature), root_object(armature)
     if empty is None:
         return
+    if _PLACE in empty:
+        armature.matrix_basis = _place(empty) @ Matrix.Scale(armature.matrix_basis.median_scale, 4)
     _hang_alike(top, empty)
     _remove(empty)
 
@@ -107,21 +110,23 @@ def to_root_object(armature: bpy.types.Object, body: Body, rate: float, *, in_pl
     :param heading: the turning about the upright axis goes with it.
     """
     clip, frames = read_clip(armature, body, rate)
-    clip, height = whole_clip(armature, clip, frames), 0.0
-    if root_object(armature) is None:  # where the user has put the armature now goes with the way
+    clip, former = whole_clip(armature, clip, frames), root_object(armature)
+    if former is None:  # where the user has put the armature now goes with the way
         bpy.context.view_layer.update()
-        place = armature.matrix_world.copy()
+        seen = armature.matrix_world
         if armature.parent is not None:  # which stays and goes on carrying it
-            place = armature.matrix_parent_inverse.inverted_safe() @ armature.matrix_local
-        size, R = place.median_scale, np.array(place.to_quaternion().to_matrix())
-        root = clip.root @ R.T + [place.translation.x / size, place.translation.y / size, 0.0]
-        clip = Clip(clip.times, np.concatenate([R @ clip.rotations[:, :1], clip.rotations[:, 1:]], axis=1), root)
-        height = place.translation.z
-        armature.matrix_basis = Matrix.Scale(size, 4)
+            seen = armature.matrix_parent_inverse.inverted_safe() @ armature.matrix_local
+        place = Matrix.LocRotScale(seen.translation, seen.to_quaternion(), None)
+        armature.matrix_basis = Matrix.Scale(seen.median_scale, 4)
+    else:
+        place = _place(former)
+    size, height = armature.matrix_basis.median_scale, place.translation.z
+    clip = _moved(clip, Matrix.Translation((0, 0, -height)) @ place, size)
     positions, angles = floor_path(clip, heading=heading)
     write_clip(armature, body, relative_to_path(clip, positions, angles), frames)
-    positions = armature.matrix_basis.median_scale * positions + [0.0, 0.0, height]
-    hang_on_root(armature, frames, positions, angles, in_place=in_place, below_parent=True)
+    positions = size * positions + [0.0, 0.0, height]
+    empty = hang_on_root(armature, frames, positions, angles, in_place=in_place, below_parent=True)
+    empty[_PLACE] = [number for row in place for number in row]
 
 
 def to_bones(armature: bpy.types.Object, body: Body, rate: float) -> None:
@@ -134,8 +139,11 @@ def to_bones(armature: bpy.types.Object, body: Body, rate: float) -> None:
 
 
 def whole_clip(armature: bpy.types.Object, clip: Clip, frames: np.ndarray) -> Clip:
-    """The clip with the way of its root object, where it has one, also one that was left out."""
-    return with_path(clip, *whole_path(armature, frames))
+    """The clip with the way of its root object, where it has one, also one that was left out: without the object."""
+    whole, empty = with_path(clip, *whole_path(armature, frames)), root_object(armature)
+    if empty is None:
+        return whole
+    return _moved(whole, _place(empty).inverted(), armature.matrix_basis.median_scale)
 
 
 def whole_path(armature: bpy.types.Object, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -168,6 +176,19 @@ def _keyed_path(
     columns = {("rotation_euler", 2): np.full(len(frames), empty.rotation_euler.z)} | columns
     positions = [columns.get(("location", k), np.full(len(frames), empty.location[k])) for k in range(3)]
     return np.stack(positions, axis=1) / armature.matrix_basis.median_scale, columns["rotation_euler", 2]
+
+
+def _place(empty: bpy.types.Object) -> Matrix:
+    """Where the armature stood before."""
+    numbers = list(empty.get(_PLACE, ()))
+    return Matrix([numbers[k : k + 4] for k in (0, 4, 8, 12)]) if numbers else Matrix()
+
+
+def _moved(clip: Clip, place: Matrix, size: float) -> Clip:
+    """The clip of an armature of some size as it is seen from where that stands."""
+    R, rotations = np.array(place.to_3x3()), clip.rotations.copy()
+    rotations[:, 0] = R @ rotations[:, 0]
+    return Clip(clip.times, rotations, clip.root @ R.T + np.array(place.translation) / size)
 
 
 def _hang_alike(obj: bpy.types.Object, other: bpy.types.Object) -> None:

@@ -189,6 +189,21 @@ def test_root_motion_of_an_armature_that_was_moved_looks_the_same(rig, tilt):
             np.testing.assert_allclose(seen(rig), before, atol=3e-4)
 
 
+@pytest.mark.parametrize("mode", ["OBJECT", "IN_PLACE"])
+def test_an_armature_stands_where_it_was_put_again_when_its_way_goes_back(rig, mode):
+    rig.rotation_mode, rig.location, rig.rotation_euler, rig.scale = "XYZ", (1.0, 2.0, 0.5), (0.3, 0, 0.8), (1.2,) * 3
+    bpy.ops.scope.smooth()
+    before, place, clip = seen(rig), np.array(rig.matrix_world), keys(rig)[0]
+    operators = bpy.ops.scope.smooth, lambda: bpy.ops.scope.root_motion(mode="BONES")
+    for back in operators:
+        bpy.ops.scope.root_motion(mode=mode)
+        back()
+        bpy.context.view_layer.update()
+        np.testing.assert_allclose(np.array(rig.matrix_world), place, atol=1e-5)
+        np.testing.assert_allclose(keys(rig)[0].root, clip.root, atol=1e-4)
+        np.testing.assert_allclose(seen(rig), before, atol=3e-4)
+
+
 @pytest.fixture
 def stage():
     """An object of the user's own, moved, turned, tilted and scaled, that goes somewhere."""
