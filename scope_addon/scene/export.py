@@ -15,12 +15,15 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import bpy
+import numpy as np
+from mathutils import Matrix
 
 from ...solver.body import Body
 from ...solver.errors import OutputError, UsageError
 from ..motion import Motion
 from ..whole_file import reason, written_beside
 from . import actions, formats
+from .animation import on_one_hemisphere
 from .bone_display import remove_if_unused
 from .build import CAPTURE_TAG, NEW_SCENE, BuildOptions, BuildResult, Progress, build_scene
 from .camera import set_resolution
@@ -253,17 +256,40 @@ def _scene_of(
 
 @contextmanager
 def _with_carriers(scene: bpy.types.Scene) -> Iterator[None]:
-    """Put what the scene's objects hang on into it for a while."""
-    carriers: list[bpy.types.Object] = []
-    for obj in scene.objects:
-        while obj.parent is not None:
-            obj = obj.parent
-            if obj not in carriers and obj not in scene.objects.values():
-                carriers.append(obj)
-    for obj in carriers:
-        scene.collection.objects.link(obj)
-    bpy.context.view_layer.update()
-    yield
+    """Let what hangs on something outside the scene hang for a while on an empty that goes the same way.
+
+    The carriers themselves would bring along all that hangs on them.
+    """
+    hanging = [obj for obj in scene.objects if obj.parent is not None and obj.parent not in scene.objects.values()]
+    kept = [(o, o.parent, o.parent_type, o.parent_bone, o.matrix_parent_inverse.copy()) for o in hanging]
+    frames = np.arange(scene.frame_start, scene.frame_end + 1)
+    ways: list[list[Matrix]] = [[] for _ in hanging]
+    for frame in frames if hanging else ():
+        scene.frame_set(int(frame))
+        evaluated = bpy.context.evaluated_depsgraph_get()
+        for obj, way in zip(hanging, ways, strict=True):
+            seen = obj.evaluated_get(evaluated)
+            way.append(seen.matrix_world @ seen.matrix_basis.inverted_safe())
+    made: list[bpy.types.ID] = []
+    try:
+        for obj, way in zip(hanging, ways, strict=True):
+            empty = bpy.data.objects.new(f"{obj.parent.name}_carrier", None)
+            channels = actions.Channels(empty, bpy.data.actions.new(empty.name))
+            made += [empty, channels.action]
+            empty.rotation_mode = "QUATERNION"
+            place, turn, size = (np.array(each) for each in zip(*(m.decompose() for m in way), strict=True))
+            channels.write("location", frames, place)
+            channels.write("rotation_quaternion", frames, on_one_hemisphere(turn))
+            channels.write("scale", frames, size)
+            scene.collection.objects.link(empty)
+            obj.parent, obj.parent_type = empty, "OBJECT"
+            obj.matrix_parent_inverse.identity()
+        scene.frame_set(scene.frame_start)
+        yield
+    finally:
+        for obj, parent, kind, bone, inverse in kept:
+            obj.parent, obj.parent_type, obj.parent_bone, obj.matrix_parent_inverse = parent, kind, bone, inverse
+        bpy.data.batch_remove(made)
 
 
 @contextmanager

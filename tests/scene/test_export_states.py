@@ -119,14 +119,18 @@ def test_what_hangs_on_something_of_the_users_goes_where_that_takes_it(body, mak
     stage = bpy.data.objects.new("Stage", None)
     bpy.context.scene.collection.objects.link(stage)
     stage.rotation_euler, person.armature.parent = (0.2, -0.1, 0.7), stage
+    bpy.ops.mesh.primitive_cube_add()
+    bpy.context.object.parent = stage
     for frame, x in ((0, 2.0), (3, 2.5)):
         stage.location = (x, -1.0, 0.3)
         stage.keyframe_insert("location", frame=frame)
     blender.go_to(3)
     wanted = blender.joints(person.armature, body.joint_names)
     export(tmp_path / f"walk{suffix}")
-    assert list(stage.users_collection) == [bpy.context.scene.collection]
+    assert person.armature.parent == stage
+    np.testing.assert_allclose(blender.joints(person.armature, body.joint_names), wanted, atol=1e-6)
     first = read_back(tmp_path / f"walk{suffix}")
+    assert not bpy.data.objects.get("Cube")
     blender.go_to(first + 3)
     seen = blender.joints(blender.only("ARMATURE"), body.joint_names)
     np.testing.assert_allclose(seen, wanted, atol=JOINT_TOLERANCE)
