@@ -60,10 +60,12 @@ def export_rig(path: Path, rig: bpy.types.Object, options: ExportOptions) -> lis
 
     :raises UsageError: unknown suffix. :raises OutputError: cannot be written.
     """
-    collection = bpy.data.collections.new(rig.name)
+    collection, parts = bpy.data.collections.new(rig.name), with_meshes(rig, bpy.context.scene.objects)
     try:
-        for obj in with_meshes(rig, bpy.context.scene.objects):
-            collection.objects.link(obj)
+        for obj in parts:
+            below = obj.children_recursive
+            if rig not in below or set(below) <= set(parts):  # what carries other things too would take them along
+                collection.objects.link(obj)
         return export(path, [collection], options=options)
     finally:
         bpy.data.collections.remove(collection)

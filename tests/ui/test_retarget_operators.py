@@ -102,6 +102,32 @@ def test_an_edit_and_the_same_button_again_update_the_rig(rig, tmp_path):
     assert np.ptp(seen(rig, ["pelvis"])[:, 0, 1]) > 1.0
 
 
+@pytest.mark.parametrize("suffix", ["glb", "fbx"])
+def test_what_else_hangs_where_the_rig_does_stays_out_of_its_file(rig, tmp_path, suffix):
+    scene, layer = bpy.context.scene, bpy.context.view_layer
+    active = layer.objects.active
+    bpy.ops.mesh.primitive_plane_add(location=(1.0, 2.0, 0.5))
+    stage = bpy.context.object
+    bpy.ops.mesh.primitive_cube_add()
+    bpy.context.object.parent = rig.parent = stage
+    layer.objects.active = active
+    bpy.ops.scope.retarget()
+    wanted = seen(rig, ["pelvis", "hand_l"], [10])
+    path = str(tmp_path / f"rig.{suffix}")
+    bpy.ops.scope.export(filepath=path, format=suffix.upper(), which="RIG")
+    assert rig.parent == stage
+    rate = scene.render.fps
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    bpy.context.scene.render.fps = rate
+    if suffix == "glb":
+        bpy.ops.import_scene.gltf(filepath=path)
+    else:
+        bpy.ops.import_scene.fbx(filepath=path, anim_offset=0.0)
+    assert not {obj.name for obj in bpy.data.objects} & {"Cube", "Plane"}
+    rig = next(obj for obj in bpy.context.scene.objects if obj.type == "ARMATURE")
+    np.testing.assert_allclose(seen(rig, ["pelvis", "hand_l"], [9 if suffix == "glb" else 10]), wanted, atol=1e-3)
+
+
 def test_with_several_people_the_panels_stay_and_ask_for_one(rig):
     people = [next(obj for obj in bpy.context.scene.objects if "scope_source" in obj), captured(motion_of(walk(2.0)))]
     people[1]["scope_body_file"] = "scope"
