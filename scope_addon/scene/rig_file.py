@@ -13,7 +13,7 @@ from ...solver.errors import InputError, UsageError
 from ..retarget.bone_map import PHALANGES, BoneMap
 from ..retarget.rig_source import RigSource
 from . import formats
-from .export import temporary_scene
+from .export_states import temporary_scene
 from .retarget import check_turning, guess_bone_map
 
 # What a file may bring along, users before what they use.
