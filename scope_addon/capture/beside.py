@@ -49,16 +49,18 @@ class BesideTracking:
         for pool in (self._pool, self._solver):
             pool.shutdown(wait=False, cancel_futures=kind is not None)
 
-    def add(self, frame: Frame, people: list[Observation], is_cut: bool = False) -> None:
-        """Begin with this frame, the first of a scene if ``is_cut``.
+    def add(
+        self, frame: Frame, people: list[Observation], largest: Observation | None, is_cut: bool = False
+    ) -> None:
+        """Begin with this frame, the first of a scene if ``is_cut``; ``largest``: of the people.
 
         Waits for the background of the one before, and raises what went wrong there.
         """
         self.wait()
         points = [o.keypoints_px for o in people]
         self._looking = self._pool.submit(self.background.add, frame.image_rgb, frame.timestamp_s, points, is_cut)
-        if people:
-            self._largest = frame.timestamp_s, max(people, key=lambda o: o.region.side_px)
+        if largest is not None:
+            self._largest = frame.timestamp_s, largest
 
     def wait(self) -> None:
         """Until the backgrounds of the frames so far have been looked at."""

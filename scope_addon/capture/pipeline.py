@@ -274,9 +274,10 @@ def _observe(
                 observations = hands.step(lit, observations, frame.timestamp_s)
         builder.add(frame.index, frame.timestamp_s, observations)
         people = [o for _, o in observations]
+        largest = max(people, key=lambda o: o.region.side_px, default=None)
         with clock.stage("background"):
-            beside.add(frame, people, is_cut)
-        watch(frame, max(people, key=lambda o: o.region.side_px, default=None), live)
+            beside.add(frame, people, largest, is_cut)
+        watch(frame, largest, live)
         progress("finding the person", len(builder), max(expected, len(builder)))
     beside.wait()
     return builder
