@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import bpy
 
-from .captured_person import captured_armature, captured_people
+from .captured_person import anybody_captured, draw_meant
 from .panel import Tab
 
 
@@ -18,16 +18,13 @@ class SCOPE_PT_edit(Tab, bpy.types.Panel):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """There is a captured person."""
-        return captured_armature(context) is not None or bool(captured_people(context))
+        return anybody_captured(context)
 
     def draw(self, context: bpy.types.Context) -> None:
         """Draw the panel."""
         layout = self.layout
-        armature = captured_armature(context)
-        if armature is None:
-            layout.label(text="Select a captured person", icon="INFO")
+        if draw_meant(layout, context) is None:
             return
-        layout.label(text=armature.name, icon="OUTLINER_OB_ARMATURE")
         row = layout.row(align=True)
         for text, strength in (("Raw", 0.0), ("Normal", 1.0), ("Calm", 2.5)):
             row.operator("scope.smooth", text=text).strength = strength

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import bpy
 
-from .captured_person import captured_armature, captured_people
+from .captured_person import anybody_captured, draw_meant
 from .panel import Tab
 
 
@@ -40,14 +40,12 @@ class SCOPE_PT_retarget(Tab, bpy.types.Panel):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """There is a captured person."""
-        return captured_armature(context) is not None or bool(captured_people(context))
+        return anybody_captured(context)
 
     def draw(self, context: bpy.types.Context) -> None:
         """Draw the panel."""
         layout, settings = self.layout, context.scene.scope_retarget
-        source = captured_armature(context)
-        text = source.name if source else "Select a captured person"
-        layout.label(text=text, icon="OUTLINER_OB_ARMATURE" if source else "INFO")
+        draw_meant(layout, context)
         layout.prop(settings, "rig")
         if settings.rig is None:
             return
