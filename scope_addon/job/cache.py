@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The folder where finished captures are kept, so that the same footage is never captured twice.
 
-ROOT/captures/<key>/report.json, person1.npz, …    finished, complete
-ROOT/jobs/<name>/                                  being written; moved to captures/ when complete
-ROOT/kernels/                                      numba's machine code
+    ROOT/captures/<key>/report.json, person1.npz, …    finished, complete
+    ROOT/jobs/<name>/                                  being written; moved to captures/ when complete
+    ROOT/kernels/                                      numba's machine code
 """
 
 from __future__ import annotations
