@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from scope.solver.body import ASSETS
+from scope.solver.loaders.body_file import ASSETS
 from scope.tools.readme_pictures.__main__ import LARGEST_BYTES, PICTURES
 from scope.tools.readme_pictures.panel import GROUND, Panel
 from scope.tools.readme_pictures.shapes import stick_figure
