@@ -14,41 +14,35 @@ import cv2
 import numpy as np
 
 from ...solver.body import Body
-from ...solver.errors import NoPersonError, UsageError, VideoError
+from ...solver.errors import NoPersonError, VideoError
 from ...solver.names import BODY_JOINTS
 from ..motion import Motion
-from .adapters.box_detector import BoxDetector
 from .adapters.description import description_path
-from .adapters.keypoint_network import KeypointNetwork
 from .assemble import assemble_motion, corrected_stance
 from .beside import BesideTracking
-from .calibration import read_calibration
 from .camera import Camera, choose_camera
 from .camera_path import CameraPath
 from .camera_travel import camera_travel
 from .compact import compact
-from .execution import AUTO, Execution
+from .execution import Execution
 from .exposure import Exposure
 from .fitting import PreparedTrack, fit_track, prepare_track, refit_track
 from .focal_fits import FocalFits
-from .hand_measure import require_fingers
 from .hand_tracker import HandTracker
 from .leaps import mend_leaps
 from .left_right import repair_left_right
 from .limb_exchange import repair_limbs
 from .line_segments import Lines
 from .live_body import LiveBody
-from .networks import landmark_network_name
 from .observation import Observation
-from .parts import ALL_PARTS, Parts
+from .options import LARGEST, CaptureOptions, check_options, most_people
+from .parts import Parts
 from .people import PeopleBuilder
 from .placement import PlacedTrack, place_track
 from .scene_cuts import SceneCuts
-from .stature import require_stature
 from .track import Track
-from .tracker import MOST_PEOPLE, PeopleTracker
+from .tracker import PeopleTracker
 from .video import Frame, Video, open_video
-from .video_range import VideoRange, Wanted
 from .world import estimate_world, share_world
 
 # Called with the stage's name, what is done and the total (0: unknown). May raise CancelledError.
@@ -58,30 +52,6 @@ Watch = Callable[[Frame, Observation | None, LiveBody], None]
 
 UNSEEN_LEGS = 0.05  # confidence below which nothing is seen of the shanks
 MOST_TOLD = 4  # cuts of which the time is told
-
-LARGEST = "largest"
-ALL = "all"
-
-
-@dataclass(frozen=True)
-class CaptureOptions:
-    """How to capture; the defaults suit a phone clip of one person."""
-
-    quality: str = "best"  # fast, balanced, best
-    people: int | str = LARGEST  # how many at most; "all"; "largest": the most prominent one over the clip
-    heights_m: Sequence[float] = ()  # of the people, the most prominent one first; of further ones it is found
-    focal_mm: float | None = None
-    fov_deg: float | None = None
-    calibration: Path | None = None
-    wanted: Wanted = VideoRange()  # which frames
-    smoothing: bool = True
-    threads: int = 0  # 0: as many as there are cores
-    hands: bool = False  # fingers too; the body needs finger joints
-    provider: str = AUTO  # what the networks run on; see `execution`
-    detector: Path | None = None  # the user's own networks, ONNX files; see `adapters`
-    keypoints: Path | None = None
-    parts: Parts = ALL_PARTS  # for experiments
-
 
 @dataclass
 class Capture:
@@ -108,7 +78,7 @@ def capture(
     path = Path(path)
     check_options(body, options)
     clock = _Clock()
-    most = _most_people(options.people)
+    most = most_people(options.people)
     with open_video(path, options.wanted) as video:
         camera = choose_camera(
             video.width,
@@ -208,38 +178,6 @@ def capture(
         "warnings": warnings,
     }
     return Capture(motions, report)
-
-
-def check_options(body: Body, options: CaptureOptions) -> None:
-    """Refuse what no footage can be captured with, as far as it is known without opening a network.
-
-    :raises UsageError: an option has an impossible value, contradicts another one or does not suit the body.
-    :raises InputError: the calibration cannot be used.
-    """
-    _most_people(options.people)
-    landmark_network_name(options.quality)
-    Execution(options.provider)
-    if options.keypoints and not options.parts.lifter:
-        raise UsageError("the lifter cannot be left out with a keypoint file: such a network tells nothing of depth")
-    if options.hands:
-        require_fingers(body)
-    for height_m in options.heights_m:
-        require_stature(body, height_m)
-    if options.focal_mm is not None or options.fov_deg is not None:
-        choose_camera(1, 1, focal_mm=options.focal_mm, fov_deg=options.fov_deg, calibration=options.calibration)
-    elif options.calibration:
-        read_calibration(options.calibration)
-
-
-def check_networks(options: CaptureOptions) -> None:
-    """Open the user's networks once, for a batch to refuse them before its first clip.
-
-    :raises ModelFileError: one of them cannot be used.
-    """
-    if options.detector:
-        BoxDetector(options.detector, threads=1)
-    if options.keypoints:
-        KeypointNetwork(options.keypoints, threads=1)
 
 
 def _observe(
@@ -401,16 +339,6 @@ def hand_frames(motion: Motion) -> dict[str, int]:
     wrists = {f"{side}_hand_frames": f"hand/{side}_wrist" for side in ("left", "right")}
     confidence = {key: motion.keypoints2d[:, names.index(name), 2] for key, name in wrists.items() if name in names}
     return {key: int((values > 0).sum()) for key, values in confidence.items()}
-
-
-def _most_people(people: int | str) -> int:
-    if people == LARGEST:
-        return 1
-    if people == ALL:
-        return MOST_PEOPLE
-    if isinstance(people, str) or not 1 <= people <= MOST_PEOPLE:
-        raise UsageError(f"people must be {LARGEST}, {ALL} or 1 to {MOST_PEOPLE}, but is {people!r}")
-    return people
 
 
 def _at(times_s: list[float]) -> str:

@@ -51,27 +51,13 @@ def run(request: JobRequest, job_folder: Path, reporter: Reporter) -> int:
         reporter.progress("starting", 0, 0)
         # Imported here, so that a missing wheel becomes a sentence in the panel as well.
         from ...solver.body import load_body
-        from ..capture.pipeline import CaptureOptions, capture
-        from ..capture.video_range import VideoRange
+        from ..capture.options import capture_options
+        from ..capture.pipeline import capture
         from .preview import PreviewWriter
 
-        options = CaptureOptions(
-            quality=request.quality,
-            people=request.people,
-            heights_m=() if request.height_m is None else (request.height_m,),
-            focal_mm=request.focal_mm,
-            fov_deg=request.fov_deg,
-            calibration=Path(request.calibration) if request.calibration else None,
-            wanted=VideoRange(request.start_s, float("inf") if request.end_s is None else request.end_s),
-            smoothing=request.smoothing,
-            hands=request.hands,
-            threads=request.threads,
-            provider=request.provider,
-            detector=Path(request.detector) if request.detector else None,
-            keypoints=Path(request.keypoints) if request.keypoints else None,
-        )
         with PreviewWriter(job_folder, reporter.send) as watch:
-            result = capture(request.footage, load_body(request.body), options, reporter.progress, watch)
+            body, options = load_body(request.values["body"]), capture_options(request.values)
+            result = capture(request.footage, body, options, reporter.progress, watch)
         names = [f"person{i + 1}.npz" for i in range(len(result.motions))]
         reporter.progress("writing", 0, 0)
         for name, motion in zip(names, result.motions, strict=True):

@@ -6,7 +6,6 @@ The modal operator calls ``step`` on a timer; scripts and tests call it in a loo
 
 from __future__ import annotations
 
-import math
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -21,8 +20,10 @@ from ..job.process import ROOT, START_SCRIPT, WorkerProcess
 from ..job.progress import JobProgress
 from ..job.request import JobRequest, code_version
 from ..motion import Motion
+from ..options import Place
 from ..scene.build import BuildOptions, BuildResult, build_scene
 from . import preview_picture
+from .declared_properties import option_values
 from .preferences import cache, preferences
 from .result import show_result
 
@@ -113,7 +114,7 @@ class CaptureJob:
 
     def _build(self, scene: bpy.types.Scene, captured: CachedCapture) -> None:
         motions = [Motion.load(path) for path in captured.motions]
-        body = load_body(self._request.body)
+        body = load_body(self._request.values["body"])
         warnings = list(captured.report.get("warnings", ()))
         footage: str | None = self._request.footage
         if not Path(self._request.footage).is_file():
@@ -121,7 +122,7 @@ class CaptureJob:
             footage = None
         with _window_shows(scene):
             result = build_scene(motions, body, footage, self._options)
-        remember_motions(result, captured.motions, self._request.body)
+        remember_motions(result, captured.motions, self._request.values["body"])
         report = dict(captured.report, warnings=warnings + result.warnings)
         show_result(scene.scope.result, self._request.footage, report, result)
 
@@ -142,32 +143,15 @@ def capture_request(scene: bpy.types.Scene) -> JobRequest:
         raise UsageError("the part of the video ends before it begins; change From or To")
     if settings.lens == "FILE" and not settings.calibration_file:
         raise UsageError("choose the file with the lens's calibration, or another lens")
-    body = {"SCOPE": "scope", "SCOPE_H": "scope_h"}.get(settings.body)
-    if body is None:
+    values = option_values(settings, Place.PANEL) | option_values(chosen, Place.PREFERENCES)
+    if values["body"] == "file":
         path = settings.body_file or (chosen.body_file if chosen else "")
         if not path:
             raise UsageError("choose a body file, here or in the preferences, or use the built-in body")
-        body = bpy.path.abspath(path)
-    if settings.hands:
-        body = body_with_hands(body)
-    return JobRequest(
-        footage=str(footage),
-        body=body,
-        quality=settings.quality.lower(),
-        people=settings.people_count if settings.people == "COUNT" else settings.people.lower(),
-        height_m=settings.height_cm / 100 or None,
-        focal_mm=settings.focal_mm if settings.lens == "FOCAL" else None,
-        fov_deg=math.degrees(settings.fov) if settings.lens == "FOV" else None,
-        calibration=bpy.path.abspath(settings.calibration_file) if settings.lens == "FILE" else "",
-        start_s=settings.range_start if settings.use_range else 0.0,
-        end_s=settings.range_end if settings.use_range else None,
-        smoothing=settings.smoothing,
-        hands=settings.hands,
-        detector=bpy.path.abspath(chosen.detector_file) if chosen else "",
-        keypoints=bpy.path.abspath(chosen.keypoints_file) if chosen else "",
-        provider=chosen.provider.lower() if chosen else "auto",
-        threads=chosen.threads if chosen else 0,
-    )
+        values["body"] = bpy.path.abspath(path)
+    if values["hands"]:
+        values["body"] = body_with_hands(values["body"])
+    return JobRequest(str(footage), **values)
 
 
 def build_options(scene: bpy.types.Scene) -> BuildOptions:

@@ -8,10 +8,10 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-from scope.scope_addon import cli_options
 from scope.scope_addon.capture import networks
 from scope.scope_addon.capture.execution import CHOICES, CPU, PROVIDERS, Execution, OneAtATime
 from scope.scope_addon.capture.networks import network_path, open_session
+from scope.scope_addon.options import option
 from scope.solver.errors import SetupError, UsageError
 
 CPU_NAME = "CPUExecutionProvider"
@@ -124,7 +124,7 @@ def test_the_line_that_says_it() -> None:
 
 
 def test_the_command_line_offers_the_same() -> None:
-    assert sorted(cli_options.PROVIDERS) == sorted(CHOICES)
+    assert sorted(option("provider").values) == sorted(CHOICES)
 
 
 def test_the_real_processor() -> None:
