@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Every option of a capture, declared once. Standard library only: neither bpy nor numpy, nor other parts of Scope.
 
-Made from these records: the arguments of the command line (`cli_options`), the request to the worker (`job.request`),
-the properties of the panel and of the preferences (`ui.declared_properties`), and the values of
-`capture.options.CaptureOptions`, whose typed fields a test compares with them. To add an option, add its record to
-`capture`, `networks` or `output`.
+Made from these records: the arguments of the command line (`command_line.arguments`), the request to the worker
+(`job.request`), and the properties of the panel and of the preferences (`ui.declared_properties`). The typed fields of
+`capture.options.CaptureOptions` take their defaults from them, and a test compares the two. To add an option, add its
+record to `capture`, `networks` or `output`.
 """
 
 from __future__ import annotations

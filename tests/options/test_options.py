@@ -14,7 +14,7 @@ from scope.scope_addon.capture.execution import CHOICES
 from scope.scope_addon.capture.networks import LANDMARK_NETWORK_OF_QUALITY
 from scope.scope_addon.capture.options import CaptureOptions, capture_options, check_options
 from scope.scope_addon.cli import build_parser
-from scope.scope_addon.cli_options import body_and_options, given_options, option_values
+from scope.scope_addon.command_line.arguments import body_and_options, given_options, option_values
 from scope.scope_addon.job.request import JobRequest
 from scope.scope_addon.options import OPTIONS, Argument, Option, Place, option, options_at
 from scope.scope_addon.retarget.rig_source import ROOTS

@@ -7,12 +7,12 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..solver.body import Body, body_with_hands
-from ..solver.errors import UsageError
-from .options import Option, Place, options_at
+from ...solver.body import Body, body_with_hands
+from ...solver.errors import UsageError
+from ..options import Option, Place, options_at
 
 if TYPE_CHECKING:
-    from .capture.options import CaptureOptions
+    from ..capture.options import CaptureOptions
 
 
 def named_path(text: str) -> Path:
@@ -60,8 +60,8 @@ def body_and_options(args: argparse.Namespace) -> tuple[Body, CaptureOptions]:
 
     :raises ScopeError: an argument has an impossible value, or there is no such body.
     """
-    from ..solver.body import load_body
-    from .capture.options import capture_options, check_options
+    from ...solver.body import load_body
+    from ..capture.options import capture_options, check_options
 
     values = option_values(args)
     options = capture_options(values)
