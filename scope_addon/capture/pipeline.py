@@ -53,6 +53,7 @@ Watch = Callable[[Frame, Observation | None, LiveBody], None]
 UNSEEN_LEGS = 0.05  # confidence below which nothing is seen of the shanks
 MOST_TOLD = 4  # cuts of which the time is told
 
+
 @dataclass
 class Capture:
     """One motion per person and the machine-readable report."""

@@ -227,7 +227,7 @@ def test_a_part_of_the_video_is_asked_for(fake_worker, footage):
     settings.use_range, settings.range_start, settings.range_end = True, 1.5, 3.0
     assert bpy.ops.scope.capture() == {"FINISHED"}
     settings.range_end = 1.0
-    with pytest.raises(RuntimeError, match="ends before it begins"):
+    with pytest.raises(RuntimeError, match="ends before it starts"):
         bpy.ops.scope.capture()
 
 
