@@ -149,7 +149,7 @@ def test_an_interrupt_while_the_overlay_is_drawn_leaves_whole_files_and_says_so(
     options = ["--end", "0.1", "--quality", "fast", "-o", motion, "--overlay", tmp_path / "a.mp4"]
     status, _, err = run(capsys, "capture", SAMPLE, *options)
     assert status == 130
-    assert err == "scope: stopped; some results may be there already, each of them whole\n"
+    assert err == "scope: stopped; some results may have been written already, each of them complete\n"
     assert files_below(tmp_path) == ["a.npz"]
 
 
@@ -211,10 +211,10 @@ def test_what_c_prints_before_and_meanwhile_is_no_part_of_the_report():
     """Blender's version waits in C's buffer when the command begins."""
     code = (
         "import ctypes\n"
-        "from scope.scope_addon.cli import _stdout_for_report\n"
+        "from scope.scope_addon.command_line.terminal import stdout_for_report\n"
         "c = ctypes.CDLL(None)\n"
         "c.puts(b'Blender 9.9')\n"
-        "with _stdout_for_report() as stdout:\n"
+        "with stdout_for_report() as stdout:\n"
         "    c.puts(b'exporting')\n"
         "    print('{}', file=stdout)\n"
     )

@@ -27,7 +27,7 @@ CAPTURE = {
         "scope_addon/capture/camera",
         "scope_addon/capture/perception",
     },
-    "scope_addon/capture/options": {"scope_addon/capture/fitting"},
+    "scope_addon/capture/options": {"scope_addon/capture/fitting", "scope_addon/options"},
     "scope_addon/capture/stages": {"scope_addon/capture/world", "scope_addon/capture/options"},
     "scope_addon/capture": {"scope_addon/capture/stages", "scope_addon/capture/overlay"},
 }
@@ -36,6 +36,7 @@ ROOMS = {
     "scope_addon/files": {"solver"},  # the files directly in scope_addon that every room may use, see SHARED
     "scope_addon/kinematics": {"scope_addon/files"},
     **CAPTURE,
+    "scope_addon/options": {"scope_addon/files"},
     "scope_addon/edit": {"scope_addon/kinematics"},
     "scope_addon/retarget": {"scope_addon/edit"},
     "scope_addon/scene": {"scope_addon/scene/character", "scope_addon/retarget"},
@@ -43,7 +44,8 @@ ROOMS = {
     "scope_addon/scene/character": {"scope_addon/scene/animation_data", "scope_addon/edit"},
     "scope_addon/job": {"scope_addon/capture"},
     "scope_addon/ui": {"scope_addon/scene", "scope_addon/job", "scope_addon/cli"},
-    "scope_addon/cli": {"scope_addon/scene", "scope_addon/job"},
+    "scope_addon/command_line": {"scope_addon/scene", "scope_addon/job"},
+    "scope_addon/cli": {"scope_addon/command_line"},
 }
 SHARED = ("errors", "motion", "atomic_write", "footage", "review_spans", "__init__")
 LARGEST_FOLDER = 14  # Python files

@@ -1,48 +1,66 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The options of a capture, and what can be refused before any footage is opened."""
+"""The options of a capture as the pipeline reads them, and what can be refused before any footage is opened."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from ...solver.body import Body
 from ..errors import UsageError
+from ..options import OPTIONS, Place, options_at
+from ..options.capture import ALL, LARGEST
 from .camera.calibration import read_calibration
 from .camera.intrinsics import choose_camera
 from .fitting.ablation import ALL_PARTS, Parts
 from .fitting.hand_measurements import require_fingers
 from .fitting.stature import require_stature
-from .media.video_range import VideoRange, Wanted
+from .media.video_range import VideoRange, Wanted, parse_range
 from .perception.adapters.detectors.box_detector import BoxDetector
 from .perception.adapters.keypoints.keypoint_network import KeypointNetwork
-from .perception.execution import AUTO, Execution
+from .perception.execution import Execution
 from .perception.sessions import landmark_network_name
 from .tracking.tracker import MOST_PEOPLE
 
-LARGEST = "largest"
-ALL = "all"
+_DEFAULT = {option.name: option.default for option in OPTIONS}
 
 
 @dataclass(frozen=True)
 class CaptureOptions:
-    """How to capture; the defaults suit a phone clip of one person."""
+    """How to capture; the defaults suit a phone clip of one person.
 
-    quality: str = "best"  # fast, balanced, best
-    people: int | str = LARGEST  # how many at most; "all"; "largest": the most prominent one over the clip
-    heights_m: Sequence[float] = ()  # of the people, the most prominent one first; of further ones it is found
-    focal_mm: float | None = None
-    fov_deg: float | None = None
-    calibration: Path | None = None
+    Its fields are the options of `Place.CAPTURE`, typed; ``start``, ``end`` and ``fps`` together are ``wanted``.
+    """
+
+    quality: str = _DEFAULT["quality"]  # fast, balanced, best
+    people: int | str = _DEFAULT["people"]  # how many at most; "all"; "largest": the most prominent one over the clip
+    heights_m: Sequence[float] = _DEFAULT["heights_m"]  # most prominent person first; others are estimated
+    focal_mm: float | None = _DEFAULT["focal_mm"]
+    fov_deg: float | None = _DEFAULT["fov_deg"]
+    calibration: Path | None = _DEFAULT["calibration"]
     wanted: Wanted = VideoRange()  # which frames
-    smoothing: bool = True
-    threads: int = 0  # 0: as many as there are cores
-    hands: bool = False  # fingers too; the body needs finger joints
-    provider: str = AUTO  # what the networks run on; see `execution`
-    detector: Path | None = None  # the user's own networks, ONNX files; see `adapters`
-    keypoints: Path | None = None
+    smoothing: bool = _DEFAULT["smoothing"]
+    threads: int = _DEFAULT["threads"]  # 0: as many as there are cores
+    hands: bool = _DEFAULT["hands"]  # the fingers as well; the body needs finger joints
+    provider: str = _DEFAULT["provider"]  # what the networks run on; see `execution`
+    detector: Path | None = _DEFAULT["detector"]  # the user's own networks, ONNX files; see `adapters`
+    keypoints: Path | None = _DEFAULT["keypoints"]
     parts: Parts = ALL_PARTS  # for experiments
+
+
+def capture_options(values: Mapping[str, Any]) -> CaptureOptions:
+    """Convert the values of a command line or of a request to the pipeline's options.
+
+    :param values: by the names of the options; further ones are ignored.
+    :raises UsageError: a time or the frame rate cannot be parsed, or the end does not come after the start.
+    """
+    fields: dict[str, Any] = {}
+    for option in options_at(Place.CAPTURE | Place.WORKER):
+        value = values[option.name]
+        fields[option.name] = Path(value) if option.value_type is Path and value is not None else value
+    return CaptureOptions(wanted=parse_range(values["start"], values["end"], values["fps"]), **fields)
 
 
 def check_options(body: Body, options: CaptureOptions) -> None:
@@ -55,7 +73,7 @@ def check_options(body: Body, options: CaptureOptions) -> None:
     landmark_network_name(options.quality)
     Execution(options.provider)
     if options.keypoints and not options.parts.lifter:
-        raise UsageError("the lifter cannot be left out with a keypoint file: such a network tells nothing of depth")
+        raise UsageError("the lifter cannot be left out with a keypoint file: such a network does not estimate depth")
     if options.hands:
         require_fingers(body)
     for height_m in options.heights_m:
@@ -64,6 +82,9 @@ def check_options(body: Body, options: CaptureOptions) -> None:
         choose_camera(1, 1, focal_mm=options.focal_mm, fov_deg=options.fov_deg, calibration=options.calibration)
     elif options.calibration:
         read_calibration(options.calibration)
+    for option in options_at(Place.CAPTURE):  # ranges without a message of their own above
+        if problem := option.range_error(getattr(options, option.name)):
+            raise UsageError(f"{option.flag} {problem}")
 
 
 def check_networks(options: CaptureOptions) -> None:

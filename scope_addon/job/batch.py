@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A folder of footage, one process per clip: what fails harms nothing else, what is finished is not done again.
+"""Capture a folder of footage, one process per clip: a clip that fails affects no other, finished clips are skipped.
 
-Beside the results lies ``scope-batch.json``, renewed after every clip, so that a batch that was stopped goes on where
-it was. A clip is finished when its content (SHA-256), the options, the program and the result files are the same.
+Next to the results, ``scope-batch.json`` is rewritten after every clip, so that a batch that was stopped continues
+where it was. A clip is finished if its content (SHA-256), the options, the program and the result files are the same.
 """
 
 from __future__ import annotations
@@ -10,7 +10,6 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-import re
 import subprocess
 import threading
 import time
@@ -23,7 +22,8 @@ from typing import IO
 from ...solver.errors import InputError
 from ..atomic_write import written_beside
 from ..errors import NO_PERSON, OutputError, UsageError
-from ..footage import FOOTAGE_SUFFIXES, PICTURE_SUFFIXES, VIDEO_SUFFIXES, is_sequence, pictures_in
+from ..footage import FOOTAGE_SUFFIXES, PICTURE_SUFFIXES
+from .clips import OVERLAY, find_clips
 from .parent import GRACE_S
 from .request import code_version
 
@@ -31,21 +31,19 @@ REPORT_NAME = "scope-batch.json"
 STATUSES = ("done", "skipped", "no_person", "failed")
 _ROOT = Path(__file__).resolve().parents[2]
 _TURN_S = 1.0
-_OVERLAY = ".overlay"
-_PERSON = re.compile(r"(.+)\.person[0-9]+")  # as person_paths names the results of one of several people
-# Ctrl-C on a terminal comes to the batch alone, which stops its clips once: twice would foil their cleaning up.
+# Ctrl-C on a terminal reaches the batch alone, which stops its clips once: a second signal would end their clean-up.
 _NEW_GROUP = getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0)
 _OWN_GROUP: dict = {"creationflags": _NEW_GROUP} if _NEW_GROUP else {"process_group": 0}
-_GRACE_S = GRACE_S + 3.0  # that a clip has to clean up when the batch is stopped
+_GRACE_S = GRACE_S + 3.0  # for a clip to clean up after the batch is stopped
 
 
 class Batch:
     """One folder of footage and one folder of results.
 
-    :param program: how a process is started that understands ``capture FILE -o OUT --json``.
-    :param options: of every capture: option string to value, None where it takes none.
+    :param program: command that takes ``capture FILE -o OUT --json``.
+    :param options: arguments of every capture: flag to text, None where the flag takes no value.
     :param suffixes: of the result files, such as ``.npz``.
-    :raises InputError: no such folder. :raises OutputError: the results' folder cannot be made.
+    :raises InputError: no such folder. :raises OutputError: the folder of the results cannot be made.
     """
 
     def __init__(
@@ -67,22 +65,14 @@ class Batch:
         self.report_file = out / REPORT_NAME
         self._program, self._options, self._suffixes, self._overlays = list(program), options, suffixes, overlays
         self._basis = self._key_basis()
-        self._running: dict[subprocess.Popen, IO] = {}  # and what keeps it running while it is open
+        self._running: dict[subprocess.Popen, IO] = {}  # to its stdin: it ends when that is closed
         self._starting = threading.Lock()
         self._stopped = False
 
     def clips(self, recursive: bool) -> dict[str, Path]:
-        """Name of the result without suffix, to the footage; in order. Results of an earlier batch are not footage."""
-        found = sorted(self._below(self.folder, recursive))
-        stems = Counter(self._stem(path) for path in found)
-        names = {}
-        for path in found:
-            relative = self._relative(path)
-            short = path.is_file() and stems[self._stem(path)] == 1
-            names[path] = (relative.with_suffix("") if short else relative).as_posix()
-        while shared := self._shared(names):  # the whole name of one may be what another is called without suffix
-            names |= shared
-        return {name: path for path, name in names.items()}
+        """Return the footage by the name of its results; see `find_clips`."""
+        several = self._options.get("--people") not in (None, "1", "largest")
+        return find_clips(self.folder, self.out, recursive=recursive, several_people=several)
 
     def run(
         self,
@@ -93,9 +83,9 @@ class Batch:
         progress: Callable[[str, int, int], None] = lambda stage, done, total: None,
         say: Callable[[str], None] = lambda text: None,
     ) -> dict:
-        """Capture what is not finished; returns the report, which is also on disk.
+        """Capture the clips that are not finished and return the report, which is also written to disk.
 
-        ``exit_status`` is 1 when a clip failed, else 3 when one showed no person, else 0.
+        ``exit_status`` is 1 if a clip failed, else 3 if no person was found in one, else 0.
 
         :raises UsageError: no footage. :raises OutputError: the report cannot be written.
         """
@@ -103,7 +93,7 @@ class Batch:
         if not clips:
             raise UsageError(
                 f"no footage in {self.folder}: no file ends with one of {' '.join(FOOTAGE_SUFFIXES)}"
-                + ("" if recursive else "; --recursive looks into the folders below")
+                + ("" if recursive else "; --recursive includes the folders below")
             )
         before = {} if again else self._earlier()
         threads = {} if jobs == 1 else {"--threads": str(max(1, (os.cpu_count() or 1) // jobs))}
@@ -116,7 +106,7 @@ class Batch:
                 progress("clips", 0, len(clips))
                 pending = set(futures)
                 while pending:
-                    # In turns: a signal that another thread is given wakes this one no sooner.
+                    # With a timeout: a signal delivered to another thread would not wake this one.
                     finished, pending = wait(pending, timeout=_TURN_S, return_when=FIRST_COMPLETED)
                     if not finished:
                         progress("clips", len(entries), len(clips))
@@ -137,7 +127,7 @@ class Batch:
         return report
 
     def _one(self, name: str, path: Path, earlier: dict | None, threads: dict[str, str]) -> dict:
-        """Capture one clip, unless it is finished; never raises for what a clip does wrong."""
+        """Capture one clip unless it is finished, and return its entry; a clip that fails raises nothing."""
         start = time.monotonic()
         entry: dict = {"file": self._relative(path).as_posix(), "name": name}
         try:
@@ -152,7 +142,7 @@ class Batch:
             arguments += ["-o", f"{target}{suffix}"]
         if self._overlays:
             suffix = ".png" if path.suffix.lower() in PICTURE_SUFFIXES else ".mp4"
-            arguments += ["--overlay", f"{target}{_OVERLAY}{suffix}"]
+            arguments += ["--overlay", f"{target}{OVERLAY}{suffix}"]
         for option, value in (threads | self._options).items():
             arguments.append(option if value is None else f"{option}={value}")  # one argument: a value may begin with -
         try:
@@ -170,7 +160,7 @@ class Batch:
         return entry | {"status": "failed", "message": _sentence(stderr) or f"the process ended with status {status}"}
 
     def _call(self, arguments: list[str]) -> tuple[int, str, str]:
-        with self._starting:  # who stops the batch knows of every process
+        with self._starting:  # _stop() must know of every process
             if self._stopped:
                 return 130, "", ""
             process = subprocess.Popen(
@@ -184,7 +174,7 @@ class Batch:
                 **_OWN_GROUP,
             )
             assert process.stdin is not None
-            # Taken away from communicate(), which would close it at once.
+            # Kept from communicate(), which would close it at once.
             lifeline, process.stdin = process.stdin, None
             self._running[process] = lifeline
         try:
@@ -208,19 +198,19 @@ class Batch:
                 process.kill()
 
     def _key_basis(self) -> hashlib._Hash:
-        """Of program and options, the same for every clip."""
+        """Hash what is the same for every clip: the program, the options and the files they name."""
         digest = hashlib.sha256(code_version(_ROOT).encode())
         values = {k: v for k, v in self._options.items() if k != "--threads"}
         digest.update(json.dumps([sorted(values.items()), list(self._suffixes), self._overlays]).encode())
         for value in values.values():
-            named = [Path(value)] if value else []  # a body, a calibration, a network, which may have a JSON beside it
-            named += [path.with_suffix(".json") for path in named if path.suffix == ".onnx"]
+            named = [Path(value)] if value else []  # a body, a calibration, a network
+            named += [path.with_suffix(".json") for path in named if path.suffix == ".onnx"]  # its description
             for file in filter(Path.is_file, named):
                 _add_content(digest, file)
         return digest
 
     def _key(self, path: Path) -> str:
-        """Of program, options and footage together."""
+        """Hash the program, the options and the footage."""
         digest = self._basis.copy()
         for file in sorted(path.iterdir()) if path.is_dir() else [path]:
             if file.is_file():
@@ -234,7 +224,7 @@ class Batch:
         return isinstance(outputs, list) and all(isinstance(p, str) and (self.out / p).is_file() for p in outputs)
 
     def _earlier(self) -> dict[str, dict]:
-        """Entries of the last report by name; none where it is missing or damaged."""
+        """Return the entries of the last report by name; none if it is missing or damaged."""
         try:
             entries = json.loads(self.report_file.read_text(encoding="utf-8"))["files"]
             return {e["name"]: e for e in entries if isinstance(e["status"], str)}
@@ -242,7 +232,7 @@ class Batch:
             return {}
 
     def _report(self, entries: dict[str, dict], before: dict[str, dict]) -> dict:
-        """Write and return the report. Earlier entries stay until their turn, or a batch stopped early forgets them."""
+        """Write and return the report. Entries of clips whose turn has not come are kept from the last one."""
         counts = Counter(e["status"] for e in entries.values())
         status = 1 if counts["failed"] else NO_PERSON if counts["no_person"] else 0
         report = {
@@ -262,55 +252,14 @@ class Batch:
     def _relative(self, path: Path) -> Path:
         return path.relative_to(self.folder)
 
-    def _shared(self, names: dict[Path, str]) -> dict[Path, str]:
-        """The whole names of those whose shortened one is another clip's, or that of one of its people's results."""
-        folded = {path: name.casefold() for path, name in names.items()}
-        counts = Counter(folded.values())
-        several = self._options.get("--people") not in (None, "1", "largest")
-        shared = {}
-        for path, name in folded.items():
-            person = _PERSON.fullmatch(name) if several else None
-            if counts[name] > 1 or (person and person[1] in counts):
-                shared[path] = self._relative(path).as_posix()
-        return {path: name for path, name in shared.items() if name != names[path]}
-
-    def _stem(self, path: Path) -> str:
-        """What two clips must not share: many systems take a.npz and A.npz for one file."""
-        return self._relative(path).with_suffix("").as_posix().casefold()
-
-    def _below(self, folder: Path, recursive: bool) -> list[Path]:
-        found: list[Path] = []
-        for path in folder.iterdir():
-            suffix = path.suffix.lower()
-            if path.name.startswith(".") or path == self.out or path.stem.endswith(_OVERLAY):
-                continue
-            if path.is_dir():
-                if _is_clip(path):
-                    found.append(path)
-                elif recursive:
-                    found += self._below(path, recursive)
-            # Opening a pipe would wait for a writer; a link that leads nowhere is told as a clip that fails.
-            elif suffix in FOOTAGE_SUFFIXES and (path.is_file() or not path.exists()):
-                found.append(path)
-        return found
-
 
 def _add_content(digest: hashlib._Hash, file: Path) -> None:
     with file.open("rb") as stream:
         digest.update(hashlib.file_digest(stream, "sha256").digest())
 
 
-def _is_clip(folder: Path) -> bool:
-    """Whether a folder is one numbered sequence, and holds no video or folder beside it."""
-    try:
-        others = [p for p in folder.iterdir() if p.is_dir() or p.suffix.lower() in VIDEO_SUFFIXES]
-        return is_sequence(pictures_in(folder)) and all(p.name.startswith(".") for p in others)
-    except OSError:
-        return False
-
-
 def _last_object(text: str) -> dict | None:
-    """The report on the last line; what the program said before it is not ours."""
+    """Return the report on the last line; lines before it are other output of the program."""
     for line in reversed(text.splitlines()):
         if line.startswith("{"):
             try:
@@ -321,7 +270,7 @@ def _last_object(text: str) -> dict | None:
 
 
 def _sentence(stderr: str) -> str:
-    """What went wrong, without the program's name before it."""
+    """Return the error message without the prefix of the program's name."""
     lines = [line.strip() for line in stderr.splitlines() if line.strip()]
     own = [line.removeprefix("scope: ") for line in lines if line.startswith("scope: ") and "warning:" not in line]
     return (own or lines or [""])[-1]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The parent's side of a job: starts the worker, takes its lines without ever waiting, ends it."""
+"""The parent's side of a job: start the worker, read its messages without blocking, end it."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ _WINDOWS_FLAGS = getattr(subprocess, "CREATE_NO_WINDOW", 0) | getattr(subprocess
 
 
 class WorkerFailedError(ScopeError):
-    """The worker said why it failed, or died without a word."""
+    """The worker reported an error, or ended without a result."""
 
 
 class WorkerProcess:
-    """One running worker. Call ``poll`` now and then; ``close`` ends it and removes its folder, in any state."""
+    """One running worker. Call ``poll`` regularly; ``close`` ends it and removes its folder, in any state."""
 
     def __init__(
         self,
@@ -39,15 +39,15 @@ class WorkerProcess:
         python: Sequence[str] = (sys.executable,),
         script: Path = START_SCRIPT,
     ) -> None:
-        """Start it.
+        """Start the worker.
 
-        :param kernels: where numba keeps compiled code; beside the sources when None.
+        :param kernels: folder of numba's compiled code; next to the sources if None.
         :param python: interpreter and its arguments; inside Blender ``[sys.executable, *bpy.app.python_args]``.
         :raises SetupError: the process cannot be started.
         """
         self.job_folder = job_folder
         self.finished = False
-        # An entry "" is the current folder, which isolated Python leaves out for good reason.
+        # An entry "" is the current folder, which isolated Python leaves out on purpose.
         search_path = [p for p in sys.path if p and os.path.exists(p)]
         command = [*python, str(script), str(ROOT), str(job_folder), *search_path]
         environment = dict(os.environ, **({"NUMBA_CACHE_DIR": str(kernels)} if kernels else {}))
@@ -66,25 +66,25 @@ class WorkerProcess:
             raise SetupError(f"cannot start {python[0]}: {error.strerror}; install Blender again") from error
         self._lines: queue.SimpleQueue[bytes | None] = queue.SimpleQueue()
         threading.Thread(target=self._read, name="scope-worker-lines", daemon=True).start()
-        with contextlib.suppress(OSError):  # it died already; poll() says so
+        with contextlib.suppress(OSError):  # it has ended already; poll() reports that
             assert self._process.stdin is not None
             self._process.stdin.write(request.to_json().encode() + b"\n")
             self._process.stdin.flush()
 
     @property
     def pid(self) -> int:
-        """Of the worker."""
+        """Process id of the worker."""
         return self._process.pid
 
     @property
     def alive(self) -> bool:
-        """Whether the process still runs."""
+        """Whether the process is still running."""
         return self._process.poll() is None
 
     def poll(self) -> list[dict]:
-        """The messages since the last call; ``finished`` after the result.
+        """Return the messages since the last call; ``finished`` is True after the result.
 
-        :raises WorkerFailedError: the worker reported an error or died.
+        :raises WorkerFailedError: the worker reported an error or ended without a result.
         """
         messages: list[dict] = []
         while True:
@@ -94,7 +94,7 @@ class WorkerProcess:
                 return messages
             if line is None:
                 if not self.finished:
-                    raise WorkerFailedError(self._last_words())
+                    raise WorkerFailedError(self._cause_of_end())
                 return messages
             message = _parse(line)
             if message is None:
@@ -105,7 +105,7 @@ class WorkerProcess:
             messages.append(message)
 
     def wait(self, timeout_s: float = 5.0) -> None:
-        """After the result: let the worker end, so that nothing holds its files when they are moved."""
+        """After the result, wait for the worker to end, so that its files are closed when they are moved."""
         with contextlib.suppress(subprocess.TimeoutExpired):
             self._process.wait(timeout_s)
         self._end()
@@ -126,15 +126,15 @@ class WorkerProcess:
             self._process.wait(timeout=5)
 
     def _read(self) -> None:
-        """In a thread: pipes cannot be read without waiting on every system."""
+        """Read in a thread: not every system can read pipes without blocking."""
         assert self._process.stdout is not None
         with contextlib.suppress(OSError, ValueError), self._process.stdout as stream:
             for line in stream:
                 self._lines.put(line)
         self._lines.put(None)
 
-    def _last_words(self) -> str:
-        """One sentence about a worker that died without saying why."""
+    def _cause_of_end(self) -> str:
+        """Describe in one sentence how a worker ended that reported no error."""
         with contextlib.suppress(subprocess.TimeoutExpired):
             self._process.wait(timeout=5)
         code = self._process.returncode

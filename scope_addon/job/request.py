@@ -1,42 +1,40 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a worker is asked to do, and the key under which its result can be found again."""
+"""The request to a worker, and the key of its result in the cache."""
 
 from __future__ import annotations
 
 import hashlib
 import json
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from ..errors import UsageError
+from ..options import Place, options_at
 
 _SAMPLE_BYTES = 1 << 20  # of the footage's beginning and end; reading gigabytes would hold up the window
 
 
-@dataclass(frozen=True)
 class JobRequest:
-    """One capture. Everything but ``threads`` and ``provider`` decides the result."""
+    """One capture: the footage, and a value for each option of `Place.WORKER`."""
 
-    footage: str
-    body: str = "scope"  # a built-in body's name or a file
-    quality: str = "best"
-    people: int | str = "largest"  # how many at most, "all", or "largest": the most prominent one
-    height_m: float | None = None  # of the most prominent person; None: it is found
-    focal_mm: float | None = None  # 35 mm equivalent
-    fov_deg: float | None = None  # along the longer side
-    calibration: str = ""  # a JSON file; empty: none
-    start_s: float = 0.0  # of the video
-    end_s: float | None = None  # None: to its end
-    smoothing: bool = True
-    hands: bool = False  # fingers too, on a body that has them
-    detector: str = ""  # the user's own networks, ONNX files; empty: ours
-    keypoints: str = ""
-    provider: str = "auto"  # what the networks run on
-    threads: int = 0  # 0: as many as there are cores
+    def __init__(self, footage: str, **values: Any) -> None:
+        """Fill in the defaults.
+
+        :raises UsageError: there is no such option, or a value is of the wrong type or none of the choices.
+        """
+        self.footage = footage
+        self.values: dict[str, Any] = _checked(values)
+
+    def __eq__(self, other: object) -> bool:
+        """Same footage and same values."""
+        return isinstance(other, JobRequest) and (self.footage, self.values) == (other.footage, other.values)
+
+    __hash__ = None  # type: ignore[assignment]
 
     def to_json(self) -> str:
         """One line."""
-        return json.dumps(asdict(self))
+        return json.dumps({"footage": self.footage, **self.values})
 
     @classmethod
     def from_json(cls, text: str) -> JobRequest:
@@ -52,22 +50,31 @@ class JobRequest:
         :param code_version: changes whenever the program might capture differently.
         :raises OSError: the footage cannot be read.
         """
-        values = asdict(self)
-        del values["threads"], values["provider"], values["footage"]
+        options = [option for option in options_at(Place.WORKER) if option.decides_result]
+        values = {option.name: self.values[option.name] for option in options}
         digest = hashlib.sha256(json.dumps([values, code_version], sort_keys=True).encode())
         _add_file(digest, Path(self.footage))
-        for file in (Path(self.body), Path(self.calibration)):
-            if file.is_file():
-                _add_file(digest, file)
-        for network in filter(None, (self.detector, self.keypoints)):
-            for file in (Path(network), Path(network).with_suffix(".json")):
-                if file.is_file():  # the worker says what is wrong with one that is not there
+        named = [values[option.name] for option in options if option.value_type is Path or option.name == "body"]
+        for path in map(Path, filter(None, named)):
+            for file in dict.fromkeys((path, path.with_suffix(".json"))):  # a network's description lies next to it
+                if file.is_file():  # the worker reports a missing file
                     _add_file(digest, file)
         return digest.hexdigest()[:32]
 
 
+def _checked(values: Mapping[str, Any]) -> dict[str, Any]:
+    options = {option.name: option for option in options_at(Place.WORKER)}
+    for name, value in values.items():
+        if name not in options:
+            raise UsageError(f"a capture request has no option {name!r}; its options are {', '.join(options)}")
+        if problem := options[name].type_error(value):
+            raise UsageError(f"{name} {problem}")
+    filled = {name: values.get(name, option.default) for name, option in options.items()}
+    return {name: tuple(value) if options[name].several else value for name, value in filled.items()}
+
+
 def _add_file(digest: hashlib._Hash, path: Path) -> None:
-    """Size, time of change, first and last megabyte."""
+    """Add size, modification time, first and last megabyte."""
     status = path.stat()
     digest.update(f"{path.name} {status.st_size} {status.st_mtime_ns}".encode())
     with path.open("rb") as file:
@@ -77,10 +84,10 @@ def _add_file(digest: hashlib._Hash, path: Path) -> None:
 
 
 def code_version(root: Path) -> str:
-    """Of the installed program: names, sizes and times of change of its sources, networks, bodies and priors."""
+    """Hash the installed program: names, sizes and modification times of sources, networks, bodies and priors."""
     files = [*(root / "solver").rglob("*.py"), *(root / "scope_addon").rglob("*.py")]
     files += [f for kind in ("*.onnx", "*.npz", "*.json") for f in (root / "assets").rglob(kind)]
-    # The panel does not decide what is captured, nor does the sample, which is footage like any other.
+    # Neither the panel nor the sample, which is footage like any other, changes the result of a capture.
     apart = (root / "scope_addon" / "ui", root / "assets" / "sample")
     status = {f.relative_to(root).as_posix(): f.stat() for f in files if not any(map(f.is_relative_to, apart))}
     stamps = sorted((name, s.st_size, s.st_mtime_ns) for name, s in status.items())

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The worker's side of a job: reads the request, captures, writes motion files, tells how it goes."""
+"""The worker's side of a job: read the request, capture, write motion files, report progress."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from ..errors import exit_status
 from .parent import when_parent_ends
 from .request import JobRequest
 
-_REMOVALS = 20  # attempts, each of which a file that was just being opened may foil
+_REMOVALS = 20  # attempts, any of which fails if a file is opened meanwhile
 _MIN_INTERVAL_S = 0.05  # between two progress lines of one stage
 
 
 class Reporter:
-    """Writes JSON lines for the parent."""
+    """Write JSON lines for the parent."""
 
     def __init__(self, stream: IO[str]) -> None:
         self._stream = stream
@@ -31,14 +31,14 @@ class Reporter:
         self._writing = threading.Lock()
 
     def send(self, event: str, **values: object) -> None:
-        """One line, at once, from any thread."""
+        """Send one line immediately, from any thread."""
         line = json.dumps({"event": event, **values}) + "\n"
         with self._writing:
             self._stream.write(line)
             self._stream.flush()
 
     def progress(self, stage: str, done: int, total: int) -> None:
-        """As ``capture`` calls it: often. The parent hears of every new stage, of its end, and some steps between."""
+        """Report the progress of a stage; of frequent calls, those that begin or end a stage and some in between."""
         now = time.monotonic()
         if stage == self._last_stage and done != total and now - self._last_time < _MIN_INTERVAL_S:
             return
@@ -47,33 +47,18 @@ class Reporter:
 
 
 def run(request: JobRequest, job_folder: Path, reporter: Reporter) -> int:
-    """Capture and write; returns the process's exit status. Every failure becomes one ``error`` line."""
+    """Capture, write the results and return the exit status. Every failure becomes one ``error`` line."""
     try:
         reporter.progress("starting", 0, 0)
-        # Imported here, so that a missing wheel becomes a sentence in the panel as well.
+        # Imported here, so that a missing wheel is reported in the panel as well.
         from ...solver.loaders.body_file import load_body
-        from ..capture.media.video_range import VideoRange
-        from ..capture.options import CaptureOptions
+        from ..capture.options import capture_options
         from ..capture.pipeline import capture
         from .preview import PreviewWriter
 
-        options = CaptureOptions(
-            quality=request.quality,
-            people=request.people,
-            heights_m=() if request.height_m is None else (request.height_m,),
-            focal_mm=request.focal_mm,
-            fov_deg=request.fov_deg,
-            calibration=Path(request.calibration) if request.calibration else None,
-            wanted=VideoRange(request.start_s, float("inf") if request.end_s is None else request.end_s),
-            smoothing=request.smoothing,
-            hands=request.hands,
-            threads=request.threads,
-            provider=request.provider,
-            detector=Path(request.detector) if request.detector else None,
-            keypoints=Path(request.keypoints) if request.keypoints else None,
-        )
         with PreviewWriter(job_folder, reporter.send) as watch:
-            result = capture(request.footage, load_body(request.body), options, reporter.progress, watch)
+            body, options = load_body(request.values["body"]), capture_options(request.values)
+            result = capture(request.footage, body, options, reporter.progress, watch)
         names = [f"person{i + 1}.npz" for i in range(len(result.motions))]
         reporter.progress("writing", 0, 0)
         for name, motion in zip(names, result.motions, strict=True):
@@ -87,25 +72,25 @@ def run(request: JobRequest, job_folder: Path, reporter: Reporter) -> int:
         reporter.send("error", message=f"a part of Scope cannot be loaded ({error}); install the extension again")
     except (OSError, MemoryError) as error:
         reporter.send("error", message=f"the system refused: {error}; free space or memory and try again")
-    except Exception as error:  # a defect of ours must reach the panel too; the log has the traceback
+    except Exception as error:  # a defect must be reported in the panel as well; the log has the traceback
         import traceback
 
         traceback.print_exc()
-        reporter.send("error", message=f"Scope failed, which is a defect ({type(error).__name__}: {error}); report it")
+        reporter.send("error", message=f"this is a bug in Scope ({type(error).__name__}: {error}); please report it")
     return 1
 
 
 def main(job_folder: Path) -> NoReturn:
-    """Entry of the worker process: the request on stdin, JSON lines on stdout, everything else on stderr."""
-    # What libraries print to stdout, also from C, goes to stderr; the parent's lines get the real stdout.
+    """Run the worker process: the request on stdin, JSON lines on stdout, everything else on stderr."""
+    # What libraries print to stdout, also from C, goes to stderr; the JSON lines get the real stdout.
     stream = os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(2, 1)
     line = sys.stdin.readline()
-    if not line:  # killed before it could ask
+    if not line:  # the parent ended before it sent the request
         _remove(job_folder)
         _leave(1)
     _die_with_parent(job_folder)
-    _step_back()
+    _lower_priority()
     status = 1
     reporter = Reporter(stream)
     with contextlib.suppress(BrokenPipeError):
@@ -117,14 +102,14 @@ def main(job_folder: Path) -> NoReturn:
 
 
 def _leave(status: int) -> NoReturn:
-    """No exit handlers: threads of the networks and of the decoder must not hold the process up."""
+    """Exit without exit handlers, which would wait for threads of the networks and of the decoder."""
     with contextlib.suppress(OSError):
         sys.stderr.flush()
     os._exit(status)
 
 
 def _die_with_parent(job_folder: Path) -> None:
-    """End when the parent has gone, or no longer wants the result. Half-written files go too."""
+    """End, and remove the job's folder, when the parent ends or closes the job."""
 
     def end() -> NoReturn:
         _remove(job_folder)
@@ -134,7 +119,7 @@ def _die_with_parent(job_folder: Path) -> None:
 
 
 def _remove(job_folder: Path) -> None:
-    """Remove the folder although the main thread writes there: what has another name it finds no more."""
+    """Remove the folder while the main thread writes to it; it is renamed first, so that new files fail."""
     gone = job_folder.with_name(f"{job_folder.name}.gone")
     with contextlib.suppress(OSError):
         job_folder.rename(gone)
@@ -145,8 +130,8 @@ def _remove(job_folder: Path) -> None:
             return
 
 
-def _step_back() -> None:
-    """Give way to Blender's window on a busy machine. (On Windows the parent starts the process this way.)"""
+def _lower_priority() -> None:
+    """Lower the priority, so that Blender stays responsive. (On Windows the parent does so at the start.)"""
     if hasattr(os, "nice"):
         with contextlib.suppress(OSError):
             os.nice(5)

@@ -10,7 +10,7 @@ from ...solver.errors import InputError
 from ..errors import UsageError
 from .bone_map import BoneMap, load_bone_map
 
-ROOTS = ("bone", "object", "in-place")  # where a rig keeps the way over the floor
+ROOTS = ("bone", "object", "in-place")  # where a rig stores the root motion
 RIG_SUFFIXES = (".blend", ".fbx", ".glb", ".gltf")
 _BEGINNINGS = {
     ".blend": (b"BLENDER", b"\x28\xb5\x2f\xfd", b"\x1f\x8b"),  # plain, Zstandard, gzip

@@ -9,48 +9,23 @@ import time
 from pathlib import Path
 
 import bpy
-from bpy.props import EnumProperty, IntProperty, StringProperty
+from bpy.props import IntProperty, StringProperty
 
 from ..job.cache import Cache
+from ..options import Place
+from .declared_properties import with_options
 
 PACKAGE = __package__.rpartition(".scope_addon")[0]  # "bl_ext.<repository>.scope" in Blender, "scope" outside
 DEFAULT_CACHE_GB = 2
-# The numbers are what Blender stores; they must never change.
-PROVIDERS = (
-    ("AUTO", "Automatic", "The graphics card where Scope can use it, the processor otherwise", 0),
-    ("CPU", "CPU", "The processor", 1),
-    ("CUDA", "CUDA", "An NVIDIA graphics card", 2),
-    ("TENSORRT", "TensorRT", "An NVIDIA graphics card with TensorRT, which prepares each network for minutes first", 3),
-    ("DIRECTML", "DirectML", "Any graphics card in Windows", 4),
-    ("COREML", "Core ML", "Apple's processors", 5),
-)
 _measured: dict[Path, tuple[int, float]] = {}  # cache folder: bytes, and when they were counted
 
 
+@with_options(Place.PREFERENCES)
 class SCOPE_AP_preferences(bpy.types.AddonPreferences):
     """Preferences of Scope."""
 
     bl_idname = PACKAGE
 
-    threads: IntProperty(
-        name="Threads", default=0, min=0, max=256, description="Processor threads that the networks may use; 0 for all"
-    )
-    provider: EnumProperty(
-        name="Networks Run On",
-        items=PROVIDERS,
-        default="AUTO",
-        description="What is not there is replaced by the processor, with a warning beside the result",
-    )
-    detector_file: StringProperty(
-        name="Person Detector",
-        subtype="FILE_PATH",
-        description="Your own detector (.onnx): YOLOX, YOLOv4, YOLOv8 and their like; ours when empty",
-    )
-    keypoints_file: StringProperty(
-        name="Keypoint Network",
-        subtype="FILE_PATH",
-        description="Your own keypoint network (.onnx): RTMPose, HRNet, ViTPose and their like; ours when empty",
-    )
     body_file: StringProperty(
         name="Body File",
         subtype="FILE_PATH",

@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 from scope.scope_addon import cli
 from scope.scope_addon.cli import SAMPLE, main
+from scope.scope_addon.command_line import signals
 from scope.scope_addon.errors import UsageError
 from scope.scope_addon.job.batch import REPORT_NAME, Batch
 from scope.scope_addon.motion import Motion
@@ -262,10 +263,11 @@ def test_the_clips_of_a_killed_batch_end_and_leave_nothing_unfinished(tmp_path, 
     (tmp_path / "clip.py").write_text(
         "import os, pathlib, sys\n"
         "from scope.scope_addon import cli\n"
+        "from scope.scope_addon.command_line import terminal\n"
         "pid = pathlib.Path(sys.argv[2] + '.pid')\n"
         "def told(self, stage, done, total):\n"
         f"    if stage == {at!r} and done > 2 and not pid.exists(): pid.write_text(str(os.getpid()))\n"
-        "cli._ProgressBar.__call__ = told\n"
+        "terminal.ProgressBar.__call__ = told\n"
         "cli.run()\n"
     )
     argv = ["batch", str(clips), "--out", str(out), "--jobs", "2", "--formats", "npz", "--overlays"]
@@ -313,7 +315,7 @@ def test_a_signal_ends_the_batch_and_its_clips_whoever_handled_it_before(folder,
         process.send_signal(number)
     _, stderr = process.communicate(timeout=300)
     assert process.returncode == 130
-    assert stderr.splitlines()[-1] == "scope: stopped; clips that are done stay, called again it goes on"
+    assert stderr.splitlines()[-1] == "scope: stopped; finished clips are kept; run the same command again to continue"
     assert not any(runs(int(pid)) for pid in pids)
 
 
@@ -321,13 +323,13 @@ def test_a_signal_that_nobody_heard_ends_the_batch_too(folder, tmp_path, monkeyp
     """Its exception is lost, as within a weak reference's callback, while clips run."""
 
     def runs_on(batch, name, *_):
-        cli._signals.append(signal.SIGINT)
+        signals.received.append(signal.SIGINT)
         time.sleep(3)
         return {"status": "failed", "file": name, "message": ""}
 
     monkeypatch.setattr(Batch, "_one", runs_on)
     assert main(["batch", str(folder), "--out", str(tmp_path / "out"), "--jobs", "2"]) == 130
-    assert "stopped; clips that are done stay" in capsys.readouterr().err
+    assert "stopped; finished clips are kept" in capsys.readouterr().err
 
 
 def test_nothing_to_do_is_said(tmp_path):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The real worker process without Blender: its search path, its words, and its end when the parent is gone."""
+"""The real worker process without Blender: its search path, its messages, and its end when the parent is gone."""
 
 import inspect
 import json
@@ -111,12 +111,37 @@ def test_a_python_that_is_not_there_is_told(folder):
 
 
 def test_requests_travel_as_one_line():
-    request = JobRequest("a\nb.mp4", quality="fast", fov_deg=60.0)
+    request = JobRequest("a\nb.mp4", quality="fast", fov_deg=60.0, heights_m=(1.8, 1.7), calibration="lens.json")
     assert "\n" not in request.to_json()
     assert JobRequest.from_json(request.to_json()) == request
-    for text in ("", "[]", json.dumps({"footage": "a", "colour": 1})):
-        with pytest.raises(UsageError):
-            JobRequest.from_json(text)
+    assert request != JobRequest("a\nb.mp4", quality="fast")
+
+
+@pytest.mark.parametrize("text", ["", "[]", "{}", '{"footage": "a", "footage": '])
+def test_what_is_no_request_is_refused(text):
+    with pytest.raises(UsageError, match="not a capture request"):
+        JobRequest.from_json(text)
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"colour": 1}, "no option 'colour'"),
+        ({"shape": "keyed"}, "no option 'shape'"),  # of the command line and the panel alone
+        ({"quality": "superb"}, "quality must be one of fast, balanced, best, not 'superb'"),
+        ({"people": "some"}, "people must be one of largest, all, not 'some'"),
+        ({"people": 1.5}, "people must be int or str, not 1.5"),
+        ({"threads": True}, "threads must be int, not True"),
+        ({"threads": None}, "threads must be int, not None"),
+        ({"hands": 1}, "hands must be bool, not 1"),
+        ({"heights_m": 1.8}, "heights_m must be a list, not 1.8"),
+        ({"heights_m": [1.8, "tall"]}, "heights_m must be float or int, not 'tall'"),
+        ({"calibration": 3}, "calibration must be str, not 3"),
+    ],
+)
+def test_a_request_states_which_value_is_wrong(values, message):
+    with pytest.raises(UsageError, match=message):
+        JobRequest.from_json(json.dumps({"footage": "a", **values}))
 
 
 def test_keys_tell_what_changes_the_result(tmp_path):
@@ -127,7 +152,7 @@ def test_keys_tell_what_changes_the_result(tmp_path):
     assert request.key("1") != request.key("2")
     assert request.key("1") != JobRequest(str(clip), quality="fast").key("1")
     assert request.key("1") != JobRequest(str(clip), hands=True).key("1")
-    assert request.key("1") != JobRequest(str(clip), height_m=1.8).key("1")
+    assert request.key("1") != JobRequest(str(clip), heights_m=(1.8,)).key("1")
     key, status = request.key("1"), clip.stat()
     clip.write_bytes(b"x" * 99 + b"y")
     os.utime(clip, ns=(status.st_atime_ns, status.st_mtime_ns))

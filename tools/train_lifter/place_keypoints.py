@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from ...scope_addon.capture.fitting.ablation import Parts
-from ...scope_addon.capture.options import ALL, CaptureOptions
+from ...scope_addon.capture.options import CaptureOptions
 from ...scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES
 from ...scope_addon.capture.pipeline import capture
 from ...scope_addon.motion import Motion
@@ -62,7 +62,7 @@ def main() -> None:
     body, parts = load_body("scope"), Parts(seen_keypoints=False)
     everybody = []
     for clip in CLIPS:
-        found = capture(folder / f"{clip}.mp4", body, CaptureOptions(people=ALL, parts=parts))
+        found = capture(folder / f"{clip}.mp4", body, CaptureOptions(people="all", parts=parts))
         everybody += [normal_equations(body, m) for m in found.motions if m.valid.sum() >= LEAST_FRAMES]
     columns = [offsets(*each) for each in everybody]
     columns.append(offsets(*(np.sum(each, axis=0) for each in zip(*everybody, strict=True))))

@@ -1,12 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One capture, from the pressed button to the built scene. ``step`` moves it on and never waits for the worker.
+"""One capture, from the button to the built scene. ``step`` advances it and never waits for the worker.
 
 The modal operator calls ``step`` on a timer; scripts and tests call it in a loop.
 """
 
 from __future__ import annotations
 
-import math
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -21,20 +20,22 @@ from ...job.process import ROOT, START_SCRIPT, WorkerProcess
 from ...job.progress import JobProgress
 from ...job.request import JobRequest, code_version
 from ...motion import Motion
+from ...options import Place
 from ...scene.build import BuildOptions, BuildResult, build_scene
+from ..declared_properties import option_values
 from ..preferences import cache, preferences
 from . import preview_picture
 from .result import show_result
 
 
 class CaptureJob:
-    """A capture for one scene, with the settings the scene has now."""
+    """A capture for one scene, with the current settings of the scene."""
 
     def __init__(self, scene: bpy.types.Scene, python: Sequence[str] = ()) -> None:
         """Start the worker, or find the finished capture in the cache.
 
-        :param python: interpreter of the worker and its arguments; Blender's own when empty.
-        :raises ScopeError: what can be known to fail without capturing.
+        :param python: interpreter of the worker and its arguments; Blender's own if empty.
+        :raises ScopeError: a setting cannot be used.
         """
         self._cache: Cache = cache()
         self.progress = JobProgress(first_use=not self._cache.has_kernels)
@@ -47,18 +48,18 @@ class CaptureJob:
         self._worker: WorkerProcess | None = None
         self._building = False
         if self._captured is None:
-            # Blender 4.2 does not say how it runs Python; it is isolated there too.
+            # Blender 4.2 has no such attribute; its Python is isolated as well.
             python = python or [sys.executable, *getattr(bpy.app, "python_args", ("-I",))]
             folder = self._cache.new_job_folder()
             self._worker = WorkerProcess(self._request, folder, self._cache.kernels, python, START_SCRIPT)
 
     @property
     def worker(self) -> WorkerProcess | None:
-        """None where the result was cached."""
+        """None if the result was cached."""
         return self._worker
 
     def step(self) -> bool:
-        """Go on as far as is possible without waiting; False once the scene is built.
+        """Continue as far as possible without waiting; return False once the scene is built.
 
         :raises ScopeError: the capture failed; the scene is as it was and nothing is left on disk.
         """
@@ -69,7 +70,7 @@ class CaptureJob:
             raise
 
     def close(self) -> None:
-        """Stop, in any state, and leave no process and no unfinished file."""
+        """Stop in any state, without leaving a process or an unfinished file behind."""
         if self._worker is not None:
             self._worker.close()
 
@@ -77,13 +78,13 @@ class CaptureJob:
         if self._captured is None:
             self._listen()
             return True
-        if not self._building:  # one step later, so that the panel can say what is going on
+        if not self._building:  # one step later, so that the panel can show this stage first
             self._building = True
             self.progress.update("building the scene", 0, 0)
             return True
         scene = next((s for s in bpy.data.scenes if s.session_uid == self._scene_uid), None)
         if scene is None:
-            raise UsageError("the scene was removed while its footage was captured; capture in another scene")
+            raise UsageError("the scene was removed during the capture; capture in another scene")
         self._build(scene, self._captured)
         return False
 
@@ -108,26 +109,26 @@ class CaptureJob:
         try:
             pixels = (self._worker.job_folder / Path(message["file"]).name).read_bytes()
         except OSError:
-            return  # on Windows, while the worker puts the next one there
+            return  # on Windows, while the worker replaces the file
         preview_picture.show(pixels, message["width"], message["height"])
 
     def _build(self, scene: bpy.types.Scene, captured: CachedCapture) -> None:
         motions = [Motion.load(path) for path in captured.motions]
-        body = load_body(self._request.body)
+        body = load_body(self._request.values["body"])
         warnings = list(captured.report.get("warnings", ()))
         footage: str | None = self._request.footage
         if not Path(self._request.footage).is_file():
-            warnings.append(f"{footage} has gone, so the camera shows no footage")
+            warnings.append(f"{footage} no longer exists, so the camera shows no footage")
             footage = None
         with _window_shows(scene):
             result = build_scene(motions, body, footage, self._options)
-        remember_motions(result, captured.motions, self._request.body)
+        remember_motions(result, captured.motions, self._request.values["body"])
         report = dict(captured.report, warnings=warnings + result.warnings)
         show_result(scene.scope.result, self._request.footage, report, result)
 
 
 def capture_request(scene: bpy.types.Scene) -> JobRequest:
-    """What the scene's settings ask the worker for.
+    """Make the request to the worker from the scene's settings and the preferences.
 
     :raises VideoError, UsageError: no footage or body is chosen, or it is not there.
     """
@@ -136,42 +137,25 @@ def capture_request(scene: bpy.types.Scene) -> JobRequest:
         raise UsageError("choose a video or picture first")
     footage = Path(bpy.path.abspath(settings.footage))
     if not footage.is_file():
-        what = "is no file" if footage.exists() else "does not exist"
+        what = "is not a file" if footage.exists() else "does not exist"
         raise VideoError(f"{footage} {what}; choose the video or picture again")
     if settings.use_range and settings.range_end <= settings.range_start:
-        raise UsageError("the part of the video ends before it begins; change From or To")
+        raise UsageError("the part of the video ends before it starts; change From or To")
     if settings.lens == "FILE" and not settings.calibration_file:
-        raise UsageError("choose the file with the lens's calibration, or another lens")
-    body = {"SCOPE": "scope", "SCOPE_H": "scope_h"}.get(settings.body)
-    if body is None:
+        raise UsageError("choose a calibration file, or another lens")
+    values = option_values(settings, Place.PANEL) | option_values(chosen, Place.PREFERENCES)
+    if values["body"] == "file":
         path = settings.body_file or (chosen.body_file if chosen else "")
         if not path:
             raise UsageError("choose a body file, here or in the preferences, or use the built-in body")
-        body = bpy.path.abspath(path)
-    if settings.hands:
-        body = body_with_hands(body)
-    return JobRequest(
-        footage=str(footage),
-        body=body,
-        quality=settings.quality.lower(),
-        people=settings.people_count if settings.people == "COUNT" else settings.people.lower(),
-        height_m=settings.height_cm / 100 or None,
-        focal_mm=settings.focal_mm if settings.lens == "FOCAL" else None,
-        fov_deg=math.degrees(settings.fov) if settings.lens == "FOV" else None,
-        calibration=bpy.path.abspath(settings.calibration_file) if settings.lens == "FILE" else "",
-        start_s=settings.range_start if settings.use_range else 0.0,
-        end_s=settings.range_end if settings.use_range else None,
-        smoothing=settings.smoothing,
-        hands=settings.hands,
-        detector=bpy.path.abspath(chosen.detector_file) if chosen else "",
-        keypoints=bpy.path.abspath(chosen.keypoints_file) if chosen else "",
-        provider=chosen.provider.lower() if chosen else "auto",
-        threads=chosen.threads if chosen else 0,
-    )
+        values["body"] = bpy.path.abspath(path)
+    if values["hands"]:
+        values["body"] = body_with_hands(values["body"])
+    return JobRequest(str(footage), **values)
 
 
 def build_options(scene: bpy.types.Scene) -> BuildOptions:
-    """How the scene's settings want the scene built."""
+    """Make the options of building the scene from its settings."""
     settings = scene.scope
     frame_rate = settings.frame_rate.lower()
     if frame_rate == "auto":
@@ -187,7 +171,7 @@ def build_options(scene: bpy.types.Scene) -> BuildOptions:
 
 
 def remember_motions(result: BuildResult, paths: Sequence[Path], body: str) -> None:
-    """Note at the capture where its motion files are, and at each person which one and which body is theirs."""
+    """Store the paths of the motion files with the capture, and each person's own with its body at the armature."""
     result.collection["scope_motions"] = [str(path) for path in paths]
     for person, path in zip(result.people, paths, strict=True):
         person.armature["scope_motion"] = str(path)
@@ -195,7 +179,7 @@ def remember_motions(result: BuildResult, paths: Sequence[Path], body: str) -> N
 
 
 def _is_animated(scene: bpy.types.Scene) -> bool:
-    """Whether another frame rate would change the speed of something in the scene."""
+    """Whether another frame rate would change the speed of any animation in the scene."""
     owners = [scene, *scene.objects, *(obj.data for obj in scene.objects if obj.data)]
     data = [owner.animation_data for owner in owners if owner.animation_data]
     return any(animation.action or animation.nla_tracks for animation in data)
@@ -203,7 +187,7 @@ def _is_animated(scene: bpy.types.Scene) -> bool:
 
 @contextmanager
 def _window_shows(scene: bpy.types.Scene) -> Iterator[None]:
-    """Let the window show the scene while it is built: the user may have gone to another one meanwhile."""
+    """Show the scene in the window while it is built: the user may have switched to another one."""
     if bpy.context.scene == scene:
         yield
         return

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Choosing footage, capturing it in the background, cancelling. The state of the running job lives here."""
+"""Operators that choose footage, capture it in the background and cancel, and the state of the running job."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ TIMER_S = 0.1
 
 
 class _State:
-    """The one capture that runs, and what is left to say of the last one. Never saved."""
+    """The running capture, and the error message of the last one. Never saved."""
 
     job: CaptureJob | None = None
     scene_uid = 0  # of the scene that the job or the message belongs to
@@ -51,14 +51,14 @@ class SCOPE_OT_choose_footage(bpy.types.Operator):
     filter_glob: StringProperty(default=";".join(f"*{s}" for s in FOOTAGE_SUFFIXES), options={"HIDDEN"})
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        """Dropped files come with a path; otherwise ask for one."""
+        """Take a dropped file, or ask for one."""
         if self.filepath:
             return self.execute(context)
         context.window_manager.fileselect_add(self)
         return {"RUNNING_MODAL"}
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        """Take the file."""
+        """Set the footage to the file."""
         path = Path(bpy.path.abspath(self.filepath))
         if not path.is_file():
             self.report({"ERROR"}, f"{path} is not a file; choose a video or picture")
@@ -68,20 +68,20 @@ class SCOPE_OT_choose_footage(bpy.types.Operator):
 
 
 class SCOPE_OT_use_sample(bpy.types.Operator):
-    """Take the short clip that comes with Scope, to see how capturing goes"""
+    """Use the short clip that comes with Scope, to try a capture"""
 
     bl_idname = "scope.use_sample"
     bl_label = "Try the Sample Clip"
     bl_options = {"UNDO"}
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        """Take the clip."""
+        """Set the footage to the sample clip."""
         context.scene.scope.footage = str(SAMPLE)
         return {"FINISHED"}
 
 
 class SCOPE_OT_capture(bpy.types.Operator):
-    """Find the person in the footage and build the animated body. Blender can be used meanwhile"""
+    """Find the person in the footage and build the animated body. Blender stays usable meanwhile"""
 
     bl_idname = "scope.capture"
     bl_label = "Capture"
@@ -89,7 +89,7 @@ class SCOPE_OT_capture(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Footage is chosen and nothing is running."""
+        """Require that footage is chosen and nothing is running."""
         if state.job is not None:
             cls.poll_message_set("A capture is running; wait for it or cancel it")
             return False
@@ -99,7 +99,7 @@ class SCOPE_OT_capture(bpy.types.Operator):
         return True
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        """From the panel: start, and go on with a timer."""
+        """Start from the panel, and continue on a timer."""
         if bpy.app.background or not self._start(context):
             return self.execute(context) if bpy.app.background else {"CANCELLED"}
         manager = context.window_manager
@@ -108,7 +108,7 @@ class SCOPE_OT_capture(bpy.types.Operator):
         return {"RUNNING_MODAL"}
 
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        """On every event: step on the timer's, cancel on Escape, leave the others to Blender."""
+        """Step on timer events, cancel on Escape, pass the others to Blender."""
         job = state.job
         if job is None:  # stopped from outside
             return self._end(context, {"CANCELLED"})
@@ -123,11 +123,11 @@ class SCOPE_OT_capture(bpy.types.Operator):
         return self._end(context, outcome) if outcome else {"PASS_THROUGH"}
 
     def cancel(self, context: bpy.types.Context) -> None:
-        """Blender opens another file or closes."""
+        """Stop when Blender opens another file or closes."""
         self._end(context, {"CANCELLED"})
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        """From a script: the same, waiting."""
+        """Capture from a script, and wait for the result."""
         if not self._start(context):
             return {"CANCELLED"}
         try:
@@ -139,7 +139,7 @@ class SCOPE_OT_capture(bpy.types.Operator):
 
     def _start(self, context: bpy.types.Context) -> bool:
         state.message, state.scene_uid = "", context.scene.session_uid
-        # Here, because it loads numba and numpy, which opening Blender must not pay for.
+        # Imported here: it loads numba and numpy, which would slow down the start of Blender.
         try:
             from .capture_job import CaptureJob
         except ImportError as error:
@@ -153,7 +153,7 @@ class SCOPE_OT_capture(bpy.types.Operator):
         return True
 
     def _step(self) -> set[str] | None:
-        """None: to be continued."""
+        """Advance the job; None if it has not ended."""
         from ....solver.errors import ScopeError
 
         assert state.job is not None
@@ -194,11 +194,11 @@ class SCOPE_OT_cancel(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Something is running."""
+        """Require that a capture is running."""
         return state.job is not None
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        """Ask the modal operator to end; the worker is ended at once."""
+        """End the worker, and ask the modal operator to end."""
         assert state.job is not None
         state.job.cancel_requested = True
         state.job.close()
@@ -206,7 +206,7 @@ class SCOPE_OT_cancel(bpy.types.Operator):
 
 
 def stop_job() -> None:
-    """End the job in whatever state it is."""
+    """End the job in any state."""
     if state.job is not None:
         state.job.close()
     state.job = None
@@ -214,21 +214,21 @@ def stop_job() -> None:
 
 
 def clear_status_bar() -> None:
-    """In every workspace: each keeps its own text, and the user may have gone from one to another meanwhile."""
+    """Clear the status bar in every workspace: each keeps its own text, and the user may have switched."""
     for workspace in bpy.data.workspaces:
-        with bpy.context.temp_override(workspace=workspace):  # Blender sets the context's, whichever it is told to
+        with bpy.context.temp_override(workspace=workspace):  # Blender sets the context's text alone
             workspace.status_text_set(None)
 
 
 def redraw(context: bpy.types.Context) -> None:
-    """Draw the sidebars anew, not the viewports beside them: drawing a heavy scene again and again would be felt."""
+    """Redraw the sidebars, but not the viewports: redrawing a heavy scene repeatedly would be slow."""
     areas = [a for window in context.window_manager.windows for a in window.screen.areas if a.type == "VIEW_3D"]
     for region in (r for area in areas for r in area.regions if r.type == "UI"):
         region.tag_redraw()
 
 
 def redraw_twice(context: bpy.types.Context) -> None:
-    """Now, and soon once more: panels below one whose height has changed move only when they are drawn again."""
+    """Redraw now and once more shortly: panels below one whose height changed move at the second redraw."""
     redraw(context)
     if not bpy.app.background:
         bpy.app.timers.register(lambda: redraw(bpy.context), first_interval=0.3)

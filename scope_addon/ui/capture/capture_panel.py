@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The sidebar of the 3D viewport, tab Scope."""
+"""The panels in the sidebar of the 3D viewport, tab Scope."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _PIXELS_PER_LETTER = 7.0
 
 
 class Tab:
-    """Where all of Scope's panels are."""
+    """Location of all of Scope's panels."""
 
     bl_space_type = "VIEW_3D"
     bl_region_type = "UI"
@@ -26,7 +26,7 @@ class Tab:
 
 
 class SCOPE_PT_capture(Tab, bpy.types.Panel):
-    """Footage, the one button, progress."""
+    """Footage, the capture button, progress."""
 
     bl_idname = "SCOPE_PT_capture"
     bl_label = "Capture"
@@ -66,7 +66,7 @@ def _draw_progress(context: bpy.types.Context, layout: bpy.types.UILayout, progr
 
 
 class SCOPE_PT_person(Tab, bpy.types.Panel):
-    """Who is captured, as what, the lens, and which part of the video."""
+    """People, body, lens, and the part of the video."""
 
     bl_idname = "SCOPE_PT_person"
     bl_parent_id = "SCOPE_PT_capture"
@@ -102,7 +102,7 @@ class SCOPE_PT_person(Tab, bpy.types.Panel):
 
 
 class SCOPE_PT_scene(Tab, bpy.types.Panel):
-    """What capturing may change in the scene."""
+    """Changes of the scene that a capture may make."""
 
     bl_idname = "SCOPE_PT_scene"
     bl_parent_id = "SCOPE_PT_capture"
@@ -121,14 +121,14 @@ class SCOPE_PT_scene(Tab, bpy.types.Panel):
 
 
 class SCOPE_PT_result(Tab, bpy.types.Panel):
-    """What was found, and where it can go."""
+    """Result of the last capture, and its export."""
 
     bl_idname = "SCOPE_PT_result"
     bl_label = "Result"
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Something was captured and is still there; of another scene whose settings this one has, it is not."""
+        """Show the panel if the captured collection is in this scene: copied settings may refer to another one."""
         return context.scene.scope.result.collection in context.scene.collection.children_recursive
 
     def draw(self, context: bpy.types.Context) -> None:
@@ -140,7 +140,7 @@ class SCOPE_PT_result(Tab, bpy.types.Panel):
         took = duration(result.frames / result.frames_per_second) if result.frames_per_second else "no time"
         frames = "1 frame" if result.frames == 1 else f"{result.frames} frames"
         column.label(text=f"{frames}, captured in {took}", icon="TIME")
-        column.label(text=f"{result.reprojection_px:.1f} pixels off the footage on average", icon="CON_CAMERASOLVER")
+        column.label(text=f"Reprojection error {result.reprojection_px:.1f} px", icon="CON_CAMERASOLVER")
         column.label(text=f"Lens: {result.camera}", icon="CAMERA_DATA")
         if result.execution:
             column.label(text=f"Networks on {result.execution}", icon="MEMORY")
@@ -163,7 +163,7 @@ class SCOPE_PT_result(Tab, bpy.types.Panel):
 
 
 def _draw_warning(context: bpy.types.Context, box: bpy.types.UILayout, warning: bpy.types.PropertyGroup) -> None:
-    """What is wrong, and a button for each span of frames, that goes there."""
+    """Draw a warning, and a button for each span of frames that goes to its first one."""
     _draw_text(context, box, warning.text, "ERROR")
     if warning.spans:
         grid = box.grid_flow(columns=4, even_columns=True, align=True, row_major=True)
@@ -172,7 +172,7 @@ def _draw_warning(context: bpy.types.Context, box: bpy.types.UILayout, warning: 
 
 
 def first_frame(span: str) -> int:
-    """12 of ``12-18``, -3 of ``-3-4``."""
+    """Return the first frame of a span: 12 of ``12-18``, -3 of ``-3-4``."""
     return int(span[0] + span[1:].split("-", 1)[0])
 
 
@@ -183,7 +183,7 @@ def _split(layout: bpy.types.UILayout) -> bpy.types.UILayout:
 
 
 def _draw_text(context: bpy.types.Context, layout: bpy.types.UILayout, text: str, icon: str = "NONE") -> None:
-    """A sentence in as many lines as the sidebar's width needs."""
+    """Draw a sentence, wrapped to the width of the sidebar."""
     scale = context.preferences.system.ui_scale
     width = max(20, int((context.region.width / scale - 60) / _PIXELS_PER_LETTER)) if context.region else 40
     column = layout.column(align=True)

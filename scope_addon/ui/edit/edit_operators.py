@@ -183,23 +183,23 @@ class SCOPE_OT_refloor(_Edit):
 
 
 class SCOPE_OT_root_motion(_Edit):
-    """Where the person's way over the floor is stored"""
+    """Choose where the person's root motion is stored"""
 
     bl_idname = "scope.root_motion"
     bl_label = "Root Motion"
 
     mode: EnumProperty(
-        name="Way",
+        name="Root Motion",
         items=(
             ("BONES", "In the Bones", "The pelvis moves through the scene, as captured", 0),
-            ("OBJECT", "On an Object", "An empty above which the person moves carries the way: root motion", 1),
-            ("IN_PLACE", "In Place", "No way at all: the person stays on the spot", 2),
+            ("OBJECT", "On an Object", "An empty on the floor carries the root motion", 1),
+            ("IN_PLACE", "In Place", "No root motion: the person stays in place", 2),
         ),
         default="OBJECT",
-        description="Where the way goes",
+        description="Where the root motion is stored",
     )
     heading: BoolProperty(
-        name="With Heading", default=True, description="Turning about the upright axis goes with the way"
+        name="With Heading", default=True, description="Include the rotation about the vertical axis in the root motion"
     )
 
     def edit(self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float) -> str:

@@ -32,7 +32,7 @@ class SCOPE_PT_edit(Tab, bpy.types.Panel):
         column.operator("scope.interpolate_span", icon="IPO_EASE_IN_OUT")
         column.operator("scope.swap_sides", icon="MOD_MIRROR")
         column.operator("scope.refloor", icon="TRIA_DOWN_BAR")
-        layout.label(text="Way over the Floor")
+        layout.label(text="Root Motion")
         row = layout.row(align=True)
         for text, mode in (("In Bones", "BONES"), ("On Object", "OBJECT"), ("In Place", "IN_PLACE")):
             row.operator("scope.root_motion", text=text).mode = mode

@@ -60,7 +60,7 @@ class SCOPE_PT_retarget(Tab, bpy.types.Panel):
         column.operator("scope.edit_bone_pair", text="", icon="REMOVE").action = "REMOVE"
         layout.prop(settings, "feet")
         column = layout.column()
-        column.label(text="Way over the Floor")
+        column.label(text="Root Motion")
         column.row(align=True).prop(settings, "root", expand=True)
         column.label(text="Captured Body")
         column.row(align=True).prop(settings, "captured", expand=True)

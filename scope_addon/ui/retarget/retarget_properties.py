@@ -50,14 +50,14 @@ class SCOPE_PG_retarget(bpy.types.PropertyGroup):
         description="Hold heel or ball where the captured ones stand, scaled to the rig, and never below the floor",
     )
     root: EnumProperty(
-        name="Way",
+        name="Root Motion",
         items=(
             ("bone", "In Bones", "The pelvis moves through the scene", 0),
-            ("object", "On Object", "An empty carries the way and the heading, the rig moves on it: root motion", 1),
-            ("in-place", "In Place", "No way at all: the character stays on the spot", 2),
+            ("object", "On Object", "An empty carries position and heading, the rig moves relative to it", 1),
+            ("in-place", "In Place", "No root motion: the character stays in place", 2),
         ),
         default="bone",
-        description="Where the way over the floor is kept",
+        description="Where the root motion of the rig is stored",
     )
     captured: EnumProperty(
         name="Captured Body",

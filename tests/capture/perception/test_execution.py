@@ -8,11 +8,11 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-from scope.scope_addon import cli_options
 from scope.scope_addon.capture.perception import sessions
 from scope.scope_addon.capture.perception.execution import CHOICES, CPU, PROVIDERS, Execution, OneAtATime
 from scope.scope_addon.capture.perception.sessions import network_path, open_session
 from scope.scope_addon.errors import SetupError, UsageError
+from scope.scope_addon.options import option
 
 CPU_NAME = "CPUExecutionProvider"
 
@@ -124,7 +124,7 @@ def test_the_line_that_says_it() -> None:
 
 
 def test_the_command_line_offers_the_same() -> None:
-    assert sorted(cli_options.PROVIDERS) == sorted(CHOICES)
+    assert sorted(option("provider").values) == sorted(CHOICES)
 
 
 def test_the_real_processor() -> None:

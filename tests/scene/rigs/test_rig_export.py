@@ -228,7 +228,7 @@ def test_the_shell_retargets_a_capture(tmp_path):
 def test_the_shell_refuses_before_it_captures(tmp_path):
     done = shell("capture", SAMPLE, "--retarget-root", "object", "-o", tmp_path / "out.glb")
     assert done.returncode == 2
-    assert "--retarget-root is about a rig" in done.stderr
+    assert "--retarget-root applies to a rig" in done.stderr
     rig = save_rig(tmp_path / "rig.blend", armatures=2)
     done = shell("capture", SAMPLE, "--retarget", rig, "-o", tmp_path / "out.glb")
     assert done.returncode == 2

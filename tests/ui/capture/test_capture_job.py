@@ -212,14 +212,14 @@ def test_footage_that_went_while_capturing_is_missed_not_fatal(fake_worker, foot
     scene = bpy.context.scene
     scene.scope.footage = str(footage)
     bpy.ops.scope.capture()
-    assert any("has gone" in w.text for w in scene.scope.result.warnings)
+    assert any("no longer exists" in w.text for w in scene.scope.result.warnings)
 
 
 @pytest.mark.parametrize(
     ("settings", "says"),
     [
         ({"footage": "/nowhere/walk.mp4"}, "walk.mp4 does not exist"),
-        ({"footage": "/"}, "/ is no file"),
+        ({"footage": "/"}, "/ is not a file"),
         ({"body": "FILE"}, "body file"),
         ({"body": "FILE", "body_file": "/nowhere/smpl.npz"}, "smpl.npz"),
         ({"lens": "FILE"}, "calibration"),

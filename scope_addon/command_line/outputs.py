@@ -1,0 +1,124 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The result files of a capture: what can be refused before the work, writing them, and the summary."""
+
+from __future__ import annotations
+
+import argparse
+import os
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ...solver.body import Body
+from ..errors import UsageError
+from ..motion import Motion
+from ..options import option
+from ..scene.export.output_paths import check_output, person_paths
+from .terminal import say
+
+if TYPE_CHECKING:
+    from ..retarget.rig_source import RigSource
+
+MOTION_SUFFIXES = (".npz",)
+OVERLAY_SUFFIXES = (".mp4", ".png", ".jpg")
+
+
+def check_outputs(outputs: list[Path], overlay: Path | None, video: Path) -> None:
+    """Refuse, before the work, what could not be written after it.
+
+    :raises UsageError: an unknown suffix, a folder, or the footage itself. :raises OutputError: see `check_output`.
+    """
+    for path in outputs:
+        check_output(path)
+    if overlay:
+        check_output(overlay, OVERLAY_SUFFIXES)
+    paths = [*outputs, overlay] if overlay else outputs
+    for path in paths:
+        if path.exists() and video.exists() and path.samefile(video):
+            raise UsageError(f"{path} is the footage itself; choose another name")
+
+
+def each_once(outputs: list[Path]) -> list[Path]:
+    """Return the paths without duplicates of the same file, such as ``out/case.npz`` and ``out/x/../case.npz``."""
+    named: dict[str, Path] = {}
+    for path in outputs:
+        named.setdefault(os.path.normcase(os.path.realpath(path)), path)
+    return list(named.values())
+
+
+def usable_rig(args: argparse.Namespace, outputs: list[Path]) -> RigSource | None:
+    """Return the user's rig, checked before the work is done; None if there is no --retarget.
+
+    :raises ScopeError: it cannot be used, or the arguments contradict each other.
+    """
+    if args.retarget is None:
+        given = {"--bone-map": args.bone_map, "--rig-object": args.rig_object}
+        given["--retarget-root"] = args.retarget_root != option("retarget_root").default
+        for flag, value in given.items():
+            if value:
+                raise UsageError(f"{flag} applies to a rig: give its file with --retarget")
+        return None
+    from ..retarget.rig_source import rig_source
+
+    rig = rig_source(args.retarget, args.rig_object, args.bone_map)
+    scene_files = [p for p in outputs if p.suffix.lower() not in MOTION_SUFFIXES]
+    if not scene_files:
+        raise UsageError("--retarget needs an output that can contain a rig, such as -o OUT.glb; a motion file cannot")
+    for path in scene_files:
+        if path.exists() and path.samefile(rig.path):
+            raise UsageError(f"{path} is the rig's own file; choose another name")
+    from ..scene.rigs.rig_file import check_rig
+
+    check_rig(rig, fingers=args.hands)
+    return rig
+
+
+def write_outputs(
+    outputs: list[Path],
+    motions: list[Motion],
+    body: Body,
+    video: Path,
+    args: argparse.Namespace,
+    rig: RigSource | None = None,
+) -> list[Path]:
+    """Write every result file and return their paths; bpy is loaded only if one of them needs a scene."""
+    motion_files = [p for p in outputs if p.suffix.lower() in MOTION_SUFFIXES]
+    scene_files = [p for p in outputs if p not in motion_files]
+    written: list[Path] = []
+    for path in motion_files:
+        targets = person_paths(path, len(motions))
+        for target, motion in zip(targets, motions, strict=True):
+            motion.save(target)
+        written += targets
+    if scene_files:
+        from ..capture.media.image_sequence import find_sequence
+        from ..scene.build import NEW_SCENE
+        from ..scene.export.export import ExportOptions, export_motions
+
+        sequence = find_sequence(video, args.fps is not None)
+        footage = sequence.paths[0] if sequence else video
+        options = replace(NEW_SCENE, name=video.stem, shape=args.shape_keys)
+        separate = ExportOptions(separate=args.file_per_person)
+        if rig is not None:
+            from ..scene.rigs.rig_export import export_on_rig
+
+            files, warnings = export_on_rig(
+                motions, body, scene_files, rig, options, args.retarget_root, footage, separate
+            )
+        else:
+            files, warnings = export_motions(motions, body, scene_files, footage, options, separate)
+        written += files
+        for warning in warnings:
+            say(f"warning: {warning}")
+    return written
+
+
+def summary(report: dict) -> str:
+    """Describe a capture in one line."""
+    people = "1 person" if report["people"] == 1 else f"{report['people']} people"
+    frames = "1 frame" if report["frames"] == 1 else f"{report['frames']} frames"
+    return (
+        f"{people}, {frames}, {report['fps']['total']:.1f} frames/s, "
+        f"reprojection error {report['reprojection_px']:.1f} px, networks on {report['execution']}; "
+        f"wrote {', '.join(report['outputs'])}"
+    )

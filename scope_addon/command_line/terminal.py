@@ -1,0 +1,79 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The terminal: messages, the progress bar, and a stdout that carries the report alone."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from typing import TextIO
+
+from . import signals
+
+_CLEAR_LINE = "\r\x1b[K"
+
+
+def say(text: str) -> None:
+    """Print a message on a line of its own, even if a progress bar is shown."""
+    clear = _CLEAR_LINE if sys.stderr.isatty() else ""
+    print(f"{clear}scope: {text}", file=sys.stderr, flush=True)
+
+
+class ProgressBar:
+    """A one-line progress bar on a terminal; silent elsewhere. Interrupts work that goes on after a signal."""
+
+    def __init__(self, stream: TextIO, *, show: bool) -> None:
+        self.stream, self.show = stream, show
+
+    def __call__(self, stage: str, done: int, total: int) -> None:
+        """Show ``done`` of ``total`` (0: unknown) of a stage.
+
+        :raises KeyboardInterrupt: a signal arrived whose own exception was lost.
+        """
+        if signals.received:
+            raise KeyboardInterrupt
+        if not self.show:
+            return
+        if total:
+            filled = min(30, 30 * done // total)
+            text = f"{stage:<20} [{'#' * filled}{'.' * (30 - filled)}] {done}/{total}"
+        else:
+            text = f"{stage:<20} {done or ''}"
+        self.stream.write(f"{_CLEAR_LINE}{text[:100]}")
+        self.stream.flush()
+
+    def __enter__(self) -> ProgressBar:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self.show:
+            self.stream.write(_CLEAR_LINE)
+
+
+@contextmanager
+def stdout_for_report() -> Iterator[TextIO]:
+    """Redirect what libraries print to stdout, also from C, to stderr; the report gets the real stdout."""
+    sys.stdout.flush()
+    try:
+        real = os.dup(1)
+    except OSError:  # a shell without any stdout
+        yield sys.stdout
+        return
+    os.dup2(2, 1)
+    _flush_c()  # its buffer, with Blender's version for example, is no part of the report either
+    try:
+        with os.fdopen(os.dup(real), "w", encoding="utf-8") as stream:
+            yield stream
+    finally:
+        sys.stdout.flush()
+        _flush_c()
+        os.dup2(real, 1)
+        os.close(real)
+
+
+def _flush_c() -> None:
+    """Write out what C libraries have buffered for stdout."""
+    with suppress(OSError, AttributeError):
+        ctypes.CDLL("ucrtbase" if os.name == "nt" else None).fflush(None)

@@ -1,0 +1,36 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Every option of a capture, declared once. Standard library only: neither bpy nor numpy, nor other parts of Scope.
+
+Made from these records: the arguments of the command line (`command_line.arguments`), the request to the worker
+(`job.request`), and the properties of the panel and of the preferences (`ui.declared_properties`). The typed fields of
+`capture.options.CaptureOptions` take their defaults from them, and a test compares the two. To add an option, add its
+record to `capture`, `networks` or `output`.
+"""
+
+from __future__ import annotations
+
+from .capture import CAPTURE_OPTIONS
+from .networks import NETWORK_OPTIONS
+from .output import OUTPUT_OPTIONS, REPORT_OPTIONS
+from .record import Argument, Choice, Option, Place, Property
+
+# In the order of the command line's help.
+OPTIONS: tuple[Option, ...] = (*CAPTURE_OPTIONS, *OUTPUT_OPTIONS, *NETWORK_OPTIONS, *REPORT_OPTIONS)
+
+__all__ = ["OPTIONS", "Argument", "Choice", "Option", "Place", "Property", "option", "options_at"]
+
+
+def options_at(place: Place) -> tuple[Option, ...]:
+    """Return the options that apply at a place (at all of them, if several are combined)."""
+    return tuple(option for option in OPTIONS if place in option.places)
+
+
+def option(name: str) -> Option:
+    """Return the option of this name.
+
+    :raises KeyError: there is none.
+    """
+    for each in OPTIONS:
+        if each.name == name:
+            return each
+    raise KeyError(name)

@@ -1,0 +1,257 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The options that decide how footage is captured."""
+
+from __future__ import annotations
+
+import math
+import re
+from pathlib import Path
+from typing import Any
+
+from .record import Argument, Choice, Option, Place, Property
+
+LARGEST, ALL = "largest", "all"  # people
+
+_EVERYWHERE = Place.COMMAND_LINE | Place.WORKER | Place.CAPTURE | Place.PANEL
+
+QUALITIES = (
+    Choice("fast", "Fast", "Smallest network: for a first look or a slow computer", 0),
+    Choice("balanced", "Balanced", "Slightly less accurate than Best, and faster", 1),
+    Choice("best", "Best", "Largest network, most accurate", 2),
+)
+PEOPLE = (
+    Choice(LARGEST, "One", "The most prominent person", 0),
+    Choice(ALL, "Everyone", "Everyone who is clearly visible", 1),
+)
+_COUNT = Choice("count", "At Most", "The most prominent people, up to a number", 2)
+BODIES = (
+    Choice("scope", "Body", "The built-in body with SMPL's 24 joints", 0),
+    Choice("scope_h", "Body with Hands", "The built-in body with SMPL+H's 52 joints, fingers included", 1),
+    Choice("file", "From File", "Your own SMPL, SMPL+H, SMPL-X or STAR file", 2),
+)
+LENSES = (
+    Choice("auto", "Automatic", "Read from the file's metadata if present, estimated otherwise", 0),
+    Choice("focal", "Focal Length", "Enter the 35 mm equivalent focal length", 1),
+    Choice("fov", "Field of View", "Enter the field of view along the longer side of the picture", 2),
+    Choice("file", "Calibration", "Read focal lengths, principal point and distortion from a calibration file", 3),
+)
+
+
+def _parse_people(text: str) -> int | str:
+    if text in (LARGEST, ALL):
+        return text
+    if not re.fullmatch("[0-9]{1,6}", text) or int(text) < 1:
+        raise ValueError("takes a number of at least 1, all or largest")
+    return int(text)
+
+
+def _parse_heights(text: str) -> tuple[float, ...]:
+    """Metres from centimetres, one number for each person."""
+    try:
+        return tuple(float(number) / 100 for number in text.split(","))
+    except ValueError as error:
+        raise ValueError("takes centimetres, say 175, or 175,162 for two people") from error
+
+
+def _seconds(settings: Any, name: str) -> str | None:
+    return f"{getattr(settings, name):.6f}" if settings.use_range else None
+
+
+_TIME = {"step": 10, "precision": 2, "subtype": "TIME_ABSOLUTE", "unit": "TIME_ABSOLUTE"}
+
+CAPTURE_OPTIONS = (
+    Option("quality", str, "best", _EVERYWHERE, "speed versus accuracy", choices=QUALITIES),
+    Option(
+        "people",
+        (int, str),
+        LARGEST,
+        _EVERYWHERE,
+        "who is captured",
+        minimum=1,
+        maximum=12,
+        choices=PEOPLE,
+        argument=Argument(
+            metavar="N|all|largest",
+            help="people to capture: at most N, all, or largest, the most prominent person over the clip; candidates"
+            " smaller than half the largest person are ignored",
+            parse=_parse_people,
+        ),
+        blender=Property(
+            choices=(*PEOPLE, _COUNT),
+            value=lambda settings: settings.people_count if settings.people == "COUNT" else settings.people.lower(),
+        ),
+    ),
+    Option(
+        "people_count",
+        int,
+        2,
+        Place.PANEL,
+        "how many people are captured at most",
+        minimum=1,
+        maximum=12,
+        blender=Property(label="At Most"),
+    ),
+    Option(
+        "start",
+        str,
+        None,
+        Place.COMMAND_LINE | Place.WORKER | Place.PANEL,
+        "start of the captured part, in seconds",
+        argument=Argument(metavar="TIME", help="start time: seconds, MM:SS, HH:MM:SS.mmm or HH:MM:SS:FF"),
+        blender=Property(
+            "range_start",
+            "From",
+            unit="s",
+            default=0.0,
+            minimum=0.0,
+            value=lambda settings: _seconds(settings, "range_start"),
+            keywords=_TIME,
+        ),
+    ),
+    Option(
+        "end",
+        str,
+        None,
+        Place.COMMAND_LINE | Place.WORKER | Place.PANEL,
+        "end of the captured part, in seconds",
+        argument=Argument(metavar="TIME", help="end time, inclusive"),
+        blender=Property(
+            "range_end",
+            "To",
+            unit="s",
+            default=10.0,
+            minimum=0.0,
+            value=lambda settings: _seconds(settings, "range_end"),
+            keywords=_TIME,
+        ),
+    ),
+    Option(
+        "use_range",
+        bool,
+        False,
+        Place.PANEL,
+        "capture only a part of the video",
+        blender=Property(label="Part of the Video"),
+    ),
+    Option(
+        "fps",
+        str,
+        None,
+        Place.COMMAND_LINE | Place.WORKER,
+        "frame rate of the capture, such as 12 or 29.97",
+        argument=Argument(metavar="N", default_text="the footage's"),
+    ),
+    Option(
+        "body",
+        str,
+        "scope",
+        Place.COMMAND_LINE | Place.WORKER | Place.PANEL,
+        "the body that is fitted to the person",
+        argument=Argument(help="body model: scope, scope_h, or your own .npz or .pkl file"),
+        blender=Property(choices=BODIES),
+    ),
+    Option(
+        "body_file",
+        Path,
+        None,
+        Place.PANEL,
+        "SMPL, SMPL+H, SMPL-X or STAR model (.npz or .pkl); the one in the preferences if empty",
+    ),
+    Option(
+        "hands",
+        bool,
+        False,
+        _EVERYWHERE,
+        "capture the fingers as well, on the body with hands; takes longer",
+        argument=Argument(help="capture the fingers as well, on scope_h unless --body names another body"),
+    ),
+    Option(
+        "heights_m",
+        float,
+        (),
+        _EVERYWHERE,
+        "heights of the people, most prominent first; sets the scale of the scene",
+        unit="m",
+        minimum=0.5,
+        maximum=2.6,
+        several=True,
+        argument=Argument("--height", "CM[,CM...]", parse=_parse_heights, default_text="estimated"),
+        # Not of unit LENGTH, which would be shown and entered in the scene's units.
+        blender=Property(
+            "height_cm",
+            "Height (cm)",
+            "Height of the person in centimetres, of the most prominent one if there are several; sets the scale of the"
+            " scene. 0: estimated from the footage, usually within 10 %",
+            unit="cm",
+            default=0.0,
+            minimum=0.0,
+            maximum=260.0,
+            value=lambda settings: (settings.height_cm / 100,) if settings.height_cm else (),
+            keywords={"step": 100, "precision": 0},
+        ),
+    ),
+    Option("lens", str, "auto", Place.PANEL, "where the camera's focal length comes from", choices=LENSES),
+    Option(
+        "focal_mm",
+        float,
+        None,
+        _EVERYWHERE,
+        "35 mm equivalent focal length of the camera",
+        unit="mm",
+        minimum=1.0,
+        maximum=2000.0,
+        argument=Argument(metavar="MM"),
+        blender=Property(
+            label="Focal Length",
+            description="35 mm equivalent focal length in millimetres; a phone's main camera has about 26",
+            default=26.0,
+            minimum=4.0,
+            value=lambda settings: settings.focal_mm if settings.lens == "FOCAL" else None,
+            keywords={"soft_max": 200.0},
+        ),
+    ),
+    Option(
+        "fov_deg",
+        float,
+        None,
+        _EVERYWHERE,
+        "field of view along the longer side of the picture",
+        unit="degrees",
+        minimum=1.0,
+        maximum=175.0,
+        argument=Argument("--fov", "DEGREES"),
+        blender=Property(
+            "fov",
+            "Field of View",
+            unit="radians",
+            default=math.radians(65.0),
+            minimum=math.radians(2.0),
+            maximum=math.radians(170.0),
+            value=lambda settings: math.degrees(settings.fov) if settings.lens == "FOV" else None,
+            keywords={"subtype": "ANGLE"},
+        ),
+    ),
+    Option(
+        "calibration",
+        Path,
+        None,
+        _EVERYWHERE,
+        "JSON file with OpenCV intrinsics (3x3), optionally dist (five values) and size (width, height)",
+        argument=Argument(metavar="FILE", help="JSON file with intrinsics, dist and size"),
+        blender=Property(
+            "calibration_file",
+            "Calibration",
+            value=lambda settings: settings.calibration_file if settings.lens == "FILE" else None,
+        ),
+    ),
+    Option(
+        "smoothing",
+        bool,
+        True,
+        _EVERYWHERE,
+        "remove jitter and hold planted feet; off keeps the raw per-frame solution",
+        argument=Argument(help="keep the raw per-frame solution: no smoothing, no foot contact"),
+        blender=Property(label="Smooth"),
+    ),
+    Option("parts", object, None, Place.CAPTURE, "stages of the pipeline that take part; only experiments set it"),
+)

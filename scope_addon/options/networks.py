@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The options of the networks: the user's own, and what they run on."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from .record import Argument, Choice, Option, Place, Property
+
+_NETWORKS = Place.COMMAND_LINE | Place.WORKER | Place.CAPTURE | Place.PREFERENCES
+
+PROVIDERS = (
+    Choice("auto", "Automatic", "A supported GPU if there is one, otherwise the CPU", 0),
+    Choice("cpu", "CPU", "The processor", 1),
+    Choice("cuda", "CUDA", "An NVIDIA GPU", 2),
+    Choice("tensorrt", "TensorRT", "An NVIDIA GPU with TensorRT, which first compiles each network for minutes", 3),
+    Choice("directml", "DirectML", "Any GPU on Windows", 4),
+    Choice("coreml", "Core ML", "Apple silicon", 5),
+)
+
+NETWORK_OPTIONS = (
+    Option(
+        "detector",
+        Path,
+        None,
+        _NETWORKS,
+        "custom person detector, an .onnx file",
+        argument=Argument(metavar="FILE"),
+        blender=Property(
+            "detector_file",
+            "Person Detector",
+            "Your own detector (.onnx): YOLOX, YOLOv4, YOLOv8 and similar; the built-in one if empty",
+        ),
+    ),
+    Option(
+        "keypoints",
+        Path,
+        None,
+        _NETWORKS,
+        "custom keypoint network, an .onnx file",
+        argument=Argument(metavar="FILE"),
+        blender=Property(
+            "keypoints_file",
+            "Keypoint Network",
+            "Your own keypoint network (.onnx): RTMPose, HRNet, ViTPose and similar; the built-in one if empty",
+        ),
+    ),
+    Option(
+        "provider",
+        str,
+        "auto",
+        _NETWORKS,
+        "what the networks run on",
+        choices=PROVIDERS,
+        decides_result=False,
+        argument=Argument(default_text="auto, the fastest available"),
+        blender=Property(
+            label="Networks Run On",
+            description="If it is not available, the networks run on the CPU, and the result shows a warning",
+        ),
+    ),
+    Option(
+        "threads",
+        int,
+        0,
+        _NETWORKS,
+        "CPU threads for the networks; 0: all cores",
+        minimum=0,
+        decides_result=False,
+        argument=Argument(metavar="N", help="CPU threads for the networks", default_text="all cores"),
+        blender=Property(maximum=256),
+    ),
+)

@@ -1,0 +1,120 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The options that decide what is made of a captured motion: files, rigs, the scene, the report."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from .record import Argument, Choice, Option, Place, Property
+
+SHAPES = (
+    Choice("keyed", "Shape Keys", "The body's shape as shape keys with one keyframe each", 0),
+    Choice("per_frame", "Shape Keys per Frame", "The same, with a keyframe on every frame", 1),
+    Choice(
+        "baked", "In the Mesh", "No shape keys: the shape is the mesh, for engines that limit shape keys to 0..1", 2
+    ),
+)
+ROOTS = (
+    Choice("bone", "In Bones", "The pelvis moves through the scene", 0),
+    Choice(
+        "object", "On Object", "Root motion: an empty carries position and heading, the rig moves relative to it", 1
+    ),
+    Choice("in-place", "In Place", "No root motion: the character stays in place", 2),
+)
+FRAME_RATES = (
+    Choice(
+        "auto", "Automatic", "Set the scene's frame rate to the footage's unless something in the scene is animated", 0
+    ),
+    Choice("set", "Set from Footage", "Set the scene's frame rate to the footage's", 1),
+    Choice("keep", "Keep", "Leave the scene's frame rate; the motion keeps its speed, with keys between frames", 2),
+    Choice("resample", "Resample to Scene", "Leave the scene's frame rate; one key on each of its frames", 3),
+)
+
+OUTPUT_OPTIONS = (
+    Option(
+        "shape",
+        str,
+        "keyed",
+        Place.COMMAND_LINE | Place.PANEL,
+        "how the person's body shape is stored",
+        choices=SHAPES,
+        argument=Argument(
+            "--shape-keys",
+            help="shape keys keyed once, keyed per_frame, or baked into the mesh for engines that clamp morph targets",
+        ),
+    ),
+    Option(
+        "file_per_person", bool, False, Place.COMMAND_LINE, "write a separate file for each person, in every format"
+    ),
+    Option(
+        "retarget",
+        Path,
+        None,
+        Place.COMMAND_LINE,
+        "retarget the motion to the rig in this .blend, .fbx or .glb file",
+        argument=Argument(metavar="RIG"),
+    ),
+    Option(
+        "rig_object",
+        str,
+        "",
+        Place.COMMAND_LINE,
+        "name of the armature, if RIG contains several",
+        argument=Argument(metavar="NAME"),
+    ),
+    Option(
+        "bone_map",
+        Path,
+        None,
+        Place.COMMAND_LINE,
+        "bone assignments, a JSON file saved in the panel",
+        argument=Argument(metavar="FILE"),
+    ),
+    Option(
+        "retarget_root",
+        str,
+        "bone",
+        Place.COMMAND_LINE,
+        "root motion of the rig: in its pelvis bone, on its object, or none (in-place)",
+        choices=ROOTS,
+    ),
+    Option("frame_rate", str, "auto", Place.PANEL, "how the scene's frame rate is set", choices=FRAME_RATES),
+    Option(
+        "start_frame",
+        int,
+        1,
+        Place.PANEL,
+        "scene frame at which the footage starts",
+        minimum=0,
+        blender=Property(label="First Frame"),
+    ),
+    Option("set_frame_range", bool, True, Place.PANEL, "set the scene's frame range to the captured frames"),
+    Option(
+        "with_markers",
+        bool,
+        True,
+        Place.PANEL,
+        "add timeline markers where the motion should be reviewed",
+        blender=Property(label="Markers"),
+    ),
+    Option(
+        "with_camera",
+        bool,
+        True,
+        Place.PANEL,
+        "add the estimated camera, with the footage in its background",
+        blender=Property(label="Camera with Footage"),
+    ),
+)
+
+REPORT_OPTIONS = (
+    Option(
+        "json",
+        bool,
+        False,
+        Place.COMMAND_LINE,
+        "print a machine-readable report on stdout",
+        argument=Argument(inherited=False),
+    ),
+    Option("quiet", bool, False, Place.COMMAND_LINE, "no progress bar", argument=Argument(inherited=False)),
+)

@@ -1,0 +1,149 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The record that declares one option, and how it appears on the command line and in Blender."""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+
+class Place(enum.Flag):
+    """Where an option applies."""
+
+    COMMAND_LINE = enum.auto()
+    WORKER = enum.auto()  # part of the request to the worker process
+    CAPTURE = enum.auto()  # a field of CaptureOptions, which experiments set as well
+    PANEL = enum.auto()  # a property of the scene
+    PREFERENCES = enum.auto()  # a property of the extension's preferences
+
+
+@dataclass(frozen=True)
+class Choice:
+    """One of the values of an option. ``number`` is what a .blend stores, so it must never change."""
+
+    value: str
+    label: str
+    description: str
+    number: int
+
+    @property
+    def identifier(self) -> str:
+        """Name of the value in Blender."""
+        return self.value.upper()
+
+
+@dataclass(frozen=True)
+class Argument:
+    """How an option appears on the command line, where that does not follow from its name and type.
+
+    :param flag: such as ``--fov``; by default the option's name, with ``no-`` before it if the option is on by default.
+    :param parse: from the argument's text to the option's value; ValueError states what the argument takes.
+    :param default_text: how the help describes the default; by default its value.
+    :param inherited: whether a batch passes the argument on to the process of each clip.
+    """
+
+    flag: str = ""
+    metavar: str | None = None
+    help: str = ""
+    parse: Callable[[str], Any] | None = None
+    default_text: str | None = None
+    inherited: bool = True
+
+
+@dataclass(frozen=True)
+class Property:
+    """How an option appears in Blender, where that does not follow from its name and type.
+
+    ``default``, ``minimum`` and ``maximum`` are in ``unit``, the option's own where it is empty.
+
+    :param value: from the properties of the panel (or the preferences) to the option's value.
+    :param keywords: further arguments of Blender's property, such as ``subtype``.
+    """
+
+    name: str = ""
+    label: str = ""
+    description: str = ""
+    unit: str = ""
+    default: Any = None
+    minimum: float | None = None
+    maximum: float | None = None
+    choices: tuple[Choice, ...] = ()
+    value: Callable[[Any], Any] | None = None
+    keywords: dict[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Option:
+    """One option of a capture. A default of None means that the option is not set.
+
+    :param value_type: of the value, or of its elements if ``several``; a Path is text in requests.
+    :param choices: the texts that are allowed, if not all are.
+    :param decides_result: False if captures that differ in this option alone have the same result.
+    """
+
+    name: str
+    value_type: type | tuple[type, ...]
+    default: Any
+    places: Place
+    help: str
+    unit: str = ""
+    minimum: float | None = None
+    maximum: float | None = None
+    choices: tuple[Choice, ...] = ()
+    several: bool = False
+    decides_result: bool = True
+    argument: Argument = Argument()
+    blender: Property = Property()
+
+    @property
+    def flag(self) -> str:
+        """Of the command line: ``--shape-keys``."""
+        negated = "no-" if self.default is True else ""
+        return self.argument.flag or f"--{negated}{self.name.replace('_', '-')}"
+
+    @property
+    def values(self) -> tuple[str, ...]:
+        """The texts that are allowed; empty if all are."""
+        return tuple(choice.value for choice in self.choices)
+
+    def type_error(self, value: object) -> str:
+        """State what a value of the wrong type, or outside the choices, should have been; empty if it is right."""
+        if value is None and self.default is None:
+            return ""
+        if self.several:
+            if not isinstance(value, list | tuple):
+                return f"must be a list, not {value!r}"
+            return next(filter(None, map(self._element_error, value)), "")
+        return self._element_error(value)
+
+    def range_error(self, value: object) -> str:
+        """State the allowed range if a number, or an element of a list, is outside of it; else empty."""
+        for each in value if isinstance(value, list | tuple) else (value,):
+            if isinstance(each, int | float) and not isinstance(each, bool):
+                low = self.minimum is None or each >= self.minimum
+                high = self.maximum is None or each <= self.maximum
+                if not (low and high):
+                    return f"must be {self._range_text()}, not {each:g}"
+        return ""
+
+    def _range_text(self) -> str:
+        unit = f" {self.unit}" if self.unit else ""
+        if self.maximum is None:
+            return f"at least {self.minimum:g}{unit}"
+        if self.minimum is None:
+            return f"at most {self.maximum:g}{unit}"
+        return f"from {self.minimum:g} to {self.maximum:g}{unit}"
+
+    def _element_error(self, value: object) -> str:
+        allowed = self.value_type if isinstance(self.value_type, tuple) else (self.value_type,)
+        wanted: set[type] = {str if t is Path else t for t in allowed}
+        if float in wanted:
+            wanted.add(int)
+        if not isinstance(value, tuple(wanted)) or (isinstance(value, bool) and bool not in wanted):
+            return f"must be {' or '.join(sorted(t.__name__ for t in wanted))}, not {value!r}"
+        if isinstance(value, str) and self.choices and value not in self.values:
+            return f"must be one of {', '.join(self.values)}, not {value!r}"
+        return ""

@@ -1,0 +1,186 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""One declaration of every option: command line, worker and pipeline agree on names, defaults, choices and ranges."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import subprocess
+import sys
+
+import pytest
+from scope.scope_addon import options as declarations
+from scope.scope_addon.capture.options import CaptureOptions, capture_options, check_options
+from scope.scope_addon.capture.perception.execution import CHOICES
+from scope.scope_addon.capture.perception.sessions import LANDMARK_NETWORK_OF_QUALITY
+from scope.scope_addon.cli import build_parser
+from scope.scope_addon.command_line.arguments import body_and_options, given_options, option_values
+from scope.scope_addon.errors import UsageError
+from scope.scope_addon.job.request import JobRequest
+from scope.scope_addon.options import OPTIONS, Argument, Option, Place, option, options_at
+from scope.scope_addon.retarget.rig_source import ROOTS
+from scope.solver.loaders.body_file import load_body
+
+# Repeated here on purpose: users' scripts rely on the flags.
+FLAGS = """
+--quality --people --start --end --fps --body --hands --height --focal-mm --fov --calibration --no-smoothing
+--shape-keys --file-per-person --retarget --rig-object --bone-map --retarget-root --detector --keypoints --provider
+--threads --json --quiet
+""".split()
+EXTRA = Option(
+    "stride",
+    int,
+    1,
+    Place.COMMAND_LINE | Place.WORKER,
+    "capture every Nth frame",
+    minimum=1,
+    argument=Argument(metavar="N"),
+)
+
+
+@pytest.fixture(scope="module")
+def body():
+    return load_body("scope")
+
+
+def parsed(*argv):
+    return build_parser().parse_args(["capture", *argv])
+
+
+def test_the_flags_are_those_that_scripts_know(capsys):
+    assert [each.flag for each in options_at(Place.COMMAND_LINE)] == FLAGS
+    with pytest.raises(SystemExit):
+        parsed("--help")
+    shown = capsys.readouterr().out.split()
+    assert set(FLAGS) <= set(shown)
+    assert all(each.help for each in OPTIONS)
+
+
+def test_names_are_unique():
+    names = [each.name for each in OPTIONS]
+    flags = [each.flag for each in options_at(Place.COMMAND_LINE)]
+    assert len(set(names)) == len(names)
+    assert len(set(flags)) == len(flags)
+
+
+def test_defaults_are_of_the_declared_type():
+    for each in options_at(Place.WORKER):
+        assert each.type_error(each.default) == "", each.name
+        assert each.range_error(each.default) == "", each.name
+
+
+def test_command_line_and_worker_have_the_same_defaults():
+    values, request = option_values(parsed()), JobRequest("walk.mp4").values
+    assert set(request) == {each.name for each in options_at(Place.WORKER)}
+    assert {name: values[name] for name in request} == request
+    assert capture_options(values) == capture_options(request) == CaptureOptions()
+
+
+def test_the_typed_fields_of_the_pipeline_are_the_declared_options():
+    fields = {field.name for field in dataclasses.fields(CaptureOptions)}
+    assert fields == {each.name for each in options_at(Place.CAPTURE)} | {"wanted"}  # wanted: start, end and fps
+    for each in options_at(Place.CAPTURE | Place.WORKER):
+        assert getattr(CaptureOptions(), each.name) == each.default
+
+
+def test_the_choices_are_those_of_the_code_behind_them():
+    assert set(option("quality").values) == set(LANDMARK_NETWORK_OF_QUALITY)
+    assert set(option("provider").values) == set(CHOICES)
+    assert option("retarget_root").values == ROOTS
+
+
+@pytest.mark.parametrize(("name", "step"), [("focal_mm", 0.01), ("fov_deg", 0.01), ("threads", 1), ("people", 1)])
+def test_the_declared_range_is_what_the_capture_accepts(body, name, step):
+    declared = option(name)
+    for limit, outside in ((declared.minimum, -step), (declared.maximum, step)):
+        if limit is None:
+            continue
+        check_options(body, CaptureOptions(**{name: limit}))
+        with pytest.raises(UsageError):
+            check_options(body, CaptureOptions(**{name: limit + outside}))
+
+
+@pytest.mark.parametrize("outside", [0.499, 2.601])
+def test_nobody_is_taller_or_smaller_than_the_declared_range(body, outside):
+    declared = option("heights_m")
+    assert (declared.minimum, declared.maximum) == (0.5, 2.6)
+    with pytest.raises(UsageError, match="from 50 to 260 cm"):
+        check_options(body, CaptureOptions(heights_m=(outside,)))
+
+
+def test_what_the_command_line_gives_reaches_the_pipeline(tmp_path):
+    lens = tmp_path / "lens.json"
+    argv = ["--quality", "fast", "--people", "2", "--start", "1.5", "--end", "3", "--fps", "12", "--fov", "60"]
+    argv += ["--height", "175,162", "--no-smoothing", "--threads", "2", "--provider", "cpu"]
+    options = body_and_options(parsed(*argv))[1]
+    assert (options.quality, options.people, options.fov_deg, options.threads) == ("fast", 2, 60.0, 2)
+    assert (options.wanted.start_s, options.wanted.end_s, options.wanted.fps) == (1.5, 3.0, 12)
+    assert options.heights_m == pytest.approx((1.75, 1.62))
+    assert (options.smoothing, options.provider, options.focal_mm) == (False, "cpu", None)
+    assert capture_options(option_values(parsed("--calibration", str(lens)))).calibration == lens
+
+
+def test_a_request_gives_the_same_options_as_the_command_line(tmp_path):
+    argv = ["--people", "all", "--start", "00:01", "--height", "175", "--hands", "--no-smoothing"]
+    argv += ["--detector", str(tmp_path / "a.onnx"), "--calibration", str(tmp_path / "lens.json")]
+    request = JobRequest(
+        "walk.mp4",
+        people="all",
+        start="1",
+        heights_m=[1.75],
+        hands=True,
+        smoothing=False,
+        detector=str(tmp_path / "a.onnx"),
+        calibration=str(tmp_path / "lens.json"),
+    )
+    travelled = JobRequest.from_json(request.to_json())
+    assert capture_options(travelled.values) == capture_options(option_values(parsed(*argv)))
+
+
+def test_a_batch_passes_on_what_was_given_and_nothing_else():
+    argv = ["batch", ".", "--out", ".", "--jobs", "2", "--json", "--quiet", "--no-smoothing", "--people", "all"]
+    argv += ["--height", "175,162", "--quality", "best"]  # the last is the default
+    given = given_options(build_parser().parse_args(argv))
+    assert given == {"--no-smoothing": None, "--people": "all", "--height": "175,162"}
+
+
+def test_a_new_option_needs_its_record_alone(monkeypatch, capsys):
+    monkeypatch.setattr(declarations, "OPTIONS", (*OPTIONS, EXTRA))
+    args = parsed("--stride", "3")
+    assert option_values(args)["stride"] == 3
+    assert given_options(args) == {"--stride": "3"}
+    with pytest.raises(SystemExit):
+        parsed("--help")
+    assert "capture every Nth frame (default: 1)" in " ".join(capsys.readouterr().out.split())
+    request = JobRequest("walk.mp4", stride=3)
+    assert json.loads(request.to_json())["stride"] == 3
+    assert JobRequest.from_json(request.to_json()) == request
+    assert JobRequest("walk.mp4").values["stride"] == 1
+    with pytest.raises(UsageError, match="stride must be int, not 'x'"):
+        JobRequest("walk.mp4", stride="x")
+    assert EXTRA.range_error(0) == "must be at least 1, not 0"
+
+
+def test_an_undeclared_option_is_unknown():
+    with pytest.raises(UsageError, match="stride"):
+        JobRequest("walk.mp4", stride=3)
+    with pytest.raises(KeyError):
+        option("stride")
+
+
+def test_enumerations_number_every_choice_once():
+    for each in OPTIONS:
+        for choices in (each.choices, each.blender.choices):
+            assert [choice.number for choice in choices] == list(range(len(choices))), each.name
+
+
+def test_the_declarations_load_nothing_but_the_standard_library():
+    code = (
+        "import importlib.util, sys\n"
+        "before = set(sys.modules)\n"
+        "import scope.scope_addon.options\n"
+        "loaded = {n.split('.')[0] for n in set(sys.modules) - before} - set(sys.stdlib_module_names)\n"
+        "print(sorted(loaded))\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd="/")
+    assert done.stdout.strip() == "['scope']"
