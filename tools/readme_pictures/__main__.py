@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""``python -m scope.tools.readme_pictures``: make the documentation's pictures. All but ``sample`` need ../shared/data."""
+"""``python -m scope.tools.readme_pictures``: make the pictures. All but ``sample`` need ../shared/data."""
 
 from __future__ import annotations
 
