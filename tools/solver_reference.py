@@ -112,8 +112,8 @@ def _class(cls: type) -> list[str]:
     fields = [node for node in tree.body if isinstance(node, ast.AnnAssign | ast.Assign)]
     if fields:
         lines.append("")
-    for node in fields:
-        lines += source[node.lineno - 1 : node.end_lineno]
+    for assignment in fields:
+        lines += source[assignment.lineno - 1 : assignment.end_lineno]
     for node in tree.body:
         if isinstance(node, ast.FunctionDef) and not node.name.startswith("_") and ast.get_docstring(node):
             lines += ["", *_indented(_signature(node)), *_indented(_documentation(node))]
