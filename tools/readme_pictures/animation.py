@@ -12,7 +12,7 @@ from ...scope_addon.capture.video import open_video
 from ...solver.errors import OutputError
 from .clips import SAMPLE, captured, default_body
 from .footage import cropped
-from .panel import Panel
+from .panel import Panel, next_to_each_other
 from .shapes import joints, posed
 from .view import from_around
 
@@ -21,7 +21,6 @@ LARGEST_BYTES = 3_000_000
 _SIZE = (300, 306)  # of one panel, pixels
 _CORNER, _TALL = (60.0, 0.0), 480.0  # the part of the footage that is shown: the person stays inside it
 _MIDDLE, _HEIGHT_M = np.array([0.35, 0.0, 0.93]), 2.35  # what the side view looks at, and how much of it
-_LINE = 2  # white pixels between the panels
 
 
 def sample_frames() -> list[np.ndarray]:
@@ -41,12 +40,6 @@ def sample_frames() -> list[np.ndarray]:
             side.body(default_body(), posed(motion, default_body(), row))
             frames.append(next_to_each_other([footage, overlay, side.finished()]))
     return frames
-
-
-def next_to_each_other(panels: list[np.ndarray]) -> np.ndarray:
-    """Panels of one height in a row, with a white line between them."""
-    line = np.full((len(panels[0]), _LINE, 3), 255, np.uint8)
-    return np.concatenate([part for panel in panels for part in (panel, line)][:-1], axis=1)
 
 
 def write_webp(path: Path, frames: list[np.ndarray], frames_per_second: float) -> int:
