@@ -36,7 +36,7 @@ def against_truth() -> np.ndarray:
     """Camera 2 at a good moment and at an average one: the camera's view and the view from the side."""
     motion, truth = camera(2)
     panels = []
-    for row in (37, 61):
+    for row in (37, 75):
         panels.append(_with_truth(motion, row, _front(motion, row, (222, 330), truth), truth))
         panels[-1].heading("camera 2")
         panels.append(_with_truth(motion, row, _side(motion, row, (222, 330), 90, 2.35), truth))
