@@ -12,8 +12,9 @@ from pathlib import Path
 for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ[_name] = "1"  # before numpy: everything is measured in one thread
 
-from ..scope_addon.whole_file import written_beside  # noqa: E402
-from . import frames, peers, plots, report, startup, steps  # noqa: E402
+from ..scope_addon.atomic_write import written_beside  # noqa: E402
+from . import frames, report  # noqa: E402
+from .solver import peers, plots, startup, steps  # noqa: E402
 
 OUT = frames.CACHE
 
@@ -78,15 +79,15 @@ def main() -> int:
 
         figures = blender(args.quick)
     elif args.what == "choices":
-        from .choices import choices
+        from .perception.choices import choices
 
         figures = choices(args.quick)
     elif args.what == "renders":
-        from .renders import renders
+        from .perception.renders import renders
 
         figures = renders(args.quick)
     else:
-        from .perception import perception
+        from .perception.perception import perception
 
         figures = perception(args.quick)
     if args.json:

@@ -20,10 +20,10 @@ import bpy
 import numpy as np
 
 from ..scope_addon.motion import Motion
-from ..scope_addon.scene.animation import animate_armature
-from ..scope_addon.scene.armature import build_armature, rest_pose
 from ..scope_addon.scene.build import BuildOptions, build_scene
-from ..solver.body import load_body
+from ..scope_addon.scene.character.animation import animate_armature
+from ..scope_addon.scene.character.armature import build_armature, rest_pose
+from ..solver.loaders.body_file import load_body
 
 WRITTEN = 10_000  # frames
 LENGTHS = {"half_a_minute": 900, "five_minutes": 9000}  # frames, at 30 a second

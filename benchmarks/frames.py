@@ -19,17 +19,17 @@ from pathlib import Path
 
 import numpy as np
 
-from ..scope_addon.capture import fitting
-from ..scope_addon.capture.camera import choose_camera
-from ..scope_addon.capture.fitting import prepare_track
-from ..scope_addon.capture.left_right import repair_left_right
-from ..scope_addon.capture.people import PeopleBuilder
-from ..scope_addon.capture.tracker import PeopleTracker
-from ..scope_addon.capture.video import open_video
-from ..scope_addon.capture.video_range import VideoRange
-from ..scope_addon.whole_file import written_beside
+from ..scope_addon.atomic_write import written_beside
+from ..scope_addon.capture.camera.intrinsics import choose_camera
+from ..scope_addon.capture.fitting import track_fit
+from ..scope_addon.capture.fitting.track_fit import prepare_track
+from ..scope_addon.capture.media.video import open_video
+from ..scope_addon.capture.media.video_range import VideoRange
+from ..scope_addon.capture.tracking.left_right import repair_left_right
+from ..scope_addon.capture.tracking.people import PeopleBuilder
+from ..scope_addon.capture.tracking.tracker import PeopleTracker
+from ..scope_addon.errors import NoPersonError
 from ..solver import Body, Fit, FrameSolver, Options, Priors, Stage, State, fit_batch, load_body
-from ..solver.errors import NoPersonError
 from ..solver.measurements import Keypoints2D, Keypoints3D, Measurements, OrientationField
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -118,9 +118,9 @@ def _read(path: Path) -> Clip:
 
 def capture_options(cold: bool, tolerance: float, triggs: float = 0.0, limit: int = 50) -> Options:
     """Return the capture's options with another end of the last stage."""
-    stages = (fitting.cold_stages if cold else fitting.warm_stages)(fitting.WEIGHTS)
+    stages = (track_fit.cold_stages if cold else track_fit.warm_stages)(track_fit.WEIGHTS)
     last: Stage = replace(stages[-1], tolerance=tolerance, max_iterations=limit)
-    return replace(fitting.ROBUST, stages=(*stages[:-1], last), triggs=triggs)
+    return replace(track_fit.ROBUST, stages=(*stages[:-1], last), triggs=triggs)
 
 
 def capture_priors(body: Body, clip: Clip) -> Priors:

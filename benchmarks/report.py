@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from .steps import TARGETS, growth, growth_in_joints
+from .solver.steps import TARGETS, growth, growth_in_joints
 
 FRAME_TARGETS = {"iteration": 30.0, "prior_23_joints": 5.0, "cold_frame_ms": 0.8, "warm_frame_ms": 0.2}
 STARTUP_TARGETS = {"first_call_s": 20.0, "cached_call_s": 0.3}

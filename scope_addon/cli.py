@@ -21,13 +21,15 @@ from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING, NoReturn, TextIO
 
-from ..solver.body import ASSETS, Body
-from ..solver.errors import ScopeError, UsageError
+from ..solver.body import Body
+from ..solver.errors import ScopeError
+from ..solver.loaders.body_file import ASSETS
 from .cli_options import add_options, body_and_options, given_options, named_path
+from .errors import UsageError, exit_status
 from .job.parent import stop_with_parent
 from .motion import Motion
 from .retarget.rig_source import ROOTS
-from .scene.output_paths import SUFFIXES, check_output, person_paths
+from .scene.export.output_paths import SUFFIXES, check_output, person_paths
 
 if TYPE_CHECKING:
     from .retarget.rig_source import RigSource
@@ -114,7 +116,7 @@ def main(argv: Sequence[str] | None = None, program: Sequence[str] = PROGRAM) ->
         return report.pop("exit_status", 0)
     except ScopeError as error:
         print(f"scope: {error}", file=sys.stderr)
-        return error.exit_status
+        return exit_status(error)
     except KeyboardInterrupt as stop:
         print(f"scope: stopped; {str(stop) or 'nothing was written'}", file=sys.stderr)
         return 130
@@ -132,7 +134,7 @@ def run_capture(args: argparse.Namespace) -> dict:
 
     body, options = body_and_options(args)
     # Imported here, so that --help and a wrong argument answer at once.
-    from .capture.overlay import write_overlay
+    from .capture.overlay.overlay_video import write_overlay
     from .capture.pipeline import capture
 
     with _ProgressBar(sys.stderr, show=sys.stderr.isatty() and not args.quiet) as progress:
@@ -207,7 +209,7 @@ def _rig_of(args: argparse.Namespace, outputs: list[Path]) -> RigSource | None:
     for path in scene_files:
         if path.exists() and path.samefile(rig.path):
             raise UsageError(f"{path} is the rig's own file; choose another name")
-    from .scene.rig_file import check_rig
+    from .scene.rigs.rig_file import check_rig
 
     check_rig(rig, fingers=args.hands)
     return rig
@@ -231,16 +233,16 @@ def _write(
             motion.save(target)
         written += targets
     if scene_files:
-        from .capture.image_sequence import find_sequence
+        from .capture.media.image_sequence import find_sequence
         from .scene.build import NEW_SCENE
-        from .scene.export import ExportOptions, export_motions
+        from .scene.export.export import ExportOptions, export_motions
 
         sequence = find_sequence(video, args.fps is not None)
         footage = sequence.paths[0] if sequence else video
         options = replace(NEW_SCENE, name=video.stem, shape=args.shape_keys)
         separate = ExportOptions(separate=args.file_per_person)
         if rig is not None:
-            from .scene.rig_export import export_on_rig
+            from .scene.rigs.rig_export import export_on_rig
 
             files, warnings = export_on_rig(
                 motions, body, scene_files, rig, options, args.retarget_root, footage, separate

@@ -8,8 +8,9 @@ import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..solver.body import BUILT_IN, Body, body_with_hands
-from ..solver.errors import UsageError
+from ..solver.body import Body
+from ..solver.loaders.body_file import BUILT_IN, body_with_hands
+from .errors import UsageError
 from .retarget.rig_source import ROOTS
 
 if TYPE_CHECKING:
@@ -98,9 +99,9 @@ def body_and_options(args: argparse.Namespace) -> tuple[Body, CaptureOptions]:
 
     :raises ScopeError: an argument cannot be meant, or there is no such body.
     """
-    from ..solver.body import load_body
+    from ..solver.loaders.body_file import load_body
+    from .capture.media.video_range import parse_range
     from .capture.pipeline import CaptureOptions, check_options
-    from .capture.video_range import parse_range
 
     if args.threads < 0:
         raise UsageError(f"--threads takes a number from 1 on, or 0 for all, not {args.threads}")

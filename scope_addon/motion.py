@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 
-from ..solver.errors import MotionFileError, OutputError
-from ..solver.npz import read_npz
-from .whole_file import reason, written_beside
+from ..solver.loaders.npz import read_npz
+from .atomic_write import reason, written_beside
+from .errors import MotionFileError, OutputError
 
 
 @dataclass

@@ -5,25 +5,18 @@ body = load_body("scope")
 fit(body, Measurements(intrinsics, keypoints2d=Keypoints2D(indices, pixels, confidence))) -> Fit
 """
 
-from .batch import fit_batch, fit_clips
-from .body import Body, load_body
-from .clip import carry, fit_clip
+from .body import Body
+from .compiled.tree import BodyArrays, Tree, make_tree
 from .errors import ShapeError
-from .frame_solver import FrameSolver, fit, fit_tree
+from .fitting.batch import fit_batch, fit_clips
+from .fitting.clip import carry, fit_clip
+from .fitting.frame_solver import FrameSolver, fit, fit_tree
 from .learned_prior import JointPrior, load_joint_prior
-from .measurements import (
-    Floor,
-    FootContacts,
-    Keypoints2D,
-    Keypoints3D,
-    Measurements,
-    OrientationField,
-    PosePriors,
-)
+from .loaders import load_body
+from .measurements import Floor, FootContacts, Keypoints2D, Keypoints3D, Measurements, OrientationField, PosePriors
 from .options import COLD_STAGES, WARM_STAGES, Options, Priors, Stage, Weights, default_priors
 from .state import ClipFit, Fit, State, Status
 from .temporal import Temporal, with_previous
-from .tree import BodyArrays, Tree, make_tree
 
 __all__ = [
     "COLD_STAGES",

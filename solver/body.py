@@ -7,28 +7,18 @@
     v      = Σ_k w_vk T_k · (v̄(β) − J_k(β))     linear blend skinning
     p_j    = R_i (V_j β + v̄_j) + t_i            keypoint j on part i (the paper's Assumption 1)
 
-File format: a .npz of plain arrays, see ``load_body``.
+Files are read by ``loaders.body_file.load_body``.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from pathlib import Path
 
 import numpy as np
 
 from .errors import ModelFileError, ShapeError
-from .npz import read_npz
-
-ASSETS = Path(__file__).resolve().parent.parent / "assets"
-BUILT_IN = {"scope": ASSETS / "body" / "scope.npz", "scope_h": ASSETS / "body" / "scope_h.npz"}
-
-
-def body_with_hands(which: str) -> str:
-    """The built-in body with fingers instead of the one without; any other stays."""
-    return "scope_h" if which == "scope" else which
 
 
 @dataclass(frozen=True)
@@ -170,148 +160,3 @@ class Body:
         if f.shape[1] == 3:
             return f
         return np.concatenate([f[:, [0, 1, 2]], f[:, [0, 2, 3]]]).astype(np.int32)
-
-
-# What a file's array must hold, and its shape; None is any extent.
-Form = tuple[str, tuple[int | None, ...]]
-_KINDS = {"numbers": "iuf", "whole numbers": "iu", "text": "U"}
-
-_REQUIRED: dict[str, Form] = {
-    "joint_names": ("text", (None,)),
-    "kintree_table": ("whole numbers", (2, None)),
-    "v_template": ("numbers", (None, 3)),
-    "shapedirs": ("numbers", (None, 3, None)),
-    "J_template": ("numbers", (None, 3)),
-    "J_shapedirs": ("numbers", (None, 3, None)),
-    "skin_joints": ("whole numbers", (None, 4)),
-    "skin_weights": ("numbers", (None, 4)),
-    "faces": ("whole numbers", (None, None)),
-    "keypoint_names": ("text", (None,)),
-    "keypoint_part": ("whole numbers", (None,)),
-    "keypoint_template": ("numbers", (None, 3)),
-    "keypoint_shapedirs": ("numbers", (None, 3, None)),
-}
-_OPTIONAL: dict[str, Form] = {
-    "uv": ("numbers", (None, 2)),
-    "uv_faces": ("whole numbers", (None, None)),
-    "face_material": ("whole numbers", (None,)),
-    "material_names": ("text", (None,)),
-    "material_colors": ("numbers", (None, 4)),
-    "name": ("text", ()),
-    "license": ("text", ()),
-}
-
-
-def load_body(which: str | Path = "scope") -> Body:
-    """Load a body by name (``scope``: K = 23, ``scope_h``: K = 51), from a .npz in the same format, or a user's model.
-
-    A user's SMPL, SMPL+H, SMPL-X or STAR file (.npz, or .pkl) goes through ``loaders.load_model``. Our own format:
-
-    Keys: joint_names, kintree_table (2, K+1), v_template, shapedirs, J_template, J_shapedirs, skin_joints,
-    skin_weights, faces, keypoint_names/part/template/shapedirs; optional uv, uv_faces, face_material,
-    material_names, material_colors, name, license. Shapes as in ``Body``.
-
-    :raises ModelFileError: the file is missing, not a body, or contradicts itself.
-    """
-    path = BUILT_IN.get(str(which), Path(which))
-    choice = f"give one of {', '.join(BUILT_IN)}, or a body's .npz or .pkl file"
-    if not path.is_file():
-        raise ModelFileError(f"body '{which}' was not found: {choice}")
-    from .loaders import is_motion, is_user_model, load_model  # here, because the loaders build a Body
-
-    if is_user_model(path):
-        return load_model(path)
-    if is_motion(path):
-        raise ModelFileError(f"{path} is a motion file, which holds how a body moves and not the body: {choice}")
-    data = read_npz(path, ModelFileError, "body file")
-    missing = [k for k in _REQUIRED if k not in data]
-    if missing:
-        raise ModelFileError(f"{path} lacks {', '.join(missing)}: it is not a Scope body file")
-    forms = _REQUIRED | _OPTIONAL
-    check_arrays(data, forms, path)
-    for key, (kind, _) in forms.items():
-        if key in data and kind == "numbers":
-            data[key] = data[key].astype(np.float64)
-    body = Body(
-        name=str(data.get("name", path.stem)),
-        joint_names=tuple(map(str, data["joint_names"])),
-        parents=data["kintree_table"][0].astype(np.int32),
-        keypoint_names=tuple(map(str, data["keypoint_names"])),
-        keypoint_part=data["keypoint_part"].astype(np.int32),
-        skin_joints=data["skin_joints"].astype(np.intp),
-        faces=data["faces"].astype(np.int32),
-        material_names=tuple(map(str, data.get("material_names", ()))),
-        license=str(data.get("license", "")),
-        v_template=data["v_template"],
-        shapedirs=data["shapedirs"],
-        J_template=data["J_template"],
-        J_shapedirs=data["J_shapedirs"],
-        skin_weights=data["skin_weights"],
-        keypoint_template=data["keypoint_template"],
-        keypoint_shapedirs=data["keypoint_shapedirs"],
-        uv=data.get("uv"),
-        uv_faces=data.get("uv_faces"),
-        face_material=data.get("face_material"),
-        material_colors=data.get("material_colors"),
-        file="" if str(which) in BUILT_IN else str(path.resolve()),
-    )
-    _check(body, path)
-    return body
-
-
-def check_arrays(arrays: Mapping[str, np.ndarray], forms: Mapping[str, Form], path: Path) -> None:
-    """What the arrays of a file hold, and their shapes, at the door. Those that are not there may be left out.
-
-    :raises ModelFileError: an array of another kind or shape.
-    """
-    for key, (kind, shape) in forms.items():
-        if key not in arrays:
-            continue
-        array = arrays[key]
-        no_names = kind == "text" and array.size == 0  # which numpy writes as numbers
-        if array.dtype.kind not in _KINDS[kind] and not no_names:
-            raise ModelFileError(f"{path}: {key} must hold {kind}, but holds {array.dtype}")
-        if array.ndim != len(shape) or any(b not in (None, a) for a, b in zip(array.shape, shape, strict=True)):
-            wanted = ", ".join("any" if b is None else str(b) for b in shape)
-            raise ModelFileError(f"{path}: {key} must have shape ({wanted}), but has {array.shape}")
-
-
-def _check(body: Body, path: Path) -> None:
-    """Shapes and index ranges of a file that may be hostile."""
-    n, p, v, m = len(body.parents), body.P, len(body.v_template), len(body.keypoint_names)
-    materials = max(1, len(body.material_names))
-    if body.faces.shape[1] not in (3, 4):
-        raise ModelFileError(f"{path}: faces must be triangles or quads, but have {body.faces.shape[1]} corners")
-    expected = {
-        "J_template": (n, 3),
-        "J_shapedirs": (n, 3, p),
-        "v_template": (v, 3),
-        "shapedirs": (v, 3, p),
-        "skin_joints": (v, 4),
-        "skin_weights": (v, 4),
-        "keypoint_part": (m,),
-        "keypoint_template": (m, 3),
-        "keypoint_shapedirs": (m, 3, p),
-        "uv_faces": body.faces.shape,
-        "face_material": (len(body.faces),),
-        "material_colors": (materials, 4),
-    }
-    for key, shape in expected.items():
-        array = getattr(body, key)
-        if array is not None and array.shape != shape:
-            raise ModelFileError(f"{path}: {key} must have shape {shape}, but has {array.shape}")
-    if len(body.joint_names) != n:
-        raise ModelFileError(f"{path}: {len(body.joint_names)} joint names for {n} joints")
-    if n == 0 or body.parents[0] != -1 or (body.parents[1:] < 0).any() or (body.parents[1:] >= np.arange(1, n)).any():
-        raise ModelFileError(f"{path}: kintree_table must list each joint after its parent, the root first")
-    tops = {"skin_joints": n, "faces": v, "keypoint_part": n, "face_material": materials}
-    if body.uv is not None:
-        tops["uv_faces"] = len(body.uv)
-    for key, top in tops.items():
-        index = getattr(body, key)
-        if index is not None and index.size and (index.min() < 0 or index.max() >= top):
-            raise ModelFileError(f"{path}: {key} points outside 0..{top - 1}")
-    for key in (key for key, (kind, _) in (_REQUIRED | _OPTIONAL).items() if kind == "numbers"):
-        array = getattr(body, key)
-        if array is not None and not np.isfinite(array).all():
-            raise ModelFileError(f"{path}: {key} contains NaN or infinity")

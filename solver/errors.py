@@ -1,67 +1,27 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Every error Scope raises on purpose. One tree, so that one ``except ScopeError`` is enough.
+"""Every error the solver raises on purpose. One tree, so that one ``except ScopeError`` is enough.
 
     ScopeError
-    ├── InputError              the user's file or value cannot be used           exit 1
-    │   ├── VideoError          a video or picture cannot be opened or decoded
-    │   ├── ModelFileError      a body or network file is missing or malformed
-    │   └── MotionFileError     a motion file is missing or malformed
-    ├── UsageError              arguments that contradict or do not exist         exit 2
-    ├── NoPersonError           nobody was found in the footage                   exit 3
-    ├── OutputError             a result cannot be written                        exit 1
-    ├── ShapeError              an array of the wrong shape or type               exit 1
-    ├── SetupError              something Scope needs is not installed or built   exit 1
-    └── CancelledError          the user asked to stop; nothing was written       exit 1
+    ├── InputError              the user's file or value cannot be used
+    │   └── ModelFileError      a body file is missing or malformed
+    └── ShapeError              an array of the wrong shape or type
 
+``scope_addon/errors.py`` adds what can go wrong with footage, files and the command line.
 Each message says what was wrong, with which file or value, and what to do about it.
 """
 
 
 class ScopeError(Exception):
-    """Root of the tree; ``exit_status`` is what the command line ends with."""
-
-    exit_status = 1
+    """Root of the tree."""
 
 
 class InputError(ScopeError):
     """The user's file or value cannot be used."""
 
 
-class VideoError(InputError):
-    """A video or picture cannot be opened or decoded."""
-
-
 class ModelFileError(InputError):
     """A body or network file is missing, malformed or does not match what is expected of it."""
 
 
-class MotionFileError(InputError):
-    """A motion file is missing or malformed."""
-
-
-class UsageError(ScopeError):
-    """Arguments that contradict each other or name something that does not exist."""
-
-    exit_status = 2
-
-
-class NoPersonError(ScopeError):
-    """Nobody was found in the footage."""
-
-    exit_status = 3
-
-
-class OutputError(ScopeError):
-    """A result cannot be written."""
-
-
 class ShapeError(ScopeError, ValueError):
     """An array does not have the shape or type that was asked for."""
-
-
-class SetupError(ScopeError):
-    """Something Scope needs is not installed or was not built."""
-
-
-class CancelledError(ScopeError):
-    """The user asked to stop; nothing was written."""

@@ -10,10 +10,10 @@ from pathlib import Path
 
 import numpy as np
 
+from .compiled.part import Array
 from .errors import ModelFileError
-from .npz import read_npz
+from .loaders.npz import read_npz
 from .residuals import joint_flow
-from .residuals.part import Array
 
 BUILT_IN = Path(__file__).resolve().parent.parent / "assets" / "prior" / "joint_prior.npz"
 

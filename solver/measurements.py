@@ -13,10 +13,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .compiled.kernel import kernel
+from .compiled.part import Array
 from .errors import ShapeError
-from .kernel import kernel
 from .residuals import floor, foot_contact, pose_prior
-from .residuals.part import Array
 
 # No length, coordinate or confidence is as large. What the solver multiplies of smaller ones stays finite; one pixel
 # whose square does not would else make the cost of a whole clip infinite.

@@ -8,11 +8,11 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .compiled.part import Array
 from .errors import ShapeError
 from .learned_prior import load_joint_prior
 from .measurements import all_finite, as_array
 from .residuals import joint_limits, joint_prior
-from .residuals.part import Array
 from .residuals.registry import FIRST_TABLE, RESIDUALS, registered
 
 

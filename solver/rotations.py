@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .compiled.kernel import kernel
 from .errors import ShapeError
-from .kernel import kernel
 
 Array = NDArray[Any]
 

@@ -6,11 +6,11 @@ from enum import Enum
 
 import numpy as np
 
-from .linearize import make_pose, place_parts
+from .compiled.part import Array, Pose
+from .compiled.tree import Tree
+from .gauss_newton.linearize import make_pose, place_parts
 from .measurements import as_array
-from .residuals.part import Array, Pose
 from .rotations import nearest_rotation
-from .tree import Tree
 
 
 class Status(Enum):

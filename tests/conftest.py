@@ -30,7 +30,7 @@ def shared() -> Path:
 @pytest.fixture(scope="session")
 def body() -> Body:
     """The built-in body without fingers."""
-    from scope.solver.body import load_body
+    from scope.solver.loaders.body_file import load_body
 
     return load_body("scope")
 

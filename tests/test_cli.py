@@ -144,7 +144,7 @@ def test_an_interrupt_while_the_overlay_is_drawn_leaves_whole_files_and_says_so(
     def interrupted(*_, **__):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("scope.scope_addon.capture.overlay.write_overlay", interrupted)
+    monkeypatch.setattr("scope.scope_addon.capture.overlay.overlay_video.write_overlay", interrupted)
     motion = tmp_path / "a.npz"
     options = ["--end", "0.1", "--quality", "fast", "-o", motion, "--overlay", tmp_path / "a.mp4"]
     status, _, err = run(capsys, "capture", SAMPLE, *options)
@@ -197,7 +197,7 @@ def test_help_names_every_option(capsys):
 
 
 def test_hands_need_a_body_with_fingers(tmp_path, capsys):
-    from scope.solver.body import BUILT_IN
+    from scope.solver.loaders.body_file import BUILT_IN
 
     out = tmp_path / "out.npz"
     status, _, err = run(capsys, "capture", str(SAMPLE), "--hands", "--body", str(BUILT_IN["scope"]), "-o", str(out))

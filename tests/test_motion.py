@@ -5,8 +5,8 @@ import pickle
 
 import numpy as np
 import pytest
+from scope.scope_addon.errors import MotionFileError, OutputError
 from scope.scope_addon.motion import Motion
-from scope.solver.errors import MotionFileError, OutputError
 
 
 def make_motion(T=4, K1=24, J=33, P=10):

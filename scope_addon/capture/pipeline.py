@@ -14,42 +14,42 @@ import cv2
 import numpy as np
 
 from ...solver.body import Body
-from ...solver.errors import NoPersonError, UsageError, VideoError
 from ...solver.names import BODY_JOINTS
+from ..errors import NoPersonError, UsageError, VideoError
+from ..kinematics.single_precision import compact
 from ..motion import Motion
-from .adapters.box_detector import BoxDetector
-from .adapters.description import description_path
-from .adapters.keypoint_network import KeypointNetwork
-from .assemble import assemble_motion, corrected_stance
-from .beside import BesideTracking
-from .calibration import read_calibration
-from .camera import Camera, choose_camera
-from .camera_path import CameraPath
-from .camera_travel import camera_travel
-from .compact import compact
-from .execution import AUTO, Execution
-from .exposure import Exposure
-from .fitting import PreparedTrack, fit_track, prepare_track, refit_track
-from .focal_fits import FocalFits
-from .hand_measure import require_fingers
-from .hand_tracker import HandTracker
-from .leaps import mend_leaps
-from .left_right import repair_left_right
-from .limb_exchange import repair_limbs
-from .line_segments import Lines
-from .live_body import LiveBody
-from .networks import landmark_network_name
-from .observation import Observation
-from .parts import ALL_PARTS, Parts
-from .people import PeopleBuilder
-from .placement import PlacedTrack, place_track
-from .scene_cuts import SceneCuts
-from .stature import require_stature
-from .track import Track
-from .tracker import MOST_PEOPLE, PeopleTracker
-from .video import Frame, Video, open_video
-from .video_range import VideoRange, Wanted
-from .world import estimate_world, share_world
+from .camera.calibration import read_calibration
+from .camera.intrinsics import Camera, choose_camera
+from .camera.line_segments import Lines
+from .fitting.ablation import ALL_PARTS, Parts
+from .fitting.background_estimators import BesideTracking
+from .fitting.focal_fits import FocalFits
+from .fitting.hand_measurements import require_fingers
+from .fitting.live_body import LiveBody
+from .fitting.stature import require_stature
+from .fitting.track_fit import PreparedTrack, fit_track, prepare_track, refit_track
+from .media.exposure import Exposure
+from .media.video import Frame, Video, open_video
+from .media.video_range import VideoRange, Wanted
+from .perception.adapters.description import description_path
+from .perception.adapters.detectors.box_detector import BoxDetector
+from .perception.adapters.keypoints.keypoint_network import KeypointNetwork
+from .perception.execution import AUTO, Execution
+from .perception.observation import Observation
+from .perception.sessions import landmark_network_name
+from .tracking.hand_tracker import HandTracker
+from .tracking.keypoint_jumps import mend_leaps
+from .tracking.left_right import repair_left_right
+from .tracking.limb_swap import repair_limbs
+from .tracking.people import PeopleBuilder
+from .tracking.scene_cuts import SceneCuts
+from .tracking.track import Track
+from .tracking.tracker import MOST_PEOPLE, PeopleTracker
+from .world.assemble import assemble_motion, corrected_stance
+from .world.camera_path import CameraPath
+from .world.camera_travel import camera_travel
+from .world.placement import PlacedTrack, place_track
+from .world.world_frame import estimate_world, share_world
 
 # Called with the stage's name, what is done and the total (0: unknown). May raise CancelledError.
 Progress = Callable[[str, int, int], None]

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...solver.body import Body
-from ...solver.errors import UsageError
 from ...solver.rotations import exp, log
-from ..capture.smoothing import smooth_rotations
-from ..capture.supports import SOLES, support_points, with_supports
+from ..errors import UsageError
+from ..kinematics.contact_points import SOLES, support_points, with_supports
+from ..kinematics.smoothing import smooth_rotations
 
 
 @dataclass

@@ -7,8 +7,8 @@ import numpy as np
 
 from ...solver.body import Body
 from ...solver.rotations import shortest_turn
-from ..capture.grounding import standing_probability
-from ..capture.smoothing import gaussian_smooth
+from ..kinematics.smoothing import gaussian_smooth
+from ..kinematics.standing import standing_probability
 from .clip import Clip
 
 UP = np.array([0.0, 0.0, 1.0])

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...solver.body import Body
-from ...solver.errors import UsageError
 from ...solver.rotations import exp, log
+from ..errors import UsageError
 from .clip import Clip, inside
 from .root_motion import floor_path, relative_to_path
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...solver.errors import UsageError
+from ..errors import UsageError
 
 
 def keep_of_quaternions(times: np.ndarray, q: np.ndarray, bound: float) -> np.ndarray:

@@ -5,8 +5,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...solver.frames import R_WORLD_MODEL
-from ..capture.smoothing import gaussian_smooth
+from ..kinematics.axes import R_WORLD_MODEL
+from ..kinematics.smoothing import gaussian_smooth
 from .clip import Clip
 
 _HEADING_CUTOFF_HZ = 1.0  # hips turn with every step; where a person goes does not

@@ -6,9 +6,9 @@ from __future__ import annotations
 import numpy as np
 
 from ...solver.body import Body
-from ...solver.errors import UsageError
 from ...solver.rotations import exp
-from ..capture.smoothing import ROTATION_CUTOFF_HZ, smooth_root, smooth_rotations
+from ..errors import UsageError
+from ..kinematics.smoothing import ROTATION_CUTOFF_HZ, smooth_root, smooth_rotations
 from ..motion import Motion
 from .clip import Clip, between
 

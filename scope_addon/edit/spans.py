@@ -6,8 +6,8 @@ from __future__ import annotations
 import numpy as np
 
 from ...solver.body import Body
-from ...solver.errors import UsageError
 from ...solver.rotations import exp, log
+from ..errors import UsageError
 from .clip import Clip, inside
 
 LIMBS = {

@@ -20,15 +20,10 @@ from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from pathlib import Path
 from typing import IO
 
-from ...solver.errors import InputError, NoPersonError, OutputError, UsageError
-from ..footage import (
-    FOOTAGE_SUFFIXES,
-    PICTURE_SUFFIXES,
-    VIDEO_SUFFIXES,
-    is_sequence,
-    pictures_in,
-)
-from ..whole_file import written_beside
+from ...solver.errors import InputError
+from ..atomic_write import written_beside
+from ..errors import NO_PERSON, OutputError, UsageError
+from ..footage import FOOTAGE_SUFFIXES, PICTURE_SUFFIXES, VIDEO_SUFFIXES, is_sequence, pictures_in
 from .parent import GRACE_S
 from .request import code_version
 
@@ -170,7 +165,7 @@ class Batch:
         if status == 0 and report is not None:
             outputs = [Path(p).relative_to(self.out).as_posix() for p in report.pop("outputs")]
             return entry | {"status": "done", "outputs": outputs, "report": report}
-        if status == NoPersonError.exit_status:
+        if status == NO_PERSON:
             return entry | {"status": "no_person", "outputs": [], "message": _sentence(stderr)}
         return entry | {"status": "failed", "message": _sentence(stderr) or f"the process ended with status {status}"}
 
@@ -249,7 +244,7 @@ class Batch:
     def _report(self, entries: dict[str, dict], before: dict[str, dict]) -> dict:
         """Write and return the report. Earlier entries stay until their turn, or a batch stopped early forgets them."""
         counts = Counter(e["status"] for e in entries.values())
-        status = 1 if counts["failed"] else NoPersonError.exit_status if counts["no_person"] else 0
+        status = 1 if counts["failed"] else NO_PERSON if counts["no_person"] else 0
         report = {
             "folder": str(self.folder),
             "options": self._options,

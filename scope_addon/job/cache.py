@@ -113,7 +113,7 @@ class Cache:
                 shutil.rmtree(folder, ignore_errors=True)
 
     def _not_writable(self, error: OSError) -> Exception:
-        from ...solver.errors import OutputError  # here: it loads numba, and the preferences need only the rest
+        from ..errors import OutputError  # here: it loads numba, and the preferences need only the rest
 
         reason = error.strerror or error
         return OutputError(

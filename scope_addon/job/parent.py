@@ -39,7 +39,7 @@ def stop_with_parent() -> None:
     """Have the main thread stop as by Ctrl-C when the parent is gone, and the process end soon after in any case."""
 
     def stop() -> NoReturn:
-        from ..whole_file import remove_unfinished
+        from ..atomic_write import remove_unfinished
 
         _thread.interrupt_main(signal.SIGINT)
         time.sleep(GRACE_S)

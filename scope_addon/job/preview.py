@@ -18,13 +18,13 @@ from types import TracebackType
 import cv2
 import numpy as np
 
-from ..capture.camera import scaled_intrinsics
-from ..capture.landmark_network import KEYPOINT_NAMES
-from ..capture.live_body import LiveBody, LivePose
-from ..capture.overlay import body_colors, draw_overlay
-from ..capture.tracker import Observation
-from ..capture.video import Frame
-from ..whole_file import written_beside
+from ..atomic_write import written_beside
+from ..capture.camera.intrinsics import scaled_intrinsics
+from ..capture.fitting.live_body import LiveBody, LivePose
+from ..capture.media.video import Frame
+from ..capture.overlay.overlay_video import body_colors, draw_overlay
+from ..capture.perception.landmark_network import KEYPOINT_NAMES
+from ..capture.tracking.tracker import Observation
 
 _LOG = logging.getLogger(__name__)
 

@@ -14,7 +14,8 @@ import threading
 from collections.abc import Sequence
 from pathlib import Path
 
-from ...solver.errors import ScopeError, SetupError
+from ...solver.errors import ScopeError
+from ..errors import SetupError
 from .request import JobRequest
 
 ROOT = Path(__file__).resolve().parents[2]

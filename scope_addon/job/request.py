@@ -8,7 +8,7 @@ import json
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from ...solver.errors import UsageError
+from ..errors import UsageError
 
 _SAMPLE_BYTES = 1 << 20  # of the footage's beginning and end; reading gigabytes would hold up the window
 

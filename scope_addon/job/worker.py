@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import IO, NoReturn
 
 from ...solver.errors import ScopeError
+from ..errors import exit_status
 from .parent import when_parent_ends
 from .request import JobRequest
 
@@ -50,9 +51,9 @@ def run(request: JobRequest, job_folder: Path, reporter: Reporter) -> int:
     try:
         reporter.progress("starting", 0, 0)
         # Imported here, so that a missing wheel becomes a sentence in the panel as well.
-        from ...solver.body import load_body
+        from ...solver.loaders.body_file import load_body
+        from ..capture.media.video_range import VideoRange
         from ..capture.pipeline import CaptureOptions, capture
-        from ..capture.video_range import VideoRange
         from .preview import PreviewWriter
 
         options = CaptureOptions(
@@ -80,7 +81,7 @@ def run(request: JobRequest, job_folder: Path, reporter: Reporter) -> int:
         return 0
     except ScopeError as error:
         reporter.send("error", message=str(error))
-        return error.exit_status
+        return exit_status(error)
     except ImportError as error:
         reporter.send("error", message=f"a part of Scope cannot be loaded ({error}); install the extension again")
     except (OSError, MemoryError) as error:

@@ -7,8 +7,9 @@ import json
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from ...solver.errors import InputError, OutputError
-from ..whole_file import reason, written_beside
+from ...solver.errors import InputError
+from ..atomic_write import reason, written_beside
+from ..errors import OutputError
 
 SIDED = ("hip", "knee", "ankle", "foot", "collar", "shoulder", "elbow", "wrist")
 SPINE = ("spine1", "spine2", "spine3")

@@ -6,7 +6,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from ...solver.errors import InputError, UsageError
+from ...solver.errors import InputError
+from ..errors import UsageError
 from .bone_map import BoneMap, load_bone_map
 
 ROOTS = ("bone", "object", "in-place")  # where a rig keeps the way over the floor

@@ -20,9 +20,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...solver.body import Body
-from ...solver.frames import R_WORLD_MODEL
 from ...solver.rotations import exp, shortest_turn
 from ..edit.clip import Clip, between
+from ..kinematics.axes import R_WORLD_MODEL
 from .bone_map import FINGERS, SPINE, BoneMap
 from .feet import FootRest, ankle_goal, flat_toes, sinking
 from .legs import reach

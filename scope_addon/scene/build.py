@@ -11,11 +11,13 @@ import bpy
 import numpy as np
 
 from ...solver.body import Body
-from ...solver.errors import MotionFileError, UsageError
+from ..errors import MotionFileError, UsageError
 from ..motion import Motion
-from . import animation, armature, body_mesh, bone_display, camera, measurements, shape_keys, timing
-from .keys import bake_whole_frames
-from .transaction import all_or_nothing
+from . import camera
+from .animation_data import timing
+from .animation_data.transaction import all_or_nothing
+from .character import animation, armature, body_mesh, bone_display, confidence_curves, shape_keys
+from .character.keys import bake_whole_frames
 
 CAPTURE_TAG = "scope_capture"  # custom property of a capture's collection; exporters find captures by it
 Progress = Callable[[float, str], None]
@@ -123,7 +125,7 @@ def _build(
     if options.with_markers:
         for index, person in enumerate(people):
             whose = "" if len(people) == 1 else f"person {index + 1} "
-            measurements.mark_low_confidence(scene, whose, person.motion, person.frames)
+            confidence_curves.mark_low_confidence(scene, whose, person.motion, person.frames)
     if options.with_camera:
         warnings += _build_cameras(name, people, collection, footage, options)
     unit = scene.unit_settings.scale_length
@@ -160,7 +162,7 @@ def _build_person(
     action = bpy.data.actions.new(label)
     action.use_fake_user = True  # stays when the armature goes on to another action or to NLA strips
     channels = animation.animate_armature(rig, action, body, motion, rest, frames)
-    measurements.key_measurements(rig, channels, body, motion, frames)
+    confidence_curves.key_measurements(rig, channels, body, motion, frames)
     if options.frame_rate == "resample":
         bake_whole_frames(rig, body, rate)
         rig["scope_resampled"] = True  # smoothing again keeps to it

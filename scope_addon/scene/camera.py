@@ -19,12 +19,12 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from ...solver.errors import VideoError
-from ...solver.frames import blender_brown_distortion, blender_camera_matrix
+from ..errors import VideoError
 from ..footage import LAST_NUMBER, PICTURE_SUFFIXES, numbered_from
 from ..motion import Motion
-from .actions import Channels
-from .animation import on_one_hemisphere, quaternion_from_matrix
+from .animation_data.actions import Channels
+from .axes import blender_brown_distortion, blender_camera_matrix
+from .character.animation import on_one_hemisphere, quaternion_from_matrix
 
 _IN_STEP = 0.6  # frames that footage may be off and counts as in step; half of one is rounding
 _LONG = 1_000_000  # frames, beyond which Blender would show the last one

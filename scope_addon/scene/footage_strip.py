@@ -7,7 +7,7 @@ from pathlib import Path
 
 import bpy
 
-from ...solver.errors import VideoError
+from ..errors import VideoError
 from ..footage import PICTURE_SUFFIXES
 
 

@@ -9,27 +9,16 @@ from __future__ import annotations
 
 import bpy
 
-from . import (
-    capture_operators,
-    command,
-    drop,
-    edit_operators,
-    edit_panel,
-    export_operators,
-    panel,
-    preferences,
-    properties,
-    retarget_operators,
-    retarget_panel,
-    retarget_properties,
-    view_after_undo,
-    view_operators,
-)
+from . import command, drop, export_operators, preferences
+from .capture import capture_operators, capture_panel, capture_properties
+from .edit import edit_operators, edit_panel
+from .retarget import retarget_operators, retarget_panel, retarget_properties
+from .view import view_after_undo, view_operators
 
 _MODULES = (
-    *(properties, preferences, capture_operators, export_operators, view_operators, edit_operators, drop),
+    *(capture_properties, preferences, capture_operators, export_operators, view_operators, edit_operators, drop),
     *(retarget_properties, retarget_operators),
-    *(panel, edit_panel, retarget_panel),
+    *(capture_panel, edit_panel, retarget_panel),
 )
 
 
@@ -41,7 +30,7 @@ def register() -> None:
             for cls in module.CLASSES:
                 bpy.utils.register_class(cls)
                 done.append(cls)
-        properties.attach()
+        capture_properties.attach()
         retarget_properties.attach()
         command.register()
         view_after_undo.attach()
@@ -57,7 +46,7 @@ def unregister() -> None:
     view_after_undo.detach()
     command.unregister()
     retarget_properties.detach()
-    properties.detach()
+    capture_properties.detach()
     for module in reversed(_MODULES):
         for cls in reversed(module.CLASSES):
             bpy.utils.unregister_class(cls)

@@ -67,7 +67,7 @@ def library_of(armature: bpy.types.Object) -> bpy.types.Library | None:
 
 def body_of(armature: bpy.types.Object) -> Body:
     """The body that the person was captured with. :raises ModelFileError: its file has gone."""
-    from ...solver.body import load_body
+    from ...solver.loaders.body_file import load_body
 
     return load_body(armature.get("scope_body_file") or armature["scope_body"])
 
@@ -76,7 +76,7 @@ def betas_of(armature: bpy.types.Object, body: Body) -> np.ndarray:
     """(P,) the person's shape. :raises UsageError: the armature does not say it."""
     import numpy as np
 
-    from ...solver.errors import UsageError
+    from ..errors import UsageError
 
     betas = np.array(list(armature.get("scope_betas", ())), float)
     if betas.shape != (body.P,):
@@ -86,7 +86,7 @@ def betas_of(armature: bpy.types.Object, body: Body) -> np.ndarray:
 
 def cached_motion(armature: bpy.types.Object) -> Motion:
     """The motion as it was solved. :raises UsageError: it is no longer in the cache."""
-    from ...solver.errors import UsageError
+    from ..errors import UsageError
     from ..motion import Motion
 
     path = armature.get("scope_motion", "")

@@ -9,7 +9,7 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, StringProperty
 
 from .captured_person import cached_motion
-from .telling import TellingOperator
+from .reporting import TellingOperator
 
 FORMATS = (
     ("FBX", "FBX", "For Unreal Engine, Unity, Maya and MotionBuilder: armature, mesh and animation", 0),
@@ -101,9 +101,9 @@ class SCOPE_OT_export(TellingOperator):
 
     def work(self, context: bpy.types.Context) -> str:
         """Write."""
-        from ...solver.errors import UsageError
-        from ..scene.export import ExportOptions, captures, export
-        from ..scene.rig_export import export_rig
+        from ..errors import UsageError
+        from ..scene.export.export import ExportOptions, captures, export
+        from ..scene.rigs.rig_export import export_rig
 
         if not bpy.path.basename(self.filepath).removesuffix(_SUFFIX[self.format]):
             raise UsageError("give the file to write a name")

@@ -66,7 +66,8 @@ def press(place: tuple[int, int], happened: Callable[[], bool]) -> Iterator[floa
 
 def addon():
     """The extension's module of operators, for looking at the job."""
-    name = next(n for n in sys.modules if n.startswith("bl_ext.") and n.endswith(".scope_addon.ui.capture_operators"))
+    module = ".scope_addon.ui.capture.capture_operators"
+    name = next(n for n in sys.modules if n.startswith("bl_ext.") and n.endswith(module))
     return sys.modules[name]
 
 

@@ -26,7 +26,7 @@ report: dict[str, str] = {}
 
 def cache():
     """The keeper of the cache folder that the preferences name now."""
-    return sys.modules[addon().__name__.replace("capture_operators", "preferences")].cache()
+    return sys.modules[addon().__name__.replace("capture.capture_operators", "preferences")].cache()
 
 
 def preferences() -> bpy.types.AddonPreferences:

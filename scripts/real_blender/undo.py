@@ -222,7 +222,7 @@ def capturing() -> Iterator[float]:
 
 def forget_captures() -> None:
     """Empty the cache, compiled code aside, so that the footage is captured again."""
-    preferences = sys.modules[addon().__name__.replace("capture_operators", "preferences")]
+    preferences = sys.modules[addon().__name__.replace("capture.capture_operators", "preferences")]
     shutil.rmtree(preferences.cache().root / "captures")
 
 

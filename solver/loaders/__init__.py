@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Body files that users bring themselves: SMPL (.npz, .pkl), SMPL+H, SMPL-X and STAR, all treated as hostile input.
 
+    body_file.py          load_body(which) -> Body: the built-in ones, our own format, users' models
+    arrays.py             what a body file's arrays must hold
+    npz.py                reading .npz files of any origin
     model_file.py         load_model(path) -> Body: which reader, which family, shapes checked
     skeletons.py          joint names, trees and vertex numbers of the SMPL family
     archive.py            the wanted arrays of a .npz, without unpickling
@@ -10,6 +13,7 @@
     landmarks.py          face, foot and fingertip points from vertex numbers or from geometry
 """
 
+from .body_file import load_body
 from .model_file import is_motion, is_user_model, load_model
 
-__all__ = ["is_motion", "is_user_model", "load_model"]
+__all__ = ["is_motion", "is_user_model", "load_body", "load_model"]

@@ -18,9 +18,10 @@ from pathlib import Path
 
 import numpy as np
 
-from ..body import Body, Form, _check, check_arrays
+from ..body import Body
 from ..errors import ModelFileError
 from .archive import npz_keys, read_members
+from .arrays import Form, check_arrays, check_body
 from .keypoints import derive_keypoints
 from .pickled_values import to_array
 from .restricted_pickle import read_pickle
@@ -76,7 +77,7 @@ def load_model(path: str | Path, max_betas: int = MAX_BETAS) -> Body:
         body = _make_body(tables, path, max_betas)
     except MemoryError as cause:
         raise ModelFileError(f"{path} is too large for this computer's memory; choose a smaller body file") from cause
-    _check(body, path)
+    check_body(body, path)
     return replace(body, gender=read_gender(tables.arrays.get("gender"), path), file=str(path.resolve()))
 
 

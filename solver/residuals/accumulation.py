@@ -8,9 +8,9 @@ and one of a joint's state adds its Hessian and gradient, turned from the parent
 Source: section 3 of the paper.
 """
 
-from ..kernel import kernel
+from ..compiled.kernel import kernel
+from ..compiled.part import GRADIENT, SHAPE
 from ..rotations import log3
-from .part import GRADIENT, SHAPE
 
 
 @kernel

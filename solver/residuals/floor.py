@@ -11,9 +11,9 @@ Source: a one-sided height keeps the form r_i(T_i, beta) of section 3 of the pap
 
 import numpy as np
 
-from ..kernel import kernel
+from ..compiled.kernel import kernel
+from ..compiled.part import Array, Linearization, Part, point_jacobian
 from .accumulation import add_to_point, lever
-from .part import Array, Linearization, Part, point_jacobian
 
 INTS = 1  # point, numbered as in the measurements
 FLOATS = 6  # n (3), a unit vector, d, w_below, w_above

@@ -10,9 +10,9 @@ Source: velocity terms whose last frame is a constant keep the form r_i(T_i, bet
 
 import numpy as np
 
-from ..kernel import kernel
+from ..compiled.kernel import kernel
+from ..compiled.part import Array, Linearization, Part, point_jacobian
 from .accumulation import add_to_point, lever
-from .part import Array, Linearization, Part, point_jacobian
 
 INTS = 1  # point, numbered as in the measurements
 FLOATS = 4  # p_stand (3), w

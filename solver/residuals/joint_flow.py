@@ -24,11 +24,11 @@ from typing import Any
 
 import numpy as np
 
-from ..kernel import allocating_kernel, kernel
-from ..lanes import LANES, sqrt, step
+from ..compiled.kernel import allocating_kernel, kernel
+from ..compiled.part import Array, Linearization, Part
+from ..compiled.simd import LANES, sqrt, step
 from ..rotations import exp, exp3, log, log3, matrix_from_quaternion
 from .accumulation import add_to_joint
-from .part import Array, Linearization, Part
 
 LAYERS, HIDDEN = 4, 4
 # Parameters of a layer in order, and where the parts of a joint's parameters begin.

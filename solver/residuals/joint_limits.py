@@ -15,10 +15,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..kernel import kernel
+from ..compiled.kernel import kernel
+from ..compiled.part import Array, Linearization, Part
 from ..rotations import left_jacobian_inverse, left_jacobian_inverse3, log, log3
 from .accumulation import add_to_joint
-from .part import Array, Linearization, Part
 
 INTS = 1  # joint
 FLOATS = 8  # axis (3), lower, upper, swing_limit, w, w_swing

@@ -9,10 +9,10 @@ Source: section 3 of the paper (joint state prior), with a Gaussian on SO(3) in 
 
 import numpy as np
 
-from ..kernel import kernel
+from ..compiled.kernel import kernel
+from ..compiled.part import Array, Linearization, Part
 from ..rotations import left_jacobian_inverse, left_jacobian_inverse3, log
 from .accumulation import add_to_joint, relative_log
-from .part import Array, Linearization, Part
 
 INTS = 1  # joint
 FLOATS = 10  # Omega_mean (9) by rows, w

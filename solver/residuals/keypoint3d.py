@@ -9,8 +9,8 @@ Source: section 3 of the paper.
 
 import numpy as np
 
-from ..kernel import kernel
-from .part import Array, Linearization, Part, point_jacobian
+from ..compiled.kernel import kernel
+from ..compiled.part import Array, Linearization, Part, point_jacobian
 from .robust import geman_mcclure, triggs_share
 
 

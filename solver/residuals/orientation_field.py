@@ -12,8 +12,8 @@ import math
 
 import numpy as np
 
-from ..kernel import kernel
-from .part import Array, Linearization, Part, hat_identity
+from ..compiled.kernel import kernel
+from ..compiled.part import Array, Linearization, Part, hat_identity
 from .robust import geman_mcclure, triggs_share
 
 SHORTEST = 1e-4  # metres

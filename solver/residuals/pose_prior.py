@@ -10,10 +10,10 @@ Source: section 3 of the paper (pose prior on T_i).
 
 import numpy as np
 
-from ..kernel import kernel
+from ..compiled.kernel import kernel
+from ..compiled.part import GRADIENT, Array, Linearization, Part, hat_identity
 from ..rotations import left_jacobian_inverse, left_jacobian_inverse3, log
 from .accumulation import add_to_point, relative_log
-from .part import GRADIENT, Array, Linearization, Part, hat_identity
 
 INTS = 1  # part
 FLOATS = 14  # R^ (9) by rows, t^ (3), w_R, w_t

@@ -19,10 +19,10 @@ from typing import Any
 
 import numpy as np
 
+from ..compiled.kernel import inlined_kernel
+from ..compiled.part import Array
 from ..errors import ShapeError
-from ..kernel import inlined_kernel
 from . import floor, foot_contact, joint_flow, joint_limits, joint_prior, pose_prior
-from .part import Array
 
 RESIDUALS = {
     "pose_prior": pose_prior,

@@ -7,7 +7,7 @@ turns it off. First-order reweighting replaces JᵀJ by k^2 JᵀJ; Triggs' corre
 4 (s/sigma) k of the part, which for s > sigma/3 would make the term concave, so it is clamped by `triggs` in [0, 1).
 """
 
-from ..kernel import kernel
+from ..compiled.kernel import kernel
 
 
 @kernel

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from scope.scope_addon.capture.landmark_network import KEYPOINT_NAMES, PoseEstimate
-from scope.scope_addon.capture.person_detector import Detection
-from scope.scope_addon.capture.region import Region
+from scope.scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES, PoseEstimate
+from scope.scope_addon.capture.perception.person_detector import Detection
+from scope.scope_addon.capture.perception.region import Region
 
 _HEIGHTS = {"shoulder": -0.5, "elbow": -0.3, "wrist": -0.1, "hip": 0.0, "knee": 0.45, "ankle": 0.85, "heel": 0.9}
 _HEIGHTS |= {"foot": 0.9, "pinky": -0.05, "index": -0.05, "thumb": -0.05}
@@ -111,7 +111,7 @@ class FakeLandmarks:
         place = person.place(t) if seen else np.asarray(region.center_px)
         body = person.body(t)
         if t in person.swapped and not self.right:
-            from scope.scope_addon.capture.left_right import SWAPPED
+            from scope.scope_addon.capture.tracking.left_right import SWAPPED
 
             body = body[SWAPPED]
         there = Region((float(place[0]), float(place[1])), 2.5 * person.size_px, 0.0)

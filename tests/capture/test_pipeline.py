@@ -12,12 +12,12 @@ from dataclasses import replace
 import cv2
 import numpy as np
 import pytest
+from scope.scope_addon.capture.media.video_range import VideoRange
 from scope.scope_addon.capture.pipeline import CaptureOptions, capture
-from scope.scope_addon.capture.video_range import VideoRange
 from scope.scope_addon.cli import SAMPLE
+from scope.scope_addon.errors import CancelledError, NoPersonError
 from scope.scope_addon.motion import Motion
-from scope.solver.body import load_body
-from scope.solver.errors import CancelledError, NoPersonError
+from scope.solver.loaders.body_file import load_body
 
 
 @pytest.fixture(scope="module")

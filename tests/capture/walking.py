@@ -4,9 +4,9 @@
 from __future__ import annotations
 
 import numpy as np
-from scope.scope_addon.capture.seen_keypoints import as_seen
-from scope.scope_addon.capture.track import Track
-from scope.solver.body import load_body
+from scope.scope_addon.capture.fitting.keypoint_offsets import as_seen
+from scope.scope_addon.capture.tracking.track import Track
+from scope.solver.loaders.body_file import load_body
 from scope.solver.rotations import exp
 
 

@@ -3,7 +3,7 @@
 
 import numpy as np
 from scope.scope_addon.edit.clip import Clip
-from scope.solver.frames import R_WORLD_MODEL
+from scope.scope_addon.kinematics.axes import R_WORLD_MODEL
 
 from .walking import BODY, NAMES, RATE
 

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 from scope.scope_addon.edit import floor, loop, reduce, root_motion, spans
 from scope.scope_addon.edit.clip import Clip, between, resample, sample
+from scope.scope_addon.errors import UsageError
 from scope.solver import load_body
-from scope.solver.errors import UsageError
 from scope.solver.rotations import exp, log, matrix_from_quaternion, quaternion_from_matrix
 
 from .walking import ARMS_DOWN, RATE, walk

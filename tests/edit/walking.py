@@ -3,8 +3,8 @@
 
 import numpy as np
 from scope.scope_addon.edit.clip import Clip
+from scope.scope_addon.kinematics.axes import R_WORLD_MODEL
 from scope.solver import load_body
-from scope.solver.frames import R_WORLD_MODEL
 from scope.solver.rotations import exp, log
 
 from ..made_motion import level_camera, made_motion

@@ -14,10 +14,11 @@ from pathlib import Path
 import pytest
 from scope.scope_addon import cli
 from scope.scope_addon.cli import SAMPLE, main
+from scope.scope_addon.errors import UsageError
 from scope.scope_addon.job.batch import REPORT_NAME, Batch
 from scope.scope_addon.motion import Motion
-from scope.solver.body import BUILT_IN
-from scope.solver.errors import InputError, UsageError
+from scope.solver.errors import InputError
+from scope.solver.loaders.body_file import BUILT_IN
 
 from .processes import runs, wait_for
 

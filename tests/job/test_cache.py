@@ -7,8 +7,8 @@ import time
 from pathlib import Path
 
 import pytest
+from scope.scope_addon.errors import OutputError
 from scope.scope_addon.job.cache import Cache
-from scope.solver.errors import OutputError
 
 
 @pytest.fixture

@@ -14,7 +14,7 @@ CHILD = """
 import signal, sys, time
 from pathlib import Path
 from scope.scope_addon.job import parent
-from scope.scope_addon.whole_file import written_beside
+from scope.scope_addon.atomic_write import written_beside
 parent.GRACE_S = {grace}
 # As the command line does; background jobs of a shell ignore it.
 signal.signal(signal.SIGINT, signal.default_int_handler)

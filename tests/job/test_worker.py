@@ -11,15 +11,15 @@ from pathlib import Path
 
 import pytest
 from scope.scope_addon.capture import pipeline
-from scope.scope_addon.capture.lifter import LIFTER_FILE
-from scope.scope_addon.capture.networks import LANDMARK_NETWORK_OF_QUALITY, network_path
+from scope.scope_addon.capture.perception.lifter import LIFTER_FILE
+from scope.scope_addon.capture.perception.sessions import LANDMARK_NETWORK_OF_QUALITY, network_path
+from scope.scope_addon.errors import SetupError, UsageError
 from scope.scope_addon.job.process import START_SCRIPT, WorkerFailedError, WorkerProcess
 from scope.scope_addon.job.request import JobRequest, code_version
 from scope.scope_addon.motion import Motion
-from scope.scope_addon.scene import export
+from scope.scope_addon.scene.export.export import export
 from scope.solver import learned_prior
-from scope.solver.body import BUILT_IN
-from scope.solver.errors import SetupError, UsageError
+from scope.solver.loaders.body_file import BUILT_IN
 
 from .processes import runs, wait_for
 

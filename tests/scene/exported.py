@@ -6,7 +6,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 from mathutils.kdtree import KDTree
-from scope.scope_addon.scene import actions
+from scope.scope_addon.scene.animation_data import actions
 
 JOINT_TOLERANCE, SKIN_TOLERANCE = 1e-3, 2e-3  # metres
 

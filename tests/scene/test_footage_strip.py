@@ -4,8 +4,8 @@ from pathlib import Path
 import bpy
 import pytest
 import scope
+from scope.scope_addon.errors import VideoError
 from scope.scope_addon.scene.footage_strip import add_footage_strips, strips_of
-from scope.solver.errors import VideoError
 
 SAMPLE = Path(scope.__file__).resolve().parent / "assets" / "sample" / "sample.mp4"
 

@@ -2,7 +2,7 @@
 """A dense Gauss-Newton step built from scratch: residuals from their definition, Jacobian by complex steps."""
 
 import numpy as np
-from scope.solver.residuals.part import GRADIENT, SHAPE
+from scope.solver.compiled.part import GRADIENT, SHAPE
 
 from .synthetic import INTRINSICS, forward
 

@@ -3,12 +3,12 @@
 
 import numpy as np
 import pytest
-from scope.solver.body import BUILT_IN, load_body
-from scope.solver.errors import SetupError
+from scope.scope_addon.errors import SetupError
+from scope.solver.loaders.body_file import BUILT_IN, load_body
 from scope.tools.build_body.build import rig_body, shape_mesh
+from scope.tools.build_body.geometry.materials import mirror_faces
 from scope.tools.build_body.joints import make_skeleton, other_side
 from scope.tools.build_body.keypoints import SURFACE
-from scope.tools.build_body.materials import mirror_faces
 from scope.tools.build_body.source import WHEEL_NAME, fetch_wheel
 from scope.tools.build_body.write import write_body
 

@@ -11,7 +11,8 @@ import pytest
 pytest.importorskip("onnx", reason="the converter needs the build-time package onnx")
 onnxruntime = pytest.importorskip("onnxruntime")
 
-from scope.solver.errors import ModelFileError, SetupError  # noqa: E402
+from scope.scope_addon.errors import SetupError  # noqa: E402
+from scope.solver.errors import ModelFileError  # noqa: E402
 from scope.tools.convert_networks.build import build_networks  # noqa: E402
 from scope.tools.convert_networks.catalogue import NETWORKS, WHEEL, Network  # noqa: E402
 from scope.tools.convert_networks.constants import densify  # noqa: E402

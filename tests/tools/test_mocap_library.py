@@ -5,7 +5,7 @@ from collections import Counter
 
 import numpy as np
 import pytest
-from scope.solver.errors import MotionFileError
+from scope.scope_addon.errors import MotionFileError
 from scope.tools.mocap import library
 
 SIDED = ("hip", "knee", "ankle", "shoulder", "elbow", "wrist", "foot_end")

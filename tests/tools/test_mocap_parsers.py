@@ -5,7 +5,8 @@ import json
 
 import numpy as np
 import pytest
-from scope.solver.errors import MotionFileError, ShapeError
+from scope.scope_addon.errors import MotionFileError
+from scope.solver.errors import ShapeError
 from scope.solver.rotations import exp
 from scope.tools.mocap import asf_amc, deepmimic, expmap
 from scope.tools.mocap.take import Take

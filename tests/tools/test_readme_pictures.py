@@ -7,8 +7,8 @@ from types import SimpleNamespace
 import cv2
 import numpy as np
 import pytest
-from scope.solver.body import ASSETS
-from scope.solver.errors import OutputError
+from scope.scope_addon.errors import OutputError
+from scope.solver.loaders.body_file import ASSETS
 from scope.tools.readme_pictures import animation
 from scope.tools.readme_pictures.__main__ import ANIMATION, LARGEST_BYTES, PICTURES
 from scope.tools.readme_pictures.panel import GROUND, Panel

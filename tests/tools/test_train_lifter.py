@@ -3,10 +3,10 @@
 
 import numpy as np
 import pytest
-from scope.scope_addon.capture.landmark_network import KEYPOINT_NAMES
-from scope.scope_addon.capture.lifter import HIPS, Lifter
-from scope.scope_addon.capture.lifter_window import MIDDLE, OFFSETS_S, SPACING_S, WINDOW
-from scope.scope_addon.capture.seen_keypoints import offset
+from scope.scope_addon.capture.fitting.keypoint_offsets import offset
+from scope.scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES
+from scope.scope_addon.capture.perception.lifter import HIPS, Lifter
+from scope.scope_addon.capture.perception.lifter_window import MIDDLE, OFFSETS_S, SPACING_S, WINDOW
 from scope.solver.names import BLAZEPOSE
 from scope.solver.rotations import exp
 from scope.tools.train_lifter import detector_noise

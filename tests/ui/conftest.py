@@ -18,7 +18,7 @@ import pytest
 import scope
 from scope.scope_addon.job.process import WorkerProcess
 from scope.scope_addon.motion import Motion
-from scope.solver.body import load_body
+from scope.solver.loaders.body_file import load_body
 
 from ..made_motion import made_motion
 
@@ -33,7 +33,8 @@ def root() -> Path:
 @pytest.fixture(autouse=True)
 def registered(tmp_path, monkeypatch):
     """A fresh Blender with the extension. The cache is this test's, the compiled solver everybody's."""
-    from scope.scope_addon.ui import capture_job, preferences
+    from scope.scope_addon.ui import preferences
+    from scope.scope_addon.ui.capture import capture_job
 
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     scope.register()
@@ -85,7 +86,7 @@ def fake_worker(tmp_path, monkeypatch, standing):
 
     It finds ``folder``, ``request``, ``send(event, **values)`` and ``finish()``, which sends the standing body.
     """
-    from scope.scope_addon.ui import capture_job
+    from scope.scope_addon.ui.capture import capture_job
 
     standing.save(tmp_path / "standing.npz")
 

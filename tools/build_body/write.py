@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...scope_addon.whole_file import written_beside
+from ...scope_addon.atomic_write import written_beside
 
 LICENSE = (
     "Default body derived from the MakeHuman/MPFB2 hm08 base mesh, macro and length targets, rig and weights (Data "

@@ -5,6 +5,7 @@ import argparse
 import sys
 from pathlib import Path
 
+from ...scope_addon.errors import exit_status
 from ...solver.errors import ScopeError
 from .build import build_networks
 
@@ -26,7 +27,7 @@ def main(argv: list[str] | None = None) -> int:
         built = build_networks(arguments.out, arguments.downloads, force=arguments.force)
     except ScopeError as error:
         print(f"convert_networks: {error}", file=sys.stderr)
-        return error.exit_status
+        return exit_status(error)
     print(f"{arguments.out}: " + (", ".join(built) if built else "up to date"))
     return 0
 

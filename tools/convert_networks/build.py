@@ -5,8 +5,8 @@ import hashlib
 import json
 from pathlib import Path
 
-from ...scope_addon.whole_file import written_beside
-from ...solver.errors import OutputError
+from ...scope_addon.atomic_write import written_beside
+from ...scope_addon.errors import OutputError
 from .catalogue import LICENSE_MEMBER, NETWORKS, WHEEL, Network
 from .fetch import fetch, read_member
 from .tflite import read_model

@@ -11,7 +11,7 @@ import tempfile
 import zipfile
 from pathlib import Path
 
-from ...solver.errors import SetupError
+from ...scope_addon.errors import SetupError
 from .catalogue import TARBALL, WHEEL, Package
 
 # The wheel is data to us, so one fixed build does for every interpreter and system.

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...solver.errors import MotionFileError
+from ...scope_addon.errors import MotionFileError
 from ...solver.rotations import exp, matrix_from_quaternion
 from .take import Take
 

@@ -18,7 +18,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...solver.errors import MotionFileError
+from ...scope_addon.errors import MotionFileError
 from ...solver.rotations import exp
 from .asf_amc import Skeleton
 

@@ -19,9 +19,10 @@ from pathlib import Path
 
 import numpy as np
 
-from ...scope_addon.whole_file import written_beside
+from ...scope_addon.atomic_write import written_beside
 from ...solver import Keypoints3D, Measurements, Options, PosePriors, Priors, Stage, State, Weights, fit_tree, make_tree
-from ...solver.body import Body, load_body
+from ...solver.body import Body
+from ...solver.loaders.body_file import load_body
 from ...solver.residuals import joint_limits
 from ...solver.rotations import log
 from .library import load_library

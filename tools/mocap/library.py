@@ -8,7 +8,7 @@ from pathlib import Path, PurePosixPath
 
 import numpy as np
 
-from ...solver.errors import MotionFileError
+from ...scope_addon.errors import MotionFileError
 from . import asf_amc, deepmimic, expmap
 from .asf_amc import Skeleton
 from .take import Take

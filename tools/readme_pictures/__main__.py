@@ -11,8 +11,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from ...scope_addon.whole_file import written_beside
-from ...solver.body import ASSETS
+from ...scope_addon.atomic_write import written_beside
+from ...solver.loaders.body_file import ASSETS
 from . import animation, pictures
 
 ANIMATION = "sample"

@@ -8,8 +8,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from ...scope_addon.capture.video import open_video
-from ...solver.errors import OutputError
+from ...scope_addon.capture.media.video import open_video
+from ...scope_addon.errors import OutputError
 from .clips import SAMPLE, captured, default_body
 from .footage import cropped
 from .panel import Panel, next_to_each_other

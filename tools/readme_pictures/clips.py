@@ -11,7 +11,7 @@ import numpy as np
 from ...scope_addon.capture.pipeline import CaptureOptions, capture
 from ...scope_addon.motion import Motion
 from ...solver import Body, load_body
-from ...solver.body import ASSETS
+from ...solver.loaders.body_file import ASSETS
 from .shapes import joints, true_joints
 
 DATA = ASSETS.parent.parent / "shared" / "data"

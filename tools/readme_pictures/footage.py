@@ -6,8 +6,8 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from ...scope_addon.capture.overlay import camera_vertices, draw_overlay
-from ...scope_addon.capture.video import open_video
+from ...scope_addon.capture.media.video import open_video
+from ...scope_addon.capture.overlay.overlay_video import camera_vertices, draw_overlay
 from ...scope_addon.motion import Motion
 from .clips import SAMPLE, default_body
 from .panel import FINER, OURS

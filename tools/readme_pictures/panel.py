@@ -6,8 +6,8 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from ...scope_addon.capture.overlay import draw_overlay
-from ...scope_addon.capture.rasterizer import Canvas, rasterize
+from ...scope_addon.capture.overlay.overlay_video import draw_overlay
+from ...scope_addon.capture.overlay.rasterizer import Canvas, rasterize
 from ...solver import Body
 from .shapes import stick_figure
 from .view import View

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...scope_addon.capture.overlay import camera_vertices
+from ...scope_addon.capture.overlay.overlay_video import camera_vertices
 from ...scope_addon.motion import Motion
 from ...solver import Body
 

@@ -9,7 +9,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from ...solver.body import ASSETS, load_body
+from ...solver.loaders.body_file import ASSETS, load_body
 from .choreography import choreograph
 from .truth import BETAS, FPS, sample_shot, write_truth
 

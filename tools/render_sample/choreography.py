@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...scope_addon.kinematics.axes import R_WORLD_MODEL
 from ...solver.body import Body
-from ...solver.frames import R_WORLD_MODEL
 from ...solver.rotations import exp, log
 from .leg import solve_leg
 

@@ -8,8 +8,8 @@ from pathlib import Path
 import bpy
 import numpy as np
 
+from ...scope_addon.scene.axes import blender_camera_matrix
 from ...solver.body import Body
-from ...solver.frames import blender_camera_matrix
 
 LAMPS = {  # name: place (metres, world), power in watts, side in metres
     "skylight": ((-0.7, -1.9, 5.0), 230.0, 1.6),

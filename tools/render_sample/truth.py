@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
+from ...scope_addon.kinematics.axes import transform_points, world_from_level_camera
 from ...solver.body import Body
-from ...solver.frames import transform_points, world_from_level_camera
 from ...solver.rotations import log
 from .choreography import standing_feet
 

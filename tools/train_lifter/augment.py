@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 from numba import njit
 
-from ...scope_addon.capture.lifter_window import OFFSETS_S, WINDOW, ends_of_runs
+from ...scope_addon.capture.perception.lifter_window import OFFSETS_S, WINDOW, ends_of_runs
 from ...solver.body import Body
 from ...solver.rotations import exp
 

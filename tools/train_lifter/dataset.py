@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from ...scope_addon.capture.lifter import HIPS, KEYPOINT_COUNT, network_input, person_size, virtual_camera
-from ...scope_addon.capture.lifter_window import MIDDLE, OFFSETS_S, WINDOW
+from ...scope_addon.capture.perception.lifter import HIPS, KEYPOINT_COUNT, network_input, person_size, virtual_camera
+from ...scope_addon.capture.perception.lifter_window import MIDDLE, OFFSETS_S, WINDOW
 from ...solver.body import Body
 from . import detector_noise
 from .augment import Motions, PoseSampler, small_rotations

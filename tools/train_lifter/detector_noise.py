@@ -17,9 +17,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...scope_addon.capture.landmark_network import KEYPOINT_NAMES
-from ...scope_addon.capture.lifter_window import WINDOW
-from ...scope_addon.capture.seen_keypoints import offset
+from ...scope_addon.capture.fitting.keypoint_offsets import offset
+from ...scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES
+from ...scope_addon.capture.perception.lifter_window import WINDOW
 from .augment import small_rotations
 
 # Metres, one standard deviation per coordinate, of where the detector sees a keypoint of one person's body part.

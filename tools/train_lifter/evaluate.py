@@ -14,9 +14,9 @@ from pathlib import Path
 
 import numpy as np
 
-from ...scope_addon.capture.lifter import HIPS, LIFTER_FILE, Lifter, virtual_camera
-from ...scope_addon.capture.lifter_window import MIDDLE
-from ...solver.body import load_body
+from ...scope_addon.capture.perception.lifter import HIPS, LIFTER_FILE, Lifter, virtual_camera
+from ...scope_addon.capture.perception.lifter_window import MIDDLE
+from ...solver.loaders.body_file import load_body
 from .augment import load_motions
 from .dataset import Dataset
 from .pairs import load_pairs

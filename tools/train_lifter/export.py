@@ -11,9 +11,9 @@ import onnx
 import torch
 from onnx import TensorProto, helper, numpy_helper
 
-from ...scope_addon.capture.lifter import INPUT_SIZE, KEYPOINT_COUNT
-from ...scope_addon.capture.lifter_window import WINDOW
-from ...scope_addon.whole_file import written_beside
+from ...scope_addon.atomic_write import written_beside
+from ...scope_addon.capture.perception.lifter import INPUT_SIZE, KEYPOINT_COUNT
+from ...scope_addon.capture.perception.lifter_window import WINDOW
 from .network import LOG_SIGMA_RANGE, LiftingNetwork
 
 OPSET = 17

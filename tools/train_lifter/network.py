@@ -6,8 +6,8 @@ from __future__ import annotations
 import torch
 from torch import Tensor, nn
 
-from ...scope_addon.capture.lifter import INPUT_SIZE, KEYPOINT_COUNT
-from ...scope_addon.capture.lifter_window import WINDOW
+from ...scope_addon.capture.perception.lifter import INPUT_SIZE, KEYPOINT_COUNT
+from ...scope_addon.capture.perception.lifter_window import WINDOW
 
 WIDTH, BLOCKS = 512, 2
 MERGES = 2  # 9 moments, 3, 1

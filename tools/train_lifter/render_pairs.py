@@ -13,11 +13,12 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from ...scope_addon.capture.landmark_network import LandmarkNetwork
-from ...scope_addon.capture.rasterizer import Canvas, rasterize
-from ...scope_addon.capture.region import region_from_points
-from ...scope_addon.whole_file import written_beside
-from ...solver.body import Body, load_body
+from ...scope_addon.atomic_write import written_beside
+from ...scope_addon.capture.overlay.rasterizer import Canvas, rasterize
+from ...scope_addon.capture.perception.landmark_network import LandmarkNetwork
+from ...scope_addon.capture.perception.region import region_from_points
+from ...solver.body import Body
+from ...solver.loaders.body_file import load_body
 from .augment import PoseSampler, load_motions
 from .dataset import cameras, pitches
 from .split import training_frames

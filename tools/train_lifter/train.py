@@ -21,9 +21,9 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from ...scope_addon.capture.lifter import HIPS, network_input
-from ...scope_addon.capture.lifter_window import MIDDLE, WINDOW
-from ...solver.body import load_body
+from ...scope_addon.capture.perception.lifter import HIPS, network_input
+from ...scope_addon.capture.perception.lifter_window import MIDDLE, WINDOW
+from ...solver.loaders.body_file import load_body
 from .augment import load_motions
 from .dataset import Batch, Dataset
 from .export import export

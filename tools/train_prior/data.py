@@ -13,8 +13,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ...solver.errors import MotionFileError
-from ...solver.npz import read_npz
+from ...scope_addon.errors import MotionFileError
+from ...solver.loaders.npz import read_npz
 from ...solver.rotations import exp
 
 STEP = 3  # every third frame: 10 a second, neighbours are nearly the same

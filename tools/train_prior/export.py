@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...scope_addon.whole_file import written_beside
+from ...scope_addon.atomic_write import written_beside
 from ...solver.residuals import joint_flow as jf
 from ...solver.rotations import nearest_rotation
 from .data import MIRROR, PAIRED, TRUNK, WITHOUT_DATA, Samples

@@ -19,8 +19,8 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from ...solver.body import load_body
 from ...solver.learned_prior import BUILT_IN
+from ...solver.loaders.body_file import load_body
 from .data import FOLDS, MODELS, Samples, load_samples
 from .export import by_joint, save
 from .flow import Flow, chart

@@ -5,8 +5,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scope.solver.body import Body, load_body
+from scope.solver.body import Body
 from scope.solver.loaders import load_model
+from scope.solver.loaders.body_file import load_body
 
 PUBLISHED = {  # vertex numbers, as found in several public projects
     ("smpl", 6890): {"nose": 332, "left_ear": 583, "right_eye": 6260, "left_big_toe": 3216, "right_heel": 6787},

@@ -1,0 +1,91 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How far the captured bodies are from the truth of the four pose2sim cameras, and what each part brings."""
+
+from __future__ import annotations
+
+import importlib.util
+import tempfile
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+
+from ...scope_addon.capture.fitting.ablation import Parts
+from ...scope_addon.capture.pipeline import CaptureOptions, capture
+from ...scope_addon.motion import Motion
+from ...solver import Body
+from ..frames import DATA
+
+CAMERAS = ("cam1", "cam2", "cam3", "cam4")
+SHOWN = {  # key of the evaluation: heading, target
+    "mpjpe_root": ("MPJPE-root mm", 75.0),
+    "pa_mpjpe": ("PA-MPJPE mm", 52.0),
+    "mpjpe_root_flat": ("without depth mm", None),
+    "jitter_rel": ("jitter m/s3", 45.0),
+    "accel_err_lp": ("accel error mm/frame2", 3.9),
+    "foot_slide_cm": ("foot slide cm", 1.5),
+    "flipped": ("flipped share", 0.01),
+    "coverage": ("coverage", 1.0),
+}
+ABLATION: dict[str, dict[str, Parts | bool]] = {
+    "all parts": {},
+    "without the lifter": {"parts": Parts(lifter=False)},
+    "lifter without world landmarks": {"parts": Parts(world_landmarks=False)},
+    "keypoints at the joints": {"parts": Parts(seen_keypoints=False)},
+    "without 3D keypoints": {"parts": Parts(keypoints3d=False)},
+    "without the orientation field": {"parts": Parts(orientation_field=False)},
+    "without the joint prior": {"parts": Parts(joint_prior=False)},
+    "without left-right repair": {"parts": Parts(left_right=False)},
+    "without mended leaps": {"parts": Parts(leaps=False)},
+    "without the second pass": {"parts": Parts(second_pass=False)},
+    "without balance": {"parts": Parts(balance=False)},
+    "without the floor in it": {"parts": Parts(floor=False)},
+    "without contact": {"parts": Parts(contact=False)},
+    "without smoothing": {"smoothing": False},
+}
+FLIPS = ("lr_swap", "mirror", "mirror_swap")
+
+
+def evaluate_camera(body: Body, camera: str, options: CaptureOptions) -> dict:
+    """Return everything that the evaluation tool says about one camera."""
+    folder = DATA / "pose2sim"
+    return evaluate_clip(body, folder / f"{camera}.mp4", folder / f"truth_{camera}.npz", options)[1]
+
+
+def evaluate_clip(body: Body, video: Path, truth: Path, options: CaptureOptions) -> tuple[Motion, dict]:
+    """Capture a clip; return its motion and everything that the evaluation tool says about it.
+
+    :raises NoPersonError: nobody was found.
+    """
+    motion = capture(video, body, options).motions[0]
+    with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # of means over nothing, in the tool
+        result = Path(folder) / "result.npz"
+        motion.save(result)
+        figures = _tool().evaluate(str(truth), str(result))
+    return motion, figures | {"flipped": max(figures[key] for key in FLIPS)}
+
+
+def evaluate_all(body: Body, options: Callable[[str], CaptureOptions]) -> dict[str, dict]:
+    """Return the figures of each camera under its name and, under "mean", the means of what is shown.
+
+    ``flipped`` is the worst of its kinds, and its mean the worst camera's.
+    """
+    found = {camera: evaluate_camera(body, camera, options(camera)) for camera in CAMERAS}
+    mean = {key: float(np.mean([f[key] for f in found.values()])) for key in SHOWN}
+    return {**found, "mean": mean | {"flipped": max(f["flipped"] for f in found.values())}}
+
+
+def calibration(camera: str) -> Path:
+    """Return the file with the camera's true intrinsics."""
+    return DATA / "pose2sim" / f"calibration_{camera}.json"
+
+
+def _tool() -> ModuleType:
+    """The evaluation tool beside the checkout."""
+    spec = importlib.util.spec_from_file_location("evaluate", DATA.parent / "tools" / "evaluate.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module

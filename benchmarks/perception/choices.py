@@ -1,0 +1,120 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""`./scripts/bench choices`: would another camera have chosen the same weights?
+
+Every weight, deviation or share that was chosen by measuring is set to values around its own. For each of the four
+pose2sim cameras in turn, the value is taken that is best for the other three, and what it has on the camera that was
+left out is compared with what ships: a choice that only fits the clips it was made on would lose there.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+from ...scope_addon.capture.fitting import track_fit
+from ...scope_addon.capture.perception import lifter
+from ...scope_addon.capture.pipeline import CaptureOptions
+from ...scope_addon.capture.world import balance, foot_lock, ground_plane
+from ...scope_addon.kinematics import standing
+from ...solver import load_body
+from ..frames import DATA
+from ..report import table
+from .accuracy import CAMERAS, evaluate_camera
+
+
+@dataclass(frozen=True)
+class Choice:
+    """A constant of the pipeline and what else it could be: ``module.name``, or the field of it named ``field``."""
+
+    what: str
+    module: ModuleType
+    name: str
+    others: tuple[float, ...]
+    field: str = ""
+
+    @property
+    def shipped(self) -> float:
+        """Its value."""
+        value = getattr(self.module, self.name)
+        return float(getattr(value, self.field) if self.field else value)
+
+    @contextmanager
+    def set_to(self, value: float) -> Iterator[None]:
+        """Another value, for as long as the context lasts."""
+        before: Any = getattr(self.module, self.name)
+        setattr(self.module, self.name, replace(before, **{self.field: value}) if self.field else value)
+        try:
+            yield
+        finally:
+            setattr(self.module, self.name, before)
+
+
+CHOICES = (
+    Choice("weight of 2D keypoints", track_fit, "WEIGHTS", (5e4, 2e5), "keypoints2d"),
+    Choice("weight of 3D keypoints", track_fit, "WEIGHTS", (2.5, 25.0), "keypoints3d"),
+    Choice("weight of the orientation field", track_fit, "WEIGHTS", (250.0, 1000.0), "orientation_field"),
+    Choice("weight of the joint prior", track_fit, "WEIGHTS", (2.0, 8.0), "joint_prior"),
+    Choice("weight of the shape prior", track_fit, "WEIGHTS", (5.0, 20.0), "shape"),
+    Choice("weight of the floor under feet that stand", track_fit, "WEIGHTS", (5e3, 2e4), "floor"),
+    Choice("share lifted with world landmarks", lifter, "WORLD_SHARE", (0.5, 1.0)),
+    Choice("speed at which balance is doubted, m/s", balance, "STANDING_M_S", (0.25, 1.0)),
+    Choice("deviation of feet from the floor, m", ground_plane, "FLOOR_SIGMA_M", (0.015, 0.06)),
+    Choice("wrong depth that a still foot may have, m", standing, "WRONG_DEPTH_M", (0.2, 0.8)),
+    Choice("what held feet may move in the picture, m", foot_lock, "PICTURE_SIGMA_M", (0.001, 0.01)),
+)
+
+
+def left_out(errors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Which value the other cameras choose, and what it has on the camera left out.
+
+    :param errors: (V, C) error with each value on each camera.
+    :return: (C,) index of the value and (C,) its error.
+    """
+    others = (errors.sum(axis=1, keepdims=True) - errors) / (errors.shape[1] - 1)
+    chosen = others.argmin(axis=0)
+    return chosen, errors[chosen, np.arange(errors.shape[1])]
+
+
+def choices(quick: bool) -> dict:
+    """Measure everything (``quick``: the first choices alone), print the tables, return the figures."""
+    if not DATA.is_dir():
+        print(f"{DATA} is not beside this checkout: nothing was measured", file=sys.stderr)
+        return {}
+    body = load_body("scope")
+
+    def errors() -> np.ndarray:
+        found = [evaluate_camera(body, camera, CaptureOptions()) for camera in CAMERAS]
+        return np.array([[f["mpjpe_root"], f["pa_mpjpe"]] for f in found])
+
+    shipped = errors()
+    print(f"As shipped, MPJPE-root / PA-MPJPE mm: {_each(shipped)}\n", flush=True)
+    figures: dict[str, dict] = {"shipped": {"errors": shipped.tolist()}}
+    rows, summary = [], []
+    for choice in CHOICES[:3] if quick else CHOICES:
+        values, found = [choice.shipped, *choice.others], [shipped]
+        for value in choice.others:
+            with choice.set_to(value):
+                found.append(errors())
+            rows.append([f"{choice.what}: {value:g} instead of {choice.shipped:g}", *_cells(found[-1])])
+        chosen, there = left_out(np.array(found)[:, :, 0])
+        named = ", ".join(f"{values[k]:g}" for k in chosen)
+        summary.append([choice.what, f"{values[0]:g}", named, shipped[:, 0].mean(), there.mean()])
+        figures[choice.what] = {"values": values, "errors": np.array(found).tolist(), "left_out": there.tolist()}
+    print(table(("MPJPE-root / PA-MPJPE mm", *CAMERAS, "mean"), rows), end="\n\n")
+    head = ("choice", "shipped", "chosen without each camera", "shipped, MPJPE-root mm", "chosen, on those left out")
+    print(table(head, summary), end="\n\n", flush=True)
+    return figures
+
+
+def _cells(errors: np.ndarray) -> list[str]:
+    return [f"{a:.1f} / {b:.1f}" for a, b in (*errors, errors.mean(axis=0))]
+
+
+def _each(errors: np.ndarray) -> str:
+    return ", ".join(f"{name} {cell}" for name, cell in zip((*CAMERAS, "mean"), _cells(errors), strict=True))

@@ -1,0 +1,151 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Shots of the motion-capture takes that trained nothing: one stretch of each, a random body and a random camera."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from ...scope_addon.kinematics.axes import R_WORLD_MODEL, world_from_level_camera
+from ...solver import Body
+from ...solver.rotations import exp
+from ...tools.render_sample.truth import FEET, Shot
+from ...tools.train_lifter.split import is_held_out
+
+SEED = 7
+SIZE = (640, 480)
+SECONDS, LEAST_SECONDS = 1.5, 0.7
+SUNK_M = 0.12  # under the floor as recorded: the fit left a hand of our body there, which the performer's model lacks
+MOST_BETA = 2.5  # of a standard normal distribution
+FOCAL_PX = (470.0, 1000.0)  # of the width 0.73 to 1.56: a phone's main camera to twice that
+HEIGHT_M, DISTANCE_M, TILT_DEG = (0.8, 2.0), (3.0, 6.5), (0.0, 15.0)  # of the camera; it looks down
+LEAST_FILL = 0.45  # the person's longer side over the picture's height, median of the frames
+MARGIN_PX = 12.0  # around everything that the person does
+FARTHEST_M = 1.7  # behind it stand bench and wall
+NEAREST_M = 1.2  # to the camera
+FEW = 40  # points of the skin to one that is looked at first
+FLOOR_QUANTILE = 0.05  # of the frames, ordered by the height of the lowest point of the feet's skin
+STILL_M_PER_S, STANDS_BELOW_M = 0.15, 0.1  # middle of heel and toe
+TRIES = 20000
+
+
+@dataclass(frozen=True)
+class Take:
+    """One recording as fitted: joint states in a world with y up, and the performer's shape."""
+
+    number: int
+    name: str
+    poses: np.ndarray  # (T, 3(K+1)) axis-angle
+    trans: np.ndarray  # (T, 3) metres
+    valid: np.ndarray  # (T,) bool
+    betas: np.ndarray  # (P,)
+    fps: float
+
+
+def held_out_takes(path: Path) -> list[Take]:
+    """The takes of a file written by ``tools.mocap.fit_body`` that measure."""
+    with np.load(path) as data:
+        arrays = {key: data[key] for key in ("poses", "trans", "valid")}
+        start, names, betas, fps = (data[f"take_{key}"] for key in ("start", "name", "betas", "fps"))
+    takes = []
+    for k in np.flatnonzero(is_held_out(np.arange(len(names)))):
+        rows = {key: array[start[k] : start[k + 1]] for key, array in arrays.items()}
+        takes.append(Take(int(k), str(names[k]), **rows, betas=betas[k], fps=round(float(fps[k]), 1)))
+    return takes
+
+
+def draw_shot(body: Body, take: Take, seed: int = SEED) -> Shot:
+    """A stretch of the take with a random body before a random camera; the same for the same seed.
+
+    The root's path is the performer's times the ratio of the legs' lengths, so that feet that stand go on standing.
+    Camera, heading and place are drawn until the person is well inside the picture and the room.
+
+    :raises ValueError: no such camera was found, or the take has no sound stretch.
+    """
+    rng = np.random.default_rng([seed, take.number])
+    frames = _stretch(rng, body, take)
+    betas = np.clip(rng.standard_normal(body.P), -MOST_BETA, MOST_BETA)
+    states = exp(take.poses[frames].reshape(len(frames), -1, 3).astype(float))
+    states[:, 0] = R_WORLD_MODEL @ states[:, 0]
+    share = _leg_length(body, betas) / _leg_length(body, take.betas)
+    pelvis = share * (body.rest_joints(take.betas)[0] + take.trans[frames].astype(float)) @ R_WORLD_MODEL.T
+    stands = np.zeros((len(frames), 2), bool)
+    trans = pelvis - body.rest_joints(betas)[0]
+    shot = Shot(states, trans, betas, np.eye(3), np.eye(4), SIZE, take.fps, stands)
+    skin = np.array([shot.vertices_world(body, k) for k in range(len(shot))])
+    low, high = skin.min((0, 1)), skin.max((0, 1))
+    floor = np.quantile(skin[:, _skin_of_feet(body), 2].min(axis=1), FLOOR_QUANTILE)
+    offset = np.append(-(low + high)[:2] / 2, -floor)
+    shot, R_heading = _draw_camera(rng, shot, skin + offset)
+    states[:, 0] = R_heading @ states[:, 0]
+    shot = replace(shot, trans=(pelvis + offset) @ R_heading.T - body.rest_joints(betas)[0])
+    return replace(shot, standing=standing_feet(body, shot))
+
+
+def standing_feet(body: Body, shot: Shot) -> np.ndarray:
+    """(T, 2) bool: whether the middle of heel and toe of the left and the right foot is low and still."""
+    feet = feet_world(body, shot.rotations, shot.trans, shot.betas)
+    speed = np.linalg.norm(np.gradient(feet, axis=0), axis=-1) * shot.fps
+    return (speed < STILL_M_PER_S) & (feet[..., 2] < STANDS_BELOW_M)
+
+
+def feet_world(body: Body, rotations: np.ndarray, trans: np.ndarray, betas: np.ndarray) -> np.ndarray:
+    """(T, 2, 3) the middle of heel and toe, left and right, in metres of the world."""
+    points = body.keypoints(*body.forward_kinematics(rotations, trans, betas), betas)
+    at = body.keypoint_set("blazepose")
+    sides = [[at[f"{side}_{point}"] for point in FEET.values()] for side in ("left", "right")]
+    return points[:, sides].mean(axis=2)
+
+
+def _stretch(rng: np.random.Generator, body: Body, take: Take) -> np.ndarray:
+    """Consecutive sound frames of the take, as many as a shot has or, failing that, as many as there are."""
+    states = exp(take.poses.reshape(len(take.poses), -1, 3).astype(float))
+    points = body.keypoints(*body.forward_kinematics(states, take.trans, take.betas), take.betas)
+    unsound = np.concatenate([[0], np.cumsum(~take.valid | (points[..., 1].min(axis=1) < -SUNK_M))])
+    least, most = (round(seconds * take.fps) for seconds in (LEAST_SECONDS, SECONDS))
+    for count in range(min(most, len(take.valid)), least - 1, -1):
+        starts = np.flatnonzero(unsound[count:] == unsound[: len(unsound) - count])
+        if len(starts):
+            return rng.choice(starts) + np.arange(count)
+    raise ValueError(f"take {take.name} has no {least} sound frames in a row")
+
+
+def _leg_length(body: Body, betas: np.ndarray) -> float:
+    J = body.rest_joints(betas)
+    chain = [body.joint_names.index(f"left_{part}") for part in ("hip", "knee", "ankle")]
+    return float(np.linalg.norm(np.diff(J[chain], axis=0), axis=1).sum())
+
+
+def _skin_of_feet(body: Body) -> np.ndarray:
+    """The vertices that follow a foot more than anything else."""
+    part = np.take_along_axis(body.skin_joints, body.skin_weights.argmax(axis=1)[:, None], axis=1)[:, 0]
+    feet = [k for k, name in enumerate(body.joint_names) if name.endswith(("_ankle", "_foot"))]
+    return np.flatnonzero(np.isin(part, feet))
+
+
+def _draw_camera(rng: np.random.Generator, shot: Shot, skin: np.ndarray) -> tuple[Shot, np.ndarray]:
+    """A random camera that has all of the skin (T, V, 3) in its picture once the world is turned by a heading."""
+    few = skin[:, ::FEW]
+    for _ in range(TRIES):
+        R_heading, tilt = exp(np.array([0.0, 0.0, rng.uniform(0, 2 * np.pi)])), np.radians(rng.uniform(*TILT_DEG))
+        focal, height, distance = (rng.uniform(*limits) for limits in (FOCAL_PX, HEIGHT_M, DISTANCE_M))
+        world_from_camera = world_from_level_camera(np.array([0.0, -np.cos(tilt), -np.sin(tilt)]), height)
+        world_from_camera[1, 3] = -distance
+        K = np.array([[focal, 0, SIZE[0] / 2 - 0.5], [0, focal, SIZE[1] / 2 - 0.5], [0, 0, 1]])
+        drawn = replace(shot, intrinsics=K, world_from_camera=world_from_camera)
+        if _well_inside(drawn, few @ R_heading.T) and _well_inside(drawn, skin @ R_heading.T):
+            return drawn, R_heading
+    raise ValueError("no camera was found: the person moves too far, or the limits are too narrow")
+
+
+def _well_inside(shot: Shot, skin: np.ndarray) -> bool:
+    camera = shot.to_camera(skin)
+    if camera[..., 2].min() < NEAREST_M or skin[..., 1].max() > FARTHEST_M:
+        return False
+    uv = shot.project(camera)
+    if uv.min() < MARGIN_PX or (uv.max((0, 1)) > np.subtract(shot.size, 1 + MARGIN_PX)).any():
+        return False
+    longer_side = np.ptp(uv, axis=1).max(axis=1)
+    return bool(np.median(longer_side) >= LEAST_FILL * shot.size[1])

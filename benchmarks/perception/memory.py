@@ -1,0 +1,86 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How much memory an hour takes: a few seconds of tracking, repeated, through everything that comes after it.
+
+    python -m scope.benchmarks.perception.memory [--frames 108000] [--people 2]
+
+Everybody is the person of the sample clip, in a place of their own. The networks of the default preset stay loaded, as
+in a capture; what they take while they run is not in the figure.
+"""
+
+from __future__ import annotations
+
+import argparse
+import resource
+import sys
+import tempfile
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+
+from ...scope_addon.capture.camera.intrinsics import choose_camera
+from ...scope_addon.capture.camera.line_segments import Lines
+from ...scope_addon.capture.fitting.ablation import ALL_PARTS
+from ...scope_addon.capture.media.video import open_video
+from ...scope_addon.capture.perception.observation import Observation
+from ...scope_addon.capture.pipeline import CaptureOptions, solve
+from ...scope_addon.capture.tracking.left_right import repair_left_right
+from ...scope_addon.capture.tracking.people import PeopleBuilder
+from ...scope_addon.capture.tracking.tracker import PeopleTracker
+from ...scope_addon.capture.world.camera_path import CameraPath
+from ...scope_addon.cli import SAMPLE
+from ...solver import load_body
+
+APART_PX = 400.0  # from one person to the next
+
+
+def replay(frames: int, people: int) -> dict[str, float]:
+    """Return the highest memory so far, MiB, after each stage."""
+    peaks: dict[str, float] = {}
+    body, seen, size = load_body("scope"), [], (0, 0)
+    tracker = PeopleTracker(CaptureOptions().quality, 2)
+    with open_video(SAMPLE) as video:
+        camera, size = choose_camera(video.width, video.height), (video.width, video.height)
+        for frame in video:
+            seen.append([o for _, o in tracker.step(frame.image_rgb, time_s=frame.timestamp_s)][0])
+    builder, fps = PeopleBuilder(), 30
+    peaks["networks"] = peak_mib()
+    for k in range(frames):
+        builder.add(k, k / fps, [(p, moved(seen[k % len(seen)], p * APART_PX)) for p in range(people)])
+    peaks["tracking"] = peak_mib()
+    tracks = [repair_left_right(track, camera) for track in builder.build(people)]
+    del builder, tracker
+    peaks["left and right"] = peak_mib()
+    about = {"fps": Fraction(fps), "image_size": size, "source": SAMPLE.name}
+    path = CameraPath.on_a_stand(frames)
+    motions, _, _ = solve(body, tracks, camera, path, Lines.none(), True, ALL_PARTS, about, lambda *_: None)
+    peaks["solver"] = peak_mib()
+    with tempfile.TemporaryDirectory() as folder:
+        for k, motion in enumerate(motions):
+            motion.save(Path(folder) / f"person{k}.npz")
+    peaks["saving"] = peak_mib()
+    return peaks
+
+
+def moved(observation: Observation, pixels: float) -> Observation:
+    """Return a copy of an observation, as a tracker would make it anew, of somebody further to the right."""
+    return replace(observation, keypoints_px=observation.keypoints_px + [pixels, 0.0])
+
+
+def peak_mib() -> float:
+    """Return the process's highest resident memory so far, MiB."""
+    unit = 1 if sys.platform == "darwin" else 1024
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit / 2**20
+
+
+def main() -> None:
+    """Run the command line."""
+    parser = argparse.ArgumentParser(prog="memory")
+    parser.add_argument("--frames", type=int, default=108_000, help="an hour at 30 a second by default")
+    parser.add_argument("--people", type=int, default=2)
+    args = parser.parse_args()
+    for stage, mib in replay(args.frames, args.people).items():
+        print(f"{stage:<16}{mib:8.0f} MiB")
+
+
+if __name__ == "__main__":
+    main()

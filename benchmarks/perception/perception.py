@@ -1,0 +1,98 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""`./scripts/bench perception`: accuracy against truth, what each part brings, frames per second."""
+
+from __future__ import annotations
+
+import sys
+
+from ...scope_addon.capture.pipeline import CaptureOptions
+from ...solver import Body, load_body
+from ..frames import DATA
+from ..report import table
+from .accuracy import ABLATION, CAMERAS, SHOWN, calibration, evaluate_all
+from .throughput import decoding, end_to_end, looped, side_by_side, warm_up
+
+LONG_CLIP, TWO_PEOPLE = "clips/run_moving_camera.mp4", "clips/two_people_portrait.mp4"
+PRESETS = ("fast", "balanced", "best")
+SPEED_TARGETS = {"fast": 60.0, CaptureOptions().quality: 30.0}
+
+
+def perception(quick: bool) -> dict:
+    """Measure everything, print the tables as they come, return the figures."""
+    if not DATA.is_dir():
+        print(f"{DATA} is not beside this checkout: nothing was measured", file=sys.stderr)
+        return {}
+    body = load_body("scope")
+    warm_up(body)
+    figures = _speed(body, quick)
+    figures |= _accuracy(body)
+    if not quick:
+        presets = {q: evaluate_all(body, lambda _, q=q: CaptureOptions(quality=q)) for q in PRESETS}
+        figures["presets"] = {q: _show(q, found) for q, found in presets.items()}
+        figures["ablation"] = _ablation(body)
+    return figures
+
+
+def _speed(body: Body, quick: bool) -> dict:
+    default = CaptureOptions().quality
+    frames, rounds = (450, 1) if quick else (1800, 3)
+    video = looped(LONG_CLIP, frames)
+    presets = {}
+    for quality in (default,) if quick else PRESETS:
+        presets[quality] = side_by_side(body, video, quality, 300, rounds)
+    # The clip has 12 frames a second: more looks for newcomers, and at left and right, fall on each of its frames.
+    pairs = {
+        name: end_to_end(body, looped(TWO_PEOPLE, 300 if quick else 600, fps), "fast", 2)
+        for name, fps in (("30 a second", 30.0), ("12 a second", None))
+    }
+    pair = pairs["30 a second"]
+    chosen = presets[default]
+    fps = {key: chosen[key] for key in ("end_to_end", "mediapipe", "networks", "solver", "over_mediapipe")}
+    fps |= {"decode": decoding(video), "two_people_fast": pair["end_to_end"]}
+    rows = [
+        [q, f["end_to_end"], SPEED_TARGETS.get(q), f["networks"], f["solver"], f["cpu_ms_per_frame"], f["mediapipe"],
+         f["over_mediapipe"]]
+        for q, f in presets.items()
+    ]  # fmt: skip
+    rows += [
+        [f"fast, two people, {name}", f["end_to_end"], 35.0, f["networks"], f["solver"], f["cpu_ms_per_frame"], None,
+         None]
+        for name, f in pairs.items()
+    ]  # fmt: skip
+    head = ("preset", "end to end", "target", "networks", "solver", "CPU ms/frame", "MediaPipe", "ratio, target 1.5")
+    print(f"Frames per second, {frames} frames of 1080p; decoding alone {fps['decode']:.0f}; default: {default}\n")
+    print(table(head, rows), end="\n\n", flush=True)
+    presets |= {"two_people_fast": pair, "two_people_fast_12": pairs["12 a second"]}
+    return {"fps": fps, "fps_presets": presets, "default": default}
+
+
+def _accuracy(body: Body) -> dict:
+    estimated = evaluate_all(body, lambda _: CaptureOptions())
+    given = evaluate_all(body, lambda camera: CaptureOptions(calibration=calibration(camera)))
+    head = ("default preset", *(heading for heading, _ in SHOWN.values()))
+    rows: list[list[object]] = [["target", *(target for _, target in SHOWN.values())]]
+    for name, found in (("estimated", estimated), ("given", given)):
+        rows += [[f"{camera}, {name} intrinsics", *_row(found[camera])] for camera in (*CAMERAS, "mean")]
+    print(table(head, rows), end="\n\n", flush=True)
+    return {"clips": estimated, "clips_given_intrinsics": given}
+
+
+def _ablation(body: Body) -> dict:
+    found, rows, by_camera = {}, [], []
+    for name, options in ABLATION.items():
+        each = evaluate_all(body, lambda _, options=options: CaptureOptions(**options))
+        found[name] = each["mean"]
+        rows.append([name, *_row(each["mean"])])
+        by_camera.append([name, *(f"{f['mpjpe_root']:.1f} / {f['pa_mpjpe']:.1f}" for f in (each[c] for c in CAMERAS))])
+    print(table(("mean of four cameras", *(heading for heading, _ in SHOWN.values())), rows), end="\n\n", flush=True)
+    print(table(("MPJPE-root / PA-MPJPE mm", *CAMERAS), by_camera), end="\n\n", flush=True)
+    return found
+
+
+def _show(quality: str, found: dict[str, dict]) -> dict:
+    print(table((quality, *(heading for heading, _ in SHOWN.values())), [["mean", *_row(found["mean"])]]), end="\n\n")
+    return found["mean"]
+
+
+def _row(figures: dict) -> list[float]:
+    return [figures[key] for key in SHOWN]

@@ -1,0 +1,70 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Render the held-out shots that build/bench/renders lacks: ``python -m scope.benchmarks.perception.render_shots``.
+
+A process of its own: Blender's module talks on standard output and can hang at exit. NAME.mp4 and NAME_truth.npz of a
+shot stay as long as the truth is what would be written today.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+from ...scope_addon.atomic_write import written_beside
+from ...solver import Body, load_body
+from ...tools.render_sample.truth import Shot, write_truth
+from ..frames import CACHE, DATA, ROOT
+from .held_out import draw_shot, held_out_takes
+
+RENDERS, MOTIONS = CACHE / "renders", ROOT / "build" / "mocap" / "motions.npz"
+SAME = ("joints_cam", "betas", "intrinsics", "frame_index")  # in two truths of one clip
+SAME_M = 1e-3
+
+
+def video_and_truth(name: str) -> tuple[Path, Path]:
+    """Where the render of a take and its truth lie."""
+    return RENDERS / f"{name}.mp4", RENDERS / f"{name}_truth.npz"
+
+
+def shots(body: Body) -> dict[str, Shot]:
+    """The shot of every held-out take by the take's name."""
+    if not MOTIONS.is_file():
+        print(f"fitting the body to the recordings in {DATA / 'mocap'}, once", file=sys.stderr, flush=True)
+        command = ("scope.tools.mocap.fit_body", str(DATA / "mocap"), "-o", str(MOTIONS))
+        subprocess.run([sys.executable, "-m", *command], check=True, stdout=subprocess.DEVNULL)
+    return {take.name: draw_shot(body, take) for take in held_out_takes(MOTIONS)}
+
+
+def render_missing(body: Body) -> None:
+    """Render what is not there or not true any more."""
+    RENDERS.mkdir(parents=True, exist_ok=True)
+    for name, shot in shots(body).items():
+        video, truth = video_and_truth(name)
+        with tempfile.TemporaryDirectory(dir=RENDERS, prefix=".frames") as scratch:
+            drawn = Path(scratch) / truth.name
+            write_truth(drawn, body, shot)
+            if video.is_file() and truth.is_file() and _same(drawn, truth):
+                continue
+            print(f"rendering {name}", file=sys.stderr, flush=True)
+            from ...tools.render_sample.clip import render_clip
+
+            truth.unlink(missing_ok=True)  # a video without truth is rendered again
+            with written_beside(video) as part:
+                render_clip(body, shot, part, Path(scratch))
+            os.replace(drawn, truth)
+
+
+def _same(drawn: Path, kept: Path) -> bool:
+    with np.load(drawn) as a, np.load(kept) as b:
+        return all(a[key].shape == b[key].shape and np.allclose(a[key], b[key], rtol=0, atol=SAME_M) for key in SAME)
+
+
+if __name__ == "__main__":
+    render_missing(load_body("scope"))
+    sys.stderr.flush()
+    os._exit(0)

@@ -1,0 +1,123 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""`./scripts/bench renders`: captures of rendered clips, whose truth is exact, with and without focal length or height.
+
+The clips are `held_out`'s shots, and the sample clip, which no mean contains.
+"""
+
+from __future__ import annotations
+
+import math
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from ...scope_addon.capture.pipeline import CaptureOptions
+from ...scope_addon.errors import NoPersonError
+from ...scope_addon.motion import Motion
+from ...solver import Body, load_body
+from ...solver.loaders.body_file import ASSETS
+from ...solver.rotations import exp
+from ..frames import DATA
+from ..report import table
+from .accuracy import evaluate_clip
+from .held_out import feet_world, held_out_takes
+from .perception import PRESETS
+from .render_shots import MOTIONS, video_and_truth
+
+SHOWN = {
+    "mpjpe_root": "MPJPE-root mm",
+    "pa_mpjpe": "PA-MPJPE mm",
+    "up_deg": "up off by, degrees",
+    "floor_cm": "floor off by, cm",
+    "foot_slide_cm": "foot slide cm",
+    "size": "size / true",
+    "focal": "focal / true",
+    "coverage": "coverage",
+}
+
+
+KNOWN = ("nothing given", "focal length given", "height given")
+
+
+def renders(quick: bool) -> dict:
+    """Render what is missing, measure, print the tables as they come, return the figures by preset and by ``KNOWN``."""
+    if not DATA.is_dir():
+        print(f"{DATA} is not beside this checkout: nothing was measured", file=sys.stderr)
+        return {}
+    command = (sys.executable, "-m", "scope.benchmarks.perception.render_shots")
+    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+    body = load_body("scope")
+    clips = {take.name: video_and_truth(take.name) for take in held_out_takes(MOTIONS)}
+    sample = ASSETS / "sample" / "sample.mp4"
+    clips["sample"] = sample, sample.with_name("sample_truth.npz")
+    figures: dict = {}
+    for quality in (CaptureOptions().quality,) if quick else PRESETS:
+        figures[quality] = {}
+        for known in KNOWN:
+            found = {name: evaluate_render(body, *files, quality, known) for name, files in clips.items()}
+            mean = mean_of([row for name, row in found.items() if name != "sample"])
+            figures[quality][known] = found | {"mean": mean}
+            rows = [[name, *(row.get(key) for key in SHOWN)] for name, row in figures[quality][known].items()]
+            print(table((f"{quality}, {known}", *SHOWN.values()), rows), end="\n\n", flush=True)
+    return figures
+
+
+def evaluate_render(body: Body, video: Path, truth: Path, quality: str, known: str) -> dict:
+    """Return what the evaluation tool says about one clip, ``size``, and what ``against_world`` says.
+
+    ``known``: one of ``KNOWN``. Where nobody was found, ``coverage`` alone. ``size``: the result's over the truth's,
+    median of the frames.
+    """
+    with np.load(truth) as data:
+        true = {key: data[key] for key in data.files}
+    options = CaptureOptions(
+        quality=quality,
+        fov_deg=_field_of_view(true) if known == "focal length given" else None,
+        heights_m=(body.stature(true["betas"].astype(float)),) if known == "height given" else (),
+    )
+    try:
+        motion, figures = evaluate_clip(body, video, truth, options)
+    except NoPersonError:
+        return {"coverage": 0.0}
+    return figures | {"size": 1 / figures["pa_scale"]} | against_world(body, motion, true)
+
+
+def against_world(body: Body, motion: Motion, truth: dict[str, np.ndarray]) -> dict[str, float | None]:
+    """Compare a motion's world and camera with the truth's, over the frames that both have.
+
+    ``up_deg``: mean angle between the two upward directions, seen from the camera. ``floor_cm``: mean error of the
+    height over the floor of feet that stand (middle of heel and toe), None if none does. ``focal``: the ratio of the
+    focal lengths.
+    """
+    rows = np.flatnonzero(motion.valid & np.isin(motion.frames, truth["frame_index"]))
+    at = np.searchsorted(truth["frame_index"], motion.frames[rows])
+    up = motion.world_from_camera[rows, 2, :3] @ truth["world_from_camera"][2, :3]
+    heights = []
+    for poses, trans, betas in (
+        (motion.poses[rows], motion.trans[rows], motion.betas),
+        (truth["poses"][at], truth["trans"][at], truth["betas"]),
+    ):
+        states = exp(poses.reshape(len(rows), -1, 3).astype(float))
+        heights.append(feet_world(body, states, trans.astype(float), betas)[..., 2])
+    off = np.abs(heights[0] - heights[1])[truth["standing"][at]]
+    return {
+        "up_deg": float(np.degrees(np.arccos(np.clip(up, -1, 1))).mean()),
+        "floor_cm": float(100 * off.mean()) if len(off) else None,
+        "focal": float(motion.intrinsics[0, 0] / truth["intrinsics"][0, 0]),
+    }
+
+
+def mean_of(rows: list[dict]) -> dict[str, float | None]:
+    """The mean of what is shown, over the rows that have it."""
+    means: dict[str, float | None] = {}
+    for key in SHOWN:
+        values = [row[key] for row in rows if row.get(key) is not None]
+        means[key] = float(np.mean(values)) if values else None
+    return means
+
+
+def _field_of_view(truth: dict[str, np.ndarray]) -> float:
+    """Degrees along the picture's longer side."""
+    return math.degrees(2 * math.atan(max(truth["size"]) / (2 * truth["intrinsics"][0, 0])))

@@ -1,0 +1,270 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The fitted bodies drawn over the footage, to see at a glance whether a capture is right.
+
+The mesh is posed in the world from the motion file and brought into each frame's camera with the inverse of
+``world_from_camera``, so that the overlay checks what other programs will read, not what the solver remembers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numba import njit
+
+from ....solver.body import Body
+from ....solver.errors import ShapeError
+from ....solver.rotations import exp
+from ...atomic_write import reason, written_beside
+from ...errors import OutputError
+from ...motion import Motion
+from ..camera.intrinsics import scaled_intrinsics
+from ..media.video import Frame, Video, open_video
+from ..media.video_range import Wanted
+from ..perception.landmark_network import KEYPOINT_COUNT
+from .rasterizer import Canvas, rasterize
+
+VIDEO_SUFFIXES = (".mp4", ".mov", ".mkv")
+STILL_SUFFIXES = (".png", ".jpg", ".jpeg", ".webp")
+LONGEST_SIDE = 1920
+_FAINT = 0.35  # opacity of a pose that was filled in, relative to one that was seen
+_TINTS = np.array([[1.0, 0.55, 0.15], [0.2, 0.75, 1.0], [0.55, 0.9, 0.3], [0.95, 0.4, 0.75], [0.95, 0.85, 0.25]])
+# H.264 plays everywhere, but the Linux wheels of OpenCV have no encoder for it; MPEG-4 Part 2 is in all of them and
+# plays in desktop players, editors and Blender. VP9, which they also have, takes 60 times as long.
+_CODECS = (("avc1", cv2.CAP_ANY), ("mp4v", cv2.CAP_FFMPEG), ("mp4v", cv2.CAP_ANY))
+
+Progress = Callable[[int, int], None]
+
+
+def write_overlay(
+    path: str | Path,
+    video_path: str | Path,
+    motions: Motion | Sequence[Motion],
+    body: Body,
+    *,
+    opacity: float = 0.6,
+    progress: Progress | None = None,
+    wanted: Wanted | None = None,
+) -> None:
+    """Write the footage with every person's body over it.
+
+    The video has the footage's rate and size (at most 1920 pixels along the longer side, both sides even). A picture
+    suffix (.png, .jpg, .webp) gives the first frame in which somebody was seen.
+
+    :param wanted: the part of the footage that was captured.
+    :param progress: called with (frames done, frames expected); what it raises stops the work, and nothing is left.
+    :raises OutputError: the suffix is none of ours, or the file cannot be written.
+    """
+    path = Path(path)
+    people = [motions] if isinstance(motions, Motion) else list(motions)
+    suffix = path.suffix.lower()
+    if suffix not in VIDEO_SUFFIXES + STILL_SUFFIXES:
+        known = ", ".join(VIDEO_SUFFIXES + STILL_SUFFIXES)
+        raise OutputError(f"cannot write the overlay {path}: its suffix must be one of {known}")
+    with open_video(video_path, wanted) as video:
+        painter = _Painter(people, body, video, opacity, even=suffix in VIDEO_SUFFIXES)
+        try:
+            with written_beside(path) as temporary:
+                if suffix in STILL_SUFFIXES:
+                    _write_still(temporary, painter, video, _first_seen(people))
+                else:
+                    _write_video(temporary, painter, video, path, progress)
+        except OSError as error:
+            raise OutputError(f"cannot write {path}: {reason(error)}") from error
+
+
+def draw_overlay(
+    image_rgb: np.ndarray,
+    vertices_cam: np.ndarray | Sequence[np.ndarray],
+    faces: np.ndarray,
+    intrinsics: np.ndarray,
+    dist: np.ndarray | None = None,
+    colors: np.ndarray | Sequence[np.ndarray] | None = None,
+    opacity: float | Sequence[float] = 0.6,
+    canvas: Canvas | None = None,
+) -> np.ndarray:
+    """Bodies over one picture, solid and shaded, those in front hiding those behind.
+
+    :param image_rgb: (H, W, 3) uint8.
+    :param vertices_cam: (V, 3), or one such array per person: metres, camera frame (OpenCV axes).
+    :param faces: (F, 3) or (F, 4), counter-clockwise seen from outside.
+    :param colors: per person (3,) or (F, 3) sRGB in 0..1; None: a tint each.
+    :param opacity: 0..1, one for all or one per person.
+    :param canvas: kept between frames by a caller who draws many.
+    :return: a new picture of the same size.
+    """
+    people = [vertices_cam] if np.ndim(vertices_cam) == 2 else list(vertices_cam)
+    if colors is None:
+        colors = [tint(i) for i in range(len(people))]
+    elif isinstance(colors, np.ndarray) and len(people) == 1 and colors.ndim <= 2:
+        colors = [colors]
+    opacities = np.broadcast_to(np.asarray(opacity, float), (len(people),))
+    height, width = image_rgb.shape[:2]
+    if canvas is None or canvas.depth.shape != (height, width):
+        canvas = Canvas.blank(width, height)
+    else:
+        canvas.clear()
+    triangles = _triangles(faces)
+    for person, color, alpha in zip(people, colors, opacities, strict=True):
+        per_face = np.asarray(color, np.float32)
+        if per_face.ndim == 2 and len(per_face) != len(triangles):
+            per_face = np.concatenate([per_face, per_face])  # a quad's two halves
+        rasterize(canvas, np.asarray(person), triangles, per_face, intrinsics, dist, float(alpha))
+    out = np.ascontiguousarray(image_rgb).copy()
+    _blend(out, canvas.rgba)
+    return out
+
+
+def tint(person: int) -> np.ndarray:
+    """(3,) sRGB colour of the person with this number."""
+    return _TINTS[person % len(_TINTS)]
+
+
+def body_colors(body: Body, person: int) -> np.ndarray:
+    """(F, 3) sRGB face colours: the body's materials, washed in the person's tint."""
+    if body.face_material is None or body.material_colors is None:
+        return np.tile(tint(person), (len(body.faces), 1))
+    linear = np.clip(body.material_colors[:, :3], 0, 1)
+    srgb = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
+    return (0.85 * tint(person) + 0.15 * srgb)[body.face_material]
+
+
+def camera_vertices(motion: Motion, body: Body, row: int) -> np.ndarray:
+    """(V, 3) the posed mesh of one row of a motion, in that row's camera frame, metres."""
+    betas = motion.betas.astype(float)
+    rotations = exp(motion.poses[row].reshape(-1, 3).astype(float))
+    R_world, t_world = body.forward_kinematics(rotations, motion.trans[row].astype(float), betas)
+    T = motion.world_from_camera[row]
+    R_camera_world = T[:3, :3].T
+    return body.skin(R_camera_world @ R_world, (t_world - T[:3, 3]) @ T[:3, :3], betas)
+
+
+def _triangles(faces: np.ndarray) -> np.ndarray:
+    if faces.shape[1] == 3:
+        return faces
+    return np.concatenate([faces[:, [0, 1, 2]], faces[:, [0, 2, 3]]])
+
+
+@njit(cache=True, nogil=True)
+def _blend(image, rgba):
+    """Lay ``rgba`` over ``image`` in place; a pixel at the edge counts by how much of its surroundings is covered."""
+    height, width = image.shape[:2]
+    for v in range(height):
+        for u in range(width):
+            if rgba[v, u, 3] == 0:
+                continue
+            covered = 0
+            for i in range(max(0, v - 1), min(height, v + 2)):
+                for j in range(max(0, u - 1), min(width, u + 2)):
+                    if rgba[i, j, 3] > 0:
+                        covered += 1
+            inside = 1.0 if 0 in (u, v) or u == width - 1 or v == height - 1 else min(1.0, covered / 8)
+            a = rgba[v, u, 3] / 255 * inside
+            for k in range(3):
+                image[v, u, k] = np.uint8(image[v, u, k] * (1 - a) + rgba[v, u, k] * a + 0.5)
+
+
+class _Painter:
+    """Paints the frames of one clip; scales the camera with the picture."""
+
+    def __init__(self, people: list[Motion], body: Body, video: Video, opacity: float, even: bool) -> None:
+        for motion in people:
+            if motion.joint_count != body.K + 1:
+                raise ShapeError(f"the motion has {motion.joint_count} joints, but body '{body.name}' has {body.K + 1}")
+        self._people, self._body, self._opacity = people, body, opacity
+        self._rows = [{int(f): row for row, f in enumerate(motion.frames)} for motion in people]
+        self._colors = [body_colors(body, i) for i in range(len(people))]
+        self._scale = min(1.0, LONGEST_SIDE / max(video.width, video.height))
+        width, height = (max(2, round(side * self._scale)) for side in (video.width, video.height))
+        self._resized = (width, height)
+        # Encoders want even sides. The last row or column is cut off, which leaves the camera as it is.
+        self._size = (width - width % 2, height - height % 2) if even else self._resized
+        self._canvas = Canvas.blank(*self._size)
+
+    def paint(self, frame: Frame) -> np.ndarray:
+        image = frame.image_rgb
+        if image.shape[1::-1] != self._resized:
+            image = cv2.resize(image, self._resized, interpolation=cv2.INTER_AREA)
+        width, height = self._size
+        image = np.ascontiguousarray(image[:height, :width])
+        shown = [(i, rows[frame.index]) for i, rows in enumerate(self._rows) if frame.index in rows]
+        if not shown:
+            return image
+        # Everybody of one clip was filmed by the same camera.
+        motion = self._people[shown[0][0]]
+        image = draw_overlay(
+            image,
+            [camera_vertices(self._people[i], self._body, row) for i, row in shown],
+            self._body.faces,
+            scaled_intrinsics(motion.intrinsics, self._scale),
+            motion.dist,
+            [self._colors[i] for i, _ in shown],
+            [self._opacity * (1.0 if self._people[i].valid[row] else _FAINT) for i, row in shown],
+            self._canvas,
+        )
+        for i, row in shown:
+            if self._people[i].valid[row]:
+                self._dots(image, self._people[i].keypoints2d[row], tint(i))
+        return image
+
+    def _dots(self, image: np.ndarray, keypoints: np.ndarray, color: np.ndarray) -> None:
+        radius = max(1, round(max(image.shape[:2]) / 500))
+        for k, (u, v, confidence) in enumerate(keypoints):
+            if confidence > 0.3 and np.isfinite((u, v)).all() and max(abs(u), abs(v)) < 1e5:
+                center = (round(float(u * self._scale)), round(float(v * self._scale)))
+                if k < KEYPOINT_COUNT:  # a hand's lie close together: they go without the rim
+                    cv2.circle(image, center, radius + 1, (20, 20, 20), -1, cv2.LINE_AA)
+                cv2.circle(image, center, radius, tuple(int(c) for c in 255 * (0.5 + 0.5 * color)), -1, cv2.LINE_AA)
+
+
+def _first_seen(people: list[Motion]) -> int:
+    """Index of the first frame in which somebody was seen; 0 if nobody ever was."""
+    return min((int(m.frames[m.valid][0]) for m in people if m.valid.any()), default=0)
+
+
+def _write_still(path: Path, painter: _Painter, video: Video, index: int) -> None:
+    for frame in video:  # the last one is kept
+        if frame.index >= index:
+            break
+    ok, data = cv2.imencode(path.suffix, cv2.cvtColor(painter.paint(frame), cv2.COLOR_RGB2BGR))
+    if not ok:
+        raise OutputError(f"cannot encode a {path.suffix} picture; choose .png")
+    path.write_bytes(data.tobytes())
+
+
+def _write_video(temporary: Path, painter: _Painter, video: Video, path: Path, progress: Progress | None) -> None:
+    writer = None
+    try:
+        for frame in video:
+            image = painter.paint(frame)
+            if writer is None:
+                writer = _open_writer(temporary, float(video.fps), image.shape[1], image.shape[0], path)
+            writer.write(cv2.cvtColor(image, cv2.COLOR_RGB2BGR))
+            if progress is not None:
+                progress(frame.index + 1, max(video.frame_count, frame.index + 1))
+    finally:
+        if writer is not None:
+            writer.release()
+    if not _is_readable(temporary):  # the encoder says nothing about what it could not write
+        raise OutputError(f"cannot write {path} to its end; free some space or choose another folder")
+
+
+def _open_writer(temporary: Path, fps: float, width: int, height: int, path: Path) -> cv2.VideoWriter:
+    for codec, backend in _CODECS:
+        fourcc = cv2.VideoWriter.fourcc(*codec)
+        writer = cv2.VideoWriter(str(temporary), backend, fourcc, fps, (width, height))
+        if writer.isOpened():
+            return writer
+        writer.release()
+    raise OutputError(f"cannot write {path}: no video encoder was found; choose a .png or .jpg overlay")
+
+
+def _is_readable(video: Path) -> bool:
+    """Whether a video has its table of contents, which is written last."""
+    reader = cv2.VideoCapture(str(video))
+    try:
+        return reader.isOpened() and reader.grab()
+    finally:
+        reader.release()

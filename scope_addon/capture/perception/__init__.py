@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Frames to observations: detection, landmark and hand networks, and the lifting network."""

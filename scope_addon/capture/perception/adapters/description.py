@@ -1,0 +1,101 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The small JSON beside a model (``NAME.json`` beside ``NAME.onnx``) that says what its graph does not."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any
+
+from .....solver.errors import ModelFileError
+from .keypoint_sets import KEYPOINT_SETS
+
+
+@dataclass(frozen=True)
+class Description:
+    """What the JSON says; None: not said, so the graph or the kind's usual value decides.
+
+    ``type``: see `DETECTOR_TYPES` and `KEYPOINT_TYPES`.  ``input_size``: [width, height].  ``mean``, ``std``: one or
+    three numbers on the scale 0..255, in the order of the channels; input = (pixel − mean) / std.
+    ``channel_order``: rgb or bgr.  ``score_threshold``: of a person or of a keypoint that counts as seen.
+    Detectors: ``decoded`` (yolox: boxes are in pixels already), ``person_class`` (number of the class).
+    Keypoints: ``keypoints`` (a set's name), ``decode`` (dark or quarter), ``udp`` (heatmaps whose corner cells lie on
+    the corner pixels).
+    """
+
+    type: str | None = None
+    input_size: tuple[int, int] | None = None
+    mean: tuple[float, ...] | None = None
+    std: tuple[float, ...] | None = None
+    channel_order: str | None = None
+    score_threshold: float | None = None
+    decoded: bool | None = None
+    person_class: int = 0
+    keypoints: str | None = None
+    decode: str = "dark"
+    udp: bool = False
+
+
+def description_path(model: Path) -> Path:
+    """Where a model's JSON lies."""
+    return model.with_suffix(".json")
+
+
+def read_description(model: Path, types: tuple[str, ...]) -> Description:
+    """The JSON beside a model; an empty one where there is none.
+
+    :param types: what ``type`` may be.
+    :raises ModelFileError: not JSON, a key that does not exist, or a value that cannot be.
+    """
+    path = description_path(model)
+    if not path.is_file():
+        return Description()
+    try:
+        values = json.loads(path.read_text("utf-8"))
+    except (OSError, ValueError, RecursionError) as error:
+        raise ModelFileError(f"{path} cannot be read as JSON ({error}); correct it or remove it") from error
+    if not isinstance(values, dict):
+        raise ModelFileError(f'{path} must hold one JSON object such as {{"type": "{types[0]}"}}')
+    known = {field.name for field in fields(Description)}
+    for key, value in values.items():
+        if key not in known:
+            raise ModelFileError(f"{path}: {key!r} is not known; write some of {', '.join(sorted(known))}")
+        if wrong := _wrong(key, value, types):
+            raise ModelFileError(f"{path}: {key} must be {wrong}, but is {json.dumps(value)[:80]}")
+    for key in ("mean", "std", "input_size"):
+        if key in values:
+            given = values[key] if isinstance(values[key], list) else [values[key]]
+            values[key] = tuple(given)
+    return Description(**values)
+
+
+def _wrong(key: str, value: Any, types: tuple[str, ...]) -> str | None:
+    """What a value must be, in words, where it is not."""
+    choices = {
+        "type": types,
+        "channel_order": ("rgb", "bgr"),
+        "keypoints": tuple(KEYPOINT_SETS),
+        "decode": ("dark", "quarter"),
+    }
+    if key in choices:
+        return None if value in choices[key] else f"one of {', '.join(choices[key])}"
+    if key in ("decoded", "udp"):
+        return None if isinstance(value, bool) else "true or false"
+    if key == "score_threshold":
+        return None if _is_number(value) and 0 < value < 1 else "a number between 0 and 1"
+    if key == "person_class":
+        return None if type(value) is int and value >= 0 else "a number from 0 on"
+    if key == "input_size":
+        sound = isinstance(value, list) and len(value) == 2 and all(type(v) is int and 16 <= v <= 4096 for v in value)
+        return None if sound else "[width, height] in pixels, 16 to 4096"
+    several = value if isinstance(value, list) else [value]
+    sound = len(several) in (1, 3) and all(_is_number(v) for v in several)
+    if key == "std":
+        sound = sound and all(v > 0 for v in several)
+    return None if sound else "one number or three" + (" above 0" if key == "std" else "")
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)

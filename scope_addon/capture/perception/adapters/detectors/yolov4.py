@@ -1,0 +1,42 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""YOLOv4-type: ``boxes`` (1, N, 1, 4) and ``confs`` (1, N, classes), in either order.
+
+A box is left, top, right, bottom as shares of the picture, into which the image was stretched without regard to its
+proportions; a score is that of the class.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..description import Description
+from ..graph import UNIT, Graph, sound
+from .boxes import Boxes
+
+TYPE = "yolov4"
+NORMALIZATION = UNIT
+CENTERED, STRETCHED = False, True
+
+
+def recognises(graph: Graph) -> bool:
+    """Two outputs with a row per box, one of them four numbers wide."""
+    if len(graph.shapes) != 2:
+        return False
+    first = _boxes_first(graph.shapes)
+    boxes, scores = graph.shapes if first else graph.shapes[::-1]
+    return _is_boxes(boxes) and len(scores) == 3 and scores[1] == boxes[1]
+
+
+def decode(outputs: list[np.ndarray], graph: Graph, said: Description) -> Boxes:
+    """The boxes of people in pixels of the network's picture."""
+    boxes, scores = outputs if _boxes_first([o.shape for o in outputs]) else outputs[::-1]
+    size = np.array([graph.width, graph.height] * 2, float)
+    return Boxes(sound(boxes).reshape(-1, 4) * size, sound(scores)[0, :, said.person_class])
+
+
+def _boxes_first(shapes: list[tuple[int, ...]]) -> bool:
+    return not _is_boxes(shapes[1]) or _is_boxes(shapes[0])
+
+
+def _is_boxes(shape: tuple[int, ...]) -> bool:
+    return len(shape) == 4 and shape[2:] == (1, 4)

@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Heatmaps (HRNet, ViTPose, AlphaPose): (1, J, rows, columns), coarser than the picture, hottest at the keypoint.
+
+The hottest cell is refined by a quarter of a cell towards its hotter neighbours, or as DARK does: with h the logarithm
+of the heatmap after a Gaussian blur, the maximum of its second-order Taylor expansion about the hottest cell is at
+
+    cell − (∇²h)⁻¹ ∇h
+
+(Zhang et al., Distribution-Aware Coordinate Representation for Human Pose Estimation, CVPR 2020). A cell c is the pixel
+c · width / columns, or with ``udp`` c · (width − 1) / (columns − 1).
+"""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+from ..graph import IMAGENET, Graph, sound
+
+TYPE = "heatmap"
+NORMALIZATION = IMAGENET
+_BLUR = 11  # cells; suits the Gaussians of 2 to 3 cells that these networks are trained with
+_COLDEST = 1e-10
+
+
+def recognises(graph: Graph) -> bool:
+    """One output, a coarser picture for each keypoint."""
+    if len(graph.shapes) != 1 or len(graph.shapes[0]) != 4:
+        return False
+    _, _, rows, columns = graph.shapes[0]
+    return 8 <= rows <= graph.height and 8 <= columns <= graph.width
+
+
+def keypoint_count(graph: Graph) -> int:
+    """How many keypoints the graph gives."""
+    return graph.shapes[0][1]
+
+
+def decode(
+    outputs: list[np.ndarray], graph: Graph, *, how: str = "dark", udp: bool = False
+) -> tuple[np.ndarray, np.ndarray]:
+    """(J, 2) pixels of the network's picture, the top left pixel's centre at 0, and (J,) scores: the greatest heat."""
+    heatmaps = sound(outputs[0])[0]
+    count, rows, columns = heatmaps.shape
+    hottest = heatmaps.reshape(count, -1).argmax(axis=1)
+    cells = np.stack([hottest % columns, hottest // columns], axis=1)
+    scores = heatmaps.reshape(count, -1).max(axis=1)
+    refine = _by_taylor if how == "dark" else _by_quarter
+    refined = np.array([refine(h, x, y) for h, (x, y) in zip(heatmaps, cells.tolist(), strict=True)])
+    size, grid = np.array([graph.width, graph.height]), np.array([columns, rows])
+    return refined * ((size - 1) / (grid - 1) if udp else size / grid), scores
+
+
+def _by_quarter(heat: np.ndarray, x: int, y: int) -> tuple[float, float]:
+    """A quarter of a cell towards the hotter neighbour, in x and in y."""
+    rows, columns = heat.shape
+    if not (0 < x < columns - 1 and 0 < y < rows - 1):
+        return x, y
+    right, down = heat[y, x + 1] - heat[y, x - 1], heat[y + 1, x] - heat[y - 1, x]
+    return x + 0.25 * float(np.sign(right)), y + 0.25 * float(np.sign(down))
+
+
+def _by_taylor(heat: np.ndarray, x: int, y: int) -> tuple[float, float]:
+    """DARK; the hottest cell itself at the edge and where the heatmap is not a hill."""
+    rows, columns = heat.shape
+    if not (1 < x < columns - 2 and 1 < y < rows - 2) or heat[y, x] <= 0:
+        return x, y
+    reach = _BLUR // 2 + 2  # only what the blur carries into the 5 x 5 cells that count
+    left, top = max(0, x - reach), max(0, y - reach)
+    part = heat[top : y + reach + 1, left : x + reach + 1]
+    # beyond the heatmap there is no heat
+    blurred = cv2.GaussianBlur(part, (_BLUR, _BLUR), 0, borderType=cv2.BORDER_CONSTANT)
+    h = np.log(np.maximum(blurred, _COLDEST))
+    x0, y0 = x - left, y - top
+    gradient = np.array([h[y0, x0 + 1] - h[y0, x0 - 1], h[y0 + 1, x0] - h[y0 - 1, x0]]) / 2
+    xx = (h[y0, x0 + 2] - 2 * h[y0, x0] + h[y0, x0 - 2]) / 4
+    yy = (h[y0 + 2, x0] - 2 * h[y0, x0] + h[y0 - 2, x0]) / 4
+    xy = (h[y0 + 1, x0 + 1] - h[y0 - 1, x0 + 1] - h[y0 + 1, x0 - 1] + h[y0 - 1, x0 - 1]) / 4
+    if xx >= 0 or xx * yy - xy * xy <= 1e-12:
+        return x, y
+    step = -np.linalg.solve(np.array([[xx, xy], [xy, yy]]), gradient)
+    step = np.clip(step, -1.0, 1.0)
+    return x + float(step[0]), y + float(step[1])

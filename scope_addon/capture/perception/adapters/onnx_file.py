@@ -1,0 +1,116 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Looks into an ONNX file before onnxruntime does: weights in other files must lie in the model's own folder.
+
+An ONNX file is a protocol buffer; only the few fields that lead to tensors are followed (onnx.proto3 of the ONNX
+project). https://protobuf.dev/programming-guides/encoding/ describes the wire format.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from .....solver.errors import ModelFileError
+
+# Message: {number of a field: what it holds}.
+_FIELDS = {
+    "model": {7: "graph", 25: "function"},
+    "graph": {1: "node", 5: "tensor", 15: "sparse"},
+    "function": {7: "node"},
+    "node": {5: "attribute"},
+    "attribute": {5: "tensor", 6: "graph", 10: "tensor", 11: "graph", 22: "sparse", 23: "sparse"},
+    "sparse": {1: "tensor", 2: "tensor"},
+    "tensor": {13: "entry"},
+}
+_GRAPH = 7
+_DEEPEST = 64
+_LARGEST_BYTES = 2 << 30  # of a protocol buffer
+
+
+def check_onnx_file(path: Path) -> None:
+    """Refuse what is not an ONNX file, and one whose weights lie outside its folder.
+
+    :raises ModelFileError: with the reason and what to do.
+    """
+    try:
+        if path.exists() and not (path.is_file() or path.is_dir()):  # reading a device or a pipe may never end
+            raise ModelFileError(f"{path} is no ordinary file; choose an ONNX file")
+        if path.stat().st_size > _LARGEST_BYTES:
+            raise ModelFileError(f"{path} is larger than the 2 GiB of an ONNX file; export its weights beside it")
+        data = memoryview(path.read_bytes())
+    except OSError as error:
+        raise ModelFileError(f"{path} cannot be read ({error.strerror}); choose an ONNX file") from error
+    try:
+        if not any(number == _GRAPH for number, _ in _fields(data)):
+            raise ValueError("it has no graph")
+        locations = list(_locations(data, "model", 0))
+    except (ValueError, UnicodeDecodeError) as error:
+        raise ModelFileError(f"{path} is not an ONNX model ({error}); export the network to ONNX") from error
+    folder = path.resolve().parent
+    for location in locations:
+        target = (folder / location).resolve()
+        if not target.is_relative_to(folder):
+            raise ModelFileError(
+                f"{path} wants to read its weights from {location!r}, outside its own folder; "
+                "export it as one file, or with its data beside it"
+            )
+        if not target.is_file():
+            raise ModelFileError(f"{path} needs its weights in {target}, which is missing; put that file beside it")
+
+
+def _locations(data: memoryview, kind: str, depth: int) -> Iterator[str]:
+    """Where the tensors of a message say that their data lies."""
+    if depth > _DEEPEST:
+        raise ValueError("it is nested too deeply")
+    for number, value in _fields(data):
+        inner = _FIELDS[kind].get(number)
+        if inner is None:
+            continue
+        if not isinstance(value, memoryview):
+            raise ValueError("a field has the wrong type")
+        if inner == "entry":
+            entry = {n: v for n, v in _fields(value) if isinstance(v, memoryview)}
+            if bytes(entry.get(1, b"")) == b"location":
+                yield bytes(entry.get(2, b"")).decode()
+        else:
+            yield from _locations(value, inner, depth + 1)
+
+
+def _fields(data: memoryview) -> Iterator[tuple[int, memoryview | int]]:
+    """(number, value) of every field of a message: bytes as they are, numbers as 0 where nobody asks for them."""
+    at = 0
+    while at < len(data):
+        tag, at = _varint(data, at)
+        number, wire = tag >> 3, tag & 7
+        if number == 0:
+            raise ValueError("a field has no number")
+        if wire == 2:
+            length, at = _varint(data, at)
+            if length > len(data) - at:
+                raise ValueError("it is cut short")
+            yield number, data[at : at + length]
+            at += length
+        elif wire == 0:
+            value, at = _varint(data, at)
+            yield number, value
+        elif wire in (1, 5):
+            at += 8 if wire == 1 else 4
+            if at > len(data):
+                raise ValueError("it is cut short")
+            yield number, 0
+        else:
+            raise ValueError("it holds an unknown kind of field")
+
+
+def _varint(data: memoryview, at: int) -> tuple[int, int]:
+    """The number at ``at``, seven bits a byte, least first; and where it ends."""
+    value = 0
+    for shift in range(0, 70, 7):
+        if at >= len(data):
+            raise ValueError("it is cut short")
+        byte = data[at]
+        at += 1
+        value |= (byte & 127) << shift
+        if byte < 128:
+            return value, at
+    raise ValueError("a number in it is too long")

@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The hand landmark network: a region of the image to the 21 keypoints of one hand, in the image and in space."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from .execution import Execution
+from .hand_region import region_from_landmarks
+from .landmark_network import disagreement
+from .region import Region
+from .sessions import network_path, open_session
+
+INPUT_SIZE = 224
+HAND_NAMES = (
+    "wrist", "thumb_cmc", "thumb_mcp", "thumb_ip", "thumb_tip",
+    "index_finger_mcp", "index_finger_pip", "index_finger_dip", "index_finger_tip",
+    "middle_finger_mcp", "middle_finger_pip", "middle_finger_dip", "middle_finger_tip",
+    "ring_finger_mcp", "ring_finger_pip", "ring_finger_dip", "ring_finger_tip",
+    "pinky_mcp", "pinky_pip", "pinky_dip", "pinky_tip",
+)  # fmt: skip
+HAND_POINTS = len(HAND_NAMES)
+_OUTPUTS = ["landmarks", "presence", "handedness", "world"]
+
+
+@dataclass(frozen=True)
+class HandEstimate:
+    """What the network says about one region.
+
+    ``keypoints_px`` (21, 2) image pixels; ``world_landmarks`` (21, 3) metres in camera axes (x right, y down,
+    z forward), the middle of the hand at 0; ``presence``: probability that there is a hand; ``left``: probability that
+    it is a left hand; ``region``: where it looked. Order: `HAND_NAMES`.
+    """
+
+    keypoints_px: np.ndarray
+    world_landmarks: np.ndarray
+    presence: float
+    left: float
+    region: Region
+
+    @property
+    def next_region(self) -> Region:
+        """Where to look in the next frame."""
+        return region_from_landmarks(self.keypoints_px)
+
+    @property
+    def disagreement(self) -> float:
+        """How far the keypoints in the image and in space contradict each other, see `PoseEstimate.disagreement`.
+
+        0.08..0.2 for hands that show; up to 0.5 for hidden ones that the network imagines.
+        """
+        return disagreement(self.keypoints_px, self.world_landmarks)
+
+    @property
+    def size_px(self) -> float:
+        """Side of the box round the keypoints, upright in the region: what distances are compared with."""
+        return float(np.ptp(self.region.crop_from_image(self.keypoints_px), axis=0).max() * self.region.side_px)
+
+
+class HandNetwork:
+    """The hand landmark network on the CPU; keeps nothing between calls."""
+
+    def __init__(self, threads: int, folder: Path | None = None, execution: Execution | None = None) -> None:
+        self._session = open_session(network_path("hand_landmark", folder), threads, execution)
+
+    def estimate(self, image_rgb: np.ndarray, region: Region) -> HandEstimate:
+        """The hand in a region of an (H, W, 3) uint8 image."""
+        blob = cv2.dnn.blobFromImage(region.cut(image_rgb, INPUT_SIZE), 1 / 255.0)
+        landmarks, presence, handedness, world = self._session.run(_OUTPUTS, {"input": blob})
+        points = landmarks.reshape(HAND_POINTS, 3)[:, :2].astype(float) / INPUT_SIZE
+        return HandEstimate(
+            keypoints_px=region.image_from_crop(points),
+            world_landmarks=region.rotate_to_camera(world.reshape(HAND_POINTS, 3).astype(float)),
+            presence=float(presence[0, 0]),
+            # The network was trained on mirrored pictures of oneself: what it calls left is a right hand.
+            left=1.0 - float(handedness[0, 0]),
+            region=region,
+        )

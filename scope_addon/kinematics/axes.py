@@ -1,0 +1,48 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The axis conventions of SMPL, OpenCV and the world, in one place; Blender's and glTF's are in ``scene/axes.py``.
+
+| frame    | right-handed axes                                    | used by                            |
+|----------|------------------------------------------------------|------------------------------------|
+| camera   | OpenCV: x right, y down, z forward                   | solver, ``joints_cam``, intrinsics |
+| world    | x right, z up, floor at z = 0                        | motion file, Blender scenes        |
+| model    | SMPL: y up, x to the person's left, person faces +z  | rest pose of a body                |
+
+``R_a_b`` takes coordinates in frame b to coordinates in frame a: ``p_a = R_a_b @ p_b``.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+# Model y up becomes world z up, (x, y, z) -> (x, -z, y): the person faces world −y, into Blender's front view.
+R_WORLD_MODEL = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+# A level OpenCV camera in the world: x right stays, y down is −z, z forward is +y.
+R_WORLD_LEVELCAMERA = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
+
+
+def world_from_level_camera(up_camera: np.ndarray, height: float = 0.0) -> np.ndarray:
+    """World frame of a camera whose view of "up" is known: z along ``up``, the camera looking along +y.
+
+    The heading is the one that keeps the optical axis in the world's y-z plane, so a level camera gives
+    ``R_WORLD_LEVELCAMERA``. The camera sits at (0, 0, height).
+
+    :param up_camera: (3,) up direction in the camera frame, any length.
+    :param height: metres of the camera above the floor.
+    :return: (4, 4) world_from_camera.
+    """
+    up = np.asarray(up_camera, float) / np.linalg.norm(up_camera)
+    forward = np.array([0.0, 0.0, 1.0])
+    forward = forward - up * (forward @ up)
+    if np.linalg.norm(forward) < 1e-6:  # looking straight up or down: head along the image's vertical instead
+        forward = np.array([0.0, 1.0, 0.0]) - up * up[1]
+    forward /= np.linalg.norm(forward)
+    right = np.cross(forward, up)
+    T_world_camera = np.eye(4)
+    T_world_camera[:3, :3] = np.stack([right, forward, up])
+    T_world_camera[2, 3] = height
+    return T_world_camera
+
+
+def transform_points(T_a_b: np.ndarray, points_b: np.ndarray) -> np.ndarray:
+    """``p_a = R p_b + t`` for (..., 4, 4) transforms and (..., N, 3) points."""
+    return points_b @ np.swapaxes(T_a_b[..., :3, :3], -1, -2) + T_a_b[..., None, :3, 3]

@@ -1,0 +1,80 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The body's mesh: quads, UVs, materials, and skin weights that deform it with the armature."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+
+from ....solver.body import Body
+from ...kinematics.axes import R_WORLD_MODEL
+
+
+def build_mesh(
+    name: str, body: Body, vertices: np.ndarray, collection: bpy.types.Collection
+) -> bpy.types.Object:
+    """A mesh object of the body with UVs and materials, at the world's origin.
+
+    :param vertices: (V, 3) metres, world frame, at rest.
+    """
+    mesh = bpy.data.meshes.new(name)
+    corners = body.faces.shape[1]
+    mesh.vertices.add(len(vertices))
+    mesh.vertices.foreach_set("co", vertices.astype(np.float32).ravel())
+    mesh.loops.add(body.faces.size)
+    mesh.loops.foreach_set("vertex_index", body.faces.astype(np.int32).ravel())
+    mesh.polygons.add(len(body.faces))
+    mesh.polygons.foreach_set("loop_start", np.arange(0, body.faces.size, corners, dtype=np.int32))
+    mesh.polygons.foreach_set("use_smooth", np.ones(len(body.faces), bool))
+    for material_name, color in _materials(body):
+        mesh.materials.append(_material(material_name, color))
+    if body.face_material is not None:
+        mesh.polygons.foreach_set("material_index", body.face_material.astype(np.int32))
+    if body.uv is not None and body.uv_faces is not None:
+        layer = mesh.uv_layers.new(name="UVMap")
+        layer.data.foreach_set("uv", body.uv[body.uv_faces].astype(np.float32).ravel())
+    mesh.update(calc_edges=True)
+    obj = bpy.data.objects.new(name, mesh)
+    collection.objects.link(obj)
+    return obj
+
+
+def rest_vertices_world(body: Body, lift: np.ndarray, betas: np.ndarray | None = None) -> np.ndarray:
+    """(V, 3) the rest mesh in the world frame, z up; ``lift`` (3,) as in ``RestPose``."""
+    return body.rest_vertices(betas) @ R_WORLD_MODEL.T + lift
+
+
+def skin_to_armature(mesh: bpy.types.Object, armature: bpy.types.Object, body: Body) -> None:
+    """Vertex groups with the body's skin weights, an Armature modifier (linear) and the armature as parent."""
+    joints, weights = body.skin_joints, body.skin_weights
+    for k, joint_name in enumerate(body.joint_names):
+        group = mesh.vertex_groups.new(name=joint_name)
+        weight = np.where(joints == k, weights, 0.0).sum(axis=1)
+        for vertex in np.flatnonzero(weight > 0):
+            group.add((int(vertex),), float(weight[vertex]), "REPLACE")
+    modifier = mesh.modifiers.new("Armature", "ARMATURE")
+    modifier.object = armature
+    modifier.use_deform_preserve_volume = False
+    mesh.parent = armature
+
+
+def _materials(body: Body) -> list[tuple[str, np.ndarray]]:
+    plain = np.array([0.6, 0.6, 0.6, 1.0])
+    names = body.material_names or ("body",)
+    colors = body.material_colors if body.material_colors is not None else np.tile(plain, (len(names), 1))
+    return list(zip(names, colors, strict=True))
+
+
+def _material(name: str, color: np.ndarray) -> bpy.types.Material:
+    """A matte Principled material of a linear RGBA colour, in the viewport and the render."""
+    material = bpy.data.materials.new(name)
+    rgba = tuple(float(c) for c in color)
+    material.diffuse_color = rgba
+    material.roughness = 0.6
+    if material.node_tree is None:  # before 5.0 materials start without nodes
+        material.use_nodes = True
+    for node in material.node_tree.nodes:
+        if node.type == "BSDF_PRINCIPLED":
+            node.inputs["Base Color"].default_value = rgba
+            node.inputs["Roughness"].default_value = 0.6
+    return material

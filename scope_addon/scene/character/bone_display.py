@@ -1,0 +1,96 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How bones look: rings about the body, left in one colour, right in another, and a bone collection for each side.
+
+A ring is a custom shape, so an animator grasps a limb from outside the body; exporters never see it, because the ring's
+object belongs to no scene.
+"""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+
+from ....solver.body import Body
+from .armature import RestPose, rest_orientations
+
+RING = "scope_bone_ring"
+# Left blue, right red, as studios have it; brighter than Blender's own palettes, which drown on the dark suit.
+SIDES = {"Left": (0.12, 0.56, 1.0), "Right": (1.0, 0.22, 0.16), "Middle": (1.0, 0.76, 0.1)}
+_SELECTED, _ACTIVE = 0.5, 0.8  # shares of white in the colours of selected and active bones
+_RING_POINTS = 32
+_CLEARANCE = 1.12  # ring radius over that of the flesh
+_THINNEST = 0.008  # metres
+_WIRE_WIDTH = 2.0  # pixels
+
+
+def side_of(joint_name: str) -> str:
+    """``Left``, ``Right`` or ``Middle``."""
+    head = joint_name.split("_", 1)[0].title()
+    return head if head in SIDES else "Middle"
+
+
+def show_bones(armature: bpy.types.Object, body: Body, rest: RestPose, vertices: np.ndarray) -> None:
+    """Give every bone its side's colour and collection, and a ring about the flesh it moves.
+
+    :param vertices: (V, 3) metres, the rest mesh of the fitted shape, world frame.
+    """
+    ring = _ring()
+    collections = {side: armature.data.collections.new(side) for side in SIDES}
+    radii = flesh_radii(body, rest, rest_orientations(armature, body), vertices)
+    for i, name in enumerate(body.joint_names):
+        side, bone, posed = side_of(name), armature.data.bones[name], armature.pose.bones[name]
+        collections[side].assign(bone)
+        _color(bone, SIDES[side])
+        radius = _CLEARANCE * float(radii[i])
+        posed.custom_shape = ring
+        posed.use_custom_shape_bone_size = False
+        posed.custom_shape_scale_xyz = (radius, radius, radius)
+        posed.custom_shape_translation = (0.0, 0.5 * bone.length, 0.0)
+        posed.custom_shape_wire_width = _WIRE_WIDTH
+        bone.show_wire = True
+
+
+def flesh_radii(body: Body, rest: RestPose, M: np.ndarray, vertices: np.ndarray) -> np.ndarray:
+    """(K+1,) metres: how far the flesh reaches from each bone's axis, half way along the bone.
+
+    Of the vertices that a bone moves most, those in the middle half of its length count, the ninth tenth of them.
+
+    :param M: (K+1, 3, 3) rest orientations, y along the bone.
+    """
+    owner = np.take_along_axis(body.skin_joints, body.skin_weights.argmax(axis=1)[:, None], axis=1)[:, 0]
+    lengths = np.linalg.norm(rest.tails - rest.joints, axis=1)
+    radii = np.empty(len(rest.joints))
+    for i, length in enumerate(lengths):
+        local = (vertices[owner == i] - rest.joints[i]) @ M[i]
+        middle = local[np.abs(local[:, 1] - 0.5 * length) <= 0.25 * length] if len(local) else local
+        reach = np.linalg.norm((middle if len(middle) else local)[:, [0, 2]], axis=1)
+        radii[i] = max(float(np.quantile(reach, 0.9)) if len(reach) else 0.3 * length, _THINNEST)
+    return radii
+
+
+def remove_if_unused() -> None:
+    """Take the ring out of the file once no bone shows it."""
+    ring = bpy.data.objects.get(RING)
+    if ring is not None and ring.users == 0:
+        mesh = ring.data
+        bpy.data.batch_remove([ring, mesh])
+
+
+def _color(bone: bpy.types.Bone, color: tuple[float, float, float]) -> None:
+    bone.color.palette = "CUSTOM"
+    custom = bone.color.custom
+    custom.normal, custom.select, custom.active = (
+        tuple(c + white * (1.0 - c) for c in color) for white in (0.0, _SELECTED, _ACTIVE)
+    )
+
+
+def _ring() -> bpy.types.Object:
+    """A circle of radius 1 in the plane across the bone's y axis; one for all captures of the file."""
+    ring = bpy.data.objects.get(RING)
+    if ring is not None and ring.type == "MESH" and ring.library is None:
+        return ring
+    angle = np.linspace(0.0, 2.0 * np.pi, _RING_POINTS, endpoint=False)
+    points = [(float(np.cos(a)), 0.0, float(np.sin(a))) for a in angle]
+    mesh = bpy.data.meshes.new(RING)
+    mesh.from_pydata(points, [(i, (i + 1) % _RING_POINTS) for i in range(_RING_POINTS)], [])
+    return bpy.data.objects.new(RING, mesh)

@@ -1,0 +1,215 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How captures stand while an exporter reads them, and stand again as before when it has: a context manager each."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+
+import bpy
+import numpy as np
+from mathutils import Matrix
+
+from ...errors import UsageError
+from ..animation_data import actions
+from ..camera import set_resolution
+from ..character.animation import on_one_hemisphere
+from ..character.shape_keys import mixed_vertices
+
+
+@contextmanager
+def temporary_scene(name: str) -> Iterator[bpy.types.Scene]:
+    """An empty scene that is the window's while the block runs, and gone afterwards."""
+    # Edit mode and the exporters work on a window's scene; timers have no window of their own, so they borrow one.
+    window = bpy.context.window or bpy.context.window_manager.windows[0]
+    with bpy.context.temp_override(window=window):
+        before = window.scene
+        scene = bpy.data.scenes.new(name)
+        try:
+            window.scene = scene
+            yield scene
+        finally:
+            window.scene = before
+            bpy.data.scenes.remove(scene)
+
+
+@contextmanager
+def scene_of(
+    collections: Sequence[bpy.types.Collection], rigs: Sequence[bpy.types.Object], with_camera: bool
+) -> Iterator[bpy.types.Scene]:
+    """A scene that holds these collections alone, with the rate and picture of the scene they come from.
+
+    It begins and ends with the motion of ``rigs``.
+
+    :param with_camera: the picture is the footage's, by which exporters tell the camera's vertical field of view.
+    :raises UsageError: the motion begins before frame 0.
+    """
+    source = bpy.context.scene
+    with temporary_scene("Capture") as scene:
+        for collection in collections:
+            scene.collection.children.link(collection)
+        for name in ("fps", "fps_base", "resolution_x", "resolution_y", "pixel_aspect_x", "pixel_aspect_y"):
+            setattr(scene.render, name, getattr(source.render, name))
+        for marker in source.timeline_markers:
+            scene.timeline_markers.new(marker.name, frame=marker.frame)
+        cameras = [obj for obj in scene.objects if obj.type == "CAMERA"]
+        scene.camera = source.camera if source.camera in cameras else next(iter(cameras), None)
+        if with_camera and scene.camera is not None:
+            set_resolution(scene, next(c for c in collections if scene.camera in c.all_objects.values()))
+        span = actions.frame_range(list(rigs)) or (source.frame_start, source.frame_end)
+        if math.floor(span[0]) < 0:  # a scene begins at 0 or later, and what lies before would be lost
+            raise UsageError(
+                f"the motion begins at frame {math.floor(span[0])}, but exports at 0: move its keys later, or capture "
+                "again with a First Frame of 0 or more"
+            )
+        scene.frame_end = math.ceil(span[1])
+        scene.frame_start = math.floor(span[0])
+        # Until the view layer is evaluated once, frame changes do not reach the objects that exporters read.
+        bpy.context.view_layer.update()
+        scene.frame_set(scene.frame_start)
+        yield scene
+    source.frame_set(source.frame_current, subframe=source.frame_subframe)
+
+
+@contextmanager
+def with_carriers(scene: bpy.types.Scene) -> Iterator[None]:
+    """Let what hangs on something outside the scene hang for a while on an empty that goes the same way.
+
+    The carriers themselves would bring along all that hangs on them.
+    """
+    hanging = [obj for obj in scene.objects if obj.parent is not None and obj.parent not in scene.objects.values()]
+    kept = [(o, o.parent, o.parent_type, o.parent_bone, o.matrix_parent_inverse.copy()) for o in hanging]
+    frames = np.arange(scene.frame_start, scene.frame_end + 1)
+    ways: list[list[Matrix]] = [[] for _ in hanging]
+    for frame in frames if hanging else ():
+        scene.frame_set(int(frame))
+        evaluated = bpy.context.evaluated_depsgraph_get()
+        for obj, way in zip(hanging, ways, strict=True):
+            seen = obj.evaluated_get(evaluated)
+            way.append(seen.matrix_world @ seen.matrix_basis.inverted_safe())
+    made: list[bpy.types.ID] = []
+    try:
+        for obj, way in zip(hanging, ways, strict=True):
+            empty = bpy.data.objects.new(f"{obj.parent.name}_carrier", None)
+            channels = actions.Channels(empty, bpy.data.actions.new(empty.name))
+            made += [empty, channels.action]
+            empty.rotation_mode = "QUATERNION"
+            place, turn, size = (np.array(each) for each in zip(*(m.decompose() for m in way), strict=True))
+            channels.write("location", frames, place)
+            channels.write("rotation_quaternion", frames, on_one_hemisphere(turn))
+            channels.write("scale", frames, size)
+            scene.collection.objects.link(empty)
+            obj.parent, obj.parent_type = empty, "OBJECT"
+            obj.matrix_parent_inverse.identity()
+        scene.frame_set(scene.frame_start)
+        yield
+    finally:
+        for obj, parent, kind, bone, inverse in kept:
+            obj.parent, obj.parent_type, obj.parent_bone, obj.matrix_parent_inverse = parent, kind, bone, inverse
+        bpy.data.batch_remove(made)
+
+
+@contextmanager
+def out_of_edit_mode(collections: Sequence[bpy.types.Collection]) -> Iterator[None]:
+    """Leave Edit Mode for a while if something in these collections is edited: it would be written as it was before."""
+    edited = any(obj.mode == "EDIT" for collection in collections for obj in collection.all_objects)
+    try:
+        if edited:
+            bpy.ops.object.mode_set(mode="OBJECT")
+        yield
+    finally:
+        if edited:
+            bpy.ops.object.mode_set(mode="EDIT")
+
+
+@contextmanager
+def all_evaluated(collections: Sequence[bpy.types.Collection]) -> Iterator[None]:
+    """Hide nothing in these collections for a while, and let their armatures move.
+
+    Viewports, renders and Rest Position each keep some exporter from what moves.
+    """
+    groups = {group for collection in collections for group in (collection, *collection.children_recursive)}
+    objects = {obj for collection in collections for obj in collection.all_objects}
+    hidden = [(each, each.hide_viewport, each.hide_render) for each in (*groups, *objects)]
+    positions = [(armature, armature.pose_position) for armature in {o.data for o in objects if o.type == "ARMATURE"}]
+    try:
+        for each, _, _ in hidden:
+            each.hide_viewport = each.hide_render = False
+        for armature, _ in positions:
+            armature.pose_position = "POSE"
+        yield
+    finally:
+        for armature, position in positions:
+            armature.pose_position = position
+        for each, in_viewports, in_renders in hidden:
+            each.hide_viewport, each.hide_render = in_viewports, in_renders
+
+
+@contextmanager
+def actions_as_long_as(scene: bpy.types.Scene) -> Iterator[None]:
+    """Let the actions of armatures last as long as the scene.
+
+    One who comes late is late in a file of their own too, and exporters do not stop before keys between whole frames.
+    """
+    moving = [obj.animation_data for obj in scene.objects if obj.type == "ARMATURE" and obj.animation_data]
+    stretched = [a for a in {data.action for data in moving} if a is not None and not a.use_frame_range]
+    try:
+        for action in stretched:
+            action.use_frame_range = True
+            action.frame_start, action.frame_end = scene.frame_start, scene.frame_end
+        yield
+    finally:
+        for action in stretched:
+            action.use_frame_range = False
+
+
+@contextmanager
+def baked_meshes(scene: bpy.types.Scene) -> Iterator[None]:
+    """Give the scene's objects with shape keys plain meshes for a while, the current mix in their vertices."""
+    shaped = [(obj, obj.data, obj.data.name) for obj in scene.objects if obj.type == "MESH" and obj.data.shape_keys]
+    baked = []
+    try:
+        for obj, mesh, name in shaped:
+            vertices = mixed_vertices(obj)
+            plain = bpy.data.meshes.new_from_object(obj)
+            baked.append(plain)
+            if mesh.library is None:  # else the name is another file's, and free in this one
+                mesh.name = f"{name} shaped"
+            plain.name = name
+            plain.vertices.foreach_set("co", vertices.ravel())
+            plain.update()
+            obj.data = plain
+        bpy.context.view_layer.update()
+        yield
+    finally:
+        for obj, mesh, _ in shaped:
+            obj.data = mesh
+        bpy.data.batch_remove(baked)
+        for _, mesh, name in shaped:
+            if mesh.library is None:
+                mesh.name = name
+
+
+@contextmanager
+def alone(
+    rig: bpy.types.Object,
+    rigs: Sequence[bpy.types.Object],
+    collections: Sequence[bpy.types.Collection],
+    name: str,
+) -> Iterator[list[bpy.types.Collection]]:
+    """Collections, for a while, of what those hold but for the other people."""
+    others = {obj for other in rigs if other != rig for obj in (other, *other.children_recursive)}
+    parts = []
+    try:
+        for collection in collections:
+            part = bpy.data.collections.new(f"{collection.name}_{name}")
+            parts.append(part)
+            for key, value in collection.items():
+                part[key] = value
+            for obj in collection.all_objects:
+                if obj not in others:
+                    part.objects.link(obj)
+        yield parts
+    finally:
+        bpy.data.batch_remove(parts)

@@ -1,0 +1,122 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Turns an FBX file of metres into one of centimetres, the format's own unit.
+
+Unreal takes lengths for centimetres whatever the file says, and Blender either writes metres or scales every object by
+100, which becomes the scale of a skeleton's root. So all lengths in the file are multiplied, and no object is scaled:
+vertices and shapes, translations and their curves, the translations in bind matrices, and what a camera measures.
+
+The file is read and written by the parser and the encoder of Blender's own FBX add-on, which need not be enabled.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...errors import OutputError
+
+_Node = Any  # the parser's: id, props, props_type (a letter's code for each) and elems, the nodes below
+
+# The encoder's methods by the letter of a property's type.
+_ADD = {
+    "Z": "add_int8",
+    "Y": "add_int16",
+    "I": "add_int32",
+    "L": "add_int64",
+    "B": "add_bool",
+    "C": "add_char",
+    "F": "add_float32",
+    "D": "add_float64",
+    "R": "add_bytes",
+    "S": "add_string",
+    "i": "add_int32_array",
+    "l": "add_int64_array",
+    "f": "add_float32_array",
+    "d": "add_float64_array",
+    "b": "add_bool_array",
+    "c": "add_byte_array",
+}
+_MATRICES = (b"Matrix", b"Transform", b"TransformLink", b"TransformAssociateModel")
+_LENGTHS = (
+    *(b"Lcl Translation", b"Size"),
+    *(b"Position", b"InterestPosition", b"NearPlane", b"FarPlane", b"BackPlaneDistance", b"FocusDistance"),
+)
+
+
+def metres_to_centimetres(path: Path) -> None:
+    """Rewrite the file in centimetres; one that is in centimetres already stays as it is.
+
+    :raises OSError: it is no binary FBX file, or cannot be written. :raises OutputError: Blender's add-on lacks a part.
+    """
+    try:
+        from io_scene_fbx import encode_bin, parse_fbx  # found once bpy is imported
+    except ImportError as error:
+        raise OutputError("this Blender's FBX add-on cannot give centimetres; choose .glb") from error
+    root, version = parse_fbx.parse(str(path))
+    settings = {p.props[0]: p for node in _below(root, b"GlobalSettings") for p in _properties(node)}
+    factor = settings[b"UnitScaleFactor"].props[-1]  # in centimetres
+    if factor == 1.0:
+        return
+    for name in (b"UnitScaleFactor", b"OriginalUnitScaleFactor"):
+        settings[name].props[-1] = 1.0
+    _multiply_lengths(root, factor)
+    encode_bin.write(str(path), _encoded(root, encode_bin.FBXElem), version)
+
+
+def _multiply_lengths(root: _Node, factor: float) -> None:
+    moved = _curves_of_translations(root)
+    translation = slice(12, 15)
+    for node in (child for objects in _below(root, b"Objects") for child in objects.elems):
+        if node.id == b"Geometry":
+            for vertices in _below(node, b"Vertices"):
+                _multiply(vertices, factor)
+        elif node.id in (b"Model", b"NodeAttribute"):
+            for p in _properties(node):
+                if p.props[0] in _LENGTHS:
+                    _multiply(p, factor)
+        elif node.id in (b"Pose", b"Deformer"):
+            for holder in (node, *_below(node, b"PoseNode")):
+                for matrix in _below(holder, *_MATRICES):
+                    _multiply(matrix, factor, translation)
+        elif node.id == b"AnimationCurveNode" and node.props[0] in moved:
+            for p in _properties(node):
+                _multiply(p, factor)
+        elif node.id == b"AnimationCurve" and node.props[0] in moved:
+            for values in _below(node, b"KeyValueFloat"):
+                _multiply(values, factor)
+
+
+def _multiply(node: _Node, factor: float, only: slice = slice(None)) -> None:
+    """Its doubles, and those elements of its arrays of floats and doubles."""
+    for index, kind in enumerate(node.props_type.decode()):
+        if kind == "D":
+            node.props[index] *= factor
+        elif kind in "fd":
+            np.frombuffer(node.props[index], kind)[only] *= factor
+
+
+def _curves_of_translations(root: _Node) -> set[int]:
+    """Numbers of the curve nodes that move a model, and of their curves."""
+    links = [c.props for node in _below(root, b"Connections") for c in _below(node, b"C") if c.props[0] == b"OP"]
+    nodes = {link[1] for link in links if link[3] == b"Lcl Translation"}
+    return nodes | {link[1] for link in links if link[2] in nodes}
+
+
+def _properties(node: _Node) -> list[_Node]:
+    return [p for block in _below(node, b"Properties70") for p in _below(block, b"P")]
+
+
+def _below(node: _Node, *names: bytes) -> Iterator[_Node]:
+    return (child for child in node.elems if child.id in names)
+
+
+def _encoded(node: _Node, element: Any) -> Any:
+    """The node as the encoder's ``element`` takes it, and all below."""
+    out = element(node.id)
+    for kind, value in zip(node.props_type.decode(), node.props, strict=True):
+        getattr(out, _ADD[kind])(value)
+    out.elems = [_encoded(child, element) for child in node.elems]
+    return out

@@ -1,0 +1,241 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""One writer per file format, each for the active scene, with the settings other tools need."""
+
+from __future__ import annotations
+
+import errno
+import io
+import os
+import re
+import struct
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager, redirect_stdout
+from pathlib import Path
+
+import addon_utils
+import bpy
+import numpy as np
+
+from ...errors import OutputError
+from ..animation_data import timing
+from . import bvh
+from .fbx_units import metres_to_centimetres
+from .glb_times import true_times
+
+
+def write_glb(path: Path, camera: bool = False) -> None:
+    """glTF binary: y up, metres, four influences a vertex, shape keys as morph targets, all motion in one animation."""
+    need_addon("io_scene_gltf2")
+    scene = bpy.context.scene
+    moving = [obj for obj in scene.objects if obj.animation_data]
+    with true_times(path, scene):
+        call_operator(
+            bpy.ops.export_scene.gltf,
+            filepath=str(path),
+            export_format="GLB",
+            use_selection=False,
+            use_active_scene=True,
+            export_yup=True,
+            export_apply=False,
+            export_cameras=camera,
+            export_skins=True,
+            export_influence_nb=4,
+            export_all_influences=False,
+            export_morph=True,
+            export_morph_normal=True,
+            export_morph_animation=True,
+            export_rest_position_armature=True,
+            export_def_bones=False,
+            export_leaf_bone=False,
+            export_animations=True,
+            export_animation_mode="ACTIVE_ACTIONS",
+            export_anim_single_armature=False,  # else Blender 4.2 mixes in the other actions of the file
+            export_force_sampling=True,
+            export_frame_range=True,
+            export_anim_slide_to_zero=True,  # players begin at zero, and would wait for the first frame each time
+            export_optimize_animation_size=False,
+            # Faster, but it hides all that moves except for the first one, and then the others rest.
+            export_optimize_disable_viewport=len(moving) < 2,
+        )
+
+
+def write_fbx(path: Path, camera: bool = False) -> None:
+    """FBX: y up, centimetres, objects at scale 1, no leaf bones, every frame keyed."""
+    need_addon("io_scene_fbx")
+    call_operator(
+        bpy.ops.export_scene.fbx,
+        filepath=str(path),
+        use_selection=False,
+        object_types={"ARMATURE", "MESH", "CAMERA"} if camera else {"ARMATURE", "MESH"},
+        apply_unit_scale=True,
+        apply_scale_options="FBX_SCALE_ALL",
+        bake_space_transform=False,  # broken with armatures
+        axis_forward="-Z",
+        axis_up="Y",
+        use_mesh_modifiers=True,
+        mesh_smooth_type="FACE",
+        add_leaf_bones=False,
+        primary_bone_axis="Y",
+        secondary_bone_axis="X",
+        use_armature_deform_only=False,
+        bake_anim=True,
+        bake_anim_use_all_bones=True,
+        bake_anim_use_nla_strips=False,
+        bake_anim_use_all_actions=False,
+        bake_anim_force_startend_keying=True,
+        bake_anim_step=1.0,
+        bake_anim_simplify_factor=0.0,
+        path_mode="AUTO",
+    )
+    metres_to_centimetres(path)
+
+
+def write_usd(path: Path, camera: bool = False) -> None:
+    """USD crate: z up, metres, skeleton, blend shapes, preview materials."""
+    call_operator(
+        bpy.ops.wm.usd_export,
+        filepath=str(path),
+        selected_objects_only=False,
+        visible_objects_only=False,
+        export_animation=True,
+        export_armatures=True,
+        only_deform_bones=False,
+        export_shapekeys=True,
+        export_uvmaps=True,
+        export_normals=True,
+        export_materials=True,
+        generate_preview_surface=True,
+        export_textures=False,
+        export_cameras=camera,
+        export_lights=False,
+        convert_world_material=False,
+        root_prim_path="/root",
+    )
+    # The exporter says nothing about what it could not write.
+    if path.suffix == ".usdc" and path.is_file() and not _is_whole_crate(path):
+        raise OSError(errno.ENOSPC, "the file could not be written to its end", str(path))
+
+
+def _is_whole_crate(path: Path) -> bool:
+    """Whether a USD crate file has its table of contents, whose place the head tells, and which is written last.
+
+    Source: OpenUSD, pxr/usd/usd/crateFile.h: identifier (8 bytes), version (8), offset of the table (8); the table is a
+    count (8) of sections of 32 bytes each.
+    """
+    size = path.stat().st_size
+    with path.open("rb") as file:
+        head = file.read(24)
+        if len(head) < 24 or head[:8] != b"PXR-USDC":
+            return False
+        (table,) = struct.unpack("<q", head[16:])
+        if not 24 <= table <= size - 8:
+            return False
+        file.seek(table)
+        (count,) = struct.unpack("<q", file.read(8))
+    return 0 < count <= (size - table - 8) // 32
+
+
+def write_blend(path: Path, scene: bpy.types.Scene) -> None:
+    """A .blend of one scene and what it uses; paths of footage relative to the file."""
+    bpy.data.libraries.write(str(path), {scene}, path_remap="RELATIVE_ALL", compress=True)
+
+
+def write_bvh(path: Path, scene: bpy.types.Scene, rig: bpy.types.Object) -> None:
+    """One armature as BVH, sampled at the scene's whole frames."""
+    path.write_text(bvh.bvh_text(sample_armature(scene, rig)), encoding="ascii", errors="replace")
+
+
+def sample_armature(scene: bpy.types.Scene, rig: bpy.types.Object) -> bvh.SampledPose:
+    """The pose of an armature at every frame of the scene's range, in the world frame."""
+    bones = [bone for bone in rig.data.bones]
+    names = [bone.name for bone in bones]
+    rest = np.array([np.array(bone.matrix_local) for bone in bones])
+    frames = range(scene.frame_start, scene.frame_end + 1)
+    posed = np.empty((len(frames), len(bones), 4, 4))
+    before = scene.frame_current, scene.frame_subframe
+    with _meshes_asleep(scene):
+        for row, frame in enumerate(frames):
+            scene.frame_set(frame)
+            evaluated = rig.evaluated_get(bpy.context.evaluated_depsgraph_get())
+            world = np.array(evaluated.matrix_world)
+            for column, name in enumerate(names):
+                posed[row, column] = world @ np.array(evaluated.pose.bones[name].matrix)
+    scene.frame_set(before[0], subframe=before[1])
+    world = np.array(rig.matrix_world)
+    rest_world = world @ rest
+    tails = np.array([world[:3, :3] @ np.array(bone.tail_local) + world[:3, 3] for bone in bones])
+    return bvh.SampledPose(
+        names=names,
+        parents=[names.index(bone.parent.name) if bone.parent else -1 for bone in bones],
+        heads=rest_world[:, :3, 3],
+        tails=tails,
+        rotations=_unscaled(posed[..., :3, :3]) @ np.swapaxes(_unscaled(rest_world[:, :3, :3]), 1, 2),
+        joints=posed[..., :3, 3],
+        rate=timing.scene_rate(scene),
+    )
+
+
+def _unscaled(R: np.ndarray) -> np.ndarray:
+    return R / np.linalg.norm(R, axis=-2, keepdims=True)
+
+
+@contextmanager
+def _meshes_asleep(scene: bpy.types.Scene) -> Iterator[None]:
+    """Do not deform meshes while only bones are read: most of a frame's time would go there."""
+    modifiers = [m for obj in scene.objects for m in obj.modifiers if m.type == "ARMATURE" and m.show_viewport]
+    for modifier in modifiers:
+        modifier.show_viewport = False
+    try:
+        yield
+    finally:
+        for modifier in modifiers:
+            modifier.show_viewport = True
+
+
+class _Nowhere(io.TextIOBase):
+    """A stream that is never closed: exporters keep log handlers that outlive the call."""
+
+    def write(self, text: str) -> int:
+        """Drop the text."""
+        return len(text)
+
+
+@contextmanager
+def quiet() -> Iterator[None]:
+    """Keep Blender's writers from printing: standard output may be carrying a report for a program."""
+    sys.stdout.flush()
+    keep = os.dup(1)
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(nowhere, 1)  # what Blender's own code prints
+        with redirect_stdout(_Nowhere()):  # what exporters in Python print
+            yield
+    finally:
+        sys.stdout.flush()
+        os.dup2(keep, 1)
+        os.close(keep)
+        os.close(nowhere)
+
+
+def need_addon(module: str) -> None:
+    """Enable an exporter or importer that comes with Blender, for this session only, where a user has turned it off."""
+    if not addon_utils.check(module)[1]:
+        addon_utils.enable(module, default_set=False)
+
+
+def call_operator(operator, **settings) -> None:
+    """Call an exporter or importer with those of our settings that this Blender's version of it has.
+
+    :raises RuntimeError: it failed. :raises KeyboardInterrupt: somebody pressed Ctrl-C.
+    """
+    try:
+        known = operator.get_rna_type().properties.keys()
+    except KeyError as error:
+        raise OutputError("this Blender was built without the format; use one from blender.org") from error
+    try:
+        operator(**{name: value for name, value in settings.items() if name in known})
+    except RuntimeError as error:
+        if re.search(r"^KeyboardInterrupt\b", str(error), re.MULTILINE):  # Blender makes one error of all
+            raise KeyboardInterrupt from None
+        raise

@@ -1,0 +1,165 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The user's rig out of a .blend, .fbx or glTF file: one armature and the meshes that it moves."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import bpy
+
+from ....solver.errors import InputError
+from ...errors import UsageError
+from ...retarget.bone_map import PHALANGES, BoneMap
+from ...retarget.rig_source import RigSource
+from ..export import formats
+from ..export.export_states import temporary_scene
+from .rig_retarget import check_turning, guess_bone_map
+
+# What a file may bring along, users before what they use.
+_KINDS = (
+    "scenes", "collections", "objects", "meshes", "armatures", "curves", "cameras", "lights", "metaballs", "lattices",
+    "actions", "materials", "node_groups", "textures", "images", "texts", "worlds", "libraries",
+)  # fmt: skip
+
+
+def load_rig(source: RigSource, collection: bpy.types.Collection) -> bpy.types.Object:
+    """Read the rig into ``collection`` of the active scene, without any animation; returns its armature.
+
+    :raises InputError: the file cannot be read or has no armature. :raises UsageError: which armature is not clear.
+    """
+    path = source.path
+    loaded = _append(path) if path.suffix.lower() == ".blend" else _import(path)
+    rig = _choose(path, [obj for obj in loaded if obj.type == "ARMATURE"], source.armature)
+    keep = with_meshes(rig, loaded)
+    for obj in loaded:
+        for other in obj.users_collection:
+            other.objects.unlink(obj)
+    rig.data.pose_position = "POSE"
+    for obj in keep:
+        collection.objects.link(obj)
+        obj.hide_viewport = obj.hide_render = False
+        _still(obj)
+    bpy.context.view_layer.update()
+    return rig
+
+
+def with_meshes(rig: bpy.types.Object, objects: Iterable[bpy.types.Object]) -> list[bpy.types.Object]:
+    """The rig, the meshes among some objects that it moves, and what these hang on."""
+    keep = [rig]
+    keep += [obj for obj in objects if obj.type == "MESH" and obj not in _widgets(rig) and _moved_by(obj, rig)]
+    for obj in keep:
+        while obj.parent is not None and obj.parent not in keep:
+            keep.append(obj.parent)
+            obj = obj.parent
+    return keep
+
+
+def check_rig(source: RigSource, *, fingers: bool = True) -> None:
+    """Whether a motion can be put on the rig, before one is captured.
+
+    :param fingers: whether that motion will have any: those of the rig stay as they are otherwise.
+    :raises InputError, UsageError: as ``load_rig``, and when its bones cannot be mapped or turned.
+    """
+    with forgotten(), temporary_scene("Looking at a rig") as scene:
+        rig = load_rig(source, scene.collection)
+        bones = bones_of(source, rig)
+        moved = {b: part for b, part in bones.parts.items() if fingers or part.partition("_")[2] not in PHALANGES}
+        check_turning(rig, BoneMap(moved))
+
+
+def bones_of(source: RigSource, rig: bpy.types.Object) -> BoneMap:
+    """The given bone map, or the guessed one.
+
+    :raises InputError: it does not fit the rig, or nothing could be guessed.
+    """
+    found = source.bone_map or guess_bone_map(rig)
+    missing = [name for name in found.parts if name not in rig.data.bones]
+    if missing:
+        raise InputError(f"{source.path}: the bone map's '{missing[0]}' is no bone of '{rig.name}'; correct the map")
+    try:
+        found.check()
+    except InputError as error:
+        raise InputError(
+            f"{source.path}: which bone of '{rig.name}' is which could not be guessed ({error}); give a --bone-map"
+        ) from error
+    return found
+
+
+@contextmanager
+def forgotten() -> Iterator[None]:
+    """Remove everything again that the block has brought into the file."""
+    before = {kind: {block.session_uid for block in getattr(bpy.data, kind)} for kind in _KINDS}
+    try:
+        yield
+    finally:
+        # A scene that is left over is the window's business.
+        kinds = [kind for kind in _KINDS if kind != "scenes"]
+        bpy.data.batch_remove([b for k in kinds for b in getattr(bpy.data, k) if b.session_uid not in before[k]])
+
+
+def _append(path: Path) -> list[bpy.types.Object]:
+    try:
+        with formats.quiet(), bpy.data.libraries.load(str(path), link=False) as (there, here):
+            here.objects = list(there.objects)
+    except (OSError, RuntimeError) as error:
+        raise InputError(f"{path}: Blender cannot read this file; save it again or choose another") from error
+    return [obj for obj in here.objects if obj is not None]
+
+
+def _import(path: Path) -> list[bpy.types.Object]:
+    before = {obj.session_uid for obj in bpy.data.objects}
+    try:
+        with formats.quiet():
+            if path.suffix.lower() == ".fbx":
+                formats.need_addon("io_scene_fbx")
+                formats.call_operator(
+                    bpy.ops.import_scene.fbx, filepath=str(path), use_anim=False, ignore_leaf_bones=False
+                )
+            else:
+                formats.need_addon("io_scene_gltf2")
+                formats.call_operator(bpy.ops.import_scene.gltf, filepath=str(path), disable_bone_shape=True)
+    except Exception as error:  # importers written in Python fail in every way on a damaged file
+        raise InputError(f"{path}: Blender cannot import this file; export it again or choose another") from error
+    return [obj for obj in bpy.data.objects if obj.session_uid not in before]
+
+
+def _choose(path: Path, rigs: list[bpy.types.Object], name: str) -> bpy.types.Object:
+    """:raises InputError: none. :raises UsageError: several, or none of that name."""
+    if not rigs:
+        raise InputError(f"{path}: there is no armature in this file; choose the file that holds your rig")
+    rigs = sorted(rigs, key=lambda rig: rig.name)
+    names = ", ".join(f"'{rig.name}'" for rig in rigs)
+    if name:
+        for rig in rigs:
+            if rig.name == name:
+                return rig
+        raise UsageError(f"{path} has no armature '{name}', but {names}; give one of them with --rig-object")
+    if len(rigs) > 1:
+        raise UsageError(f"{path} has {len(rigs)} armatures, {names}; choose one with --rig-object NAME")
+    return rigs[0]
+
+
+def _widgets(rig: bpy.types.Object) -> set[bpy.types.Object]:
+    return {bone.custom_shape for bone in rig.pose.bones if bone.custom_shape is not None}
+
+
+def _moved_by(obj: bpy.types.Object, rig: bpy.types.Object) -> bool:
+    if any(m.type == "ARMATURE" and m.object == rig for m in obj.modifiers):
+        return True
+    parent = obj.parent
+    while parent is not None:
+        if parent == rig:
+            return True
+        parent = parent.parent
+    return False
+
+
+def _still(obj: bpy.types.Object) -> None:
+    """Without action and NLA: drivers stay."""
+    if obj.animation_data is None:
+        return
+    obj.animation_data.action = None
+    for track in list(obj.animation_data.nla_tracks):
+        obj.animation_data.nla_tracks.remove(track)

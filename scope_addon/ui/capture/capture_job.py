@@ -1,0 +1,218 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""One capture, from the pressed button to the built scene. ``step`` moves it on and never waits for the worker.
+
+The modal operator calls ``step`` on a timer; scripts and tests call it in a loop.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+import bpy
+
+from ....solver.loaders.body_file import body_with_hands, load_body
+from ...errors import UsageError, VideoError
+from ...job.cache import Cache, CachedCapture
+from ...job.process import ROOT, START_SCRIPT, WorkerProcess
+from ...job.progress import JobProgress
+from ...job.request import JobRequest, code_version
+from ...motion import Motion
+from ...scene.build import BuildOptions, BuildResult, build_scene
+from ..preferences import cache, preferences
+from . import preview_picture
+from .result import show_result
+
+
+class CaptureJob:
+    """A capture for one scene, with the settings the scene has now."""
+
+    def __init__(self, scene: bpy.types.Scene, python: Sequence[str] = ()) -> None:
+        """Start the worker, or find the finished capture in the cache.
+
+        :param python: interpreter of the worker and its arguments; Blender's own when empty.
+        :raises ScopeError: what can be known to fail without capturing.
+        """
+        self._cache: Cache = cache()
+        self.progress = JobProgress(first_use=not self._cache.has_kernels)
+        self.cancel_requested = False
+        self._scene_uid = scene.session_uid
+        self._options = build_options(scene)
+        self._request = capture_request(scene)
+        self._key = self._request.key(code_version(ROOT))
+        self._captured: CachedCapture | None = self._cache.find(self._key)
+        self._worker: WorkerProcess | None = None
+        self._building = False
+        if self._captured is None:
+            # Blender 4.2 does not say how it runs Python; it is isolated there too.
+            python = python or [sys.executable, *getattr(bpy.app, "python_args", ("-I",))]
+            folder = self._cache.new_job_folder()
+            self._worker = WorkerProcess(self._request, folder, self._cache.kernels, python, START_SCRIPT)
+
+    @property
+    def worker(self) -> WorkerProcess | None:
+        """None where the result was cached."""
+        return self._worker
+
+    def step(self) -> bool:
+        """Go on as far as is possible without waiting; False once the scene is built.
+
+        :raises ScopeError: the capture failed; the scene is as it was and nothing is left on disk.
+        """
+        try:
+            return self._step()
+        except BaseException:
+            self.close()
+            raise
+
+    def close(self) -> None:
+        """Stop, in any state, and leave no process and no unfinished file."""
+        if self._worker is not None:
+            self._worker.close()
+
+    def _step(self) -> bool:
+        if self._captured is None:
+            self._listen()
+            return True
+        if not self._building:  # one step later, so that the panel can say what is going on
+            self._building = True
+            self.progress.update("building the scene", 0, 0)
+            return True
+        scene = next((s for s in bpy.data.scenes if s.session_uid == self._scene_uid), None)
+        if scene is None:
+            raise UsageError("the scene was removed while its footage was captured; capture in another scene")
+        self._build(scene, self._captured)
+        return False
+
+    def _listen(self) -> None:
+        assert self._worker is not None
+        for message in self._worker.poll():
+            if message["event"] == "progress":
+                self.progress.update(message["stage"], message["done"], message["total"])
+            elif message["event"] == "preview":
+                self._show_preview(message)
+            elif message["event"] == "result":
+                self._worker.wait()
+                self._captured = self._cache.keep(
+                    self._worker.job_folder, self._key, message["motions"], message["report"]
+                )
+                limit = preferences()
+                self._cache.prune((limit.cache_limit_gb if limit else 2) * 10**9)
+                self._worker.close()
+
+    def _show_preview(self, message: dict) -> None:
+        assert self._worker is not None
+        try:
+            pixels = (self._worker.job_folder / Path(message["file"]).name).read_bytes()
+        except OSError:
+            return  # on Windows, while the worker puts the next one there
+        preview_picture.show(pixels, message["width"], message["height"])
+
+    def _build(self, scene: bpy.types.Scene, captured: CachedCapture) -> None:
+        motions = [Motion.load(path) for path in captured.motions]
+        body = load_body(self._request.body)
+        warnings = list(captured.report.get("warnings", ()))
+        footage: str | None = self._request.footage
+        if not Path(self._request.footage).is_file():
+            warnings.append(f"{footage} has gone, so the camera shows no footage")
+            footage = None
+        with _window_shows(scene):
+            result = build_scene(motions, body, footage, self._options)
+        remember_motions(result, captured.motions, self._request.body)
+        report = dict(captured.report, warnings=warnings + result.warnings)
+        show_result(scene.scope.result, self._request.footage, report, result)
+
+
+def capture_request(scene: bpy.types.Scene) -> JobRequest:
+    """What the scene's settings ask the worker for.
+
+    :raises VideoError, UsageError: no footage or body is chosen, or it is not there.
+    """
+    settings, chosen = scene.scope, preferences()
+    if not settings.footage:
+        raise UsageError("choose a video or picture first")
+    footage = Path(bpy.path.abspath(settings.footage))
+    if not footage.is_file():
+        what = "is no file" if footage.exists() else "does not exist"
+        raise VideoError(f"{footage} {what}; choose the video or picture again")
+    if settings.use_range and settings.range_end <= settings.range_start:
+        raise UsageError("the part of the video ends before it begins; change From or To")
+    if settings.lens == "FILE" and not settings.calibration_file:
+        raise UsageError("choose the file with the lens's calibration, or another lens")
+    body = {"SCOPE": "scope", "SCOPE_H": "scope_h"}.get(settings.body)
+    if body is None:
+        path = settings.body_file or (chosen.body_file if chosen else "")
+        if not path:
+            raise UsageError("choose a body file, here or in the preferences, or use the built-in body")
+        body = bpy.path.abspath(path)
+    if settings.hands:
+        body = body_with_hands(body)
+    return JobRequest(
+        footage=str(footage),
+        body=body,
+        quality=settings.quality.lower(),
+        people=settings.people_count if settings.people == "COUNT" else settings.people.lower(),
+        height_m=settings.height_cm / 100 or None,
+        focal_mm=settings.focal_mm if settings.lens == "FOCAL" else None,
+        fov_deg=math.degrees(settings.fov) if settings.lens == "FOV" else None,
+        calibration=bpy.path.abspath(settings.calibration_file) if settings.lens == "FILE" else "",
+        start_s=settings.range_start if settings.use_range else 0.0,
+        end_s=settings.range_end if settings.use_range else None,
+        smoothing=settings.smoothing,
+        hands=settings.hands,
+        detector=bpy.path.abspath(chosen.detector_file) if chosen else "",
+        keypoints=bpy.path.abspath(chosen.keypoints_file) if chosen else "",
+        provider=chosen.provider.lower() if chosen else "auto",
+        threads=chosen.threads if chosen else 0,
+    )
+
+
+def build_options(scene: bpy.types.Scene) -> BuildOptions:
+    """How the scene's settings want the scene built."""
+    settings = scene.scope
+    frame_rate = settings.frame_rate.lower()
+    if frame_rate == "auto":
+        frame_rate = "keep" if _is_animated(scene) else "set"
+    return BuildOptions(
+        frame_rate=frame_rate,
+        set_frame_range=settings.set_frame_range,
+        start_frame=float(settings.start_frame),
+        shape=settings.shape.lower(),
+        with_camera=settings.with_camera,
+        with_markers=settings.with_markers,
+    )
+
+
+def remember_motions(result: BuildResult, paths: Sequence[Path], body: str) -> None:
+    """Note at the capture where its motion files are, and at each person which one and which body is theirs."""
+    result.collection["scope_motions"] = [str(path) for path in paths]
+    for person, path in zip(result.people, paths, strict=True):
+        person.armature["scope_motion"] = str(path)
+        person.armature["scope_body_file"] = body
+
+
+def _is_animated(scene: bpy.types.Scene) -> bool:
+    """Whether another frame rate would change the speed of something in the scene."""
+    owners = [scene, *scene.objects, *(obj.data for obj in scene.objects if obj.data)]
+    data = [owner.animation_data for owner in owners if owner.animation_data]
+    return any(animation.action or animation.nla_tracks for animation in data)
+
+
+@contextmanager
+def _window_shows(scene: bpy.types.Scene) -> Iterator[None]:
+    """Let the window show the scene while it is built: the user may have gone to another one meanwhile."""
+    if bpy.context.scene == scene:
+        yield
+        return
+    window = bpy.context.window or bpy.context.window_manager.windows[0]
+    with bpy.context.temp_override(window=window):
+        before = window.scene
+        window.scene = scene
+        try:
+            yield
+        finally:
+            window.scene = before
+

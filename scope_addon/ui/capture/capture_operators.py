@@ -1,0 +1,237 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Choosing footage, capturing it in the background, cancelling. The state of the running job lives here."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import bpy
+from bpy.props import StringProperty
+
+from ...footage import FOOTAGE_SUFFIXES
+from ..reporting import sentence
+from ..view.view_operators import frame_selected, hide_startup_cube
+from . import preview_picture
+
+if TYPE_CHECKING:
+    from .capture_job import CaptureJob
+
+SAMPLE = Path(__file__).resolve().parents[3] / "assets" / "sample" / "sample.mp4"
+TIMER_S = 0.1
+
+
+class _State:
+    """The one capture that runs, and what is left to say of the last one. Never saved."""
+
+    job: CaptureJob | None = None
+    scene_uid = 0  # of the scene that the job or the message belongs to
+    message = ""  # why the last capture failed
+
+
+state = _State()
+
+
+def stop_everything() -> None:
+    """End a running capture: the extension is being disabled, or a test begins."""
+    stop_job()
+    clear_status_bar()
+    state.message = ""
+
+
+class SCOPE_OT_choose_footage(bpy.types.Operator):
+    """Choose a video or picture of a person"""
+
+    bl_idname = "scope.choose_footage"
+    bl_label = "Choose Video or Picture"
+    bl_options = {"UNDO"}
+
+    filepath: StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"})
+    filter_glob: StringProperty(default=";".join(f"*{s}" for s in FOOTAGE_SUFFIXES), options={"HIDDEN"})
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        """Dropped files come with a path; otherwise ask for one."""
+        if self.filepath:
+            return self.execute(context)
+        context.window_manager.fileselect_add(self)
+        return {"RUNNING_MODAL"}
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Take the file."""
+        path = Path(bpy.path.abspath(self.filepath))
+        if not path.is_file():
+            self.report({"ERROR"}, f"{path} is not a file; choose a video or picture")
+            return {"CANCELLED"}
+        context.scene.scope.footage = str(path)
+        return {"FINISHED"}
+
+
+class SCOPE_OT_use_sample(bpy.types.Operator):
+    """Take the short clip that comes with Scope, to see how capturing goes"""
+
+    bl_idname = "scope.use_sample"
+    bl_label = "Try the Sample Clip"
+    bl_options = {"UNDO"}
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Take the clip."""
+        context.scene.scope.footage = str(SAMPLE)
+        return {"FINISHED"}
+
+
+class SCOPE_OT_capture(bpy.types.Operator):
+    """Find the person in the footage and build the animated body. Blender can be used meanwhile"""
+
+    bl_idname = "scope.capture"
+    bl_label = "Capture"
+    bl_options = {"UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Footage is chosen and nothing is running."""
+        if state.job is not None:
+            cls.poll_message_set("A capture is running; wait for it or cancel it")
+            return False
+        if not context.scene.scope.footage:
+            cls.poll_message_set("Choose a video or picture first")
+            return False
+        return True
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        """From the panel: start, and go on with a timer."""
+        if bpy.app.background or not self._start(context):
+            return self.execute(context) if bpy.app.background else {"CANCELLED"}
+        manager = context.window_manager
+        self._timer = manager.event_timer_add(TIMER_S, window=context.window)
+        manager.modal_handler_add(self)
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        """On every event: step on the timer's, cancel on Escape, leave the others to Blender."""
+        job = state.job
+        if job is None:  # stopped from outside
+            return self._end(context, {"CANCELLED"})
+        if job.cancel_requested or (event.type == "ESC" and event.value == "PRESS"):
+            self.report({"INFO"}, "Capture cancelled; nothing was changed")
+            return self._end(context, {"CANCELLED"})
+        if event.type != "TIMER":
+            return {"PASS_THROUGH"}
+        outcome = self._step()
+        context.workspace.status_text_set(f"Scope: {', '.join(job.progress.lines())}   (Esc to cancel)")
+        redraw(context)
+        return self._end(context, outcome) if outcome else {"PASS_THROUGH"}
+
+    def cancel(self, context: bpy.types.Context) -> None:
+        """Blender opens another file or closes."""
+        self._end(context, {"CANCELLED"})
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """From a script: the same, waiting."""
+        if not self._start(context):
+            return {"CANCELLED"}
+        try:
+            while not (outcome := self._step()):
+                time.sleep(0.02)
+            return outcome
+        finally:
+            stop_job()
+
+    def _start(self, context: bpy.types.Context) -> bool:
+        state.message, state.scene_uid = "", context.scene.session_uid
+        # Here, because it loads numba and numpy, which opening Blender must not pay for.
+        try:
+            from .capture_job import CaptureJob
+        except ImportError as error:
+            return self._fail(f"a part of Scope cannot be loaded ({error}); install the extension again")
+        from ....solver.errors import ScopeError
+
+        try:
+            state.job = CaptureJob(context.scene)
+        except (ScopeError, OSError) as error:
+            return self._fail(error)
+        return True
+
+    def _step(self) -> set[str] | None:
+        """None: to be continued."""
+        from ....solver.errors import ScopeError
+
+        assert state.job is not None
+        try:
+            if state.job.step():
+                return None
+        except (ScopeError, OSError, MemoryError) as error:
+            self._fail(error)
+            return {"CANCELLED"}
+        self.report({"INFO"}, "Captured")
+        return {"FINISHED"}
+
+    def _fail(self, error: Exception | str) -> bool:
+        state.message = sentence(error)
+        stop_job()  # before the report, which raises when a script called us
+        redraw_twice(bpy.context)
+        self.report({"ERROR"}, state.message)
+        return False
+
+    def _end(self, context: bpy.types.Context, outcome: set[str]) -> set[str]:
+        stop_job()
+        if (timer := getattr(self, "_timer", None)) is not None:
+            context.window_manager.event_timer_remove(timer)
+            self._timer = None
+        clear_status_bar()
+        if "FINISHED" in outcome:
+            hide_startup_cube(context)
+            frame_selected(context)
+        redraw_twice(context)
+        return outcome
+
+
+class SCOPE_OT_cancel(bpy.types.Operator):
+    """Stop the capture; nothing is changed"""
+
+    bl_idname = "scope.cancel"
+    bl_label = "Cancel Capture"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Something is running."""
+        return state.job is not None
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Ask the modal operator to end; the worker is ended at once."""
+        assert state.job is not None
+        state.job.cancel_requested = True
+        state.job.close()
+        return {"FINISHED"}
+
+
+def stop_job() -> None:
+    """End the job in whatever state it is."""
+    if state.job is not None:
+        state.job.close()
+    state.job = None
+    preview_picture.clear()
+
+
+def clear_status_bar() -> None:
+    """In every workspace: each keeps its own text, and the user may have gone from one to another meanwhile."""
+    for workspace in bpy.data.workspaces:
+        with bpy.context.temp_override(workspace=workspace):  # Blender sets the context's, whichever it is told to
+            workspace.status_text_set(None)
+
+
+def redraw(context: bpy.types.Context) -> None:
+    """Draw the sidebars anew, not the viewports beside them: drawing a heavy scene again and again would be felt."""
+    areas = [a for window in context.window_manager.windows for a in window.screen.areas if a.type == "VIEW_3D"]
+    for region in (r for area in areas for r in area.regions if r.type == "UI"):
+        region.tag_redraw()
+
+
+def redraw_twice(context: bpy.types.Context) -> None:
+    """Now, and soon once more: panels below one whose height has changed move only when they are drawn again."""
+    redraw(context)
+    if not bpy.app.background:
+        bpy.app.timers.register(lambda: redraw(bpy.context), first_interval=0.3)
+
+
+CLASSES = (SCOPE_OT_choose_footage, SCOPE_OT_use_sample, SCOPE_OT_capture, SCOPE_OT_cancel)

@@ -1,0 +1,194 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The sidebar of the 3D viewport, tab Scope."""
+
+from __future__ import annotations
+
+import textwrap
+from pathlib import Path
+
+import bpy
+
+from ...job.progress import JobProgress, duration
+from ..export_operators import FORMATS
+from ..view.view_operators import camera_of, is_looking_through
+from . import preview_picture
+from .capture_operators import state
+
+_PIXELS_PER_LETTER = 7.0
+
+
+class Tab:
+    """Where all of Scope's panels are."""
+
+    bl_space_type = "VIEW_3D"
+    bl_region_type = "UI"
+    bl_category = "Scope"
+
+
+class SCOPE_PT_capture(Tab, bpy.types.Panel):
+    """Footage, the one button, progress."""
+
+    bl_idname = "SCOPE_PT_capture"
+    bl_label = "Capture"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Draw the panel."""
+        layout, settings = self.layout, context.scene.scope
+        column = layout.column()
+        column.enabled = state.job is None
+        if not settings.footage:
+            row = column.row()
+            row.scale_y = 1.6
+            row.operator("scope.choose_footage", icon="FILE_MOVIE")
+            column.operator("scope.use_sample", icon="PLAY")
+            return
+        column.prop(settings, "footage", text="", icon="FILE_MOVIE")
+        column.row(align=True).prop(settings, "quality", expand=True)
+        if state.job is not None:
+            _draw_progress(context, layout, state.job.progress)
+        else:
+            row = layout.row()
+            row.scale_y = 1.6
+            row.operator("scope.capture", icon="ARMATURE_DATA")
+        if state.message and state.scene_uid == context.scene.session_uid:
+            _draw_text(context, layout.box(), state.message, "ERROR")
+
+
+def _draw_progress(context: bpy.types.Context, layout: bpy.types.UILayout, progress: JobProgress) -> None:
+    layout.progress(text=f"{100 * progress.fraction:.0f} %", factor=progress.fraction)
+    if icon := preview_picture.icon_id():
+        layout.template_icon(icon_value=icon, scale=10.0)
+    for part in progress.lines():
+        _draw_text(context, layout, part)
+    row = layout.row()
+    row.scale_y = 1.6
+    row.operator("scope.cancel", text="Cancel", icon="CANCEL")
+
+
+class SCOPE_PT_person(Tab, bpy.types.Panel):
+    """Who is captured, as what, the lens, and which part of the video."""
+
+    bl_idname = "SCOPE_PT_person"
+    bl_parent_id = "SCOPE_PT_capture"
+    bl_label = "Options"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Draw the panel."""
+        layout, settings = _split(self.layout), context.scene.scope
+        layout.enabled = state.job is None
+        layout.prop(settings, "people")
+        if settings.people == "COUNT":
+            layout.prop(settings, "people_count", text="Number")
+        layout.prop(settings, "body")
+        if settings.body == "FILE":
+            layout.prop(settings, "body_file", text="File")
+        layout.prop(settings, "height_cm")
+        layout.prop(settings, "hands")
+        layout.prop(settings, "shape")
+        layout.prop(settings, "lens")
+        if settings.lens == "FOCAL":
+            layout.prop(settings, "focal_mm", text="35 mm Equivalent")
+        elif settings.lens == "FOV":
+            layout.prop(settings, "fov", text="Angle")
+        elif settings.lens == "FILE":
+            layout.prop(settings, "calibration_file", text="File")
+        layout.prop(settings, "smoothing")
+        layout.prop(settings, "use_range")
+        if settings.use_range:
+            column = layout.column(align=True)
+            column.prop(settings, "range_start")
+            column.prop(settings, "range_end")
+
+
+class SCOPE_PT_scene(Tab, bpy.types.Panel):
+    """What capturing may change in the scene."""
+
+    bl_idname = "SCOPE_PT_scene"
+    bl_parent_id = "SCOPE_PT_capture"
+    bl_label = "Scene"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Draw the panel."""
+        layout, settings = _split(self.layout), context.scene.scope
+        layout.enabled = state.job is None
+        layout.prop(settings, "frame_rate")
+        layout.prop(settings, "start_frame")
+        layout.prop(settings, "set_frame_range")
+        layout.prop(settings, "with_camera")
+        layout.prop(settings, "with_markers")
+
+
+class SCOPE_PT_result(Tab, bpy.types.Panel):
+    """What was found, and where it can go."""
+
+    bl_idname = "SCOPE_PT_result"
+    bl_label = "Result"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Something was captured and is still there; of another scene whose settings this one has, it is not."""
+        return context.scene.scope.result.collection in context.scene.collection.children_recursive
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Draw the panel."""
+        layout, result = self.layout, context.scene.scope.result
+        column = layout.column(align=True)
+        column.label(text=Path(result.footage).name, icon="FILE_MOVIE")
+        column.label(text="1 person" if result.people == 1 else f"{result.people} people", icon="OUTLINER_OB_ARMATURE")
+        took = duration(result.frames / result.frames_per_second) if result.frames_per_second else "no time"
+        frames = "1 frame" if result.frames == 1 else f"{result.frames} frames"
+        column.label(text=f"{frames}, captured in {took}", icon="TIME")
+        column.label(text=f"{result.reprojection_px:.1f} pixels off the footage on average", icon="CON_CAMERASOLVER")
+        column.label(text=f"Lens: {result.camera}", icon="CAMERA_DATA")
+        if result.execution:
+            column.label(text=f"Networks on {result.execution}", icon="MEMORY")
+        for warning in result.warnings:
+            _draw_warning(context, layout.box(), warning)
+        camera = camera_of(context.scene)
+        if camera is not None:
+            back = is_looking_through(context)
+            text = "Back to the Scene" if back else "Compare with Footage"
+            layout.operator("scope.look_through", text=text, icon="VIEW_CAMERA", depress=back)
+            for background in camera.data.background_images[:1]:
+                layout.prop(background, "alpha", text="Footage Opacity", slider=True)
+            layout.operator("scope.footage_to_sequencer", icon="SEQUENCE")
+        layout.label(text="Export")
+        grid = layout.grid_flow(columns=2, row_major=True, even_columns=True, align=True)
+        for key, label, _, _ in FORMATS:
+            cell = grid.column()
+            cell.enabled = key != "USDC" or "usd_export" in dir(bpy.ops.wm)  # some systems build Blender without USD
+            cell.operator("scope.export", text=label).format = key
+
+
+def _draw_warning(context: bpy.types.Context, box: bpy.types.UILayout, warning: bpy.types.PropertyGroup) -> None:
+    """What is wrong, and a button for each span of frames, that goes there."""
+    _draw_text(context, box, warning.text, "ERROR")
+    if warning.spans:
+        grid = box.grid_flow(columns=4, even_columns=True, align=True, row_major=True)
+        for span in warning.spans.split(","):
+            grid.operator("scope.go_to_frame", text=span).frame = first_frame(span)
+
+
+def first_frame(span: str) -> int:
+    """12 of ``12-18``, -3 of ``-3-4``."""
+    return int(span[0] + span[1:].split("-", 1)[0])
+
+
+def _split(layout: bpy.types.UILayout) -> bpy.types.UILayout:
+    layout.use_property_split = True
+    layout.use_property_decorate = False
+    return layout
+
+
+def _draw_text(context: bpy.types.Context, layout: bpy.types.UILayout, text: str, icon: str = "NONE") -> None:
+    """A sentence in as many lines as the sidebar's width needs."""
+    scale = context.preferences.system.ui_scale
+    width = max(20, int((context.region.width / scale - 60) / _PIXELS_PER_LETTER)) if context.region else 40
+    column = layout.column(align=True)
+    for index, line in enumerate(textwrap.wrap(text, width)):
+        column.label(text=line, icon=icon if index == 0 or icon == "NONE" else "BLANK1")
+
+
+CLASSES = (SCOPE_PT_capture, SCOPE_PT_person, SCOPE_PT_scene, SCOPE_PT_result)

@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a capture found, as the panel shows it: figures, and warnings with the scene frames to look at."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+
+from ...motion import Motion
+from ...review_spans import REASONS, Span, low_confidence_spans
+from ...scene.build import BuildResult
+from ...scene.camera import pixel_aspect
+from ..reporting import sentence
+
+_MOST_SPANS = 12  # buttons
+
+
+def show_result(shown: bpy.types.PropertyGroup, footage: str, report: dict, result: BuildResult) -> None:
+    """Fill the result section.
+
+    :param report: of the capture pipeline.
+    """
+    shown.footage = footage
+    shown.collection = result.collection
+    shown.people = len(result.people)
+    shown.frames = max(len(p.motion) for p in result.people)
+    shown.valid_frames = int(sum(p.motion.valid.sum() for p in result.people))
+    residuals = np.concatenate([p.motion.residual_px[p.motion.valid] for p in result.people])
+    shown.reprojection_px = float(residuals.mean()) if residuals.size else 0.0
+    shown.frames_per_second = float(report.get("fps", {}).get("total", 0.0))
+    shown.camera = str(report.get("camera", ""))
+    shown.execution = str(report.get("execution", ""))
+    first = result.people[0].motion
+    shown.resolution = [int(n) for n in first.image_size]
+    shown.pixel_aspect = pixel_aspect(first)
+    shown.warnings.clear()
+    for line in report.get("warnings", ()):
+        _warn(shown, str(line))
+    for index, person in enumerate(result.people):
+        whose = "" if len(result.people) == 1 else f"person {index + 1}: "
+        for reason, spans in frame_warnings(person.motion, person.frames).items():
+            _warn(shown, whose + REASONS[reason], spans)
+
+
+def frame_warnings(motion: Motion, frames: np.ndarray) -> dict[str, str]:
+    """The spans of scene frames that deserve a look, by reason; of very many the longest.
+
+    :param frames: (T,) scene frame of each pose.
+    :return: reason, a key of ``REASONS``, to spans as in ``12-18,40``.
+    """
+    by_reason: dict[str, list[Span]] = {}
+    for span in low_confidence_spans(motion):
+        by_reason.setdefault(span.reason, []).append(span)
+    return {reason: _text(spans, frames) for reason, spans in by_reason.items()}
+
+
+def _text(spans: list[Span], frames: np.ndarray) -> str:
+    longest = sorted(spans, key=lambda span: span.first - span.last)[:_MOST_SPANS]
+    texts = []
+    for span in sorted(longest, key=lambda span: span.first):
+        a, b = round(float(frames[span.first])), round(float(frames[span.last]))
+        texts.append(f"{a}" if a == b else f"{a}-{b}")
+    return ",".join(texts)
+
+
+def _warn(shown: bpy.types.PropertyGroup, text: str, spans: str = "") -> None:
+    warning = shown.warnings.add()
+    warning.text, warning.spans = sentence(text), spans

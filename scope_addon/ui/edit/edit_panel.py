@@ -1,0 +1,46 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The buttons for work on a captured motion."""
+
+from __future__ import annotations
+
+import bpy
+
+from ..capture.capture_panel import Tab
+from ..captured_person import anybody_captured, draw_meant
+
+
+class SCOPE_PT_edit(Tab, bpy.types.Panel):
+    """Smoothing, mending, floor, root motion, loops and keys of the selected person."""
+
+    bl_idname = "SCOPE_PT_edit"
+    bl_label = "Refine"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """There is a captured person."""
+        return anybody_captured(context)
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Draw the panel."""
+        layout = self.layout
+        if draw_meant(layout, context) is None:
+            return
+        row = layout.row(align=True)
+        for text, strength in (("Raw", 0.0), ("Normal", 1.0), ("Calm", 2.5)):
+            row.operator("scope.smooth", text=text).strength = strength
+        column = layout.column(align=True)
+        column.operator("scope.interpolate_span", icon="IPO_EASE_IN_OUT")
+        column.operator("scope.swap_sides", icon="MOD_MIRROR")
+        column.operator("scope.refloor", icon="TRIA_DOWN_BAR")
+        layout.label(text="Way over the Floor")
+        row = layout.row(align=True)
+        for text, mode in (("In Bones", "BONES"), ("On Object", "OBJECT"), ("In Place", "IN_PLACE")):
+            row.operator("scope.root_motion", text=text).mode = mode
+        layout.label(text="Keys")
+        column = layout.column(align=True)
+        column.operator("scope.loop", icon="FILE_REFRESH")
+        column.operator("scope.reduce_keys", icon="KEY_DEHLT")
+        column.operator("scope.bake_rate", icon="KEYFRAME_HLT")
+
+
+CLASSES = (SCOPE_PT_edit,)

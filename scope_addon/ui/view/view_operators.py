@@ -1,0 +1,172 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Looking at the result."""
+
+from __future__ import annotations
+
+import bpy
+from bpy.props import IntProperty
+from mathutils import Matrix
+
+from ..reporting import TellingOperator
+
+
+def hide_startup_cube(context: bpy.types.Context) -> None:
+    """The cube of a file that was never saved, if nobody has touched it: it stands where the person does."""
+    cube = context.scene.objects.get("Cube")
+    if bpy.data.filepath or cube is None or cube.type != "MESH" or len(cube.data.vertices) != 8:
+        return
+    touched = cube.animation_data or cube.modifiers or cube.constraints or cube.children
+    if not touched and cube.matrix_world == Matrix.Identity(4) and cube.name in context.view_layer.objects:
+        cube.hide_set(True)
+
+
+def frame_selected(context: bpy.types.Context) -> None:
+    """Turn to what is selected in the viewport that shows the panel; a camera's view stays as it is."""
+    area = context.area
+    if context.window is None or area is None or area.type != "VIEW_3D":
+        return
+    region = next((r for r in area.regions if r.type == "WINDOW"), None)
+    view = area.spaces.active.region_3d
+    if region is None or view is None or view.view_perspective == "CAMERA":
+        return
+    with context.temp_override(window=context.window, area=area, region=region):
+        if bpy.ops.view3d.view_selected.poll():
+            bpy.ops.view3d.view_selected()
+
+
+class SCOPE_OT_look_through(bpy.types.Operator):
+    """See the body over the footage, through the capture's camera, and back. Sets the scene's camera and resolution"""
+
+    bl_idname = "scope.look_through"
+    bl_label = "Compare with Footage"
+    bl_options = {"UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """The last capture has a camera, and can be seen."""
+        if camera_of(context.scene) is None:
+            cls.poll_message_set("Capture something first, with its camera: the scene has none of a capture")
+            return False
+        collection = context.scene.scope.result.collection
+        if not is_looking_through(context) and not _is_shown(collection, context.view_layer.layer_collection):
+            cls.poll_message_set(f"The collection '{collection.name}' is hidden; show it in the Outliner")
+            return False
+        return True
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Set the scene's camera and resolution, and the viewport's view."""
+        from ...scene.visibility import hide_again
+
+        scene, camera = context.scene, camera_of(context.scene)
+        if is_looking_through(context):
+            bpy.ops.view3d.localview(frame_selected=False)
+            bpy.ops.view3d.view_camera()  # Blender's own toggle: it knows the view there was before
+            for obj in [obj for obj in scene.scope.result.collection.all_objects if "scope_source" in obj]:
+                hide_again(obj, context.view_layer)
+            return {"FINISHED"}
+        assert camera is not None  # poll has asked
+        scene.camera = camera
+        camera.hide_viewport = False  # a hidden one shows no footage
+        camera.hide_set(False, view_layer=context.view_layer)
+        render, result = scene.render, scene.scope.result
+        render.resolution_x, render.resolution_y = result.resolution
+        render.pixel_aspect_x, render.pixel_aspect_y = result.pixel_aspect
+        render.resolution_percentage = 100
+        if not bpy.app.background and context.area and context.area.type == "VIEW_3D":
+            self._show_alone(context, scene.scope.result.collection)
+        return {"FINISHED"}
+
+    def _show_alone(self, context: bpy.types.Context, collection: bpy.types.Collection) -> None:
+        """Local view: what else is in the scene would hide the footage or the body."""
+        from ...scene.visibility import show
+
+        space, selected, active = context.space_data, context.selected_objects, context.view_layer.objects.active
+        if active and active.mode != "OBJECT":
+            bpy.ops.object.mode_set(mode="OBJECT")
+        if space.local_view:
+            bpy.ops.view3d.localview(frame_selected=False)
+        bpy.ops.object.select_all(action="DESELECT")
+        for obj in list(collection.all_objects):  # which hiding and showing invalidates
+            if "scope_source" in obj:  # perhaps hidden while a rig moves instead
+                show(obj, context.view_layer, for_now=True)
+            obj.select_set(True)
+        bpy.ops.view3d.localview(frame_selected=False)
+        bpy.ops.object.select_all(action="DESELECT")
+        for obj in selected:
+            obj.select_set(True)
+        if space.region_3d.view_perspective != "CAMERA":
+            bpy.ops.view3d.view_camera()
+
+
+def _is_shown(collection: bpy.types.Collection, layer: bpy.types.LayerCollection) -> bool:
+    """Whether a collection is shown, in this layer collection or below it."""
+    here = layer.collection == collection and layer.is_visible
+    return here or any(_is_shown(collection, child) for child in layer.children)
+
+
+def is_looking_through(context: bpy.types.Context) -> bool:
+    """Whether the viewport shows a capture alone through its camera."""
+    space = context.space_data
+    return space is not None and space.type == "VIEW_3D" and looks_through(context.scene, space)
+
+
+def looks_through(scene: bpy.types.Scene, space: bpy.types.SpaceView3D) -> bool:
+    """The same of a viewport that need not be the context's."""
+    if not space.local_view or space.region_3d.view_perspective != "CAMERA":
+        return False
+    return scene.camera is not None and scene.camera == camera_of(scene)
+
+
+def camera_of(scene: bpy.types.Scene) -> bpy.types.Object | None:
+    """The camera of the scene's last capture."""
+    collection = scene.scope.result.collection
+    return next((o for o in collection.all_objects if o.type == "CAMERA"), None) if collection else None
+
+
+class SCOPE_OT_go_to_frame(bpy.types.Operator):
+    """Go to the frame, to see what the warning is about"""
+
+    bl_idname = "scope.go_to_frame"
+    bl_label = "Go to Frame"
+    bl_options = {"INTERNAL"}
+
+    frame: IntProperty(name="Frame", description="Scene frame to show")
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Set the current frame."""
+        context.scene.frame_set(self.frame)
+        return {"FINISHED"}
+
+
+class SCOPE_OT_footage_to_sequencer(TellingOperator):
+    """Put the footage, picture and sound, into the video sequencer, in time with the motion"""
+
+    bl_idname = "scope.footage_to_sequencer"
+    bl_label = "Footage to Sequencer"
+    bl_options = {"UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Something was captured."""
+        return context.scene.scope.result.collection is not None
+
+    def work(self, context: bpy.types.Context) -> str:
+        """Add the strips."""
+        from ...scene.animation_data.timing import scene_rate
+        from ...scene.footage_strip import add_footage_strips
+
+        scene, result = context.scene, context.scene.scope.result
+        armatures = (o for o in result.collection.all_objects if "scope_start" in o)
+        start = next((float(o["scope_start"]) for o in armatures), 0.0)
+        strips = add_footage_strips(scene, bpy.path.abspath(result.footage), start)
+        rate = getattr(strips[-1], "fps", 0.0)
+        if rate and abs(rate - scene_rate(scene)) > 0.01:
+            self.report(
+                {"WARNING"},
+                f"The scene plays at {scene_rate(scene):.5g} frames/s and the footage at {rate:.5g}: the strip drifts "
+                "from the motion",
+            )
+        return ""
+
+
+CLASSES = (SCOPE_OT_look_through, SCOPE_OT_go_to_frame, SCOPE_OT_footage_to_sequencer)

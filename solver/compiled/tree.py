@@ -1,0 +1,109 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The kinematic tree as flat arrays for the kernels. Any number of joints, any shape basis, any tree par(i) < i."""
+
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import ShapeError
+from .rows import padded
+
+
+class BodyArrays(Protocol):
+    """What the solver reads of a body; `scope.solver.Body` has it, and so may any other object.
+
+    Properties, because reading is all the solver does: (K+1,) parents, -1 for part 0; (K+1, 3, P) S, joint offsets by
+    shape; (K+1, 3) l, joint offsets at beta = 0, metres; (M,) keypoint_part; (M, 3) v_bar, keypoints relative to
+    their part's origin at beta = 0, metres; (M, 3, P) V.
+    """
+
+    @property
+    def parents(self) -> np.ndarray: ...  # noqa: D102
+    @property
+    def S(self) -> np.ndarray: ...  # noqa: D102
+    @property
+    def l(self) -> np.ndarray: ...  # noqa: D102, E743
+    @property
+    def keypoint_part(self) -> np.ndarray: ...  # noqa: D102
+    @property
+    def v_bar(self) -> np.ndarray: ...  # noqa: D102
+    @property
+    def V(self) -> np.ndarray: ...  # noqa: D102
+
+
+class Tree(NamedTuple):
+    """A body for the kernels. W is P, plus one if the focal length is unknown, padded to whole vectors.
+
+    Part i has the pose (R_i, t_i) in the camera; its relative pose is (Omega_i, S_i beta + l_i). A keypoint j of part i
+    is at v_j = R_i (V_j beta + v_bar_j) + t_i. `points` below are the keypoints, then the K+1 part origins.
+    """
+
+    parents: NDArray[np.int64]  # (K+1,)
+    S: NDArray[np.float64]  # (K+1, 3, W)
+    l: NDArray[np.float64]  # (K+1, 3)
+    point_part: NDArray[np.int64]  # (M+K+1,)
+    v_bar: NDArray[np.float64]  # (M+K+1, 3)
+    V: NDArray[np.float64]  # (M+K+1, 3, W)
+    keypoints: int  # M
+    shape: int  # P
+    globals: int  # P, or P + 1 with an unknown focal length, which is then column P
+
+
+def make_tree(body: BodyArrays, focal: bool = False) -> Tree:
+    """Check a body's arrays and lay them out for the kernels; `focal` adds a column for an unknown focal length.
+
+    Raises ShapeError when a shape does not fit the others, or when a parent does not come before its child.
+    """
+    parents = np.ascontiguousarray(body.parents, dtype=np.int64)
+    n = parents.shape[0]
+    if parents.ndim != 1 or n == 0 or parents[0] != -1 or any(not 0 <= parents[i] < i for i in range(1, n)):
+        raise ShapeError(f"Parents must be -1 for part 0 and come before their children, but got {parents.tolist()}.")
+    p = int(np.shape(body.S)[-1])
+    s = _check(body.S, (n, 3, p), "S")
+    offsets = _check(body.l, (n, 3), "l")
+    part = np.ascontiguousarray(body.keypoint_part, dtype=np.int64)
+    m = part.shape[0]
+    if m and (part.min() < 0 or part.max() >= n):
+        raise ShapeError(f"Keypoint parts must lie in 0..{n - 1}, but go from {part.min()} to {part.max()}.")
+    v_bar = _check(body.v_bar, (m, 3), "v_bar")
+    v = _check(body.V, (m, 3, p), "V")
+    width = padded(p + focal)
+    s_padded, v_padded = np.zeros((n, 3, width)), np.zeros((m + n, 3, width))
+    s_padded[1:, :, :p] = s[1:]  # row 0 is not used: the root's pose is free
+    v_padded[:m, :, :p] = v
+    return Tree(
+        parents,
+        s_padded,
+        offsets,
+        np.concatenate([part, np.arange(n)]),
+        np.concatenate([v_bar, np.zeros((n, 3))]),
+        v_padded,
+        m,
+        p,
+        p + int(focal),
+    )
+
+
+def with_fixed_shape(tree: Tree, beta: ArrayLike) -> Tree:
+    """Return the tree at shape beta (P,), with no shape columns left: poses alone, at a fraction of the cost."""
+    beta = _check(beta, (tree.shape,), "beta")
+    n, m = len(tree.parents), len(tree.v_bar)
+    return Tree(
+        tree.parents,
+        np.zeros((n, 3, 0)),
+        tree.l + tree.S[:, :, : tree.shape] @ beta,
+        tree.point_part,
+        tree.v_bar + tree.V[:, :, : tree.shape] @ beta,
+        np.zeros((m, 3, 0)),
+        tree.keypoints,
+        0,
+        0,
+    )
+
+
+def _check(value: ArrayLike, shape: tuple[int, ...], name: str) -> NDArray[np.float64]:
+    array = np.array(value, dtype=np.float64, order="C")
+    if array.shape != shape:
+        raise ShapeError(f"{name} must have shape {shape} to fit the rest of the body, but got shape {array.shape}.")
+    return array

@@ -1,0 +1,320 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""One shape, and if asked one focal length, over a clip: O(T (K + N)) for a step of all poses and the shape.
+
+Given beta (and the focal length) the frames are independent, so each frame's pose is eliminated by itself and leaves
+    (C - N_0ᵀ M_0^-1 N_0) dbeta = -(c - N_0ᵀ M_0^-1 m_0)
+These systems add up over the frames; the shape prior enters once. Their solution is substituted back in every frame.
+That is the exact Gauss-Newton step of the clip. Causally, the information matrix summed so far is the prior of the
+next frame (`carry`).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..compiled.part import Array, Blocks, Pose
+from ..compiled.tree import BodyArrays, Tree, make_tree, with_fixed_shape
+from ..errors import ShapeError
+from ..gauss_newton.linearize import linearize, make_blocks, make_pose
+from ..gauss_newton.optimizer import CONVERGED, DAMPING_LEAST, DAMPING_MOST, MAX_ITERATIONS, NON_FINITE, STALLED
+from ..gauss_newton.recursion import Workspace, eliminate, make_workspace, retract, solve_globals, substitute
+from ..gauss_newton.terms import Terms, fill_terms, pack_priors, usable
+from ..measurements import Measurements
+from ..options import Options, Priors, default_priors
+from ..residuals.registry import SHAPE_PRIOR
+from ..state import ClipFit, Fit, State, Status
+from ..temporal import Temporal, with_previous
+from .frame_solver import fit_tree
+from .report import cost_by_term
+
+
+def carry(priors: Priors, fitted: Fit, shape_weight: float) -> Priors:
+    """Return the priors of the next frame: the shape at this frame's estimate, with its information added.
+
+    `shape_weight` is `Weights.shape` of the fit, over which the information is kept.
+    """
+    P = len(fitted.state.beta)
+    information = np.eye(P) if priors.shape_information is None else np.asarray(priors.shape_information, dtype=float)
+    if fitted.status in (Status.NO_MEASUREMENTS, Status.NON_FINITE) or shape_weight <= 0.0:
+        return priors
+    total = information + fitted.beta_information / shape_weight
+    return replace(priors, shape_mean=fitted.state.beta.copy(), shape_information=0.5 * (total + total.T))
+
+
+def fit_clip(
+    body: BodyArrays,
+    measurements: Sequence[Measurements],
+    *,
+    init: Sequence[State] | None = None,
+    priors: Priors | None = None,
+    options: Options = Options(),  # noqa: B008 - frozen
+    temporal: Temporal | None = None,
+    focal: bool = False,
+    focal_weight: float = 1.0,
+    shape_frames: int = 500,
+) -> ClipFit:
+    """Fit every frame's pose and one shape, and with `focal` one focal length, to a clip.
+
+    First every frame is fitted in order, from the frame before and with the shape's information carried along (not if
+    `init` is given); then all poses and the shape are optimized together. `temporal` adds the pull towards the frame
+    before, as it came out of the first pass. A frame in which nothing was measured holds the pose of the last one
+    before it in which something was, or of the first one after it; its status says so. With `temporal` the pull is a
+    measurement of its own: see `Fit.measurements`.
+    `focal_weight` is a prior on the squared logarithm of the focal scale.
+    At most `shape_frames` frames, evenly spaced, decide the shape; the others are then fitted with it fixed.
+    Raises ShapeError for arrays that do not fit the body.
+    """
+    if len(measurements) == 0:
+        raise ShapeError("A clip needs at least one frame of measurements, but got none.")
+    if init is not None and len(init) != len(measurements):
+        raise ShapeError(f"There must be one initial state a frame, {len(measurements)}, but got {len(init)}.")
+    priors = default_priors(body) if priors is None else priors
+    tree = make_tree(body)
+    if init is None:
+        init = _fit_in_order(tree, measurements, priors, options, temporal)
+    if temporal is not None:
+        pulled = [with_previous(m, s, temporal) for m, s in zip(measurements[1:], init, strict=False)]
+        measurements = [measurements[0], *pulled]
+    clip_tree = make_tree(body, focal)
+    packed = pack_priors(clip_tree, priors)
+    frames = [
+        _Frame(clip_tree, fill_terms(clip_tree, m, packed, None)[0], s) for m, s in zip(measurements, init, strict=True)
+    ]
+    seen = [k for k, frame in enumerate(frames) if frame.count]
+    chosen = seen
+    if len(seen) > shape_frames > 0:
+        chosen = [seen[k] for k in np.linspace(0, len(seen) - 1, shape_frames).round().astype(int)]
+    joint = _Joint(clip_tree, [frames[k] for k in chosen], priors, options, focal_weight if focal else 0.0)
+    joint.run()
+    beta, scale = joint.beta[: tree.shape].copy(), float(np.exp(joint.log_focal))
+    together = dict(zip(chosen, joint.fits(), strict=True))
+    fixed = with_fixed_shape(tree, beta)
+    fits = [
+        together[k] if k in together else _fit_with_shape(fixed, measurements[k], init[k], beta, scale, priors, options)
+        for k in range(len(frames))
+    ]
+    shares = joint.cost_by_term() if options.report else {}
+    return ClipFit(
+        fits, beta, joint.information(), scale, joint.status, joint.cost, joint.iterations, joint.rejected, shares
+    )
+
+
+def _fit_in_order(
+    tree: Tree, measurements: Sequence[Measurements], priors: Priors, options: Options, temporal: Temporal | None
+) -> list[State]:
+    """Fit each frame from the one before, carrying the shape's information; a lost person starts afresh.
+
+    Frames without measurements hold the last state that was measured, before the first the first.
+    """
+    states: list[State] = []
+    last: State | None = None
+    seen = False
+    weight = options.schedule(cold=False)[-1].weights.shape
+    for m in measurements:
+        pulled = m if temporal is None or last is None else with_previous(m, last, temporal)
+        fitted = fit_tree(tree, pulled, last, priors, options)
+        if fitted.status is Status.NO_MEASUREMENTS:
+            states.append(states[-1] if seen else fitted.state)
+            last = None
+            continue
+        if not seen:
+            states, seen = [fitted.state] * len(states), True
+        last = fitted.state
+        priors = carry(priors, fitted, weight)
+        states.append(last)
+    return states
+
+
+def _fit_with_shape(
+    tree: Tree, m: Measurements, init: State, beta: Array, scale: float, priors: Priors, options: Options
+) -> Fit:
+    """Fit one frame with shape and focal length fixed; `tree` has them built in."""
+    if m.intrinsics is not None and scale != 1.0:
+        K = np.array(m.intrinsics, dtype=float)
+        K[0, :2] *= scale
+        K[1, 1] *= scale
+        m = replace(m, intrinsics=K)
+    empty = np.zeros(0)
+    without = replace(priors, shape_mean=None, shape_information=None)
+    fitted = fit_tree(tree, m, replace(init, beta=empty), without, options)
+    return replace(fitted, state=replace(fitted.state, beta=beta.copy()), beta_information=np.zeros((len(beta),) * 2))
+
+
+@dataclass
+class _Frame:
+    """One frame's terms and where it starts."""
+
+    tree: Tree
+    terms: Terms
+    init: State
+
+    @property
+    def count(self) -> int:
+        """Usable measurements."""
+        return usable(self.terms)
+
+
+@dataclass
+class _Active:
+    """A frame that takes part in the joint optimization, with its buffers."""
+
+    terms: Terms
+    count: int
+    pose: Pose
+    trial: Pose
+    blocks: Blocks
+    work: Workspace
+    cost: float = 0.0
+
+
+class _Joint:
+    """Levenberg-Marquardt over the poses of several frames and the global columns they share."""
+
+    def __init__(self, tree: Tree, frames: list[_Frame], priors: Priors, options: Options, focal_weight: float) -> None:
+        self.tree, self.options = tree, options
+        self.P, self.focal_weight = tree.shape, focal_weight
+        self.mean, self.prior = priors.packed_shape(tree.shape)
+        self.table, self.tolerances, self.limits = options.stage_table(options.schedule(cold=False))
+        self.shape_weights = self.table[:, 0, SHAPE_PRIOR].copy()
+        self.table[:, 0, SHAPE_PRIOR] = 0.0  # once for the clip, not in every frame
+        self.root_scale = 1.0 / options.root_length
+        self.beta = np.zeros(tree.S.shape[2])
+        self.log_focal = 0.0
+        self.status, self.cost = Status.NO_MEASUREMENTS, 0.0
+        self.iterations, self.rejected = 0, 0
+        # the last frame's shape has seen most, when the frames were fitted in order
+        self.beta[: self.P] = frames[-1].init.beta if frames else self.mean
+        shared = make_workspace(tree)
+        self.frames: list[_Active] = []
+        for f in frames:
+            work = make_workspace(tree)._replace(A=shared.A, scratch=shared.scratch)
+            pose = replace(f.init, beta=self.beta[: self.P]).pose(tree)
+            self.frames.append(_Active(f.terms, f.count, pose, make_pose(tree), make_blocks(tree), work))
+
+    def run(self) -> None:
+        """Optimize through the stages."""
+        if not self.frames:
+            return
+        code = CONVERGED
+        for s in range(len(self.table)):
+            code = self._stage(s)
+            if code == NON_FINITE:
+                break
+        self.status = Status(code)
+
+    def _stage(self, s: int) -> int:
+        damping, grow = self.options.damping, 2.0
+        self.cost = self._linearize(s, trial=False)
+        if not np.isfinite(self.cost):
+            return NON_FINITE
+        for _ in range(self.limits[s]):
+            predicted = self._step(s, damping)
+            if predicted <= 1e-13 * self.cost:
+                return CONVERGED
+            self.iterations += 1
+            cost = self._linearize(s, trial=True) if np.isfinite(predicted) else np.inf
+            if cost < self.cost:
+                decrease = self.cost - cost
+                small = decrease <= self.tolerances[s] * self.cost
+                gain = 2.0 * decrease / predicted - 1.0
+                damping = min(max(damping * max(1.0 / 9.0, 1.0 - gain**3), DAMPING_LEAST), DAMPING_MOST)
+                grow = 2.0
+                self.cost = cost
+                for frame in self.frames:
+                    frame.pose, frame.trial = frame.trial, frame.pose
+                self.beta = self.frames[0].pose.beta.copy()
+                self.log_focal = float(self.frames[0].pose.log_focal[0])
+                if small:
+                    return CONVERGED
+            else:
+                self.rejected += 1
+                self._linearize(s, trial=False)  # one set of blocks a frame: memory, not time, is what a clip lacks
+                damping *= grow
+                grow *= 2.0
+                if damping > DAMPING_MOST:
+                    return STALLED
+        return MAX_ITERATIONS
+
+    def _linearize(self, s: int, trial: bool) -> float:
+        """Linearize every frame at its pose or its trial pose and return the clip's cost."""
+        total = 0.0
+        for f in self.frames:
+            pose = f.trial if trial else f.pose
+            f.cost = linearize(self.tree, f.terms, self.table[s], self.options.triggs, pose, f.blocks, f.work.scratch)
+            total += f.cost
+        pose = self.frames[0].trial if trial else self.frames[0].pose
+        offset = pose.beta[: self.P] - self.mean
+        total += 0.5 * self.shape_weights[s] * float(offset @ self.prior @ offset)
+        return total + 0.5 * self.focal_weight * float(pose.log_focal[0]) ** 2
+
+    def _reduced(self, s: int, damping: float) -> tuple[Array, Array, float]:
+        """Eliminate every frame's pose; return the summed system of the global columns and the sum of |q~|^2."""
+        P, squares = self.P, 0.0
+        C, c = np.zeros_like(self.frames[0].work.C), np.zeros_like(self.beta)
+        for f in self.frames:
+            squares += eliminate(self.tree, f.pose, f.blocks, damping, self.root_scale, f.work)
+            C += f.work.C
+            c += f.work.c
+        C[:P, :P] += self.shape_weights[s] * self.prior
+        c[:P] += self.shape_weights[s] * (self.prior @ (self.beta[:P] - self.mean))
+        if self.tree.globals > P:
+            C[P, P] += self.focal_weight
+            c[P] += self.focal_weight * self.log_focal
+        return C, c, squares
+
+    def _step(self, s: int, damping: float) -> float:
+        """Write every frame's trial pose and return the predicted decrease."""
+        C, c, squares = self._reduced(s, damping)
+        dbeta = np.zeros_like(self.beta)
+        squares += solve_globals(self.tree, C, c, dbeta)
+        for f in self.frames:
+            f.work.dbeta[:] = dbeta
+            squares += substitute(self.tree, f.pose, damping, self.root_scale, f.work)
+            retract(self.tree, f.pose, f.work, f.trial)
+        return 0.5 * squares
+
+    def fits(self) -> list[Fit]:
+        """Return the frames' results."""
+        out = []
+        last, triggs = self.table[-1], self.options.triggs
+        for f in self.frames:
+            f.cost = linearize(self.tree, f.terms, last, triggs, f.pose, f.blocks, f.work.scratch)
+            eliminate(self.tree, f.pose, f.blocks, DAMPING_LEAST, self.root_scale, f.work)
+            pose, P = f.pose, self.P
+            state, n = State.from_pose(self.tree, pose), self.iterations
+            information = f.work.C[:P, :P].copy()
+            shares = self._shares(f) if self.options.report else {}
+            out.append(
+                Fit(
+                    state, self.status, float(f.cost), n, pose.R.copy(), pose.t.copy(), information, f.count,
+                    self.rejected, shares,
+                )  # fmt: skip
+            )
+        return out
+
+    def _shares(self, f: _Active) -> dict[str, float]:
+        return cost_by_term(self.tree, f.terms, self.table[-1], self.options.triggs, f.pose, f.blocks, f.work.scratch)
+
+    def cost_by_term(self) -> dict[str, float]:
+        """Return what the clip's cost is made of: the frames' sums, the shape prior once, the focal length's prior."""
+        total: dict[str, float] = {}
+        for f in self.frames:
+            for name, cost in self._shares(f).items():
+                total[name] = total.get(name, 0.0) + cost
+        offset = self.beta[: self.P] - self.mean
+        total["shape_prior"] = 0.5 * self.shape_weights[-1] * float(offset @ self.prior @ offset)
+        if self.tree.globals > self.P:
+            total["focal_prior"] = 0.5 * self.focal_weight * self.log_focal**2
+        return total
+
+    def information(self) -> Array:
+        """Return the information matrix of beta (P, P), prior included, poses and focal length eliminated."""
+        P = self.P
+        if not self.frames:
+            return self.shape_weights[-1] * self.prior
+        C, _, _ = self._reduced(len(self.table) - 1, DAMPING_LEAST)
+        out = C[:P, :P].copy()
+        if self.tree.globals > P and C[P, P] > 0.0:
+            out -= np.outer(C[:P, P], C[P, :P]) / C[P, P]
+        return out

@@ -1,0 +1,283 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Measurements of one frame as flat arrays: one slot a point, with all that was measured of it, by body part."""
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from ..compiled.kernel import allocating_kernel, kernel
+from ..compiled.part import Array
+from ..compiled.tree import Tree
+from ..errors import ShapeError
+from ..measurements import LARGEST, Measurements, all_within
+from ..residuals.registry import RESIDUALS, empty_tables, registered
+
+if TYPE_CHECKING:
+    from ..options import Priors
+
+HAS_SHAPE, HAS_2D, HAS_3D, HAS_DIRECTION = 1, 2, 4, 8
+# The least that a residual's whole numbers may be, by its INDEXES, and the array of `Tree` that has one row for each.
+_RANGES = {"points": (0, "point_part"), "parts": (0, "parents"), "joints": (1, "parents"), "indices": (0, None)}
+_UNLIMITED = np.iinfo(np.int64).max
+
+
+class Terms(NamedTuple):
+    """One frame's terms for the kernels. W as in `Tree`."""
+
+    starts: Array  # (K+2,): the slots of part i are starts[i]:starts[i+1]
+    flags: Array  # (n,), what a slot has
+    rest: Array  # (n, 3), the point, or difference of points, relative to its part at beta = 0
+    V: Array  # (n, 3, W)
+    image: Array  # (n, 3): u, v in normalized image coordinates, confidence
+    point: Array  # (n, 4): metres in the camera frame, confidence
+    direction: Array  # (n, 4): unit vector in the camera frame, confidence
+    ints: tuple[Array, ...]  # one table for each of RESIDUALS
+    floats: tuple[Array, ...]
+    shape_mean: Array  # (W,)
+    shape_information: Array  # (W, W)
+
+
+@kernel
+def _common_part(tree: Tree, a: int, b: int) -> tuple:
+    """Return (part, start joint or -1, end joint or -1): a part that two points are both fixed to.
+
+    A joint belongs to its own part, as its origin, and to its parent, where it sits at S beta + l. -1 if none.
+    """
+    M = tree.keypoints
+    for p in range(2):
+        for q in range(2):
+            i = tree.point_part[a] if p == 0 else (tree.parents[a - M] if a >= M else -1)
+            j = tree.point_part[b] if q == 0 else (tree.parents[b - M] if b >= M else -1)
+            if i == j and i >= 0:
+                return i, (a - M if p else -1), (b - M if q else -1)
+    return -1, -1, -1
+
+
+@allocating_kernel
+def _lay_out(tree: Tree, i2, i3, i_start, i_end) -> tuple:  # type: ignore[no-untyped-def]
+    """Return (starts, shaped, rest, V, slots of 2D, of 3D, of directions, first direction without a common part or -1).
+
+    Points measured in several ways share one slot, unless one way repeats. `shaped` is HAS_SHAPE where V is not zero.
+    """
+    n_points, W = tree.V.shape[0], tree.S.shape[2]
+    n_parts = tree.parents.shape[0]
+    counts = (i2.shape[0], i3.shape[0], i_end.shape[0])
+    most = counts[0] + counts[1] + counts[2]
+    of_point = np.full(n_points + n_parts, -1, np.int64)  # after the points: joints as points of their parents
+    part, listed = np.empty(most, np.int64), np.zeros(most, np.int64)
+    point, minus = np.empty(most, np.int64), np.full(most, -1, np.int64)  # numbered as of_point
+    slots = np.empty(most, np.int64)
+    n, term = 0, 0
+    for way in range(3):
+        for k in range(counts[way]):
+            first, last = -1, -1
+            if way < 2:
+                end = i2[k] if way == 0 else i3[k]
+                i = tree.point_part[end]
+            else:
+                end = i_end[k]
+                i, first, last = _common_part(tree, i_start[k], end)
+                if i < 0:
+                    empty = np.zeros(0, np.int64)
+                    return empty, empty, np.zeros((0, 3)), np.zeros((0, 3, W)), empty, empty, empty, k
+            key = end if last < 0 else n_points + last
+            from_origin = way < 2 or (first < 0 and i_start[k] == tree.keypoints + i)
+            slot = of_point[key] if from_origin else -1
+            bit = HAS_2D if way == 0 else (HAS_3D if way == 1 else HAS_DIRECTION)
+            if slot < 0 or listed[slot] & bit:
+                slot = n
+                n += 1
+                part[slot], point[slot] = i, key
+                if from_origin:
+                    of_point[key] = slot
+                else:
+                    minus[slot] = i_start[k] if first < 0 else n_points + first
+            listed[slot] |= bit
+            slots[term] = slot
+            term += 1
+    starts = np.zeros(n_parts + 1, np.int64)
+    for k in range(n):
+        starts[part[k] + 1] += 1
+    for i in range(n_parts):
+        starts[i + 1] += starts[i]
+    shaped, rest, V = np.zeros(n, np.int64), np.zeros((n, 3)), np.zeros((n, 3, W))
+    place, free = np.empty(n, np.int64), starts[:-1].copy()
+    for k in range(n):
+        at = free[part[k]]
+        free[part[k]] += 1
+        place[k] = at
+        for sign, key in ((1.0, point[k]), (-1.0, minus[k])):
+            if key < 0:
+                continue
+            for r in range(3):
+                rest[at, r] += sign * (tree.v_bar[key, r] if key < n_points else tree.l[key - n_points, r])
+                for c in range(W):
+                    V[at, r, c] += sign * (tree.V[key, r, c] if key < n_points else tree.S[key - n_points, r, c])
+        for r in range(3):
+            for c in range(W):
+                if V[at, r, c] != 0.0:
+                    shaped[at] = HAS_SHAPE
+    for k in range(most):
+        slots[k] = place[slots[k]]
+    a, b = counts[0], counts[0] + counts[1]
+    return starts, shaped, rest, V, slots[:a], slots[a:b], slots[b:], -1
+
+
+@kernel
+def _usable(values, k: int) -> bool:  # type: ignore[no-untyped-def]
+    """Whether all of row k are numbers below `LARGEST` and its confidence, the last, is positive."""
+    last = values.shape[1] - 1
+    for r in range(last + 1):
+        if not abs(values[k, r]) < LARGEST:
+            return False
+    return bool(values[k, last] > 0.0)
+
+
+@kernel
+def _fill(  # type: ignore[no-untyped-def]
+    shaped, slots2, slots3, slots_d, m2, m3, md, flags, image, point, direction
+) -> int:
+    """Write the values and flags of all that is usable; return how many slots have anything."""
+    for k in range(flags.shape[0]):
+        flags[k] = shaped[k]
+    for k in range(slots2.shape[0]):
+        if _usable(m2, k):
+            at = slots2[k]
+            flags[at] |= HAS_2D
+            for r in range(3):
+                image[at, r] = m2[k, r]
+    for k in range(slots3.shape[0]):
+        if _usable(m3, k):
+            at = slots3[k]
+            flags[at] |= HAS_3D
+            for r in range(4):
+                point[at, r] = m3[k, r]
+    for k in range(slots_d.shape[0]):
+        norm = np.sqrt(md[k, 0] ** 2 + md[k, 1] ** 2 + md[k, 2] ** 2)
+        if _usable(md, k) and norm >= 1e-9:
+            at = slots_d[k]
+            flags[at] |= HAS_DIRECTION
+            for r in range(3):
+                direction[at, r] = md[k, r] / norm
+            direction[at, 3] = md[k, 3]
+    count = 0
+    for k in range(flags.shape[0]):
+        if flags[k] & (HAS_2D | HAS_3D | HAS_DIRECTION):
+            count += 1
+    return count
+
+
+@kernel
+def _same(a, b) -> bool:  # type: ignore[no-untyped-def]
+    """Whether two lists of indices are equal."""
+    if a.shape[0] != b.shape[0]:
+        return False
+    for k in range(a.shape[0]):
+        if a[k] != b[k]:
+            return False
+    return True
+
+
+class Layout:
+    """Which slot every measurement goes to: the part of `Terms` that stays while the same points are measured."""
+
+    def __init__(self, tree: Tree, indices: tuple[Array, ...]) -> None:
+        """Lay out the slots for indices of 2D, 3D, and starts and ends of directions. Raises ShapeError."""
+        self.indices = tuple(index.copy() for index in indices)
+        self.starts, self.shaped, self.rest, self.V, *slots, bad = _lay_out(tree, *self.indices)
+        self.slots = tuple(slots)
+        if bad >= 0:
+            raise ShapeError(
+                f"Orientation {bad} goes from point {indices[2][bad]} to point {indices[3][bad]}, which no body part "
+                f"has in common; both ends must be fixed to one part."
+            )
+        n = len(self.rest)
+        self.values = np.zeros(n, np.int64), np.zeros((n, 3)), np.zeros((n, 4)), np.zeros((n, 4))
+
+    def fits(self, indices: tuple[Array, ...]) -> bool:
+        """Whether it is the layout of these indices."""
+        return all(_same(a, b) for a, b in zip(self.indices, indices, strict=True))
+
+
+class PackedPriors(NamedTuple):
+    """Priors laid out for the kernels."""
+
+    tables: dict[str, tuple[Array, Array]]
+    shape_mean: Array  # (W,)
+    shape_information: Array  # (W, W)
+
+
+def pack_priors(tree: Tree, priors: "Priors") -> PackedPriors:
+    """Check and lay out the priors. Raises ShapeError."""
+    tables = empty_tables()
+    for name, table in priors.packed_tables(len(tree.parents) - 1).items():
+        tables[name] = _checked_table(tree, name, table)
+    W = tree.S.shape[2]
+    mean, information = priors.packed_shape(tree.shape)
+    return PackedPriors(tables, _padded(mean, (W,)), _padded(information, (W, W)))
+
+
+def _padded(a: Array, shape: tuple[int, ...]) -> Array:
+    out = np.zeros(shape)
+    out[tuple(slice(0, n) for n in a.shape)] = a
+    return out
+
+
+def _checked_table(tree: Tree, name: str, table: tuple[Array, Array]) -> tuple[Array, Array]:
+    """Return the rows of a registered residual, or raise ShapeError where kernels would read beyond the arrays."""
+    module = registered(name)
+    ints, floats = np.asarray(table[0], dtype=np.int64), np.asarray(table[1], dtype=np.float64)
+    if (ints.shape[1:], floats.shape[1:]) != ((module.INTS,), (module.FLOATS,)) or len(ints) != len(floats):
+        raise ShapeError(
+            f"Tables of {name!r} must have shapes (n, {module.INTS}) and (n, {module.FLOATS}), "
+            f"but got {ints.shape} and {floats.shape}."
+        )
+    counted = getattr(module, "INDEXES", "indices")
+    least, of_what = _RANGES[counted]
+    limit = _UNLIMITED if of_what is None else len(getattr(tree, of_what))
+    if not all_within(ints.ravel(), least, limit):
+        wanted = "not be negative" if of_what is None else f"lie in {least}..{limit - 1}"
+        raise ShapeError(f"{counted.capitalize()} of {name!r} must {wanted}, but go from {ints.min()} to {ints.max()}.")
+    return ints, floats
+
+
+def make_terms(tree: Tree, measurements: Measurements, priors: "Priors") -> Terms:
+    """Pack one frame's measurements and priors. Raises ShapeError naming the array that does not fit the body."""
+    return fill_terms(tree, measurements, pack_priors(tree, priors), None)[0]
+
+
+def fill_terms(
+    tree: Tree, measurements: Measurements, priors: PackedPriors, layout: Layout | None
+) -> tuple[Terms, int, Layout]:
+    """Return the terms, how many slots are in use, and the layout, whose arrays the terms share.
+
+    `layout` is an earlier frame's: it is used again where the same points were measured.
+    """
+    m = measurements
+    n_points = len(tree.point_part)
+    i2, m2 = m.packed2d(n_points)
+    i3, m3 = m.packed3d(n_points)
+    starts, ends, md = m.packed_directions(n_points)
+    indices = i2, i3, starts, ends
+    if layout is None or not layout.fits(indices):
+        layout = Layout(tree, indices)
+    count = _fill(layout.shaped, *layout.slots, m2, m3, md, *layout.values)
+    tables = priors.tables
+    own = m.packed_tables(len(tree.parents) - 1, n_points)
+    if own or m.tables:
+        tables = {**tables, **own}
+        for name, table in m.tables.items():
+            more = _checked_table(tree, name, table)
+            tables[name] = np.concatenate([tables[name][0], more[0]]), np.concatenate([tables[name][1], more[1]])
+    ints = tuple([np.ascontiguousarray(tables[name][0], dtype=np.int64) for name in RESIDUALS])
+    floats = tuple([np.ascontiguousarray(tables[name][1], dtype=np.float64) for name in RESIDUALS])
+    terms = Terms(
+        layout.starts, layout.values[0], layout.rest, layout.V, *layout.values[1:], ints, floats,
+        priors.shape_mean, priors.shape_information,
+    )  # fmt: skip
+    return terms, count, layout
+
+
+def usable(terms: Terms) -> int:
+    """Return how many points, directions and poses were measured."""
+    return int(np.count_nonzero(terms.flags & ~HAS_SHAPE)) + len(terms.ints[0])

@@ -1,0 +1,99 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the arrays of a body file must hold, and the checks of a file that may be hostile."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from ..body import Body
+from ..errors import ModelFileError
+
+# What a file's array must hold, and its shape; None is any extent.
+Form = tuple[str, tuple[int | None, ...]]
+_KINDS = {"numbers": "iuf", "whole numbers": "iu", "text": "U"}
+
+REQUIRED: dict[str, Form] = {
+    "joint_names": ("text", (None,)),
+    "kintree_table": ("whole numbers", (2, None)),
+    "v_template": ("numbers", (None, 3)),
+    "shapedirs": ("numbers", (None, 3, None)),
+    "J_template": ("numbers", (None, 3)),
+    "J_shapedirs": ("numbers", (None, 3, None)),
+    "skin_joints": ("whole numbers", (None, 4)),
+    "skin_weights": ("numbers", (None, 4)),
+    "faces": ("whole numbers", (None, None)),
+    "keypoint_names": ("text", (None,)),
+    "keypoint_part": ("whole numbers", (None,)),
+    "keypoint_template": ("numbers", (None, 3)),
+    "keypoint_shapedirs": ("numbers", (None, 3, None)),
+}
+OPTIONAL: dict[str, Form] = {
+    "uv": ("numbers", (None, 2)),
+    "uv_faces": ("whole numbers", (None, None)),
+    "face_material": ("whole numbers", (None,)),
+    "material_names": ("text", (None,)),
+    "material_colors": ("numbers", (None, 4)),
+    "name": ("text", ()),
+    "license": ("text", ()),
+}
+
+
+def check_arrays(arrays: Mapping[str, np.ndarray], forms: Mapping[str, Form], path: Path) -> None:
+    """What the arrays of a file hold, and their shapes, at the door. Those that are not there may be left out.
+
+    :raises ModelFileError: an array of another kind or shape.
+    """
+    for key, (kind, shape) in forms.items():
+        if key not in arrays:
+            continue
+        array = arrays[key]
+        no_names = kind == "text" and array.size == 0  # which numpy writes as numbers
+        if array.dtype.kind not in _KINDS[kind] and not no_names:
+            raise ModelFileError(f"{path}: {key} must hold {kind}, but holds {array.dtype}")
+        if array.ndim != len(shape) or any(b not in (None, a) for a, b in zip(array.shape, shape, strict=True)):
+            wanted = ", ".join("any" if b is None else str(b) for b in shape)
+            raise ModelFileError(f"{path}: {key} must have shape ({wanted}), but has {array.shape}")
+
+
+def check_body(body: Body, path: Path) -> None:
+    """Shapes and index ranges of a file that may be hostile."""
+    n, p, v, m = len(body.parents), body.P, len(body.v_template), len(body.keypoint_names)
+    materials = max(1, len(body.material_names))
+    if body.faces.shape[1] not in (3, 4):
+        raise ModelFileError(f"{path}: faces must be triangles or quads, but have {body.faces.shape[1]} corners")
+    expected = {
+        "J_template": (n, 3),
+        "J_shapedirs": (n, 3, p),
+        "v_template": (v, 3),
+        "shapedirs": (v, 3, p),
+        "skin_joints": (v, 4),
+        "skin_weights": (v, 4),
+        "keypoint_part": (m,),
+        "keypoint_template": (m, 3),
+        "keypoint_shapedirs": (m, 3, p),
+        "uv_faces": body.faces.shape,
+        "face_material": (len(body.faces),),
+        "material_colors": (materials, 4),
+    }
+    for key, shape in expected.items():
+        array = getattr(body, key)
+        if array is not None and array.shape != shape:
+            raise ModelFileError(f"{path}: {key} must have shape {shape}, but has {array.shape}")
+    if len(body.joint_names) != n:
+        raise ModelFileError(f"{path}: {len(body.joint_names)} joint names for {n} joints")
+    if n == 0 or body.parents[0] != -1 or (body.parents[1:] < 0).any() or (body.parents[1:] >= np.arange(1, n)).any():
+        raise ModelFileError(f"{path}: kintree_table must list each joint after its parent, the root first")
+    tops = {"skin_joints": n, "faces": v, "keypoint_part": n, "face_material": materials}
+    if body.uv is not None:
+        tops["uv_faces"] = len(body.uv)
+    for key, top in tops.items():
+        index = getattr(body, key)
+        if index is not None and index.size and (index.min() < 0 or index.max() >= top):
+            raise ModelFileError(f"{path}: {key} points outside 0..{top - 1}")
+    for key in (key for key, (kind, _) in (REQUIRED | OPTIONAL).items() if kind == "numbers"):
+        array = getattr(body, key)
+        if array is not None and not np.isfinite(array).all():
+            raise ModelFileError(f"{path}: {key} contains NaN or infinity")

@@ -1,0 +1,36 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Reading .npz files that may come from anyone: plain arrays only, bounded size, one kind of error."""
+
+from __future__ import annotations
+
+import zipfile
+import zlib
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import InputError
+
+LARGEST_BYTES = 4 << 30  # unpacked; an hour of SMPL+H motion at 60 fps takes a quarter of this
+
+# What zipfile, zlib and numpy raise on damaged or hostile files.
+_BROKEN = (OSError, ValueError, KeyError, EOFError, RuntimeError, MemoryError, zipfile.BadZipFile, zlib.error)
+
+
+def read_npz(path: Path, error: type[InputError], what: str) -> dict[str, np.ndarray]:
+    """All arrays of a .npz file, never unpickling.
+
+    :param error: class raised for a missing, broken, oversized or pickled file.
+    :param what: what the file should have been, for the message, e.g. ``motion file``.
+    """
+    try:
+        with zipfile.ZipFile(path) as archive:
+            size = sum(entry.file_size for entry in archive.infolist())
+        if size > LARGEST_BYTES:
+            raise error(f"{path} would unpack to {size >> 20} MiB, too large for a {what}")
+        with np.load(path, allow_pickle=False) as file:
+            return {key: file[key] for key in file.files}
+    except FileNotFoundError as cause:
+        raise error(f"{path} does not exist; choose an existing {what}") from cause
+    except _BROKEN as cause:
+        raise error(f"{path} is not a readable {what} ({cause}); choose another file") from cause

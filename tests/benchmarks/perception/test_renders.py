@@ -1,0 +1,113 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The shots of held-out recordings: in the picture, on the floor, the same for the same seed; and what is measured."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import SimpleNamespace
+
+import cv2
+import numpy as np
+import pytest
+from scope.benchmarks.perception.held_out import (
+    MARGIN_PX,
+    SIZE,
+    Take,
+    draw_shot,
+    held_out_takes,
+    standing_feet,
+)
+from scope.benchmarks.perception.renders import against_world, mean_of
+from scope.scope_addon.kinematics.axes import R_WORLD_MODEL
+from scope.solver.loaders.body_file import ASSETS
+from scope.solver.rotations import log
+from scope.tools.render_sample.choreography import choreograph
+from scope.tools.render_sample.truth import sample_shot
+
+
+@pytest.fixture(scope="module")
+def take(body) -> Take:
+    """The sample clip's motion as a recording in a world with y up."""
+    betas = np.zeros(body.P)
+    states, trans = choreograph(body, betas, 30)
+    states[:, 0] = R_WORLD_MODEL.T @ states[:, 0]
+    J_root = body.rest_joints(betas)[0]
+    poses = log(states).reshape(len(trans), -1)
+    return Take(9, "sample", poses, (trans + J_root) @ R_WORLD_MODEL - J_root, np.ones(len(trans), bool), betas, 30.0)
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_the_person_stands_on_the_floor_well_inside_the_picture(body, take, seed):
+    shot = draw_shot(body, take, seed)
+    camera_from_world = np.linalg.inv(shot.world_from_camera)
+    turn = cv2.Rodrigues(camera_from_world[:3, :3])[0]
+    for frame in range(0, len(shot), 6):
+        skin = shot.vertices_world(body, frame)
+        uv = cv2.projectPoints(skin, turn, camera_from_world[:3, 3], shot.intrinsics, None)[0][:, 0]
+        assert uv.min() >= MARGIN_PX - 1e-3
+        assert (uv.max(0) <= np.array(SIZE) - 1 - MARGIN_PX + 1e-3).all()
+        assert -0.03 < skin[:, 2].min() < 0.05
+        assert skin[:, 2].max() > 0.9  # squats, at the lowest
+    assert shot.standing.any(axis=1).mean() > 0.8  # one foot or both, as in the sample: the path fits the legs
+
+
+def test_a_shot_is_the_same_for_the_same_seed_alone(body, take):
+    first, again, other = (draw_shot(body, take, seed) for seed in (3, 3, 4))
+    for key in ("rotations", "trans", "betas", "intrinsics", "world_from_camera", "standing"):
+        assert np.array_equal(getattr(first, key), getattr(again, key)), key
+    assert not np.array_equal(first.betas, other.betas)
+    assert not np.array_equal(first.intrinsics, other.intrinsics)
+
+
+def test_frames_that_the_fit_calls_broken_are_left_out(body, take):
+    valid = np.zeros(len(take.valid), bool)
+    valid[60:105] = True
+    shot = draw_shot(body, Take(9, "broken", take.poses, take.trans, valid, take.betas, take.fps))
+    np.testing.assert_allclose(log(shot.rotations[:, 1:]).reshape(45, -1), take.poses[60:105, 3:], atol=1e-9)
+    with pytest.raises(ValueError, match="no 21 sound frames"):
+        draw_shot(body, Take(9, "broken", take.poses, take.trans, np.zeros_like(valid), take.betas, take.fps))
+
+
+def test_only_every_tenth_take_is_drawn(tmp_path, body):
+    count, path = 21, tmp_path / "motions.npz"
+    np.savez(
+        path,
+        poses=np.zeros((2 * count, 72)),
+        trans=np.zeros((2 * count, 3)),
+        valid=np.ones(2 * count, bool),
+        take_start=2 * np.arange(count + 1),
+        take_name=np.array([f"take {k}" for k in range(count)]),
+        take_betas=np.zeros((count, body.P)),
+        take_fps=np.full(count, 30.0),
+    )
+    assert [(take.name, len(take.poses)) for take in held_out_takes(path)] == [("take 9", 2), ("take 19", 2)]
+
+
+def test_feet_stand_where_the_sample_says(body):
+    shot = sample_shot(*choreograph(body, np.zeros(body.P), 30))
+    assert np.mean(standing_feet(body, shot) == shot.standing) > 0.95
+
+
+def test_worlds_are_compared_by_up_floor_and_focal_length(body):
+    truth = dict(np.load(Path(ASSETS) / "sample" / "sample_truth.npz"))
+    rows = np.arange(10, 60)
+    tilted = truth["world_from_camera"].copy()
+    tilted[:3, :3] = cv2.Rodrigues(np.array([np.radians(5), 0, 0]))[0] @ tilted[:3, :3]
+    motion = SimpleNamespace(
+        frames=rows,
+        valid=rows != 20,
+        poses=truth["poses"][rows],
+        trans=truth["trans"][rows] + [0, 0, 0.03],
+        betas=truth["betas"],
+        world_from_camera=np.repeat(tilted[None], len(rows), axis=0),
+        intrinsics=truth["intrinsics"] * 0.8,
+    )
+    found = against_world(body, motion, truth)
+    assert found == pytest.approx({"up_deg": 5.0, "floor_cm": 3.0, "focal": 0.8}, abs=1e-4)
+
+
+def test_a_mean_leaves_out_what_a_clip_does_not_have():
+    means = mean_of([{"floor_cm": 2.0, "coverage": 1.0}, {"floor_cm": None, "coverage": 0.0}, {"coverage": 1.0}])
+    assert means["floor_cm"] == 2.0
+    assert means["coverage"] == pytest.approx(2 / 3)
+    assert means["up_deg"] is None

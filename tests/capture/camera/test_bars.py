@@ -1,0 +1,111 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Bars: found where they are, not in dark scenes or doorways, and what the camera is then taken to be."""
+
+from fractions import Fraction
+
+import cv2
+import numpy as np
+import pytest
+from scope.scope_addon.capture.camera.bars import find_bars, longer_side_between
+from scope.scope_addon.capture.camera.camera_rotation import BackgroundTracker
+from scope.scope_addon.capture.camera.intrinsics import choose_camera
+from scope.scope_addon.capture.camera.line_segments import Segments, find_segments
+from scope.scope_addon.capture.fitting.focal_length import camera_by_edges
+
+WIDTH, HEIGHT = 960, 540
+
+
+def scene(width: int, height: int, seed: int = 0) -> np.ndarray:
+    return np.random.default_rng(seed).integers(0, 256, (height, width, 3), dtype=np.uint8)
+
+
+def barred(left: int = 0, right: int = 0, top: int = 0, bottom: int = 0, black: int = 0) -> np.ndarray:
+    noise = np.random.default_rng(1).integers(0, 9, (HEIGHT, WIDTH, 3), dtype=np.uint8)
+    picture = black + noise
+    picture[top : HEIGHT - bottom, left : WIDTH - right] = scene(WIDTH - left - right, HEIGHT - top - bottom)
+    return picture
+
+
+@pytest.mark.parametrize("sides", [(328, 328, 0, 0), (0, 0, 70, 70), (120, 121, 30, 30)])
+def test_bars_are_found(sides: tuple[int, int, int, int]) -> None:
+    left, right, top, bottom = sides
+    bars = find_bars(barred(*sides, black=8))
+    inside = np.ones((HEIGHT, WIDTH), bool)
+    for x0, y0, x1, y1 in np.array(bars).round().astype(int):
+        inside[y0:y1, x0:x1] = False
+    expected = np.zeros((HEIGHT, WIDTH), bool)
+    expected[top : HEIGHT - bottom, left : WIDTH - right] = True
+    assert (inside == expected).mean() > 0.995
+    longer = max(WIDTH - left - right, HEIGHT - top - bottom)
+    assert longer_side_between(bars, WIDTH, HEIGHT) == pytest.approx(longer, abs=4)
+
+
+@pytest.mark.parametrize("upright", [False, True])
+@pytest.mark.parametrize("kind", ["blurred", "white"])
+def test_bars_of_other_kinds_are_found(kind: str, upright: bool) -> None:
+    """An upright clip before its own blurred copy, as broadcasters show it; or beside a colour."""
+    clip = cv2.resize(scene(30, 54), (300, 540), interpolation=cv2.INTER_CUBIC)
+    picture = np.full((540, 960, 3), 235, np.uint8)
+    if kind == "blurred":
+        picture = cv2.resize(cv2.GaussianBlur(cv2.resize(clip, (96, 172)), (0, 0), 5)[60:114], (960, 540))
+    picture[:, 330:630] = clip
+    if upright:
+        picture = picture.transpose(1, 0, 2).copy()
+    bars = find_bars(cv2.imdecode(cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, 80])[1], cv2.IMREAD_COLOR))
+    sizes = [bar[[3, 2]] if upright else bar[[2, 3]] for bar in bars]
+    assert sizes[0][0] == pytest.approx(330, abs=2)
+    assert longer_side_between(bars, *picture.shape[1::-1]) == pytest.approx(540)
+
+
+@pytest.mark.parametrize("detail", [40, 0], ids=["a pattern on the wall", "a plain wall, a door off the middle"])
+def test_a_door_frame_is_no_picture_between_bars(detail: int) -> None:
+    picture = np.full((HEIGHT, WIDTH, 3), 160, np.uint8)
+    picture += np.random.default_rng(0).integers(0, detail + 1, picture.shape, dtype=np.uint8)
+    left = 300 if detail else 340
+    picture[:, left:660] = scene(660 - left, HEIGHT) // 4
+    assert find_bars(picture) == []
+
+
+@pytest.mark.parametrize(
+    "picture",
+    [
+        scene(WIDTH, HEIGHT),
+        np.zeros((HEIGHT, WIDTH, 3), np.uint8),
+        barred(top=200),  # a night sky
+        barred(left=100, right=300),
+        barred(left=10, right=10),
+    ],
+    ids=["none", "black", "one side", "of two widths", "thin"],
+)
+def test_other_pictures_have_none(picture: np.ndarray) -> None:
+    assert find_bars(picture) == []
+    assert longer_side_between([], WIDTH, HEIGHT) == WIDTH
+
+
+def test_somebody_in_a_spotlight_is_no_picture_between_bars() -> None:
+    y, x = np.mgrid[:HEIGHT, :WIDTH]
+    picture = np.where(np.hypot(x - WIDTH / 2, y - HEIGHT / 2) < 200, 200, 5).astype(np.uint8)
+    assert find_bars(np.repeat(picture[..., None], 3, axis=2)) == []
+
+
+def test_the_assumed_angle_is_that_of_what_lies_between() -> None:
+    found = camera_by_edges(Segments.none(), WIDTH, HEIGHT, float(HEIGHT))
+    assert found.intrinsics[0, 0] == pytest.approx(choose_camera(HEIGHT, 300).intrinsics[0, 0])
+    assert found.intrinsics[:2, 2] == pytest.approx([WIDTH / 2, HEIGHT / 2])
+    assert "between the bars" in found.source
+
+
+def test_their_edges_are_neither_lines_nor_corners() -> None:
+    """A picture that moves between bars that stay: a camera that turns."""
+    camera, wide = choose_camera(WIDTH, HEIGHT), np.kron(scene(80, 36), np.ones((15, 15, 1), np.uint8))
+    person = [np.array([[470.0, 200.0], [490.0, 340.0]])]
+    tracker = BackgroundTracker(camera, WIDTH, HEIGHT)
+    for k in range(12):
+        picture = np.zeros((HEIGHT, WIDTH, 3), np.uint8)
+        picture[:, 328:632] = wide[:, 6 * k : 6 * k + 304]
+        tracker.add(picture, float(k * Fraction(1, 10)), person)
+    assert len(tracker.bars) == 2
+    edges = find_segments(picture, person, bars=tracker.bars)
+    assert not (np.abs(edges.ends_px[:, :, 0].mean(axis=1)[:, None] - [328, 632]) < 4).any()
+    turned = np.degrees(np.arctan(6 * 11 / camera.intrinsics[0, 0]))
+    assert tracker.motion(camera).largest_turn_deg == pytest.approx(turned, rel=0.1)

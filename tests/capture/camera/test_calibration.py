@@ -1,0 +1,155 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Calibration files: what they mean, written out, and what is refused instead of being taken for something else."""
+
+import json
+import re
+
+import numpy as np
+import pytest
+from scope.scope_addon.capture.camera.intrinsics import choose_camera
+from scope.solver.errors import InputError
+
+K = [[1000, 0, 500], [0, 1100, 300], [0, 0, 1]]
+KNOWN = {"intrinsics": K, "dist": [0.1, 0], "size": [1000, 600]}
+
+
+@pytest.fixture
+def path(tmp_path):
+    return tmp_path / "cam.json"
+
+
+def camera(path, content, width=1000, height=600):
+    path.write_text(content if isinstance(content, str) else json.dumps(content), "utf-8")
+    return choose_camera(width, height, calibration=path)
+
+
+def refused(path, content, says, width=1000, height=600):
+    with pytest.raises(InputError, match=says) as caught:
+        camera(path, content, width, height)
+    text = str(caught.value)
+    assert "cam.json" in text
+    assert "\n" not in text
+    assert len(text) < 600
+
+
+def test_calibration_scales_with_the_footage(path):
+    path.write_text(
+        json.dumps({"intrinsics": [[1000, 0, 500], [0, 1100, 300], [0, 0, 1]], "dist": [0.1, 0], "size": [1000, 600]})
+    )
+    camera = choose_camera(2000, 1200, calibration=path)
+    assert np.allclose(camera.intrinsics, [[2000, 0, 1000], [0, 2200, 600], [0, 0, 1]])
+    assert np.allclose(camera.dist, [0.1, 0, 0, 0, 0])
+
+
+def test_undistorted_points_project_back_through_the_distortion(path):
+    path.write_text(
+        json.dumps({"intrinsics": [[900, 0, 320], [0, 900, 240], [0, 0, 1]], "dist": [-0.2, 0.05, 0.001, -0.002, 0]})
+    )
+    camera = choose_camera(640, 480, calibration=path)
+    x, y = 0.2, -0.15  # normalized point; the Brown model written out
+    k1, k2, p1, p2, _ = camera.dist
+    r2 = x * x + y * y
+    q = 1 + k1 * r2 + k2 * r2 * r2
+    seen = [x * q + 2 * p1 * x * y + p2 * (r2 + 2 * x * x), y * q + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y]
+    pixels = np.array(seen) * 900 + [320, 240]
+    assert np.allclose(camera.undistort(pixels[None]), np.array([[x, y]]) * 900 + [320, 240], atol=0.05)
+
+
+@pytest.mark.parametrize(("size", "footage"), [((1920, 1080), (1768, 994)), ((854, 480), (3840, 2160))])
+def test_sizes_may_be_rounded(path, size, footage):
+    middle = [[900, 0, size[0] / 2], [0, 900, size[1] / 2], [0, 0, 1]]
+    got = camera(path, {"intrinsics": middle, "size": size}, *footage).intrinsics
+    assert np.allclose(got[:2, 2], np.array(footage) / 2)
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        ("K", "distortion", "image_size"),
+        ("camera_matrix", "distortion_coefficients", "size"),
+        ("K", "dist_coeffs", "size"),
+    ],
+)
+def test_the_same_by_other_names(path, names):
+    expected = camera(path, KNOWN)
+    got = camera(path, dict(zip(names, KNOWN.values(), strict=True)) | {"fps": 60, "rms": 0.2, "name": "left"})
+    np.testing.assert_array_equal(got.intrinsics, expected.intrinsics)
+    np.testing.assert_array_equal(got.dist, expected.dist)
+
+
+def test_coefficients_in_a_row_and_those_that_are_zero(path):
+    assert camera(path, KNOWN | {"dist": [[0.1, 0.2, 0, 0, 0.3]]}).dist.tolist() == [0.1, 0.2, 0, 0, 0.3]
+    assert camera(path, KNOWN | {"dist": [[0.1], [0.2], [0], [0]]}).dist.tolist() == [0.1, 0.2, 0, 0, 0]
+    assert camera(path, KNOWN | {"dist": [0.1, 0.2, 0, 0, 0.3, 0, 0, 0]}).dist.tolist() == [0.1, 0.2, 0, 0, 0.3]
+
+
+@pytest.mark.parametrize(
+    ("focal", "dist"),
+    [
+        (780, [-0.27, 0.1, 0.001, -0.002, -0.02]),  # an action camera
+        (1400, [0.12, -0.3, 0, 0, 0.2]),
+        (9000, [-0.5, 30, 0, 0, 900]),  # a long lens, whose radii are small
+    ],
+)
+def test_lenses_that_there_are(path, focal, dist):
+    content = {"intrinsics": [[focal, 0, 960], [0, focal, 540], [0, 0, 1]], "dist": dist}
+    assert camera(path, content, 1920, 1080).dist.tolist() == dist
+
+
+def test_another_shape_of_the_picture_is_refused(path):
+    refused(path, KNOWN | {"size": [1920, 1080]}, "1920 x 1080.*576 x 576.*same mode", 576, 576)
+    refused(path, KNOWN | {"size": [1920, 1080]}, "1920 x 1080.*1080 x 1920.*rotated", 1080, 1920)
+    refused(path, {"intrinsics": [[1400, 0, 960], [0, 1400, 540], [0, 0, 1]]}, 'principal point.*"size"', 576, 576)
+
+
+@pytest.mark.parametrize(
+    ("changed", "says"),
+    [
+        ({"intrinsics": np.transpose(K).tolist()}, "transposed"),
+        ({"intrinsics": [[1000, 0, 500], [0, 1100, 300], [0, 0, 0]]}, "must be"),
+        ({"intrinsics": [[1000, 0, 500], [3, 1100, 300], [0, 0, 1]]}, "must be"),
+        ({"intrinsics": [[1000, 40, 500], [0, 1100, 300], [0, 0, 1]]}, "skew"),
+        ({"intrinsics": [[0, 0, 0], [0, 0, 0], [0, 0, 1]]}, "above 0"),
+        ({"intrinsics": [[0.9, 0, 0.5], [0, 0.9, 0.5], [0, 0, 1]]}, "in pixels"),
+        ({"intrinsics": [[10000, 0, 500], [0, 1100, 300], [0, 0, 1]]}, "do not go together"),
+        ({"intrinsics": [[1000, 0, 1e300], [0, 1100, 300], [0, 0, 1]]}, "too far"),
+        ({"intrinsics": [[1000, 0, 500], [0, 1100, -12000], [0, 0, 1]]}, "too far"),
+        ({"intrinsics": [[1e300, 0, 500], [0, 1100, 300], [0, 0, 1]]}, "no lens"),
+        ({"intrinsics": [[1000, 0, float("nan")], [0, 1100, 300], [0, 0, 1]]}, "three numbers"),
+        ({"intrinsics": 1}, "three numbers"),
+        ({"intrinsics": [["a"]]}, "three numbers"),
+        ({"intrinsics": [[10**400, 0, 500], [0, 1100, 300], [0, 0, 1]]}, "three numbers"),
+        ({"dist": [0.1, 0.2, 0, 0, 0.3, 0.1, 0, 0]}, "8 numbers.*undistort"),
+        ({"dist": [0, 0, 0, 0, 0, 0]}, "6 numbers"),
+        ({"dist": [[0.1, 0], [0, 0]]}, "list of numbers"),
+        ({"dist": ["much"]}, "list of numbers"),
+        ({"dist": [float("inf")]}, "list of numbers"),
+        ({"dist": [1e6]}, "folds or tears"),
+        ({"dist": [-1e300, 1e300]}, "folds or tears"),
+        ({"dist": [-5, 2]}, "folds or tears"),
+        ({"dist": [0, 0, 0.9, 0]}, "folds or tears"),
+        ({"distortion": [0.1]}, "twice, as dist and distortion"),
+        ({"distorsion": [0.1]}, "'distorsion' is not known"),
+        ({"k1": 0.1}, "'k1' is not known"),
+        ({"camera_model": "fisheye"}, "'camera_model' is not known"),
+        ({"resolution": [1000, 600]}, "'resolution' is not known"),
+        ({"size": [float("nan"), 576]}, "size must be"),
+        ({"size": [0, 0]}, "size must be"),
+        ({"size": [1e200, 1e200]}, "size must be"),
+        ({"size": [1000, 600, 3]}, "size must be"),
+        ({"size": {"0": 1000}}, "size must be"),
+    ],
+)
+def test_what_cannot_be_meant_is_refused(path, changed, says):
+    refused(path, KNOWN | changed, says)
+
+
+@pytest.mark.parametrize("text", ["", "[]", "{}", "null", "[" * 100_000, '{"K":' * 100_000, "\x00", "9" * 9999])
+def test_what_is_no_calibration_is_named(path, text):
+    refused(path, text, re.escape(f"{path} is not a calibration"))
+
+
+def test_no_file(path, tmp_path):
+    for missing in (path, tmp_path):
+        with pytest.raises(InputError, match="cannot read the calibration"):
+            choose_camera(640, 480, calibration=missing)

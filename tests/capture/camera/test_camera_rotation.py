@@ -1,0 +1,135 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The camera's turning, on pictures of a wall and a room seen by a camera whose turns are known."""
+
+import cv2
+import numpy as np
+import pytest
+from scope.scope_addon.capture.camera.camera_rotation import BackgroundTracker, consensus_rotation
+from scope.scope_addon.capture.camera.intrinsics import Camera, pinhole
+from scope.solver.rotations import exp, log
+
+WIDTH, HEIGHT, FOCAL = 960, 540, 900.0
+K = pinhole(WIDTH, HEIGHT, FOCAL)
+CAMERA = Camera(K, np.zeros(5), "given")
+FPS = 30.0
+
+
+@pytest.fixture(scope="module")
+def panorama():
+    """A texture with corners all over: blocks of noise at three sizes, seen by a still wide camera."""
+    rng = np.random.default_rng(0)
+    layers = [cv2.resize(rng.integers(0, 255, (n, 2 * n, 3), np.uint8), (3600, 1800), interpolation=cv2.INTER_CUBIC)
+              for n in (20, 60, 180)]
+    return np.mean(layers, axis=0).astype(np.uint8)
+
+
+def view(panorama, R_first_camera):
+    """What a camera sees that has turned: the panorama is a plane at infinity before the first camera."""
+    wide = pinhole(3600, 1800, FOCAL)
+    H = wide @ R_first_camera @ np.linalg.inv(K)
+    return cv2.warpPerspective(panorama, np.linalg.inv(H), (WIDTH, HEIGHT), flags=cv2.INTER_LINEAR)
+
+
+def angle_deg(a, b):
+    return np.degrees(np.linalg.norm(log(np.swapaxes(a, -1, -2) @ b), axis=-1))
+
+
+def follow(pictures, people=lambda k: [], assumed=CAMERA):
+    tracker = BackgroundTracker(assumed, WIDTH, HEIGHT)
+    for k, picture in enumerate(pictures):
+        tracker.add(picture, k / FPS, people(k))
+    return tracker.motion(CAMERA)
+
+
+def test_a_pan_with_tilt_and_roll_is_found(panorama):
+    T = 75
+    s = np.linspace(0, 1, T)[:, None]
+    truth = exp(np.concatenate([0.08 * np.sin(3 * s), 0.6 * s, 0.05 * s], axis=1))
+    found = follow(view(panorama, R) for R in truth)
+    assert not found.is_static
+    assert angle_deg(found.R_first_camera, truth).max() < 0.3
+    assert found.known.sum() >= T / 3
+
+
+@pytest.mark.parametrize("ratio", [0.85, 1.2])
+def test_a_pan_is_right_once_the_focal_length_is_known(panorama, ratio):
+    s = np.linspace(0, 1, 60)[:, None]
+    truth = exp(np.concatenate([0.05 * np.sin(3 * s), 0.5 * s, 0.05 * s], axis=1))
+    wrong = Camera(pinhole(WIDTH, HEIGHT, ratio * FOCAL), np.zeros(5), "assumed", 0.25)
+    found = follow((view(panorama, R) for R in truth), assumed=wrong)
+    assert angle_deg(found.R_first_camera, truth).max() < 1.0  # 4 to 6 degrees without
+
+
+def test_a_camera_on_a_stand_is_static_in_spite_of_noise_and_of_somebody_who_walks_through(panorama):
+    rng = np.random.default_rng(1)
+    still = view(panorama, np.eye(3))
+    walker = rng.integers(0, 255, (300, 120, 3), np.uint8)
+
+    def picture(k):
+        image = np.clip(still + rng.normal(0, 4, still.shape), 0, 255).astype(np.uint8)
+        image[150:450, 10 * k : 10 * k + 120] = walker
+        return image
+
+    def people(k):
+        return [np.array([[10.0 * k, 150.0], [10.0 * k + 120, 450.0]])]
+
+    found = follow((picture(k) for k in range(60)), people)
+    assert found.is_static, found.largest_turn_deg
+
+
+def test_something_large_that_moves_does_not_take_the_background_with_it(panorama):
+    """A third of the picture moves against the pan, and nobody said that it is a person."""
+    T = 45
+    truth = exp(np.linspace(0, 0.25, T)[:, None] * [0.0, 1.0, 0.0])
+    rng = np.random.default_rng(2)
+    lorry = cv2.resize(rng.integers(0, 255, (20, 20, 3), np.uint8), (400, 400), interpolation=cv2.INTER_CUBIC)
+
+    def picture(k):
+        image = view(panorama, truth[k])
+        image[100:500, 100 + 6 * k : 500 + 6 * k] = lorry
+        return image
+
+    found = follow(picture(k) for k in range(T))
+    assert angle_deg(found.R_first_camera, truth).max() < 0.4
+
+
+def test_nothing_to_see_is_static_and_said_to_be_unknown():
+    found = follow(np.full((HEIGHT, WIDTH, 3), 90, np.uint8) for _ in range(10))
+    assert found.is_static
+    np.testing.assert_array_equal(found.R_first_camera, np.tile(np.eye(3), (10, 1, 1)))
+    assert follow(iter([])).R_first_camera.shape == (0, 3, 3)
+
+
+@pytest.mark.parametrize(("width", "height"), [(2000, 2), (2, 2000), (9000, 4), (1, 1)])
+def test_the_narrowest_pictures_tell_nothing(width, height):
+    camera = Camera(pinhole(width, height, 1000.0), np.zeros(5), "given")
+    tracker = BackgroundTracker(camera, width, height)
+    for k in range(3):
+        tracker.add(np.full((height, width, 3), 128, np.uint8), k / FPS, [])
+    assert tracker.motion(camera).is_static
+
+
+def test_a_moment_without_sight_is_bridged(panorama):
+    T = 60
+    truth = exp(np.linspace(0, 0.3, T)[:, None] * [0.0, 1.0, 0.0])
+
+    def picture(k):
+        return np.zeros((HEIGHT, WIDTH, 3), np.uint8) if k in (30, 31, 32) else view(panorama, truth[k])
+
+    found = follow(picture(k) for k in range(T))
+    assert not found.is_static
+    # what the camera did in the dark is lost, not more
+    lost = angle_deg(truth[28:29], truth[36:37])[0]
+    assert angle_deg(found.R_first_camera, truth).max() < lost + 0.4
+
+
+def test_most_directions_decide():
+    rng = np.random.default_rng(3)
+    a = rng.standard_normal((60, 3))
+    a /= np.linalg.norm(a, axis=1, keepdims=True)
+    R = exp([0.1, -0.3, 0.2])
+    b = a @ R.T
+    b[:24] = b[rng.permutation(24)]
+    found, agree = consensus_rotation(a, b, 1e-3, rng)
+    np.testing.assert_allclose(found, R, atol=1e-9)
+    assert agree[24:].all()

@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Turning without drift: edges of a hall seen by a camera whose turns are known, and a runner who runs straight on."""
+
+import numpy as np
+import pytest
+from scope.scope_addon.capture.camera.heading_drift import Look, without_drift
+from scope.scope_addon.capture.camera.intrinsics import Camera, pinhole
+from scope.scope_addon.capture.camera.line_segments import Segments
+from scope.scope_addon.capture.pipeline import CaptureOptions, capture
+from scope.solver import load_body
+from scope.solver.rotations import exp, log
+
+WIDTH, HEIGHT = 1280, 720
+CAMERA = Camera(pinhole(WIDTH, HEIGHT, 1100.0), np.zeros(5), "given")
+
+
+def edges(rng, directions, count=25):
+    """(n, 2, 3) ends of edges in space along each of the directions."""
+    starts = rng.uniform([-8, -3, 5], [14, 3, 12], (len(directions) * count, 3))
+    return np.stack([starts, starts + np.repeat(directions, count, axis=0) * rng.uniform(1, 4, (len(starts), 1))], 1)
+
+
+def seen(rng, ends, R_camera_hall, center, noise_px=0.5):
+    """The edges in a camera's picture, the longest first, with noise."""
+    points = (ends - center) @ R_camera_hall.T
+    points = points[(points[..., 2] > 1).all(axis=1)]
+    pixels = points @ CAMERA.intrinsics.T
+    pixels = pixels[..., :2] / pixels[..., 2:] + rng.normal(0, noise_px, points[..., :2].shape)
+    inside = ((pixels >= 0) & (pixels < [WIDTH, HEIGHT])).all(axis=(1, 2))
+    lengths = np.linalg.norm(pixels[inside, 1] - pixels[inside, 0], axis=1) / WIDTH
+    order = np.argsort(-lengths)
+    return Segments(pixels[inside][order], lengths[order])
+
+
+def run(clutter, directions=None):
+    """Errors in degrees before and after, of a camera that pans, travels, and is thought to turn more."""
+    rng = np.random.default_rng(3)
+    T = 150
+    times = np.arange(T) / 25
+    s = np.linspace(0, 1, T)[:, None]
+    hall = exp([0.05, 0.4, 0.02])
+    truth = exp(s * [0.02, 0.25, -0.01])  # R_first_camera
+    drifted = exp(s * [0.01, 0.4, 0.02]) @ truth
+    ends = edges(rng, np.eye(3) if directions is None else directions)
+    ends = np.concatenate([ends, edges(rng, rng.standard_normal((clutter, 3)), 1)]) if clutter else ends
+    looks = [
+        Look(k, seen(rng, ends, truth[k].T @ hall, np.array([4.0 * k / T, 0, 0]))) for k in (0, *range(12, T, 12))
+    ]
+    found = without_drift(drifted, times, looks, CAMERA, WIDTH, HEIGHT)
+    error = [np.degrees(np.linalg.norm(log(np.swapaxes(truth, 1, 2) @ R), axis=1)).max() for R in (drifted, found)]
+    np.testing.assert_allclose(found[0], np.eye(3), atol=1e-9)
+    return error, found, drifted
+
+
+@pytest.mark.parametrize("clutter", [0, 25])
+def test_edges_at_right_angles_take_the_drift_out(clutter):
+    (before, after), *_ = run(clutter)
+    assert before > 20
+    assert after < 1.6
+
+
+def test_edges_in_any_direction_change_nothing():
+    rng = np.random.default_rng(8)
+    _, found, drifted = run(0, directions=rng.standard_normal((75, 3)))
+    assert found is drifted
+
+
+def test_few_looks_change_nothing():
+    R = exp(np.linspace(0, 0.3, 10)[:, None] * [0, 1.0, 0])
+    times = np.arange(10) / 25
+    assert without_drift(R, times, [], CAMERA, WIDTH, HEIGHT) is R
+    none = [Look(k, Segments.none()) for k in (0, 4, 8)]
+    assert without_drift(R, times, none, CAMERA, WIDTH, HEIGHT) is R
+
+
+def test_a_runner_beside_whom_the_camera_runs_goes_straight_on(shared):
+    clip = shared / "data/clips/run_moving_camera.mp4"
+    motion = capture(clip, load_body("scope"), CaptureOptions(quality="fast")).motions[0]
+    facing = exp(motion.poses[:, :3].astype(float))[:, :2, 2]
+    angle = np.degrees(np.unwrap(np.arctan2(facing[:, 1], facing[:, 0])))
+    stride = np.ones(22) / 22  # two steps: the pelvis turns to and fro
+    assert np.ptp(np.convolve(angle, stride, "valid")) < 12
+    way = motion.trans[:, :2] - motion.trans[0, :2]
+    along = way[-1] / np.linalg.norm(way[-1])
+    across = way @ [-along[1], along[0]]
+    assert np.linalg.norm(way[-1]) > 3
+    assert np.abs(np.convolve(across, stride, "valid")).max() < 0.35

@@ -1,0 +1,45 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Intrinsics from every source, against the definitions of focal length and field of view."""
+
+import numpy as np
+import pytest
+from scope.scope_addon.capture.camera.camera_rotation import BackgroundTracker
+from scope.scope_addon.capture.camera.intrinsics import Camera, choose_camera, pinhole
+from scope.scope_addon.errors import UsageError
+
+
+def test_field_of_view_spans_the_longer_side():
+    for size in ((1920, 1080), (1080, 1920)):
+        K = choose_camera(*size, fov_deg=90).intrinsics
+        assert np.isclose(K[0, 0], 960)  # tan 45 degrees = half the longer side over f
+        assert np.allclose(K[:2, 2], np.array(size) / 2)
+
+
+def test_focal_mm_is_35_mm_equivalent():
+    assert np.isclose(choose_camera(1800, 1000, focal_mm=36).intrinsics[0, 0], 1800)
+
+
+def test_metadata_counts_only_without_the_users_word():
+    assert np.isclose(choose_camera(3600, 2000, metadata_focal_mm=26).intrinsics[0, 0], 2600)
+    assert np.isclose(choose_camera(3600, 2000, metadata_focal_mm=26, focal_mm=50).intrinsics[0, 0], 5000)
+    assert "assumed" in choose_camera(640, 480).source
+
+
+@pytest.mark.parametrize(
+    "options", [{"focal_mm": 26, "fov_deg": 60}, {"fov_deg": 0}, {"fov_deg": 180}, {"focal_mm": -1}]
+)
+def test_contradictory_or_impossible_values_are_refused(options):
+    with pytest.raises(UsageError):
+        choose_camera(640, 480, **options)
+
+
+def test_a_lens_that_distorts_before_a_black_picture_and_a_bare_wall():
+    """Neither has corners or edges: no points are undistorted to none, and nothing is said of how the camera turns."""
+    camera = Camera(pinhole(320, 240, 300.0), np.array([-0.2, 0.05, 0.0, 0.0, 0.0]), "calibration")
+    assert camera.rays(np.zeros((0, 2))).shape == (0, 3)
+    background = BackgroundTracker(camera, 320, 240)
+    for k, grey in enumerate((0, 0, 128, 128)):
+        background.add(np.full((240, 320, 3), grey, np.uint8), k / 10, [np.array([[100.0, 60.0], [160.0, 200.0]])])
+    motion = background.motion(camera)
+    assert motion.is_static
+    assert len(background.lines(motion, camera).lengths) == 0

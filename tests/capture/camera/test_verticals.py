@@ -1,0 +1,179 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Up by upright and level edges: drawn rooms whose camera is known, and real pictures whose true up is."""
+
+import cv2
+import numpy as np
+import pytest
+from scope.scope_addon.capture.camera.intrinsics import Camera, choose_camera, pinhole
+from scope.scope_addon.capture.camera.line_segments import Lines, Segments, find_segments
+from scope.scope_addon.capture.camera.verticals import told_by_lines
+from scope.scope_addon.capture.world.world_frame import upright
+from scope.solver.rotations import exp
+
+WIDTH, HEIGHT = 1280, 720
+K = pinhole(WIDTH, HEIGHT, 1100.0)
+CAMERA = Camera(K, np.zeros(5), "given")
+LEVEL_UP = np.array([0.0, -1.0, 0.0])
+
+
+def room(R_camera_level, posts=14, clutter=0, seed=0, across=10, tiles=0):
+    """A picture of posts, of level edges across it, of a tiled floor, and clutter, by a camera turned from level."""
+    rng = np.random.default_rng(seed)
+    picture = np.full((HEIGHT, WIDTH, 3), 120, np.uint8)
+
+    def line(a, b, colour):
+        ends = np.array([a, b]) @ R_camera_level.T
+        if (ends[:, 2] > 0.5).all():
+            pixels = ends @ K.T
+            pixels = np.round(pixels[:, :2] / pixels[:, 2:]).astype(int)
+            cv2.line(picture, tuple(map(int, pixels[0])), tuple(map(int, pixels[1])), colour, 3, cv2.LINE_AA)
+
+    for _ in range(posts):
+        x, z = rng.uniform(-4, 4), rng.uniform(4, 9)
+        line([x, -1.5, z], [x, 1.2, z], (30, 30, 30))
+    for _ in range(across):
+        y, z = rng.uniform(-1.5, 1.2), rng.uniform(4, 9)
+        line([-4, y, z], [4, y, z], (220, 220, 220))
+    for k in range(tiles):
+        x = 8 * (k + 0.5) / tiles
+        line([x - 4, 1.2, 3], [x - 4, 1.2, 9], (220, 220, 220))
+        line([-4, 1.2, x + 2], [4, 1.2, x + 2], (220, 220, 220))
+    for _ in range(clutter):
+        a = rng.uniform([-4, -1.5, 4], [4, 1.2, 9])
+        line(a, a + rng.uniform(-0.7, 0.7, 3), (60, 60, 200))
+    return picture
+
+
+def angle_deg(a, b):
+    return float(np.degrees(np.arccos(np.clip(a @ b, -1, 1))))
+
+
+@pytest.mark.parametrize("turn", [[0, 0, 0], [0.25, 0, 0.0], [-0.15, 0.3, 0.2], [0.3, -0.5, -0.25]])
+def test_posts_correct_a_body_that_leans(turn):
+    R = exp(turn)
+    truth = R @ LEVEL_UP
+    lines = find_segments(room(R, clutter=25), []).lines(CAMERA)
+    leaning = exp([0.12, 0.0, 0.15]) @ truth
+    found = told_by_lines(lines, leaning).up
+    assert angle_deg(leaning, truth) > 9
+    assert angle_deg(found, truth) < 1.0
+
+
+@pytest.mark.parametrize("turn", [[0, 0, 0], [0.25, 0, 0.0], [-0.1, 0.3, 0.2], [0.2, -0.5, -0.2]])
+def test_a_tiled_floor_tells_up_without_anything_upright(turn):
+    R = exp(turn)
+    truth = R @ LEVEL_UP
+    picture = room(R, posts=0, across=0, tiles=8, clutter=10)
+    leaning = exp([0.12, 0.0, 0.15]) @ truth
+    assert angle_deg(told_by_lines(find_segments(picture, []).lines(CAMERA), leaning).up, truth) < 1.0
+
+
+def test_a_body_that_leans_by_thirty_degrees_is_corrected():
+    """As bodies seem to before a camera that looks down steeply."""
+    truth = LEVEL_UP
+    lines = find_segments(room(np.eye(3), tiles=4), []).lines(CAMERA)
+    assert angle_deg(told_by_lines(lines, exp([np.radians(30), 0.0, 0.0]) @ truth).up, truth) < 1.0
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_ramp_beside_a_floor_leaves_open_which_is_level(seed):
+    """Edges across both, and as many along the one as along the other: either alone tells, both together do not."""
+    rng = np.random.default_rng(seed)
+    up_of = {"floor": LEVEL_UP, "ramp": exp([np.radians(16), 0, 0]) @ LEVEL_UP}
+    R = exp([0.0, 0.5, 0.0])
+    between = exp([np.radians(8), 0, 0]) @ LEVEL_UP
+
+    def edges(direction, count):
+        through = np.stack([rng.uniform(-0.5, 0.5, count), rng.uniform(-0.3, 0.3, count), np.ones(count)], axis=1)
+        normals = np.cross(through, direction)
+        return normals / np.linalg.norm(normals, axis=1, keepdims=True)
+
+    across = edges(R @ [1.0, 0, 0], 16)
+    along = {name: edges(R @ np.cross(up, [1.0, 0, 0]), 16) for name, up in up_of.items()}
+    for name, up in up_of.items():
+        normals = np.concatenate([across, along[name]])
+        assert angle_deg(told_by_lines(Lines(normals, np.full(len(normals), 0.1)), R @ between).up, R @ up) < 1.0
+    normals = np.concatenate([across, *along.values()])
+    assert told_by_lines(Lines(normals, np.full(len(normals), 0.1)), R @ between).up is None
+
+
+@pytest.mark.parametrize("turn", [[0, 0, 0.12], [-0.1, 0.1, -0.1]])
+def test_a_fence_tells_what_is_level_though_not_what_is_up(turn):
+    R = exp(turn)
+    lines = find_segments(room(R, posts=0, clutter=10), []).lines(CAMERA)
+    leaning = exp([0.1, 0.0, 0.15]) @ R @ LEVEL_UP
+    assert told_by_lines(lines, leaning).up is None
+    assert abs(90 - angle_deg(told_by_lines(lines, leaning).level, R @ LEVEL_UP)) < 0.5
+    feet = np.zeros((5, 4, 3))
+    off_deg = angle_deg(upright(leaning, feet, lines), R @ LEVEL_UP)
+    assert off_deg < 0.8 * angle_deg(leaning, R @ LEVEL_UP)
+    assert off_deg == pytest.approx(np.degrees(0.1), abs=1.2)  # the pitch, which no edge tells, stays
+
+
+def test_a_banister_is_not_level():
+    R = exp([0.0, 0.0, 0.5])  # of the edges, not of the camera
+    assert told_by_lines(find_segments(room(R, posts=0), []).lines(CAMERA), LEVEL_UP).level is None
+
+
+def test_few_posts_are_believed_where_level_edges_agree():
+    R = exp([0.2, 0.1, 0.1])
+    lines = find_segments(room(R, posts=3, across=12, tiles=4), []).lines(CAMERA)
+    truth = R @ LEVEL_UP
+    assert angle_deg(told_by_lines(lines, exp([0.15, 0.0, 0.1]) @ truth).up, truth) < 1.0
+
+
+@pytest.mark.parametrize("count", [12, 60, 200])
+@pytest.mark.parametrize("seed", range(4))
+def test_lines_at_random_say_nothing(count, seed):
+    rng = np.random.default_rng(seed)
+    middle, angle = rng.uniform([0, 0], [WIDTH, HEIGHT], (count, 2)), rng.uniform(0, np.pi, count)
+    lengths = np.sort(0.03 + rng.exponential(0.08, count))[::-1]
+    half = 0.5 * WIDTH * lengths[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    lines = Segments(np.stack([middle - half, middle + half], axis=1), lengths).lines(CAMERA)
+    assert told_by_lines(lines, LEVEL_UP).up is None
+    assert told_by_lines(lines, LEVEL_UP).level is None
+
+
+def test_a_picture_without_anything_upright_says_nothing():
+    assert told_by_lines(Lines.none(), LEVEL_UP).up is None
+    blank = np.full((HEIGHT, WIDTH, 3), 90, np.uint8)
+    assert told_by_lines(find_segments(blank, []).lines(CAMERA), LEVEL_UP).up is None
+    level_edges_alone = room(np.eye(3), posts=0)
+    assert told_by_lines(find_segments(level_edges_alone, []).lines(CAMERA), LEVEL_UP).up is None
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_leaves_and_rubbish_do_not_turn_the_world(seed):
+    rubbish = room(np.eye(3), posts=0, clutter=60, seed=seed)
+    found = told_by_lines(find_segments(rubbish, []).lines(CAMERA), LEVEL_UP).up
+    assert found is None or angle_deg(found, LEVEL_UP) < 2.0
+
+
+def test_the_lines_of_people_do_not_count():
+    picture = room(np.eye(3), posts=0)
+    for k in range(12):
+        cv2.line(picture, (600 + 8 * k, 200), (500 + 8 * k, 520), (0, 0, 0), 3)  # somebody's striped coat
+    box = np.array([[480.0, 190.0], [700.0, 530.0]])
+    assert len(find_segments(picture, []).lengths) > len(find_segments(picture, [box]).lengths) + 5
+
+
+def test_lines_turn_with_their_axes():
+    R = exp([0.1, 0.4, -0.2])
+    lines = find_segments(room(np.eye(3)), []).lines(CAMERA)
+    turned = told_by_lines(lines.turned(R), R @ LEVEL_UP).up
+    np.testing.assert_allclose(turned, R @ told_by_lines(lines, LEVEL_UP).up, atol=1e-6)
+
+
+@pytest.mark.parametrize("number", [1, 2, 3, 4])
+def test_real_cameras_that_are_rolled_and_pitched(shared, number):
+    """Four pictures of a laboratory; their truth says which way is up."""
+    folder = shared / "data" / "pose2sim"
+    ok, picture = cv2.VideoCapture(str(folder / f"cam{number}.mp4")).read()
+    assert ok
+    truth = np.load(folder / f"truth_cam{number}.npz")["up"]
+    camera = choose_camera(picture.shape[1], picture.shape[0])  # the focal length is not known
+    lines = find_segments(cv2.cvtColor(picture, cv2.COLOR_BGR2RGB), []).lines(camera)
+    rng = np.random.default_rng(number)
+    for _ in range(3):
+        leaning = exp(np.radians(7) * rng.standard_normal(3)) @ truth
+        assert angle_deg(told_by_lines(lines, leaning).up, truth) < 2.0

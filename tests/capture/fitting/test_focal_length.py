@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The focal length by edges: drawn boxes seen by a known camera, and real pictures whose calibration is known."""
+
+import json
+
+import cv2
+import numpy as np
+import pytest
+from scope.scope_addon.capture.camera.intrinsics import choose_camera, pinhole
+from scope.scope_addon.capture.camera.line_segments import Segments, find_segments
+from scope.scope_addon.capture.camera.manhattan import Edges
+from scope.scope_addon.capture.fitting.focal_length import focal_from_edges
+from scope.solver.rotations import exp
+
+WIDTH, HEIGHT = 1280, 720
+ASSUMED = choose_camera(WIDTH, HEIGHT).intrinsics[0, 0]
+
+
+def room(focal_px, R_camera_room, clutter=20, seed=0):
+    """A picture of edges along three directions at right angles, with clutter in any direction."""
+    rng = np.random.default_rng(seed)
+    K = pinhole(WIDTH, HEIGHT, focal_px)
+    picture = np.full((HEIGHT, WIDTH, 3), 120, np.uint8)
+
+    def line(a, b, colour):
+        ends = np.array([a, b]) @ R_camera_room.T + [0, 0, 7.0]
+        if (ends[:, 2] > 0.5).all():
+            pixels = ends @ K.T
+            pixels = np.round(pixels[:, :2] / pixels[:, 2:]).astype(int)
+            cv2.line(picture, tuple(map(int, pixels[0])), tuple(map(int, pixels[1])), colour, 3, cv2.LINE_AA)
+
+    for axis in range(3):
+        for _ in range(14):
+            a = rng.uniform([-3, -1.5, -3], [3, 1.5, 3])
+            b = a.copy()
+            b[axis] += rng.uniform(1.0, 3.0)
+            line(a, b, (30, 30, 30))
+    for _ in range(clutter):
+        a = rng.uniform([-3, -1.5, -3], [3, 1.5, 3])
+        line(a, a + rng.uniform(-0.7, 0.7, 3), (60, 60, 200))
+    return picture
+
+
+def found(picture):
+    return focal_from_edges(find_segments(picture, []), WIDTH, HEIGHT, ASSUMED)
+
+
+@pytest.mark.parametrize("ratio", [0.7, 1.0, 1.4])
+@pytest.mark.parametrize("turn", [[0.1, 0.6, 0.0], [-0.15, -0.5, 0.1]])
+def test_a_room_seen_across_its_corner_tells_the_focal_length(ratio, turn):
+    R = exp([turn[0], 0, 0]) @ exp([0, 0, turn[2]]) @ exp([0, turn[1], 0])
+    estimate = found(room(ratio * ASSUMED, R))
+    assert estimate.focal_px == pytest.approx(ratio * ASSUMED, rel=0.05)
+    assert abs(np.log(estimate.focal_px / (ratio * ASSUMED))) < 3 * estimate.deviation + 0.01
+
+
+def test_a_wall_seen_straight_on_tells_nothing():
+    wall = np.full((HEIGHT, WIDTH, 3), 120, np.uint8)
+    for k in range(12):
+        cv2.line(wall, (60 + 100 * k, 80), (60 + 100 * k, 640), (30, 30, 30), 3)
+        cv2.line(wall, (60, 80 + 50 * k), (1200, 80 + 50 * k), (220, 220, 220), 3)
+    assert found(wall) is None
+
+
+@pytest.mark.parametrize("ratio", [0.5, 1.0, 2.0])
+def test_level_edges_count_at_every_focal_length_where_none_is_upright(ratio):
+    """Else a focal length at which two edges happen to meet straight above would have nothing to compare with."""
+    floor = np.full((HEIGHT, WIDTH, 3), 120, np.uint8)
+    for y in (380, 400, 470, 690):
+        cv2.line(floor, (40, y), (1240, y), (30, 30, 30), 3)
+    for side in (-1, 1):  # a mat's, which meet at the horizon
+        cv2.line(floor, (640 + side * 260, 470), (640 + side * 640, 690), (220, 220, 220), 3, cv2.LINE_AA)
+    edges = Edges.of(find_segments(floor, []), WIDTH, HEIGHT)
+    level = np.abs(edges.along[:, 1]) < 0.01
+    assert level.sum() >= 4
+    assert edges.support(ratio * ASSUMED) > 0.95 * edges.weight[level].sum()
+
+
+def test_nothing_and_rubbish_tell_nothing_far_from_what_was_assumed():
+    assert focal_from_edges(Segments.none(), WIDTH, HEIGHT, ASSUMED) is None
+    assert found(np.full((HEIGHT, WIDTH, 3), 90, np.uint8)) is None
+    rng = np.random.default_rng(4)
+    scribble = np.full((HEIGHT, WIDTH, 3), 120, np.uint8)
+    for _ in range(80):
+        a = rng.uniform([50, 50], [1200, 650])
+        b = a + rng.uniform(-150, 150, 2)
+        cv2.line(scribble, tuple(map(int, a)), tuple(map(int, b)), (30, 30, 30), 3, cv2.LINE_AA)
+    estimate = found(scribble)
+    assert estimate is None or abs(np.log(estimate.focal_px / ASSUMED)) < 0.3
+
+
+@pytest.mark.parametrize("number", [1, 2, 3, 4])
+def test_real_cameras(shared, number):
+    """Four pictures of a laboratory; one of them shows too few edges across, which must not be taken for knowledge."""
+    folder = shared / "data" / "pose2sim"
+    ok, picture = cv2.VideoCapture(str(folder / f"cam{number}.mp4")).read()
+    assert ok
+    height, width = picture.shape[:2]
+    truth = json.loads((folder / f"calibration_cam{number}.json").read_text())["intrinsics"][0][0]
+    assumed = 1.2 * truth  # so that what was assumed is no help
+    estimate = focal_from_edges(find_segments(cv2.cvtColor(picture, cv2.COLOR_BGR2RGB), []), width, height, assumed)
+    if number == 4:
+        assert estimate is None
+    else:
+        assert estimate.focal_px == pytest.approx(truth, rel=0.04)

@@ -1,0 +1,108 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The body in single frames, on our own clip with exact truth."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+import pytest
+from scope.scope_addon.capture.camera.intrinsics import choose_camera
+from scope.scope_addon.capture.fitting import background_estimators
+from scope.scope_addon.capture.fitting.live_body import LiveBody
+from scope.scope_addon.capture.overlay.overlay_video import draw_overlay
+from scope.scope_addon.capture.pipeline import CaptureOptions, capture
+from scope.scope_addon.cli import SAMPLE
+from scope.scope_addon.errors import CancelledError
+from scope.solver.loaders.body_file import load_body
+
+LIMBS = [1, 2, 4, 5, 7, 8, 16, 17, 18, 19, 20, 21]
+
+
+@pytest.fixture(scope="module")
+def watched(body):
+    """The sample's capture, and the live pose of every tenth frame: (frame index, picture, pose)."""
+    seen = []
+
+    def watch(frame, observation, live):
+        if frame.index % 10 == 0 and observation is not None:
+            seen.append((frame.index, frame.image_rgb, live.fit(observation)))
+
+    return capture(SAMPLE, body, CaptureOptions(quality="fast"), watch=watch), seen
+
+
+def silhouette(image, vertices, body, camera) -> np.ndarray:
+    black = np.zeros_like(image)
+    white = np.ones((len(body.faces), 3))
+    drawn = draw_overlay(black, vertices, body.faces, camera.intrinsics, camera.dist, white, 1.0)
+    return drawn.max(axis=2) > 60
+
+
+def test_the_body_lies_where_the_truth_has_it(watched, body):
+    truth = np.load(SAMPLE.with_name("sample_truth.npz"))
+    _, seen = watched
+    assert len(seen) >= 5
+    for index, image, pose in seen:
+        joints = truth["joints_cam"][index]
+        pixels = joints @ truth["intrinsics"].T
+        pixels = np.round(pixels[:, :2] / pixels[:, 2:]).astype(int)[LIMBS]
+        drawn = silhouette(image, pose.vertices_cam, body, pose.camera)
+        assert 0.005 < drawn.mean() < 0.5
+        near = [drawn[max(v - 8, 0) : v + 9, max(u - 8, 0) : u + 9].any() for u, v in pixels]
+        assert np.mean(near) > 0.9, index
+
+
+def test_watching_changes_nothing(watched, body):
+    alone = capture(SAMPLE, body, CaptureOptions(quality="fast")).motions[0]
+    for name in ("poses", "trans", "betas", "joints_cam"):
+        np.testing.assert_array_equal(getattr(alone, name), getattr(watched[0].motions[0], name))
+
+
+def test_the_result_does_not_depend_on_how_fast_the_threads_are(watched, body, monkeypatch):
+    class Slow(LiveBody):
+        def load(self):
+            time.sleep(0.5)
+            super().load()
+
+    focal = background_estimators.camera_by_edges
+
+    def slow_focal(*arguments):
+        time.sleep(0.5)
+        return focal(*arguments)
+
+    monkeypatch.setattr("scope.scope_addon.capture.pipeline.LiveBody", Slow)
+    monkeypatch.setattr(background_estimators, "camera_by_edges", slow_focal)
+    slowly = capture(SAMPLE, body, CaptureOptions(quality="fast")).motions[0]
+    for name in ("poses", "trans", "betas", "joints_cam", "intrinsics"):
+        np.testing.assert_array_equal(getattr(slowly, name), getattr(watched[0].motions[0], name))
+
+
+def test_a_failure_beside_is_not_lost(body, monkeypatch):
+    def broken(*_):
+        raise ValueError("no edges today")
+
+    monkeypatch.setattr(background_estimators, "camera_by_edges", broken)
+    with pytest.raises(ValueError, match="no edges today"):
+        capture(SAMPLE, body, CaptureOptions(quality="fast"))
+
+
+@pytest.mark.parametrize("name", ["scope", "scope_h"])
+def test_a_body_is_ready_once_it_is_loaded(name):
+    live = LiveBody(load_body(name), choose_camera(640, 480))
+    assert not live.is_ready
+    live.load()
+    assert live.is_ready
+
+
+def test_an_observation_that_is_not_finite_gives_no_body(body, watched):
+    seen = []
+
+    def watch(frame, observation, live):
+        if not seen and observation is not None:
+            observation.keypoints_px[5] = np.nan
+            seen.append(live.fit(observation))
+            raise CancelledError("enough")
+
+    with pytest.raises(CancelledError):
+        capture(SAMPLE, body, CaptureOptions(quality="fast"), watch=watch)
+    assert seen == [None]

@@ -1,0 +1,208 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Both fits of a track work from one preparation."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from scope.scope_addon.capture.camera.intrinsics import choose_camera
+from scope.scope_addon.capture.fitting import track_fit
+from scope.scope_addon.capture.fitting.keypoint_offsets import as_seen
+from scope.scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES
+from scope.scope_addon.capture.perception.lifter import Lifted, Lifter
+from scope.scope_addon.capture.tracking.track import Track
+from scope.scope_addon.capture.world.placement import place_track
+from scope.solver import State, load_body
+from scope.solver.rotations import exp
+
+FRAMES = 4
+FEET = np.array([1.0, 1.0, 1.0, 1.0, 0.0, 0.0])  # stand, and hands do not
+
+
+def _standing_track(body, camera, bent=()) -> Track:
+    """A person in the rest pose, but for ``bent`` (joint, radians about x), upright, 4 m in front of the camera."""
+    flip = np.diag([1.0, -1.0, -1.0])  # body y up, OpenCV y down
+    rotations = np.tile(np.eye(3), (1, body.K + 1, 1, 1))
+    rotations[:, 0] = flip
+    for joint, angle in bent:
+        rotations[:, body.joint_names.index(joint)] = exp(np.array([angle, 0.0, 0.0]))
+    R, t = body.forward_kinematics(rotations, np.array([[0.0, 0.0, 4.0]]), np.zeros(body.P))
+    at = body.keypoint_set("blazepose")
+    points = as_seen(body).keypoints(R, t, np.zeros(body.P))[0, [at[name] for name in KEYPOINT_NAMES]]
+    pixels = points[:, :2] / points[:, 2:] * camera.intrinsics[0, 0] + camera.intrinsics[:2, 2]
+    hips = [KEYPOINT_NAMES.index(f"{side}_hip") for side in ("left", "right")]
+    J = len(KEYPOINT_NAMES)
+    return Track(
+        frames=np.arange(FRAMES),
+        times=np.arange(FRAMES) / 30.0,
+        keypoints_px=np.tile(pixels, (FRAMES, 1, 1)),
+        confidence=np.ones((FRAMES, J)),
+        world_landmarks=np.tile(points - points[hips].mean(0), (FRAMES, 1, 1)),
+        seen=np.ones(FRAMES, bool),
+        acquired=np.arange(FRAMES) == 0,
+    )
+
+
+def _stance(fit: track_fit.FittedTrack, contact: float = 0.0, floor_m: float = 0.0) -> track_fit.Stance:
+    """The pelvis where it was fitted; feet that stand so surely on a level floor so far below the camera."""
+    return track_fit.Stance(
+        root_cam=fit.t_camera_root,
+        turn=np.tile(np.eye(3), (FRAMES, 1, 1)),
+        floor_normal=np.tile([0.0, -1.0, 0.0], (FRAMES, 1)),
+        floor_offset=np.full(FRAMES, -floor_m),
+        contact=np.full((FRAMES, 6), contact) * FEET,
+    )
+
+
+def test_the_lifting_network_runs_once_for_both_fits(monkeypatch):
+    body, camera = load_body("scope"), choose_camera(1080, 1920)
+    track = _standing_track(body, camera)
+    lifts = []
+
+    lift_both_ways = Lifter.lift_both_ways
+
+    def counted(self, *arguments):
+        lifts.append(1)
+        return lift_both_ways(self, *arguments)
+
+    monkeypatch.setattr(Lifter, "lift_both_ways", counted)
+    prepared = track_fit.prepare_track(body, track, camera)
+    first = track_fit.fit_track(prepared, lambda *_: None)
+    second = track_fit.refit_track(prepared, first, _stance(first), lambda *_: None)
+    assert len(lifts) == 1
+    np.testing.assert_array_equal(second.betas, first.betas)
+    placed = place_track(body, track, second, smoothing=False)
+    np.testing.assert_allclose(placed.joints[:, 0], second.t_camera_root, atol=1e-9)
+    assert abs(placed.joints[:, 0, 2].mean() - 4.0) < 0.6  # metres; one view tells the distance by the body's size
+
+
+def test_who_is_nearer_than_it_seemed_is_smaller():
+    """A floor that others stand on tells the distance, and with it the size: the picture stays the same."""
+    body, camera = load_body("scope"), choose_camera(1080, 1920)
+    prepared = track_fit.prepare_track(body, _standing_track(body, camera), camera)
+    first = track_fit.fit_track(prepared, lambda *_: None)
+
+    def leg(fit):
+        J = body.rest_joints(fit.betas)
+        return np.linalg.norm(J[body.joint_names.index("left_hip")] - J[body.joint_names.index("left_ankle")])
+
+    for nearer in (0.85, 1.1):
+        stance = replace(_stance(first), root_cam=nearer * first.t_camera_root)
+        second = track_fit.refit_track(prepared, first, stance, lambda *_: None)
+        moved = second.t_camera_root[:, 2].mean() / first.t_camera_root[:, 2].mean()
+        assert abs(moved / nearer - 1) < 0.05
+        assert abs(leg(second) / leg(first) / moved - 1) < 0.03
+
+
+def test_a_limb_goes_where_it_is_seen_to_go_for_sure_and_was_there_before():
+    """A leg before the body looks as one behind it, and the first frames are believed to show the wrong one."""
+    body, camera = load_body("scope"), choose_camera(1080, 1920)
+    track = _standing_track(body, camera, (("right_hip", 0.3), ("right_knee", 0.9)))
+    prepared = track_fit.prepare_track(body, track, camera)
+    leg = [KEYPOINT_NAMES.index(f"right_{name}") for name in ("knee", "ankle", "heel", "foot_index")]
+    hip = KEYPOINT_NAMES.index("right_hip")
+    truth, sigma = track.world_landmarks.copy(), np.full((FRAMES, len(KEYPOINT_NAMES)), 0.1)
+    lifted = truth.copy()
+    lifted[:2, leg, 2] = 2 * truth[:2, hip, None, 2] - truth[:2, leg, 2]  # the leg's mirror image in depth
+    sigma[:2, leg] = 0.25
+    prepared = replace(prepared, lifted=Lifted(lifted, sigma, sigma))
+
+    first = track_fit.fit_track(prepared, lambda *_: None)
+    for fit in (first, track_fit.refit_track(prepared, first, _stance(first), lambda *_: None)):
+        joints = place_track(body, track, fit, smoothing=False).joints
+        for joint in ("knee", "ankle"):
+            k, at_hip = (body.joint_names.index(f"right_{name}") for name in (joint, "hip"))
+            i = KEYPOINT_NAMES.index(f"right_{joint}")
+            there = truth[:, i, 2] - truth[:, hip, 2]
+            np.testing.assert_allclose(joints[:, k, 2] - joints[:, at_hip, 2], there, atol=0.2)
+
+
+def test_a_frame_is_turned_as_the_one_before_was():
+    rng = np.random.default_rng(0)
+    body = load_body("scope")
+
+    def state() -> State:
+        return State(
+            exp(rng.standard_normal(3)), rng.standard_normal(3), exp(rng.standard_normal((body.K, 3))), np.zeros(body.P)
+        )
+
+    before, now, after = state(), state(), state()
+    same = track_fit.turned_alike(now, before, before)
+    np.testing.assert_allclose(same.Omega, now.Omega, atol=1e-12)
+    there = track_fit.turned_alike(before, before, after)
+    np.testing.assert_allclose(there.Omega, after.Omega, atol=1e-12)
+    np.testing.assert_allclose(there.R_camera_root, after.R_camera_root, atol=1e-12)
+    np.testing.assert_array_equal(there.t_camera_root, before.t_camera_root)
+    turned = track_fit.turned_alike(now, before, after)  # by the same rotation, in the parent's axes
+    by = turned.Omega @ np.swapaxes(now.Omega, 1, 2)
+    np.testing.assert_allclose(by, after.Omega @ np.swapaxes(before.Omega, 1, 2), atol=1e-12)
+
+
+def test_of_two_ways_to_bend_a_leg_frames_go_on_with_that_of_the_frame_before():
+    """All first fits have it on the wrong side; the first frame is then told better, the others nothing of depth."""
+    body, camera = load_body("scope"), choose_camera(1080, 1920)
+    track = _standing_track(body, camera, (("right_hip", 0.3), ("right_knee", 0.9)))
+    prepared = track_fit.prepare_track(body, track, camera)
+    leg = [KEYPOINT_NAMES.index(f"right_{name}") for name in ("knee", "ankle", "heel", "foot_index")]
+    hip, ankle = (KEYPOINT_NAMES.index(f"right_{name}") for name in ("hip", "ankle"))
+    truth, sure = track.world_landmarks, np.full((FRAMES, len(KEYPOINT_NAMES)), 0.1)
+    mirrored = truth.copy()
+    mirrored[:, leg, 2] = 2 * truth[:, hip, None, 2] - truth[:, leg, 2]
+    first = track_fit.fit_track(replace(prepared, lifted=Lifted(mirrored, sure, sure)), lambda *_: None)
+    sigma = sure.copy()
+    sigma[1:, leg] = 3.0
+    second = track_fit.refit_track(
+        replace(prepared, lifted=Lifted(truth, sigma, sigma)), first, _stance(first), lambda *_: None
+    )
+
+    def ahead(fit):
+        joints = place_track(body, track, fit, smoothing=False).joints
+        at_ankle, at_hip = (body.joint_names.index(f"right_{name}") for name in ("ankle", "hip"))
+        return joints[:, at_ankle, 2] - joints[:, at_hip, 2]
+
+    there = truth[0, ankle, 2] - truth[0, hip, 2]
+    assert abs(there) > 0.2
+    assert (np.sign(ahead(first)) == -np.sign(there)).all()
+    np.testing.assert_allclose(ahead(second), there, atol=0.2)
+
+
+def test_a_leg_at_a_wrong_depth_is_drawn_to_the_floor_where_it_stands_and_only_there():
+    """Seen from above, a foot that was lifted too near hangs in the air; the picture alone does not tell."""
+    body, camera = load_body("scope"), choose_camera(1080, 1920)
+    down = exp(np.array([0.35, 0.0, 0.0]))  # the camera looks down on the person
+    level = _standing_track(body, camera)
+    points = level.world_landmarks[0] + [0.0, 0.0, 4.0]
+    points = (points - [0.0, 0.0, 4.0]) @ down.T + [0.0, 0.0, 4.0]
+    pixels = points[:, :2] / points[:, 2:] * camera.intrinsics[0, 0] + camera.intrinsics[:2, 2]
+    world = points - [0.0, 0.0, 4.0]
+    track = replace(
+        level,
+        keypoints_px=np.tile(pixels, (FRAMES, 1, 1)),
+        world_landmarks=np.tile(world, (FRAMES, 1, 1)),
+    )
+    up = down @ [0.0, -1.0, 0.0]
+    prepared = track_fit.prepare_track(body, track, camera)
+    leg = [KEYPOINT_NAMES.index(f"right_{name}") for name in ("knee", "ankle", "heel", "foot_index")]
+    lifted, sigma = track.world_landmarks.copy(), np.full((FRAMES, len(KEYPOINT_NAMES)), 0.1)
+    good = track_fit.fit_track(replace(prepared, lifted=Lifted(lifted.copy(), sigma, sigma)), lambda *_: None)
+    floor_m = (place_track(body, track, good, smoothing=False).soles @ up).min(axis=1)
+    lifted[:, leg, 2] -= [0.15, 0.3, 0.3, 0.3]
+    prepared = replace(prepared, lifted=Lifted(lifted, sigma, sigma))
+    first = track_fit.fit_track(prepared, lambda *_: None)
+
+    def heights(fit):
+        return (place_track(body, track, fit, smoothing=False).soles @ up - floor_m[:, None])[:, 2:]
+
+    assert heights(first).min() > 0.05
+    stance = replace(_stance(good), floor_normal=np.tile(up, (FRAMES, 1)), floor_offset=floor_m)
+    free = track_fit.refit_track(prepared, first, stance, lambda *_: None)
+    assert heights(free).min() > 0.05
+    standing = replace(stance, contact=np.full((FRAMES, 6), 0.9) * FEET)
+    held = track_fit.refit_track(prepared, first, standing, lambda *_: None)
+    assert np.abs(heights(held)).max() < 0.025
+    placed, true = (place_track(body, track, fit, smoothing=False).joints for fit in (held, good))
+    ankle = body.joint_names.index("right_ankle")
+    before = place_track(body, track, first, smoothing=False).joints
+    wrong = np.abs(before - true)[:, ankle, 2]
+    assert (np.abs(placed - true)[:, ankle, 2] < 0.6 * wrong).all()

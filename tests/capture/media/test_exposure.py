@@ -1,0 +1,61 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Dark frames are brightened, without flicker, and others left alone; a man in the dark is captured."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from scope.scope_addon.capture.media.exposure import BRIGHT, MOST_GAIN, Exposure
+from scope.scope_addon.capture.pipeline import CaptureOptions, capture
+from scope.scope_addon.errors import SetupError
+from scope.solver import Body
+
+
+def picture(level: float) -> np.ndarray:
+    """Grey slopes up to ``level``."""
+    return np.repeat(np.linspace(0, level, 320)[None, :, None], 180, axis=0).repeat(3, axis=2).round().astype(np.uint8)
+
+
+@pytest.mark.parametrize("level", [10, 25, 60, 100])
+def test_brightest_places_become_bright(level: int) -> None:
+    found = Exposure().brightened(picture(level))
+    gain = min(BRIGHT / (0.98 * level), MOST_GAIN)
+    assert np.percentile(found, 98) == pytest.approx(0.98 * level * gain, rel=0.15)
+    shown = np.abs(found.astype(float) - picture(level) * gain)
+    assert shown.max() < 0.1 * BRIGHT
+
+
+@pytest.mark.parametrize("level", [0, 3, 130, 255])
+def test_black_and_bright_ones_stay(level: int) -> None:
+    frame = picture(level)
+    assert Exposure().brightened(frame) is frame
+
+
+def test_brightness_does_not_flicker() -> None:
+    exposure = Exposure()
+    levels = [40 + 8 * (k % 2) for k in range(40)]
+    gains = [float(exposure.brightened(picture(level))[:, -1].mean()) / level for level in levels]
+    assert np.abs(np.diff(np.log(gains[20:]))).max() < 0.05
+    assert exposure.brightened(picture(200)).max() <= 201  # the light is switched on
+
+
+def test_a_man_in_the_dark_is_captured(shared: Path, body: Body, tmp_path: Path) -> None:
+    """At 6 % of the light, of which nothing was seen before."""
+    clip = tmp_path / "dark.mp4"
+    writer = cv2.VideoWriter(str(clip), cv2.VideoWriter.fourcc(*"mp4v"), 15, (540, 960))
+    video = cv2.VideoCapture(str(shared / "data" / "pose2sim" / "cam2.mp4"))
+    for k in range(40):
+        frame = video.read()[1]
+        if k % 4 == 0:
+            small = cv2.resize(frame, (540, 960), interpolation=cv2.INTER_AREA)
+            writer.write((0.06 * small).astype(np.uint8))
+    writer.release()
+    try:
+        (motion,) = capture(clip, body, CaptureOptions(quality="fast")).motions
+    except SetupError as error:
+        pytest.skip(f"the networks are not built: {error}")
+    assert motion.valid.all()
+    assert motion.residual_px.mean() < 6

@@ -1,0 +1,167 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Pictures of phones: in one piece and in tiles, turned as they say, with their focal length, damaged, and hostile."""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scope.scope_addon.capture.media.frame_readers import decode_items
+from scope.scope_addon.capture.media.heif import assemble, read_layout
+from scope.scope_addon.capture.media.still_images import read_picture
+from scope.scope_addon.capture.media.video import open_video
+from scope.scope_addon.capture.media.video_range import VideoRange
+from scope.scope_addon.errors import VideoError
+
+from ..heif_files import heic
+
+W, H = 150, 100
+
+
+def slopes(width: int = W, height: int = H) -> np.ndarray:
+    """A picture that looks different whichever way it is turned."""
+    y, x = np.mgrid[:height, :width]
+    return np.stack([255 * x / width, 255 * y / height, 90 + 0 * x], axis=-1).astype(np.uint8)
+
+
+def read(path: Path, data: bytes) -> np.ndarray:
+    path.write_bytes(data)
+    with open_video(path) as video:
+        (frame,) = video
+    assert video.frame_count == 1
+    return frame.image_rgb.astype(int)
+
+
+@pytest.mark.parametrize("tile", [None, 64])
+@pytest.mark.parametrize("name", ["IMG_0001.HEIC", "a.jpg"])
+def test_pieces_become_the_picture(tmp_path: Path, tile: int | None, name: str) -> None:
+    found = read(tmp_path / name, heic(slopes(), tile))
+    assert found.shape == (H, W, 3)
+    assert np.abs(found - slopes()).mean() < 3
+
+
+@pytest.mark.parametrize("tile", [None, 64])
+@pytest.mark.parametrize(
+    ("turns", "expected"),
+    [
+        ([("irot", 1)], lambda a: a.transpose(1, 0, 2)[::-1]),  # a quarter turn anticlockwise: right becomes top
+        ([("irot", 2)], lambda a: a[::-1, ::-1]),
+        ([("irot", 3)], lambda a: a[::-1].transpose(1, 0, 2)),
+        ([("imir", 0)], lambda a: a[::-1]),
+        ([("imir", 1)], lambda a: a[:, ::-1]),
+        ([("imir", 1), ("irot", 1)], lambda a: a[:, ::-1].transpose(1, 0, 2)[::-1]),
+    ],
+    ids=str,
+)
+def test_turned_as_the_file_says(tmp_path: Path, turns: list, expected, tile: int | None) -> None:
+    found = read(tmp_path / "a.heic", heic(slopes(), tile, turns))
+    wanted = expected(slopes().astype(int))
+    assert found.shape == wanted.shape
+    assert np.abs(found - wanted).mean() < 3
+
+
+def test_the_focal_length_is_read(tmp_path: Path) -> None:
+    (tmp_path / "a.heic").write_bytes(heic(slopes(), 64, focal_mm=26))
+    with open_video(tmp_path / "a.heic") as video:
+        assert video.focal_35mm == 26
+
+
+def test_numbered_ones_are_a_sequence(tmp_path: Path) -> None:
+    for k in (1, 2):
+        (tmp_path / f"IMG_{k}.HEIC").write_bytes(heic(np.full((64, 64, 3), 60 * k, np.uint8)))
+    with open_video(tmp_path, VideoRange(fps=Fraction(10))) as video:
+        assert [int(frame.image_rgb.mean()) for frame in video] == pytest.approx([60, 120], abs=4)
+
+
+@pytest.mark.parametrize(
+    "grid",
+    [
+        struct.pack(">BBBBHH", 0, 0, 1, 2, 193, 129),  # larger than its tiles
+        struct.pack(">BBBBHH", 0, 0, 0, 2, W, H),  # fewer of them than there are
+        struct.pack(">BBBBHH", 0, 0, 255, 255, W, H),
+        struct.pack(">BBBBII", 0, 1, 1, 2, 1 << 31, 1 << 31),
+        struct.pack(">BBBBHH", 0, 0, 1, 2, 0, 0),
+        b"\0",
+    ],
+)
+def test_a_grid_that_cannot_be_is_refused(tmp_path: Path, grid: bytes) -> None:
+    (tmp_path / "a.heic").write_bytes(heic(slopes(), 64, grid=grid))
+    with pytest.raises(VideoError, match=r"a\.heic is a picture that cannot be decoded"):
+        open_video(tmp_path / "a.heic")
+
+
+def test_pieces_of_other_sizes_are_refused() -> None:
+    layout = read_layout(heic(slopes(), 64))
+    assert layout is not None
+    pieces = {n: np.zeros((64, 64, 3), np.uint8) for n in layout.tiles.ravel().tolist()}
+    assert assemble(layout, pieces) is not None
+    assert assemble(layout, pieces | {2: np.zeros((64, 32, 3), np.uint8)}) is None
+    del pieces[3]
+    assert assemble(layout, pieces) is None
+
+
+def test_damage_is_told_and_never_anything_else(tmp_path: Path) -> None:
+    whole, path = heic(slopes(64, 48), 32), tmp_path / "a.heic"
+    for size in (30, 100, 300, len(whole) // 2, len(whole) - 40):
+        path.write_bytes(whole[:size])
+        with pytest.raises(VideoError, match=r"a\.heic"):
+            open_video(path)
+    whole, rng = heic(slopes(64, 48), 32, focal_mm=26), np.random.default_rng(0)
+    boxes = whole.index(b"mdat")
+    for _ in range(150):
+        broken = bytearray(whole)
+        for at in rng.integers(24, boxes, 3):
+            broken[at] = rng.integers(256)
+        path.write_bytes(broken)
+        picture = read_picture(path)
+        assert picture is None or picture.rgb.ndim == 3
+
+
+def patched(data: bytes, name: bytes, content: bytes) -> bytes:
+    """A file whose first box of this name has another content of the same length, or less."""
+    at = data.index(name) + 4
+    return data[:at] + content + data[at + len(content) :]
+
+
+def test_a_small_file_cannot_ask_for_much() -> None:
+    """Places without a length, repeated; one place that is the whole file, many times."""
+    whole = heic(slopes(64, 48), 32, focal_mm=26)
+    at = whole.index(b"iloc")
+    for sizes, parts in ((0x0000, 5 * struct.pack(">HHH", 1, 0, 65535)), (0x4400, b"")):
+        places = parts or struct.pack(">HHH", 5, 0, 9) + 9 * struct.pack(">II", 0, len(whole))
+        content = struct.pack(">IHH", 0, sizes, 5 if parts else 1) + places
+        assert len(content) <= int.from_bytes(whole[at - 4 : at], "big") - 8
+        assert read_layout(patched(whole, b"iloc", content)) is None
+
+
+def test_no_more_pixels_are_decoded_than_are_allowed(tmp_path: Path) -> None:
+    path = tmp_path / "a.heic"
+    path.write_bytes(heic(slopes(), 64))
+    assert len(decode_items(path, {2, 3, 4}, 3 * 64 * 64)) == 3
+    assert decode_items(path, {2, 3, 4}, 3 * 64 * 64 - 1) == {}
+
+
+def test_tiles_that_a_grid_has_no_use_for_are_refused() -> None:
+    layout = replace(read_layout(heic(slopes(), 64)), size=(64, 64))
+    assert assemble(layout, {n: np.zeros((64, 64, 3), np.uint8) for n in range(2, 8)}) is None
+
+
+def test_a_grid_within_the_boxes_is_found(tmp_path: Path) -> None:
+    """As phones write it: the grid in the idat box."""
+    (tmp_path / "a.heic").write_bytes(heic(slopes(), 64, is_inside=True))
+    with open_video(tmp_path / "a.heic") as video:
+        assert (video.width, video.height) == (W, H)
+
+
+def test_a_box_in_itself_ends() -> None:
+    whole = heic(slopes(64, 48), 32)
+    at = whole.index(b"dimg") + 4
+    # the grid's first tile is the grid itself
+    assert read_layout(whole[: at + 4] + whole[at : at + 2] + whole[at + 6 :]) is None
+    assert read_layout(b"\0\0\0\x08meta" * 3) is None
+    assert read_layout(struct.pack(">I4sQ", 1, b"meta", 1 << 63)) is None
+    assert read_layout(struct.pack(">I4s", 0, b"free") * 5) is None

@@ -1,0 +1,141 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Numbered pictures are footage too."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from scope.scope_addon.capture.media.video import open_video
+from scope.scope_addon.capture.media.video_range import VideoRange
+from scope.scope_addon.errors import VideoError
+from scope.scope_addon.job.batch import Batch
+
+NUMBERS = [*range(7, 12), 100]
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """Frames 7 to 11 and 100, not zero-padded, as bright as their number; and what does not belong to them."""
+    for number in NUMBERS:
+        cv2.imwrite(str(tmp_path / f"walk_{number}.png"), np.full((20, 30, 3), number, np.uint8))
+    (tmp_path / "notes.txt").write_text("no picture")
+    return tmp_path
+
+
+def brightness(path: Path, wanted: VideoRange | None = None) -> list[int]:
+    with open_video(path, wanted) as video:
+        return [int(frame.image_rgb[0, 0, 0]) for frame in video]
+
+
+@pytest.mark.parametrize("name", ["", "walk_####.png", "walk_%04d.png", "walk_%d.png", "walk_7.png"])
+def test_in_the_order_of_their_numbers(folder: Path, name: str) -> None:
+    wanted = VideoRange(fps=Fraction(12))
+    assert brightness(folder / name, wanted) == NUMBERS
+    with open_video(folder / name, wanted) as video:
+        frames = list(video)
+        assert (video.fps, video.frame_count, video.width, video.height) == (12, 6, 30, 20)
+        assert [f.timestamp_s for f in frames] == pytest.approx([k / 12 for k in range(6)])
+        (warning,) = video.warnings
+        assert "88 numbers between 7 and 100 have no picture" in warning
+
+
+def test_a_part_of_them(folder: Path) -> None:
+    assert brightness(folder, VideoRange(0.1, 0.3, Fraction(10))) == [8, 9, 10]
+    assert brightness(folder / "walk_9.png", VideoRange(fps=Fraction(10))) == [9, 10, 11, 100]
+
+
+def test_without_a_rate(folder: Path) -> None:
+    with open_video(folder / "walk_9.png") as video:
+        assert video.frame_count == 1
+    with open_video(folder) as video:
+        assert video.fps == 30
+        assert any("--fps on the command line" in warning for warning in video.warnings)
+
+
+@pytest.mark.parametrize(
+    ("numbers", "times", "says"),
+    [
+        ([3, 4, 5, 6], [0, 1, 2, 3], None),
+        ([0, 10, 20, 30], [0, 1, 2, 3], None),
+        ([0, 1, 4, 5, 6], [0, 1, 4, 5, 6], "2 numbers between 0 and 6"),
+        ([0, 10, 30, 40], [0, 1, 3, 4], "1 numbers between 0 and 40"),
+        ([0, 1, 9], [0, 1, 2], "one after the other"),
+        ([1690000000033, 1690000000067, 1690000000100], [0, 1, 2], "one after the other"),
+    ],
+)
+def test_missing_pictures_leave_their_time_and_are_told(
+    tmp_path: Path, numbers: list[int], times: list[int], says: str | None
+) -> None:
+    for number in numbers:
+        cv2.imwrite(str(tmp_path / f"a_{number:04}.png"), np.zeros((20, 30, 3), np.uint8))
+    with open_video(tmp_path, VideoRange(fps=Fraction(10))) as video:
+        assert video.expected_frames == len(numbers)
+        assert [f.timestamp_s for f in video] == pytest.approx([t / 10 for t in times])
+        assert [f.index for f in video] == list(range(len(numbers)))
+        assert [says in warning for warning in video.warnings] == [True] if says else not video.warnings
+    with open_video(tmp_path, VideoRange(0.1, 0.45, Fraction(10))) as video:
+        wanted = [t / 10 for t in times if 1 <= t <= 4]
+        assert [f.timestamp_s for f in video] == pytest.approx(wanted)
+        assert video.expected_frames == len(wanted)
+
+
+def test_pictures_of_a_sequence_look_as_they_do_alone(tmp_path: Path) -> None:
+    clear = np.zeros((20, 30, 4), np.uint8)
+    deep = np.full((20, 30, 3), 70 * 257, np.uint16)
+    for number, image in enumerate((clear, deep)):
+        cv2.imwrite(str(tmp_path / f"a_{number}.png"), image)
+    assert brightness(tmp_path, VideoRange(fps=Fraction(10))) == [255, 70]
+    assert [brightness(tmp_path / f"a_{k}.png") for k in (0, 1)] == [[255], [70]]
+
+
+def test_a_damaged_picture_ends_it_with_a_warning(folder: Path) -> None:
+    (folder / "walk_9.png").write_bytes(b"no picture any more")
+    with open_video(folder, VideoRange(fps=Fraction(10))) as video:
+        assert [int(f.image_rgb[0, 0, 0]) for f in video] == [7, 8]
+        assert any("stopped after 2" in warning for warning in video.warnings)
+
+
+def test_nothing_to_see(tmp_path: Path) -> None:
+    (tmp_path / "empty").mkdir()
+    for path, words in ((tmp_path / "empty", "folder without a picture"), (tmp_path / "x_##.png", "does not exist")):
+        with pytest.raises(VideoError, match=words):
+            open_video(path)
+
+
+def test_a_folder_of_unrelated_pictures_is_no_clip(folder: Path) -> None:
+    (folder / "holiday.png").write_bytes((folder / "walk_9.png").read_bytes())
+    with pytest.raises(VideoError, match=r"holiday\.png.*pattern"):
+        open_video(folder)
+    assert brightness(folder / "walk_####.png", VideoRange(fps=Fraction(10))) == NUMBERS
+
+
+@pytest.mark.parametrize(
+    ("names", "numbered"),
+    [
+        (["a_1.png", "a_10.png", "a_2.PNG"], True),
+        (["take2_0001.jpg", "take2_0002.jpg"], True),
+        (["take1_0001.jpg", "take2_0001.jpg"], False),
+        (["a_1.png", "a_2.jpg"], False),
+        (["a_1.png", "b_1.png"], False),
+        (["a_1.png"], False),
+        (["one.png", "two.png"], False),
+    ],
+)
+def test_capture_and_batch_agree_on_what_a_sequence_is(tmp_path: Path, names: list[str], numbered: bool) -> None:
+    clips = tmp_path / "clips"
+    (clips / "folder").mkdir(parents=True)
+    for name in names:
+        ok, data = cv2.imencode(".png", np.zeros((20, 30, 3), np.uint8))
+        (clips / "folder" / name).write_bytes(data.tobytes())
+    found = Batch(clips, tmp_path / "out", [], {}, [".npz"]).clips(recursive=False)
+    assert list(found) == (["folder"] if numbered else [])
+    if numbered or len(names) == 1:
+        with open_video(clips / "folder", VideoRange(fps=Fraction(10))) as video:
+            assert len(list(video)) == len(names)
+    else:
+        with pytest.raises(VideoError, match="no numbered sequence"):
+            open_video(clips / "folder")

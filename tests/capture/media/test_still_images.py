@@ -1,0 +1,96 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Pictures that cameras and browsers write besides JPEG and PNG, and what is said of those that cannot be read."""
+
+from __future__ import annotations
+
+import struct
+import sys
+from fractions import Fraction
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from scope.scope_addon.capture.media.video import open_video
+from scope.scope_addon.capture.media.video_range import VideoRange, parse_range
+from scope.scope_addon.errors import VideoError
+
+W, H = 64, 48
+GREY = np.full((H, W, 3), 90, np.uint8)
+
+
+def png(image: np.ndarray) -> bytes:
+    return cv2.imencode(".png", image)[1].tobytes()
+
+
+def box(name: bytes, content: bytes) -> bytes:
+    return struct.pack(">I", len(content) + 8) + name + content
+
+
+def avif(path: Path, image_rgb: np.ndarray) -> Path:
+    av = pytest.importorskip("av")
+    try:
+        with av.open(str(path), "w", format="avif") as container:
+            stream = container.add_stream("libsvtav1", rate=1)
+            stream.width, stream.height, stream.pix_fmt = image_rgb.shape[1], image_rgb.shape[0], "yuv420p"
+            for packet in [*stream.encode(av.VideoFrame.from_ndarray(image_rgb, "rgb24")), *stream.encode()]:
+                container.mux(packet)
+    except (av.error.FFmpegError, ValueError) as error:
+        pytest.skip(f"this PyAV does not write AVIF: {error}")
+    return path
+
+
+def test_avif_is_a_picture_whatever_it_is_called(tmp_path: Path) -> None:
+    image = np.full((H, W, 3), 255, np.uint8)
+    image[: H // 2] = (255, 0, 0)
+    for name in ("a.avif", "a.jpg"):
+        with open_video(avif(tmp_path / name, image)) as video:
+            (frame,) = video
+        assert video.frame_count == 1
+        assert (video.width, video.height) == (W, H)
+        assert np.abs(frame.image_rgb.astype(int) - image)[[6, -7]].max() < 12
+
+
+def test_avif_in_a_sequence(tmp_path: Path) -> None:
+    for k in (1, 2):
+        avif(tmp_path / f"a_{k}.avif", GREY + 50 * np.uint8(k))
+    with open_video(tmp_path, VideoRange(fps=Fraction(10))) as video:
+        assert [int(f.image_rgb.mean()) for f in video] == pytest.approx([140, 190], abs=4)
+
+
+def test_damaged_avif(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = avif(tmp_path / "a.avif", GREY).read_bytes()
+    for size in (40, 200, len(whole) - 20):
+        (tmp_path / "cut.avif").write_bytes(whole[:size])
+        with pytest.raises(VideoError, match=r"cut\.avif is a picture that cannot be decoded"):
+            open_video(tmp_path / "cut.avif")
+    monkeypatch.setitem(sys.modules, "av", None)
+    with pytest.raises(VideoError, match=r"a\.avif is AV1 or HEIC, which needs the package 'av'.*JPEG"):
+        open_video(tmp_path / "a.avif")
+
+
+def test_openexr_says_what_to_do(tmp_path: Path) -> None:
+    (tmp_path / "render.exr").write_bytes(b"v/1\x01" + bytes(99))
+    with pytest.raises(VideoError, match=r"render\.exr is an OpenEXR picture.*PNG"):
+        open_video(tmp_path / "render.exr")
+
+
+@pytest.mark.parametrize("asked", [("5", None, None), ("00:00:01:00", None, None), (None, None, "9")])
+def test_a_range_of_a_picture_is_told_to_change_nothing(tmp_path: Path, asked: tuple[str | None, ...]) -> None:
+    (tmp_path / "a.png").write_bytes(png(GREY))
+    with open_video(tmp_path / "a.png", parse_range(*asked)) as video:
+        assert len(list(video)) == 1
+        assert "a.png is a single picture: a start, an end or a frame rate changes nothing" in video.warnings
+    with open_video(tmp_path / "a.png") as video:
+        assert not video.warnings
+
+
+@pytest.mark.parametrize("name", ["a.webp", "a.png"])
+def test_an_animation_is_told_to_be_one(tmp_path: Path, name: str) -> None:
+    animation = cv2.Animation()
+    animation.frames, animation.durations = [GREY, GREY + 30, GREY + 60], [100, 100, 100]
+    assert cv2.imwriteanimation(str(tmp_path / name), animation)
+    with open_video(tmp_path / name) as video:
+        (frame,) = video
+        assert abs(int(frame.image_rgb.mean()) - 90) < 4
+        assert f"{name} is an animation of 3 pictures" in video.warnings[0]

@@ -1,0 +1,478 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Videos and pictures: files made here with known content, files broken here, and real clips."""
+
+from __future__ import annotations
+
+import os
+import struct
+import threading
+import time
+import wave
+import zlib
+from fractions import Fraction
+from pathlib import Path
+
+import av
+import cv2
+import numpy as np
+import pytest
+from scope.scope_addon.capture.media.frame_readers import OpencvReader, PyavReader
+from scope.scope_addon.capture.media.video import exact_fps, open_video
+from scope.scope_addon.capture.media.video_range import VideoRange
+from scope.scope_addon.errors import VideoError
+
+W, H = 64, 48
+
+
+def corner_image(width: int = W, height: int = H) -> np.ndarray:
+    """RGB: red top left, green top right, blue bottom left, white bottom right."""
+    image = np.full((height, width, 3), 255, np.uint8)
+    image[: height // 2, : width // 2] = (255, 0, 0)
+    image[: height // 2, width // 2 :] = (0, 255, 0)
+    image[height // 2 :, : width // 2] = (0, 0, 255)
+    return image
+
+
+def corners(image: np.ndarray) -> str:
+    """The image's corners (top left, top right, bottom left, bottom right) as letters of ``corner_image``."""
+    names = {(1, 0, 0): "r", (0, 1, 0): "g", (0, 0, 1): "b", (1, 1, 1): "w"}
+    points = [image[6, 6], image[6, -7], image[-7, 6], image[-7, -7]]
+    return "".join(names.get(tuple(int(c > 128) for c in p), "?") for p in points)
+
+
+def write_video(path: Path, images: list[np.ndarray], fps: float = 30.0, codec: str = "mp4v") -> Path:
+    height, width = images[0].shape[:2]
+    writer = cv2.VideoWriter(str(path), cv2.CAP_FFMPEG, cv2.VideoWriter_fourcc(*codec), fps, (width, height))
+    assert writer.isOpened()
+    for image in images:
+        writer.write(cv2.cvtColor(image, cv2.COLOR_RGB2BGR))
+    writer.release()
+    return path
+
+
+def ramp(count: int) -> list[np.ndarray]:
+    return [np.full((H, W, 3), 10 + 4 * i, np.uint8) for i in range(count)]
+
+
+def replace_mp4_box(data: bytes, path: tuple[bytes, ...], payload: bytes) -> bytes:
+    """``data`` with the payload of the box at ``path`` replaced; sizes of the boxes around it are corrected.
+
+    Only for files whose sample data lies before the index, as OpenCV writes them: offsets then stay true.
+    """
+    at, end, outer = 0, len(data), []
+    for name in path:
+        while data[at + 4 : at + 8] != name:
+            at += struct.unpack_from(">I", data, at)[0]
+            assert at < end
+        outer.append(at)
+        end = at + struct.unpack_from(">I", data, at)[0]
+        at += 8
+    grown = bytearray(data[:at] + payload + data[end:])
+    for start in outer:
+        size = struct.unpack_from(">I", data, start)[0]
+        struct.pack_into(">I", grown, start, size + len(payload) - (end - at))
+    return bytes(grown)
+
+
+TRACK = (b"moov", b"trak")
+TABLE = (*TRACK, b"mdia", b"minf", b"stbl")
+
+
+def with_time_table(path: Path, timescale: int, steps: list[tuple[int, int]]) -> None:
+    """Give an .mp4 a clock of ``timescale`` ticks a second and (count, ticks) frame durations."""
+    data = path.read_bytes()
+    duration = sum(n * d for n, d in steps)
+    header = struct.pack(">IIIIIHH", 0, 0, 0, timescale, duration, 0x55C4, 0)
+    data = replace_mp4_box(data, (*TRACK, b"mdia", b"mdhd"), header)
+    table = struct.pack(">II", 0, len(steps)) + b"".join(struct.pack(">II", *s) for s in steps)
+    data = replace_mp4_box(data, (*TABLE, b"stts"), table)
+    path.write_bytes(data.replace(b"edts", b"free"))  # without the edit list, whose duration is the old one
+
+
+def patch_track_header(path: Path, matrix: tuple[int, ...] | None = None, width: int | None = None) -> None:
+    """Write the display matrix (rotation) and the display width (pixel aspect) of an .mp4."""
+    data = bytearray(path.read_bytes())
+    at = data.find(b"tkhd") + 4 + 40
+    if matrix:
+        struct.pack_into(">9i", data, at, *matrix)
+    if width:
+        struct.pack_into(">I", data, at + 36, width << 16)
+    path.write_bytes(data)
+
+
+CLOCKWISE = (0, 65536, 0, -65536, 0, 0, 0, 0, 1 << 30)
+HALF_TURN = (-65536, 0, 0, 0, -65536, 0, 0, 0, 1 << 30)
+COUNTERCLOCKWISE = (0, -65536, 0, 65536, 0, 0, 0, 0, 1 << 30)
+
+
+def test_frames_come_in_order_as_rgb_with_their_times(tmp_path):
+    images = [np.full((H, W, 3), 20 * i, np.uint8) for i in range(12)]
+    path = write_video(tmp_path / "a.mp4", images, fps=25)
+    with open_video(path) as video:
+        frames = list(video)
+    assert (video.width, video.height, video.fps, video.frame_count) == (W, H, Fraction(25), 12)
+    assert video.frame_count > 1
+    assert not video.warnings
+    assert [f.index for f in frames] == list(range(12))
+    np.testing.assert_allclose([f.timestamp_s for f in frames], np.arange(12) / 25, atol=1e-6)
+    for i, frame in enumerate(frames):
+        assert frame.image_rgb.dtype == np.uint8
+        assert frame.image_rgb.shape == (H, W, 3)
+        assert abs(float(frame.image_rgb.mean()) - 20 * i) < 8
+
+
+def test_channels_are_rgb(tmp_path):
+    path = write_video(tmp_path / "a.mp4", [corner_image()] * 2)
+    assert corners(next(iter(open_video(path))).image_rgb) == "rgbw"
+
+
+def test_every_iteration_starts_at_the_first_frame(tmp_path):
+    video = open_video(write_video(tmp_path / "a.mp4", ramp(5)))
+    assert [f.index for f in video] == [f.index for f in video] == list(range(5))
+
+
+@pytest.mark.parametrize("rate", [Fraction(30000, 1001), Fraction(24000, 1001), Fraction(60000, 1001), Fraction(25)])
+def test_the_rate_of_the_container_is_exact(tmp_path, rate):
+    path = write_video(tmp_path / "a.mp4", ramp(10))
+    with_time_table(path, rate.numerator, [(10, rate.denominator)])
+    video = open_video(path)
+    assert video.fps == rate
+    np.testing.assert_allclose([f.timestamp_s for f in video], [float(i / rate) for i in range(10)], atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("fps", "expected"),
+    [
+        (30000 / 1001, Fraction(30000, 1001)),
+        (29.97, Fraction(2997, 100)),
+        (29.9701, Fraction(30000, 1001)),
+        (23.97602, Fraction(24000, 1001)),
+        (12.5, Fraction(25, 2)),
+        (29.8, Fraction(149, 5)),
+        (0.0, None),
+        (float("nan"), None),
+        (90000.0, None),
+    ],
+)
+def test_exact_fps(fps, expected):
+    assert exact_fps(fps) == expected
+
+
+def test_a_variable_rate_keeps_presentation_times(tmp_path):
+    path = write_video(tmp_path / "a.mp4", ramp(9))
+    with_time_table(path, 1000, [(3, 40), (3, 100), (3, 20)])
+    with open_video(path) as video:
+        times = [f.timestamp_s for f in video]
+    np.testing.assert_allclose(times, np.cumsum([0, 40, 40, 40, 100, 100, 100, 20, 20]) / 1000, atol=1e-6)
+    assert not video.warnings
+
+
+@pytest.mark.parametrize(
+    ("matrix", "expected", "size"),
+    [(CLOCKWISE, "brwg", (H, W)), (HALF_TURN, "wbgr", (W, H)), (COUNTERCLOCKWISE, "gwrb", (H, W))],
+)
+def test_rotation_metadata_is_applied(tmp_path, matrix, expected, size):
+    path = write_video(tmp_path / "a.mp4", [corner_image()] * 2)
+    patch_track_header(path, matrix=matrix)
+    video = open_video(path)
+    assert (video.width, video.height) == size
+    for frame in video:
+        assert frame.image_rgb.shape == (size[1], size[0], 3)
+        assert corners(frame.image_rgb) == expected
+
+
+@pytest.mark.parametrize(
+    ("display_width", "matrix", "size"),
+    [(2 * W, None, (2 * W, H)), (W // 2, None, (W, 2 * H)), (2 * W, CLOCKWISE, (H, 2 * W))],
+)
+def test_pixels_become_square(tmp_path, display_width, matrix, size):
+    path = write_video(tmp_path / "a.mp4", [corner_image()] * 2)
+    patch_track_header(path, matrix, display_width)
+    video = open_video(path)
+    assert (video.width, video.height) == size
+    assert next(iter(video)).image_rgb.shape == (size[1], size[0], 3)
+
+
+@pytest.mark.parametrize("matrix", [None, CLOCKWISE, HALF_TURN, COUNTERCLOCKWISE])
+@pytest.mark.parametrize("display_width", [W, 2 * W, W // 2])
+def test_both_readers_see_the_same(tmp_path, matrix, display_width):
+    path = write_video(tmp_path / "a.mp4", [corner_image(), 255 - corner_image()] * 10, fps=25)
+    patch_track_header(path, matrix, display_width)
+    readers = [OpencvReader(path), PyavReader(path)]
+    assert readers[0].rate == readers[1].rate == 25
+    assert readers[0].frame_count == readers[1].frame_count == 20
+    assert [reader.skip_to(0.2, Fraction(25)) for reader in readers] == [5, 5]
+    for k in range(5, 20):
+        (time_a, a), (time_b, b) = (reader.read() for reader in readers)
+        assert time_a == pytest.approx(0.04 * k)
+        assert time_b == pytest.approx(0.04 * k)
+        np.testing.assert_allclose(a.astype(int), b.astype(int), atol=6)
+    assert [reader.read() for reader in readers] == [None, None]
+    for reader in readers:
+        reader.close()
+
+
+def test_odd_sizes(tmp_path):
+    jpeg = cv2.imencode(".jpg", cv2.cvtColor(corner_image(65, 49), cv2.COLOR_RGB2BGR))[1].tobytes()
+    path = tmp_path / "odd.mjpeg"
+    path.write_bytes(jpeg * 5)
+    video = open_video(path)
+    frames = list(video)
+    assert (video.width, video.height, len(frames)) == (65, 49, 5)
+    assert corners(frames[0].image_rgb) == "rgbw"
+    assert (np.diff([f.timestamp_s for f in frames]) > 0).all()
+
+
+def test_leaving_early_ends_the_decoding_thread(tmp_path):
+    path = write_video(tmp_path / "a.mp4", ramp(50))
+
+    def decoding() -> bool:
+        return any(t.name == "scope-decode" for t in threading.enumerate())
+
+    with open_video(path) as video:
+        for frame in video:
+            if frame.index == 2:
+                break
+        assert not decoding()
+        unfinished = iter(video)
+        next(unfinished)
+    assert not decoding()
+    with pytest.raises(StopIteration):
+        next(unfinished)
+
+
+def test_decoding_runs_ahead_by_a_few_frames_only(tmp_path):
+    video = open_video(write_video(tmp_path / "a.mp4", ramp(50)))
+    frames = iter(video)
+    next(frames)
+    time.sleep(0.2)
+    assert 1 <= video._decoders[0]._queue.qsize() <= 8
+    assert sum(1 for _ in frames) == 49
+
+
+# Pictures
+
+
+def exif_block(orientation: int, focal_35mm: int | None = None, endian: str = "<") -> bytes:
+    """A TIFF directory with an orientation and, one directory further, a focal length."""
+    entry = struct.Struct(endian + "HHIHH")
+    main = [entry.pack(0x0112, 3, 1, orientation, 0)]
+    inner = b""
+    if focal_35mm:
+        main.append(struct.pack(endian + "HHII", 0x8769, 4, 1, 8 + 2 + 24 + 4))
+        inner = struct.pack(endian + "H", 1) + entry.pack(0xA405, 3, 1, focal_35mm, 0) + b"\0\0\0\0"
+    head = b"II*\0" if endian == "<" else b"MM\0*"
+    return head + struct.pack(endian + "IH", 8, len(main)) + b"".join(main) + b"\0\0\0\0" + inner
+
+
+def encode(suffix: str, image: np.ndarray) -> bytes:
+    code = cv2.COLOR_RGBA2BGRA if image.shape[2] == 4 else cv2.COLOR_RGB2BGR
+    return cv2.imencode(suffix, cv2.cvtColor(image, code))[1].tobytes()
+
+
+def jpeg_with_exif(image: np.ndarray, tiff: bytes) -> bytes:
+    data, segment = encode(".jpg", image), b"Exif\0\0" + tiff
+    return data[:2] + b"\xff\xe1" + struct.pack(">H", len(segment) + 2) + segment + data[2:]
+
+
+@pytest.mark.parametrize("suffix", [".jpg", ".png", ".webp", ".tiff", ".bmp"])
+def test_a_picture_is_one_frame(tmp_path, suffix):
+    path = tmp_path / f"picture{suffix}"
+    path.write_bytes(encode(suffix, corner_image(65, 49)))
+    with open_video(path) as video:
+        frames = list(video)
+    assert video.frame_count == 1
+    assert (video.width, video.height, video.frame_count, video.focal_35mm) == (65, 49, 1, None)
+    assert [(f.index, f.timestamp_s) for f in frames] == [(0, 0.0)]
+    assert corners(frames[0].image_rgb) == "rgbw"
+
+
+# Where each corner must come to lie, from the EXIF standard: orientation -> position of row 0 and column 0.
+UPRIGHT = {1: "rgbw", 2: "grwb", 3: "wbgr", 4: "bwrg", 5: "rbgw", 6: "brwg", 7: "wgbr", 8: "gwrb"}
+
+
+@pytest.mark.parametrize("endian", ["<", ">"])
+@pytest.mark.parametrize("orientation", range(1, 9))
+def test_exif_orientation_and_focal_length(tmp_path, orientation, endian):
+    path = tmp_path / "a.jpg"
+    path.write_bytes(jpeg_with_exif(corner_image(), exif_block(orientation, 26, endian)))
+    video = open_video(path)
+    image = next(iter(video)).image_rgb
+    assert corners(image) == UPRIGHT[orientation]
+    assert (video.width, video.height) == image.shape[1::-1] == ((W, H) if orientation < 5 else (H, W))
+    assert video.focal_35mm == 26
+    theirs = cv2.cvtColor(cv2.imread(str(path)), cv2.COLOR_BGR2RGB)
+    np.testing.assert_array_equal(image, theirs)
+
+
+def test_orientation_of_png_webp_and_tiff(tmp_path):
+    block = exif_block(6)
+    png = encode(".png", corner_image())
+    cut = png.index(b"IDAT") - 4
+    chunk = struct.pack(">I", len(block)) + b"eXIf" + block
+    (tmp_path / "a.png").write_bytes(png[:cut] + chunk + struct.pack(">I", zlib.crc32(chunk[4:])) + png[cut:])
+    webp = encode(".webp", corner_image())
+    block += b"\0" * (len(block) % 2)
+    extended = b"VP8X" + struct.pack("<II", 10, 8) + struct.pack("<I", W - 1)[:3] + struct.pack("<I", H - 1)[:3]
+    body = b"WEBP" + extended + webp[12:] + b"EXIF" + struct.pack("<I", len(block)) + block
+    (tmp_path / "a.webp").write_bytes(b"RIFF" + struct.pack("<I", len(body)) + body)
+    tiff = bytearray(encode(".tiff", corner_image()))
+    start = struct.unpack_from("<I", tiff, 4)[0]
+    count = struct.unpack_from("<H", tiff, start)[0]
+    entries = [bytes(tiff[start + 2 + 12 * i : start + 14 + 12 * i]) for i in range(count)]
+    entries = sorted([*entries, struct.pack("<HHIHH", 0x0112, 3, 1, 6, 0)], key=lambda e: struct.unpack("<H", e[:2])[0])
+    struct.pack_into("<I", tiff, 4, len(tiff))
+    (tmp_path / "a.tiff").write_bytes(tiff + struct.pack("<H", count + 1) + b"".join(entries) + b"\0\0\0\0")
+    for name in ("a.png", "a.webp", "a.tiff"):
+        assert corners(next(iter(open_video(tmp_path / name))).image_rgb) == "brwg", name
+
+
+def test_damaged_exif_counts_as_none(tmp_path):
+    for i, block in enumerate((b"II*\0", b"II*\0\xff\xff\xff\xff", b"", exif_block(6)[:12], exif_block(99), b"XX" * 9)):
+        path = tmp_path / f"{i}.jpg"
+        path.write_bytes(jpeg_with_exif(corner_image(), block))
+        assert corners(next(iter(open_video(path))).image_rgb) == "rgbw"
+
+
+def test_sixteen_bits_grey_and_alpha(tmp_path):
+    deep = corner_image().astype(np.uint16)[..., ::-1] * 257
+    for suffix in (".png", ".tiff"):
+        cv2.imwrite(str(tmp_path / f"deep{suffix}"), deep)
+        np.testing.assert_array_equal(next(iter(open_video(tmp_path / f"deep{suffix}"))).image_rgb, corner_image())
+    cv2.imwrite(str(tmp_path / "grey.png"), np.full((H, W), 77, np.uint8))
+    assert (next(iter(open_video(tmp_path / "grey.png"))).image_rgb == 77).all()
+    clear = np.dstack([corner_image(), np.full((H, W), 255, np.uint8)])
+    clear[: H // 2, : W // 2, 3] = 0
+    (tmp_path / "clear.png").write_bytes(encode(".png", clear))
+    assert corners(next(iter(open_video(tmp_path / "clear.png"))).image_rgb) == "wgbw"
+
+
+# Files that cannot be used
+
+
+def silence(path: Path) -> None:
+    with wave.open(str(path), "wb") as sound:
+        sound.setparams((1, 2, 8000, 0, "NONE", ""))
+        sound.writeframes(b"\0\0" * 8000)
+
+
+@pytest.mark.parametrize(
+    ("name", "make", "words"),
+    [
+        ("missing.mp4", lambda p: None, "does not exist"),
+        ("empty.mp4", lambda p: p.write_bytes(b""), "is empty"),
+        ("folder.mp4", lambda p: p.mkdir(), "is a folder"),
+        ("text.mp4", lambda p: p.write_text("not a film at all\n" * 50), "not a video or picture"),
+        ("sound.wav", silence, "not a video or picture"),
+        ("noise.mp4", lambda p: p.write_bytes(np.random.default_rng(0).bytes(20000)), "not a video or picture"),
+        ("half.png", lambda p: p.write_bytes(encode(".png", corner_image())[:40]), "cannot be decoded"),
+        ("cut.mp4", lambda p: p.write_bytes(write_video(p, ramp(9)).read_bytes()[:700]), "not a video or picture"),
+    ],
+)
+def test_what_cannot_be_used_gives_one_clear_sentence(tmp_path, capfd, name, make, words):
+    make(tmp_path / name)
+    with pytest.raises(VideoError, match=words) as caught:
+        open_video(tmp_path / name)
+    assert name in str(caught.value)
+    assert "\n" not in str(caught.value)
+    assert capfd.readouterr().err == ""
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="Windows keeps its pipes in no folder")
+def test_a_pipe_is_refused_and_not_waited_for(tmp_path):
+    path = tmp_path / "pipe.mp4"
+    os.mkfifo(path)
+    both_ends = os.open(path, os.O_RDWR)  # so that nothing waits here whatever is done with it
+    try:
+        with pytest.raises(VideoError, match="pipe.mp4 is a pipe or a device"):
+            open_video(path)
+    finally:
+        os.close(both_ends)
+
+
+def test_no_decodable_frame_is_an_error(tmp_path):
+    path = write_video(tmp_path / "a.mp4", ramp(4))
+    data = bytearray(path.read_bytes())
+    start = data.find(b"mdat") + 4
+    size = struct.unpack_from(">I", data, start - 8)[0]
+    data[start : start + size - 8] = b"\0" * (size - 8)
+    path.write_bytes(data)
+    with pytest.raises(VideoError, match="decoded"):
+        open_video(path)
+
+
+def test_decoding_that_stops_early_gives_what_there_is_and_a_warning(tmp_path, capfd):
+    rng = np.random.default_rng(1)
+    images = [rng.integers(0, 255, (H, W, 3), dtype=np.uint8) for _ in range(40)]
+    path = write_video(tmp_path / "a.mkv", images)
+    data = path.read_bytes()
+    path.write_bytes(data[: len(data) // 2])
+    video = open_video(path)
+    frames = list(video)
+    assert 5 < len(frames) < 35
+    assert len(video.warnings) == 1
+    assert "stopped after" in video.warnings[0]
+    assert capfd.readouterr().err == ""
+
+
+@pytest.mark.parametrize(("suffix", "shift_s"), [(".mp4", -0.8), (".mkv", 20.0)])
+def test_a_clip_cut_without_coding_it_anew_is_whole(tmp_path, suffix, shift_s):
+    """An edit list leaves its beginning out, or its times begin late: both are no damage."""
+    cut = tmp_path / f"cut{suffix}"
+    with av.open(str(write_video(tmp_path / "a.mp4", ramp(60)))) as source, av.open(str(cut), "w") as out:
+        stream = source.streams.video[0]
+        copy = out.add_stream_from_template(stream)
+        for packet in source.demux(stream):
+            if packet.dts is not None:
+                packet.pts += int(shift_s / stream.time_base)
+                packet.dts += int(shift_s / stream.time_base)
+                packet.stream = copy
+                out.mux(packet)
+    video = open_video(cut)
+    count = len(list(video))
+    assert video.warnings == []
+    assert count == (60 if shift_s > 0 else 36)
+    assert abs(video.expected_frames - count) <= 1
+
+
+@pytest.mark.parametrize(
+    ("name", "codec", "start_s", "options"),
+    [("late.flv", "flv1", 100.0, {}), ("pieces.mp4", "mpeg4", 0.0, {"movflags": "frag_keyframe"})],
+)
+def test_a_container_that_counts_oddly_can_be_entered_in_its_middle(tmp_path, name, codec, start_s, options):
+    """Times that begin late in a file whose length leaves that out; pieces of which the first alone is counted."""
+    path = tmp_path / name
+    with av.open(str(path), "w", options=options) as out:
+        stream = out.add_stream(codec, rate=25)
+        stream.width, stream.height, stream.pix_fmt, stream.gop_size = 64, 48, "yuv420p", 25
+        stream.time_base = Fraction(1, 25)
+        for k in range(100):
+            frame = av.VideoFrame.from_ndarray(np.full((48, 64, 3), 2 * k, np.uint8), format="rgb24")
+            frame.pts, frame.time_base = k + round(25 * start_s), Fraction(1, 25)
+            out.mux(stream.encode(frame))
+        out.mux(stream.encode(None))
+    video = open_video(path, VideoRange(start_s=2.0))
+    assert abs(video.frame_count - 100) <= 1
+    assert len(list(video)) == 50
+    assert video.warnings == []
+
+
+# Real clips: sizes, rates and counts of ../shared/data/README.md
+
+CLIPS = [
+    ("clips/walk_side_static.mp4", 1768, 994, 30, 230),
+    ("clips/squats_5fps.mp4", 720, 1280, 5, 65),
+    ("clips/gesture_square.mp4", 576, 576, 30, 120),
+    ("clips/two_people_portrait.mp4", 1080, 1920, 12, 40),
+    ("clips/hand_closeup.mp4", 620, 1080, 25, 325),
+    ("pose2sim/cam1.mp4", 1080, 1920, 60, 100),
+]
+
+
+@pytest.mark.parametrize(("name", "width", "height", "fps", "count"), CLIPS)
+def test_real_clips(shared, name, width, height, fps, count):
+    with open_video(shared / "data" / name) as video:
+        times = [f.timestamp_s for f in video]
+    assert (video.width, video.height, video.fps, video.frame_count) == (width, height, fps, count)
+    np.testing.assert_allclose(times, np.arange(count) / fps, atol=1e-3)
+    assert not video.warnings

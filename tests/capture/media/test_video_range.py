@@ -1,0 +1,121 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Parts of videos: start, end and frame rate; every frame of the test video shows its own number."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from scope.scope_addon.capture.media.video import Frame, open_video
+from scope.scope_addon.capture.media.video_range import FrameChooser, VideoRange, parse_range, parse_rate
+from scope.scope_addon.errors import UsageError, VideoError
+
+FPS = 25
+
+
+@pytest.fixture(scope="module")
+def long_video(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """60 s at 25 fps with a key frame now and then; the number of the frame in 12 black or white squares."""
+    path = tmp_path_factory.mktemp("range") / "long.mp4"
+    return write_numbers(path, FPS, 60 * FPS, "mp4v")
+
+
+def write_numbers(path: Path, fps: float, count: int, codec: str) -> Path:
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*codec), fps, (192, 32))
+    for number in range(count):
+        bits = [(number >> b & 1) * 255 for b in range(12)]
+        row = np.repeat(np.array(bits, np.uint8), 16)
+        writer.write(np.repeat(np.tile(row, (32, 1))[..., None], 3, axis=2))
+    writer.release()
+    return path
+
+
+def shown(frame: Frame) -> int:
+    return sum((int(frame.image_rgb[16, 16 * b + 8, 0]) > 127) << b for b in range(12))
+
+
+@pytest.mark.parametrize(("start", "end"), [(0, 0.5), (3.2, 4.0), (19.0, 19.4), (41.36, 42.0), (59.0, 1e9)])
+def test_frames_of_a_part_are_those_of_the_whole(long_video: Path, start: float, end: float) -> None:
+    with open_video(long_video, VideoRange(start, end)) as video:
+        frames = list(video)
+        assert video.expected_frames == pytest.approx(len(frames), abs=1)
+        assert not video.warnings
+    assert [f.index for f in frames] == [k for k in range(60 * FPS) if start - 1e-6 <= k / FPS <= end + 1e-6]
+    assert [shown(f) for f in frames] == [f.index for f in frames]
+    assert [f.timestamp_s for f in frames] == pytest.approx([f.index / FPS for f in frames])
+
+
+def test_resampled(long_video: Path) -> None:
+    with open_video(long_video, VideoRange(1.0, 2.0, Fraction(10))) as video:
+        assert video.fps == 10
+        assert [f.index for f in video] == pytest.approx(list(np.arange(25, 51, 2.5)), abs=0.5)
+    with open_video(long_video, VideoRange(1.0, 2.0, Fraction(60))) as video:
+        assert video.fps == FPS
+        assert [f.index for f in video] == list(range(25, 51))
+        assert "60" in video.warnings[0]
+
+
+def test_a_start_after_the_end_of_the_video(long_video: Path) -> None:
+    with pytest.raises(VideoError, match="60.0 s"):
+        open_video(long_video, VideoRange(100))
+
+
+def test_nearest_frames_of_a_variable_rate() -> None:
+    times = [0.0, 0.09, 0.11, 0.3, 0.39, 0.52, 0.6, 0.61]
+    chooser = FrameChooser(Fraction(10))
+    image = np.zeros((1, 1, 3), np.uint8)
+    chosen = [f.timestamp_s for k, t in enumerate(times) for f in chooser.choose(Frame(k, t, image))]
+    chosen += [f.timestamp_s for f in chooser.rest()]
+    assert chosen == [0.0, 0.11, 0.3, 0.39, 0.52, 0.6]  # for 0.0, 0.1, (0.2: nothing near), 0.3, 0.4, 0.5, 0.6
+
+
+def test_rates() -> None:
+    assert parse_rate("25") == 25
+    assert parse_rate("29.97") == Fraction(30000, 1001)
+    assert parse_rate("23.976") == Fraction(24000, 1001)
+    assert parse_rate("30000/1001") == Fraction(30000, 1001)
+    assert parse_rate("12.5") == Fraction(25, 2)
+    for text in ("0", "-3", "fast", "1/0", "nan"):
+        with pytest.raises(UsageError):
+            parse_rate(text)
+
+
+def test_an_impossible_range() -> None:
+    for start, end in ((-1, 5), (5, 5), (6, 5), (float("nan"), 5)):
+        with pytest.raises(UsageError):
+            VideoRange(start, end)
+
+
+@pytest.fixture(scope="module")
+def rounded_video(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """12 s of the same at 29.97 frames a second, from a container that rounds times to milliseconds."""
+    return write_numbers(tmp_path_factory.mktemp("range") / "rounded.mkv", 30000 / 1001, 360, "MJPG")
+
+
+@pytest.mark.parametrize(("name", "nominal"), [("long_video", 25), ("rounded_video", 30)])
+def test_timecodes_mean_frames(name: str, nominal: int, request: pytest.FixtureRequest) -> None:
+    """From 3 s and 12 frames to 4 s and 7 frames, both included."""
+    path, first, last = request.getfixturevalue(name), 3 * nominal + 12, 4 * nominal + 7
+    with open_video(path, parse_range("00:00:03:12", "00:00:04:07", None)) as video:
+        assert [shown(f) for f in video] == list(range(first, last + 1))
+        assert video.expected_frames == pytest.approx(last + 1 - first, abs=1)
+    for frame in (first, first + 1, first + 2):
+        one = f"00:00:03:{frame - 3 * nominal}"
+        with open_video(path, parse_range(one, one, None)) as video:
+            assert [shown(f) for f in video] == [frame]
+
+
+def test_a_range_by_seconds_and_timecode(long_video: Path) -> None:
+    with open_video(long_video, parse_range("1.5", "00:00:02:00", "5")) as video:
+        assert [shown(f) for f in video] == [38, 43, 48]
+    assert parse_range(None, None, None) == VideoRange()
+    with pytest.raises(UsageError, match="must come after"):
+        open_video(long_video, parse_range("00:00:03:12", "2", None))
+    with pytest.raises(UsageError, match="up to 24"):
+        open_video(long_video, parse_range("00:00:03:25", None, None))
+    for nothing in (("", None, None), (None, "", None), (None, None, "")):
+        with pytest.raises(UsageError, match="''"):
+            parse_range(*nothing)

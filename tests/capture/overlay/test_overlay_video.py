@@ -1,0 +1,213 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The overlay: where the body is drawn, what stays as it was, and how files come to be."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from scope.scope_addon.capture.media.video import open_video
+from scope.scope_addon.capture.overlay.overlay_video import (
+    body_colors,
+    camera_vertices,
+    draw_overlay,
+    write_overlay,
+)
+from scope.scope_addon.errors import CancelledError, OutputError, VideoError
+from scope.scope_addon.kinematics.axes import R_WORLD_MODEL, world_from_level_camera
+from scope.scope_addon.motion import Motion
+from scope.solver.body import Body
+from scope.solver.errors import ShapeError
+
+from ...made_motion import made_motion
+
+W, H = 160, 120
+K = np.array([[130.0, 0, 80.0], [0, 130.0, 60.0], [0, 0, 1]])
+GREY = 90
+
+
+def standing(body: Body, frames: list[int], x: float = 0.0, y: float = 3.0, size=(W, H), intrinsics=K) -> Motion:
+    """A person in T-pose ``y`` metres ahead of a level camera at 1 m, seen in every frame."""
+    T, K1 = len(frames), body.K + 1
+    poses = np.zeros((T, K1, 3), np.float32)
+    poses[:, 0] = cv2.Rodrigues(R_WORLD_MODEL)[0].ravel()
+    trans = np.tile(np.array([x, y, 0.95]) - body.J_template[0], (T, 1))
+    return made_motion(
+        body,
+        poses,
+        trans,
+        frames=np.array(frames),
+        timestamps=np.array(frames) / 30,
+        intrinsics=intrinsics,
+        world_from_camera=np.tile(world_from_level_camera(np.array([0, -1.0, 0]), 1.0), (T, 1, 1)),
+        image_size=np.array(size),
+    )
+
+
+@pytest.fixture
+def footage(tmp_path) -> Path:
+    """Ten grey frames at 25 per second."""
+    path = tmp_path / "footage.mp4"
+    writer = cv2.VideoWriter(str(path), cv2.CAP_FFMPEG, cv2.VideoWriter_fourcc(*"mp4v"), 25, (W, H))
+    for _ in range(10):
+        writer.write(np.full((H, W, 3), GREY, np.uint8))
+    writer.release()
+    return path
+
+
+def changed(image: np.ndarray) -> np.ndarray:
+    """(H, W) bool: clearly not the grey of the footage."""
+    return np.abs(image.astype(int) - GREY).max(-1) > 12
+
+
+def silhouette(body: Body, x: float = 0.0, y: float = 3.0) -> np.ndarray:
+    """(H, W) bool by OpenCV's filled polygons, posed by hand: x stays, model y is up, facing the camera."""
+    offset = body.v_template - body.J_template[0]
+    points = np.stack([x + offset[:, 0], 1.0 - (0.95 + offset[:, 1]), y - offset[:, 2]], -1)
+    pixels = np.round((points[:, :2] / points[:, 2:] @ K[:2, :2].T + K[:2, 2]) * 256).astype(np.int32)
+    mask = np.zeros((H, W), np.uint8)
+    for quad in body.faces:
+        cv2.fillConvexPoly(mask, pixels[quad], 1, shift=8)
+    return mask > 0
+
+
+def overlap(a: np.ndarray, b: np.ndarray) -> float:
+    return (a & b).sum() / (a | b).sum()
+
+
+def test_vertices_come_into_the_camera_of_their_row(body):
+    motion = standing(body, [0, 1])
+    rng = np.random.default_rng(2)
+    rotation = cv2.Rodrigues(rng.normal(size=3))[0]
+    motion.world_from_camera[1] = np.block([[rotation, rng.normal(size=(3, 1))], [np.zeros((1, 3)), np.ones((1, 1))]])
+    motion.betas[:2] = (1.5, -2.0)
+    rest = body.v_template + body.shapedirs @ motion.betas.astype(float)
+    pelvis = body.J_template[0] + body.J_shapedirs[0] @ motion.betas.astype(float)
+    world = (rest - pelvis) @ R_WORLD_MODEL.T + pelvis + motion.trans[0]
+    for row in (0, 1):
+        homogeneous = np.c_[world, np.ones(len(world))] @ np.linalg.inv(motion.world_from_camera[row]).T
+        np.testing.assert_allclose(camera_vertices(motion, body, row), homogeneous[:, :3], atol=1e-5)
+
+
+def test_the_video_shows_the_body_where_it_is_and_nothing_elsewhere(tmp_path, footage, body):
+    seen = []
+    out = tmp_path / "overlay.mp4"
+    motion = standing(body, [2, 3, 4, 5, 6], x=0.3)
+    motion.valid[2] = False
+    write_overlay(out, footage, motion, body, opacity=0.8, progress=lambda done, total: seen.append((done, total)))
+    with open_video(out) as video:
+        images = [f.image_rgb for f in video]
+    assert (video.width, video.height, video.fps, len(images)) == (W, H, 25, 10)
+    assert seen == [(i, 10) for i in range(1, 11)]
+    for i in (0, 1, 7, 8, 9):
+        assert changed(images[i]).mean() < 0.01
+    expected = silhouette(body, x=0.3)
+    for i in (2, 3, 5, 6):
+        assert overlap(changed(images[i]), expected) > 0.65  # at this size the codec blurs the outline
+    strength = [np.abs(image[expected].astype(float) - GREY).mean() for image in images]
+    assert 0.1 * strength[3] < strength[4] < 0.6 * strength[3]  # filled in: drawn fainter
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["footage.mp4", "overlay.mp4"]
+
+
+def test_two_people_have_their_own_colours_and_the_nearer_hides_the_other(body):
+    image = np.full((H, W, 3), GREY, np.uint8)
+    near, far = (camera_vertices(standing(body, [0], x, y), body, 0) for x, y in ((0.0, 2.5), (0.2, 4.0)))
+    out = draw_overlay(image, [far, near], body.faces, K, opacity=1.0)
+    other = draw_overlay(image, [near, far], body.faces, K, colors=[(0.2, 0.75, 1.0), (1.0, 0.55, 0.15)], opacity=1.0)
+    np.testing.assert_array_equal(out, other)
+    in_front, behind = silhouette(body, 0.0, 2.5), silhouette(body, 0.2, 4.0)
+    inside, only_far = (cv2.erode(m.astype(np.uint8), np.ones((3, 3))) > 0 for m in (in_front, behind & ~in_front))
+    blue = out[..., 2].astype(int) > out[..., 0]
+    assert blue[inside].mean() > 0.98  # the second tint; an eye may be of its own colour
+    assert blue[only_far].mean() < 0.02  # the first is orange
+
+
+def test_opacity_blends_and_the_picture_given_stays_as_it_was(body):
+    image = np.full((H, W, 3), GREY, np.uint8)
+    vertices = camera_vertices(standing(body, [0]), body, 0)
+    colors = body_colors(body, 0)
+    assert colors.shape == (len(body.faces), 3)
+    none, half, full = (draw_overlay(image, vertices, body.faces, K, None, colors, a) for a in (0.0, 0.5, 1.0))
+    np.testing.assert_array_equal(none, image)
+    assert np.abs(half.astype(int) - (full.astype(int) + GREY) / 2).max() <= 2
+    assert (image == GREY).all()
+
+
+def test_a_picture_suffix_gives_the_first_frame_with_somebody(tmp_path, footage, body):
+    motion = standing(body, [0, 1, 2])
+    motion.valid[:] = (False, False, True)
+    for name in ("still.png", "still.JPG", "still.webp"):
+        write_overlay(tmp_path / name, footage, motion, body)
+        image = cv2.cvtColor(cv2.imread(str(tmp_path / name)), cv2.COLOR_BGR2RGB)
+        assert overlap(changed(image), silhouette(body)) > 0.8
+
+
+def test_keypoints_are_dots_where_they_are_sure(tmp_path, footage, body):
+    motion = standing(body, [0])
+    motion.keypoints2d = np.array([[[20, 30, 0.9], [20, 90, 0.1], [np.nan, 5, 0.9], [1e9, 5, 0.9]]], np.float32)
+    motion.keypoints2d_names = np.array(list("abcd"))
+    write_overlay(tmp_path / "a.png", footage, motion, body)
+    marks = changed(cv2.imread(str(tmp_path / "a.png")))
+    assert marks[30, 20]
+    assert not marks[85:95, 15:25].any()
+
+
+def test_odd_sizes_lose_a_row_and_large_ones_are_bounded(tmp_path, body):
+    picture = cv2.imencode(".jpg", np.full((61, 2401, 3), GREY, np.uint8))[1].tobytes()
+    (tmp_path / "wide.mjpeg").write_bytes(picture * 3)
+    camera = np.array([[60.0, 0, 1200], [0, 60.0, 30.0], [0, 0, 1]])
+    motion = standing(body, [0, 1, 2], size=(2401, 61), intrinsics=camera)
+    write_overlay(tmp_path / "a.mp4", tmp_path / "wide.mjpeg", motion, body)
+    with open_video(tmp_path / "a.mp4") as video:
+        image = next(iter(video)).image_rgb
+    assert (video.width, video.height) == (1920, 48)
+    u = np.nonzero(changed(image))[1]
+    assert abs(u.mean() - 1200.5 * 1920 / 2401) < 2
+
+
+@pytest.mark.parametrize("name", ["overlay.gif", "overlay", "no/such/folder/overlay.mp4"])
+def test_what_cannot_be_written_is_said(tmp_path, footage, body, name):
+    with pytest.raises(OutputError, match="cannot write"):
+        write_overlay(tmp_path / name, footage, standing(body, [0]), body)
+    assert [p.name for p in tmp_path.iterdir()] == ["footage.mp4"]
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no limit on a file's size that a process could set")
+@pytest.mark.parametrize("name", ["overlay.mp4", "overlay.png"])
+def test_no_room_is_said_and_nothing_is_left(tmp_path, footage, body, name):
+    import resource
+
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (500, before[1]))
+    try:
+        with pytest.raises(OutputError, match=f"cannot write .*{name}.*free some space"):
+            write_overlay(tmp_path / name, footage, standing(body, [0]), body)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    assert [p.name for p in tmp_path.iterdir()] == ["footage.mp4"]
+
+
+def test_cancelling_leaves_nothing_and_keeps_what_was_there(tmp_path, footage, body):
+    (tmp_path / "overlay.mp4").write_bytes(b"the last one")
+
+    def cancel(done: int, total: int) -> None:
+        if done == 3:
+            raise CancelledError("stopped")
+
+    with pytest.raises(CancelledError):
+        write_overlay(tmp_path / "overlay.mp4", footage, standing(body, [0]), body, progress=cancel)
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["footage.mp4", "overlay.mp4"]
+    assert (tmp_path / "overlay.mp4").read_bytes() == b"the last one"
+
+
+def test_footage_that_is_gone_and_a_body_that_does_not_fit(tmp_path, footage, body):
+    with pytest.raises(VideoError):
+        write_overlay(tmp_path / "a.mp4", tmp_path / "gone.mp4", standing(body, [0]), body)
+    motion = standing(body, [0])
+    motion.joints_cam = np.zeros((1, 52, 3), np.float32)
+    with pytest.raises(ShapeError, match="52 joints"):
+        write_overlay(tmp_path / "a.mp4", footage, motion, body)
+    assert [p.name for p in tmp_path.iterdir()] == ["footage.mp4"]

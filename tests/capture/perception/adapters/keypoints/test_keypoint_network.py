@@ -1,0 +1,187 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Keypoint adapters on graphs of ours that see coloured spots: known pixels come back, whatever the region and size."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+pytest.importorskip("onnx", reason="the graphs are made with the build-time package onnx")
+
+from scope.scope_addon.capture.perception.adapters.keypoint_sets import COCO_17, KEYPOINT_SETS
+from scope.scope_addon.capture.perception.adapters.keypoints.keypoint_network import KeypointNetwork
+from scope.scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES
+from scope.scope_addon.capture.perception.region import Region
+from scope.solver.errors import ModelFileError
+
+from ....small_graphs import fixed, heatmaps, simcc
+
+# (x, y) of the red, green and blue spot in an image of odd size
+SPOTS = np.array([[140.0, 77.0], [171.0, 201.0], [211.0, 133.0]])
+REGIONS = {
+    "larger": Region((170.3, 141.8), 301.0, 0.0),
+    "enlarged": Region((176.0, 138.0), 190.0, 0.0),
+    "turned": Region((170.3, 141.8), 340.0, 0.6),
+    "over the edge": Region((160.0, 100.0), 330.0, 0.0),
+}
+
+
+def spots(sigma: float = 5.0) -> np.ndarray:
+    y, x = np.mgrid[:281, :357]
+    near = [np.exp(-((x - u) ** 2 + (y - v) ** 2) / (2 * sigma**2)) for u, v in SPOTS]
+    return np.round(255 * np.stack(near, axis=-1)).astype(np.uint8)
+
+
+def unit_colours(path: Path, **more: object) -> None:
+    """The spots are to be seen as 0..1, which real networks are not trained for."""
+    path.with_suffix(".json").write_text(json.dumps({"mean": 0, "std": 255, **more}))
+
+
+@pytest.mark.parametrize("region", REGIONS.values(), ids=REGIONS)
+@pytest.mark.parametrize("graph", [simcc, heatmaps], ids=["simcc", "heatmap"])
+@pytest.mark.parametrize("size", [(192, 256), (288, 384)], ids=str)
+def test_known_pixels_come_back(tmp_path: Path, graph: object, region: Region, size: tuple[int, int]) -> None:
+    path = graph(tmp_path / "m.onnx", 17, *size)  # type: ignore[operator]
+    unit_colours(path)
+    network = KeypointNetwork(path, threads=1)
+    assert network.keypoint_set.name == "coco17"
+    (seen,) = network.estimate(spots(), [region])
+    for k, name in enumerate(COCO_17):
+        j = KEYPOINT_NAMES.index(name)
+        np.testing.assert_allclose(seen.keypoints_px[j], SPOTS[k % 3], atol=1.0 if graph is heatmaps else 0.8)
+        assert seen.visibility[j] > 0.4
+    assert seen.presence == 1.0
+    assert not seen.world_landmarks.any()
+    assert seen.disagreement == 0.0
+
+
+def test_channel_order_and_square_pictures(tmp_path: Path) -> None:
+    path = simcc(tmp_path / "m.onnx", 17, 256, 256)
+    unit_colours(path, channel_order="bgr")
+    (seen,) = KeypointNetwork(path, threads=1).estimate(spots(), [REGIONS["larger"]])
+    np.testing.assert_allclose(seen.keypoints_px[KEYPOINT_NAMES.index("nose")], SPOTS[2], atol=1.0)
+
+
+def test_normalisation_is_imagenets(tmp_path: Path) -> None:
+    """Grey of ImageNet's mean is 0; the score of a picture one deviation above it is 1."""
+    path = simcc(tmp_path / "m.onnx", 17, 192, 256)
+    above = np.array([123.675 + 58.395, 116.28 + 57.12, 103.53 + 57.375])
+    image = np.full((100, 100, 3), np.round(above), np.uint8)
+    network = KeypointNetwork(path, threads=1)
+    outputs = network._graph.run(cv2.resize(image, (192, 256)), network._normalization)
+    assert all(o.max() == pytest.approx(1.0, abs=0.02) and o.min() > 0.97 for o in outputs)
+
+
+@pytest.mark.parametrize("how", ["dark", "quarter"])
+@pytest.mark.parametrize("udp", [False, True])
+def test_heatmap_peaks_between_cells(tmp_path: Path, how: str, udp: bool) -> None:
+    """Gaussians whose middle is known to a fraction of a cell: DARK finds it exactly, the quarter offset roughly."""
+    rng = np.random.default_rng(3)
+    middle = rng.uniform([6, 6], [41, 57], (17, 2))
+    y, x = np.mgrid[:64, :48]
+    maps = [np.exp(-((x - u) ** 2 + (y - v) ** 2) / (2 * 2.0**2)) for u, v in middle]
+    path = fixed(tmp_path / "m.onnx", 192, 256, {"heatmaps": np.stack(maps)[None].astype(np.float32)})
+    path.with_suffix(".json").write_text(json.dumps({"decode": how, "udp": udp}))
+    network = KeypointNetwork(path, threads=1)
+    points, scores = network._decode(network._graph.trial, network._graph)
+    pixels = middle * ([191 / 47, 255 / 63] if udp else 4.0)
+    assert np.abs(points - pixels).max() < (0.05 if how == "dark" else 1.1)
+    assert scores.min() > 0.9
+
+
+def numbered(count: int) -> tuple[np.ndarray, np.ndarray]:
+    return np.stack([np.arange(count), 1000 - np.arange(count)], axis=1).astype(float), np.linspace(0.5, 1, count)
+
+
+@pytest.mark.parametrize("name", KEYPOINT_SETS)
+def test_keypoint_orders(name: str) -> None:
+    points, scores = numbered(KEYPOINT_SETS[name].count)
+    ours, confidence = KEYPOINT_SETS[name].to_ours(points, scores)
+    at = dict(zip(KEYPOINT_NAMES, ours[:, 0], strict=True))
+    known = dict(zip(KEYPOINT_NAMES, confidence, strict=True))
+    assert at["nose"] == 0
+    assert (at["left_shoulder"], at["right_shoulder"], at["right_ankle"]) == (5, 6, 16)
+    assert known["right_ankle"] == scores[16]
+    if name == "coco17":
+        assert {n for n, c in known.items() if c > 0} == set(COCO_17)
+    if name == "halpe26":
+        assert (at["left_heel"], at["right_heel"]) == (24, 25)
+        assert at["right_foot_index"] == pytest.approx(0.85 * 21 + 0.15 * 23)
+        assert known["left_thumb"] == 0
+    if name == "wholebody133":
+        assert (at["left_heel"], at["right_heel"]) == (19, 22)
+        assert at["left_foot_index"] == pytest.approx(0.85 * 17 + 0.15 * 18)
+        assert (at["right_eye_outer"], at["left_eye_outer"], at["mouth_left"]) == (59, 68, 77)
+        assert (at["left_index"], at["right_pinky"], at["right_thumb"]) == (96, 129, 115)
+        assert min(known.values()) > 0
+
+
+@pytest.mark.parametrize("name", ["halpe26", "wholebody133"])
+def test_the_set_follows_from_the_count(tmp_path: Path, name: str) -> None:
+    path = simcc(tmp_path / "m.onnx", KEYPOINT_SETS[name].count, 192, 256)
+    assert KeypointNetwork(path, threads=1).keypoint_set.name == name
+
+
+def test_an_unknown_count_asks_for_the_json(tmp_path: Path) -> None:
+    path = heatmaps(tmp_path / "m.onnx", 21, 192, 256)
+    with pytest.raises(ModelFileError, match=r"21 keypoints.*m\.json.*keypoints"):
+        KeypointNetwork(path, threads=1)
+    path.with_suffix(".json").write_text('{"keypoints": "coco17"}')
+    assert KeypointNetwork(path, threads=1).keypoint_set.name == "coco17"
+
+
+def test_a_detector_is_no_keypoint_network(tmp_path: Path) -> None:
+    path = fixed(tmp_path / "m.onnx", 640, 640, {"output0": np.zeros((1, 84, 8400), np.float32)})
+    with pytest.raises(ModelFileError, match=r"as a keypoint network.*output0 \[1, 84, 8400\].*simcc, heatmap"):
+        KeypointNetwork(path, threads=1)
+
+
+def upright(count: int = 17) -> np.ndarray:
+    """(33, 2) a standing person, 200 pixels from nose to ankles."""
+    height = {"nose": 0, "eye": -5, "ear": 0, "shoulder": 35, "elbow": 70, "wrist": 100, "hip": 100, "knee": 150}
+    height |= {"ankle": 200}
+    points = np.zeros((33, 2))
+    for name in COCO_17:
+        x = 20 if "left" in name else -20 if "right" in name else 0
+        points[KEYPOINT_NAMES.index(name)] = x, next(h for key, h in height.items() if key in name)
+    return points + [400, 300]
+
+
+def test_the_next_region_holds_the_keypoints(tmp_path: Path) -> None:
+    network = KeypointNetwork(simcc(tmp_path / "m.onnx", 17, 192, 256), threads=1)
+    confidence = np.array([0.9 if name in COCO_17 else 0.0 for name in KEYPOINT_NAMES])
+    seen = confidence > 0
+    region = network._next_region(upright(), confidence, Region((400, 400), 250.0, 0.0))
+    assert region.rotation == 0
+    assert region.side_px == pytest.approx(1.4 * 205)  # more than what trunk and legs ask for
+    np.testing.assert_allclose(region.center_px, (400, 397.5))
+    # head down: turned, and just as large
+    turn = np.array([[-1.0, 0.0], [0.0, -1.0]])
+    over = network._next_region(upright() @ turn + [800, 800], confidence, region)
+    assert abs(over.rotation) == pytest.approx(math.pi)
+    assert over.side_px == pytest.approx(region.side_px)
+    crop = over.crop_from_image((upright() @ turn + [800, 800])[seen])
+    assert crop.min() > 0.1
+    assert crop.max() < 0.9
+    # arms wide: the picture is narrower than high
+    wide = upright()
+    for side, x in (("left", 700), ("right", 100)):
+        wide[KEYPOINT_NAMES.index(f"{side}_wrist")] = x, 340
+    assert network._next_region(wide, confidence, region).side_px == pytest.approx(1.4 * 600 * 256 / 192)
+    # hardly anything seen: stay
+    assert network._next_region(upright(), confidence * 0.05, region) is region
+    # legs hidden: shrink slowly
+    legs = np.array(["knee" in n or "ankle" in n or "hip" in n for n in KEYPOINT_NAMES])
+    assert network._next_region(upright(), confidence * ~legs, region).side_px == pytest.approx(
+        0.97 * region.side_px
+    )
+    # crouching: the box stays as large as the person will be
+    low = upright()
+    ankles = [KEYPOINT_NAMES.index(f"{side}_ankle") for side in ("left", "right")]
+    low[ankles] += [0, -90]
+    assert network._next_region(low, confidence, Region((400, 400), 100.0, 0.0)).side_px > 1.6 * (65 + 50 + 40) - 1

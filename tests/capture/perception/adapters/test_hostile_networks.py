@@ -1,0 +1,206 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Files that are no network, or networks that want what they must not have: a sentence for each."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+onnx = pytest.importorskip("onnx", reason="the graphs are made with the build-time package onnx")
+from onnx import TensorProto, helper, numpy_helper  # noqa: E402
+from scope.scope_addon.capture.perception.adapters.detectors.box_detector import BoxDetector  # noqa: E402
+from scope.scope_addon.capture.perception.adapters.keypoints.keypoint_network import KeypointNetwork  # noqa: E402
+from scope.scope_addon.capture.perception.adapters.onnx_file import check_onnx_file  # noqa: E402
+from scope.scope_addon.cli import SAMPLE, main  # noqa: E402
+from scope.solver.errors import ModelFileError  # noqa: E402
+
+from ...small_graphs import fixed, picture_input, save, simcc  # noqa: E402
+
+Open = Callable[..., object]
+OPENERS = pytest.mark.parametrize("opens", [BoxDetector, KeypointNetwork])
+
+
+def refused(opens: Open, path: Path, says: str) -> None:
+    with pytest.raises(ModelFileError, match=says) as caught:
+        opens(path, threads=1)
+    text = str(caught.value)
+    assert "\n" not in text
+    assert path.stem in text
+
+
+@OPENERS
+@pytest.mark.parametrize("content", [b"", b"PK\x03\x04 torch", b"\x80\x04 pickle", b"text\n" * 99, b"\xff" * 99])
+def test_no_onnx(tmp_path: Path, opens: Open, content: bytes) -> None:
+    (tmp_path / "m.onnx").write_bytes(content)
+    refused(opens, tmp_path / "m.onnx", "not an ONNX model")
+
+
+@OPENERS
+def test_missing_and_folder(tmp_path: Path, opens: Open) -> None:
+    refused(opens, tmp_path / "m.onnx", "cannot be read")
+    (tmp_path / "m.onnx").mkdir()
+    refused(opens, tmp_path / "m.onnx", "cannot be read")
+
+
+@OPENERS
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="Windows keeps its pipes in no folder")
+def test_what_would_be_read_forever(tmp_path: Path, opens: Open) -> None:
+    pipe = tmp_path / "m.onnx"
+    os.mkfifo(pipe)
+    keeps_open = os.open(pipe, os.O_RDWR | os.O_NONBLOCK)
+    os.write(keeps_open, b"text")
+    try:
+        refused(opens, pipe, "m.onnx is no ordinary file")
+    finally:
+        os.close(keeps_open)
+
+
+@OPENERS
+def test_more_than_a_protocol_buffer_can_hold(tmp_path: Path, opens: Open) -> None:
+    path = tmp_path / "m.onnx"
+    with path.open("wb") as file:
+        file.truncate((2 << 30) + 1)
+    refused(opens, path, "larger than the 2 GiB")
+
+
+@OPENERS
+def test_every_truncation_and_many_flipped_bytes(tmp_path: Path, opens: Open) -> None:
+    whole = simcc(tmp_path / "whole.onnx", 17, 32, 32).read_bytes()
+    path = tmp_path / "m.onnx"
+    rng = np.random.default_rng(0)
+    damaged = [whole[:k] for k in range(0, len(whole), 41)]
+    for _ in range(40):
+        data = bytearray(whole)
+        data[rng.integers(len(data))] = rng.integers(256)
+        damaged.append(bytes(data))
+    for data in damaged:
+        path.write_bytes(data)
+        with contextlib.suppress(ModelFileError):  # some damage does no harm; nothing else may be raised
+            opens(path, threads=1)
+
+
+def with_external_data(path: Path, location: str, inside: str = "initializer") -> Path:
+    weight = numpy_helper.from_array(np.zeros((1, 17, 64), np.float32), "w")
+    weight.ClearField("raw_data")
+    weight.data_location = TensorProto.EXTERNAL
+    for key, value in {"location": location, "offset": "0", "length": "4352"}.items():
+        entry = weight.external_data.add()
+        entry.key, entry.value = key, value
+    if inside == "initializer":
+        node, weights = helper.make_node("Identity", ["w"], ["simcc_x"]), [weight]
+    else:
+        node, weights = helper.make_node("Constant", [], ["simcc_x"], value=weight), []
+    info = helper.make_tensor_value_info("simcc_x", TensorProto.FLOAT, [1, 17, 64])
+    graph = helper.make_graph([node], "ours", [picture_input(32, 32)], [info], weights)
+    path.write_bytes(helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)]).SerializeToString())
+    return path
+
+
+@OPENERS
+@pytest.mark.parametrize("inside", ["initializer", "constant"])
+@pytest.mark.parametrize("location", ["../secret.bin", "{tmp}/secret.bin", "a/../../secret.bin", "link"])
+def test_weights_outside_of_the_folder(tmp_path: Path, opens: Open, location: str, inside: str) -> None:
+    (tmp_path / "secret.bin").write_bytes(bytes(4352))
+    folder = tmp_path / "models"
+    folder.mkdir()
+    (folder / "link").symlink_to(tmp_path / "secret.bin")
+    path = with_external_data(folder / "m.onnx", location.format(tmp=tmp_path), inside)
+    refused(opens, path, "outside its own folder")
+
+
+def test_weights_beside_it_are_welcome(tmp_path: Path) -> None:
+    path = with_external_data(tmp_path / "m.onnx", "m.onnx.data")
+    refused(KeypointNetwork, path, "missing; put that file beside it")
+    (tmp_path / "m.onnx.data").write_bytes(bytes(4352))
+    check_onnx_file(path)
+
+
+@OPENERS
+def test_operators_of_its_own(tmp_path: Path, opens: Open) -> None:
+    node = helper.make_node("Magic", ["images"], ["out"], domain="com.example")
+    info = helper.make_tensor_value_info("out", TensorProto.FLOAT, [1, 17, 64])
+    graph = helper.make_graph([node], "ours", [picture_input(32, 32)], [info])
+    opsets = [helper.make_opsetid("", 17), helper.make_opsetid("com.example", 1)]
+    path = tmp_path / "m.onnx"
+    path.write_bytes(helper.make_model(graph, opset_imports=opsets, ir_version=8).SerializeToString())
+    refused(opens, path, "onnxruntime cannot load.*standard operators")
+
+
+@OPENERS
+def test_an_opset_that_is_too_new(tmp_path: Path, opens: Open) -> None:
+    path = fixed(tmp_path / "m.onnx", 32, 32, {"out": np.zeros((1, 17, 8, 8), np.float32)})
+    model = onnx.load(path)
+    model.opset_import[0].version = 99
+    onnx.save(model, path)
+    refused(opens, path, "onnxruntime cannot load.*Export it again, .* an opset that is not newer")
+
+
+@OPENERS
+@pytest.mark.parametrize(
+    ("shape", "kind", "says"),
+    [
+        ([1, 1, 32, 32], TensorProto.FLOAT, "colour"),
+        ([4, 3, 32, 32], TensorProto.FLOAT, "batch size 1"),
+        ([1, 3, 32], TensorProto.FLOAT, "batch size 1"),
+        ([1, 3, 2, 2], TensorProto.FLOAT, "16 to 4096"),
+        ([1, 3, 32, 32], TensorProto.INT64, "int64"),
+        ([1, 3, "h", "w"], TensorProto.FLOAT, "input_size"),
+    ],
+)
+def test_inputs_that_are_no_picture(tmp_path: Path, opens: Open, shape: list, kind: int, says: str) -> None:
+    info = helper.make_tensor_value_info("images", kind, shape)
+    out = helper.make_tensor_value_info("out", kind, shape)
+    path = save(tmp_path / "m.onnx", [helper.make_node("Identity", ["images"], ["out"])], [info], [out])
+    refused(opens, path, says)
+
+
+@OPENERS
+def test_a_graph_that_fails_when_it_runs(tmp_path: Path, opens: Open) -> None:
+    nodes = [helper.make_node("Reshape", ["images", "wanted"], ["out"])]
+    out = helper.make_tensor_value_info("out", TensorProto.FLOAT, [7, 11])
+    shape = {"wanted": np.array([7, 11], np.int64)}
+    path = save(tmp_path / "m.onnx", nodes, [picture_input("w", "h")], [out], shape)
+    path.with_suffix(".json").write_text('{"input_size": [32, 32]}')
+    refused(opens, path, "cannot be run on a picture of 32 x 32")
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("{", "as JSON"),
+        ("[]", "one JSON object"),
+        ("[" * 100_000, "as JSON"),
+        ('{"colour": "rgb"}', "'colour' is not known"),
+        ('{"type": "yolov99"}', "type must be one of simcc, heatmap"),
+        ('{"mean": [1, 2]}', "mean must be one number or three"),
+        ('{"std": 0}', "above 0"),
+        ('{"mean": NaN}', "mean must be"),
+        ('{"input_size": [640, 0]}', "input_size must be"),
+        ('{"input_size": 640}', "input_size must be"),
+        ('{"input_size": [640, 640]}', "says input_size"),
+        ('{"score_threshold": 3}', "between 0 and 1"),
+        ('{"type": ["simcc"]}', "type must be"),
+        ('{"keypoints": "mpii16"}', "coco17, halpe26, wholebody133"),
+        ('{"type": "heatmap"}', "not heatmap"),
+    ],
+)
+def test_a_json_that_is_wrong(tmp_path: Path, text: str, says: str) -> None:
+    path = simcc(tmp_path / "m.onnx", 17, 32, 32)
+    path.with_suffix(".json").write_text(text)
+    refused(KeypointNetwork, path, says)
+
+
+@pytest.mark.parametrize("option", ["--detector", "--keypoints"])
+def test_the_command_line_says_it_in_one_sentence(tmp_path: Path, capsys: pytest.CaptureFixture, option: str) -> None:
+    path = fixed(tmp_path / "m.onnx", 32, 32, {"what": np.zeros((1, 7), np.float32)})
+    assert main(["capture", str(SAMPLE), option, str(path), "-o", str(tmp_path / "out.npz")]) == 1
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1
+    assert json.loads('"what [1, 7]"') in said
+    assert not (tmp_path / "out.npz").exists()

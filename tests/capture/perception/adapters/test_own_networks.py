@@ -1,0 +1,121 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A whole capture with plugged-in networks, which are ours behind the outputs of others."""
+
+from __future__ import annotations
+
+import importlib.util
+import warnings
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+pytest.importorskip("onnx", reason="the graphs are made with the build-time package onnx")
+
+from scope.scope_addon.capture.media.video_range import VideoRange
+from scope.scope_addon.capture.pipeline import Capture, CaptureOptions, capture
+from scope.scope_addon.capture.tracking.tracker import PeopleTracker
+from scope.scope_addon.cli import SAMPLE
+from scope.scope_addon.errors import NoPersonError, SetupError
+from scope.solver.loaders.body_file import load_body
+
+from ...small_graphs import fixed
+from ...wrapped_networks import box_rows, coco_simcc
+
+Frames = Callable[..., Iterator[np.ndarray]]
+
+
+@pytest.fixture(scope="module")
+def networks(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    folder = tmp_path_factory.mktemp("networks")
+    try:
+        return box_rows(folder / "detector.onnx"), coco_simcc(folder / "keypoints.onnx")
+    except SetupError as error:
+        pytest.skip(f"the networks are not built: {error}")
+
+
+def captured(detector: Path | None = None, keypoints: Path | None = None) -> Capture:
+    options = CaptureOptions(
+        quality="fast", wanted=VideoRange(0.0, 1.0), threads=2, detector=detector, keypoints=keypoints
+    )
+    return capture(SAMPLE, load_body("scope"), options)
+
+
+def test_a_capture_with_both_is_as_good_as_ours(networks: tuple[Path, Path]) -> None:
+    ours, theirs = captured(), captured(*networks)
+    assert theirs.report["detector"] == str(networks[0])
+    assert theirs.report["execution"] == "CPU, 2 threads"
+    motion = theirs.motions[0]
+    assert motion.valid.all()
+    truth = np.load(SAMPLE.with_name("sample_truth.npz"))["joints_cam"][motion.frames]
+    errors = []
+    for found in (ours.motions[0].joints_cam, motion.joints_cam):
+        a, b = (j - j[:, :1] for j in (found[:, :22], truth[:, :22]))
+        errors.append(np.linalg.norm(a - b, axis=-1).mean())
+    assert errors[1] < 1.25 * errors[0] + 0.01
+    assert not motion.keypoints2d[:, [1, 9, 17, 31], 2].any()  # what COCO lacks: eye corner, mouth, finger, toe
+
+
+def test_a_network_that_sees_nobody_is_named(tmp_path: Path) -> None:
+    blind = fixed(tmp_path / "blind.onnx", 640, 640, {"output0": np.zeros((1, 84, 8400), np.float32)})
+    with pytest.raises(NoPersonError, match=r"crop it; if .* without blind\.onnx, write into blind\.json"):
+        captured(detector=blind)
+
+
+def test_lost_and_found_again(networks: tuple[Path, Path]) -> None:
+    video = cv2.VideoCapture(str(SAMPLE))
+    images = [np.ascontiguousarray(video.read()[1][:, :, ::-1]) for _ in range(6)]
+    tracker = PeopleTracker("fast", 2, detector=networks[0], keypoints=networks[1])
+    before = [tracker.step(image) for image in images[:3]]
+    assert [tracker.step(np.zeros_like(images[0])) for _ in range(3)] == [[]] * 3
+    after = [tracker.step(image) for image in images[3:]]
+    assert all(len(seen) == 1 for seen in before + after)
+    assert after[0][0][1].acquired
+    assert after[0][0][1].region.resembles(before[-1][0][1].region, 0.15)
+
+
+def test_left_and_right_of_a_plugged_in_network_are_repaired(shared: Path, tmp_path: Path) -> None:
+    """BlazePose-full exchanges them in 29 of 100 frames of this clip, in which the man's face hardly shows."""
+    spec = importlib.util.spec_from_file_location("evaluate", shared / "tools/evaluate.py")
+    tool = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(tool)
+    options = CaptureOptions(keypoints=coco_simcc(tmp_path / "full.onnx", "pose_landmark_full"), threads=2)
+    found = capture(shared / "data/pose2sim/cam2.mp4", load_body("scope"), options)
+    found.motions[0].save(tmp_path / "cam2.npz")
+    with np.errstate(all="ignore"), warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)
+        figures = tool.evaluate(str(shared / "data/pose2sim/truth_cam2.npz"), str(tmp_path / "cam2.npz"))
+    assert max(figures[key] for key in ("lr_swap", "mirror", "mirror_swap")) <= 0.01
+    assert figures["mpjpe_root"] < 90
+
+
+def test_two_people_stay_themselves(networks: tuple[Path, Path], frames: Frames) -> None:
+    tracker = PeopleTracker("fast", 2, people=4, detector=networks[0], keypoints=networks[1])
+    for image in frames("clips/two_people_portrait", stop=24):
+        seen = dict(tracker.step(image))
+        assert sorted(seen) == [0, 1]
+    assert abs(seen[0].region.center_px[0] - seen[1].region.center_px[0]) > 200
+
+
+def test_a_runner_is_followed_at_a_low_rate(networks: tuple[Path, Path], frames: Frames) -> None:
+    """Without auxiliary points to go by: at 7.5 frames a second, every limb stays in the region that was foretold."""
+    tracker, numbers = PeopleTracker("fast", 2, detector=networks[0], keypoints=networks[1]), set()
+    for image in frames("clips/run_moving_camera", every=4):
+        ((number, seen),) = tracker.step(image)
+        numbers.add(number)
+        in_region = seen.region.crop_from_image(seen.keypoints_px[[0, *range(11, 17), *range(23, 29)]])
+        assert ((in_region > 0.03) & (in_region < 0.97)).all()
+    assert numbers == {0}
+
+
+def test_who_walks_out_of_the_picture_is_let_go(networks: tuple[Path, Path], frames: Frames) -> None:
+    """The woman on the grass leaves at the left edge between frames 195 and 207."""
+    tracker, woman = PeopleTracker("fast", 2, people=2, keypoints=networks[1]), []
+    for index, image in enumerate(frames("clips/walk_side_static", stop=215)):
+        if index >= 185:
+            seen = tracker.step(image)
+            woman += [index for _, observation in seen if observation.keypoints_px[:, 0].mean() < 200]
+    assert len(woman) >= 10
+    assert 195 <= woman[-1] <= 207

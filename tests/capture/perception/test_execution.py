@@ -1,0 +1,141 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Which provider a session gets: what is there, what was asked for, and the processor when that fails."""
+
+from __future__ import annotations
+
+import threading
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+from scope.scope_addon import cli_options
+from scope.scope_addon.capture.perception import sessions
+from scope.scope_addon.capture.perception.execution import CHOICES, CPU, PROVIDERS, Execution, OneAtATime
+from scope.scope_addon.capture.perception.sessions import network_path, open_session
+from scope.scope_addon.errors import SetupError, UsageError
+
+CPU_NAME = "CPUExecutionProvider"
+
+
+class FakeRuntime:
+    """onnxruntime with these providers; those in ``broken`` raise, those in ``silent`` are left out."""
+
+    def __init__(self, available: list[str], broken: tuple[str, ...] = (), silent: tuple[str, ...] = ()) -> None:
+        self.available, self.broken, self.silent = available, broken, silent
+        self.asked: list[list[str]] = []
+        self.threads: list[int] = []
+
+    def get_available_providers(self) -> list[str]:
+        return [*self.available, CPU_NAME]
+
+    def SessionOptions(self) -> SimpleNamespace:
+        return SimpleNamespace(add_session_config_entry=lambda *_: None)
+
+    def InferenceSession(self, path: str, options: SimpleNamespace, providers: list[str]) -> SimpleNamespace:
+        self.asked.append(providers)
+        self.threads.append(options.intra_op_num_threads)
+        if providers[0] in self.broken:
+            raise RuntimeError("no device\nwas found")
+        got = [p for p in providers if p not in self.silent]
+        return SimpleNamespace(get_providers=lambda: got, options=options)
+
+
+@pytest.fixture
+def runtime(monkeypatch: pytest.MonkeyPatch):
+    def make(*available: str, **more) -> FakeRuntime:
+        fake = FakeRuntime([PROVIDERS[name][0] for name in available], **more)
+        monkeypatch.setattr(sessions, "_runtime", lambda: fake)
+        return fake
+
+    return make
+
+
+@pytest.mark.parametrize(
+    ("available", "asked", "used"),
+    [
+        ((), "auto", "cpu"),
+        (("tensorrt", "cuda"), "auto", "cuda"),
+        (("tensorrt",), "auto", "cpu"),
+        (("directml",), "auto", "directml"),
+        (("coreml",), "auto", "coreml"),
+        (("tensorrt", "cuda"), "tensorrt", "tensorrt"),
+        (("cuda",), "cpu", "cpu"),
+    ],
+)
+def test_the_best_there_is(runtime, available: tuple[str, ...], asked: str, used: str) -> None:
+    fake, execution = runtime(*available), Execution(asked)
+    open_session(Path("m.onnx"), 3, execution)
+    assert execution.used == [used]
+    assert execution.warnings == []
+    assert fake.asked[-1][-1] == CPU_NAME  # for operators that the other does not have
+    assert fake.threads == [3]
+
+
+def test_what_is_not_there_is_said_once(runtime) -> None:
+    fake, execution = runtime("coreml"), Execution("cuda")
+    open_session(Path("m.onnx"), 1, execution)
+    open_session(Path("m.onnx"), 1, execution)
+    assert fake.asked == [[CPU_NAME]] * 2
+    (warning,) = execution.warnings
+    assert "CUDA was asked for, but this onnxruntime has only CoreML, CPU" in warning
+
+
+@pytest.mark.parametrize("how", ["broken", "silent"])
+def test_a_provider_that_fails_gives_way_once_and_for_all(runtime, how: str) -> None:
+    fake, execution = runtime("cuda", **{how: (PROVIDERS["cuda"][0],)}), Execution("auto")
+    for _ in range(3):
+        open_session(Path("m.onnx"), 1, execution)
+    assert len([a for a in fake.asked if a[0] != CPU_NAME]) == 1
+    assert execution.used == [CPU]
+    (warning,) = execution.warnings
+    assert "CUDA cannot run the networks" in warning
+    assert "\n" not in warning
+
+
+def test_directml_runs_one_at_a_time(runtime) -> None:
+    runtime("directml")
+    session = open_session(Path("m.onnx"), 1, Execution("auto"))
+    assert isinstance(session, OneAtATime)
+    assert session.options.enable_mem_pattern is False
+    inside = threading.Semaphore()
+
+    def run(*_: object) -> list:
+        assert inside.acquire(blocking=False)
+        threading.Event().wait(0.005)
+        inside.release()
+        return [1]
+
+    session._session.run = run
+    results: list = []
+    threads = [threading.Thread(target=lambda: results.extend(session.run(None, {}))) for _ in range(6)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert results == [1] * 6
+
+
+def test_the_line_that_says_it() -> None:
+    assert Execution("auto", used=["cuda"]).describe(2) == "CUDA"
+    assert Execution("auto", used=["cpu"]).describe(2) == "CPU, 2 threads"
+    assert Execution("auto", used=["cpu"]).describe(1) == "CPU, 1 thread"
+    with pytest.raises(UsageError, match="auto, cpu"):
+        Execution("gpu")
+
+
+def test_the_command_line_offers_the_same() -> None:
+    assert sorted(cli_options.PROVIDERS) == sorted(CHOICES)
+
+
+def test_the_real_processor() -> None:
+    try:
+        path = network_path("pose_detection")
+    except SetupError as error:
+        pytest.skip(f"the networks are not built: {error}")
+    execution = Execution("tensorrt")
+    session = open_session(path, 2, execution)
+    if PROVIDERS["tensorrt"][0] in session.get_providers():
+        pytest.skip("this machine has TensorRT")
+    assert session.get_session_options().intra_op_num_threads == 2
+    assert execution.used == [CPU]
+    assert "TensorRT was asked for" in execution.warnings[0]

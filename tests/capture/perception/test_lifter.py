@@ -1,0 +1,240 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The committed lifting network on people whose depth is known exactly, and its invariances."""
+
+import numpy as np
+import pytest
+from scope.scope_addon.capture.fitting.keypoint_offsets import as_seen
+from scope.scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES, LandmarkNetwork
+from scope.scope_addon.capture.perception.lifter import (
+    HIPS,
+    LIFTER_FILE,
+    Lifted,
+    Lifter,
+    mixture,
+    network_input,
+    virtual_camera,
+)
+from scope.scope_addon.capture.perception.lifter_window import windows_around
+from scope.scope_addon.capture.perception.person_detector import PersonDetector
+from scope.scope_addon.capture.tracking.left_right import SWAPPED
+from scope.scope_addon.errors import SetupError
+from scope.solver.errors import ModelFileError, ShapeError
+from scope.solver.rotations import exp
+
+
+@pytest.fixture(scope="module")
+def lifter():
+    return Lifter()
+
+
+def before_camera(body, R, heading):
+    """(2, 33, 3) keypoints of a pose (24, 3, 3) 5 m away, camera frame: the body's own, and where they are seen."""
+    R[0] = np.diag([1.0, -1.0, -1.0]) @ exp(np.array([0, heading, 0])) @ R[0]
+    pose, at = body.forward_kinematics(R, np.array([0.3, 0.1, 5.0])), list(body.keypoint_set("blazepose").values())
+    return np.array([which.keypoints(*pose)[at] for which in (body, as_seen(body))])
+
+
+def truth_and_rays(moments):
+    own, seen = np.array(moments).swapaxes(0, 1)
+    return own, seen[..., :2] / seen[..., 2:]
+
+
+@pytest.fixture(scope="module")
+def people(body):
+    """Keypoints of the body in the camera frame (T, 33, 3) and where they are seen, (T, 33, 2) with z = 1: walking-like
+    poses, every heading, a camera 5 m away."""
+    rng, out = np.random.default_rng(0), []
+    for k in range(48):
+        pose = rng.normal(0, 0.05, (body.K + 1, 3))
+        swing = 0.5 * np.sin(k)
+        for name, angle in (("left_hip", -swing), ("right_hip", swing), ("left_knee", 0.4), ("right_knee", 0.4)):
+            pose[body.joint_names.index(name), 0] += angle
+        for name, side in (("left_shoulder", -1), ("right_shoulder", 1)):
+            pose[body.joint_names.index(name), 2] += 1.2 * side
+        R = exp(pose)
+        out.append(before_camera(body, R, 2 * np.pi * k / 48))
+    return truth_and_rays(out)
+
+
+@pytest.fixture(scope="module")
+def walkers(body):
+    """As ``people``, of a walk on the spot that turns once, 4 s, 30 frames a second; and times."""
+    times, out = np.arange(120) / 30, []
+    for t in times:
+        pose = np.zeros((body.K + 1, 3))
+        swing = 0.5 * np.sin(2 * np.pi * 0.9 * t)
+        turns = {"left_hip": -swing, "right_hip": swing, "left_shoulder": swing, "right_shoulder": -swing}
+        for name, angle in (turns | {"left_knee": 0.3, "right_knee": 0.3}).items():
+            pose[body.joint_names.index(name), 0] += angle
+        R = exp(pose)
+        for name, side in (("left_shoulder", -1), ("right_shoulder", 1)):
+            k = body.joint_names.index(name)
+            R[k] = R[k] @ exp(np.array([0, 0, 1.2 * side]))
+        out.append(before_camera(body, R, 2 * np.pi * t / 4))
+    return *truth_and_rays(out), times
+
+
+def relative(points):
+    return points - points[:, HIPS].mean(axis=1, keepdims=True)
+
+
+def test_depth_of_unseen_people_is_found_from_their_image_alone(lifter, people):
+    people, rays = people
+    lifted = lifter.lift(rays, np.ones(rays.shape[:2]), None)
+    limbs = [*range(11, 17), *range(25, 29)]
+    error = np.linalg.norm(lifted.points - relative(people), axis=-1)[:, limbs].mean()
+    flat = np.linalg.norm(relative(people) * [1, 1, 0] - relative(people), axis=-1)[:, limbs].mean()
+    assert error < 0.1
+    assert error < 0.7 * flat
+
+
+def test_true_world_landmarks_make_it_better(lifter, people):
+    people, rays = people
+    ones = np.ones(people.shape[:2])
+    R = virtual_camera(rays)
+    given = relative(people) @ np.swapaxes(R, 1, 2)  # landmark networks look straight at the person
+    without, informed = lifter.lift(rays, ones, None), lifter.lift(rays, ones, given)
+    error = [np.linalg.norm(x.points - relative(people), axis=-1).mean() for x in (without, informed)]
+    assert error[1] < error[0]
+
+
+def test_what_lies_around_a_frame_makes_it_better(lifter, walkers):
+    """With errors of the image that change from frame to frame, three seeds: nearer to the truth, and calmer."""
+    points, seen, times = walkers
+    truth, ones = relative(points), np.ones(points.shape[:2])
+    windows = windows_around(times, np.ones(len(times), bool))
+    for seed in range(3):
+        rays = seen + np.random.default_rng(seed).normal(0, 0.004, seen.shape)
+        error, unrest = [], []
+        for around in (None, windows):
+            lifted = lifter.lift(rays, ones, None, around).points
+            error.append(np.linalg.norm(lifted - truth, axis=-1).mean())
+            unrest.append(np.linalg.norm(np.diff(lifted - truth, axis=0), axis=-1).mean())
+        assert error[1] < error[0]
+        assert unrest[1] < 0.8 * unrest[0]
+
+
+def test_long_clips_are_lifted_in_blocks_that_know_their_neighbours(lifter, walkers, monkeypatch):
+    points, rays, times = walkers
+    ones = np.ones(points.shape[:2])
+    windows = windows_around(times, np.ones(len(times), bool))
+    whole = lifter.lift_both_ways(rays, ones, relative(points), windows)
+    monkeypatch.setattr("scope.scope_addon.kinematics.frame_blocks.BLOCK_FRAMES", 17)
+    blocks = lifter.lift_both_ways(rays, ones, relative(points), windows)
+    assert np.allclose(blocks.points, whole.points, atol=1e-5)
+    assert np.allclose(blocks.sigma_along, whole.sigma_along, atol=1e-5)
+
+
+def test_errors_are_as_large_as_foretold(lifter, people):
+    people, rays = people
+    lifted = lifter.lift(rays, np.ones(rays.shape[:2]), None)
+    z = (lifted.points - relative(people))[..., 2] / lifted.sigma_along
+    assert 0.9 < np.sqrt(np.square(z).mean()) < 1.15
+    assert (lifted.sigma_along > 0).all()
+    assert lifted.sigma_along[:, 15].mean() > lifted.sigma_along[:, HIPS].mean()  # wrists are harder than hips
+
+
+@pytest.fixture(scope="module")
+def real_people(shared, frames):
+    """What the landmark network sees of a man, filmed by four cameras, and where he truly was, hips' middle at 0.
+
+    rays (n, 33, 2), confidence (n, 33), world landmarks (n, 33, 3), true limbs (n, 10, 3), NaN where not
+    measured, and their keypoints' numbers.
+    """
+    detector, network = PersonDetector(threads=1), LandmarkNetwork("pose_landmark_heavy", threads=1)
+    limbs = [f"{side}_{part}" for part in ("shoulder", "elbow", "wrist", "knee", "ankle") for side in ("left", "right")]
+    found = []
+    for camera in range(1, 5):
+        truth = np.load(shared / "data" / "pose2sim" / f"truth_cam{camera}.npz")
+        names = [{"L": "left_", "R": "right_"}.get(n[0], "") + n[1:].lower() for n in truth["names"]]
+        rows = {int(index): row for row, index in enumerate(truth["frame_index"])}
+        for k, image in enumerate(frames(f"pose2sim/cam{camera}", stop=81, every=20)):
+            if 20 * k not in rows:
+                continue
+            joints = truth["joints"][rows[20 * k]]
+            (seen,) = network.estimate(image, [max(detector.detect(image), key=lambda d: d.region.side_px).region])
+            (seen,) = network.estimate(image, [seen.next_region])
+            K = truth["intrinsics"]
+            rays = (seen.keypoints_px - K[:2, 2]) / np.diag(K)[:2]
+            hips = joints[[names.index("left_hip"), names.index("right_hip")]].mean(axis=0)
+            limb_joints = joints[[names.index(n) for n in limbs]] - hips
+            found.append((rays, seen.keypoints_confidence, seen.world_landmarks, limb_joints))
+    return [np.array(part) for part in zip(*found, strict=True)], [KEYPOINT_NAMES.index(n) for n in limbs]
+
+
+def test_real_people_are_lifted_better_than_by_their_world_landmarks(lifter, real_people):
+    (rays, confidence, world, truth), limbs = real_people
+    lifted = lifter.lift_both_ways(rays, confidence, world)
+    ours, theirs = (np.nanmean(np.linalg.norm(p[:, limbs] - truth, axis=-1)) for p in (lifted.points, world))
+    assert len(truth) >= 15
+    assert ours < 0.115
+    assert ours < 0.85 * theirs
+
+
+def test_errors_on_real_people_are_as_large_as_foretold(lifter, real_people):
+    """Root mean square of residual over deviation, one for honest deviations, all four cameras together."""
+    (rays, confidence, world, truth), limbs = real_people
+    lifted = lifter.lift_both_ways(rays, confidence, world)
+    error = (lifted.points[:, limbs] - truth) @ np.swapaxes(virtual_camera(rays), 1, 2)
+    across = error[..., :2] / lifted.sigma_across[:, limbs, None]
+    along = error[..., 2] / lifted.sigma_along[:, limbs]
+    assert 0.75 < np.sqrt(np.nanmean(np.square(across))) < 1.25
+    assert 0.75 < np.sqrt(np.nanmean(np.square(along))) < 1.25
+
+
+def test_disagreement_widens_the_deviation_along_its_own_axis(people):
+    people, rays = people
+    rng, R = np.random.default_rng(1), virtual_camera(rays)
+    sigma = rng.uniform(0.02, 0.1, (2, *people.shape[:2]))
+    depth = np.swapaxes(R, 1, 2) @ np.array([0.0, 0.0, 0.2])  # of the virtual camera, in camera axes
+    ways = [Lifted(people + side * depth[:, None], sigma[0], sigma[1]) for side in (-1, 1)]
+    both = mixture(ways, [0.5, 0.5], R)
+    assert np.allclose(both.points, people)
+    assert np.allclose(both.sigma_across, sigma[0])
+    assert np.allclose(both.sigma_along, np.hypot(sigma[1], 0.2))
+    uneven = mixture(ways, [0.75, 0.25], R)
+    assert np.allclose(uneven.points, people - 0.5 * depth[:, None])
+    assert np.allclose(uneven.sigma_along, np.sqrt(sigma[1] ** 2 + 0.75 * 0.1**2 + 0.25 * 0.3**2))
+
+
+def test_the_mirror_image_is_lifted_to_the_mirror_image(lifter, people):
+    people, rays = people
+    ones = np.ones(people.shape[:2])
+    plain = lifter.lift(rays, ones, None).points
+    mirrored = lifter.lift(rays[:, SWAPPED] * [-1, 1], ones, None).points
+    assert np.linalg.norm(mirrored - plain[:, SWAPPED] * [-1, 1, 1], axis=-1).mean() < 0.05
+
+
+def test_the_virtual_camera_looks_at_the_person_and_stands_upright():
+    rays = np.random.default_rng(0).uniform(-0.5, 0.5, (20, 33, 2))
+    R = virtual_camera(rays)
+    assert np.allclose(R @ np.swapaxes(R, 1, 2), np.eye(3), atol=1e-12)
+    assert np.allclose(np.linalg.det(R), 1)
+    center = np.concatenate([rays[:, [11, 12, 23, 24]].mean(axis=1), np.ones((20, 1))], axis=1)
+    seen = np.einsum("tij,tj->ti", R, center)
+    assert np.abs(seen[:, :2]).max() < 1e-12
+    assert np.allclose(R[:, 0, 1], 0)  # its x axis stays level
+
+
+def test_turning_the_camera_changes_neither_input_nor_shape(lifter, people):
+    """A pan about the camera's own centre moves the person in the picture; what is lifted turns with it."""
+    turn, (_, rays) = exp(np.array([0.0, 0.35, 0.0])), people
+    turned = np.concatenate([rays, np.ones((*rays.shape[:2], 1))], axis=-1) @ turn.T
+    other = turned[..., :2] / turned[..., 2:]
+    ones, none = np.ones(rays.shape[:2]), np.zeros((*rays.shape[:2], 3))
+    x, _ = network_input(rays, ones, none, np.zeros(len(rays)))
+    y, _ = network_input(other, ones, none, np.zeros(len(rays)))
+    # The mean of rays is not quite the ray of a mean, so the two cameras differ a little.
+    assert np.abs(x - y).max() < 0.1
+    a, b = lifter.lift(rays, ones, None).points, lifter.lift(other, ones, None).points
+    assert np.linalg.norm(a @ turn.T - b, axis=-1).mean() < 0.03
+
+
+def test_wrong_shapes_and_files_are_named(lifter, tmp_path):
+    with pytest.raises(ShapeError, match="confidence"):
+        lifter.lift(np.zeros((2, 33, 2)), np.zeros((3, 33)), None)
+    with pytest.raises(SetupError, match="nowhere"):
+        Lifter(tmp_path / "nowhere.onnx")
+    (tmp_path / "junk.onnx").write_bytes(LIFTER_FILE.read_bytes()[:1000])
+    with pytest.raises(ModelFileError, match="junk"):
+        Lifter(tmp_path / "junk.onnx")

@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Windows around frames, against moments worked out by hand."""
+
+import numpy as np
+from scope.scope_addon.capture.perception.lifter_window import (
+    LONGEST_GAP_S,
+    MIDDLE,
+    OFFSETS_S,
+    WINDOW,
+    standing_still,
+    windows_around,
+)
+
+
+def moments(times, seen, values=None):
+    """What a window of times (or other values of each frame) holds, for every frame."""
+    windows = windows_around(times, seen)
+    rows = np.arange(len(times))
+    first, end = windows.span(rows)
+    x = (times if values is None else values).astype(float)[first:end, None]
+    return windows.of(x, rows, first)[..., 0]
+
+
+def test_moments_are_evenly_spaced_in_time_at_any_frame_rate():
+    for rate in (10, 24, 25, 29.97, 30, 60, 240):
+        times = np.arange(int(4 * rate)) / rate
+        found = moments(times, np.ones(len(times), bool))
+        inside = (times > 0.41) & (times < times[-1] - 0.41)
+        assert np.allclose(found[inside], times[inside, None] + OFFSETS_S, atol=1e-6)
+
+
+def test_frames_of_variable_rate_are_mixed_in_proportion_to_time():
+    times = np.cumsum(np.random.default_rng(0).uniform(0.01, 0.2, 100))
+    found = moments(times, np.ones(100, bool))
+    expected = np.clip(times[:, None] + OFFSETS_S, times[0], times[-1])
+    assert np.allclose(found, expected, atol=1e-6)
+
+
+def test_the_ends_of_a_clip_are_repeated():
+    times = np.arange(90) / 30
+    found = moments(times, np.ones(90, bool))
+    assert np.allclose(found[0, : MIDDLE + 1], 0)
+    assert np.allclose(found[-1, MIDDLE:], times[-1])
+
+
+def test_a_short_gap_is_bridged_and_a_long_one_is_not_looked_across():
+    times = np.arange(90) / 30
+    seen = np.ones(90, bool)
+    seen[40:44] = False
+    assert np.allclose(moments(times, seen)[39], times[39] + OFFSETS_S, atol=1e-6)
+    seen[40:60] = False
+    assert moments(times, seen)[39].max() <= times[39] + 1e-9
+    assert moments(times, seen)[60].min() >= times[60] - 1e-9
+
+
+def test_frames_that_were_not_seen_lend_nothing_to_others():
+    times = np.arange(90) / 30
+    seen = np.ones(90, bool)
+    seen[[10, 33, 34, 70]] = False
+    values = np.where(seen, 1.0, np.nan)
+    assert np.isfinite(moments(times, seen, np.where(seen, values, 1e6))[seen]).all()
+    assert np.allclose(moments(times, seen, np.where(seen, 1.0, 1e6))[seen], 1.0)
+
+
+def test_sparse_frames_and_single_pictures_stand_still():
+    times = np.arange(5) * 2 * LONGEST_GAP_S
+    assert np.allclose(moments(times, np.ones(5, bool)), times[:, None])
+    assert np.allclose(moments(np.zeros(1), np.ones(1, bool)), 0)
+    assert np.allclose(moments(times, np.zeros(5, bool))[:, MIDDLE], times)  # nobody was seen: nothing fails
+    still = standing_still(3)
+    x = np.arange(3.0)[:, None]
+    assert np.array_equal(still.of(x, np.arange(3), 0)[..., 0], np.repeat(x, WINDOW, axis=1))
+
+
+def test_a_block_of_frames_needs_only_the_rows_around_it():
+    times = np.arange(9000) / 60
+    windows = windows_around(times, np.ones(9000, bool))
+    rows = np.arange(4096, 8192)
+    first, end = windows.span(rows)
+    assert 24 <= 4096 - first <= 25
+    assert 24 <= end - 8192 <= 25
+    whole = windows.of(times[:, None], rows, 0)
+    assert np.array_equal(windows.of(times[first:end, None], rows, first), whole)

@@ -1,0 +1,111 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The person detector: its pieces against hand-made answers, the whole on real pictures."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scope.scope_addon.capture.perception.person_detector import (
+    PersonDetector,
+    decode,
+    letterbox,
+    make_anchors,
+    merge_overlapping,
+    squares,
+)
+from scope.scope_addon.capture.perception.sessions import network_path, open_session
+from scope.scope_addon.errors import SetupError, UsageError
+from scope.solver.errors import ModelFileError
+
+
+@pytest.fixture(scope="module")
+def detector() -> PersonDetector:
+    try:
+        return PersonDetector(threads=1)
+    except SetupError as error:
+        pytest.skip(f"the networks are not built: {error}")
+
+
+def test_anchors_are_cell_centres_in_layer_order() -> None:
+    anchors = make_anchors()
+    assert anchors.shape == (2254, 2)
+    np.testing.assert_array_equal(anchors[[0, 1, 2, 3, 56]], [[4, 4], [4, 4], [12, 4], [12, 4], [4, 12]])
+    np.testing.assert_array_equal(anchors[1568:1571], [[8, 8], [8, 8], [24, 8]])
+    np.testing.assert_array_equal(anchors[[1960, 1965, 1966, 2253]], [[16, 16], [16, 16], [48, 16], [208, 208]])
+
+
+def test_decode_adds_the_anchor_and_sorts_by_score() -> None:
+    boxes = np.zeros((3, 12))
+    boxes[1] = [1, 2, 10, 20, 5, 6, 0, 0, 0, 0, -3, 4]
+    score, values = decode(boxes, np.array([0.0, 500.0, -1.0]), np.array([[10, 10], [100, 50], [0, 0]]), 0.5)
+    np.testing.assert_allclose(score, [1.0, 0.5])
+    np.testing.assert_allclose(values[0], [96, 42, 106, 62, 105, 56, 100, 50, 100, 50, 97, 54])
+    np.testing.assert_allclose(values[1], [10] * 12)
+
+
+def test_overlapping_boxes_become_their_weighted_mean() -> None:
+    far = [100, 100, 110, 110, 1, 1]
+    values = np.array([[0, 0, 10, 10, 4, 4], far, [0, 2, 10, 12, 4, 8]], float)
+    score, merged = merge_overlapping(np.array([0.9, 0.8, 0.3]), values)
+    np.testing.assert_allclose(score, [0.9, 0.8])
+    np.testing.assert_allclose(merged, [[0, 0.5, 10, 10.5, 4, 5], far])
+    assert [a.shape for a in merge_overlapping(np.zeros(0), np.zeros((0, 12)))] == [(0,), (0, 12)]
+
+
+@pytest.mark.parametrize(("height", "width"), [(1080, 1920), (640, 360), (31, 29), (1, 500)])
+def test_letterbox_keeps_the_picture_whole_and_centred(height: int, width: int) -> None:
+    square, scale, offset = letterbox(np.full((height, width, 3), 255, np.uint8))
+    rows, columns = np.flatnonzero(square.any(axis=(1, 2))), np.flatnonzero(square.any(axis=(0, 2)))
+    np.testing.assert_allclose([columns[0], rows[0]], offset)
+    np.testing.assert_allclose([len(columns), len(rows)], np.maximum(np.array([width, height]) * scale, 1), atol=0.51)
+    assert abs(offset[1] - (224 - len(rows)) / 2) <= 0.5
+
+
+def test_squares_cover_an_oblong_image() -> None:
+    assert squares(500, 500) == []
+    assert squares(1080, 1920) == [(0, 0, 1080), (840, 0, 1080)]
+    assert squares(900, 300) == [(0, 0, 300), (0, 300, 300), (0, 600, 300)]
+
+
+def test_finds_the_squatting_person(detector: PersonDetector, first_frame: Callable[[str], np.ndarray]) -> None:
+    (person,) = detector.detect(first_frame("clips/squats_5fps"))
+    assert person.score > 0.9
+    left, top, right, bottom = person.box_px
+    assert 0 < left < right < 720
+    assert 0 < top < bottom < person.points_px[0, 1]  # the face is above the hips
+    assert abs(person.region.rotation) < 0.3
+
+
+def test_result_follows_the_picture(detector: PersonDetector, first_frame: Callable[[str], np.ndarray]) -> None:
+    image = first_frame("clips/gesture_square")
+    (person,) = detector.detect(image)
+    bordered = np.zeros((800, 900, 3), np.uint8)
+    bordered[100:676, 200:776] = image
+    (moved,) = detector.detect(bordered)
+    assert np.abs(moved.points_px[:2] - person.points_px[:2] - [200, 100]).max() < 0.04 * person.region.side_px
+    (mirrored,) = detector.detect(np.ascontiguousarray(image[:, ::-1]))
+    assert np.abs(575 - mirrored.points_px[:2, 0] - person.points_px[:2, 0]).max() < 0.04 * person.region.side_px
+
+
+def test_finds_both_people(detector: PersonDetector, last_frame: Callable[[str], np.ndarray]) -> None:
+    found = detector.detect(last_frame("clips/two_people_portrait"))
+    assert len(found) == 2
+    assert not found[0].region.resembles(found[1].region, 0.2)
+
+
+def test_nobody_in_a_blank_picture(detector: PersonDetector) -> None:
+    assert detector.detect(np.full((90, 160, 3), 128, np.uint8)) == []
+
+
+def test_missing_and_damaged_networks_are_named(tmp_path: Path) -> None:
+    with pytest.raises(SetupError, match="pose_detection.onnx is missing"):
+        network_path("pose_detection", tmp_path)
+    broken = tmp_path / "broken.onnx"
+    broken.write_bytes(b"no network")
+    with pytest.raises(ModelFileError, match=r"broken\.onnx"):
+        open_session(broken, 1)
+    with pytest.raises(UsageError, match="0 threads"):
+        open_session(broken, 0)

@@ -1,0 +1,187 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Hands followed through real footage, and with invented networks: lost and found, strangers, two on one hand."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scope.scope_addon.capture.media.video_range import VideoRange
+from scope.scope_addon.capture.perception.hand_landmarks import HandEstimate
+from scope.scope_addon.capture.perception.hand_region import HAND_LENGTH_M, pixels_per_metre
+from scope.scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES
+from scope.scope_addon.capture.perception.observation import Observation
+from scope.scope_addon.capture.perception.palm_detector import Palm
+from scope.scope_addon.capture.perception.region import Region
+from scope.scope_addon.capture.pipeline import CaptureOptions, capture
+from scope.scope_addon.capture.tracking import hand_tracker
+from scope.scope_addon.capture.tracking.hand_tracker import HandTracker
+from scope.scope_addon.capture.tracking.tracker import PeopleTracker
+from scope.solver.loaders.body_file import load_body
+from scope.solver.rotations import exp
+
+SCALE = 500.0  # pixels per metre
+LENGTH = HAND_LENGTH_M * SCALE
+IMAGE = np.zeros((1000, 1000, 3), np.uint8)
+
+
+def hand_at(wrist, left=0.95, presence=0.95):
+    """An upright hand as the network would say it."""
+    points = np.array([[0.0, 0.0], *([x, y] for x in (-0.25, -0.12, 0, 0.12, 0.24) for y in (-0.5, -0.65, -0.8, -1))])
+    region = Region((wrist[0], wrist[1] - LENGTH / 2), 2 * LENGTH, 0.0)
+    world = np.pad(points * HAND_LENGTH_M, ((0, 0), (0, 1)))
+    return HandEstimate(points * LENGTH + wrist, world, presence, left, region)
+
+
+def person(left_wrist=(300, 500), right_wrist=(700, 500)):
+    world = np.zeros((33, 3))
+    world[:, :2] = np.random.default_rng(0).standard_normal((33, 2)) * 0.4
+    for side, wrist in (("left", left_wrist), ("right", right_wrist)):
+        for name, up in (("elbow", -0.25), ("wrist", 0.0), ("index", 0.09), ("pinky", 0.09)):
+            at = KEYPOINT_NAMES.index(f"{side}_{name}")
+            world[at, :2] = (np.array(wrist) - 500) / SCALE - [0, up]
+    pixels = world[:, :2] * SCALE + 500
+    assert pixels_per_metre(pixels, world) == pytest.approx(SCALE)
+    return Observation(pixels, np.ones(33), world, 1.0, Region((500.0, 500.0), 900.0, 0.0), False)
+
+
+class FakeHands:
+    """Sees the hand whose middle is nearest to the region's, if it lies inside; nothing else."""
+
+    def __init__(self, hands):
+        self.hands, self.looks = hands, 0
+
+    def estimate(self, _image, region):
+        self.looks += 1
+        inside = [h for h in self.hands if np.hypot(*(h.keypoints_px[9] - region.center_px)) < region.side_px / 3]
+        if not inside:
+            return hand_at(region.center_px, presence=0.0)
+        return min(inside, key=lambda h: np.hypot(*(h.keypoints_px[9] - region.center_px)))
+
+
+class FakePalms:
+    def __init__(self, hands):
+        self.hands, self.looks = hands, 0
+
+    def detect(self, _image, where):
+        self.looks += 1
+        near = [h for h in self.hands if np.hypot(*(h.keypoints_px[9] - where.center_px)) < where.side_px / 2]
+        return [Palm(0.9, h.region) for h in near]
+
+
+@pytest.fixture
+def follow(monkeypatch):
+    """``follow(hands)``: a tracker whose networks see these hands, as long as they are in the list."""
+
+    def make(hands):
+        monkeypatch.setattr(hand_tracker, "HandNetwork", lambda *_: FakeHands(hands))
+        monkeypatch.setattr(hand_tracker, "PalmDetector", lambda *_: FakePalms(hands))
+        return HandTracker(1)
+
+    return make
+
+
+def seen(tracker, observation):
+    (_, found), *_ = tracker.step(IMAGE, [(0, observation)])
+    return found.hands[:, 0, 2] > 0
+
+
+def test_each_hand_goes_to_its_own_side_and_then_needs_one_look_a_frame(follow):
+    left, right = hand_at((300, 500)), hand_at((700, 500), left=0.05)
+    tracker = follow([left, right])
+    (_, found), *_ = tracker.step(IMAGE, [(0, person())])
+    assert np.array_equal(found.hands[0, :, :2], left.keypoints_px)
+    assert np.array_equal(found.hands[1, :, :2], right.keypoints_px)
+    palms, looks = tracker._palms.looks, tracker._network.looks
+    assert seen(tracker, person()).all()
+    assert tracker._palms.looks == palms
+    assert tracker._network.looks == looks + 2
+
+
+def test_a_hand_is_found_again_after_it_was_gone_and_zeros_stand_for_it_meanwhile(follow):
+    hands = [hand_at((300, 500))]
+    tracker = follow(hands)
+    assert list(seen(tracker, person())) == [True, False]
+    gone = hands.pop()
+    (_, found), *_ = tracker.step(IMAGE, [(0, person())])
+    assert not found.hands.any()
+    for _ in range(30):
+        assert not seen(tracker, person()).any()
+    hands.append(gone)
+    assert any(seen(tracker, person())[0] for _ in range(4))
+
+
+@pytest.mark.parametrize("rate", [12, 30, 60])
+def test_a_hand_that_stays_away_is_looked_for_as_often_at_any_frame_rate(follow, rate):
+    """In every frame for a third of a second, then six to eight times a second, each hand."""
+    tracker = follow([])
+    looks = []
+    for k in range(3 * rate):
+        tracker.step(IMAGE, [(0, person())], k / rate)
+        looks.append(tracker._palms.looks)
+    assert looks[rate // 3] == 2 * (rate // 3 + 1)
+    assert 22 <= looks[3 * rate - 1] - looks[rate - 1] <= 32  # in two seconds, both hands
+
+
+def test_a_hand_far_from_the_bodys_wrist_is_let_go(follow):
+    tracker = follow([hand_at((300, 500))])
+    assert seen(tracker, person())[0]
+    assert not seen(tracker, person(left_wrist=(300, 900)))[0]
+
+
+def test_a_hand_of_the_other_side_is_not_taken(follow):
+    assert not seen(follow([hand_at((300, 500), left=0.02)]), person())[0]
+
+
+def test_one_hand_is_not_given_to_both_sides(follow):
+    tracker = follow([hand_at((500, 500), left=0.5)])
+    assert list(seen(tracker, person(left_wrist=(495, 500), right_wrist=(540, 500)))) == [True, False]
+
+
+def test_hands_are_found_in_most_frames_of_somebody_who_gestures(frames):
+    """Small ones: some 25 pixels. In the first second they hang edge-on; from the second on they are raised."""
+    people, hands = PeopleTracker("fast", 1), HandTracker(1)
+    found, apart = [], []
+    for image in frames("clips/gesture_square", stop=72):
+        for _, o in hands.step(image, people.step(image)):
+            found.append(o.hands[:, 0, 2] > 0)
+            wrists = o.keypoints_px[[KEYPOINT_NAMES.index(f"{side}_wrist") for side in ("left", "right")]]
+            apart += list(np.linalg.norm(o.hands[:, 0, :2] - wrists, axis=1)[found[-1]])
+    share = np.mean(found[35:], axis=0)
+    assert (share > 0.8).all()
+    assert np.median(apart) < 10  # pixels, between the body's and the hand's wrist
+
+
+def test_nothing_is_made_up_where_nobody_is():
+    tracker = HandTracker(1)
+    assert tracker.step(IMAGE, []) == []
+    assert not seen(tracker, person()).any()
+
+
+def test_a_hand_that_contradicts_itself_is_imagined(follow):
+    hand = hand_at((300, 500))
+    hand.world_landmarks[:] = hand.world_landmarks[:, [1, 0, 2]]
+    assert hand.disagreement > 0.5
+    assert hand_at((300, 500)).disagreement < 1e-9
+    assert not seen(follow([hand]), person())[0]
+
+
+def test_a_capture_with_hands_from_file_to_motion(shared):
+    """Fingers near the keypoints in the image, and everything of the motion in step with each other."""
+    body = load_body("scope_h")
+    wanted = VideoRange(1.4, 2.0, None)
+    options = CaptureOptions(quality="fast", hands=True, threads=1, smoothing=False, wanted=wanted)
+    result = capture(shared / "data/clips/gesture_square.mp4", body, options)
+    m = result.motions[0]
+    assert m.body_model == "scope_h"
+    assert m.keypoints2d.shape[1] == len(m.keypoints2d_names) == 33 + 42
+    assert result.report["per_person"][0]["left_hand_frames"] > 0.8 * len(m)
+    index = [body.keypoint_names.index(str(name)) for name in m.keypoints2d_names[33:]]
+    R, t = body.forward_kinematics(exp(m.poses.reshape(len(m), -1, 3).astype(float)), m.trans.astype(float), m.betas)
+    points = body.keypoints(R, t, m.betas.astype(float))[:, index]
+    camera_from_world = np.linalg.inv(m.world_from_camera)
+    points = np.einsum("tij,tkj->tki", camera_from_world[:, :3, :3], points) + camera_from_world[:, None, :3, 3]
+    pixels = points[..., :2] / points[..., 2:] * m.intrinsics[0, 0] + m.intrinsics[:2, 2]
+    off = np.linalg.norm(pixels - m.keypoints2d[:, 33:, :2], axis=-1)[m.keypoints2d[:, 33:, 2] > 0]
+    assert np.median(off) < 3.5  # pixels; a palm measures 13 of them
+    finger = body.joint_names.index("left_index2")
+    assert np.array_equal(m.joint_confidence[:, finger] > 0, m.keypoints2d[:, 33, 2] > 0)

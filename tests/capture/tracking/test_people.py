@@ -1,0 +1,376 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Who is who: invented people who meet, hide, leave and come back, and two real clips moved across each other."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scope.scope_addon.capture.perception.landmark_network import PoseEstimate
+from scope.scope_addon.capture.perception.person_detector import Detection
+from scope.scope_addon.capture.perception.region import Region
+from scope.scope_addon.capture.tracking import tracker as tracker_module
+from scope.scope_addon.capture.tracking.people import PeopleBuilder, trim_flickering_end
+from scope.scope_addon.capture.tracking.track import Track, Tracklet
+from scope.scope_addon.capture.tracking.tracker import PeopleTracker
+from scope.scope_addon.errors import SetupError
+
+from ..composites import composite
+from ..fake_people import FakeDetector, FakeLandmarks, Person, pictures
+
+RED, BLUE, GREEN = (200, 40, 40), (40, 60, 200), (40, 160, 60)
+FPS = 30
+
+
+@pytest.fixture
+def follow(monkeypatch: pytest.MonkeyPatch) -> Callable[..., list[Track]]:
+    """``follow(people, count, wanted=None, fps=30)``: the tracks of the invented people."""
+
+    def run(people: list[Person], count: int, wanted: int | None = None, fps: float = FPS) -> list[Track]:
+        monkeypatch.setattr(tracker_module, "LandmarkNetwork", lambda name, *_: FakeLandmarks(people, "heavy" in name))
+        monkeypatch.setattr(tracker_module, "PersonDetector", lambda *_: FakeDetector(people))
+        tracker, builder = PeopleTracker("fast", 1, wanted), PeopleBuilder()
+        for t, image in enumerate(pictures(people, count)):
+            builder.add(t, t / fps, tracker.step(image, time_s=t / fps))
+        return builder.build(wanted or 1)
+
+    return run
+
+
+def who(track: Track, people: list[Person]) -> set[int]:
+    """The people whose hips the track's hips were at, in any of its frames."""
+    out = set()
+    for t in np.flatnonzero(track.seen):
+        hips = track.keypoints_px[t, [23, 24]].mean(axis=0)
+        places = [np.inf if p.place(t) is None else np.linalg.norm(p.place(t) - hips) for p in people]
+        assert min(places) < 60
+        out.add(int(np.argmin(places)))
+    return out
+
+
+@pytest.mark.parametrize("colors", [(RED, BLUE), (RED, RED)], ids=["different clothes", "same clothes"])
+@pytest.mark.parametrize("hidden", [0, 10, 20])
+def test_a_crossing(follow: Callable[..., list[Track]], colors: tuple, hidden: int) -> None:
+    """The one behind is hidden for some frames, in which the network sees the one in front in the region of both."""
+    meets = 60
+    back = Person(lambda t: (200 + 6.0 * t, 200), colors[0], hidden=range(meets - hidden // 2, meets + hidden // 2))
+    front = Person(lambda t: (920 - 6.0 * t, 205), colors[1], size_px=110)
+    tracks = follow([back, front], 120, wanted=2)
+    assert [who(track, [back, front]) for track in tracks] == [{1}, {0}]
+    assert tracks[0].seen.mean() >= 0.98
+    assert tracks[1].seen.sum() >= 120 - hidden - 22  # not while the two bodies cannot be told apart
+
+
+@pytest.mark.parametrize("count", [2, 8])
+@pytest.mark.parametrize("fps", [1, 2])
+def test_who_is_elsewhere_in_each_frame_at_a_low_rate(follow: Callable[..., list[Track]], fps: int, count: int) -> None:
+    walks = Person(lambda t: (100 + 90.0 * t, 200), RED)
+    (track,) = follow([walks], count, fps=fps)
+    assert track.seen.all()
+
+
+def test_a_single_frame_is_not_enough_beside_somebody_who_was_followed(follow: Callable[..., list[Track]]) -> None:
+    stands = Person(lambda t: (300, 200), BLUE)
+    flickers = Person(lambda t: (900, 200) if t == 4 else None, RED)
+    (track,) = follow([stands, flickers], 8, wanted=3, fps=2)
+    assert who(track, [stands, flickers]) == {0}
+
+
+def test_overtaken_by_somebody_just_found(follow: Callable[..., list[Track]]) -> None:
+    """Whom the newcomer hides slides onto them, and is not them because of having been followed for longer."""
+    stands = Person(lambda t: (500, 200), RED, hidden=range(46, 56))
+    passes = Person(lambda t: (540 - 12.0 * (t - 46), 205) if t >= 40 else None, RED, size_px=110)
+    tracks = follow([stands, passes], 80, wanted=3)
+    assert sorted(tuple(who(track, [stands, passes])) for track in tracks) == [(0,), (1,)]
+
+
+def test_a_person_who_comes_and_goes(follow: Callable[..., list[Track]]) -> None:
+    stays = Person(lambda t: (300, 200), BLUE)
+    visits = Person(lambda t: (1100 - 4.0 * (t - 40), 200) if 40 <= t < 100 else None, RED)
+    tracks = follow([stays, visits], 150, wanted=4)
+    assert len(tracks) == 2
+    assert [who(track, [stays, visits]) for track in tracks] == [{0}, {1}]
+    seen = np.flatnonzero(tracks[1].seen)
+    assert 40 <= seen[0] <= 49  # the others are looked for every 0.27 s
+    assert seen[-1] == 99
+
+
+@pytest.mark.parametrize("fps", [5, 24, 30, 60, 120])
+@pytest.mark.parametrize(("wanted", "within_s"), [(4, 0.27), (None, 0.67)], ids=["all", "largest"])
+def test_a_newcomer_is_found_as_soon_at_any_rate(
+    follow: Callable[..., list[Track]], fps: int, wanted: int | None, within_s: float
+) -> None:
+    """Half a frame later at most."""
+    first = Person(lambda t: (300, 200), BLUE, size_px=70)
+    second = Person(lambda t: (900, 200) if t >= fps else None, RED)
+    tracks = follow([first, second], 6 * fps, wanted, fps)
+    (track,) = (track for track in tracks if who(track, [first, second]) == {1})
+    comes, found = np.ceil(fps) / fps, track.times[track.seen][0]
+    assert comes <= found <= 1 + within_s + 0.5 / fps
+
+
+@pytest.mark.parametrize("fps", [5, 24, 30, 60, 120])
+def test_the_networks_look_as_often_at_any_rate(monkeypatch: pytest.MonkeyPatch, fps: int) -> None:
+    """For newcomers every 0.27 s, or in every frame; left and right once a second; the clothes every 0.13 s."""
+    people = [Person(lambda t: (300, 200), BLUE)]
+    detector = FakeDetector(people)
+    monkeypatch.setattr(tracker_module, "LandmarkNetwork", lambda name, *_: FakeLandmarks(people, "heavy" in name))
+    monkeypatch.setattr(tracker_module, "PersonDetector", lambda *_: detector)
+    tracker = PeopleTracker("fast", 1, 2)
+    seen = [tracker.step(image, time_s=t / fps)[0][1] for t, image in enumerate(pictures(people, 4 * fps))]
+    assert abs(detector.calls - 4 * fps / max(1, round(fps * 8 / 30))) <= 1
+    assert [t / fps for t, o in enumerate(seen) if o.judged_landmarks is not None] == [0.0, 1.0, 2.0, 3.0]
+    assert abs(sum(o.appearance is not None for o in seen) - 4 * fps / max(1, round(fps * 4 / 30))) <= 1
+
+
+def test_newcomers_are_looked_for_less_often_beside_all_who_are_wanted(monkeypatch: pytest.MonkeyPatch) -> None:
+    """After the opening of two seconds, every 0.67 s, as beside the most prominent one; at once when one is lost."""
+    people = [Person(lambda t: (300, 200), BLUE), Person(lambda t: (900, 200) if t < 180 else None, RED)]
+    detector = FakeDetector(people)
+    monkeypatch.setattr(tracker_module, "LandmarkNetwork", lambda name, *_: FakeLandmarks(people))
+    monkeypatch.setattr(tracker_module, "PersonDetector", lambda *_: detector)
+    tracker, calls = PeopleTracker("fast", 1, people=2), []
+    for t, image in enumerate(pictures(people, 184)):
+        before = detector.calls
+        tracker.step(image, time_s=t / FPS)
+        calls += [t] if detector.calls > before else []
+    assert [t for t in calls if t < 60] == list(range(0, 60, 8))
+    assert [t for t in calls if 60 <= t < 180] == list(range(76, 180, 20))
+    assert [t for t in calls if t >= 180] == [180, 181, 182, 183]
+
+
+def test_nobody_of_all_is_complete(monkeypatch: pytest.MonkeyPatch) -> None:
+    people = [Person(lambda t, k=k: (90 * k + 60, 200), BLUE, size_px=30) for k in range(11)]
+    detector = FakeDetector(people)
+    monkeypatch.setattr(tracker_module, "LandmarkNetwork", lambda name, *_: FakeLandmarks(people))
+    monkeypatch.setattr(tracker_module, "PersonDetector", lambda *_: detector)
+    tracker = PeopleTracker("fast", 1, people=12)
+    for t, image in enumerate(pictures(people, 120)):
+        assert len(tracker.step(image, time_s=t / FPS)) == 11
+    assert detector.calls == 120 // 8
+
+
+def test_every_look_for_somebody_just_lost_is_close(monkeypatch: pytest.MonkeyPatch) -> None:
+    """At 30 frames a second all others too; where frames are few, some of the others look at the whole picture."""
+    stays = Person(lambda t: (300, 200), BLUE)
+    for fps, close_alone in ((30, True), (6, False)):
+        leaves = Person(lambda t, fps=fps: (900, 200) if t < fps else None, RED)
+        detector = FakeDetector([stays, leaves])
+        monkeypatch.setattr(tracker_module, "LandmarkNetwork", lambda *_, d=detector: FakeLandmarks(d.people))
+        monkeypatch.setattr(tracker_module, "PersonDetector", lambda *_, d=detector: d)
+        tracker, looks = PeopleTracker("fast", 1, 2), []
+        for t, image in enumerate(pictures([stays, leaves], 2 * fps)):
+            before = detector.calls, detector.close_calls
+            tracker.step(image, time_s=t / fps)
+            looks.append((detector.calls - before[0], detector.close_calls - before[1]))
+        assert looks[fps : fps + fps // 2] == [(1, 1)] * (fps // 2)  # lost for less than half a second
+        assert all(look == close for look, close in looks[:fps]) == close_alone
+
+
+def test_known_again_by_the_clothes_after_a_long_time(follow: Callable[..., list[Track]]) -> None:
+    red = Person(lambda t: (200, 200) if not 40 <= t < 140 else None, RED)
+    blue = Person(lambda t: (700, 200) if not 30 <= t < 160 else None, BLUE)
+    moved = Person(lambda t: (640, 200) if t >= 140 else (200, 200) if t < 40 else None, RED)
+    tracks = follow([red, blue], 220, wanted=2)
+    assert [who(track, [red, blue]) for track in tracks] == [{0}, {1}]
+    tracks = follow([moved, blue], 220, wanted=2)  # comes back where the other one was
+    assert [who(track, [moved, blue]) for track in tracks] == [{0}, {1}]
+
+
+def test_the_most_prominent_one_is_chosen_over_the_clip_and_kept(follow: Callable[..., list[Track]]) -> None:
+    """Neither the first nor the largest at some time, and a gap rather than somebody else."""
+    first = Person(lambda t: (200, 200) if t < 60 else None, RED)
+    main = Person(lambda t: (900, 200) if t >= 20 else None, BLUE, hidden=range(100, 110))
+    (track,) = follow([first, main], 200)
+    assert who(track, [first, main]) == {1}
+    assert not track.seen[:20].any()
+    assert not track.seen[100:110].any()
+    assert track.seen[45:100].all()
+    assert track.seen[112:].all()
+
+
+@pytest.mark.parametrize("comes_s", [0, 3])
+def test_a_rival_from_the_start_is_looked_for_closely(monkeypatch: pytest.MonkeyPatch, comes_s: int) -> None:
+    """Who is hard to detect may be the most prominent person too, if they are there before the clip has settled."""
+    leaves = Person(lambda t: (300, 200) if t < 150 else None, BLUE)
+    stays = Person(lambda t: (900, 200) if t >= comes_s * FPS else None, RED, size_px=80)
+
+    class Detector(FakeDetector):
+        def detect(self, image: np.ndarray, threshold: float = 0.5, closely: bool = False) -> list[Detection]:
+            return super().detect(image, threshold)[: None if closely else 1]
+
+    people = [leaves, stays]
+    monkeypatch.setattr(tracker_module, "LandmarkNetwork", lambda name, *_: FakeLandmarks(people))
+    monkeypatch.setattr(tracker_module, "PersonDetector", lambda *_: Detector(people))
+    tracker, builder = PeopleTracker("best", 1), PeopleBuilder()
+    for t, image in enumerate(pictures(people, 240)):
+        builder.add(t, t / FPS, tracker.step(image, time_s=t / FPS))
+    (track,) = builder.build(1)
+    assert who(track, people) == ({1} if comes_s == 0 else {0})
+    if comes_s == 0:
+        assert track.seen[4:].all()
+
+
+def test_someone_small_beside_the_most_prominent_one_costs_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    people = [Person(lambda t: (300, 200), BLUE), Person(lambda t: (900, 200), RED, size_px=40)]
+    networks = FakeLandmarks(people)
+    monkeypatch.setattr(tracker_module, "LandmarkNetwork", lambda name, *_: networks)
+    monkeypatch.setattr(tracker_module, "PersonDetector", lambda *_: FakeDetector(people))
+    tracker = PeopleTracker("best", 1)
+    for image in pictures(people, 100):
+        assert len(tracker.step(image)) == 1
+    assert sum(networks.batches) <= 104
+    tracker = PeopleTracker("best", 1, people=2)
+    assert [len(tracker.step(image)) for image in pictures(people, 3)] == [2, 2, 2]
+    assert networks.batches[-1] == 2  # both in one batch
+
+
+@pytest.mark.parametrize("leap", [0, 90], ids=["steady", "leaps"])
+@pytest.mark.parametrize(("quality", "again"), [("best", 8), ("fast", 0)])
+def test_looking_ahead_changes_nothing_but_the_order(
+    monkeypatch: pytest.MonkeyPatch, quality: str, again: int, leap: int
+) -> None:
+    """What was foretold is used where the person goes on as before, and looked at again where not.
+
+    The small networks look ahead only once they know where: nothing is looked at twice.
+    """
+    people = [Person(lambda t: (200 + 3.0 * t + (leap if t >= 20 else 0), 200), BLUE)]
+    networks, strong = FakeLandmarks(people), FakeLandmarks(people)
+    if quality == "best":
+        strong = networks
+    monkeypatch.setattr(tracker_module, "LandmarkNetwork", lambda name, *_: strong if "heavy" in name else networks)
+    monkeypatch.setattr(tracker_module, "PersonDetector", lambda *_: FakeDetector(people))
+    images = list(pictures(people, 60))
+    plain, ahead = PeopleTracker(quality, 1), PeopleTracker(quality, 1)
+    expected = [plain.step(image) for image in images]
+    networks.batches.clear()
+    found = [ahead.step(image, upcoming) for image, upcoming in zip(images, [*images[1:], None], strict=True)]
+    for one, other in zip(expected, found, strict=True):
+        np.testing.assert_allclose(one[0][1].keypoints_px, other[0][1].keypoints_px)
+        assert [number for number, _ in one] == [number for number, _ in other]
+    assert networks.ahead >= 50
+    assert sum(networks.batches) <= 8 + (again if leap else 0)
+
+
+def test_a_flicker_is_nobody(follow: Callable[..., list[Track]]) -> None:
+    blinks = Person(lambda t: (200 + 30 * (t // 20), 200) if t % 20 < 3 else None, RED)
+    assert follow([blinks], 200, wanted=3) == []
+
+
+def test_the_strong_network_stands_in_where_left_and_right_change_places(follow: Callable[..., list[Track]]) -> None:
+    person = Person(lambda t: (300 + t, 200), BLUE, swapped=[*range(40, 70), 80])
+    (track,) = follow([person], 120)
+    assert (track.keypoints_px[:, 11, 0] > track.keypoints_px[:, 12, 0]).all()
+
+
+def test_the_strong_network_stands_in_where_a_smaller_one_loses_somebody(follow: Callable[..., list[Track]]) -> None:
+    (track,) = follow([Person(lambda t: (300 + t, 200), BLUE, lost=range(40, 80))], 120)
+    assert track.seen.all()
+    assert track.acquired.sum() == 1
+
+
+def test_exchanged_left_and_right_are_judged(follow: Callable[..., list[Track]]) -> None:
+    from scope.scope_addon.capture.camera.intrinsics import choose_camera
+    from scope.scope_addon.capture.tracking.left_right import repair_left_right
+
+    person = Person(lambda t: (300 + t, 200), BLUE, swapped=range(110))
+    (track,) = follow([person], 120)
+    left, right = (track.keypoints_px[:, k, 0] for k in (11, 12))
+    assert (left < right).sum() == 110
+    repaired = repair_left_right(track, choose_camera(1200, 400))
+    assert (repaired.keypoints_px[:, 11, 0] > repaired.keypoints_px[:, 12, 0]).all()
+    assert len(track.judged_rows) <= 120 // 30 + 3
+
+
+def test_nobody_waits_for_the_judge(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its judgement of the first frame arrives after the last one."""
+    person, free = Person(lambda t: (300 + t, 200), BLUE), threading.Event()
+
+    class SlowJudge(FakeLandmarks):
+        def estimate(self, image: np.ndarray, regions: list[Region]) -> list[PoseEstimate]:
+            free.wait(60)
+            return super().estimate(image, regions)
+
+    networks = {True: SlowJudge([person], right=True), False: FakeLandmarks([person])}
+    monkeypatch.setattr(tracker_module, "LandmarkNetwork", lambda name, *_: networks["heavy" in name])
+    monkeypatch.setattr(tracker_module, "PersonDetector", lambda *_: FakeDetector([person]))
+    tracker, builder = PeopleTracker("fast", 1), PeopleBuilder()
+    for t, image in enumerate(pictures([person], 20)):
+        builder.add(t, t / FPS, tracker.step(image))
+    assert networks[True].batches == []
+    free.set()
+    (track,) = builder.build(1)
+    assert track.judged_rows.tolist() == [0]
+    np.testing.assert_allclose(track.judged_landmarks[0], person.body(0))
+
+
+@pytest.mark.parametrize(
+    ("rows", "kept"),
+    [
+        (range(20), 20),
+        ([*range(20), 30, 31], 20),
+        ([*range(20), 30, 31, 40], 20),
+        ([*range(20), *range(30, 34)], 24),  # a tenth of a second
+        ([0, 1], 2),
+        ([], 0),
+    ],
+)
+def test_who_is_seen_again_for_a_moment_only_ends_before_it(rows: list[int], kept: int) -> None:
+    tracklet = Tracklet(rows=list(rows), values=[np.zeros((33, 6), np.float32)] * len(rows))
+    trim_flickering_end(tracklet, np.arange(60) / FPS)
+    assert tracklet.rows == list(rows)[:kept]
+
+
+@pytest.mark.parametrize("every", [2, 12], ids=["30 fps", "5 fps"])
+def test_a_real_newcomer_is_found_as_soon_at_any_rate(shared: Path, every: int) -> None:
+    try:
+        tracker = PeopleTracker("fast", threads=2, people=4)
+    except SetupError as error:
+        pytest.skip(f"the networks are not built: {error}")
+    comes_s, found_s = 0.5, None
+    for t, (image, places, _) in enumerate(composite(shared, ("cam1", "cam3"), crossing=False)):
+        if t / 60 < comes_s:
+            image[:, 700:] = 140
+        if t % every or found_s is not None:
+            continue
+        hips = [o.keypoints_px[[23, 24]].mean(axis=0) for _, o in tracker.step(image, time_s=t / 60)]
+        if any(np.linalg.norm(place - places[1]) < 80 for place in hips):
+            found_s = t / 60
+    assert found_s is not None
+    assert comes_s <= found_s <= comes_s + 0.27 + every / 60
+
+
+@pytest.mark.parametrize(
+    ("cameras", "crossing"), [(("cam2", "cam3"), True), (("cam4", "cam1"), True), (("cam1", "cam3"), False)]
+)
+def test_real_people_are_never_mixed_up(shared: Path, cameras: tuple[str, str], crossing: bool) -> None:
+    """The same man twice, so that clothes say nothing; hidden for some twenty frames where the clips cross."""
+    try:
+        tracker, builder = PeopleTracker("fast", threads=2, people=2), PeopleBuilder()
+    except SetupError as error:
+        pytest.skip(f"the networks are not built: {error}")
+    places, hidden = [], []
+    for t, (image, at, is_hidden) in enumerate(composite(shared, cameras, crossing)):
+        builder.add(t, t / 60, tracker.step(image, time_s=t / 60))
+        places.append(at)
+        hidden.append(is_hidden)
+    truth, visible = np.array(places), ~np.array(hidden)
+    assert visible.sum() >= 75
+    assert crossing == (not visible.all())
+    tracks = builder.build(2)
+    assert len(tracks) == 2
+    found = []
+    for track in tracks:
+        trunk = track.keypoints_px[:, [11, 12, 23, 24]].mean(axis=1)
+        distance = np.linalg.norm(trunk[:, None] - truth, axis=-1)
+        rows = track.seen & visible & np.isfinite(truth).all(axis=(1, 2))
+        people = np.unique(distance[rows].argmin(axis=1))
+        assert len(people) == 1, "switched"
+        assert np.percentile(distance[rows].min(axis=1), 90) < 40
+        found.append(int(people[0]))
+    assert sorted(found) == [0, 1]
+    for track, person in zip(tracks, found, strict=True):
+        assert track.seen[visible].mean() >= (0.98 if person == 1 or not crossing else 0.9)

@@ -1,0 +1,74 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Cuts are found, and what only looks like one is none; what follows a cut is captured for itself."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from scope.scope_addon.capture.pipeline import CaptureOptions, capture
+from scope.scope_addon.capture.tracking.scene_cuts import SceneCuts
+from scope.scope_addon.errors import SetupError
+from scope.solver import Body
+
+W, H = 320, 180
+
+
+def scene(seed: int, width: int = W) -> np.ndarray:
+    coarse = np.random.default_rng(seed).integers(0, 256, (9, max(2, width // 20), 3), dtype=np.uint8)
+    return cv2.resize(coarse, (width, H), interpolation=cv2.INTER_CUBIC)
+
+
+def cuts(frames: Sequence[np.ndarray]) -> list[float]:
+    found = SceneCuts()
+    for t, (frame, upcoming) in enumerate(zip(frames, [*frames[1:], None], strict=True)):
+        assert found.is_cut(frame, upcoming, float(t)) == (t in found.times_s)
+    return found.times_s
+
+
+def test_each_scene_begins_with_a_cut() -> None:
+    assert cuts([scene(k // 10) for k in range(40)]) == [10.0, 20.0, 30.0]
+    assert cuts([scene(k // 10) for k in range(11)]) == [10.0]  # in the last frame
+
+
+@pytest.mark.parametrize(
+    "frames",
+    [
+        [scene(0)] * 10 + [np.full((H, W, 3), 250, np.uint8)] + [scene(0)] * 10,
+        [scene(0)] * 10 + [scene(1)] + [scene(0)] * 10,
+        [scene(0)] * 10 + [np.zeros((H, W, 3), np.uint8)] * 10 + [scene(0)] * 10,
+        [scene(0, 4000)[:, 60 * k : 60 * k + W] for k in range(40)],
+        [cv2.addWeighted(scene(0), 1 - k / 20, scene(1), k / 20, 0) for k in range(21)],
+        [np.clip(scene(0) * (k / 20), 0, 255).astype(np.uint8) for k in range(30)],
+    ],
+    ids=["a flash", "a frame of something else", "a gap", "a camera that swings", "a dissolve", "a fade"],
+)
+def test_what_is_no_cut(frames: list[np.ndarray]) -> None:
+    assert cuts(frames) == []
+
+
+def test_what_follows_a_cut_is_captured_for_itself(shared: Path, body: Body, tmp_path: Path) -> None:
+    """A man from two sides, one after the other: told, and on him up to the cut and from it on."""
+    clip = tmp_path / "two.mp4"
+    writer = cv2.VideoWriter(str(clip), cv2.VideoWriter.fourcc(*"mp4v"), 30, (540, 960))
+    for camera in ("cam3", "cam1"):
+        video = cv2.VideoCapture(str(shared / "data" / "pose2sim" / f"{camera}.mp4"))
+        for k in range(50):
+            picture = video.read()[1]
+            if k % 2 == 0:
+                writer.write(cv2.resize(picture, (540, 960), interpolation=cv2.INTER_AREA))
+    writer.release()
+    try:
+        found = capture(clip, body, CaptureOptions(quality="fast"))
+    except SetupError as error:
+        pytest.skip(f"the networks are not built: {error}")
+    (motion,) = found.motions
+    assert found.report["cuts_s"] == [pytest.approx(25 / 30, abs=1e-3)]
+    assert any("two.mp4 cuts to another scene at 0.8 s" in text for text in found.report["warnings"])
+    assert np.allclose(np.diff(motion.timestamps), 1 / 30, atol=1e-3)
+    seen = motion.valid
+    assert seen.mean() > 0.4  # one of the two, if not both
+    assert motion.residual_px[seen].max() < 12

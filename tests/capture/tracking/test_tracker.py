@@ -1,0 +1,130 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Following people through real clips, frame by frame."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+import pytest
+from scope.scope_addon.capture.media.video import open_video
+from scope.scope_addon.capture.perception.observation import Observation
+from scope.scope_addon.capture.tracking.tracker import PeopleTracker
+from scope.scope_addon.errors import SetupError
+from scope.solver.errors import ShapeError
+
+Frames = Callable[..., Iterator[np.ndarray]]
+
+
+@pytest.fixture(scope="module")
+def tracker_of_module() -> PeopleTracker:
+    try:
+        return PeopleTracker("fast", threads=2)
+    except SetupError as error:
+        pytest.skip(f"the networks are not built: {error}")
+
+
+@pytest.fixture
+def tracker(tracker_of_module: PeopleTracker) -> PeopleTracker:
+    tracker_of_module.reset()
+    return tracker_of_module
+
+
+def largest(tracker: PeopleTracker, image: np.ndarray) -> tuple[int, Observation] | None:
+    return max(tracker.step(image), key=lambda entry: entry[1].region.side_px, default=None)
+
+
+@pytest.mark.parametrize("clip", ["walk_side_static", "run_moving_camera", "squats_5fps"])
+def test_person_is_found_once_and_kept(tracker: PeopleTracker, frames: Frames, clip: str) -> None:
+    seen = [tracker.step(image) for image in frames(f"clips/{clip}", stop=40)]
+    found = [observations[0][1] for observations in seen if [n for n, _ in observations] == [0]]
+    assert len(found) >= 0.98 * len(seen)
+    assert [o.acquired for o in found] == [True] + [False] * (len(found) - 1)
+    for before, after in zip(found, found[1:], strict=False):
+        assert after.region.resembles(before.region, 0.25)
+    assert found[-1].keypoints_px.shape == (33, 2)
+    assert found[-1].world_landmarks.shape == (33, 3)
+    assert all(((o.keypoints_confidence >= 0) & (o.keypoints_confidence <= 1)).all() for o in found)
+    assert found[0].judged_landmarks is not None  # left and right are told from the first frame on
+    assert sum(o.judged_landmarks is not None for o in found) <= 1 + len(found) // 8
+
+
+def test_two_people_are_followed_and_nobody_twice(frames: Frames) -> None:
+    tracker = PeopleTracker("fast", threads=2, people=4)
+    for image in frames("clips/two_people_portrait"):
+        observations = dict(tracker.step(image))
+        assert sorted(observations) == [0, 1]
+        assert observations[0].region.center_px[0] > 500 > observations[1].region.center_px[0]
+
+
+def test_a_hand_is_no_person(tracker: PeopleTracker, frames: Frames) -> None:
+    seen = [tracker.step(image) for image in frames("clips/hand_closeup", every=9)]
+    assert sum(len(observations) > 0 for observations in seen) <= 0.1 * len(seen)
+
+
+def test_lost_and_found_again(tracker: PeopleTracker, frames: Frames) -> None:
+    images = list(frames("clips/run_moving_camera", stop=6))
+    blank = np.zeros_like(images[0])
+    before = [largest(tracker, image) for image in images[:3]]
+    assert [tracker.step(blank) for _ in range(3)] == [[]] * 3
+    after = [largest(tracker, image) for image in images[3:]]
+    assert None not in before + after
+    assert after[0][1].acquired
+    assert after[0][0] != before[-1][0]
+    assert after[0][1].region.resembles(before[-1][1].region, 0.1)
+
+
+def test_reset_forgets(tracker: PeopleTracker, frames: Frames) -> None:
+    (image,) = frames("clips/gesture_square", stop=1)
+    first = largest(tracker, image)
+    tracker.step(image)
+    tracker.reset()
+    again = largest(tracker, image)
+    assert first is not None
+    assert again is not None
+    assert again[1].acquired
+    np.testing.assert_array_equal(again[1].keypoints_px, first[1].keypoints_px)
+
+
+def test_odd_images(tracker: PeopleTracker) -> None:
+    for shape in ((1, 1), (3, 500), (17, 5)):
+        assert tracker.step(np.zeros((*shape, 3), np.uint8)) == []
+    with pytest.raises(ShapeError, match=r"\(5, 5\)"):
+        tracker.step(np.zeros((5, 5), np.uint8))
+
+
+def test_a_somersault_is_followed_all_the_way_round(shared):
+    """The man turns over once in the air, against the sun, between frames 165 and 183."""
+    tracker, seen = PeopleTracker("best", threads=2), {}
+    with open_video(shared / "data/clips/walk_side_static.mp4") as video:
+        for frame in video:
+            if frame.index > 186:
+                break
+            if frame.index >= 100:
+                for tracklet, observation in tracker.step(frame.image_rgb):
+                    if observation.keypoints_px[:, 1].mean() < 600:  # the man in the air, not the woman on the grass
+                        seen.setdefault(tracklet, {})[frame.index] = observation
+    (man,) = (track for track in seen.values() if 165 in track)
+    assert set(range(150, 187)) <= set(man)
+    head_above_hips = {k: o.keypoints_px[[23, 24], 1].mean() - o.keypoints_px[0, 1] for k, o in man.items()}
+    assert head_above_hips[150] > 0
+    assert head_above_hips[170] < 0
+    assert head_above_hips[186] > 0
+
+
+def test_who_walks_out_of_the_picture_is_gone(shared):
+    """The woman on the grass leaves at the left edge between frames 195 and 207, and nothing comes in her stead.
+
+    The man runs behind a tree between frames 223 and 229, and is not seen in its bark.
+    """
+    tracker, seen = PeopleTracker("best", 2, 2), {}
+    with open_video(shared / "data/clips/walk_side_static.mp4") as video:
+        for frame in video:
+            if frame.index >= 185:
+                for tracklet, _ in tracker.step(frame.image_rgb):
+                    seen.setdefault(tracklet, []).append(frame.index)
+    # somebody is a person from a third of a second on
+    lasting = sorted((frames for frames in seen.values() if len(frames) >= 10), key=lambda frames: frames[-1])
+    woman, man = lasting
+    assert 195 <= woman[-1] <= 207
+    assert 223 <= man[-1] <= 226  # behind a tree, where nobody is made out any more

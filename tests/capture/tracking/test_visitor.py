@@ -1,0 +1,80 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The main job with everybody of a video, one of whom comes in after a while and leaves before the end."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from scope.scope_addon.capture.media.video_range import VideoRange
+from scope.scope_addon.capture.pipeline import Capture, CaptureOptions, capture
+from scope.solver.body import Body
+
+from ..composites import visit
+
+EVERY = 2  # of the frames, so that there are 30 a second
+EDGE = 1200.0
+
+
+@pytest.fixture(scope="module")
+def footage(shared: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, np.ndarray]:
+    """A video, and the true places of the two, (T, 2, 2) pixels."""
+    path, places, writer = tmp_path_factory.mktemp("visit") / "visit.avi", [], None
+    for t, (image, at) in enumerate(visit(shared)):
+        if t % EVERY == 0:
+            writer = writer or cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*"MJPG"), 30, image.shape[1::-1])
+            writer.write(np.ascontiguousarray(image[:, :, ::-1]))
+            places.append(at)
+    assert writer is not None
+    writer.release()
+    return path, np.array(places)
+
+
+@pytest.fixture(scope="module")
+def everybody(footage: tuple[Path, np.ndarray], body: Body) -> Capture:
+    return capture(footage[0], body, CaptureOptions(quality="fast", people="all"))
+
+
+def test_the_visitor_is_valid_while_in_the_picture_and_only_then(
+    everybody: Capture, footage: tuple[Path, np.ndarray]
+) -> None:
+    places = footage[1]
+    assert len(everybody.motions) == 2
+    stays, visitor = everybody.motions
+    assert stays.valid.mean() >= 0.98
+    inside, outside = places[:, 1, 0] < EDGE - 150, ~(places[:, 1, 0] < EDGE + 30)
+    assert inside.sum() >= 15
+    assert outside.sum() >= 12
+    assert visitor.valid[inside][8:].all()  # newcomers are looked for every 0.27 s
+    assert not visitor.valid[outside].any()
+    for motion, at in zip(everybody.motions, np.moveaxis(places, 1, 0), strict=True):
+        trunk = projected_trunk(motion)
+        rows = motion.valid & np.isfinite(at).all(axis=1)
+        assert np.percentile(np.linalg.norm(trunk - at, axis=1)[rows], 90) < 40
+
+
+def test_nobody_is_flung_where_they_come_and_go(everybody: Capture) -> None:
+    for motion in everybody.motions:
+        steps = np.linalg.norm(np.diff(motion.joints_cam[:, 0], axis=0), axis=1)
+        assert steps.max() < 0.25  # metres a frame; the visitor slides in and out at up to 0.15
+        assert (motion.joints_cam[:, 0, 2] > 1.0).all()
+
+
+def test_the_visitor_is_the_same_at_six_frames_a_second(footage: tuple[Path, np.ndarray], body: Body) -> None:
+    options = CaptureOptions(quality="fast", people="all", wanted=VideoRange(fps=Fraction(6)))
+    result = capture(footage[0], body, options)
+    stays, visitor = result.motions
+    places = footage[1][visitor.frames, 1, 0]
+    assert stays.valid.all()
+    assert visitor.valid[places < EDGE - 150][1:].all()
+    assert not visitor.valid[~(places < EDGE + 30)].any()
+    assert np.linalg.norm(np.diff(visitor.joints_cam[:, 0], axis=0), axis=1).max() < 0.9
+
+
+def projected_trunk(motion) -> np.ndarray:
+    """(T, 2) pixels of the middle of hips and shoulders."""
+    middle = motion.joints_cam[:, [1, 2, 16, 17]].mean(axis=1) @ motion.intrinsics.T
+    return middle[:, :2] / middle[:, 2:]

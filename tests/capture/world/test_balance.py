@@ -1,0 +1,132 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Weight over feet: bodies that lean away from the camera, and some that may."""
+
+import numpy as np
+import pytest
+from scope.scope_addon.capture.world.balance import center_of_mass, turn_over_feet
+from scope.scope_addon.capture.world.placement import PlacedTrack
+from scope.scope_addon.kinematics.contact_points import support_points, with_supports
+from scope.solver import load_body, rotations
+
+UP = np.array([0.0, -1.0, 0.0])  # camera axes, level camera
+AWAY = np.array([0.0, 0.0, 1.0])
+T = 60
+TIMES = np.arange(T) / 30
+FEET = np.tile([1.0, 1.0, 1.0, 1.0, 0.0, 0.0], (T, 1))  # stand, and hands do not
+
+
+def standing(lean_deg=0.0, axis=(1.0, 0.0, 0.0), speed_m_s=0.0, arms=(0.0, 0.0, 60.0), bends=()):
+    """A person who stands 4 m away with arms down, leaning as a whole about the feet; gliding along if so asked.
+
+    ``arms``: the right shoulder's axis-angle, degrees; the left one mirrors it. ``bends``: of both hips, knees and so
+    on, degrees about the joint's x axis.
+    """
+    body = load_body("scope")
+    supported = with_supports(body, np.zeros(body.P))
+    omega = np.tile(np.eye(3), (T, body.K + 1, 1, 1))
+    for side, sign in (("left", -1), ("right", 1)):
+        omega[:, body.joint_names.index(f"{side}_shoulder")] = rotations.exp(sign * np.radians(arms))
+        for name, degrees in bends:
+            omega[:, body.joint_names.index(f"{side}_{name}")] = rotations.exp(np.radians([degrees, 0, 0]))
+    upright = rotations.exp([np.pi, 0.0, 0.0])  # model y up to camera y down
+    lean = rotations.exp(np.radians(lean_deg) * np.array(axis))
+    omega[:, 0] = lean @ upright
+    J0 = body.rest_joints()[0]
+
+    def place(root):
+        R, t = body.forward_kinematics(omega, root - J0)
+        return t, support_points(supported, R, t)
+
+    root = np.zeros((T, 3))
+    joints, supports = place(root)
+    root += np.array([0, 1.0, 4.0]) - supports[:, :4].mean(axis=(0, 1)) + speed_m_s * TIMES[:, None] * [1.0, 0, 0]
+    joints, supports = place(root)
+    seen, center = np.ones((T, 6)), np.zeros((T, 3))
+    every = np.ones(T, bool)
+    return PlacedTrack(supported, np.zeros(body.P), TIMES, every, omega, root, joints, supports, seen, center)
+
+
+def turned_deg(turn):
+    """Degrees about the camera's x axis."""
+    return np.degrees(rotations.log(turn))[:, 0]
+
+
+def test_the_center_of_mass_is_that_of_the_volume():
+    body = load_body("scope")
+    placed = standing()
+    R, t = body.forward_kinematics(placed.rotations[0], placed.root[0] - body.rest_joints()[0])
+    v = body.skin(R, t)
+    a, b, c = (v[body.faces[:, k]] for k in range(3))
+    volume = np.einsum("ij,ij->i", a, np.cross(b, c)) / 6
+    centroid = (volume[:, None] * (a + b + c) / 4).sum(0) / volume.sum()
+    np.testing.assert_allclose(center_of_mass(body, placed.joints)[0], centroid, atol=0.05)
+
+
+@pytest.mark.parametrize("lean", [-20.0, 20.0])
+def test_who_would_fall_is_turned_back_over_the_feet(lean):
+    placed = standing(lean)
+    turn, pivot = turn_over_feet(placed, FEET, UP)
+    angle = turned_deg(turn)[T // 2]
+    assert np.sign(angle) == -np.sign(lean)
+    assert 3.0 < abs(angle) < 10.5
+    np.testing.assert_allclose(pivot, placed.soles.mean(axis=1), atol=1e-9)
+    turned = pivot + np.einsum("tij,tj->ti", turn, center_of_mass(placed.body, placed.joints) - pivot)
+    before, after = ((c - pivot)[T // 2] @ AWAY for c in (center_of_mass(placed.body, placed.joints), turned))
+    assert abs(after) < 0.75 * abs(before)
+
+
+def test_who_stands_upright_is_left_alone():
+    assert np.abs(turned_deg(turn_over_feet(standing(), FEET, UP)[0])).max() < 1.0
+
+
+def test_a_lean_across_the_line_of_sight_is_seen_and_left_alone():
+    turn, _ = turn_over_feet(standing(20.0, axis=(0.0, 0.0, 1.0)), FEET, UP)
+    assert np.abs(rotations.log(turn)).max() < np.radians(1.0)
+
+
+def test_who_moves_or_flies_is_left_alone():
+    turn, _ = turn_over_feet(standing(20.0, speed_m_s=1.5), FEET, UP)
+    assert np.abs(turned_deg(turn)[10:-10]).max() < 0.5  # the speed at the ends is not known well
+    turn, _ = turn_over_feet(standing(20.0), np.zeros((T, 6)), UP)
+    assert np.isfinite(turn).all()
+    assert np.abs(turned_deg(turn)).max() < 1e-6
+
+
+SITS, KNEELS, BENDS = (("hip", -85), ("knee", 85)), (("knee", 90), ("ankle", 50)), (("hip", -20), ("knee", 40))
+
+
+@pytest.mark.parametrize("bends", [SITS, KNEELS], ids=["sits", "kneels"])
+@pytest.mark.parametrize("lean", [-10.0, 0.0, 10.0])
+def test_who_rests_on_a_chair_or_the_shins_is_left_alone(bends, lean):
+    turn, _ = turn_over_feet(standing(lean, bends=bends), FEET, UP)
+    assert np.abs(turned_deg(turn)).max() < 0.1
+
+
+def test_who_goes_down_a_little_has_to_keep_balance():
+    turn, _ = turn_over_feet(standing(20.0, bends=BENDS), FEET, UP)
+    assert turned_deg(turn)[T // 2] < -3.0
+
+
+def test_who_is_on_hands_and_feet_is_left_alone():
+    """A plank towards the camera: the weight is between toes and palms, far from the feet."""
+    planks = standing(80.0, arms=(0.0, 90.0, 0.0))
+    assert turned_deg(turn_over_feet(planks, FEET, UP)[0])[T // 2] < -3.0
+    turn, pivot = turn_over_feet(planks, np.ones((T, 6)), UP)
+    assert np.abs(turned_deg(turn)).max() < 0.1
+    np.testing.assert_allclose(pivot, planks.supports.mean(axis=1), atol=1e-6)
+
+
+def test_a_still_is_judged_as_it_stands():
+    placed = standing(20.0)
+    one = PlacedTrack(*(getattr(placed, n) if n in ("body", "betas") else getattr(placed, n)[:1]
+                        for n in placed.__dataclass_fields__))  # fmt: skip
+    turn, _ = turn_over_feet(one, FEET[:1], UP)
+    assert turned_deg(turn)[0] < -3.0
+
+
+def test_a_frame_in_which_nothing_stands_is_turned_about_its_own_feet_too():
+    """As the first one after a cut: those beside it say by how much, and far away is not where it is turned about."""
+    placed, contact = standing(20.0), FEET.copy()
+    contact[T // 2] = 0.0
+    _, pivot = turn_over_feet(placed, contact, UP)
+    np.testing.assert_allclose(pivot, placed.soles.mean(axis=1), atol=1e-6)

@@ -1,0 +1,248 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Contact, depth and held feet on motions whose truth is known."""
+
+import numpy as np
+import pytest
+from scope.scope_addon.capture.world import foot_lock, ground_plane
+from scope.scope_addon.kinematics import standing
+from scope.scope_addon.kinematics.axes import transform_points, world_from_level_camera
+from scope.scope_addon.kinematics.contact_points import support_points, with_supports
+from scope.scope_addon.kinematics.smoothing import gaussian_smooth
+from scope.solver import rotations
+from scope.solver.loaders.body_file import load_body
+
+FPS = 30.0
+CAMERA = np.zeros(3)
+
+
+@pytest.fixture(scope="module")
+def step():
+    """A person who shifts the weight and raises the left foot for a second, 4 m from a camera 1.5 m high."""
+    body = load_body("scope")
+    T = 90
+    times = np.arange(T) / FPS
+    T_world_camera = world_from_level_camera(np.array([0.0, -1.0, -0.2]), height=1.5)
+    R_camera_world = T_world_camera[:3, :3].T
+    lift = np.clip(np.sin((times - 1.0) * np.pi), 0, 1)  # 1 s to 2 s
+    omega = np.tile(np.eye(3), (T, body.K + 1, 1, 1))
+    names = body.joint_names
+    x = np.array([1.0, 0, 0])
+    omega[:, names.index("left_hip")] = rotations.exp(-0.9 * lift[:, None] * x)
+    omega[:, names.index("left_knee")] = rotations.exp(1.2 * lift[:, None] * x)
+    facing = rotations.exp(np.array([np.pi / 2, 0, 0]))  # model y up to world z up
+    omega[:, 0] = R_camera_world @ facing
+    supported = with_supports(body, np.zeros(body.P))
+
+    def place(local, root):
+        R, t = body.forward_kinematics(local, root)
+        return R, t, support_points(supported, R, t)
+
+    root_world = np.tile([0.0, 4.0, 0.0], (T, 1))
+    lowest = place(omega, np.zeros((T, 3)))[2][:, 2:4] @ T_world_camera[2, :3]
+    root_world[:, 2] = -lowest.min(1)
+    root = transform_points(np.linalg.inv(T_world_camera), root_world)
+    return supported, omega, root, place, T_world_camera, times
+
+
+def test_the_raised_foot_is_known_from_the_standing_one(step):
+    _, omega, root, place, T_world_camera, times = step
+    p = standing.resting_probability(place(omega, root)[2], T_world_camera[2, :3], times, CAMERA)
+    assert (p[:, 2:4] > 0.8).all()  # right
+    assert (p[:, 4:] < 0.01).all()  # hands
+    assert (p[:20, :2] > 0.8).all()
+    assert (p[36:54, :2] < 0.3).all()
+    assert (p[75:, :2] > 0.8).all()
+
+
+def test_a_still_foot_at_a_wrong_distance_stands_and_a_raised_one_does_not(step):
+    """A foot that is seen too near, or too far, along its line of sight seems to be below the floor, or above it."""
+    _, omega, root, place, T_world_camera, times = step
+    up = T_world_camera[2, :3]
+    soles = place(omega[:1], root[:1])[2][:, :4].repeat(len(times), axis=0)
+    sight = soles[:, :2] / np.linalg.norm(soles[:, :2], axis=-1, keepdims=True)
+    far = soles.copy()
+    far[:, :2] -= 0.35 * sight  # the left one: nearer to the camera, so higher
+    higher = ((far[:, :2] - soles[:, :2]) @ up).mean()
+    assert higher > 0.1
+    assert (standing.standing_probability(far, up, times, CAMERA)[:, :2] > 0.5).all()
+    assert (standing.standing_probability(far, up, times)[:, :2] < 0.1).all()  # nobody knows where the sight is
+
+    raised = soles.copy()
+    raised[:, :2] += 0.35 * up
+    assert (standing.standing_probability(raised, up, times, CAMERA)[:, :2] < 0.1).all()
+
+    moving = far.copy()
+    moving[:, :2, 0] += 0.06 * np.sin(2 * np.pi * times)[:, None]  # up to 0.38 m/s, and slow where it turns round
+    assert (standing.standing_probability(moving, up, times, CAMERA)[:, :2] < 0.3).all()
+    at = np.array([2.0, -1.0, 3.0])
+    for center in (at, np.tile(at, (len(times), 1))):
+        elsewhere = standing.standing_probability(far + at, up, times, center)
+        np.testing.assert_allclose(elsewhere, standing.standing_probability(far, up, times, CAMERA), atol=1e-9)
+
+
+def test_wrong_depth_is_found_again_by_the_floor(step):
+    _, omega, root, place, T_world_camera, times = step
+    unit = root / np.linalg.norm(root, axis=1, keepdims=True)
+    wrong = 0.15 * np.sin(2 * np.pi * 0.4 * times)
+    seen = place(omega, root + wrong[:, None] * unit)[2]
+    contact = standing.resting_probability(seen, T_world_camera[2, :3], times, CAMERA)
+    away = ground_plane.correct_depth(root + wrong[:, None] * unit, seen, contact, T_world_camera, times)
+    assert np.abs(away + wrong).mean() < 0.25 * np.abs(wrong).mean()
+    left = np.diff(wrong + away)[:28]  # while both feet stand
+    assert np.abs(left).max() < 0.1 * np.abs(np.diff(wrong)).max()  # and what is left hardly slides
+
+
+def test_right_depth_is_left_alone(step):
+    _, omega, root, place, T_world_camera, times = step
+    soles = place(omega, root)[2]
+    contact = standing.resting_probability(soles, T_world_camera[2, :3], times, CAMERA)
+    assert np.abs(ground_plane.correct_depth(root, soles, contact, T_world_camera, times)).max() < 0.05
+
+
+def test_the_depth_system_is_solved_as_a_dense_one():
+    rng = np.random.default_rng(0)
+    off = rng.normal(size=30)
+    diagonal = 3 + np.abs(np.r_[off, 0]) + np.abs(np.r_[0, off])
+    right = rng.normal(size=31)
+    dense = np.diag(diagonal) + np.diag(off, 1) + np.diag(off, -1)
+    assert np.allclose(ground_plane._solve_tridiagonal(diagonal, off, right), np.linalg.solve(dense, right))
+
+
+def test_a_trembling_motion_stands_still_where_it_stands(step):
+    supported, omega, root, place, T_world_camera, times = step
+    rng = np.random.default_rng(1)
+    noise = gaussian_smooth(rng.normal(size=(len(times), supported.K + 1, 3)), times, 4.5)
+    shaken = omega @ rotations.exp(0.06 * noise)
+    # across the line of sight, the picture tells better than 3 mm where somebody is
+    sight = standing.along_sight(root)
+    trembling = gaussian_smooth(rng.normal(size=root.shape), times, 4.5)
+    shaken_root = root + 0.003 * trembling + 0.02 * trembling[:, :1] * sight
+    contact = standing.resting_probability(place(omega, root)[2], T_world_camera[2, :3], times, CAMERA)
+    local, moved = foot_lock.stand_on_floor(
+        supported, shaken, shaken_root, np.zeros(supported.P), lambda *m: place(*m)[2], contact, T_world_camera, times
+    )
+    before, after = (
+        transform_points(T_world_camera, place(*m)[2][:, 2]) for m in ((shaken, shaken_root), (local, moved))
+    )
+    assert after.std(0).max() < 0.4 * before.std(0).max()
+    assert np.abs(after[:, 2]).max() < 0.015  # on the floor
+    assert np.abs(place(local, moved)[1] - place(shaken, shaken_root)[1]).max() < 0.2  # nobody was thrown about
+
+
+@pytest.mark.parametrize("turned", [0.0, 0.6, 2.5])
+def test_the_picture_stays_where_feet_are_held_elsewhere(step, turned):
+    """Whatever way the camera looks, and wherever it is: legs and distance give way, not what was seen."""
+    supported, omega, root, place, T_world_camera, _ = step
+    R, center = rotations.exp(np.array([0.0, turned, 0.0])), np.array([1.0, -0.2, 0.5])
+    omega, root = omega[:3].copy(), root[:3] @ R.T + center
+    omega[:, 0] = R @ omega[:, 0]
+    up, soles = R @ T_world_camera[2, :3], place(omega, root)[2]
+    indices = np.arange(len(supported.keypoint_names) - 6, len(supported.keypoint_names))
+    for away in (-0.03, 0.03):
+        held = soles + away * up
+        floor = up, np.full(len(root), float((held @ up).min()))
+        targets = indices, held, np.tile([0.9, 0.9, 0.9, 0.9, 0.0, 0.0], (len(root), 1))
+        local, moved = foot_lock.hold_feet(supported, omega, root, np.zeros(supported.P), targets, floor, center)
+        for joint in ("head", "left_wrist", "right_hip"):
+            j = supported.joint_names.index(joint)
+            was, now = ((place(*m)[1][:, j] - center) @ R for m in ((omega, root), (local, moved)))
+            shift = now[:, :2] / now[:, 2:] - was[:, :2] / was[:, 2:]
+            assert np.abs(shift).max() < 0.006 / 4, joint
+        assert np.abs((place(local, moved)[2] - held)[:, :4] @ up).max() < 0.022
+
+
+@pytest.mark.parametrize("level", [-1.8, -0.5, 0.6])
+def test_feet_on_another_level_are_not_drawn_to_the_floor(step, level):
+    """Half of the time the person stands on the floor, then on a wall or in a pit."""
+    supported, omega, root, place, T_world_camera, times = step
+    up = T_world_camera[2, :3]
+    other = root + np.where(times > 1.5, level, 0.0)[:, None] * up
+    soles = place(omega, other)[2]
+    contact = standing.resting_probability(soles, up, times, CAMERA)
+    local, moved = foot_lock.stand_on_floor(
+        supported, omega, other, np.zeros(supported.P), lambda *m: place(*m)[2], contact, T_world_camera, times
+    )
+    after = transform_points(T_world_camera, place(local, moved)[2])
+    before = transform_points(T_world_camera, soles)
+    assert np.abs(after[:, 2:, 2] - before[:, 2:, 2]).max() < 0.06
+    assert np.abs(after[60:, 2, 2] - level).max() < 0.06
+    assert np.abs(after[:30, 2, 2]).max() < 0.03
+
+
+def test_a_still_and_a_single_frame_pass(step):
+    supported, omega, root, place, T_world_camera, times = step
+    contact = standing.resting_probability(place(omega[:1], root[:1])[2], T_world_camera[2, :3], times[:1], CAMERA)
+    betas = np.zeros(supported.P)
+    local, moved = foot_lock.stand_on_floor(
+        supported, omega[:1], root[:1], betas, lambda *m: place(*m)[2], contact, T_world_camera, times[:1]
+    )
+    assert np.allclose(place(local, moved)[2][0, 2:4] @ T_world_camera[2, :3] + 1.5, 0, atol=0.02)
+
+
+@pytest.fixture(scope="module")
+def plank():
+    """On toes and palms for two seconds, headed aside, 4 m from a camera 1.5 m high; palms and toes level."""
+    body = load_body("scope")
+    supported, times = with_supports(body, np.zeros(body.P)), np.arange(60) / FPS
+    T_world_camera = world_from_level_camera(np.array([0.0, -1.0, -0.2]), height=1.5)
+    omega = np.tile(np.eye(3), (body.K + 1, 1, 1))
+    for side, sign in (("left", 1), ("right", -1)):
+        omega[body.joint_names.index(f"{side}_shoulder")] = rotations.exp([0, -sign * np.pi / 2, 0])
+        omega[body.joint_names.index(f"{side}_wrist")] = rotations.exp([0, 0, sign * np.pi / 2])
+        omega[body.joint_names.index(f"{side}_ankle")] = rotations.exp([0.5, 0, 0])
+    down = rotations.exp(np.array([np.pi / 2, 0, 0])) @ rotations.exp(np.array([np.pi / 2, 0, 0]))  # model z down
+
+    def place(local, root):
+        R, t = body.forward_kinematics(local, root)
+        return R, t, support_points(supported, R, t)
+
+    pitch = 0.0
+    for _ in range(30):  # until toes and palms are level
+        omega[0] = rotations.exp(np.array([0, 0, np.pi / 2])) @ rotations.exp(np.array([pitch, 0, 0])) @ down
+        points = place(omega[None], np.zeros((1, 3)))[2][0]
+        toes, palms = points[[1, 3]].mean(0), points[4:].mean(0)
+        pitch += 0.5 * (palms - toes)[2] / np.linalg.norm(palms - toes)
+    assert abs((palms - toes)[2]) < 1e-3
+    root = np.array([0.0, 4.0, -toes[2]]) - [*points.mean(0)[:2], 0.0]
+    camera = np.linalg.inv(T_world_camera)
+    root = transform_points(camera, root[None])[0]
+    omega[0] = camera[:3, :3] @ omega[0]
+    omega, root = (np.repeat(each[None], len(times), axis=0) for each in (omega, root))
+    return supported, omega, root, place, T_world_camera, times
+
+
+def test_palms_rest_where_they_keep_still_on_the_floor(plank):
+    _, omega, root, place, T_world_camera, times = plank
+    up, supports = T_world_camera[2, :3], place(omega, root)[2]
+    p = standing.resting_probability(supports, up, times, CAMERA)
+    assert p[:, [1, 3, 4, 5]].min() > 0.8  # toes and palms
+    raised, moved = supports.copy(), supports.copy()
+    raised[:, 4] += 0.4 * up
+    moved[:, 4, 1] += 0.3 * np.sin(2 * np.pi * times)
+    for other in (raised, moved):
+        p = standing.resting_probability(other, up, times, CAMERA)
+        assert np.median(p[:, 4]) < 0.1
+        assert p[:, 5].min() > 0.8
+
+
+def test_feet_that_keep_still_above_the_hands_do_not_stand(plank):
+    _, omega, root, place, T_world_camera, times = plank
+    up, supports = T_world_camera[2, :3], place(omega, root)[2]
+    supports[:, :4] += 1.5 * up
+    p = standing.resting_probability(supports, up, times, CAMERA)
+    assert p[:, :4].max() < 0.05
+    assert p[:, 4:].min() > 0.8
+
+
+def test_trembling_palms_keep_still_on_the_floor(plank):
+    supported, omega, root, place, T_world_camera, times = plank
+    rng = np.random.default_rng(2)
+    noise = gaussian_smooth(rng.normal(size=(len(times), supported.K + 1, 3)), times, 4.5)
+    shaken = omega @ rotations.exp(0.06 * noise)
+    contact = standing.resting_probability(place(omega, root)[2], T_world_camera[2, :3], times, CAMERA)
+    local, moved = foot_lock.stand_on_floor(
+        supported, shaken, root, np.zeros(supported.P), lambda *m: place(*m)[2], contact, T_world_camera, times
+    )
+    before, after = (transform_points(T_world_camera, place(*m)[2][:, 4:]) for m in ((shaken, root), (local, moved)))
+    assert after.std(0).max() < 0.4 * before.std(0).max()
+    assert np.abs(after[..., 2]).max() < 0.03

@@ -1,0 +1,40 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Whose feet stand, on a body that does."""
+
+import numpy as np
+import pytest
+from scope.scope_addon.capture.world.placement import PlacedTrack
+from scope.scope_addon.kinematics.contact_points import support_points, with_supports
+from scope.solver.loaders.body_file import load_body
+from scope.solver.rotations import exp
+
+UP = np.array([0.0, -1.0, 0.0])  # OpenCV's axes, a level camera
+
+
+def stands(times):
+    """The body at rest, 4 m before a camera on a stand."""
+    body, T = load_body("scope"), len(times)
+    supported = with_supports(body, np.zeros(body.P))
+    rotations = np.tile(np.eye(3), (T, body.K + 1, 1, 1))
+    rotations[:, 0] = exp([np.pi, 0.0, 0.0])
+    R, joints = supported.forward_kinematics(rotations, np.tile([0.0, 0.0, 4.0], (T, 1)))
+    supports, every = support_points(supported, R, joints), np.ones(T, bool)
+    return PlacedTrack(
+        supported, np.zeros(body.P), times, every, rotations, joints[:, 0], joints, supports, np.ones((T, 6)),
+        np.zeros((T, 3)),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("step_s", [1 / 240, 1 / 30, 1.0, 30.03 / 30, 5.0])
+def test_who_stands_does_so_at_any_frame_rate(step_s):
+    contact = stands(np.arange(8) * step_s).contact(UP)
+    assert contact[:, :4].min() > 0.9
+    assert contact[:, 4:].max() < 0.01  # hands
+
+
+@pytest.mark.parametrize("frames", [1, 4])
+def test_nothing_stands_from_one_scene_into_the_next(frames):
+    times = np.arange(2 * frames) / 30 + np.repeat([0.0, 10.0], frames)
+    contact = stands(times).contact(UP)
+    assert contact[frames].max() == 0.0
+    assert np.delete(contact, frames, axis=0)[:, :4].min() > 0.9

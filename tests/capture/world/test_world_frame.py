@@ -1,0 +1,200 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Up and floor on bodies placed in a known world."""
+
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+from scope.scope_addon.capture.world.placement import PlacedTrack
+from scope.scope_addon.capture.world.world_frame import (
+    estimate_world,
+    share_world,
+    up_from_bodies,
+    up_from_standing,
+)
+from scope.scope_addon.kinematics.axes import R_WORLD_MODEL, transform_points, world_from_level_camera
+from scope.scope_addon.kinematics.contact_points import support_points, with_supports
+from scope.solver import rotations
+from scope.solver.loaders.body_file import load_body
+
+
+def walk(body, T=60, lean_deg=0.0):
+    """A stiff walk through the world: root positions along x, legs swinging; returns part poses in the world."""
+    omega = np.tile(np.eye(3), (T, body.K + 1, 1, 1))
+    swing = 0.35 * np.sin(np.linspace(0, 6 * np.pi, T))
+    x = np.array([1.0, 0, 0])
+    for side, sign in (("left", 1), ("right", -1)):
+        omega[:, body.joint_names.index(f"{side}_hip")] = rotations.exp(sign * swing[:, None] * x)
+    omega[:, 0] = R_WORLD_MODEL @ rotations.exp(np.radians(lean_deg) * x)
+    R, t = body.forward_kinematics(omega, np.zeros((T, 3)))
+    soles = support_points(with_supports(body, np.zeros(body.P)), R, t)
+    t = t + np.stack([np.linspace(-1, 1, T), np.linspace(0, 1.5, T), -soles[..., 2].min(1)], 1)[:, None]
+    return R, t
+
+
+def seen_by(body, R, t, camera_from_world):
+    """The motion of part poses in the world before a camera, 30 frames a second, everything seen."""
+    soled, T = with_supports(body, np.zeros(body.P)), len(t)
+    joints, R_camera = transform_points(camera_from_world, t), camera_from_world[:3, :3] @ R
+    supports = support_points(soled, R_camera, joints)
+    every = np.ones(T, bool)
+    return PlacedTrack(
+        soled, np.zeros(body.P), np.arange(T) / 30, every, R_camera, joints[:, 0], joints, supports, np.ones((T, 6)),
+        np.zeros((T, 3)),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("pitch_deg", [-20.0, 0.0, 15.0])
+@pytest.mark.parametrize("roll_deg", [0.0, 8.0])
+def test_up_and_floor_are_recovered_from_a_walk(pitch_deg, roll_deg):
+    body = load_body("scope")
+    R, t = walk(body)
+    up = rotations.exp(np.radians([pitch_deg, 0, roll_deg])) @ [0, -1.0, 0]
+    truth = world_from_level_camera(up, height=1.6)
+    truth[:3, 3] += truth[:3, :3] @ [0, 0, -5.0] * [1, 1, 0]
+    camera_from_world = np.linalg.inv(truth)
+    placed = seen_by(body, R, t, camera_from_world)
+    got = estimate_world(placed)
+    angle = np.degrees(np.arccos(np.clip(got[2, :3] @ truth[2, :3], -1, 1)))
+    assert angle < 2.0
+    # The person is up to 6.5 m away: the camera's height above the floor is as uncertain as the angle makes it.
+    assert abs(got[2, 3] - 1.6) < 0.01 + 6.5 * np.sin(np.radians(angle))
+    assert abs(np.median(transform_points(got, placed.soles)[..., 2].min(1))) < 0.01
+    assert np.allclose(transform_points(got, placed.joints[:1, 0])[0, :2], 0)
+
+
+def test_who_leaps_for_most_of_a_clip_stands_on_the_floor_between():
+    """Leaps of half a second, 0.3 m high, and a fifth of a second on the floor after each."""
+    body = load_body("scope")
+    R, t = (np.repeat(each[:1], 84, axis=0) for each in walk(body))
+    since = np.arange(84) % 21 / 30
+    t[..., 2] += np.where(since < 0.5, 4.9 * since * (0.5 - since), 0.0)[:, None]
+    truth = world_from_level_camera(np.array([0, -1.0, 0]), height=1.6)
+    placed = seen_by(body, R, t + np.array([0, 5.0, 0]), np.linalg.inv(truth))
+    lowest = transform_points(estimate_world(placed), placed.soles)[..., 2].min(axis=1)
+    assert abs(lowest.min()) < 0.01
+    assert np.median(lowest) > 0.1
+
+
+def test_people_share_a_world_and_each_has_a_floor():
+    """One who is seen from the tenth frame on, one who walks 1 m higher, one who seems to be 4 % farther away."""
+    body = load_body("scope")
+    R, t = walk(body)
+    up = rotations.exp(np.radians([-12.0, 0, 5.0])) @ [0, -1.0, 0]
+    camera_from_world = np.linalg.inv(world_from_level_camera(up, height=1.6))
+    walker, climber = (seen_by(body, R, t + [0.0, 5.0, z], camera_from_world) for z in (0.0, 1.0))
+    farther = replace(walker, joints=1.04 * walker.joints, supports=1.04 * walker.supports)
+    valid = np.arange(len(t)) >= 10
+    walker = replace(walker, valid=valid, supports=np.where(valid[:, None, None], walker.supports, walker.supports[10]))
+    world = share_world([walker, climber, farther])
+    assert np.degrees(np.arccos(world.T_world_camera[2, :3] @ up)) < 2.0
+    assert abs(world.T_world_camera[2, 3] - 1.6) < 0.25
+    np.testing.assert_allclose(transform_points(world.T_world_camera, walker.joints[10, :1])[0, :2], 0, atol=1e-9)
+    assert world.floors_m[0] == world.floors_m[2] == 0.0
+    assert abs(world.floors_m[1] - 1.0) < 0.1
+    soles = transform_points(world.floor_from_camera(1), climber.soles)[..., 2].min(axis=1)
+    assert abs(np.median(soles)) < 0.02
+
+
+def centroid(vertices, faces):
+    """Of the volume within a closed surface: tetrahedra from the origin."""
+    a, b, c = (vertices[faces[:, k]] for k in range(3))
+    volume = np.einsum("ij,ij->i", a, np.cross(b, c))
+    return (volume[:, None] * (a + b + c)).sum(0) / (4 * volume.sum())
+
+
+@pytest.mark.parametrize("pitch_deg", [-25.0, 0.0, 20.0])
+def test_who_bends_over_is_upright_by_the_weight(pitch_deg):
+    """Knees and hips bent, so that no axis of the body is upright, the mesh's centre of volume over the soles."""
+    body = load_body("scope")
+    omega = np.tile(np.eye(3), (body.K + 1, 1, 1))
+    omega[0] = R_WORLD_MODEL
+    for name, degrees in (("hip", -80.0), ("knee", 50.0)):
+        for side in ("left", "right"):
+            omega[body.joint_names.index(f"{side}_{name}")] = rotations.exp(np.radians([degrees, 0, 0]))
+    soled = with_supports(body, np.zeros(body.P))
+    for _ in range(30):
+        R, t = body.forward_kinematics(omega, np.zeros(3))
+        soles = support_points(soled, R[None], t[None])[0, :4]
+        off = centroid(body.skin(R, t), body.triangles()) - soles.mean(axis=0)
+        omega[0] = rotations.exp([0.5 * off[1] / off[2], -0.5 * off[0] / off[2], 0]) @ omega[0]
+    assert np.hypot(off[0], off[1]) < 0.005
+    R, t = (np.repeat(each[None], 60, axis=0) for each in (R, t + [0.0, 4.0, -soles[:, 2].min()]))
+    up = rotations.exp(np.radians([pitch_deg, 0, 0])) @ [0, -1.0, 0]
+    placed = seen_by(body, R, t, np.linalg.inv(world_from_level_camera(up, height=1.6)))
+    assert np.degrees(np.arccos(up_from_standing([placed]) @ up)) > 10.0
+    assert np.degrees(np.arccos(up_from_bodies([placed]) @ up)) < 8.0
+
+
+@pytest.mark.parametrize("bends", [{"hip": -85.0, "knee": 85.0}, {"knee": 90.0, "ankle": 50.0}], ids=["sits", "kneels"])
+@pytest.mark.parametrize("turned_deg", [0.0, 90.0, 180.0])
+def test_who_sits_or_kneels_does_not_tilt_the_world(bends, turned_deg):
+    """Their feet keep still as well, but the weight is on a chair or the shins: a trunk that is upright tells up."""
+    body = load_body("scope")
+    omega = np.tile(np.eye(3), (body.K + 1, 1, 1))
+    omega[0] = rotations.exp(np.radians([0, 0, turned_deg])) @ R_WORLD_MODEL
+    for name, degrees in bends.items():
+        for side in ("left", "right"):
+            omega[body.joint_names.index(f"{side}_{name}")] = rotations.exp(np.radians([degrees, 0, 0]))
+    R, t = (np.repeat(each[None], 60, axis=0) for each in body.forward_kinematics(omega, np.zeros(3)))
+    up = np.array([0, -1.0, 0])
+    placed = seen_by(body, R, t + [0.0, 4.0, 0.0], np.linalg.inv(world_from_level_camera(up, height=1.6)))
+    assert np.degrees(np.arccos(estimate_world(placed)[2, :3] @ up)) < 2.0
+
+
+def test_a_moment_tells_nothing_by_the_weight():
+    """Who runs is not over the feet in a picture; over a clip, forces average out."""
+    body = load_body("scope")
+    R, t = walk(body, T=60, lean_deg=12.0)
+    camera_from_world = np.linalg.inv(world_from_level_camera(np.array([0, -1.0, 0]), height=1.6))
+    placed = seen_by(body, R, t + np.array([0, 5.0, 0]), camera_from_world)
+    one = PlacedTrack(*(getattr(placed, f.name)[:1] if f.name not in ("body", "betas") else getattr(placed, f.name)
+                        for f in fields(placed)))  # fmt: skip
+    np.testing.assert_allclose(up_from_bodies([one]), up_from_standing([one]), atol=1e-9)
+    assert np.abs(up_from_bodies([placed]) - up_from_standing([placed])).max() > 1e-3
+
+
+@pytest.mark.parametrize("standing", [0, 20])
+def test_who_lies_on_the_floor_does_not_tilt_the_world(standing):
+    """Lies for 60 frames, straight, and then stands, or does not: a camera 10 degrees from level."""
+    body = load_body("scope")
+    R, t = walk(body, T=60 + standing)
+    up = rotations.exp(np.radians([10.0, 0, 0])) @ [0, -1.0, 0]
+    truth = world_from_level_camera(up, height=1.6)
+    fallen = rotations.exp(np.radians([0, -85.0, 0]))
+    R[:60], t[:60] = fallen @ R[:60], t[:60] @ fallen.T
+    placed = seen_by(body, R, t + np.array([0, 5.0, 0]), np.linalg.inv(truth))
+    angle = np.degrees(np.arccos(up_from_standing([placed]) @ up))
+    assert angle < (5 if standing else 12)  # with nothing else to go by, cameras are taken for level
+
+
+def test_soles_lie_under_the_ankles_on_the_ground():
+    body = load_body("scope")
+    R, t = body.forward_kinematics(np.tile(np.eye(3), (1, body.K + 1, 1, 1)), np.zeros((1, 3)))
+    soles = support_points(with_supports(body, np.zeros(body.P)), R, t)[0, :4]
+    lowest = body.v_template[:, 1].min()
+    assert np.abs(soles[:, 1] - lowest).max() < 0.02
+    assert (soles[:2, 0] > 0).all()  # left
+    assert (soles[2:, 0] < 0).all()
+    assert soles[1, 2] > soles[0, 2] + 0.08  # toes are in front of heels
+
+
+def test_soles_of_another_shape_are_on_its_own_ground():
+    body = load_body("scope")
+    betas = np.array([1.5, -1.0, *np.zeros(body.P - 2)])
+    R, t = body.forward_kinematics(np.tile(np.eye(3), (1, body.K + 1, 1, 1)), np.zeros((1, 3)), betas)
+    lowest = body.skin(R[0], t[0], betas)[:, 1].min()
+    assert np.abs(support_points(with_supports(body, betas), R, t)[0, :4, 1] - lowest).max() < 0.02
+
+
+@pytest.mark.parametrize("name", ["scope", "scope_h"])
+def test_palms_lie_under_the_hands_that_are_held_down(name):
+    body = load_body(name)
+    R, t = body.forward_kinematics(np.tile(np.eye(3), (1, body.K + 1, 1, 1)), np.zeros((1, 3)))
+    palms = support_points(with_supports(body, np.zeros(body.P)), R, t)[0, 4:]
+    wrists = t[0, [body.joint_names.index(f"{side}_wrist") for side in ("left", "right")]]
+    assert np.sign(palms[:, 0]).tolist() == [1.0, -1.0]
+    assert (np.abs(palms[:, 0]) > np.abs(wrists[:, 0]) + 0.02).all()  # further out
+    below = wrists[:, 1] - palms[:, 1]
+    assert (below > 0.005).all()
+    assert (below < 0.06).all()

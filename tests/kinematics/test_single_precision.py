@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a long clip keeps of every frame is small, and as good as what was computed."""
+
+from __future__ import annotations
+
+import tracemalloc
+from dataclasses import dataclass
+
+import numpy as np
+from scope.scope_addon.capture.fitting.track_fit import FittedTrack
+from scope.scope_addon.capture.tracking.track import Track
+from scope.scope_addon.capture.world.placement import place_track
+from scope.scope_addon.kinematics.single_precision import compact
+from scope.solver.loaders.body_file import load_body
+from scope.solver.rotations import exp
+
+
+@dataclass(frozen=True)
+class Record:
+    large: np.ndarray
+    point: np.ndarray
+    times: np.ndarray
+    frames: np.ndarray
+    name: str
+
+
+def test_only_what_is_large_is_rounded() -> None:
+    rng = np.random.default_rng(0)
+    record = Record(
+        rng.normal(0, 5, (50, 33, 3)), rng.normal(0, 5, (50, 3)), np.arange(50) / 30, np.arange(400).reshape(50, 8), "a"
+    )
+    small = compact(record)
+    assert small.large.dtype == np.float32
+    np.testing.assert_allclose(small.large, record.large, atol=1e-6)
+    assert small.point is record.point
+    assert small.times is record.times
+    assert small.frames is record.frames
+    assert compact(small) is small
+
+
+def walk(frames: int) -> tuple[Track, FittedTrack]:
+    body, times = load_body("scope"), np.arange(frames) / 30
+    pose = 0.3 * np.sin(times[:, None, None] * np.linspace(1, 3, 3 * (body.K + 1)).reshape(-1, 3))
+    root = np.stack([np.sin(times), 0 * times, 4 + 0.5 * np.cos(times)], axis=1)
+    valid = np.ones(frames, bool)
+    valid[10:13] = False
+    nothing = np.zeros((frames, 33, 3), np.float32)
+    track = Track(np.arange(frames), times, valid, nothing[..., :2], nothing[..., 0], nothing, np.arange(frames) == 0)
+    return track, FittedTrack(exp(pose), root, np.zeros(body.P), valid, np.ones((frames, body.K + 1)), 1.0)
+
+
+def test_a_compact_fit_is_placed_within_a_hundredth_of_a_millimetre() -> None:
+    body, (track, fitted) = load_body("scope"), walk(120)
+    exact, small = place_track(body, track, fitted, True), place_track(body, track, compact(fitted), True)
+    np.testing.assert_allclose(small.joints, exact.joints, atol=1e-5)
+    np.testing.assert_allclose(small.soles, exact.soles, atol=1e-5)
+    # and as the same formula in double precision has it
+    joints = exact.body.forward_kinematics(exact.rotations, exact.root - exact.body.rest_joints(exact.betas)[0])[1]
+    np.testing.assert_allclose(small.joints, joints, atol=1e-5)
+
+
+def test_placing_a_long_clip_takes_few_kilobytes_a_frame() -> None:
+    body, count = load_body("scope"), 30_000
+    track, fitted = walk(count)
+    fitted = compact(fitted)
+    tracemalloc.start()
+    try:
+        placed = place_track(body, track, fitted, True)
+        kept, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert len(placed.joints) == count
+    assert kept / count < 1500
+    assert peak / count < 4500
+
+
+def test_a_track_without_depth() -> None:
+    track, _ = walk(5)
+    track.world_landmarks[:] = 1.0
+    flat = track.without_depth()
+    assert track.knows_depth
+    assert not flat.knows_depth
+    assert flat.world_landmarks.shape == (5, 33, 3)
+    assert len(flat.judged_rows) == len(flat.judged_landmarks) == 0

@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Smoothing against the frequency response it promises, and gaps against known in-betweens."""
+
+import numpy as np
+import pytest
+from scope.scope_addon.kinematics.smoothing import (
+    fill_gaps,
+    fill_rotation_gaps,
+    gaussian_smooth,
+    smooth_root,
+    smooth_rotations,
+)
+
+
+def turn(angle):
+    c, s = np.cos(angle), np.sin(angle)
+    z, one = np.zeros_like(angle), np.ones_like(angle)
+    return np.stack([np.stack([c, -s, z], -1), np.stack([s, c, z], -1), np.stack([z, z, one], -1)], -2)
+
+
+@pytest.mark.parametrize("cutoff", [2.0, 6.0])
+def test_the_gain_at_the_cutoff_is_minus_3_db_and_the_phase_zero(cutoff):
+    times = np.arange(600) / 120
+    wave = np.sin(2 * np.pi * cutoff * times)
+    middle = slice(150, 450)
+    smooth = gaussian_smooth(wave[:, None], times, cutoff)[middle, 0]
+    gain = (smooth @ wave[middle]) / (wave[middle] @ wave[middle])
+    assert np.isclose(gain, 1 / np.sqrt(2), atol=0.01)
+    assert np.abs(smooth - gain * wave[middle]).max() < 0.01
+
+
+def test_constants_and_slow_motion_pass():
+    times = np.arange(200) / 30
+    slow = np.sin(2 * np.pi * 0.5 * times)
+    assert np.allclose(gaussian_smooth(np.full((200, 2), 3.0), times, 6), 3)
+    assert np.abs(gaussian_smooth(slow[:, None], times, 6)[20:-20, 0] - slow[20:-20]).max() < 0.01
+
+
+def test_uneven_times_count_as_they_are():
+    rng = np.random.default_rng(0)
+    times = np.cumsum(rng.uniform(0.002, 0.015, 2000))
+    wave = np.sin(2 * np.pi * 3 * times)
+    smooth = gaussian_smooth(wave[:, None], times, 12.0)[200:-200, 0]
+    expected = np.exp(-0.5 * np.log(2) * (3 / 12) ** 2)
+    assert abs((smooth @ wave[200:-200]) / (wave[200:-200] @ wave[200:-200]) - expected) < 0.03
+
+
+def test_a_stretch_of_many_frames_a_second_is_smoothed_as_if_all_of_it_were_such():
+    """As telephones film: most of a clip at 24 frames a second, a part of it at 120."""
+    dense = np.arange(10, 12, 1 / 120)
+    noise = np.random.default_rng(3).normal(size=len(dense))
+    times = np.concatenate([np.arange(0, 10, 1 / 24), dense])
+    smooth = gaussian_smooth(np.concatenate([np.zeros(len(times) - len(dense)), noise]), times, 2.0)
+    assert np.allclose(smooth[-120:], gaussian_smooth(noise, dense, 2.0)[-120:], atol=1e-3)
+
+
+def test_rotations_stay_rotations_and_cross_pi_without_a_jump():
+    times = np.arange(240) / 60
+    R = turn(np.linspace(0, 4 * np.pi, 240) + 0.05 * np.random.default_rng(1).normal(size=240))[:, None]
+    smooth = smooth_rotations(R, times)
+    assert np.allclose(smooth @ np.swapaxes(smooth, -1, -2), np.eye(3), atol=1e-9)
+    steps = np.arccos(
+        np.clip((np.trace(np.swapaxes(smooth[:-1, 0], -1, -2) @ smooth[1:, 0], axis1=1, axis2=2) - 1) / 2, -1, 1)
+    )
+    assert steps.max() < 2.0 * (4 * np.pi / 239)
+
+
+def test_the_root_keeps_its_place_in_the_picture_while_depth_is_smoothed():
+    times = np.arange(120) / 30
+    depth = 4 + 0.3 * np.random.default_rng(2).normal(size=120)
+    root = np.stack([0.2 * depth, -0.1 * depth, depth], 1)
+    smooth = smooth_root(root, times)
+    assert np.allclose(smooth[:, 0] / smooth[:, 2], 0.2)
+    assert np.allclose(smooth[:, 1] / smooth[:, 2], -0.1)
+    assert smooth[20:-20, 2].std() < 0.35 * depth.std()
+
+
+def test_gaps_are_filled_by_time_and_held_at_the_ends():
+    times = np.array([0, 1, 2, 4, 5.0])
+    valid = np.array([False, True, False, True, False])
+    got = fill_gaps(np.array([[9.0], [1], [9], [4], [9]]), valid, times)
+    assert np.allclose(got[:, 0], [1, 1, 2, 4, 4])
+    R = turn(np.array([9, 0.2, 9, 0.8, 9]))[:, None]
+    filled = fill_rotation_gaps(R, valid, times)
+    angle = np.arctan2(filled[:, 0, 1, 0], filled[:, 0, 0, 0])
+    assert np.allclose(angle[[0, 1, 3, 4]], [0.2, 0.2, 0.8, 0.8])
+    assert np.isclose(angle[2], 0.4, atol=0.01)

@@ -1,0 +1,35 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The cheapest path against all there are."""
+
+from __future__ import annotations
+
+from itertools import pairwise, product
+
+import numpy as np
+import pytest
+from scope.scope_addon.kinematics.viterbi import cheapest_path
+
+
+@pytest.mark.parametrize("barred", [0.0, 0.4])
+@pytest.mark.parametrize(("count", "states"), [(1, 3), (2, 2), (5, 3), (6, 4)])
+def test_no_other_path_costs_less(count: int, states: int, barred: float) -> None:
+    rng = np.random.default_rng(count)
+    for _ in range(5):
+        costs, switching = rng.normal(size=(count, states)), rng.normal(size=(count - 1, states, states))
+        switching[rng.random(switching.shape) < barred] = np.inf
+        switching[:, 0, 0] = 1.0  # there is always a way
+
+        def cost(path, costs=costs, switching=switching) -> float:
+            there = sum(costs[t, x] for t, x in enumerate(path))
+            return there + sum(switching[t, a, b] for t, (a, b) in enumerate(pairwise(path)))
+
+        expected = min(product(range(states), repeat=count), key=cost)
+        assert tuple(cheapest_path(costs, switching)) == expected
+
+
+def test_of_equals_the_lower_states() -> None:
+    assert cheapest_path(np.zeros((4, 3)), np.zeros((3, 3, 3))).tolist() == [0, 0, 0, 0]
+
+
+def test_nothing() -> None:
+    assert cheapest_path(np.zeros((0, 3)), np.zeros((0, 3, 3))).shape == (0,)

@@ -1,0 +1,491 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Each format is written, read back by Blender's importer, and compared with the solver's own joints and skin."""
+
+import json
+import os
+import re
+import struct
+from pathlib import Path
+
+import bpy
+import numpy as np
+import pytest
+import scope
+from scope.scope_addon.errors import OutputError, UsageError
+from scope.scope_addon.motion import Motion
+from scope.scope_addon.scene.build import NEW_SCENE, build_scene
+from scope.scope_addon.scene.export import formats
+from scope.scope_addon.scene.export.export import ExportOptions, captures, export, export_motions
+from scope.scope_addon.scene.export.output_paths import SUFFIXES, person_paths
+
+from ..exported import JOINT_TOLERANCE, SKIN_TOLERANCE, corresponding, read_back
+
+SCENE_SUFFIXES = [s for s in SUFFIXES if s != ".npz"]
+
+
+@pytest.mark.parametrize("suffix", SCENE_SUFFIXES)
+@pytest.mark.parametrize("rate", [30.0, 30000 / 1001])
+def test_joints_and_skin_survive(body, make_motion, truth, joints_world, blender, tmp_path, suffix, rate):
+    motion = make_motion(body, 12, rate=rate)
+    path = tmp_path / f"walk{suffix}"
+    assert export_motions([motion], body, path) == ([path], [])
+    assert [p.name for p in tmp_path.iterdir()] == [path.name]
+    first = read_back(path, rate)
+    armature = blender.only("ARMATURE")
+    assert set(armature.data.bones.keys()) == set(body.joint_names)
+    expected = truth(body, motion)
+    for t in (0, 4, 11):
+        blender.go_to(first + t)
+        joints = blender.joints(armature, body.joint_names)
+        np.testing.assert_allclose(joints, joints_world(motion)[t], atol=JOINT_TOLERANCE)
+        if suffix != ".bvh":
+            mesh = blender.only("MESH")
+            match = corresponding(mesh, body, motion.betas)
+            assert len(np.unique(match)) == len(body.v_template)
+            found = blender.vertices(mesh)
+            np.testing.assert_allclose(found, expected.vertices(t)[match], atol=SKIN_TOLERANCE)
+
+
+@pytest.mark.parametrize("suffix", [".glb", ".fbx", ".usdc"])
+@pytest.mark.parametrize("shape", ["keys", "baked"])
+def test_shape_as_morphs_or_baked(body, make_motion, truth, blender, tmp_path, suffix, shape):
+    motion = make_motion(body, 4)
+    path = tmp_path / f"walk{suffix}"
+    export_motions([motion], body, path, export_options=ExportOptions(shape=shape))
+    first = read_back(path)
+    mesh = blender.only("MESH")
+    blender.go_to(first + 3)
+    assert (mesh.data.shape_keys is not None) == (shape == "keys")
+    if shape == "keys":
+        keys = mesh.data.shape_keys.key_blocks
+        assert list(keys.keys())[1:] == [f"Shape{p:03d}" for p in range(body.P)]
+        np.testing.assert_allclose([k.value for k in keys[1:]], motion.betas, atol=1e-4)
+    match = corresponding(mesh, body, motion.betas)
+    np.testing.assert_allclose(blender.vertices(mesh), truth(body, motion).vertices(3)[match], atol=SKIN_TOLERANCE)
+
+
+@pytest.mark.parametrize("suffix", SCENE_SUFFIXES)
+def test_variable_frame_rate_keeps_its_timing(body, make_motion, truth, blender, tmp_path, suffix):
+    # Frames at every second tick of 30, then at every tick: files of constant rate must hold the whole ticks.
+    stamps = np.array([0, 2, 4, 5, 6, 8]) / 30
+    motion = make_motion(body, timestamps=stamps, rate=30.0)
+    path = tmp_path / f"walk{suffix}"
+    export_motions([motion], body, path)
+    first = read_back(path)
+    armature, expected = blender.only("ARMATURE"), truth(body, motion)
+    for t, stamp in enumerate(stamps):
+        blender.go_to(first + round(stamp * 30))
+        joints = blender.joints(armature, body.joint_names)
+        np.testing.assert_allclose(joints, expected.joints[t], atol=JOINT_TOLERANCE)
+
+
+@pytest.mark.parametrize("suffix", SCENE_SUFFIXES)
+def test_a_last_pose_between_whole_frames_is_reached(body, make_motion, truth, blender, tmp_path, suffix):
+    motion = make_motion(body, timestamps=np.array([0, 1, 2, 3.9]) / 30, rate=30.0)
+    path = tmp_path / f"walk{suffix}"
+    export_motions([motion], body, path)
+    blender.go_to(read_back(path) + 4)
+    joints = blender.joints(blender.only("ARMATURE"), body.joint_names)
+    np.testing.assert_allclose(joints, truth(body, motion).joints[3], atol=2e-3)
+
+
+@pytest.mark.parametrize("suffix", [".fbx", ".blend", ".bvh"])
+@pytest.mark.parametrize("rate", [24000 / 1001, 25.0, 30000 / 1001, 60000 / 1001])
+def test_formats_that_store_a_frame_rate_store_the_right_one(body, make_motion, tmp_path, suffix, rate):
+    path = tmp_path / f"walk{suffix}"
+    export_motions([make_motion(body, 3, rate=rate)], body, path)
+    read_back(path, 24.0)
+    render = bpy.context.scene.render
+    assert render.fps / render.fps_base == pytest.approx(rate, rel=1e-5)
+
+
+def test_usd_counts_time_in_the_scenes_frames_and_lengths_in_metres(body, make_motion, tmp_path):
+    build_scene([make_motion(body, 3, rate=29.97)], body, options=NEW_SCENE)
+    path = tmp_path / "walk.usda"  # the text form of the same writer
+    formats.write_usd(path)
+    header = path.read_text()[:2000]
+    assert float(re.search(r"timeCodesPerSecond = ([\d.]+)", header)[1]) == pytest.approx(30000 / 1001, rel=1e-6)
+    assert re.search(r"metersPerUnit = 1\b", header)
+    assert 'upAxis = "Z"' in header
+
+
+@pytest.mark.parametrize("suffix", [".glb", ".fbx", ".usdc"])
+def test_materials_survive(body, make_motion, tmp_path, suffix, blender):
+    path = tmp_path / f"walk{suffix}"
+    export_motions([make_motion(body, 2)], body, path)
+    read_back(path)
+    mesh = blender.only("MESH").data
+    used = {mesh.materials[p.material_index].name for p in mesh.polygons}
+    assert used == {body.material_names[i] for i in np.unique(body.face_material)}
+    for material in mesh.materials:
+        shader = next(n for n in material.node_tree.nodes if n.type == "BSDF_PRINCIPLED")
+        color = body.material_colors[body.material_names.index(material.name)]
+        np.testing.assert_allclose(shader.inputs["Base Color"].default_value, color, atol=2e-3)
+
+
+def test_fbx_objects_have_unit_scale_and_no_leaf_bones(body, make_motion, tmp_path, blender):
+    path = tmp_path / "walk.fbx"
+    export_motions([make_motion(body, 2)], body, path)
+    read_back(path)
+    armature = blender.only("ARMATURE")
+    assert len(armature.data.bones) == len(body.joint_names)
+
+
+def test_fbx_is_in_centimetres_without_any_scaling(body, make_motion, tmp_path):
+    """As read by Blender's own parser. Unreal takes the numbers for centimetres, whatever unit the file names."""
+    parser = pytest.importorskip("io_scene_fbx.parse_fbx")
+    path, motion = tmp_path / "walk.fbx", make_motion(body, 4)
+    export_motions([motion], body, path, export_options=ExportOptions(camera=True))
+    root, version = parser.parse(str(path))
+    assert version == 7400
+
+    def below(elem, *names):
+        return [e for e in elem.elems if e.id.decode() in names]
+
+    def properties(elem):
+        return {p.props[0].decode(): p.props[4:] for block in below(elem, "Properties70") for p in block.elems}
+
+    assert properties(below(root, "GlobalSettings")[0])["UnitScaleFactor"] == [1.0]
+    objects = below(root, "Objects")[0]
+    models = {e.props[1].split(b"\0")[0].decode(): properties(e) for e in below(objects, "Model")}
+    for name, values in models.items():
+        np.testing.assert_allclose(values.get("Lcl Scaling", [1, 1, 1]), 1.0, atol=1e-4, err_msg=name)
+    joints = body.rest_joints(motion.betas)
+    knee, hip = (body.joint_names.index(f"left_{part}") for part in ("knee", "hip"))
+    shin = np.linalg.norm(models["left_knee"]["Lcl Translation"])
+    assert shin == pytest.approx(100 * np.linalg.norm(joints[knee] - joints[hip]), rel=1e-4)
+    mesh = next(e for e in below(objects, "Geometry") if e.props[2] == b"Mesh")
+    heights = np.reshape(below(mesh, "Vertices")[0].props[0], (-1, 3))
+    assert 100 < np.ptp(heights, axis=0).max() < 250
+    shapes = [e for e in below(objects, "Geometry") if e.props[2] == b"Shape"]
+    largest = max(np.abs(below(e, "Vertices")[0].props[0]).max() for e in shapes)
+    assert largest == pytest.approx(100 * np.abs(body.shapedirs).max(), rel=1e-3)
+    places = [below(n, "Matrix")[0].props[0][12:15] for e in below(objects, "Pose") for n in below(e, "PoseNode")]
+    assert np.abs(places).max() > 50
+    camera = next(properties(e) for e in below(objects, "NodeAttribute") if e.props[2] == b"Camera")
+    assert camera["FarPlane"] == [pytest.approx(100 * 1000.0)]
+
+
+def glb_json(path: Path) -> dict:
+    data = path.read_bytes()
+    assert data[:4] == b"glTF"
+    length = struct.unpack("<I", data[12:16])[0]
+    return json.loads(data[20 : 20 + length])
+
+
+def test_glb_holds_one_animation_one_skin_and_named_morphs(body, make_motion, tmp_path):
+    motions = [make_motion(body, 5, rate=25.0), make_motion(body, 5, rate=25.0, seed=1)]
+    path = tmp_path / "pair.glb"
+    export_motions(motions, body, path)
+    gltf = glb_json(path)
+    assert len(gltf["animations"]) == 1
+    assert len(gltf["skins"]) == 2
+    for mesh in gltf["meshes"]:
+        assert mesh["extras"]["targetNames"] == [f"Shape{p:03d}" for p in range(body.P)]
+        np.testing.assert_allclose(mesh["weights"], motions[0].betas, atol=1e-6)
+        for primitive in mesh["primitives"]:
+            assert "JOINTS_0" in primitive["attributes"]
+            assert "JOINTS_1" not in primitive["attributes"]
+    times = {gltf["accessors"][s["input"]]["max"][0] for s in gltf["animations"][0]["samplers"]}
+    assert max(times) == pytest.approx(4 / 25)
+
+
+@pytest.mark.parametrize("rate", [12.5, 24000 / 1001, 30000 / 1001, 24.449])
+def test_glb_tells_the_seconds_of_the_footage(body, make_motion, tmp_path, rate):
+    """As they stand in the file: Blender's importer would take back what its exporter does to them."""
+    motion, path = make_motion(body, 7, rate=rate), tmp_path / "walk.glb"
+    export_motions([motion], body, path, export_options=ExportOptions(camera=True))
+    gltf, data = glb_json(path), path.read_bytes()
+    assert len(data) == struct.unpack("<I", data[8:12])[0]
+    binary = data[28 + struct.unpack("<I", data[12:16])[0] :]
+    for index in {sampler["input"] for sampler in gltf["animations"][0]["samplers"]}:
+        accessor = gltf["accessors"][index]
+        start = gltf["bufferViews"][accessor["bufferView"]]["byteOffset"]
+        times = np.frombuffer(binary, "<f4", accessor["count"], start)
+        np.testing.assert_allclose(times, motion.timestamps[: len(times)], atol=1e-6)
+        assert (accessor["min"], accessor["max"]) == ([times[0]], [times[-1]])
+        assert len(times) in (2, 7)  # constant shapes have their ends alone
+
+
+def test_glb_of_a_part_of_the_footage_begins_at_once(body, make_motion, tmp_path):
+    motion = make_motion(body, 5, rate=25.0)
+    motion.frames += 250
+    motion.timestamps += 10.0
+    path = tmp_path / "late.glb"
+    export_motions([motion, motion], body, path)
+    gltf = glb_json(path)
+    inputs = [gltf["accessors"][s["input"]] for s in gltf["animations"][0]["samplers"]]
+    assert min(i["min"][0] for i in inputs) == 0.0
+    assert max(i["max"][0] for i in inputs) == pytest.approx(4 / 25)
+
+
+def test_glb_is_upright_in_its_y_up_frame(body, make_motion, tmp_path):
+    path = tmp_path / "walk.glb"
+    export_motions([make_motion(body, 2)], body, path)
+    gltf = glb_json(path)
+    positions = [gltf["accessors"][p["attributes"]["POSITION"]] for p in gltf["meshes"][0]["primitives"]]
+    low = np.min([p["min"] for p in positions], axis=0)
+    high = np.max([p["max"] for p in positions], axis=0)
+    assert low[1] == pytest.approx(0.0, abs=0.15)  # shaped soles lie at 0, the unshaped mesh near it
+    assert 1.4 < high[1] - low[1] < 2.2
+
+
+def test_the_footages_camera_comes_along_on_request(body, make_motion, tmp_path, blender):
+    path = tmp_path / "walk.glb"
+    motion = make_motion(body, 2)
+    export_motions([motion], body, path, export_options=ExportOptions(camera=True))
+    read_back(path)
+    camera = blender.only("CAMERA")
+    np.testing.assert_allclose(camera.matrix_world.translation, motion.world_from_camera[0, :3, 3], atol=1e-5)
+
+
+@pytest.mark.parametrize("suffix", [".glb", ".fbx", ".usdc"])
+@pytest.mark.parametrize(("fx", "fy"), [(600.0, 600.0), (600.0, 900.0)])
+def test_the_camera_keeps_its_field_of_view_in_a_scene_of_another_shape(
+    body, make_motion, tmp_path, blender, suffix, fx, fy
+):
+    motion = make_motion(body, 2, intrinsics=np.array([[fx, 0, 320], [0, fy, 240], [0, 0, 1]]))
+    bpy.context.scene.render.resolution_x, bpy.context.scene.render.resolution_y = 1920, 1080
+    build_scene([motion], body)
+    path = tmp_path / f"walk{suffix}"
+    export(path, options=ExportOptions(camera=True))
+    assert bpy.context.scene.render.resolution_x == 1920
+    expected = 2 * np.arctan([320 / fx, 240 / fy])
+    if suffix == ".glb":
+        lens = glb_json(path)["cameras"][0]["perspective"]
+        found = 2 * np.arctan(np.tan(lens["yfov"] / 2) * lens["aspectRatio"]), lens["yfov"]
+    else:
+        read_back(path)
+        lens = blender.only("CAMERA").data
+        found = 2 * np.arctan(np.array([lens.sensor_width, lens.sensor_height]) / 2 / lens.lens)
+    np.testing.assert_allclose(found, expected, rtol=1e-4)
+
+
+def test_blend_opens_with_camera_rate_and_shape_keys(body, make_motion, tmp_path, blender):
+    path = tmp_path / "walk.blend"
+    motion = make_motion(body, 6, rate=29.97, image_size=(1080, 1920))
+    motion.valid[3:5] = False
+    export_motions([motion], body, path)
+    read_back(path)
+    scene = bpy.context.scene
+    assert [(marker.name, marker.frame) for marker in scene.timeline_markers] == [("not seen 3-4", 3)]
+    assert {bone.custom_shape.type for bone in blender.only("ARMATURE").pose.bones} == {"MESH"}
+    assert (scene.name, scene.frame_start, scene.frame_end) == ("Capture", 0, 5)
+    assert (scene.render.resolution_x, scene.render.resolution_y) == (1080, 1920)
+    assert scene.camera == blender.only("CAMERA")
+    assert captures(scene)[0].name == "walk"
+    keys = blender.only("MESH").data.shape_keys.key_blocks
+    assert (keys["Shape001"].slider_min, keys["Shape001"].slider_max) == (-10, 10)
+
+
+@pytest.mark.parametrize("separate", [False, True])
+@pytest.mark.parametrize("suffix", [".glb", ".fbx", ".bvh"])
+def test_a_capture_without_its_armature_is_told(body, make_motion, tmp_path, suffix, separate):
+    person = build_scene([make_motion(body, 2)], body).people[0]
+    bpy.data.objects.remove(person.armature)
+    with pytest.raises(UsageError, match="armature was removed"):
+        export(tmp_path / f"walk{suffix}", options=ExportOptions(separate=separate))
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("suffix", [".glb", ".fbx", ".usdc", ".blend"])
+def test_a_file_for_each_of_several_people(body, make_motion, tmp_path, blender, truth, suffix):
+    """Each with one armature and mesh, moving as the person does, and all of them beginning at the same time."""
+    late = make_motion(body, timestamps=np.arange(2, 6) / 30, seed=1)
+    motions = [make_motion(body, 6), late]
+    before = sorted(c.name for c in bpy.data.collections)
+    written, _ = export_motions(
+        motions, body, tmp_path / f"pair{suffix}", export_options=ExportOptions(separate=True, camera=True)
+    )
+    assert [p.name for p in written] == [f"pair.person{n}{suffix}" for n in (1, 2)]
+    assert sorted(c.name for c in bpy.data.collections) == before
+    for path, motion, first in zip(written, motions, (0, 2), strict=True):
+        start = read_back(path)
+        armature = blender.only("ARMATURE")
+        assert len([o for o in bpy.data.objects if o.type == "MESH" and o.users_scene and o.find_armature()]) == 1
+        blender.go_to(start + first + 1)
+        posed = blender.joints(armature, body.joint_names)
+        np.testing.assert_allclose(posed, truth(body, motion).joints[1], atol=2e-3)
+
+
+@pytest.mark.parametrize("suffix", [".glb", ".fbx", ".usdc", ".blend"])
+def test_several_people_in_one_file_all_move(body, make_motion, tmp_path, blender, truth, suffix):
+    motions = [make_motion(body, 6), make_motion(body, 6, seed=1), make_motion(body, 6, seed=2)]
+    path = tmp_path / f"three{suffix}"
+    export_motions(motions, body, path)
+    first = read_back(path)
+    armatures = sorted((obj for obj in bpy.data.objects if obj.type == "ARMATURE"), key=lambda obj: obj.name)
+    for t in (0, 3, 5):
+        blender.go_to(first + t)
+        for armature, motion in zip(armatures, motions, strict=True):
+            joints = blender.joints(armature, body.joint_names)
+            np.testing.assert_allclose(joints, truth(body, motion).joints[t], atol=2e-3, err_msg=armature.name)
+
+
+def test_bvh_is_y_up_in_metres_and_one_file_a_person(body, make_motion, tmp_path, truth):
+    motions = [make_motion(body, 3), make_motion(body, 3, seed=1)]
+    written, _ = export_motions(motions, body, tmp_path / "pair.bvh")
+    assert [p.name for p in written] == ["pair.person1.bvh", "pair.person2.bvh"]
+    for path, motion in zip(written, motions, strict=True):
+        lines = path.read_text().splitlines()
+        start = lines.index("MOTION")
+        assert lines[start + 1] == "Frames: 3"
+        rows = np.array([[float(v) for v in line.split()] for line in lines[start + 3 :]])
+        pelvis = truth(body, motion).joints[:, 0]
+        np.testing.assert_allclose(rows[:, :3], pelvis[:, [0, 2, 1]] * [1, 1, -1], atol=1e-5)
+
+
+def test_npz_is_the_motion_itself(body, make_motion, tmp_path):
+    motion = make_motion(body)
+    written, _ = export_motions([motion], body, tmp_path / "walk.npz")
+    np.testing.assert_array_equal(Motion.load(written[0]).poses, motion.poses)
+
+
+def test_several_files_at_once(body, make_motion, tmp_path):
+    paths = [tmp_path / "a.glb", tmp_path / "b.npz", tmp_path / "c.bvh"]
+    written, _ = export_motions([make_motion(body, 2)], body, paths)
+    assert sorted(written) == paths
+    assert all(p.stat().st_size for p in paths)
+
+
+def test_exporting_motions_leaves_no_trace(body, make_motion, tmp_path):
+    bpy.ops.mesh.primitive_cube_add()
+    scene, window = bpy.context.scene, bpy.context.window
+    kinds = "scenes collections objects meshes armatures actions cameras materials shape_keys movieclips".split()
+    before = {kind: [b.name for b in getattr(bpy.data, kind)] for kind in kinds}
+    sample = Path(scope.__file__).resolve().parent / "assets" / "sample" / "sample.mp4"
+    export_motions([make_motion(body, 2)], body, [tmp_path / "a.glb", tmp_path / "a.usdc"], footage=sample)
+    assert {kind: [b.name for b in getattr(bpy.data, kind)] for kind in kinds} == before
+    assert window.scene == scene
+    assert bpy.context.view_layer.objects.active.name == "Cube"
+
+
+def test_a_caller_without_a_window_can_export(body, make_motion, tmp_path):
+    with bpy.context.temp_override(window=None):  # as in a timer
+        assert bpy.context.window is None
+        written, _ = export_motions([make_motion(body, 2)], body, [tmp_path / "a.bvh", tmp_path / "b.glb"])
+    assert all(path.is_file() for path in written)
+
+
+def test_a_folder_is_told_from_a_name_without_suffix(body, make_motion, tmp_path):
+    with pytest.raises(UsageError, match="it is a folder; name a file in it"):
+        export_motions([make_motion(body, 1)], body, tmp_path)
+
+
+def test_an_unknown_suffix_lists_the_valid_ones(body, make_motion, tmp_path):
+    with pytest.raises(UsageError, match=r"\.glb, \.fbx, \.blend, \.bvh, \.usdc, \.npz"):
+        export_motions([make_motion(body, 1)], body, tmp_path / "walk.obj")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_missing_folder_is_named(body, make_motion, tmp_path):
+    with pytest.raises(OutputError, match="nowhere"):
+        export_motions([make_motion(body, 1)], body, tmp_path / "nowhere" / "walk.glb")
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows counts letters, and those of the whole path")
+@pytest.mark.parametrize("suffix", [".bvh", ".npz"])
+def test_names_may_be_as_long_as_the_system_lets_them(body, make_motion, tmp_path, suffix):
+    longest = tmp_path / ("ä" * 125 + suffix)  # 254 bytes
+    export_motions([make_motion(body, 1)], body, longest)
+    assert list(tmp_path.iterdir()) == [longest]
+    for people in (1, 2):
+        too_long = tmp_path / ("x" * (252 if people == 1 else 245) + suffix)
+        with pytest.raises(OutputError, match=f"cannot write .*x(.person1)?{suffix}: .*; choose a shorter name"):
+            export_motions([make_motion(body, 1)] * people, body, too_long)
+    assert list(tmp_path.iterdir()) == [longest]
+
+
+@pytest.mark.skipif(os.name == "nt" or os.geteuid() == 0, reason="root and Windows write where the mode bits forbid it")
+def test_an_unwritable_folder_is_named(body, make_motion, tmp_path):
+    tmp_path.chmod(0o500)
+    with pytest.raises(OutputError, match="not writable"):
+        export_motions([make_motion(body, 1)], body, tmp_path / "walk.glb")
+
+
+@pytest.mark.skipif(not Path("/proc/self").is_dir(), reason="needs a folder in which even root cannot make files")
+@pytest.mark.parametrize("suffix", SCENE_SUFFIXES)
+def test_a_folder_that_takes_no_files_is_named(body, make_motion, suffix):
+    with pytest.raises(OutputError, match="cannot write /proc/walk"):
+        export_motions([make_motion(body, 1)], body, f"/proc/walk{suffix}")
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no limit on a file's size that a process could set")
+@pytest.mark.parametrize("suffix", SCENE_SUFFIXES)
+def test_no_room_for_the_file_is_told_in_a_sentence_and_leaves_nothing(body, make_motion, tmp_path, suffix):
+    import resource
+
+    path, motion = tmp_path / f"walk{suffix}", make_motion(body, 200)
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, before[1]))
+    try:
+        with pytest.raises(OutputError, match="cannot write .*walk") as raised:
+            export_motions([motion], body, path)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    assert "\n" not in str(raised.value)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("suffix", SCENE_SUFFIXES)
+def test_a_failing_writer_leaves_the_old_file_and_no_other(body, make_motion, tmp_path, monkeypatch, suffix):
+    path = tmp_path / f"walk{suffix}"
+    path.write_text("before")
+
+    def fail(temporary, *rest):
+        temporary.write_text("half")
+        raise RuntimeError("disk full")
+
+    name = {".usdc": "usd"}.get(suffix, suffix[1:])
+    monkeypatch.setattr(formats, f"write_{name}", fail)
+    with pytest.raises(OutputError, match="disk full"):
+        export_motions([make_motion(body, 1)], body, path)
+    assert [p.name for p in tmp_path.iterdir()] == [path.name]
+    assert path.read_text() == "before"
+    assert [s.name for s in bpy.data.scenes] == ["Scene"]
+
+
+class StoppedExporter(bpy.types.Operator):
+    """An exporter in Python, in which somebody presses Ctrl-C."""
+
+    bl_idname, bl_label = "scope_test.stopped", "Stopped"
+
+    def execute(self, context):
+        raise KeyboardInterrupt
+
+
+def test_ctrl_c_in_an_exporter_stops_and_is_no_failure(body, make_motion, tmp_path, monkeypatch):
+    monkeypatch.setattr(formats, "write_glb", lambda *rest: formats.call_operator(bpy.ops.scope_test.stopped))
+    bpy.utils.register_class(StoppedExporter)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            export_motions([make_motion(body, 1)], body, tmp_path / "walk.glb")
+    finally:
+        bpy.utils.unregister_class(StoppedExporter)
+    assert list(tmp_path.iterdir()) == []
+    assert [s.name for s in bpy.data.scenes] == ["Scene"]
+
+
+def test_a_scene_without_captures_cannot_be_exported(tmp_path):
+    with pytest.raises(UsageError, match="no capture"):
+        export(tmp_path / "walk.glb")
+
+
+def test_writers_keep_standard_output_clean(body, make_motion, tmp_path, capfd):
+    paths = [tmp_path / f"walk{suffix}" for suffix in SUFFIXES]
+    capfd.readouterr()
+    export_motions([make_motion(body, 2)], body, paths)
+    assert capfd.readouterr().out == ""
+
+
+@pytest.mark.parametrize(
+    ("path", "people", "expected"),
+    [
+        ("a/walk.npz", 1, ["a/walk.npz"]),
+        ("a/walk.npz", 2, ["a/walk.person1.npz", "a/walk.person2.npz"]),
+        ("walk.v2.bvh", 2, ["walk.v2.person1.bvh", "walk.v2.person2.bvh"]),
+        ("walk.glb", 3, ["walk.glb"]),
+    ],
+)
+def test_one_path_per_person(path, people, expected):
+    assert [p.as_posix() for p in person_paths(path, people)] == expected

@@ -1,0 +1,214 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Captures in whatever state users leave them, exported: hidden, at rest, edited, linked, in the NLA, beside others."""
+
+import bpy
+import numpy as np
+import pytest
+from scope.scope_addon.errors import UsageError
+from scope.scope_addon.scene.animation_data import actions
+from scope.scope_addon.scene.build import BuildOptions, build_scene
+from scope.scope_addon.scene.export.export import export
+
+from ..exported import JOINT_TOLERANCE, SKIN_TOLERANCE, corresponding, read_back
+
+
+@pytest.mark.parametrize("suffix", [".glb", ".fbx", ".usdc", ".blend"])
+def test_only_the_capture_leaves_a_users_scene(body, make_motion, tmp_path, suffix, blender, truth):
+    bpy.ops.mesh.primitive_cube_add()
+    bpy.context.scene.name = "Shot"
+    motion = make_motion(body, 4)
+    result = build_scene([motion], body)
+    person = result.people[0]
+    person.mesh.hide_set(True)  # hidden things are captured things all the same
+    scene = bpy.context.scene
+    scene.frame_set(2)
+    names = sorted(obj.name for obj in bpy.data.objects)
+    path = tmp_path / f"walk{suffix}"
+    assert export(path) == [path]
+    assert sorted(obj.name for obj in bpy.data.objects) == names
+    assert (bpy.context.scene, scene.frame_current) == (scene, 2)
+    assert [s.name for s in bpy.data.scenes] == ["Shot"]
+    assert person.mesh.data.shape_keys is not None
+    first = read_back(path, 24.0)
+    assert not [obj for obj in bpy.data.objects if obj.name.startswith("Cube")]
+    assert [obj.type for obj in bpy.context.scene.objects].count("MESH") == 1
+    blender.go_to(first)
+    joints = blender.joints(blender.only("ARMATURE"), body.joint_names)
+    np.testing.assert_allclose(joints, truth(body, motion).joints[0], atol=JOINT_TOLERANCE)
+
+
+@pytest.mark.parametrize("overridden", [False, True])
+def test_a_linked_capture_is_exported_with_its_shape_baked(body, make_motion, tmp_path, blender, truth, overridden):
+    motion, file, path = make_motion(body, 4), tmp_path / "capture.blend", tmp_path / "walk.usdc"
+    name = build_scene([motion], body, options=BuildOptions(frame_rate="set")).collection.name
+    bpy.ops.wm.save_as_mainfile(filepath=str(file))
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    bpy.context.scene.render.fps = 30
+    with bpy.data.libraries.load(str(file), link=True) as (_, here):
+        here.collections = [name]
+    if overridden:
+        here.collections[0].override_hierarchy_create(bpy.context.scene, bpy.context.view_layer)
+    else:
+        bpy.context.scene.collection.children.link(here.collections[0])
+    before = sorted(mesh.name for mesh in bpy.data.meshes)
+    export(path)
+    assert sorted(mesh.name for mesh in bpy.data.meshes) == before
+    first = read_back(path)
+    blender.go_to(first + 3)
+    mesh = blender.only("MESH")
+    assert mesh.data.name == "walk_body"
+    match = corresponding(mesh, body, motion.betas)
+    np.testing.assert_allclose(blender.vertices(mesh), truth(body, motion).vertices(3)[match], atol=SKIN_TOLERANCE)
+
+
+def _in_rest_position(person, collection):
+    person.armature.data.pose_position = "REST"
+
+
+def _in_edit_mode(person, collection):
+    bpy.context.view_layer.objects.active = person.armature
+    bpy.ops.object.mode_set(mode="EDIT")
+
+
+def _out_of_viewports(person, collection):
+    collection.hide_viewport = person.armature.hide_viewport = person.mesh.hide_viewport = True
+
+
+def _out_of_renders(person, collection):
+    collection.hide_render = person.armature.hide_render = person.mesh.hide_render = True
+
+
+@pytest.mark.parametrize("suffix", [".glb", ".fbx", ".usdc", ".bvh"])
+@pytest.mark.parametrize("hide", [_in_rest_position, _in_edit_mode, _out_of_viewports, _out_of_renders])
+def test_what_does_not_move_in_the_viewport_moves_in_the_file(
+    body, make_motion, tmp_path, blender, truth, suffix, hide
+):
+    motion = make_motion(body, 4)
+    result = build_scene([motion], body, options=BuildOptions(frame_rate="set"))
+    person, collection = result.people[0], result.collection
+    hide(person, collection)
+
+    def state():
+        hidden = [(o.hide_viewport, o.hide_render) for o in (collection, person.armature, person.mesh)]
+        return hidden, person.armature.data.pose_position, person.armature.mode
+
+    before, path = state(), tmp_path / f"walk{suffix}"
+    export(path)
+    assert state() == before
+    first = read_back(path)
+    blender.go_to(first + 3)
+    joints = blender.joints(blender.only("ARMATURE"), body.joint_names)
+    np.testing.assert_allclose(joints, truth(body, motion).joints[3], atol=JOINT_TOLERANCE)
+
+
+def _to_nla(datablock, *starts):
+    """Let a datablock play its action by the NLA alone, once from each of these frames on."""
+    animation = datablock.animation_data
+    action, slot = animation.action, getattr(animation, "action_slot", None)
+    animation.action = None
+    for start in starts:
+        strip = animation.nla_tracks.new().strips.new(f"from {start}", start, action)
+        if slot is not None:
+            strip.action_slot = slot
+    return animation
+
+
+@pytest.mark.parametrize("suffix", [".glb", ".fbx", ".usdc", ".bvh"])
+def test_what_hangs_on_something_of_the_users_goes_where_that_takes_it(body, make_motion, tmp_path, blender, suffix):
+    person = build_scene([make_motion(body, 4)], body, options=BuildOptions(frame_rate="set")).people[0]
+    stage = bpy.data.objects.new("Stage", None)
+    bpy.context.scene.collection.objects.link(stage)
+    stage.rotation_euler, person.armature.parent = (0.2, -0.1, 0.7), stage
+    bpy.ops.mesh.primitive_cube_add()
+    bpy.context.object.parent = stage
+    for frame, x in ((0, 2.0), (3, 2.5)):
+        stage.location = (x, -1.0, 0.3)
+        stage.keyframe_insert("location", frame=frame)
+    blender.go_to(3)
+    wanted = blender.joints(person.armature, body.joint_names)
+    export(tmp_path / f"walk{suffix}")
+    assert person.armature.parent == stage
+    np.testing.assert_allclose(blender.joints(person.armature, body.joint_names), wanted, atol=1e-6)
+    first = read_back(tmp_path / f"walk{suffix}")
+    assert not bpy.data.objects.get("Cube")
+    blender.go_to(first + 3)
+    seen = blender.joints(blender.only("ARMATURE"), body.joint_names)
+    np.testing.assert_allclose(seen, wanted, atol=JOINT_TOLERANCE)
+
+
+@pytest.mark.parametrize("suffix", [".glb", ".fbx", ".bvh"])
+def test_a_motion_in_the_nla_is_exported_as_it_is_seen(body, make_motion, tmp_path, blender, truth, suffix):
+    motion = make_motion(body, 5)
+    person = build_scene([motion], body, options=BuildOptions(frame_rate="set")).people[0]
+    animation = _to_nla(person.armature, 40)
+    actions_before, path = set(bpy.data.actions), tmp_path / f"walk{suffix}"
+    export(path)
+    assert (animation.action, animation.use_nla, set(bpy.data.actions)) == (None, True, actions_before)
+    read_back(path)
+    armature = blender.only("ARMATURE")
+    first, last = actions.frame_range([armature])
+    assert last - first == pytest.approx(4, abs=0.01)
+    blender.go_to(first + 3)
+    joints = blender.joints(armature, body.joint_names)
+    np.testing.assert_allclose(joints, truth(body, motion).joints[3], atol=JOINT_TOLERANCE)
+
+
+def test_what_has_no_bones_may_be_in_the_nla_too(body, make_motion, tmp_path, blender, truth):
+    motion = make_motion(body, 5)
+    person = build_scene([motion], body, options=BuildOptions(frame_rate="set")).people[0]
+    _to_nla(person.armature, 1)
+    person.camera.keyframe_insert("location", frame=1)
+    layered = _to_nla(person.camera, 1)
+    person.camera.keyframe_insert("location", frame=1)  # an action of its own over the strip
+    layered.action_blend_type, action = "ADD", layered.action
+    export(tmp_path / "walk.glb")
+    assert (layered.action, layered.action_blend_type, layered.use_nla) == (action, "ADD", True)
+    first = read_back(tmp_path / "walk.glb")
+    blender.go_to(first + 3)
+    joints = blender.joints(blender.only("ARMATURE"), body.joint_names)
+    np.testing.assert_allclose(joints, truth(body, motion).joints[3], atol=JOINT_TOLERANCE)
+
+
+def test_a_track_that_plays_solo_lasts_as_long_as_it_does(body, make_motion):
+    person = build_scene([make_motion(body, 5)], body, options=BuildOptions(frame_rate="set")).people[0]
+    animation = _to_nla(person.armature, 1, 1000)
+    assert actions.frame_range([person.armature])[1] > 1000
+    animation.nla_tracks[0].is_solo = True
+    assert actions.frame_range([person.armature])[1] < 10
+
+
+def test_a_scene_keeps_what_is_hidden_in_it(body, make_motion, tmp_path):
+    result = build_scene([make_motion(body, 4)], body, options=BuildOptions(frame_rate="set"))
+    person = result.people[0]
+    person.armature.data.pose_position = "REST"
+    person.armature.hide_render = person.mesh.hide_viewport = person.mesh.hide_render = True
+    name = person.mesh.name
+    export(tmp_path / "walk.blend")
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "walk.blend"))
+    mesh = bpy.data.objects[name]
+    assert (mesh.hide_viewport, mesh.hide_render, mesh.parent.hide_render) == (True, True, True)
+    assert mesh.parent.data.pose_position == "REST"
+
+
+def test_a_users_edit_is_exported(body, make_motion, tmp_path, blender):
+    motion = make_motion(body, 4)
+    person = build_scene([motion], body, options=BuildOptions(frame_rate="set")).people[0]
+    person.armature.location = (5.0, 0.0, 0.0)
+    for suffix in (".bvh", ".glb"):
+        export(tmp_path / f"walk{suffix}")
+    before = None
+    for suffix in (".bvh", ".glb"):
+        first = read_back(tmp_path / f"walk{suffix}")
+        blender.go_to(first + 3)
+        joints = blender.joints(blender.only("ARMATURE"), body.joint_names)
+        assert before is None or np.abs(joints - before).max() < JOINT_TOLERANCE
+        before = joints
+    assert before[0, 0] == pytest.approx(5.0 + motion.trans[3, 0] + body.rest_joints(motion.betas)[0, 0], abs=1e-3)
+
+
+def test_a_motion_that_begins_before_frame_0_is_not_cut_off(body, make_motion, tmp_path):
+    build_scene([make_motion(body, 60)], body, options=BuildOptions(start_frame=-20))
+    with pytest.raises(UsageError, match="begins at frame -20"):
+        export(tmp_path / "walk.glb")
+    assert list(tmp_path.iterdir()) == []
+    assert [s.name for s in bpy.data.scenes] == ["Scene"]

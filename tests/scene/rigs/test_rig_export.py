@@ -1,0 +1,254 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Motions on the user's own rig, from file to file."""
+
+import json
+import subprocess
+import sys
+from dataclasses import replace
+
+import bpy
+import numpy as np
+import pytest
+from scope.scope_addon.cli import SAMPLE
+from scope.scope_addon.errors import UsageError
+from scope.scope_addon.retarget.bone_map import BoneMap, save_bone_map
+from scope.scope_addon.retarget.rig_source import rig_source
+from scope.scope_addon.scene.build import NEW_SCENE
+from scope.scope_addon.scene.export import formats
+from scope.scope_addon.scene.rigs.rig_export import export_on_rig
+from scope.scope_addon.scene.rigs.rig_file import check_rig
+from scope.solver.errors import InputError
+
+from ...edit.walking import BODY, NAMES, motion_of, walk
+from ..made_rigs import ARMS, FRAMES, build_rig, names_of, seen, truth
+
+
+def save_rig(path, scheme="mixamo", armatures=1, animated=False):
+    """A file of rigs, each with its mesh, and a stone that belongs to nobody; the session is empty then."""
+    for k in range(armatures):
+        rig, bone_of = build_rig(scheme, seed=k)
+        rig.name = f"Rig{k}"
+        mesh = bpy.data.meshes.new("Skin")
+        heads = [rig.data.bones[name].head_local for name in bone_of.values()]
+        mesh.from_pydata(heads, [], [(i, i + 1, i + 2) for i in range(len(heads) - 2)])
+        skin = bpy.data.objects.new("Skin", mesh)
+        bpy.context.scene.collection.objects.link(skin)
+        for i, name in enumerate(bone_of.values()):
+            skin.vertex_groups.new(name=name).add([i], 1.0, "REPLACE")
+        skin.parent = rig
+        skin.modifiers.new("Armature", "ARMATURE").object = rig
+        rig.data.pose_position = "REST"  # as it may well have been saved
+        if animated:
+            rig.pose.bones[0].location = (0, 9, 0)
+            rig.pose.bones[0].keyframe_insert("location", frame=3)
+            track = rig.animation_data.nla_tracks.new()
+            track.strips.new("old", 1, rig.animation_data.action)
+    stone = bpy.data.objects.new("Stone", bpy.data.meshes.new("Stone"))
+    bpy.context.scene.collection.objects.link(stone)
+    writers = {
+        ".blend": lambda: formats.write_blend(path, bpy.context.scene),
+        ".fbx": lambda: formats.write_fbx(path),
+        ".glb": lambda: formats.write_glb(path),
+    }
+    with formats.quiet():
+        writers[path.suffix]()
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    return path
+
+
+def read(path):
+    """The armatures of a file, which the active scene holds then."""
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    bpy.context.scene.render.fps = 30
+    with formats.quiet():
+        if path.suffix == ".blend":
+            with bpy.data.libraries.load(str(path)) as (there, here):
+                here.objects = list(there.objects)
+            for obj in here.objects:
+                bpy.context.scene.collection.objects.link(obj)
+        elif path.suffix == ".fbx":
+            bpy.ops.import_scene.fbx(filepath=str(path), anim_offset=0.0)
+        else:
+            bpy.ops.import_scene.gltf(filepath=str(path))
+    return [obj for obj in bpy.context.scene.objects if obj.type == "ARMATURE"]
+
+
+def worst_arm(rig, bone_of, offset):
+    """Degrees between the rig's arms and the body's; the motion begins at frame ``offset``."""
+    joints, worst = truth()[[f - 1 for f in FRAMES]], 0.0
+    frames = [f - 1 + offset for f in FRAMES]
+    for a, b in ARMS:
+        heads = seen(rig, [bone_of[a], bone_of[b]], frames)
+        ours, theirs = heads[:, 1] - heads[:, 0], joints[:, NAMES.index(b)] - joints[:, NAMES.index(a)]
+        cosine = (ours * theirs).sum(1) / np.linalg.norm(ours, axis=1) / np.linalg.norm(theirs, axis=1)
+        worst = max(worst, float(np.degrees(np.arccos(np.clip(cosine, -1, 1))).max()))
+    return worst
+
+
+OPTIONS = replace(NEW_SCENE, name="walk")
+
+
+@pytest.mark.parametrize("kind", [".blend", ".fbx", ".glb"])
+def test_a_rig_from_a_file_goes_into_every_format(tmp_path, kind):
+    source = rig_source(save_rig(tmp_path / f"rig{kind}", animated=kind == ".blend"))
+    targets = [tmp_path / name for name in ("out.blend", "out.fbx", "out.glb", "out.bvh", "out.usdc")]
+    before = {k: len(getattr(bpy.data, k)) for k in ("objects", "meshes", "armatures", "actions", "collections")}
+    written, _ = export_on_rig([motion_of(walk(2.0))], BODY, targets, source, OPTIONS)
+    assert written == targets
+    assert {k: len(getattr(bpy.data, k)) for k in before} == before
+    for path in targets[:3]:
+        rigs = read(path)
+        assert len(rigs) == 1
+        skins = [o for o in bpy.context.scene.objects if o.type == "MESH" and o.find_armature() == rigs[0]]
+        assert len(skins) == 1
+        assert "Stone" not in bpy.data.objects
+        assert worst_arm(rigs[0], names_of("mixamo"), 0) < 1.0, path
+
+
+def test_two_people_have_a_rig_each(tmp_path):
+    source = rig_source(save_rig(tmp_path / "rig.glb"))
+    other = walk(2.0)
+    other.root[:, 0] += 2.0
+    motions = [motion_of(walk(2.0)), motion_of(other)]
+    export_on_rig(motions, BODY, [tmp_path / "out.glb"], source, OPTIONS)
+    rigs = read(tmp_path / "out.glb")
+    places = [seen(rig, [names_of("mixamo")["pelvis"]], [30])[0, 0, 0] for rig in rigs]
+    assert len(rigs) == 2
+    assert abs(places[0] - places[1]) > 1.5
+
+
+def test_several_armatures_need_a_name(tmp_path):
+    path = save_rig(tmp_path / "rig.blend", armatures=2)
+    with pytest.raises(UsageError, match="'Rig0', 'Rig1'.*--rig-object"):
+        check_rig(rig_source(path))
+    with pytest.raises(UsageError, match="no armature 'Rig9'"):
+        check_rig(rig_source(path, "Rig9"))
+    check_rig(rig_source(path, "Rig1"))
+    assert not bpy.data.armatures
+
+
+def test_a_file_without_an_armature_is_refused(tmp_path):
+    save_rig(tmp_path / "rig.blend", armatures=0)
+    with pytest.raises(InputError, match="no armature"):
+        check_rig(rig_source(tmp_path / "rig.blend"))
+
+
+def test_a_rig_whose_bones_are_held_is_refused_before_the_work(tmp_path):
+    rig, bone_of = build_rig("mixamo")
+    limit = rig.pose.bones[bone_of["left_knee"]].constraints.new("LIMIT_ROTATION")
+    limit.owner_space = "LOCAL"
+    limit.use_limit_x = limit.use_limit_y = limit.use_limit_z = True
+    formats.write_blend(tmp_path / "rig.blend", bpy.context.scene)
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    with pytest.raises(InputError, match="'mixamorig:LeftLeg' of 'mixamo' does not move"):
+        check_rig(rig_source(tmp_path / "rig.blend"))
+
+
+def test_fingers_that_follow_one_another_matter_only_where_fingers_are_captured(tmp_path):
+    rig, bone_of = build_rig("mixamo")
+    bpy.context.view_layer.objects.active = rig
+    bpy.ops.object.mode_set(mode="EDIT")
+    hand = rig.data.edit_bones[bone_of["left_wrist"]]
+    parent, along = hand, (hand.tail - hand.head).normalized() * 0.03
+    for k in (1, 2, 3):
+        bone = rig.data.edit_bones.new(f"mixamorig:LeftHandIndex{k}")
+        bone.head, bone.tail, bone.parent = parent.tail, parent.tail + along, parent
+        parent = bone
+    bpy.ops.object.mode_set(mode="OBJECT")
+    held = rig.pose.bones["mixamorig:LeftHandIndex2"].constraints.new("COPY_ROTATION")
+    held.target, held.subtarget = rig, "mixamorig:LeftHandIndex1"
+    held.target_space = held.owner_space = "LOCAL"
+    formats.write_blend(tmp_path / "rig.blend", bpy.context.scene)
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    parts = {bone: part for part, bone in names_of("mixamo").items()}
+    parts |= {f"mixamorig:LeftHandIndex{k}": f"left_index{k}" for k in (1, 2, 3)}
+    save_bone_map(BoneMap(parts), tmp_path / "map.json")
+    source = rig_source(tmp_path / "rig.blend", bone_map=tmp_path / "map.json")
+    check_rig(source, fingers=False)
+    with pytest.raises(InputError, match="LeftHandIndex2.*does not move"):
+        check_rig(source)
+
+
+def test_a_map_of_another_rig_is_refused(tmp_path):
+    path = save_rig(tmp_path / "rig.glb")
+    save_bone_map(BoneMap({bone: part for part, bone in names_of("unreal").items()}), tmp_path / "map.json")
+    with pytest.raises(InputError, match="'pelvis' is no bone of 'Rig0'"):
+        check_rig(rig_source(path, bone_map=tmp_path / "map.json"))
+
+
+@pytest.mark.parametrize("suffix", [".blend", ".fbx", ".glb", ".gltf", ".obj"])
+@pytest.mark.parametrize("damage", ["missing", "empty", "text", "half", "head"])
+def test_damaged_files_are_refused_in_one_sentence(tmp_path, suffix, damage):
+    path = tmp_path / f"rig{suffix}"
+    if damage in ("half", "head"):
+        if suffix not in (".blend", ".fbx", ".glb"):
+            pytest.skip("nothing to cut")
+        whole = save_rig(path).read_bytes()
+        path.write_bytes(whole[: len(whole) // 2] if damage == "half" else whole[:40])
+    elif damage != "missing":
+        path.write_bytes({"empty": b"", "text": b"{this is no rig\n" * 50}[damage])
+    with pytest.raises((InputError, UsageError), match=f"rig{suffix}") as caught:
+        check_rig(rig_source(path))
+    assert "\n" not in str(caught.value)
+    assert not bpy.data.armatures
+
+
+@pytest.mark.parametrize("kind", [".blend", ".fbx", ".glb"])
+def test_the_way_on_an_object_is_the_same_in_every_format(tmp_path, kind):
+    source = rig_source(save_rig(tmp_path / "rig.glb"))
+    paths = {}
+    for root in ("bone", "object"):
+        out = tmp_path / f"{root}{kind}"
+        export_on_rig([motion_of(walk(2.0))], BODY, [out], source, OPTIONS, root)
+        rigs = read(out)
+        bone = names_of("mixamo")["pelvis"]
+        paths[root] = seen(rigs[0], [bone], range(2, 60, 8))[:, 0], np.array(rigs[0].pose.bones[bone].head)
+    np.testing.assert_allclose(paths["object"][0], paths["bone"][0], atol=5e-3)
+    assert np.ptp(paths["object"][0][:, 1]) > 1.0
+    assert np.abs(paths["object"][1][[0, 1]]).max() < 0.1 < np.abs(paths["bone"][1]).max()
+
+
+def shell(*arguments):
+    argv = [sys.executable, "-m", "scope.scope_addon.cli", *map(str, arguments)]
+    return subprocess.run(argv, capture_output=True, text=True, check=False)
+
+
+def test_the_shell_retargets_a_capture(tmp_path):
+    rig = save_rig(tmp_path / "rig.glb")
+    argv = ["capture", SAMPLE, "--quality", "fast", "--end", "0.2", "--json", "--retarget", rig]
+    argv += ["--retarget-root", "object"]
+    done = shell(*argv, "-o", tmp_path / "out.glb", "-o", tmp_path / "out.npz")
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["outputs"] == [str(tmp_path / "out.npz"), str(tmp_path / "out.glb")]
+    rigs = read(tmp_path / "out.glb")
+    assert [rig.name for rig in rigs] == ["Rig0"]
+    assert set(names_of("mixamo").values()) <= set(rigs[0].data.bones.keys())
+
+
+def test_the_shell_refuses_before_it_captures(tmp_path):
+    done = shell("capture", SAMPLE, "--retarget-root", "object", "-o", tmp_path / "out.glb")
+    assert done.returncode == 2
+    assert "--retarget-root is about a rig" in done.stderr
+    rig = save_rig(tmp_path / "rig.blend", armatures=2)
+    done = shell("capture", SAMPLE, "--retarget", rig, "-o", tmp_path / "out.glb")
+    assert done.returncode == 2
+    assert sum(line.startswith("scope:") for line in done.stderr.splitlines()) == 1  # Blender 5.2 has its own lines
+    assert "Traceback" not in done.stderr
+    assert "--rig-object" in done.stderr
+    before = rig.read_bytes()
+    done = shell("capture", SAMPLE, "--retarget", rig, "--rig-object", "Rig1", "-o", rig)
+    assert done.returncode == 2
+    assert "rig's own file" in done.stderr
+    done = shell("capture", SAMPLE, "--retarget", rig, "--rig-object", "Rig1", "-o", tmp_path / "out.npz")
+    assert done.returncode == 2
+    assert rig.read_bytes() == before
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["rig.blend"]
+
+
+def test_a_batch_refuses_a_bad_rig_once(tmp_path):
+    (tmp_path / "clips").mkdir()
+    done = shell("batch", tmp_path / "clips", "--out", tmp_path / "out", "--retarget", tmp_path / "rig.fbx")
+    assert done.returncode == 1
+    assert sum(line.startswith("scope:") for line in done.stderr.splitlines()) == 1
+    assert "rig.fbx" in done.stderr
+    assert not (tmp_path / "out").exists()

@@ -1,0 +1,290 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Retargeting, judged by what Blender's depsgraph shows of the rig and by forward kinematics of our own."""
+
+import json
+
+import bpy
+import numpy as np
+import pytest
+from scope.scope_addon.errors import UsageError
+from scope.scope_addon.retarget.bone_map import BoneMap, load_bone_map, save_bone_map
+from scope.scope_addon.scene.rigs.rig_retarget import RetargetOptions, guess_bone_map, retarget
+from scope.solver.errors import InputError
+
+from ...edit.walking import BODY, NAMES, RATE, motion_of, walk
+from ..made_rigs import ARMS, FBX, FRAMES, LEGS, SCHEMES, build_rig, captured, seen, truth
+
+
+@pytest.fixture
+def source():
+    return captured(motion_of(walk(2.0)))
+
+
+def direction_error(rig, bone_of, pairs):
+    """Largest angle in degrees between a limb of the rig and the body's."""
+    joints, worst = truth()[[f - 1 for f in FRAMES]], 0.0
+    for a, b in pairs:
+        ours = seen(rig, [bone_of[a], bone_of[b]])
+        ours = ours[:, 1] - ours[:, 0]
+        theirs = joints[:, NAMES.index(b)] - joints[:, NAMES.index(a)]
+        cosine = (ours * theirs).sum(1) / np.linalg.norm(ours, axis=1) / np.linalg.norm(theirs, axis=1)
+        worst = max(worst, float(np.degrees(np.arccos(np.clip(cosine, -1, 1))).max()))
+    return worst
+
+
+def run(source, rig, bone_map=None, **options):
+    return retarget(
+        source, BODY, np.zeros(BODY.P), rig, bone_map or guess_bone_map(rig), RATE, RetargetOptions(**options)
+    )
+
+
+@pytest.mark.parametrize("scheme", ["mixamo", "unreal"])
+@pytest.mark.parametrize("feet", [False, True])
+def test_limbs_point_where_the_body_points(source, scheme, feet):
+    rig, bone_of = build_rig(scheme, matrix=FBX if scheme == "mixamo" else None)
+    run(source, rig, feet=feet)
+    assert direction_error(rig, bone_of, ARMS) < 1.0
+    if not feet:  # test_retarget_feet.py has the legs of standing feet
+        assert direction_error(rig, bone_of, LEGS) < 1.0
+
+
+def _in_edit_mode(rig):
+    bpy.context.view_layer.objects.active = rig
+    bpy.ops.object.mode_set(mode="EDIT")
+
+
+def _in_a_hidden_collection(rig):
+    hidden = bpy.data.collections.new("Hidden")
+    bpy.context.scene.collection.children.link(hidden)
+    hidden.objects.link(rig)
+    bpy.context.scene.collection.objects.unlink(rig)
+    hidden.hide_viewport = True
+
+
+def _in_rest_position(rig):
+    rig.data.pose_position = "REST"
+
+
+def _disabled_in_viewports(rig):
+    rig.hide_viewport = True
+
+
+@pytest.mark.parametrize("hide", [_in_rest_position, _in_edit_mode, _disabled_in_viewports, _in_a_hidden_collection])
+def test_a_rig_that_does_not_react_moves_all_the_same(source, hide):
+    rig, bone_of = build_rig("mixamo")
+    hide(rig)
+    collections, hidden = rig.users_collection, rig.hide_viewport
+    run(source, rig, feet=False)
+    assert (rig.users_collection, rig.hide_viewport) == (collections, hidden)
+    assert (rig.mode, rig.data.pose_position) == ("OBJECT", "POSE")  # it would not be seen to move otherwise
+    rig.hide_viewport = collections[0].hide_viewport = False
+    assert direction_error(rig, bone_of, ARMS + LEGS) < 1.0
+
+
+def test_a_bone_that_is_held_is_named_and_nothing_changes(source):
+    rig, bone_of = build_rig("mixamo")
+    target = bpy.data.objects.new("target", None)
+    bpy.context.scene.collection.objects.link(target)
+    rig.pose.bones[bone_of["left_elbow"]].constraints.new("COPY_ROTATION").target = target
+    rig.data.pose_position = "REST"
+    with pytest.raises(InputError, match="'mixamorig:LeftForeArm' of 'mixamo' does not move"):
+        run(source, rig)
+    assert rig.data.pose_position == "REST"
+    assert rig.animation_data is None
+
+
+@pytest.mark.parametrize("scale", [(0, 0, 0), (1, 1, 0)])
+def test_a_rig_without_size_or_bones_is_refused(source, scale):
+    rig, _ = build_rig("mixamo")
+    rig.scale = scale
+    with pytest.raises(InputError, match="'mixamo' is scaled to 0"):
+        run(source, rig)
+    empty = bpy.data.objects.new("Empty", bpy.data.armatures.new("Empty"))
+    with pytest.raises(InputError, match="'Empty' has no bones"):
+        guess_bone_map(empty)
+
+
+def test_a_rig_of_controls_alone_stands_on_its_lowest_bone(source):
+    rig, bone_of = build_rig("mixamo")
+    run(source, rig)
+    before = seen(rig, bone_of.values())
+    for bone in rig.data.bones:
+        bone.use_deform = False
+    run(source, rig)
+    np.testing.assert_allclose(seen(rig, bone_of.values()), before, atol=1e-5)
+
+
+def test_rigify(source, rigify_rigs):
+    limbs = ("thigh", "shin", "foot", "upper_arm", "forearm", "hand")
+    parts = ("hip", "knee", "ankle", "shoulder", "elbow", "wrist")
+    for rig, prefix in rigify_rigs:
+        bone_of = {
+            f"{side}_{part}": f"{prefix}{limb}.{side[0].upper()}"
+            for side in ("left", "right")
+            for part, limb in zip(parts, limbs, strict=True)
+        }
+        assert run(source, rig, feet=False).warnings == []
+        assert direction_error(rig, bone_of, ARMS + LEGS) < 1.0
+        assert run(source, rig).warnings == []
+        assert direction_error(rig, bone_of, ARMS) < 1.0
+    metarig = rigify_rigs[0][0]
+    before = guess_bone_map(metarig).parts
+    for bone in metarig.data.bones:  # the bones that a game gets
+        bone.name = f"DEF-{bone.name}"
+    assert guess_bone_map(metarig).parts == {f"DEF-{bone}": part for bone, part in before.items()}
+
+
+@pytest.mark.parametrize("scheme", sorted(SCHEMES))
+def test_bones_are_guessed(scheme):
+    rig, bone_of = build_rig(scheme)
+    found = guess_bone_map(rig)
+    wrong = {bone: found.parts.get(bone) for part, bone in bone_of.items() if found.parts.get(bone) != part}
+    assert not wrong
+    assert all(0 < c <= 1 for c in found.confidence.values())
+
+
+def test_the_rigs_own_action_stays(source):
+    rig, bone_of = build_rig("unreal")
+    rig.pose.bones[0].keyframe_insert("location", frame=3)
+    before = rig.animation_data.action
+    run(source, rig)
+    assert rig.animation_data.action != before
+    assert before.use_fake_user
+
+
+def _tweaked(animation):
+    animation.nla_tracks[0].strips[0].select = animation.nla_tracks[0].select = True
+    animation.use_tweak_mode = True
+
+
+def _added(animation):
+    animation.action_blend_type = "ADD"
+
+
+def _faint(animation):
+    animation.action_influence = 0.3
+
+
+def _solo(animation):
+    animation.nla_tracks[0].is_solo = True
+
+
+@pytest.mark.parametrize("prepare", [_tweaked, _added, _faint, _solo])
+def test_a_rig_whose_nla_plays_moves_as_captured(source, prepare):
+    rig, bone_of = build_rig("unreal")
+    knee = rig.pose.bones[bone_of["left_knee"]]
+    knee.rotation_mode, knee.rotation_quaternion = "QUATERNION", (0.7, 0.7, 0, 0)
+    knee.keyframe_insert("rotation_quaternion", frame=1)
+    animation = rig.animation_data
+    own = animation.action
+    track = animation.nla_tracks.new()
+    track.strips.new("own", 1, own)
+    animation.action = None
+    prepare(animation)
+    run(source, rig, feet=False)
+    assert direction_error(rig, bone_of, ARMS + LEGS) < 1.0
+    assert [strip.action for strip in track.strips] == [own]
+
+
+@pytest.mark.parametrize("step", ["transfer", "_probe", "_channel", "drop_root"])
+def test_what_fails_leaves_the_rig_as_it_was(source, monkeypatch, step):
+    rig, _ = build_rig("unreal")
+    bone = rig.pose.bones[3]
+    bone["IK_FK"] = 0.25
+    rig.pose.bones[0].keyframe_insert("location", frame=3)
+    before, actions = rig.animation_data.action, len(bpy.data.actions)
+
+    def fail(*args, **keywords):
+        raise MemoryError
+
+    monkeypatch.setattr(f"scope.scope_addon.scene.rigs.rig_retarget.{step}", fail)
+    with pytest.raises(MemoryError):
+        run(source, rig)
+    assert bone["IK_FK"] == 0.25
+    assert rig.animation_data.action == before
+    assert len(bpy.data.actions) == actions
+    assert not before.use_fake_user
+
+
+def test_in_place_stays_on_the_spot(source):
+    rig, bone_of = build_rig("unreal")
+    run(source, rig, root="in-place")
+    assert np.ptp(seen(rig, [bone_of["pelvis"]])[:, 0, :2], axis=0).max() < 1e-3
+
+
+def test_a_map_is_read_as_it_was_saved(tmp_path):
+    rig, _ = build_rig("mixamo")
+    found = guess_bone_map(rig)
+    save_bone_map(found, tmp_path / "map.json")
+    assert load_bone_map(tmp_path / "map.json").parts == found.parts
+
+
+def _legs_and(pelvis):
+    """A map with all that is needed."""
+    bones = {"a": "left_hip", "b": "left_knee", "c": "right_hip", "d": "right_knee", "PELVIS": "pelvis"}
+    text = json.dumps({"format": "scope bone map", "version": 1, "bones": bones})
+    return text.replace("PELVIS", pelvis)
+
+
+def test_a_map_that_an_editor_has_marked_as_unicode_is_read(tmp_path):
+    (tmp_path / "map.json").write_text(_legs_and("Hüfte"), encoding="utf-8-sig")
+    assert load_bone_map(tmp_path / "map.json").bone("pelvis") == "Hüfte"
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["", "[]", "{" * 5000, "[" * 100000, '{"format": "scope bone map", "version": 1, "bones": {"a": 3}}',
+     '{"format": "scope bone map", "version": 1, "bones": {"a": "tail"}}',
+     '{"format": "scope bone map", "version": 1, "bones": {}}', '{"format": 1}', _legs_and(r"\ud800"),
+     _legs_and(r"a\u0000")],
+)  # fmt: skip
+def test_hostile_maps_are_refused(tmp_path, text):
+    path = tmp_path / "map.json"
+    path.write_text(text)
+    with pytest.raises(InputError, match="map.json"):
+        load_bone_map(path)
+
+
+def test_what_cannot_be_retargeted_is_said(source):
+    rig, _ = build_rig("unreal")
+    with pytest.raises(UsageError, match="another armature"):
+        run(source, source, guess_bone_map(rig))
+    with pytest.raises(InputError, match="pelvis"):
+        run(source, rig, BoneMap({"head": "head"}))
+
+
+def test_a_pelvis_that_cannot_be_moved_is_told(source):
+    rig, bone_of = build_rig("unreal")
+    bpy.context.view_layer.objects.active = rig
+    bpy.ops.object.mode_set(mode="EDIT")
+    root, pelvis = rig.data.edit_bones.new("root"), rig.data.edit_bones[bone_of["pelvis"]]
+    root.head, root.tail = (0, 0, 0), pelvis.head
+    pelvis.parent, pelvis.use_connect = root, True
+    bpy.ops.object.mode_set(mode="OBJECT")
+    with pytest.raises(InputError, match="'pelvis' of 'unreal' is connected to 'root'"):
+        run(source, rig)
+    bpy.ops.object.mode_set(mode="EDIT")
+    rig.data.edit_bones["pelvis"].use_connect = False
+    bpy.ops.object.mode_set(mode="OBJECT")
+    run(source, rig)
+    assert np.ptp(seen(rig, ["pelvis"])[:, 0, 1]) > 1.0
+    held = rig.pose.bones["pelvis"].constraints.new("COPY_LOCATION")
+    held.target, held.subtarget = rig, "root"
+    with pytest.raises(InputError, match="'pelvis' of 'unreal' does not move"):
+        run(source, rig)
+
+
+def test_bones_that_a_constraint_holds_are_told(source):
+    rig, bone_of = build_rig("unreal")
+    assert run(source, rig).warnings == []
+    target = bpy.data.objects.new("target", None)
+    bpy.context.scene.collection.objects.link(target)
+    target.location = (0.2, 0.0, 0.2)
+    held = rig.pose.bones[bone_of["left_knee"]].constraints.new("IK")
+    held.target, held.chain_count = target, 2
+    (warning,) = run(source, rig).warnings
+    assert "'thigh_l'" in warning
+    assert "cannot follow: mute the constraints" in warning
+    held.mute = True
+    assert run(source, rig).warnings == []
+    assert direction_error(rig, bone_of, ARMS) < 1.0

@@ -1,0 +1,122 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Feet that stand on the body stand on the rig: heel and ball, contact by contact, as the depsgraph shows them."""
+
+import bpy
+import numpy as np
+import pytest
+from scope.solver.rotations import exp
+
+from ...edit.rolling import STRIDE, joint, rolling_walk
+from ...edit.walking import motion_of, walk
+from ..made_rigs import FBX, build_rig, captured, seen
+from .test_rig_retarget import run
+
+PART = {"thigh": "hip", "shin": "knee", "foot": "ankle", "toe": "foot"}
+
+
+@pytest.fixture
+def source():
+    return captured(motion_of(rolling_walk()[0]))
+
+
+def contacts(stands):
+    """Spans of frames in which a point stands."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], stands.astype(int), [0]])))
+    return [slice(a, b) for a, b in zip(edges[::2], edges[1::2], strict=True) if b - a > 2]
+
+
+def points(rig, foot, ball):
+    """(T, 2, 3) heel and ball in the world, and where they are at rest."""
+    _, stands = rolling_walk()
+    ankle = np.array(rig.matrix_world @ rig.data.bones[foot].head_local)
+    back = ankle - np.array(rig.matrix_world @ rig.data.bones[ball].head_local)
+    heel = ankle + back * [1, 1, 0] * 0.3
+    heel[2] = 0.0
+    local = np.linalg.inv(np.array(rig.matrix_world @ rig.data.bones[foot].matrix_local)) @ [*heel, 1]
+    seen = []
+    for frame in range(1, len(stands["left"]) + 1):
+        bpy.context.scene.frame_set(frame)
+        posed = rig.evaluated_get(bpy.context.evaluated_depsgraph_get())
+        at = np.array(posed.matrix_world @ posed.pose.bones[foot].matrix) @ local
+        seen.append([at[:3], np.array(posed.matrix_world @ posed.pose.bones[ball].head)])
+    rest_ball = np.array(rig.matrix_world @ rig.data.bones[ball].head_local)
+    return np.array(seen), np.array([heel, rest_ball])
+
+
+def leg_length(rig, spell):
+    places = [rig.matrix_world @ rig.data.bones[spell("left", part)].head_local for part in ("thigh", "shin", "foot")]
+    return (places[1] - places[0]).length + (places[2] - places[1]).length
+
+
+def check_contacts(rig, spell):
+    """Every contact: the point slides less than 1 cm, and its height is its resting one within 1 cm; steps scale."""
+    _, stands = rolling_walk()
+    scale = leg_length(rig, spell) / sum(
+        np.linalg.norm(joint(f"left_{a}") - joint(f"left_{b}")) for a, b in (("hip", "knee"), ("knee", "ankle"))
+    )
+    for side in ("left", "right"):
+        seen, rest = points(rig, spell(side, "foot"), spell(side, "toe"))
+        for k, what in enumerate(("heel", "ball")):
+            spans = contacts(stands[side][:, k])
+            assert spans
+            for span in spans:
+                p = seen[span, k]
+                slide = np.linalg.norm(p[:, None, :2] - p[None, :, :2], axis=-1).max()
+                off = np.abs(p[:, 2] - rest[k, 2]).max()
+                assert slide < 0.01, (side, what, span, slide)
+                assert off < 0.01, (side, what, span, off)
+            first, second = (seen[span, k, :2].mean(axis=0) for span in spans[-2:])
+            assert abs(np.linalg.norm(second - first) - scale * STRIDE) < 0.02
+
+
+@pytest.mark.parametrize(("scheme", "size"), [("mixamo", 1.3), ("mixamo", 0.7), ("unreal", 1.0)])
+def test_feet_stand(source, scheme, size):
+    rig, bone_of = build_rig(scheme, size=size, matrix=FBX if scheme == "mixamo" else None)
+    run(source, rig)
+    check_contacts(rig, lambda side, part: bone_of[f"{side}_{PART[part]}"])
+
+
+@pytest.mark.parametrize("loose", [("thigh",), ("",)], ids=["thighs", "every bone"])
+def test_a_rig_whose_bones_do_not_inherit_rotation_moves_as_one_whose_bones_do(loose):
+    clip, frames = walk(2.0), range(1, 60, 6)
+    clip.rotations[:, 0] = exp(0.4 * np.sin(5 * clip.times)[:, None] * [0.3, 1.0, 0.5]) @ clip.rotations[:, 0]
+    source = captured(motion_of(clip))
+    rig, bone_of = build_rig("unreal")
+    run(source, rig)
+    wanted = seen(rig, bone_of.values(), frames)
+    for bone in rig.data.bones:
+        bone.use_inherit_rotation = not bone.name.startswith(loose)
+    run(source, rig)
+    np.testing.assert_allclose(seen(rig, bone_of.values(), frames), wanted, atol=1e-3)
+
+
+def test_feet_of_a_capture_below_the_floor_stay_on_it():
+    clip, stands = rolling_walk()
+    clip.root[:, 2] -= 0.05
+    rig, bone_of = build_rig("mixamo")
+    run(captured(motion_of(clip)), rig)
+    for side in ("left", "right"):
+        seen, rest = points(rig, bone_of[f"{side}_ankle"], bone_of[f"{side}_foot"])
+        assert (seen[..., 2] - rest[:, 2]).min() > -0.01
+        assert np.abs(seen[stands[side][:, 1], 1, 2] - rest[1, 2]).max() < 0.01
+
+
+def test_toes_that_were_not_seen_to_bend_stay_flat():
+    rig, bone_of = build_rig("mixamo")
+    run(captured(motion_of(rolling_walk(stiff_toes=True)[0])), rig)
+    _, stands = rolling_walk()
+    bpy.context.view_layer.update()
+    for side in ("left", "right"):
+        bone = bone_of[f"{side}_foot"]
+        rest = np.array(rig.matrix_world @ rig.data.bones[bone].matrix_local)[:3, 1]
+        for frame in np.flatnonzero(stands[side][:, 1]):
+            bpy.context.scene.frame_set(int(frame) + 1)
+            posed = rig.evaluated_get(bpy.context.evaluated_depsgraph_get())
+            along = np.array(posed.matrix_world @ posed.pose.bones[bone].matrix)[:3, 1]
+            assert np.degrees(np.arccos(np.clip(along @ rest, -1, 1))) < 2.0
+
+
+def test_feet_of_rigify_stand(source, rigify_rigs):
+    for rig, prefix in rigify_rigs:
+        run(source, rig)
+        check_contacts(rig, lambda side, part, prefix=prefix: f"{prefix}{part}.{side[0].upper()}")

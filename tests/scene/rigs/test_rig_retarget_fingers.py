@@ -1,0 +1,196 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Fingers on other rigs: found by their names and by the hand's shape, pointing where the body's fingers point."""
+
+import bpy
+import numpy as np
+import pytest
+from mathutils import Matrix, Vector
+from scope.scope_addon.edit.clip import Clip
+from scope.scope_addon.scene.animation_data.actions import bone_path, fcurves
+from scope.scope_addon.scene.build import BuildOptions, build_scene
+from scope.scope_addon.scene.rigs.rig_retarget import RetargetOptions, guess_bone_map, retarget
+from scope.solver.loaders.body_file import load_body
+from scope.solver.rotations import exp
+
+from ...edit.walking import BODY, RATE, motion_of, walk
+from ..made_rigs import FBX, FRAMES, build_rig, captured, seen, truth
+
+HANDS = load_body("scope_h")
+FINGERS = ("thumb", "index", "middle", "ring", "pinky")
+# Knuckle, the two joints after it and the tip: along the arm, across to the thumb's side, down; metres from the wrist.
+SHAPE = {
+    "thumb": ((0.02, 0.03, 0.01), (0.05, 0.06, 0.02), (0.075, 0.075, 0.03), (0.095, 0.085, 0.035)),
+    "index": ((0.1, 0.03, 0), (0.14, 0.032, 0), (0.165, 0.034, 0.004), (0.185, 0.035, 0.01)),
+    "middle": ((0.105, 0.01, 0), (0.15, 0.01, 0), (0.178, 0.01, 0.004), (0.2, 0.01, 0.01)),
+    "ring": ((0.1, -0.01, 0), (0.14, -0.012, 0), (0.165, -0.013, 0.004), (0.185, -0.014, 0.01)),
+    "pinky": ((0.09, -0.03, 0), (0.118, -0.034, 0), (0.137, -0.037, 0.004), (0.152, -0.039, 0.01)),
+}
+UNITY = {1: "Proximal", 2: "Intermediate", 3: "Distal"}
+SPELL = {
+    "mixamo": lambda f, k, side: f"mixamorig:{side.title()}Hand{f.title()}{k}",
+    "unreal": lambda f, k, side: f"{f}_{k:02d}_{side[0]}",
+    "unity": lambda f, k, side: f"{side.title()}{'Little' if f == 'pinky' else f.title()}{UNITY[k]}",
+    "mpfb": lambda f, k, side: f"finger{FINGERS.index(f) + 1}-{k}.{side[0].upper()}",
+    "smpl": lambda f, k, side: f"{side}_{f}{k}",
+    "biped": lambda f, k, side: f"Bip01 {side[0].upper()} Finger{FINGERS.index(f)}{k - 1 or ''}",
+    "vroid": lambda f, k, side: f"J_Bip_{side[0].upper()}_{'Little' if f == 'pinky' else f.title()}{k}",
+    "character creator": lambda f, k, side: f"CC_Base_{side[0].upper()}_{'Mid' if f == 'middle' else f.title()}{k}",
+    "nameless": lambda f, k, side: f"{side[0]}{'qwert'[FINGERS.index(f)]}{'uvw'[k - 1]}",
+}
+PALM = {
+    "unreal": lambda f, side: f"{f}_metacarpal_{side[0]}",
+    "mpfb": lambda f, side: f"metacarpal{FINGERS.index(f)}.{side[0].upper()}",
+}
+
+
+def build_hands(scheme, twist=0.6, **options):
+    """A rig with fingers, its palms turned about the forearm, and the bones of the phalanges by part."""
+    rig, bone_of = build_rig(scheme, **options)
+    to_armature = rig.matrix_world.inverted()
+    size, rng = options.get("size", 1.3), np.random.default_rng(5)
+    bpy.context.view_layer.objects.active = rig
+    bpy.ops.object.mode_set(mode="EDIT")
+    edit, spell, found = rig.data.edit_bones, SPELL[scheme], {}
+
+    def bone(name, parent, head, tail):
+        new = edit.new(name)
+        new.head, new.tail, new.parent, new.roll = to_armature @ head, to_armature @ tail, parent, rng.uniform(-3, 3)
+        return new
+
+    for side in ("left", "right"):
+        wrist, elbow = edit[bone_of[f"{side}_wrist"]], edit[bone_of[f"{side}_elbow"]]
+        start = rig.matrix_world @ wrist.head
+        along = (start - rig.matrix_world @ elbow.head).normalized()
+        down = along.cross(Vector((0, -1, 0))) * (1 if side == "left" else -1)
+        turn = Matrix.Rotation(twist if side == "left" else -twist, 3, along)
+        axes = [along, turn @ Vector((0, -1, 0)), turn @ down.normalized()]
+        for finger in FINGERS:
+            offsets = [sum((c * a for c, a in zip(p, axes, strict=True)), Vector()) for p in SHAPE[finger]]
+            points = [start + size * offset for offset in offsets]
+            above = wrist
+            if scheme in PALM and finger != "thumb":
+                above = bone(PALM[scheme](finger, side), wrist, start.lerp(points[0], 0.2), points[0])
+            for k in (1, 2, 3):
+                above = bone(spell(finger, k, side), above, points[k - 1], points[k])
+                found[f"{side}_{finger}{k}"] = above.name
+            if scheme == "mixamo":  # its leaves
+                bone(spell(finger, 4, side), above, points[3], 2 * points[3] - points[2])
+    bpy.ops.object.mode_set(mode="OBJECT")
+    bpy.context.view_layer.update()
+    return rig, bone_of | found
+
+
+def gesture():
+    """A walk whose hands open and close; every finger, and the wrists, in their own way."""
+    plain = walk(2.0)
+    rotations = np.tile(np.eye(3), (len(plain), HANDS.K + 1, 1, 1))
+    phase = 2 * np.pi * plain.times
+    for i, name in enumerate(HANDS.joint_names):
+        side, _, part = name.partition("_")
+        if name in BODY.joint_names:
+            rotations[:, i] = plain.rotations[:, BODY.joint_names.index(name)]
+        sign = 1.0 if side == "left" else -1.0
+        if part == "wrist":
+            rotations[:, i] = exp(np.stack([0.5 * np.sin(phase), 0 * phase, 0.3 * sign * np.cos(phase)], axis=1))
+        elif part[:-1] in FINGERS:
+            bend = 0.5 * (1 + np.sin(phase + FINGERS.index(part[:-1])))
+            axis = [0, sign, 0] if part.startswith("thumb") else [0, 0, -sign]
+            rotations[:, i] = exp(bend[:, None] * axis)
+    return Clip(plain.times, rotations, plain.root)
+
+
+@pytest.fixture
+def source():
+    return captured(motion_of(gesture(), body=HANDS), HANDS)
+
+
+def run(source, rig, body=HANDS):
+    return retarget(source, body, np.zeros(body.P), rig, guess_bone_map(rig), RATE, RetargetOptions())
+
+
+def angles(a, b):
+    """Degrees between directions (..., 3)."""
+    cosine = (a * b).sum(-1) / np.linalg.norm(a, axis=-1) / np.linalg.norm(b, axis=-1)
+    return np.degrees(np.arccos(np.clip(cosine, -1, 1)))
+
+
+def check_hands(rig, bone_of):
+    """Phalanges point where the body's do, and palms face where the body's face; at the frames that are looked at."""
+    joints = truth(motion_of(gesture(), body=HANDS), HANDS)[[f - 1 for f in FRAMES]]
+    parts = list(bone_of)
+    heads = seen(rig, [bone_of[part] for part in parts])
+    for side in ("left", "right"):
+
+        def rows(part, side=side):
+            part = f"{side}_{part}"
+            return heads[:, parts.index(part)], joints[:, HANDS.joint_names.index(part)]
+
+        for finger in FINGERS:
+            for k in (1, 2):
+                (a, A), (b, B) = rows(f"{finger}{k}"), rows(f"{finger}{k + 1}")
+                assert angles(b - a, B - A).max() < 1.0, (side, finger, k)
+        (w, W), (i, I), (p, P) = (rows(part) for part in ("wrist", "index1", "pinky1"))
+        assert angles(np.cross(i - w, p - w), np.cross(I - W, P - W)).max() < 1.0, side
+
+
+@pytest.mark.parametrize("scheme", sorted(SPELL))
+def test_fingers_are_guessed(scheme):
+    rig, bone_of = build_hands(scheme)
+    found = guess_bone_map(rig).parts
+    assert {bone: part for part, bone in bone_of.items()} == found
+
+
+@pytest.mark.parametrize("scheme", ["mixamo", "unreal", "mpfb"])
+@pytest.mark.parametrize("twist", [-0.6, 0.9])
+def test_fingers_point_where_the_body_points(source, scheme, twist):
+    rig, bone_of = build_hands(scheme, twist, matrix=FBX if scheme == "mixamo" else None)
+    run(source, rig)
+    check_hands(rig, bone_of)
+
+
+def test_fingers_of_rigify(source, rigify_rigs):
+    for rig, prefix in rigify_rigs:
+        bone_of = {}
+        for side in ("left", "right"):
+            bone_of[f"{side}_wrist"] = f"{prefix}hand.{side[0].upper()}"
+            for f in FINGERS:
+                name = f if f == "thumb" else f"f_{f}"
+                bone_of |= {f"{side}_{f}{k}": f"{prefix}{name}.{k:02d}.{side[0].upper()}" for k in (1, 2, 3)}
+        run(source, rig)
+        check_hands(rig, bone_of)
+
+
+def test_a_capture_without_fingers_leaves_them_as_they_are():
+    source = captured(motion_of(walk(2.0)))
+    rig, bone_of = build_hands("unreal")
+    bent = [bone_of[f"left_{finger}2"] for finger in FINGERS]
+    for name in bent:
+        rig.pose.bones[name].matrix_basis = Matrix.Rotation(0.7, 4, "X")
+    before = {name: rig.pose.bones[name].matrix_basis.copy() for name in bent}
+    done = run(source, rig, BODY)
+    for frame in (1, 30):
+        bpy.context.scene.frame_set(frame)
+        for name in bent:
+            assert np.allclose(rig.pose.bones[name].matrix_basis, before[name], atol=1e-5)
+    paths = {curve.data_path for curve in fcurves(rig)}
+    assert not any(bone_path(name, "rotation_quaternion") in paths for name in bent)
+    assert rig.animation_data.action == done.action
+
+
+def test_a_rig_of_the_same_shape_gets_the_same_flesh(source, blender):
+    """The captured body's own skeleton under other names: its mesh has to lie where the captured one lies."""
+    person = build_scene([motion_of(gesture(), body=HANDS)], HANDS, None, BuildOptions(start_frame=1.0)).people[0]
+    rig, mesh = person.armature, person.mesh
+    rig.animation_data_clear()
+    for name in HANDS.joint_names:
+        side, _, part = name.partition("_")
+        if part[:-1] in FINGERS:
+            rig.data.bones[name].name = SPELL["unreal"](part[:-1], int(part[-1]), side)
+    for bone in rig.pose.bones:
+        bone.matrix_basis = Matrix()
+    retarget(source, HANDS, np.zeros(HANDS.P), rig, guess_bone_map(rig), RATE, RetargetOptions(feet=False))
+    captured = next(o for o in source.children if o.type == "MESH")
+    for frame in (1, 12, 23, 40):
+        bpy.context.scene.frame_set(frame)
+        off = np.linalg.norm(blender.vertices(mesh) - blender.vertices(captured), axis=1)
+        assert off.max() < 0.002

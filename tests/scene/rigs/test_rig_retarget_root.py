@@ -1,0 +1,164 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A retargeted rig's way over the floor: in its bones, on an object of its own or left out, the capture's likewise."""
+
+import math
+
+import bpy
+import numpy as np
+import pytest
+from mathutils import Matrix
+from scope.scope_addon.edit.root_motion import with_path
+from scope.scope_addon.errors import UsageError
+from scope.scope_addon.scene.character.root_object import root_object, to_bones, to_root_object
+from scope.scope_addon.scene.rigs.rig_retarget import RetargetOptions, guess_bone_map, retarget
+
+from ...edit.walking import BODY, RATE, motion_of, walk
+from ..made_rigs import FBX, build_rig, captured, seen
+
+TURNED = Matrix.LocRotScale((2.0, 1.0, 0.0), Matrix.Rotation(math.pi, 3, "Z").to_quaternion(), (1.0,) * 3)
+
+
+@pytest.fixture
+def source():
+    """A walk that begins somewhere and takes a bend."""
+    clip = walk(2.0)
+    bent = with_path(clip, np.tile([0.7, -0.4, 0.0], (len(clip), 1)), 0.3 + 0.8 * clip.times)
+    return captured(motion_of(bent))
+
+
+def run(source, rig, **options):
+    return retarget(source, BODY, np.zeros(BODY.P), rig, guess_bone_map(rig), RATE, RetargetOptions(**options))
+
+
+def rigs_matrices(rig, frames=(1, 20, 50)):
+    out = []
+    for frame in frames:
+        bpy.context.scene.frame_set(frame)
+        out.append(rig.evaluated_get(bpy.context.evaluated_depsgraph_get()).matrix_world.copy())
+    return np.array(out)
+
+
+@pytest.mark.parametrize("matrix", [None, FBX, TURNED])
+def test_on_an_object_the_rig_looks_the_same(source, matrix):
+    rig, bone_of = build_rig("mixamo", matrix=matrix)
+    own = np.array(rig.matrix_world)
+    bones = list(bone_of.values())
+    run(source, rig)
+    before = seen(rig, bones)
+    assert root_object(rig) is None
+    for _ in range(2):  # and once more, from a rig that hangs on such an object
+        run(source, rig, root="object")
+        np.testing.assert_allclose(seen(rig, bones), before, atol=1e-3)
+        roots = [obj for obj in bpy.data.objects if "scope_root" in obj]
+        assert roots == [root_object(rig)]
+        # The rig's origin is below the pelvis, and the rig faces in its own object where it faces at rest.
+        places = rigs_matrices(rig)
+        pelvis = seen(rig, [bone_of["pelvis"]], (1, 20, 50))[:, 0]
+        np.testing.assert_allclose(places[:, :2, 3], pelvis[:, :2], atol=1e-3)
+        hips = seen(rig, [bone_of["left_hip"], bone_of["right_hip"]], (1, 20, 50))
+        left = np.einsum("tji,tj->ti", places[:, :3, :3], hips[:, 0] - hips[:, 1])
+        rest = rig.data.bones[bone_of["left_hip"]].head_local - rig.data.bones[bone_of["right_hip"]].head_local
+        cosine = left @ np.array(rest) / np.linalg.norm(left, axis=1) / rest.length
+        assert cosine.min() > math.cos(math.radians(8))  # the heading is the hips' smoothed one
+    run(source, rig)
+    np.testing.assert_allclose(seen(rig, bones), before, atol=1e-3)
+    bpy.context.view_layer.update()
+    np.testing.assert_allclose(np.array(rig.matrix_world), own, atol=1e-6)
+    assert not [obj for obj in bpy.data.objects if "scope_root" in obj]
+
+
+def test_a_capture_whose_way_is_on_an_object_or_left_out(source):
+    rig, bone_of = build_rig("unreal")
+    bones = list(bone_of.values())
+    run(source, rig)
+    before = seen(rig, bones)
+    to_root_object(source, BODY, RATE, in_place=False, heading=True)
+    for root in ("bone", "object"):
+        run(source, rig, root=root)
+        np.testing.assert_allclose(seen(rig, bones), before, atol=2e-3)
+    to_root_object(source, BODY, RATE, in_place=True, heading=False)
+    run(source, rig)
+    there = seen(rig, bones)
+    pelvis = bones.index(bone_of["pelvis"])
+    assert np.ptp(there[:, pelvis, :2], axis=0).max() < 0.02  # the hips' middle stays, and the body turns about it
+    np.testing.assert_allclose(there[0], before[0], atol=2e-3)
+    to_bones(source, BODY, RATE)
+    run(source, rig)
+    np.testing.assert_allclose(seen(rig, bones), before, atol=2e-3)
+
+
+@pytest.mark.parametrize("root", ["bone", "object"])
+def test_the_rig_follows_where_the_user_puts_the_captured_armature(source, root):
+    rig, bone_of = build_rig("unreal")
+    bones = list(bone_of.values())
+    run(source, rig, root=root)
+    before = seen(rig, bones)
+    place = Matrix.LocRotScale((3.0, -1.0, 0.5), Matrix.Rotation(1.1, 3, "Z").to_quaternion(), (1.0,) * 3)
+    source.matrix_world = place
+    run(source, rig, root=root, offset=(0.0, 0.0, 0.25))
+    wanted = before @ np.array(place)[:3, :3].T + np.array(place.translation) + [0, 0, 0.25]
+    np.testing.assert_allclose(seen(rig, bones), wanted, atol=2e-3)
+
+
+def test_what_is_re_run_replaces_its_own_action_but_not_a_changed_one(source):
+    rig, _ = build_rig("unreal")
+    name, actions = run(source, rig).action.name, len(bpy.data.actions)
+    for root in ("object", "object", "in-place", "bone"):
+        assert run(source, rig, root=root).action.name == name
+    assert len(bpy.data.actions) == actions
+    rig.pose.bones[3].keyframe_insert("location", frame=7)
+    changed = rig.animation_data.action
+    run(source, rig)
+    assert changed.use_fake_user
+    assert len(bpy.data.actions) == actions + 1
+
+
+def test_a_rig_that_hangs_on_something_takes_it_along(source):
+    rig, bone_of = build_rig("unreal")
+    bones = list(bone_of.values())
+    holder = bpy.data.objects.new("Holder", None)
+    bpy.context.scene.collection.objects.link(holder)
+    holder.location = (1.0, 0.0, 0.0)
+    rig.parent = holder
+    run(source, rig)
+    before = seen(rig, bones)
+    run(source, rig, root="object")
+    np.testing.assert_allclose(seen(rig, bones), before, atol=1e-3)
+    assert rig.parent == holder
+    assert holder.parent == root_object(rig)
+    run(source, rig)
+    assert holder.parent is None
+    other, _ = build_rig("mixamo")
+    other.parent = holder
+    action = rig.animation_data.action
+    with pytest.raises(UsageError, match="take 'mixamo' along"):
+        run(source, rig, root="object")
+    assert rig.animation_data.action == action
+    np.testing.assert_allclose(seen(rig, bones), before, atol=1e-3)
+
+
+@pytest.mark.parametrize("hung", ["capture", "rig"])
+def test_a_root_object_stays_hung_where_the_user_hangs_it(source, hung):
+    rig, bone_of = build_rig("unreal")
+    bones = list(bone_of.values())
+    run(source, rig, root="object")
+    before = seen(rig, bones)
+    to_root_object(source, BODY, RATE, in_place=False, heading=True)
+    stage = bpy.data.objects.new("Stage", None)
+    bpy.context.scene.collection.objects.link(stage)
+    turn = Matrix.Rotation(1.1, 3, "Z").to_quaternion()
+    place = stage.matrix_world = Matrix.LocRotScale((3.0, -1.0, 0.5), turn, None)
+    root_object(source if hung == "capture" else rig).parent = stage
+    wanted = before
+    if hung == "capture":
+        wanted = before @ np.array(place)[:3, :3].T + np.array(place.translation)
+    for root in ("object", "bone"):
+        run(source, rig, root=root)
+        np.testing.assert_allclose(seen(rig, bones), wanted, atol=2e-3)
+        if hung == "rig":
+            assert (root_object(rig) or rig).parent == stage
+
+
+def test_a_choice_that_is_not_offered_is_refused():
+    with pytest.raises(UsageError, match="bone, object, in-place"):
+        RetargetOptions(root="pelvis")

@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Nothing is hard-wired to a body: any number of joints, any tree, any number of shape coefficients."""
+
+import numpy as np
+import pytest
+from scope.solver import (
+    Keypoints2D,
+    Keypoints3D,
+    Measurements,
+    Options,
+    Priors,
+    Stage,
+    State,
+    Weights,
+    fit,
+    fit_clip,
+    rotations,
+)
+
+from ..synthetic import INTRINSICS, RandomBody, forward, project, random_body, random_state
+
+TIGHT = Options(stages=[Stage(Weights(joint_prior=0.0, shape=0.0, joint_limits=0.0), 1e-14, 300)])
+
+
+def shaped_tree(rng, kind, K, P, M, shape=0.02):
+    body = random_body(rng, K, P, M, shape)
+    if kind == "chain":
+        parents = np.arange(-1, K)
+    elif kind == "star":
+        parents = np.array([-1] + [0] * K)
+    else:
+        return body
+    return RandomBody(parents, body.S, body.l, body.keypoint_part, body.v_bar, body.V)
+
+
+def check_recovery(body, state, K, atol=1e-5):
+    R, t, points = forward(body, *state)
+    index = np.arange(len(points))
+    seen = Measurements(
+        INTRINSICS,
+        Keypoints2D(index, project(points), np.ones(len(index))),
+        Keypoints3D(index, points, np.ones(len(index))),
+    )
+    rng = np.random.default_rng(0)
+    turned = state[2] @ rotations.exp(min(0.05, 0.5 / K) * rng.standard_normal((K, 3)))
+    near = State(state[0], state[1] + 0.02, turned, 0.9 * state[3])
+    found = fit(body, seen, init=near, priors=Priors(), options=TIGHT)
+    placed = np.einsum("mij,mj->mi", found.R_camera_part[body.keypoint_part], body.V @ found.state.beta + body.v_bar)
+    np.testing.assert_allclose(placed + found.t_camera_part[body.keypoint_part], points, atol=atol)
+    return found
+
+
+@pytest.mark.parametrize(("K", "kind"), [(1, "chain"), (2, "star"), (23, "random"), (51, "star"), (100, "chain")])
+@pytest.mark.parametrize("P", [0, 1, 10])
+def test_trees_and_shapes(K, kind, P):
+    rng = np.random.default_rng(K + P)
+    body = shaped_tree(rng, kind, K, P, 4 * (K + 1))
+    body.l *= 0.3 if K == 100 else 1.0
+    check_recovery(body, random_state(rng, K, P, 0.3), K)
+
+
+@pytest.mark.parametrize("P", [100, 300])
+def test_many_shape_coefficients(P):
+    rng = np.random.default_rng(P)
+    K = 23
+    body = shaped_tree(rng, "random", K, P, 10 * (K + 1), shape=0.005)
+    found = check_recovery(body, random_state(rng, K, P, 0.3), K, atol=1e-4)
+    assert found.state.beta.shape == (P,)
+
+
+def test_three_hundred_coefficients_over_a_clip():
+    rng = np.random.default_rng(1)
+    body = random_body(rng, 23, 300, 200, shape=0.005)
+    beta = rng.standard_normal(300)
+    clip = []
+    for _ in range(3):
+        R0, t0, Omega, _ = random_state(rng, 23, 300, 0.2)
+        points = forward(body, R0, t0, Omega, beta)[2]
+        clip.append(Measurements(keypoints3d=Keypoints3D(np.arange(200), points, np.ones(200))))
+    found = fit_clip(body, clip, priors=Priors())
+    assert found.beta.shape == (300,)
+    assert np.isfinite(found.beta).all()
+    residual = [
+        forward(body, f.state.R_camera_root, f.state.t_camera_root, f.state.Omega, found.beta)[2] - m.keypoints3d.points
+        for f, m in zip(found.frames, clip, strict=True)
+    ]
+    assert np.sqrt(np.mean(np.square(residual))) < 0.01

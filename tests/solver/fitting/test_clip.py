@@ -1,0 +1,248 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""One shape and one focal length over a clip."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scope.solver import (
+    Keypoints2D,
+    Keypoints3D,
+    Measurements,
+    Options,
+    Priors,
+    ShapeError,
+    Stage,
+    State,
+    Status,
+    Temporal,
+    Weights,
+    carry,
+    fit,
+    fit_clip,
+    load_body,
+    make_tree,
+    rotations,
+    with_previous,
+)
+from scope.solver.examples import somebody
+from scope.solver.fitting.clip import _Frame, _Joint
+from scope.solver.gauss_newton.terms import make_terms
+
+from ..dense import jacobian, residuals, robust_factors
+from ..synthetic import INTRINSICS, forward, project, random_body, random_state
+
+K, P, M, T = 12, 6, 52, 12
+WEAK = Options(stages=[Stage(Weights(joint_prior=1e-3, shape=1e-4, joint_limits=0.0), 1e-12, 300)])
+SCALE = 1.12
+
+
+def clip(seed, noise=0.0, scale=SCALE, frames=T):
+    """A walk through random states seen by a camera whose focal length is `scale` times what the solver is told."""
+    rng = np.random.default_rng(seed)
+    body = random_body(rng, K, P, M)
+    R0, t0, Omega, beta = random_state(rng, K, P, angle=0.3)
+    true = INTRINSICS.copy()
+    true[0, 0] *= scale
+    true[1, 1] *= scale
+    index, ones, states, measurements = np.arange(M), np.ones(M), [], []
+    for _ in range(frames):
+        R0 = rotations.exp(0.1 * rng.standard_normal(3)) @ R0
+        t0 = t0 + 0.03 * rng.standard_normal(3)
+        Omega = Omega @ rotations.exp(0.06 * rng.standard_normal((K, 3)))
+        states.append((R0, t0, Omega, beta))
+        p = forward(body, *states[-1])[2]
+        pixels = project(p, true) + 2.0 * noise * rng.standard_normal((M, 2))
+        points = p + 0.01 * noise * rng.standard_normal((M, 3))
+        measurements.append(
+            Measurements(INTRINSICS, Keypoints2D(index, pixels, ones), Keypoints3D(index, points, ones))
+        )
+    return body, states, measurements, beta
+
+
+def refined(body, measurements, focal=True):
+    """The clip fitted with the default weights, then with hardly any prior; the focal length's scale."""
+    first = fit_clip(body, measurements, focal=focal, priors=Priors())
+    known = INTRINSICS.copy()
+    known[:2, :2] *= first.focal_scale
+    again = [replace(m, intrinsics=known) for m in measurements]
+    second = fit_clip(
+        body, again, init=[f.state for f in first.frames], options=WEAK, priors=Priors(), focal=focal, focal_weight=1e-6
+    )
+    return second, first.focal_scale * second.focal_scale
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_recovers_shape_and_focal_length_without_noise(seed):
+    body, states, measurements, beta = clip(seed)
+    found, scale = refined(body, measurements)
+    np.testing.assert_allclose(found.beta, beta, atol=1e-4)
+    assert scale == pytest.approx(SCALE, abs=1e-5)
+    for f, state in zip(found.frames, states, strict=True):
+        assert np.linalg.norm(f.t_camera_part - forward(body, *state)[1], axis=1).max() < 1e-3
+
+
+@pytest.mark.parametrize("subset", [slice(0, 3), slice(2, 11, 4), slice(5, None)])
+def test_recovers_them_from_any_subset_of_frames(subset):
+    body, _, measurements, beta = clip(1)
+    found, scale = refined(body, measurements[subset])
+    np.testing.assert_allclose(found.beta, beta, atol=2e-4)
+    assert scale == pytest.approx(SCALE, abs=2e-5)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_noise_leaves_errors_of_the_size_the_information_says(seed):
+    body, _, measurements, beta = clip(seed, noise=1.0)
+    found, scale = refined(body, measurements)
+    error = found.beta - beta
+    # noise variance times weight: (2 px / 1100)^2 1e6 = 3.3 and 0.01^2 24000 = 2.4; chi^2 of P degrees of freedom
+    assert error @ found.beta_information @ error / 3.3 < 22.0
+    assert abs(scale - SCALE) < 0.02
+
+
+def test_more_frames_say_more_about_the_shape():
+    body, _, measurements, beta = clip(4, noise=2.0)
+    one, _ = refined(body, measurements[:1], focal=False)
+    all_of_them, _ = refined(body, measurements, focal=False)
+    assert np.linalg.eigvalsh(all_of_them.beta_information - one.beta_information).min() > 0
+
+
+def test_joint_step_is_the_dense_step_of_the_whole_clip():
+    frames = 3
+    body, states, measurements, _ = clip(5, noise=1.0, frames=frames)
+    rng = np.random.default_rng(0)
+    options = Options()
+    beta = rng.standard_normal(P)
+    starts = [State(R0, t0, Om @ rotations.exp(0.02 * rng.standard_normal((K, 3))), beta) for R0, t0, Om, _ in states]
+    tree = make_tree(body, focal=True)
+    flat = Options(stages=[Stage(Weights(joint_prior=0.0, joint_limits=0.0))])
+    joint = _Joint(
+        tree, [_Frame(tree, make_terms(tree, m, Priors()), s) for m, s in zip(measurements, starts, strict=True)],
+        Priors(), flat, 7.0,
+    )  # fmt: skip
+    joint.cost = joint._linearize(0, trial=False)
+    predicted = joint._step(0, 20.0)
+    n, G = 6 + 3 * K, P + 1
+    H, g = np.zeros((frames * n + G,) * 2), np.zeros(frames * n + G)
+    cost = 0.5 * 100.0 * beta @ beta
+    for k, (m, s) in enumerate(zip(measurements, starts, strict=True)):
+        data = {"pixels": m.keypoints2d.pixels, "points": m.keypoints3d.points, "directions": np.ones((M, 3))}
+        state = (s.R_camera_root, s.t_camera_root, s.Omega, s.beta)
+        raw = residuals(body, data, focal=True)
+        sigmas, weights = (
+            [options.robust_keypoints2d, options.robust_keypoints3d],
+            [1e6 * np.ones(M), 24000.0 * np.ones(M)],
+        )
+        factors, part_cost = robust_factors(raw(state, np.zeros(n + G))[:2], sigmas, weights)
+        cost += part_cost
+
+        def stacked(moved, d, raw=raw, factors=factors):
+            return np.concatenate([(f[:, None] * r).ravel() for f, r in zip(factors, raw(moved, d), strict=False)])
+
+        J, r = jacobian(body, state, stacked, extra=1), np.real(stacked(state, np.zeros(n + G)))
+        at = np.r_[k * n : (k + 1) * n, frames * n : frames * n + G]
+        H[np.ix_(at, at)] += J.T @ J
+        g[at] += J.T @ r
+        H[range(k * n, (k + 1) * n), range(k * n, (k + 1) * n)] += (
+            20.0 * np.r_[np.ones(3), np.full(3, 1 / 0.09), np.ones(3 * K)]
+        )
+    shape = slice(frames * n, frames * n + P)
+    H[shape, shape] += 100.0 * np.eye(P)
+    g[shape] += 100.0 * beta
+    H[-1, -1] += 7.0
+    expected = -np.linalg.solve(H, g)
+    found = [np.r_[f.work.x[0], f.work.u[1:].ravel()] for f in joint.frames]
+    found = np.concatenate([*found, joint.frames[0].work.dbeta[:G]])
+    np.testing.assert_allclose(found, expected, atol=1e-8 * np.abs(expected).max())
+    assert joint.cost == pytest.approx(cost, rel=1e-11)
+    assert predicted > 0
+
+
+def test_carried_information_equals_what_the_frames_say_together():
+    """With the pose eliminated at the same states, information adds up; the causal estimate nears the joint one."""
+    body, _, measurements, beta = clip(6, noise=1.0, scale=1.0)
+    priors, last = Priors(), None
+    for m in measurements:
+        fitted = fit(body, m, init=last, priors=priors)
+        priors, last = carry(priors, fitted, Weights().shape), fitted.state
+    joint = fit_clip(body, measurements, priors=Priors())
+    single = fit(body, measurements[0], priors=Priors())
+    causal_error = np.linalg.norm(fitted.state.beta - joint.beta)
+    assert causal_error < 0.5 * np.linalg.norm(single.state.beta - joint.beta)
+    ratio = np.diag(priors.shape_information) * Weights().shape / np.diag(joint.beta_information)
+    assert (np.abs(ratio - 1) < 0.1).all()
+
+
+def test_frames_share_the_shape_and_those_left_out_are_fitted_to_it():
+    body, states, measurements, _ = clip(7, noise=0.5)
+    every = fit_clip(body, measurements, focal=True)
+    some = fit_clip(body, measurements, focal=True, shape_frames=4)
+    for f, state in zip(some.frames, states, strict=True):
+        np.testing.assert_array_equal(f.state.beta, some.beta)
+        assert np.linalg.norm(f.t_camera_part - forward(body, *state)[1], axis=1).max() < 0.05
+    assert some.focal_scale == pytest.approx(every.focal_scale, abs=0.01)
+
+
+def test_temporal_terms_pull_towards_the_last_frame():
+    body, _, measurements, _ = clip(8, noise=4.0, scale=1.0)
+    free = fit_clip(body, measurements)
+    held = fit_clip(body, measurements, temporal=Temporal(1e6, 1e6, 1000.0))
+
+    def jitter(found):
+        return np.mean(
+            [
+                np.sum((a.t_camera_part - b.t_camera_part) ** 2)
+                for a, b in zip(found.frames, found.frames[1:], strict=False)
+            ]
+        )
+
+    assert jitter(held) < 0.8 * jitter(free)
+    m = with_previous(measurements[0], free.frames[0].state, Temporal())
+    assert len(m.pose_priors.parts) == 1
+    assert len(m.tables["joint_prior"][0]) == K
+
+
+def test_a_gap_and_a_clip_without_measurements_end_well():
+    body, _, measurements, _ = clip(9)
+    measurements[4] = Measurements()
+    found = fit_clip(body, measurements)
+    assert found.frames[4].status is Status.NO_MEASUREMENTS
+    assert np.isfinite(found.frames[4].t_camera_part).all()
+    empty = fit_clip(body, [Measurements(), Measurements()], focal=True)
+    assert empty.status is Status.NO_MEASUREMENTS
+    assert empty.focal_scale == 1.0
+    np.testing.assert_array_equal(empty.beta, np.zeros(P))
+
+
+def from_behind():
+    """The default body with its back to the camera, where a start from the rest pose ends a metre beside the truth."""
+    body = load_body("scope")
+    state = somebody.pose(body, seed=3, bend=0.1)
+    turn = np.diag([1.0, -1.0, -1.0]) @ rotations.exp([0.0, np.pi - 0.3, 0.0])
+    R, t = somebody.place(body, replace(state, R_camera_root=turn))
+    index = np.array(list(body.keypoint_set("blazepose").values()))
+    points, ones = body.keypoints(R, t, state.beta)[index], np.ones(len(index))
+    image, space = Keypoints2D(index, somebody.project(points), ones), Keypoints3D(index, points, ones)
+    return body, t, Measurements(somebody.INTRINSICS, image, space)
+
+
+@pytest.mark.parametrize("temporal", [None, Temporal()])
+@pytest.mark.parametrize("unseen", [1, 3])
+def test_whoever_appears_later_is_fitted_as_from_the_first_frame(unseen, temporal):
+    body, joints, seen = from_behind()
+    found = fit_clip(body, [*[Measurements()] * unseen, seen, seen, seen], temporal=temporal)
+    before, after = found.frames[: 1 if temporal else unseen], found.frames[unseen:]
+    for f in [*before, *after]:  # those before hold the pose in which the person appears
+        assert np.linalg.norm(f.t_camera_part - joints, axis=1).mean() < 0.02
+    assert {f.status for f in before} == {Status.NO_MEASUREMENTS}
+
+
+def test_a_clip_is_deterministic_and_refuses_nonsense():
+    body, _, measurements, _ = clip(10, noise=1.0)
+    a, b = fit_clip(body, measurements, focal=True), fit_clip(body, measurements, focal=True)
+    assert a.cost == b.cost
+    np.testing.assert_array_equal(a.beta, b.beta)
+    with pytest.raises(ShapeError, match="at least one frame"):
+        fit_clip(body, [])
+    with pytest.raises(ShapeError, match="one initial state a frame"):
+        fit_clip(body, measurements, init=[a.frames[0].state])

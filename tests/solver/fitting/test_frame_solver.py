@@ -1,0 +1,447 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Fitting one frame: recovery, invariance, prediction, determinism, and an honest end whatever is measured."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scope.solver import (
+    Keypoints2D,
+    Keypoints3D,
+    Measurements,
+    Options,
+    OrientationField,
+    PosePriors,
+    Priors,
+    ShapeError,
+    Stage,
+    State,
+    Status,
+    Temporal,
+    Weights,
+    fit,
+    fit_clip,
+    make_tree,
+    rotations,
+    with_previous,
+)
+from scope.solver.gauss_newton.linearize import linearize, make_blocks, make_pose
+from scope.solver.gauss_newton.recursion import make_workspace, retract, step
+from scope.solver.gauss_newton.terms import make_terms
+from scope.solver.options import COLD_STAGES, WARM_STAGES
+from scope.solver.residuals.registry import RESIDUALS
+
+from ..synthetic import INTRINSICS, forward, project, random_body, random_state
+
+K, P, M = 23, 10, 60
+FREE = Weights(joint_prior=0.0, shape=0.0, joint_limits=0.0)
+NO_PRIOR = Options(stages=[Stage(FREE, 1e-14, 200)])
+
+
+def measured(body, state, noise=0.0, seed=0):
+    """All three kinds of measurement of every keypoint; noise in units of 1 px, 5 mm, 0.01."""
+    rng = np.random.default_rng(seed)
+    R, t, p = forward(body, *state)
+    n = len(p)
+    index, ones = np.arange(n), np.ones(n)
+    return Measurements(
+        INTRINSICS,
+        Keypoints2D(index, project(p) + noise * rng.standard_normal((n, 2)), ones),
+        Keypoints3D(index, p + 0.005 * noise * rng.standard_normal((n, 3)), ones),
+        OrientationField(
+            n + body.keypoint_part, index, p - t[body.keypoint_part] + 0.002 * noise * rng.standard_normal((n, 3)), ones
+        ),
+    )
+
+
+def scene(seed, angle=0.4, keypoints=M):
+    rng = np.random.default_rng(seed)
+    body = random_body(rng, K, P, keypoints)
+    return body, random_state(rng, K, P, angle)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_recovers_pose_and_shape_without_noise(seed):
+    body, state = scene(seed)
+    m = measured(body, state)
+    found = fit(body, m, init=fit(body, m).state, options=NO_PRIOR, priors=Priors())
+    R, t, _ = forward(body, *state)
+    np.testing.assert_allclose(found.t_camera_part, t, atol=1e-6)
+    np.testing.assert_allclose(found.R_camera_part, R, atol=1e-5)
+    np.testing.assert_allclose(found.state.beta, state[3], atol=1e-5)
+    assert found.status in (Status.CONVERGED, Status.STALLED)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_cold_start_finds_the_person_with_the_default_schedule(seed):
+    body, state = scene(seed)
+    found = fit(body, measured(body, state, noise=1.0, seed=seed))
+    _, t, _ = forward(body, *state)
+    assert found.status is Status.CONVERGED
+    assert np.linalg.norm(found.t_camera_part - t, axis=1).max() < 0.03
+
+
+@pytest.mark.parametrize("kind", ["keypoints2d", "keypoints3d", "orientation_field"])
+def test_one_kind_of_measurement_is_enough_to_start(kind):
+    body, (R0, t0, Omega, beta) = scene(1, angle=0.2)
+    state = (np.diag([1.0, -1.0, -1.0]) @ rotations.exp([0.0, 0.4, 0.0]), t0, Omega, beta)
+    m = measured(body, state)
+    only = Measurements(INTRINSICS, **{kind: getattr(m, kind)})
+    found = fit(body, only)
+    assert found.status is Status.CONVERGED
+    _, t, p = forward(body, found.state.R_camera_root, found.state.t_camera_root, found.state.Omega, found.state.beta)
+    _, t_true, p_true = forward(body, *state)
+    if kind == "keypoints2d":
+        assert np.median(np.linalg.norm(project(p) - project(p_true), axis=1)) < 10.0
+    elif kind == "keypoints3d":
+        assert np.linalg.norm(p - p_true, axis=1).max() < 0.03
+    else:
+        bone, true = p - t[body.keypoint_part], p_true - t_true[body.keypoint_part]
+        cosines = np.sum(bone * true, 1) / np.linalg.norm(bone, axis=1) / np.linalg.norm(true, axis=1)
+        assert np.median(cosines) > 0.98
+
+
+def test_an_outlier_moves_the_fit_less_than_without_the_robust_kernel():
+    body, state = scene(2)
+    m = measured(body, state)
+    bad = Keypoints3D(m.keypoints3d.indices, m.keypoints3d.points.copy(), m.keypoints3d.confidence)
+    bad.points[10] += [0.0, 0.8, 0.0]
+    m = replace(m, keypoints3d=bad)
+    plain = Options(robust_keypoints2d=np.inf, robust_keypoints3d=np.inf, robust_orientation_field=np.inf)
+    _, t, _ = forward(body, *state)
+    error = [np.abs(fit(body, m, options=o).t_camera_part - t).max() for o in (Options(), plain)]
+    assert error[0] < 0.3 * error[1]
+
+
+def run_iterates(body, state, m, count=5):
+    tree = make_tree(body)
+    table, _, _ = Options().stage_table([Stage()])
+    terms, pose, trial = make_terms(tree, m, Priors()), State(*state).pose(tree), make_pose(tree)
+    blocks, work, out = make_blocks(tree), make_workspace(tree), []
+    for _ in range(count):
+        cost = linearize(tree, terms, table[0], 0.0, pose, blocks, work.scratch)
+        out.append((cost, pose.Omega[1:].copy(), pose.beta.copy(), pose.t - pose.t[0]))
+        step(tree, pose, blocks, 30.0, 1 / 0.3, work)
+        retract(tree, pose, work, trial)
+        pose, trial = trial, pose
+    return out
+
+
+def test_moving_camera_and_person_together_leaves_the_iterates_unchanged():
+    body, state = scene(3)
+    m = measured(body, state, noise=2.0)
+    start = random_state(np.random.default_rng(9), K, P)
+    G, shift = rotations.exp([0.3, -1.0, 0.5]), np.array([2.0, -30.0, 400.0])
+    m = replace(m, keypoints2d=None)
+    m2 = replace(
+        m,
+        keypoints3d=replace(m.keypoints3d, points=m.keypoints3d.points @ G.T + shift),
+        orientation_field=replace(m.orientation_field, directions=m.orientation_field.directions @ G.T),
+    )
+    for a, b in zip(
+        run_iterates(body, start, m),
+        run_iterates(body, (G @ start[0], G @ start[1] + shift, *start[2:]), m2),
+        strict=True,
+    ):
+        assert a[0] == pytest.approx(b[0], rel=1e-8)
+        np.testing.assert_allclose(a[1], b[1], atol=1e-8)
+        np.testing.assert_allclose(a[2], b[2], atol=1e-7)
+        np.testing.assert_allclose(a[3] @ G.T, b[3], atol=1e-8)
+
+
+@pytest.mark.parametrize("damping", [0.1, 10.0, 1000.0])
+def test_predicted_decrease_is_the_actual_one_near_the_solution(damping):
+    body, state = scene(4)
+    m = measured(body, state)
+    tree = make_tree(body)
+    off = Options(robust_keypoints2d=np.inf, robust_keypoints3d=np.inf, robust_orientation_field=np.inf)
+    table, _, _ = off.stage_table([Stage(FREE)])
+    terms = make_terms(tree, m, Priors())
+    start = State(state[0] @ rotations.exp([1e-4, -2e-4, 1e-4]), state[1] + 1e-4, state[2], state[3] + 1e-3)
+    pose, trial, blocks, work = start.pose(tree), make_pose(tree), make_blocks(tree), make_workspace(tree)
+    cost = linearize(tree, terms, table[0], 0.0, pose, blocks, work.scratch)
+    predicted = step(tree, pose, blocks, damping, 1 / 0.3, work)
+    retract(tree, pose, work, trial)
+    actual = cost - linearize(tree, terms, table[0], 0.0, trial, blocks, work.scratch)
+    assert actual == pytest.approx(predicted, rel=2e-3)
+
+
+def test_the_cost_never_rises_with_more_iterations():
+    body, state = scene(5)
+    m = measured(body, state, noise=3.0)
+    start = State.rest(K, P)
+    costs = [fit(body, m, init=start, options=Options(stages=[Stage(Weights(), 0.0, n)])).cost for n in range(0, 40, 3)]
+    assert all(b <= a for a, b in zip(costs[:-1], costs[1:], strict=True))
+    assert costs[-1] < 0.1 * costs[0]
+
+
+def test_second_order_correction_reaches_the_same_minimum():
+    body, state = scene(6)
+    m = measured(body, state, noise=1.0)
+    init = fit(body, m).state
+    tight = [Stage(Weights(), 1e-13, 300)]
+    first, second = (fit(body, m, init=init, options=Options(stages=tight, triggs=t)) for t in (0.0, 0.9))
+    assert second.cost == pytest.approx(first.cost, rel=1e-7)
+
+
+def test_same_input_gives_the_same_bits():
+    body, state = scene(7)
+    m = measured(body, state, noise=2.0)
+    a, b = fit(body, m), fit(body, m)
+    assert a.cost == b.cost
+    np.testing.assert_array_equal(a.state.Omega, b.state.Omega)
+    np.testing.assert_array_equal(a.state.beta, b.state.beta)
+
+
+def test_joint_limit_keeps_a_knee_from_bending_forwards():
+    rng = np.random.default_rng(0)
+    body = random_body(rng, 2, 0, 0)
+    body.parents = np.array([-1, 0, 1])
+    body.l = np.array([[0, 0, 0], [0, -0.4, 0], [0, -0.4, 0.0]])
+    body.joint_names = ("pelvis", "left_knee", "left_ankle")
+    up = np.diag([1.0, -1.0, -1.0])
+    forwards = up @ rotations.exp([-0.8, 0, 0]) @ [0, -0.4, 0.0]
+    origin = np.array([0, 0, 3.0])
+    knee = origin + up @ [0, -0.4, 0]
+    m = Measurements(
+        keypoints3d=Keypoints3D([0, 1, 2], np.stack([origin, knee, knee + forwards]), [1.0, 1.0, 1.0]),
+        pose_priors=PosePriors([0], up[None], origin[None], [1e6], [1e6]),
+    )
+    init = State(up, origin, np.tile(np.eye(3), (2, 1, 1)), np.zeros(0))
+    loose = fit(body, m, init=init, priors=Priors())
+    limited = fit(body, m, init=init, options=Options(stages=[Stage(Weights(joint_limits=1e6))]))
+    angle = [rotations.log(f.state.Omega[0])[0] for f in (loose, limited)]
+    assert angle[0] < -0.6
+    assert -0.1 < angle[1] < 0.05
+
+
+def nothing(m):
+    return Measurements()
+
+
+def zero_confidence(m):
+    z = np.zeros(M)
+    return replace(
+        m,
+        keypoints2d=replace(m.keypoints2d, confidence=z),
+        keypoints3d=replace(m.keypoints3d, confidence=z),
+        orientation_field=replace(m.orientation_field, confidence=z),
+    )
+
+
+def nan_everywhere(m):
+    return Measurements(INTRINSICS, Keypoints2D(np.arange(M), np.full((M, 2), np.nan), np.ones(M)))
+
+
+def one_nan(m):
+    points = m.keypoints3d.points.copy()
+    points[3] = np.nan, 1.0, np.inf
+    return replace(m, keypoints3d=replace(m.keypoints3d, points=points))
+
+
+def behind_camera(m):
+    return replace(m, keypoints3d=replace(m.keypoints3d, points=-m.keypoints3d.points))
+
+
+def single_point(m):
+    return Measurements(INTRINSICS, Keypoints2D([0], [[100.0, 100.0]], [1.0]))
+
+
+def single_place(m):
+    return Measurements(INTRINSICS, keypoints3d=Keypoints3D(np.arange(M), np.tile([0.0, 0.0, 2.0], (M, 1)), np.ones(M)))
+
+
+def at_the_camera(m):
+    return Measurements(INTRINSICS, m.keypoints2d, Keypoints3D(np.arange(M), np.zeros((M, 3)), np.ones(M)))
+
+
+def contradictory(m):
+    twice = np.concatenate([np.arange(M), np.arange(M)])
+    points = np.concatenate([m.keypoints3d.points, m.keypoints3d.points[::-1] + 1.0])
+    return replace(m, keypoints3d=Keypoints3D(twice, points, np.ones(2 * M)))
+
+
+def far_away(m):
+    return replace(m, keypoints3d=replace(m.keypoints3d, points=m.keypoints3d.points + 1e9))
+
+
+def huge_pixels(m):
+    return Measurements(INTRINSICS, replace(m.keypoints2d, pixels=m.keypoints2d.pixels * 1e12))
+
+
+def opposite_directions(m):
+    o = m.orientation_field
+    both = [np.concatenate([a, b]) for a, b in ((o.starts, o.starts), (o.ends, o.ends), (o.directions, -o.directions))]
+    return Measurements(orientation_field=OrientationField(*both, np.ones(2 * M)))
+
+
+def zero_directions(m):
+    o = m.orientation_field
+    return Measurements(orientation_field=replace(o, directions=np.zeros((M, 3))))
+
+
+BAD = {
+    nothing: {Status.NO_MEASUREMENTS},
+    zero_confidence: {Status.NO_MEASUREMENTS},
+    nan_everywhere: {Status.NO_MEASUREMENTS},
+    zero_directions: {Status.NO_MEASUREMENTS},
+    one_nan: {Status.CONVERGED},
+    single_point: {Status.CONVERGED, Status.STALLED},
+    single_place: {Status.CONVERGED, Status.STALLED, Status.MAX_ITERATIONS},
+    behind_camera: {Status.CONVERGED, Status.STALLED, Status.MAX_ITERATIONS},
+    at_the_camera: {Status.CONVERGED, Status.STALLED, Status.MAX_ITERATIONS},
+    contradictory: {Status.CONVERGED, Status.STALLED, Status.MAX_ITERATIONS},
+    far_away: {Status.CONVERGED, Status.STALLED, Status.MAX_ITERATIONS},
+    huge_pixels: {Status.CONVERGED, Status.STALLED, Status.MAX_ITERATIONS},
+    opposite_directions: {Status.CONVERGED, Status.STALLED, Status.MAX_ITERATIONS},
+}
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("robust", [True, False])
+@pytest.mark.parametrize("priors", [True, False])
+@pytest.mark.parametrize("warm", [True, False])
+@pytest.mark.parametrize("spoil", BAD, ids=lambda f: f.__name__)
+def test_no_measurement_can_break_it(spoil, warm, priors, robust):
+    body, state = scene(8)
+    m = spoil(measured(body, state))
+    options = Options() if robust else Options(robust_keypoints2d=np.inf, robust_keypoints3d=np.inf)
+    if not priors:
+        options = replace(options, stages=[Stage(FREE, 1e-5, 50)])
+    found = fit(body, m, init=State.rest(K, P) if warm else None, options=options)
+    s = found.state
+    for array in (s.R_camera_root, s.t_camera_root, s.Omega, s.beta, found.R_camera_part, found.t_camera_part):
+        assert np.isfinite(array).all()
+    assert np.isfinite(found.cost)
+    eye = np.tile(np.eye(3), (K, 1, 1))
+    np.testing.assert_allclose(s.Omega @ np.swapaxes(s.Omega, 1, 2), eye, atol=1e-9)
+    allowed = BAD[spoil] if priors else BAD[spoil] | {Status.CONVERGED, Status.STALLED, Status.MAX_ITERATIONS}
+    if BAD[spoil] == {Status.NO_MEASUREMENTS}:
+        allowed = BAD[spoil]
+    assert found.status in allowed
+
+
+@pytest.mark.parametrize("temporal", [Temporal(0.0, 0.0), Temporal(0.0, 1e4), Temporal(1e4, 0.0)])
+def test_a_pose_prior_counts_where_it_weighs_something(temporal):
+    body, state = scene(9)
+    pulled = with_previous(Measurements(), State(*state), temporal)
+    found = fit(body, pulled, init=State.rest(K, P))
+    weighs = temporal.root_rotation > 0.0 or temporal.root_position > 0.0
+    assert found.measurements == int(weighs)
+    assert (found.status is Status.NO_MEASUREMENTS) != weighs
+
+
+def test_nothing_measured_returns_the_initial_state():
+    body, state = scene(9)
+    found = fit(body, Measurements(), init=State(*state))
+    np.testing.assert_allclose(found.state.Omega, state[2], atol=1e-12)
+    assert found.measurements == 0
+
+
+def test_a_state_that_is_not_finite_is_reported():
+    body, state = scene(9)
+    found = fit(body, measured(body, state), init=State(state[0], np.array([0.0, np.nan, 1.0]), *state[2:]))
+    assert found.status is Status.NON_FINITE
+
+
+@pytest.mark.parametrize(
+    ("measurements", "message"),
+    [
+        (Measurements(INTRINSICS, Keypoints2D([0, 1], [[0.0, 0.0]], [1.0, 1.0])), r"\(2, 2\), but got shape \(1, 2\)"),
+        (Measurements(None, Keypoints2D([0], [[0.0, 0.0]], [1.0])), "intrinsics"),
+        (Measurements(np.eye(4), Keypoints2D([0], [[0.0, 0.0]], [1.0])), r"\(3, 3\), but got shape \(4, 4\)"),
+        (Measurements(keypoints3d=Keypoints3D([0], [[0.0, 0.0]], [1.0])), r"\(1, 3\), but got shape \(1, 2\)"),
+        (Measurements(keypoints3d=Keypoints3D([M + K + 1], [[0.0, 0.0, 1.0]], [1.0])), f"0..{M + K}"),
+        (Measurements(keypoints3d=Keypoints3D([0.5], [[0.0, 0.0, 1.0]], [1.0])), "integers"),
+        (
+            Measurements(orientation_field=OrientationField([0], [M - 1], [[0, 0, 1.0]], [1.0])),
+            "no body part has in common",
+        ),
+        (Measurements(pose_priors=PosePriors([0], np.eye(3), np.zeros((1, 3)), [1.0], [1.0])), r"\(1, 3, 3\)"),
+        (Measurements(tables={"nonesuch": (np.zeros((0, 1)), np.zeros((0, 1)))}), "pose_prior, joint_prior"),
+        (Measurements(tables={"joint_limits": (np.zeros((1, 1), int), np.zeros((1, 3)))}), "joint_limits"),
+    ],
+)
+def test_wrong_shapes_are_refused_with_what_was_expected(measurements, message):
+    body, _ = scene(10)
+    with pytest.raises(ShapeError, match=message):
+        fit(body, measurements)
+
+
+INDICES = {
+    "pose_prior": ([-1, K + 1], f"Parts of 'pose_prior' must lie in 0..{K}"),
+    "joint_prior": ([0, K + 1], f"Joints of 'joint_prior' must lie in 1..{K}"),
+    "joint_limits": ([0, K + 1], f"Joints of 'joint_limits' must lie in 1..{K}"),
+    "joint_flow": ([-1, K + 1], f"Parts of 'joint_flow' must lie in 0..{K}"),
+    "foot_contact": ([-1, M + K + 1], f"Points of 'foot_contact' must lie in 0..{M + K}"),
+    "floor": ([-1, M + K + 1], f"Points of 'floor' must lie in 0..{M + K}"),
+}
+
+
+@pytest.mark.parametrize("name", INDICES)
+def test_rows_of_tables_that_point_outside_the_body_are_refused(name):
+    body, state = scene(10)
+    module, (outside, message) = RESIDUALS[name], INDICES[name]
+    for index in outside:
+        table = np.full((1, module.INTS), index), np.ones((1, module.FLOATS))
+        with pytest.raises(ShapeError, match=f"{message}, but go from {index} to {index}"):
+            fit(body, replace(measured(body, state), tables={name: table}))
+        if name in ("joint_limits", "joint_flow"):
+            with pytest.raises(ShapeError, match=message):
+                fit(body, measured(body, state), priors=Priors(**{name.removeprefix("joint_"): table}))
+
+
+@pytest.mark.parametrize("prior", ["limits", "flow"])
+def test_tables_of_priors_of_other_widths_are_refused(prior):
+    body, state = scene(10)
+    module = RESIDUALS[f"joint_{prior}"]
+    message = rf"'joint_{prior}' must have shapes \(n, {module.INTS}\) and \(n, {module.FLOATS}\)"
+    right = np.ones((1, module.INTS), int), np.ones((1, module.FLOATS))
+    for table in ((right[0], np.ones((1, 3))), (right[0][0], right[1]), (right[0], np.ones((2, module.FLOATS)))):
+        with pytest.raises(ShapeError, match=message):
+            fit(body, measured(body, state), priors=Priors(**{prior: table}))
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: Weights(tables={"nosuch": 5.0}), "no residual named 'nosuch'; the registered ones are pose_prior"),
+        (lambda: Weights(tables={"keypoints2d": 5.0}), "no residual named 'keypoints2d'"),
+        (lambda: Options(damping=np.nan), "damping must be positive and finite, but is nan"),
+        (lambda: Options(damping=0.0), "damping must be positive"),
+        (lambda: Options(root_length=0), "root_length must be positive and finite, but is 0"),
+        (lambda: Options(root_length=np.inf), "root_length must be positive and finite, but is inf"),
+        (lambda: Options(triggs=5), "triggs must lie in 0..1, but is 5"),
+        (lambda: Options(triggs=np.nan), "triggs must lie in 0..1, but is nan"),
+    ],
+)
+def test_options_that_no_fit_could_use_are_refused(make, message):
+    with pytest.raises(ShapeError, match=message):
+        make()
+
+
+@pytest.mark.parametrize("warm", [True, False])
+def test_an_empty_schedule_is_refused_and_none_is_the_default(warm):
+    body, state = scene(10)
+    m = measured(body, state)
+    init = State.rest(K, P) if warm else None
+    for stages in ([], ()):
+        with pytest.raises(ShapeError, match="at least one stage"):
+            fit(body, m, init=init, options=Options(stages=stages))
+        with pytest.raises(ShapeError, match="at least one stage"):
+            fit_clip(body, [m], init=[init] if warm else None, options=Options(stages=stages))
+    default = WARM_STAGES if warm else COLD_STAGES
+    costs = [fit(body, m, init=init, options=Options(stages=stages)).cost for stages in (None, default)]
+    assert costs[0] == costs[1]
+
+
+def test_wrong_states_priors_and_trees_are_refused():
+    body, state = scene(11)
+    m = measured(body, state)
+    with pytest.raises(ShapeError, match=r"Omega must have shape \(23, 3, 3\), but got shape \(22, 3, 3\)"):
+        fit(body, m, init=State(state[0], state[1], state[2][1:], state[3]))
+    with pytest.raises(ShapeError, match="shape prior"):
+        fit(body, m, priors=Priors(shape_mean=np.zeros(3)))
+    body.parents = np.array([-1, 2, 1, *range(2, 23)])
+    with pytest.raises(ShapeError, match="before their children"):
+        fit(body, m)

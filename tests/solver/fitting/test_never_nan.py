@@ -1,0 +1,156 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Whatever is measured, of whatever body: a finite pose, an honest status, and the same bits again."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scope.solver import (
+    Floor,
+    FootContacts,
+    Keypoints2D,
+    Keypoints3D,
+    Measurements,
+    Options,
+    PosePriors,
+    ShapeError,
+    State,
+    Status,
+    fit,
+    fit_clip,
+)
+from scope.solver.measurements import LARGEST
+
+from ..synthetic import random_body, random_state
+from .test_frame_solver import INTRINSICS, measured
+
+STOPPED = {Status.CONVERGED, Status.STALLED, Status.MAX_ITERATIONS}
+BODIES = {"P0": (23, 0), "K51": (51, 10), "P300": (23, 300), "one joint": (1, 0)}
+
+
+def masked(m, value):
+    """Every kind of measurement with `value` in place of its confidence."""
+    kinds = ("keypoints2d", "keypoints3d", "orientation_field")
+    fields = {k: replace(getattr(m, k), confidence=np.full(len(getattr(m, k).confidence), value)) for k in kinds}
+    return replace(m, **fields)
+
+
+def contradiction(m):
+    k = m.keypoints3d
+    indices, ones = np.tile(k.indices, 2), np.ones(2 * len(k.indices))
+    return replace(m, keypoints3d=Keypoints3D(indices, np.concatenate([k.points, 1.0 - k.points[::-1]]), ones))
+
+
+def beneath_its_own_floor(m):
+    """A floor above the head, and feet that are said to stand still far away in two places at once."""
+    feet = np.array([0, 1, 0, 1])
+    where = np.array([[5.0, 0, 0], [-5.0, 0, 0], [-5.0, 0, 0], [5.0, 0, 0]])
+    floor = Floor(np.arange(2), [0.0, -1.0, 0.0], 50.0, np.ones(2))
+    return replace(m, floor=floor, foot_contacts=FootContacts(feet, where, np.ones(4)))
+
+
+def half_turned(m):
+    """A pose prior against the measurements: half a turn away, and stronger."""
+    return replace(m, pose_priors=PosePriors([0], np.diag([-1.0, -1.0, 1.0])[None], [[0.0, 0, -3]], [1e7], [1e7]))
+
+
+def mirrored(m):
+    """Points behind the camera, where the image says they are in front."""
+    return replace(m, keypoints3d=replace(m.keypoints3d, points=-m.keypoints3d.points))
+
+
+def gathered(m):
+    """All points in the camera's centre."""
+    return replace(m, keypoints3d=replace(m.keypoints3d, points=0.0 * m.keypoints3d.points))
+
+
+SPOILED = {
+    "nothing": (lambda m: Measurements(), {Status.NO_MEASUREMENTS}),
+    "no confidence": (lambda m: masked(m, 0.0), {Status.NO_MEASUREMENTS}),
+    "confidence not a number": (lambda m: masked(m, np.nan), {Status.NO_MEASUREMENTS}),
+    "one point": (lambda m: Measurements(INTRINSICS, Keypoints2D([0], [[100.0, 100.0]], [1.0])), STOPPED),
+    "behind the camera": (mirrored, STOPPED),
+    "all in the camera": (gathered, STOPPED),
+    "contradictory": (contradiction, STOPPED),
+    "beneath its own floor": (beneath_its_own_floor, STOPPED),
+    "against its prior": (half_turned, STOPPED),
+}
+
+
+@pytest.fixture(scope="module", params=BODIES.values(), ids=BODIES)
+def scene(request):
+    K, P = request.param
+    rng = np.random.default_rng(K + P)
+    body = random_body(rng, K, P, 2 * (K + 1), 0.02 if P < 100 else 0.004)
+    return body, measured(body, random_state(rng, K, P, 0.4)), State.rest(K, P)
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("warm", [True, False], ids=["warm", "cold"])
+@pytest.mark.parametrize("spoiled", SPOILED.values(), ids=SPOILED)
+def test_any_body_ends_in_a_finite_pose(scene, spoiled, warm):
+    body, m, rest = scene
+    spoil, allowed = spoiled
+    found, again = (fit(body, spoil(m), init=rest if warm else None) for _ in range(2))
+    s = found.state
+    for array in (s.R_camera_root, s.t_camera_root, s.Omega, s.beta, found.t_camera_part, found.beta_information):
+        assert np.isfinite(array).all()
+    assert np.isfinite(found.cost)
+    assert np.abs(s.Omega @ np.swapaxes(s.Omega, 1, 2) - np.eye(3)).max() < 1e-9
+    assert found.status in allowed
+    assert found.rejected <= found.iterations
+    np.testing.assert_array_equal(found.state.Omega, again.state.Omega)
+    assert (found.cost, found.status, found.iterations) == (again.cost, again.status, again.iterations)
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf, 1e160, -1e40])
+def test_one_bad_value_masks_its_own_measurement_and_nothing_else(bad):
+    rng = np.random.default_rng(4)
+    body = random_body(rng, 23, 10, 48)
+    m = measured(body, random_state(rng, 23, 10, 0.4))
+    spoiled, without = masked(m, 1.0), masked(m, 1.0)
+    for name, field in (("keypoints2d", "pixels"), ("keypoints3d", "points"), ("orientation_field", "directions")):
+        broken = np.array(getattr(getattr(m, name), field))
+        broken[5, 1] = bad
+        getattr(without, name).confidence[5] = 0.0
+        spoiled = replace(spoiled, **{name: replace(getattr(spoiled, name), **{field: broken})})
+    a, b = fit(body, spoiled), fit(body, without)
+    assert a.measurements == b.measurements
+    np.testing.assert_array_equal(a.t_camera_part, b.t_camera_part)
+
+
+@pytest.mark.parametrize("size", [1e29, 1e30, 1e160])
+def test_no_value_however_large_spoils_the_frames_of_a_clip(size):
+    """Robust or not; below the largest they may draw a frame away, but leave the cost finite."""
+    rng = np.random.default_rng(5)
+    body = random_body(rng, 23, 10, 48)
+    m = measured(body, random_state(rng, 23, 10, 0.4))
+    ones, far = np.ones(1), np.array([[size, 0.0, size]])
+    image, space = np.array(m.keypoints2d.pixels), np.array(m.keypoints3d.points)
+    image[3], space[4] = size * INTRINSICS[0, 0], size
+    spoiled = replace(
+        m,
+        keypoints2d=replace(m.keypoints2d, pixels=image),
+        keypoints3d=replace(m.keypoints3d, points=space),
+        foot_contacts=FootContacts([0], far, ones),
+        pose_priors=PosePriors([0], np.eye(3)[None], far, ones, ones),
+        floor=Floor([0], [0.0, -1.0, 0.0], size, ones),
+    )
+    for robust in (0.01, np.inf):
+        options = Options(robust_keypoints2d=robust, robust_keypoints3d=robust)
+        found = fit_clip(body, [m, spoiled, m], options=options)
+        assert found.status in STOPPED
+        assert np.isfinite(found.cost)
+        if size >= LARGEST:
+            assert found.iterations > 0
+            assert found.frames[1].measurements == found.frames[0].measurements
+            np.testing.assert_allclose(found.frames[1].t_camera_part, found.frames[0].t_camera_part, atol=0.05)
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf])
+def test_intrinsics_that_are_not_finite_are_refused(bad):
+    body = random_body(np.random.default_rng(0), 3, 2, 8)
+    K = INTRINSICS.copy()
+    K[0, 2] = bad
+    with pytest.raises(ShapeError, match="finite"):
+        fit(body, Measurements(K, Keypoints2D([0], [[1.0, 1.0]], [1.0])))

@@ -1,0 +1,65 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a fit tells of itself: what the cost is made of, how many steps were rejected, why it stopped."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scope.solver import FootContacts, Options, Stage, Status, Temporal, default_priors, fit, fit_clip, load_body
+from scope.solver.fitting.report import COLUMNS
+
+from ..residuals.test_foot_contact import BODY, FEET, INTRINSICS, points, seen, standing
+from .test_frame_solver import measured, scene
+
+REPORT = Options(report=True)
+
+
+def test_the_shares_add_up_to_the_cost_and_name_what_was_measured():
+    body, state = scene(2)
+    found = fit(body, measured(body, state, noise=1.0), options=REPORT)
+    assert sum(found.cost_by_term.values()) == pytest.approx(found.cost, rel=1e-10)
+    assert set(found.cost_by_term) <= set(COLUMNS)
+    used = {name for name, cost in found.cost_by_term.items() if cost > 0.0}
+    assert {"keypoints2d", "keypoints3d", "orientation_field", "joint_prior", "shape_prior"} <= used
+    assert not used & {"pose_prior", "foot_contact", "floor"}
+    assert fit(body, measured(body, state)).cost_by_term == {}
+
+
+def test_a_share_is_the_residuals_own_cost():
+    """Of a single contact without anything else: half weight times squared distance."""
+    state = standing()
+    stand = points(state)[FEET[:1]] + [0.0, 0.0, 0.1]
+    m = replace(seen(state), foot_contacts=FootContacts(FEET[:1], stand, [0.5]))
+    still = Options(stages=[Stage(max_iterations=0)], report=True)
+    found = fit(BODY, m, init=state, options=still)
+    assert found.cost_by_term["foot_contact"] == pytest.approx(0.5 * 4e4 * 0.5 * 0.01, rel=1e-9)
+    assert found.cost_by_term["keypoints3d"] == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.mark.parametrize("focal", [False, True])
+def test_a_clips_shares_count_the_shape_once(focal):
+    state = standing(1)
+    frames = [seen(state, 0.02, seed) for seed in range(4)]
+    found = fit_clip(BODY, frames, options=REPORT, temporal=Temporal(), focal=focal)
+    assert sum(found.cost_by_term.values()) == pytest.approx(found.cost, rel=1e-9)
+    beta = found.beta
+    assert found.cost_by_term["shape_prior"] == pytest.approx(0.5 * 100.0 * float(beta @ beta), rel=1e-9)
+    assert ("focal_prior" in found.cost_by_term) == focal
+
+
+def test_rejected_steps_are_counted_among_the_iterations():
+    """Keypoints that contradict each other, from a bad start and hardly damped: not every step can be right."""
+    body, state = scene(4, angle=1.5)
+    m = measured(body, state, noise=30.0)
+    found = fit(body, m, options=Options(damping=1e-9))
+    assert 0 < found.rejected < found.iterations
+    assert found.status in (Status.CONVERGED, Status.STALLED, Status.MAX_ITERATIONS)
+    short = fit(body, m, options=Options(stages=[Stage(max_iterations=2, tolerance=0.0)]))
+    assert (short.status, short.iterations) == (Status.MAX_ITERATIONS, 2)
+
+
+def test_priors_of_a_real_body_show_in_the_report():
+    body = load_body("scope")
+    found = fit(body, replace(seen(standing(2)), intrinsics=INTRINSICS), priors=default_priors(body), options=REPORT)
+    assert found.cost_by_term["joint_flow"] > 0.0
+    assert np.isfinite(list(found.cost_by_term.values())).all()

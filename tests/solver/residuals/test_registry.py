@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A contributor's residual: one new file, its import and one line in the registry, tried on a copy of the solver."""
+
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[3]
+
+RESIDUAL = '''
+"""A joint that is drawn to one height of the image: r = sqrt(w) (t_y - height), metres."""
+import numpy as np
+from ..compiled.kernel import kernel
+from .accumulation import add_to_point
+INTS, FLOATS = 1, 2  # part;  height, w
+INDEXES = "parts"
+
+@kernel
+def accumulate(tree, ints, floats, weight, inv_sigma, triggs, pose, blocks):
+    cost = 0.0
+    for k in range(ints.shape[0]):
+        r, w = pose.t[ints[k, 0], 1] - floats[k, 0], weight * floats[k, 1]
+        cost += 0.5 * w * r * r
+        point = tree.keypoints + ints[k, 0]
+        add_to_point(tree, pose, blocks, point, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, w, 0.0, 0.0, 0.0, w * r, 0.0)
+    return cost
+'''
+
+USE = """
+import sys
+import numpy as np
+sys.path.insert(0, sys.argv[1])
+from copied import solver
+from copied.solver.residuals import toy
+body = type("Body", (), {})()
+body.parents = np.array([-1, 0, 1])
+body.S, body.l = np.zeros((3, 3, 1)), np.array([[0, 0, 0], [0, 0.3, 0], [0.4, 0, 0]])
+body.keypoint_part, body.v_bar, body.V = np.zeros(1, int), np.zeros((1, 3)), np.zeros((1, 3, 1))
+seen = solver.Keypoints3D([1], [[0.0, 0.0, 3.0]], [1.0])  # the pelvis
+free = solver.Priors(joint_weights=np.zeros(2))
+weights = solver.Weights(shape=1.0, tables={"toy": 1e4})
+options = solver.Options(stages=[solver.Stage(weights, 1e-14, 200)], report=True)
+
+def fitted(part):
+    rows = np.array([[part]]), np.array([[-0.5, 1.0]])
+    return solver.fit(body, solver.Measurements(keypoints3d=seen, tables={"toy": rows}), priors=free, options=options)
+
+found = fitted(2)
+print(found.t_camera_part[2, 1], found.cost_by_term["toy"], found.status.name)
+for part, declared in ((3, True), (-1, True), (-1, False)):
+    if not declared and hasattr(toy, "INDEXES"):
+        del toy.INDEXES
+    try:
+        fitted(part)
+    except solver.ShapeError as error:
+        print(error)
+"""
+
+
+def test_one_file_its_import_and_one_line_add_a_residual(tmp_path):
+    copied = tmp_path / "copied"
+    shutil.copytree(ROOT / "solver", copied / "solver", ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copytree(ROOT / "assets" / "body", copied / "assets" / "body")
+    (copied / "__init__.py").touch()
+    (copied / "solver" / "residuals" / "toy.py").write_text(RESIDUAL)
+    registry = copied / "solver" / "residuals" / "registry.py"
+    text = registry.read_text()
+    text = text.replace('    "floor": floor,\n', '    "floor": floor,\n    "toy": toy,\n')
+    registry.write_text(text.replace("import floor,", "import toy, floor,"))  # the import is what the line needs
+    done = subprocess.run([sys.executable, "-c", USE, str(tmp_path)], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    first, *refused = done.stdout.splitlines()
+    height, cost, status = first.split()
+    assert abs(float(height) + 0.5) < 1e-3  # within the chain's reach
+    assert float(cost) < 1e-2
+    assert status in ("CONVERGED", "STALLED")
+    assert refused == [
+        "Parts of 'toy' must lie in 0..2, but go from 3 to 3.",
+        "Parts of 'toy' must lie in 0..2, but go from -1 to -1.",
+        "Indices of 'toy' must not be negative, but go from -1 to -1.",
+    ]

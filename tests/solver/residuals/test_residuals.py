@@ -1,0 +1,321 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Every residual through one derivative helper, and every kernel against its residual's JᵀJ and Jᵀr."""
+
+import inspect
+
+import numpy as np
+import pytest
+from scope.solver import Options, Priors, State, make_tree, rotations
+from scope.solver.compiled.part import GRADIENT, SHAPE, Part
+from scope.solver.gauss_newton.linearize import linearize, make_blocks, make_pose, place_parts
+from scope.solver.gauss_newton.recursion import make_workspace
+from scope.solver.gauss_newton.terms import make_terms
+from scope.solver.measurements import Keypoints2D, Keypoints3D, Measurements, OrientationField
+from scope.solver.options import Stage, Weights
+from scope.solver.residuals import (
+    floor,
+    foot_contact,
+    joint_flow,
+    joint_limits,
+    joint_prior,
+    keypoint2d,
+    keypoint3d,
+    orientation_field,
+    pose_prior,
+    registry,
+    robust,
+    shape_prior,
+)
+
+from ..synthetic import INTRINSICS, random_body, random_flow, random_state
+
+P = 6
+AXIS = np.array([0.6, 0.0, 0.8])
+
+
+def random_part(rng, scale=1.0):
+    """A part in front of the camera; `scale` times the angle of a random joint state."""
+    R_parent = rotations.exp(rng.standard_normal(3))
+    Omega = rotations.exp(scale * rng.standard_normal(3))
+    t = np.array([0.2, -0.1, 3.0]) + 0.3 * rng.standard_normal(3)
+    D = 0.1 * rng.standard_normal((3, P))
+    return Part(R_parent @ Omega, t, D, Omega, R_parent, t + 0.4 * rng.standard_normal(3), rng.standard_normal(P))
+
+
+def moved(part, x, u, dbeta):
+    """The part moved by a twist about its origin of twists, with its joint and the shape, by their definition."""
+    w, nu = x[:3], x[3:]
+    E = rotations.exp(w)
+    return Part(
+        E @ part.R,
+        part.t + np.cross(w, part.t - part.origin) + nu + part.D @ dbeta,
+        part.D,
+        part.R_parent.T @ rotations.exp(u) @ part.R_parent @ part.Omega,
+        part.R_parent,
+        part.origin,
+        part.beta + dbeta,
+    )
+
+
+def check_derivatives(evaluate, part, atol=2e-7, h=1e-6):
+    """Compare a residual's three Jacobians with central differences; return the linearization."""
+    found = evaluate(part)
+    for name, size, place in (("J_x", 6, 0), ("J_u", 3, 1), ("J_beta", P, 2)):
+        numeric = np.zeros((len(found.r), size))
+        for k in range(size):
+            d = [np.zeros(6), np.zeros(3), np.zeros(P)]
+            d[place][k] = h
+            numeric[:, k] = (evaluate(moved(part, *d)).r - evaluate(moved(part, *(-v for v in d))).r) / (2 * h)
+        scale = max(1.0, np.abs(numeric).max())
+        np.testing.assert_allclose(getattr(found, name), numeric, atol=atol * scale, err_msg=name)
+    return found
+
+
+V_BAR, V = 0.2 * np.random.default_rng(8).standard_normal(3), 0.05 * np.random.default_rng(9).standard_normal((3, P))
+L = np.random.default_rng(10).standard_normal((P, P))
+HAT = rotations.exp([0.2, -0.5, 0.3])
+FLOW = random_flow(np.random.default_rng(11), HAT)
+
+CASES = {
+    "keypoint2d": lambda part, w: keypoint2d.evaluate(part, V_BAR, V, np.array([0.1, 0.2]), w, 1.2),
+    "keypoint3d": lambda part, w: keypoint3d.evaluate(part, V_BAR, V, np.array([0.1, 0.2, 3.1]), w),
+    "orientation_field": lambda part, w: orientation_field.evaluate(part, V_BAR, V, AXIS, w),
+    "foot_contact": lambda part, w: foot_contact.evaluate(part, V_BAR, V, np.array([0.1, 0.2, 3.1]), w),
+    "floor": lambda part, w: floor.evaluate(part, V_BAR, V, AXIS, 9.0, 2.0, 0.0, w),
+    "floor_above": lambda part, w: floor.evaluate(part, V_BAR, V, AXIS, -9.0, 2.0, 3.0, w),
+    "pose_prior": lambda part, w: pose_prior.evaluate(part, HAT, np.array([0.1, 0.1, 2.5]), 2.0, 3.0, w),
+    "joint_prior": lambda part, w: joint_prior.evaluate(part, HAT, w),
+    "joint_flow": lambda part, w: joint_flow.evaluate(part, FLOW, w),
+    "joint_flow_log_det": lambda part, w: joint_flow.evaluate(part, FLOW, w, 0.6),
+    "joint_limits": lambda part, w: joint_limits.evaluate(part, AXIS, -0.1, 0.1, 0.05, 2.0, 3.0, w),
+    "shape_prior": lambda part, w: shape_prior.evaluate(part, np.ones(P), L @ L.T, w),
+}
+
+
+@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("seed", range(4))
+def test_derivatives_at_random_states(name, seed):
+    check_derivatives(lambda part: CASES[name](part, 1.7), random_part(np.random.default_rng(seed)))
+
+
+@pytest.mark.parametrize("name", ["joint_prior", "joint_flow", "joint_flow_log_det", "pose_prior", "joint_limits"])
+@pytest.mark.parametrize("angle", [0.0, 1e-9, 1e-5, 1e-2, 3.0, np.pi - 1e-3])
+def test_derivatives_near_identity_and_near_pi(name, angle):
+    rng = np.random.default_rng(3)
+    part = random_part(rng)
+    axis = rng.standard_normal(3)
+    turn = rotations.exp(angle * axis / np.linalg.norm(axis))
+    if name == "pose_prior":
+        part.R = HAT @ turn
+    else:
+        part.Omega = (np.eye(3) if name == "joint_limits" else HAT) @ turn
+    if name == "joint_limits":  # the swing's kink is not at zero angle
+        check_derivatives(lambda p: joint_limits.evaluate(p, AXIS, -2.9, 0.4, 0.3, 2.0, 3.0), part, atol=2e-5)
+    else:
+        check_derivatives(lambda p: CASES[name](p, 1.0), part, atol=2e-5)
+
+
+def test_derivatives_behind_the_camera():
+    part = random_part(np.random.default_rng(0))
+    for depth in (-2.0, 0.02):
+        part.t[2] = depth - (part.R @ (V @ part.beta + V_BAR))[2]
+        found = check_derivatives(lambda p: CASES["keypoint2d"](p, 1.0), part)
+        assert found.r[2] > 0
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_weight_is_linear_in_the_cost(name):
+    part = random_part(np.random.default_rng(1))
+    one, four = CASES[name](part, 1.0), CASES[name](part, 4.0)
+    for a, b in zip(one, four, strict=True):
+        np.testing.assert_allclose(b, 2.0 * a, rtol=1e-14)
+
+
+def test_every_registered_residual_is_in_these_tests():
+    others = {"keypoint2d", "keypoint3d", "orientation_field", "shape_prior", "joint_flow_log_det", "floor_above"}
+    assert set(registry.RESIDUALS) | others == set(CASES)
+    for module in registry.RESIDUALS.values():
+        assert module.INDEXES in ("points", "parts", "joints")
+        assert list(inspect.signature(module.accumulate.py_func).parameters) == [
+            "tree", "ints", "floats", "weight", "inv_sigma", "triggs", "pose", "blocks",
+        ]  # fmt: skip
+
+
+def chain(seed=0):
+    """A body, its tree and a pose for the kernels."""
+    rng = np.random.default_rng(seed)
+    body = random_body(rng, 4, P, 10)
+    tree = make_tree(body)
+    return rng, body, tree, State(*random_state(rng, 4, P, angle=1.0)).pose(tree)
+
+
+def part_of(tree, pose, i):
+    j = max(tree.parents[i], 0)
+    return Part(pose.R[i], pose.t[i], pose.D[i, :, :P], pose.Omega[i], pose.R[j], pose.t[0], pose.beta[:P])
+
+
+def check_blocks(tree, blocks, cost, i, found):
+    """The blocks of part i hold JᵀJ and Jᵀr of one residual, and nothing else does."""
+    r, J_x, J_u, J_b = found
+    assert cost == pytest.approx(0.5 * r @ r, rel=1e-10)
+    for expected, got in (
+        (J_x.T @ J_x, blocks.A[i, :, :6]), (J_x.T @ r, blocks.A[i, :, GRADIENT]),
+        (J_x.T @ J_b, blocks.A[i, :, SHAPE : SHAPE + P]), (J_u.T @ J_u, blocks.H_uu[i]),
+        (J_u.T @ r, blocks.H_u[i, :, GRADIENT]), (np.triu(J_b.T @ J_b), np.triu(blocks.C[:P, :P])),
+        (J_b.T @ r, blocks.c[:P]),
+    ):  # fmt: skip
+        np.testing.assert_allclose(got, expected, atol=1e-9 * max(1.0, np.abs(expected).max()))
+    others = np.arange(len(tree.parents)) != i
+    assert not blocks.A[others].any()
+    assert not blocks.H_uu[others].any()
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize(
+    "name",
+    [
+        *("pose_prior", "joint_prior", "joint_flow", "joint_flow_log_det", "joint_limits"),
+        *("foot_contact", "floor", "floor_above", "foot_contact_of_a_joint"),
+    ],
+)
+def test_table_kernels_accumulate_their_residual(name, seed):
+    rng, body, tree, pose = chain(seed)
+    i, w = 3, 1.9
+    k = int(np.flatnonzero(body.keypoint_part == i)[0])
+    v_bar, shape = body.v_bar[k], body.V[k]
+    part = part_of(tree, pose, i)
+    if name == "pose_prior":
+        tables = pose_prior.pack([i], HAT[None], np.array([[0.1, 0.1, 2.5]]), [2.0], [3.0])
+        found = pose_prior.evaluate(part, HAT, np.array([0.1, 0.1, 2.5]), 2.0, 3.0, w)
+    elif name == "joint_prior":
+        tables = joint_prior.pack([i], HAT[None], [2.0])
+        found = joint_prior.evaluate(part, HAT, 2.0 * w)
+    elif name.startswith("joint_flow"):
+        h = 0.7 if name.endswith("log_det") else 0.0
+        tables = joint_flow.pack([i], FLOW[None], [2.0], h)
+        found = joint_flow.evaluate(part, FLOW, 2.0 * w, h)
+        name = "joint_flow"
+    elif name.startswith("foot_contact"):
+        if name.endswith("joint"):
+            k, v_bar, shape = 10 + i, np.zeros(3), np.zeros((3, P))
+        tables = foot_contact.pack([k], np.array([[0.1, 0.2, 3.1]]), [2.0])
+        found = foot_contact.evaluate(part, v_bar, shape, np.array([0.1, 0.2, 3.1]), 2.0 * w)
+        name = "foot_contact"
+    elif name.startswith("floor"):
+        offset = -9.0 if name.endswith("above") else 9.0
+        tables = floor.pack([k], AXIS, offset, [2.0], [3.0])
+        found = floor.evaluate(part, v_bar, shape, AXIS, offset, 2.0, 3.0, w)
+        name = "floor"
+    else:
+        tables = joint_limits.pack([i], AXIS[None], [-0.1], [0.1], [0.05], [2.0], [3.0])
+        found = joint_limits.evaluate(part, AXIS, -0.1, 0.1, 0.05, 2.0, 3.0, w)
+    blocks = make_blocks(tree)
+    cost = registry.RESIDUALS[name].accumulate(tree, *tables, w, 0.0, 0.0, pose, blocks)
+    check_blocks(tree, blocks, cost, i, found)
+
+
+MEASURED = {
+    "image": (lambda i: {"keypoints2d": Keypoints2D([i], [[700.0, 300.0]], [0.5])}),
+    "space": (lambda i: {"keypoints3d": Keypoints3D([i], [[0.2, 0.1, 4.2]], [0.5])}),
+    "direction": (lambda i: {"orientation_field": OrientationField([10 + i // 2], [i], [AXIS], [0.5])}),
+}
+
+
+@pytest.mark.parametrize("behind", [False, True])
+@pytest.mark.parametrize("way", MEASURED)
+def test_measurement_kernel_accumulates_its_residual(way, behind):
+    _, body, tree, pose = chain(2)
+    if behind:
+        pose.t[0, 2] -= 5.0
+        place_parts(tree, pose)
+    j = 7
+    i = int(body.keypoint_part[j])
+    measurements = Measurements(INTRINSICS, **MEASURED[way](j))
+    if way == "direction":
+        measurements.orientation_field.starts = [10 + i]
+    weights = Weights(
+        shape=0.0, joint_prior=0.0, joint_limits=0.0, keypoints2d=30.0, keypoints3d=40.0, orientation_field=50.0
+    )
+    off = Options(robust_keypoints2d=np.inf, robust_keypoints3d=np.inf, robust_orientation_field=np.inf)
+    table, _, _ = off.stage_table([Stage(weights)])
+    blocks = make_blocks(tree)
+    cost = linearize(
+        tree, make_terms(tree, measurements, Priors()), table[0], 0.0, pose, blocks, make_workspace(tree).scratch
+    )
+    part = part_of(tree, pose, i)
+    uv = np.array([(700.0 - 640.0) / 1100.0, (300.0 - 360.0) / 1080.0])
+    found = {
+        "image": lambda: keypoint2d.evaluate(part, body.v_bar[j], body.V[j], uv, 15.0),
+        "space": lambda: keypoint3d.evaluate(part, body.v_bar[j], body.V[j], np.array([0.2, 0.1, 4.2]), 20.0),
+        "direction": lambda: orientation_field.evaluate(part, body.v_bar[j], body.V[j], AXIS, 25.0),
+    }[way]()
+    check_blocks(tree, blocks, cost, i, found)
+
+
+def test_direction_between_two_joints_and_between_two_keypoints_of_one_part():
+    rng = np.random.default_rng(4)
+    body = random_body(rng, 4, P, 10)
+    body.parents = np.array([-1, 0, 0, 1, 2])
+    tree = make_tree(body)
+    pose = State(*random_state(rng, 4, P)).pose(tree)
+    points = np.einsum("mij,mj->mi", pose.R[tree.point_part], tree.V[:, :, :P] @ pose.beta[:P] + tree.v_bar)
+    points += pose.t[tree.point_part]
+    table, _, _ = Options().stage_table([Stage(Weights(shape=0.0, joint_prior=0.0))])
+    for start, end in ((11, 12), (10, 11), (11, 13), (6, 7), (13, 6), (6, 13)):
+        field = OrientationField([start], [end], [points[end] - points[start]], [1.0])
+        terms = make_terms(tree, Measurements(orientation_field=field), Priors())
+        cost = linearize(tree, terms, table[0], 0.0, pose, make_blocks(tree), make_workspace(tree).scratch)
+        assert cost == pytest.approx(0.0, abs=1e-20), (start, end)
+
+
+def test_geman_mcclure_and_its_derivative():
+    for s in (0.0, 1e-4, 0.02, 3.0):
+        rho, slope = robust.geman_mcclure(s, 1 / 0.02)
+        assert rho == pytest.approx(0.02 * s / (0.02 + s))
+        h = 1e-7
+        numeric = (robust.geman_mcclure(s + h, 50.0)[0] - robust.geman_mcclure(s - h, 50.0)[0]) / (2 * h)
+        assert slope == pytest.approx(numeric, rel=1e-6)
+    assert robust.geman_mcclure(5.0, 0.0) == (5.0, 1.0)
+
+
+@pytest.mark.parametrize("way", MEASURED)
+def test_triggs_correction_is_the_second_derivative_along_the_residual(way):
+    """With 4 (s/sigma) k below the clamp, W = dp-Hessian of the kernel with linearized r."""
+    rng = np.random.default_rng(0)
+    p = np.array([0.3, -0.2, 3.0])
+    inv_sigma, w = 3.0, 2.0
+    if way == "image":
+        uv = (0.15, 0.1)
+        out = keypoint2d.term(*p, *uv, 1.0, w, inv_sigma, 0.99)
+        W, G = out[1:7], np.array([[1, 0, -p[0] / p[2]], [0, 1, -p[1] / p[2]]]) / p[2]
+        r = p[:2] / p[2] - uv
+    elif way == "space":
+        m = p + 0.1 * rng.standard_normal(3)
+        _, scale, kappa, *f = keypoint3d.term(*p, *m, w, inv_sigma, 0.99)
+        full = scale * np.eye(3) - kappa * np.outer(f, f)
+        W, G, r = full[np.triu_indices(3)], np.eye(3), p - m
+    else:
+        n = np.array([0.2, -0.1, 1.0]) / np.linalg.norm([0.2, -0.1, 1.0])
+        W = orientation_field.term(*p, *n, w, inv_sigma, 0.99)[1:7]
+        unit = p / np.linalg.norm(p)
+        G, r = (np.eye(3) - np.outer(unit, unit)) / np.linalg.norm(p), unit - n
+    s = r @ r
+    k = 1 / (1 + s * inv_sigma)
+    expected = w * k**2 * (G.T @ G - 4 * inv_sigma * k * np.outer(G.T @ r, G.T @ r))
+    np.testing.assert_allclose(W, expected[np.triu_indices(3)], rtol=1e-9, atol=1e-12)
+
+
+def test_knees_and_elbows_bend_the_right_way():
+    """In SMPL's T-pose (x left, y up, z forward) a bent knee takes the foot back, a bent elbow the hand forward."""
+    rest = {
+        "left_knee": [0, -1.0, 0],
+        "right_knee": [0, -1.0, 0],
+        "left_elbow": [1.0, 0, 0],
+        "right_elbow": [-1.0, 0, 0],
+    }
+    ints, floats = joint_limits.hinges_of(["pelvis", *rest])
+    assert ints.ravel().tolist() == [1, 2, 3, 4]
+    for row, (name, bone) in zip(floats, rest.items(), strict=True):
+        end = rotations.exp(0.5 * (row[3] + row[4]) * row[:3]) @ bone
+        assert end[2] < -0.5 if "knee" in name else end[2] > 0.5
+    assert make_pose(make_tree(random_body(np.random.default_rng(0), 3, 0, 0))).beta.size == 0

@@ -1,0 +1,108 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Results are whole or not there at all, links to them stay links, and what is no file stays what it is."""
+
+from __future__ import annotations
+
+import os
+import socket
+
+import pytest
+from scope.scope_addon.atomic_write import written_beside
+from scope.scope_addon.errors import OutputError
+from scope.scope_addon.scene.export.output_paths import check_output
+
+
+def write(path, text="new"):
+    with written_beside(path) as temporary:
+        temporary.write_text(text)
+
+
+@pytest.fixture
+def link(tmp_path):
+    """A link beside a folder, to a file in it that is not there yet, as who keeps results on another disk makes it."""
+    (tmp_path / "disk").mkdir()
+    path = tmp_path / "walk.npz"
+    path.symlink_to("disk/kept.npz")
+    return path
+
+
+@pytest.mark.parametrize("earlier", [None, "earlier"])
+def test_a_link_stays_and_its_target_is_written(link, tmp_path, earlier):
+    target = tmp_path / "disk" / "kept.npz"
+    if earlier:
+        target.write_text(earlier)
+    write(check_output(link))
+    assert link.is_symlink()
+    assert target.read_text() == "new"
+    assert os.listdir(target.parent) == ["kept.npz"]
+
+
+def test_a_link_to_a_link_stays_too(link, tmp_path):
+    second = tmp_path / "disk" / "second.npz"
+    second.symlink_to(link)
+    write(second)
+    assert second.is_symlink()
+    assert link.is_symlink()
+    assert (tmp_path / "disk" / "kept.npz").read_text() == "new"
+
+
+def test_what_a_link_leads_to_survives_a_failure(link, tmp_path):
+    target = tmp_path / "disk" / "kept.npz"
+    target.write_text("earlier")
+    with pytest.raises(TypeError), written_beside(link) as temporary:
+        temporary.write_text(b"no text")
+    assert link.is_symlink()
+    assert target.read_text() == "earlier"
+    assert sorted(os.listdir(tmp_path)) == ["disk", "walk.npz"]
+    assert os.listdir(target.parent) == ["kept.npz"]
+
+
+def test_a_link_into_a_folder_that_is_not_there_is_told_before_the_work(link, tmp_path):
+    (tmp_path / "disk").rmdir()
+    with pytest.raises(OutputError, match="disk, which does not exist"):
+        check_output(link)
+
+
+def test_links_that_lead_in_a_circle_are_told(tmp_path):
+    path = tmp_path / "walk.npz"
+    path.symlink_to(path)
+    for refused in (check_output, write):
+        with pytest.raises(OutputError, match="in a circle"):
+            refused(path)
+
+
+def make_pipe(path):
+    os.mkfifo(path)
+
+
+def make_socket(path):
+    with socket.socket(socket.AF_UNIX) as server:
+        server.bind(str(path))
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="Windows keeps its pipes in no folder")
+@pytest.mark.parametrize("linked", [False, True])
+@pytest.mark.parametrize("make", [make_pipe, make_socket, os.mkdir])
+def test_what_is_no_file_is_neither_written_nor_replaced(tmp_path, monkeypatch, make, linked):
+    monkeypatch.chdir(tmp_path)  # a socket's name has to be short
+    other = tmp_path / "other"
+    make(other.relative_to(tmp_path))
+    path = tmp_path / "walk.npz"
+    if linked:
+        path.symlink_to(other)
+    else:
+        other.rename(path)
+    before = path.stat()
+    for refused in (check_output, write):
+        with pytest.raises(OutputError, match="is a device, a pipe or a socket|is a folder|a folder of that name"):
+            refused(path)
+    assert path.stat() == before
+    assert path.is_symlink() == linked
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/null"), reason="Windows has no such device")
+def test_a_device_is_refused(tmp_path):
+    path = tmp_path / "walk.npz"
+    path.symlink_to("/dev/null")
+    with pytest.raises(OutputError, match="it is a link to /dev/null, and that is a device"):
+        check_output(path)

@@ -1,0 +1,132 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""One table says which room may import which, directly or through others; nothing imports in a circle."""
+
+from __future__ import annotations
+
+import ast
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+PRODUCT = ("solver", "scope_addon")
+
+# Each room and the rooms that its files may import directly; what these may import in turn, it may reach as well.
+# A name stands for the folder and everything below it, unless a longer name fits better.
+SOLVER = {"solver": set()}
+CAPTURE = {
+    "scope_addon/capture/media": {"scope_addon/files"},
+    "scope_addon/capture/perception": {"scope_addon/kinematics"},
+    "scope_addon/capture/camera": {"scope_addon/capture/perception"},
+    "scope_addon/capture/tracking": {"scope_addon/capture/camera"},
+    "scope_addon/capture/fitting": {"scope_addon/capture/tracking", "scope_addon/capture/media"},
+    "scope_addon/capture/world": {"scope_addon/capture/fitting"},
+    "scope_addon/capture/overlay": {
+        "scope_addon/capture/media",
+        "scope_addon/capture/camera",
+        "scope_addon/capture/perception",
+    },
+    "scope_addon/capture": {"scope_addon/capture/world", "scope_addon/capture/overlay"},
+}
+ROOMS = {
+    **SOLVER,
+    "scope_addon/files": {"solver"},  # the files directly in scope_addon that every room may use, see SHARED
+    "scope_addon/kinematics": {"scope_addon/files"},
+    **CAPTURE,
+    "scope_addon/edit": {"scope_addon/kinematics"},
+    "scope_addon/retarget": {"scope_addon/edit"},
+    "scope_addon/scene": {"scope_addon/scene/character", "scope_addon/retarget"},
+    "scope_addon/scene/animation_data": {"scope_addon/files"},
+    "scope_addon/scene/character": {"scope_addon/scene/animation_data", "scope_addon/edit"},
+    "scope_addon/job": {"scope_addon/capture"},
+    "scope_addon/ui": {"scope_addon/scene", "scope_addon/job", "scope_addon/cli"},
+    "scope_addon/cli": {"scope_addon/scene", "scope_addon/job"},
+}
+SHARED = ("errors", "motion", "atomic_write", "footage", "review_spans", "__init__")
+LARGEST_FOLDER = 14  # Python files
+CAPTURE_FILES = 3  # directly in scope_addon/capture, beside its rooms
+
+
+def modules() -> list[str]:
+    """Every module of the product, as a path without its suffix; a package is its folder."""
+    paths = (p.relative_to(ROOT).with_suffix("") for top in PRODUCT for p in (ROOT / top).rglob("*.py"))
+    return sorted(str(p.parent if p.name == "__init__" else p) for p in paths)
+
+
+def room(module: str) -> str:
+    """The room of the table that a module lies in."""
+    top, _, rest = module.partition("/")
+    if top == "scope_addon" and "/" not in rest and not (ROOT / module).is_dir():
+        return "scope_addon/files" if rest in SHARED else "scope_addon/cli"
+    if module == "scope_addon":
+        return "scope_addon/files"
+    return max((name for name in ROOMS if f"{module}/".startswith(f"{name}/")), key=len)
+
+
+@cache
+def imported(module: str) -> frozenset[str]:
+    """The modules of the product that a module imports, also inside functions and for type checking."""
+    path = ROOT / module
+    package = path.is_dir()
+    base = module.split("/") if package else module.split("/")[:-1]
+    found = set()
+    for node in ast.walk(ast.parse((path / "__init__.py" if package else path.with_suffix(".py")).read_text())):
+        if isinstance(node, ast.ImportFrom) and node.level:
+            target = "/".join([*base[: len(base) - node.level + 1], *filter(None, (node.module or "").split("."))])
+            for alias in node.names:
+                inner = f"{target}/{alias.name}"
+                is_module = (ROOT / inner).is_dir() or (ROOT / inner).with_suffix(".py").is_file()
+                found.add(inner if is_module else target)
+    return frozenset(m for m in found if m.startswith(PRODUCT) and m != module)
+
+
+def reachable(name: str) -> set[str]:
+    """The rooms that a room may reach: itself, those of its row, and theirs."""
+    seen, todo = set(), [name]
+    while todo:
+        here = todo.pop()
+        if here not in seen:
+            seen.add(here)
+            todo += ROOMS[here]
+    return seen
+
+
+@pytest.mark.parametrize("module", modules())
+def test_a_module_reaches_only_rooms_of_its_row(module: str) -> None:
+    """Follow its imports to the end, so that nothing leaks in through another room."""
+    allowed, seen, todo = reachable(room(module)), set(), [(module, (module,))]
+    while todo:
+        here, chain = todo.pop()
+        for target in imported(here):
+            if target not in seen:
+                seen.add(target)
+                assert room(target) in allowed, f"{' -> '.join((*chain, target))}: not in the row of {room(module)}"
+                todo.append((target, (*chain, target)))
+
+
+def test_the_table_has_no_circle_and_no_room_that_does_not_exist() -> None:
+    for name, below in ROOMS.items():
+        assert not any(name in reachable(other) for other in below), f"{name} and a room of its row reach each other"
+        assert name in ("scope_addon/files", "scope_addon/cli") or (ROOT / name).is_dir(), f"{name} does not exist"
+
+
+def test_no_module_imports_itself_through_others() -> None:
+    done: set[str] = set()
+
+    def visit(module: str, chain: tuple[str, ...]) -> None:
+        assert module not in chain, f"import circle: {' -> '.join((*chain[chain.index(module) :], module))}"
+        if module not in done:
+            for target in imported(module):
+                visit(target, (*chain, module))
+            done.add(module)
+
+    for module in modules():
+        visit(module, ())
+
+
+def test_folders_stay_small() -> None:
+    folders = [p.parent for top in (*PRODUCT, "tests", "tools", "benchmarks") for p in (ROOT / top).rglob("*.py")]
+    for folder in set(folders):
+        assert folders.count(folder) <= LARGEST_FOLDER, f"{folder.relative_to(ROOT)}: {folders.count(folder)} files"
+    assert folders.count(ROOT / "scope_addon" / "capture") <= CAPTURE_FILES

@@ -1,0 +1,345 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The capture job and its operators: results, failures, cancelling, the cache, several scenes."""
+
+import json
+import os
+import signal
+import time
+
+import bpy
+import numpy as np
+import pytest
+from scope.scope_addon.job.process import WorkerFailedError
+from scope.scope_addon.motion import Motion
+from scope.scope_addon.scene.animation_data.actions import fcurves, read_keys
+from scope.scope_addon.scene.build import BuildOptions, build_scene
+from scope.scope_addon.ui.capture import capture_operators
+from scope.scope_addon.ui.capture.capture_job import CaptureJob
+from scope.scope_addon.ui.capture.capture_operators import SAMPLE, state
+from scope.scope_addon.ui.preferences import cache
+from scope.solver.errors import ScopeError
+from scope.solver.loaders.body_file import load_body
+
+FINISH = "send('progress', stage='solving', done=1, total=10)\nfinish()"
+
+
+def run_to_end(job, timeout_s=120.0):
+    end = time.monotonic() + timeout_s
+    while job.step():
+        assert time.monotonic() < end, job.progress.lines()
+        time.sleep(0.01)
+
+
+def wait_for(condition, timeout_s=120.0):
+    end = time.monotonic() + timeout_s
+    while not condition():
+        assert time.monotonic() < end
+        time.sleep(0.01)
+
+
+def job_files():
+    return [p for p in cache().root.rglob("*") if "captures" not in p.parts and p.name not in ("jobs", "kernels")]
+
+
+def captures():
+    return [c for c in bpy.data.collections if "scope_capture" in c]
+
+
+def test_a_result_is_built_shown_and_cached(fake_worker, footage):
+    fake_worker(FINISH)
+    scene = bpy.context.scene
+    scene.scope.footage = str(footage)
+    assert bpy.ops.scope.capture() == {"FINISHED"}
+    result = scene.scope.result
+    assert (result.people, result.frames, result.valid_frames) == (1, 10, 7)
+    assert result.reprojection_px == pytest.approx(2.0)
+    shown = [(w.text, w.spans) for w in result.warnings]
+    assert shown == [("A warning", ""), ("Filled in without being seen", "4-5,8")]
+    assert result.collection == captures()[0]
+    assert (scene.render.fps, scene.frame_start, scene.frame_end) == (25, 1, 10)
+    assert job_files() == []
+    fake_worker("send('error', message='must not be asked again')")
+    assert bpy.ops.scope.capture() == {"FINISHED"}
+    assert len(captures()) == 2
+
+
+def test_several_people_are_built_and_told_apart(fake_worker, footage):
+    fake_worker("assert request['people'] == 3\nfinish(2)")
+    scene = bpy.context.scene
+    scene.scope.footage, scene.scope.people, scene.scope.people_count = str(footage), "COUNT", 3
+    bpy.ops.scope.capture()
+    assert scene.scope.result.people == 2
+    assert [w.text[:8] for w in scene.scope.result.warnings[1:]] == ["Person 1", "Person 2"]
+    assert len([o for o in captures()[0].objects if o.type == "ARMATURE"]) == 2
+
+
+def test_hands_ask_for_the_body_with_fingers(fake_worker, footage):
+    fake_worker("assert request['hands'] and request['body'] == 'scope_h'\nsend('error', message='so it was')")
+    bpy.context.scene.scope.footage, bpy.context.scene.scope.hands = str(footage), True
+    with pytest.raises(RuntimeError, match="So it was"):
+        bpy.ops.scope.capture()
+
+
+def test_other_options_are_another_capture(fake_worker, footage):
+    fake_worker(FINISH)
+    scene = bpy.context.scene
+    scene.scope.footage = str(footage)
+    bpy.ops.scope.capture()
+    fake_worker("send('error', message='asked again')")
+    others = {"quality": "FAST", "lens": "FOV", "smoothing": False, "body": "SCOPE_H", "people": "ALL", "hands": True}
+    others |= {"height_cm": 180.0}
+    for name, value in others.items():
+        before = getattr(scene.scope, name)
+        setattr(scene.scope, name, value)
+        with pytest.raises(RuntimeError, match="Asked again"):
+            bpy.ops.scope.capture()
+        setattr(scene.scope, name, before)
+    os.utime(footage, (1, 1))
+    with pytest.raises(RuntimeError, match="Asked again"):
+        bpy.ops.scope.capture()
+
+
+def test_the_operator_builds_what_the_interface_builds(fake_worker, footage, standing):
+    fake_worker(FINISH)
+    bpy.context.scene.scope.footage = str(footage)
+    bpy.ops.scope.capture()
+    operators = next(o for o in captures()[0].objects if o.type == "ARMATURE")
+    options = BuildOptions(frame_rate="set", start_frame=1.0)
+    interfaces = build_scene([standing], load_body("scope"), footage, options).people[0].armature
+    ours, theirs = fcurves(operators), fcurves(interfaces)
+    assert [(c.data_path, c.array_index) for c in ours] == [(c.data_path, c.array_index) for c in theirs]
+    for a, b in zip(ours, theirs, strict=True):
+        assert np.array_equal(read_keys(a), read_keys(b))
+
+
+@pytest.mark.parametrize(
+    ("script", "says"),
+    [
+        ("send('error', message='nobody is in person.png')", "Nobody is in person.png"),
+        ("os.kill(os.getpid(), 9)", "signal 9"),
+        ("sys.exit('no module named numba')", "no module named numba"),
+        ("print('not json'); print('[1]'); sys.exit(3)", "status 3"),
+        ("send('result', motions=['person1.npz'], report={})", "person1.npz"),
+        ("open(folder + '/person1.npz', 'w').write('x'); send('result', motions=['person1.npz'], report={})", "npz"),
+    ],
+)
+def test_a_failure_is_told_and_changes_nothing(fake_worker, footage, contents, script, says):
+    fake_worker(script)
+    bpy.context.scene.scope.footage = str(footage)
+    before = contents()
+    with pytest.raises(RuntimeError, match=says):
+        bpy.ops.scope.capture()
+    assert says in state.message
+    assert state.job is None
+    assert contents() == before
+    assert job_files() == []
+
+
+@pytest.mark.parametrize("end", [lambda job: job.close(), lambda job: os.kill(job.worker.pid, signal.SIGKILL)])
+def test_cancelled_or_killed_in_the_middle_nothing_is_left(fake_worker, footage, contents, end):
+    fake_worker("send('progress', stage='solving', done=3, total=10)\nopen(folder + '/half', 'w')\ntime.sleep(600)")
+    bpy.context.scene.scope.footage = str(footage)
+    before = contents()
+    job = CaptureJob(bpy.context.scene)
+    wait_for(lambda: job.step() and job.progress.done == 3)
+    end(job)
+    with pytest.raises(WorkerFailedError):
+        run_to_end(job)
+    assert not job.worker.alive
+    assert contents() == before
+    assert job_files() == []
+
+
+def test_cancel_operator_ends_the_worker_at_once(fake_worker, footage):
+    fake_worker("time.sleep(600)")
+    bpy.context.scene.scope.footage = str(footage)
+    assert not bpy.ops.scope.cancel.poll()
+    state.job = CaptureJob(bpy.context.scene)
+    assert not bpy.ops.scope.capture.poll()
+    bpy.ops.scope.cancel()
+    assert state.job.cancel_requested
+    assert not state.job.worker.alive
+    capture_operators.stop_everything()
+    assert bpy.ops.scope.capture.poll()
+
+
+def test_no_workspace_goes_on_telling_of_a_capture_that_has_ended(monkeypatch):
+    told = {}
+
+    def tell(_, text):  # as Blender does it: the workspace is the context's
+        told[bpy.context.workspace.name] = text
+
+    monkeypatch.setattr(bpy.types.WorkSpace, "status_text_set", tell)
+    capture_operators.stop_everything()
+    assert len(told) > 1
+    assert told == dict.fromkeys((workspace.name for workspace in bpy.data.workspaces), None)
+
+
+def test_disabling_the_extension_ends_the_worker(fake_worker, footage):
+    import scope
+
+    fake_worker("time.sleep(600)")
+    bpy.context.scene.scope.footage = str(footage)
+    state.job = job = CaptureJob(bpy.context.scene)
+    scope.unregister()
+    try:
+        assert not job.worker.alive
+        assert job_files() == []
+    finally:
+        scope.register()
+
+
+def test_step_never_waits_for_the_worker(fake_worker, footage):
+    fake_worker("time.sleep(600)")
+    bpy.context.scene.scope.footage = str(footage)
+    job = CaptureJob(bpy.context.scene)
+    for _ in range(1000):  # each would take minutes if one of them waited
+        assert job.step()
+    job.close()
+
+
+def test_a_full_disk_is_told(footage, monkeypatch, tmp_path, contents):
+    (tmp_path / "user").write_text("a file where the folder should be")
+    bpy.context.scene.scope.footage = str(footage)
+    before = contents()
+    with pytest.raises(RuntimeError, match="(?i)cannot write in the cache folder"):
+        bpy.ops.scope.capture()
+    assert contents() == before
+
+
+def test_footage_that_went_while_capturing_is_missed_not_fatal(fake_worker, footage):
+    fake_worker(f"os.remove({str(footage)!r})\nfinish()")
+    scene = bpy.context.scene
+    scene.scope.footage = str(footage)
+    bpy.ops.scope.capture()
+    assert any("has gone" in w.text for w in scene.scope.result.warnings)
+
+
+@pytest.mark.parametrize(
+    ("settings", "says"),
+    [
+        ({"footage": "/nowhere/walk.mp4"}, "walk.mp4 does not exist"),
+        ({"footage": "/"}, "/ is no file"),
+        ({"body": "FILE"}, "body file"),
+        ({"body": "FILE", "body_file": "/nowhere/smpl.npz"}, "smpl.npz"),
+        ({"lens": "FILE"}, "calibration"),
+        ({"lens": "FILE", "calibration_file": "/nowhere/lens.json"}, "lens.json"),
+    ],
+)
+def test_wrong_settings_are_told(footage, settings, says, contents):
+    scene = bpy.context.scene
+    scene.scope.footage = str(footage)
+    for name, value in settings.items():
+        setattr(scene.scope, name, value)
+    before = contents()
+    with pytest.raises(RuntimeError, match=says):
+        bpy.ops.scope.capture()
+    assert contents() == before
+
+
+def test_the_result_goes_to_the_scene_it_was_started_in(fake_worker, footage):
+    fake_worker(FINISH)
+    first = bpy.context.scene
+    first.scope.footage = str(footage)
+    job = CaptureJob(first)
+    second = bpy.data.scenes.new("second")
+    bpy.context.window.scene = second
+    run_to_end(job)
+    assert bpy.context.scene == second
+    assert second.scope.result.collection is None
+    assert first.scope.result.collection.name in [c.name for c in first.collection.children]
+    assert not second.collection.children
+
+
+def test_a_removed_scene_is_told(fake_worker, footage):
+    fake_worker(FINISH)
+    scene = bpy.data.scenes.new("gone soon")
+    scene.scope.footage = str(footage)
+    job = CaptureJob(scene)
+    bpy.data.scenes.remove(scene)
+    with pytest.raises(ScopeError, match="removed"):
+        run_to_end(job)
+
+
+@pytest.mark.parametrize(("animated", "rate"), [(False, 25), (True, 24)])
+def test_the_automatic_frame_rate_respects_other_animation(fake_worker, footage, animated, rate):
+    fake_worker(FINISH)
+    scene = bpy.context.scene
+    scene.render.fps = 24
+    if animated:
+        cube = bpy.data.objects.new("cube", None)
+        scene.collection.objects.link(cube)
+        cube.keyframe_insert("location", frame=1)
+    scene.scope.footage = str(footage)
+    bpy.ops.scope.capture()
+    assert scene.render.fps == rate
+
+
+def test_real_worker_on_a_picture(footage):
+    """Blender's own Python, isolated, with nothing but the folders it was given."""
+    scene = bpy.context.scene
+    scene.scope.footage, scene.scope.quality = str(footage), "FAST"
+    assert bpy.ops.scope.capture() == {"FINISHED"}
+    assert scene.scope.result.people == 1
+    from scope.scope_addon.capture.pipeline import CaptureOptions, capture
+
+    expected = capture(footage, load_body("scope"), CaptureOptions(quality="fast")).motions[0]
+    got = Motion.load(scene.scope.result.collection["scope_motions"][0])
+    assert np.allclose(got.poses, expected.poses, atol=1e-4)
+    assert np.allclose(got.trans, expected.trans, atol=1e-4)
+
+
+def test_real_worker_knows_a_calibrated_lens(footage, tmp_path):
+    import cv2
+
+    height, width = cv2.imread(str(footage)).shape[:2]
+    K, dist = [[700.0, 0, width / 2 + 3], [0, 720.0, height / 2], [0, 0, 1]], [-0.05, 0.01, 0.002, 0.0, 0.0]
+    lens, scene = tmp_path / "lens.json", bpy.context.scene
+    scene.scope.footage, scene.scope.quality = str(footage), "FAST"
+    scene.scope.lens, scene.scope.calibration_file = "FILE", str(lens)
+    found = []
+    for k1 in (dist[0], -0.1):  # what changed in the file is another capture
+        lens.write_text(json.dumps({"intrinsics": K, "dist": [k1, *dist[1:]]}))
+        assert bpy.ops.scope.capture() == {"FINISHED"}
+        found.append(Motion.load(scene.scope.result.collection["scope_motions"][0]))
+    assert np.allclose(found[0].intrinsics, K)
+    assert np.allclose(found[0].dist, dist)
+    assert found[1].dist[0] == -0.1
+    assert scene.scope.result.pixel_aspect[:] == pytest.approx((720 / 700, 1.0))
+    camera = next(o for o in captures()[0].objects if o.type == "CAMERA")
+    assert camera.data.background_images[0].clip_user.use_render_undistorted
+
+
+def test_real_worker_says_that_nobody_is_there(tmp_path):
+    import cv2
+
+    cv2.imwrite(str(tmp_path / "wall.png"), np.full((240, 320, 3), 128, np.uint8))
+    scene = bpy.context.scene
+    scene.scope.footage, scene.scope.quality = str(tmp_path / "wall.png"), "FAST"
+    with pytest.raises(RuntimeError, match="No person was found in wall.png"):
+        bpy.ops.scope.capture()
+
+
+def test_real_worker_touches_no_network(footage, tmp_path):
+    guard = tmp_path / "guard.py"
+    guard.write_text(
+        "import runpy, sys\n"
+        "def hook(event, arguments):\n"
+        "    if event in ('socket.connect', 'socket.getaddrinfo', 'socket.bind', 'socket.sendto'):\n"
+        "        raise RuntimeError('network')\n"
+        "sys.addaudithook(hook)\n"
+        "sys.argv = sys.argv[1:]\n"
+        "runpy.run_path(sys.argv[0], run_name='__main__')\n"
+    )
+    import sys
+
+    scene = bpy.context.scene
+    scene.scope.footage, scene.scope.quality = str(footage), "FAST"
+    run_to_end(CaptureJob(scene, python=[sys.executable, str(guard)]))
+    assert scene.scope.result.people == 1
+
+
+def test_the_sample_is_there():
+    bpy.ops.scope.use_sample()
+    assert bpy.context.scene.scope.footage == str(SAMPLE)
+    assert SAMPLE.is_file()

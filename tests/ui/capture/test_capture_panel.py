@@ -1,0 +1,308 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Settings in the .blend, dropped files, export buttons, the camera button, texts."""
+
+import time
+from types import SimpleNamespace
+
+import bpy
+import numpy as np
+import pytest
+from scope.scope_addon import cli_options
+from scope.scope_addon.job.progress import JobProgress, duration
+from scope.scope_addon.motion import Motion
+from scope.scope_addon.scene.footage_strip import strips_of
+from scope.scope_addon.ui import drop, preferences
+from scope.scope_addon.ui.capture import capture_job
+from scope.scope_addon.ui.capture.capture_operators import state, stop_everything
+from scope.scope_addon.ui.preferences import cache
+
+FINISH = "finish()"
+
+
+def captured(fake_worker, footage):
+    fake_worker(FINISH)
+    bpy.context.scene.scope.footage = str(footage)
+    bpy.ops.scope.capture()
+
+
+def test_settings_and_result_survive_the_file(fake_worker, footage, tmp_path):
+    captured(fake_worker, footage)
+    settings = bpy.context.scene.scope
+    wanted = {"quality": "FAST", "body": "FILE", "body_file": "//smpl.npz", "lens": "FOCAL", "focal_mm": 35.0}
+    wanted |= {"smoothing": False, "frame_rate": "KEEP", "start_frame": 101, "shape": "BAKED", "with_camera": False}
+    wanted |= {"people": "ALL", "people_count": 5, "use_range": True, "range_start": 2.5, "with_markers": False}
+    wanted |= {"height_cm": 175.0}
+    for name, value in wanted.items():
+        setattr(settings, name, value)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "saved.blend"))
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    assert bpy.context.scene.scope.quality == "BEST"
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "saved.blend"))
+    settings = bpy.context.scene.scope
+    assert {name: getattr(settings, name) for name in wanted} == wanted
+    assert settings.result.frames == 10
+    assert settings.result.collection.name == "person"
+    assert len(settings.result.warnings) == 2
+
+
+def test_a_height_is_asked_for_in_centimetres_and_none_is_none(footage):
+    scene = bpy.context.scene
+    scene.scope.footage = str(footage)
+    assert capture_job.capture_request(scene).height_m is None
+    scene.unit_settings.system, scene.unit_settings.scale_length = "METRIC", 0.01
+    scene.scope.height_cm = 182.0
+    assert capture_job.capture_request(scene).height_m == pytest.approx(1.82)
+
+
+def test_each_scene_has_its_own_settings():
+    first, second = bpy.context.scene, bpy.data.scenes.new("second")
+    first.scope.quality = "FAST"
+    assert second.scope.quality == "BEST"
+
+
+def test_a_scene_that_took_over_the_settings_alone_shows_no_result(fake_worker, footage):
+    captured(fake_worker, footage)
+    panel = bpy.types.SCOPE_PT_result
+    assert panel.poll(bpy.context)
+    bpy.ops.scene.new(type="EMPTY")
+    assert bpy.context.scene.scope.footage == str(footage)
+    assert not panel.poll(bpy.context)
+    bpy.ops.scene.new(type="FULL_COPY")
+    assert not panel.poll(bpy.context)
+
+
+def test_dropped_files_become_the_footage(footage):
+    suffixes = drop.SCOPE_FH_footage.bl_file_extensions.split(";")
+    assert {".mp4", ".mov", ".png", ".jpg"} <= set(suffixes)
+    # What Blender does with a dropped file: the handler's operator, with a path.
+    assert bpy.ops.scope.choose_footage("INVOKE_DEFAULT", filepath=str(footage)) == {"FINISHED"}
+    assert bpy.context.scene.scope.footage == str(footage)
+    with pytest.raises(RuntimeError, match="not a file"):
+        bpy.ops.scope.choose_footage(filepath=str(footage.parent))
+    assert bpy.context.scene.scope.footage == str(footage)
+
+
+def test_buttons_wait_for_what_they_need(fake_worker, footage):
+    assert not bpy.ops.scope.capture.poll()
+    assert not bpy.ops.scope.export.poll()
+    assert not bpy.ops.scope.look_through.poll()
+    captured(fake_worker, footage)
+    assert bpy.ops.scope.capture.poll()
+    assert bpy.ops.scope.export.poll()
+    assert bpy.ops.scope.look_through.poll()
+
+
+@pytest.mark.parametrize(("kind", "suffix"), [(k, f".{k.lower()}") for k in ("FBX", "GLB", "BVH", "USDC", "NPZ")])
+def test_export_buttons_write_and_leave_the_file_alone(fake_worker, footage, tmp_path, contents, kind, suffix):
+    if kind == "USDC" and "usd_export" not in dir(bpy.ops.wm):
+        pytest.skip("this Blender was built without USD")
+    captured(fake_worker, footage)
+    before = contents()
+    assert bpy.ops.scope.export(filepath=str(tmp_path / "walk"), format=kind) == {"FINISHED"}
+    assert (tmp_path / f"walk{suffix}").stat().st_size > 1000
+    assert contents() == before
+
+
+def test_a_motion_file_holds_what_was_captured(fake_worker, footage, tmp_path):
+    captured(fake_worker, footage)
+    armature = next(o for o in bpy.data.objects if "scope_motion" in o)
+    bpy.context.view_layer.objects.active = armature
+    bpy.ops.scope.refloor()
+    bpy.ops.scope.export(filepath=str(tmp_path / "walk.npz"), format="NPZ")
+    got, kept = Motion.load(tmp_path / "walk.npz"), Motion.load(armature["scope_motion"])
+    assert np.array_equal(got.poses, kept.poses)
+    bpy.ops.scope.clear_cache()
+    with pytest.raises(RuntimeError, match="no longer in the cache"):
+        bpy.ops.scope.export(filepath=str(tmp_path / "again.npz"), format="NPZ")
+
+
+def test_export_of_the_active_capture_alone(fake_worker, footage, tmp_path):
+    captured(fake_worker, footage)
+    bpy.ops.scope.capture()
+    bpy.ops.scope.export(filepath=str(tmp_path / "both.bvh"), format="BVH", which="ALL")
+    assert len(list(tmp_path.glob("both*.bvh"))) == 2
+    bpy.ops.scope.export(filepath=str(tmp_path / "one.bvh"), format="BVH", which="ACTIVE")
+    assert [p.name for p in tmp_path.glob("one*.bvh")] == ["one.bvh"]
+    bpy.context.view_layer.objects.active = None
+    with pytest.raises(RuntimeError, match="belongs to no capture"):
+        bpy.ops.scope.export(filepath=str(tmp_path / "none.bvh"), format="BVH", which="ACTIVE")
+
+
+def test_an_export_that_cannot_be_written_is_told(fake_worker, footage, tmp_path):
+    captured(fake_worker, footage)
+    with pytest.raises(RuntimeError, match="does not exist"):
+        bpy.ops.scope.export(filepath=str(tmp_path / "none" / "walk.glb"), format="GLB")
+
+
+@pytest.mark.parametrize("name", ["", ".glb"])
+def test_an_export_without_a_name_asks_for_one(fake_worker, footage, tmp_path, name):
+    captured(fake_worker, footage)
+    with pytest.raises(RuntimeError, match="Give the file to write a name"):
+        bpy.ops.scope.export(filepath=f"{tmp_path}/{name}", format="GLB")
+    with pytest.raises(RuntimeError, match="Give the file to write a name"):
+        bpy.ops.scope.export(format="GLB")
+
+
+@pytest.mark.parametrize("way", ["sample", "chosen", "typed"])
+def test_other_footage_leaves_an_earlier_failure_behind(footage, tmp_path, way):
+    settings = bpy.context.scene.scope
+    settings.footage = str(tmp_path / "gone.mp4")
+    with pytest.raises(RuntimeError, match="does not exist"):
+        bpy.ops.scope.capture()
+    assert state.message
+    if way == "sample":
+        bpy.ops.scope.use_sample()
+    elif way == "chosen":
+        bpy.ops.scope.choose_footage(filepath=str(footage))
+    else:
+        settings.footage = str(footage)
+    assert not state.message
+
+
+def test_looking_through_the_camera_sets_camera_and_resolution(fake_worker, footage):
+    captured(fake_worker, footage)
+    scene = bpy.context.scene
+    assert scene.camera is None
+    bpy.ops.scope.look_through()
+    assert scene.camera.name == "person_camera"
+    assert (scene.render.resolution_x, scene.render.resolution_y) == (640, 480)
+
+
+def test_a_hidden_camera_is_shown_since_it_shows_the_footage(fake_worker, footage):
+    captured(fake_worker, footage)
+    camera = next(obj for obj in bpy.context.scene.scope.result.collection.objects if obj.type == "CAMERA")
+    camera.hide_viewport = True
+    camera.hide_set(True)
+    bpy.ops.scope.look_through()
+    assert camera.visible_get()
+
+
+@pytest.mark.parametrize("way", ["exclude", "hide_viewport"])
+def test_a_hidden_capture_is_not_compared_with_its_footage(fake_worker, footage, way):
+    captured(fake_worker, footage)
+    shown = bpy.context.scene.scope.result.collection
+    layer = next(c for c in bpy.context.view_layer.layer_collection.children if c.collection == shown)
+    setattr(layer, way, True)
+    bpy.context.view_layer.update()
+    with pytest.raises(RuntimeError, match=f"'{shown.name}' is hidden; show it in the Outliner"):
+        bpy.ops.scope.look_through()
+    setattr(layer, way, False)
+    bpy.context.view_layer.update()
+    assert bpy.ops.scope.look_through() == {"FINISHED"}
+
+
+def test_warnings_lead_to_their_frames(fake_worker, footage):
+    from scope.scope_addon.ui.capture.capture_panel import first_frame
+
+    captured(fake_worker, footage)
+    scene = bpy.context.scene
+    spans = scene.scope.result.warnings[1].spans.split(",")
+    assert [first_frame(span) for span in spans] == [4, 8]
+    bpy.ops.scope.go_to_frame(frame=8)
+    assert scene.frame_current == 8
+    assert [first_frame(span) for span in ("-12--4", "-3-4", "7")] == [-12, -3, 7]
+    assert [m.frame for m in scene.timeline_markers] == [4]  # both spans: they lie near each other
+
+
+def test_the_footage_begins_at_frame_0_at_the_earliest():
+    """Where scenes do, and exports with them."""
+    settings = bpy.context.scene.scope
+    settings.start_frame = -50
+    assert settings.start_frame == 0
+
+
+def test_the_footage_goes_to_the_sequencer(fake_worker, footage):
+    assert not bpy.ops.scope.footage_to_sequencer.poll()
+    bpy.context.scene.scope.start_frame = 11
+    captured(fake_worker, footage)
+    assert bpy.ops.scope.footage_to_sequencer() == {"FINISHED"}
+    assert [strip.frame_final_start for strip in strips_of(bpy.context.scene.sequence_editor)] == [11]
+    footage.unlink()
+    with pytest.raises(RuntimeError, match="does not exist"):
+        bpy.ops.scope.footage_to_sequencer()
+
+
+def test_a_part_of_the_video_is_asked_for(fake_worker, footage):
+    fake_worker("assert (request['start_s'], request['end_s']) == (1.5, 3.0)\nfinish()")
+    settings = bpy.context.scene.scope
+    settings.footage = str(footage)
+    settings.use_range, settings.range_start, settings.range_end = True, 1.5, 3.0
+    assert bpy.ops.scope.capture() == {"FINISHED"}
+    settings.range_end = 1.0
+    with pytest.raises(RuntimeError, match="ends before it begins"):
+        bpy.ops.scope.capture()
+
+
+def test_the_preferences_reach_the_worker(fake_worker, footage, monkeypatch):
+    chosen = SimpleNamespace(
+        threads=3, provider="DIRECTML", detector_file="/a/d.onnx", keypoints_file="/a/k.onnx", body_file="",
+        cache_folder="", cache_limit_gb=2,
+    )  # fmt: skip
+    monkeypatch.setattr(capture_job, "preferences", lambda: chosen)
+    wanted = {"threads": 3, "provider": "directml", "detector": "/a/d.onnx", "keypoints": "/a/k.onnx"}
+    fake_worker(f"wanted = {wanted}\nassert {{k: request[k] for k in wanted}} == wanted\nfinish()")
+    bpy.context.scene.scope.footage = str(footage)
+    assert bpy.ops.scope.capture() == {"FINISHED"}
+
+
+def test_the_preferences_offer_what_the_command_line_does():
+    assert [number for *_, number in preferences.PROVIDERS] == list(range(6))
+    assert {name.lower() for name, *_ in preferences.PROVIDERS} == set(cli_options.PROVIDERS)
+
+
+def test_clearing_the_cache_leaves_the_scene(fake_worker, footage):
+    captured(fake_worker, footage)
+    bystander = cache().root / "notes.txt"
+    bystander.write_text("the user's")
+    assert cache().size() > 1000
+    bpy.ops.scope.clear_cache()
+    assert cache().size() == 0
+    assert bystander.exists()
+    assert bpy.context.scene.scope.result.collection is not None
+
+
+def test_the_current_frame_is_shown_while_capturing(fake_worker, footage):
+    from scope.scope_addon.ui.capture import preview_picture
+    from scope.scope_addon.ui.capture.capture_job import CaptureJob
+
+    fake_worker(
+        "open(folder + '/preview.rgba', 'wb').write(bytes(range(24)))\n"
+        "send('preview', file='preview.rgba', width=3, height=2, frame=0)\n"
+        "send('progress', stage='solving', done=1, total=10)\nsys.stdin.read()"
+    )
+    bpy.context.scene.scope.footage = str(footage)
+    state.job = job = CaptureJob(bpy.context.scene)
+    while job.step() and job.progress.done == 0:
+        time.sleep(0.01)
+    icon = preview_picture._collection["frame"]
+    assert tuple(icon.image_size) == (3, 2)
+    assert icon.image_pixels[0] == int.from_bytes(bytes(range(4)), "little")
+    stop_everything()
+    assert preview_picture.icon_id() == 0
+    preview_picture.show(b"half", 3, 2)
+    assert preview_picture.icon_id() == 0
+
+
+def test_progress_says_stage_speed_and_time_left():
+    now = [0.0]
+    progress = JobProgress(clock=lambda: now[0])
+    assert progress.lines() == ["Starting"]
+    progress.update("finding the person", 0, 100)
+    now[0] = 10.0
+    progress.update("finding the person", 50, 100)
+    assert progress.frames_per_second == pytest.approx(5.0)
+    assert 0.3 < progress.fraction < 0.4
+    assert progress.lines()[0] == "Finding the person, 50 of 100"
+    assert progress.lines()[1].startswith("5.0 frames/s, ")
+    before = progress.fraction
+    progress.update("finding the shape", 0, 0)
+    assert progress.fraction > before
+    assert progress.seconds_left is None
+    assert len(JobProgress(first_use=True).lines()) == 1
+
+
+@pytest.mark.parametrize(
+    ("seconds", "text"), [(0.2, "0 s"), (59.6, "1 min 00 s"), (125, "2 min 05 s"), (3720, "1 h 02 min")]
+)
+def test_durations(seconds, text):
+    assert duration(seconds) == text

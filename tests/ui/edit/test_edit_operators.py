@@ -1,0 +1,427 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The operators on a captured motion, by what Blender's depsgraph shows afterwards."""
+
+import bpy
+import numpy as np
+import pytest
+from mathutils import Matrix
+from scope.scope_addon.scene.build import BuildOptions, build_scene
+from scope.scope_addon.scene.character.keys import read_clip
+from scope.scope_addon.scene.character.root_object import root_object
+from scope.scope_addon.ui.captured_person import body_of
+from scope.solver.loaders.body_file import BUILT_IN, load_body
+from scope.solver.rotations import exp, log
+
+from ...edit.walking import BODY, NAMES, RATE, motion_of, walk
+from ...scene import made_rigs
+from ...scene.made_rigs import captured
+
+SECONDS = 3.0
+
+
+@pytest.fixture
+def rig(tmp_path):
+    """A captured walk, its armature active, with the motion file that the cache would keep."""
+    motion = motion_of(walk(SECONDS), noise=0.05)
+    armature = captured(motion)
+    path = tmp_path / "person1.npz"
+    motion.save(path)
+    armature["scope_motion"], armature["scope_body_file"] = str(path), "scope"
+    return armature
+
+
+def seen(rig, frames=range(1, 80, 7)):
+    """(T, K+1, 3) heads of all bones in the world."""
+    return made_rigs.seen(rig, NAMES, frames)
+
+
+def keys(rig):
+    return read_clip(rig, BODY, RATE)
+
+
+def turned(a, b):
+    return np.degrees(np.linalg.norm(log(np.swapaxes(a, -1, -2) @ b), axis=-1).max())
+
+
+def test_the_keys_are_read_as_they_were_written(rig):
+    clip, frames = keys(rig)
+    truth = walk(SECONDS)
+    assert turned(clip.rotations, truth.rotations) < 0.01
+    np.testing.assert_allclose(clip.root, truth.root, atol=1e-5)
+    np.testing.assert_allclose(frames, 1 + np.arange(len(truth)))
+    np.testing.assert_allclose(clip.joints(BODY, np.zeros(BODY.P))[0], seen(rig, [1])[0], atol=1e-4)
+
+
+def test_a_scene_of_the_users_own_body_knows_its_file(tmp_path, monkeypatch):
+    """As the command line makes it, which knows of no cache."""
+    monkeypatch.chdir(tmp_path)
+    with np.load(BUILT_IN["scope"]) as arrays:
+        np.savez("hero.npz", **dict(arrays, name="hero"))
+    body = load_body("hero.npz")
+    captured(motion_of(walk(SECONDS)), body)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "walk.blend"))
+    monkeypatch.chdir(tmp_path.parent)
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "walk.blend"))
+    armature = next(obj for obj in bpy.data.objects if "scope_source" in obj)
+    bpy.context.view_layer.objects.active = armature
+    assert bpy.ops.scope.refloor() == {"FINISHED"}
+    assert body_of(armature).name == "hero"
+
+
+def test_smoothing_from_raw_and_back(rig):
+    before, action = seen(rig), rig.animation_data.action
+    bpy.ops.scope.smooth(strength=0.0)
+    raw = seen(rig)
+    assert np.abs(raw - before).max() > 0.02
+    bpy.ops.scope.smooth(strength=3.0)
+    calm = seen(rig)
+    shaking = [np.linalg.norm(np.diff(joints, 2, axis=0), axis=-1).mean() for joints in (calm, raw)]
+    assert shaking[0] < shaking[1]
+    bpy.ops.scope.smooth(strength=1.0)  # what the capture did
+    np.testing.assert_allclose(seen(rig), before, atol=2e-4)
+    assert rig.animation_data.action == action
+
+
+def test_smoothing_a_resampled_motion_keeps_its_keys_on_whole_frames(tmp_path):
+    scene = bpy.context.scene
+    scene.render.fps, scene.render.fps_base = 24, 1.0
+    motion = motion_of(walk(SECONDS), noise=0.05)
+    rig = build_scene([motion], BODY, None, BuildOptions(frame_rate="resample", start_frame=1.0)).people[0].armature
+    motion.save(tmp_path / "person1.npz")
+    rig["scope_motion"], rig["scope_body_file"] = str(tmp_path / "person1.npz"), "scope"
+    before = read_clip(rig, BODY, 24.0)[1]
+    np.testing.assert_array_equal(before, np.arange(1, len(before) + 1))
+    bpy.ops.scope.smooth(strength=2.0)
+    np.testing.assert_array_equal(read_clip(rig, BODY, 24.0)[1], before)
+
+
+def test_smoothing_without_the_cached_motion_is_told(rig):
+    before = seen(rig)
+    rig["scope_motion"] = "/nowhere/person1.npz"
+    with pytest.raises(RuntimeError, match="no longer in the cache"):
+        bpy.ops.scope.smooth(strength=2.0)
+    np.testing.assert_array_equal(seen(rig), before)
+
+
+def test_bridging_and_swapping_a_span(rig):
+    before = keys(rig)[0]
+    bpy.ops.scope.swap_sides(start=20, end=30, limbs="legs")
+    swapped = keys(rig)[0]
+    assert turned(swapped.rotations[19:30], before.rotations[19:30]) > 10
+    assert turned(np.delete(swapped.rotations, range(19, 30), 0), np.delete(before.rotations, range(19, 30), 0)) < 0.01
+    bpy.ops.scope.swap_sides(start=20, end=30, limbs="legs")
+    assert turned(keys(rig)[0].rotations, before.rotations) < 0.05
+    bpy.ops.scope.interpolate_span(start=40, end=44)
+    assert 0.1 < turned(keys(rig)[0].rotations, before.rotations) < 8
+    with pytest.raises(RuntimeError, match="reaches the motion's end"):
+        bpy.ops.scope.interpolate_span(start=-5, end=44)
+
+
+def test_feet_to_floor(rig):
+    clip, _ = keys(rig)
+    from scope.scope_addon.scene.character.keys import write_clip
+
+    clip.root[:, 2] += 0.3
+    write_clip(rig, BODY, clip, 1 + np.arange(len(clip)))
+    bpy.ops.scope.refloor()
+    lowest = keys(rig)[0].soles(BODY, np.zeros(BODY.P))[..., 2].min(axis=1)
+    assert np.abs(lowest).max() < 0.06  # this walk's feet are not exactly on a floor themselves
+    assert lowest.min() > -1e-4
+
+
+def test_the_floor_is_where_the_armature_was_put(rig):
+    rig.location.z = 0.5
+    bpy.ops.scope.refloor()
+    assert keys(rig)[0].soles(BODY, np.zeros(BODY.P))[..., 2].min() == pytest.approx(0.0, abs=1e-4)
+    assert "the height of the armature's origin" in bpy.ops.scope.refloor.get_rna_type().description
+
+
+@pytest.mark.parametrize("mode", ["OBJECT", "IN_PLACE"])
+def test_feet_of_one_whose_way_is_not_in_the_bones_come_to_the_same_floor(rig, mode):
+    from scope.scope_addon.scene.character.keys import write_clip
+
+    clip, frames = keys(rig)
+    tilt = exp([0.1, 0.0, 0.0])
+    clip.root = clip.root @ tilt.T
+    clip.rotations[:, 0] = tilt @ clip.rotations[:, 0]
+    write_clip(rig, BODY, clip, frames)
+    bpy.ops.scope.root_motion(mode=mode)
+    bpy.ops.scope.refloor()
+    bpy.ops.scope.root_motion(mode="BONES")
+    there = keys(rig)[0]
+    write_clip(rig, BODY, clip, frames)
+    bpy.ops.scope.refloor()
+    wanted = keys(rig)[0]
+    np.testing.assert_allclose(there.root, wanted.root, atol=1e-3)
+    assert turned(there.rotations, wanted.rotations) < 0.1
+
+
+@pytest.mark.parametrize("heading", [True, False])
+def test_root_motion_looks_the_same_and_comes_back(rig, heading):
+    before, clip = seen(rig), keys(rig)[0]
+    bpy.ops.scope.root_motion(mode="OBJECT", heading=heading)
+    empty = root_object(rig)
+    np.testing.assert_allclose(seen(rig), before, atol=2e-4)
+    assert np.abs(keys(rig)[0].root[:, :2]).max() < 1e-5
+    bpy.context.scene.frame_set(60)
+    assert empty.matrix_world.translation.y == pytest.approx(-1.2 * 59 / RATE, abs=1e-3)
+    bpy.ops.scope.root_motion(mode="IN_PLACE", heading=heading)
+    there = seen(rig)
+    assert np.ptp(there[:, 0, :2], axis=0).max() < 1e-3
+    np.testing.assert_allclose(there[0], before[0], atol=2e-4)
+    bpy.ops.scope.root_motion(mode="BONES")
+    assert root_object(rig) is None
+    np.testing.assert_allclose(seen(rig), before, atol=2e-4)
+    assert turned(keys(rig)[0].rotations, clip.rotations) < 0.05
+    assert not [o for o in bpy.data.objects if "scope_root" in o]
+
+
+@pytest.mark.parametrize("tilt", [0.0, 0.5])
+def test_root_motion_of_an_armature_that_was_moved_looks_the_same(rig, tilt):
+    rig.location, rig.rotation_euler, rig.scale = (1.0, 2.0, 0.5), (tilt, -0.4 * tilt, 0.8), (1.2,) * 3
+    rig.rotation_mode = "XYZ"
+    before = seen(rig)
+    for mode in ("OBJECT", "OBJECT", "IN_PLACE", "OBJECT", "BONES"):
+        bpy.ops.scope.root_motion(mode=mode)
+        if mode == "IN_PLACE":
+            np.testing.assert_allclose(seen(rig)[0], before[0], atol=3e-4)
+        else:
+            np.testing.assert_allclose(seen(rig), before, atol=3e-4)
+
+
+@pytest.mark.parametrize("mode", ["OBJECT", "IN_PLACE"])
+def test_an_armature_stands_where_it_was_put_again_when_its_way_goes_back(rig, mode):
+    rig.rotation_mode, rig.location, rig.rotation_euler, rig.scale = "XYZ", (1.0, 2.0, 0.5), (0.3, 0, 0.8), (1.2,) * 3
+    bpy.ops.scope.smooth()
+    before, place, clip = seen(rig), np.array(rig.matrix_world), keys(rig)[0]
+    operators = bpy.ops.scope.smooth, lambda: bpy.ops.scope.root_motion(mode="BONES")
+    for back in operators:
+        bpy.ops.scope.root_motion(mode=mode)
+        back()
+        bpy.context.view_layer.update()
+        np.testing.assert_allclose(np.array(rig.matrix_world), place, atol=1e-5)
+        np.testing.assert_allclose(keys(rig)[0].root, clip.root, atol=1e-4)
+        np.testing.assert_allclose(seen(rig), before, atol=3e-4)
+
+
+@pytest.fixture
+def stage():
+    """An object of the user's own, moved, turned, tilted and scaled, that goes somewhere."""
+    obj = bpy.data.objects.new("Stage", None)
+    bpy.context.scene.collection.objects.link(obj)
+    obj.rotation_euler, obj.scale = (0.2, -0.1, 0.7), (1.5,) * 3
+    for frame, x in ((1, 2.0), (90, 5.0)):
+        obj.location = (x, -1.0, 0.3)
+        obj.keyframe_insert("location", frame=frame)
+    return obj
+
+
+def test_root_motion_keeps_what_the_user_has_hung_the_armature_on(rig, stage):
+    rig.parent, rig.location, rig.rotation_euler, rig.rotation_mode = stage, (0.4, 0, 0), (0, 0, 0.5), "XYZ"
+    rig.matrix_parent_inverse = Matrix.Translation((0, 0.2, 0)) @ Matrix.Scale(0.8, 4)
+    before = seen(rig)
+    for mode in ("OBJECT", "OBJECT", "IN_PLACE", "BONES", "OBJECT", "BONES"):
+        bpy.ops.scope.root_motion(mode=mode)
+        if mode == "BONES":
+            assert rig.parent == stage
+        else:
+            assert (root_object(rig).parent, rig.parent) == (stage, root_object(rig))
+        if mode == "IN_PLACE":
+            np.testing.assert_allclose(seen(rig)[0], before[0], atol=3e-4)
+        else:
+            np.testing.assert_allclose(seen(rig), before, atol=3e-4)
+    assert not [o for o in bpy.data.objects if "scope_root" in o]
+
+
+def test_root_motion_below_a_bone_of_the_users(rig, stage):
+    crane = bpy.data.objects.new("Crane", bpy.data.armatures.new("Crane"))
+    bpy.context.scene.collection.objects.link(crane)
+    bpy.context.view_layer.objects.active = crane
+    bpy.ops.object.mode_set(mode="EDIT")
+    crane.data.edit_bones.new("hook").tail = (0.3, 0.0, 0.9)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    bpy.context.view_layer.objects.active = rig
+    rig.parent, rig.parent_type, rig.parent_bone = crane, "BONE", "hook"
+    before = seen(rig)
+    for mode in ("OBJECT", "BONES"):
+        bpy.ops.scope.root_motion(mode=mode)
+        np.testing.assert_allclose(seen(rig), before, atol=3e-4)
+    assert (rig.parent, rig.parent_type, rig.parent_bone) == (crane, "BONE", "hook")
+
+
+def test_what_fails_halfway_leaves_keys_and_root_as_they_were(rig, monkeypatch):
+    bpy.ops.scope.root_motion(mode="OBJECT")
+    before, empty, action = seen(rig), root_object(rig), rig.animation_data.action.name
+    blocks = (len(bpy.data.objects), len(bpy.data.actions))
+
+    def fail(*args, **keywords):
+        raise OSError("no room")
+
+    monkeypatch.setattr("scope.scope_addon.scene.character.root_object.Channels", fail)
+    with pytest.raises(RuntimeError, match="No room"):
+        bpy.ops.scope.root_motion(mode="OBJECT", heading=False)  # the bones are written by then
+    assert root_object(rig) == empty
+    assert (len(bpy.data.objects), len(bpy.data.actions)) == blocks
+    np.testing.assert_array_equal(seen(rig), before)
+    with pytest.raises(RuntimeError, match="no keys in the chosen frames"):
+        bpy.ops.scope.loop(start=500, end=600)
+    assert root_object(rig) == empty
+    np.testing.assert_array_equal(seen(rig), before)
+    assert rig.animation_data.action.name == action
+
+
+def test_a_loop_goes_on_for_ever_where_it_ended(rig):
+    bpy.ops.scope.loop(start=5, end=85, shortest=0.8)
+    scene = bpy.context.scene
+    length = scene.frame_end + 1 - scene.frame_start
+    assert length in (30, 60)  # a period is one second
+    first = scene.frame_start
+    once, next_time = seen(rig, [first, first + 10]), seen(rig, [first + length, first + length + 10])
+    gone = next_time[:, 0] - once[:, 0]
+    np.testing.assert_allclose(gone[:, 1], -1.2 * length / RATE, atol=0.02)
+    np.testing.assert_allclose(next_time - next_time[:, :1], once - once[:, :1], atol=2e-3)
+
+
+def test_a_loop_that_is_smoothed_again_is_the_whole_motion_once_more(rig):
+    last = 1 + round(SECONDS * RATE)
+    bpy.ops.scope.smooth()
+    before = seen(rig, [1, last, last + 20])
+    bpy.ops.scope.loop(start=5, end=85, shortest=0.8)
+    bpy.ops.scope.smooth()
+    np.testing.assert_allclose(seen(rig, [1, last, last + 20]), before, atol=1e-5)
+
+
+def test_a_loop_that_is_smoothed_again_is_played_as_a_whole(rig):
+    scene = bpy.context.scene
+    scene.frame_start, scene.frame_end = 2, 120
+    bpy.ops.scope.loop(start=5, end=85, shortest=0.8)
+    cycle = scene.frame_start, scene.frame_end
+    bpy.ops.scope.loop(start=cycle[0], end=cycle[1] + 1, shortest=0.5)  # once more, within the first one
+    bpy.ops.scope.smooth()
+    assert (scene.frame_start, scene.frame_end) == (2, 120)
+    bpy.ops.scope.loop(start=5, end=85, shortest=0.8)
+    scene.frame_start = 1  # the user's own choice stays
+    bpy.ops.scope.smooth()
+    assert (scene.frame_start, scene.frame_end) == (1, cycle[1])
+
+
+@pytest.mark.parametrize("suffix", ["glb", "fbx", "bvh"])
+def test_a_loop_is_exported_alone(rig, tmp_path, suffix):
+    """Curves that loop for ever, and the confidence of the frames that were cut off, do not make the file longer."""
+    bpy.ops.scope.loop(start=5, end=85, shortest=0.8)
+    length = bpy.context.scene.frame_end + 1 - bpy.context.scene.frame_start
+    path = str(tmp_path / f"loop.{suffix}")
+    bpy.ops.scope.export(filepath=path, format=suffix.upper())
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    bpy.context.scene.render.fps = int(RATE)
+    operators = {"glb": bpy.ops.import_scene.gltf, "fbx": bpy.ops.import_scene.fbx, "bvh": bpy.ops.import_anim.bvh}
+    operators[suffix](filepath=path)
+    for action in bpy.data.actions:
+        assert action.frame_range[1] - action.frame_range[0] == pytest.approx(length, abs=0.01)
+        assert suffix != "glb" or action.frame_range[0] == 0  # players begin there
+
+
+def test_a_motion_file_of_a_capture_without_its_armature_is_not_promised(rig, tmp_path):
+    bpy.data.objects.remove(rig)
+    with pytest.raises(RuntimeError, match="armature was removed; undo that or capture again"):
+        bpy.ops.scope.export(filepath=str(tmp_path / "walk.npz"), format="NPZ")
+    assert not (tmp_path / "walk.npz").exists()
+
+
+@pytest.mark.parametrize("degrees", [0.3, 2.0])
+def test_reduced_keys_stay_within_what_was_asked(rig, degrees):
+    before, dense = seen(rig, range(1, 91)), keys(rig)[0]
+    count = sum(len(c.keyframe_points) for c in _curves(rig))
+    bpy.ops.scope.reduce_keys(degrees=degrees, millimetres=3.0)
+    after = sum(len(c.keyframe_points) for c in _curves(rig))
+    assert after < 0.5 * count
+    reduced, frames = keys(rig)
+    truth = dense.rotations[np.round(frames - 1).astype(int)]
+    assert turned(reduced.rotations, truth) <= degrees * 1.01 + 0.01
+    assert np.abs(seen(rig, range(1, 91))[:, 0] - before[:, 0]).max() < 0.0031
+
+
+def test_baking_to_rates(rig):
+    before = seen(rig)
+    bpy.ops.scope.bake_rate(rate=15.0)
+    assert len(keys(rig)[1]) == 46
+    np.testing.assert_allclose(np.diff(keys(rig)[1]), 2.0)
+    assert np.abs(seen(rig) - before).max() < 0.03
+    bpy.ops.scope.bake_rate(rate=0.0)
+    np.testing.assert_allclose(keys(rig)[1], 1 + np.arange(91))
+
+
+def test_edits_need_a_captured_armature_and_find_the_only_one():
+    assert not bpy.ops.scope.smooth.poll()
+    bpy.ops.object.empty_add()
+    assert not bpy.ops.scope.refloor.poll()
+
+
+@pytest.mark.parametrize("overridden", [False, True])
+def test_a_linked_capture_is_not_edited_until_it_is_local(rig, tmp_path, overridden):
+    name, file = rig.users_collection[0].name, tmp_path / "capture.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(file))
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    scene, layer = bpy.context.scene, bpy.context.view_layer
+    scene.render.fps = int(RATE)
+    with bpy.data.libraries.load(str(file), link=True) as (_, here):
+        here.collections = [name]
+    if overridden:
+        here.collections[0].override_hierarchy_create(scene, layer)
+    else:
+        scene.collection.children.link(here.collections[0])
+    linked = layer.objects.active = next(obj for obj in scene.objects if obj.type == "ARMATURE")
+    before = seen(linked)
+    for operator in (bpy.ops.scope.refloor, bpy.ops.scope.root_motion):
+        with pytest.raises(RuntimeError, match=r"linked from .*capture\.blend.*Make Local"):
+            operator()
+    np.testing.assert_array_equal(seen(linked), before)
+    for obj in layer.objects:
+        obj.select_set(True)
+    bpy.ops.object.make_local(type="ALL")
+    local = layer.objects.active = next(obj for obj in scene.objects if obj.type == "ARMATURE")
+    assert bpy.ops.scope.root_motion() == {"FINISHED"}
+    np.testing.assert_allclose(seen(local), before, atol=2e-4)
+
+
+def test_lost_keys_are_told_and_change_nothing(rig):
+    from scope.scope_addon.scene.animation_data.actions import fcurves
+
+    name = NAMES[5]
+    for curve in fcurves(rig):
+        if name in curve.data_path:
+            curve.keyframe_points.clear()
+    with pytest.raises(RuntimeError, match="has lost the keys"):
+        bpy.ops.scope.refloor()
+
+
+def test_a_motion_in_the_nla_is_not_taken_for_lost(rig):
+    animation = rig.animation_data
+    action, slot = animation.action, getattr(animation, "action_slot", None)
+    animation.action = None
+    track = animation.nla_tracks.new()
+    strip = track.strips.new("walk", 1, action)
+    if slot is not None:
+        strip.action_slot = slot
+    with pytest.raises(RuntimeError, match="NLA track '.*', not by an action of its own: enter Tweak Mode"):
+        bpy.ops.scope.refloor()
+    animation.nla_tracks.active, strip.select = track, True
+    animation.use_tweak_mode = True
+    assert bpy.ops.scope.refloor() == {"FINISHED"}
+
+
+def test_an_edit_can_be_undone_by_hand_made_changes_too(rig):
+    """The keys are the truth: a pose changed by hand survives another edit."""
+    clip, _ = keys(rig)
+    from scope.scope_addon.scene.character.keys import write_clip
+
+    clip.rotations[:, NAMES.index("head")] = exp([0.3, 0.0, 0.0])
+    write_clip(rig, BODY, clip, 1 + np.arange(len(clip)))
+    bpy.ops.scope.refloor()
+    assert turned(keys(rig)[0].rotations[:, NAMES.index("head")], exp([0.3, 0.0, 0.0])) < 0.01
+
+
+def _curves(rig):
+    from scope.scope_addon.scene.animation_data.actions import fcurves
+
+    return fcurves(rig)

@@ -1,0 +1,257 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The retarget section as a user works it."""
+
+import bpy
+import numpy as np
+import pytest
+from scope.scope_addon.retarget.bone_map import PARTS
+from scope.scope_addon.scene.character.root_object import root_object
+from scope.scope_addon.scene.visibility import hide_again, show
+from scope.scope_addon.ui.captured_person import captured_armature
+from scope.scope_addon.ui.retarget.retarget_properties import offered_parts
+
+from ...edit.walking import RATE, motion_of, walk
+from ...scene.exported import read_back
+from ...scene.made_rigs import build_rig, captured, seen
+
+
+@pytest.fixture
+def rig():
+    source = captured(motion_of(walk(2.0)))
+    source["scope_body_file"] = "scope"
+    rig, _ = build_rig("unreal")
+    bpy.context.scene.scope_retarget.rig = rig
+    return rig
+
+
+def test_guess_keep_and_retarget(rig, tmp_path):
+    settings = bpy.context.scene.scope_retarget
+    bpy.ops.scope.guess_bones()
+    count = len(settings.pairs)
+    assert count == 22
+    bpy.ops.scope.save_bone_map(filepath=str(tmp_path / "bones.json"))
+    settings.active = count - 1
+    bpy.ops.scope.edit_bone_pair(action="REMOVE")
+    assert len(settings.pairs) == count - 1
+    bpy.ops.scope.load_bone_map(filepath=str(tmp_path / "bones.json"))
+    assert len(settings.pairs) == count
+    bpy.ops.scope.retarget()
+    assert np.ptp(seen(rig, ["pelvis"])[:, 0, 1]) > 1.0  # it walks
+
+
+def test_the_captured_body_is_hidden_beside_or_left(rig):
+    settings, scene = bpy.context.scene.scope_retarget, bpy.context.scene
+    source = next(obj for obj in scene.objects if "scope_source" in obj)
+    body = next(obj for obj in source.children if obj.type == "MESH")
+    bpy.ops.scope.retarget()
+    assert all(obj.hide_get() and obj.hide_render for obj in (source, body))
+    assert not rig.hide_get()
+    assert bpy.context.view_layer.objects.active == rig
+    assert captured_armature(bpy.context) == source  # so that it can be refined
+    there = seen(rig, ["pelvis"])
+    settings.captured = "beside"
+    bpy.ops.scope.retarget()
+    assert not any(obj.hide_get() or obj.hide_render for obj in (source, body))
+    np.testing.assert_allclose(seen(rig, ["pelvis"]) - there, np.broadcast_to([1.5, 0, 0], there.shape), atol=1e-4)
+    body.hide_render = True  # the user's own choice
+    settings.captured = "keep"
+    bpy.ops.scope.retarget()
+    np.testing.assert_allclose(seen(rig, ["pelvis"]), there, atol=1e-4)
+    assert body.hide_render
+
+
+@pytest.mark.parametrize("captured", ["hide", "beside"])
+def test_the_captured_persons_collection_may_be_left_out_of_the_view_layer(rig, captured):
+    source = next(obj for obj in bpy.context.scene.objects if "scope_source" in obj)
+    layers = bpy.context.view_layer.layer_collection.children
+    next(c for c in layers if c.collection in source.users_collection).exclude = True
+    bpy.context.scene.scope.result.collection = source.users_collection[0]
+    bpy.context.scene.scope_retarget.captured = captured
+    assert bpy.ops.scope.retarget() == {"FINISHED"}
+    assert np.ptp(seen(rig, ["pelvis"])[:, 0, 1]) > 1.0
+
+
+def test_what_is_hidden_is_shown_for_now_and_hidden_again(rig):
+    layer = bpy.context.view_layer
+    source = next(obj for obj in bpy.context.scene.objects if "scope_source" in obj)
+    bpy.ops.scope.retarget()
+    show(source, layer, for_now=True)
+    assert not source.hide_get()
+    hide_again(source, layer)
+    assert source.hide_get()
+    show(source, layer)
+    hide_again(source, layer)
+    assert not source.hide_get()
+
+
+def test_an_edit_and_the_same_button_again_update_the_rig(rig, tmp_path):
+    source = next(obj for obj in bpy.context.scene.objects if "scope_source" in obj)
+    motion_of(walk(2.0), noise=0.1).save(tmp_path / "person1.npz")
+    source["scope_motion"] = str(tmp_path / "person1.npz")
+    bpy.ops.scope.retarget()
+    before, count, name = seen(rig, ["upperarm_l", "hand_l"]), len(bpy.data.actions), rig.animation_data.action.name
+    bpy.ops.scope.smooth(strength=0.0)
+    bpy.ops.scope.retarget()
+    assert np.abs(seen(rig, ["upperarm_l", "hand_l"]) - before).max() > 0.02
+    bpy.ops.scope.smooth(strength=1.0)
+    bpy.ops.scope.retarget()
+    assert (len(bpy.data.actions), rig.animation_data.action.name) == (count, name)
+    bpy.context.scene.scope_retarget.root = "object"
+    bpy.ops.scope.retarget()
+    assert root_object(rig) is not None
+    assert np.ptp(seen(rig, ["pelvis"])[:, 0, 1]) > 1.0
+
+
+@pytest.mark.parametrize("suffix", ["glb", "fbx"])
+def test_what_else_hangs_where_the_rig_does_stays_out_of_its_file(rig, tmp_path, suffix):
+    scene, layer = bpy.context.scene, bpy.context.view_layer
+    active = layer.objects.active
+    bpy.ops.mesh.primitive_plane_add(location=(1.0, 2.0, 0.5))
+    stage = bpy.context.object
+    bpy.ops.mesh.primitive_cube_add()
+    bpy.context.object.parent = rig.parent = stage
+    layer.objects.active = active
+    bpy.ops.scope.retarget()
+    wanted = seen(rig, ["pelvis", "hand_l"], [10])
+    path = str(tmp_path / f"rig.{suffix}")
+    bpy.ops.scope.export(filepath=path, format=suffix.upper(), which="RIG")
+    assert rig.parent == stage
+    rate = scene.render.fps
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    bpy.context.scene.render.fps = rate
+    if suffix == "glb":
+        bpy.ops.import_scene.gltf(filepath=path)
+    else:
+        bpy.ops.import_scene.fbx(filepath=path, anim_offset=0.0)
+    assert not {obj.name for obj in bpy.data.objects} & {"Cube", "Plane"}
+    rig = next(obj for obj in bpy.context.scene.objects if obj.type == "ARMATURE")
+    np.testing.assert_allclose(seen(rig, ["pelvis", "hand_l"], [9 if suffix == "glb" else 10]), wanted, atol=1e-3)
+
+
+def test_with_several_people_the_panels_stay_and_ask_for_one(rig):
+    people = [next(obj for obj in bpy.context.scene.objects if "scope_source" in obj), captured(motion_of(walk(2.0)))]
+    people[1]["scope_body_file"] = "scope"
+    panels, layer = (bpy.types.SCOPE_PT_retarget, bpy.types.SCOPE_PT_edit), bpy.context.view_layer
+    layer.objects.active = rig
+    assert all(panel.poll(bpy.context) for panel in panels)
+    with pytest.raises(RuntimeError, match="Several people are captured: select the armature"):
+        bpy.ops.scope.retarget()
+    layer.objects.active = people[1]
+    bpy.ops.scope.retarget()
+    assert people[1].hide_get()
+    assert not people[0].hide_get()
+    for person in people:
+        assert all(panel.poll(bpy.context) for panel in panels)
+        bpy.data.objects.remove(person)
+    assert not any(panel.poll(bpy.context) for panel in panels)
+
+
+def test_body_parts_are_offered_while_they_are_typed():
+    assert offered_parts(None, bpy.context, "LEFT_h") == ["left_hip"]
+    assert offered_parts(None, bpy.context, "") == list(PARTS)
+
+
+def test_a_list_without_legs_is_refused(rig):
+    bpy.ops.scope.guess_bones()
+    for pair in bpy.context.scene.scope_retarget.pairs:
+        if pair.part == "left_knee":
+            pair.bone = ""
+    with pytest.raises(RuntimeError, match="left_knee"):
+        bpy.ops.scope.retarget()
+    assert rig.animation_data is None or rig.animation_data.action is None
+
+
+def test_undo_takes_the_motion_away(rig):
+    name = rig.name
+    bpy.ops.scope.guess_bones()
+    bpy.ops.ed.undo_push(message="before")
+    bpy.ops.scope.retarget()
+    bpy.ops.ed.undo_push(message="Retarget")  # an operator called by a script pushes none itself
+    assert bpy.data.objects[name].animation_data.action is not None
+    bpy.ops.ed.undo()
+    rig = bpy.data.objects[name]
+    assert rig.animation_data is None or rig.animation_data.action is None
+    assert len(bpy.context.scene.scope_retarget.pairs) == 22
+    bpy.ops.ed.redo()
+    assert bpy.data.objects[name].animation_data.action is not None
+
+
+@pytest.mark.parametrize("kind", ["fbx", "glb", "bvh"])
+def test_the_rig_is_exported_as_it_moves_with_its_mesh_alone(rig, tmp_path, kind):
+    """The captured body stays behind; in the scene nothing changes."""
+    mesh = bpy.data.meshes.new("skin")
+    mesh.from_pydata([(0, 0, 1), (0.1, 0, 1), (0, 0.1, 1)], [], [(0, 1, 2)])
+    skin = bpy.data.objects.new("skin", mesh)
+    bpy.context.scene.collection.objects.link(skin)
+    skin.modifiers.new("rig", "ARMATURE").object = rig
+    skin.vertex_groups.new(name="pelvis").add([0, 1, 2], 1.0, "REPLACE")
+    bpy.ops.scope.retarget()
+    there, before = seen(rig, ["pelvis"])[:, 0], sorted(c.name for c in bpy.data.collections)
+    path = tmp_path / f"hero.{kind}"
+    assert bpy.ops.scope.export(filepath=str(path), format=kind.upper(), which="RIG") == {"FINISHED"}
+    assert sorted(c.name for c in bpy.data.collections) == before
+    read_back(path, RATE)
+    moved = [obj for obj in bpy.data.objects if obj.type == "ARMATURE"]
+    assert len(moved) == 1
+    meshes = [obj for obj in bpy.data.objects if obj.type == "MESH" and obj.find_armature()]
+    assert len(meshes) == (0 if kind == "bvh" else 1)
+    way = seen(moved[0], ["pelvis"])[:, 0]
+    assert np.ptp(way, axis=0).max() == pytest.approx(np.ptp(there, axis=0).max(), rel=0.05)
+
+
+def test_a_bone_map_that_cannot_be_saved_names_its_place(rig, tmp_path):
+    bpy.ops.scope.guess_bones()
+    with pytest.raises(RuntimeError, match=r"Cannot write .*nowhere/bones\.json: its folder does not exist"):
+        bpy.ops.scope.save_bone_map(filepath=str(tmp_path / "nowhere" / "bones.json"))
+
+
+def test_without_a_rig_its_export_says_what_to_do(rig, tmp_path):
+    bpy.context.scene.scope_retarget.rig = None
+    with pytest.raises(RuntimeError, match="choose yours"):
+        bpy.ops.scope.export(filepath=str(tmp_path / "hero.fbx"), format="FBX", which="RIG")
+
+
+def _linked_character(folder):
+    """A rig in a collection that is linked from another file."""
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    rig, _ = build_rig("unreal")
+    character = bpy.data.collections.new("Character")
+    character.objects.link(rig)
+    bpy.data.libraries.write(str(folder / "hero.blend"), {character})
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    captured(motion_of(walk(2.0)))["scope_body_file"] = "scope"
+    with bpy.data.libraries.load(str(folder / "hero.blend"), link=True) as (_, here):
+        here.collections = ["Character"]
+    bpy.context.scene.collection.children.link(here.collections[0])
+    bpy.context.view_layer.update()
+    return here.collections[0]
+
+
+def test_on_a_linked_rig_the_button_says_what_to_do(tmp_path):
+    bpy.context.scene.scope_retarget.rig = _linked_character(tmp_path).objects["unreal"]
+    with pytest.raises(RuntimeError, match=r"linked from .*hero\.blend.*make an override"):
+        bpy.ops.scope.retarget()
+
+
+@pytest.mark.parametrize("root", ["bone", "object"])
+def test_a_library_override_moves_and_is_saved(tmp_path, root):
+    _linked_character(tmp_path).override_hierarchy_create(bpy.context.scene, bpy.context.view_layer)
+    settings = bpy.context.scene.scope_retarget
+    settings.rig = next(obj for obj in bpy.context.scene.objects if obj.override_library)
+    settings.root = root
+    bpy.ops.scope.retarget()
+    moving = seen(settings.rig, ["pelvis", "hand_l"])
+    assert np.ptp(moving[:, 0, 1]) > 1.0
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "shot.blend"))
+    np.testing.assert_allclose(seen(bpy.context.scene.scope_retarget.rig, ["pelvis", "hand_l"]), moving, atol=1e-4)
+
+
+def test_a_rig_that_is_out_of_the_view_layer_is_said_to_be(rig):
+    aside = bpy.data.collections.new("Aside")
+    bpy.context.scene.collection.children.link(aside)
+    aside.objects.link(rig)
+    bpy.context.scene.collection.objects.unlink(rig)
+    bpy.context.view_layer.layer_collection.children["Aside"].exclude = True
+    with pytest.raises(RuntimeError, match="'unreal' is not in the scene's view layer"):
+        bpy.ops.scope.retarget()
