@@ -162,7 +162,7 @@ def run_capture(args: argparse.Namespace) -> dict:
 
 def run_batch(args: argparse.Namespace) -> dict:
     """``scope batch``: one process per clip, so that none can harm another; returns the report of all."""
-    from .capture.pipeline import check_networks
+    from .capture.options import check_networks
     from .job.batch import Batch
 
     formats = [f".{f.strip().lstrip('.').lower()}" for f in args.formats.split(",") if f.strip()]

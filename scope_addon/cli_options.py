@@ -14,7 +14,7 @@ from .errors import UsageError
 from .retarget.rig_source import ROOTS
 
 if TYPE_CHECKING:
-    from .capture.pipeline import CaptureOptions
+    from .capture.options import CaptureOptions
 
 SHAPE_MODES = ("keyed", "per_frame", "baked")
 QUALITIES = ("fast", "balanced", "best")
@@ -101,7 +101,7 @@ def body_and_options(args: argparse.Namespace) -> tuple[Body, CaptureOptions]:
     """
     from ..solver.loaders.body_file import load_body
     from .capture.media.video_range import parse_range
-    from .capture.pipeline import CaptureOptions, check_options
+    from .capture.options import CaptureOptions, check_options
 
     if args.threads < 0:
         raise UsageError(f"--threads takes a number from 1 on, or 0 for all, not {args.threads}")

@@ -13,7 +13,8 @@ from types import ModuleType
 import numpy as np
 
 from ...scope_addon.capture.fitting.ablation import Parts
-from ...scope_addon.capture.pipeline import CaptureOptions, capture
+from ...scope_addon.capture.options import CaptureOptions
+from ...scope_addon.capture.pipeline import capture
 from ...scope_addon.motion import Motion
 from ...solver import Body
 from ..frames import DATA

@@ -18,8 +18,8 @@ from typing import Any
 import numpy as np
 
 from ...scope_addon.capture.fitting import track_fit
+from ...scope_addon.capture.options import CaptureOptions
 from ...scope_addon.capture.perception import lifter
-from ...scope_addon.capture.pipeline import CaptureOptions
 from ...scope_addon.capture.world import balance, foot_lock, ground_plane
 from ...scope_addon.kinematics import standing
 from ...solver import load_body

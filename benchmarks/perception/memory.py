@@ -19,14 +19,15 @@ from pathlib import Path
 
 from ...scope_addon.capture.camera.intrinsics import choose_camera
 from ...scope_addon.capture.camera.line_segments import Lines
-from ...scope_addon.capture.fitting.ablation import ALL_PARTS
 from ...scope_addon.capture.media.video import open_video
+from ...scope_addon.capture.options import CaptureOptions
 from ...scope_addon.capture.perception.observation import Observation
-from ...scope_addon.capture.pipeline import CaptureOptions, solve
+from ...scope_addon.capture.stages.solve import solve
 from ...scope_addon.capture.tracking.left_right import repair_left_right
 from ...scope_addon.capture.tracking.people import PeopleBuilder
 from ...scope_addon.capture.tracking.tracker import PeopleTracker
 from ...scope_addon.capture.world.camera_path import CameraPath
+from ...scope_addon.capture.world.shot import Shot
 from ...scope_addon.cli import SAMPLE
 from ...solver import load_body
 
@@ -50,9 +51,8 @@ def replay(frames: int, people: int) -> dict[str, float]:
     tracks = [repair_left_right(track, camera) for track in builder.build(people)]
     del builder, tracker
     peaks["left and right"] = peak_mib()
-    about = {"fps": Fraction(fps), "image_size": size, "source": SAMPLE.name}
-    path = CameraPath.on_a_stand(frames)
-    motions, _, _ = solve(body, tracks, camera, path, Lines.none(), True, ALL_PARTS, about, lambda *_: None)
+    shot = Shot(body, camera, CameraPath.on_a_stand(frames), Lines.none(), Fraction(fps), size, SAMPLE.name)
+    motions = solve(shot, tracks, lambda *_: None).motions
     peaks["solver"] = peak_mib()
     with tempfile.TemporaryDirectory() as folder:
         for k, motion in enumerate(motions):

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import sys
 
-from ...scope_addon.capture.pipeline import CaptureOptions
+from ...scope_addon.capture.options import CaptureOptions
 from ...solver import Body, load_body
 from ..frames import DATA
 from ..report import table

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...scope_addon.capture.pipeline import CaptureOptions
+from ...scope_addon.capture.options import CaptureOptions
 from ...scope_addon.errors import NoPersonError
 from ...scope_addon.motion import Motion
 from ...solver import Body, load_body

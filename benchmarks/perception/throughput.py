@@ -19,7 +19,8 @@ import numpy as np
 from ...scope_addon.atomic_write import written_beside
 from ...scope_addon.capture.media.video import open_video
 from ...scope_addon.capture.media.video_range import VideoRange
-from ...scope_addon.capture.pipeline import Capture, CaptureOptions, capture
+from ...scope_addon.capture.options import CaptureOptions
+from ...scope_addon.capture.pipeline import Capture, capture
 from ...solver import Body
 from ..frames import CACHE, DATA, ROOT
 from ..solver.peers import make_environment

@@ -53,7 +53,8 @@ def run(request: JobRequest, job_folder: Path, reporter: Reporter) -> int:
         # Imported here, so that a missing wheel becomes a sentence in the panel as well.
         from ...solver.loaders.body_file import load_body
         from ..capture.media.video_range import VideoRange
-        from ..capture.pipeline import CaptureOptions, capture
+        from ..capture.options import CaptureOptions
+        from ..capture.pipeline import capture
         from .preview import PreviewWriter
 
         options = CaptureOptions(

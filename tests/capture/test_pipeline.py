@@ -13,7 +13,8 @@ import cv2
 import numpy as np
 import pytest
 from scope.scope_addon.capture.media.video_range import VideoRange
-from scope.scope_addon.capture.pipeline import CaptureOptions, capture
+from scope.scope_addon.capture.options import CaptureOptions
+from scope.scope_addon.capture.pipeline import capture
 from scope.scope_addon.cli import SAMPLE
 from scope.scope_addon.errors import CancelledError, NoPersonError
 from scope.scope_addon.motion import Motion

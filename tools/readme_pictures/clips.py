@@ -8,7 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ...scope_addon.capture.pipeline import CaptureOptions, capture
+from ...scope_addon.capture.options import CaptureOptions
+from ...scope_addon.capture.pipeline import capture
 from ...scope_addon.motion import Motion
 from ...solver import Body, load_body
 from ...solver.loaders.body_file import ASSETS

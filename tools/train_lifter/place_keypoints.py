@@ -13,8 +13,9 @@ from pathlib import Path
 import numpy as np
 
 from ...scope_addon.capture.fitting.ablation import Parts
+from ...scope_addon.capture.options import ALL, CaptureOptions
 from ...scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES
-from ...scope_addon.capture.pipeline import ALL, CaptureOptions, capture
+from ...scope_addon.capture.pipeline import capture
 from ...scope_addon.motion import Motion
 from ...solver import Body, load_body
 from ...solver.rotations import exp

@@ -27,6 +27,10 @@ class CameraPath:
         """A camera that stands still."""
         return cls.turning(np.tile(np.eye(3), (frames, 1, 1)))
 
+    def __len__(self) -> int:
+        """Return the number of frames."""
+        return len(self.center)
+
     @property
     def is_static(self) -> bool:
         """Whether it does not move at all."""

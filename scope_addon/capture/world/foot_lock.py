@@ -8,8 +8,7 @@ measurements. Palms that rest on the floor are treated as soles are.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -30,129 +29,29 @@ from ....solver import (
     make_tree,
 )
 from ....solver.rotations import shortest_turn
-from ...kinematics.contact_points import SOLES
+from ...kinematics.contact_points import SOLES, SUPPORTS
 from ...kinematics.frame_blocks import by_blocks
 from ...kinematics.smoothing import smooth_rotations
 from ...kinematics.standing import along_sight
 from ..fitting.frame_measurements import NEAREST_M
 from .ground_plane import correct_depth, on_floor
+from .placement import PlacedTrack
 
 PICTURE_SIGMA_M = 0.003  # by how much held feet may move a keypoint in the picture, at the person's distance
-# They take off the edges where a foot or palm begins and ceases to be held: from legs and arms that do it, and from the
-# rest.
+# Low-pass that rounds off the steps where a lock begins or ends: of the limbs that are locked, and of all other joints.
 STEP_CUTOFF_HZ = 8.0
 REST_CUTOFF_HZ = 12.0
+LEAST_WEIGHT = 0.05  # of a frame whose feet are locked at all
+_SIDED = ("shoulder", "elbow", "wrist", "hip", "knee")
+_SEEN = ("nose", *(f"{side}_{name}" for side in ("left", "right") for name in _SIDED))
+_LEG, _ARM = ("hip", "knee", "ankle"), ("shoulder", "elbow", "wrist")
+_AT_WRISTS = np.array([_SEEN.index(f"{side}_wrist") for side in ("left", "right")])
 
-
-SupportsOf = Callable[[np.ndarray, np.ndarray], np.ndarray]
-
-
-def stand_on_floor(
-    body_with_supports: Body,
-    rotations: np.ndarray,
-    root_cam: np.ndarray,
-    betas: np.ndarray,
-    supports_of: SupportsOf,
-    contact: np.ndarray,
-    T_world_camera: np.ndarray,
-    times: np.ndarray,
-    center: np.ndarray | float = 0.0,
-) -> tuple[np.ndarray, np.ndarray]:
-    """The motion with its depth corrected by the floor, and standing feet held.
-
-    :param rotations, root_cam: (T, K+1, 3, 3), (T, 3) in the camera frame, smoothed.
-    :param supports_of: rotations and root positions to soles and palms (T, 6, 3), camera frame.
-    :param contact: (T, 6) probability that each rests on something.
-    :param center: (T, 3) of the camera, where it travels.
-    :return: rotations and root positions.
-    """
-    supports = supports_of(rotations, root_cam)
-    away = correct_depth(root_cam - center, supports, contact, T_world_camera, times)
-    root_cam = root_cam + away[:, None] * along_sight(root_cam - center)
-    R, t = T_world_camera[:3, :3], T_world_camera[:3, 3]
-    held = anchors(supports_of(rotations, root_cam) @ R.T + t, contact)
-    indices = np.arange(len(body_with_supports.keypoint_names) - held.shape[1], len(body_with_supports.keypoint_names))
-    lowest = np.minimum(held[..., 2].min(axis=1), 0.0)
-    floor = R[2], lowest * (1 - on_floor(lowest)) - float(t[2])  # far below it, there is no floor
-    targets = indices, (held - t) @ R, contact
-    rotations, root_cam = hold_feet(body_with_supports, rotations, root_cam, betas, targets, floor, center)
-    names = body_with_supports.joint_names
-    holding = _LEG + _ARM if (contact[:, len(SOLES) :] > 0.5).any() else _LEG
-    holds = np.array([k == 0 or any(part in name for part in holding) for k, name in enumerate(names)])
-    for joints, cutoff_hz in ((holds, STEP_CUTOFF_HZ), (~holds, REST_CUTOFF_HZ)):
-        rotations[:, joints] = smooth_rotations(rotations[:, joints], times, cutoff_hz)
-    return rotations, root_cam
-
-
-def hold_feet(
-    body: Body,
-    rotations: np.ndarray,
-    root_cam: np.ndarray,
-    betas: np.ndarray,
-    targets: tuple[np.ndarray, np.ndarray, np.ndarray],
-    floor: tuple[np.ndarray, np.ndarray],
-    center: np.ndarray | float = 0.0,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Fit each frame once more with held points above a floor, everything else staying at the given motion.
-
-    What the camera saw of head, arms, hips and knees stays where it was in the picture, but for wrists whose palms are
-    held: a body gives way along the line of sight, whose length is known worst, rather than across it. Each frame is
-    fitted in the axes of a camera that looks straight at the pelvis.
-
-    :param rotations: (T, K+1, 3, 3);  root_cam: (T, 3): the motion to stay at, camera frame.
-    :param targets: keypoint indices (6,), positions (T, 6, 3) in the camera frame, weights (T, 6) 0..1.
-    :param floor: its unit normal (3,), upwards, and offset (T,): normal . p = offset on it, camera frame.
-    :param center: (T, 3) of the camera, where it travels.
-    :return: rotations and root positions as given.
-    """
-    tree = make_tree(body)
-    indices, positions, weights = targets
-    center = np.broadcast_to(center, root_cam.shape)
-    turns = shortest_turn(root_cam - center, np.array([0.0, 0.0, 1.0]))
-    seen = [body.keypoint_set("blazepose")[name] for name in _SEEN]
-    at_palms = np.array([_SEEN.index(f"{side}_wrist") for side in ("left", "right")])
-    at_rest = body.rest_joints(betas)[0]
-
-    def shown(rotations: np.ndarray, root_cam: np.ndarray) -> tuple[np.ndarray]:
-        return (body.keypoints(*body.forward_kinematics(rotations, root_cam - at_rest, betas), betas, seen),)
-
-    (points,) = by_blocks(shown, rotations, root_cam)
-    priors = replace(
-        default_priors(body),
-        shape_mean=betas,
-        shape_information=np.eye(body.P) * 1e8,
-        joint_weights=np.ones(body.K),
-    )
-    options = Options(stages=(Stage(_HOLD, 1e-3, 8),))
-    free = np.zeros(len(indices))  # contact decides where a sole is; the floor alone where it cannot be
-    pelvis, turn_weight, place_weight = np.zeros(1, int), np.array([1 / 0.01**2]), np.array([1 / 0.02**2])
-    rotations, root_cam = rotations.copy(), np.array(root_cam, float)
-    for t in np.flatnonzero(weights.max(1) > 0.05):
-        turn = turns[t]
-        root = turn @ (root_cam[t] - center[t])
-        state = State(turn @ rotations[t, 0], root, rotations[t, 1:], betas)
-        ahead = (points[t] - center[t]) @ turn.T
-        certain = np.full(len(seen), np.square(root[2] / PICTURE_SIGMA_M))
-        certain[at_palms] *= 1 - weights[t, len(SOLES) :]
-        measurements = Measurements(
-            intrinsics=np.eye(3),
-            keypoints2d=Keypoints2D(seen, ahead[:, :2] / np.maximum(ahead[:, 2:], NEAREST_M), certain),
-            foot_contacts=FootContacts(indices, (positions[t] - center[t]) @ turn.T, weights[t]),
-            floor=Floor(indices, turn @ floor[0], float(floor[1][t] - floor[0] @ center[t]), free),
-            pose_priors=PosePriors(pelvis, state.R_camera_root[None], root[None], turn_weight, place_weight),
-        )
-        here: Priors = replace(priors, joint_mean=rotations[t, 1:])
-        found = fit_tree(tree, measurements, state, here, options).state
-        rotations[t, 0], rotations[t, 1:] = turn.T @ found.R_camera_root, found.Omega
-        root_cam[t] = turn.T @ found.t_camera_root + center[t]
-    return rotations, root_cam
-
-
-# A standing foot is held to 5 mm, no sole may be far below the floor; the pelvis may give 2 cm and half a degree, every
-# joint alike two degrees, what is seen 3 mm across the line of sight. Legs that give more follow a sole's every error:
-# with ten times the freedom, knees and ankles are 1 to 2 mm worse on footage and renders with known truth, and feet
-# slide no less. A pelvis that is held to 5 mm in every direction, and nothing seen beside it, draws the whole body off
-# the footage, by 2 cm where the floor is wrong.
+# Standard deviations: a standing foot 5 mm, a sole below the floor 2 cm, the pelvis 2 cm and half a degree, every joint
+# two degrees, what is seen 3 mm across the line of sight. Softer legs follow every error of a sole: with ten times the
+# freedom, knees and ankles are 1 to 2 mm worse on footage and renders with known truth, and feet slide no less. With
+# the pelvis held to 5 mm in every direction and nothing else seen, the whole body leaves the footage by 2 cm where the
+# floor is wrong.
 _HOLD = Weights(
     foot_contact=1 / 0.005**2,
     floor=1 / 0.02**2,
@@ -161,9 +60,123 @@ _HOLD = Weights(
     joint_limits=2000.0,
     shape=1.0,
 )
-_SIDED = ("shoulder", "elbow", "wrist", "hip", "knee")
-_SEEN = ("nose", *(f"{side}_{name}" for side in ("left", "right") for name in _SIDED))
-_LEG, _ARM = ("hip", "knee", "ankle"), ("shoulder", "elbow", "wrist")
+
+
+@dataclass(frozen=True)
+class LockedPoints:
+    """Where soles and palms are held, and the plane that none of them goes below; camera frame, metres."""
+
+    positions: np.ndarray  # (T, 6, 3)
+    weights: np.ndarray  # (T, 6) 0..1
+    floor_normal: np.ndarray  # (3,) unit, upwards
+    floor_offset: np.ndarray  # (T,) normal . p on the floor
+
+
+def lock_feet(placed: PlacedTrack, contact: np.ndarray, T_world_camera: np.ndarray) -> PlacedTrack:
+    """Correct the depth of a smoothed motion by the floor, and lock standing feet and resting palms.
+
+    :param contact: (T, 6) probability that each sole and palm rests on something.
+    :param T_world_camera: (4, 4) camera to world, this person's floor at z = 0.
+    :return: the motion with other rotations and root; its joints and supports are still those of the given motion.
+    """
+    rotations, root = placed.rotations, placed.root
+    supports = placed.place(rotations, root)[1]
+    away = correct_depth(root - placed.center, supports, contact, T_world_camera, placed.times)
+    root = root + away[:, None] * along_sight(root - placed.center)
+    locked = _locked_points(placed.place(rotations, root)[1], contact, T_world_camera)
+    rotations, root = hold_points(replace(placed, root=root), locked)
+    names = placed.body.joint_names
+    holding = _LEG + _ARM if (contact[:, len(SOLES) :] > 0.5).any() else _LEG
+    holds = np.array([k == 0 or any(part in name for part in holding) for k, name in enumerate(names)])
+    for joints, cutoff_hz in ((holds, STEP_CUTOFF_HZ), (~holds, REST_CUTOFF_HZ)):
+        rotations[:, joints] = smooth_rotations(rotations[:, joints], placed.times, cutoff_hz)
+    return replace(placed, rotations=rotations, root=root)
+
+
+def _locked_points(supports: np.ndarray, contact: np.ndarray, T_world_camera: np.ndarray) -> LockedPoints:
+    """Hold each support where it stands; far below the floor, on a stair down, there is no floor.
+
+    :param supports, contact: (T, 6, 3) in the camera frame, metres, and (T, 6).
+    """
+    R, t = T_world_camera[:3, :3], T_world_camera[:3, 3]
+    held = anchors(supports @ R.T + t, contact)
+    lowest = np.minimum(held[..., 2].min(axis=1), 0.0)
+    return LockedPoints((held - t) @ R, contact, R[2], lowest * (1 - on_floor(lowest)) - float(t[2]))
+
+
+def hold_points(placed: PlacedTrack, locked: LockedPoints) -> tuple[np.ndarray, np.ndarray]:
+    """Fit each frame once more with points held above a floor, everything else staying at the given motion.
+
+    The projections of head, arms, hips and knees stay where they were, except for wrists whose palms are held: the
+    body gives way along the line of sight, the least certain direction, rather than across it. Each frame is fitted in
+    the axes of a camera that looks straight at the pelvis.
+
+    :return: rotations (T, K+1, 3, 3) and root positions (T, 3), camera frame.
+    """
+    frames = _LockedFrames(placed, locked)
+    rotations, root = placed.rotations.copy(), np.array(placed.root, float)
+    for t in np.flatnonzero(locked.weights.max(1) > LEAST_WEIGHT):
+        turn, found = frames.turns[t], frames.fit(t)
+        rotations[t, 0], rotations[t, 1:] = turn.T @ found.R_camera_root, found.Omega
+        root[t] = turn.T @ found.t_camera_root + placed.center[t]
+    return rotations, root
+
+
+class _LockedFrames:
+    """The single-frame problems of `hold_points`."""
+
+    def __init__(self, placed: PlacedTrack, locked: LockedPoints) -> None:
+        body = placed.body
+        self._placed, self._locked = placed, locked
+        self._tree = make_tree(body)
+        self._supports = np.arange(len(body.keypoint_names) - len(SUPPORTS), len(body.keypoint_names))
+        self._seen = [body.keypoint_set("blazepose")[name] for name in _SEEN]
+        self._points = _keypoints(body, placed, self._seen)
+        self._priors = replace(
+            default_priors(body),
+            shape_mean=placed.betas,
+            shape_information=np.eye(body.P) * 1e8,
+            joint_weights=np.ones(body.K),
+        )
+        self._options = Options(stages=(Stage(_HOLD, 1e-3, 8),))
+        self.turns = shortest_turn(placed.root - placed.center, np.array([0.0, 0.0, 1.0]))
+
+    def fit(self, t: int) -> State:
+        """Solve frame ``t`` in the axes of a camera that looks straight at the pelvis."""
+        placed, turn = self._placed, self.turns[t]
+        root = turn @ (placed.root[t] - placed.center[t])
+        state = State(turn @ placed.rotations[t, 0], root, placed.rotations[t, 1:], placed.betas)
+        priors: Priors = replace(self._priors, joint_mean=placed.rotations[t, 1:])
+        return fit_tree(self._tree, self._measure(t, state), state, priors, self._options).state
+
+    def _measure(self, t: int, state: State) -> Measurements:
+        placed, locked, turn = self._placed, self._locked, self.turns[t]
+        center, root = placed.center[t], state.t_camera_root
+        ahead = (self._points[t] - center) @ turn.T
+        certain = np.full(len(self._seen), np.square(root[2] / PICTURE_SIGMA_M))
+        certain[_AT_WRISTS] *= 1 - locked.weights[t, len(SOLES) :]
+        offset = float(locked.floor_offset[t] - locked.floor_normal @ center)
+        # Contact decides where a sole is; the floor only where none can be.
+        unweighted = np.zeros(len(self._supports))
+        pelvis, turn_weight, place_weight = np.zeros(1, int), np.array([1 / 0.01**2]), np.array([1 / 0.02**2])
+        return Measurements(
+            intrinsics=np.eye(3),
+            keypoints2d=Keypoints2D(self._seen, ahead[:, :2] / np.maximum(ahead[:, 2:], NEAREST_M), certain),
+            foot_contacts=FootContacts(self._supports, (locked.positions[t] - center) @ turn.T, locked.weights[t]),
+            floor=Floor(self._supports, turn @ locked.floor_normal, offset, unweighted),
+            pose_priors=PosePriors(pelvis, state.R_camera_root[None], root[None], turn_weight, place_weight),
+        )
+
+
+def _keypoints(body: Body, placed: PlacedTrack, which: list[int]) -> np.ndarray:
+    """(T, n, 3) keypoints of these numbers, camera frame."""
+    at_rest = body.rest_joints(placed.betas)[0]
+
+    def shown(rotations: np.ndarray, root: np.ndarray) -> tuple[np.ndarray]:
+        R, t = body.forward_kinematics(rotations, root - at_rest, placed.betas)
+        return (body.keypoints(R, t, placed.betas, which),)
+
+    return by_blocks(shown, placed.rotations, placed.root)[0]
 
 
 def anchors(points_world: np.ndarray, contact: np.ndarray) -> np.ndarray:

@@ -140,17 +140,17 @@ def floor_height(soles_cam: np.ndarray, contact: np.ndarray, up: np.ndarray) -> 
     return float(lowest[order[np.searchsorted(sums, 0.5 * sums[-1])]])
 
 
-def estimate_world(placed: PlacedTrack, lines: Lines | None = None) -> np.ndarray:
-    """(4, 4) world_from_camera of one person alone, see `share_world`."""
-    return share_world([placed], lines).T_world_camera
-
-
 @dataclass(frozen=True)
 class SharedWorld:
     """``T_world_camera`` (4, 4) for everybody, and the height of each person's own floor in it, metres."""
 
     T_world_camera: np.ndarray
     floors_m: list[float]
+
+    @property
+    def up(self) -> np.ndarray:
+        """(3,) unit vector, in the first frame's camera axes."""
+        return self.T_world_camera[2, :3]
 
     def floor_from_camera(self, person: int) -> np.ndarray:
         """(4, 4) as ``T_world_camera``, with the person's own floor at z = 0."""

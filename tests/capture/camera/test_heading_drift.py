@@ -6,7 +6,8 @@ import pytest
 from scope.scope_addon.capture.camera.heading_drift import Look, without_drift
 from scope.scope_addon.capture.camera.intrinsics import Camera, pinhole
 from scope.scope_addon.capture.camera.line_segments import Segments
-from scope.scope_addon.capture.pipeline import CaptureOptions, capture
+from scope.scope_addon.capture.options import CaptureOptions
+from scope.scope_addon.capture.pipeline import capture
 from scope.solver import load_body
 from scope.solver.rotations import exp, log
 

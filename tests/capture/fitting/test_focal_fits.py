@@ -12,11 +12,12 @@ from scope.scope_addon.capture.fitting.focal_fits import FocalFits
 from scope.scope_addon.capture.fitting.focal_length import camera_by_fits
 from scope.scope_addon.capture.fitting.keypoint_offsets import as_seen
 from scope.scope_addon.capture.media.video_range import VideoRange
+from scope.scope_addon.capture.options import CaptureOptions
 from scope.scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES
 from scope.scope_addon.capture.perception.lifter import HIPS
 from scope.scope_addon.capture.perception.observation import Observation
 from scope.scope_addon.capture.perception.region import Region
-from scope.scope_addon.capture.pipeline import CaptureOptions, capture
+from scope.scope_addon.capture.pipeline import capture
 from scope.scope_addon.cli import SAMPLE
 from scope.solver.rotations import exp
 

@@ -15,7 +15,8 @@ from scope.scope_addon.capture.fitting.frame_measurements import Measurer
 from scope.scope_addon.capture.fitting.keypoint_offsets import as_seen, offset
 from scope.scope_addon.capture.fitting.track_fit import prepare_track
 from scope.scope_addon.capture.media.video_range import VideoRange
-from scope.scope_addon.capture.pipeline import CaptureOptions, capture
+from scope.scope_addon.capture.options import CaptureOptions
+from scope.scope_addon.capture.pipeline import capture
 from scope.scope_addon.motion import Motion
 from scope.solver.body import Body
 from scope.solver.names import BLAZEPOSE

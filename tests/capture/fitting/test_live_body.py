@@ -10,8 +10,9 @@ import pytest
 from scope.scope_addon.capture.camera.intrinsics import choose_camera
 from scope.scope_addon.capture.fitting import background_estimators
 from scope.scope_addon.capture.fitting.live_body import LiveBody
+from scope.scope_addon.capture.options import CaptureOptions
 from scope.scope_addon.capture.overlay.overlay_video import draw_overlay
-from scope.scope_addon.capture.pipeline import CaptureOptions, capture
+from scope.scope_addon.capture.pipeline import capture
 from scope.scope_addon.cli import SAMPLE
 from scope.scope_addon.errors import CancelledError
 from scope.solver.loaders.body_file import load_body
@@ -70,7 +71,7 @@ def test_the_result_does_not_depend_on_how_fast_the_threads_are(watched, body, m
         time.sleep(0.5)
         return focal(*arguments)
 
-    monkeypatch.setattr("scope.scope_addon.capture.pipeline.LiveBody", Slow)
+    monkeypatch.setattr("scope.scope_addon.capture.stages.observe.LiveBody", Slow)
     monkeypatch.setattr(background_estimators, "camera_by_edges", slow_focal)
     slowly = capture(SAMPLE, body, CaptureOptions(quality="fast")).motions[0]
     for name in ("poses", "trans", "betas", "joints_cam", "intrinsics"):

@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 from scope.scope_addon.capture.fitting.stature import with_stature
 from scope.scope_addon.capture.media.video_range import VideoRange
-from scope.scope_addon.capture.pipeline import CaptureOptions, capture, check_options
+from scope.scope_addon.capture.options import CaptureOptions, check_options
+from scope.scope_addon.capture.pipeline import capture
 from scope.scope_addon.errors import UsageError
 from scope.solver import default_priors, load_body
 from scope.solver.loaders.body_file import ASSETS

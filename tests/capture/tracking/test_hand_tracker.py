@@ -6,13 +6,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scope.scope_addon.capture.media.video_range import VideoRange
+from scope.scope_addon.capture.options import CaptureOptions
 from scope.scope_addon.capture.perception.hand_landmarks import HandEstimate
 from scope.scope_addon.capture.perception.hand_region import HAND_LENGTH_M, pixels_per_metre
 from scope.scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES
 from scope.scope_addon.capture.perception.observation import Observation
 from scope.scope_addon.capture.perception.palm_detector import Palm
 from scope.scope_addon.capture.perception.region import Region
-from scope.scope_addon.capture.pipeline import CaptureOptions, capture
+from scope.scope_addon.capture.pipeline import capture
 from scope.scope_addon.capture.tracking import hand_tracker
 from scope.scope_addon.capture.tracking.hand_tracker import HandTracker
 from scope.scope_addon.capture.tracking.tracker import PeopleTracker

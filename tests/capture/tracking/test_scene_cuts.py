@@ -9,7 +9,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from scope.scope_addon.capture.pipeline import CaptureOptions, capture
+from scope.scope_addon.capture.options import CaptureOptions
+from scope.scope_addon.capture.pipeline import capture
 from scope.scope_addon.capture.tracking.scene_cuts import SceneCuts
 from scope.scope_addon.errors import SetupError
 from scope.solver import Body

@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 from scope.scope_addon.capture.fitting.track_fit import FittedTrack, Stance
 from scope.scope_addon.capture.media.video_range import VideoRange
-from scope.scope_addon.capture.pipeline import CaptureOptions, capture
+from scope.scope_addon.capture.options import CaptureOptions
+from scope.scope_addon.capture.pipeline import capture
 from scope.scope_addon.capture.world.camera_path import CameraPath
 from scope.scope_addon.capture.world.camera_travel import camera_travel
 from scope.solver import load_body

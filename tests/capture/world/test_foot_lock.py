@@ -3,7 +3,9 @@
 
 import numpy as np
 import pytest
-from scope.scope_addon.capture.world import foot_lock, ground_plane
+from scope.scope_addon.capture.world import ground_plane
+from scope.scope_addon.capture.world.foot_lock import LockedPoints, hold_points, lock_feet
+from scope.scope_addon.capture.world.placement import PlacedTrack
 from scope.scope_addon.kinematics import standing
 from scope.scope_addon.kinematics.axes import transform_points, world_from_level_camera
 from scope.scope_addon.kinematics.contact_points import support_points, with_supports
@@ -13,6 +15,20 @@ from scope.solver.loaders.body_file import load_body
 
 FPS = 30.0
 CAMERA = np.zeros(3)
+
+
+def placed(supported, omega, root, times, center):
+    """A motion of a body of mean shape, seen in every frame."""
+    R, t = supported.forward_kinematics(omega, root - supported.rest_joints()[0])
+    supports, seen = support_points(supported, R, t), np.ones((len(root), 6))
+    betas, valid = np.zeros(supported.P), np.ones(len(root), bool)
+    return PlacedTrack(supported, betas, times, valid, omega, root, t, supports, seen, center)
+
+
+def locked(supported, omega, root, contact, T_world_camera, times):
+    """Rotations and root of the motion with its feet locked, for a camera on a stand."""
+    found = lock_feet(placed(supported, omega, root, times, np.zeros((len(root), 3))), contact, T_world_camera)
+    return found.rotations, found.root
 
 
 @pytest.fixture(scope="module")
@@ -118,9 +134,7 @@ def test_a_trembling_motion_stands_still_where_it_stands(step):
     trembling = gaussian_smooth(rng.normal(size=root.shape), times, 4.5)
     shaken_root = root + 0.003 * trembling + 0.02 * trembling[:, :1] * sight
     contact = standing.resting_probability(place(omega, root)[2], T_world_camera[2, :3], times, CAMERA)
-    local, moved = foot_lock.stand_on_floor(
-        supported, shaken, shaken_root, np.zeros(supported.P), lambda *m: place(*m)[2], contact, T_world_camera, times
-    )
+    local, moved = locked(supported, shaken, shaken_root, contact, T_world_camera, times)
     before, after = (
         transform_points(T_world_camera, place(*m)[2][:, 2]) for m in ((shaken, shaken_root), (local, moved))
     )
@@ -137,12 +151,12 @@ def test_the_picture_stays_where_feet_are_held_elsewhere(step, turned):
     omega, root = omega[:3].copy(), root[:3] @ R.T + center
     omega[:, 0] = R @ omega[:, 0]
     up, soles = R @ T_world_camera[2, :3], place(omega, root)[2]
-    indices = np.arange(len(supported.keypoint_names) - 6, len(supported.keypoint_names))
     for away in (-0.03, 0.03):
         held = soles + away * up
-        floor = up, np.full(len(root), float((held @ up).min()))
-        targets = indices, held, np.tile([0.9, 0.9, 0.9, 0.9, 0.0, 0.0], (len(root), 1))
-        local, moved = foot_lock.hold_feet(supported, omega, root, np.zeros(supported.P), targets, floor, center)
+        weights = np.tile([0.9, 0.9, 0.9, 0.9, 0.0, 0.0], (len(root), 1))
+        targets = LockedPoints(held, weights, up, np.full(len(root), float((held @ up).min())))
+        times, centers = np.arange(len(root)) / FPS, np.tile(center, (len(root), 1))
+        local, moved = hold_points(placed(supported, omega, root, times, centers), targets)
         for joint in ("head", "left_wrist", "right_hip"):
             j = supported.joint_names.index(joint)
             was, now = ((place(*m)[1][:, j] - center) @ R for m in ((omega, root), (local, moved)))
@@ -159,9 +173,7 @@ def test_feet_on_another_level_are_not_drawn_to_the_floor(step, level):
     other = root + np.where(times > 1.5, level, 0.0)[:, None] * up
     soles = place(omega, other)[2]
     contact = standing.resting_probability(soles, up, times, CAMERA)
-    local, moved = foot_lock.stand_on_floor(
-        supported, omega, other, np.zeros(supported.P), lambda *m: place(*m)[2], contact, T_world_camera, times
-    )
+    local, moved = locked(supported, omega, other, contact, T_world_camera, times)
     after = transform_points(T_world_camera, place(local, moved)[2])
     before = transform_points(T_world_camera, soles)
     assert np.abs(after[:, 2:, 2] - before[:, 2:, 2]).max() < 0.06
@@ -172,10 +184,7 @@ def test_feet_on_another_level_are_not_drawn_to_the_floor(step, level):
 def test_a_still_and_a_single_frame_pass(step):
     supported, omega, root, place, T_world_camera, times = step
     contact = standing.resting_probability(place(omega[:1], root[:1])[2], T_world_camera[2, :3], times[:1], CAMERA)
-    betas = np.zeros(supported.P)
-    local, moved = foot_lock.stand_on_floor(
-        supported, omega[:1], root[:1], betas, lambda *m: place(*m)[2], contact, T_world_camera, times[:1]
-    )
+    local, moved = locked(supported, omega[:1], root[:1], contact, T_world_camera, times[:1])
     assert np.allclose(place(local, moved)[2][0, 2:4] @ T_world_camera[2, :3] + 1.5, 0, atol=0.02)
 
 
@@ -240,9 +249,7 @@ def test_trembling_palms_keep_still_on_the_floor(plank):
     noise = gaussian_smooth(rng.normal(size=(len(times), supported.K + 1, 3)), times, 4.5)
     shaken = omega @ rotations.exp(0.06 * noise)
     contact = standing.resting_probability(place(omega, root)[2], T_world_camera[2, :3], times, CAMERA)
-    local, moved = foot_lock.stand_on_floor(
-        supported, shaken, root, np.zeros(supported.P), lambda *m: place(*m)[2], contact, T_world_camera, times
-    )
+    local, moved = locked(supported, shaken, root, contact, T_world_camera, times)
     before, after = (transform_points(T_world_camera, place(*m)[2][:, 4:]) for m in ((shaken, root), (local, moved)))
     assert after.std(0).max() < 0.4 * before.std(0).max()
     assert np.abs(after[..., 2]).max() < 0.03

@@ -4,7 +4,8 @@
 import cv2
 import numpy as np
 from scope.scope_addon.capture.camera.intrinsics import pinhole
-from scope.scope_addon.capture.pipeline import CaptureOptions, capture
+from scope.scope_addon.capture.options import CaptureOptions
+from scope.scope_addon.capture.pipeline import capture
 from scope.solver import load_body
 from scope.solver.rotations import exp, log
 

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from scope.scope_addon.capture.world.placement import PlacedTrack
 from scope.scope_addon.capture.world.world_frame import (
-    estimate_world,
     share_world,
     up_from_bodies,
     up_from_standing,
@@ -54,7 +53,7 @@ def test_up_and_floor_are_recovered_from_a_walk(pitch_deg, roll_deg):
     truth[:3, 3] += truth[:3, :3] @ [0, 0, -5.0] * [1, 1, 0]
     camera_from_world = np.linalg.inv(truth)
     placed = seen_by(body, R, t, camera_from_world)
-    got = estimate_world(placed)
+    got = share_world([placed]).T_world_camera
     angle = np.degrees(np.arccos(np.clip(got[2, :3] @ truth[2, :3], -1, 1)))
     assert angle < 2.0
     # The person is up to 6.5 m away: the camera's height above the floor is as uncertain as the angle makes it.
@@ -71,7 +70,7 @@ def test_who_leaps_for_most_of_a_clip_stands_on_the_floor_between():
     t[..., 2] += np.where(since < 0.5, 4.9 * since * (0.5 - since), 0.0)[:, None]
     truth = world_from_level_camera(np.array([0, -1.0, 0]), height=1.6)
     placed = seen_by(body, R, t + np.array([0, 5.0, 0]), np.linalg.inv(truth))
-    lowest = transform_points(estimate_world(placed), placed.soles)[..., 2].min(axis=1)
+    lowest = transform_points(share_world([placed]).T_world_camera, placed.soles)[..., 2].min(axis=1)
     assert abs(lowest.min()) < 0.01
     assert np.median(lowest) > 0.1
 
@@ -139,7 +138,7 @@ def test_who_sits_or_kneels_does_not_tilt_the_world(bends, turned_deg):
     R, t = (np.repeat(each[None], 60, axis=0) for each in body.forward_kinematics(omega, np.zeros(3)))
     up = np.array([0, -1.0, 0])
     placed = seen_by(body, R, t + [0.0, 4.0, 0.0], np.linalg.inv(world_from_level_camera(up, height=1.6)))
-    assert np.degrees(np.arccos(estimate_world(placed)[2, :3] @ up)) < 2.0
+    assert np.degrees(np.arccos(share_world([placed]).T_world_camera[2, :3] @ up)) < 2.0
 
 
 def test_a_moment_tells_nothing_by_the_weight():

@@ -281,7 +281,8 @@ def test_real_worker_on_a_picture(footage):
     scene.scope.footage, scene.scope.quality = str(footage), "FAST"
     assert bpy.ops.scope.capture() == {"FINISHED"}
     assert scene.scope.result.people == 1
-    from scope.scope_addon.capture.pipeline import CaptureOptions, capture
+    from scope.scope_addon.capture.options import CaptureOptions
+    from scope.scope_addon.capture.pipeline import capture
 
     expected = capture(footage, load_body("scope"), CaptureOptions(quality="fast")).motions[0]
     got = Motion.load(scene.scope.result.collection["scope_motions"][0])

@@ -1,0 +1,30 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Seconds spent in each stage of a capture."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+
+class StageClock:
+    """Adds up the seconds of each stage; of stages that overlap in threads, those that the main thread waited for."""
+
+    def __init__(self) -> None:
+        """Start with no stage."""
+        self.seconds: dict[str, float] = {}
+
+    @contextmanager
+    def stage(self, name: str) -> Iterator[None]:
+        """Count the time within the context as this stage's."""
+        since = time.perf_counter()
+        try:
+            yield
+        finally:
+            self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - since
+
+    def rates(self, frames: int) -> dict[str, float]:
+        """Return the frames per second of each stage and of all together (``total``)."""
+        seconds = dict(self.seconds, total=sum(self.seconds.values()))
+        return {name: round(frames / max(s, 1e-9), 2) for name, s in seconds.items()}

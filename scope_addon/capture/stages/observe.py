@@ -1,0 +1,198 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Everybody in every frame, and what the background says of the camera. Frames are not kept."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from ....solver.body import Body
+from ...errors import NoPersonError, VideoError
+from ..camera.camera_rotation import CameraMotion
+from ..camera.intrinsics import Camera, choose_camera
+from ..camera.line_segments import Lines
+from ..fitting.background_estimators import BesideTracking
+from ..fitting.focal_fits import FocalFits
+from ..fitting.live_body import LiveBody
+from ..media.exposure import Exposure
+from ..media.frame import Frame
+from ..media.video import Video
+from ..options import LARGEST, CaptureOptions, most_people
+from ..perception.adapters.description import description_path
+from ..perception.execution import Execution
+from ..perception.observation import Observation
+from ..tracking.hand_tracker import HandTracker
+from ..tracking.people import PeopleBuilder
+from ..tracking.scene_cuts import SceneCuts
+from ..tracking.track import Track
+from ..tracking.tracker import PeopleTracker
+from .clock import StageClock
+
+# Called with the stage's name, what is done and the total (0: unknown). May raise CancelledError.
+Progress = Callable[[str, int, int], None]
+# Called with each decoded frame, the largest person seen in it, and what fits the body to such a person.
+Watch = Callable[[Frame, Observation | None, LiveBody], None]
+
+
+@dataclass(frozen=True)
+class Listeners:
+    """What is told of the work while it goes on."""
+
+    progress: Progress
+    watch: Watch
+
+
+@dataclass(frozen=True)
+class Footage:
+    """What all frames together say of the footage, apart from the people in it."""
+
+    timestamps: np.ndarray  # (T,) seconds
+    camera: Camera
+    camera_motion: CameraMotion
+    lines: Lines  # of the background, in the first frame's camera axes
+    cuts_s: list[float]
+    execution: str  # what the networks ran on, for the report
+    warnings: list[str]
+
+
+def observe(
+    video: Video, body: Body, options: CaptureOptions, clock: StageClock, listeners: Listeners
+) -> tuple[Footage, list[Track]]:
+    """Find the people of every frame and follow them, the most prominent one first.
+
+    :raises VideoError: there is no frame in the chosen range.
+    :raises NoPersonError: nobody was found.
+    :raises CancelledError: raised by ``listeners.progress`` itself, passed on.
+    """
+    execution = Execution(options.provider)
+    threads = _network_threads(options, execution)
+    camera = choose_camera(
+        video.width,
+        video.height,
+        focal_mm=options.focal_mm,
+        fov_deg=options.fov_deg,
+        calibration=options.calibration,
+        metadata_focal_mm=video.focal_35mm,
+    )
+    live = LiveBody(body, camera, options.parts, next(iter(options.heights_m), None))
+    fits = FocalFits(body, options.parts)
+    with BesideTracking(camera, video.width, video.height, live, fits) as background, _opencv_in_one_thread():
+        frames = _Frames(_tracker(options, threads, execution), _hands(options, threads, execution), background, clock)
+        frames.run(video, live, listeners)
+    with clock.stage("solver"):
+        camera = background.camera()
+        motion = background.background.motion(camera)
+        footage = Footage(
+            np.array(frames.people.timestamps),
+            camera,
+            motion,
+            background.background.lines(motion, camera),
+            frames.cuts.times_s,
+            execution.describe(threads),
+            execution.warnings + list(video.warnings),
+        )
+        tracks = frames.people.build(most_people(options.people))
+    if not len(footage.timestamps):
+        raise VideoError(f"{video.path} has no frame in the time that was asked for; change the start or the end")
+    if not tracks:
+        own_networks = [network for network in (options.detector, options.keypoints) if network]
+        raise _nobody(Path(video.path), len(footage.timestamps), own_networks)
+    return footage, tracks
+
+
+class _Frames:
+    """Sends each frame through the networks. No frame is kept: an hour takes no more memory than a minute."""
+
+    def __init__(
+        self, tracker: PeopleTracker, hands: HandTracker | None, background: BesideTracking, clock: StageClock
+    ) -> None:
+        self._tracker, self._hands, self._background, self._clock = tracker, hands, background, clock
+        self.people, self.cuts = PeopleBuilder(), SceneCuts()
+
+    def run(self, video: Video, live: LiveBody, listeners: Listeners) -> None:
+        """Look at every frame, each decoded while the networks run on the one before."""
+        expected, exposure = video.expected_frames, Exposure()
+        frames = ((frame, exposure.brightened(frame.image_rgb)) for frame in video)
+        with self._clock.stage("decode"):
+            upcoming = next(frames, None)
+        while upcoming is not None:
+            frame, lit = upcoming
+            with self._clock.stage("decode"):
+                upcoming = next(frames, None)
+            largest = self._look(frame, lit, upcoming)
+            listeners.watch(frame, largest, live)
+            listeners.progress("finding the person", len(self.people), max(expected, len(self.people)))
+        self._background.wait()
+
+    def _look(
+        self, frame: Frame, lit: np.ndarray, upcoming: tuple[Frame, np.ndarray] | None
+    ) -> Observation | None:
+        """Add one frame; return the largest person in it."""
+        upcoming_rgb, upcoming_lit = (upcoming[0].image_rgb, upcoming[1]) if upcoming else (None, None)
+        with self._clock.stage("networks"):
+            is_cut = self.cuts.is_cut(frame.image_rgb, upcoming_rgb, frame.timestamp_s)
+            if is_cut:
+                self._tracker.forget()
+                self.people.cut()
+            observations = self._tracker.step(lit, upcoming_lit, frame.timestamp_s)
+        if self._hands is not None:
+            with self._clock.stage("hands"):
+                observations = self._hands.step(lit, observations, frame.timestamp_s)
+        self.people.add(frame.index, frame.timestamp_s, observations)
+        people = [observation for _, observation in observations]
+        largest = max(people, key=lambda observation: observation.region.side_px, default=None)
+        with self._clock.stage("background"):
+            self._background.add(frame, people, largest, is_cut)
+        return largest
+
+
+def _network_threads(options: CaptureOptions, execution: Execution) -> int:
+    """Use no more threads than there are cores: more would wait for each other."""
+    cores = os.cpu_count() or 1
+    if options.threads > cores:
+        execution.warnings.append(f"{options.threads} threads were asked for, but there are {cores} cores")
+    return min(options.threads or cores, cores)
+
+
+def _tracker(options: CaptureOptions, threads: int, execution: Execution) -> PeopleTracker:
+    return PeopleTracker(
+        options.quality,
+        threads,
+        None if options.people == LARGEST else most_people(options.people),
+        detector=options.detector,
+        keypoints=options.keypoints,
+        execution=execution,
+    )
+
+
+def _hands(options: CaptureOptions, threads: int, execution: Execution) -> HandTracker | None:
+    return HandTracker(threads, execution=execution) if options.hands else None
+
+
+@contextmanager
+def _opencv_in_one_thread() -> Iterator[None]:
+    """Let whole stages run in parallel, where OpenCV's own threads would wait for one another."""
+    before = cv2.getNumThreads()
+    cv2.setNumThreads(1)
+    try:
+        yield
+    finally:
+        cv2.setNumThreads(before)
+
+
+def _nobody(path: Path, frames: int, own_networks: list[Path]) -> NoPersonError:
+    where = f"in the {frames} frames of {path.name}" if frames > 1 else f"in {path.name}"
+    networks = "".join(
+        f"; if somebody is found without {own.name}, write into {description_path(own).name} which colours it expects"
+        for own in own_networks
+    )
+    return NoPersonError(
+        f"no person was found {where}: the footage needs one person who is mostly in the picture and measures "
+        f"at least a fifth of its shorter side; if somebody there is smaller, crop it{networks}"
+    )

@@ -1,0 +1,107 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The machine-readable report of a capture, and the warnings that a user should see."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ....solver.body import Body
+from ....solver.names import BODY_JOINTS
+from ...motion import Motion
+from ..media.video import Video
+from ..options import CaptureOptions
+from .observe import Footage
+from .solve import Solved
+
+UNSEEN_LEGS = 0.05  # confidence below which nothing is seen of the shanks
+MOST_TIMES = 4  # cuts whose times are listed
+
+
+def make_report(
+    video: Video, body: Body, options: CaptureOptions, footage: Footage, solved: Solved, rates: dict[str, float]
+) -> dict[str, Any]:
+    """Put together what ``--json`` prints of a capture.
+
+    :param rates: frames per second by stage.
+    """
+    motions, camera, motion = solved.motions, footage.camera, footage.camera_motion
+    return {
+        "source": str(video.path),
+        "frames": len(footage.timestamps),
+        "people": len(motions),
+        "valid_frames": int(motions[0].valid.sum()),
+        "per_person": [_about_person(body, motion) for motion in motions],
+        "quality": options.quality,
+        "detector": str(options.detector or "built-in"),
+        "keypoints": str(options.keypoints or "built-in"),
+        "execution": footage.execution,
+        "body": body.name,
+        "camera": camera.source,
+        "camera_turns_deg": 0.0 if motion.is_static else round(motion.largest_turn_deg, 2),
+        "camera_travels_m": round(float(np.linalg.norm(np.diff(solved.path.center, axis=0), axis=1).sum()), 2),
+        "focal_px": float(camera.intrinsics[0, 0]),
+        "focal_deviation": round(camera.focal_deviation, 3),
+        "frame_rate": [video.fps.numerator, video.fps.denominator],
+        "fps": rates,
+        "reprojection_px": float(motions[0].residual_px[motions[0].valid].mean()),
+        "iterations": solved.iterations,
+        "cuts_s": [round(t, 3) for t in footage.cuts_s],
+        "warnings": footage.warnings + capture_warnings(Path(video.path).name, options, footage.cuts_s, motions),
+    }
+
+
+def capture_warnings(name: str, options: CaptureOptions, cuts_s: list[float], motions: list[Motion]) -> list[str]:
+    """List what a user should know of the result, in sentences; ``name``: the footage's."""
+    warnings = []
+    if cuts_s:
+        times = _at(cuts_s)
+        warnings.append(f"{name} cuts to another scene {times}: capture each scene by itself, by its start and end")
+    if len(options.heights_m) > len(motions):
+        found = f"{len(motions)} people were found" if len(motions) > 1 else "one person was found"
+        warnings.append(f"{name}: {len(options.heights_m)} heights were given, but {found}")
+    for number, motion in enumerate(motions, 1):
+        who = "the person" if len(motions) == 1 else f"person {number}"
+        missing = int((~motion.valid).sum())
+        if missing:
+            warnings.append(f"{name}: {who} was not seen in {missing} of {len(motion)} frames; these are filled in")
+        if _legs_confidence(motion) < UNSEEN_LEGS:
+            warnings.append(f"{name}: the legs of {who} were not seen, so what they do is a guess")
+        if options.hands and not any(hand_frames(motion).values()):
+            warnings.append(f"{name}: no hands of {who} were found; come closer, or show the palms more to the camera")
+    return warnings
+
+
+def hand_frames(motion: Motion) -> dict[str, int]:
+    """Count the frames in which each hand was seen; empty where hands were not looked for."""
+    names = motion.keypoints2d_names.tolist()
+    wrists = {f"{side}_hand_frames": f"hand/{side}_wrist" for side in ("left", "right")}
+    confidence = {key: motion.keypoints2d[:, names.index(name), 2] for key, name in wrists.items() if name in names}
+    return {key: int((values > 0).sum()) for key, values in confidence.items()}
+
+
+def _about_person(body: Body, motion: Motion) -> dict[str, Any]:
+    seen = motion.frames[motion.valid]
+    return hand_frames(motion) | {
+        "valid_frames": len(seen),
+        "first_frame": int(seen[0]),
+        "last_frame": int(seen[-1]),
+        "reprojection_px": float(motion.residual_px[motion.valid].mean()),
+        "height_m": round(body.stature(motion.betas), 3),
+    }
+
+
+def _legs_confidence(motion: Motion) -> float:
+    """Return the better seen leg's mean over the frames in which the person was seen."""
+    shanks = [BODY_JOINTS.index(f"{side}_knee") for side in ("left", "right")]
+    return float(motion.joint_confidence[motion.valid][:, shanks].mean(axis=0).max())
+
+
+def _at(times_s: list[float]) -> str:
+    """List times, such as "at 2.0 s and at 4.1 s"; of many, the first few."""
+    listed = [f"at {t:.1f} s" for t in times_s[:MOST_TIMES]]
+    more = len(times_s) - len(listed)
+    listed += [f"{more} times more"] if more else []
+    return listed[0] if len(listed) == 1 else f"{', '.join(listed[:-1])} and {listed[-1]}"

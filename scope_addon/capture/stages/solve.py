@@ -1,0 +1,100 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Tracks to motions: every person is fitted in each frame's camera; the world is one for all of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+from ...kinematics.single_precision import compact
+from ...motion import Motion
+from ..fitting.track_fit import FittedTrack, PreparedTrack, fit_track, prepare_track, refit_track
+from ..tracking.track import Track
+from ..world.assemble import assemble_motion
+from ..world.camera_path import CameraPath
+from ..world.camera_travel import camera_travel
+from ..world.foot_lock import lock_feet
+from ..world.placement import PlacedTrack, place_track
+from ..world.shot import FittedPerson, Shot
+from ..world.stance import corrected_stance
+from ..world.world_frame import SharedWorld, share_world
+
+Progress = Callable[[str, int, int], None]
+
+
+@dataclass(frozen=True)
+class Solved:
+    """The motions, the most prominent person's first, the camera's path, and the solver's mean iterations a frame."""
+
+    motions: list[Motion]
+    path: CameraPath
+    iterations: float
+
+
+def solve(shot: Shot, tracks: Sequence[Track], progress: Progress, heights_m: Sequence[float] = ()) -> Solved:
+    """Fit every person on their own, find the world they share, and move the motions into it.
+
+    For a clip of an hour, each list below takes hundreds of megabytes: none stays for longer than it is needed.
+
+    :param heights_m: of the first people, where they are known, metres.
+    """
+    prepared = prepare(shot, tracks, heights_m)
+    fits = [compact(fit_track(each, progress)) for each in prepared]
+    shot = replace(shot, path=find_camera_path(shot, prepared[0], fits[0]))
+    if shot.parts.second_pass and not shot.is_picture:
+        fits = refit(shot, prepared, fits, progress)
+    people = [FittedPerson(each.track, fit, each.body) for each, fit in zip(prepared, fits, strict=True)]
+    iterations = fits[0].iterations
+    del prepared, fits
+    placed = [place(shot, person.track, person.fit, shot.smoothing) for person in people]
+    world = share_world(placed, shot.lines)
+    motions: list[Motion] = []
+    while people:
+        motions.append(finish(shot, people.pop(0), placed.pop(0), world, len(motions)))
+    return Solved(motions, shot.path, iterations)
+
+
+def prepare(shot: Shot, tracks: Sequence[Track], heights_m: Sequence[float]) -> list[PreparedTrack]:
+    """Lift every track to 3D and set up its priors."""
+    out = []
+    for k, track in enumerate(tracks):
+        each = prepare_track(shot.body, track, shot.camera, shot.parts, heights_m[k] if k < len(heights_m) else None)
+        out.append(compact(replace(each, track=track.without_depth(), lifted=compact(each.lifted))))
+    return out
+
+
+def place(shot: Shot, track: Track, fit: FittedTrack, smoothing: bool = True) -> PlacedTrack:
+    """Fill the gaps of a fit, smooth it, and bring it into the first frame's camera axes."""
+    return place_track(shot.body, track, fit, smoothing, shot.path)
+
+
+def find_camera_path(shot: Shot, first: PreparedTrack, fit: FittedTrack) -> CameraPath:
+    """Return where the camera was: one that turns may travel as well, which the standing feet of one person tell."""
+    if shot.path.is_static or shot.is_picture:
+        return shot.path
+    placed = place(shot, first.track, fit)
+    up = share_world([placed], shot.lines).up
+    return replace(shot.path, center=camera_travel(placed.soles, placed.valid, up, placed.times))
+
+
+def refit(
+    shot: Shot, prepared: Sequence[PreparedTrack], fits: Sequence[FittedTrack], progress: Progress
+) -> list[FittedTrack]:
+    """Fit everybody once more, with the distance and lean that the floor, the feet and balance determine."""
+    placed = [place(shot, each.track, fit) for each, fit in zip(prepared, fits, strict=True)]
+    world = share_world(placed, shot.lines)
+    floors = [world.floor_from_camera(k) for k in range(len(placed))]
+    stances = [corrected_stance(*each, shot.parts.balance) for each in zip(placed, floors, strict=True)]
+    del placed
+    return [
+        compact(refit_track(each, fit, shot.path.stance_to_frames(stance), progress))
+        for each, fit, stance in zip(prepared, fits, stances, strict=True)
+    ]
+
+
+def finish(shot: Shot, person: FittedPerson, placed: PlacedTrack, world: SharedWorld, number: int) -> Motion:
+    """Lock the feet of one person, the ``number``-th of the world, and assemble the motion."""
+    contact = placed.contact(world.up)
+    if shot.smoothing and shot.parts.contact:
+        placed = lock_feet(placed, contact, world.floor_from_camera(number))
+    return assemble_motion(shot, person, placed, contact, world.T_world_camera)
