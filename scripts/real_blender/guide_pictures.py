@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The user guide's pictures, cut out of the screenshots of a real Blender."""
+"""Cut the pictures of docs/guide.md, which lie in assets/guide, out of the screenshots of a real Blender."""
 
 from pathlib import Path
 
 import cv2
 
-# Name in the guide: screenshot, and the part of it to show: left, top, right, bottom in pixels.
+# Name of the picture: screenshot, and the part of it to show (left, top, right, bottom in pixels).
 PICTURES = {
     "footage": ("2_footage_chosen", (1000, 60, 1330, 330)),
     "capturing": ("9_body_over_footage", (700, 60, 1330, 560)),

@@ -1,13 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the README's pictures are drawn with: views, sticks, and that the README shows what lies there."""
+"""What the README's pictures are drawn with: views, sticks, animations; and that README and docs show what there is."""
 
 import re
 from types import SimpleNamespace
 
+import cv2
 import numpy as np
 import pytest
+from scope.scope_addon.errors import OutputError
 from scope.solver.loaders.body_file import ASSETS
-from scope.tools.readme_pictures.__main__ import LARGEST_BYTES, PICTURES
+from scope.tools.readme_pictures import animation
+from scope.tools.readme_pictures.__main__ import ANIMATION, LARGEST_BYTES, PICTURES
 from scope.tools.readme_pictures.panel import GROUND, Panel
 from scope.tools.readme_pictures.shapes import stick_figure
 from scope.tools.readme_pictures.view import from_around, from_the_camera
@@ -53,8 +56,28 @@ def test_sticks_are_drawn_where_they_project():
     assert np.abs(picture[5, 5] - GROUND).max() < 5
 
 
-def test_the_readme_shows_every_picture_and_each_is_small():
-    shown = re.findall(r"assets/pictures/(\w+)\.jpg", (ASSETS.parent / "README.md").read_text(encoding="utf-8"))
-    assert sorted(shown) == sorted(PICTURES)
+def test_readme_and_docs_show_every_picture_and_each_is_small():
+    root = ASSETS.parent
+    text = "".join(p.read_text(encoding="utf-8") for p in [root / "README.md", *sorted((root / "docs").glob("*.md"))])
+    assert sorted(re.findall(r"assets/pictures/(\w+)\.jpg", text)) == sorted(PICTURES)
     for name in PICTURES:
         assert 0 < (ASSETS / "pictures" / f"{name}.jpg").stat().st_size <= LARGEST_BYTES
+    assert re.findall(r"assets/pictures/(\w+)\.webp", text) == [ANIMATION]
+    assert 0 < (ASSETS / "pictures" / f"{ANIMATION}.webp").stat().st_size <= animation.LARGEST_BYTES
+
+
+def test_an_animation_has_all_its_frames_at_their_rate(tmp_path):
+    frames = [np.full((48, 64, 3), (10 * k, 0, 255 - 10 * k), np.uint8) for k in range(5)]
+    animation.write_webp(tmp_path / "a.webp", frames, 20)
+    found, read = cv2.imreadanimation(str(tmp_path / "a.webp"))
+    assert found
+    assert len(read.frames) == 5
+    assert list(read.durations) == [50] * 5
+    means = np.array([frame[..., :3].mean((0, 1)) for frame in read.frames])  # BGR
+    assert np.abs(means - [[255 - 10 * k, 0, 10 * k] for k in range(5)]).max() < 12
+
+
+def test_an_animation_that_stays_too_large_is_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr(animation, "LARGEST_BYTES", 10)
+    with pytest.raises(OutputError, match="larger than 10 bytes"):
+        animation.write_webp(tmp_path / "a.webp", [np.zeros((8, 8, 3), np.uint8)] * 2, 20)

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The README's pictures: captured bodies on a bare floor, beside the truth where there is one, without the footage."""
+"""The pictures of README and docs: captured bodies on a bare floor, with ground truth; footage of the sample only."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""``python -m scope.tools.readme_pictures``: make the README's pictures anew. Needs ../shared/data."""
+"""``python -m scope.tools.readme_pictures``: make the pictures. All but ``sample`` need ../shared/data."""
 
 from __future__ import annotations
 
@@ -13,8 +13,9 @@ import numpy as np
 
 from ...scope_addon.atomic_write import written_beside
 from ...solver.loaders.body_file import ASSETS
-from . import pictures
+from . import animation, pictures
 
+ANIMATION = "sample"
 PICTURES = {
     "capture": pictures.sample,
     "against_truth": pictures.against_truth,
@@ -28,19 +29,24 @@ LARGEST_BYTES = 60_000
 
 def main() -> int:
     """Make all pictures, or those that are named."""
+    known = [ANIMATION, *PICTURES]
     parser = argparse.ArgumentParser(prog="readme_pictures", description=__doc__)
-    parser.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join(PICTURES)}; default: all")
+    parser.add_argument("names", nargs="*", metavar="NAME", help=f"one of {', '.join(known)}; default: all")
     parser.add_argument("-o", "--out", type=Path, default=ASSETS / "pictures", help="folder (default: assets/pictures)")
     arguments = parser.parse_args()
-    unknown = set(arguments.names) - set(PICTURES)
+    unknown = set(arguments.names) - set(known)
     if unknown:
-        parser.error(f"there is no picture {', '.join(sorted(unknown))}; choose of {', '.join(PICTURES)}")
-    if not pictures.DATA.is_dir():
-        print(f"{pictures.DATA} is not beside this checkout: the pictures show what its clips give", file=sys.stderr)
+        parser.error(f"there is no picture {', '.join(sorted(unknown))}; choose from {', '.join(known)}")
+    names = arguments.names or known
+    if names != [ANIMATION] and not pictures.DATA.is_dir():
+        print(f"{pictures.DATA} does not exist: the pictures show captures of its clips", file=sys.stderr)
         return 1
     arguments.out.mkdir(parents=True, exist_ok=True)
-    for name in arguments.names or PICTURES:
-        _write(arguments.out / f"{name}.jpg", PICTURES[name]())
+    for name in names:
+        if name == ANIMATION:
+            _write_animation(arguments.out / f"{name}.webp")
+        else:
+            _write(arguments.out / f"{name}.jpg", PICTURES[name]())
     return 0
 
 
@@ -54,6 +60,16 @@ def _write(path: Path, picture: np.ndarray) -> None:
     with written_beside(path) as temporary:
         temporary.write_bytes(data)
     print(f"{path}: {picture.shape[1]} x {picture.shape[0]}, {len(data) / 1000:.0f} kB, quality {quality}")
+
+
+def _write_animation(path: Path) -> None:
+    """Write the moving picture."""
+    frames = animation.sample_frames()
+    with written_beside(path) as temporary:
+        quality = animation.write_webp(temporary, frames, 30 / animation.FRAME_STEP)
+    height, width = frames[0].shape[:2]
+    size_kb = path.stat().st_size / 1000
+    print(f"{path}: {len(frames)} frames of {width} x {height}, {size_kb:.0f} kB, quality {quality}")
 
 
 if __name__ == "__main__":

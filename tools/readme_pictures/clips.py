@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The clips that the pictures show, captured with default settings, and how far a frame is from its truth."""
+"""The clips of the pictures, captured with default settings, and the error of a frame against ground truth."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from .shapes import joints, true_joints
 
 DATA = ASSETS.parent.parent / "shared" / "data"
 SAMPLE, SAMPLE_TRUTH = ASSETS / "sample" / "sample.mp4", ASSETS / "sample" / "sample_truth.npz"
-_LIMBS = {  # the truth's name: SMPL's joint
+_LIMBS = {  # name in the ground truth: SMPL's joint
     "LShoulder": 16, "RShoulder": 17, "LElbow": 18, "RElbow": 19, "LWrist": 20, "RWrist": 21,
     "LHip": 1, "RHip": 2, "LKnee": 4, "RKnee": 5, "LAnkle": 7, "RAnkle": 8,
 }  # fmt: skip
@@ -31,22 +31,22 @@ def default_body() -> Body:
 
 @cache
 def captured(video: Path, everybody: bool = False) -> list[Motion]:
-    """Everybody whom a capture with default settings finds, or the most prominent person alone."""
+    """Capture a clip with default settings: everyone, or the most prominent person only."""
     return capture(video, default_body(), CaptureOptions(people="all" if everybody else "largest")).motions
 
 
 def camera(number: int) -> tuple[Motion, Path]:
-    """What was captured by one of the four pose2sim cameras, and its truth."""
+    """The motion captured from one of the four pose2sim cameras, and the file of its ground truth."""
     folder = DATA / "pose2sim"
     return captured(folder / f"cam{number}.mp4")[0], folder / f"truth_cam{number}.npz"
 
 
 def error_mm(motion: Motion, row: int, truth: Path) -> float:
-    """Mean distance of the twelve limb joints from where they were, the hips' middle laid on each other."""
+    """Mean distance of the twelve limb joints from ground truth, with the middle of the hips aligned."""
     true, found = true_joints(motion, row, truth), joints(motion, row)
     return 1000 * float(np.mean([np.linalg.norm(found[k] - true[name]) for name, k in _LIMBS.items() if name in true]))
 
 
 def distance_cm(motion: Motion, row: int, truth: Path, name: str) -> float:
-    """How far one joint is from where it was, laid likewise."""
+    """Distance of one joint from ground truth, aligned in the same way."""
     return 100 * float(np.linalg.norm(joints(motion, row)[_LIMBS[name]] - true_joints(motion, row, truth)[name]))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The sample clip's footage with the body over it: the one clip whose pixels are ours to show."""
+"""The sample clip's footage with the body over it: the one clip whose pixels may be shown."""
 
 from __future__ import annotations
 
@@ -17,17 +17,35 @@ _OPACITY = 0.72
 
 
 def sample_with_body(motion: Motion, row: int, size: tuple[int, int]) -> np.ndarray:
-    """(H, W, 3) RGB: a frame of the sample clip, cropped to the person."""
+    """(H, W, 3) RGB: a frame of the sample clip with the body, cropped to the person."""
     with open_video(SAMPLE) as video:
         image = next(frame.image_rgb for frame in video if frame.index == motion.frames[row])
-    body, vertices = default_body(), camera_vertices(motion, default_body(), row)
+    vertices = camera_vertices(motion, default_body(), row)
     pixels = vertices / vertices[:, 2:] @ motion.intrinsics.T
-    scale = FINER * size[1] / _TALL
-    left, top = pixels[:, 0].mean() * scale - FINER * size[0] / 2, (image.shape[0] - _TALL) * scale
-    crop = np.array([[scale, 0, -left], [0, scale, -top], [0, 0, 1.0]])
+    left = pixels[:, 0].mean() - _TALL * size[0] / size[1] / 2
+    return cropped(image, (left, image.shape[0] - _TALL), _TALL, size, motion, row)
+
+
+def cropped(
+    image: np.ndarray,
+    corner: tuple[float, float],
+    height: float,
+    size: tuple[int, int],
+    motion: Motion | None = None,
+    row: int = 0,
+) -> np.ndarray:
+    """(H, W, 3) RGB: a part of a frame, with the body over it where a motion is given.
+
+    :param corner: upper left corner of the part, pixels of the frame.
+    :param height: of the part, pixels of the frame.
+    :param size: (width, height) of the result, pixels.
+    """
+    scale = FINER * size[1] / height
+    crop = np.array([[scale, 0, -corner[0] * scale], [0, scale, -corner[1] * scale], [0, 0, 1.0]])
     wide = (FINER * size[0], FINER * size[1])
     larger = cv2.warpAffine(image, crop[:2], wide, flags=cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)
-    drawn = draw_overlay(
-        larger, vertices, body.faces, crop @ motion.intrinsics, colors=np.array(OURS), opacity=_OPACITY
-    )
-    return cv2.resize(drawn, size, interpolation=cv2.INTER_AREA)
+    if motion is not None:
+        body, vertices = default_body(), camera_vertices(motion, default_body(), row)
+        K = crop @ motion.intrinsics
+        larger = draw_overlay(larger, vertices, body.faces, K, colors=np.array(OURS), opacity=_OPACITY)
+    return cv2.resize(larger, size, interpolation=cv2.INTER_AREA)

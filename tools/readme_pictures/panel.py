@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One panel of a picture: a light ground, the floor's grid, shadows, bodies, sticks, measures and a heading."""
+"""One panel of a picture: background, floor grid, shadows, bodies, stick figures, measures and a heading."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from ...solver import Body
 from .shapes import stick_figure
 from .view import View
 
-FINER = 3  # everything is drawn so many times larger, and made smaller at the end
+FINER = 3  # supersampling: everything is drawn larger by this factor and scaled down at the end
 GROUND, GRID, INK = (246, 247, 249), (203, 208, 215), (52, 58, 66)
 OURS, TRUTH = (0.42, 0.62, 0.90), (0.88, 0.22, 0.16)
 _FONT = cv2.FONT_HERSHEY_SIMPLEX
-_HIDDEN = 0.55  # how far a stick shows through the body
-_STEP, _REACH = 0.5, 5.0  # the grid's step and how far around the middle it goes, metres
+_HIDDEN = 0.55  # opacity of a stick behind the body
+_STEP, _REACH = 0.5, 5.0  # spacing and half width of the grid, metres
 
 
 class Panel:
-    """A picture in the making. Points are metres in the view's world; the floor is z = 0."""
+    """A picture that is being drawn. Points are in metres in the view's world; the floor is z = 0."""
 
     def __init__(self, view: View, middle: np.ndarray) -> None:
         scale = np.diag([FINER, FINER, 1.0])
@@ -32,7 +32,7 @@ class Panel:
         self._grid(middle)
 
     def body(self, body: Body, vertices: np.ndarray, color: tuple = OURS) -> None:
-        """Draw a body and its shadow, as of a sun in the zenith."""
+        """Draw a body and its shadow under a light from above."""
         triangles = np.concatenate([body.faces[:, [0, 1, 2]], body.faces[:, [0, 2, 3]]])
         self._shadow(vertices, triangles)
         seen = self.view.to_camera(vertices)
@@ -40,7 +40,7 @@ class Panel:
         self._depth = np.minimum(self._depth, self._rasterized(seen, triangles, color).depth)
 
     def sticks(self, points: dict[str, np.ndarray], color: tuple = TRUTH, radius: float = 0.014) -> None:
-        """Draw a stick figure; what lies within or behind a body shines through it."""
+        """Draw a stick figure; parts within or behind a body show through it."""
         vertices, triangles = stick_figure(points, radius)
         canvas = self._rasterized(self.view.to_camera(vertices), triangles, color)
         alpha = np.where(canvas.depth < self._depth, 1.0, _HIDDEN) * canvas.coverage
@@ -56,7 +56,7 @@ class Panel:
             self._stroke(points[k], points[k + 1], color, width)
 
     def note(self, text: str, at: np.ndarray, offset: tuple[float, float], size: float = 0.46) -> None:
-        """Write beside a point, ``offset`` pixels of the finished picture away, a thin line leading there."""
+        """Label a point at ``offset`` pixels of the finished picture from it, with a thin leader line."""
         point = self.view.project(at)
         place = point + FINER * np.array(offset)
         (width, _), _ = cv2.getTextSize(text, _FONT, FINER * size, FINER)
@@ -66,7 +66,7 @@ class Panel:
         self._write(text, np.array([left, place[1] + FINER * 5]), size)
 
     def heading(self, text: str) -> None:
-        """Write what the panel shows into its upper left corner."""
+        """Write a heading into the upper left corner."""
         self._write(text, FINER * np.array([12.0, 24.0]), 0.5)
 
     def legend(self, entries: list[tuple[str, tuple]]) -> None:
@@ -83,7 +83,7 @@ class Panel:
         return cv2.resize(self.image, None, fx=1 / FINER, fy=1 / FINER, interpolation=cv2.INTER_AREA)
 
     def _grid(self, middle: np.ndarray) -> None:
-        """Lines on the floor that fade with their distance from the middle."""
+        """Draw lines on the floor that fade with their distance from the middle."""
         center = np.round(np.asarray(middle)[:2] / _STEP) * _STEP
         across = np.arange(-_REACH, _REACH + 1e-6, _STEP)
         along = np.linspace(-_REACH, _REACH, 101)
@@ -102,7 +102,7 @@ class Panel:
         flat = vertices * [1, 1, 0]
         both = np.concatenate([triangles, triangles[:, ::-1]])
         covered = self._rasterized(self.view.to_camera(flat), both, (0.0, 0.0, 0.0)).coverage
-        covered &= ~np.isfinite(self._depth)  # a body that stands there hides it
+        covered &= ~np.isfinite(self._depth)  # hidden by a body
         soft = cv2.GaussianBlur(covered.astype(np.float32), (0, 0), 3.0 * FINER)[..., None]
         self.image = (self.image * (1 - 0.28 * soft) + 0.5).astype(np.uint8)
 
@@ -122,3 +122,9 @@ class Panel:
 
 def _pixel(at: np.ndarray) -> tuple[int, int]:
     return round(float(at[0])), round(float(at[1]))
+
+
+def next_to_each_other(panels: list[np.ndarray]) -> np.ndarray:
+    """Panels of one height in a row, with a white line between them."""
+    line = np.full((len(panels[0]), 2, 3), 255, np.uint8)
+    return np.concatenate([part for panel in panels for part in (panel, line)][:-1], axis=1)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What each picture shows. Frames were chosen by eye; every figure in a picture is measured as it is made."""
+"""The content of each picture. Frames were chosen by eye; every figure in a picture is measured when it is made."""
 
 from __future__ import annotations
 
@@ -10,91 +10,91 @@ import numpy as np
 from ...scope_addon.motion import Motion
 from .clips import DATA, SAMPLE, SAMPLE_TRUTH, camera, captured, default_body, distance_cm, error_mm
 from .footage import sample_with_body
-from .panel import OURS, TRUTH, Panel
+from .panel import OURS, TRUTH, Panel, next_to_each_other
 from .shapes import joints, posed, true_joints
 from .view import View, from_around, from_the_camera
 
-AMBER, FAINT = (0.96, 0.70, 0.34), (0.74, 0.79, 0.86)  # a second person; a pose that was filled in
-BOTH = [("Scope", OURS), ("truth", TRUTH)]
+AMBER, FAINT = (0.96, 0.70, 0.34), (0.74, 0.79, 0.86)  # a second person; a filled-in pose
+BOTH = [("Scope", OURS), ("ground truth", TRUTH)]
 LEFT_WRIST, HEAD = 20, 15
 
 
 def sample() -> np.ndarray:
-    """The sample clip: the body over the footage, and from the side with the exact truth."""
+    """The sample clip: the body over the footage, and from the side with the exact ground truth."""
     motion = captured(SAMPLE)[0]
     columns: list[np.ndarray] = []
     for row in (48, 66, 119):
-        panel = _beside_truth(motion, row, _side(motion, row, (298, 330), 90, 2.35), SAMPLE_TRUTH)
+        panel = _with_truth(motion, row, _side(motion, row, (298, 330), 90, 2.35), SAMPLE_TRUTH)
         panel.heading(f"from the side, {error_mm(motion, row, SAMPLE_TRUTH):.0f} mm")
         if not columns:
             panel.legend(BOTH)
         columns.append(np.concatenate([sample_with_body(motion, row, (298, 330)), panel.finished()]))
-    return _beside(columns)
+    return next_to_each_other(columns)
 
 
 def against_truth() -> np.ndarray:
-    """Camera 2, at a good moment and at an average one, as it sees the man and from the side."""
+    """Camera 2 at a good moment and at an average one: the camera's view and the view from the side."""
     motion, truth = camera(2)
     panels = []
-    for row in (37, 61):
-        panels.append(_beside_truth(motion, row, _front(motion, row, (222, 330), truth), truth))
+    for row in (37, 75):
+        panels.append(_with_truth(motion, row, _front(motion, row, (222, 330), truth), truth))
         panels[-1].heading("camera 2")
-        panels.append(_beside_truth(motion, row, _side(motion, row, (222, 330), 90, 2.35), truth))
-        panels[-1].heading(f"its right, {error_mm(motion, row, truth):.0f} mm")
+        panels.append(_with_truth(motion, row, _side(motion, row, (222, 330), 90, 2.35), truth))
+        panels[-1].heading(f"right side, {error_mm(motion, row, truth):.0f} mm")
     panels[0].legend(BOTH)
-    return _beside([panel.finished() for panel in panels])
+    return next_to_each_other([panel.finished() for panel in panels])
 
 
 def in_motion() -> np.ndarray:
-    """A runner every 0.9 s, filmed by a camera that goes along, and two who shake hands."""
+    """A runner every 0.9 s, filmed by a travelling camera, and two people shaking hands."""
     runner = captured(DATA / "clips" / "run_moving_camera.mp4")[0]
     run = _together([(runner, row, OURS) for row in range(4, 180, 27)], (598, 300), 0, 2.75, 12)
-    run.heading("a runner, the camera going along")
+    run.heading("runner, travelling camera")
     first, second = captured(DATA / "clips" / "two_people_portrait.mp4", everybody=True)
     pair = _together([(first, 32, OURS), (second, 32, AMBER)], (298, 300), 30, 2.5, 12)
-    pair.heading("two people, from a third side")
-    return _beside([run.finished(), pair.finished()])
+    pair.heading("two people, from another side")
+    return next_to_each_other([run.finished(), pair.finished()])
 
 
 def along_the_view() -> np.ndarray:
-    """Failure: what fits the picture leans and reaches wrongly along the line of sight (camera 1)."""
+    """Failure: depth ambiguity, trunk and arms displaced along the line of sight (camera 1)."""
     return _hand_off(1, 52, 90, (14, 28))
 
 
 def from_behind() -> np.ndarray:
-    """Failure: from behind it is not seen how far somebody bends away, nor where the arm before him is (camera 4)."""
+    """Failure: lean and an occluded arm are not visible from behind (camera 4)."""
     return _hand_off(4, 64, -90, (-14, 28))
 
 
 def two_floors() -> np.ndarray:
-    """Failure: one floor for a clip in which somebody leaps from a roof (walk_side_static)."""
+    """Failure: one floor for a clip in which a man leaps from a roof (walk_side_static)."""
     acrobat, walker = captured(DATA / "clips" / "walk_side_static.mp4", everybody=True)
     rows = (100, 150, 168, 175, 184, 193, 207)
     people = [(acrobat, row, OURS if acrobat.valid[row] else FAINT) for row in rows] + [(walker, 42, AMBER)]
     panel = _together(people, (760, 420), 0, 4.7, 6)
-    panel.heading("the floor: the roof that he stands on first")
+    panel.heading("floor: the roof on which he stands at first")
     for row in rows:
         if not acrobat.valid[row]:
-            panel.note("not seen here: filled in", joints(acrobat, row)[0], (90, -40))
+            panel.note("not seen: filled in", joints(acrobat, row)[0], (90, -40))
     low = posed(acrobat, default_body(), 193)
     foot = low[low[:, 2].argmin()]
-    panel.note(f"he lands {-foot[2]:.1f} m below the floor", foot, (-70, 4))
-    panel.note("who walks by", joints(walker, 42)[HEAD], (26, -28))
+    panel.note(f"lands {-foot[2]:.1f} m below the floor", foot, (-70, 4))
+    panel.note("passer-by", joints(walker, 42)[HEAD], (26, -28))
     return panel.finished()
 
 
 def _hand_off(number: int, row: int, turn: float, place: tuple[float, float]) -> np.ndarray:
-    """A frame of a pose2sim camera as it sees it and from its side, and how far the left hand is off."""
+    """A frame of a pose2sim camera: its view, the view from the side, and the error of the left hand."""
     motion, truth = camera(number)
-    front = _beside_truth(motion, row, _front(motion, row, (449, 380), truth), truth)
-    front.heading(f"camera {number} sees this")
+    front = _with_truth(motion, row, _front(motion, row, (449, 380), truth), truth)
+    front.heading(f"view of camera {number}")
     front.legend(BOTH)
-    side = _beside_truth(motion, row, _side(motion, row, (449, 380), turn, 2.35), truth)
-    side.heading(f"from its {'right' if turn > 0 else 'left'}, {error_mm(motion, row, truth):.0f} mm")
+    side = _with_truth(motion, row, _side(motion, row, (449, 380), turn, 2.35), truth)
+    side.heading(f"from the {'right' if turn > 0 else 'left'}, {error_mm(motion, row, truth):.0f} mm")
     true_hand = true_joints(motion, row, truth)["LWrist"]
     side.line(joints(motion, row)[LEFT_WRIST], true_hand, dashed=True)
     side.note(f"hand {distance_cm(motion, row, truth, 'LWrist'):.0f} cm off", true_hand, place)
-    return _beside([front.finished(), side.finished()])
+    return next_to_each_other([front.finished(), side.finished()])
 
 
 def _front(motion: Motion, row: int, size: tuple[int, int], truth: Path | None = None) -> View:
@@ -116,7 +116,7 @@ def _alone(motion: Motion, row: int, view: View) -> Panel:
     return panel
 
 
-def _beside_truth(motion: Motion, row: int, view: View, truth: Path) -> Panel:
+def _with_truth(motion: Motion, row: int, view: View, truth: Path) -> Panel:
     panel = _alone(motion, row, view)
     panel.sticks(true_joints(motion, row, truth))
     return panel
@@ -125,7 +125,7 @@ def _beside_truth(motion: Motion, row: int, view: View, truth: Path) -> Panel:
 def _together(
     people: list[tuple[Motion, int, tuple]], size: tuple[int, int], turn: float, height: float, pitch: float
 ) -> Panel:
-    """Several poses in one world, those farther away drawn first."""
+    """Several poses in one world, farther ones drawn first."""
     bodies = [(posed(motion, default_body(), row), color) for motion, row, color in people]
     everything = np.concatenate([vertices for vertices, _ in bodies])
     middle = (everything.min(0) + everything.max(0)) / 2
@@ -134,9 +134,3 @@ def _together(
     for vertices, color in sorted(bodies, key=lambda b: -view.to_camera(b[0])[:, 2].mean()):
         panel.body(default_body(), vertices, color)
     return panel
-
-
-def _beside(pictures: list[np.ndarray]) -> np.ndarray:
-    """Pictures of one height in a row, a white line between them."""
-    line = np.full((len(pictures[0]), 2, 3), 255, np.uint8)
-    return np.concatenate([part for picture in pictures for part in (picture, line)][:-1], axis=1)

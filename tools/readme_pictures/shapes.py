@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What stands in the pictures: the posed body of a motion, and a stick figure of true joints."""
+"""The shapes in the pictures: the posed body of a motion, and a stick figure of true joints."""
 
 from __future__ import annotations
 
@@ -39,11 +39,11 @@ def to_world(motion: Motion, row: int, points_camera: np.ndarray) -> np.ndarray:
 
 
 def true_joints(motion: Motion, row: int, truth: Path) -> dict[str, np.ndarray]:
-    """Where the joints truly were, by name, the hips' middle laid on the captured one; world, metres.
+    """True joints by name, with the middle of the hips aligned to the captured one; world, metres.
 
-    The same alignment as MPJPE-root's: nothing is turned or scaled.
+    The same alignment as MPJPE-root's: nothing is rotated or scaled.
 
-    :raises ValueError: the truth does not have this frame.
+    :raises ValueError: the ground truth does not have this frame.
     """
     with np.load(truth) as file:
         rows = np.flatnonzero(file["frame_index"] == motion.frames[row])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where a picture is taken from: the footage's own camera, cropped to the person, or one that looks from elsewhere."""
+"""The view of a picture: the footage's own camera, cropped to the person, or a virtual camera elsewhere."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from ...scope_addon.motion import Motion
 
-_FAR = 14.0  # metres from which level views are taken, so that lines along the view hardly converge
+_FAR = 14.0  # distance of the virtual camera in metres, so that there is little perspective
 
 
 @dataclass(frozen=True)

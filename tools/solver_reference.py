@@ -1,0 +1,167 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""``python -m scope.tools.solver_reference``: write docs/solver_api.md from the solver's source.
+
+Every name of ``scope.solver.__all__`` appears exactly once, with its parameters and docstring. A test compares the page
+with what this would write.
+"""
+
+from __future__ import annotations
+
+import ast
+import inspect
+import sys
+import textwrap
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from .. import solver
+from ..solver import rotations
+
+PAGE = Path(__file__).resolve().parents[1] / "docs" / "solver_api.md"
+_INTRODUCTION = """\
+# The solver: API
+
+Everything here is importable from `scope.solver`, which needs numpy and numba only.
+[Mathematics](solver_mathematics.md) explains the equations, and the [glossary](glossary.md) the terms. This page is
+written by `python -m scope.tools.solver_reference` from the docstrings; edit those.
+
+Lengths are in metres and angles in radians. Camera axes are OpenCV's (x right, y down, z forward). Pixels are those of
+the image that the intrinsics belong to. There are K joints besides the root, P shape coefficients, M keypoints of the
+body and N measurements.
+
+## Example
+
+```python
+from scope import solver
+
+body = solver.load_body("scope")  # or your own SMPL.npz, SMPLH.pkl, …
+index = list(body.keypoint_set("coco").values())[:17]  # COCO's 17 points
+fit = solver.fit(body, solver.Measurements(K, keypoints2d=solver.Keypoints2D(index, pixels, confidence)))
+fits = solver.fit_batch(body, frames)  # independent frames, on all cores
+clip = solver.fit_clip(body, frames)  # one shape for all frames
+print(fit.status, fit.t_camera_part, fit.state.beta)  # why it stopped, joints in camera axes, shape
+```
+
+`K` is the (3, 3) camera matrix, `pixels` (17, 2), `confidence` (17,), and `frames` a list of `Measurements`.
+`solver/examples/` fits 3D joints, 2D keypoints, a marker set and an SMPL+H hand, and refines a regression network's
+output:
+
+```sh
+.venv/bin/python -m scope.solver.examples.from_markers
+```
+"""
+# Headings, and the names below each. A name that is missing here comes last.
+_SECTIONS = {
+    "Body models": ("load_body", "Body", "BodyArrays", "Tree", "make_tree"),
+    "Measurements": (
+        "Measurements", "Keypoints2D", "Keypoints3D", "OrientationField", "PosePriors", "FootContacts", "Floor",
+    ),
+    "Fitting": ("fit", "fit_batch", "fit_clip", "fit_clips", "FrameSolver", "fit_tree", "carry"),
+    "Options and priors": (
+        "Options", "Stage", "Weights", "COLD_STAGES", "WARM_STAGES", "Priors", "default_priors", "JointPrior",
+        "load_joint_prior", "Temporal", "with_previous",
+    ),
+    "Results": ("Fit", "ClipFit", "State", "Status"),
+}  # fmt: skip
+_ERRORS, _ROTATIONS, _OTHER = "Errors", "Rotations", "Other names"
+
+
+def reference() -> str:
+    """The page as Markdown."""
+    listed = [name for names in _SECTIONS.values() for name in names]
+    errors = sorted(name for name in solver.__all__ if _is_error(getattr(solver, name)))
+    sections = {heading: [n for n in names if n in solver.__all__] for heading, names in _SECTIONS.items()}
+    sections[_ERRORS] = [name for name in errors if name not in listed]
+    sections[_OTHER] = sorted(set(solver.__all__) - set(listed) - set(errors))
+    parts = [_INTRODUCTION]
+    for heading, names in sections.items():
+        if names:
+            parts += [f"## {heading}\n", *(_entry(name, getattr(solver, name)) for name in names)]
+    parts.append(f"## {_ROTATIONS}\n\nFunctions of `scope.solver.rotations`.\n")
+    parts += [_entry(f"rotations.{name}", function) for name, function in _functions(rotations)]
+    return "\n".join(parts)
+
+
+def _entry(name: str, value: Any) -> str:
+    """Heading, and as a block of text the parameters and docstring of one name."""
+    if inspect.isclass(value):
+        lines = _class(value)
+    elif inspect.isfunction(value):
+        lines = _function(value)
+    else:
+        kind = f"tuple of {len(value)} {type(value[0]).__name__}" if isinstance(value, tuple) else type(value).__name__
+        lines = [f"{name.split('.')[-1]}: {kind}"]
+    text = "\n".join(lines).rstrip()
+    return f"### {name}\n\n```text\n{text}\n```\n"
+
+
+def _function(function: Any) -> list[str]:
+    """Signature and docstring."""
+    tree = ast.parse(textwrap.dedent(inspect.getsource(function))).body[0]
+    assert isinstance(tree, ast.FunctionDef)
+    return [*_signature(tree), *_documentation(tree)]
+
+
+def _class(cls: type) -> list[str]:
+    """Docstring, then fields with their comments, then public methods and properties that have a docstring."""
+    source = textwrap.dedent(inspect.getsource(cls)).splitlines()
+    tree = ast.parse("\n".join(source)).body[0]
+    assert isinstance(tree, ast.ClassDef)
+    lines = [cls.__name__, *_documentation(tree)]
+    fields = [node for node in tree.body if isinstance(node, ast.AnnAssign | ast.Assign)]
+    if fields:
+        lines.append("")
+    for assignment in fields:
+        lines += source[assignment.lineno - 1 : assignment.end_lineno]
+    for node in tree.body:
+        if isinstance(node, ast.FunctionDef) and not node.name.startswith("_") and ast.get_docstring(node):
+            lines += ["", *_indented(_signature(node)), *_indented(_documentation(node))]
+    return lines
+
+
+def _signature(node: ast.FunctionDef) -> list[str]:
+    """The name with its parameters and result, in one line where it fits."""
+    names = {d.id for d in node.decorator_list if isinstance(d, ast.Name)}
+    result = f" -> {ast.unparse(node.returns)}" if node.returns else ""
+    if names & {"property", "cached_property"}:
+        return [f"{node.name}{result}"]
+    arguments = node.args
+    if "staticmethod" not in names and arguments.args and arguments.args[0].arg in ("self", "cls"):
+        arguments.args = arguments.args[1:]
+    line = f"{node.name}({ast.unparse(arguments)}){result}"
+    return textwrap.wrap(line, 112, subsequent_indent="    ", break_long_words=False, break_on_hyphens=False)
+
+
+def _documentation(node: ast.FunctionDef | ast.ClassDef) -> list[str]:
+    """The docstring, indented."""
+    text = ast.get_docstring(node)
+    return _indented(text.splitlines()) if text else []
+
+
+def _functions(module: Any) -> list[tuple[str, Any]]:
+    """Public functions that take arrays; the module's kernels are for other kernels."""
+    return [
+        (name, value)
+        for name, value in vars(module).items()
+        if inspect.isfunction(value) and value.__module__ == module.__name__ and not name.startswith("_")
+    ]
+
+
+def _is_error(value: Any) -> bool:
+    return inspect.isclass(value) and issubclass(value, BaseException)
+
+
+def _indented(lines: Iterable[str]) -> list[str]:
+    return [f"    {line}".rstrip() for line in lines]
+
+
+def main() -> int:
+    """Write the page."""
+    PAGE.write_text(reference(), encoding="utf-8")
+    print(f"{PAGE}: {len(solver.__all__)} names")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
