@@ -37,6 +37,8 @@ def convert_model(
             continue
         if not operator.inputs or operator.inputs[0] < 0:
             raise graph.fail(operator, "it has no input")
+        if operator.kind not in CONVERTERS:
+            raise graph.fail(operator, "this operator is not supported")
         CONVERTERS[operator.kind](graph, operator)
     described = []
     for tensor, (_, name, shape) in zip(kept, outputs, strict=True):
