@@ -101,29 +101,37 @@ def _refuse(*_: object) -> Any:
     raise ModelFileError("it makes an object in a way that body files do not")
 
 
-def _filled(*state: object) -> PickledArray:
+_NDARRAY, _OBJECT = Global(_refuse), Global(_refuse)
+
+
+def _reconstruct(kind: object, *_: object) -> PickledArray:
+    return PickledArray() if kind is _NDARRAY else _refuse()
+
+
+def _reconstructor(kind: Any, base: object, state: object) -> PickledObject:
+    return kind() if kind in _CLASSES.values() and base is _OBJECT and state is None else _refuse()
+
+
+def _from_buffer(raw: object, dtype: object, shape: object, order: object) -> PickledArray:
     made = PickledArray()
-    made.__setstate__(state)
+    made.__setstate__((shape, dtype, order in ("F", b"F"), raw))
     return made
 
 
-_NDARRAY, _OBJECT = Global(_refuse), Global(_refuse)
+def _scalar(dtype: object, raw: object) -> Any:
+    return _from_bytes(raw, dtype, (), False)[()]
+
+
 # Modules have had several names: Python 2 and 3, numpy 1 and 2, scipy before and after 1.8.
 _GLOBALS: dict[str, Any] = {
     r"numpy\.ndarray": _NDARRAY,
     r"numpy\.dtype": PickledDtype,
-    r"numpy\._?core\.multiarray\._reconstruct": Global(lambda kind, *_: (_refuse, PickledArray)[kind is _NDARRAY]()),
-    r"numpy\._?core\.multiarray\.scalar": Global(lambda dtype, raw: _from_bytes(raw, dtype, (), False)[()]),
-    r"numpy\._?core\.numeric\._frombuffer": Global(
-        lambda raw, dtype, shape, order: _filled(shape, dtype, order in ("F", b"F"), raw)
-    ),
+    r"numpy\._?core\.multiarray\._reconstruct": Global(_reconstruct),
+    r"numpy\._?core\.multiarray\.scalar": Global(_scalar),
+    r"numpy\._?core\.numeric\._frombuffer": Global(_from_buffer),
     r"(builtins|__builtin__)\.object": _OBJECT,
     r"(builtins|__builtin__)\.(frozen)?set": Global(lambda *_: Discarded()),
-    r"copy_?reg\._reconstructor": Global(
-        lambda kind, base, state: (
-            kind() if kind in _CLASSES.values() and (base, state) == (_OBJECT, None) else _refuse()
-        )
-    ),
+    r"copy_?reg\._reconstructor": Global(_reconstructor),
     r"chumpy(\.ch)?\.Ch": _CLASSES["Ch"],
     r"chumpy\.reordering\.Select": _CLASSES["Select"],
     **{rf"scipy\.sparse(\._?{kind})?\.{kind}_(matrix|array)": _CLASSES[kind] for kind in _SPARSE},

@@ -71,7 +71,7 @@ class _BodyUnpickler(pickle._Unpickler):
         if (module, name) == ("_codecs", "encode"):
             return Global(self._encode)
         if module in ("builtins", "__builtin__") and name in ("bytes", "bytearray"):
-            return Global(lambda *arguments: self._encode(*arguments) if len(arguments) > 1 else b"".join(arguments))
+            return Global(lambda *given: self._encode(*given) if len(given) == 2 else b"".join(given))
         found = stand_in(f"{module}.{name}")
         if found is None:
             shown = f"{module:.80}.{name:.80}"
