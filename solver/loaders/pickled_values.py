@@ -17,7 +17,7 @@ import numpy as np
 from ..errors import ModelFileError
 
 LARGEST_DENSE = 5_000_000  # elements of one sparse matrix made dense; SMPL-X's joint regressor has 0.6 million
-DEEPEST_CHUMPY = 8  # nested chumpy expressions; real files have two
+DEEPEST = 8  # matrices and chumpy expressions within each other; real files have two
 
 _DTYPE = re.compile(r"([<>|=]?)(\?|[biufSU][1-9][0-9]{0,3})")
 
@@ -174,11 +174,11 @@ def to_array(value: object, depth: int = 0) -> np.ndarray:
         return value.array
     if isinstance(value, bytes | str):
         return np.array(value.decode("latin1") if isinstance(value, bytes) else value)
-    if isinstance(value, PickledObject) and value.state is not None and depth < DEEPEST_CHUMPY:
-        kind = type(value).__name__
+    if isinstance(value, PickledObject) and value.state is not None and depth < DEEPEST:
+        kind, deeper = type(value).__name__, depth + 1
         if kind in _SPARSE:
-            return _dense(kind, value.state)
-        return _selected(value.state, depth + 1) if kind == "Select" else to_array(value.state.get("x"), depth + 1)
+            return _dense(kind, value.state, deeper)
+        return _selected(value.state, deeper) if kind == "Select" else to_array(value.state.get("x"), deeper)
     raise ModelFileError(f"an array was expected, but a {type(value).__name__} was found, or an unfinished array")
 
 
@@ -194,7 +194,7 @@ def _selected(state: dict[str, Any], depth: int) -> np.ndarray:
     return flat[index].reshape(shape)
 
 
-def _dense(kind: str, state: dict[str, Any]) -> np.ndarray:
+def _dense(kind: str, state: dict[str, Any], depth: int) -> np.ndarray:
     """A CSC, CSR or COO matrix (row, column) made dense; repeated entries add up."""
     shape = state.get("_shape", state.get("shape"))
     if not isinstance(shape, tuple) or len(shape) != 2 or not all(isinstance(n, int | np.integer) for n in shape):
@@ -202,17 +202,17 @@ def _dense(kind: str, state: dict[str, Any]) -> np.ndarray:
     rows, columns = shape = tuple(int(n) for n in shape)
     if not _is_shape(shape) or max(shape) > LARGEST_DENSE or rows * columns > LARGEST_DENSE:
         raise ModelFileError("it holds a sparse matrix of a negative size, or too large for a body")
-    data = to_array(state.get("data"))
+    data = to_array(state.get("data"), depth)
     if data.ndim != 1 or data.dtype.kind not in "biuf":
         raise ModelFileError("it holds a sparse matrix without numbers")
     if kind == "coo":
         pair = state.get("coords", (state.get("row"), state.get("col")))
         if not isinstance(pair, tuple) or len(pair) != 2:
             raise ModelFileError("it holds a COO matrix without coordinates")
-        i, j = _indices(to_array(pair[0]), rows), _indices(to_array(pair[1]), columns)
+        i, j = _indices(to_array(pair[0], depth), rows), _indices(to_array(pair[1], depth), columns)
     else:
         major, minor = (columns, rows) if kind == "csc" else (rows, columns)
-        start = to_array(state.get("indptr"))
+        start = to_array(state.get("indptr"), depth)
         if start.shape != (major + 1,) or start.dtype.kind not in "iu":
             raise ModelFileError("it holds a sparse matrix with a broken index")
         start = start.astype(np.int64)
@@ -220,7 +220,7 @@ def _dense(kind: str, state: dict[str, Any]) -> np.ndarray:
         if start[0] != 0 or (count < 0).any() or start[-1] > data.size:
             raise ModelFileError("it holds a sparse matrix with a broken index")
         data = data[: start[-1]]
-        inner = _indices(to_array(state.get("indices"))[: start[-1]], minor)
+        inner = _indices(to_array(state.get("indices"), depth)[: start[-1]], minor)
         outer = np.repeat(np.arange(major), count)
         i, j = (inner, outer) if kind == "csc" else (outer, inner)
     if not i.shape == j.shape == data.shape:

@@ -216,6 +216,10 @@ REFUSED = {
     "negative sparse": csc(b"J\xff\xff\xff\xffK\x02\x86", *NO_ARRAYS),
     "sparse shape of a list": csc(b"]", *NO_ARRAYS),
     "sparse with real indices": csc(b"K\x01K\x01\x86", EMPTY_ARRAY, EMPTY_ARRAY, TWO_ZEROS),
+    "sparse in itself": under(
+        "J_regressor",
+        b"cscipy.sparse.csc\ncsc_matrix\n)\x81q\x00}(" + text("_shape") + b"K\x01K\x01\x86" + text("data") + b"h\x00ub",
+    ),
     "sparse of texts": csc(b"K\x01K\x01\x86", text("a"), EMPTY_ARRAY, EMPTY_ARRAY),
 }  # fmt: skip
 
