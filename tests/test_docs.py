@@ -21,7 +21,7 @@ from scope.scope_addon.capture.perception.adapters.description import read_descr
 from scope.scope_addon.capture.perception.adapters.detectors.box_detector import DETECTOR_TYPES
 from scope.scope_addon.capture.perception.adapters.keypoints.keypoint_network import KEYPOINT_TYPES
 from scope.scope_addon.cli import SAMPLE, build_parser, main
-from scope.scope_addon.cli_options import body_and_options
+from scope.scope_addon.command_line.arguments import body_and_options
 from scope.scope_addon.motion import Motion
 from scope.scope_addon.scene.export.output_paths import check_output
 from scope.solver.loaders.body_file import BUILT_IN

@@ -7,8 +7,8 @@
     model_file.py         load_model(path) -> Body: which reader, which family, shapes checked
     skeletons.py          joint names, trees and vertex numbers of the SMPL family
     archive.py            the wanted arrays of a .npz, without unpickling
-    restricted_pickle.py  a pickle interpreter of our own that never calls what the file names
-    pickled_values.py     what that interpreter may build: arrays, sparse matrices, chumpy arrays
+    restricted_pickle.py  Python's unpickler, kept from importing or calling what the file names
+    pickled_values.py     what it builds instead: arrays, sparse matrices, chumpy arrays
     keypoints.py          detector keypoints for a mesh that has none
     landmarks.py          face, foot and fingertip points from vertex numbers or from geometry
 """

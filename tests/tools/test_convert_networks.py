@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 pytest.importorskip("onnx", reason="the converter needs the build-time package onnx")
+pytest.importorskip("tflite", reason="the converter needs the build-time package tflite")
 onnxruntime = pytest.importorskip("onnxruntime")
 
 from scope.scope_addon.errors import SetupError  # noqa: E402

@@ -94,7 +94,7 @@ class Graph:
 
     def finish(self, operator: Operator, name: str) -> None:
         """Apply the operator's fused activation to ``name`` and make it the operator's output."""
-        code = operator.options.get("activation", 0)
+        code = operator.options.get("fused_activation_function", 0)
         activation = ACTIVATIONS.get(code)
         if activation is None:
             raise self.fail(operator, f"fused activation {code} is not supported")

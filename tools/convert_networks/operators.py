@@ -35,7 +35,7 @@ def _window_pads(graph: Graph, operator: Operator, size: tuple[int, ...], kernel
     before, after = [], []
     for n, k, axis in zip(size, kernel, "hw", strict=True):
         stride = options[f"stride_{axis}"]
-        reach = (k - 1) * options.get(f"dilation_{axis}", 1) + 1
+        reach = (k - 1) * options.get(f"dilation_{axis}_factor", 1) + 1
         missing = max((-(-n // stride) - 1) * stride + reach - n, 0)
         before.append(missing // 2)
         after.append(missing - missing // 2)
@@ -63,7 +63,7 @@ def _convolution(graph: Graph, operator: Operator, weights: np.ndarray, groups: 
         inputs,
         kernel_shape=list(kernel),
         strides=[options["stride_h"], options["stride_w"]],
-        dilations=[options["dilation_h"], options["dilation_w"]],
+        dilations=[options["dilation_h_factor"], options["dilation_w_factor"]],
         pads=pads,
         group=groups,
     )
@@ -110,7 +110,7 @@ def pad(graph: Graph, operator: Operator) -> None:
 def max_pool_2d(graph: Graph, operator: Operator) -> None:
     """Padding never wins the maximum in either format."""
     options = operator.options
-    kernel = (options["filter_h"], options["filter_w"])
+    kernel = (options["filter_height"], options["filter_width"])
     pads = _window_pads(graph, operator, graph.shape(operator.inputs[0])[1:3], kernel)
     strides = [options["stride_h"], options["stride_w"]]
     name = graph.node(

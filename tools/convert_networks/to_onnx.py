@@ -37,7 +37,12 @@ def convert_model(
             continue
         if not operator.inputs or operator.inputs[0] < 0:
             raise graph.fail(operator, "it has no input")
-        CONVERTERS[operator.kind](graph, operator)
+        if operator.kind not in CONVERTERS:
+            raise graph.fail(operator, "this operator is not supported")
+        try:
+            CONVERTERS[operator.kind](graph, operator)
+        except (ValueError, IndexError) as error:
+            raise graph.fail(operator, f"its tensors do not fit it ({error})") from error
     described = []
     for tensor, (_, name, shape) in zip(kept, outputs, strict=True):
         graph.nodes.append(helper.make_node("Identity", [graph.value(tensor)], [name], name=f"output_{name}"))

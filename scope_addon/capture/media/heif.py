@@ -3,7 +3,8 @@
 
 A file has items: coded pictures, grids made of them (phones code pictures in tiles), thumbnails, depth, EXIF. Which one
 is the picture, and how the others belong to it, is told by boxes within its ``meta`` box. Decoders give the items that
-are coded; what a grid makes of them is here. Crops (``clap``) and overlays (``iovl``) are not known.
+are coded; what a grid makes of them is here. Crops (``clap``) and overlays (``iovl``) are not known. PyAV does
+not say how tiles belong together, and libheif's packages for Python can crash where a file's boxes are damaged.
 
 Sources: ISO/IEC 23008-12 (items, grids, irot, imir), ISO/IEC 14496-12 (boxes, iloc, iinf, iref).
 """

@@ -2,7 +2,8 @@
 """The focal length that telephones write into their .mov and .mp4 files.
 
 QuickTime metadata: a ``meta`` box, of the film (``moov``) or of a track (``trak``), holds ``keys`` (names) and ``ilst``
-(values, numbered as the names are). Anything damaged or unknown counts as absent.
+(values, numbered as the names are). Anything damaged or unknown counts as absent. Telephones write the focal length
+into the track, whose keys FFmpeg does not report.
 """
 
 from __future__ import annotations
@@ -83,5 +84,5 @@ def _number(kind: int, value: bytes) -> float | None:
     if kind in (21, 22):  # integers of any length
         return float(int.from_bytes(value, "big", signed=kind == 21))
     if kind == 1:  # text
-        return float(value.decode("ascii", "replace"))
+        return float(value.decode("ascii", "replace").removesuffix("mm"))  # Apple documents "50.00mm"
     return float(struct.unpack(_NUMBERS[kind], value)[0]) if kind in _NUMBERS else None

@@ -38,6 +38,7 @@ def meta(kind: int, value: bytes, key: bytes = KEY, version: bytes = b"") -> byt
         (23, struct.pack(">f", 26.0)),
         (24, struct.pack(">d", 26.0)),
         (1, b"26"),
+        (1, b"26.00mm"),
     ],
 )
 def test_values_of_each_type_in_film_and_track(tmp_path, kind, value):

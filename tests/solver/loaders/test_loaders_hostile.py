@@ -69,7 +69,7 @@ RUNS_CODE = {
     "hidden in a table's key": (b"}" + TOUCH[:-1] + b"Ns.", r"os\.system", True),
     "after the model": (b"}0" + TOUCH, r"os\.system", True),
     "dotted name": (b"\x80\x04" + text("numpy") + text("ndarray.__class__") + b"\x93.", r"ndarray\.__class__", False),
-    "class change": (b"cnumpy\nndarray\n}" + text("__class__") + b"Nsb.", "sets attributes of a Role", False),
+    "class change": (b"cnumpy\nndarray\n}" + text("__class__") + b"Nsb.", "sets attributes of a function", False),
 }  # fmt: skip
 
 
@@ -154,6 +154,12 @@ REFUSED = {
     "items of a list as a set": b"\x80\x04](N\x90.",
     "array as a key": b"}" + EMPTY_ARRAY + b"Ns.",
     "tuple as a key": b"})Ns.",
+    "tuple of doubling tuples as a key": b"})" + b"2\x86" * 80 + b"Ns.",
+    "deep tuple as a key": b"})" + b"\x85" * DEEP + b"Ns.",
+    "deep tuple in a set": b"\x80\x04}\x8f()" + b"\x85" * DEEP + b"\x90Ns.",
+    "doubling tuples in a frozen set": b"\x80\x04}()" + b"2\x86" * 80 + b"\x91Ns.",
+    "attributes of a class": b"cchumpy.ch\nCh\nN}" + text("part") + b"Ns\x86b.",
+    "attributes of a set": b"\x80\x04\x8fN}" + text("add") + b"Ns\x86b.",
     "the array class as an instance": b"cnumpy\nndarray\n)\x81.",
     "the array class called": b"cnumpy\nndarray\n(J\xff\xff\xff\x7ftR.",
     "a subclass to reconstruct": b"cnumpy.core.multiarray\n_reconstruct\ncnumpy\ndtype\nK\x00\x85U\x01b\x87R.",
@@ -181,6 +187,8 @@ REFUSED = {
     "less data than the shape": under("f", array(b"K\x02\x85", b"U\x08AAAAAAAA")),
     "bytes that are not there": under("f", b"T" + HUGE),
     "negative byte count": under("f", b"T\xff\xff\xff\xff"),
+    "byte array that is not there": b"\x80\x05\x96" + struct.pack("<Q", 1 << 40),
+    "frame that is not there": b"\x80\x04\x95" + b"\xff" * 8 + b"}",
     "eight-byte count": b"\x80\x04\x8e" + b"\xff" * 8,
     "enormous memo index": b"}r\xff\xff\xff\xff0.",
     "number of many digits": b"L" + b"9" * 100_000 + b"L\n.",
@@ -208,6 +216,10 @@ REFUSED = {
     "negative sparse": csc(b"J\xff\xff\xff\xffK\x02\x86", *NO_ARRAYS),
     "sparse shape of a list": csc(b"]", *NO_ARRAYS),
     "sparse with real indices": csc(b"K\x01K\x01\x86", EMPTY_ARRAY, EMPTY_ARRAY, TWO_ZEROS),
+    "sparse in itself": under(
+        "J_regressor",
+        b"cscipy.sparse.csc\ncsc_matrix\n)\x81q\x00}(" + text("_shape") + b"K\x01K\x01\x86" + text("data") + b"h\x00ub",
+    ),
     "sparse of texts": csc(b"K\x01K\x01\x86", text("a"), EMPTY_ARRAY, EMPTY_ARRAY),
 }  # fmt: skip
 
@@ -240,6 +252,19 @@ def test_memory_stays_within_a_small_multiple_of_the_file(tmp_path):
         assert tracemalloc.get_traced_memory()[1] < 5 * path.stat().st_size
     finally:
         tracemalloc.stop()
+
+
+def test_sizes_that_a_file_states_are_not_allocated(tmp_path):
+    path = tmp_path / "body.pkl"
+    for data in (REFUSED[name] for name in REFUSED if "not there" in name or "memo" in name or "count" in name):
+        path.write_bytes(data)
+        tracemalloc.start()
+        try:
+            with pytest.raises(ModelFileError):
+                load_model(path)
+            assert tracemalloc.get_traced_memory()[1] < 5_000_000
+        finally:
+            tracemalloc.stop()
 
 
 def test_an_oversized_file_is_refused(tmp_path, monkeypatch):
