@@ -11,10 +11,10 @@ from .initialize import initial_state
 from .kernel import announce_compilation, kernel
 from .linearize import make_blocks, make_pose
 from .measurements import Measurements, as_array
-from .optimizer import optimize
+from .optimizer import Memory, Settings, make_settings, optimize
 from .options import Options, Priors, Stage, default_priors
 from .recursion import make_workspace
-from .report import cost_by_term
+from .report import Outcome, cost_by_term, make_fit
 from .residuals.part import Array
 from .residuals.registry import SHAPE_PRIOR
 from .rotations import nearest_rotation, orthonormalize
@@ -68,14 +68,12 @@ class FrameSolver:
         self.priors = default_priors(body) if priors is None else priors
         self.options = options
         tree = self.tree
-        self._poses = make_pose(tree), make_pose(tree)
-        self._blocks = make_blocks(tree), make_blocks(tree)
-        self._curvature = make_curvature(tree)
-        self._work = make_workspace(tree)
+        poses, blocks = (make_pose(tree), make_pose(tree)), (make_blocks(tree), make_blocks(tree))
+        self._memory = Memory(poses, blocks, make_curvature(tree), make_workspace(tree))
         self._rest = np.tile(np.eye(3), (len(tree.parents) - 1, 1, 1))
         self._layout: Layout | None = None
         self._packed: tuple[Priors, PackedPriors] | None = None
-        self._schedules: list[tuple[Options, Sequence[Stage], tuple[Array, Array, Array]]] = []
+        self._settings: list[tuple[Options, Sequence[Stage], Settings]] = []
 
     def fit(
         self,
@@ -87,44 +85,37 @@ class FrameSolver:
         """Fit one frame, as `fit` does; priors and options are those given at the start unless others are given."""
         priors = self.priors if priors is None else priors
         options = self.options if options is None else options
-        tree, work, (pose, other) = self.tree, self._work, self._poses
+        tree, memory, work = self.tree, self._memory, self._memory.work
         packed = self._pack(priors)
         terms, count, self._layout = fill_terms(tree, measurements, packed, self._layout)
         count += len(terms.ints[0])
-        table, tolerances, limits = self._schedule(options, cold=init is None)
+        settings = self._settings_of(options, cold=init is None)
         if init is None:
             init = initial_state(tree, terms, self._mean(priors), packed.shape_mean[: tree.shape])
         self._enter(init)
-        cost, code, iterations, rejected, which = optimize(
-            tree, terms, count > 0, table, tolerances, limits, options.triggs, options.damping,
-            1.0 / options.root_length, pose, other, self._blocks[0], self._blocks[1],
-            self._curvature, work,
-        )  # fmt: skip
-        found, P = self._poses[which], tree.shape
-        information = work.C[:P, :P] - table[-1, 0, SHAPE_PRIOR] * packed.shape_information[:P, :P]
-        state = State.from_pose(tree, found)
+        cost, code, iterations, rejected, which = optimize(tree, terms, count > 0, settings, memory)
+        found, P, last = memory.poses[which], tree.shape, settings.stages[-1]
+        information = work.C[:P, :P] - last[0, SHAPE_PRIOR] * packed.shape_information[:P, :P]
         shares = {}
         if options.report:
-            blocks, last = self._blocks[0], table[-1]
-            shares = cost_by_term(tree, terms, last, options.triggs, found, blocks, work.scratch)
-        return Fit(
-            state, Status(code), cost, iterations, found.R.copy(), found.t.copy(), information, count, rejected, shares
-        )
+            shares = cost_by_term(tree, terms, last, options.triggs, found, memory.blocks[0], work.scratch)
+        outcome = Outcome(Status(code), cost, iterations, rejected, shares)
+        return make_fit(tree, found, outcome, information, count)
 
     def _pack(self, priors: Priors) -> PackedPriors:
         if self._packed is None or self._packed[0] is not priors:
             self._packed = priors, pack_priors(self.tree, priors)
         return self._packed[1]
 
-    def _schedule(self, options: Options, cold: bool) -> tuple[Array, Array, Array]:
+    def _settings_of(self, options: Options, cold: bool) -> Settings:
         stages = options.schedule(cold)
-        for known, its_stages, table in self._schedules:
+        for known, its_stages, settings in self._settings:
             if its_stages is stages and known == options:
-                return table
-        table = options.stage_table(stages)
+                return settings
+        settings = make_settings(options, stages)
         if isinstance(stages, tuple):  # a list may change
-            self._schedules = [*self._schedules[-3:], (options, stages, table)]
-        return table
+            self._settings = [*self._settings[-3:], (options, stages, settings)]
+        return settings
 
     def _mean(self, priors: Priors) -> Array:
         if priors.joint_mean is None:
@@ -133,7 +124,7 @@ class FrameSolver:
 
     def _enter(self, state: State) -> None:
         """Put `state` into the first pose, with rotations made orthonormal."""
-        tree, pose = self.tree, self._poses[0]
+        tree, pose = self.tree, self._memory.poses[0]
         K, P = len(tree.parents) - 1, tree.shape
         R = as_array(state.R_camera_root, (3, 3), "R_camera_root")
         t = as_array(state.t_camera_root, (3,), "t_camera_root")

@@ -1,14 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a fit's cost is made of.
+"""The results of a fit: its state, how it ended, and what its cost is made of.
 
 Every residual's cost is linear in its weight, so the share of one kind is the cost with all other weights at zero.
 """
+
+from typing import NamedTuple
 
 import numpy as np
 
 from .linearize import linearize
 from .residuals.part import Array, Blocks, Pose
 from .residuals.registry import FIRST_TABLE, KEYPOINT2D, KEYPOINT3D, ORIENTATION_FIELD, RESIDUALS, SHAPE_PRIOR
+from .state import Fit, State, Status
 from .terms import Terms
 from .tree import Tree
 
@@ -20,6 +23,32 @@ COLUMNS = {
     "shape_prior": SHAPE_PRIOR,
     **{name: FIRST_TABLE + k for k, name in enumerate(RESIDUALS)},
 }
+
+
+class Outcome(NamedTuple):
+    """How an optimization ended; the fields are those of `Fit` and `ClipFit`."""
+
+    status: Status
+    cost: float
+    iterations: int
+    rejected: int
+    cost_by_term: dict[str, float]
+
+
+def make_fit(tree: Tree, pose: Pose, outcome: Outcome, beta_information: Array, measurements: int) -> Fit:
+    """Return the result of one frame at `pose`, which is copied; beta_information (P, P)."""
+    return Fit(
+        state=State.from_pose(tree, pose),
+        R_camera_part=pose.R.copy(),
+        t_camera_part=pose.t.copy(),
+        beta_information=beta_information,
+        measurements=measurements,
+        status=outcome.status,
+        cost=outcome.cost,
+        iterations=outcome.iterations,
+        rejected=outcome.rejected,
+        cost_by_term=outcome.cost_by_term,
+    )
 
 
 def cost_by_term(
