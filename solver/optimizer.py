@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .curvature import Curvature, correct, forget, learn, remember
+from .curvature import Curvature, apply_correction, reset, set_current, update
 from .kernel import kernel
 from .linearize import linearize
 from .options import Options, Stage
@@ -97,12 +97,12 @@ def _run_stage(tree, terms, s, settings, memory, start):  # type: ignore[no-unty
     if not np.isfinite(cost):
         return cost, NON_FINITE, iterations, rejected, at
     if settings.curvature:
-        forget(curvature)
-        remember(tree, pose, blocks, curvature)
+        reset(curvature)
+        set_current(tree, pose, blocks, curvature)
     status = MAX_ITERATIONS
     for _ in range(settings.limits[s]):
         if settings.curvature:
-            correct(tree, pose, blocks, curvature, 1.0)
+            apply_correction(tree, pose, blocks, curvature, 1.0)
         predicted = step(tree, pose, blocks, damping, settings.root_scale, work)
         if predicted <= LEAST_DECREASE * cost:
             status = CONVERGED
@@ -114,20 +114,20 @@ def _run_stage(tree, terms, s, settings, memory, start):  # type: ignore[no-unty
             trial_cost = linearize(tree, terms, stage, settings.triggs, trial, trial_blocks, work.scratch)
         accepted, damping, growth, verdict = _judge_trial(cost, trial_cost, predicted, damping, growth, tolerance)
         if settings.curvature and np.isfinite(trial_cost):
-            learn(tree, pose, work.u, trial, trial_blocks, accepted, curvature)
+            update(tree, pose, work.u, trial, trial_blocks, accepted, curvature)
         if accepted:
             cost, at = trial_cost, 1 - at
             pose, trial = trial, pose
             blocks, trial_blocks = trial_blocks, blocks
             if settings.curvature:
-                remember(tree, pose, blocks, curvature)
+                set_current(tree, pose, blocks, curvature)
         else:
             rejected += 1
         if verdict != RUNNING:
             status = verdict
             break
     if settings.curvature:
-        correct(tree, pose, blocks, curvature, 0.0)
+        apply_correction(tree, pose, blocks, curvature, 0.0)
     return cost, status, iterations, rejected, at
 
 
