@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .errors import ShapeError
 from .frame_solver import fit_tree
@@ -31,7 +32,7 @@ from .optimizer import (
 from .options import Options, Priors, default_priors
 from .recursion import Workspace, eliminate, make_workspace, retract, solve_globals, substitute
 from .report import Outcome, cost_by_term, make_fit
-from .residuals.part import Array, Blocks, Pose
+from .residuals.part import Blocks, Pose
 from .residuals.registry import SHAPE_PRIOR
 from .state import ClipFit, Fit, State, Status
 from .temporal import Temporal, with_previous
@@ -73,7 +74,9 @@ def fit_clip(
     measurement of its own: see `Fit.measurements`.
     `focal_weight` is a prior on the squared logarithm of the focal scale.
     At most `shape_frames` frames, evenly spaced, decide the shape; the others are then fitted with it fixed.
-    Raises ShapeError for arrays that do not fit the body.
+
+    :return: the frames' fits and the shape they share.
+    :raises ShapeError: when there is no frame, or when an array does not fit the body.
     """
     if len(measurements) == 0:
         raise ShapeError("A clip needs at least one frame of measurements, but got none.")
@@ -137,7 +140,7 @@ def _fit_in_order(
 
 
 def _fit_with_shape(
-    tree: Tree, m: Measurements, init: State, beta: Array, scale: float, priors: Priors, options: Options
+    tree: Tree, m: Measurements, init: State, beta: NDArray[np.float64], scale: float, priors: Priors, options: Options
 ) -> Fit:
     """Fit one frame with shape and focal length fixed; `tree` has them built in."""
     if m.intrinsics is not None and scale != 1.0:
@@ -254,7 +257,7 @@ class _Joint:
         total += 0.5 * self.shape_weights[s] * float(offset @ self.prior @ offset)
         return total + 0.5 * self.focal_weight * float(pose.log_focal[0]) ** 2
 
-    def _reduced(self, s: int, damping: float) -> tuple[Array, Array, float]:
+    def _reduced(self, s: int, damping: float) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
         """Eliminate every frame's pose; return the summed system of the global columns and the sum of |q~|^2."""
         P, squares = self.P, 0.0
         C, c = np.zeros_like(self.frames[0].work.C), np.zeros_like(self.beta)
@@ -308,7 +311,7 @@ class _Joint:
             total["focal_prior"] = 0.5 * self.focal_weight * self.log_focal**2
         return total
 
-    def information(self) -> Array:
+    def information(self) -> NDArray[np.float64]:
         """Return the information matrix of beta (P, P), prior included, poses and focal length eliminated."""
         P = self.P
         if not self.frames:

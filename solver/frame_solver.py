@@ -5,6 +5,7 @@ import threading
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .curvature import make_curvature
 from .initialize import initial_state
@@ -15,7 +16,6 @@ from .optimizer import Memory, Settings, make_settings, optimize
 from .options import Options, Priors, Stage, default_priors
 from .recursion import make_workspace
 from .report import Outcome, cost_by_term, make_fit
-from .residuals.part import Array
 from .residuals.registry import SHAPE_PRIOR
 from .rotations import nearest_rotation, orthonormalize
 from .state import Fit, State, Status
@@ -35,9 +35,10 @@ def fit(
 
     minimize 1/2 sum_i |r_i(T_i, Omega_i, beta)|^2 over T_0, Omega_1..K and beta (section 3 of the paper).
 
-    With `init` (camera frame, metres) the fit starts there, in one stage; without, from a guess by `initial_state`,
-    in several. `priors` are `default_priors(body)` unless given: the learned joint prior, joint limits and the
-    population's shape. Raises ShapeError for arrays that do not fit the body; never for measured values: see Status.
+    :param init: where to start, camera frame, metres, in one stage; without it, from `initial_state`, in several.
+    :param priors: `default_priors(body)` unless given: the learned joint prior, joint limits, the population's shape.
+    :return: the state and how it was reached; whatever values were measured, see `Status`.
+    :raises ShapeError: when an array does not fit the body.
     """
     return FrameSolver(body, priors, options).fit(measurements, init)
 
@@ -62,7 +63,10 @@ class FrameSolver:
         priors: Priors | None = None,
         options: Options = Options(),  # noqa: B008 - frozen
     ) -> None:
-        """Check the body and make room. Raises ShapeError."""
+        """Check the body and allocate the working memory.
+
+        :raises ShapeError: when an array does not fit the others.
+        """
         announce_compilation(optimize)
         self.tree = body if isinstance(body, Tree) else make_tree(body)
         self.priors = default_priors(body) if priors is None else priors
@@ -82,7 +86,10 @@ class FrameSolver:
         priors: Priors | None = None,
         options: Options | None = None,
     ) -> Fit:
-        """Fit one frame, as `fit` does; priors and options are those given at the start unless others are given."""
+        """Fit one frame, as `fit` does, with the priors and options of the constructor unless others are given.
+
+        :raises ShapeError: when an array does not fit the body.
+        """
         priors = self.priors if priors is None else priors
         options = self.options if options is None else options
         tree, memory, work = self.tree, self._memory, self._memory.work
@@ -117,7 +124,7 @@ class FrameSolver:
             self._settings = [*self._settings[-3:], (options, stages, settings)]
         return settings
 
-    def _mean(self, priors: Priors) -> Array:
+    def _mean(self, priors: Priors) -> NDArray[np.float64]:
         if priors.joint_mean is None:
             return self._rest
         return np.asarray(priors.joint_mean, dtype=np.float64)
@@ -138,7 +145,7 @@ _last = threading.local()
 
 @kernel
 def _enter(R, t, Omega, beta, pose) -> bool:  # type: ignore[no-untyped-def]
-    """Copy a state; return whether its rotations could be made orthonormal in passing."""
+    """Copy a state to `pose`; return whether its rotations are orthonormal now, which fails for singular ones."""
     for r in range(3):
         pose.t[0, r] = t[r]
         for c in range(3):

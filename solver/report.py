@@ -7,9 +7,10 @@ Every residual's cost is linear in its weight, so the share of one kind is the c
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .linearize import linearize
-from .residuals.part import Array, Blocks, Pose
+from .residuals.part import Blocks, Pose
 from .residuals.registry import FIRST_TABLE, KEYPOINT2D, KEYPOINT3D, ORIENTATION_FIELD, RESIDUALS, SHAPE_PRIOR
 from .state import Fit, State, Status
 from .terms import Terms
@@ -35,7 +36,7 @@ class Outcome(NamedTuple):
     cost_by_term: dict[str, float]
 
 
-def make_fit(tree: Tree, pose: Pose, outcome: Outcome, beta_information: Array, measurements: int) -> Fit:
+def make_fit(tree: Tree, pose: Pose, outcome: Outcome, beta_information: NDArray[np.float64], measurements: int) -> Fit:
     """Return the result of one frame at `pose`, which is copied; beta_information (P, P)."""
     return Fit(
         state=State.from_pose(tree, pose),
@@ -52,7 +53,13 @@ def make_fit(tree: Tree, pose: Pose, outcome: Outcome, beta_information: Array, 
 
 
 def cost_by_term(
-    tree: Tree, terms: Terms, stage: Array, triggs: float, pose: Pose, blocks: Blocks, scratch: Array
+    tree: Tree,
+    terms: Terms,
+    stage: NDArray[np.float64],
+    triggs: float,
+    pose: Pose,
+    blocks: Blocks,
+    scratch: NDArray[np.float64],
 ) -> dict[str, float]:
     """Return the cost of each kind of residual at `pose`; they add up to what `linearize` returns there.
 
