@@ -155,16 +155,18 @@ class FootContacts:
 
 @dataclass
 class Floor:
-    """The plane normal^T p = offset in this frame's camera, and the points that may not be below it.
+    """The plane normal^T p = offset in this frame's camera, and points that touch it or may not be below it.
 
     indices (n,), normal (3,), a unit vector pointing up, offset in metres, contact (n,): the probability of touching
-    the floor, 0 where a point is free to be above.
+    the floor, 0 where a point is free to be above; below (n,): the weight of a point that is below, one for all if
+    None, 0 where a point is free to be there, as on a stair.
     """
 
     indices: ArrayLike
     normal: ArrayLike
     offset: float
     contact: ArrayLike
+    below: ArrayLike | None = None
 
 
 @dataclass
@@ -263,13 +265,15 @@ def _floor_rows(m: Floor, points: int) -> tuple[Array, Array]:
     indices = as_indices(m.indices, points, "Indices of the floor's points")
     normal = as_array(m.normal, (3,), "Normal of the floor")
     contact = as_array(m.contact, (len(indices),), "Contact with the floor")
+    below = np.ones(len(indices)) if m.below is None else m.below
+    below = as_array(below, (len(indices),), "Weights below the floor")
     length = math.hypot(*normal)
     if not (math.isfinite(m.offset) and abs(length - 1.0) < 1e-6):
         raise ShapeError(
             f"The floor needs a finite offset and a normal of length 1, but got offset {m.offset} and a normal of "
             f"length {length:.6g}; divide both by that length."
         )
-    return _usable_rows(floor.pack(indices, normal, float(m.offset), np.ones(len(indices)), contact))
+    return _usable_rows(floor.pack(indices, normal, float(m.offset), below, contact))
 
 
 def _usable_rows(table: tuple[Array, Array]) -> tuple[Array, Array]:

@@ -96,6 +96,8 @@ class Options:
     damping: Levenberg-Marquardt lambda at the start, on joint rotations in radians; root_length: metres of pelvis
     motion that are damped like one radian.
     stages: replaces the default schedule, which depends on whether an initial state is given.
+    curvature: estimate from the steps taken what Gauss-Newton leaves out of the joints' Hessians (curvature.py), in
+    every fit of one frame; without, each step is plain Levenberg-Marquardt's. It changes the steps, not the minimum.
     report: also tell what the cost is made of (`Fit.cost_by_term`), which takes another evaluation for each kind of
     residual.
     """
@@ -107,6 +109,7 @@ class Options:
     triggs: float = 0.0
     damping: float = 1.0
     root_length: float = 0.3
+    curvature: bool = True
     report: bool = False
 
     def __post_init__(self) -> None:

@@ -2,7 +2,7 @@
 """Compiled loops around what is timed, so that no call from Python is inside the measurement."""
 
 from ...solver.compiled.kernel import kernel
-from ...solver.gauss_newton.curvature import correct, learn, remember
+from ...solver.gauss_newton.curvature import apply_correction, set_current, update
 from ...solver.gauss_newton.linearize import linearize
 from ...solver.gauss_newton.recursion import retract, step
 from ...solver.residuals.registry import accumulate_tables
@@ -43,12 +43,12 @@ def iterations(  # type: ignore[no-untyped-def]
     total = linearize(tree, terms, stage, 0.0, pose, blocks, work.scratch)
     for k in range(count):
         put(bank, k, pose)
-        correct(tree, pose, blocks, curvature, 1.0)
+        apply_correction(tree, pose, blocks, curvature, 1.0)
         total += step(tree, pose, blocks, damping, root_scale, work)
         retract(tree, pose, work, trial)
         total += linearize(tree, terms, stage, 0.0, trial, other, work.scratch)
-        learn(tree, pose, work.u, trial, other, True, curvature)
-        remember(tree, trial, other, curvature)
+        update(tree, pose, work.u, trial, other, True, curvature)
+        set_current(tree, trial, other, curvature)
     return total
 
 

@@ -2,7 +2,7 @@
 """Short rows of doubles in vector registers: the few operations that carry the solver's arithmetic.
 
 The number of shape columns is known only at run time, and a compiler leaves a run-time loop of ten turns scalar.
-All rows are therefore padded with zeros to a multiple of `LANES`, and these intrinsics work on `LANES` doubles at a
+All rows are therefore padded with zeros to a multiple of `WIDTH`, and these intrinsics work on `WIDTH` doubles at a
 time; LLVM lowers such a vector to whatever the processor has (AVX, two NEON registers, ...).
 
 Arrays are C-contiguous float64 of any rank; positions are flat element offsets, so `a[i, r, :]` of an array
@@ -16,22 +16,22 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic as _intrinsic
 
-LANES = 4
-VECTOR = ir.VectorType(ir.DoubleType(), LANES)
+WIDTH = 4
+VECTOR = ir.VectorType(ir.DoubleType(), WIDTH)
 _INT32 = ir.IntType(32)
 intrinsic: Any = _intrinsic  # its first parameter is the compiler's, which type checkers do not see
 
 
 def padded(n: int) -> int:
-    """Return `n` rounded up to a multiple of `LANES`."""
-    return -(-n // LANES) * LANES
+    """Return `n` rounded up to a multiple of `WIDTH`."""
+    return -(-n // WIDTH) * WIDTH
 
 
 def splat_of(builder: Any, scalar: Any) -> Any:
     """Return a vector of which every lane is `scalar`."""
     undefined = ir.Constant(VECTOR, ir.Undefined)
     one = builder.insert_element(undefined, scalar, ir.Constant(_INT32, 0))
-    return builder.shuffle_vector(one, undefined, ir.Constant(ir.VectorType(_INT32, LANES), [0] * LANES))
+    return builder.shuffle_vector(one, undefined, ir.Constant(ir.VectorType(_INT32, WIDTH), [0] * WIDTH))
 
 
 def _combine(context: Any, builder: Any, sig: Any, args: Any, terms: int) -> Any:
@@ -45,9 +45,9 @@ def _combine(context: Any, builder: Any, sig: Any, args: Any, terms: int) -> Any
         return builder.bitcast(builder.gep(data, [offset]), VECTOR.as_pointer())
 
     splats = [splat_of(builder, a) for a in scales]
-    lanes = ir.Constant(n.type, LANES)
-    with cgutils.for_range(builder, builder.sdiv(n, lanes)) as loop:
-        shift = builder.mul(loop.index, lanes)
+    width = ir.Constant(n.type, WIDTH)
+    with cgutils.for_range(builder, builder.sdiv(n, width)) as loop:
+        shift = builder.mul(loop.index, width)
         target = at(dst_data, builder.add(d, shift))
         total = builder.load(target, align=8)
         for splat, offset in zip(splats, offsets, strict=True):
@@ -64,11 +64,11 @@ def clear(typingctx, dst, d, n):  # type: ignore[no-untyped-def]
 
     def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         data = context.make_array(sig.args[0])(context, builder, args[0]).data
-        lanes = ir.Constant(args[2].type, LANES)
-        with cgutils.for_range(builder, builder.sdiv(args[2], lanes)) as loop:
-            place = builder.add(args[1], builder.mul(loop.index, lanes))
+        width = ir.Constant(args[2].type, WIDTH)
+        with cgutils.for_range(builder, builder.sdiv(args[2], width)) as loop:
+            place = builder.add(args[1], builder.mul(loop.index, width))
             target = builder.bitcast(builder.gep(data, [place]), VECTOR.as_pointer())
-            builder.store(ir.Constant(VECTOR, [0.0] * LANES), target, align=8)
+            builder.store(ir.Constant(VECTOR, [0.0] * WIDTH), target, align=8)
         return context.get_dummy_value()
 
     return types.void(dst, types.intp, types.intp), generate
@@ -80,9 +80,9 @@ def copy(typingctx, dst, d, src, s, n):  # type: ignore[no-untyped-def]
 
     def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         to, source = (context.make_array(sig.args[k])(context, builder, args[k]).data for k in (0, 2))
-        lanes = ir.Constant(args[4].type, LANES)
-        with cgutils.for_range(builder, builder.sdiv(args[4], lanes)) as loop:
-            shift = builder.mul(loop.index, lanes)
+        width = ir.Constant(args[4].type, WIDTH)
+        with cgutils.for_range(builder, builder.sdiv(args[4], width)) as loop:
+            shift = builder.mul(loop.index, width)
             places = ((source, args[3]), (to, args[1]))
             a, b = (builder.gep(data, [builder.add(offset, shift)]) for data, offset in places)
             value = builder.load(builder.bitcast(a, VECTOR.as_pointer()), align=8)

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The same formula for several joints at once: arithmetic on vectors of `LANES` doubles inside compiled kernels.
+"""Explicit SIMD in compiled kernels: one formula for several joints at once, on vectors of `WIDTH` doubles.
 
 A formula is a plain function of numbers, `formula(q, s) -> list`, with parameters q(k) and a state s, a list. It uses
-+, -, *, / and `sqrt` and no branches. Called with floats or numpy arrays it computes at once; `step` turns it into a
-function for kernels that applies it to a state whose entry k is the vector state[k * LANES : (k + 1) * LANES].
++, -, *, / and `sqrt` and no branches. Called with floats or numpy arrays it computes at once; `vectorized` turns it
+into a function for kernels that applies it to a state whose entry k is the vector state[k * WIDTH : (k + 1) * WIDTH].
 LLVM lowers the vectors to whatever the processor has, as for rows.py.
 """
 
@@ -18,66 +18,66 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic as _intrinsic
 
-LANES = 8
-_VECTOR = ir.VectorType(ir.DoubleType(), LANES)
+WIDTH = 8
+_VECTOR = ir.VectorType(ir.DoubleType(), WIDTH)
 _FLAGS = ("contract", "nsz")
 intrinsic: Any = _intrinsic  # its first parameter is the compiler's, which type checkers do not see
 
 
-class Lanes:
-    """A vector while code is generated for it; operators emit instructions."""
+class Vector:
+    """A SIMD vector during code generation; its operators emit LLVM instructions."""
 
     def __init__(self, builder: Any, value: Any) -> None:
-        """Wrap an LLVM value of type <LANES x double>."""
+        """Wrap an LLVM value of type <WIDTH x double>."""
         self.builder, self.value = builder, value
 
     def _of(self, other: Any) -> Any:
-        if isinstance(other, Lanes):
+        if isinstance(other, Vector):
             return other.value
-        return ir.Constant(_VECTOR, [float(other)] * LANES)
+        return ir.Constant(_VECTOR, [float(other)] * WIDTH)
 
-    def __add__(self, other: Any) -> Lanes:
+    def __add__(self, other: Any) -> Vector:
         """Sum."""
-        return Lanes(self.builder, self.builder.fadd(self.value, self._of(other), flags=_FLAGS))
+        return Vector(self.builder, self.builder.fadd(self.value, self._of(other), flags=_FLAGS))
 
-    def __sub__(self, other: Any) -> Lanes:
+    def __sub__(self, other: Any) -> Vector:
         """Difference."""
-        return Lanes(self.builder, self.builder.fsub(self.value, self._of(other), flags=_FLAGS))
+        return Vector(self.builder, self.builder.fsub(self.value, self._of(other), flags=_FLAGS))
 
-    def __mul__(self, other: Any) -> Lanes:
+    def __mul__(self, other: Any) -> Vector:
         """Product."""
-        return Lanes(self.builder, self.builder.fmul(self.value, self._of(other), flags=_FLAGS))
+        return Vector(self.builder, self.builder.fmul(self.value, self._of(other), flags=_FLAGS))
 
-    def __truediv__(self, other: Any) -> Lanes:
+    def __truediv__(self, other: Any) -> Vector:
         """Quotient."""
-        return Lanes(self.builder, self.builder.fdiv(self.value, self._of(other), flags=_FLAGS))
+        return Vector(self.builder, self.builder.fdiv(self.value, self._of(other), flags=_FLAGS))
 
-    def __rsub__(self, other: Any) -> Lanes:
+    def __rsub__(self, other: Any) -> Vector:
         """Difference from a number."""
-        return Lanes(self.builder, self.builder.fsub(self._of(other), self.value, flags=_FLAGS))
+        return Vector(self.builder, self.builder.fsub(self._of(other), self.value, flags=_FLAGS))
 
-    def __rtruediv__(self, other: Any) -> Lanes:
+    def __rtruediv__(self, other: Any) -> Vector:
         """Quotient of a number."""
-        return Lanes(self.builder, self.builder.fdiv(self._of(other), self.value, flags=_FLAGS))
+        return Vector(self.builder, self.builder.fdiv(self._of(other), self.value, flags=_FLAGS))
 
     __radd__, __rmul__ = __add__, __mul__
 
-    def sqrt(self) -> Lanes:
+    def sqrt(self) -> Vector:
         """Square root, by one instruction."""
         kind = ir.FunctionType(_VECTOR, [_VECTOR])
-        function = cgutils.get_or_insert_function(self.builder.module, kind, f"llvm.sqrt.v{LANES}f64")
-        return Lanes(self.builder, self.builder.call(function, [self.value]))
+        function = cgutils.get_or_insert_function(self.builder.module, kind, f"llvm.sqrt.v{WIDTH}f64")
+        return Vector(self.builder, self.builder.call(function, [self.value]))
 
 
 def sqrt(x: Any) -> Any:
-    """Return the square root of a number, an array or a vector of lanes."""
-    return x.sqrt() if isinstance(x, Lanes) else np.sqrt(x)
+    """Return the square root of a number, an array or a SIMD vector."""
+    return x.sqrt() if isinstance(x, Vector) else np.sqrt(x)
 
 
-def step(formula: Callable[[Callable[[int], Any], list], Sequence[Any]], reads: int) -> Any:
+def vectorized(formula: Callable[[Callable[[int], Any], list], Sequence[Any]], reads: int) -> Any:
     """Return `apply(table, at, state)` for kernels: state <- formula(q, state[:reads]), written from entry 0 on.
 
-    q(k) is the vector of `table`'s elements at + k LANES and following. Both arrays are C-contiguous float64 of any
+    q(k) is the vector of `table`'s elements at + k WIDTH and following. Both arrays are C-contiguous float64 of any
     rank, read and written as flat; nothing is checked.
     """
 
@@ -89,13 +89,13 @@ def step(formula: Callable[[Callable[[int], Any], list], Sequence[Any]], reads: 
         def at(data: Any, offset: Any) -> Any:
             return builder.bitcast(builder.gep(data, [offset]), _VECTOR.as_pointer())
 
-        def parameter(k: int) -> Lanes:
-            offset = builder.add(args[1], ir.Constant(index, k * LANES))
-            return Lanes(builder, builder.load(at(table, offset), align=8))
+        def parameter(k: int) -> Vector:
+            offset = builder.add(args[1], ir.Constant(index, k * WIDTH))
+            return Vector(builder, builder.load(at(table, offset), align=8))
 
-        given = [Lanes(builder, builder.load(at(state, ir.Constant(index, k * LANES)), align=8)) for k in range(reads)]
+        given = [Vector(builder, builder.load(at(state, ir.Constant(index, k * WIDTH)), align=8)) for k in range(reads)]
         for k, value in enumerate(formula(parameter, given)):
-            builder.store(value.value, at(state, ir.Constant(index, k * LANES)), align=8)
+            builder.store(value.value, at(state, ir.Constant(index, k * WIDTH)), align=8)
         return context.get_dummy_value()
 
     @intrinsic

@@ -12,12 +12,23 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ..compiled.part import Array, Blocks, Pose
+from ..compiled.part import Blocks, Pose
 from ..compiled.tree import BodyArrays, Tree, make_tree, with_fixed_shape
 from ..errors import ShapeError
 from ..gauss_newton.linearize import linearize, make_blocks, make_pose
-from ..gauss_newton.optimizer import CONVERGED, DAMPING_LEAST, DAMPING_MOST, MAX_ITERATIONS, NON_FINITE, STALLED
+from ..gauss_newton.optimizer import (
+    CONVERGED,
+    DAMPING_LEAST,
+    FIRST_GROWTH,
+    LEAST_DECREASE,
+    MAX_ITERATIONS,
+    NON_FINITE,
+    RUNNING,
+    judge_trial,
+    make_settings,
+)
 from ..gauss_newton.recursion import Workspace, eliminate, make_workspace, retract, solve_globals, substitute
 from ..gauss_newton.terms import Terms, fill_terms, pack_priors, usable
 from ..measurements import Measurements
@@ -26,7 +37,7 @@ from ..residuals.registry import SHAPE_PRIOR
 from ..state import ClipFit, Fit, State, Status
 from ..temporal import Temporal, with_previous
 from .frame_solver import fit_tree
-from .report import cost_by_term
+from .report import Outcome, cost_by_term, make_fit
 
 
 def carry(priors: Priors, fitted: Fit, shape_weight: float) -> Priors:
@@ -63,7 +74,9 @@ def fit_clip(
     measurement of its own: see `Fit.measurements`.
     `focal_weight` is a prior on the squared logarithm of the focal scale.
     At most `shape_frames` frames, evenly spaced, decide the shape; the others are then fitted with it fixed.
-    Raises ShapeError for arrays that do not fit the body.
+
+    :return: the frames' fits and the shape they share.
+    :raises ShapeError: when there is no frame, or when an array does not fit the body.
     """
     if len(measurements) == 0:
         raise ShapeError("A clip needs at least one frame of measurements, but got none.")
@@ -127,7 +140,7 @@ def _fit_in_order(
 
 
 def _fit_with_shape(
-    tree: Tree, m: Measurements, init: State, beta: Array, scale: float, priors: Priors, options: Options
+    tree: Tree, m: Measurements, init: State, beta: NDArray[np.float64], scale: float, priors: Priors, options: Options
 ) -> Fit:
     """Fit one frame with shape and focal length fixed; `tree` has them built in."""
     if m.intrinsics is not None and scale != 1.0:
@@ -172,13 +185,13 @@ class _Joint:
     """Levenberg-Marquardt over the poses of several frames and the global columns they share."""
 
     def __init__(self, tree: Tree, frames: list[_Frame], priors: Priors, options: Options, focal_weight: float) -> None:
-        self.tree, self.options = tree, options
+        self.tree, self.report = tree, options.report
         self.P, self.focal_weight = tree.shape, focal_weight
         self.mean, self.prior = priors.packed_shape(tree.shape)
-        self.table, self.tolerances, self.limits = options.stage_table(options.schedule(cold=False))
-        self.shape_weights = self.table[:, 0, SHAPE_PRIOR].copy()
-        self.table[:, 0, SHAPE_PRIOR] = 0.0  # once for the clip, not in every frame
-        self.root_scale = 1.0 / options.root_length
+        self.settings = make_settings(options, options.schedule(cold=False))
+        self.stages = self.settings.stages
+        self.shape_weights = self.stages[:, 0, SHAPE_PRIOR].copy()
+        self.stages[:, 0, SHAPE_PRIOR] = 0.0  # once for the clip, not in every frame
         self.beta = np.zeros(tree.S.shape[2])
         self.log_focal = 0.0
         self.status, self.cost = Status.NO_MEASUREMENTS, 0.0
@@ -197,63 +210,59 @@ class _Joint:
         if not self.frames:
             return
         code = CONVERGED
-        for s in range(len(self.table)):
-            code = self._stage(s)
+        for s in range(len(self.stages)):
+            code = self._run_stage(s)
             if code == NON_FINITE:
                 break
         self.status = Status(code)
 
-    def _stage(self, s: int) -> int:
-        damping, grow = self.options.damping, 2.0
+    def _run_stage(self, s: int) -> int:
+        damping, growth, tolerance = self.settings.damping, FIRST_GROWTH, self.settings.tolerances[s]
         self.cost = self._linearize(s, trial=False)
         if not np.isfinite(self.cost):
             return NON_FINITE
-        for _ in range(self.limits[s]):
+        for _ in range(self.settings.limits[s]):
             predicted = self._step(s, damping)
-            if predicted <= 1e-13 * self.cost:
+            if predicted <= LEAST_DECREASE * self.cost:
                 return CONVERGED
             self.iterations += 1
             cost = self._linearize(s, trial=True) if np.isfinite(predicted) else np.inf
-            if cost < self.cost:
-                decrease = self.cost - cost
-                small = decrease <= self.tolerances[s] * self.cost
-                gain = 2.0 * decrease / predicted - 1.0
-                damping = min(max(damping * max(1.0 / 9.0, 1.0 - gain**3), DAMPING_LEAST), DAMPING_MOST)
-                grow = 2.0
-                self.cost = cost
-                for frame in self.frames:
-                    frame.pose, frame.trial = frame.trial, frame.pose
-                self.beta = self.frames[0].pose.beta.copy()
-                self.log_focal = float(self.frames[0].pose.log_focal[0])
-                if small:
-                    return CONVERGED
+            accepted, damping, growth, verdict = judge_trial(self.cost, cost, predicted, damping, growth, tolerance)
+            if accepted:
+                self._accept(cost)
             else:
                 self.rejected += 1
                 self._linearize(s, trial=False)  # one set of blocks a frame: memory, not time, is what a clip lacks
-                damping *= grow
-                grow *= 2.0
-                if damping > DAMPING_MOST:
-                    return STALLED
+            if verdict != RUNNING:
+                return verdict
         return MAX_ITERATIONS
+
+    def _accept(self, cost: float) -> None:
+        """Make the trial poses the current ones."""
+        self.cost = cost
+        for frame in self.frames:
+            frame.pose, frame.trial = frame.trial, frame.pose
+        self.beta = self.frames[0].pose.beta.copy()
+        self.log_focal = float(self.frames[0].pose.log_focal[0])
 
     def _linearize(self, s: int, trial: bool) -> float:
         """Linearize every frame at its pose or its trial pose and return the clip's cost."""
         total = 0.0
         for f in self.frames:
             pose = f.trial if trial else f.pose
-            f.cost = linearize(self.tree, f.terms, self.table[s], self.options.triggs, pose, f.blocks, f.work.scratch)
+            f.cost = linearize(self.tree, f.terms, self.stages[s], self.settings.triggs, pose, f.blocks, f.work.scratch)
             total += f.cost
         pose = self.frames[0].trial if trial else self.frames[0].pose
         offset = pose.beta[: self.P] - self.mean
         total += 0.5 * self.shape_weights[s] * float(offset @ self.prior @ offset)
         return total + 0.5 * self.focal_weight * float(pose.log_focal[0]) ** 2
 
-    def _reduced(self, s: int, damping: float) -> tuple[Array, Array, float]:
+    def _reduced(self, s: int, damping: float) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
         """Eliminate every frame's pose; return the summed system of the global columns and the sum of |q~|^2."""
         P, squares = self.P, 0.0
         C, c = np.zeros_like(self.frames[0].work.C), np.zeros_like(self.beta)
         for f in self.frames:
-            squares += eliminate(self.tree, f.pose, f.blocks, damping, self.root_scale, f.work)
+            squares += eliminate(self.tree, f.pose, f.blocks, damping, self.settings.root_scale, f.work)
             C += f.work.C
             c += f.work.c
         C[:P, :P] += self.shape_weights[s] * self.prior
@@ -270,31 +279,25 @@ class _Joint:
         squares += solve_globals(self.tree, C, c, dbeta)
         for f in self.frames:
             f.work.dbeta[:] = dbeta
-            squares += substitute(self.tree, f.pose, damping, self.root_scale, f.work)
+            squares += substitute(self.tree, f.pose, damping, self.settings.root_scale, f.work)
             retract(self.tree, f.pose, f.work, f.trial)
         return 0.5 * squares
 
     def fits(self) -> list[Fit]:
         """Return the frames' results."""
         out = []
-        last, triggs = self.table[-1], self.options.triggs
+        last, triggs = self.stages[-1], self.settings.triggs
         for f in self.frames:
             f.cost = linearize(self.tree, f.terms, last, triggs, f.pose, f.blocks, f.work.scratch)
-            eliminate(self.tree, f.pose, f.blocks, DAMPING_LEAST, self.root_scale, f.work)
-            pose, P = f.pose, self.P
-            state, n = State.from_pose(self.tree, pose), self.iterations
-            information = f.work.C[:P, :P].copy()
-            shares = self._shares(f) if self.options.report else {}
-            out.append(
-                Fit(
-                    state, self.status, float(f.cost), n, pose.R.copy(), pose.t.copy(), information, f.count,
-                    self.rejected, shares,
-                )  # fmt: skip
-            )
+            eliminate(self.tree, f.pose, f.blocks, DAMPING_LEAST, self.settings.root_scale, f.work)
+            shares = self._shares(f) if self.report else {}
+            outcome = Outcome(self.status, float(f.cost), self.iterations, self.rejected, shares)
+            information = f.work.C[: self.P, : self.P].copy()
+            out.append(make_fit(self.tree, f.pose, outcome, information, f.count))
         return out
 
     def _shares(self, f: _Active) -> dict[str, float]:
-        return cost_by_term(self.tree, f.terms, self.table[-1], self.options.triggs, f.pose, f.blocks, f.work.scratch)
+        return cost_by_term(self.tree, f.terms, self.stages[-1], self.settings.triggs, f.pose, f.blocks, f.work.scratch)
 
     def cost_by_term(self) -> dict[str, float]:
         """Return what the clip's cost is made of: the frames' sums, the shape prior once, the focal length's prior."""
@@ -308,12 +311,12 @@ class _Joint:
             total["focal_prior"] = 0.5 * self.focal_weight * self.log_focal**2
         return total
 
-    def information(self) -> Array:
+    def information(self) -> NDArray[np.float64]:
         """Return the information matrix of beta (P, P), prior included, poses and focal length eliminated."""
         P = self.P
         if not self.frames:
             return self.shape_weights[-1] * self.prior
-        C, _, _ = self._reduced(len(self.table) - 1, DAMPING_LEAST)
+        C, _, _ = self._reduced(len(self.stages) - 1, DAMPING_LEAST)
         out = C[:P, :P].copy()
         if self.tree.globals > P and C[P, P] > 0.0:
             out -= np.outer(C[:P, P], C[P, :P]) / C[P, P]

@@ -5,13 +5,13 @@ import threading
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..compiled.kernel import announce_compilation, kernel
-from ..compiled.part import Array
 from ..compiled.tree import BodyArrays, Tree, make_tree
 from ..gauss_newton.curvature import make_curvature
 from ..gauss_newton.linearize import make_blocks, make_pose
-from ..gauss_newton.optimizer import optimize
+from ..gauss_newton.optimizer import Memory, Settings, make_settings, optimize
 from ..gauss_newton.recursion import make_workspace
 from ..gauss_newton.terms import Layout, PackedPriors, fill_terms, pack_priors
 from ..measurements import Measurements, as_array
@@ -20,7 +20,7 @@ from ..residuals.registry import SHAPE_PRIOR
 from ..rotations import nearest_rotation, orthonormalize
 from ..state import Fit, State, Status
 from .initialize import initial_state
-from .report import cost_by_term
+from .report import Outcome, cost_by_term, make_fit
 
 
 def fit(
@@ -35,9 +35,10 @@ def fit(
 
     minimize 1/2 sum_i |r_i(T_i, Omega_i, beta)|^2 over T_0, Omega_1..K and beta (section 3 of the paper).
 
-    With `init` (camera frame, metres) the fit starts there, in one stage; without, from a guess by `initial_state`,
-    in several. `priors` are `default_priors(body)` unless given: the learned joint prior, joint limits and the
-    population's shape. Raises ShapeError for arrays that do not fit the body; never for measured values: see Status.
+    :param init: where to start, camera frame, metres, in one stage; without it, from `initial_state`, in several.
+    :param priors: `default_priors(body)` unless given: the learned joint prior, joint limits, the population's shape.
+    :return: the state and how it was reached; whatever values were measured, see `Status`.
+    :raises ShapeError: when an array does not fit the body.
     """
     return FrameSolver(body, priors, options).fit(measurements, init)
 
@@ -62,20 +63,21 @@ class FrameSolver:
         priors: Priors | None = None,
         options: Options = Options(),  # noqa: B008 - frozen
     ) -> None:
-        """Check the body and make room. Raises ShapeError."""
+        """Check the body and allocate the working memory.
+
+        :raises ShapeError: when an array does not fit the others.
+        """
         announce_compilation(optimize)
         self.tree = body if isinstance(body, Tree) else make_tree(body)
         self.priors = default_priors(body) if priors is None else priors
         self.options = options
         tree = self.tree
-        self._poses = make_pose(tree), make_pose(tree)
-        self._blocks = make_blocks(tree), make_blocks(tree)
-        self._curvature = make_curvature(tree)
-        self._work = make_workspace(tree)
+        poses, blocks = (make_pose(tree), make_pose(tree)), (make_blocks(tree), make_blocks(tree))
+        self._memory = Memory(poses, blocks, make_curvature(tree), make_workspace(tree))
         self._rest = np.tile(np.eye(3), (len(tree.parents) - 1, 1, 1))
         self._layout: Layout | None = None
         self._packed: tuple[Priors, PackedPriors] | None = None
-        self._schedules: list[tuple[Options, Sequence[Stage], tuple[Array, Array, Array]]] = []
+        self._settings: list[tuple[Options, Sequence[Stage], Settings]] = []
 
     def fit(
         self,
@@ -84,56 +86,52 @@ class FrameSolver:
         priors: Priors | None = None,
         options: Options | None = None,
     ) -> Fit:
-        """Fit one frame, as `fit` does; priors and options are those given at the start unless others are given."""
+        """Fit one frame, as `fit` does, with the priors and options of the constructor unless others are given.
+
+        :raises ShapeError: when an array does not fit the body.
+        """
         priors = self.priors if priors is None else priors
         options = self.options if options is None else options
-        tree, work, (pose, other) = self.tree, self._work, self._poses
+        tree, memory, work = self.tree, self._memory, self._memory.work
         packed = self._pack(priors)
         terms, count, self._layout = fill_terms(tree, measurements, packed, self._layout)
         count += len(terms.ints[0])
-        table, tolerances, limits = self._schedule(options, cold=init is None)
+        settings = self._settings_of(options, cold=init is None)
         if init is None:
             init = initial_state(tree, terms, self._mean(priors), packed.shape_mean[: tree.shape])
         self._enter(init)
-        cost, code, iterations, rejected, which = optimize(
-            tree, terms, count > 0, table, tolerances, limits, options.triggs, options.damping,
-            1.0 / options.root_length, pose, other, self._blocks[0], self._blocks[1],
-            self._curvature, work,
-        )  # fmt: skip
-        found, P = self._poses[which], tree.shape
-        information = work.C[:P, :P] - table[-1, 0, SHAPE_PRIOR] * packed.shape_information[:P, :P]
-        state = State.from_pose(tree, found)
+        cost, code, iterations, rejected, which = optimize(tree, terms, count > 0, settings, memory)
+        found, P, last = memory.poses[which], tree.shape, settings.stages[-1]
+        information = work.C[:P, :P] - last[0, SHAPE_PRIOR] * packed.shape_information[:P, :P]
         shares = {}
         if options.report:
-            blocks, last = self._blocks[0], table[-1]
-            shares = cost_by_term(tree, terms, last, options.triggs, found, blocks, work.scratch)
-        return Fit(
-            state, Status(code), cost, iterations, found.R.copy(), found.t.copy(), information, count, rejected, shares
-        )
+            shares = cost_by_term(tree, terms, last, options.triggs, found, memory.blocks[0], work.scratch)
+        outcome = Outcome(Status(code), cost, iterations, rejected, shares)
+        return make_fit(tree, found, outcome, information, count)
 
     def _pack(self, priors: Priors) -> PackedPriors:
         if self._packed is None or self._packed[0] is not priors:
             self._packed = priors, pack_priors(self.tree, priors)
         return self._packed[1]
 
-    def _schedule(self, options: Options, cold: bool) -> tuple[Array, Array, Array]:
+    def _settings_of(self, options: Options, cold: bool) -> Settings:
         stages = options.schedule(cold)
-        for known, its_stages, table in self._schedules:
+        for known, its_stages, settings in self._settings:
             if its_stages is stages and known == options:
-                return table
-        table = options.stage_table(stages)
+                return settings
+        settings = make_settings(options, stages)
         if isinstance(stages, tuple):  # a list may change
-            self._schedules = [*self._schedules[-3:], (options, stages, table)]
-        return table
+            self._settings = [*self._settings[-3:], (options, stages, settings)]
+        return settings
 
-    def _mean(self, priors: Priors) -> Array:
+    def _mean(self, priors: Priors) -> NDArray[np.float64]:
         if priors.joint_mean is None:
             return self._rest
         return np.asarray(priors.joint_mean, dtype=np.float64)
 
     def _enter(self, state: State) -> None:
         """Put `state` into the first pose, with rotations made orthonormal."""
-        tree, pose = self.tree, self._poses[0]
+        tree, pose = self.tree, self._memory.poses[0]
         K, P = len(tree.parents) - 1, tree.shape
         R = as_array(state.R_camera_root, (3, 3), "R_camera_root")
         t = as_array(state.t_camera_root, (3,), "t_camera_root")
@@ -147,7 +145,7 @@ _last = threading.local()
 
 @kernel
 def _enter(R, t, Omega, beta, pose) -> bool:  # type: ignore[no-untyped-def]
-    """Copy a state; return whether its rotations could be made orthonormal in passing."""
+    """Copy a state to `pose`; return whether its rotations are orthonormal now, which fails for singular ones."""
     for r in range(3):
         pose.t[0, r] = t[r]
         for c in range(3):

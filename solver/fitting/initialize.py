@@ -8,9 +8,9 @@ Position: by 3D keypoints, the difference of centroids; by 2D keypoints, the lin
 """
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..compiled.kernel import kernel
-from ..compiled.part import Array
 from ..compiled.tree import Tree
 from ..gauss_newton.linearize import make_pose, place_parts
 from ..gauss_newton.terms import HAS_2D, HAS_3D, HAS_DIRECTION, Terms
@@ -82,7 +82,7 @@ def _image_system(terms, points, R, H, g, mean) -> None:  # type: ignore[no-unty
         mean[2] += w * v
 
 
-def _rotation_onto(products: Array) -> Array | None:
+def _rotation_onto(products: NDArray[np.float64]) -> NDArray[np.float64] | None:
     """Return R maximizing tr(Rᵀ B) for B = sum w target sourceᵀ (3, 3), or None where B does not fix it."""
     if not np.isfinite(products).all():
         return None
@@ -93,8 +93,12 @@ def _rotation_onto(products: Array) -> Array | None:
     return u @ vt
 
 
-def initial_state(tree: Tree, terms: Terms, joint_mean: Array, beta: Array) -> State:
-    """Return a first state; finite whatever the measurements are. joint_mean (K, 3, 3), beta (P,)."""
+def initial_state(tree: Tree, terms: Terms, joint_mean: NDArray[np.float64], beta: NDArray[np.float64]) -> State:
+    """Return a first state in the camera frame, metres; finite whatever the measurements are.
+
+    :param joint_mean: (K, 3, 3) states of joints 1..K.
+    :param beta: (P,)
+    """
     pose = make_pose(tree)
     pose.Omega[1:] = joint_mean
     pose.beta[: tree.shape] = beta
@@ -117,7 +121,7 @@ def initial_state(tree: Tree, terms: Terms, joint_mean: Array, beta: Array) -> S
     return State(R.copy(), t, joint_mean.copy(), beta.copy())
 
 
-def _position_in_image(terms: Terms, points: Array, R: Array) -> Array | None:
+def _position_in_image(terms: Terms, points: NDArray[np.float64], R: NDArray[np.float64]) -> NDArray[np.float64] | None:
     """Return t (3,) by linear least squares; where it is not in front of the camera, at a distance on the mean ray."""
     H, g, mean = np.zeros((3, 3)), np.zeros(3), np.zeros(3)
     _image_system(terms, points, R, H, g, mean)

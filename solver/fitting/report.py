@@ -1,16 +1,20 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a fit's cost is made of.
+"""The results of a fit: its state, how it ended, and what its cost is made of.
 
 Every residual's cost is linear in its weight, so the share of one kind is the cost with all other weights at zero.
 """
 
-import numpy as np
+from typing import NamedTuple
 
-from ..compiled.part import Array, Blocks, Pose
+import numpy as np
+from numpy.typing import NDArray
+
+from ..compiled.part import Blocks, Pose
 from ..compiled.tree import Tree
 from ..gauss_newton.linearize import linearize
 from ..gauss_newton.terms import Terms
 from ..residuals.registry import FIRST_TABLE, KEYPOINT2D, KEYPOINT3D, ORIENTATION_FIELD, RESIDUALS, SHAPE_PRIOR
+from ..state import Fit, State, Status
 
 # Columns of a stage's weights by name, in their order.
 COLUMNS = {
@@ -22,8 +26,40 @@ COLUMNS = {
 }
 
 
+class Outcome(NamedTuple):
+    """How an optimization ended; the fields are those of `Fit` and `ClipFit`."""
+
+    status: Status
+    cost: float
+    iterations: int
+    rejected: int
+    cost_by_term: dict[str, float]
+
+
+def make_fit(tree: Tree, pose: Pose, outcome: Outcome, beta_information: NDArray[np.float64], measurements: int) -> Fit:
+    """Return the result of one frame at `pose`, which is copied; beta_information (P, P)."""
+    return Fit(
+        state=State.from_pose(tree, pose),
+        R_camera_part=pose.R.copy(),
+        t_camera_part=pose.t.copy(),
+        beta_information=beta_information,
+        measurements=measurements,
+        status=outcome.status,
+        cost=outcome.cost,
+        iterations=outcome.iterations,
+        rejected=outcome.rejected,
+        cost_by_term=outcome.cost_by_term,
+    )
+
+
 def cost_by_term(
-    tree: Tree, terms: Terms, stage: Array, triggs: float, pose: Pose, blocks: Blocks, scratch: Array
+    tree: Tree,
+    terms: Terms,
+    stage: NDArray[np.float64],
+    triggs: float,
+    pose: Pose,
+    blocks: Blocks,
+    scratch: NDArray[np.float64],
 ) -> dict[str, float]:
     """Return the cost of each kind of residual at `pose`; they add up to what `linearize` returns there.
 

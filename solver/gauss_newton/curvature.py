@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What Gauss-Newton leaves out of a joint's Hessian, learned from the steps that are taken.
+"""What Gauss-Newton leaves out of a joint's Hessian, estimated from the steps that are taken.
 
 The joint priors and limits together are functions f_i(Omega_i) of three numbers each. Gauss-Newton takes JᵀJ for the
 Hessian of f_i and leaves out sum_k r_k d^2 r_k, which for the learned prior is as large: steps along some joints are
@@ -21,14 +21,14 @@ from ..compiled.part import GRADIENT, Array, Blocks, Pose
 from ..compiled.tree import Tree
 
 LEAST_SHARE = 0.2  # of JᵀJ that H + t S keeps
-LEAST_COSINE = 0.1  # between d and w: below, dᵀw says little and the update would be large
+LEAST_COSINE = 0.1  # between d and w: below, dᵀw is uncertain and the update would be large
 SHORTEST_STEP = 1e-7  # radians: below, the difference of two gradients is mostly rounding
 
 
 class Curvature(NamedTuple):
-    """Of every joint at the current pose, in its parent's axes; row 0 is unused."""
+    """The estimate for every joint at the current pose, in its parent's axes; row 0 is unused."""
 
-    S: Array  # (K+1, 3, 3), what was learned
+    S: Array  # (K+1, 3, 3), estimate of what Gauss-Newton leaves out
     H: Array  # (K+1, 3, 3), JᵀJ
     g: Array  # (K+1, 3), gradient
 
@@ -91,8 +91,8 @@ def _share(H, S) -> float:  # type: ignore[no-untyped-def]
 
 
 @kernel
-def forget(curvature: Curvature) -> None:
-    """Start anew, as when the weights change."""
+def reset(curvature: Curvature) -> None:
+    """Set S to zero, as when the weights change."""
     for i in range(curvature.S.shape[0]):
         for r in range(3):
             for c in range(3):
@@ -100,7 +100,7 @@ def forget(curvature: Curvature) -> None:
 
 
 @kernel
-def remember(tree: Tree, pose: Pose, blocks: Blocks, curvature: Curvature) -> None:
+def set_current(tree: Tree, pose: Pose, blocks: Blocks, curvature: Curvature) -> None:
     """Make `pose`, with its blocks as `linearize` left them, the current one."""
     for i in range(1, tree.parents.shape[0]):
         R = pose.R[tree.parents[i]]
@@ -111,13 +111,13 @@ def remember(tree: Tree, pose: Pose, blocks: Blocks, curvature: Curvature) -> No
 
 
 @kernel
-def learn(
+def update(
     tree: Tree, pose: Pose, u: Array, trial: Pose, trial_blocks: Blocks, accepted: bool, curvature: Curvature
 ) -> None:
     """Update S by the step u (K+1, 3), in camera axes, from the current `pose` to `trial`.
 
     Residuals that couple a joint's state with its part's pose (blocks.cross) have gradients that depend on more than
-    the joint: nothing is learned from those.
+    the joint: S stays as it is.
     """
     if trial_blocks.cross[0]:
         return
@@ -150,13 +150,13 @@ def learn(
 
 
 @kernel
-def correct(tree: Tree, pose: Pose, blocks: Blocks, curvature: Curvature, share: float) -> None:
-    """Write R_par (H + share t S) R_parᵀ to the blocks of the current pose; a share of 0 gives back Gauss-Newton's."""
+def apply_correction(tree: Tree, pose: Pose, blocks: Blocks, curvature: Curvature, share: float) -> None:
+    """Write R_par (H + share t S) R_parᵀ to the blocks of the current pose; a share of 0 restores Gauss-Newton's."""
     for i in range(1, tree.parents.shape[0]):
         H, S = curvature.H[i], curvature.S[i]
         h00, h01, h02, h11, h12, h22 = _upper(H)
         t = share * _share(H, S) if share > 0.0 else 0.0
-        if t > 0.0:  # S may have overflown
+        if t > 0.0:  # False if S has overflowed
             h00, h01, h02 = h00 + t * S[0, 0], h01 + t * S[0, 1], h02 + t * S[0, 2]
             h11, h12, h22 = h11 + t * S[1, 1], h12 + t * S[1, 2], h22 + t * S[2, 2]
         _store(blocks.H_uu[i], _turn(pose.R[tree.parents[i]], (h00, h01, h02, h11, h12, h22), True))

@@ -11,7 +11,7 @@ from numba import types
 from numba.core import cgutils
 
 from ..compiled.kernel import kernel
-from ..compiled.rows import LANES, VECTOR, intrinsic, splat_of
+from ..compiled.rows import VECTOR, WIDTH, intrinsic, splat_of
 
 
 def _tile(vectors: int, sign: int) -> Any:
@@ -22,7 +22,7 @@ def _tile(vectors: int, sign: int) -> Any:
         c_data, x_data, z_data = (context.make_array(sig.args[k])(context, builder, args[k]).data for k in (0, 3, 6))
 
         def vector_at(data: Any, place: Any, v: int) -> Any:
-            place = builder.add(place, ir.Constant(place.type, v * LANES))
+            place = builder.add(place, ir.Constant(place.type, v * WIDTH))
             return builder.bitcast(builder.gep(data, [place]), VECTOR.as_pointer())
 
         starts = [at]

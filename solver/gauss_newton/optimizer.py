@@ -1,85 +1,156 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Levenberg-Marquardt on one frame, through a schedule of stages; one compiled function runs the whole of it.
+"""Levenberg-Marquardt: the control that every fit shares, and the compiled optimizer of one frame.
 
-Every trial point is linearized in the pass that evaluates it, so an accepted step costs one pass and one solve; a
-rejected one leaves the kept blocks to be solved again with a larger damping (two sets of blocks, swapped on
-acceptance). The damping follows the ratio of the actual decrease to the predicted one, after Nielsen. Rejected or not,
-a trial teaches what Gauss-Newton leaves out of the joints' Hessians (curvature.py).
+A trial point is accepted if it lowers the cost. The damping follows the gain ratio, the actual decrease over the
+predicted one (`judge_trial`), and a stage ends when the decrease, predicted or actual, becomes negligible.
+Of one frame, every trial point is linearized in the pass that evaluates it, so an accepted step costs one pass and one
+solve; a rejected one leaves the kept blocks to be solved again with a larger damping (two sets of blocks, swapped on
+acceptance). Rejected or not, a trial updates the estimate of what Gauss-Newton leaves out of the joints' Hessians
+(curvature.py).
+Source: damping by the gain ratio after Nielsen, Damping Parameter in Marquardt's Method, IMM-REP-1999-05.
 """
 
+from collections.abc import Sequence
+from typing import NamedTuple
+
 import numpy as np
+from numpy.typing import NDArray
 
 from ..compiled.kernel import kernel
-from .curvature import correct, forget, learn, remember
+from ..compiled.part import Blocks, Pose
+from ..options import Options, Stage
+from .curvature import Curvature, apply_correction, reset, set_current, update
 from .linearize import linearize
-from .recursion import eliminate, retract, step
+from .recursion import Workspace, eliminate, retract, step
 
 DAMPING_LEAST, DAMPING_MOST = 1e-9, 1e12
-CONVERGED, MAX_ITERATIONS, STALLED, NO_MEASUREMENTS, NON_FINITE = range(5)
+FIRST_GROWTH = 2.0  # of the damping after the first rejected step; it doubles with every further one in a row
+LEAST_DECREASE = 1e-13  # a predicted decrease below this share of the cost is rounding
+RUNNING = -1  # not a `Status`: the stage goes on
+CONVERGED, MAX_ITERATIONS, STALLED, NO_MEASUREMENTS, NON_FINITE = range(5)  # values of `Status`
+
+
+class Settings(NamedTuple):
+    """`Options` for `optimize`; S stages."""
+
+    stages: NDArray[np.float64]  # (S, 2, weights): weights and 1/sigma in the registry's order
+    tolerances: NDArray[np.float64]  # (S,) relative decrease at which a stage ends
+    limits: NDArray[np.int64]  # (S,) iterations
+    triggs: float
+    damping: float  # at the start of each stage
+    root_scale: float  # radians per metre of the pelvis's motion
+    curvature: bool  # whether curvature.py takes part
+
+
+def make_settings(options: Options, stages: Sequence[Stage]) -> Settings:
+    """Return the settings of a fit through these stages.
+
+    :raises ShapeError: when a weight, a robust scale or a tolerance cannot be used.
+    """
+    table = options.stage_table(stages)
+    triggs, damping, root_scale = float(options.triggs), float(options.damping), 1.0 / options.root_length
+    return Settings(*table, triggs, damping, root_scale, bool(options.curvature))
+
+
+class Memory(NamedTuple):
+    """The working memory of `optimize`; the first pose is where it starts."""
+
+    poses: tuple[Pose, Pose]
+    blocks: tuple[Blocks, Blocks]
+    curvature: Curvature
+    work: Workspace
+
+
+def judge_trial(
+    cost: float, trial_cost: float, predicted: float, damping: float, growth: float, tolerance: float
+) -> tuple[bool, float, float, int]:
+    """Return (whether to accept a trial point, the next damping, its next growth, CONVERGED, STALLED or RUNNING).
+
+    With the gain ratio g = (cost - trial_cost) / predicted, an accepted step multiplies the damping by
+    max(1/9, 1 - (2 g - 1)^3), a rejected one by `growth`, which then doubles. A trial cost that is not a number is
+    rejected. CONVERGED: the decrease is at most `tolerance` times the cost. STALLED: the damping exceeds its limit.
+    """
+    if trial_cost < cost:  # False for NaN
+        decrease = cost - trial_cost
+        gain = 2.0 * decrease / predicted - 1.0
+        damping = min(max(damping * max(1.0 / 9.0, 1.0 - gain**3), DAMPING_LEAST), DAMPING_MOST)
+        return True, damping, FIRST_GROWTH, CONVERGED if decrease <= tolerance * cost else RUNNING
+    damping *= growth
+    return False, damping, 2.0 * growth, STALLED if damping > DAMPING_MOST else RUNNING
+
+
+_judge_trial = kernel(judge_trial)  # for `optimize`; clip.py, whose loop is not compiled, calls it as it is
 
 
 @kernel
-def optimize(  # type: ignore[no-untyped-def]
-    tree, terms, measured, stages, tolerances, limits, triggs, damping, root_scale, pose, other_pose, blocks,
-    other_blocks, curvature, work,
-):
-    """Run all stages from `pose`; return (cost, status, iterations, how many were rejected, 1 if the result is in
-    `other_pose`).
+def _run_stage(tree, terms, s, settings, memory, start):  # type: ignore[no-untyped-def]
+    """Run stage s from memory.poses[start]; return (cost, status, iterations, how many rejected, index of the result).
 
-    stages (S, 2, weights), tolerances (S,), limits (S,). Without measurements, or for a cost that is not finite, the
-    pose stays where it is. At the end work.C is the reduced Gauss-Newton system of the result: see `eliminate`.
+    The blocks of the result have the same index.
     """
-    cur, nxt, cur_blocks, nxt_blocks, swapped = pose, other_pose, blocks, other_blocks, 0
-    cost, status, iterations, rejected = 0.0, CONVERGED, 0, 0
-    if not measured:
-        cost = linearize(tree, terms, stages[-1], triggs, cur, cur_blocks, work.scratch)
-        eliminate(tree, cur, cur_blocks, DAMPING_LEAST, root_scale, work)
-        return cost, NO_MEASUREMENTS, iterations, rejected, swapped
-    for s in range(stages.shape[0]):
-        stage = stages[s]
-        lam, grow = damping, 2.0
-        cost = linearize(tree, terms, stage, triggs, cur, cur_blocks, work.scratch)
-        if not np.isfinite(cost):
-            status = NON_FINITE
+    stage, tolerance = settings.stages[s], settings.tolerances[s]
+    curvature, work = memory.curvature, memory.work
+    at, damping, growth, iterations, rejected = start, settings.damping, FIRST_GROWTH, 0, 0
+    pose, blocks = memory.poses[start], memory.blocks[start]
+    trial, trial_blocks = memory.poses[1 - start], memory.blocks[1 - start]
+    cost = linearize(tree, terms, stage, settings.triggs, pose, blocks, work.scratch)
+    if not np.isfinite(cost):
+        return cost, NON_FINITE, iterations, rejected, at
+    if settings.curvature:
+        reset(curvature)
+        set_current(tree, pose, blocks, curvature)
+    status = MAX_ITERATIONS
+    for _ in range(settings.limits[s]):
+        if settings.curvature:
+            apply_correction(tree, pose, blocks, curvature, 1.0)
+        predicted = step(tree, pose, blocks, damping, settings.root_scale, work)
+        if predicted <= LEAST_DECREASE * cost:
+            status = CONVERGED
             break
-        forget(curvature)
-        remember(tree, cur, cur_blocks, curvature)
-        status = MAX_ITERATIONS
-        for _ in range(limits[s]):
-            correct(tree, cur, cur_blocks, curvature, 1.0)
-            predicted = step(tree, cur, cur_blocks, lam, root_scale, work)
-            if predicted <= 1e-13 * cost:
-                status = CONVERGED
+        iterations += 1
+        trial_cost = np.inf
+        if np.isfinite(predicted):
+            retract(tree, pose, work, trial)
+            trial_cost = linearize(tree, terms, stage, settings.triggs, trial, trial_blocks, work.scratch)
+        accepted, damping, growth, verdict = _judge_trial(cost, trial_cost, predicted, damping, growth, tolerance)
+        if settings.curvature and np.isfinite(trial_cost):
+            update(tree, pose, work.u, trial, trial_blocks, accepted, curvature)
+        if accepted:
+            cost, at = trial_cost, 1 - at
+            pose, trial = trial, pose
+            blocks, trial_blocks = trial_blocks, blocks
+            if settings.curvature:
+                set_current(tree, pose, blocks, curvature)
+        else:
+            rejected += 1
+        if verdict != RUNNING:
+            status = verdict
+            break
+    if settings.curvature:
+        apply_correction(tree, pose, blocks, curvature, 0.0)
+    return cost, status, iterations, rejected, at
+
+
+@kernel
+def optimize(tree, terms, measured, settings, memory):  # type: ignore[no-untyped-def]
+    """Run all stages from memory.poses[0]; return (cost, status, iterations, how many rejected, index of the result).
+
+    Without measurements, or for a cost that is not finite, the pose stays where it is. At the end memory.work.C is
+    the reduced Gauss-Newton system of the result: see `eliminate`.
+    """
+    work, at, iterations, rejected = memory.work, 0, 0, 0
+    if measured:
+        cost, status = 0.0, CONVERGED
+        for s in range(settings.stages.shape[0]):
+            cost, status, more, missed, at = _run_stage(tree, terms, s, settings, memory, at)
+            iterations += more
+            rejected += missed
+            if status == NON_FINITE:
                 break
-            iterations += 1
-            trial_cost = np.inf
-            if np.isfinite(predicted):
-                retract(tree, cur, work, nxt)
-                trial_cost = linearize(tree, terms, stage, triggs, nxt, nxt_blocks, work.scratch)
-            better = trial_cost < cost  # False for NaN
-            if np.isfinite(trial_cost):
-                learn(tree, cur, work.u, nxt, nxt_blocks, better, curvature)
-            if better:
-                decrease = cost - trial_cost
-                small = decrease <= tolerances[s] * cost
-                gain = 2.0 * decrease / predicted - 1.0
-                lam = min(max(lam * max(1.0 / 9.0, 1.0 - gain * gain * gain), DAMPING_LEAST), DAMPING_MOST)
-                grow = 2.0
-                cost = trial_cost
-                cur, nxt = nxt, cur
-                cur_blocks, nxt_blocks = nxt_blocks, cur_blocks
-                swapped = 1 - swapped
-                remember(tree, cur, cur_blocks, curvature)
-                if small:
-                    status = CONVERGED
-                    break
-            else:
-                rejected += 1
-                lam *= grow
-                grow *= 2.0
-                if lam > DAMPING_MOST:
-                    status = STALLED
-                    break
-        correct(tree, cur, cur_blocks, curvature, 0.0)
-    eliminate(tree, cur, cur_blocks, DAMPING_LEAST, root_scale, work)
-    return cost, status, iterations, rejected, swapped
+    else:
+        status = NO_MEASUREMENTS
+        cost = linearize(
+            tree, terms, settings.stages[-1], settings.triggs, memory.poses[0], memory.blocks[0], work.scratch
+        )
+    eliminate(tree, memory.poses[at], memory.blocks[at], DAMPING_LEAST, settings.root_scale, work)
+    return cost, status, iterations, rejected, at

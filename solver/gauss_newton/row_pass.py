@@ -12,11 +12,11 @@ from llvmlite import ir
 from numba import types
 from numba.core import cgutils
 
-from ..compiled.rows import LANES, VECTOR, intrinsic, splat_of
+from ..compiled.rows import VECTOR, WIDTH, intrinsic, splat_of
 
 
 class _Row:
-    """A vector of a row while code is generated for it; operators emit instructions."""
+    """A SIMD vector of a row during code generation; its operators emit LLVM instructions."""
 
     def __init__(self, builder: Any, value: Any) -> None:
         self.builder, self.value = builder, value
@@ -32,7 +32,7 @@ class _Row:
 
 
 class _Any:
-    """Stands for a vector where only the number of results counts."""
+    """Placeholder for a vector where only the number of results is wanted."""
 
     def __add__(self, other: object) -> "_Any":
         return self
@@ -54,7 +54,6 @@ def row_pass(formula: Callable[..., Sequence[Sequence["_Row"]]], rows: Sequence[
 
     def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         scalars, n = args[0], args[1]
-        written = [len(group) for group in formula(*_counted(sig.args[0].count, rows))]
         written = [len(list(group)) for group in formula(*_counted(sig.args[0].count, rows))]
         splats = [_Row(builder, splat_of(builder, builder.extract_value(scalars, k))) for k in range(sig.args[0].count)]
         starts = []
@@ -65,9 +64,9 @@ def row_pass(formula: Callable[..., Sequence[Sequence["_Row"]]], rows: Sequence[
             for _ in range(max(count, written[k]) - 1):
                 places.append(builder.add(places[-1], stride))
             starts.append([builder.gep(data, [place]) for place in places])
-        lanes = ir.Constant(n.type, LANES)
-        with cgutils.for_range(builder, builder.sdiv(n, lanes)) as loop:
-            shift = builder.mul(loop.index, lanes)
+        width = ir.Constant(n.type, WIDTH)
+        with cgutils.for_range(builder, builder.sdiv(n, width)) as loop:
+            shift = builder.mul(loop.index, width)
             at = [[builder.bitcast(builder.gep(p, [shift]), VECTOR.as_pointer()) for p in group] for group in starts]
             loaded = [[_Row(builder, builder.load(p, align=8)) for p in at[k][:count]] for k, count in enumerate(rows)]
             for pointers, values in zip(at, formula(splats, *loaded), strict=True):

@@ -26,7 +26,7 @@ import numpy as np
 
 from ..compiled.kernel import allocating_kernel, kernel
 from ..compiled.part import Array, Linearization, Part
-from ..compiled.simd import LANES, sqrt, step
+from ..compiled.simd import WIDTH, sqrt, vectorized
 from ..rotations import exp, exp3, log, log3, matrix_from_quaternion
 from .accumulation import add_to_joint
 
@@ -44,8 +44,8 @@ LAST = FIRST_LAYER + LAYERS * LAYER_SIZE  # A (3, 3) and b (3,) of the last line
 CONSTANT, BOUND = LAST + 12, LAST + 13  # sum of log |det A| with -log(2/pi^2); B
 SIZE = LAST + 14  # of a joint's parameters
 
-INTS = LANES  # joints, 0 for none: one row holds several
-FLOATS = LANES * (SIZE + 2)  # their parameters, then w and h, each as LANES values
+INTS = WIDTH  # joints, 0 for none: one row holds several
+FLOATS = WIDTH * (SIZE + 2)  # their parameters, then w and h, each as WIDTH values
 INDEXES = "parts"
 _W = SIZE
 NEAREST = 1e-4  # radians to pi
@@ -164,33 +164,35 @@ def normal(q: Callable[[int], Any], s: list) -> list:
     return [*H, *g, s[0] * s[0] + s[1] * s[1] + s[2] * s[2]]
 
 
-_chart, _layer, _finish, _normal = step(chart, 9), step(layer, STATE), step(finish, STATE), step(normal, 12)
+_chart, _layer, _finish, _normal = (
+    vectorized(formula, reads) for formula, reads in ((chart, 9), (layer, STATE), (finish, STATE), (normal, 12))
+)
 
 
 @kernel
 def _gather(pose, ints, k, state):  # type: ignore[no-untyped-def]
     """Write the states of the joints of row k side by side."""
-    for lane in range(LANES):
+    for lane in range(WIDTH):
         Om = pose.Omega[ints[k, lane]]
         for r in range(3):
-            state[3 * r * LANES + lane] = Om[r, 0]
-            state[(3 * r + 1) * LANES + lane] = Om[r, 1]
-            state[(3 * r + 2) * LANES + lane] = Om[r, 2]
+            state[3 * r * WIDTH + lane] = Om[r, 0]
+            state[(3 * r + 1) * WIDTH + lane] = Om[r, 1]
+            state[(3 * r + 2) * WIDTH + lane] = Om[r, 2]
 
 
 @allocating_kernel
 def _keep_off_half_turns(floats, k, state):  # type: ignore[no-untyped-def]
     """Take the joints of row k in `state` that are nearly a half turn from their M back to pi - `NEAREST`."""
     M, R = np.empty((3, 3)), np.empty((3, 3))
-    for lane in range(LANES):
+    for lane in range(WIDTH):
         for e in range(9):
-            M[e // 3, e % 3] = floats[k, (MEAN + e) * LANES + lane]
+            M[e // 3, e % 3] = floats[k, (MEAN + e) * WIDTH + lane]
         trace = 0.0
         for r in range(3):
             for c in range(3):
                 R[r, c] = 0.0
                 for i in range(3):
-                    R[r, c] += M[i, r] * state[(3 * i + c) * LANES + lane]
+                    R[r, c] += M[i, r] * state[(3 * i + c) * WIDTH + lane]
             trace += R[r, r]
         if 1.0 + trace > _LEAST_TRACE:
             continue
@@ -199,42 +201,42 @@ def _keep_off_half_turns(floats, k, state):  # type: ignore[no-untyped-def]
         E = exp3(scale * x, scale * y, scale * z)
         for r in range(3):
             for c in range(3):
-                state[(3 * r + c) * LANES + lane] = M[r, 0] * E[c] + M[r, 1] * E[3 + c] + M[r, 2] * E[6 + c]
+                state[(3 * r + c) * WIDTH + lane] = M[r, 0] * E[c] + M[r, 1] * E[3 + c] + M[r, 2] * E[6 + c]
 
 
 @allocating_kernel
 def accumulate(tree, ints, floats, weight, inv_sigma, triggs, pose, blocks):  # type: ignore[no-untyped-def]
-    """Add every joint's H_uu and g_u to the blocks and return the cost. ints (n, LANES), floats (n, FLOATS)."""
+    """Add every joint's H_uu and g_u to the blocks and return the cost. ints (n, WIDTH), floats (n, FLOATS)."""
     cost = 0.0
     if ints.shape[0] == 0 or weight <= 0.0:
         return cost
-    state = np.empty(STATE * LANES)
+    state = np.empty(STATE * WIDTH)
     for k in range(ints.shape[0]):
         at = k * FLOATS
         _gather(pose, ints, k, state)
         _chart(floats, at, state)
         near = False
-        for lane in range(LANES):
-            near = near or not state[12 * LANES + lane] < _FARTHEST  # or not a number
+        for lane in range(WIDTH):
+            near = near or not state[12 * WIDTH + lane] < _FARTHEST  # or not a number
         if near:
             _gather(pose, ints, k, state)
             _keep_off_half_turns(floats, k, state)
             _chart(floats, at, state)
         for number in range(LAYERS):
-            _layer(floats, at + (FIRST_LAYER + number * LAYER_SIZE) * LANES, state)
+            _layer(floats, at + (FIRST_LAYER + number * LAYER_SIZE) * WIDTH, state)
         _finish(floats, at, state)
         _normal(floats, at, state)
-        for lane in range(LANES):
+        for lane in range(WIDTH):
             i = ints[k, lane]
-            w, h = weight * floats[k, _W * LANES + lane], floats[k, (_W + 1) * LANES + lane]
+            w, h = weight * floats[k, _W * WIDTH + lane], floats[k, (_W + 1) * WIDTH + lane]
             if i == 0 or w <= 0.0:
                 continue
-            e = state[lane::LANES]
+            e = state[lane::WIDTH]
             cost += 0.5 * w * e[9]
             h00, h01, h02, h11, h12, h22 = w * e[0], w * e[1], w * e[2], w * e[3], w * e[4], w * e[5]
             g0, g1, g2 = w * e[6], w * e[7], w * e[8]
             if h > 0.0:
-                a = floats[k, BOUND * LANES + lane] - floats[k, CONSTANT * LANES + lane] - math.log(e[12])
+                a = floats[k, BOUND * WIDTH + lane] - floats[k, CONSTANT * WIDTH + lane] - math.log(e[12])
                 root = math.sqrt(a * a + 1.0)
                 half = 0.5 * (a + root)  # l^2 / 2
                 slope = half / root
@@ -250,13 +252,13 @@ def accumulate(tree, ints, floats, weight, inv_sigma, triggs, pose, blocks):  # 
 def pack(joints: Array, parameters: Array, weights: Array, log_det: float = 0.0) -> tuple[Array, Array]:
     """Return the tables of `accumulate` from joints (n,) in 1..K, parameters (n, SIZE), weights w (n,), and h."""
     n = len(joints)
-    rows = -(-n // LANES)
-    ints, floats = np.zeros((rows * LANES, 1), np.int64), np.zeros((rows * LANES, SIZE + 2))
+    rows = -(-n // WIDTH)
+    ints, floats = np.zeros((rows * WIDTH, 1), np.int64), np.zeros((rows * WIDTH, SIZE + 2))
     floats[:, MEAN : MEAN + 9] = np.eye(3).ravel()
     ints[:n, 0] = joints
     floats[:n] = np.hstack([np.reshape(parameters, (n, SIZE)), np.c_[weights], np.full((n, 1), log_det)])
-    lanes_last = floats.reshape(rows, LANES, SIZE + 2).transpose(0, 2, 1)
-    return ints.reshape(rows, LANES), np.ascontiguousarray(lanes_last).reshape(rows, FLOATS)
+    width_last = floats.reshape(rows, WIDTH, SIZE + 2).transpose(0, 2, 1)
+    return ints.reshape(rows, WIDTH), np.ascontiguousarray(width_last).reshape(rows, FLOATS)
 
 
 def transform(parameters: Array, Omega: Array) -> tuple[Array, Array, Array, Array]:

@@ -19,6 +19,7 @@ from ....solver import (
     Body,
     ClipFit,
     Fit,
+    Floor,
     Measurements,
     Options,
     Priors,
@@ -31,7 +32,6 @@ from ....solver import (
     fit_tree,
     make_tree,
 )
-from ....solver.residuals import floor
 from ...kinematics.contact_points import SUPPORTS, with_supports
 from ..camera.intrinsics import Camera
 from ..perception.lifter import Lifted, our_lifter
@@ -90,13 +90,13 @@ class Stance:
     floor_offset: np.ndarray  # (T,) normal . p on the floor
     contact: np.ndarray  # (T, 6) probability that each sole and palm rests on it
 
-    def floor(self, k: int, supports: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Frame ``k``'s rows of the solver's residual ``floor``; supports (6,): their keypoint indices.
+    def floor(self, k: int, supports: np.ndarray) -> Floor:
+        """Frame ``k``'s floor for the solver; supports (6,): keypoint indices of soles and palms.
 
         Feet that do not stand are as free below the floor as above it: they may be on a stair.
         """
         contact = self.contact[k]
-        return floor.pack(supports, self.floor_normal[k], float(self.floor_offset[k]), contact, contact)
+        return Floor(supports, self.floor_normal[k], float(self.floor_offset[k]), contact, below=contact)
 
 
 @dataclass(frozen=True)
@@ -127,7 +127,7 @@ class PreparedTrack:
         measured = self.measure(k, root_cam)
         if self.stance is not None:
             supports = np.arange(len(SUPPORTS)) + len(self.body.keypoint_names) - len(SUPPORTS)
-            measured = replace(measured, tables={"floor": self.stance.floor(k, supports)})
+            measured = replace(measured, floor=self.stance.floor(k, supports))
         if self.hand_measurer is None or self.hands is None:
             return measured
         return self.hand_measurer.add(measured, self.hands[k])

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What Gauss-Newton leaves out of the joints' Hessians: learned exactly, added safely, and taken away in the end."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scope.solver import (
@@ -13,11 +15,19 @@ from scope.solver import (
     Weights,
     default_priors,
     fit,
+    fit_batch,
+    fit_clip,
     make_tree,
     rotations,
 )
 from scope.solver.compiled.part import GRADIENT
-from scope.solver.gauss_newton.curvature import correct, forget, learn, make_curvature, remember
+from scope.solver.gauss_newton.curvature import (
+    apply_correction,
+    make_curvature,
+    reset,
+    set_current,
+    update,
+)
 from scope.solver.gauss_newton.linearize import linearize, make_blocks, make_pose
 from scope.solver.gauss_newton.optimizer import DAMPING_LEAST
 from scope.solver.gauss_newton.recursion import eliminate, make_workspace
@@ -26,6 +36,7 @@ from scope.solver.learned_prior import load_joint_prior
 from scope.solver.residuals.registry import SHAPE_PRIOR
 
 from ..synthetic import forward, random_body, random_state
+from .test_recursion import dense_system, problem
 
 K = 5
 
@@ -65,19 +76,19 @@ def test_three_steps_teach_the_hessian_of_a_quadratic(small, accepted):
     true, known = symmetric(rng, K + 1), np.tile(2.0 * np.eye(3), (K + 1, 1, 1))
     at = rng.standard_normal((K + 1, 3))
     pose = placed(rng, tree)
-    remember(tree, pose, filled(tree, pose, known, np.einsum("iab,ib->ia", true, at)), curvature)
+    set_current(tree, pose, filled(tree, pose, known, np.einsum("iab,ib->ia", true, at)), curvature)
     for _ in range(12):  # some of them are too nearly orthogonal to teach anything
         w = 0.1 * rng.standard_normal((K + 1, 3))
         u = np.zeros((K + 1, 3))
         u[1:] = np.einsum("iab,ib->ia", pose.R[tree.parents[1:]], w[1:])
         trial = placed(rng, tree)
         trial_blocks = filled(tree, trial, known, np.einsum("iab,ib->ia", true, at + w))
-        learn(tree, pose, u, trial, trial_blocks, accepted, curvature)
+        update(tree, pose, u, trial, trial_blocks, accepted, curvature)
         if accepted:
             pose, at = trial, at + w
-            remember(tree, pose, trial_blocks, curvature)
+            set_current(tree, pose, trial_blocks, curvature)
     np.testing.assert_allclose(curvature.S[1:], (true - known)[1:], atol=1e-8)
-    forget(curvature)
+    reset(curvature)
     assert not curvature.S.any()
 
 
@@ -89,11 +100,11 @@ def test_what_is_solved_with_stays_above_a_share_of_gauss_newton(small):
         pose = placed(rng, tree)
         blocks = filled(tree, pose, H, np.zeros((K + 1, 3)))
         before = blocks.H_uu.copy()
-        remember(tree, pose, blocks, curvature)
+        set_current(tree, pose, blocks, curvature)
         curvature.S[:] = 5.0 * symmetric(rng, K + 1)
-        correct(tree, pose, blocks, curvature, 1.0)
+        apply_correction(tree, pose, blocks, curvature, 1.0)
         assert np.linalg.eigvalsh(blocks.H_uu[1:] - 0.2 * before[1:]).min() > -1e-9
-        correct(tree, pose, blocks, curvature, 0.0)
+        apply_correction(tree, pose, blocks, curvature, 0.0)
         np.testing.assert_allclose(blocks.H_uu, before, atol=1e-12)
 
 
@@ -103,9 +114,9 @@ def test_what_overflowed_is_not_added(small, bad):
     pose = placed(rng, tree)
     blocks = filled(tree, pose, np.tile(np.eye(3), (K + 1, 1, 1)), np.zeros((K + 1, 3)))
     before = blocks.H_uu.copy()
-    remember(tree, pose, blocks, curvature)
+    set_current(tree, pose, blocks, curvature)
     curvature.S[:] = bad
-    correct(tree, pose, blocks, curvature, 1.0)
+    apply_correction(tree, pose, blocks, curvature, 1.0)
     assert np.isfinite(blocks.H_uu).all()
     if not abs(bad) < np.inf:
         np.testing.assert_allclose(blocks.H_uu, before, atol=1e-12)
@@ -115,10 +126,10 @@ def test_residuals_that_couple_joint_and_part_teach_nothing(small):
     rng, tree, curvature = small
     pose, trial = placed(rng, tree), placed(rng, tree)
     ones = np.ones((K + 1, 3))
-    remember(tree, pose, filled(tree, pose, symmetric(rng, K + 1), ones), curvature)
+    set_current(tree, pose, filled(tree, pose, symmetric(rng, K + 1), ones), curvature)
     blocks = filled(tree, trial, symmetric(rng, K + 1), -ones)
     blocks.cross[0] = 1
-    learn(tree, pose, 0.1 * ones, trial, blocks, True, curvature)
+    update(tree, pose, 0.1 * ones, trial, blocks, True, curvature)
     assert not curvature.S.any()
 
 
@@ -144,6 +155,48 @@ def test_the_default_stop_is_close_to_the_end(body):
         apart = np.linalg.norm(found.t_camera_part - best.t_camera_part, axis=1).max()
         close.append(apart < 1e-3 and abs(found.cost / best.cost - 1.0) < 1e-3)
     assert np.mean(close) >= 0.95
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_without_it_the_minimum_is_the_same(body, seed):
+    start, m = noisy(body, seed)
+    to_the_end = (Stage(Weights(), 1e-14, 1000),)
+    found, plain = (fit(body, m, init=start, options=Options(to_the_end, curvature=on)) for on in (True, False))
+    assert plain.cost == pytest.approx(found.cost, rel=1e-8)
+    np.testing.assert_allclose(plain.t_camera_part, found.t_camera_part, atol=1e-4)
+    assert plain.iterations != found.iterations
+
+
+def test_without_it_every_step_is_a_dense_gauss_newton_step():
+    """Three steps from the definitions, by complex-step Jacobians, hardly damped; with it, the third is another."""
+    _, arrays, state, _, _, _, raw, sigmas, scales, priors, weights, measurements = problem(1, 7, 4, 30)
+    options = Options([Stage(weights, 0.0, 3)], damping=DAMPING_LEAST)
+    start = State(*state)
+    for _ in range(3):
+        J, r, _ = dense_system(arrays, state, raw, sigmas, scales, priors, weights)
+        d = -np.linalg.solve(J.T @ J, J.T @ r)
+        R, _, _ = forward(arrays, *state)
+        R_parent, u = R[arrays.parents[1:]], d[6:27].reshape(7, 3)
+        Omega = rotations.exp(np.einsum("iba,ib->ia", R_parent, u)) @ state[2]
+        state = rotations.exp(d[:3]) @ state[0], state[1] + d[3:6], Omega, state[3] + d[27:]
+    plain = fit(arrays, measurements, init=start, priors=priors, options=replace(options, curvature=False))
+    assert (plain.iterations, plain.rejected) == (3, 0)
+    for found, expected in zip(vars(plain.state).values(), state, strict=True):
+        np.testing.assert_allclose(found, expected, atol=1e-7)
+    other = fit(arrays, measurements, init=start, priors=priors, options=options)
+    assert np.abs(other.state.Omega - state[2]).max() > 1e-6
+
+
+def test_clips_and_batches_heed_the_option(body):
+    """Frames of both come out as `fit` gives them with the same option, and otherwise than without it."""
+    start, m = noisy(body, 1)
+    off = Options(curvature=False)
+    plain, found = (fit(body, m, init=start, options=options) for options in (off, Options()))
+    assert plain.iterations != found.iterations
+    (alone,) = fit_batch(body, [m], init=[start], options=off)
+    np.testing.assert_array_equal(alone.t_camera_part, plain.t_camera_part)
+    first, then = (fit_clip(body, [m, m], options=options).frames[0].state.Omega for options in (off, Options()))
+    assert np.abs(first - then).max() > 1e-9
 
 
 def test_the_information_on_the_shape_is_gauss_newtons(body):

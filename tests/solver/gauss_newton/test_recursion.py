@@ -59,7 +59,7 @@ def problem(seed, K, P, M, focal=False):
         np.array([70.0]),
         np.array([90.0]),
     ]
-    return rng, body, state, tree, terms, table[0], raw, sigmas, scales, priors, weights
+    return rng, body, state, tree, terms, table[0], raw, sigmas, scales, priors, weights, measurements
 
 
 def dense_system(body, state, raw, sigmas, scales, priors, weights, extra=0):
@@ -85,7 +85,7 @@ def dense_system(body, state, raw, sigmas, scales, priors, weights, extra=0):
 )
 def test_step_equals_dense_step(K, P, M, damping, coupled):
     for seed in range(2):
-        rng, body, state, tree, terms, stage, raw, sigmas, scales, priors, weights = problem(seed, K, P, M)
+        rng, body, state, tree, terms, stage, raw, sigmas, scales, priors, weights, _ = problem(seed, K, P, M)
         J, r, cost = dense_system(body, state, raw, sigmas, scales, priors, weights)
         pose, blocks, work = State(*state).pose(tree), make_blocks(tree), make_workspace(tree)
         assert linearize(tree, terms, stage, 0.0, pose, blocks, work.scratch) == pytest.approx(cost, rel=1e-11)
@@ -103,7 +103,7 @@ def test_step_equals_dense_step(K, P, M, damping, coupled):
 
 @pytest.mark.parametrize("damping", [0.0, 40.0])
 def test_focal_length_is_one_more_column(damping):
-    rng, body, state, tree, terms, stage, raw, sigmas, scales, priors, weights = problem(3, 23, 10, 40, focal=True)
+    rng, body, state, tree, terms, stage, raw, sigmas, scales, priors, weights, _ = problem(3, 23, 10, 40, focal=True)
     J, r, _ = dense_system(body, state, raw, sigmas, scales, priors, weights, extra=1)
     pose, blocks, work = State(*state).pose(tree), make_blocks(tree), make_workspace(tree)
     linearize(tree, terms, stage, 0.0, pose, blocks, work.scratch)

@@ -86,6 +86,21 @@ def test_nobody_sinks_into_the_floor_and_nobody_in_the_air_is_pulled_down():
     assert np.abs(held).max() < 0.3 * np.abs(free).max()
 
 
+def test_points_may_be_left_free_below_the_floor():
+    """On a stair that leads down, or where the floor is uncertain: no weight below, no contact, no pull."""
+    state = standing()
+    height = (points(state)[FEET] @ UP).min() + 0.05
+    free = fit(BODY, seen(state, floor=Floor(FEET, UP, height, np.zeros(4), below=np.zeros(4))), init=state)
+    plain = fit(BODY, seen(state), init=state)
+    np.testing.assert_array_equal(free.t_camera_part, plain.t_camera_part)
+    half, full = (
+        fit(BODY, seen(state, floor=Floor(FEET, UP, height, np.zeros(4), below=np.full(4, w))), init=state)
+        for w in (0.02, 1.0)
+    )
+    low = [(points(f.state)[FEET] @ UP - height).min() for f in (plain, half, full)]
+    assert low[0] < low[1] - 1e-3 < low[2] - 2e-3
+
+
 @pytest.mark.parametrize("size", [-1.5, 1.5])
 def test_the_floor_tells_the_depth_that_a_picture_does_not(size):
     """With 2D alone, distance and size are one; a floor of known height below somebody small or tall decides."""
@@ -135,6 +150,7 @@ def test_a_point_that_is_not_finite_is_left_out_and_no_probability_is_no_contact
         ({"floor": Floor(FEET, 2.0 * UP, 0.0, np.zeros(4))}, "length 2"),
         ({"floor": Floor(FEET, UP, np.nan, np.zeros(4))}, "offset nan"),
         ({"floor": Floor(FEET, UP, 0.0, np.zeros(3))}, r"\(4,\)"),
+        ({"floor": Floor(FEET, UP, 0.0, np.zeros(4), below=np.zeros(5))}, r"\(4,\), but got shape \(5,\)"),
         ({"floor": Floor([10000], UP, 0.0, [0.0])}, "10000"),
         ({"foot_contacts": FootContacts(FEET, np.zeros((3, 3)), np.ones(4))}, r"\(4, 3\)"),
     ],
