@@ -24,6 +24,7 @@ from typing import TYPE_CHECKING, NoReturn, TextIO
 from ..solver.body import ASSETS, Body
 from ..solver.errors import ScopeError, UsageError
 from .cli_options import add_options, body_and_options, given_options, named_path
+from .installed import CAPTURE, check_installed
 from .job.parent import stop_with_parent
 from .motion import Motion
 from .retarget.rig_source import ROOTS
@@ -125,9 +126,13 @@ def main(argv: Sequence[str] | None = None, program: Sequence[str] = PROGRAM) ->
 
 def run_capture(args: argparse.Namespace) -> dict:
     """``scope capture``: check the arguments, capture, write every output; returns the report."""
+    check_installed(CAPTURE)
     video = args.video or SAMPLE
+    if not args.video and not SAMPLE.is_file():
+        raise UsageError("the sample clip comes with the repository alone: name the VIDEO to capture")
     outputs = _each_once(args.output) or [video.with_suffix(".npz"), video.with_suffix(".glb")]
     _check_outputs(outputs, args.overlay, video)
+    _check_blender(outputs)
     rig = _rig_of(args, outputs)
 
     body, options = body_and_options(args)
@@ -160,6 +165,7 @@ def run_capture(args: argparse.Namespace) -> dict:
 
 def run_batch(args: argparse.Namespace) -> dict:
     """``scope batch``: one process per clip, so that none can harm another; returns the report of all."""
+    check_installed(CAPTURE)
     from .capture.pipeline import check_networks
     from .job.batch import Batch
 
@@ -170,7 +176,9 @@ def run_batch(args: argparse.Namespace) -> dict:
             raise UsageError(f"--formats takes a list out of {known}, not {args.formats!r}")
     if args.jobs < 1:
         raise UsageError(f"--jobs takes a number from 1 on, not {args.jobs}")
-    _rig_of(args, [args.out / f"clip{suffix}" for suffix in formats])
+    clips = [args.out / f"clip{suffix}" for suffix in formats]
+    _check_blender(clips)
+    _rig_of(args, clips)
     _, options = body_and_options(args)
     check_networks(options)  # what no clip can be captured with is said once, before the first
     batch = Batch(args.folder, args.out, args.program, given_options(args), formats, args.overlays)
@@ -263,6 +271,12 @@ def _check_outputs(outputs: list[Path], overlay: Path | None, video: Path) -> No
     for path in paths:
         if path.exists() and video.exists() and path.samefile(video):
             raise UsageError(f"{path} is the footage itself; choose another name")
+
+
+def _check_blender(outputs: list[Path]) -> None:
+    """Outputs other than motion files are written by Blender."""
+    if any(path.suffix.lower() not in MOTION_SUFFIXES for path in outputs):
+        check_installed(["bpy"])
 
 
 def _each_once(outputs: list[Path]) -> list[Path]:
