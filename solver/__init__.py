@@ -8,7 +8,7 @@ fit(body, Measurements(intrinsics, keypoints2d=Keypoints2D(indices, pixels, conf
 from .batch import fit_batch, fit_clips
 from .body import Body, load_body
 from .clip import carry, fit_clip
-from .errors import ShapeError
+from .errors import InputError, InvalidValueError, ModelFileError, ScopeError, ScopeWarning, ShapeError, UnitsWarning
 from .frame_solver import FrameSolver, fit, fit_tree
 from .learned_prior import JointPrior, load_joint_prior
 from .measurements import (
@@ -35,20 +35,26 @@ __all__ = [
     "Floor",
     "FootContacts",
     "FrameSolver",
+    "InputError",
+    "InvalidValueError",
     "JointPrior",
     "Keypoints2D",
     "Keypoints3D",
     "Measurements",
+    "ModelFileError",
     "Options",
     "OrientationField",
     "PosePriors",
     "Priors",
+    "ScopeError",
+    "ScopeWarning",
     "ShapeError",
     "Stage",
     "State",
     "Status",
     "Temporal",
     "Tree",
+    "UnitsWarning",
     "Weights",
     "carry",
     "default_priors",

@@ -16,7 +16,7 @@ import numpy as np
 from .errors import ShapeError
 from .frame_solver import fit_tree
 from .linearize import linearize, make_blocks, make_pose
-from .measurements import Measurements
+from .measurements import Measurements, as_array
 from .optimizer import CONVERGED, DAMPING_LEAST, DAMPING_MOST, MAX_ITERATIONS, NON_FINITE, STALLED
 from .options import Options, Priors, default_priors
 from .recursion import Workspace, eliminate, make_workspace, retract, solve_globals, substitute
@@ -184,7 +184,7 @@ class _Joint:
         self.status, self.cost = Status.NO_MEASUREMENTS, 0.0
         self.iterations, self.rejected = 0, 0
         # the last frame's shape has seen most, when the frames were fitted in order
-        self.beta[: self.P] = frames[-1].init.beta if frames else self.mean
+        self.beta[: self.P] = as_array(frames[-1].init.beta, (self.P,), "beta") if frames else self.mean
         shared = make_workspace(tree)
         self.frames: list[_Active] = []
         for f in frames:

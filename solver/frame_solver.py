@@ -138,6 +138,7 @@ class FrameSolver:
         R = as_array(state.R_camera_root, (3, 3), "R_camera_root")
         t = as_array(state.t_camera_root, (3,), "t_camera_root")
         Omega = as_array(state.Omega, (K, 3, 3), "Omega")
+        State.check(R, Omega)
         if not _enter(R, t, Omega, as_array(state.beta, (P,), "beta"), pose):
             pose.R[0], pose.Omega[1:] = nearest_rotation(R), nearest_rotation(Omega)
 

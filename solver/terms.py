@@ -7,10 +7,11 @@ import numpy as np
 
 from .errors import ShapeError
 from .kernel import allocating_kernel, kernel
-from .measurements import LARGEST, Measurements, all_within
+from .measurements import LARGEST, Measurements
 from .residuals.part import Array
 from .residuals.registry import RESIDUALS, empty_tables, registered
 from .tree import Tree
+from .validation import all_within, as_table
 
 if TYPE_CHECKING:
     from .options import Priors
@@ -226,12 +227,7 @@ def _padded(a: Array, shape: tuple[int, ...]) -> Array:
 def _checked_table(tree: Tree, name: str, table: tuple[Array, Array]) -> tuple[Array, Array]:
     """Return the rows of a registered residual, or raise ShapeError where kernels would read beyond the arrays."""
     module = registered(name)
-    ints, floats = np.asarray(table[0], dtype=np.int64), np.asarray(table[1], dtype=np.float64)
-    if (ints.shape[1:], floats.shape[1:]) != ((module.INTS,), (module.FLOATS,)) or len(ints) != len(floats):
-        raise ShapeError(
-            f"Tables of {name!r} must have shapes (n, {module.INTS}) and (n, {module.FLOATS}), "
-            f"but got {ints.shape} and {floats.shape}."
-        )
+    ints, floats = as_table(table, module.INTS, module.FLOATS, name)
     counted = getattr(module, "INDEXES", "indices")
     least, of_what = _RANGES[counted]
     limit = _UNLIMITED if of_what is None else len(getattr(tree, of_what))

@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import ShapeError
+from ..errors import InvalidValueError
 from ..kernel import inlined_kernel
 from . import floor, foot_contact, joint_flow, joint_limits, joint_prior, pose_prior
 from .part import Array
@@ -63,9 +63,12 @@ for _index, _module in enumerate(RESIDUALS.values()):
 
 
 def registered(name: str) -> Any:
-    """Return the module of the residual with that name. Raises ShapeError."""
+    """Return the module of the residual with that name.
+
+    :raises InvalidValueError: there is none.
+    """
     if name not in RESIDUALS:
-        raise ShapeError(f"There is no residual named {name!r}; the registered ones are {', '.join(RESIDUALS)}.")
+        raise InvalidValueError(f"There is no residual named {name!r}; the registered ones are {', '.join(RESIDUALS)}.")
     return RESIDUALS[name]
 
 
