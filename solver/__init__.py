@@ -21,6 +21,7 @@ from .measurements import (
     PosePriors,
 )
 from .options import COLD_STAGES, WARM_STAGES, Options, Priors, Stage, Weights, default_priors
+from .residuals.registry import register_residual
 from .state import ClipFit, Fit, State, Status
 from .temporal import Temporal, with_previous
 from .tree import BodyArrays, Tree, make_tree
@@ -66,5 +67,6 @@ __all__ = [
     "load_body",
     "load_joint_prior",
     "make_tree",
+    "register_residual",
     "with_previous",
 ]

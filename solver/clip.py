@@ -21,6 +21,7 @@ from .optimizer import CONVERGED, DAMPING_LEAST, DAMPING_MOST, MAX_ITERATIONS, N
 from .options import Options, Priors, default_priors
 from .recursion import Workspace, eliminate, make_workspace, retract, solve_globals, substitute
 from .report import cost_by_term
+from .residuals.external import raise_failure
 from .residuals.part import Array, Blocks, Pose
 from .residuals.registry import SHAPE_PRIOR
 from .state import ClipFit, Fit, State, Status
@@ -243,6 +244,7 @@ class _Joint:
             pose = f.trial if trial else f.pose
             f.cost = linearize(self.tree, f.terms, self.table[s], self.options.triggs, pose, f.blocks, f.work.scratch)
             total += f.cost
+        raise_failure()
         pose = self.frames[0].trial if trial else self.frames[0].pose
         offset = pose.beta[: self.P] - self.mean
         total += 0.5 * self.shape_weights[s] * float(offset @ self.prior @ offset)

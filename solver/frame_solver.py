@@ -15,6 +15,7 @@ from .optimizer import optimize
 from .options import Options, Priors, Stage, default_priors
 from .recursion import make_workspace
 from .report import cost_by_term
+from .residuals.external import raise_failure
 from .residuals.part import Array
 from .residuals.registry import SHAPE_PRIOR
 from .rotations import nearest_rotation, orthonormalize
@@ -100,6 +101,7 @@ class FrameSolver:
             1.0 / options.root_length, pose, other, self._blocks[0], self._blocks[1],
             self._curvature, work,
         )  # fmt: skip
+        raise_failure()
         found, P = self._poses[which], tree.shape
         information = work.C[:P, :P] - table[-1, 0, SHAPE_PRIOR] * packed.shape_information[:P, :P]
         state = State.from_pose(tree, found)

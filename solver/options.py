@@ -13,7 +13,7 @@ from .errors import InvalidValueError
 from .learned_prior import load_joint_prior
 from .residuals import joint_limits, joint_prior
 from .residuals.part import Array
-from .residuals.registry import FIRST_TABLE, RESIDUALS, registered
+from .residuals.registry import COLUMNS, FIRST_EXTERNAL, RESIDUALS, column_of, registered
 from .validation import (
     as_array,
     as_number,
@@ -71,8 +71,11 @@ class Weights:
             "floor": self.floor,
         }
         by_name = {**own, **self.tables}
-        first = [self.keypoints2d, self.keypoints3d, self.orientation_field, self.shape]
-        return first + [by_name.get(name, 1.0) for name in RESIDUALS]
+        row = [self.keypoints2d, self.keypoints3d, self.orientation_field, self.shape]
+        row += [by_name.get(name, 1.0) for name in RESIDUALS] + [1.0] * (COLUMNS - FIRST_EXTERNAL)
+        for name in self.tables:
+            row[column_of(name)] = by_name[name]
+        return row
 
 
 @dataclass(frozen=True)
@@ -173,7 +176,7 @@ class Options:
 
         :raises InvalidValueError: an entry of `stages` is no Stage.
         """
-        table = np.zeros((len(stages), 2, FIRST_TABLE + len(RESIDUALS)))
+        table = np.zeros((len(stages), 2, COLUMNS))
         sigmas = np.array([self.robust_keypoints2d, self.robust_keypoints3d, self.robust_orientation_field])
         for k, stage in enumerate(stages):
             check_type(stage, Stage, f"Options.stages[{k}]")

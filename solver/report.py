@@ -7,8 +7,9 @@ Every residual's cost is linear in its weight, so the share of one kind is the c
 import numpy as np
 
 from .linearize import linearize
+from .residuals.external import external_residuals
 from .residuals.part import Array, Blocks, Pose
-from .residuals.registry import FIRST_TABLE, KEYPOINT2D, KEYPOINT3D, ORIENTATION_FIELD, RESIDUALS, SHAPE_PRIOR
+from .residuals.registry import KEYPOINT2D, KEYPOINT3D, ORIENTATION_FIELD, RESIDUALS, SHAPE_PRIOR, column_of
 from .terms import Terms
 from .tree import Tree
 
@@ -18,7 +19,7 @@ COLUMNS = {
     "keypoints3d": KEYPOINT3D,
     "orientation_field": ORIENTATION_FIELD,
     "shape_prior": SHAPE_PRIOR,
-    **{name: FIRST_TABLE + k for k, name in enumerate(RESIDUALS)},
+    **{name: column_of(name) for name in RESIDUALS},
 }
 
 
@@ -30,7 +31,9 @@ def cost_by_term(
     Arguments as of `linearize`; the blocks are overwritten. Kinds whose weight is zero are left out.
     """
     found = {}
-    for name, column in COLUMNS.items():
+    measured = terms.external.calls[:, 4]  # columns of external residuals that have rows
+    external = {name: column_of(name) for name in external_residuals() if column_of(name) in measured}
+    for name, column in {**COLUMNS, **external}.items():
         if stage[0, column] > 0.0:
             alone = stage.copy()
             alone[0] = np.where(np.arange(len(stage[0])) == column, stage[0], 0.0)

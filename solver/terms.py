@@ -8,8 +8,9 @@ import numpy as np
 from .errors import ShapeError
 from .kernel import allocating_kernel, kernel
 from .measurements import LARGEST, Measurements
+from .residuals.external import NONE, External, pack_external
 from .residuals.part import Array
-from .residuals.registry import RESIDUALS, empty_tables, registered
+from .residuals.registry import FIRST_EXTERNAL, RESIDUALS, empty_tables, registered
 from .tree import Tree
 from .validation import all_within, as_table
 
@@ -36,6 +37,7 @@ class Terms(NamedTuple):
     floats: tuple[Array, ...]
     shape_mean: Array  # (W,)
     shape_information: Array  # (W, W)
+    external: External  # rows of residuals that were registered from outside
 
 
 @kernel
@@ -258,18 +260,23 @@ def fill_terms(
     if layout is None or not layout.fits(indices):
         layout = Layout(tree, indices)
     count = _fill(layout.shaped, *layout.slots, m2, m3, md, *layout.values)
-    tables = priors.tables
+    tables, external = priors.tables, NONE
     own = m.packed_tables(len(tree.parents) - 1, n_points)
     if own or m.tables:
         tables = {**tables, **own}
+        outside = []
         for name, table in m.tables.items():
             more = _checked_table(tree, name, table)
-            tables[name] = np.concatenate([tables[name][0], more[0]]), np.concatenate([tables[name][1], more[1]])
+            if name in RESIDUALS:
+                tables[name] = np.concatenate([tables[name][0], more[0]]), np.concatenate([tables[name][1], more[1]])
+            else:
+                outside.append((registered(name), *more))
+        external = pack_external(outside, FIRST_EXTERNAL) if outside else NONE
     ints = tuple([np.ascontiguousarray(tables[name][0], dtype=np.int64) for name in RESIDUALS])
     floats = tuple([np.ascontiguousarray(tables[name][1], dtype=np.float64) for name in RESIDUALS])
     terms = Terms(
         layout.starts, layout.values[0], layout.rest, layout.V, *layout.values[1:], ints, floats,
-        priors.shape_mean, priors.shape_information,
+        priors.shape_mean, priors.shape_information, external,
     )  # fmt: skip
     return terms, count, layout
 
