@@ -36,7 +36,7 @@ _PROTOTYPE = _F(
     _PF, _PF, _PF, _PF, _PF, _PF,  # of `Pose`
     _PF, _PF, _PF, _PF, _PF, _PI,  # of `Blocks`
 )  # fmt: skip
-_C_TYPES = {_I: ctypes.c_int64, _F: ctypes.c_double, _PI: ctypes.c_void_p, _PF: ctypes.c_void_p}
+_C_TYPES: dict[Any, Any] = {_I: ctypes.c_int64, _F: ctypes.c_double, _PI: ctypes.c_void_p, _PF: ctypes.c_void_p}
 _CALLBACK = ctypes.CFUNCTYPE(ctypes.c_double, *(_C_TYPES[kind] for kind in _PROTOTYPE.args))
 
 
@@ -78,7 +78,8 @@ class Registered:
 
     def _entry(self) -> Any:
         ints, floats = self.INTS, self.FLOATS
-        accumulate = self.kernel if hasattr(self.kernel, "signatures") else inlined_kernel(self.kernel)  # type: ignore[arg-type]
+        given: Any = self.kernel
+        accumulate = given if hasattr(given, "signatures") else inlined_kernel(given)
 
         def entry(  # type: ignore[no-untyped-def]
             i, rows, f, weight, inv_sigma, triggs, n, points, W, keypoints, shape, globals_, parents, S, l, point_part,
@@ -182,5 +183,5 @@ def accumulate_external(tree, external, weights, inv_sigma, triggs, pose, blocks
             pose.Omega, pose.R, pose.t, pose.D, pose.beta, pose.log_focal,
             blocks.A, blocks.H_u, blocks.H_uu, blocks.C, blocks.c, blocks.cross,
         )  # fmt: skip
-        cost += _call(address, arguments)
+        cost += _call(address, arguments)  # type: ignore[call-arg]
     return cost

@@ -117,4 +117,5 @@ def _view(address: int, *shape: int, whole: bool = False) -> Array:
     if size == 0:
         return np.zeros(shape)
     kind = ctypes.c_int64 if whole else ctypes.c_double
-    return np.frombuffer((kind * size).from_address(address), dtype=np.int64 if whole else np.float64).reshape(shape)
+    memory: Any = (kind * size).from_address(address)
+    return np.frombuffer(memory, dtype=np.int64 if whole else np.float64).reshape(shape)
