@@ -17,10 +17,11 @@ from typing import NoReturn
 from ..solver.errors import ScopeError
 from ..solver.loaders.body_file import ASSETS
 from .command_line.arguments import add_options, body_and_options, given_options, named_path
-from .command_line.outputs import check_outputs, each_once, summary, usable_rig, write_outputs
+from .command_line.outputs import check_blender, check_outputs, each_once, summary, usable_rig, write_outputs
 from .command_line.signals import interrupted, stopped_by_signals
 from .command_line.terminal import ProgressBar, say, stdout_for_report
 from .errors import UsageError, exit_status
+from .installed import CAPTURE, check_installed
 from .job.parent import stop_with_parent
 from .scene.export.output_paths import SUFFIXES
 
@@ -121,9 +122,13 @@ def main(argv: Sequence[str] | None = None, program: Sequence[str] = PROGRAM) ->
 
 def run_capture(args: argparse.Namespace) -> dict:
     """``scope capture``: check the arguments, capture, write every output; returns the report."""
+    check_installed(CAPTURE)
     video = args.video or SAMPLE
+    if not args.video and not SAMPLE.is_file():
+        raise UsageError("the sample clip comes with the repository alone: name the VIDEO to capture")
     outputs = each_once(args.output) or [video.with_suffix(".npz"), video.with_suffix(".glb")]
     check_outputs(outputs, args.overlay, video)
+    check_blender(outputs)
     rig = usable_rig(args, outputs)
 
     body, options = body_and_options(args)
@@ -156,6 +161,7 @@ def run_capture(args: argparse.Namespace) -> dict:
 
 def run_batch(args: argparse.Namespace) -> dict:
     """``scope batch``: one process per clip, so that none can harm another; returns the report of all."""
+    check_installed(CAPTURE)
     from .capture.options import check_networks
     from .job.batch import Batch
 
@@ -166,7 +172,9 @@ def run_batch(args: argparse.Namespace) -> dict:
             raise UsageError(f"--formats takes a list of {known}, not {args.formats!r}")
     if args.jobs < 1:
         raise UsageError(f"--jobs takes a number of at least 1, not {args.jobs}")
-    usable_rig(args, [args.out / f"clip{suffix}" for suffix in formats])
+    clips = [args.out / f"clip{suffix}" for suffix in formats]
+    check_blender(clips)
+    usable_rig(args, clips)
     _, options = body_and_options(args)
     check_networks(options)  # a network that no clip can be captured with is reported once, before the first
     batch = Batch(args.folder, args.out, args.program, given_options(args), formats, args.overlays)

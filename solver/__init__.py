@@ -7,7 +7,7 @@ fit(body, Measurements(intrinsics, keypoints2d=Keypoints2D(indices, pixels, conf
 
 from .body import Body
 from .compiled.tree import BodyArrays, Tree, make_tree
-from .errors import ShapeError
+from .errors import InputError, InvalidValueError, ModelFileError, ScopeError, ScopeWarning, ShapeError, UnitsWarning
 from .fitting.batch import fit_batch, fit_clips
 from .fitting.clip import carry, fit_clip
 from .fitting.frame_solver import FrameSolver, fit, fit_tree
@@ -15,6 +15,7 @@ from .learned_prior import JointPrior, load_joint_prior
 from .loaders import load_body
 from .measurements import Floor, FootContacts, Keypoints2D, Keypoints3D, Measurements, OrientationField, PosePriors
 from .options import COLD_STAGES, WARM_STAGES, Options, Priors, Stage, Weights, default_priors
+from .residuals.registry import register_residual
 from .state import ClipFit, Fit, State, Status
 from .temporal import Temporal, with_previous
 
@@ -28,20 +29,26 @@ __all__ = [
     "Floor",
     "FootContacts",
     "FrameSolver",
+    "InputError",
+    "InvalidValueError",
     "JointPrior",
     "Keypoints2D",
     "Keypoints3D",
     "Measurements",
+    "ModelFileError",
     "Options",
     "OrientationField",
     "PosePriors",
     "Priors",
+    "ScopeError",
+    "ScopeWarning",
     "ShapeError",
     "Stage",
     "State",
     "Status",
     "Temporal",
     "Tree",
+    "UnitsWarning",
     "Weights",
     "carry",
     "default_priors",
@@ -53,5 +60,6 @@ __all__ = [
     "load_body",
     "load_joint_prior",
     "make_tree",
+    "register_residual",
     "with_previous",
 ]

@@ -19,6 +19,7 @@ from functools import cached_property
 import numpy as np
 
 from .errors import ModelFileError, ShapeError
+from .validation import as_array
 
 
 @dataclass(frozen=True)
@@ -87,7 +88,10 @@ class Body:
         return out
 
     def keypoint_set(self, prefix: str) -> dict[str, int]:
-        """Keypoints of one set, e.g. ``blazepose``: name without the prefix -> index, in file order."""
+        """Keypoints of one set, e.g. ``blazepose``: name without the prefix -> index, in file order.
+
+        :raises ModelFileError: the body has no keypoints of that name.
+        """
         found = {n.split("/", 1)[1]: i for i, n in enumerate(self.keypoint_names) if n.startswith(prefix + "/")}
         if not found:
             sets = sorted({n.split("/", 1)[0] for n in self.keypoint_names})
@@ -95,22 +99,31 @@ class Body:
         return found
 
     def rest_joints(self, betas: np.ndarray | None = None) -> np.ndarray:
-        """J(β): (K+1, 3) metres, model frame."""
+        """J(β): (K+1, 3) metres, model frame.
+
+        :param betas: (P,); zeros if None.
+        :raises ShapeError: betas have another shape.
+        """
         return self.J_template if betas is None else self.J_template + self.J_shapedirs @ self._betas(betas)
 
     def rest_vertices(self, betas: np.ndarray | None = None) -> np.ndarray:
-        """v̄(β): (V, 3) metres, model frame."""
+        """v̄(β): (V, 3) metres, model frame.
+
+        :param betas: (P,); zeros if None.
+        :raises ShapeError: betas have another shape.
+        """
         return self.v_template if betas is None else self.v_template + self.shapedirs @ self._betas(betas)
 
     def stature(self, betas: np.ndarray | None = None) -> float:
-        """Height of who stands: from the lowest to the highest vertex of v̄(β), metres."""
+        """Height of who stands: from the lowest to the highest vertex of v̄(β), metres.
+
+        :param betas: (P,); zeros if None.
+        :raises ShapeError: betas have another shape.
+        """
         return float(np.ptp(self.rest_vertices(betas)[:, 1]))
 
     def _betas(self, betas: np.ndarray) -> np.ndarray:
-        betas = np.asarray(betas, float)
-        if betas.shape != (self.P,):
-            raise ShapeError(f"betas must have shape ({self.P},) for body '{self.name}', but got {betas.shape}")
-        return betas
+        return as_array(betas, (self.P,), f"betas of body '{self.name}'")
 
     def forward_kinematics(
         self, rotations: np.ndarray, trans: np.ndarray, betas: np.ndarray | None = None
@@ -119,7 +132,9 @@ class Body:
 
         :param rotations: (..., K+1, 3, 3); row 0 the root's rotation into the target frame, the others Ω_i.
         :param trans: (..., 3) metres, target frame; the root joint comes to lie at J_0(β) + trans.
+        :param betas: (P,); zeros if None.
         :return: R (..., K+1, 3, 3) and t (..., K+1, 3): part to target frame; t are the joints.
+        :raises ShapeError: rotations or betas have another shape.
         """
         rotations = np.asarray(rotations, float)
         if rotations.shape[-3:] != (self.K + 1, 3, 3):
@@ -139,7 +154,9 @@ class Body:
         """Linear blend skinning of one frame.
 
         :param R, t: (K+1, 3, 3), (K+1, 3) part poses from ``forward_kinematics``.
+        :param betas: (P,); zeros if None.
         :return: (V, 3) vertices in the frame of R and t.
+        :raises ShapeError: betas have another shape.
         """
         offset = t - np.einsum("kij,kj->ki", R, self.rest_joints(betas))
         A = np.concatenate([R, offset[..., None]], axis=2).reshape(len(R), 12)
@@ -149,7 +166,14 @@ class Body:
     def keypoints(
         self, R: np.ndarray, t: np.ndarray, betas: np.ndarray | None = None, which: Sequence[int] | slice = slice(None)
     ) -> np.ndarray:
-        """(..., M, 3) keypoints, or those of these numbers, for part poses (..., K+1, 3, 3), (..., K+1, 3)."""
+        """Keypoints, metres.
+
+        :param R, t: (..., K+1, 3, 3), (..., K+1, 3) part poses from ``forward_kinematics``.
+        :param betas: (P,); zeros if None.
+        :param which: numbers (M',) of the keypoints; all if left out.
+        :return: (..., M', 3) in the frame of R and t.
+        :raises ShapeError: betas have another shape.
+        """
         local = self.v_bar[which] if betas is None else self.v_bar[which] + self.V[which] @ self._betas(betas)
         part = self.keypoint_part[which]
         return np.einsum("...mij,mj->...mi", R[..., part, :, :], local) + t[..., part, :]

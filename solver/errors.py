@@ -1,10 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Every error the solver raises on purpose. One tree, so that one ``except ScopeError`` is enough.
+"""Every error and warning the solver raises on purpose. One tree, so that one ``except ScopeError`` is enough.
 
     ScopeError
-    ├── InputError              the user's file or value cannot be used
-    │   └── ModelFileError      a body file is missing or malformed
-    └── ShapeError              an array of the wrong shape or type
+    └── InputError                  the user's file or value cannot be used
+        ├── ModelFileError          a body file is missing or malformed
+        ├── ShapeError              an array of the wrong shape or type
+        └── InvalidValueError       an array or option of the right shape with a value that cannot be used
+
+    ScopeWarning                    what is probably a mistake, but can be used (a UserWarning)
+    └── UnitsWarning                lengths that are probably not in metres
 
 ``scope_addon/errors.py`` adds what can go wrong with footage, files and the command line.
 Each message says what was wrong, with which file or value, and what to do about it.
@@ -23,5 +27,17 @@ class ModelFileError(InputError):
     """A body or network file is missing, malformed or does not match what is expected of it."""
 
 
-class ShapeError(ScopeError, ValueError):
+class ShapeError(InputError, ValueError):
     """An array does not have the shape or type that was asked for."""
+
+
+class InvalidValueError(InputError, ValueError):
+    """An array, option or name has the right shape and type, but a value that cannot be used."""
+
+
+class ScopeWarning(UserWarning):
+    """Root of the warnings: what was given is probably a mistake, but can be used."""
+
+
+class UnitsWarning(ScopeWarning):
+    """Lengths are probably not in metres."""

@@ -11,9 +11,10 @@ from pathlib import Path
 import numpy as np
 
 from .compiled.part import Array
-from .errors import ModelFileError
+from .errors import InvalidValueError, ModelFileError, ShapeError
 from .loaders.npz import read_npz
 from .residuals import joint_flow
+from .validation import as_array, check_weight
 
 BUILT_IN = Path(__file__).resolve().parent.parent / "assets" / "prior" / "joint_prior.npz"
 
@@ -25,10 +26,24 @@ class JointPrior:
     names: tuple[str, ...]
     parameters: Array
 
+    def __post_init__(self) -> None:
+        """Check the parameters.
+
+        :raises ShapeError: they are not (n, SIZE), with one row for each name.
+        """
+        if np.shape(self.parameters) != (len(self.names), joint_flow.SIZE):
+            raise ShapeError(
+                f"Parameters of the joint prior must have shape ({len(self.names)}, {joint_flow.SIZE}), "
+                f"but got shape {np.shape(self.parameters)}."
+            )
+
     def of(self, joint: str) -> Array:
-        """Return the parameters (SIZE,) of a joint. Raises KeyError."""
+        """Return the parameters (SIZE,) of a joint.
+
+        :raises InvalidValueError: the prior has no joint of that name.
+        """
         if joint not in self.names:
-            raise KeyError(f"The prior has no joint {joint!r}; it has {', '.join(self.names)}.")
+            raise InvalidValueError(f"The prior has no joint {joint!r}; it has {', '.join(self.names)}.")
         return self.parameters[self.names.index(joint)]
 
     def tables(
@@ -36,20 +51,33 @@ class JointPrior:
     ) -> tuple[Array, Array]:
         """Return the tables of residuals/joint_flow.py for the joints of a body (K+1,) that have a prior.
 
-        weights: w by joint name, one where nothing is said. log_det: h, one for the density's maximum, zero for
-        the paper's 1/2 |z|^2.
+        :param weights: w by joint name, one where nothing is said.
+        :param log_det: h, one for the density's maximum, zero for the paper's 1/2 |z|^2.
+        :return: (n, INTS) int64 and (n, FLOATS) float64.
+        :raises InvalidValueError: a weight or `log_det` is negative or no number.
         """
+        check_weight(log_det, "log_det")
+        for name, weight in (weights or {}).items():
+            check_weight(weight, f"The weight of {name!r}")
         rows = [(i, name) for i, name in enumerate(joint_names) if i > 0 and name in self.names]
         w = np.array([1.0 if weights is None else float(weights.get(name, 1.0)) for _, name in rows])
         parameters = np.array([self.of(name) for _, name in rows]).reshape(len(rows), joint_flow.SIZE)
         return joint_flow.pack(np.array([i for i, _ in rows], np.int64), parameters, w, log_det)
 
     def sample(self, joint: str, count: int, rng: np.random.Generator) -> Array:
-        """Return states (count, 3, 3) of a joint drawn from its prior."""
+        """Return states (count, 3, 3) of a joint drawn from its prior.
+
+        :raises InvalidValueError: the prior has no joint of that name.
+        """
         return joint_flow.invert(self.of(joint), rng.standard_normal((count, 3)))
 
     def log_density(self, joint: str, Omega: Array) -> Array:
-        """Return the log density (...) of states (..., 3, 3) against the normalized Haar measure, in nats."""
+        """Return the log density (...) of states (..., 3, 3) against the normalized Haar measure, in nats.
+
+        :raises InvalidValueError: the prior has no joint of that name.
+        :raises ShapeError: the states have another shape.
+        """
+        Omega = as_array(Omega, (None,) * max(0, np.ndim(Omega) - 2) + (3, 3), "Omega")
         return joint_flow.log_density(self.of(joint), Omega)
 
 
@@ -57,7 +85,9 @@ class JointPrior:
 def load_joint_prior(path: str | Path = BUILT_IN) -> JointPrior:
     """Read a prior written by tools/train_prior.
 
-    File: joint_names (n,) str, parameters (n, SIZE) f64, layers and hidden (). Raises ModelFileError.
+    File: joint_names (n,) str, parameters (n, SIZE) f64, layers and hidden ().
+
+    :raises ModelFileError: the file is missing, or no prior that the solver can evaluate.
     """
     arrays = read_npz(Path(path), ModelFileError, "joint prior")
     expected = {"layers": joint_flow.LAYERS, "hidden": joint_flow.HIDDEN}

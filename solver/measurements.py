@@ -15,52 +15,22 @@ from numpy.typing import ArrayLike
 
 from .compiled.kernel import kernel
 from .compiled.part import Array
-from .errors import ShapeError
+from .errors import InvalidValueError, ShapeError
 from .residuals import floor, foot_contact, pose_prior
+from .validation import (
+    as_array,
+    as_indices,
+    as_number,
+    check_intrinsics,
+    check_not_negative,
+    check_rotations,
+    check_type,
+    warn_of_units,
+)
 
 # No length, coordinate or confidence is as large. What the solver multiplies of smaller ones stays finite; one pixel
 # whose square does not would else make the cost of a whole clip infinite.
 LARGEST = 1e30
-
-
-def as_array(value: ArrayLike, shape: tuple[int | None, ...], name: str) -> Array:
-    """Return `value` as contiguous float64 of `shape` (None: any length). Raises ShapeError."""
-    array = np.ascontiguousarray(value, dtype=np.float64)
-    if array.shape == shape and array.ndim:
-        return array
-    if len(shape) != array.ndim or any(n is not None and n != m for n, m in zip(shape, array.shape, strict=True)):
-        wanted = ", ".join("n" if n is None else str(n) for n in shape) + ("," if len(shape) == 1 else "")
-        raise ShapeError(f"{name} must have shape ({wanted}), but got shape {array.shape}.")
-    return array
-
-
-def as_indices(value: ArrayLike, limit: int, name: str) -> Array:
-    """Return `value` as int64 indices (n,) in 0..limit-1. Raises ShapeError."""
-    array = np.asarray(value)
-    if array.ndim != 1 or (array.size and array.dtype.kind not in "iu"):
-        raise ShapeError(f"{name} must be integers of shape (n,), but got {array.dtype} of shape {array.shape}.")
-    array = np.ascontiguousarray(array, dtype=np.int64)
-    if not all_within(array, 0, limit):
-        raise ShapeError(f"{name} must lie in 0..{limit - 1}, but go from {array.min()} to {array.max()}.")
-    return array
-
-
-@kernel
-def all_within(indices: Array, least: int, limit: int) -> bool:
-    """Whether all of (n,) lie in least..limit-1."""
-    for k in range(indices.shape[0]):
-        if not least <= indices[k] < limit:
-            return False
-    return True
-
-
-@kernel
-def all_finite(values: Array) -> bool:
-    """Whether all of (n,) are finite; numpy takes ten times as long for so few."""
-    total = 0.0
-    for k in range(values.shape[0]):
-        total += 0.0 * values[k]
-    return total == 0.0
 
 
 @kernel
@@ -82,20 +52,13 @@ def _all_weigh(w_R: Array, w_t: Array) -> bool:
 
 
 @kernel
-def _normalize(K: Array, pixels: Array, confidence: Array, out: Array) -> bool:
-    """Write normalized image coordinates and confidence; False if the intrinsics K are not usable."""
-    total = 0.0
-    for r in range(3):
-        for c in range(3):
-            total += 0.0 * K[r, c]
-    if total != 0.0 or not K[0, 0] > 0.0 or not K[1, 1] > 0.0:
-        return False
+def _normalize(K: Array, pixels: Array, confidence: Array, out: Array) -> None:
+    """Write normalized image coordinates and confidence."""
     for k in range(out.shape[0]):
         v = (pixels[k, 1] - K[1, 2]) / K[1, 1]
         out[k, 0] = (pixels[k, 0] - K[0, 2] - K[0, 1] * v) / K[0, 0]
         out[k, 1] = v
         out[k, 2] = confidence[k]
-    return True
 
 
 @dataclass
@@ -185,8 +148,23 @@ class Measurements:
     floor: Floor | None = None
     tables: Mapping[str, tuple[Array, Array]] = field(default_factory=dict)
 
+    def __post_init__(self) -> None:
+        """Check what kinds of measurements the fields hold; their arrays are checked against the body by a fit.
+
+        :raises InvalidValueError: a field holds something else.
+        """
+        for name, kind in _KINDS.items():
+            value = getattr(self, name)
+            if value is not None and not isinstance(value, kind):
+                check_type(value, (kind, type(None)), f"Measurements.{name}")
+
     def packed2d(self, points: int) -> tuple[Array, Array]:
-        """Return indices (n,) and (n, 3) of normalized image coordinates and confidence."""
+        """Return indices (n,) and (n, 3) of normalized image coordinates and confidence.
+
+        :param points: how many points the body has, joints included.
+        :raises ShapeError: an array has another shape, or an index lies outside.
+        :raises InvalidValueError: the intrinsics are no camera matrix.
+        """
         m = self.keypoints2d
         if m is None:
             return np.zeros(0, np.int64), np.zeros((0, 3))
@@ -196,24 +174,34 @@ class Measurements:
         if self.intrinsics is None:
             raise ShapeError("2D keypoints need the camera's intrinsics, shape (3, 3), but got None.")
         K = as_array(self.intrinsics, (3, 3), "Intrinsics")
+        check_intrinsics(K)
         out = np.empty((n, 3))
-        if not _normalize(K, pixels, as_array(m.confidence, (n,), "Confidence of 2D keypoints"), out):
-            raise ShapeError(f"Intrinsics must be finite with positive focal lengths, but got {K.tolist()}.")
+        _normalize(K, pixels, as_array(m.confidence, (n,), "Confidence of 2D keypoints"), out)
         return indices, out
 
     def packed3d(self, points: int) -> tuple[Array, Array]:
-        """Return indices (n,) and (n, 4) of positions and confidence."""
+        """Return indices (n,) and (n, 4) of positions and confidence.
+
+        :param points: how many points the body has, joints included.
+        :raises ShapeError: an array has another shape, or an index lies outside.
+        """
         m = self.keypoints3d
         if m is None:
             return np.zeros(0, np.int64), np.zeros((0, 4))
         indices = as_indices(m.indices, points, "Indices of 3D keypoints")
+        points_3d = as_array(m.points, (len(indices), 3), "Points of 3D keypoints")
+        warn_of_units(points_3d, "Points of 3D keypoints")
         out = np.empty((len(indices), 4))
-        out[:, :3] = as_array(m.points, (len(indices), 3), "Points of 3D keypoints")
+        out[:, :3] = points_3d
         out[:, 3] = as_array(m.confidence, (len(indices),), "Confidence of 3D keypoints")
         return indices, out
 
     def packed_directions(self, points: int) -> tuple[Array, Array, Array]:
-        """Return starts (n,), ends (n,) and (n, 4) of directions and confidence."""
+        """Return starts (n,), ends (n,) and (n, 4) of directions and confidence.
+
+        :param points: how many points the body has, joints included.
+        :raises ShapeError: an array has another shape, or an index lies outside.
+        """
         m = self.orientation_field
         if m is None:
             return np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros((0, 4))
@@ -228,7 +216,13 @@ class Measurements:
         return starts, ends, out
 
     def packed_tables(self, K: int, points: int) -> dict[str, tuple[Array, Array]]:
-        """Return the tables of the residuals that have their own field; rows that are not usable are left out."""
+        """Return the tables of the residuals that have their own field; rows that are not usable are left out.
+
+        :param K: how many joints the body has without the root.
+        :param points: how many points it has, joints included.
+        :raises ShapeError: an array has another shape, or an index lies outside.
+        :raises InvalidValueError: a weight is negative, a rotation is none, or the floor is no plane.
+        """
         tables = {}
         if self.pose_priors is not None:
             tables["pose_prior"] = _pose_prior_rows(self.pose_priors, K)
@@ -239,6 +233,17 @@ class Measurements:
         return tables
 
 
+_KINDS = {
+    "keypoints2d": Keypoints2D,
+    "keypoints3d": Keypoints3D,
+    "orientation_field": OrientationField,
+    "pose_priors": PosePriors,
+    "foot_contacts": FootContacts,
+    "floor": Floor,
+    "tables": Mapping,
+}
+
+
 def _pose_prior_rows(m: PosePriors, K: int) -> tuple[Array, Array]:
     parts = as_indices(m.parts, K + 1, "Parts of pose priors")
     n = len(parts)
@@ -246,6 +251,9 @@ def _pose_prior_rows(m: PosePriors, K: int) -> tuple[Array, Array]:
     t = as_array(m.t_camera_part, (n, 3), "Positions of pose priors")
     w_R = as_array(m.weight_rotation, (n,), "Rotation weights of pose priors")
     w_t = as_array(m.weight_translation, (n,), "Translation weights of pose priors")
+    check_not_negative(w_R, "Rotation weights of pose priors")
+    check_not_negative(w_t, "Translation weights of pose priors")
+    check_rotations(R, "Rotations of pose priors", w_R)
     ints, floats = pose_prior.pack(parts, R, t, w_R, w_t)
     if not _all_weigh(w_R, w_t):
         weigh = (w_R > 0.0) | (w_t > 0.0)
@@ -258,6 +266,7 @@ def _foot_contact_rows(m: FootContacts, points: int) -> tuple[Array, Array]:
     n = len(indices)
     stand = as_array(m.points, (n, 3), "Points of foot contacts")
     weight = as_array(m.probability, (n,), "Probability of foot contacts")
+    check_not_negative(weight, "Probability of foot contacts")
     return _usable_rows(foot_contact.pack(indices, stand, weight))
 
 
@@ -267,13 +276,16 @@ def _floor_rows(m: Floor, points: int) -> tuple[Array, Array]:
     contact = as_array(m.contact, (len(indices),), "Contact with the floor")
     below = np.ones(len(indices)) if m.below is None else m.below
     below = as_array(below, (len(indices),), "Weights below the floor")
+    check_not_negative(below, "Weights below the floor")
+    check_not_negative(contact, "Contact with the floor")
+    offset = as_number(m.offset, "Offset of the floor")
     length = math.hypot(*normal)
-    if not (math.isfinite(m.offset) and abs(length - 1.0) < 1e-6):
-        raise ShapeError(
-            f"The floor needs a finite offset and a normal of length 1, but got offset {m.offset} and a normal of "
+    if not (math.isfinite(offset) and abs(length - 1.0) < 1e-6):
+        raise InvalidValueError(
+            f"The floor needs a finite offset and a normal of length 1, but got offset {offset} and a normal of "
             f"length {length:.6g}; divide both by that length."
         )
-    return _usable_rows(floor.pack(indices, normal, float(m.offset), below, contact))
+    return _usable_rows(floor.pack(indices, normal, offset, below, contact))
 
 
 def _usable_rows(table: tuple[Array, Array]) -> tuple[Array, Array]:

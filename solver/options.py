@@ -3,17 +3,27 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
+from numbers import Integral
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from .compiled.part import Array
-from .errors import ShapeError
+from .errors import InvalidValueError
 from .learned_prior import load_joint_prior
-from .measurements import all_finite, as_array
 from .residuals import joint_limits, joint_prior
-from .residuals.registry import FIRST_TABLE, RESIDUALS, registered
+from .residuals.registry import COLUMNS, FIRST_EXTERNAL, RESIDUALS, column_of, registered
+from .validation import (
+    as_array,
+    as_number,
+    check_finite,
+    check_information,
+    check_not_negative,
+    check_rotations,
+    check_type,
+    check_weight,
+)
 
 
 @dataclass(frozen=True)
@@ -38,9 +48,17 @@ class Weights:
     tables: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        """Refuse weights of no residual. Raises ShapeError."""
-        for name in self.tables:
+        """Check the weights.
+
+        :raises InvalidValueError: one is negative, infinite or no number, or `tables` names no registered residual.
+        """
+        check_type(self.tables, Mapping, "Weights.tables")
+        for own in fields(self):
+            if own.name != "tables":
+                check_weight(getattr(self, own.name), f"Weights.{own.name}")
+        for name, weight in self.tables.items():
             registered(name)
+            check_weight(weight, f"Weights.tables[{name!r}]")
 
     def row(self) -> list[float]:
         """Return the weights in the registry's order."""
@@ -53,8 +71,11 @@ class Weights:
             "floor": self.floor,
         }
         by_name = {**own, **self.tables}
-        first = [self.keypoints2d, self.keypoints3d, self.orientation_field, self.shape]
-        return first + [by_name.get(name, 1.0) for name in RESIDUALS]
+        row = [self.keypoints2d, self.keypoints3d, self.orientation_field, self.shape]
+        row += [by_name.get(name, 1.0) for name in RESIDUALS] + [1.0] * (COLUMNS - FIRST_EXTERNAL)
+        for name in self.tables:
+            row[column_of(name)] = by_name[name]
+        return row
 
 
 @dataclass(frozen=True)
@@ -64,6 +85,19 @@ class Stage:
     weights: Weights = Weights()
     tolerance: float = 1e-6
     max_iterations: int = 50
+
+    def __post_init__(self) -> None:
+        """Check the values.
+
+        :raises InvalidValueError: the tolerance is negative or NaN, or the limit is negative or no whole number.
+        """
+        check_type(self.weights, Weights, "Stage.weights")
+        if not as_number(self.tolerance, "Stage.tolerance") >= 0.0:
+            raise InvalidValueError(f"Stage.tolerance must be a number from 0 on, but is {self.tolerance}.")
+        if not isinstance(self.max_iterations, Integral) or self.max_iterations < 0:
+            raise InvalidValueError(
+                f"Stage.max_iterations must be a whole number from 0 on, but is {self.max_iterations!r}."
+            )
 
 
 # From far away: directions first, which have no bad minimum nearby, positions in the image and in space joining in.
@@ -113,32 +147,43 @@ class Options:
     report: bool = False
 
     def __post_init__(self) -> None:
-        """Refuse values that no fit could use. Raises ShapeError."""
+        """Check the values.
+
+        :raises InvalidValueError: a value that no fit could use.
+        """
         for name in ("damping", "root_length"):
             value = getattr(self, name)
-            if not 0.0 < value < math.inf:
-                raise ShapeError(f"Options.{name} must be positive and finite, but is {value}.")
-        if not 0.0 <= self.triggs <= 1.0:
-            raise ShapeError(f"Options.triggs must lie in 0..1, but is {self.triggs}.")
+            if not 0.0 < as_number(value, f"Options.{name}") < math.inf:
+                raise InvalidValueError(f"Options.{name} must be positive and finite, but is {value}.")
+        for name in ("robust_keypoints2d", "robust_keypoints3d", "robust_orientation_field"):
+            value = getattr(self, name)
+            if not as_number(value, f"Options.{name}") > 0.0:
+                raise InvalidValueError(f"Options.{name} must be positive, or infinite for none, but is {value}.")
+        if not 0.0 <= as_number(self.triggs, "Options.triggs") <= 1.0:
+            raise InvalidValueError(f"Options.triggs must lie in 0..1, but is {self.triggs}.")
+        check_type(self.stages, (Sequence, type(None)), "Options.stages")
 
     def schedule(self, cold: bool) -> Sequence[Stage]:
-        """Return the stages of a fit, `cold` without an initial state. Raises ShapeError where there are none."""
+        """Return the stages of a fit, `cold` without an initial state.
+
+        :raises InvalidValueError: there are none.
+        """
         if self.stages is None:
             return COLD_STAGES if cold else WARM_STAGES
         if not self.stages:
-            raise ShapeError("A fit needs at least one stage, but Options.stages is empty; None is the default.")
+            raise InvalidValueError("A fit needs at least one stage, but Options.stages is empty; None is the default.")
         return self.stages
 
     def stage_table(self, stages: Sequence[Stage]) -> tuple[Array, Array, Array]:
-        """Return (S, 2, weights) of weights and 1/sigma, tolerances (S,) and iteration limits (S,)."""
-        table = np.zeros((len(stages), 2, FIRST_TABLE + len(RESIDUALS)))
+        """Return (S, 2, weights) of weights and 1/sigma, tolerances (S,) and iteration limits (S,).
+
+        :raises InvalidValueError: an entry of `stages` is no Stage.
+        """
+        table = np.zeros((len(stages), 2, COLUMNS))
         sigmas = np.array([self.robust_keypoints2d, self.robust_keypoints3d, self.robust_orientation_field])
-        if not (sigmas > 0).all():
-            raise ShapeError(f"Robust scales must be positive, but got {sigmas.tolist()}.")
         for k, stage in enumerate(stages):
+            check_type(stage, Stage, f"Options.stages[{k}]")
             table[k, 0] = stage.weights.row()
-        if not (np.isfinite(table).all() and (table >= 0).all()):
-            raise ShapeError("Weights must be finite and not negative.")
         table[:, 1, :3] = 1.0 / sigmas
         tolerances = np.array([float(stage.tolerance) for stage in stages])
         return table, tolerances, np.array([int(stage.max_iterations) for stage in stages], dtype=np.int64)
@@ -163,13 +208,19 @@ class Priors:
     flow: tuple[Array, Array] | None = None
 
     def packed_tables(self, K: int) -> dict[str, tuple[Array, Array]]:
-        """Return the tables of joint_prior, joint_limits and joint_flow for a body of K joints."""
+        """Return the tables of joint_prior, joint_limits and joint_flow for a body of K joints.
+
+        :raises ShapeError: an array has another shape.
+        :raises InvalidValueError: a mean is no rotation, or a weight is negative; both must be finite.
+        """
         mean = np.tile(np.eye(3), (K, 1, 1)) if self.joint_mean is None else self.joint_mean
         weights = np.ones(K) if self.joint_weights is None else self.joint_weights
         mean = as_array(mean, (K, 3, 3), "Means of the joint prior")
         weights = as_array(weights, (K,), "Weights of the joint prior")
-        if not (all_finite(mean.ravel()) and all_finite(weights)):
-            raise ShapeError("The joint prior must be finite.")
+        check_finite(mean, "Means of the joint prior")
+        check_finite(weights, "Weights of the joint prior")
+        check_rotations(mean, "Means of the joint prior", weights)
+        check_not_negative(weights, "Weights of the joint prior")
         tables = {"joint_prior": joint_prior.pack(np.arange(1, K + 1), mean, weights)}
         if self.limits is not None:
             tables["joint_limits"] = self.limits
@@ -178,12 +229,18 @@ class Priors:
         return tables
 
     def packed_shape(self, P: int) -> tuple[Array, Array]:
-        """Return the shape prior's mean (P,) and information (P, P)."""
+        """Return the shape prior's mean (P,) and information (P, P).
+
+        :raises ShapeError: an array has another shape.
+        :raises InvalidValueError: one is not finite, or the information is no symmetric positive semidefinite matrix.
+        """
         mean = as_array(np.zeros(P) if self.shape_mean is None else self.shape_mean, (P,), "Mean of the shape prior")
         information = np.eye(P) if self.shape_information is None else self.shape_information
         information = as_array(information, (P, P), "Information of the shape prior")
-        if not (all_finite(mean) and all_finite(information.ravel())):
-            raise ShapeError("The shape prior must be finite.")
+        check_finite(mean, "Mean of the shape prior")
+        check_finite(information, "Information of the shape prior")
+        if self.shape_information is not None:
+            check_information(information, "Information of the shape prior (Priors.shape_information)")
         return mean, 0.5 * (information + information.T)
 
 
@@ -191,8 +248,11 @@ def default_priors(body: object, log_det: float = 0.0) -> Priors:
     """Return what is known of any person: the learned prior of the joints that `body` names as SMPL does, the limits
     of its knees and elbows, and the population's shape. Joints without a learned prior are drawn to the rest pose.
 
-    log_det: 0 for the learned prior's 1/2 |z|^2, as in the paper; 1 for its whole -log p (residuals/joint_flow.py).
-    Raises ModelFileError when the prior cannot be read.
+    :param body: `joint_names` (K+1,) are all that is read of it.
+    :param log_det: 0 for the learned prior's 1/2 |z|^2, as in the paper; 1 for its whole -log p
+        (residuals/joint_flow.py).
+    :raises ModelFileError: the prior cannot be read.
+    :raises InvalidValueError: `log_det` is negative or no number.
     """
     names = list(getattr(body, "joint_names", ()))
     limits = joint_limits.hinges_of(names)

@@ -9,8 +9,8 @@ import numpy as np
 from .compiled.part import Array, Pose
 from .compiled.tree import Tree
 from .gauss_newton.linearize import make_pose, place_parts
-from .measurements import as_array
 from .rotations import nearest_rotation
+from .validation import as_array, check_rotations
 
 
 class Status(Enum):
@@ -34,20 +34,36 @@ class State:
 
     @classmethod
     def rest(cls, K: int, P: int, distance: float = 3.0) -> "State":
-        """Return the rest pose, upright and facing a camera `distance` metres away."""
+        """Return the rest pose of K joints, beta (P,) zero, upright and facing a camera `distance` metres away."""
         R_camera_root = np.diag([1.0, -1.0, -1.0])
         return cls(R_camera_root, np.array([0.0, 0.0, distance]), np.tile(np.eye(3), (K, 1, 1)), np.zeros(P))
 
     def pose(self, tree: Tree) -> Pose:
-        """Return the state for the kernels, with rotations made orthonormal. Raises ShapeError."""
+        """Return the state for the kernels, with rotations made orthonormal.
+
+        :raises ShapeError: an array does not fit the tree.
+        :raises InvalidValueError: R_camera_root, or a matrix of Omega, is no rotation.
+        """
         K, P = len(tree.parents) - 1, tree.shape
+        R = as_array(self.R_camera_root, (3, 3), "R_camera_root")
+        t = as_array(self.t_camera_root, (3,), "t_camera_root")
+        Omega = as_array(self.Omega, (K, 3, 3), "Omega")
+        self.check(R, Omega)
         pose = make_pose(tree)
-        pose.R[0] = nearest_rotation(as_array(self.R_camera_root, (3, 3), "R_camera_root"))
-        pose.t[0] = as_array(self.t_camera_root, (3,), "t_camera_root")
-        pose.Omega[1:] = nearest_rotation(as_array(self.Omega, (K, 3, 3), "Omega"))
+        pose.R[0], pose.t[0] = nearest_rotation(R), t
+        pose.Omega[1:] = nearest_rotation(Omega)
         pose.beta[:P] = as_array(self.beta, (P,), "beta")
         place_parts(tree, pose)
         return pose
+
+    @staticmethod
+    def check(R_camera_root: Array, Omega: Array) -> None:
+        """Check the rotations of an initial state, (3, 3) and (K, 3, 3).
+
+        :raises InvalidValueError: a matrix is no rotation.
+        """
+        check_rotations(R_camera_root[None], "R_camera_root of the initial state")
+        check_rotations(Omega, "Omega of the initial state")
 
     @classmethod
     def from_pose(cls, tree: Tree, pose: Pose) -> "State":

@@ -12,6 +12,7 @@ import numpy as np
 from .measurements import Measurements, PosePriors
 from .residuals import joint_prior
 from .state import State
+from .validation import as_array, check_rotations, check_weight
 
 
 @dataclass(frozen=True)
@@ -24,11 +25,26 @@ class Temporal:
     root_position: float = 100.0
     joints: float = 1.0
 
+    def __post_init__(self) -> None:
+        """Check the weights.
+
+        :raises InvalidValueError: one is negative, infinite or no number.
+        """
+        for name in ("root_rotation", "root_position", "joints"):
+            check_weight(getattr(self, name), f"Temporal.{name}")
+
 
 def with_previous(measurements: Measurements, previous: State, temporal: Temporal) -> Measurements:
-    """Return the measurements with the pull towards `previous`, in the same camera frame, added to them."""
-    K = len(previous.Omega)
-    rows = joint_prior.pack(np.arange(1, K + 1), previous.Omega, np.full(K, temporal.joints))
+    """Return the measurements with the pull towards `previous`, in the same camera frame, added to them.
+
+    :param previous: the last frame's state: R_camera_root (3, 3), t_camera_root (3,) in metres, Omega (K, 3, 3).
+    :raises ShapeError: Omega has another shape.
+    :raises InvalidValueError: Omega holds a matrix that is no rotation.
+    """
+    Omega = as_array(previous.Omega, (None, 3, 3), "Omega of the previous state")
+    check_rotations(Omega, "Omega of the previous state")
+    K = len(Omega)
+    rows = joint_prior.pack(np.arange(1, K + 1), Omega, np.full(K, temporal.joints))
     tables = dict(measurements.tables)
     if "joint_prior" in tables:
         ints, floats = tables["joint_prior"]
@@ -37,8 +53,8 @@ def with_previous(measurements: Measurements, previous: State, temporal: Tempora
     own = measurements.pose_priors or PosePriors(np.zeros(0, int), np.zeros((0, 3, 3)), np.zeros((0, 3)), [], [])
     root = PosePriors(
         np.append(own.parts, 0).astype(int),
-        np.concatenate([own.R_camera_part, previous.R_camera_root[None]]),
-        np.concatenate([own.t_camera_part, previous.t_camera_root[None]]),
+        np.concatenate([own.R_camera_part, np.asarray(previous.R_camera_root)[None]]),
+        np.concatenate([own.t_camera_part, np.asarray(previous.t_camera_root)[None]]),
         np.append(own.weight_rotation, temporal.root_rotation),
         np.append(own.weight_translation, temporal.root_position),
     )

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from ...solver.body import Body
 from ..errors import UsageError
+from ..installed import check_installed
 from ..motion import Motion
 from ..options import option
 from ..scene.export.output_paths import check_output, person_paths
@@ -36,6 +37,15 @@ def check_outputs(outputs: list[Path], overlay: Path | None, video: Path) -> Non
     for path in paths:
         if path.exists() and video.exists() and path.samefile(video):
             raise UsageError(f"{path} is the footage itself; choose another name")
+
+
+def check_blender(outputs: list[Path]) -> None:
+    """Refuse outputs that Blender writes, which is all but motion files, where it is not installed.
+
+    :raises SetupError: it is not; the message has the command that installs it.
+    """
+    if any(path.suffix.lower() not in MOTION_SUFFIXES for path in outputs):
+        check_installed(["bpy"])
 
 
 def each_once(outputs: list[Path]) -> list[Path]:

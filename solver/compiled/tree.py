@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import ShapeError
+from ..validation import as_array, as_indices, as_integers, check_finite, warn_of_units
 from .rows import padded
 
 
@@ -53,21 +54,24 @@ class Tree(NamedTuple):
 def make_tree(body: BodyArrays, focal: bool = False) -> Tree:
     """Check a body's arrays and lay them out for the kernels; `focal` adds a column for an unknown focal length.
 
-    Raises ShapeError when a shape does not fit the others, or when a parent does not come before its child.
+    :raises ShapeError: an array is missing, does not fit the others, or a parent does not come before its child.
+    :raises InvalidValueError: an array holds NaN or infinity.
     """
-    parents = np.ascontiguousarray(body.parents, dtype=np.int64)
+    missing = [name for name in _ARRAYS if not hasattr(body, name)]
+    if missing:
+        raise ShapeError(f"A body needs the arrays {', '.join(_ARRAYS)}, but {type(body).__name__} lacks {missing[0]}.")
+    parents = as_integers(body.parents, "The body's parents")
     n = parents.shape[0]
-    if parents.ndim != 1 or n == 0 or parents[0] != -1 or any(not 0 <= parents[i] < i for i in range(1, n)):
+    if n == 0 or parents[0] != -1 or any(not 0 <= parents[i] < i for i in range(1, n)):
         raise ShapeError(f"Parents must be -1 for part 0 and come before their children, but got {parents.tolist()}.")
-    p = int(np.shape(body.S)[-1])
-    s = _check(body.S, (n, 3, p), "S")
+    s = _check(body.S, (n, 3, None), "S")
+    p = s.shape[2]
     offsets = _check(body.l, (n, 3), "l")
-    part = np.ascontiguousarray(body.keypoint_part, dtype=np.int64)
+    part = as_indices(body.keypoint_part, n, "The body's keypoint parts")
     m = part.shape[0]
-    if m and (part.min() < 0 or part.max() >= n):
-        raise ShapeError(f"Keypoint parts must lie in 0..{n - 1}, but go from {part.min()} to {part.max()}.")
     v_bar = _check(body.v_bar, (m, 3), "v_bar")
     v = _check(body.V, (m, 3, p), "V")
+    warn_of_units(np.cumsum(offsets, axis=0), "The body's joint offsets l")
     width = padded(p + focal)
     s_padded, v_padded = np.zeros((n, 3, width)), np.zeros((m + n, 3, width))
     s_padded[1:, :, :p] = s[1:]  # row 0 is not used: the root's pose is free
@@ -86,7 +90,11 @@ def make_tree(body: BodyArrays, focal: bool = False) -> Tree:
 
 
 def with_fixed_shape(tree: Tree, beta: ArrayLike) -> Tree:
-    """Return the tree at shape beta (P,), with no shape columns left: poses alone, at a fraction of the cost."""
+    """Return the tree at shape beta (P,), with no shape columns left: poses alone, at a fraction of the cost.
+
+    :raises ShapeError: beta has another shape.
+    :raises InvalidValueError: beta is not finite.
+    """
     beta = _check(beta, (tree.shape,), "beta")
     n, m = len(tree.parents), len(tree.v_bar)
     return Tree(
@@ -102,8 +110,11 @@ def with_fixed_shape(tree: Tree, beta: ArrayLike) -> Tree:
     )
 
 
-def _check(value: ArrayLike, shape: tuple[int, ...], name: str) -> NDArray[np.float64]:
-    array = np.array(value, dtype=np.float64, order="C")
-    if array.shape != shape:
-        raise ShapeError(f"{name} must have shape {shape} to fit the rest of the body, but got shape {array.shape}.")
-    return array
+_ARRAYS = ("parents", "S", "l", "keypoint_part", "v_bar", "V")
+
+
+def _check(value: ArrayLike, shape: tuple[int | None, ...], name: str) -> NDArray[np.float64]:
+    """Return a copy of an array of the body."""
+    array = as_array(value, shape, f"To fit the rest of the body, {name}")
+    check_finite(array, f"The body's {name}")
+    return np.array(array, order="C")

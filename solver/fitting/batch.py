@@ -5,14 +5,16 @@ import os
 import threading
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from numbers import Integral
 from typing import TypeVar
 
 from ..compiled.tree import BodyArrays, make_tree
-from ..errors import ShapeError
+from ..errors import InvalidValueError, ShapeError
 from ..measurements import Measurements
 from ..options import Options, Priors, default_priors
 from ..state import ClipFit, Fit, State
 from ..temporal import Temporal
+from ..validation import check_type
 from .clip import fit_clip
 from .frame_solver import FrameSolver
 
@@ -33,10 +35,17 @@ def fit_batch(
 ) -> list[Fit]:
     """Fit frames that have nothing to do with each other, in order of `measurements`.
 
-    Every frame comes out as `fit` gives it, bit by bit, whatever the number of threads. `init` may hold a state for
-    each frame, None where there is none. threads: 0 is one for each core. Raises ShapeError for arrays that do not fit
-    the body, whichever frame they belong to.
+    Every frame comes out as `fit` gives it, bit by bit, whatever the number of threads.
+
+    :param init: a state for each frame, None where there is none.
+    :param threads: how many; 0 is one for each core.
+    :raises ShapeError: an array does not fit the body, whichever frame it belongs to, or `init` has another length.
+    :raises InvalidValueError: a value that no fit can use, in whichever frame.
     """
+    for k, m in enumerate(measurements):
+        check_type(m, Measurements, f"measurements[{k}]")
+    for k, state in enumerate(init or ()):
+        check_type(state, (State, type(None)), f"init[{k}]")
     if init is not None and len(init) != len(measurements):
         raise ShapeError(f"There must be one initial state a frame, {len(measurements)}, but got {len(init)}.")
     starts = [None] * len(measurements) if init is None else list(init)
@@ -66,7 +75,13 @@ def fit_clips(
     focal_weight: float = 1.0,
     threads: int = 0,
 ) -> list[ClipFit]:
-    """`fit_clip` on several clips of the same kind of body, one clip a thread; each comes out as alone."""
+    """`fit_clip` on several clips of the same kind of body, one clip a thread; each comes out as alone.
+
+    :param clips: the measurements of each clip's frames; all other arguments as of `fit_clip`.
+    :param threads: how many; 0 is one for each core.
+    :raises ShapeError: an array does not fit the body, or a clip has no frames.
+    :raises InvalidValueError: a value that no fit can use, in whichever clip.
+    """
     priors = default_priors(body) if priors is None else priors
 
     def one(clip: Sequence[Measurements]) -> ClipFit:
@@ -80,6 +95,8 @@ def fit_clips(
 def _spread(work: Callable[[_T], _R], jobs: Iterable[_T], threads: int) -> list[_R]:
     """Results in the jobs' order. The first job runs alone, so that kernels are compiled once, not by every thread."""
     queue = list(jobs)
+    if not isinstance(threads, Integral) or threads < 0:
+        raise InvalidValueError(f"threads must be a whole number from 0 on, but is {threads!r}.")
     threads = min(threads if threads > 0 else os.cpu_count() or 1, max(1, len(queue)))
     if threads == 1:
         return [work(job) for job in queue]

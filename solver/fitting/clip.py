@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from ..compiled.part import Blocks, Pose
 from ..compiled.tree import BodyArrays, Tree, make_tree, with_fixed_shape
+from ..custom_residuals.external import raise_failure
 from ..errors import ShapeError
 from ..gauss_newton.linearize import linearize, make_blocks, make_pose
 from ..gauss_newton.optimizer import (
@@ -31,7 +32,7 @@ from ..gauss_newton.optimizer import (
 )
 from ..gauss_newton.recursion import Workspace, eliminate, make_workspace, retract, solve_globals, substitute
 from ..gauss_newton.terms import Terms, fill_terms, pack_priors, usable
-from ..measurements import Measurements
+from ..measurements import Measurements, as_array
 from ..options import Options, Priors, default_priors
 from ..residuals.registry import SHAPE_PRIOR
 from ..state import ClipFit, Fit, State, Status
@@ -197,7 +198,7 @@ class _Joint:
         self.status, self.cost = Status.NO_MEASUREMENTS, 0.0
         self.iterations, self.rejected = 0, 0
         # the last frame's shape has seen most, when the frames were fitted in order
-        self.beta[: self.P] = frames[-1].init.beta if frames else self.mean
+        self.beta[: self.P] = as_array(frames[-1].init.beta, (self.P,), "beta") if frames else self.mean
         shared = make_workspace(tree)
         self.frames: list[_Active] = []
         for f in frames:
@@ -252,6 +253,7 @@ class _Joint:
             pose = f.trial if trial else f.pose
             f.cost = linearize(self.tree, f.terms, self.stages[s], self.settings.triggs, pose, f.blocks, f.work.scratch)
             total += f.cost
+        raise_failure()
         pose = self.frames[0].trial if trial else self.frames[0].pose
         offset = pose.beta[: self.P] - self.mean
         total += 0.5 * self.shape_weights[s] * float(offset @ self.prior @ offset)

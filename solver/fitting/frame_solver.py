@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from ..compiled.kernel import announce_compilation, kernel
 from ..compiled.tree import BodyArrays, Tree, make_tree
+from ..custom_residuals.external import raise_failure
 from ..gauss_newton.curvature import make_curvature
 from ..gauss_newton.linearize import make_blocks, make_pose
 from ..gauss_newton.optimizer import Memory, Settings, make_settings, optimize
@@ -101,6 +102,7 @@ class FrameSolver:
             init = initial_state(tree, terms, self._mean(priors), packed.shape_mean[: tree.shape])
         self._enter(init)
         cost, code, iterations, rejected, which = optimize(tree, terms, count > 0, settings, memory)
+        raise_failure()
         found, P, last = memory.poses[which], tree.shape, settings.stages[-1]
         information = work.C[:P, :P] - last[0, SHAPE_PRIOR] * packed.shape_information[:P, :P]
         shares = {}
@@ -136,6 +138,7 @@ class FrameSolver:
         R = as_array(state.R_camera_root, (3, 3), "R_camera_root")
         t = as_array(state.t_camera_root, (3,), "t_camera_root")
         Omega = as_array(state.Omega, (K, 3, 3), "Omega")
+        State.check(R, Omega)
         if not _enter(R, t, Omega, as_array(state.beta, (P,), "beta"), pose):
             pose.R[0], pose.Omega[1:] = nearest_rotation(R), nearest_rotation(Omega)
 

@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 
 from ..compiled.part import Blocks, Pose
 from ..compiled.tree import Tree
+from ..custom_residuals.external import external_residuals
 from ..gauss_newton.linearize import linearize
 from ..gauss_newton.terms import Terms
-from ..residuals.registry import FIRST_TABLE, KEYPOINT2D, KEYPOINT3D, ORIENTATION_FIELD, RESIDUALS, SHAPE_PRIOR
+from ..residuals.registry import KEYPOINT2D, KEYPOINT3D, ORIENTATION_FIELD, RESIDUALS, SHAPE_PRIOR, column_of
 from ..state import Fit, State, Status
 
 # Columns of a stage's weights by name, in their order.
@@ -22,7 +23,7 @@ COLUMNS = {
     "keypoints3d": KEYPOINT3D,
     "orientation_field": ORIENTATION_FIELD,
     "shape_prior": SHAPE_PRIOR,
-    **{name: FIRST_TABLE + k for k, name in enumerate(RESIDUALS)},
+    **{name: column_of(name) for name in RESIDUALS},
 }
 
 
@@ -66,7 +67,9 @@ def cost_by_term(
     Arguments as of `linearize`; the blocks are overwritten. Kinds whose weight is zero are left out.
     """
     found = {}
-    for name, column in COLUMNS.items():
+    measured = terms.external.calls[:, 4]  # columns of external residuals that have rows
+    external = {name: column_of(name) for name in external_residuals() if column_of(name) in measured}
+    for name, column in {**COLUMNS, **external}.items():
         if stage[0, column] > 0.0:
             alone = stage.copy()
             alone[0] = np.where(np.arange(len(stage[0])) == column, stage[0], 0.0)

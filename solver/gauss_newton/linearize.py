@@ -15,6 +15,7 @@ from ..compiled.kernel import kernel
 from ..compiled.part import GRADIENT, SHAPE, Array, Blocks, Pose
 from ..compiled.rows import add3, clear
 from ..compiled.tree import Tree
+from ..custom_residuals.external import accumulate_external
 from ..residuals import keypoint2d, keypoint3d, orientation_field, shape_prior
 from ..residuals.registry import KEYPOINT2D, KEYPOINT3D, ORIENTATION_FIELD, SHAPE_PRIOR, accumulate_tables
 from .gram import add_gram
@@ -279,5 +280,6 @@ def linearize(
         B[3, GRADIENT], B[4, GRADIENT], B[5, GRADIENT] = fx, fy, fz
     add_gram(C, W, scratch, 0, 2 * W, scratch, W, 2 * W, waiting)
     cost += accumulate_tables(tree, terms.ints, terms.floats, weights, inv_sigma, triggs, pose, blocks)
+    cost += accumulate_external(tree, terms.external, weights, inv_sigma, triggs, pose, blocks)
     cost += shape_prior.accumulate(terms.shape_mean, terms.shape_information, weights[SHAPE_PRIOR], pose, blocks)
     return cost

@@ -8,9 +8,11 @@ import numpy as np
 from ..compiled.kernel import allocating_kernel, kernel
 from ..compiled.part import Array
 from ..compiled.tree import Tree
+from ..custom_residuals.external import NONE, External, pack_external
 from ..errors import ShapeError
-from ..measurements import LARGEST, Measurements, all_within
-from ..residuals.registry import RESIDUALS, empty_tables, registered
+from ..measurements import LARGEST, Measurements
+from ..residuals.registry import FIRST_EXTERNAL, RESIDUALS, empty_tables, registered
+from ..validation import all_within, as_table
 
 if TYPE_CHECKING:
     from ..options import Priors
@@ -35,6 +37,7 @@ class Terms(NamedTuple):
     floats: tuple[Array, ...]
     shape_mean: Array  # (W,)
     shape_information: Array  # (W, W)
+    external: External  # rows of residuals that were registered from outside
 
 
 @kernel
@@ -226,12 +229,7 @@ def _padded(a: Array, shape: tuple[int, ...]) -> Array:
 def _checked_table(tree: Tree, name: str, table: tuple[Array, Array]) -> tuple[Array, Array]:
     """Return the rows of a registered residual, or raise ShapeError where kernels would read beyond the arrays."""
     module = registered(name)
-    ints, floats = np.asarray(table[0], dtype=np.int64), np.asarray(table[1], dtype=np.float64)
-    if (ints.shape[1:], floats.shape[1:]) != ((module.INTS,), (module.FLOATS,)) or len(ints) != len(floats):
-        raise ShapeError(
-            f"Tables of {name!r} must have shapes (n, {module.INTS}) and (n, {module.FLOATS}), "
-            f"but got {ints.shape} and {floats.shape}."
-        )
+    ints, floats = as_table(table, module.INTS, module.FLOATS, name)
     counted = getattr(module, "INDEXES", "indices")
     least, of_what = _RANGES[counted]
     limit = _UNLIMITED if of_what is None else len(getattr(tree, of_what))
@@ -262,18 +260,23 @@ def fill_terms(
     if layout is None or not layout.fits(indices):
         layout = Layout(tree, indices)
     count = _fill(layout.shaped, *layout.slots, m2, m3, md, *layout.values)
-    tables = priors.tables
+    tables, external = priors.tables, NONE
     own = m.packed_tables(len(tree.parents) - 1, n_points)
     if own or m.tables:
         tables = {**tables, **own}
+        outside = []
         for name, table in m.tables.items():
             more = _checked_table(tree, name, table)
-            tables[name] = np.concatenate([tables[name][0], more[0]]), np.concatenate([tables[name][1], more[1]])
+            if name in RESIDUALS:
+                tables[name] = np.concatenate([tables[name][0], more[0]]), np.concatenate([tables[name][1], more[1]])
+            else:
+                outside.append((registered(name), *more))
+        external = pack_external(outside, FIRST_EXTERNAL) if outside else NONE
     ints = tuple([np.ascontiguousarray(tables[name][0], dtype=np.int64) for name in RESIDUALS])
     floats = tuple([np.ascontiguousarray(tables[name][1], dtype=np.float64) for name in RESIDUALS])
     terms = Terms(
         layout.starts, layout.values[0], layout.rest, layout.V, *layout.values[1:], ints, floats,
-        priors.shape_mean, priors.shape_information,
+        priors.shape_mean, priors.shape_information, external,
     )  # fmt: skip
     return terms, count, layout
 

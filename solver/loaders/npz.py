@@ -22,6 +22,7 @@ def read_npz(path: Path, error: type[InputError], what: str) -> dict[str, np.nda
 
     :param error: class raised for a missing, broken, oversized or pickled file.
     :param what: what the file should have been, for the message, e.g. ``motion file``.
+    :raises InputError: as `error`, when the file cannot be read, would be too large or holds pickled objects.
     """
     try:
         with zipfile.ZipFile(path) as archive:

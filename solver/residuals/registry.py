@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Every residual the optimizer knows. This is the one place to register another.
+"""Every residual the optimizer knows. This is the one place to add another; `register_residual` adds one from outside.
 
 A residual r_i(T_i, Omega_i, beta) beside the measurements is a module with
     INTS, FLOATS                             columns of its two tables, one row for each term
@@ -8,20 +8,23 @@ A residual r_i(T_i, Omega_i, beta) beside the measurements is a module with
     accumulate(tree, ints, floats, weight, inv_sigma, triggs, pose, blocks) -> cost
                                              compiled with @kernel; adds JᵀJ and Jᵀr to `Blocks` (see part.py)
     evaluate(part, ...) -> Linearization     the same in plain numpy, for the derivative test
-To register it: its import, and one line, its module in RESIDUALS. Its tables come in through
+To add it here: its import, and one line, its module in RESIDUALS. Its tables come in through
 `Measurements.tables[name]`, its weight through `Weights.tables[name]`. A residual with no rows costs one call.
 
 The three measurements (keypoint2d, keypoint3d, orientation_field) are not here: the hot path in linearize.py merges
 those of one point into one term.
 """
 
+from collections.abc import Callable
+from numbers import Integral
 from typing import Any
 
 import numpy as np
 
 from ..compiled.kernel import inlined_kernel
 from ..compiled.part import Array
-from ..errors import ShapeError
+from ..custom_residuals.external import INDEXES, MOST, Registered, external_residuals
+from ..errors import InvalidValueError
 from . import floor, foot_contact, joint_flow, joint_limits, joint_prior, pose_prior
 
 RESIDUALS = {
@@ -33,8 +36,10 @@ RESIDUALS = {
     "floor": floor,
 }
 
-# Columns of a stage's weights: the measurements, the shape prior, then RESIDUALS in order.
+# Columns of a stage's weights: the measurements, the shape prior, then RESIDUALS in order, then external ones.
 KEYPOINT2D, KEYPOINT3D, ORIENTATION_FIELD, SHAPE_PRIOR, FIRST_TABLE = range(5)
+FIRST_EXTERNAL = FIRST_TABLE + len(RESIDUALS)
+COLUMNS = FIRST_EXTERNAL + MOST
 
 
 @inlined_kernel
@@ -63,10 +68,69 @@ for _index, _module in enumerate(RESIDUALS.values()):
 
 
 def registered(name: str) -> Any:
-    """Return the module of the residual with that name. Raises ShapeError."""
+    """Return the module of the residual with that name, or what was registered from outside.
+
+    :raises InvalidValueError: there is none.
+    """
+    external = external_residuals()
+    if name in external:
+        return external[name]
     if name not in RESIDUALS:
-        raise ShapeError(f"There is no residual named {name!r}; the registered ones are {', '.join(RESIDUALS)}.")
+        names = ", ".join([*RESIDUALS, *external])
+        raise InvalidValueError(f"There is no residual named {name!r}; the registered ones are {names}.")
     return RESIDUALS[name]
+
+
+def column_of(name: str) -> int:
+    """Return the column of a stage's weights of a registered residual."""
+    if name in RESIDUALS:
+        return FIRST_TABLE + list(RESIDUALS).index(name)
+    return FIRST_EXTERNAL + external_residuals()[name].slot
+
+
+def register_residual(
+    name: str,
+    *,
+    ints: int = 1,
+    floats: int = 1,
+    indexes: str = "parts",
+    kernel: Callable[..., Any] | None = None,
+    function: Callable[..., Any] | None = None,
+) -> None:
+    """Add a residual of the form r(T_i, Omega_i, beta) to the solver, for this process. No file of Scope changes.
+
+    Rows come in through `Measurements.tables[name]`, int64 (n, ints) and float64 (n, floats); `Weights.tables[name]`
+    is its weight, 1 if left out; `Fit.cost_by_term[name]` its cost. The same name again replaces the residual.
+
+    :param ints: columns of whole numbers; the first is what the row is about.
+    :param floats: columns of other numbers.
+    :param indexes: what all whole numbers count: "points" as in the measurements, "parts" 0..K or "joints" 1..K.
+    :param kernel: ``accumulate(tree, ints, floats, weight, inv_sigma, triggs, pose, blocks) -> cost``, as this module
+        describes it: a plain function, which is compiled here, or one that `numba.njit` has compiled. Its speed is that
+        of Scope's own.
+    :param function: ``function(part, ints, floats) -> r (n,)`` of one row (ints,), (floats,) in plain Python, with
+        R (3, 3), t (3,) of `residuals.part.Part` the pose of part i in the camera frame, metres, Omega (3, 3) the state
+        of its joint and beta (P,). Derivatives are central differences: slow, to try an idea.
+    :raises InvalidValueError: the name is one of Scope's own, not exactly one of `kernel` and `function` is given, a
+        count is no whole number from 1 (`floats`: 0) on, `indexes` is unknown or "points" with a `function`, or too
+        many are registered.
+    """
+    external = external_residuals()
+    own = [*RESIDUALS, "keypoints2d", "keypoints3d", "orientation_field", "shape_prior", "focal_prior"]
+    if not isinstance(name, str) or not name or name in own:
+        raise InvalidValueError(f"A residual of your own needs a name other than {', '.join(own)}, but got {name!r}.")
+    if (kernel is None) == (function is None) or not callable(kernel or function):
+        raise InvalidValueError(f"Residual {name!r} needs either a kernel or a function, something to call.")
+    for what, count, least in (("ints", ints, 1), ("floats", floats, 0)):
+        if not isinstance(count, Integral) or count < least:
+            raise InvalidValueError(f"{what} of {name!r} must be a whole number from {least} on, but is {count!r}.")
+    allowed = INDEXES if function is None else INDEXES[1:]
+    if indexes not in allowed:
+        raise InvalidValueError(f"indexes of {name!r} must be one of {', '.join(allowed)}, but is {indexes!r}.")
+    if name not in external and len(external) == MOST:
+        raise InvalidValueError(f"There is room for {MOST} residuals from outside: {', '.join(external)}.")
+    slot = external[name].slot if name in external else len(external)
+    external[name] = Registered(name, slot, int(ints), int(floats), indexes, kernel, function)
 
 
 def empty_tables() -> dict[str, tuple[Array, Array]]:

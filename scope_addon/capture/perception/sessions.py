@@ -34,7 +34,9 @@ def network_path(name: str, folder: Path | None = None) -> Path:
     """The file of a network; SetupError when it has not been built."""
     path = (folder or NETWORKS_FOLDER) / f"{name}.onnx"
     if not path.is_file():
-        raise SetupError(f"{path} is missing. Build the networks with: python -m scope.tools.convert_networks")
+        raise SetupError(
+            f"{path} is missing. Build the networks in the repository with: python -m scope.tools.convert_networks"
+        )
     return path
 
 

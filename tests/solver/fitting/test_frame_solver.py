@@ -6,6 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scope.solver import (
+    InputError,
+    InvalidValueError,
     Keypoints2D,
     Keypoints3D,
     Measurements,
@@ -364,7 +366,7 @@ def test_a_state_that_is_not_finite_is_reported():
 )
 def test_wrong_shapes_are_refused_with_what_was_expected(measurements, message):
     body, _ = scene(10)
-    with pytest.raises(ShapeError, match=message):
+    with pytest.raises(InputError, match=message):
         fit(body, measurements)
 
 
@@ -416,7 +418,7 @@ def test_tables_of_priors_of_other_widths_are_refused(prior):
     ],
 )
 def test_options_that_no_fit_could_use_are_refused(make, message):
-    with pytest.raises(ShapeError, match=message):
+    with pytest.raises(InvalidValueError, match=message):
         make()
 
 
@@ -426,9 +428,9 @@ def test_an_empty_schedule_is_refused_and_none_is_the_default(warm):
     m = measured(body, state)
     init = State.rest(K, P) if warm else None
     for stages in ([], ()):
-        with pytest.raises(ShapeError, match="at least one stage"):
+        with pytest.raises(InvalidValueError, match="at least one stage"):
             fit(body, m, init=init, options=Options(stages=stages))
-        with pytest.raises(ShapeError, match="at least one stage"):
+        with pytest.raises(InvalidValueError, match="at least one stage"):
             fit_clip(body, [m], init=[init] if warm else None, options=Options(stages=stages))
     default = WARM_STAGES if warm else COLD_STAGES
     costs = [fit(body, m, init=init, options=Options(stages=stages)).cost for stages in (None, default)]

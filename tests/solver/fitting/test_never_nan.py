@@ -8,12 +8,12 @@ import pytest
 from scope.solver import (
     Floor,
     FootContacts,
+    InvalidValueError,
     Keypoints2D,
     Keypoints3D,
     Measurements,
     Options,
     PosePriors,
-    ShapeError,
     State,
     Status,
     fit,
@@ -152,5 +152,5 @@ def test_intrinsics_that_are_not_finite_are_refused(bad):
     body = random_body(np.random.default_rng(0), 3, 2, 8)
     K = INTRINSICS.copy()
     K[0, 2] = bad
-    with pytest.raises(ShapeError, match="finite"):
+    with pytest.raises(InvalidValueError, match="finite"):
         fit(body, Measurements(K, Keypoints2D([0], [[1.0, 1.0]], [1.0])))

@@ -8,12 +8,12 @@ import pytest
 from scope.solver import (
     Floor,
     FootContacts,
+    InputError,
     Keypoints2D,
     Keypoints3D,
     Measurements,
     Options,
     Priors,
-    ShapeError,
     State,
     fit,
     fit_clip,
@@ -139,9 +139,7 @@ def test_a_point_that_is_not_finite_is_left_out_and_no_probability_is_no_contact
         found = fit(BODY, replace(m, foot_contacts=FootContacts(FEET[:2], where, probability)), init=state)
         np.testing.assert_array_equal(found.t_camera_part, plain.t_camera_part)
     floor = Floor(FEET, UP, 100.0, np.full(4, np.nan))
-    np.testing.assert_array_equal(
-        fit(BODY, replace(m, floor=floor), init=state).t_camera_part, plain.t_camera_part
-    )
+    np.testing.assert_array_equal(fit(BODY, replace(m, floor=floor), init=state).t_camera_part, plain.t_camera_part)
 
 
 @pytest.mark.parametrize(
@@ -156,5 +154,5 @@ def test_a_point_that_is_not_finite_is_left_out_and_no_probability_is_no_contact
     ],
 )
 def test_what_does_not_fit_is_refused(more, message):
-    with pytest.raises(ShapeError, match=message):
+    with pytest.raises(InputError, match=message):
         fit(BODY, seen(standing(), **more), options=Options())

@@ -1,0 +1,25 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Find the packages of the wheel by rule; everything else about the distribution is in pyproject.toml.
+
+The root folder is the package `scope`, and setuptools' own search cannot put a prefix before the names it finds.
+Editable installations map the whole folder, so that `scope.benchmarks` and `scope.tools` are importable in these.
+"""
+
+from setuptools import find_packages, setup
+from setuptools.command.build_py import build_py
+
+PRODUCT = ["solver", "solver.*", "scope_addon", "scope_addon.*"]
+
+
+class BuildProduct(build_py):
+    """Copies the packages, without this file, which lies in the folder of the root package."""
+
+    def find_package_modules(self, package, package_dir):
+        """Return (package, module, file) of every module of a package."""
+        return [found for found in super().find_package_modules(package, package_dir) if found[1] != "setup"]
+
+
+setup(
+    packages=["scope", *(f"scope.{name}" for name in find_packages(".", include=PRODUCT))],
+    cmdclass={"build_py": BuildProduct},
+)

@@ -1,0 +1,187 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Residuals that other programs register: compiled ones, and plain Python ones with finite differences (numeric.py).
+
+The solver's machine code calls them through their address, with plain pointers and sizes, in the order of `_PROTOTYPE`.
+So it stays as it is on disk whatever is registered, and without rows of such a residual it makes no call.
+"""
+
+import ctypes
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+from llvmlite import ir
+from numba import carray, cfunc, types
+from numba.core.errors import NumbaError
+from numba.extending import intrinsic
+
+from ..compiled.kernel import inlined_kernel
+from ..compiled.kernel import kernel as compiled
+from ..compiled.part import Array, Blocks, Pose
+from ..compiled.tree import Tree
+from ..errors import InvalidValueError
+from . import numeric
+
+MOST = 16  # external residuals; each has a column of the weights
+INDEXES = ("points", "parts", "joints")
+
+_I, _F = types.int64, types.float64
+_PI, _PF = types.CPointer(_I), types.CPointer(_F)
+_PROTOTYPE = _F(
+    _PI, _I, _PF, _F, _F, _F,  # ints, how many rows, floats, weight, inv_sigma, triggs
+    _I, _I, _I, _I, _I, _I,  # parts, points, W, and keypoints, shape and globals of `Tree`
+    _PI, _PF, _PF, _PI, _PF, _PF,  # the arrays of `Tree`
+    _PF, _PF, _PF, _PF, _PF, _PF,  # of `Pose`
+    _PF, _PF, _PF, _PF, _PF, _PI,  # of `Blocks`
+)  # fmt: skip
+_C_TYPES: dict[Any, Any] = {_I: ctypes.c_int64, _F: ctypes.c_double, _PI: ctypes.c_void_p, _PF: ctypes.c_void_p}
+_CALLBACK = ctypes.CFUNCTYPE(ctypes.c_double, *(_C_TYPES[kind] for kind in _PROTOTYPE.args))
+
+
+class External(NamedTuple):
+    """The rows of external residuals for the kernels."""
+
+    calls: Array  # (m, 5): address, how many rows, where they begin in ints and in floats, column of the weights
+    ints: Array  # (n,)
+    floats: Array  # (n,)
+
+
+NONE = External(np.zeros((0, 5), np.int64), np.zeros(0, np.int64), np.zeros(0))
+
+
+@dataclass
+class Registered:
+    """A residual from outside, with what a module of RESIDUALS has."""
+
+    name: str
+    slot: int  # among the columns for external residuals
+    INTS: int
+    FLOATS: int
+    INDEXES: str
+    kernel: Callable[..., Any] | None
+    function: Callable[..., Any] | None
+    _callable: Any = field(default=None, repr=False)  # what the address belongs to
+
+    def address(self) -> int:
+        """Return the address of the machine code, compiled on the first call.
+
+        :raises InvalidValueError: the kernel does not compile.
+        """
+        with _LOCK:
+            if self._callable is None:
+                self._callable = self._callback() if self.kernel is None else self._entry()
+        if self.kernel is None:
+            return int(ctypes.cast(self._callable, ctypes.c_void_p).value or 0)
+        return int(self._callable.address)
+
+    def _entry(self) -> Any:
+        ints, floats = self.INTS, self.FLOATS
+        given: Any = self.kernel
+        accumulate = given if hasattr(given, "signatures") else inlined_kernel(given)
+
+        def entry(  # type: ignore[no-untyped-def]
+            i, rows, f, weight, inv_sigma, triggs, n, points, W, keypoints, shape, globals_, parents, S, l, point_part,
+            v_bar, V, Omega, R, t, D, beta, log_focal, A, H_u, H_uu, C, c, cross,
+        ):  # fmt: skip
+            tree = Tree(
+                carray(parents, (n,)), carray(S, (n, 3, W)), carray(l, (n, 3)), carray(point_part, (points,)),
+                carray(v_bar, (points, 3)), carray(V, (points, 3, W)), keypoints, shape, globals_,
+            )  # fmt: skip
+            pose = Pose(
+                carray(Omega, (n, 3, 3)), carray(R, (n, 3, 3)), carray(t, (n, 3)), carray(D, (n, 3, W)),
+                carray(beta, (W,)), carray(log_focal, (1,)),
+            )  # fmt: skip
+            blocks = Blocks(
+                carray(A, (n, 6, 8 + W)), carray(H_u, (n, 3, 8 + W)), carray(H_uu, (n, 3, 3)), carray(C, (W, W)),
+                carray(c, (W,)), carray(cross, (1,)),
+            )  # fmt: skip
+            table, numbers = carray(i, (rows, ints)), carray(f, (rows, floats))
+            return accumulate(tree, table, numbers, weight, inv_sigma, triggs, pose, blocks)
+
+        try:
+            return cfunc(_PROTOTYPE)(entry)
+        except NumbaError as error:
+            lines = [line for line in str(error).splitlines() if line and not line.startswith("Failed in")]
+            reason = lines[0] if lines else type(error).__name__  # the whole of it is the cause
+            raise InvalidValueError(f"The kernel of residual {self.name!r} does not compile: {reason}") from error
+
+    def _callback(self) -> Any:
+        name, function, ints, floats = self.name, self.function, self.INTS, self.FLOATS
+
+        def call(i: int, rows: int, f: int, weight: float, _s: float, _t: float, *sizes_and_arrays: int) -> float:
+            try:
+                assert function is not None
+                return numeric.accumulate(function, (i, f), (rows, ints, floats), weight, sizes_and_arrays)
+            except Exception as error:  # it cannot pass through machine code: `raise_failure` does it
+                _failure.error = name, error
+                return float("nan")
+
+        return _CALLBACK(call)
+
+
+_external: dict[str, Registered] = {}
+_LOCK = threading.RLock()
+_failure = threading.local()
+
+
+def external_residuals() -> dict[str, Registered]:
+    """Return the residuals that were registered from outside, by name."""
+    return _external
+
+
+def raise_failure() -> None:
+    """Pass on what a Python residual raised within the machine code.
+
+    :raises InvalidValueError: one has, since the last call.
+    """
+    failed = getattr(_failure, "error", None)
+    if failed is not None:
+        _failure.error = None
+        name, error = failed
+        raise InvalidValueError(f"The residual {name!r} raised {type(error).__name__}: {error}") from error
+
+
+def pack_external(tables: list[tuple[Registered, Array, Array]], first_column: int) -> External:
+    """Return the rows (n, INTS), (n, FLOATS) of several residuals for the kernels."""
+    calls, i, f = np.zeros((len(tables), 5), np.int64), 0, 0
+    for k, (residual, ints, floats) in enumerate(tables):
+        calls[k] = residual.address(), len(ints), i, f, first_column + residual.slot
+        i, f = i + ints.size, f + floats.size
+    ints = np.concatenate([ints.ravel() for _, ints, _ in tables])
+    return External(calls, ints, np.concatenate([floats.ravel() for _, _, floats in tables]))
+
+
+@intrinsic
+def _call(typingctx, address, arguments):  # type: ignore[no-untyped-def]
+    """Call the function at an address; of arrays among the arguments, a tuple, it gets the pointer to their data."""
+
+    def generate(context, builder, signature, args):  # type: ignore[no-untyped-def]
+        values = []
+        for k, kind in enumerate(signature.args[1].types):
+            value = builder.extract_value(args[1], k)
+            if isinstance(kind, types.Array):
+                value = context.make_array(kind)(context, builder, value).data
+            values.append(value)
+        prototype = ir.FunctionType(ir.DoubleType(), [value.type for value in values])
+        return builder.call(builder.inttoptr(args[0], prototype.as_pointer()), values)
+
+    return types.float64(types.int64, arguments), generate
+
+
+@compiled
+def accumulate_external(tree, external, weights, inv_sigma, triggs, pose, blocks):  # type: ignore[no-untyped-def]
+    """Add all rows to the blocks and return their cost."""
+    cost, n, points, W = 0.0, tree.parents.shape[0], tree.point_part.shape[0], tree.S.shape[2]
+    for k in range(external.calls.shape[0]):
+        address, rows, i, f, column = external.calls[k]
+        arguments = (
+            external.ints[i:], rows, external.floats[f:], weights[column], inv_sigma[column], triggs,
+            n, points, W, tree.keypoints, tree.shape, tree.globals,
+            tree.parents, tree.S, tree.l, tree.point_part, tree.v_bar, tree.V,
+            pose.Omega, pose.R, pose.t, pose.D, pose.beta, pose.log_focal,
+            blocks.A, blocks.H_u, blocks.H_uu, blocks.C, blocks.c, blocks.cross,
+        )  # fmt: skip
+        cost += _call(address, arguments)  # type: ignore[call-arg]
+    return cost

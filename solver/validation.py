@@ -1,0 +1,339 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Checks of what comes in from outside, one for each kind of value; every message names the field.
+
+Two errors: ShapeError for what is no array of numbers of the expected shape, InvalidValueError for the right shape with
+values that no fit can use. The checks of arrays that come with every frame are compiled: numpy takes ten times as long
+for so few numbers.
+"""
+
+from __future__ import annotations
+
+import math
+import warnings
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .compiled.kernel import allocating_kernel, kernel
+from .compiled.part import Array
+from .errors import InvalidValueError, ShapeError, UnitsWarning
+
+_FLOAT64 = np.dtype(np.float64)
+ROTATION_TOLERANCE = 0.01  # of the entries of R Rᵀ - I: rotations rounded to two decimals pass, scaled ones do not
+LARGEST_STEP = 10.0  # metres between two points or joints of one person, one after the other in a list
+_NO_WEIGHTS = np.zeros(0)
+_UNITS = "Scope's unit is the metre; divide millimetres by 1000"
+
+
+def as_array(value: ArrayLike, shape: tuple[int | None, ...], name: str) -> Array:
+    """Return `value` as contiguous float64.
+
+    :param value: an array, or lists of numbers, of `shape`.
+    :param shape: the expected shape; None is any length.
+    :param name: what the array is, as a message begins.
+    :raises ShapeError: it has another shape, or is no array of numbers.
+    """
+    if type(value) is not np.ndarray or value.dtype is not _FLOAT64:
+        _refuse_unless_numbers(value, "fiub", "numbers", shape, name)
+    array = np.ascontiguousarray(value, dtype=np.float64)
+    if array.shape == shape and array.ndim:
+        return array
+    if len(shape) != np.ndim(value) or any(n is not None and n != m for n, m in zip(shape, array.shape, strict=True)):
+        raise ShapeError(f"{name} must have shape {_written(shape)}, but got shape {np.shape(value)}.")
+    return array
+
+
+def as_integers(value: ArrayLike, name: str) -> Array:
+    """Return `value` as contiguous int64 (n,).
+
+    :raises ShapeError: it is no list of whole numbers.
+    """
+    if type(value) is not np.ndarray or value.dtype.kind not in "iu":
+        _refuse_unless_numbers(value, "iu", "integers", (None,), name)
+    array = np.asarray(value)
+    if array.ndim != 1:
+        raise ShapeError(f"{name} must be integers of shape (n,), but got {array.dtype} of shape {array.shape}.")
+    return np.ascontiguousarray(array, dtype=np.int64)
+
+
+def as_indices(value: ArrayLike, limit: int, name: str) -> Array:
+    """Return `value` as int64 indices (n,) in 0..limit-1.
+
+    :raises ShapeError: it is no list of whole numbers, or one of them lies outside.
+    """
+    array = as_integers(value, name)
+    if not all_within(array, 0, limit):
+        raise ShapeError(f"{name} must lie in 0..{limit - 1}, but go from {array.min()} to {array.max()}.")
+    return array
+
+
+def as_table(value: Any, ints: int, floats: int, name: str) -> tuple[Array, Array]:
+    """Return the rows of a residual as int64 (n, ints) and float64 (n, floats).
+
+    :raises ShapeError: it is no pair of such arrays.
+    """
+    if not isinstance(value, (tuple, list)) or len(value) != 2:
+        raise ShapeError(f"Tables of {name!r} must be a pair of arrays (ints, floats), but got {_described(value)}.")
+    _refuse_unless_numbers(value[0], "iu", "integers", (None, ints), f"Whole numbers of {name!r}")
+    _refuse_unless_numbers(value[1], "fiub", "numbers", (None, floats), f"Numbers of {name!r}")
+    table = np.asarray(value[0], dtype=np.int64), np.asarray(value[1], dtype=np.float64)
+    if (table[0].shape[1:], table[1].shape[1:]) != ((ints,), (floats,)) or len(table[0]) != len(table[1]):
+        raise ShapeError(
+            f"Tables of {name!r} must have shapes (n, {ints}) and (n, {floats}), "
+            f"but got {table[0].shape} and {table[1].shape}."
+        )
+    return table
+
+
+def as_number(value: Any, name: str) -> float:
+    """Return a single number, which may be NaN.
+
+    :raises InvalidValueError: it is none.
+    """
+    if isinstance(value, (str, bytes)) or value is None or np.ndim(value) != 0:
+        raise InvalidValueError(f"{name} must be a number, but is {_described(value)}.")
+    try:
+        return float(value)
+    except (TypeError, ValueError):
+        raise InvalidValueError(f"{name} must be a number, but is {_described(value)}.") from None
+
+
+def check_weight(value: Any, name: str) -> None:
+    """Check a weight, a single number.
+
+    :raises InvalidValueError: it is negative, infinite or no number.
+    """
+    if not 0.0 <= as_number(value, name) < math.inf:
+        raise InvalidValueError(f"{name} must be finite and not negative, but is {value}.")
+
+
+def check_not_negative(values: Array, name: str) -> None:
+    """Check weights (n,); NaN passes, because it leaves a measurement out.
+
+    :raises InvalidValueError: one is negative.
+    """
+    k = _first_negative(values)
+    if k >= 0:
+        raise InvalidValueError(f"{name} must not be negative, but number {k} is {values[k]:.6g}.")
+
+
+def check_finite(values: Array, name: str) -> None:
+    """Check an array of any shape.
+
+    :raises InvalidValueError: a value is NaN or infinite.
+    """
+    if not all_finite(values.ravel()):
+        raise InvalidValueError(f"{name} must be finite, but hold NaN or infinity.")
+
+
+def check_rotations(R: Array, name: str, weights: Array | None = None) -> None:
+    """Check matrices (n, 3, 3).
+
+    :param weights: (n,), of measurements: a matrix whose weight is not positive may be anything, and one that is not
+        finite leaves the measurement out. None checks all.
+    :raises InvalidValueError: one is no rotation.
+    """
+    k = _first_not_rotation(R, _NO_WEIGHTS if weights is None else weights, weights is None)
+    if k >= 0:
+        raise InvalidValueError(
+            f"{name} must be rotation matrices, orthonormal and of determinant 1, but number {k} is {R[k].tolist()}."
+        )
+
+
+def check_information(information: Array, name: str) -> None:
+    """Check an information matrix (P, P).
+
+    :raises InvalidValueError: it is not symmetric, or has a negative eigenvalue.
+    """
+    if _definiteness(information) == 1:
+        raise InvalidValueError(f"{name} must be symmetric, but differs from its transpose.")
+    if _definiteness(information) == 2:
+        least = np.linalg.eigvalsh(information).min()
+        raise InvalidValueError(
+            f"{name} must be positive semidefinite, as an inverse covariance is, but has the eigenvalue {least:.6g}."
+        )
+
+
+def check_intrinsics(intrinsics: Array) -> None:
+    """Check a camera matrix (3, 3), [[fx, s, cx], [0, fy, cy], [0, 0, 1]] in pixels.
+
+    :raises InvalidValueError: it is not finite, or none of that form.
+    """
+    fault = _fault_of_intrinsics(intrinsics)
+    if fault == 0:
+        return
+    K = intrinsics.tolist()
+    if fault == 1:
+        raise InvalidValueError(f"Intrinsics must be finite with positive focal lengths, but got {K}.")
+    hint = ""
+    if _fault_of_intrinsics(np.ascontiguousarray(intrinsics.T)) == 0:
+        hint = "; transpose it"
+    elif intrinsics[2, 2] and _fault_of_intrinsics(intrinsics / intrinsics[2, 2]) == 0:
+        hint = f"; divide it by its last entry, {intrinsics[2, 2]:.6g}"
+    raise InvalidValueError(
+        f"Intrinsics must be a camera matrix [[fx, s, cx], [0, fy, cy], [0, 0, 1]] in pixels, but got {K}{hint}."
+    )
+
+
+def check_type(value: Any, wanted: type | tuple[type, ...], name: str) -> None:
+    """Check what kind of object a field holds.
+
+    :raises InvalidValueError: it is an instance of none of `wanted`.
+    """
+    if not isinstance(value, wanted):
+        kinds = wanted if isinstance(wanted, tuple) else (wanted,)
+        allowed = " or ".join("None" if kind is type(None) else kind.__name__ for kind in kinds)
+        raise InvalidValueError(f"{name} must be {allowed}, but is {_described(value)}.")
+
+
+def warn_of_units(points: Array, name: str) -> None:
+    """Warn of points (n, 3) of one person that lie too far apart to be in metres, with `UnitsWarning`."""
+    if _far_apart(points, LARGEST_STEP):
+        warnings.warn(
+            f"{name} lie more than {LARGEST_STEP:g} m apart, one after the other, which no person is; {_UNITS}.",
+            UnitsWarning,
+            stacklevel=3,
+        )
+
+
+@kernel
+def all_within(indices: Array, least: int, limit: int) -> bool:
+    """Whether all of (n,) lie in least..limit-1."""
+    for k in range(indices.shape[0]):
+        if not least <= indices[k] < limit:
+            return False
+    return True
+
+
+@kernel
+def all_finite(values: Array) -> bool:
+    """Whether all of (n,) are finite; numpy takes ten times as long for so few."""
+    total = 0.0
+    for k in range(values.shape[0]):
+        total += 0.0 * values[k]
+    return total == 0.0
+
+
+@kernel
+def _first_negative(values: Array) -> int:
+    """Return the index of the first negative of (n,), or -1."""
+    for k in range(values.shape[0]):
+        if values[k] < 0.0:
+            return k
+    return -1
+
+
+@kernel
+def _first_not_rotation(R: Array, weights: Array, every: bool) -> int:
+    """Return the index of the first of (n, 3, 3) that is no rotation, or -1; unless `every`, as `check_rotations`."""
+    for k in range(R.shape[0]):
+        if not every and not weights[k] > 0.0:
+            continue
+        M, off = R[k], 0.0
+        for r in range(3):
+            for c in range(3):
+                e = M[r, 0] * M[c, 0] + M[r, 1] * M[c, 1] + M[r, 2] * M[c, 2] - (1.0 if r == c else 0.0)
+                off = max(off, abs(e))
+        det = (
+            M[0, 0] * (M[1, 1] * M[2, 2] - M[1, 2] * M[2, 1])
+            - M[0, 1] * (M[1, 0] * M[2, 2] - M[1, 2] * M[2, 0])
+            + M[0, 2] * (M[1, 0] * M[2, 1] - M[1, 1] * M[2, 0])
+        )
+        if 0.0 * det != 0.0:
+            if every:
+                return k
+        elif off > ROTATION_TOLERANCE or det < 0.0:
+            return k
+    return -1
+
+
+@allocating_kernel
+def _definiteness(A: Array) -> int:
+    """Return 0 if (P, P) is symmetric and positive semidefinite to rounding, 1 if not symmetric, 2 if indefinite.
+
+    By the pivots of Cholesky's decomposition, with a millionth of the largest diagonal entry added.
+    """
+    n, largest = A.shape[0], 0.0
+    for i in range(n):
+        for j in range(n):
+            largest = max(largest, abs(A[i, j]))
+    for i in range(n):
+        for j in range(i):
+            if abs(A[i, j] - A[j, i]) > 1e-6 * largest:
+                return 1
+    L = np.zeros((n, n))
+    for i in range(n):
+        for j in range(i + 1):
+            s = 0.5 * (A[i, j] + A[j, i])
+            for k in range(j):
+                s -= L[i, k] * L[j, k]
+            if i == j:
+                s += 1e-6 * largest
+                if s < 0.0:
+                    return 2
+                L[i, i] = np.sqrt(s)
+            else:
+                L[i, j] = s / L[j, j] if L[j, j] > 0.0 else 0.0
+    return 0
+
+
+@kernel
+def _fault_of_intrinsics(K: Array) -> int:
+    """Return 0 for a camera matrix, 1 if not finite or a focal length is not positive, 2 if of another form."""
+    total = 0.0
+    for r in range(3):
+        for c in range(3):
+            total += 0.0 * K[r, c]
+    if total != 0.0:
+        return 1
+    if abs(K[2, 0]) > 1e-9 or abs(K[2, 1]) > 1e-9 or abs(K[2, 2] - 1.0) > 1e-9 or abs(K[1, 0]) > 1e-9 * abs(K[0, 0]):
+        return 2
+    return 0 if K[0, 0] > 0.0 and K[1, 1] > 0.0 else 1
+
+
+@kernel
+def _far_apart(points: Array, most: float) -> bool:
+    """Whether more than half of the steps from one finite point of (n, 3) to the next are longer than `most`."""
+    steps, far, before = 0, 0, -1
+    for k in range(points.shape[0]):
+        total = 0.0 * points[k, 0] + 0.0 * points[k, 1] + 0.0 * points[k, 2]
+        if total != 0.0:
+            continue
+        if before >= 0:
+            square = 0.0
+            for r in range(3):
+                square += (points[k, r] - points[before, r]) ** 2
+            steps += 1
+            if square > most * most:
+                far += 1
+        before = k
+    return 2 * far > steps
+
+
+def _refuse_unless_numbers(value: Any, kinds: str, what: str, shape: tuple[int | None, ...], name: str) -> None:
+    """Raise ShapeError for strings, None, ragged lists and numbers of another kind; an empty list is of any kind."""
+    try:
+        array = np.asarray(value)
+        usable = array.dtype.kind in kinds or (array.size == 0 and array.dtype.kind == "f")
+        found = f"{array.dtype} of shape {array.shape}" if array.dtype.kind in "fiubc" else _described(value)
+    except ValueError:  # numpy's, for lists of different lengths
+        usable, found = False, "a ragged list"
+    if not usable:
+        raise ShapeError(f"{name} must be {what} of shape {_written(shape)}, but got {found}.")
+
+
+def _written(shape: tuple[int | None, ...]) -> str:
+    """A shape as numpy writes it, with n for any length."""
+    return f"({', '.join('n' if n is None else str(n) for n in shape)}{',' if len(shape) == 1 else ''})"
+
+
+def _described(value: Any) -> str:
+    """What a message says of a value of the wrong kind."""
+    if value is None:
+        return "None"
+    if isinstance(value, str):
+        return f"the text {value[:40]!r}"
+    if isinstance(value, np.ndarray):
+        return f"an array of {value.dtype} of shape {value.shape}"
+    return f"a {type(value).__name__}"

@@ -1,0 +1,282 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Residuals that a program registers give what those within the solver give, compiled or not."""
+
+import subprocess
+import sys
+import threading
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scope.solver import (
+    InvalidValueError,
+    Keypoints3D,
+    Measurements,
+    Options,
+    Priors,
+    ShapeError,
+    Stage,
+    State,
+    Status,
+    Weights,
+    fit,
+    fit_batch,
+    fit_clip,
+    register_residual,
+    rotations,
+)
+from scope.solver.compiled.part import Part
+from scope.solver.custom_residuals import numeric
+from scope.solver.examples import own_residual
+from scope.solver.residuals import floor, foot_contact, joint_prior, pose_prior
+
+from ..synthetic import forward, random_body, random_state
+
+K, P, M = 6, 4, 14
+BODY = random_body(np.random.default_rng(1), K, P, M)
+R0, T0, OMEGA, BETA = random_state(np.random.default_rng(2), K, P)
+POINTS = forward(BODY, R0, T0, OMEGA, BETA)[2]
+SEEN = Measurements(keypoints3d=Keypoints3D(np.arange(M), POINTS, np.ones(M)))
+TRUTH = State(R0, T0, OMEGA, BETA)
+
+
+def solved(m, weights=Weights()):  # noqa: B008 - frozen
+    """Fit to the last digit, from the truth and without robust kernels, so that there is one minimum to find."""
+    options = Options(stages=[Stage(weights, 1e-14, 200)], robust_keypoints3d=np.inf, report=True)
+    return fit(BODY, m, init=TRUTH, priors=Priors(), options=options)
+
+
+own_residual.register()
+register_residual("own_floor", kernel=floor.accumulate, ints=1, floats=6, indexes="points")
+register_residual("own_contact", kernel=foot_contact.accumulate.py_func, ints=1, floats=4, indexes="points")
+register_residual(
+    "slow_joint",
+    function=lambda part, ints, f: np.sqrt(f[9]) * rotations.log(f[:9].reshape(3, 3).T @ part.Omega),
+    floats=10,
+    indexes="joints",
+)
+
+
+def slow_pose(part, ints, f):
+    """pose_prior.py's residual, from its equation alone."""
+    turn = rotations.log(f[:9].reshape(3, 3).T @ part.R)
+    return np.concatenate([np.sqrt(f[12]) * turn, np.sqrt(f[13]) * (part.t - f[9:12])])
+
+
+register_residual("slow_pose", function=slow_pose, floats=14)
+
+
+def fitted(name, rows, weight=1.0):
+    own_field = name in ("floor", "foot_contact")
+    weights = Weights(**{name: weight}) if own_field else Weights(tables={name: weight})
+    return solved(replace(SEEN, tables={name: rows}), weights)
+
+
+def assert_same(a, b, atol):
+    np.testing.assert_allclose(a.t_camera_part, b.t_camera_part, atol=atol)
+    np.testing.assert_allclose(a.R_camera_part, b.R_camera_part, atol=atol)
+    np.testing.assert_allclose(a.state.beta, b.state.beta, atol=atol)
+    np.testing.assert_allclose(a.cost, b.cost, rtol=1e-6)
+
+
+UP = np.array([0.0, -1.0, 0.0])
+POINT_ROWS = {
+    "floor": floor.pack(np.arange(M), UP, -0.1, np.ones(M), np.full(M, 0.5)),
+    "foot_contact": foot_contact.pack(np.arange(4), POINTS[:4] + 0.1, np.ones(4)),
+}
+
+
+@pytest.mark.parametrize(("own", "built_in"), [("own_floor", "floor"), ("own_contact", "foot_contact")])
+def test_a_registered_kernel_fits_as_the_same_kernel_within_the_solver(own, built_in):
+    """One that numba has compiled already, and one as plain Python."""
+    rows = POINT_ROWS[built_in]
+    a, b, none = fitted(own, rows, 4e4), fitted(built_in, rows, 4e4), solved(SEEN)
+    assert_same(a, b, 1e-9)
+    assert np.abs(a.t_camera_part - none.t_camera_part).max() > 1e-3
+    np.testing.assert_allclose(a.cost_by_term[own], b.cost_by_term[built_in], rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("slow", "built_in", "rows"),
+    [
+        (
+            "slow_joint",
+            "joint_prior",
+            joint_prior.pack(np.array([2, 5]), rotations.exp(0.3 * np.eye(3)[:2]), [90.0, 70]),
+        ),
+        (
+            "slow_pose",
+            "pose_prior",
+            pose_prior.pack(np.array([0, 3]), rotations.exp(np.eye(3)[:2]), POINTS[:2], [40.0, 9.0], [10.0, 300.0]),
+        ),
+    ],
+)
+def test_a_python_residual_fits_as_the_solvers_own_kernel(slow, built_in, rows):
+    a = fitted(slow, rows, 3.0)
+    floats = rows[1].copy()
+    floats[:, -1] *= 3.0
+    if built_in == "pose_prior":
+        floats[:, -2] *= 3.0
+    else:
+        floats[:, -1] /= Weights().joint_prior  # its own weight is 50
+    b = solved(replace(SEEN, tables={built_in: (rows[0], floats)}))
+    assert_same(a, b, 1e-6)
+    assert a.cost_by_term[slow] > 1.0
+
+
+def test_the_python_residual_of_the_example_fits_as_its_kernel():
+    rows = np.array([[2], [5]]), np.array([[0.3, 1.0], [-0.4, 2.0]])
+    a, b = fitted("height", rows, 1e4), fitted("slow_height", rows, 1e4)
+    assert_same(a, b, 1e-6)
+    np.testing.assert_allclose(a.cost_by_term["height"], b.cost_by_term["slow_height"], rtol=1e-6)
+
+
+def test_the_cost_of_an_own_residual_is_what_its_equation_says():
+    rows = np.array([[3]]), np.array([[0.9, 2.0]])
+    found = fitted("height", rows, 500.0)
+    r = found.t_camera_part[3, 1] - 0.9
+    np.testing.assert_allclose(found.cost_by_term["height"], 0.5 * 500.0 * 2.0 * r * r, rtol=1e-9)
+    np.testing.assert_allclose(sum(found.cost_by_term.values()), found.cost, rtol=1e-9)
+
+
+def test_without_a_weight_it_is_one_and_zero_turns_it_off():
+    rows = np.array([[3]]), np.array([[0.9, 2.0]])
+    m = replace(SEEN, tables={"height": rows})
+    assert_same(solved(m), fitted("height", rows, 1.0), 1e-12)
+    assert_same(fitted("height", rows, 0.0), solved(SEEN), 1e-9)
+
+
+def test_a_clip_and_a_batch_know_it_too():
+    rows = np.array([[3]]), np.array([[0.9, 1.0]])
+    options = Options(stages=[Stage(Weights(tables={"height": 1e5}))], report=True)
+    m = replace(SEEN, tables={"height": rows})
+    single = fit(BODY, m, priors=Priors(), options=options)
+    for found in fit_batch(BODY, [m] * 40, priors=Priors(), options=options, threads=2):
+        np.testing.assert_array_equal(found.t_camera_part, single.t_camera_part)
+    clip = fit_clip(BODY, [m, m], priors=Priors(), options=options)
+    assert clip.cost_by_term["height"] > 0.0
+    assert abs(clip.frames[1].t_camera_part[3, 1] - 0.9) < abs(forward_height(3) - 0.9)
+
+
+def forward_height(part):
+    return forward(BODY, R0, T0, OMEGA, BETA)[1][part, 1]
+
+
+def test_derivatives_by_differences_are_those_of_the_equation():
+    """A residual linear in everything, whose derivatives are known; the part's origin moves with the shape."""
+    rng = np.random.default_rng(5)
+    part = Part(
+        rotations.exp(rng.standard_normal(3)), rng.standard_normal(3), rng.standard_normal((3, P)),
+        rotations.exp(rng.standard_normal(3)), rotations.exp(rng.standard_normal(3)), rng.standard_normal(3),
+        rng.standard_normal(P),
+    )  # fmt: skip
+    found = numeric.differentiate(lambda p: np.concatenate([p.t, p.beta, rotations.log(p.Omega @ part.Omega.T)]), part)
+    e = part.t - part.origin
+    np.testing.assert_allclose(found.J_x[:3], np.hstack([-rotations.hat(e), np.eye(3)]), atol=1e-8)
+    np.testing.assert_allclose(found.J_beta[:3], part.D, atol=1e-8)
+    np.testing.assert_allclose(found.J_beta[3 : 3 + P], np.eye(P), atol=1e-8)
+    np.testing.assert_allclose(found.J_u[3 + P :], part.R_parent.T, atol=1e-8)
+    assert not found.J_u[:3].any()
+    assert not found.J_x[3:].any()
+
+
+def test_what_a_python_residual_raises_reaches_the_caller_once():
+    def broken(part, ints, floats):
+        raise KeyError("a mistake of the user's")
+
+    register_residual("broken", function=broken, floats=0)
+    m = replace(SEEN, tables={"broken": (np.array([[1]]), np.zeros((1, 0)))})
+    for attempt in (lambda: fit(BODY, m), lambda: fit_clip(BODY, [m]), lambda: fit_batch(BODY, [m])):
+        with pytest.raises(InvalidValueError, match="residual 'broken' raised KeyError: \"a mistake of the user's"):
+            attempt()
+    assert fit(BODY, SEEN).status is Status.CONVERGED
+
+
+@pytest.mark.parametrize(
+    ("returned", "message"),
+    [("text", "must return numbers"), (1.0, r"shape \(n,\), but returned shape \(\)"), ([np.nan], "finite numbers")],
+)
+def test_what_a_python_residual_must_return_is_said(returned, message):
+    register_residual("broken", function=lambda part, ints, floats: returned)
+    m = replace(SEEN, tables={"broken": (np.array([[1]]), np.zeros((1, 1)))})
+    with pytest.raises(InvalidValueError, match=message):
+        fit(BODY, m)
+
+
+def test_a_kernel_that_does_not_compile_is_refused():
+    def wrong(tree, ints, floats, weight, inv_sigma, triggs, pose, blocks):
+        return tree.nothing_of_the_sort
+
+    register_residual("broken", kernel=wrong)
+    m = replace(SEEN, tables={"broken": (np.array([[1]]), np.zeros((1, 1)))})
+    with pytest.raises(InvalidValueError, match="kernel of residual 'broken' does not compile: .*nothing_of_the_sort"):
+        fit(BODY, m)
+
+
+def test_rows_that_do_not_fit_are_refused_as_the_solvers_own():
+    for part in (-1, K + 1):
+        with pytest.raises(ShapeError, match=rf"Parts of 'height' must lie in 0..{K}, but go from {part}"):
+            fitted("height", (np.array([[part]]), np.ones((1, 2))))
+    with pytest.raises(ShapeError, match=r"\(n, 1\) and \(n, 2\), but got \(1, 1\) and \(1, 3\)"):
+        fitted("height", (np.array([[1]]), np.ones((1, 3))))
+
+
+def test_an_unknown_name_is_answered_with_the_known_ones():
+    for make in (lambda: Weights(tables={"hight": 1.0}), lambda: fit(BODY, replace(SEEN, tables={"hight": ([], [])}))):
+        with pytest.raises(InvalidValueError, match="no residual named 'hight'; .* pose_prior, .* floor, height"):
+            make()
+
+
+def nothing(*_):
+    return 0.0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"name": "floor", "kernel": nothing}, "name other than .*floor.* but got 'floor'"),
+        ({"name": "keypoints2d", "kernel": nothing}, "name other than"),
+        ({"name": "", "kernel": nothing}, "name other than"),
+        ({"name": "mine"}, "either a kernel or a function"),
+        ({"name": "mine", "kernel": nothing, "function": nothing}, "either a kernel or a function"),
+        ({"name": "mine", "kernel": "nothing"}, "something to call"),
+        ({"name": "mine", "kernel": nothing, "ints": 0}, "ints of 'mine' must be a whole number from 1 on"),
+        ({"name": "mine", "kernel": nothing, "floats": 1.5}, "floats of 'mine' must be a whole number from 0 on"),
+        ({"name": "mine", "kernel": nothing, "indexes": "bones"}, "one of points, parts, joints, but is 'bones'"),
+        ({"name": "mine", "function": nothing, "indexes": "points"}, "one of parts, joints, but is 'points'"),
+    ],
+)
+def test_registrations_that_cannot_work_are_refused(arguments, message):
+    with pytest.raises(InvalidValueError, match=message):
+        register_residual(**arguments)
+
+
+def test_registering_again_replaces_and_other_threads_see_it():
+    rows = np.array([[3]]), np.array([[0.9, 1.0]])
+    register_residual("again", kernel=own_residual.accumulate, floats=2)
+    before = fitted("again", rows, 1e4)
+    register_residual("again", function=lambda part, ints, floats: part.t[1:2] - floats[0], floats=2)
+    after = []
+    thread = threading.Thread(target=lambda: after.append(fitted("again", rows, 1e4)))
+    thread.start()
+    thread.join()
+    assert_same(before, after[0], 1e-6)
+
+
+def test_the_solvers_machine_code_on_disk_stays_good():
+    """A first fit with an external residual finds `optimize` compiled by the sessions without it."""
+    code = """
+from scope.solver.examples import own_residual
+from scope.solver.gauss_newton.optimizer import optimize
+own_residual.main()
+assert sum(optimize.stats.cache_hits.values()) == 1 and not optimize.stats.cache_misses, optimize.stats
+"""
+    own_residual.main()
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
+def test_the_example_brings_the_hands_to_their_height():
+    before, after = own_residual.main()
+    assert after < 2.0
+    assert before > 5.0 * after

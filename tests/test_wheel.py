@@ -1,0 +1,136 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The wheel holds the product and nothing else, and its solver works beside numpy and numba alone."""
+
+import os
+import shutil
+import subprocess
+import sys
+import tomllib
+import venv
+import zipfile
+from importlib.util import find_spec
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+PRODUCT = ("solver", "scope_addon")
+DATA = {
+    "scope/assets/body/LICENSE.md",
+    "scope/assets/body/scope.npz",
+    "scope/assets/body/scope_h.npz",
+    "scope/assets/prior/README.md",
+    "scope/assets/prior/joint_prior.npz",
+}
+CAPTURE_MODULES = ("cv2", "onnxruntime", "av", "bpy")
+
+FIT = """
+import importlib.util, sys
+import numpy as np
+
+for name in {capture}:
+    assert importlib.util.find_spec(name) is None, name
+import scope
+from scope import solver
+
+assert scope.__file__.startswith(sys.prefix), scope.__file__
+assert solver.load_body("scope").K == 23 and solver.load_body("scope_h").K == 51
+assert "left_knee" in solver.load_joint_prior().names
+body = solver.load_body("scope")
+joints = body.rest_joints() * [1.0, -1.0, -1.0] + [0.0, 0.0, 3.0]
+seen = solver.Keypoints3D(len(body.keypoint_names) + np.arange(24), joints, np.ones(24))
+found = solver.fit(body, solver.Measurements(keypoints3d=seen))
+print(np.abs(found.t_camera_part - joints).max())
+"""
+
+
+def folders() -> set[str]:
+    """Every folder of the product that holds a module, as a package's path in the wheel."""
+    found = {path.parent for name in PRODUCT for path in (ROOT / name).rglob("*.py")}
+    return {f"scope/{folder.relative_to(ROOT).as_posix()}" for folder in found}
+
+
+@pytest.fixture(scope="session")
+def wheel(tmp_path_factory) -> Path:
+    """The wheel, built from a copy of what it is made of, so that nothing is written into the checkout."""
+    place = tmp_path_factory.mktemp("wheel")
+    source = place / "source"
+    ignored = shutil.ignore_patterns("__pycache__", "*.onnx", "pictures", "guide", "sample")
+    for name in (*PRODUCT, "assets", "tests", "tools", "benchmarks", "scripts"):
+        shutil.copytree(ROOT / name, source / name, ignore=ignored)
+    for name in ("__init__.py", "setup.py", "pyproject.toml", "README.md", "LICENSE", "THIRD_PARTY.md"):
+        shutil.copy(ROOT / name, source)
+    command = [sys.executable, "-m", "pip", "wheel", "--quiet", "--disable-pip-version-check", "--no-deps"]
+    command += ["--no-build-isolation", "--wheel-dir", str(place), str(source)]
+    built = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert built.returncode == 0, built.stderr
+    return next(place.glob("*.whl"))
+
+
+@pytest.fixture(scope="session")
+def installed(wheel, tmp_path_factory) -> Path:
+    """The Python of an environment that has the wheel, numpy, numba and llvmlite."""
+    place = tmp_path_factory.mktemp("environment")
+    venv.create(place, with_pip=False, symlinks=os.name != "nt")
+    packages = next(iter(place.rglob("site-packages")))
+    for name in ("numpy", "numba", "llvmlite"):
+        package = Path(find_spec(name).origin).parent
+        for folder in (package, package.with_name(f"{name}.libs")):  # where wheels keep their shared libraries
+            if folder.is_dir():
+                (packages / folder.name).symlink_to(folder, target_is_directory=True)
+    with zipfile.ZipFile(wheel) as archive:
+        archive.extractall(packages)
+    return next(path for path in (place / "bin" / "python", place / "Scripts" / "python.exe") if path.exists())
+
+
+def run(python: Path, *arguments: str) -> subprocess.CompletedProcess:
+    environment = {k: v for k, v in os.environ.items() if not k.startswith(("PYTHON", "COVERAGE"))}
+    command = [str(python), *arguments]
+    return subprocess.run(command, capture_output=True, text=True, check=False, cwd=python.parent, env=environment)
+
+
+def test_the_wheel_has_every_package_of_the_product_and_its_data(wheel):
+    with zipfile.ZipFile(wheel) as archive:
+        names = {name for name in archive.namelist() if ".dist-info/" not in name}
+    modules = {name for name in names if name.endswith(".py")}
+    assert {name.rpartition("/")[0] for name in modules} == folders() | {"scope"}
+    on_disk = {f"scope/{p.relative_to(ROOT).as_posix()}" for name in PRODUCT for p in (ROOT / name).rglob("*.py")}
+    assert modules == on_disk | {"scope/__init__.py"}
+    assert names - modules == DATA
+
+
+def test_every_folder_of_modules_is_a_package():
+    """Without its `__init__.py` a folder would be left out of the wheel, though it can be imported here."""
+    assert [f for f in sorted(folders()) if not (ROOT / f.removeprefix("scope/") / "__init__.py").is_file()] == []
+
+
+def test_the_wheel_asks_for_numpy_and_numba_alone(wheel):
+    with zipfile.ZipFile(wheel) as archive:
+        metadata = next(name for name in archive.namelist() if name.endswith(".dist-info/METADATA"))
+        lines = archive.read(metadata).decode().splitlines()
+    needed = [line.removeprefix("Requires-Dist: ") for line in lines if line.startswith("Requires-Dist: ")]
+    assert [name for name in needed if "extra ==" not in name] == ["numpy", "numba"]
+
+
+def test_the_extras_name_every_package_that_a_missing_module_asks_for():
+    from scope.scope_addon.installed import EXTRAS
+
+    extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
+    assert set(EXTRAS.values()) == set(extras)
+    assert set(EXTRAS) == set(CAPTURE_MODULES)
+
+
+def test_the_solver_fits_beside_numpy_and_numba_alone(installed):
+    """A body at rest, whose joints are known without the solver."""
+    done = run(installed, "-W", "error", "-c", FIT.format(capture=CAPTURE_MODULES))
+    assert done.returncode == 0, done.stderr
+    assert float(done.stdout) < 0.02
+
+
+@pytest.mark.parametrize("command", [["capture", "walk.mp4", "-o", "walk.npz"], ["batch", ".", "--out", "."]])
+def test_the_command_line_says_what_a_capture_still_needs(installed, command):
+    done = run(installed, "-m", "scope.scope_addon.cli", *command)
+    assert done.returncode == 1
+    assert done.stderr == (
+        "scope: cv2, onnxruntime, av must be installed for this: pip install 'scope-mocap[capture]'\n"
+    )
