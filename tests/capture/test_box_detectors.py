@@ -8,9 +8,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-pytest.importorskip("onnx", reason="the graphs are made with the build-time package onnx")
-
 from scope.scope_addon.capture.adapters.box_detector import BoxDetector
 from scope.scope_addon.capture.adapters.boxes import letterbox
 from scope.scope_addon.capture.adapters.yolox import cells

@@ -12,7 +12,7 @@ from scope.scope_addon import cli_options
 from scope.scope_addon.capture import networks
 from scope.scope_addon.capture.execution import CHOICES, CPU, PROVIDERS, Execution, OneAtATime
 from scope.scope_addon.capture.networks import network_path, open_session
-from scope.solver.errors import SetupError, UsageError
+from scope.solver.errors import UsageError
 
 CPU_NAME = "CPUExecutionProvider"
 
@@ -127,11 +127,9 @@ def test_the_command_line_offers_the_same() -> None:
     assert sorted(cli_options.PROVIDERS) == sorted(CHOICES)
 
 
+@pytest.mark.usefixtures("networks")
 def test_the_real_processor() -> None:
-    try:
-        path = network_path("pose_detection")
-    except SetupError as error:
-        pytest.skip(f"the networks are not built: {error}")
+    path = network_path("pose_detection")
     execution = Execution("tensorrt")
     session = open_session(path, 2, execution)
     if PROVIDERS["tensorrt"][0] in session.get_providers():

@@ -4,23 +4,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import numpy as np
 import pytest
 from scope.scope_addon.capture.observation import Observation
 from scope.scope_addon.capture.tracker import PeopleTracker
 from scope.scope_addon.capture.video import open_video
-from scope.solver.errors import SetupError, ShapeError
+from scope.solver.errors import ShapeError
 
 Frames = Callable[..., Iterator[np.ndarray]]
 
 
 @pytest.fixture(scope="module")
-def tracker_of_module() -> PeopleTracker:
-    try:
-        return PeopleTracker("fast", threads=2)
-    except SetupError as error:
-        pytest.skip(f"the networks are not built: {error}")
+def tracker_of_module(networks: Path) -> PeopleTracker:
+    return PeopleTracker("fast", threads=2)
 
 
 @pytest.fixture
