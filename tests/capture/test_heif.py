@@ -111,14 +111,17 @@ def test_damage_is_told_and_never_anything_else(tmp_path: Path) -> None:
         with pytest.raises(VideoError, match=r"a\.heic"):
             open_video(path)
     whole, rng = heic(slopes(64, 48), 32, focal_mm=26), np.random.default_rng(0)
-    boxes = whole.index(b"mdat")
+    boxes, refused = whole.index(b"mdat"), 0
     for _ in range(150):
         broken = bytearray(whole)
         for at in rng.integers(24, boxes, 3):
             broken[at] = rng.integers(256)
         path.write_bytes(broken)
         picture = read_picture(path)
-        assert picture is None or picture.rgb.ndim == 3
+        refused += picture is None
+        if picture is not None:  # harmless damage, or another turn
+            assert picture.rgb.shape in {(48, 64, 3), (64, 48, 3)}
+    assert 0 < refused < 150
 
 
 def patched(data: bytes, name: bytes, content: bytes) -> bytes:

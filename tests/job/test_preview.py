@@ -73,12 +73,18 @@ def test_a_full_disk_does_not_stop_the_capture(tmp_path, monkeypatch):
 
 def test_a_picture_that_is_being_read_does_not_stop_the_capture_at_its_end(tmp_path, monkeypatch):
     """Windows removes no file that somebody has open."""
+    told, refused = [], []
 
     def in_use(self, missing_ok=False):
+        refused.append(self)
         raise PermissionError(13, "it is being used by another process")
 
-    with PreviewWriter(tmp_path, lambda event, **values: None):
+    with PreviewWriter(tmp_path, lambda event, **values: told.append(event)) as writer:
+        writer(Frame(0, 0.0, np.zeros((10, 10, 3), np.uint8)), None, NotReady())
+        wait_for(lambda: told == ["preview"])
         monkeypatch.setattr(preview.Path, "unlink", in_use)
+    assert refused == [tmp_path / FILE]
+    assert (tmp_path / FILE).is_file()
 
 
 def test_a_body_that_cannot_be_fitted_gives_way_to_the_skeleton(tmp_path):
