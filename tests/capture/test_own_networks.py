@@ -108,9 +108,8 @@ def test_a_runner_is_followed_at_a_low_rate(own_networks: tuple[Path, Path], fra
 def test_who_walks_out_of_the_picture_is_let_go(own_networks: tuple[Path, Path], frames: Frames) -> None:
     """The woman on the grass leaves at the left edge between frames 195 and 207."""
     tracker, woman = PeopleTracker("fast", 2, people=2, keypoints=own_networks[1]), []
-    for index, image in enumerate(frames("clips/walk_side_static", stop=215)):
-        if index >= 185:
-            seen = tracker.step(image)
-            woman += [index for _, observation in seen if observation.keypoints_px[:, 0].mean() < 200]
+    for index, image in enumerate(frames("clips/walk_side_static", start=185, stop=215), 185):
+        seen = tracker.step(image)
+        woman += [index for _, observation in seen if observation.keypoints_px[:, 0].mean() < 200]
     assert len(woman) >= 10
     assert 195 <= woman[-1] <= 207

@@ -60,7 +60,7 @@ def test_the_worker_ends_when_its_parent_is_killed(folder):
     pid = int(parent.stdout.readline())
     assert runs(pid)
     parent.send_signal(signal.SIGKILL)
-    parent.wait()
+    parent.communicate()
     wait_for(lambda: not runs(pid))
     wait_for(lambda: not folder.exists())
 
