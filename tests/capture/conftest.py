@@ -15,7 +15,7 @@ Frames = Callable[..., Iterator[np.ndarray]]
 
 @pytest.fixture(scope="session")
 def frames(shared: Path) -> Frames:
-    """``frames("clips/NAME", stop=None, every=1, start=0)``: RGB frames in order, one of ``every`` from ``start`` on."""
+    """``frames("clips/NAME", stop=None, every=1, start=0)``: RGB frames in order, one of ``every`` from ``start``."""
 
     def read(name: str, stop: int | None = None, every: int = 1, start: int = 0) -> Iterator[np.ndarray]:
         video = cv2.VideoCapture(str(shared / "data" / f"{name}.mp4"))
