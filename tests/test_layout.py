@@ -37,7 +37,7 @@ def module_of(test: Path) -> Path | None:
     return None
 
 
-def test_files() -> list[Path]:
+def files_of_tests() -> list[Path]:
     return sorted(TESTS.rglob("test_*.py"))
 
 
@@ -49,7 +49,7 @@ def modules() -> list[Path]:
 
 @pytest.mark.xfail(reason="some test files have still to be moved and renamed", strict=False)
 def test_every_test_file_is_named_after_a_module():
-    files = test_files()
+    files = files_of_tests()
     assert len(files) > 50
     lost = [str(path.relative_to(TESTS)) for path in files if module_of(path) is None]
     assert sorted(set(lost) - set(CROSS_CUTTING)) == []
@@ -63,7 +63,7 @@ def test_no_listed_exception_is_stale():
 
 def test_modules_without_tests_of_their_own_are_reported(record_property):
     """Not a failure: some are tested through others. ``pytest --junitxml`` shows them."""
-    tested = {module_of(path) for path in test_files()}
+    tested = {module_of(path) for path in files_of_tests()}
     packages = {path.parent for path in tested if path is not None and path.name == "__init__.py"}
     without = [path for path in modules() if path not in tested and path.parent not in packages]
     record_property("modules_without_tests", [str(path.relative_to(ROOT)) for path in without])
