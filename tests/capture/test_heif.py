@@ -55,7 +55,7 @@ def test_pieces_become_the_picture(tmp_path: Path, tile: int | None, name: str) 
         ([("imir", 1)], lambda a: a[:, ::-1]),
         ([("imir", 1), ("irot", 1)], lambda a: a[:, ::-1].transpose(1, 0, 2)[::-1]),
     ],
-    ids=str,
+    ids=["left turn", "half turn", "right turn", "upside down", "mirrored", "mirrored, left turn"],
 )
 def test_turned_as_the_file_says(tmp_path: Path, turns: list, expected, tile: int | None) -> None:
     found = read(tmp_path / "a.heic", heic(slopes(), tile, turns))
