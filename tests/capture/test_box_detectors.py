@@ -163,4 +163,6 @@ def test_numbers_that_are_none_do_no_harm(tmp_path: Path, value: float) -> None:
     rows, person = yolox_rows(80)
     rows[50:60] = value
     detector = BoxDetector(fixed(tmp_path / "m.onnx", WIDTH, HEIGHT, {"output": rows[None]}), threads=1)
-    assert all(np.isfinite(found.score) for found in detector.detect(IMAGE))
+    scores = [found.score for found in detector.detect(IMAGE)]
+    assert len(scores) > 0  # the person, whom they do not hide
+    assert np.isfinite(scores).all()
