@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from .required import missing
+
 if TYPE_CHECKING:
     from scope.solver.body import Body
 
@@ -19,12 +21,25 @@ SHARED = ROOT.parent / "shared"
 
 @pytest.fixture(scope="session")
 def shared() -> Path:
-    """The folder of real clips and motion data that lies beside the checkout."""
-    if not (SHARED / "data").is_dir():
-        if os.environ.get("CI"):
-            pytest.fail(f"{SHARED}/data must be there in CI: the tests on real clips may not be skipped")
-        pytest.skip("../shared/data is not beside this checkout: the tests on real clips need it")
+    """The folder of real clips and motion data next to the checkout.
+
+    It is not public: a CI that cannot have it sets ``SCOPE_WITHOUT_SHARED``, and the tests on real clips are skipped.
+    """
+    if os.environ.get("SCOPE_WITHOUT_SHARED") or not (SHARED / "data").is_dir():
+        missing(f"the tests on real clips need {SHARED / 'data'}", allowed_by="SCOPE_WITHOUT_SHARED")
     return SHARED
+
+
+@pytest.fixture(scope="session")
+def networks() -> Path:
+    """The folder of the built pose networks."""
+    from scope.scope_addon.capture.perception.sessions import NETWORKS_FOLDER
+    from scope.tools.convert_networks.catalogue import NETWORKS
+
+    absent = [network.name for network in NETWORKS if not (NETWORKS_FOLDER / f"{network.name}.onnx").is_file()]
+    if absent:
+        missing(f"{NETWORKS_FOLDER} lacks {', '.join(absent)}; python -m scope.tools.convert_networks builds them")
+    return NETWORKS_FOLDER
 
 
 @pytest.fixture(scope="session")

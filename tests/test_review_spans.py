@@ -1,23 +1,21 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
+"""Which frames of a motion deserve a look, and why."""
+
 import sys
 from subprocess import run
-from types import SimpleNamespace
 
 import numpy as np
 from scope.scope_addon.review_spans import Span, body_confidence, low_confidence_spans
+from scope.solver.loaders.body_file import load_body
+
+from .made_motion import made_motion
 
 
 def motion(count: int = 30):
-    confidence = np.ones((count, 4))
-    confidence[:, 3] = 0.0  # a joint that nothing measures
-    return SimpleNamespace(
-        valid=np.ones(count, bool),
-        residual_px=np.full(count, 2.0),
-        image_size=np.array([640, 480]),
-        joint_confidence=confidence,
-        timestamps=np.arange(count) / 30.0,
-        __len__=lambda: count,
-    )
+    body = load_body("scope")
+    m = made_motion(body, np.zeros((count, 3 * (body.K + 1))), np.zeros((count, 3)), residual_px=np.full(count, 2.0))
+    m.joint_confidence[:, 3] = 0.0  # a joint that nothing measures
+    return m
 
 
 def test_a_good_motion_has_none():
@@ -28,7 +26,7 @@ def test_each_frame_has_one_reason():
     m = motion()
     m.valid[[0, 1, 29]] = False
     m.residual_px[:5] = 100.0
-    m.joint_confidence[:8, :3] = 0.1
+    m.joint_confidence[:8] *= 0.1
     expected = [Span("unseen", 0, 1), Span("unseen", 29, 29), Span("far", 2, 4), Span("unsure", 5, 7)]
     assert low_confidence_spans(m) == expected
 
@@ -41,6 +39,13 @@ def test_near_spans_become_one():
 
 def test_joints_that_nothing_measures_do_not_count():
     np.testing.assert_array_equal(body_confidence(motion()), 1.0)
+
+
+def test_a_body_of_which_nothing_is_measured_is_unsure_throughout():
+    m = motion()
+    m.joint_confidence[:] = 0.0
+    np.testing.assert_array_equal(body_confidence(m), np.zeros(30))
+    assert low_confidence_spans(m) == [Span("unsure", 0, 29)]
 
 
 def test_fingers_that_are_not_seen_leave_the_body_sure():

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import cv2
@@ -12,6 +13,7 @@ import numpy as np
 FPS = 60  # of the clips
 
 
+@cache
 def panels(shared: Path, camera: str) -> tuple[list[np.ndarray], np.ndarray]:
     """The middle of a clip, 500 pixels high, and the true middle of the trunk in each frame, (100, 2) pixels."""
     truth = np.load(shared / f"data/pose2sim/truth_{camera}.npz")

@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 
@@ -14,18 +15,18 @@ Frames = Callable[..., Iterator[np.ndarray]]
 
 @pytest.fixture(scope="session")
 def frames(shared: Path) -> Frames:
-    """``frames("clips/NAME", stop=None, every=1)``: RGB frames in order."""
-    cv2 = pytest.importorskip("cv2")
+    """``frames("clips/NAME", stop=None, every=1, start=0)``: RGB frames in order, one of ``every`` from ``start``."""
 
-    def read(name: str, stop: int | None = None, every: int = 1) -> Iterator[np.ndarray]:
+    def read(name: str, stop: int | None = None, every: int = 1, start: int = 0) -> Iterator[np.ndarray]:
         video = cv2.VideoCapture(str(shared / "data" / f"{name}.mp4"))
         index = 0
         while stop is None or index < stop:
-            ok, image = video.read()
-            if not ok:
+            if not video.grab():
                 assert index, f"{name} cannot be read"
                 return
-            if index % every == 0:
+            if index >= start and (index - start) % every == 0:  # the others are decoded, but not converted
+                ok, image = video.retrieve()
+                assert ok
                 yield np.ascontiguousarray(image[:, :, ::-1])
             index += 1
 
@@ -35,7 +36,7 @@ def frames(shared: Path) -> Frames:
 @pytest.fixture(scope="session")
 def first_frame(frames: Frames) -> Callable[..., np.ndarray]:
     """``first_frame("clips/NAME", skip=0)``."""
-    return lambda name, skip=0: list(frames(name, stop=skip + 1))[-1]
+    return lambda name, skip=0: next(frames(name, start=skip))
 
 
 @pytest.fixture(scope="session")

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -17,7 +18,13 @@ def wait_for(condition: Callable[[], object], timeout_s: float = 300.0) -> None:
 
 
 def runs(pid: int) -> bool:
-    """Whether a process exists and is not a zombie that nobody waited for."""
+    """Whether a process exists and, where /proc tells, is not a zombie that nobody waited for."""
+    if not Path("/proc/self").exists():  # macOS
+        try:
+            os.kill(pid, 0)
+        except ProcessLookupError:
+            return False
+        return True
     try:
         return Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0] != "Z"
     except OSError:

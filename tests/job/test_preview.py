@@ -74,12 +74,18 @@ def test_a_full_disk_does_not_stop_the_capture(tmp_path, monkeypatch):
 
 def test_a_picture_that_is_being_read_does_not_stop_the_capture_at_its_end(tmp_path, monkeypatch):
     """Windows removes no file that somebody has open."""
+    told, refused = [], []
 
     def in_use(self, missing_ok=False):
+        refused.append(self)
         raise PermissionError(13, "it is being used by another process")
 
-    with PreviewWriter(tmp_path, lambda event, **values: None):
+    with PreviewWriter(tmp_path, lambda event, **values: told.append(event)) as writer:
+        writer(Frame(0, 0.0, np.zeros((10, 10, 3), np.uint8)), None, NotReady())
+        wait_for(lambda: told == ["preview"])
         monkeypatch.setattr(preview.Path, "unlink", in_use)
+    assert refused == [tmp_path / FILE]
+    assert (tmp_path / FILE).is_file()
 
 
 def test_a_body_that_cannot_be_fitted_gives_way_to_the_skeleton(tmp_path):
@@ -92,8 +98,12 @@ def test_a_body_that_cannot_be_fitted_gives_way_to_the_skeleton(tmp_path):
     told = []
     with PreviewWriter(tmp_path, lambda event, **values: told.append(event)) as writer:
         writer._rasterizer.result()
-        writer(Frame(0, 0.0, np.zeros((50, 50, 3), np.uint8)), observation(np.full((33, 2), 20.0)), Broken())
+        image, seen = np.zeros((50, 50, 3), np.uint8), observation(np.linspace([5.0, 5.0], [45.0, 40.0], 33))
+        writer(Frame(0, 0.0, image), seen, Broken())
         wait_for(lambda: told == ["preview"])
+        shown = np.frombuffer((tmp_path / FILE).read_bytes(), np.uint8).reshape(LONGER_SIDE, LONGER_SIDE, 4)
+    np.testing.assert_array_equal(shown[::-1], draw(image, seen))
+    assert shown[..., :3].max() > 200
 
 
 def test_pictures_do_not_wait_for_a_rasterizer_that_compiles(tmp_path, monkeypatch):

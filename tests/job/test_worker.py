@@ -60,7 +60,7 @@ def test_the_worker_ends_when_its_parent_is_killed(folder):
     pid = int(parent.stdout.readline())
     assert runs(pid)
     parent.send_signal(signal.SIGKILL)
-    parent.wait()
+    parent.communicate()
     wait_for(lambda: not runs(pid))
     wait_for(lambda: not folder.exists())
 
@@ -157,7 +157,6 @@ def test_keys_tell_what_changes_the_result(tmp_path):
     clip.write_bytes(b"x" * 99 + b"y")
     os.utime(clip, ns=(status.st_atime_ns, status.st_mtime_ns))
     assert request.key("1") != key
-    assert code_version(ROOT) == code_version(ROOT)
 
 
 def test_the_program_is_another_one_when_anything_changes_that_decides_the_result(tmp_path):

@@ -6,6 +6,7 @@ from __future__ import annotations
 import os
 import tempfile
 from dataclasses import dataclass
+from pathlib import Path
 
 # Blender reads this once, when bpy is first imported: tests must not write in the home folder.
 os.environ["BLENDER_USER_RESOURCES"] = tempfile.mkdtemp(prefix="scope-tests-blender-")
@@ -168,14 +169,30 @@ def joints_world():
     return joints
 
 
-@pytest.fixture
-def rigify_rigs() -> list[tuple[bpy.types.Object, str]]:
-    """Rigify's metarig and the rig generated from it, each with what its deforming bones' names begin with."""
+@pytest.fixture(scope="session")
+def rigify_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A file with Rigify's metarig and the rig generated from it, which takes seconds."""
     import addon_utils  # bpy puts it on the path
 
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     addon_utils.enable("rigify", default_set=True)
     bpy.ops.object.armature_human_metarig_add()
-    metarig = bpy.context.object
     bpy.ops.pose.rigify_generate()
-    generated = next(o for o in bpy.context.scene.objects if o.type == "ARMATURE" and "torso" in o.data.bones)
+    path = tmp_path_factory.mktemp("rigify") / "rigs.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    return path
+
+
+@pytest.fixture
+def rigify_rigs(rigify_file: Path) -> list[tuple[bpy.types.Object, str]]:
+    """Rigify's metarig and the rig generated from it, each with what its deforming bones' names begin with."""
+    with bpy.data.libraries.load(str(rigify_file)) as (found, wanted):
+        wanted.scenes = found.scenes
+    (scene,) = wanted.scenes
+    rigs = [o for o in scene.objects if o.type == "ARMATURE"]
+    for rig in rigs:
+        bpy.context.scene.collection.objects.link(rig)
+    bpy.data.scenes.remove(scene)
+    metarig = next(o for o in rigs if "torso" not in o.data.bones)
+    generated = next(o for o in rigs if "torso" in o.data.bones)
     return [(metarig, ""), (generated, "ORG-")]

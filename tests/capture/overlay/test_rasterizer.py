@@ -134,7 +134,7 @@ def test_nothing_behind_the_camera_or_not_a_number_is_drawn():
 
 @pytest.mark.parametrize("dist", [[-0.25, 0.06, 0.002, -0.001, 0.0], [0.3], [0.1, -0.05, 0.0, 0.0, 0.01]])
 def test_distortion_agrees_with_opencv(dist):
-    rng = np.random.default_rng(5)
+    rng, inside = np.random.default_rng(5), 0
     for _ in range(30):
         center = rng.uniform([-0.9, -0.6, 2.5], [0.9, 0.6, 3.0])
         canvas = Canvas.blank(WIDTH, HEIGHT)
@@ -143,7 +143,9 @@ def test_distortion_agrees_with_opencv(dist):
         pixel = cv2.projectPoints(center[None], np.zeros(3), np.zeros(3), K, lens)[0]
         v, u = np.nonzero(canvas.coverage)
         if 3 < pixel[0, 0, 0] < WIDTH - 4 and 3 < pixel[0, 0, 1] < HEIGHT - 4:
+            inside += 1
             assert np.linalg.norm([u.mean() - pixel[0, 0, 0], v.mean() - pixel[0, 0, 1]]) < 0.5
+    assert inside > 10
 
 
 def test_points_far_outside_the_picture_do_not_fold_back_with_barrel_distortion():

@@ -11,7 +11,7 @@ import pytest
 from scope.scope_addon.capture.perception import sessions
 from scope.scope_addon.capture.perception.execution import CHOICES, CPU, PROVIDERS, Execution, OneAtATime
 from scope.scope_addon.capture.perception.sessions import network_path, open_session
-from scope.scope_addon.errors import SetupError, UsageError
+from scope.scope_addon.errors import UsageError
 from scope.scope_addon.options import option
 
 CPU_NAME = "CPUExecutionProvider"
@@ -127,11 +127,9 @@ def test_the_command_line_offers_the_same() -> None:
     assert sorted(option("provider").values) == sorted(CHOICES)
 
 
+@pytest.mark.usefixtures("networks")
 def test_the_real_processor() -> None:
-    try:
-        path = network_path("pose_detection")
-    except SetupError as error:
-        pytest.skip(f"the networks are not built: {error}")
+    path = network_path("pose_detection")
     execution = Execution("tensorrt")
     session = open_session(path, 2, execution)
     if PROVIDERS["tensorrt"][0] in session.get_providers():

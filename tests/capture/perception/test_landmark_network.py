@@ -13,7 +13,7 @@ from scope.scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES
 from scope.scope_addon.capture.perception.person_detector import PersonDetector
 from scope.scope_addon.capture.perception.region import Region
 from scope.scope_addon.capture.perception.sessions import landmark_network_name
-from scope.scope_addon.errors import SetupError, UsageError
+from scope.scope_addon.errors import UsageError
 
 TRUTH_NAMES = {
     "LShoulder": "left_shoulder", "RShoulder": "right_shoulder", "LElbow": "left_elbow", "RElbow": "right_elbow",
@@ -23,11 +23,8 @@ TRUTH_NAMES = {
 
 
 @pytest.fixture(scope="module")
-def network() -> LandmarkNetwork:
-    try:
-        return LandmarkNetwork(landmark_network_name("best"), threads=1)
-    except SetupError as error:
-        pytest.skip(f"the networks are not built: {error}")
+def network(networks: Path) -> LandmarkNetwork:
+    return LandmarkNetwork(landmark_network_name("best"), threads=1)
 
 
 def raw_outputs() -> tuple[np.ndarray, np.ndarray, np.ndarray]:

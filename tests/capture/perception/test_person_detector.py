@@ -22,11 +22,8 @@ from scope.solver.errors import ModelFileError
 
 
 @pytest.fixture(scope="module")
-def detector() -> PersonDetector:
-    try:
-        return PersonDetector(threads=1)
-    except SetupError as error:
-        pytest.skip(f"the networks are not built: {error}")
+def detector(networks: Path) -> PersonDetector:
+    return PersonDetector(threads=1)
 
 
 def test_anchors_are_cell_centres_in_layer_order() -> None:

@@ -12,7 +12,6 @@ import pytest
 from scope.scope_addon.capture.options import CaptureOptions
 from scope.scope_addon.capture.pipeline import capture
 from scope.scope_addon.capture.tracking.scene_cuts import SceneCuts
-from scope.scope_addon.errors import SetupError
 from scope.solver import Body
 
 W, H = 320, 180
@@ -51,6 +50,7 @@ def test_what_is_no_cut(frames: list[np.ndarray]) -> None:
     assert cuts(frames) == []
 
 
+@pytest.mark.usefixtures("networks")
 def test_what_follows_a_cut_is_captured_for_itself(shared: Path, body: Body, tmp_path: Path) -> None:
     """A man from two sides, one after the other: told, and on him up to the cut and from it on."""
     clip = tmp_path / "two.mp4"
@@ -62,10 +62,7 @@ def test_what_follows_a_cut_is_captured_for_itself(shared: Path, body: Body, tmp
             if k % 2 == 0:
                 writer.write(cv2.resize(picture, (540, 960), interpolation=cv2.INTER_AREA))
     writer.release()
-    try:
-        found = capture(clip, body, CaptureOptions(quality="fast"))
-    except SetupError as error:
-        pytest.skip(f"the networks are not built: {error}")
+    found = capture(clip, body, CaptureOptions(quality="fast"))
     (motion,) = found.motions
     assert found.report["cuts_s"] == [pytest.approx(25 / 30, abs=1e-3)]
     assert any("two.mp4 cuts to another scene at 0.8 s" in text for text in found.report["warnings"])

@@ -4,24 +4,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import numpy as np
 import pytest
-from scope.scope_addon.capture.media.video import open_video
 from scope.scope_addon.capture.perception.observation import Observation
 from scope.scope_addon.capture.tracking.tracker import PeopleTracker
-from scope.scope_addon.errors import SetupError
 from scope.solver.errors import ShapeError
 
 Frames = Callable[..., Iterator[np.ndarray]]
 
 
 @pytest.fixture(scope="module")
-def tracker_of_module() -> PeopleTracker:
-    try:
-        return PeopleTracker("fast", threads=2)
-    except SetupError as error:
-        pytest.skip(f"the networks are not built: {error}")
+def tracker_of_module(networks: Path) -> PeopleTracker:
+    return PeopleTracker("fast", threads=2)
 
 
 @pytest.fixture
@@ -93,17 +89,13 @@ def test_odd_images(tracker: PeopleTracker) -> None:
         tracker.step(np.zeros((5, 5), np.uint8))
 
 
-def test_a_somersault_is_followed_all_the_way_round(shared):
+def test_a_somersault_is_followed_all_the_way_round(frames: Frames) -> None:
     """The man turns over once in the air, against the sun, between frames 165 and 183."""
     tracker, seen = PeopleTracker("best", threads=2), {}
-    with open_video(shared / "data/clips/walk_side_static.mp4") as video:
-        for frame in video:
-            if frame.index > 186:
-                break
-            if frame.index >= 100:
-                for tracklet, observation in tracker.step(frame.image_rgb):
-                    if observation.keypoints_px[:, 1].mean() < 600:  # the man in the air, not the woman on the grass
-                        seen.setdefault(tracklet, {})[frame.index] = observation
+    for index, image in enumerate(frames("clips/walk_side_static", start=100, stop=187), 100):
+        for tracklet, observation in tracker.step(image):
+            if observation.keypoints_px[:, 1].mean() < 600:  # the man in the air, not the woman on the grass
+                seen.setdefault(tracklet, {})[index] = observation
     (man,) = (track for track in seen.values() if 165 in track)
     assert set(range(150, 187)) <= set(man)
     head_above_hips = {k: o.keypoints_px[[23, 24], 1].mean() - o.keypoints_px[0, 1] for k, o in man.items()}
@@ -112,17 +104,15 @@ def test_a_somersault_is_followed_all_the_way_round(shared):
     assert head_above_hips[186] > 0
 
 
-def test_who_walks_out_of_the_picture_is_gone(shared):
+def test_who_walks_out_of_the_picture_is_gone(frames: Frames) -> None:
     """The woman on the grass leaves at the left edge between frames 195 and 207, and nothing comes in her stead.
 
     The man runs behind a tree between frames 223 and 229, and is not seen in its bark.
     """
     tracker, seen = PeopleTracker("best", 2, 2), {}
-    with open_video(shared / "data/clips/walk_side_static.mp4") as video:
-        for frame in video:
-            if frame.index >= 185:
-                for tracklet, _ in tracker.step(frame.image_rgb):
-                    seen.setdefault(tracklet, []).append(frame.index)
+    for index, image in enumerate(frames("clips/walk_side_static", start=185), 185):
+        for tracklet, _ in tracker.step(image):
+            seen.setdefault(tracklet, []).append(index)
     # somebody is a person from a third of a second on
     lasting = sorted((frames for frames in seen.values() if len(frames) >= 10), key=lambda frames: frames[-1])
     woman, man = lasting

@@ -316,6 +316,7 @@ def test_a_loop_is_exported_alone(rig, tmp_path, suffix):
     bpy.context.scene.render.fps = int(RATE)
     operators = {"glb": bpy.ops.import_scene.gltf, "fbx": bpy.ops.import_scene.fbx, "bvh": bpy.ops.import_anim.bvh}
     operators[suffix](filepath=path)
+    assert len(bpy.data.actions) > 0
     for action in bpy.data.actions:
         assert action.frame_range[1] - action.frame_range[0] == pytest.approx(length, abs=0.01)
         assert suffix != "glb" or action.frame_range[0] == 0  # players begin there

@@ -49,15 +49,20 @@ class Graph:
         self.path = path
         self._session = open_session(path, threads, execution)
         inputs = self._session.get_inputs()
+        try:
+            names, shapes = [i.name for i in inputs], [i.shape for i in inputs]
+            self.names = [output.name for output in self._session.get_outputs()]
+        except UnicodeDecodeError as error:
+            raise ModelFileError(f"{path} has a name that is not UTF-8 text ({error}); export it again") from error
         if len(inputs) != 1:
-            names = ", ".join(i.name for i in inputs)
-            raise ModelFileError(f"{path} takes {len(inputs)} inputs ({names}); only graphs that take one picture do")
-        self._name = inputs[0].name
+            raise ModelFileError(
+                f"{path} takes {len(inputs)} inputs ({', '.join(names)}); only graphs that take one picture do"
+            )
+        self._name = names[0]
         if inputs[0].type not in _TYPES:
             raise ModelFileError(f"{path} takes {inputs[0].type}; only pictures of {', '.join(_TYPES)} can be given")
         self._type = _TYPES[inputs[0].type]
-        self._channels_last, self.width, self.height = self._input_layout(inputs[0].shape, said)
-        self.names = [output.name for output in self._session.get_outputs()]
+        self._channels_last, self.width, self.height = self._input_layout(shapes[0], said)
         self.trial = self.run(np.full((self.height, self.width, 3), 114, np.uint8), UNIT)
 
     @property

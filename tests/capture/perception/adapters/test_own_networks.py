@@ -11,15 +11,11 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-
-pytest.importorskip("onnx", reason="the graphs are made with the build-time package onnx")
-
 from scope.scope_addon.capture.media.video_range import VideoRange
-from scope.scope_addon.capture.options import CaptureOptions
-from scope.scope_addon.capture.pipeline import Capture, capture
+from scope.scope_addon.capture.pipeline import Capture, CaptureOptions, capture
 from scope.scope_addon.capture.tracking.tracker import PeopleTracker
 from scope.scope_addon.cli import SAMPLE
-from scope.scope_addon.errors import NoPersonError, SetupError
+from scope.scope_addon.errors import NoPersonError
 from scope.solver.loaders.body_file import load_body
 
 from ...small_graphs import fixed
@@ -29,12 +25,10 @@ Frames = Callable[..., Iterator[np.ndarray]]
 
 
 @pytest.fixture(scope="module")
-def networks(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+def own_networks(networks: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    """A detector and a keypoint network as a user brings them."""
     folder = tmp_path_factory.mktemp("networks")
-    try:
-        return box_rows(folder / "detector.onnx"), coco_simcc(folder / "keypoints.onnx")
-    except SetupError as error:
-        pytest.skip(f"the networks are not built: {error}")
+    return box_rows(folder / "detector.onnx"), coco_simcc(folder / "keypoints.onnx")
 
 
 def captured(detector: Path | None = None, keypoints: Path | None = None) -> Capture:
@@ -44,9 +38,9 @@ def captured(detector: Path | None = None, keypoints: Path | None = None) -> Cap
     return capture(SAMPLE, load_body("scope"), options)
 
 
-def test_a_capture_with_both_is_as_good_as_ours(networks: tuple[Path, Path]) -> None:
-    ours, theirs = captured(), captured(*networks)
-    assert theirs.report["detector"] == str(networks[0])
+def test_a_capture_with_both_is_as_good_as_ours(own_networks: tuple[Path, Path]) -> None:
+    ours, theirs = captured(), captured(*own_networks)
+    assert theirs.report["detector"] == str(own_networks[0])
     assert theirs.report["execution"] == "CPU, 2 threads"
     motion = theirs.motions[0]
     assert motion.valid.all()
@@ -65,10 +59,10 @@ def test_a_network_that_sees_nobody_is_named(tmp_path: Path) -> None:
         captured(detector=blind)
 
 
-def test_lost_and_found_again(networks: tuple[Path, Path]) -> None:
+def test_lost_and_found_again(own_networks: tuple[Path, Path]) -> None:
     video = cv2.VideoCapture(str(SAMPLE))
     images = [np.ascontiguousarray(video.read()[1][:, :, ::-1]) for _ in range(6)]
-    tracker = PeopleTracker("fast", 2, detector=networks[0], keypoints=networks[1])
+    tracker = PeopleTracker("fast", 2, detector=own_networks[0], keypoints=own_networks[1])
     before = [tracker.step(image) for image in images[:3]]
     assert [tracker.step(np.zeros_like(images[0])) for _ in range(3)] == [[]] * 3
     after = [tracker.step(image) for image in images[3:]]
@@ -92,17 +86,17 @@ def test_left_and_right_of_a_plugged_in_network_are_repaired(shared: Path, tmp_p
     assert figures["mpjpe_root"] < 90
 
 
-def test_two_people_stay_themselves(networks: tuple[Path, Path], frames: Frames) -> None:
-    tracker = PeopleTracker("fast", 2, people=4, detector=networks[0], keypoints=networks[1])
+def test_two_people_stay_themselves(own_networks: tuple[Path, Path], frames: Frames) -> None:
+    tracker = PeopleTracker("fast", 2, people=4, detector=own_networks[0], keypoints=own_networks[1])
     for image in frames("clips/two_people_portrait", stop=24):
         seen = dict(tracker.step(image))
         assert sorted(seen) == [0, 1]
     assert abs(seen[0].region.center_px[0] - seen[1].region.center_px[0]) > 200
 
 
-def test_a_runner_is_followed_at_a_low_rate(networks: tuple[Path, Path], frames: Frames) -> None:
+def test_a_runner_is_followed_at_a_low_rate(own_networks: tuple[Path, Path], frames: Frames) -> None:
     """Without auxiliary points to go by: at 7.5 frames a second, every limb stays in the region that was foretold."""
-    tracker, numbers = PeopleTracker("fast", 2, detector=networks[0], keypoints=networks[1]), set()
+    tracker, numbers = PeopleTracker("fast", 2, detector=own_networks[0], keypoints=own_networks[1]), set()
     for image in frames("clips/run_moving_camera", every=4):
         ((number, seen),) = tracker.step(image)
         numbers.add(number)
@@ -111,12 +105,11 @@ def test_a_runner_is_followed_at_a_low_rate(networks: tuple[Path, Path], frames:
     assert numbers == {0}
 
 
-def test_who_walks_out_of_the_picture_is_let_go(networks: tuple[Path, Path], frames: Frames) -> None:
+def test_who_walks_out_of_the_picture_is_let_go(own_networks: tuple[Path, Path], frames: Frames) -> None:
     """The woman on the grass leaves at the left edge between frames 195 and 207."""
-    tracker, woman = PeopleTracker("fast", 2, people=2, keypoints=networks[1]), []
-    for index, image in enumerate(frames("clips/walk_side_static", stop=215)):
-        if index >= 185:
-            seen = tracker.step(image)
-            woman += [index for _, observation in seen if observation.keypoints_px[:, 0].mean() < 200]
+    tracker, woman = PeopleTracker("fast", 2, people=2, keypoints=own_networks[1]), []
+    for index, image in enumerate(frames("clips/walk_side_static", start=185, stop=215), 185):
+        seen = tracker.step(image)
+        woman += [index for _, observation in seen if observation.keypoints_px[:, 0].mean() < 200]
     assert len(woman) >= 10
     assert 195 <= woman[-1] <= 207

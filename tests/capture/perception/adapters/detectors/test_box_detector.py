@@ -8,9 +8,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-pytest.importorskip("onnx", reason="the graphs are made with the build-time package onnx")
-
 from scope.scope_addon.capture.perception.adapters.detectors.box_detector import BoxDetector
 from scope.scope_addon.capture.perception.adapters.detectors.boxes import letterbox
 from scope.scope_addon.capture.perception.adapters.detectors.yolox import cells
@@ -166,4 +163,6 @@ def test_numbers_that_are_none_do_no_harm(tmp_path: Path, value: float) -> None:
     rows, person = yolox_rows(80)
     rows[50:60] = value
     detector = BoxDetector(fixed(tmp_path / "m.onnx", WIDTH, HEIGHT, {"output": rows[None]}), threads=1)
-    assert all(np.isfinite(found.score) for found in detector.detect(IMAGE))
+    scores = [found.score for found in detector.detect(IMAGE)]
+    assert len(scores) > 0  # the person, whom they do not hide
+    assert np.isfinite(scores).all()

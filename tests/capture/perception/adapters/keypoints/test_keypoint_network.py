@@ -10,9 +10,6 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-
-pytest.importorskip("onnx", reason="the graphs are made with the build-time package onnx")
-
 from scope.scope_addon.capture.perception.adapters.keypoint_sets import COCO_17, KEYPOINT_SETS
 from scope.scope_addon.capture.perception.adapters.keypoints.keypoint_network import KeypointNetwork
 from scope.scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES
