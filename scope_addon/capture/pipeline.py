@@ -38,9 +38,9 @@ from .perception.execution import AUTO, Execution
 from .perception.observation import Observation
 from .perception.sessions import landmark_network_name
 from .tracking.hand_tracker import HandTracker
-from .tracking.keypoint_jumps import mend_leaps
+from .tracking.keypoint_jumps import repair_keypoint_jumps
 from .tracking.left_right import repair_left_right
-from .tracking.limb_swap import repair_limbs
+from .tracking.limb_swap import repair_limb_swaps
 from .tracking.people import PeopleBuilder
 from .tracking.scene_cuts import SceneCuts
 from .tracking.track import Track
@@ -373,8 +373,8 @@ def solve(
 def _repaired(track: Track, camera: Camera, parts: Parts) -> Track:
     """The track without what the networks are known to get wrong for a while."""
     if parts.left_right:
-        track = repair_limbs(repair_left_right(track, camera))
-    return mend_leaps(track) if parts.leaps else track
+        track = repair_limb_swaps(repair_left_right(track, camera))
+    return repair_keypoint_jumps(track) if parts.leaps else track
 
 
 def _about_person(body: Body, motion: Motion) -> dict:

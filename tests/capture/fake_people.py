@@ -111,9 +111,9 @@ class FakeLandmarks:
         place = person.place(t) if seen else np.asarray(region.center_px)
         body = person.body(t)
         if t in person.swapped and not self.right:
-            from scope.scope_addon.capture.tracking.left_right import SWAPPED
+            from scope.scope_addon.capture.tracking.left_right import MIRROR_PARTNER
 
-            body = body[SWAPPED]
+            body = body[MIRROR_PARTNER]
         there = Region((float(place[0]), float(place[1])), 2.5 * person.size_px, 0.0)
         return PoseEstimate(
             keypoints_px=place + body[:, :2] * person.size_px,

@@ -46,6 +46,6 @@ def track_without_depth(pixels: np.ndarray, rate: float, judged: dict[int, np.nd
         confidence=np.tile(np.where(np.arange(33) % 2 == 0, 0.9, 0.8), (count, 1)),
         world_landmarks=np.zeros((count, 33, 3)),
         acquired=np.arange(count) == 0,
-        judged_rows=np.array(list(judged), np.int64),
-        judged_landmarks=np.array(list(judged.values())).reshape(-1, 33, 3),
+        reference_rows=np.array(list(judged), np.int64),
+        reference_landmarks=np.array(list(judged.values())).reshape(-1, 33, 3),
     )

@@ -39,7 +39,7 @@ def find_bars(image_rgb: np.ndarray) -> list[np.ndarray]:
     return bars
 
 
-def longer_side_between(bars: list[np.ndarray], width: int, height: int) -> float:
+def longer_content_side(bars: list[np.ndarray], width: int, height: int) -> float:
     """The longer side of what a picture of this size has between its bars."""
     thick = np.array([bar[2:] - bar[:2] for bar in bars]).reshape(-1, 2)
     upright = thick[:, 1] == height

@@ -25,7 +25,7 @@ from ....solver.rotations import exp, log
 from ...kinematics.smoothing import fill_rotation_gaps
 from ..perception.region import inside, surroundings
 from .bars import find_bars
-from .heading_drift import LOOK_SIDE_PX, LOOKS_EVERY_S, Look, without_drift
+from .heading_drift import LOOK_SIDE_PX, LOOKS_EVERY_S, Look, remove_heading_drift
 from .intrinsics import Camera
 from .line_segments import Lines, Segments, find_segments
 
@@ -144,11 +144,11 @@ class BackgroundTracker:
             filled[late] = R[b] @ exp((times[late] - times[b])[:, None] * rate)
         R = filled[0].T @ filled
         if self._agreeing and np.mean(self._agreeing) < TRAVELLING_SHARE:
-            R = without_drift(R, times, self._looks, camera, *self._full_size)
+            R = remove_heading_drift(R, times, self._looks, camera, *self._full_size)
         return CameraMotion(R, known)
 
     @property
-    def has_looked(self) -> bool:
+    def has_searched_edges(self) -> bool:
         """Whether somebody was seen, and with that, straight edges were looked for."""
         return bool(self._looks)
 

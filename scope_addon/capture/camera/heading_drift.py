@@ -23,7 +23,7 @@ from ....solver.rotations import exp, log
 from ...kinematics.smoothing import gaussian_smooth
 from .intrinsics import Camera
 from .line_segments import Lines, Segments
-from .manhattan import Edges, line_pull
+from .manhattan import Edges, line_normal_equations
 
 LOOKS_EVERY_S = 0.5
 LOOK_SIDE_PX = 640  # the longer side of the picture in looks after the first one: half the time, as right
@@ -44,7 +44,7 @@ class Look:
     segments: Segments
 
 
-def without_drift(
+def remove_heading_drift(
     R_first_camera: np.ndarray, times: np.ndarray, looks: Sequence[Look], camera: Camera, width: int, height: int
 ) -> np.ndarray:
     """(T, 3, 3) the camera's axes in the first frame's, corrected where the looks agree on three directions.
@@ -82,6 +82,6 @@ def _drift(lines: Lines, axes: np.ndarray, start: np.ndarray) -> tuple[np.ndarra
     E = start.T
     supports: np.ndarray = np.zeros(3)
     for sigma in NARROWING:
-        H, g, supports = line_pull(lines, axes @ E.T, sigma)
+        H, g, supports = line_normal_equations(lines, axes @ E.T, sigma)
         E = exp(np.linalg.solve(H + 1e-3 * np.eye(3), g)) @ E
     return E.T, supports

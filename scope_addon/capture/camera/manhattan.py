@@ -7,7 +7,7 @@ directions explain an edge i if one of the three points lies along it, within an
     score(f) = max over u, h of Σ_i w_i max_d exp(−sin² ∠_i / 2 s²)
 
 w_i the edge's length in sides of the picture. Angles are those in the picture, since those between planes through the
-camera's centre shrink when f grows. Where f is known, such planes are simpler (`line_pull`): with unit normals n_i,
+camera's centre shrink when f grows. Where f is known, such planes are simpler (`line_normal_equations`): with unit normals n_i,
 edges along d have n_i·d = 0.
 
 Source: Coughlan and Yuille 2003.
@@ -124,7 +124,7 @@ def meeting_directions(normals: np.ndarray, up: np.ndarray) -> np.ndarray:
     return v[v @ up > np.cos(LARGEST_TILT)]
 
 
-def line_pull(
+def line_normal_equations(
     lines: Lines, directions: np.ndarray, sigma: float, worth: np.ndarray | float = 1.0
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """What lines ask of a small turn ω of three directions, each line of the direction that is nearest to it.

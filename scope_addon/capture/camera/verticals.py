@@ -8,7 +8,7 @@ With u_0 what the body says is up, up u and two level directions h and u × h, a
 
 w_i the line's length in sides of the picture. Lines that agree by chance are more often level than upright, where two
 directions are to choose from. Directions around u_0 are tried, the best of them refined, each line then counted of the
-direction that is nearest to it (`line_pull`). Nothing is said where three directions would explain as much of lines
+direction that is nearest to it (`line_normal_equations`). Nothing is said where three directions would explain as much of lines
 drawn at random, or where too little that is upright is to be seen, unless both level directions are, and no other ones
 do nearly as well: then they tell what is upright to both.
 
@@ -25,7 +25,7 @@ import numpy as np
 
 from ....solver.rotations import exp
 from .line_segments import Lines
-from .manhattan import NEARLY, line_pull
+from .manhattan import NEARLY, line_normal_equations
 
 LARGEST_LEAN = np.radians(35.0)  # between what the body says and what lines may say
 BODY_SIGMA = np.radians(10.0)
@@ -46,7 +46,7 @@ LARGEST_SLOPE = np.radians(15.0)  # of level edges, by what the body says is up:
 
 
 @dataclass(frozen=True)
-class Told:
+class UpEstimate:
     """What lines say. Where ``up`` is not clear, ``level`` may be right nevertheless: up may still turn about it."""
 
     up: np.ndarray | None = None  # (3,) the upright direction
@@ -60,10 +60,10 @@ class _Axes:
     score: float
 
 
-def told_by_lines(lines: Lines, up: np.ndarray) -> Told:
+def estimate_up_from_lines(lines: Lines, up: np.ndarray) -> UpEstimate:
     """What lines say of up and level, near ``up``, what the body says; None for what they do not say."""
     if not len(lines.lengths):
-        return Told()
+        return UpEstimate()
     lines = Lines(lines.normals[:MOST_LINES], lines.lengths[:MOST_LINES])
     tried = sorted((_about(u, lines, up) for u in _around(up)), key=lambda scored: -scored[0])[:REFINED]
     best, *others = sorted((_refined(axes, lines, up) for _, axes in tried), key=lambda axes: -axes.score)
@@ -71,13 +71,13 @@ def told_by_lines(lines: Lines, up: np.ndarray) -> Told:
     count = np.square(lines.lengths.sum()) / np.square(lines.lengths).sum()
     found = best.directions[0]
     if share < CHANCE_SHARE + CHANCE_SIGMAS / np.sqrt(count) or found @ up < np.cos(LARGEST_LEAN):
-        return Told()
+        return UpEstimate()
     second = max((o.score for o in others if o.directions[0] @ found < np.cos(OTHER)), default=-np.inf)
     is_clear = best.supports[1:].min() >= LEAST_LEVEL and best.score - second > LEAST_MARGIN
     which = 1 + int(best.supports[1:].argmax())
     level = best.directions[which]
     is_level = best.supports[which] >= LEAST_LEVEL and abs(level @ up) < np.sin(LARGEST_SLOPE)
-    return Told(found if best.supports[0] >= LEAST_UPRIGHT or is_clear else None, level if is_level else None)
+    return UpEstimate(found if best.supports[0] >= LEAST_UPRIGHT or is_clear else None, level if is_level else None)
 
 
 def _around(up: np.ndarray) -> np.ndarray:
@@ -105,12 +105,12 @@ def _about(u: np.ndarray, lines: Lines, up: np.ndarray) -> tuple[float, np.ndarr
 
 def _refined(directions: np.ndarray, lines: Lines, up: np.ndarray) -> _Axes:
     for _ in range(STEPS):
-        H, g, _ = line_pull(lines, directions, NEARLY, WORTH)
+        H, g, _ = line_normal_equations(lines, directions, NEARLY, WORTH)
         u = directions[0]
         H = KAPPA / NEARLY**2 * H + (np.eye(3) - np.outer(u, u)) / BODY_SIGMA**2 + 1e-9 * np.eye(3)
         g = KAPPA / NEARLY**2 * g + np.cross(u, up) / BODY_SIGMA**2
         directions = directions @ exp(np.linalg.solve(H, g)).T
-    supports = line_pull(lines, directions, NEARLY)[2]
+    supports = line_normal_equations(lines, directions, NEARLY)[2]
     return _Axes(directions, supports, _score(float(WORTH @ supports), directions[0], up))
 
 

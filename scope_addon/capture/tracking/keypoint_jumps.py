@@ -29,13 +29,13 @@ SPREAD_M = 0.5  # root mean square distance of a standing adult's limbs from the
 SPREAD_S = 1.0  # people who bend for a moment do not shrink
 
 
-def mend_leaps(track: Track) -> Track:
+def repair_keypoint_jumps(track: Track) -> Track:
     """The track with leaping keypoints and landmarks moved onto the straight way, see above."""
     if len(track) < 3:
         return track
     step_s = float(np.median(np.diff(track.times)))
-    in_picture = find_leaps(track.keypoints_px / metre_px(track)[:, None, None], track.seen, step_s)
-    in_space = in_picture | find_leaps(track.world_landmarks, track.seen, step_s)
+    in_picture = find_keypoint_jumps(track.keypoints_px / scale_px_per_m(track)[:, None, None], track.seen, step_s)
+    in_space = in_picture | find_keypoint_jumps(track.world_landmarks, track.seen, step_s)
     if not in_space.any():
         return track
     return replace(
@@ -46,7 +46,7 @@ def mend_leaps(track: Track) -> Track:
     )
 
 
-def find_leaps(points: np.ndarray, seen: np.ndarray, step_s: float) -> np.ndarray:
+def find_keypoint_jumps(points: np.ndarray, seen: np.ndarray, step_s: float) -> np.ndarray:
     """(T, J) which points (T, J, n), metres, leap; those seen without a gap from the frame before to the one after.
 
     They stray by more than the two are apart: what goes elsewhere and stays there does not leap.
@@ -68,7 +68,7 @@ def find_leaps(points: np.ndarray, seen: np.ndarray, step_s: float) -> np.ndarra
     return leaps
 
 
-def metre_px(track: Track) -> np.ndarray:
+def scale_px_per_m(track: Track) -> np.ndarray:
     """(T,) pixels that a metre takes at the person's distance, roughly."""
     size = np.where(track.seen, person_size(track.keypoints_px), 0.0)
     near = round(SPREAD_S / max(float(np.median(np.diff(track.times))), 1e-3)) if len(track) > 1 else 0

@@ -26,7 +26,7 @@ from ..perception.lifter import our_lifter
 from .track import Track
 
 _PARTNERS = {"left": "right", "right": "left"}
-SWAPPED = np.array(
+MIRROR_PARTNER = np.array(
     [KEYPOINT_NAMES.index("_".join(_PARTNERS.get(word, word) for word in name.split("_"))) for name in KEYPOINT_NAMES]
 )
 """(33,) number of each keypoint's mirror partner (of the nose: itself)."""
@@ -46,30 +46,30 @@ M_PER_CONFIDENCE = 0.3
 FAR_APART_M = 0.12
 REACH_S = 0.13
 
-AS_SAID, EXCHANGED, TURNED = 0, 1, 2  # TURNED: exchanged, and the depth reversed: the front taken for the back
+AS_DETECTED, LEFT_RIGHT_SWAPPED, TURNED = 0, 1, 2  # TURNED: exchanged, and the depth reversed: the front taken for the back
 
 
 def repair_left_right(track: Track, camera: Camera) -> Track:
     """The track with left and right (and depth) as `find_labels` finds them, and corrected by the judged frames."""
     judged = None
-    if len(track.judged_rows):
+    if len(track.reference_rows):
         judged = np.full(track.world_landmarks.shape, np.nan, np.float32)
-        judged[track.judged_rows] = track.judged_landmarks
-    if not track.knows_depth:
-        return exchanged(track, _find_lifted_labels(track, camera, judged) != AS_SAID)
+        judged[track.reference_rows] = track.reference_landmarks
+    if not track.has_depth:
+        return exchanged(track, _find_lifted_labels(track, camera, judged) != AS_DETECTED)
     world = np.where(track.seen[:, None, None], track.world_landmarks, np.nan)
     labels = find_labels(world, track.acquired, judged, FRAME_COST_UNJUDGED_M if judged is None else FRAME_COST_M)
     del judged
-    if not (labels != AS_SAID).any() and not len(track.judged_rows):
+    if not (labels != AS_DETECTED).any() and not len(track.reference_rows):
         return track
     repaired = labelled(world, labels)
     repaired += _pull(repaired, track)
     return replace(
-        exchanged(track, labels != AS_SAID), world_landmarks=np.where(track.seen[:, None, None], repaired, 0.0)
+        exchanged(track, labels != AS_DETECTED), world_landmarks=np.where(track.seen[:, None, None], repaired, 0.0)
     )
 
 
-def exchanged(track: Track, where: np.ndarray, order: np.ndarray = SWAPPED, *, with_hands: bool = True) -> Track:
+def exchanged(track: Track, where: np.ndarray, order: np.ndarray = MIRROR_PARTNER, *, with_hands: bool = True) -> Track:
     """The track with keypoints in another order in the frames ``where`` (T,) says so, and the hands exchanged.
 
     :param order: (33,) which keypoint each one is.
@@ -92,7 +92,7 @@ def reordered(values: np.ndarray, where: np.ndarray, order: np.ndarray) -> np.nd
 
 def labelled(world_landmarks: np.ndarray, labels: np.ndarray) -> np.ndarray:
     """World landmarks (T, 33, 3) with the labels (T,) of `find_labels` applied."""
-    out = reordered(world_landmarks, labels != AS_SAID, SWAPPED)
+    out = reordered(world_landmarks, labels != AS_DETECTED, MIRROR_PARTNER)
     out[labels == TURNED] *= [1.0, 1.0, -1.0]
     return out
 
@@ -100,7 +100,7 @@ def labelled(world_landmarks: np.ndarray, labels: np.ndarray) -> np.ndarray:
 def looks_swapped(before: PoseEstimate, after: PoseEstimate) -> bool:
     """Whether the bodies of two successive frames lie closer with left and right exchanged in one of them."""
     a, b = _body(before), _body(after)
-    return bool(_distance(a[SWAPPED], b) < _distance(a, b))
+    return bool(_distance(a[MIRROR_PARTNER], b) < _distance(a, b))
 
 
 def _body(estimate: PoseEstimate) -> np.ndarray:
@@ -116,7 +116,7 @@ def find_labels(
     judged: np.ndarray | None = None,
     frame_cost_m: float = FRAME_COST_M,
 ) -> np.ndarray:
-    """How each frame's landmarks should be read, (T,) int: AS_SAID, EXCHANGED or TURNED.
+    """How each frame's landmarks should be read, (T,) int: AS_DETECTED, LEFT_RIGHT_SWAPPED or TURNED.
 
     The labels x_t with the least
 
@@ -131,7 +131,7 @@ def find_labels(
     :param judged: (T, 33, 3) the same as a better network sees it; rows of NaN where it did not look.
     """
     known = np.isfinite(world_landmarks[:, _LIMBS]).all(axis=(1, 2))
-    exchanged = world_landmarks[known][:, SWAPPED[_LIMBS]]
+    exchanged = world_landmarks[known][:, MIRROR_PARTNER[_LIMBS]]
     turned = exchanged * np.array([1, 1, -1], exchanged.dtype)
     readings = np.stack([world_landmarks[known][:, _LIMBS], exchanged, turned])
     costs = np.array([0.0, frame_cost_m, frame_cost_m + TURN_COST_M])
@@ -139,14 +139,14 @@ def find_labels(
 
 
 def _find_lifted_labels(track: Track, camera: Camera, judged: np.ndarray | None) -> np.ndarray:
-    """Labels, (T,) AS_SAID or EXCHANGED, of a track without depth: those of `find_labels` for the lifted bodies.
+    """Labels, (T,) AS_DETECTED or LEFT_RIGHT_SWAPPED, of a track without depth: those of `find_labels` for the lifted bodies.
 
     The lifting network may move one reading less than the other, which says nothing: the mean counts. The confidences
     count beside the positions.
     """
     rays, lifter = camera.rays(track.keypoints_px)[..., :2], our_lifter()
     readings = []
-    for order in (np.arange(len(SWAPPED)), SWAPPED):
+    for order in (np.arange(len(MIRROR_PARTNER)), MIRROR_PARTNER):
         body = lifter.lift(rays[:, order], track.confidence[:, order], None).points
         sureness = M_PER_CONFIDENCE * track.confidence[:, order, None]
         readings.append(np.concatenate([body, sureness], axis=-1)[track.seen][:, _LIMBS].astype(np.float32))
@@ -165,7 +165,7 @@ def _cheapest(
     starts: np.ndarray | None,
     judged: np.ndarray | None,
 ) -> np.ndarray:
-    """(T,) labels of least cost, see `find_labels`; AS_SAID in frames that are not ``known`` (T,).
+    """(T,) labels of least cost, see `find_labels`; AS_DETECTED in frames that are not ``known`` (T,).
 
     :param readings: (n, N, 12, 3 or more: what else is compared) the limbs in the N known frames, by label.
     :param steps: (N−1, n, n) what it costs that one label follows another.  own_cost: (n,) of each label, per frame.
@@ -177,7 +177,7 @@ def _cheapest(
     if judged is not None:
         far = _apart(readings[..., :3], judged[known][:, _LIMBS]).T
         costs += np.where(np.isfinite(far), far, 0.0)
-    labels = np.full(len(known), AS_SAID)
+    labels = np.full(len(known), AS_DETECTED)
     labels[known] = cheapest_path(costs, switching)
     return labels
 
@@ -194,7 +194,7 @@ def _pull(world: np.ndarray, track: Track) -> np.ndarray:
     """
     judged = {
         int(row): landmarks
-        for row, landmarks in zip(track.judged_rows, track.judged_landmarks, strict=True)
+        for row, landmarks in zip(track.reference_rows, track.reference_landmarks, strict=True)
         if track.seen[row]
     }
     # at a low frame rate it would only make its own frame jump

@@ -26,8 +26,8 @@ import numpy as np
 
 from ...kinematics.viterbi import cheapest_path
 from ..perception.landmark_network import KEYPOINT_NAMES
-from .keypoint_jumps import metre_px
-from .left_right import SWAPPED, exchanged, reordered
+from .keypoint_jumps import scale_px_per_m
+from .left_right import MIRROR_PARTNER, exchanged, reordered
 from .track import Track
 
 SIGMA_M, SIGMA_M_S = 0.02, 0.35  # σ₀ and σ₁: of what a limb does against expectation
@@ -59,10 +59,10 @@ LEGS = _Limbs(_numbers("knee", "ankle"), _numbers("hip"), _numbers("knee", "ankl
 ARMS = _Limbs(_numbers("elbow", "wrist"), _numbers("shoulder"), _numbers("elbow", "wrist", "pinky", "index", "thumb"))
 
 
-def repair_limbs(track: Track) -> Track:
-    """The track with legs and arms exchanged where `find_exchanged` says so; hands go with the arms."""
+def repair_limb_swaps(track: Track) -> Track:
+    """The track with legs and arms exchanged where `find_limb_swaps` says so; hands go with the arms."""
     for limbs in (LEGS, ARMS):
-        where = find_exchanged(track, limbs)
+        where = find_limb_swaps(track, limbs)
         if where.any():
             track = _exchange(track, limbs, where)
     return track
@@ -70,14 +70,14 @@ def repair_limbs(track: Track) -> Track:
 
 def _exchange(track: Track, limbs: _Limbs, where: np.ndarray) -> Track:
     order = np.arange(len(KEYPOINT_NAMES))
-    order[limbs.all_points] = SWAPPED[limbs.all_points]
+    order[limbs.all_points] = MIRROR_PARTNER[limbs.all_points]
     track = exchanged(track, where, order, with_hands=limbs is ARMS)
-    if not track.knows_depth:
+    if not track.has_depth:
         return track
     return replace(track, world_landmarks=reordered(track.world_landmarks, where, order))
 
 
-def find_exchanged(track: Track, limbs: _Limbs) -> np.ndarray:
+def find_limb_swaps(track: Track, limbs: _Limbs) -> np.ndarray:
     """(T,) bool, where left and right of these limbs have to be exchanged: see the module's equation."""
     where = np.zeros(len(track), bool)
     rows = np.flatnonzero(track.seen)
@@ -97,12 +97,12 @@ def _places(track: Track, limbs: _Limbs) -> tuple[np.ndarray, np.ndarray]:
     def from_anchor(points: np.ndarray) -> np.ndarray:
         return points[:, limbs.joints] - points[:, limbs.anchors].mean(axis=1, keepdims=True)
 
-    deep = 3 if track.knows_depth else 2
-    in_picture = from_anchor(track.keypoints_px) / metre_px(track)[:, None, None]
+    deep = 3 if track.has_depth else 2
+    in_picture = from_anchor(track.keypoints_px) / scale_px_per_m(track)[:, None, None]
     in_space = from_anchor(track.world_landmarks)[..., 2:deep]
     sureness = M_PER_CONFIDENCE * track.confidence[:, limbs.joints, None]
     judged = np.full((len(track), 4, deep), np.nan)
-    judged[track.judged_rows] = from_anchor(track.judged_landmarks)[..., :deep]
+    judged[track.reference_rows] = from_anchor(track.reference_landmarks)[..., :deep]
     return np.concatenate([in_picture, in_space, sureness], axis=-1), judged
 
 

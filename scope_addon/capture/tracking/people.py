@@ -9,7 +9,7 @@ import numpy as np
 
 from ..perception.observation import Observation
 from .association import link
-from .scene_cuts import BETWEEN_SCENES_S
+from .scene_cuts import SCENE_GAP_S
 from .track import Track, Tracklet, make_track
 
 SHORTEST_SHARE = 0.02  # seen in fewer frames than this, a "person" is a mistake of the detector
@@ -44,7 +44,7 @@ class PeopleBuilder:
 
         The tracks' times say so; ``timestamps`` do not.
         """
-        self._away_s += BETWEEN_SCENES_S
+        self._away_s += SCENE_GAP_S
 
     def __len__(self) -> int:
         return len(self._frames)

@@ -19,7 +19,7 @@ TIMES_USUAL = 4.0
 LASTS = 0.7  # of the difference that is left a frame later
 LATE = 15  # frames that say what is usual
 PLAIN = 8.0  # deviation within a picture that shows nothing
-BETWEEN_SCENES_S = 10.0  # added to a track's times at a cut, so that nothing is drawn from one scene into the next
+SCENE_GAP_S = 10.0  # added to a track's times at a cut, so that nothing is drawn from one scene into the next
 
 
 class SceneCuts:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ..perception.landmark_network import KEYPOINT_COUNT
-from ..perception.observation import Judgement, Observation
+from ..perception.observation import PendingReference, Observation
 from .appearance import SIZE as APPEARANCE_SIZE
 
 
@@ -25,8 +25,8 @@ class Track:
     world_landmarks: np.ndarray  # (T, 33, 3) metres, hip-centred, axes of the camera; all 0: unknown
     acquired: np.ndarray  # (T,) the person was not followed from the frame before, but found (again) in this one
     # The strong network's world landmarks, in few frames: rows (A,) and (A, 33, 3). See `left_right`.
-    judged_rows: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int64))
-    judged_landmarks: np.ndarray = field(default_factory=lambda: np.zeros((0, KEYPOINT_COUNT, 3)))
+    reference_rows: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int64))
+    reference_landmarks: np.ndarray = field(default_factory=lambda: np.zeros((0, KEYPOINT_COUNT, 3)))
     # (T, 2, 21, 6) pixels, confidence, world landmarks of the left and right hand; None: they were not looked for.
     hands: np.ndarray | None = None
 
@@ -34,14 +34,14 @@ class Track:
         return len(self.frames)
 
     @property
-    def knows_depth(self) -> bool:
+    def has_depth(self) -> bool:
         """Whether the landmark network told depth; a user's keypoint network does not."""
         return bool(self.world_landmarks.any())
 
     def without_depth(self) -> Track:
         """The same, the world landmarks forgotten: of an hour they take 43 MB."""
         nothing = np.broadcast_to(np.float32(0.0), self.world_landmarks.shape)
-        return replace(self, world_landmarks=nothing, judged_rows=self.judged_rows[:0], judged_landmarks=nothing[:0])
+        return replace(self, world_landmarks=nothing, reference_rows=self.reference_rows[:0], reference_landmarks=nothing[:0])
 
 
 @dataclass
@@ -53,7 +53,7 @@ class Tracklet:
     centers_px: list[np.ndarray] = field(default_factory=list)  # (2,) middle of the trunk
     sides_px: list[float] = field(default_factory=list)  # of the region
     appearance: np.ndarray = field(default_factory=lambda: np.zeros(APPEARANCE_SIZE))  # sum over the frames
-    judged: list[tuple[int, Judgement]] = field(default_factory=list)
+    judged: list[tuple[int, PendingReference]] = field(default_factory=list)
     hands: list[np.ndarray] = field(default_factory=list)  # (2, 21, 6) each; none when they are not looked for
 
     def add(self, row: int, observation: Observation) -> None:
@@ -68,8 +68,8 @@ class Tracklet:
         self.sides_px.append(o.region.side_px)
         if o.appearance is not None:
             self.appearance = self.appearance + o.appearance
-        if o.judged_landmarks is not None:
-            self.judged.append((row, o.judged_landmarks))
+        if o.reference_landmarks is not None:
+            self.judged.append((row, o.reference_landmarks))
         if o.hands is not None:
             self.hands.append(np.where(np.isfinite(o.hands), o.hands, 0.0).astype(np.float32))
 
@@ -112,14 +112,14 @@ def make_track(frames: Sequence[int], times: Sequence[float], tracklets: Sequenc
         confidence=confidence[..., 0],
         world_landmarks=world,
         acquired=acquired,
-        judged_rows=np.array([row for row, _ in judged], np.int64),
-        judged_landmarks=np.array([w for _, w in judged], float).reshape(-1, KEYPOINT_COUNT, 3),
+        reference_rows=np.array([row for row, _ in judged], np.int64),
+        reference_landmarks=np.array([w for _, w in judged], float).reshape(-1, KEYPOINT_COUNT, 3),
         hands=hands,
     )
 
 
-def track_of_one(observation: Observation) -> Track:
+def single_frame_track(observation: Observation) -> Track:
     """A track of one frame, without the judgement, which may still be awaited, and without fingers."""
     tracklet = Tracklet()
-    tracklet.add(0, replace(observation, judged_landmarks=None, hands=None))
+    tracklet.add(0, replace(observation, reference_landmarks=None, hands=None))
     return make_track([0], [0.0], [tracklet])

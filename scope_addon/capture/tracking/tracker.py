@@ -23,7 +23,7 @@ from ..perception.adapters.detectors.box_detector import BoxDetector
 from ..perception.adapters.keypoints.keypoint_network import KeypointNetwork
 from ..perception.execution import Execution
 from ..perception.landmark_network import LandmarkNetwork, PoseEstimate
-from ..perception.observation import Judgement, Observation
+from ..perception.observation import PendingReference, Observation
 from ..perception.person_detector import Detection, PersonDetector
 from ..perception.region import Region, bounds, inside
 from ..perception.sessions import landmark_network_name
@@ -110,7 +110,7 @@ class PeopleTracker:
             self._landmarks = LandmarkNetwork(name, threads, folder, execution)
             if name != strongest:
                 self._judge = LandmarkNetwork(strongest, 1, folder, execution)
-        self._judging: list[Judgement] = []
+        self._judging: list[PendingReference] = []
         self._judges = ThreadPoolExecutor(1, "scope-judge")
         self._begins_early = not keypoints
         self._looks_ahead = self._begins_early and self._judge is None
@@ -386,7 +386,7 @@ class PeopleTracker:
         followed.lost, followed.foreseen = 1, None
         self._lost.append(followed)
 
-    def _ask_judge(self, image_rgb: np.ndarray) -> dict[int, Judgement]:
+    def _ask_judge(self, image_rgb: np.ndarray) -> dict[int, PendingReference]:
         """World landmarks of the strong network, by tracklet, for those whose left and right are due or in doubt.
 
         Nothing here waits for them, so it looks in a thread of its own, beside the next frames.
@@ -412,7 +412,7 @@ class PeopleTracker:
         (estimate,) = self._judge.estimate(image_rgb, [region])
         return estimate.world_landmarks if believable(estimate) else None
 
-    def _observe(self, image_rgb: np.ndarray, followed: Followed, judged: Judgement | None) -> Observation:
+    def _observe(self, image_rgb: np.ndarray, followed: Followed, judged: PendingReference | None) -> Observation:
         e = followed.estimate
         look = self._has_passed(APPEARANCE_S, followed.followed_s - followed.clothes_s)
         if look:
@@ -425,7 +425,7 @@ class PeopleTracker:
             e.region,
             acquired=followed.age == 0,
             appearance=appearance(image_rgb, e.keypoints_px) if look else None,
-            judged_landmarks=judged,
+            reference_landmarks=judged,
         )
 
     def _look(self, image_rgb: np.ndarray, regions: list[Region], sure: bool = True) -> list[PoseEstimate | None]:

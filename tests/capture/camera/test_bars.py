@@ -6,7 +6,7 @@ from fractions import Fraction
 import cv2
 import numpy as np
 import pytest
-from scope.scope_addon.capture.camera.bars import find_bars, longer_side_between
+from scope.scope_addon.capture.camera.bars import find_bars, longer_content_side
 from scope.scope_addon.capture.camera.camera_rotation import BackgroundTracker
 from scope.scope_addon.capture.camera.intrinsics import choose_camera
 from scope.scope_addon.capture.camera.line_segments import Segments, find_segments
@@ -37,7 +37,7 @@ def test_bars_are_found(sides: tuple[int, int, int, int]) -> None:
     expected[top : HEIGHT - bottom, left : WIDTH - right] = True
     assert (inside == expected).mean() > 0.995
     longer = max(WIDTH - left - right, HEIGHT - top - bottom)
-    assert longer_side_between(bars, WIDTH, HEIGHT) == pytest.approx(longer, abs=4)
+    assert longer_content_side(bars, WIDTH, HEIGHT) == pytest.approx(longer, abs=4)
 
 
 @pytest.mark.parametrize("upright", [False, True])
@@ -54,7 +54,7 @@ def test_bars_of_other_kinds_are_found(kind: str, upright: bool) -> None:
     bars = find_bars(cv2.imdecode(cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, 80])[1], cv2.IMREAD_COLOR))
     sizes = [bar[[3, 2]] if upright else bar[[2, 3]] for bar in bars]
     assert sizes[0][0] == pytest.approx(330, abs=2)
-    assert longer_side_between(bars, *picture.shape[1::-1]) == pytest.approx(540)
+    assert longer_content_side(bars, *picture.shape[1::-1]) == pytest.approx(540)
 
 
 @pytest.mark.parametrize("detail", [40, 0], ids=["a pattern on the wall", "a plain wall, a door off the middle"])
@@ -79,7 +79,7 @@ def test_a_door_frame_is_no_picture_between_bars(detail: int) -> None:
 )
 def test_other_pictures_have_none(picture: np.ndarray) -> None:
     assert find_bars(picture) == []
-    assert longer_side_between([], WIDTH, HEIGHT) == WIDTH
+    assert longer_content_side([], WIDTH, HEIGHT) == WIDTH
 
 
 def test_somebody_in_a_spotlight_is_no_picture_between_bars() -> None:

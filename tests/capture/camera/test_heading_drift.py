@@ -3,7 +3,7 @@
 
 import numpy as np
 import pytest
-from scope.scope_addon.capture.camera.heading_drift import Look, without_drift
+from scope.scope_addon.capture.camera.heading_drift import Look, remove_heading_drift
 from scope.scope_addon.capture.camera.intrinsics import Camera, pinhole
 from scope.scope_addon.capture.camera.line_segments import Segments
 from scope.scope_addon.capture.pipeline import CaptureOptions, capture
@@ -46,7 +46,7 @@ def run(clutter, directions=None):
     looks = [
         Look(k, seen(rng, ends, truth[k].T @ hall, np.array([4.0 * k / T, 0, 0]))) for k in (0, *range(12, T, 12))
     ]
-    found = without_drift(drifted, times, looks, CAMERA, WIDTH, HEIGHT)
+    found = remove_heading_drift(drifted, times, looks, CAMERA, WIDTH, HEIGHT)
     error = [np.degrees(np.linalg.norm(log(np.swapaxes(truth, 1, 2) @ R), axis=1)).max() for R in (drifted, found)]
     np.testing.assert_allclose(found[0], np.eye(3), atol=1e-9)
     return error, found, drifted
@@ -68,9 +68,9 @@ def test_edges_in_any_direction_change_nothing():
 def test_few_looks_change_nothing():
     R = exp(np.linspace(0, 0.3, 10)[:, None] * [0, 1.0, 0])
     times = np.arange(10) / 25
-    assert without_drift(R, times, [], CAMERA, WIDTH, HEIGHT) is R
+    assert remove_heading_drift(R, times, [], CAMERA, WIDTH, HEIGHT) is R
     none = [Look(k, Segments.none()) for k in (0, 4, 8)]
-    assert without_drift(R, times, none, CAMERA, WIDTH, HEIGHT) is R
+    assert remove_heading_drift(R, times, none, CAMERA, WIDTH, HEIGHT) is R
 
 
 def test_a_runner_beside_whom_the_camera_runs_goes_straight_on(shared):

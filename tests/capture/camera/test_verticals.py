@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scope.scope_addon.capture.camera.intrinsics import Camera, choose_camera, pinhole
 from scope.scope_addon.capture.camera.line_segments import Lines, Segments, find_segments
-from scope.scope_addon.capture.camera.verticals import told_by_lines
+from scope.scope_addon.capture.camera.verticals import estimate_up_from_lines
 from scope.scope_addon.capture.world.world_frame import upright
 from scope.solver.rotations import exp
 
@@ -54,7 +54,7 @@ def test_posts_correct_a_body_that_leans(turn):
     truth = R @ LEVEL_UP
     lines = find_segments(room(R, clutter=25), []).lines(CAMERA)
     leaning = exp([0.12, 0.0, 0.15]) @ truth
-    found = told_by_lines(lines, leaning).up
+    found = estimate_up_from_lines(lines, leaning).up
     assert angle_deg(leaning, truth) > 9
     assert angle_deg(found, truth) < 1.0
 
@@ -65,14 +65,14 @@ def test_a_tiled_floor_tells_up_without_anything_upright(turn):
     truth = R @ LEVEL_UP
     picture = room(R, posts=0, across=0, tiles=8, clutter=10)
     leaning = exp([0.12, 0.0, 0.15]) @ truth
-    assert angle_deg(told_by_lines(find_segments(picture, []).lines(CAMERA), leaning).up, truth) < 1.0
+    assert angle_deg(estimate_up_from_lines(find_segments(picture, []).lines(CAMERA), leaning).up, truth) < 1.0
 
 
 def test_a_body_that_leans_by_thirty_degrees_is_corrected():
     """As bodies seem to before a camera that looks down steeply."""
     truth = LEVEL_UP
     lines = find_segments(room(np.eye(3), tiles=4), []).lines(CAMERA)
-    assert angle_deg(told_by_lines(lines, exp([np.radians(30), 0.0, 0.0]) @ truth).up, truth) < 1.0
+    assert angle_deg(estimate_up_from_lines(lines, exp([np.radians(30), 0.0, 0.0]) @ truth).up, truth) < 1.0
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -92,9 +92,9 @@ def test_a_ramp_beside_a_floor_leaves_open_which_is_level(seed):
     along = {name: edges(R @ np.cross(up, [1.0, 0, 0]), 16) for name, up in up_of.items()}
     for name, up in up_of.items():
         normals = np.concatenate([across, along[name]])
-        assert angle_deg(told_by_lines(Lines(normals, np.full(len(normals), 0.1)), R @ between).up, R @ up) < 1.0
+        assert angle_deg(estimate_up_from_lines(Lines(normals, np.full(len(normals), 0.1)), R @ between).up, R @ up) < 1.0
     normals = np.concatenate([across, *along.values()])
-    assert told_by_lines(Lines(normals, np.full(len(normals), 0.1)), R @ between).up is None
+    assert estimate_up_from_lines(Lines(normals, np.full(len(normals), 0.1)), R @ between).up is None
 
 
 @pytest.mark.parametrize("turn", [[0, 0, 0.12], [-0.1, 0.1, -0.1]])
@@ -102,8 +102,8 @@ def test_a_fence_tells_what_is_level_though_not_what_is_up(turn):
     R = exp(turn)
     lines = find_segments(room(R, posts=0, clutter=10), []).lines(CAMERA)
     leaning = exp([0.1, 0.0, 0.15]) @ R @ LEVEL_UP
-    assert told_by_lines(lines, leaning).up is None
-    assert abs(90 - angle_deg(told_by_lines(lines, leaning).level, R @ LEVEL_UP)) < 0.5
+    assert estimate_up_from_lines(lines, leaning).up is None
+    assert abs(90 - angle_deg(estimate_up_from_lines(lines, leaning).level, R @ LEVEL_UP)) < 0.5
     feet = np.zeros((5, 4, 3))
     off_deg = angle_deg(upright(leaning, feet, lines), R @ LEVEL_UP)
     assert off_deg < 0.8 * angle_deg(leaning, R @ LEVEL_UP)
@@ -112,14 +112,14 @@ def test_a_fence_tells_what_is_level_though_not_what_is_up(turn):
 
 def test_a_banister_is_not_level():
     R = exp([0.0, 0.0, 0.5])  # of the edges, not of the camera
-    assert told_by_lines(find_segments(room(R, posts=0), []).lines(CAMERA), LEVEL_UP).level is None
+    assert estimate_up_from_lines(find_segments(room(R, posts=0), []).lines(CAMERA), LEVEL_UP).level is None
 
 
 def test_few_posts_are_believed_where_level_edges_agree():
     R = exp([0.2, 0.1, 0.1])
     lines = find_segments(room(R, posts=3, across=12, tiles=4), []).lines(CAMERA)
     truth = R @ LEVEL_UP
-    assert angle_deg(told_by_lines(lines, exp([0.15, 0.0, 0.1]) @ truth).up, truth) < 1.0
+    assert angle_deg(estimate_up_from_lines(lines, exp([0.15, 0.0, 0.1]) @ truth).up, truth) < 1.0
 
 
 @pytest.mark.parametrize("count", [12, 60, 200])
@@ -130,22 +130,22 @@ def test_lines_at_random_say_nothing(count, seed):
     lengths = np.sort(0.03 + rng.exponential(0.08, count))[::-1]
     half = 0.5 * WIDTH * lengths[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
     lines = Segments(np.stack([middle - half, middle + half], axis=1), lengths).lines(CAMERA)
-    assert told_by_lines(lines, LEVEL_UP).up is None
-    assert told_by_lines(lines, LEVEL_UP).level is None
+    assert estimate_up_from_lines(lines, LEVEL_UP).up is None
+    assert estimate_up_from_lines(lines, LEVEL_UP).level is None
 
 
 def test_a_picture_without_anything_upright_says_nothing():
-    assert told_by_lines(Lines.none(), LEVEL_UP).up is None
+    assert estimate_up_from_lines(Lines.none(), LEVEL_UP).up is None
     blank = np.full((HEIGHT, WIDTH, 3), 90, np.uint8)
-    assert told_by_lines(find_segments(blank, []).lines(CAMERA), LEVEL_UP).up is None
+    assert estimate_up_from_lines(find_segments(blank, []).lines(CAMERA), LEVEL_UP).up is None
     level_edges_alone = room(np.eye(3), posts=0)
-    assert told_by_lines(find_segments(level_edges_alone, []).lines(CAMERA), LEVEL_UP).up is None
+    assert estimate_up_from_lines(find_segments(level_edges_alone, []).lines(CAMERA), LEVEL_UP).up is None
 
 
 @pytest.mark.parametrize("seed", range(4))
 def test_leaves_and_rubbish_do_not_turn_the_world(seed):
     rubbish = room(np.eye(3), posts=0, clutter=60, seed=seed)
-    found = told_by_lines(find_segments(rubbish, []).lines(CAMERA), LEVEL_UP).up
+    found = estimate_up_from_lines(find_segments(rubbish, []).lines(CAMERA), LEVEL_UP).up
     assert found is None or angle_deg(found, LEVEL_UP) < 2.0
 
 
@@ -160,8 +160,8 @@ def test_the_lines_of_people_do_not_count():
 def test_lines_turn_with_their_axes():
     R = exp([0.1, 0.4, -0.2])
     lines = find_segments(room(np.eye(3)), []).lines(CAMERA)
-    turned = told_by_lines(lines.turned(R), R @ LEVEL_UP).up
-    np.testing.assert_allclose(turned, R @ told_by_lines(lines, LEVEL_UP).up, atol=1e-6)
+    turned = estimate_up_from_lines(lines.turned(R), R @ LEVEL_UP).up
+    np.testing.assert_allclose(turned, R @ estimate_up_from_lines(lines, LEVEL_UP).up, atol=1e-6)
 
 
 @pytest.mark.parametrize("number", [1, 2, 3, 4])
@@ -176,4 +176,4 @@ def test_real_cameras_that_are_rolled_and_pitched(shared, number):
     rng = np.random.default_rng(number)
     for _ in range(3):
         leaning = exp(np.radians(7) * rng.standard_normal(3)) @ truth
-        assert angle_deg(told_by_lines(lines, leaning).up, truth) < 2.0
+        assert angle_deg(estimate_up_from_lines(lines, leaning).up, truth) < 2.0

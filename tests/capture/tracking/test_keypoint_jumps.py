@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scope.scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES
-from scope.scope_addon.capture.tracking.keypoint_jumps import CONFIDENCE, find_leaps, mend_leaps, metre_px
+from scope.scope_addon.capture.tracking.keypoint_jumps import CONFIDENCE, find_keypoint_jumps, repair_keypoint_jumps, scale_px_per_m
 from scope.scope_addon.capture.tracking.track import Track
 
 WRIST, ANKLE = KEYPOINT_NAMES.index("left_wrist"), KEYPOINT_NAMES.index("right_ankle")
@@ -39,7 +39,7 @@ def test_a_leap_goes_back_onto_its_way(rate: float, frames: int) -> None:
     track = standing(90, rate)
     right, off = track.keypoints_px.copy(), slice(40, 40 + frames)
     track.keypoints_px[off, ANKLE] += [0.6 * PX, 0.0]
-    mended = mend_leaps(track)
+    mended = repair_keypoint_jumps(track)
     np.testing.assert_allclose(mended.keypoints_px[off, ANKLE], right[off, ANKLE], atol=0.03 * PX)
     np.testing.assert_allclose(mended.confidence[off, ANKLE], 0.9 * CONFIDENCE, rtol=1e-5)
     others = np.arange(33) != ANKLE
@@ -51,7 +51,7 @@ def test_a_leap_goes_back_onto_its_way(rate: float, frames: int) -> None:
 def test_depth_leaps_alone() -> None:
     track = standing(90, 60.0)
     track.world_landmarks[50, WRIST, 2] += 0.5
-    mended = mend_leaps(track)
+    mended = repair_keypoint_jumps(track)
     assert abs(mended.world_landmarks[50, WRIST, 2]) < 0.05
     np.testing.assert_array_equal(mended.keypoints_px, track.keypoints_px)
     np.testing.assert_array_equal(mended.confidence, track.confidence)
@@ -66,26 +66,26 @@ def test_what_a_body_can_do_is_left_alone(rate: float) -> None:
     for values, metre in ((track.keypoints_px, PX), (track.world_landmarks, 1.0)):
         values[:, WRIST, 1] += metre * punch
         values[:, ANKLE, 0] += metre * 0.3 * (1 - np.cos(np.pi * np.clip((time - 1.6) / 0.15, 0, 1)))
-    assert mend_leaps(track) is track
+    assert repair_keypoint_jumps(track) is track
 
 
 @pytest.mark.parametrize("rate", [1.0, 30.0, 240.0])
 def test_who_crouches_for_a_moment_does_not_shrink(rate: float) -> None:
     track = standing(max(2, int(4 * rate)), rate)
-    usual = metre_px(track)
+    usual = scale_px_per_m(track)
     crouches = np.abs(track.times - 2.0) < 0.4
     middle = track.keypoints_px.mean(axis=1, keepdims=True)
     track.keypoints_px[crouches] = (middle + 0.4 * (track.keypoints_px - middle))[crouches]
-    np.testing.assert_allclose(metre_px(track), usual, rtol=0.05)
+    np.testing.assert_allclose(scale_px_per_m(track), usual, rtol=0.05)
 
 
 def test_gaps_and_ends() -> None:
     points = np.zeros((12, 1, 2))
     points[[0, 5, 11]] = 3.0
     seen = np.ones(12, bool)
-    np.testing.assert_array_equal(np.flatnonzero(find_leaps(points, seen, 1 / 30)[:, 0]), [5])
+    np.testing.assert_array_equal(np.flatnonzero(find_keypoint_jumps(points, seen, 1 / 30)[:, 0]), [5])
     seen[6] = False
-    assert not find_leaps(points, seen, 1 / 30).any()
-    assert not find_leaps(points[:2], seen[:2], 1 / 30).any()
+    assert not find_keypoint_jumps(points, seen, 1 / 30).any()
+    assert not find_keypoint_jumps(points[:2], seen[:2], 1 / 30).any()
     short = standing(2, 30.0)
-    assert mend_leaps(short) is short
+    assert repair_keypoint_jumps(short) is short

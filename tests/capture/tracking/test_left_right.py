@@ -8,8 +8,8 @@ import pytest
 from scope.scope_addon.capture.camera.intrinsics import Camera, pinhole
 from scope.scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES
 from scope.scope_addon.capture.tracking.left_right import (
-    EXCHANGED,
-    SWAPPED,
+    LEFT_RIGHT_SWAPPED,
+    MIRROR_PARTNER,
     TURNED,
     find_labels,
     labelled,
@@ -34,9 +34,9 @@ def walker(count: int, turn_rad: float = 0.0) -> np.ndarray:
 
 
 def test_partners() -> None:
-    assert SWAPPED[0] == 0
-    assert KEYPOINT_NAMES[SWAPPED[KEYPOINT_NAMES.index("mouth_left")]] == "mouth_right"
-    np.testing.assert_array_equal(SWAPPED[SWAPPED], np.arange(33))
+    assert MIRROR_PARTNER[0] == 0
+    assert KEYPOINT_NAMES[MIRROR_PARTNER[KEYPOINT_NAMES.index("mouth_left")]] == "mouth_right"
+    np.testing.assert_array_equal(MIRROR_PARTNER[MIRROR_PARTNER], np.arange(33))
 
 
 @pytest.mark.parametrize("turn_rad", [0.0, 2 * np.pi])
@@ -45,20 +45,20 @@ def test_minority_stretch_is_found(stretch: slice, turn_rad: float) -> None:
     world = walker(120, turn_rad)
     expected = np.zeros(120, bool)
     expected[stretch] = True
-    world[stretch] = world[stretch][:, SWAPPED]
-    np.testing.assert_array_equal(find_labels(world) == EXCHANGED, expected)
+    world[stretch] = world[stretch][:, MIRROR_PARTNER]
+    np.testing.assert_array_equal(find_labels(world) == LEFT_RIGHT_SWAPPED, expected)
 
 
 def test_gaps_and_new_people() -> None:
     world = walker(60)
     expected = np.zeros(60, bool)
     expected[10:30] = True
-    world[expected] = world[expected][:, SWAPPED]
+    world[expected] = world[expected][:, MIRROR_PARTNER]
     world[28:33] = np.nan
     expected[28:30] = False
-    np.testing.assert_array_equal(find_labels(world) == EXCHANGED, expected)
+    np.testing.assert_array_equal(find_labels(world) == LEFT_RIGHT_SWAPPED, expected)
     # someone else, seen from behind, for the second half: no exchange
-    other = np.concatenate([walker(40), walker(30)[:, SWAPPED]])
+    other = np.concatenate([walker(40), walker(30)[:, MIRROR_PARTNER]])
     starts = np.arange(70) == 40
     assert not find_labels(other, starts).any()
     assert find_labels(other)[40:].all()
@@ -68,7 +68,7 @@ def test_gaps_and_new_people() -> None:
 def test_few_judged_frames_overrule_the_majority(turn_rad: float) -> None:
     right = walker(120, turn_rad)
     expected = np.zeros(120, int)
-    expected[20:100] = EXCHANGED
+    expected[20:100] = LEFT_RIGHT_SWAPPED
     expected[40:60] = TURNED
     wrong = labelled(right, expected)  # both exchanges undo themselves
     judged = np.full_like(right, np.nan)
@@ -80,7 +80,7 @@ def test_few_judged_frames_overrule_the_majority(turn_rad: float) -> None:
 def test_a_track_is_repaired_and_left_alone_where_nobody_was_seen() -> None:
     right = walker(90)
     wrong, seen = right.copy(), np.ones(90, bool)
-    wrong[10:70] = wrong[10:70][:, SWAPPED]
+    wrong[10:70] = wrong[10:70][:, MIRROR_PARTNER]
     wrong[80:85] += [0.0, 0.0, 0.5]  # what the judge sees otherwise
     seen[40:44] = False
     rows = np.array([0, 30, 60, 82])
@@ -92,8 +92,8 @@ def test_a_track_is_repaired_and_left_alone_where_nobody_was_seen() -> None:
         confidence=np.where(seen[:, None], wrong[..., 0], 0),
         world_landmarks=np.where(seen[:, None, None], wrong, 0),
         acquired=np.arange(90) == 0,
-        judged_rows=rows,
-        judged_landmarks=right[rows],
+        reference_rows=rows,
+        reference_landmarks=right[rows],
     )
     repaired = repair_left_right(track, CAMERA)
     calm = seen & (np.arange(90) < 75)
@@ -124,12 +124,12 @@ def test_keypoints_without_depth_are_repaired(name: str, is_judged: bool) -> Non
     right, world = someone_walking(90, 30.0, HEADINGS[name])
     stretch = slice(8, 85) if is_judged else slice(30, 55)
     wrong = right.copy()
-    wrong[stretch] = wrong[stretch][:, SWAPPED]
+    wrong[stretch] = wrong[stretch][:, MIRROR_PARTNER]
     track = track_without_depth(wrong, 30.0, {k: world[k] for k in (5, 35, 65)} if is_judged else {})
     repaired = repair_left_right(track, CAMERA)
     off = np.linalg.norm(repaired.keypoints_px - right, axis=-1)[:, 11:29].mean(axis=1)
     assert (off > 1.0).mean() <= 0.01
-    np.testing.assert_array_equal(repaired.confidence[40], track.confidence[40][SWAPPED])
+    np.testing.assert_array_equal(repaired.confidence[40], track.confidence[40][MIRROR_PARTNER])
     assert not repaired.world_landmarks.any()
 
 

@@ -122,7 +122,7 @@ def test_the_networks_look_as_often_at_any_rate(monkeypatch: pytest.MonkeyPatch,
     tracker = PeopleTracker("fast", 1, 2)
     seen = [tracker.step(image, time_s=t / fps)[0][1] for t, image in enumerate(pictures(people, 4 * fps))]
     assert abs(detector.calls - 4 * fps / max(1, round(fps * 8 / 30))) <= 1
-    assert [t / fps for t, o in enumerate(seen) if o.judged_landmarks is not None] == [0.0, 1.0, 2.0, 3.0]
+    assert [t / fps for t, o in enumerate(seen) if o.reference_landmarks is not None] == [0.0, 1.0, 2.0, 3.0]
     assert abs(sum(o.appearance is not None for o in seen) - 4 * fps / max(1, round(fps * 4 / 30))) <= 1
 
 
@@ -282,7 +282,7 @@ def test_exchanged_left_and_right_are_judged(follow: Callable[..., list[Track]])
     assert (left < right).sum() == 110
     repaired = repair_left_right(track, choose_camera(1200, 400))
     assert (repaired.keypoints_px[:, 11, 0] > repaired.keypoints_px[:, 12, 0]).all()
-    assert len(track.judged_rows) <= 120 // 30 + 3
+    assert len(track.reference_rows) <= 120 // 30 + 3
 
 
 def test_nobody_waits_for_the_judge(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -303,8 +303,8 @@ def test_nobody_waits_for_the_judge(monkeypatch: pytest.MonkeyPatch) -> None:
     assert networks[True].batches == []
     free.set()
     (track,) = builder.build(1)
-    assert track.judged_rows.tolist() == [0]
-    np.testing.assert_allclose(track.judged_landmarks[0], person.body(0))
+    assert track.reference_rows.tolist() == [0]
+    np.testing.assert_allclose(track.reference_landmarks[0], person.body(0))
 
 
 @pytest.mark.parametrize(

@@ -45,8 +45,8 @@ def test_person_is_found_once_and_kept(tracker: PeopleTracker, frames: Frames, c
     assert found[-1].keypoints_px.shape == (33, 2)
     assert found[-1].world_landmarks.shape == (33, 3)
     assert all(((o.keypoints_confidence >= 0) & (o.keypoints_confidence <= 1)).all() for o in found)
-    assert found[0].judged_landmarks is not None  # left and right are told from the first frame on
-    assert sum(o.judged_landmarks is not None for o in found) <= 1 + len(found) // 8
+    assert found[0].reference_landmarks is not None  # left and right are told from the first frame on
+    assert sum(o.reference_landmarks is not None for o in found) <= 1 + len(found) // 8
 
 
 def test_two_people_are_followed_and_nobody_twice(frames: Frames) -> None:
