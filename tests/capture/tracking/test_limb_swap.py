@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Legs or arms alone that changed sides are changed back, and limbs that only pass each other are left alone."""
+"""Swapped legs or arms are repaired, and limbs that only pass each other are left alone."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ HEADINGS = {"front": 0.0, "aslant": 0.8, "side": np.pi / 2, "back": np.pi}
 LIMBS = {"legs": LEGS, "arms": ARMS}
 
 
-def exchange(track: Track, points: np.ndarray, where: slice) -> Track:
+def swapped(track: Track, points: np.ndarray, where: slice) -> Track:
     order = np.arange(33)
     order[points] = MIRROR_PARTNER[points]
     keypoints, confidence, world = (v.copy() for v in (track.keypoints_px, track.confidence, track.world_landmarks))
@@ -28,7 +28,7 @@ def exchange(track: Track, points: np.ndarray, where: slice) -> Track:
 
 
 def walker(heading: float, rate: float = 30.0, count: int = 90, has_depth: bool = False) -> Track:
-    """Half a pixel of noise, equal confidence on both sides: the places alone have to tell."""
+    """Half a pixel of noise and equal confidence on both sides: only positions carry information."""
     pixels, world = someone_walking(count, rate, heading)
     noise = np.random.default_rng(3).normal(0, 0.5, pixels.shape)
     track = track_without_depth(pixels + noise, rate, {})
@@ -37,7 +37,7 @@ def walker(heading: float, rate: float = 30.0, count: int = 90, has_depth: bool 
     )
 
 
-def test_which_points_change_sides() -> None:
+def test_the_points_that_are_swapped() -> None:
     names = {key: {KEYPOINT_NAMES[k] for k in limbs.all_points} for key, limbs in LIMBS.items()}
     assert names["legs"] == {
         f"{side}_{part}" for side in ("left", "right") for part in ("knee", "ankle", "heel", "foot_index")
@@ -54,10 +54,10 @@ def test_which_points_change_sides() -> None:
     # from the side the arms of this walk are nearly in one place
     [(which, name) for which in LIMBS for name in HEADINGS if (which, name) != ("arms", "side")],
 )
-def test_a_stretch_is_repaired(which: str, name: str, has_depth: bool) -> None:
+def test_an_interval_is_repaired(which: str, name: str, has_depth: bool) -> None:
     right = walker(HEADINGS[name], has_depth=has_depth)
     for where in (slice(20, 32), slice(38, 61), slice(0, 9), slice(80, 90)):
-        repaired = repair_limb_swaps(exchange(right, LIMBS[which].all_points, where))
+        repaired = repair_limb_swaps(swapped(right, LIMBS[which].all_points, where))
         off = np.linalg.norm(repaired.keypoints_px - right.keypoints_px, axis=-1).max(axis=1)
         assert (off > 12.0).sum() <= 1  # where the limbs meet, either reading is right
         if has_depth:
@@ -66,19 +66,20 @@ def test_a_stretch_is_repaired(which: str, name: str, has_depth: bool) -> None:
 
 @pytest.mark.parametrize("rate", [60.0, 30.0, 15.0, 8.0, 5.0])
 @pytest.mark.parametrize("heading", HEADINGS.values(), ids=HEADINGS)
-def test_whoever_walks_is_left_alone(heading: float, rate: float) -> None:
+def test_walking_is_left_alone(heading: float, rate: float) -> None:
     for has_depth in (False, True):
         track = walker(heading, rate, has_depth=has_depth)
         assert repair_limb_swaps(track) is track
 
 
-def test_the_judge_knows_when_more_than_half_is_wrong() -> None:
+def test_the_reference_decides_where_more_than_half_is_wrong() -> None:
     right = walker(HEADINGS["aslant"], has_depth=True)
     rows = np.array([5, 20, 35, 50])
-    wrong = exchange(right, LEGS.all_points, slice(12, 60))
-    judged = replace(wrong, reference_rows=rows, reference_landmarks=right.world_landmarks[rows])
+    wrong = swapped(right, LEGS.all_points, slice(12, 60))
+    referenced = replace(wrong, reference_rows=rows, reference_landmarks=right.world_landmarks[rows])
     alone, helped = (
-        np.linalg.norm(repair_limb_swaps(track).keypoints_px - right.keypoints_px, axis=-1) for track in (wrong, judged)
+        np.linalg.norm(repair_limb_swaps(track).keypoints_px - right.keypoints_px, axis=-1)
+        for track in (wrong, referenced)
     )
     assert (alone.max(axis=1) > 12.0).sum() > 40
     assert (helped.max(axis=1) > 12.0).sum() <= 1
@@ -87,15 +88,15 @@ def test_the_judge_knows_when_more_than_half_is_wrong() -> None:
 def test_hands_go_with_the_arms() -> None:
     right = walker(HEADINGS["front"])
     right = replace(right, hands=np.random.default_rng(0).normal(size=(90, 2, 21, 6)))
-    wrong = exchange(right, ARMS.all_points, slice(30, 50))
+    wrong = swapped(right, ARMS.all_points, slice(30, 50))
     hands = right.hands.copy()
     hands[30:50] = hands[30:50, ::-1]
     np.testing.assert_array_equal(repair_limb_swaps(replace(wrong, hands=hands)).hands, right.hands)
-    legs = repair_limb_swaps(exchange(right, LEGS.all_points, slice(30, 50)))
+    legs = repair_limb_swaps(swapped(right, LEGS.all_points, slice(30, 50)))
     np.testing.assert_array_equal(legs.hands, right.hands)
 
 
-def test_someone_new_need_not_go_on_as_the_one_before() -> None:
+def test_another_person_need_not_continue_the_motion() -> None:
     one, other = walker(0.0, count=40), walker(np.pi, count=50)
     both = replace(
         walker(0.0),
