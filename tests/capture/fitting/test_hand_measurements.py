@@ -240,8 +240,9 @@ def test_tracks_keep_hands_in_their_rows_and_exchange_them_with_left_and_right()
     assert [track.hands[k, 0].max() for k in range(3)] == [0, 1, 2]
     assert track.hands.dtype == np.float32  # an hour of one person's take 110 MB
     assert make_track([0], [0.0], [Tracklet()]).hands is None
-    # the strong network says of both frames that left and right are exchanged
-    judged = replace(track, reference_rows=np.array([1, 2]), reference_landmarks=track.world_landmarks[[1, 2]][:, MIRROR_PARTNER])
+    # the reference network has left and right swapped in both frames
+    landmarks = track.world_landmarks[[1, 2]][:, MIRROR_PARTNER]
+    judged = replace(track, reference_rows=np.array([1, 2]), reference_landmarks=landmarks)
     repaired = repair_left_right(judged, choose_camera(640, 480))
     assert repaired.hands[1, 1].max() == 1
     assert repaired.hands[1, 0].max() == 0
