@@ -26,7 +26,7 @@ MAX_DETAIL = 0.2  # of the picture's, on average
 
 
 def find_bars(image_rgb: NDArray[np.uint8]) -> list[NDArray[np.float64]]:
-    """Find pairs of opposite bars of equal width; a night sky has no counterpart.
+    """Find pairs of opposite bars of equal width; a dark sky alone has no counterpart.
 
     :param image_rgb: (H, W, 3).
     :return: (4,) x0, y0, x1, y1 in pixels of each bar, up to the picture between them.

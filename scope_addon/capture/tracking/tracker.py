@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Tracking of people through a video: detect now and then, and follow each person's landmarks in between.
 
-The result are tracklets: intervals in which a person was followed from frame to frame. A tracklet ends where the person
-is lost, and where their identity is in doubt: behind somebody else, or after a jump. `people` decides over the whole
-clip which tracklets are the same person.
+The results are tracklets: intervals in which a person was followed from frame to frame. A tracklet ends where the
+person is lost, and where their identity is in doubt: behind somebody else, or after a jump. `people` decides over the
+whole clip which tracklets are the same person.
 """
 
 from __future__ import annotations

@@ -33,7 +33,7 @@ def test_links_that_cost_too_much_are_left_out() -> None:
 
 
 def tracklet(first: int, last: int, start_px: float, speed_px: float, appearance: np.ndarray) -> Tracklet:
-    """Somebody who moves horizontally, by so many pixels per frame from where they would be in frame 0."""
+    """A person who moves horizontally at ``speed_px`` per frame, and would be at ``start_px`` in frame 0."""
     rows = list(range(first, last))
     centers = [np.array([start_px + speed_px * row, 200.0]) for row in rows]
     values = [np.zeros((33, 6), np.float32)] * len(rows)
