@@ -11,7 +11,7 @@ from ...solver.body import Body
 from ...solver.rotations import exp, log
 from ..errors import UsageError
 from .clip import Clip, inside
-from .root_motion import floor_path, relative_to_path
+from .root_motion import floor_trajectory, relative_to_trajectory
 
 SPEED_S = 0.1  # a difference in speed of 1 m/s counts like one of 0.1 m in place
 STRAIGHT = np.radians(5.0)  # a smaller turn over a cycle is noise: who walks straight on must not go in circles
@@ -41,7 +41,7 @@ def best_cycle(
         raise UsageError(f"a cycle of at least {shortest} s does not fit in the chosen frames; choose more of them")
     span = span[:: max(1, len(span) // MOST_KEYS)]
     part = Clip(clip.times[span], clip.rotations[span], clip.root[span])
-    joints = relative_to_path(part, *floor_path(part)).joints(body, betas)
+    joints = relative_to_trajectory(part, *floor_trajectory(part)).joints(body, betas)
     speed = SPEED_S * np.gradient(joints, part.times, axis=0)
     features = np.concatenate([joints, speed], axis=-1).reshape(len(span), -1)
     squares = (features**2).sum(1)

@@ -11,13 +11,13 @@ import numpy as np
 from ..errors import UsageError
 
 
-def keep_of_quaternions(times: np.ndarray, q: np.ndarray, bound: float) -> np.ndarray:
+def select_quaternion_keys(times: np.ndarray, q: np.ndarray, bound: float) -> np.ndarray:
     """Indices of the keys to keep so that no rotation (T, 4), on one hemisphere, is off by more than ``bound`` rad."""
     _check(bound)
     return _keep(times, q, lambda a, b, part: angles_between(_lerp(times, q, a, b, part), q[part]), bound)
 
 
-def keep_of_positions(times: np.ndarray, p: np.ndarray, bound: float) -> np.ndarray:
+def select_position_keys(times: np.ndarray, p: np.ndarray, bound: float) -> np.ndarray:
     """Indices of the keys to keep so that no position (T, n) is off by more than ``bound``, in its own unit."""
     _check(bound)
     return _keep(times, p, lambda a, b, part: np.linalg.norm(_lerp(times, p, a, b, part) - p[part], axis=1), bound)

@@ -12,7 +12,7 @@ from .clip import Clip
 _HEADING_CUTOFF_HZ = 1.0  # hips turn with every step; where a person goes does not
 
 
-def floor_path(clip: Clip, *, heading: bool = True) -> tuple[np.ndarray, np.ndarray]:
+def floor_trajectory(clip: Clip, *, heading: bool = True) -> tuple[np.ndarray, np.ndarray]:
     """The pelvis's shadow on the floor.
 
     :param heading: also how far the person has turned about the upright axis, smoothed; zeros otherwise.
@@ -28,7 +28,7 @@ def floor_path(clip: Clip, *, heading: bool = True) -> tuple[np.ndarray, np.ndar
     return positions, gaussian_smooth(angle, clip.times, _HEADING_CUTOFF_HZ)
 
 
-def relative_to_path(clip: Clip, positions: np.ndarray, angles: np.ndarray) -> Clip:
+def relative_to_trajectory(clip: Clip, positions: np.ndarray, angles: np.ndarray) -> Clip:
     """The motion as seen from something that stands at ``positions`` and has turned by ``angles``."""
     turn = about_z(angles)
     rotations = clip.rotations.copy()
@@ -36,8 +36,8 @@ def relative_to_path(clip: Clip, positions: np.ndarray, angles: np.ndarray) -> C
     return Clip(clip.times, rotations, np.einsum("tji,tj->ti", turn, clip.root - positions))
 
 
-def with_path(clip: Clip, positions: np.ndarray, angles: np.ndarray) -> Clip:
-    """The inverse of ``relative_to_path``."""
+def with_trajectory(clip: Clip, positions: np.ndarray, angles: np.ndarray) -> Clip:
+    """The inverse of ``relative_to_trajectory``."""
     turn = about_z(angles)
     rotations = clip.rotations.copy()
     rotations[:, 0] = turn @ rotations[:, 0]

@@ -13,7 +13,7 @@ from ..motion import Motion
 from .clip import Clip, between
 
 
-def clip_of(body: Body, motion: Motion, raw: bool) -> Clip:
+def clip_from_motion(body: Body, motion: Motion, raw: bool) -> Clip:
     """The motion as keys: as it was finished, or as it was solved (``raw``)."""
     poses, trans = (motion.poses_raw, motion.trans_raw) if raw else (motion.poses, motion.trans)
     rotations = exp(poses.reshape(len(motion), -1, 3).astype(float))
@@ -32,10 +32,10 @@ def smoothed(body: Body, motion: Motion, strength: float) -> Clip:
     """
     if not np.isfinite(strength) or strength < 0:
         raise UsageError(f"smoothing takes a strength from 0 on, not {strength}")
-    raw = clip_of(body, motion, raw=True)
+    raw = clip_from_motion(body, motion, raw=True)
     if strength == 0 or len(raw) < 3:
         return raw
-    finished = clip_of(body, motion, raw=False)
+    finished = clip_from_motion(body, motion, raw=False)
     if strength == 1:
         return finished
     plain, wanted = _plain(raw, motion, 1.0), _plain(raw, motion, strength)

@@ -115,7 +115,7 @@ def _build(
     rate = timing.scene_rate(scene)
     collection = bpy.data.collections.new(name)
     collection[CAPTURE_TAG] = motions[0].source or name
-    camera.remember_resolution(collection, motions[0])
+    camera.store_resolution(collection, motions[0])
     scene.collection.children.link(collection)
     people: list[Person] = []
     for index, motion in enumerate(motions):
@@ -125,7 +125,7 @@ def _build(
     if options.with_markers:
         for index, person in enumerate(people):
             whose = "" if len(people) == 1 else f"person {index + 1} "
-            confidence_curves.mark_low_confidence(scene, whose, person.motion, person.frames)
+            confidence_curves.add_review_markers(scene, whose, person.motion, person.frames)
     if options.with_camera:
         warnings += _build_cameras(name, people, collection, footage, options)
     unit = scene.unit_settings.scale_length

@@ -42,7 +42,7 @@ def pixel_aspect(motion: Motion) -> tuple[float, float]:
     return (float(ratio), 1.0) if ratio > 1 else (1.0, float(1 / ratio))
 
 
-def remember_resolution(collection: bpy.types.Collection, motion: Motion) -> None:
+def store_resolution(collection: bpy.types.Collection, motion: Motion) -> None:
     """Have a capture's collection tell the size and pixel aspect of the footage."""
     collection[_PICTURE] = [*(float(n) for n in motion.image_size), *pixel_aspect(motion)]
 

@@ -19,12 +19,12 @@ def hide(armature: bpy.types.Object, view_layer: bpy.types.ViewLayer) -> None:
         obj.hide_render = True
 
 
-def show(armature: bpy.types.Object, view_layer: bpy.types.ViewLayer, *, for_now: bool = False) -> None:
-    """Show what ``hide`` has hidden; ``for_now``: until ``hide_again``."""
+def show(armature: bpy.types.Object, view_layer: bpy.types.ViewLayer, *, temporarily: bool = False) -> None:
+    """Show what ``hide`` has hidden; ``temporarily``: until ``hide_again``."""
     for obj in _person(armature, view_layer):
         if _HIDDEN not in obj:
             continue
-        if not for_now:
+        if not temporarily:
             del obj[_HIDDEN]
         elif obj.hide_get(view_layer=view_layer):
             obj[_HIDDEN] = _COMES_BACK

@@ -122,18 +122,18 @@ def test_the_path_and_what_is_left_make_the_motion_again():
     clip = walk(3.0)
     turn = np.linspace(0, 7.0, len(clip))  # more than a whole turn
     clip.rotations[:, 0] = exp(turn[:, None] * [0, 0, 1.0]) @ clip.rotations[:, 0]
-    positions, angles = root_motion.floor_path(clip)
+    positions, angles = root_motion.floor_trajectory(clip)
     assert np.abs(angles[30:-30] - turn[30:-30]).max() < 0.02
     np.testing.assert_array_equal(positions[:, 2], 0.0)
-    local = root_motion.relative_to_path(clip, positions, angles)
+    local = root_motion.relative_to_trajectory(clip, positions, angles)
     assert np.abs(local.root[:, :2]).max() < 1e-12
     assert np.abs(np.diff(angles)).max() < 0.1
     facing = local.rotations[30:-30, 0] @ [0.0, 0.0, 1.0]
     np.testing.assert_allclose(facing, np.broadcast_to([0.0, -1.0, 0.0], facing.shape), atol=0.03)
-    again = root_motion.with_path(local, positions, angles)
+    again = root_motion.with_trajectory(local, positions, angles)
     np.testing.assert_allclose(again.rotations, clip.rotations, atol=1e-12)
     np.testing.assert_allclose(again.root, clip.root, atol=1e-12)
-    assert not root_motion.floor_path(clip, heading=False)[1].any()
+    assert not root_motion.floor_trajectory(clip, heading=False)[1].any()
 
 
 def test_the_cycle_of_a_walk_is_found_and_closed():
@@ -168,7 +168,7 @@ def test_reduced_keys_stay_within_the_bound(degrees):
     clip = walk(4.0)
     q = quaternion_from_matrix(clip.rotations[:, NAMES.index("left_hip")])
     q *= np.where((q[:, :1] < 0), -1, 1)
-    keep = reduce.keep_of_quaternions(clip.times, q, np.radians(degrees))
+    keep = reduce.select_quaternion_keys(clip.times, q, np.radians(degrees))
     assert len(keep) < len(q)
     # Blender's interpolation, written again: every number linear, then normalized
     rebuilt = np.stack([np.interp(clip.times, clip.times[keep], q[keep, k]) for k in range(4)], axis=1)
@@ -176,9 +176,9 @@ def test_reduced_keys_stay_within_the_bound(degrees):
     off = angle(matrix_from_quaternion(rebuilt), matrix_from_quaternion(q))
     assert off.max() <= np.radians(degrees) * (1 + 1e-6)
     still = np.tile([1.0, 0, 0, 0], (50, 1))
-    assert len(reduce.keep_of_quaternions(np.arange(50.0), still, 0.01)) == 2
-    keep = reduce.keep_of_positions(clip.times, clip.root, 0.005)
+    assert len(reduce.select_quaternion_keys(np.arange(50.0), still, 0.01)) == 2
+    keep = reduce.select_position_keys(clip.times, clip.root, 0.005)
     rebuilt = np.stack([np.interp(clip.times, clip.times[keep], clip.root[keep, k]) for k in range(3)], axis=1)
     assert np.linalg.norm(rebuilt - clip.root, axis=1).max() <= 0.005
     with pytest.raises(UsageError, match="above zero"):
-        reduce.keep_of_positions(clip.times, clip.root, 0.0)
+        reduce.select_position_keys(clip.times, clip.root, 0.0)

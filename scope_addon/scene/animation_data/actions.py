@@ -151,19 +151,19 @@ def rewrite_keys(
     curve.update()
 
 
-def repeat_for_ever(datablock: bpy.types.ID, onwards: set[tuple[str, int]] | None = None) -> None:
+def add_cycles(datablock: bpy.types.ID, onwards: set[tuple[str, int]] | None = None) -> None:
     """Let every curve of a datablock repeat.
 
     :param onwards: data paths and indices of the curves that go on from where a repetition ended.
     """
-    repeat_no_more(datablock)
+    remove_cycles(datablock)
     for curve in fcurves(datablock):
         modifier = curve.modifiers.new("CYCLES")
         going = (curve.data_path, curve.array_index) in (onwards or set())
         modifier.mode_before = modifier.mode_after = "REPEAT_OFFSET" if going else "REPEAT"
 
 
-def repeat_no_more(datablock: bpy.types.ID) -> None:
+def remove_cycles(datablock: bpy.types.ID) -> None:
     """Let every curve of a datablock go from its first key to its last, once."""
     for curve in fcurves(datablock):
         for modifier in [m for m in curve.modifiers if m.type == "CYCLES"]:

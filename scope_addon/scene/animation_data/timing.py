@@ -86,7 +86,7 @@ def play_cycle(scene: bpy.types.Scene, armature: bpy.types.Object, first: int, l
     armature[_CYCLE] = f"{scene.frame_start} {scene.frame_end} {before[0]} {before[1]}"
 
 
-def play_whole(scene: bpy.types.Scene, armature: bpy.types.Object) -> None:
+def restore_scene_range(scene: bpy.types.Scene, armature: bpy.types.Object) -> None:
     """Let the scene play again what it played before the cycle, unless other frames have been chosen meanwhile."""
     cycle, before = _remembered(armature)
     if _CYCLE in armature:

@@ -48,7 +48,7 @@ def key_measurements(
             curve.hide = True
 
 
-def mark_low_confidence(scene: bpy.types.Scene, whose: str, motion: Motion, frames: np.ndarray) -> int:
+def add_review_markers(scene: bpy.types.Scene, whose: str, motion: Motion, frames: np.ndarray) -> int:
     """Put a marker on the timeline where each span that deserves a look begins; returns how many.
 
     Of very many the longest get one. What a marker means stands in its name: "not seen 12-18".

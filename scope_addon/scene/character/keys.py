@@ -17,7 +17,7 @@ from ....solver.body import Body
 from ....solver.rotations import matrix_from_quaternion
 from ....solver.rotations import quaternion_from_matrix as quaternions
 from ...edit.clip import Clip, band_limited, sample
-from ...edit.reduce import angles_between, keep_of_positions, keep_of_quaternions
+from ...edit.reduce import angles_between, select_position_keys, select_quaternion_keys
 from ...errors import UsageError
 from ...kinematics.axes import R_WORLD_MODEL
 from ..animation_data.actions import bone_path, fcurves, read_keys, rewrite_keys
@@ -37,10 +37,10 @@ def read_clip(armature: bpy.types.Object, body: Body, rate: float) -> tuple[Clip
     """
     curves = _curves(armature, body)
     frames = np.unique(np.concatenate([read_keys(curve)[:, 0] for bone in curves.values() for curve in bone]))
-    return read_at(armature, body, rate, frames), frames
+    return read_clip_at(armature, body, rate, frames), frames
 
 
-def read_at(armature: bpy.types.Object, body: Body, rate: float, frames: np.ndarray) -> Clip:
+def read_clip_at(armature: bpy.types.Object, body: Body, rate: float, frames: np.ndarray) -> Clip:
     """The motion at scene frames (T,), as Blender interpolates it."""
     curves = _curves(armature, body)
     values = {path: np.stack([_values(curve, frames) for curve in bone], axis=1) for path, bone in curves.items()}
@@ -107,13 +107,13 @@ def reduce_keys(
     for path, bone in _curves(armature, body).items():
         before += sum(len(curve.keyframe_points) for curve in bone)
         if path == location_path(body):
-            keep = keep_of_positions(clip.times, location, distance)
+            keep = select_position_keys(clip.times, location, distance)
         else:
-            keep = keep_of_quaternions(clip.times, values[path], angle)
+            keep = select_quaternion_keys(clip.times, values[path], angle)
         for index, curve in enumerate(bone):
             rewrite_keys(curve, frames[keep], values[path][keep, index])
         after += len(keep) * len(bone)
-    reduced = read_at(armature, body, rate, frames)
+    reduced = read_clip_at(armature, body, rate, frames)
     off = angles_between(channels(armature, body, reduced)[0], q)
     moved = np.linalg.norm(reduced.joints(body, betas) - clip.joints(body, betas), axis=-1)
     return Reduction(before, after, float(off.max()), float(moved.max()))

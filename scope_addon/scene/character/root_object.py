@@ -13,7 +13,7 @@ from mathutils import Matrix
 
 from ....solver.body import Body
 from ...edit.clip import Clip
-from ...edit.root_motion import floor_path, relative_to_path, with_path
+from ...edit.root_motion import floor_trajectory, relative_to_trajectory, with_trajectory
 from ...errors import UsageError
 from ..animation_data.actions import Channels, fcurves, read_keys
 from .keys import read_clip, write_clip
@@ -36,7 +36,7 @@ def root_object(armature: bpy.types.Object) -> bpy.types.Object | None:
     return topmost(armature).parent
 
 
-def hang_on_root(
+def parent_to_root_object(
     armature: bpy.types.Object,
     frames: np.ndarray,
     positions: np.ndarray,
@@ -84,7 +84,7 @@ def hang_on_root(
     return empty
 
 
-def drop_root(armature: bpy.types.Object) -> None:
+def remove_root_object(armature: bpy.types.Object) -> None:
     """Remove the empty; the armature stays with what its bones hold, and stands and hangs as it did before."""
     top, empty = topmost(armature), root_object(armature)
     if empty is None:
@@ -103,14 +103,14 @@ def carried(obj: bpy.types.Object) -> Matrix:
     return obj.matrix_world @ obj.matrix_basis.inverted_safe()
 
 
-def to_root_object(armature: bpy.types.Object, body: Body, rate: float, *, in_place: bool, heading: bool) -> None:
+def move_root_motion_to_object(armature: bpy.types.Object, body: Body, rate: float, *, in_place: bool, heading: bool) -> None:
     """Take the way out of the bones.
 
     :param in_place: leave it out altogether: the person stays above the spot where the motion begins.
     :param heading: the turning about the upright axis goes with it.
     """
     clip, frames = read_clip(armature, body, rate)
-    clip, former = whole_clip(armature, clip, frames), root_object(armature)
+    clip, former = clip_with_root_motion(armature, clip, frames), root_object(armature)
     if former is None:  # where the user has put the armature now goes with the way
         bpy.context.view_layer.update()
         seen = armature.matrix_world
@@ -122,31 +122,31 @@ def to_root_object(armature: bpy.types.Object, body: Body, rate: float, *, in_pl
         place = _place(former)
     size, height = armature.matrix_basis.median_scale, place.translation.z
     clip = _moved(clip, Matrix.Translation((0, 0, -height)) @ place, size)
-    positions, angles = floor_path(clip, heading=heading)
-    write_clip(armature, body, relative_to_path(clip, positions, angles), frames)
+    positions, angles = floor_trajectory(clip, heading=heading)
+    write_clip(armature, body, relative_to_trajectory(clip, positions, angles), frames)
     positions = size * positions + [0.0, 0.0, height]
-    empty = hang_on_root(armature, frames, positions, angles, in_place=in_place, below_parent=True)
+    empty = parent_to_root_object(armature, frames, positions, angles, in_place=in_place, below_parent=True)
     empty[_PLACE] = [number for row in place for number in row]
 
 
-def to_bones(armature: bpy.types.Object, body: Body, rate: float) -> None:
+def move_root_motion_to_bones(armature: bpy.types.Object, body: Body, rate: float) -> None:
     """Put the way back into the bones and remove the empty. A way that was left out comes back too."""
     if root_object(armature) is None:
         return
     clip, frames = read_clip(armature, body, rate)
-    write_clip(armature, body, whole_clip(armature, clip, frames), frames)
-    drop_root(armature)
+    write_clip(armature, body, clip_with_root_motion(armature, clip, frames), frames)
+    remove_root_object(armature)
 
 
-def whole_clip(armature: bpy.types.Object, clip: Clip, frames: np.ndarray) -> Clip:
+def clip_with_root_motion(armature: bpy.types.Object, clip: Clip, frames: np.ndarray) -> Clip:
     """The clip with the way of its root object, where it has one, also one that was left out: without the object."""
-    whole, empty = with_path(clip, *whole_path(armature, frames)), root_object(armature)
+    whole, empty = with_trajectory(clip, *removed_root_motion(armature, frames)), root_object(armature)
     if empty is None:
         return whole
     return _moved(whole, _place(empty).inverted(), armature.matrix_basis.median_scale)
 
 
-def whole_path(armature: bpy.types.Object, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def removed_root_motion(armature: bpy.types.Object, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Positions (T, 3) and angles (T,) of the way that is not in the bones, also of one that was left out."""
     empty = root_object(armature)
     if empty is None:
@@ -159,10 +159,10 @@ def whole_path(armature: bpy.types.Object, frames: np.ndarray) -> tuple[np.ndarr
     return positions / armature.matrix_basis.median_scale, angle
 
 
-def seen_clip(armature: bpy.types.Object, clip: Clip, frames: np.ndarray) -> Clip:
+def clip_as_displayed(armature: bpy.types.Object, clip: Clip, frames: np.ndarray) -> Clip:
     """The clip as it is seen: where its root object goes, or stands where the way was left out."""
     empty = root_object(armature)
-    return clip if empty is None else with_path(clip, *_keyed_path(armature, empty, frames))
+    return clip if empty is None else with_trajectory(clip, *_keyed_path(armature, empty, frames))
 
 
 def _keyed_path(

@@ -24,14 +24,14 @@ from ..build import CAPTURE_TAG, NEW_SCENE, BuildOptions, BuildResult, Progress,
 from ..character.bone_display import remove_if_unused
 from . import formats
 from .export_states import (
-    actions_as_long_as,
+    actions_over_scene_range,
     all_evaluated,
     alone,
     baked_meshes,
     out_of_edit_mode,
     scene_of,
     temporary_scene,
-    with_carriers,
+    external_parents_replaced,
 )
 from .output_paths import check_output, person_paths
 
@@ -114,10 +114,10 @@ def _write_one(
         out_of_edit_mode(collections),
         nullcontext() if suffix == ".blend" else all_evaluated(collections),  # a scene keeps what is hidden in it
         scene_of(collections, rigs, options.camera) as scene,
-        with_carriers(scene) if suffix == ".glb" else nullcontext(),  # that exporter leaves out what hangs on others
+        external_parents_replaced(scene) if suffix == ".glb" else nullcontext(),  # that exporter leaves out what hangs on others
         baked_meshes(scene) if options.bakes(suffix) else nullcontext(),
         actions.nla_as_actions(scene) if suffix == ".glb" else nullcontext(),  # that exporter reads actions alone
-        actions_as_long_as(scene),
+        actions_over_scene_range(scene),
     ):
         rig = next((obj for obj in scene.objects if obj.type == "ARMATURE"), None)
         writers = {

@@ -73,7 +73,7 @@ def scene_of(
 
 
 @contextmanager
-def with_carriers(scene: bpy.types.Scene) -> Iterator[None]:
+def external_parents_replaced(scene: bpy.types.Scene) -> Iterator[None]:
     """Let what hangs on something outside the scene hang for a while on an empty that goes the same way.
 
     The carriers themselves would bring along all that hangs on them.
@@ -147,7 +147,7 @@ def all_evaluated(collections: Sequence[bpy.types.Collection]) -> Iterator[None]
 
 
 @contextmanager
-def actions_as_long_as(scene: bpy.types.Scene) -> Iterator[None]:
+def actions_over_scene_range(scene: bpy.types.Scene) -> Iterator[None]:
     """Let the actions of armatures last as long as the scene.
 
     One who comes late is late in a file of their own too, and exporters do not stop before keys between whole frames.

@@ -21,15 +21,15 @@ from ...errors import OutputError
 from ..animation_data import timing
 from . import bvh
 from .fbx_units import metres_to_centimetres
-from .glb_times import true_times
+from .glb_times import corrected_key_times
 
 
 def write_glb(path: Path, camera: bool = False) -> None:
     """glTF binary: y up, metres, four influences a vertex, shape keys as morph targets, all motion in one animation."""
-    need_addon("io_scene_gltf2")
+    enable_addon("io_scene_gltf2")
     scene = bpy.context.scene
     moving = [obj for obj in scene.objects if obj.animation_data]
-    with true_times(path, scene):
+    with corrected_key_times(path, scene):
         call_operator(
             bpy.ops.export_scene.gltf,
             filepath=str(path),
@@ -62,7 +62,7 @@ def write_glb(path: Path, camera: bool = False) -> None:
 
 def write_fbx(path: Path, camera: bool = False) -> None:
     """FBX: y up, centimetres, objects at scale 1, no leaf bones, every frame keyed."""
-    need_addon("io_scene_fbx")
+    enable_addon("io_scene_fbx")
     call_operator(
         bpy.ops.export_scene.fbx,
         filepath=str(path),
@@ -218,7 +218,7 @@ def quiet() -> Iterator[None]:
         os.close(nowhere)
 
 
-def need_addon(module: str) -> None:
+def enable_addon(module: str) -> None:
     """Enable an exporter or importer that comes with Blender, for this session only, where a user has turned it off."""
     if not addon_utils.check(module)[1]:
         addon_utils.enable(module, default_set=False)

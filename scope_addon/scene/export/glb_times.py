@@ -21,7 +21,7 @@ _HEADER, _CHUNK_HEADER = 12, 8  # bytes; of the file: magic, version, length; of
 
 
 @contextmanager
-def true_times(path: Path, scene: bpy.types.Scene) -> Iterator[None]:
+def corrected_key_times(path: Path, scene: bpy.types.Scene) -> Iterator[None]:
     """Have a .glb of the scene that is written here tell the seconds that the scene means."""
     base = scene.render.fps_base
     scene.render.fps_base = 1.0

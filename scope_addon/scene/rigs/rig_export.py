@@ -14,7 +14,7 @@ from ...retarget.rig_source import RigSource
 from ..build import BuildOptions, build_scene
 from ..export.export import ExportOptions, export, temporary_scene
 from ..export.output_paths import check_output
-from .rig_file import bones_of, forgotten, load_rig, with_meshes
+from .rig_file import rig_bone_map, forgotten, load_rig, with_meshes
 from .rig_retarget import RetargetOptions, retarget
 
 
@@ -42,7 +42,7 @@ def export_on_rig(
         warnings = list(result.warnings)
         for number, person in enumerate(result.people, 1):
             rig = load_rig(source, result.collection)
-            bones = bones_of(source, rig)
+            bones = rig_bone_map(source, rig)
             if number == 1 and any(c <= 0.5 for c in bones.confidence.values()):
                 warnings.append(f"the bones of '{rig.name}' were guessed by its rest pose alone; look at the result")
             if len(motions) > 1:

@@ -15,7 +15,7 @@ from ...retarget.bone_map import PHALANGES, BoneMap
 from ...retarget.rig_source import RigSource
 from ..export import formats
 from ..export.export_states import temporary_scene
-from .rig_retarget import check_turning, guess_bone_map
+from .rig_retarget import check_bones_move, guess_bone_map
 
 # What a file may bring along, users before what they use.
 _KINDS = (
@@ -64,12 +64,12 @@ def check_rig(source: RigSource, *, fingers: bool = True) -> None:
     """
     with forgotten(), temporary_scene("Looking at a rig") as scene:
         rig = load_rig(source, scene.collection)
-        bones = bones_of(source, rig)
+        bones = rig_bone_map(source, rig)
         moved = {b: part for b, part in bones.parts.items() if fingers or part.partition("_")[2] not in PHALANGES}
-        check_turning(rig, BoneMap(moved))
+        check_bones_move(rig, BoneMap(moved))
 
 
-def bones_of(source: RigSource, rig: bpy.types.Object) -> BoneMap:
+def rig_bone_map(source: RigSource, rig: bpy.types.Object) -> BoneMap:
     """The given bone map, or the guessed one.
 
     :raises InputError: it does not fit the rig, or nothing could be guessed.
@@ -113,12 +113,12 @@ def _import(path: Path) -> list[bpy.types.Object]:
     try:
         with formats.quiet():
             if path.suffix.lower() == ".fbx":
-                formats.need_addon("io_scene_fbx")
+                formats.enable_addon("io_scene_fbx")
                 formats.call_operator(
                     bpy.ops.import_scene.fbx, filepath=str(path), use_anim=False, ignore_leaf_bones=False
                 )
             else:
-                formats.need_addon("io_scene_gltf2")
+                formats.enable_addon("io_scene_gltf2")
                 formats.call_operator(bpy.ops.import_scene.gltf, filepath=str(path), disable_bone_shape=True)
     except Exception as error:  # importers written in Python fail in every way on a damaged file
         raise InputError(f"{path}: Blender cannot import this file; export it again or choose another") from error

@@ -19,7 +19,7 @@ from mathutils import Matrix, Quaternion
 from ....solver.body import Body
 from ....solver.errors import InputError
 from ....solver.rotations import quaternion_from_matrix
-from ...edit.root_motion import about_z, floor_path
+from ...edit.root_motion import about_z, floor_trajectory
 from ...errors import UsageError
 from ...retarget.bone_map import PHALANGES, BoneMap
 from ...retarget.guess import RestBones, guess
@@ -29,7 +29,7 @@ from ..animation_data.actions import Channels, bone_path, fcurves_of, read_keys
 from ..animation_data.transaction import all_or_nothing
 from ..character.animation import on_one_hemisphere
 from ..character.keys import read_clip
-from ..character.root_object import carried, drop_root, hang_on_root, root_object, seen_clip, topmost
+from ..character.root_object import carried, remove_root_object, parent_to_root_object, root_object, clip_as_displayed, topmost
 
 # Rigify's switches: limbs by FK, neck and head with the chest.
 _SWITCHES = ("IK_FK", "neck_follow", "head_follow")
@@ -54,7 +54,7 @@ class RetargetOptions:
 
 
 @dataclass(frozen=True)
-class Retargeted:
+class RetargetResult:
     """What ``retarget`` did: the rig's new action, and what the user should know of it."""
 
     action: bpy.types.Action
@@ -80,7 +80,7 @@ def retarget(
     bone_map: BoneMap,
     rate: float,
     options: RetargetOptions | None = None,
-) -> Retargeted:
+) -> RetargetResult:
     """Key the mapped bones of ``rig`` so that it moves as the captured ``source``, in a new action.
 
     The rig's former action stays in the file, but one that came of retargeting and is as it was written. Fingers stay
@@ -99,7 +99,7 @@ def retarget(
         raise UsageError(f"'{rig.name}' has no bone '{missing[0]}'; guess the bones anew or correct the list")
     bone_map = BoneMap({bone: part for bone, part in bone_map.parts.items() if part in body.joint_names})
     clip, frames = read_clip(source, body, rate)
-    clip = seen_clip(source, clip, frames)
+    clip = clip_as_displayed(source, clip, frames)
     if rig.animation_data and rig.animation_data.use_tweak_mode:  # in which no action can be set
         rig.animation_data.use_tweak_mode = False
     with all_or_nothing(bpy.context.scene, rig, topmost(rig)):
@@ -113,7 +113,7 @@ def retarget(
             if options.root == "in-place":
                 heads[:, :2] = skeleton.heads[root, :2]
             elif options.root == "object":
-                positions, angles = heads * [1.0, 1.0, 0.0], floor_path(clip)[1] + yaw + pose.facing
+                positions, angles = heads * [1.0, 1.0, 0.0], floor_trajectory(clip)[1] + yaw + pose.facing
                 turn, origin = about_z(angles), place[:3, 3] * [1.0, 1.0, 0.0]
                 rotations = np.swapaxes(turn, 1, 2)[:, None] @ rotations
                 heads = np.einsum("tji,tj->ti", turn, heads - positions) + origin
@@ -124,19 +124,19 @@ def retarget(
         action = _write(rig, place, skeleton, turns, root, heads, frames)
         hanging = topmost(rig)
         if way is None:
-            drop_root(rig)
+            remove_root_object(rig)
         else:
-            hanging = hang_on_root(rig, frames, *way)
+            hanging = parent_to_root_object(rig, frames, *way)
         if hanging.parent is not None:  # the keys say where in the world it is
             hanging.matrix_parent_inverse = hanging.matrix_parent_inverse @ carried(hanging).inverted_safe()
         rig.data.pose_position = "POSE"
         _above_nla(rig.animation_data)
         _put_by(former)
         action.name = f"{rig.name}_{source.name}"
-    return Retargeted(action, warnings)
+    return RetargetResult(action, warnings)
 
 
-def check_turning(rig: bpy.types.Object, bone_map: BoneMap) -> None:
+def check_bones_move(rig: bpy.types.Object, bone_map: BoneMap) -> None:
     """Whether the mapped bones can be turned, and the pelvis moved. :raises InputError: one of them cannot."""
     with _at_rest(rig):
         _probe(rig, bone_map.parts)

@@ -186,7 +186,7 @@ def test_a_rig_whose_nla_plays_moves_as_captured(source, prepare):
     assert [strip.action for strip in track.strips] == [own]
 
 
-@pytest.mark.parametrize("step", ["transfer", "_probe", "_channel", "drop_root"])
+@pytest.mark.parametrize("step", ["transfer", "_probe", "_channel", "remove_root_object"])
 def test_what_fails_leaves_the_rig_as_it_was(source, monkeypatch, step):
     rig, _ = build_rig("unreal")
     bone = rig.pose.bones[3]

@@ -7,9 +7,9 @@ import bpy
 import numpy as np
 import pytest
 from mathutils import Matrix
-from scope.scope_addon.edit.root_motion import with_path
+from scope.scope_addon.edit.root_motion import with_trajectory
 from scope.scope_addon.errors import UsageError
-from scope.scope_addon.scene.character.root_object import root_object, to_bones, to_root_object
+from scope.scope_addon.scene.character.root_object import root_object, move_root_motion_to_bones, move_root_motion_to_object
 from scope.scope_addon.scene.rigs.rig_retarget import RetargetOptions, guess_bone_map, retarget
 
 from ...edit.walking import BODY, RATE, motion_of, walk
@@ -22,7 +22,7 @@ TURNED = Matrix.LocRotScale((2.0, 1.0, 0.0), Matrix.Rotation(math.pi, 3, "Z").to
 def source():
     """A walk that begins somewhere and takes a bend."""
     clip = walk(2.0)
-    bent = with_path(clip, np.tile([0.7, -0.4, 0.0], (len(clip), 1)), 0.3 + 0.8 * clip.times)
+    bent = with_trajectory(clip, np.tile([0.7, -0.4, 0.0], (len(clip), 1)), 0.3 + 0.8 * clip.times)
     return captured(motion_of(bent))
 
 
@@ -72,17 +72,17 @@ def test_a_capture_whose_way_is_on_an_object_or_left_out(source):
     bones = list(bone_of.values())
     run(source, rig)
     before = seen(rig, bones)
-    to_root_object(source, BODY, RATE, in_place=False, heading=True)
+    move_root_motion_to_object(source, BODY, RATE, in_place=False, heading=True)
     for root in ("bone", "object"):
         run(source, rig, root=root)
         np.testing.assert_allclose(seen(rig, bones), before, atol=2e-3)
-    to_root_object(source, BODY, RATE, in_place=True, heading=False)
+    move_root_motion_to_object(source, BODY, RATE, in_place=True, heading=False)
     run(source, rig)
     there = seen(rig, bones)
     pelvis = bones.index(bone_of["pelvis"])
     assert np.ptp(there[:, pelvis, :2], axis=0).max() < 0.02  # the hips' middle stays, and the body turns about it
     np.testing.assert_allclose(there[0], before[0], atol=2e-3)
-    to_bones(source, BODY, RATE)
+    move_root_motion_to_bones(source, BODY, RATE)
     run(source, rig)
     np.testing.assert_allclose(seen(rig, bones), before, atol=2e-3)
 
@@ -143,7 +143,7 @@ def test_a_root_object_stays_hung_where_the_user_hangs_it(source, hung):
     bones = list(bone_of.values())
     run(source, rig, root="object")
     before = seen(rig, bones)
-    to_root_object(source, BODY, RATE, in_place=False, heading=True)
+    move_root_motion_to_object(source, BODY, RATE, in_place=False, heading=True)
     stage = bpy.data.objects.new("Stage", None)
     bpy.context.scene.collection.objects.link(stage)
     turn = Matrix.Rotation(1.1, 3, "Z").to_quaternion()
