@@ -18,10 +18,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...solver.body import Body
 from ...solver.rotations import exp, shortest_turn
-from ..edit.clip import Clip, between
+from ..edit.clip import Clip, interpolate_rotations
 from ..kinematics.axes import R_WORLD_MODEL
 from .bone_map import FINGERS, SPINE, BoneMap
 from .feet import FootRest, ankle_goal, flat_toes, sinking
@@ -43,11 +44,11 @@ class Skeleton:
     """
 
     names: list[str]
-    parents: np.ndarray  # (B,)
-    carriers: np.ndarray  # (B,)
-    heads: np.ndarray  # (B, 3)
-    tails: np.ndarray  # (B, 3)
-    rotations: np.ndarray  # (B, 3, 3) bone to world
+    parents: NDArray[np.float64]  # (B,)
+    carriers: NDArray[np.float64]  # (B,)
+    heads: NDArray[np.float64]  # (B, 3)
+    tails: NDArray[np.float64]  # (B, 3)
+    rotations: NDArray[np.float64]  # (B, 3, 3) bone to world
     floor: float = 0.0  # height on which the rig rests
 
 
@@ -58,13 +59,13 @@ class Pose:
     ``facing``: radians about the upright axis from where the rested rig faces to where the rested body does.
     """
 
-    rotations: np.ndarray
-    heads: np.ndarray
+    rotations: NDArray[np.float64]
+    heads: NDArray[np.float64]
     facing: float
 
 
 def transfer(
-    clip: Clip, body: Body, betas: np.ndarray, rig: Skeleton, bone_map: BoneMap, *, feet: bool = True
+    clip: Clip, body: Body, betas: NDArray[np.float64], rig: Skeleton, bone_map: BoneMap, *, feet: bool = True
 ) -> Pose:
     """The rig's motion.
 
@@ -82,7 +83,7 @@ def transfer(
     turns = _turns(D, rig, part_of, index)
     world = turns @ (A @ F @ rig.rotations)
 
-    def leg_length(points: np.ndarray, rows: dict[str, int], side: str) -> float:
+    def leg_length(points: NDArray[np.float64], rows: dict[str, int], side: str) -> float:
         hip, knee = points[rows[f"{side}_hip"]], points[rows[f"{side}_knee"]]
         shin = rows.get(f"{side}_ankle")
         end = points[shin] if shin is not None else knee + (knee - hip)
@@ -108,15 +109,15 @@ def transfer(
 def _stand(
     rig: Skeleton,
     row: dict[str, int],
-    world: np.ndarray,
-    heads: np.ndarray,
-    turns: np.ndarray,
-    AF: np.ndarray,
+    world: NDArray[np.float64],
+    heads: NDArray[np.float64],
+    turns: NDArray[np.float64],
+    AF: NDArray[np.float64],
     body: Body,
-    betas: np.ndarray,
-    joints: np.ndarray,
+    betas: NDArray[np.float64],
+    joints: NDArray[np.float64],
     scale: float,
-    times: np.ndarray,
+    times: NDArray[np.float64],
 ) -> None:
     """Bring the ankles, and with them heels and balls, to where the body's are; in place."""
     index = {part: k for k, part in enumerate(body.joint_names)}
@@ -148,7 +149,7 @@ def _stand(
     heads += (first - heads[:, hips[0]])[:, None]
 
 
-def body_feet(body: Body, betas: np.ndarray) -> dict[str, FootRest]:
+def body_feet(body: Body, betas: NDArray[np.float64]) -> dict[str, FootRest]:
     """The rested body's feet by side; the heel is the rear end of what the foot, without its toes, stands on."""
     v, J = body.rest_vertices(betas) @ R_WORLD_MODEL.T, body.rest_joints(betas) @ R_WORLD_MODEL.T
     strongest = body.skin_joints[np.arange(len(v)), body.skin_weights.argmax(1)]
@@ -164,7 +165,7 @@ def body_feet(body: Body, betas: np.ndarray) -> dict[str, FootRest]:
 
 
 def _rig_foot(
-    rig: Skeleton, AF: np.ndarray, ankle: int, toe: int | None, source: FootRest, scale: float
+    rig: Skeleton, AF: NDArray[np.float64], ankle: int, toe: int | None, source: FootRest, scale: float
 ) -> FootRest:
     """The rig's foot; where no bone tells its ball, it is as long as the body's."""
     height = float(rig.heads[ankle, 2]) - rig.floor
@@ -177,7 +178,7 @@ def _rig_foot(
     return FootRest(heel, ball, height)
 
 
-def basis(rig: Skeleton, world: np.ndarray) -> np.ndarray:
+def basis(rig: Skeleton, world: NDArray[np.float64]) -> NDArray[np.float64]:
     """(T, B, 3, 3) rotations that the bones' channels hold: ``B = (R_parent R_parent0ᵀ R_b0)ᵀ R_b``."""
     out = np.empty_like(world)
     for b, parent in enumerate(rig.parents):
@@ -189,7 +190,7 @@ def basis(rig: Skeleton, world: np.ndarray) -> np.ndarray:
     return out
 
 
-def _positions(rig: Skeleton, world: np.ndarray) -> np.ndarray:
+def _positions(rig: Skeleton, world: NDArray[np.float64]) -> NDArray[np.float64]:
     """(T, B, 3) heads where nothing has been moved."""
     heads = np.empty((*world.shape[:2], 3))
     for b, carrier in enumerate(rig.carriers):
@@ -201,15 +202,15 @@ def _positions(rig: Skeleton, world: np.ndarray) -> np.ndarray:
     return heads
 
 
-def _facing(rig: Skeleton, row: dict[str, int]) -> np.ndarray:
+def _facing(rig: Skeleton, row: dict[str, int]) -> NDArray[np.float64]:
     """(3, 3) turn about the upright axis after which the rig's left is the body's, +x."""
     left = rig.heads[row["left_hip"]] - rig.heads[row["right_hip"]]
     return exp(np.array([0.0, 0.0, -np.arctan2(left[1], left[0])]))
 
 
 def _rest_alignment(
-    rig: Skeleton, part_of: list[str], row: dict[str, int], rest: np.ndarray, index: dict[str, int], F: np.ndarray
-) -> np.ndarray:
+    rig: Skeleton, part_of: list[str], row: dict[str, int], rest: NDArray[np.float64], index: dict[str, int], F: NDArray[np.float64]
+) -> NDArray[np.float64]:
     """(B, 3, 3) A_b."""
     A = np.tile(np.eye(3), (len(part_of), 1, 1))
     for b, part in enumerate(part_of):
@@ -239,8 +240,8 @@ def _rest_alignment(
 
 
 def _palm_alignment(
-    heads: np.ndarray, row: dict[str, int], rest: np.ndarray, index: dict[str, int], side: str
-) -> np.ndarray | None:
+    heads: NDArray[np.float64], row: dict[str, int], rest: NDArray[np.float64], index: dict[str, int], side: str
+) -> NDArray[np.float64] | None:
     """(3, 3) the turn of the rig's palm onto the body's, by wrist and knuckles; None where one has no fingers."""
     parts = [f"{side}_{part}" for part in ("wrist", "index1", "pinky1")]
     if not all(part in row and part in index for part in parts):
@@ -257,7 +258,7 @@ def _palm_alignment(
     return palms[1] @ palms[0].T
 
 
-def _turns(D: np.ndarray, rig: Skeleton, part_of: list[str], index: dict[str, int]) -> np.ndarray:
+def _turns(D: NDArray[np.float64], rig: Skeleton, part_of: list[str], index: dict[str, int]) -> NDArray[np.float64]:
     """(T, B, 3, 3) D of each bone; spine and neck are spread over the bones that the rig has for them."""
     out = np.empty((len(D), len(part_of), 3, 3))
     for b, part in enumerate(part_of):
@@ -269,10 +270,10 @@ def _turns(D: np.ndarray, rig: Skeleton, part_of: list[str], index: dict[str, in
             low = min(int(place), len(chain) - 2)
             first, second = D[:, index[chain[low]]], D[:, index[chain[low + 1]]]
             share = place - low
-            out[:, b] = second if share == 1 else between(first, second, share)
+            out[:, b] = second if share == 1 else interpolate_rotations(first, second, share)
     return out
 
 
-def _sole_height(body: Body, betas: np.ndarray) -> float:
+def _sole_height(body: Body, betas: NDArray[np.float64]) -> float:
     """Height of the rested body's lowest point, world axes."""
     return float((body.rest_vertices(betas) @ R_WORLD_MODEL.T)[:, 2].min())
