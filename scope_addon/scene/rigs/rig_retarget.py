@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 from mathutils import Matrix, Quaternion
+from numpy.typing import NDArray
 
 from ....solver.body import Body
 from ....solver.errors import InputError
@@ -24,12 +25,20 @@ from ...errors import UsageError
 from ...retarget.bone_map import PHALANGES, BoneMap
 from ...retarget.guess import RestBones, guess
 from ...retarget.rig_source import ROOTS
-from ...retarget.transfer import Skeleton, basis, transfer
+from ...retarget.skeleton import Skeleton, basis
+from ...retarget.transfer import transfer
 from ..animation_data.actions import Channels, bone_path, fcurves_of, read_keys
 from ..animation_data.transaction import all_or_nothing
 from ..character.animation import on_one_hemisphere
 from ..character.keys import read_clip
-from ..character.root_object import carried, remove_root_object, parent_to_root_object, root_object, clip_as_displayed, topmost
+from ..character.root_object import (
+    carried,
+    clip_as_displayed,
+    parent_to_root_object,
+    remove_root_object,
+    root_object,
+    topmost,
+)
 
 # Rigify's switches: limbs by FK, neck and head with the chest.
 _SWITCHES = ("IK_FK", "neck_follow", "head_follow")
@@ -75,7 +84,7 @@ def guess_bone_map(rig: bpy.types.Object) -> BoneMap:
 def retarget(
     source: bpy.types.Object,
     body: Body,
-    betas: np.ndarray,
+    betas: NDArray[np.float64],
     rig: bpy.types.Object,
     bone_map: BoneMap,
     rate: float,
@@ -143,8 +152,8 @@ def check_bones_move(rig: bpy.types.Object, bone_map: BoneMap) -> None:
 
 
 def _where_seen(
-    source: bpy.types.Object, rotations: np.ndarray, heads: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, float]:
+    source: bpy.types.Object, rotations: NDArray[np.float64], heads: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
     """Moved and turned as the user has moved and turned the captured armature; and by how much about the upright axis.
 
     A root object's way is in the motion already, but not where its parent takes it. How large the armature is drawn
@@ -161,12 +170,12 @@ def _where_seen(
 
 def _write(
     rig: bpy.types.Object,
-    place: np.ndarray,
+    place: NDArray[np.float64],
     skeleton: Skeleton,
-    rotations: np.ndarray,
+    rotations: NDArray[np.float64],
     root: int,
-    heads: np.ndarray,
-    frames: np.ndarray,
+    heads: NDArray[np.float64],
+    frames: NDArray[np.float64],
 ) -> bpy.types.Action:
     """A new action with the keys, each bone's in the mode that it has.
 
@@ -217,7 +226,7 @@ def _checksum(action: bpy.types.Action) -> str:
     return found.hexdigest()
 
 
-def _channel(mode: str, R: np.ndarray) -> tuple[str, np.ndarray]:
+def _channel(mode: str, R: NDArray[np.float64]) -> tuple[str, NDArray[np.float64]]:
     """Data path and values (T, n) of rotations (T, 3, 3)."""
     if mode == "QUATERNION":
         return "rotation_quaternion", on_one_hemisphere(quaternion_from_matrix(R))
@@ -277,12 +286,12 @@ def _probe(rig: bpy.types.Object, parts: dict[str, str]) -> Skeleton:
     )
 
 
-def _nearest(above: np.ndarray) -> np.ndarray:
+def _nearest(above: NDArray[np.float64]) -> NDArray[np.float64]:
     """(B,) the last of the bones before that each one goes with, -1 without any; ``above``: (B, B), row by column."""
     return np.array([max(np.flatnonzero(row[:b]), default=-1) for b, row in enumerate(above)], int)
 
 
-def _check_turned(rig: bpy.types.Object, names: list[str], turned: np.ndarray) -> None:
+def _check_turned(rig: bpy.types.Object, names: list[str], turned: NDArray[np.float64]) -> None:
     """Of a bone that stays where it is, every other one that stays would seem to follow it.
 
     :param turned: (B, 3, 3) by how much each of these bones did turn.
@@ -317,7 +326,7 @@ def _check_moved(rig: bpy.types.Object, name: str) -> None:
     )
 
 
-def _held_back(rig: bpy.types.Object, names: list[str], turns: np.ndarray, wanted: np.ndarray) -> list[str]:
+def _held_back(rig: bpy.types.Object, names: list[str], turns: NDArray[np.float64], wanted: NDArray[np.float64]) -> list[str]:
     """Warns of bones that do not go where they should though they can be turned, as those of a leg by IK.
 
     :param turns: (T, B, 3, 3) rotations of the channels; wanted: (T, B, 3, 3) where they should turn the bones to.
@@ -349,14 +358,14 @@ def _independent(parts: dict[str, str]) -> list[list[int]]:
     return list(groups.values())
 
 
-def _matrices(rig: bpy.types.Object, names: list[str]) -> np.ndarray:
+def _matrices(rig: bpy.types.Object, names: list[str]) -> NDArray[np.float64]:
     """(B, 4, 4) evaluated bones to world."""
     bpy.context.view_layer.update()
     posed = rig.evaluated_get(bpy.context.evaluated_depsgraph_get())
     return np.array([posed.matrix_world @ posed.pose.bones[name].matrix for name in names], float)
 
 
-def _rotations(matrices: np.ndarray) -> np.ndarray:
+def _rotations(matrices: NDArray[np.float64]) -> NDArray[np.float64]:
     """Their rotations, scale taken out."""
     U, _, Vt = np.linalg.svd(matrices[:, :3, :3])
     return U @ Vt
