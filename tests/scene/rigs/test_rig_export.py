@@ -15,7 +15,7 @@ from scope.scope_addon.retarget.bone_map import BoneMap, save_bone_map
 from scope.scope_addon.retarget.rig_source import rig_source
 from scope.scope_addon.scene.build import NEW_SCENE
 from scope.scope_addon.scene.export import formats
-from scope.scope_addon.scene.rigs.rig_export import export_on_rig
+from scope.scope_addon.scene.rigs.rig_export import RigExportOptions, export_on_rig
 from scope.scope_addon.scene.rigs.rig_file import check_rig
 from scope.solver.errors import InputError
 
@@ -93,7 +93,7 @@ def test_a_rig_from_a_file_goes_into_every_format(tmp_path, kind):
     source = rig_source(save_rig(tmp_path / f"rig{kind}", animated=kind == ".blend"))
     targets = [tmp_path / name for name in ("out.blend", "out.fbx", "out.glb", "out.bvh", "out.usdc")]
     before = {k: len(getattr(bpy.data, k)) for k in ("objects", "meshes", "armatures", "actions", "collections")}
-    written, _ = export_on_rig([motion_of(walk(2.0))], BODY, targets, source, OPTIONS)
+    written, _ = export_on_rig([motion_of(walk(2.0))], BODY, targets, source, RigExportOptions(OPTIONS))
     assert written == targets
     assert {k: len(getattr(bpy.data, k)) for k in before} == before
     for path in targets[:3]:
@@ -110,7 +110,7 @@ def test_two_people_have_a_rig_each(tmp_path):
     other = walk(2.0)
     other.root[:, 0] += 2.0
     motions = [motion_of(walk(2.0)), motion_of(other)]
-    export_on_rig(motions, BODY, [tmp_path / "out.glb"], source, OPTIONS)
+    export_on_rig(motions, BODY, [tmp_path / "out.glb"], source, RigExportOptions(OPTIONS))
     rigs = read(tmp_path / "out.glb")
     places = [seen(rig, [names_of("mixamo")["pelvis"]], [30])[0, 0, 0] for rig in rigs]
     assert len(rigs) == 2
@@ -172,7 +172,7 @@ def test_fingers_that_follow_one_another_matter_only_where_fingers_are_captured(
 def test_a_map_of_another_rig_is_refused(tmp_path):
     path = save_rig(tmp_path / "rig.glb")
     save_bone_map(BoneMap({bone: part for part, bone in names_of("unreal").items()}), tmp_path / "map.json")
-    with pytest.raises(InputError, match="'pelvis' is no bone of 'Rig0'"):
+    with pytest.raises(InputError, match="'pelvis' is not a bone of 'Rig0'"):
         check_rig(rig_source(path, bone_map=tmp_path / "map.json"))
 
 
@@ -199,7 +199,7 @@ def test_the_way_on_an_object_is_the_same_in_every_format(tmp_path, kind):
     paths = {}
     for root in ("bone", "object"):
         out = tmp_path / f"{root}{kind}"
-        export_on_rig([motion_of(walk(2.0))], BODY, [out], source, OPTIONS, root)
+        export_on_rig([motion_of(walk(2.0))], BODY, [out], source, RigExportOptions(OPTIONS, root))
         rigs = read(out)
         bone = names_of("mixamo")["pelvis"]
         paths[root] = seen(rigs[0], [bone], range(2, 60, 8))[:, 0], np.array(rigs[0].pose.bones[bone].head)

@@ -284,7 +284,7 @@ def test_bones_that_a_constraint_holds_are_told(source):
     held.target, held.chain_count = target, 2
     (warning,) = run(source, rig).warnings
     assert "'thigh_l'" in warning
-    assert "cannot follow: mute the constraints" in warning
+    assert "cannot follow the motion: mute the constraints" in warning
     held.mute = True
     assert run(source, rig).warnings == []
     assert direction_error(rig, bone_of, ARMS) < 1.0

@@ -9,7 +9,11 @@ import pytest
 from mathutils import Matrix
 from scope.scope_addon.edit.root_motion import with_trajectory
 from scope.scope_addon.errors import UsageError
-from scope.scope_addon.scene.character.root_object import root_object, move_root_motion_to_bones, move_root_motion_to_object
+from scope.scope_addon.scene.character.root_object import (
+    move_root_motion_to_bones,
+    move_root_motion_to_object,
+    root_object,
+)
 from scope.scope_addon.scene.rigs.rig_retarget import RetargetOptions, guess_bone_map, retarget
 
 from ...edit.walking import BODY, RATE, motion_of, walk
