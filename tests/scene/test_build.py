@@ -105,9 +105,7 @@ def test_variable_frame_rate_keeps_its_timing(body, make_motion, truth, blender)
     expected = truth(body, motion)
     for t in range(len(stamps)):
         blender.go_to(stamps[t] * 25)
-        np.testing.assert_allclose(
-            blender.joints(person.armature, body.joint_names), expected.joints[t], atol=1e-4
-        )
+        np.testing.assert_allclose(blender.joints(person.armature, body.joint_names), expected.joints[t], atol=1e-4)
     assert (bpy.context.scene.frame_start, bpy.context.scene.frame_end) == (0, 7)
 
 
