@@ -22,7 +22,7 @@ def add_footage_strips(scene: bpy.types.Scene, footage: str | Path, start_frame:
     """
     path = Path(footage)
     if not path.is_file():
-        raise VideoError(f"the footage {path} does not exist; choose the video or picture again and capture it anew")
+        raise VideoError(f"the footage {path} does not exist; choose the video or picture again and repeat the capture")
     editor = scene.sequence_editor or scene.sequence_editor_create()
     strips = strips_of(editor)
     if not len(strips):

@@ -130,7 +130,7 @@ def test_a_new_scene_takes_rate_size_and_range(body, make_motion):
     assert scene.camera == result.people[0].camera
 
 
-def test_a_scene_that_counts_in_centimetres_is_told_of(body, make_motion):
+def test_a_scene_in_centimetres_gives_a_warning(body, make_motion):
     assert build_scene([make_motion(body, 2)], body).warnings == []
     bpy.context.scene.unit_settings.scale_length = 0.01
     warnings = build_scene([make_motion(body, 2)], body).warnings

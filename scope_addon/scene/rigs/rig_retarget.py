@@ -134,7 +134,7 @@ def _usable_map(source: bpy.types.Object, body: Body, rig: bpy.types.Object, bon
     """
     bone_map.check()
     if rig == source or rig.type != "ARMATURE":
-        raise UsageError("the rig must be an armature other than the captured one; choose another")
+        raise UsageError("the rig must be an armature, and not the captured one; choose another armature")
     missing = [name for name in bone_map.parts if name not in rig.pose.bones]
     if missing:
         raise UsageError(f"'{rig.name}' has no bone '{missing[0]}'; guess the bones again or correct the list")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Motions on the user's own rig, from file to file."""
+"""Retargeting from a rig file to exported files."""
 
 import json
 import subprocess
@@ -24,7 +24,7 @@ from ..made_rigs import ARMS, FRAMES, build_rig, names_of, seen, truth
 
 
 def save_rig(path, scheme="mixamo", armatures=1, animated=False):
-    """A file of rigs, each with its mesh, and a stone that belongs to nobody; the session is empty then."""
+    """Write a file of rigs, each with its mesh, and an unrelated object; the session is empty afterwards."""
     for k in range(armatures):
         rig, bone_of = build_rig(scheme, seed=k)
         rig.name = f"Rig{k}"
@@ -57,7 +57,7 @@ def save_rig(path, scheme="mixamo", armatures=1, animated=False):
 
 
 def read(path):
-    """The armatures of a file, which the active scene holds then."""
+    """Load a file into the active scene and return its armatures."""
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     bpy.context.scene.render.fps = 30
     with formats.quiet():
@@ -74,7 +74,7 @@ def read(path):
 
 
 def worst_arm(rig, bone_of, offset):
-    """Degrees between the rig's arms and the body's; the motion begins at frame ``offset``."""
+    """Return the angles between the rig's arms and the body's, degrees; the motion begins at frame ``offset``."""
     joints, worst = truth()[[f - 1 for f in FRAMES]], 0.0
     frames = [f - 1 + offset for f in FRAMES]
     for a, b in ARMS:
@@ -133,7 +133,7 @@ def test_a_file_without_an_armature_is_refused(tmp_path):
         check_rig(rig_source(tmp_path / "rig.blend"))
 
 
-def test_a_rig_whose_bones_are_held_is_refused_before_the_work(tmp_path):
+def test_a_rig_with_blocked_bones_is_refused_before_the_capture(tmp_path):
     rig, bone_of = build_rig("mixamo")
     limit = rig.pose.bones[bone_of["left_knee"]].constraints.new("LIMIT_ROTATION")
     limit.owner_space = "LOCAL"
@@ -155,9 +155,9 @@ def test_fingers_that_follow_one_another_matter_only_where_fingers_are_captured(
         bone.head, bone.tail, bone.parent = parent.tail, parent.tail + along, parent
         parent = bone
     bpy.ops.object.mode_set(mode="OBJECT")
-    held = rig.pose.bones["mixamorig:LeftHandIndex2"].constraints.new("COPY_ROTATION")
-    held.target, held.subtarget = rig, "mixamorig:LeftHandIndex1"
-    held.target_space = held.owner_space = "LOCAL"
+    constraint = rig.pose.bones["mixamorig:LeftHandIndex2"].constraints.new("COPY_ROTATION")
+    constraint.target, constraint.subtarget = rig, "mixamorig:LeftHandIndex1"
+    constraint.target_space = constraint.owner_space = "LOCAL"
     formats.write_blend(tmp_path / "rig.blend", bpy.context.scene)
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     parts = {bone: part for part, bone in names_of("mixamo").items()}
@@ -194,7 +194,7 @@ def test_damaged_files_are_refused_in_one_sentence(tmp_path, suffix, damage):
 
 
 @pytest.mark.parametrize("kind", [".blend", ".fbx", ".glb"])
-def test_the_way_on_an_object_is_the_same_in_every_format(tmp_path, kind):
+def test_root_motion_on_an_object_is_the_same_in_every_format(tmp_path, kind):
     source = rig_source(save_rig(tmp_path / "rig.glb"))
     paths = {}
     for root in ("bone", "object"):
@@ -213,7 +213,7 @@ def shell(*arguments):
     return subprocess.run(argv, capture_output=True, text=True, check=False)
 
 
-def test_the_shell_retargets_a_capture(tmp_path):
+def test_the_command_line_retargets_a_capture(tmp_path):
     rig = save_rig(tmp_path / "rig.glb")
     argv = ["capture", SAMPLE, "--quality", "fast", "--end", "0.2", "--json", "--retarget", rig]
     argv += ["--retarget-root", "object"]
@@ -225,7 +225,7 @@ def test_the_shell_retargets_a_capture(tmp_path):
     assert set(names_of("mixamo").values()) <= set(rigs[0].data.bones.keys())
 
 
-def test_the_shell_refuses_before_it_captures(tmp_path):
+def test_the_command_line_checks_the_rig_before_the_capture(tmp_path):
     done = shell("capture", SAMPLE, "--retarget-root", "object", "-o", tmp_path / "out.glb")
     assert done.returncode == 2
     assert "--retarget-root is about a rig" in done.stderr
