@@ -169,8 +169,8 @@ def _curves(armature: bpy.types.Object, body: Body) -> dict[str, list[bpy.types.
     animation = armature.animation_data
     if missing and animation is not None and animation.action is None and len(animation.nla_tracks):
         raise UsageError(
-            f"'{armature.name}' is animated by the NLA track '{animation.nla_tracks[0].name}', not by an action of its own: "
-            "enter Tweak Mode on the track's strip (Tab), or choose the action in the Action Editor again"
+            f"'{armature.name}' is animated by the NLA track '{animation.nla_tracks[0].name}', not by an action of its "
+            "own: enter Tweak Mode on the track's strip (Tab), or choose the action in the Action Editor again"
         )
     if missing:
         raise UsageError(f"'{armature.name}' has lost the keys of {missing[0]}; undo their removal, or capture again")
