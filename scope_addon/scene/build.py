@@ -36,7 +36,7 @@ class BuildOptions:
     set_frame_range: bool = True
     active_camera: bool = False  # make the capture's camera the scene's active camera
     start_frame: float = 0.0  # the scene frame of timestamp 0
-    shape: str = "keyed"  # "keyed": one key. "per_frame". "baked": into the mesh
+    shape: str = "keyed"  # "keyed": one key. "per_frame": a key per pose. "baked": into the mesh
     with_camera: bool = True
     with_markers: bool = True  # at the review spans, on the timeline
 

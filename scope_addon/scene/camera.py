@@ -139,9 +139,8 @@ def show_footage(
         if len(motion.frames) > 1:
             warnings += _show_picture_sequence(camera.data, background, path, motion, frames)
     else:
-        clip = bpy.data.movieclips.load(
-            str(path)
-        )  # a separate clip, because another capture may have another start or lens
+        # Always a new clip, because another capture may have another start or lens.
+        clip = bpy.data.movieclips.load(str(path))
         clip.frame_start = round(frames[0] - motion.frames[0])
         drift = float(np.abs(frames - (clip.frame_start + motion.frames)).max())
         size = tuple(clip.size)
