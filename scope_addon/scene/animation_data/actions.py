@@ -157,15 +157,15 @@ def rewrite_keys(
     curve.update()
 
 
-def add_cycles(datablock: bpy.types.ID, onwards: set[tuple[str, int]] | None = None) -> None:
+def add_cycles(datablock: bpy.types.ID, offset_curves: set[tuple[str, int]] | None = None) -> None:
     """Make every curve of a datablock cyclic.
 
-    :param onwards: data paths and indices of the curves to which each cycle adds an offset.
+    :param offset_curves: data paths and indices of the curves to which each cycle adds an offset.
     """
     remove_cycles(datablock)
     for curve in fcurves(datablock):
         modifier = curve.modifiers.new("CYCLES")
-        offset = (curve.data_path, curve.array_index) in (onwards or set())
+        offset = (curve.data_path, curve.array_index) in (offset_curves or set())
         modifier.mode_before = modifier.mode_after = "REPEAT_OFFSET" if offset else "REPEAT"
 
 

@@ -260,7 +260,7 @@ class SCOPE_OT_loop(_Span):
         first, last = float(frames[cycle.first]), float(frames[cycle.last])
         write_clip(armature, body, closed, frames[cycle.first : cycle.last + 1])
         if self.repeat:
-            add_cycles(armature, onwards={(location_path(body), 0), (location_path(body), 1)})
+            add_cycles(armature, offset_curves={(location_path(body), 0), (location_path(body), 1)})
         play_cycle(context.scene, armature, math.ceil(first), math.floor(last) - 1)
         remove_root_object(armature)
         return f"A cycle of {closed.times[-1]:.2f} s, its ends {100 * cycle.error_m:.1f} cm apart before closing"
