@@ -130,8 +130,8 @@ def _build(
         people.append(_build_person(label, motion, body, collection, rate, options))
     if options.with_markers:
         for index, person in enumerate(people):
-            whose = "" if len(people) == 1 else f"person {index + 1} "
-            confidence_curves.add_review_markers(scene, whose, person.motion, person.frames)
+            prefix = "" if len(people) == 1 else f"person {index + 1} "
+            confidence_curves.add_review_markers(scene, prefix, person.motion, person.frames)
     if options.with_camera:
         warnings += _build_cameras(name, people, collection, footage, options)
     unit = scene.unit_settings.scale_length

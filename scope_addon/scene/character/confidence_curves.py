@@ -50,12 +50,12 @@ def key_measurements(
             curve.hide = True
 
 
-def add_review_markers(scene: bpy.types.Scene, whose: str, motion: Motion, frames: NDArray[np.float64]) -> int:
+def add_review_markers(scene: bpy.types.Scene, prefix: str, motion: Motion, frames: NDArray[np.float64]) -> int:
     """Add a timeline marker at the start of each review span; return how many.
 
     If there are too many spans, the longest get a marker. Its name states the reason: "not seen 12-18".
 
-    :param whose: prefix of the name, to distinguish several people.
+    :param prefix: of the marker's name, to distinguish several people.
     :param frames: (T,) scene frame of each pose.
     """
     spans = sorted(low_confidence_spans(motion, _GAP_S), key=lambda span: span.first - span.last)[:_MAX_MARKERS]
@@ -63,7 +63,7 @@ def add_review_markers(scene: bpy.types.Scene, whose: str, motion: Motion, frame
     for span in sorted(spans, key=lambda span: span.first):
         first, last = round(float(frames[span.first])), round(float(frames[span.last]))
         at = f"{first}" if first == last else f"{first}-{last}"
-        name = f"{whose}{MARKER_NAMES[span.reason]} {at}"
+        name = f"{prefix}{MARKER_NAMES[span.reason]} {at}"
         if (name, first) not in there:
             scene.timeline_markers.new(name, frame=first)
     return len(spans)

@@ -177,7 +177,9 @@ class SCOPE_OT_refloor(_Edit):
         clip, frames = read_clip(armature, body, rate)
         positions, angles = removed_root_motion(armature, frames)
         path = positions * [1.0, 1.0, 0.0], angles  # feet that stand are still only where the person goes
-        floored = refloor(with_trajectory(clip, *path), body, betas_of(armature, body), level=self.level, lift=self.lift)
+        floored = refloor(
+            with_trajectory(clip, *path), body, betas_of(armature, body), level=self.level, lift=self.lift
+        )
         write_clip(armature, body, relative_to_trajectory(floored, *path), frames)
         return ""
 
