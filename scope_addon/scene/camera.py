@@ -7,9 +7,9 @@ OpenCV's pinhole ``u = fx x/z + cx, v = fy y/z + cy`` in a W × H picture is, wi
     pixel_aspect_x / pixel_aspect_y = fy / fx,     shift_y = (cy − H/2) / W · fx / fy.
 
 Pixel aspect and resolution belong to the scene in Blender; the camera alone is exact for square pixels. The footage has
-a display aspect of its own, without which it would not fill the picture. The clip's lens has a third one, fy / fx, because
-it measures rows in units of columns. Source: Blender's BKE_camera_params_compute_viewplane, overlay_image.cc and
-tracking.cc.
+a display aspect of its own, without which it would not fill the picture. The clip's lens has a third one, fy / fx,
+because it measures rows in units of columns. Source: Blender's BKE_camera_params_compute_viewplane, overlay_image.cc
+and tracking.cc.
 """
 
 from __future__ import annotations

@@ -252,7 +252,7 @@ class SCOPE_OT_loop(_Span):
         from ...scene.animation_data.actions import add_cycles
         from ...scene.animation_data.timing import play_cycle
         from ...scene.character.keys import location_path, read_clip, write_clip
-        from ...scene.character.root_object import remove_root_object, clip_with_root_motion
+        from ...scene.character.root_object import clip_with_root_motion, remove_root_object
 
         clip, frames = read_clip(armature, body, rate)
         clip = clip_with_root_motion(armature, clip, frames)
