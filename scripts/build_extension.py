@@ -83,7 +83,7 @@ def download_wheels(platform: str) -> list[Path]:
 
 def locked(python: str) -> str:
     """The entries of our packages in the lock of a Python, hashes included."""
-    text = (ROOT / "scripts" / f"requirements-{python}.txt").read_text()
+    text = (ROOT / "scripts" / "requirements" / f"{python}.txt").read_text()
     entries = re.findall(r"^(\S+?)==\S+(?:.*\\\n)*.*$", text, flags=re.M)
     blocks = re.findall(r"^\S+?==\S+(?:.*\\\n)*.*$", text, flags=re.M)
     found = {name: block for name, block in zip(entries, blocks, strict=True) if name in PACKAGES}

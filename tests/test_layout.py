@@ -47,7 +47,7 @@ def modules() -> list[Path]:
     return sorted(path for folder in folders for path in folder.rglob("*.py") if path.name != "__init__.py")
 
 
-@pytest.mark.xfail(reason="some test files have still to be moved and renamed", strict=False)
+
 def test_every_test_file_is_named_after_a_module():
     files = files_of_tests()
     assert len(files) > 50
