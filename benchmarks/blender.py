@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What an animator waits for: keys written, work on a captured motion, Blender opening, its window in a capture."""
+"""Times for which an animator waits: writing keys, editing a captured motion, opening Blender, and capturing in it."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ TARGETS = {"writing": 1.5, "working again": 1.0, "opening": 50.0, "timer gaps": 
 
 
 def blender(quick: bool) -> dict:
-    """Measure, print the table, return the figures; what cannot be had here is None."""
+    """Measure, print the table and return the figures; those that cannot be measured on this machine are None."""
     figures = _work(3 if quick else 11)
     figures["opening"] = _in_real_blender("startup", "startup.json")
     panel = None if quick else _in_real_blender("panel", "report.json")
@@ -42,7 +42,7 @@ def blender(quick: bool) -> dict:
 
 
 def _work(rounds: int) -> dict:
-    """The figures of ``blender_work``, in a process of its own: Blender's module can hang at exit."""
+    """Return the figures of ``blender_work``, run in a separate process because Blender's module can hang at exit."""
     frames.CACHE.mkdir(parents=True, exist_ok=True)
     motion = frames.CACHE / "sample.npz"
     if not motion.is_file():
@@ -54,7 +54,7 @@ def _work(rounds: int) -> dict:
 
 
 def _in_real_blender(part: str, file: str) -> dict | None:
-    """One part of ./scripts/blender, which needs root and Debian; None with a reason where it does not run."""
+    """Run one part of ./scripts/blender, which needs root and Debian; return None, and print why, if it fails."""
     environment = {name: value for name, value in os.environ.items() if not name.endswith("_NUM_THREADS")}
     command = [str(ROOT / "scripts" / "blender"), "--part", part]
     done = subprocess.run(command, env=environment, stdout=subprocess.DEVNULL, check=False)

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Cold and warm fits of real frames: iterations, time, and how many converge.
 
-The measurements are those that the capture hands to the solver: the clips beside the checkout go through its networks
-once, and what arrives at the solver is kept in build/bench. Weights, stages and robust scales are the capture's; the
-shape is unknown in every frame. Cold: without an earlier estimate, from `initial_state` through all stages. Warm: from
-the frame before. Converged: cost within 0.1 % and joints within 1 mm of the same start run to a relative decrease of
-1e-12.
+The measurements are those that the capture passes to the solver: its networks process the clips next to the checkout
+once, and the measurements are kept in build/bench. Weights, stages and robust scales are the capture's; the shape is
+unknown in every frame. Cold: without an earlier estimate, from `initial_state` through all stages. Warm: from the
+previous frame. Converged: cost within 0.1 % and joints within 1 mm of the result of the same start at a relative
+decrease of 1e-12.
 """
 
 from __future__ import annotations
@@ -132,7 +132,7 @@ def capture_priors(body: Body, clip: Clip) -> Priors:
 
 @dataclass
 class Outcome:
-    """What became of the fits of one kind, cold or warm, at one tolerance; one entry a frame."""
+    """Results of the fits of one kind, cold or warm, at one tolerance; one entry per frame."""
 
     milliseconds: np.ndarray
     iterations: np.ndarray
@@ -175,13 +175,13 @@ def measure(clips: Sequence[Clip], tolerance: float, triggs: float = 0.0, every:
 
 
 def same(found: Fit, best: Fit) -> bool:
-    """Whether a fit has converged to `best`."""
+    """Return whether a fit has converged to `best`."""
     apart = np.linalg.norm(found.t_camera_part - best.t_camera_part, axis=1).max()
     return bool(abs(found.cost - best.cost) <= COST_SHARE * best.cost and apart <= JOINTS_M)
 
 
 def throughput(clips: Sequence[Clip], repeats: int = 5) -> dict[str, float]:
-    """Frames fitted in a second, each by itself from no earlier estimate: one thread, all cores, and their ratio."""
+    """Return the cold frames fitted per second by one thread and by all cores, and their ratio."""
     body = load_body("scope")
     priors = capture_priors(body, clips[0])
     frames = [m for clip in clips for m in clip.frames]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How far the captured bodies are from the truth of the four pose2sim cameras, and what each part brings."""
+"""Errors of captured bodies against ground truth of the four pose2sim cameras, and the ablation."""
 
 from __future__ import annotations
 
@@ -50,19 +50,19 @@ FLIPS = ("lr_swap", "mirror", "mirror_swap")
 
 
 def evaluate_camera(body: Body, camera: str, options: CaptureOptions) -> dict:
-    """Return everything that the evaluation tool says about one camera."""
+    """Return all figures of the evaluation tool for one camera."""
     folder = DATA / "pose2sim"
     return evaluate_clip(body, folder / f"{camera}.mp4", folder / f"truth_{camera}.npz", options)[1]
 
 
 def evaluate_clip(body: Body, video: Path, truth: Path, options: CaptureOptions) -> tuple[Motion, dict]:
-    """Capture a clip; return its motion and everything that the evaluation tool says about it.
+    """Capture a clip; return its motion and all figures of the evaluation tool for it.
 
-    :raises NoPersonError: nobody was found.
+    :raises NoPersonError: when nobody was found.
     """
     motion = capture(video, body, options).motions[0]
     with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
-        warnings.simplefilter("ignore", RuntimeWarning)  # of means over nothing, in the tool
+        warnings.simplefilter("ignore", RuntimeWarning)  # of means of no values, in the tool
         result = Path(folder) / "result.npz"
         motion.save(result)
         figures = _tool().evaluate(str(truth), str(result))
@@ -70,9 +70,9 @@ def evaluate_clip(body: Body, video: Path, truth: Path, options: CaptureOptions)
 
 
 def evaluate_all(body: Body, options: Callable[[str], CaptureOptions]) -> dict[str, dict]:
-    """Return the figures of each camera under its name and, under "mean", the means of what is shown.
+    """Return the figures of each camera under its name and, under "mean", the means of those in ``SHOWN``.
 
-    ``flipped`` is the worst of its kinds, and its mean the worst camera's.
+    ``flipped`` is the largest of the three shares of ``FLIPS``, and its mean is that of the worst camera.
     """
     found = {camera: evaluate_camera(body, camera, options(camera)) for camera in CAMERAS}
     mean = {key: float(np.mean([f[key] for f in found.values()])) for key in SHOWN}
@@ -85,7 +85,7 @@ def calibration(camera: str) -> Path:
 
 
 def _tool() -> ModuleType:
-    """The evaluation tool beside the checkout."""
+    """Import the evaluation tool next to the checkout."""
     spec = importlib.util.spec_from_file_location("evaluate", DATA.parent / "tools" / "evaluate.py")
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`./scripts/bench choices`: would another camera have chosen the same weights?
+"""`./scripts/bench choices`: cross-validate weights and thresholds over cameras.
 
-Every weight, deviation or share that was chosen by measuring is set to values around its own. For each of the four
-pose2sim cameras in turn, the value is taken that is best for the other three, and what it has on the camera that was
-left out is compared with what ships: a choice that only fits the clips it was made on would lose there.
+Every weight, deviation or share that was chosen by measuring is set to values around the shipped one. For each of the
+four pose2sim cameras in turn, the value that is best for the other three is evaluated on the camera that was left out
+and compared with the shipped value. A value that is overfitted to the clips on which it was chosen loses there.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from .accuracy import CAMERAS, evaluate_camera
 
 @dataclass(frozen=True)
 class Choice:
-    """A constant of the pipeline and what else it could be: ``module.name``, or the field of it named ``field``."""
+    """A constant of the pipeline, ``module.name`` or its field ``field``, and alternative values."""
 
     what: str
     module: ModuleType
@@ -40,13 +40,13 @@ class Choice:
 
     @property
     def shipped(self) -> float:
-        """Its value."""
+        """The shipped value."""
         value = getattr(self.module, self.name)
         return float(getattr(value, self.field) if self.field else value)
 
     @contextmanager
     def set_to(self, value: float) -> Iterator[None]:
-        """Another value, for as long as the context lasts."""
+        """Set another value while the context lasts."""
         before: Any = getattr(self.module, self.name)
         setattr(self.module, self.name, replace(before, **{self.field: value}) if self.field else value)
         try:
@@ -71,7 +71,7 @@ CHOICES = (
 
 
 def left_out(errors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Which value the other cameras choose, and what it has on the camera left out.
+    """Return the value that the other cameras choose, and its error on the camera left out.
 
     :param errors: (V, C) error with each value on each camera.
     :return: (C,) index of the value and (C,) its error.
@@ -82,7 +82,7 @@ def left_out(errors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def choices(quick: bool) -> dict:
-    """Measure everything (``quick``: the first choices alone), print the tables, return the figures."""
+    """Measure all choices (``quick``: the first three), print the tables and return the figures."""
     if not DATA.is_dir():
         print(f"{DATA} is not beside this checkout: nothing was measured", file=sys.stderr)
         return {}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`./scripts/bench perception`: accuracy against truth, what each part brings, frames per second."""
+"""`./scripts/bench perception`: accuracy against ground truth, ablation, frames per second."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def _speed(body: Body, quick: bool) -> dict:
     presets = {}
     for quality in (default,) if quick else PRESETS:
         presets[quality] = side_by_side(body, video, quality, 300, rounds)
-    # The clip has 12 frames a second: more looks for newcomers, and at left and right, fall on each of its frames.
+    # The clip has 12 frames per second, so detection and left-right decisions take a larger share of each frame.
     pairs = {
         name: end_to_end(body, looped(TWO_PEOPLE, 300 if quick else 600, fps), "fast", 2)
         for name, fps in (("30 a second", 30.0), ("12 a second", None))

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`./scripts/bench renders`: captures of rendered clips, whose truth is exact, with and without focal length or height.
+"""`./scripts/bench renders`: captures of rendered clips with exact ground truth, given focal length, height or neither.
 
-The clips are `held_out`'s shots, and the sample clip, which no mean contains.
+The clips are the shots of `held_out` and the sample clip, which the means leave out.
 """
 
 from __future__ import annotations
@@ -65,10 +65,10 @@ def renders(quick: bool) -> dict:
 
 
 def evaluate_render(body: Body, video: Path, truth: Path, quality: str, known: str) -> dict:
-    """Return what the evaluation tool says about one clip, ``size``, and what ``against_world`` says.
+    """Return the figures of the evaluation tool for one clip, ``size``, and the figures of ``against_world``.
 
-    ``known``: one of ``KNOWN``. Where nobody was found, ``coverage`` alone. ``size``: the result's over the truth's,
-    median of the frames.
+    ``known``: one of ``KNOWN``. If nobody was found, only ``coverage``. ``size``: captured over true size, median of
+    the frames.
     """
     with np.load(truth) as data:
         true = {key: data[key] for key in data.files}
@@ -85,11 +85,11 @@ def evaluate_render(body: Body, video: Path, truth: Path, quality: str, known: s
 
 
 def against_world(body: Body, motion: Motion, truth: dict[str, np.ndarray]) -> dict[str, float | None]:
-    """Compare a motion's world and camera with the truth's, over the frames that both have.
+    """Compare a motion's world and camera with ground truth, over the frames that both have.
 
     ``up_deg``: mean angle between the two upward directions, seen from the camera. ``floor_cm``: mean error of the
-    height over the floor of feet that stand (middle of heel and toe), None if none does. ``focal``: the ratio of the
-    focal lengths.
+    height above the floor of standing feet (midpoint of heel and toe), None if no foot stands. ``focal``: the ratio of
+    the focal lengths.
     """
     rows = np.flatnonzero(motion.valid & np.isin(motion.frames, truth["frame_index"]))
     at = np.searchsorted(truth["frame_index"], motion.frames[rows])
@@ -110,7 +110,7 @@ def against_world(body: Body, motion: Motion, truth: dict[str, np.ndarray]) -> d
 
 
 def mean_of(rows: list[dict]) -> dict[str, float | None]:
-    """The mean of what is shown, over the rows that have it."""
+    """Return the mean of every figure that is shown, over the rows that have it."""
     means: dict[str, float | None] = {}
     for key in SHOWN:
         values = [row[key] for row in rows if row.get(key) is not None]
@@ -119,5 +119,5 @@ def mean_of(rows: list[dict]) -> dict[str, float | None]:
 
 
 def _field_of_view(truth: dict[str, np.ndarray]) -> float:
-    """Degrees along the picture's longer side."""
+    """Return the field of view along the longer side of the image, in degrees."""
     return math.degrees(2 * math.atan(max(truth["size"]) / (2 * truth["intrinsics"][0, 0])))

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Frames per second from the file to the motion file, by stage, beside MediaPipe's own pipeline with the same network.
+"""Frames per second from video to motion file, by stage, compared with MediaPipe's pipeline with the same network.
 
-Short clips are looped to a length at which starting up does not count. Loading the networks is left out on both sides.
-Ours and MediaPipe's take turns, so that what else the machine does falls on both.
+Short clips are looped until start-up no longer matters. Loading the networks is not timed on either side. Scope and
+MediaPipe alternate, so that other load on the machine affects both alike.
 """
 
 from __future__ import annotations
@@ -76,7 +76,7 @@ def end_to_end(body: Body, video: Path, quality: str, people: int | str = "large
 
 
 def warm_up(body: Body) -> None:
-    """Compile and cache what the first capture would."""
+    """Compile and cache everything that the first capture would."""
     capture(DATA / "clips/run_moving_camera.mp4", body, CaptureOptions(quality="fast", wanted=VideoRange(0, 1.0)))
 
 
@@ -116,7 +116,7 @@ def _save_all(result: Capture) -> float:
 
 
 def _bring_network(python: Path, name: str) -> None:
-    """MediaPipe would download the networks that its wheel lacks; the capture's own download has them."""
+    """Copy the networks that MediaPipe's wheel lacks, and that it would download, from the capture's own package."""
     folder = next((python.parent.parent / "lib").glob("python*/site-packages/mediapipe/modules/pose_landmark"))
     target = folder / f"pose_landmark_{name}.tflite"
     if not target.exists():

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One peer on the benchmark problem, in the peer's own environment: prints the microseconds of one iteration.
+"""Run one peer on the benchmark problem, in the peer's own environment; print the microseconds of one iteration.
 
 Unknowns are the coordinates d of a step away from a state of the bank, as in dense.py; residuals and Jacobian come
 from the same compiled code as there.
@@ -25,7 +25,7 @@ REPEATS, ITERATIONS = 30, 10
 
 
 class Residuals:
-    """r(d) and its Jacobian about a state of the bank."""
+    """Residuals r(d) and their Jacobian at a state of the bank."""
 
     def __init__(self) -> None:
         """Make the problem K = 23, P = 10, N = 120."""

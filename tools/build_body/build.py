@@ -21,7 +21,7 @@ from .write import LICENSE, lengths
 
 @dataclass(frozen=True)
 class ShapedMesh:
-    """The source pose before any skeleton: ``basis`` (1 + P, N, 3), the mean and the components over all vertices."""
+    """The mesh in the source pose: ``basis`` (1 + P, N, 3), the mean and the components over all vertices."""
 
     source: SourceMesh
     mesh: Mesh
@@ -29,7 +29,7 @@ class ShapedMesh:
 
 
 def build_bodies(downloads: Path = DOWNLOADS) -> dict[str, dict[str, np.ndarray]]:
-    """The arrays of both bodies, ``scope`` (24 joints) and ``scope_h`` (52), by file key."""
+    """Return the arrays of both bodies, ``scope`` (24 joints) and ``scope_h`` (52), by file key."""
     shaped = shape_mesh(downloads)
     skeletons = (make_skeleton(shaped.source, with_hands) for with_hands in (False, True))
     return {skeleton.name: rig_body(shaped, skeleton) for skeleton in skeletons}

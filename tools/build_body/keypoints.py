@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the 2D detectors find, as points rigidly attached to body parts (Assumption 1 of the paper).
+"""The keypoints of the 2D detectors, as points rigidly attached to body parts (Assumption 1 of the paper).
 
-Three sets: BlazePose-33, COCO-17 with six feet points, and 21 points a hand in MediaPipe's order. A keypoint is a
+Three sets: BlazePose-33, COCO-17 with six feet points, and 21 points per hand in MediaPipe's order. A keypoint is a
 joint, the mean of some surface vertices, or a joint cube inside the mesh; its place is linear in the shape.
 """
 
@@ -37,7 +37,7 @@ CUBE_POINTS = {"left_index": "finger-2-1", "left_pinky": "finger-5-1", "left_thu
 
 @dataclass(frozen=True)
 class Keypoint:
-    """One keypoint: the regressor (N,) of its place in the source pose, and the part it turns with."""
+    """One keypoint: the regressor (N,) of its position in the source pose, and the part to which it belongs."""
 
     name: str
     regressor: np.ndarray
@@ -45,7 +45,7 @@ class Keypoint:
 
 
 def make_keypoints(source: SourceMesh, skeleton: Skeleton) -> list[Keypoint]:
-    """All keypoints of the three sets, in file order, names with the set's prefix."""
+    """Return all keypoints of the three sets, in file order, names with the set's prefix."""
     named = [(f"blazepose/{name}", *_body_point(source, skeleton, name)) for name in BLAZEPOSE]
     named += [(f"coco/{name}", *_body_point(source, skeleton, name)) for name in COCO]
     for side in ("left", "right"):
@@ -56,7 +56,7 @@ def make_keypoints(source: SourceMesh, skeleton: Skeleton) -> list[Keypoint]:
 def pose_keypoints(
     keypoints: list[Keypoint], R: np.ndarray, J: np.ndarray, posed_J: np.ndarray, basis: np.ndarray
 ) -> np.ndarray:
-    """(B, M, 3) T-posed keypoints, k' = R_i (k − J_i) + J'_i, for a stack of source vertex sets ``basis`` (B, N, 3)."""
+    """Return T-posed keypoints (B, M, 3), k' = R_i (k − J_i) + J'_i, of source vertex sets ``basis`` (B, N, 3)."""
     part = np.array([keypoint.part for keypoint in keypoints])
     points = np.stack([keypoint.regressor for keypoint in keypoints]) @ basis
     return np.einsum("mxy,bmy->bmx", R[part], points - J[:, part]) + posed_J[:, part]

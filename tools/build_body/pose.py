@@ -21,11 +21,12 @@ MIRROR = np.diag([-1.0, 1.0, 1.0])
 
 
 def part_rotations(skeleton: Skeleton, J: np.ndarray, across_hand: np.ndarray) -> np.ndarray:
-    """(K+1, 3, 3) global rotations that take the mean shape's parts into the T-pose.
+    """Return (K+1, 3, 3) global rotations that take the mean shape's parts into the T-pose.
 
     :param J: (K+1, 3) joints of the mean shape.
     :param across_hand: (3,) direction from the left little to the left index knuckle.
     """
+
     def joint(name: str) -> np.ndarray:
         return J[skeleton.index(name)]
 
@@ -53,7 +54,7 @@ def part_rotations(skeleton: Skeleton, J: np.ndarray, across_hand: np.ndarray) -
 
 
 def pose_joints(skeleton: Skeleton, R: np.ndarray, J: np.ndarray) -> np.ndarray:
-    """J' for a stack of joint sets J (B, K+1, 3): the mean and each component."""
+    """Return J' of a stack of joint sets J (B, K+1, 3): the mean and each component."""
     posed = J.copy()
     for i, parent in enumerate(skeleton.parents):
         if parent >= 0:
@@ -64,11 +65,11 @@ def pose_joints(skeleton: Skeleton, R: np.ndarray, J: np.ndarray) -> np.ndarray:
 def pose_vertices(
     skeleton: Skeleton, R: np.ndarray, W: np.ndarray, J: np.ndarray, posed_J: np.ndarray, basis: np.ndarray
 ) -> np.ndarray:
-    """v' for a stack of vertex sets ``basis`` (B, V, 3); ``J`` (B, K+1, 3) and ``posed_J`` as in ``pose_joints``."""
+    """Return v' of a stack of vertex sets ``basis`` (B, V, 3); ``J`` (B, K+1, 3), ``posed_J`` as in ``pose_joints``."""
     A = _centre_weights(skeleton, W)
     Q = _blend_rotations(R, W)
     centre = np.einsum("vi,bix->bvx", A, J)
-    # Where each part takes the centre, blended: Σ w (R_i c + d_i), d_i = J'_i − R_i J_i.
+    # The blended positions to which the parts move the centre: Σ w (R_i c + d_i), d_i = J'_i − R_i J_i.
     shift = posed_J - np.einsum("ixy,biy->bix", R, J)
     blended = np.einsum("vi,ixy->vxy", W, R)
     moved_centre = np.einsum("vxy,bvy->bvx", blended, centre) + np.einsum("vi,bix->bvx", W, shift)
@@ -87,7 +88,7 @@ def _about_z(angle: float) -> np.ndarray:
 
 
 def _align(source: tuple, target: tuple) -> np.ndarray:
-    """The rotation that takes source[0] to target[0] and source[1] as near to target[1] as it can."""
+    """Return the rotation that takes source[0] to target[0] and source[1] as near to target[1] as possible."""
 
     def frame(first, second):
         x = np.asarray(first, float) / np.linalg.norm(first)
@@ -99,7 +100,7 @@ def _align(source: tuple, target: tuple) -> np.ndarray:
 
 
 def _centre_weights(skeleton: Skeleton, W: np.ndarray) -> np.ndarray:
-    """(V, K+1): a_vi from the products of the weights of a joint's part and its parent's; rows sum to one."""
+    """Return a_vi (V, K+1): products of the weights of a joint's part and its parent's; rows sum to one."""
     A = 1e-9 * W
     for i, parent in enumerate(skeleton.parents):
         if parent >= 0:
@@ -108,7 +109,7 @@ def _centre_weights(skeleton: Skeleton, W: np.ndarray) -> np.ndarray:
 
 
 def _blend_rotations(R: np.ndarray, W: np.ndarray) -> np.ndarray:
-    """(V, 3, 3): the weighted quaternion mean of the part rotations (all less than 180° apart)."""
+    """Return (V, 3, 3), the weighted quaternion mean of the part rotations (all less than 180° apart)."""
     q = np.array([_quaternion(each) for each in R])
     mean = W @ q
     w, x, y, z = (mean / np.linalg.norm(mean, axis=1, keepdims=True)).T
@@ -121,6 +122,6 @@ def _blend_rotations(R: np.ndarray, W: np.ndarray) -> np.ndarray:
 
 
 def _quaternion(R: np.ndarray) -> np.ndarray:
-    """(w, x, y, z) with w > 0; the rotations here are far from 180°."""
+    """Return (w, x, y, z) with w > 0; the rotations here are far from 180°."""
     w = 0.5 * np.sqrt(1.0 + np.trace(R))
     return np.array([w, *(np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]]) / (4.0 * w))])

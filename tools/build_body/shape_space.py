@@ -6,9 +6,9 @@ in its slider, its weights summing to one (MakeHuman's rule):
 
     vertices(person) = base + Σ_t Π_f weight_f,t(person) · target_t
 
-To these come MakeHuman's targets of single lengths (``source.LENGTHS``), because the sliders alone give people of one
-stature the same upper arms and trunks, and arms whose span is 0.99 of the stature. Of adults who are measured it is
-1.03 to 1.04, and upper arm and forearm are 0.16 and 0.15 of it (de Leva 1996; 0.145 and 0.140 with the sliders).
+MakeHuman's targets of single lengths (``source.LENGTHS``) are added, because the sliders alone give people of one
+stature the same upper arms and trunks, and an arm span of 0.99 of the stature. In measured adults it is 1.03 to 1.04,
+and upper arm and forearm are 0.16 and 0.15 of it (de Leva 1996; 0.145 and 0.140 with the sliders).
 
 Every shape is shifted so that the pelvis joint stays at the origin.
 """
@@ -34,8 +34,8 @@ FACTORS = {  # factor -> its levels; the first and last levels lie at slider 0 a
 }
 RACES = ("african", "asian", "caucasian")
 STATURE = {"female": (1.625, 0.068), "male": (1.755, 0.071)}  # mean and standard deviation in metres
-# Length target -> mean and standard deviation, relative, of what it adds. The mean body's span becomes 1.03 of its
-# stature; what people's limbs differ in once their stature is known becomes some 3 % of each.
+# Length target -> relative mean and standard deviation of its change. The mean body's arm span becomes 1.03 of its
+# stature; the variation of limb lengths among people of one stature becomes about 3 %.
 LENGTHENING = {
     "arms/measure-upperarm-length": (0.076, 0.03),
     "arms/measure-lowerarm-length": (0.076, 0.02),
@@ -57,7 +57,7 @@ class ShapeSpace:
 
 
 def build_shape_space(source: SourceMesh, body: np.ndarray, area: np.ndarray) -> ShapeSpace:
-    """Principal components of ``PEOPLE`` adults.
+    """Compute the principal components of ``PEOPLE`` adults.
 
     :param body: (B,) indices of the vertices whose variance counts.
     :param area: (B,) their areas, the weights of the variance.
@@ -93,14 +93,14 @@ def build_shape_space(source: SourceMesh, body: np.ndarray, area: np.ndarray) ->
 
 
 def _gain(source: SourceMesh, base: np.ndarray, move: np.ndarray, name: str) -> float:
-    """By how much a length target changes its length, relative to that of the base mesh."""
+    """Return the change of a length by its target, relative to that of the base mesh."""
     a, b = (source.cubes[cube] for cube in LENGTHS[name.rpartition("-")[0]])
     before, after = (np.linalg.norm(v[a].mean(axis=0) - v[b].mean(axis=0)) for v in (base, base + move))
     return float(after / before - 1.0)
 
 
 def _draw_people(names: list[str], gains: dict[str, float], base: np.ndarray, moves: np.ndarray) -> np.ndarray:
-    """(PEOPLE, targets) coefficients. Stature is drawn in metres and the height slider solved for it.
+    """Draw coefficients (PEOPLE, targets). Stature is drawn in metres, and the height slider solved for it.
 
     :param gains: target of a length -> relative change of that length.
     """
@@ -136,7 +136,7 @@ def _draw_people(names: list[str], gains: dict[str, float], base: np.ndarray, mo
 
 
 def _coefficients(names: list[str], sliders: dict[str, np.ndarray], lengths: dict[str, np.ndarray]) -> np.ndarray:
-    """(PEOPLE, targets): ``lengths`` are known by target, all others follow from the sliders."""
+    """Return (PEOPLE, targets): ``lengths`` are given by target, all others follow from the sliders."""
     weight = {}
     for factor, levels in FACTORS.items():
         knots = np.linspace(0.0, 1.0, len(levels))
@@ -145,9 +145,7 @@ def _coefficients(names: list[str], sliders: dict[str, np.ndarray], lengths: dic
     weight |= dict.fromkeys(RACES, np.full(PEOPLE, 1.0 / len(RACES)))
     weight["universal"] = np.ones(PEOPLE)
     columns = [
-        lengths[name]
-        if name in lengths
-        else np.prod([weight[word] for word in name.split("/")[-1].split("-")], axis=0)
+        lengths[name] if name in lengths else np.prod([weight[word] for word in name.split("/")[-1].split("-")], axis=0)
         for name in names
     ]
     return np.stack(columns, axis=1)

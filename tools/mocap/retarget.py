@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How a source's skeleton corresponds to our body's parts, and the shape that gives our body its bone lengths.
+"""Correspondence between a source's skeleton and the body's parts, and the shape with the source's bone lengths.
 
 Rotations: part i follows a segment s of the source, R_world_part = R_world_s · C_i, where the constant C_i takes the
 part's rest bone and hinge axis to the segment's. It fixes the twist, which joint positions alone leave open.
 Positions: joint j follows a point fixed to a segment, p_world_j = p_world_s + R_world_s · o_j; the constant o_j
-bridges what the two skeletons mean by a joint (CMU's hip joints lie 15-18 cm apart, ours 21 cm).
+is the distance between the two skeletons' joints (CMU's hip joints are 15-18 cm apart, the body's 21 cm).
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ from .take import Take
 SIDES = ("left", "right")
 CMU_SPLAY = np.radians(20.0)  # of CMU's thighs at zero pose
 CMU_ELBOW_ROLL = np.radians(30.0)  # of CMU's elbow axis about the outstretched arm at zero pose, up at the front
-HEAD_PITCH = np.radians(5.0)  # median forward pitch that heads are set to: people look a little down
+HEAD_PITCH = np.radians(5.0)  # median forward pitch to which heads are set: people look slightly down
 MOST_HEAD_PITCH = np.radians(25.0)
 STANCE_SPEED = 0.12  # m/s: a foot slower than this stands
 LENGTHS = (  # joint, joint, source joint, source joint, standard deviation in metres
     *((f"{s}_{a}", f"{s}_{b}", f"{s}_{a}", f"{s}_{b}", 0.01)
       for s in SIDES for a, b in (("hip", "knee"), ("knee", "ankle"), ("shoulder", "elbow"))),
 )  # fmt: skip
-ARM_LENGTHS = {"cmu": ("hand", "knuckle"), "deepmimic": ("wrist", "wrist")}  # our and the source's end of the forearm
+ARM_LENGTHS = {"cmu": ("hand", "knuckle"), "deepmimic": ("wrist", "wrist")}  # ends of the forearm: body, source
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class Follow:
     first: str
     second: str = ""
     share: float = 0.0
-    weight: float = 300.0  # per radian^2, beside 24000 per metre^2 of a joint: 300 is a lever of 11 cm
+    weight: float = 300.0  # per radian^2, against 24000 per metre^2 of a joint: 300 is a lever of 11 cm
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ class Point:
 
 @dataclass
 class Correspondence:
-    """Everything that relates one performer to our body."""
+    """The correspondence between one performer's skeleton and the body."""
 
     parts: dict[str, Follow]
     points: dict[str, Point]
@@ -61,7 +61,8 @@ class Correspondence:
 
 
 def _sided(table: dict) -> dict:
-    """Both sides' entries of a table whose names begin with ``*_``."""
+    """Return both sides' entries of a table whose names begin with ``*_``."""
+
     def put(value, side):  # type: ignore[no-untyped-def]
         changes = {k: v.replace("*", side) for k, v in vars(value).items() if isinstance(v, str)}
         return type(value)(**{**vars(value), **changes})
@@ -102,7 +103,7 @@ DEEPMIMIC_POINTS = _sided({
 
 
 def correspond(body: Body, betas: np.ndarray, takes: list[Take]) -> Correspondence:
-    """The correspondence for one performer's takes, with feet levelled and heads upright; offsets are still zero."""
+    """Return the correspondence for one performer's takes, with level feet and upright heads, and zero offsets."""
     cmu = takes[0].source.startswith("cmu_")
     found = Correspondence(CMU_PARTS if cmu else DEEPMIMIC_PARTS, CMU_POINTS if cmu else DEEPMIMIC_POINTS)
     rest = body.rest_joints(betas)
@@ -120,9 +121,9 @@ def correspond(body: Body, betas: np.ndarray, takes: list[Take]) -> Corresponden
 
 
 def segment_rotations(take: Take, follow: Follow) -> np.ndarray:
-    """(T, 3, 3) R_world_segment of the segment or mixture that a part follows.
+    """Return R_world_segment (T, 3, 3) of the segment or mixture that a part follows.
 
-    :raises ShapeError: the take has positions only.
+    :raises ShapeError: when the take has positions only.
     """
     if take.orientations is None:
         raise ShapeError(f"{take.name} has no orientations: our body cannot be fitted to joint positions alone")
@@ -134,7 +135,7 @@ def segment_rotations(take: Take, follow: Follow) -> np.ndarray:
 
 
 def targets(take: Take, found: Correspondence) -> tuple[np.ndarray, np.ndarray]:
-    """Rotations (T, parts, 3, 3) and positions (T, points, 3) that our parts and joints shall have."""
+    """Return target rotations (T, parts, 3, 3) of parts and target positions (T, points, 3) of joints."""
     R = np.stack([segment_rotations(take, follow) @ found.C[part] for part, follow in found.parts.items()], axis=1)
     p = np.stack([take.joint(point.joint) + segment_rotations(take, Follow(point.segment)) @ found.offset[joint]
                   for joint, point in found.points.items()], axis=1)  # fmt: skip
@@ -142,7 +143,7 @@ def targets(take: Take, found: Correspondence) -> tuple[np.ndarray, np.ndarray]:
 
 
 def shape_from_lengths(body: Body, take: Take) -> np.ndarray:
-    """Shape (P,) with the take's bone lengths and trunk height: Gauss-Newton on (length − measured)/σ and β/1."""
+    """Fit the shape (P,) to bone lengths and trunk height by Gauss-Newton on (length − measured)/σ and β/1."""
     ours, theirs = ARM_LENGTHS["cmu" if take.source.startswith("cmu_") else "deepmimic"]
     pairs = [*LENGTHS, *((f"{s}_elbow", f"{s}_{ours}", f"{s}_elbow", f"{s}_{theirs}", 0.01) for s in SIDES)]
     index = {name: i for i, name in enumerate(body.joint_names)}
@@ -170,7 +171,7 @@ def shape_from_lengths(body: Body, take: Take) -> np.ndarray:
 
 
 def _chain(a: str, b: str) -> list[str]:
-    """The source's joints from a to b: its forearm is two bones, and then comes the hand."""
+    """Return the source's joints from a to b: its forearm is two bones, followed by the hand."""
     if not b.endswith("_knuckle"):
         return [a, b]
     side = b.split("_")[0]
@@ -178,7 +179,7 @@ def _chain(a: str, b: str) -> list[str]:
 
 
 def _rest_alignment(body: Body, rest: np.ndarray, part: str, cmu: bool) -> np.ndarray:
-    """C that takes a limb's rest bone and hinge axis to the source's; identity elsewhere, as all stand upright."""
+    """Return C, which takes a limb's rest bone and hinge axis to the source's; identity for upright parts."""
     side, _, name = part.rpartition("_")
     mirror = -1.0 if side == "right" else 1.0
     child = {"hip": "knee", "knee": "ankle", "shoulder": "elbow", "elbow": "wrist"}.get(name)
@@ -202,12 +203,12 @@ def _rest_alignment(body: Body, rest: np.ndarray, part: str, cmu: bool) -> np.nd
 
 
 def _hanging(mirror: float) -> np.ndarray:
-    """Rotation of an arm from the T-pose to hanging, palms to the thighs."""
+    """Return the rotation of an arm from the T-pose to hanging, palms to the thighs."""
     return exp([0.0, 0.0, -mirror * np.pi / 2])
 
 
 def _frame(bone: np.ndarray | list[float], axis: np.ndarray | list[float]) -> np.ndarray:
-    """Rotation with columns (bone, the axis made perpendicular to it, their cross product)."""
+    """Return the rotation with columns (bone, the axis made perpendicular to it, their cross product)."""
     b = np.asarray(bone, float) / np.linalg.norm(bone)
     a = np.asarray(axis, float) - b * (b @ axis)
     a /= np.linalg.norm(a)
@@ -215,7 +216,7 @@ def _frame(bone: np.ndarray | list[float], axis: np.ndarray | list[float]) -> np
 
 
 def _levelled(C: np.ndarray, follow: Follow, takes: list[Take], side: str) -> np.ndarray:
-    """C turned by the least rotation that makes the foot level in the median frame in which it stands."""
+    """Return C turned by the smallest rotation that makes the foot level in the median frame in which it stands."""
     ups = []
     for take in takes:
         ball = f"{side}_foot" if f"{side}_foot" in take.joint_names else f"{side}_foot_end"
@@ -235,6 +236,6 @@ def _levelled(C: np.ndarray, follow: Follow, takes: list[Take], side: str) -> np
 
 
 def _forward_lean(R: np.ndarray) -> np.ndarray:
-    """(T,) how far a segment's up axis leans towards where the segment faces, in the horizontal plane."""
+    """Return (T,) how far a segment's up axis leans in its facing direction, in the horizontal plane."""
     facing = R[:, [0, 2], 2] / np.maximum(np.linalg.norm(R[:, [0, 2], 2], axis=1, keepdims=True), 1e-9)
     return np.einsum("ti,ti->t", facing, R[:, [0, 2], 1])

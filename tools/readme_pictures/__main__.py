@@ -76,4 +76,4 @@ if __name__ == "__main__":
     status = main()
     sys.stdout.flush()
     sys.stderr.flush()
-    os._exit(status)  # footage and onnxruntime's threads may hang at exit
+    os._exit(status)  # footage and onnxruntime's threads can hang at exit

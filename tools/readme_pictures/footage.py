@@ -17,7 +17,7 @@ _OPACITY = 0.72
 
 
 def sample_with_body(motion: Motion, row: int, size: tuple[int, int]) -> np.ndarray:
-    """(H, W, 3) RGB: a frame of the sample clip with the body, cropped to the person."""
+    """Return (H, W, 3) RGB: a frame of the sample clip with the body, cropped to the person."""
     with open_video(SAMPLE) as video:
         image = next(frame.image_rgb for frame in video if frame.index == motion.frames[row])
     vertices = camera_vertices(motion, default_body(), row)
@@ -34,7 +34,7 @@ def cropped(
     motion: Motion | None = None,
     row: int = 0,
 ) -> np.ndarray:
-    """(H, W, 3) RGB: a part of a frame, with the body over it where a motion is given.
+    """Return (H, W, 3) RGB: a part of a frame, with the body over it where a motion is given.
 
     :param corner: upper left corner of the part, pixels of the frame.
     :param height: of the part, pixels of the frame.

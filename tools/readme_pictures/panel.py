@@ -70,7 +70,7 @@ class Panel:
         self._write(text, FINER * np.array([12.0, 24.0]), 0.5)
 
     def legend(self, entries: list[tuple[str, tuple]]) -> None:
-        """Name colours in the lower left corner."""
+        """Draw a legend of colours in the lower left corner."""
         left, top = FINER * 12, self.image.shape[0] - FINER * 12
         for text, color in entries:
             rgb = tuple(int(255 * c) for c in color)
@@ -79,7 +79,7 @@ class Panel:
             left += FINER * 28 + cv2.getTextSize(text, _FONT, FINER * 0.44, FINER)[0][0]
 
     def finished(self) -> np.ndarray:
-        """(H, W, 3) RGB."""
+        """Return the picture, (H, W, 3) RGB."""
         return cv2.resize(self.image, None, fx=1 / FINER, fy=1 / FINER, interpolation=cv2.INTER_AREA)
 
     def _grid(self, middle: np.ndarray) -> None:
@@ -125,6 +125,6 @@ def _pixel(at: np.ndarray) -> tuple[int, int]:
 
 
 def next_to_each_other(panels: list[np.ndarray]) -> np.ndarray:
-    """Panels of one height in a row, with a white line between them."""
+    """Join panels of one height in a row, with a white line between them."""
     line = np.full((len(panels[0]), 2, 3), 255, np.uint8)
     return np.concatenate([part for panel in panels for part in (panel, line)][:-1], axis=1)

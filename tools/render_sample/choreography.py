@@ -16,7 +16,7 @@ from .leg import solve_leg
 
 DURATION = 5.0
 START = np.array([-0.50, 0.0])
-TURN = 68.0  # yaw of the walk: to the right of the picture and a little towards the camera
+TURN = 68.0  # yaw of the walk: to the right of the image and slightly towards the camera
 FOOT_APART, TOE_OUT = 0.115, 8.0
 SQUAT = (2.2, 2.72, 2.86, 3.28)  # begins, is lowest from .. to, ends
 
@@ -24,7 +24,7 @@ Key = tuple[float, np.ndarray]  # time, value
 
 
 def choreograph(body: Body, betas: np.ndarray, fps: float) -> tuple[np.ndarray, np.ndarray]:
-    """Pose of every frame: rotations (T, K+1, 3, 3), row 0 the root in the world; and trans (T, 3)."""
+    """Return the pose of every frame: rotations (T, K+1, 3, 3), row 0 the root in the world; and trans (T, 3)."""
     times = np.arange(round(DURATION * fps)) / fps
     J = body.rest_joints(betas)
     index = {name: i for i, name in enumerate(body.joint_names)}
@@ -52,7 +52,7 @@ def choreograph(body: Body, betas: np.ndarray, fps: float) -> tuple[np.ndarray, 
 
 
 def standing_feet(times: np.ndarray) -> np.ndarray:
-    """(T, 2) bool: whether the left and the right foot stand flat and still at these times."""
+    """Return (T, 2) bool: whether the left and the right foot are flat and at rest at these times."""
     return np.array([[not any(t0 < t < t1 for t0, t1, *_ in _STEPS[s]) for s in ("left", "right")] for t in times])
 
 
@@ -60,7 +60,7 @@ def standing_feet(times: np.ndarray) -> np.ndarray:
 
 
 def _beside(along: float, side: str, yaw: float) -> np.ndarray:
-    """A place on the floor, ``along`` metres into the walk, half the width of the stance to one side."""
+    """Return a place on the floor, ``along`` metres into the walk, half the width of the stance to one side."""
     walk, facing = np.radians(TURN), np.radians(yaw)
     ahead = np.array([np.sin(walk), -np.cos(walk)])
     left = np.array([np.cos(facing), np.sin(facing)])
@@ -82,7 +82,7 @@ _STEPS: dict[str, list[tuple[float, float, np.ndarray, float]]] = {
 
 
 def _foot_at(side: str, t: float) -> tuple[np.ndarray, np.ndarray]:
-    """Ankle above its height on the floor (3,), and the foot's rotation in the world."""
+    """Return the ankle above its height on the floor (3,), and the foot's rotation in the world."""
     place, yaw, lift, pitch = _beside(0.0, side, 0.0), 0.0, 0.0, 0.0
     for begin, end, to, to_yaw in _STEPS[side]:
         if t >= end:
@@ -130,7 +130,7 @@ _LEAN = [(0.0, 0.0), (SQUAT[0], 0.0), (SQUAT[1], 32.0), (SQUAT[2], 32.0), (SQUAT
 
 
 def _arm(raised: float, ahead: float = 0.0, pitch: float = 0.0, twist: float = 0.0, elbow: float = 10.0) -> dict:
-    """Left collar, shoulder and elbow. ``raised``: −90 hangs, 0 is the T-pose; ``pitch`` > 0 swings ahead."""
+    """Return rotations of left collar, shoulder and elbow; ``raised``: −90 hangs, 0 is the T-pose; ``pitch`` > 0: ahead."""
     collar = max(raised, 0) * 0.3
     axes = np.radians([[-pitch, 0, 0], [0, -ahead, 0], [0, 0, raised - collar], [twist, 0, 0]])
     shoulder = exp(axes[0]) @ exp(axes[1]) @ exp(axes[2]) @ exp(axes[3])
@@ -172,7 +172,7 @@ def _upper_body() -> dict[str, list[Key]]:
 
 
 def _turns(keys: list[tuple[float, float, float]]) -> list[Key]:
-    """(time, degrees forward, degrees to the left) as rotations."""
+    """Convert (time, degrees forward, degrees to the left) to rotations."""
     return [(t, exp(np.radians([0, turn, 0])) @ exp(np.radians([nod, 0, 0]))) for t, nod, turn in keys]
 
 
@@ -180,12 +180,12 @@ def _turns(keys: list[tuple[float, float, float]]) -> list[Key]:
 
 
 def _ease(s: float) -> float:
-    """From 0 to 1 without velocity or acceleration at either end."""
+    """Ease from 0 to 1 without velocity or acceleration at either end."""
     return s * s * s * (10 + s * (6 * s - 15))
 
 
 def _span(keys: list, t: float) -> tuple[int, float]:
-    """Which two keys ``t`` lies between, and how far along, 0..1."""
+    """Return the indices of the two keys around ``t``, and the fraction 0..1 between them."""
     times = [key[0] for key in keys]
     i = int(np.clip(np.searchsorted(times, t, side="right") - 1, 0, len(keys) - 2))
     return i, float(np.clip((t - times[i]) / (times[i + 1] - times[i]), 0, 1))
@@ -197,13 +197,13 @@ def _eased(keys: list[tuple[float, float]], t: float) -> float:
 
 
 def _rotation_at(keys: list[Key], t: float) -> np.ndarray:
-    """Turns from key to key about one axis."""
+    """Interpolate rotations from key to key about one axis."""
     i, s = _span(keys, t)
     return keys[i][1] @ exp(_ease(s) * log(keys[i][1].T @ keys[i + 1][1]))
 
 
 def _curve(keys: list[Key], t: float) -> np.ndarray:
-    """Monotone cubic through the keys."""
+    """Evaluate the monotone cubic through the keys."""
     i, s = _span(keys, t)
     (t0, p0), (t1, p1) = keys[i], keys[i + 1]
     d = t1 - t0
@@ -213,7 +213,7 @@ def _curve(keys: list[Key], t: float) -> np.ndarray:
 
 
 def _velocity(keys: list[Key], i: int) -> np.ndarray:
-    """Harmonic mean of the slopes on both sides; zero at the ends and at turning points. Never overshoots."""
+    """Return the harmonic mean of the slopes on both sides; zero at ends and turning points. Never overshoots."""
     if i in (0, len(keys) - 1):
         return np.zeros_like(keys[i][1])
     before, after = ((keys[j + 1][1] - keys[j][1]) / (keys[j + 1][0] - keys[j][0]) for j in (i - 1, i))

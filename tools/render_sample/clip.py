@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A shot as pictures: the empty room rendered once, the person into it frame by frame. Needs bpy."""
+"""Render a shot: the empty room once, and the person in it frame by frame. Needs bpy."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from .stage import LAMPS, build_stage, encode, pose_person, render_part, render_
 from .truth import Shot
 
 KBIT_PER_S = 2000  # 5 s: 1.2 MB
-_MARGIN, _FEATHER = 24, 16  # pixels around the person that are rendered, and over which they pass into the room
+_MARGIN, _FEATHER = 24, 16  # pixels around the person that are rendered, and over which they are blended with the room
 
 
 def render_clip(body: Body, shot: Shot, path: Path, scratch: Path) -> None:
@@ -44,7 +44,7 @@ def render_pictures(body: Body, shot: Shot, frames: Iterable[int], folder: Path)
 
 
 def _affected(shot: Shot, vertices_world: np.ndarray, lamps: np.ndarray) -> tuple[int, int, int, int]:
-    """Left, top, right, bottom in pixels of what the person and the person's shadows on the floor can change."""
+    """Return left, top, right and bottom, in pixels, of the area that person and shadows can change."""
     points = [vertices_world]
     for lamp in lamps:
         share = lamp[2] / (lamp[2] - vertices_world[:, 2:])

@@ -13,15 +13,15 @@ X = np.array([1.0, 0.0, 0.0])
 def solve_leg(
     R_world_root: np.ndarray, hip: np.ndarray, ankle: np.ndarray, thigh: np.ndarray, shank: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Hip and knee rotations that bring the ankle to its target.
+    """Return the hip and knee rotations that bring the ankle to its target.
 
     The knee is a hinge about the model's x axis, bent by θ ≥ 0 so that |thigh + Rx(θ) shank| is the distance from hip
-    to ankle. The hip then turns that vector onto the target, with the hinge as near to the root's x axis as it can be.
+    to ankle. The hip then turns that vector onto the target, with the hinge as near to the root's x axis as possible.
 
     :param R_world_root: (3, 3); hip, ankle: (3,) world, metres.
     :param thigh, shank: (3,) bone vectors at rest, model frame.
     :return: Ω_hip, Ω_knee (3, 3), relative to the parent.
-    :raises ValueError: the ankle is farther away than the leg is long.
+    :raises ValueError: when the ankle is farther away than the leg is long.
     """
     target = R_world_root.T @ (ankle - hip)
     # With y and z across the hinge: |thigh + Rx(θ) shank|² = a + b cos θ + c sin θ.
@@ -38,7 +38,7 @@ def solve_leg(
 
 
 def _frame(direction: np.ndarray) -> np.ndarray:
-    """Rotation whose first column is the direction and whose second is as near to x as that allows."""
+    """Return the rotation whose first column is the direction and whose second is as near to x as possible."""
     first = direction / np.linalg.norm(direction)
     second = X - first * first[0]
     second /= np.linalg.norm(second)

@@ -11,7 +11,7 @@ import numpy as np
 from ...scope_addon.scene.axes import blender_camera_matrix
 from ...solver.body import Body
 
-LAMPS = {  # name: place (metres, world), power in watts, side in metres
+LAMPS = {  # name: position (metres, world), power in watts, side in metres
     "skylight": ((-0.7, -1.9, 5.0), 230.0, 1.6),
 }
 _SAMPLES_ROOM, _SAMPLES_PERSON = 32, 8
@@ -20,7 +20,7 @@ _SAMPLES_ROOM, _SAMPLES_PERSON = 32, 8
 def build_stage(
     body: Body, intrinsics: np.ndarray, size: tuple[int, int], world_from_camera: np.ndarray
 ) -> bpy.types.Object:
-    """A fresh scene, ready to render; returns the person's mesh object, whose vertices lie in the world frame."""
+    """Build the scene, ready to render; return the person's mesh object, whose vertices are in the world frame."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     scene = bpy.context.scene
     _render_settings(scene, size)
@@ -104,7 +104,7 @@ def _render_settings(scene: bpy.types.Scene, size: tuple[int, int]) -> None:
 
 
 def _camera(scene: bpy.types.Scene, K: np.ndarray, size: tuple[int, int], world_from_camera: np.ndarray) -> None:
-    """A camera of the given pinhole intrinsics: pixel (u, v) is the centre of a pixel, as OpenCV counts."""
+    """Add a camera of the given pinhole intrinsics; pixel (u, v) is the centre of a pixel, as in OpenCV."""
     data = bpy.data.cameras.new("camera")
     camera = bpy.data.objects.new("camera", data)
     scene.collection.objects.link(camera)
@@ -167,7 +167,7 @@ def _box(name: str, center: tuple, size: tuple, material: bpy.types.Material) ->
 def _material(
     name: str, color: tuple, second: tuple | None = None, stretch: tuple = (2.0, 2.0, 2.0)
 ) -> bpy.types.Material:
-    """A matt surface of one linear colour, or mottled between two."""
+    """Return a matt material of one linear colour, or mottled between two."""
     material = bpy.data.materials.new(name)
     material.use_nodes = True
     nodes, links = material.node_tree.nodes, material.node_tree.links

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Many motions and proportions from few recordings.
+"""Augment few recordings to many motions and proportions.
 
 A pose is a state of each joint, Ω (24, 3, 3), and a root rotation into a world with y up; a motion is a window of poses
-at the lifter's moments. Torso, arms and legs come from different recordings now and then, joints are turned at random
-by what stays the same through the window, the body leans, some motions run slower, faster or backwards, and half of
-everything is mirrored.
+at the lifter's moments. Torso, arms and legs sometimes come from different recordings, joints are rotated at random
+by a constant of the window, the body leans, some motions run slower, faster or backwards, and half of all samples are
+mirrored.
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ from ...solver.body import Body
 from ...solver.rotations import exp
 
 _MIRROR = np.diag([-1.0, 1.0, 1.0])
-# Share of samples in which a part comes from a frame of its own.
+# Share of samples in which a part comes from another frame.
 SWAP_UPPER, SWAP_ARM, SWAP_LEG = 0.5, 0.4, 0.2
 # Radians about a random axis, times a factor per sample of |N(0, 1)|.
 JOINT_NOISE = {"shoulder": 0.45, "collar": 0.1, "elbow": 0.25, "wrist": 0.3, "hand": 0.2, "hip": 0.2, "knee": 0.2}
 JOINT_NOISE |= {"ankle": 0.2, "foot": 0.1, "spine": 0.08, "neck": 0.15, "head": 0.2}
 LEAN, STRONG_LEAN, STRONG_LEAN_SHARE = np.radians(7.0), np.radians(45.0), 0.1
-AS_RECORDED = 0.25  # share of samples whose joints are not turned
-SPEED_SPREAD = 0.2  # of the logarithm of how fast a motion is played
+AS_RECORDED = 0.25  # share of samples whose joints are not rotated
+SPEED_SPREAD = 0.2  # of the logarithm of a motion's speed
 SHAPE_SPREAD, SHAPE_LIMIT = 1.0, 2.5
 BONE_SPREAD = 0.04  # of the logarithm of each bone's length, left and right alike
 CLUSTERS = 256
@@ -46,17 +46,17 @@ class Motions:
         return len(self.Omega)
 
     def select(self, frames: np.ndarray) -> Motions:
-        """Only these frames (mask or indices)."""
+        """Return only these frames (mask or indices)."""
         return Motions(self.Omega[frames], self.take[frames], self.fps[frames])
 
     @cached_property
     def ends(self) -> tuple[np.ndarray, np.ndarray]:
-        """(F,) the first and (F,) the last frame of each frame's take."""
+        """Return (F,) the first and (F,) the last frame of each frame's take."""
         return ends_of_runs(self.take)
 
     @cached_property
     def share(self) -> np.ndarray:
-        """(F,) probability with which a frame is drawn: common poses, such as walking, do not crowd out rare ones.
+        """Return (F,) the probability of drawing a frame, so that common poses, such as walking, do not dominate.
 
         Proportional to 1/√(frames in the same cluster of joint states), clusters by k-means on Ω.
         """
@@ -73,7 +73,7 @@ class Motions:
 
 
 def load_motions(path: Path) -> Motions:
-    """The sound frames of a file written by ``tools.mocap.fit_body``."""
+    """Read the valid frames of a file written by ``tools.mocap.fit_body``."""
     with np.load(path) as data:
         poses, valid, start, fps = data["poses"], data["valid"], data["take_start"], data["take_fps"]
     take = np.repeat(np.arange(len(start) - 1), np.diff(start))
@@ -95,7 +95,7 @@ class PoseSampler:
         self._noise = np.array([next((v for k, v in JOINT_NOISE.items() if k in n), 0.0) for n in names])
 
     def _below(self, joint: str) -> np.ndarray:
-        """The joint and all that hang on it."""
+        """Return the indices of the joint and of all its descendants."""
         inside = {self.body.joint_names.index(joint)}
         for i, parent in enumerate(self.body.parents):
             if int(parent) in inside:
@@ -103,12 +103,12 @@ class PoseSampler:
         return np.array(sorted(inside))
 
     def mirror(self, Omega: np.ndarray) -> np.ndarray:
-        """The mirror image of poses (..., 24, 3, 3) about the body's (and the world's) x = 0."""
+        """Return the mirror image of poses (..., 24, 3, 3) about the body's (and the world's) x = 0."""
         signs = np.outer(np.diag(_MIRROR), np.diag(_MIRROR)).astype(Omega.dtype)
         return (Omega * signs)[..., self.partner, :, :]
 
     def _windows(self, rng: np.random.Generator, n: int) -> np.ndarray:
-        """(n, WINDOW, 24, 3, 3) of one recording each."""
+        """Draw windows (n, WINDOW, 24, 3, 3) of one recording each."""
         drawn = np.searchsorted(self._cumulative, rng.random(n) * self._cumulative[-1])
         middle = np.minimum(drawn, len(self.motions) - 1)
         speed = np.exp(SPEED_SPREAD * rng.standard_normal(n)) * np.where(rng.random(n) < 0.5, 1, -1)
@@ -120,7 +120,7 @@ class PoseSampler:
         return Omega
 
     def motion_windows(self, rng: np.random.Generator, n: int) -> np.ndarray:
-        """(n, WINDOW, 24, 3, 3) f32; row 0 of a pose turns the root into a world with y up, heading at random."""
+        """Draw windows (n, WINDOW, 24, 3, 3) f32; row 0 of a pose is R_world_root, y up, with a random heading."""
         Omega = self._windows(rng, n)
         for joints, share in zip(self._parts, (SWAP_UPPER, SWAP_ARM, SWAP_ARM, SWAP_LEG, SWAP_LEG), strict=True):
             rows = np.flatnonzero(rng.random(n) < share)
@@ -141,11 +141,11 @@ class PoseSampler:
         return Omega
 
     def pose(self, rng: np.random.Generator) -> np.ndarray:
-        """(24, 3, 3) of one moment."""
+        """Draw the pose (24, 3, 3) of one moment."""
         return self.motion_windows(rng, 1)[0, WINDOW // 2]
 
     def proportions(self, rng: np.random.Generator, n: int) -> tuple[np.ndarray, np.ndarray]:
-        """Random bodies: joints from their parents (n, 24, 3), BlazePose keypoints from their joints (n, 33, 3)."""
+        """Draw bodies: joints relative to parents (n, 24, 3), BlazePose keypoints relative to joints (n, 33, 3)."""
         body, at = self.body, np.array(list(self.body.keypoint_set("blazepose").values()))
         betas = np.clip(rng.standard_normal((n, body.P)) * SHAPE_SPREAD, -SHAPE_LIMIT, SHAPE_LIMIT)
         factor = np.exp(rng.standard_normal((n, body.K + 1)) * BONE_SPREAD)
@@ -157,7 +157,7 @@ class PoseSampler:
 
 @njit(fastmath=True)
 def _turn_joints(Omega: np.ndarray, turn: np.ndarray) -> None:
-    """Omega[a, w, k] @ turn[a, k], in place."""
+    """Multiply Omega[a, w, k] by turn[a, k] from the right, in place."""
     for a in range(Omega.shape[0]):
         for w in range(Omega.shape[1]):
             for k in range(Omega.shape[2]):
@@ -168,7 +168,7 @@ def _turn_joints(Omega: np.ndarray, turn: np.ndarray) -> None:
 
 
 def small_rotations(phi: np.ndarray) -> np.ndarray:
-    """exp of rotation vectors (..., 3) in their own precision: I + sin θ/θ [φ] + (1 − cos θ)/θ² [φ]²."""
+    """Return exp of rotation vectors (..., 3) in their own precision: I + sin θ/θ [φ] + (1 − cos θ)/θ² [φ]²."""
     x, y, z = np.moveaxis(phi, -1, 0)
     theta = np.sqrt(x * x + y * y + z * z) + 1e-8
     a, b = np.sin(theta) / theta, (1 - np.cos(theta)) / (theta * theta)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Measure a lifting network: ``python -m scope.tools.train_lifter.evaluate MOTIONS PAIRS [--network lifter.onnx]``.
 
-On held-out takes with the detector's errors imitated, and on renders that the landmark network really saw:
-the error of the limbs' keypoints beside that of the world landmarks, and how well the deviations foretell errors.
+On held-out takes with simulated detector errors, and on renders processed by the landmark network:
+the error of the limbs' keypoints compared with the world landmarks', and the calibration of the predicted deviations.
 Needs neither PyTorch nor onnx.
 """
 
@@ -26,7 +26,7 @@ MEASURED = np.array([*range(11, 17), *range(25, 29)])  # shoulders, elbows, wris
 
 
 def measure_renders(lifter: Lifter, pairs: Path) -> dict:
-    """Millimetres on renders: world landmarks, network with and without them; deviation of error over predicted σ."""
+    """Return millimetres on renders (world landmarks, network with and without them), and error over predicted σ."""
     points, rays, confidence, world = (a.astype(float) for a in load_pairs(pairs))
     truth = points - points[:, HIPS].mean(axis=1, keepdims=True)
     result = {"renders": len(points), "world_landmarks_mm": _limb_error(world - truth)}
@@ -41,7 +41,7 @@ def measure_renders(lifter: Lifter, pairs: Path) -> dict:
 
 
 def measure_takes(lifter: Lifter, motions: Path, n: int = 8192) -> dict:
-    """Millimetres on held-out takes with imitated errors, all of them and those with known world landmarks."""
+    """Return millimetres on held-out takes with simulated errors: all samples, and those with world landmarks."""
     batch = Dataset(load_body("scope"), held_out_frames(load_motions(motions))).batch((2, 0), n)
     points, _ = lifter.run(batch.input)
     error, known = points - batch.points, batch.input[:, MIDDLE, -2] > 0.5
@@ -53,13 +53,13 @@ def _limb_error(error: np.ndarray) -> float:
 
 
 def _deviation(z: np.ndarray) -> float:
-    """Root mean square of the 99 % smallest."""
+    """Return the root mean square of the 99 % smallest."""
     z = np.sort(np.abs(z[:, MEASURED]).ravel())
     return round(float(np.sqrt(np.square(z[: int(0.99 * len(z))]).mean())), 2)
 
 
 def main() -> None:
-    """Command line."""
+    """Run the command line."""
     parser = argparse.ArgumentParser(description="Measure a lifting network.")
     parser.add_argument("motions", type=Path)
     parser.add_argument("pairs", type=Path)

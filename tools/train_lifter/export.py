@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Writes the network as ONNX: matrices as half floats with a Cast behind them, the rest in single precision."""
+"""Write the network as ONNX: matrices in half precision followed by a Cast, the rest in single precision."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Show renders of our body to the landmark network: ``python -m scope.tools.train_lifter.render_pairs MOTIONS``.
+"""Run the landmark network on renders of the body: ``python -m scope.tools.train_lifter.render_pairs MOTIONS``.
 
-Our body in augmented poses, random clothes and before random backgrounds, drawn with the add-on's own rasterizer; for
-each picture the true keypoints and what the network reports. This is how the detector's errors are known.
+The body in augmented poses and random clothes in front of random backgrounds, drawn with the add-on's own rasterizer;
+for each image the true keypoints and the network's output, from which the detector's errors follow.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ from .dataset import cameras, pitches
 from .split import training_frames
 
 PICTURE_PX = 420
-FILL = 0.72  # of the picture, the person's longer side
+FILL = 0.72  # of the image, the person's longer side
 NEAREST_M, FARTHEST_M = 2.2, 9.0
 SAVE_EVERY = 500
 SKIN, HAIR, SUIT, ACCENT = range(4)  # the body's materials
-WAIST_M = 0.05  # faces of the suit that lie lower, in the model frame, are trousers
+WAIST_M = 0.05  # faces of the suit below, in the model frame, are trousers
 KEYS = ("points", "rays", "confidence", "world", "presence", "spread", "disagreement")
 
 
@@ -44,7 +44,7 @@ class Renderer:
         self.colors = np.sqrt(body.material_colors[:, :3])
 
     def clothes(self, rng: np.random.Generator) -> np.ndarray:
-        """(F, 3) colours of the triangles, sRGB."""
+        """Draw colours (F, 3) of the triangles, sRGB."""
         colors = self.colors.copy()
         colors[SKIN] = np.array([0.9, 0.7, 0.6]) * rng.uniform(0.35, 1)
         colors[HAIR] = rng.uniform(0, 0.6) * np.array([1, 0.8, 0.6])
@@ -56,7 +56,7 @@ class Renderer:
         return faces
 
     def picture(self, rng: np.random.Generator, vertices: np.ndarray, intrinsics: np.ndarray) -> np.ndarray:
-        """(420, 420, 3) uint8 of the vertices (V, 3) in the camera frame before a random background."""
+        """Draw the vertices (V, 3), camera frame, in front of a random background; (420, 420, 3) uint8."""
         size = PICTURE_PX
         faces = self.clothes(rng)
         cells = rng.uniform(0, 255, (rng.integers(2, 12), rng.integers(2, 12), 3)).astype(np.float32)
@@ -73,7 +73,7 @@ class Renderer:
 def observe(
     rng: np.random.Generator, sampler: PoseSampler, renderer: Renderer, network: LandmarkNetwork
 ) -> dict | None:
-    """One picture: true points and the network's report (``KEYS``), or None if the person stands too close."""
+    """Return true points and the network's output (``KEYS``) of one image, or None if the person is too close."""
     body, at = sampler.body, np.array(list(sampler.body.keypoint_set("blazepose").values()))
     Omega = sampler.pose(rng).astype(float)
     betas = np.clip(rng.standard_normal(body.P), -2.5, 2.5)
@@ -110,7 +110,7 @@ def save(path: Path, pairs: list[dict]) -> None:
 
 
 def main() -> None:
-    """Command line."""
+    """Run the command line."""
     parser = argparse.ArgumentParser(description="Observe the landmark network's errors on renders of our body.")
     parser.add_argument("motions", type=Path, help="file written by scope.tools.mocap.fit_body")
     parser.add_argument("-o", "--output", type=Path, default=Path("build/lifter/pairs.npz"))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the flow is measured against, each by maximum likelihood: log densities against the normalized Haar measure.
+"""Baselines for the flow, fitted by maximum likelihood: log densities against the normalized Haar measure.
 
 Gaussian in the tangent space of the mean M, phi = log(MᵀOmega) ~ N(m, C), with the volume factor of the chart:
     dmu = (1 - cos|phi|) / (4 pi^2 |phi|^2) d^3phi
@@ -81,8 +81,6 @@ def _log_c(s: np.ndarray) -> float:
     all_terms = np.concatenate(total)
     top = all_terms.max()
     return float(s.sum() + top + np.log(np.exp(all_terms - top).sum()))
-
-
 
 
 def _slope(s: np.ndarray, k: int) -> float:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Trained flows -> assets/prior/joint_prior.npz: one row of parameters for each of SMPL's joints."""
+"""Write trained flows to assets/prior/joint_prior.npz: one row of parameters for each of SMPL's joints."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Held-out likelihoods of the prior beside the baselines: ``python -m scope.tools.train_prior.report MOTIONS``.
+"""Held-out likelihoods of the prior and the baselines: ``python -m scope.tools.train_prior.report MOTIONS``.
 
 Prints the table of assets/prior/README.md: mean negative log-likelihood, in nats against the normalized Haar measure,
-of the test performers' states as they were recorded. The baselines are fitted to the same training performers without
+of the test performers' states as recorded. The baselines are fitted to the same training performers without
 blur, each with the better of two weightings of the performers. Needs no PyTorch.
 """
 
@@ -34,7 +34,7 @@ class Row:
 
     @property
     def best(self) -> bool:
-        """Whether the flow has the least."""
+        """Return whether the flow has the smallest."""
         return self.flow < min(self.gaussian, self.fisher)
 
 
@@ -61,7 +61,7 @@ def _fit_gaussian(rotations: np.ndarray, weights: np.ndarray) -> Density:
 
 
 def _better(fit: Callable[[np.ndarray, np.ndarray], Density], s: Samples, states: np.ndarray) -> np.ndarray:
-    """NLL (n,) of the test states under the better of the fits with frames equal and performers balanced."""
+    """Return the NLL (n,) of the test states under the better of the fits with frames equal and performers balanced."""
     training, group = s.rotations[s.is_training], s.group[s.is_training]
     found = [-fit(training, balanced(group, balance))(states) for balance in (0.0, 0.7)]
     return min(found, key=np.mean)
@@ -94,7 +94,7 @@ def _bold(value: float, best: bool) -> str:
 
 
 def main() -> None:
-    """Command line."""
+    """Run the command line."""
     parser = argparse.ArgumentParser(description="Measure the joint-state prior on performers it has not seen.")
     parser.add_argument("motions", type=Path, help="motions.npz of tools/mocap")
     parser.add_argument("--prior", type=Path, default=BUILT_IN, help="(default: %(default)s)")

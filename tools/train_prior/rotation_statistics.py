@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Means of rotations, weights of performers, and isotropic noise: what training and measuring have in common."""
+"""Means of rotations, weights of performers, and isotropic noise, for training and evaluation."""
 
 from __future__ import annotations
 

@@ -7,13 +7,13 @@ import numpy as np
 
 
 def perineum(mirror: np.ndarray, vertices: np.ndarray) -> np.ndarray:
-    """(3,) the lowest point of the mesh on the midline."""
+    """Return the lowest point of the mesh on the midline, (3,) metres."""
     midline = np.flatnonzero(mirror == np.arange(len(vertices)))
     return vertices[midline[vertices[midline, 1].argmin()]]
 
 
 def bump(vertices: np.ndarray, centre: np.ndarray, radius: float) -> np.ndarray:
-    """(V,) one at the centre, smoothly zero from ``radius`` on."""
+    """Return (V,) factors: one at the centre, falling smoothly to zero at ``radius``."""
     distance = np.linalg.norm(vertices - centre, axis=1) / radius
     return np.clip(1.0 - distance**2, 0.0, None) ** 2
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The look: a two-tone suit that leaves only head and hands bare, so that the body can be shown anywhere."""
+"""Materials: a two-tone suit that leaves only head and hands bare."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ X, Y = np.eye(3)[:2]
 
 
 def face_materials(mesh: Mesh, skeleton: Skeleton, vertices: np.ndarray, J: np.ndarray) -> np.ndarray:
-    """(F,) index into ``MATERIALS``, symmetric. The borders are closed edge loops around limbs and trunk.
+    """Return (F,) indices into ``MATERIALS``, symmetric, with closed edge loops around limbs and trunk as borders.
 
     :param vertices: (V, 3) the mean shape in T-pose; ``J`` (K+1, 3) its joints.
     """
@@ -41,7 +41,7 @@ def face_materials(mesh: Mesh, skeleton: Skeleton, vertices: np.ndarray, J: np.n
         return a + fraction * (b - a)
 
     def beyond(point: np.ndarray, normal: np.ndarray, radius: float) -> np.ndarray:
-        """Faces past the loop nearest to the plane, on the side that the normal points to."""
+        """Return the faces beyond the loop nearest to the plane, on the side to which the normal points."""
         distance = np.linalg.norm(centre - point - 0.5 * radius * normal, axis=1)
         seed = int(np.where(mesh.is_eye, np.inf, distance).argmin())
         return loops.beyond(loops.nearest(vertices, point, normal, radius), seed)
@@ -71,13 +71,13 @@ def face_materials(mesh: Mesh, skeleton: Skeleton, vertices: np.ndarray, J: np.n
 
 
 def mirror_faces(mesh: Mesh) -> np.ndarray:
-    """(F,) index of the face on the other side."""
+    """Return (F,) the index of the face on the other side."""
     place = {frozenset(quad): f for f, quad in enumerate(mesh.faces.tolist())}
     return np.array([place[frozenset(quad)] for quad in mesh.mirror[mesh.faces].tolist()])
 
 
 def _front_of_eyes(mesh: Mesh, vertices: np.ndarray, rings: int) -> np.ndarray:
-    """(F,) bool: eyeball faces inside the first ``rings`` rings around the line of sight."""
+    """Return (F,) bool: the eyeball faces inside the first ``rings`` rings around the line of sight."""
     inside = np.zeros(len(vertices), bool)
     eyeballs = np.unique(mesh.faces[mesh.is_eye])
     for side in (1.0, -1.0):

@@ -28,12 +28,12 @@ class Mesh:
 
 
 def body_and_eyes(source: SourceMesh) -> tuple[np.ndarray, np.ndarray]:
-    """(F,) masks over the source faces: the skin, and the eyeballs."""
+    """Return (F,) masks over the source faces: the skin, and the eyeballs."""
     return source.face_group == "body", np.isin(source.face_group, ("helper-l-eye", "helper-r-eye"))
 
 
 def keep_visible(source: SourceMesh, vertices: np.ndarray) -> Mesh:
-    """Drop helpers and the inside of the head (mouth, eye sockets, nostrils), renumber what is left.
+    """Remove helpers and the inside of the head (mouth, eye sockets, nostrils) and renumber the rest.
 
     :param vertices: (N, 3) the mean shape.
     """
@@ -42,7 +42,7 @@ def keep_visible(source: SourceMesh, vertices: np.ndarray) -> Mesh:
     in_head = skin & (vertices[source.faces][:, :, 1].min(axis=1) > neck)
     head, hidden_by = source.faces[in_head], source.faces[eyes]
     seen = seen_from_outside(vertices, split_quads(head), split_quads(hidden_by)).reshape(2, -1).any(axis=0)
-    # One ring more than is seen, so that no rim shows an edge when the shape changes; and the same on both sides.
+    # One ring more than is visible, so that no border shows when the shape changes; the same on both sides.
     touched = np.zeros(len(vertices), bool)
     touched[head[seen]] = True
     touched |= touched[source.mirror]
@@ -57,19 +57,19 @@ def keep_visible(source: SourceMesh, vertices: np.ndarray) -> Mesh:
 
 
 def split_quads(quads: np.ndarray) -> np.ndarray:
-    """(2F, 3) triangles: first halves of all quads, then second halves."""
+    """Return (2F, 3) triangles: first halves of all quads, then second halves."""
     return np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
 
 
 def vertex_areas(vertices: np.ndarray, quads: np.ndarray) -> np.ndarray:
-    """(N,) a third of the area of the triangles around each vertex."""
+    """Return (N,) a third of the area of the triangles around each vertex."""
     a, b, c = vertices[split_quads(quads)].transpose(1, 0, 2)
     area = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 6.0
     return np.bincount(split_quads(quads).ravel(), np.repeat(area, 3), len(vertices))
 
 
 def edges(quads: np.ndarray) -> np.ndarray:
-    """(E, 2) undirected edges, each once."""
+    """Return (E, 2) undirected edges, each once."""
     sides = np.concatenate([quads[:, [k, (k + 1) % 4]] for k in range(4)])
     return np.unique(np.sort(sides, axis=1), axis=0)
 
@@ -89,7 +89,7 @@ def smooth_nipples(source: SourceMesh, basis: np.ndarray) -> np.ndarray:
 
 
 def smooth_perineum(mesh: Mesh, basis: np.ndarray) -> np.ndarray:
-    """As a suit drapes: average the mesh between the legs, in the mean and in every component (linear in both).
+    """Smooth the mesh between the legs like a suit, in the mean and in every component (linear in both).
 
     :param basis: (1 + P, N, 3).
     """
@@ -103,7 +103,7 @@ def smooth_perineum(mesh: Mesh, basis: np.ndarray) -> np.ndarray:
 
 
 def thin_plate(links: np.ndarray, unknown: np.ndarray, basis: np.ndarray) -> np.ndarray:
-    """(1 + P, n, 3): positions of ``unknown`` (ascending indices) on a thin plate through their surroundings.
+    """Return positions (1 + P, n, 3) of ``unknown`` (ascending indices) on a thin plate through their surroundings.
 
     They minimize the squared umbrella Laplacian, summed over them and their rim.
     """
@@ -127,7 +127,7 @@ def thin_plate(links: np.ndarray, unknown: np.ndarray, basis: np.ndarray) -> np.
 
 
 def _enclosed(links: np.ndarray, ring: np.ndarray, count: int) -> np.ndarray:
-    """Vertices cut off from the rest of the mesh by a closed loop of vertices."""
+    """Return the vertices cut off from the rest of the mesh by a closed loop of vertices."""
     open_links = links[~np.isin(links, ring).any(axis=1)]
     label = np.arange(count)
     while True:  # the lowest index reachable labels a component

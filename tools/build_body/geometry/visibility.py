@@ -11,11 +11,11 @@ PIXEL = 0.0007  # metres
 
 
 def seen_from_outside(vertices: np.ndarray, triangles: np.ndarray, occluders: np.ndarray) -> np.ndarray:
-    """(T,) bool: the triangle shows its front in at least one pixel of one direction.
+    """Return (T,) bool: whether the triangle's front is visible in at least one pixel from one direction.
 
     :param vertices: (N, 3) metres.
     :param triangles: (T, 3), counter-clockwise from outside.
-    :param occluders: (O, 3) further triangles that hide but are not asked about.
+    :param occluders: (O, 3) further triangles that only occlude.
     """
     corners = vertices[np.concatenate([triangles, occluders])]
     seen = np.zeros(len(corners), bool)
@@ -30,7 +30,7 @@ def seen_from_outside(vertices: np.ndarray, triangles: np.ndarray, occluders: np
 
 
 def _sphere(count: int) -> np.ndarray:
-    """Directions spread evenly over the sphere (the golden spiral)."""
+    """Return directions spread evenly over the sphere (the golden spiral)."""
     i = np.arange(count) + 0.5
     height, turn = 1.0 - 2.0 * i / count, i * np.pi * (3.0 - np.sqrt(5.0))
     ring = np.sqrt(1.0 - height**2)

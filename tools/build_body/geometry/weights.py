@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Skin weights: MakeHuman's bones merged onto the joints, mirrored, diffused where they crease, four a vertex."""
+"""Skin weights: MakeHuman's bones merged onto the joints, mirrored, diffused where they crease, four per vertex."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ SIDE_BONES = {  # bone without .L / .R -> joint without left_ / right_
 
 
 def skin_weights(source: SourceMesh, mesh: Mesh, skeleton: Skeleton, mean_shape: np.ndarray) -> np.ndarray:
-    """(V, K+1) weights, rows summing to one, at most four of them above zero, symmetric.
+    """Return (V, K+1) weights, rows summing to one, at most four of them above zero, symmetric.
 
     :param mean_shape: (N, 3) all source vertices of the mean shape, in the source pose.
     """
@@ -46,7 +46,7 @@ def skin_weights(source: SourceMesh, mesh: Mesh, skeleton: Skeleton, mean_shape:
 
 
 def keep_strongest(W: np.ndarray) -> np.ndarray:
-    """Only the four largest weights of a row, normalized; those that tie with the fifth go too, for symmetry."""
+    """Keep the four largest weights of each row, normalized, without those equal to the fifth, for symmetry."""
     fifth = np.sort(W, axis=1)[:, -INFLUENCES - 1][:, None]
     W = np.where(W > fifth + 1e-9, W, 0.0)
     W[W < 1e-3] = 0.0
@@ -54,7 +54,7 @@ def keep_strongest(W: np.ndarray) -> np.ndarray:
 
 
 def pack(W: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(V, 4) joint indices and (V, 4) weights, the strongest first; unused slots are joint 0 with weight 0."""
+    """Return (V, 4) joint indices and (V, 4) weights, the strongest first; unused slots are joint 0 with weight 0."""
     joints = np.argsort(-W, axis=1, kind="stable")[:, :INFLUENCES]
     weights = np.take_along_axis(W, joints, axis=1)
     return np.where(weights > 0.0, joints, 0), weights
