@@ -18,6 +18,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..scope_addon.atomic_write import written_beside
 from ..scope_addon.capture.camera.intrinsics import choose_camera
@@ -51,7 +52,7 @@ class Clip:
     """The measurements of one clip's frames in order, and the joint prior's weights."""
 
     frames: list[Measurements]
-    joint_weights: np.ndarray  # (K,)
+    joint_weights: NDArray[np.float64]  # (K,)
 
 
 def load_clips(names: Sequence[str]) -> list[Clip]:
@@ -134,10 +135,10 @@ def capture_priors(body: Body, clip: Clip) -> Priors:
 class Outcome:
     """Results of the fits of one kind, cold or warm, at one tolerance; one entry per frame."""
 
-    milliseconds: np.ndarray
-    iterations: np.ndarray
-    converged: np.ndarray  # bool
-    cost: np.ndarray
+    milliseconds: NDArray[np.float64]
+    iterations: NDArray[np.int64]
+    converged: NDArray[np.bool_]  # bool
+    cost: NDArray[np.float64]
 
     def summary(self) -> dict[str, float]:
         """Return medians and shares."""

@@ -16,6 +16,7 @@ from types import ModuleType
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...scope_addon.capture.fitting import track_fit
 from ...scope_addon.capture.options import CaptureOptions
@@ -70,7 +71,7 @@ CHOICES = (
 )
 
 
-def left_out(errors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def left_out(errors: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
     """Return the value that the other cameras choose, and its error on the camera left out.
 
     :param errors: (V, C) error with each value on each camera.
@@ -88,7 +89,7 @@ def choices(quick: bool) -> dict:
         return {}
     body = load_body("scope")
 
-    def errors() -> np.ndarray:
+    def errors() -> NDArray[np.float64]:
         found = [evaluate_camera(body, camera, CaptureOptions()) for camera in CAMERAS]
         return np.array([[f["mpjpe_root"], f["pa_mpjpe"]] for f in found])
 
@@ -112,9 +113,9 @@ def choices(quick: bool) -> dict:
     return figures
 
 
-def _cells(errors: np.ndarray) -> list[str]:
+def _cells(errors: NDArray[np.float64]) -> list[str]:
     return [f"{a:.1f} / {b:.1f}" for a, b in (*errors, errors.mean(axis=0))]
 
 
-def _each(errors: np.ndarray) -> str:
+def _each(errors: NDArray[np.float64]) -> str:
     return ", ".join(f"{name} {cell}" for name, cell in zip((*CAMERAS, "mean"), _cells(errors), strict=True))

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...scope_addon.kinematics.axes import R_WORLD_MODEL, world_from_level_camera
 from ...solver import Body
@@ -37,10 +38,10 @@ class Take:
 
     number: int
     name: str
-    poses: np.ndarray  # (T, 3(K+1)) axis-angle
-    trans: np.ndarray  # (T, 3) metres
-    valid: np.ndarray  # (T,) bool
-    betas: np.ndarray  # (P,)
+    poses: NDArray[np.float64]  # (T, 3(K+1)) axis-angle
+    trans: NDArray[np.float64]  # (T, 3) metres
+    valid: NDArray[np.bool_]  # (T,) bool
+    betas: NDArray[np.float64]  # (P,)
     fps: float
 
 
@@ -84,14 +85,16 @@ def draw_shot(body: Body, take: Take, seed: int = SEED) -> Shot:
     return replace(shot, standing=standing_feet(body, shot))
 
 
-def standing_feet(body: Body, shot: Shot) -> np.ndarray:
+def standing_feet(body: Body, shot: Shot) -> NDArray[np.bool_]:
     """Return (T, 2) bool: whether the midpoint of heel and toe of the left and the right foot is low and at rest."""
     feet = feet_world(body, shot.rotations, shot.trans, shot.betas)
     speed = np.linalg.norm(np.gradient(feet, axis=0), axis=-1) * shot.fps
     return (speed < STILL_M_PER_S) & (feet[..., 2] < STANDS_BELOW_M)
 
 
-def feet_world(body: Body, rotations: np.ndarray, trans: np.ndarray, betas: np.ndarray) -> np.ndarray:
+def feet_world(
+    body: Body, rotations: NDArray[np.float64], trans: NDArray[np.float64], betas: NDArray[np.float64]
+) -> NDArray[np.float64]:
     """Return (T, 2, 3), the midpoints of heel and toe, left and right, in the world, in metres."""
     points = body.keypoints(*body.forward_kinematics(rotations, trans, betas), betas)
     at = body.keypoint_set("blazepose")
@@ -99,7 +102,7 @@ def feet_world(body: Body, rotations: np.ndarray, trans: np.ndarray, betas: np.n
     return points[:, sides].mean(axis=2)
 
 
-def _stretch(rng: np.random.Generator, body: Body, take: Take) -> np.ndarray:
+def _stretch(rng: np.random.Generator, body: Body, take: Take) -> NDArray[np.intp]:
     """Return the indices (n,) of consecutive valid frames: as many as a shot has, or fewer if the take has no more."""
     states = exp(take.poses.reshape(len(take.poses), -1, 3).astype(float))
     points = body.keypoints(*body.forward_kinematics(states, take.trans, take.betas), take.betas)
@@ -112,20 +115,20 @@ def _stretch(rng: np.random.Generator, body: Body, take: Take) -> np.ndarray:
     raise ValueError(f"take {take.name} has no {least} sound frames in a row")
 
 
-def _leg_length(body: Body, betas: np.ndarray) -> float:
+def _leg_length(body: Body, betas: NDArray[np.float64]) -> float:
     J = body.rest_joints(betas)
     chain = [body.joint_names.index(f"left_{part}") for part in ("hip", "knee", "ankle")]
     return float(np.linalg.norm(np.diff(J[chain], axis=0), axis=1).sum())
 
 
-def _skin_of_feet(body: Body) -> np.ndarray:
+def _skin_of_feet(body: Body) -> NDArray[np.intp]:
     """Return the indices (n,) of the vertices whose largest skinning weight is a foot's."""
     part = np.take_along_axis(body.skin_joints, body.skin_weights.argmax(axis=1)[:, None], axis=1)[:, 0]
     feet = [k for k, name in enumerate(body.joint_names) if name.endswith(("_ankle", "_foot"))]
     return np.flatnonzero(np.isin(part, feet))
 
 
-def _draw_camera(rng: np.random.Generator, shot: Shot, skin: np.ndarray) -> tuple[Shot, np.ndarray]:
+def _draw_camera(rng: np.random.Generator, shot: Shot, skin: NDArray[np.float64]) -> tuple[Shot, NDArray[np.float64]]:
     """Draw a camera, and a heading by which the world is turned, with all of the skin (T, V, 3) in the image."""
     few = skin[:, ::FEW]
     for _ in range(TRIES):
@@ -140,7 +143,7 @@ def _draw_camera(rng: np.random.Generator, shot: Shot, skin: np.ndarray) -> tupl
     raise ValueError("no camera was found: the person moves too far, or the limits are too narrow")
 
 
-def _well_inside(shot: Shot, skin: np.ndarray) -> bool:
+def _well_inside(shot: Shot, skin: NDArray[np.float64]) -> bool:
     camera = shot.to_camera(skin)
     if camera[..., 2].min() < NEAREST_M or skin[..., 1].max() > FARTHEST_M:
         return False

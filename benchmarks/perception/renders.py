@@ -10,8 +10,10 @@ import math
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...scope_addon.capture.options import CaptureOptions
 from ...scope_addon.errors import NoPersonError
@@ -84,7 +86,7 @@ def evaluate_render(body: Body, video: Path, truth: Path, quality: str, known: s
     return figures | {"size": 1 / figures["pa_scale"]} | against_world(body, motion, true)
 
 
-def against_world(body: Body, motion: Motion, truth: dict[str, np.ndarray]) -> dict[str, float | None]:
+def against_world(body: Body, motion: Motion, truth: dict[str, NDArray[Any]]) -> dict[str, float | None]:
     """Compare a motion's world and camera with ground truth, over the frames that both have.
 
     ``up_deg``: mean angle between the two upward directions, seen from the camera. ``floor_cm``: mean error of the
@@ -118,6 +120,6 @@ def mean_of(rows: list[dict]) -> dict[str, float | None]:
     return means
 
 
-def _field_of_view(truth: dict[str, np.ndarray]) -> float:
+def _field_of_view(truth: dict[str, NDArray[Any]]) -> float:
     """Return the field of view along the longer side of the image, in degrees."""
     return math.degrees(2 * math.atan(max(truth["size"]) / (2 * truth["intrinsics"][0, 0])))

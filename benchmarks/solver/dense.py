@@ -12,6 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...solver.compiled.kernel import kernel
 from ...solver.compiled.part import GRADIENT
@@ -166,7 +167,7 @@ class Dense:
         damped[6 + 3 * K :] = 0.0
         self.damping = np.diag(self.problem.damping * damped)
 
-    def step(self, k: int) -> np.ndarray:
+    def step(self, k: int) -> NDArray[np.float64]:
         """Return the damped Gauss-Newton direction (6 + 3K + P) at state k of the bank."""
         p = self.problem
         put(p.bank, k, self.pose)

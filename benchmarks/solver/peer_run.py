@@ -14,6 +14,7 @@ import time
 os.environ["OPENBLAS_NUM_THREADS"] = os.environ["OMP_NUM_THREADS"] = "1"
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...solver.gauss_newton.linearize import make_pose, place_parts
 from ...solver.gauss_newton.recursion import make_workspace, retract
@@ -40,7 +41,7 @@ class Residuals:
         put(self.problem.bank, k, self.base)
         place_parts(self.problem.tree, self.base)
 
-    def at(self, d: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def at(self, d: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return r and J at d."""
         p, work = self.problem, self.work
         n = len(work.u)

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...solver import Measurements, Options, Priors, Stage, State, Tree, Weights, load_body, make_tree, rotations
 from ...solver.gauss_newton.terms import Terms, make_terms
@@ -30,12 +31,12 @@ BANK = 16  # states that alternate
 class Arrays:
     """The arrays of a body that the solver reads: see `BodyArrays`."""
 
-    parents: np.ndarray
-    S: np.ndarray
-    l: np.ndarray
-    keypoint_part: np.ndarray
-    v_bar: np.ndarray
-    V: np.ndarray
+    parents: NDArray[np.intp]
+    S: NDArray[np.float64]
+    l: NDArray[np.float64]
+    keypoint_part: NDArray[np.intp]
+    v_bar: NDArray[np.float64]
+    V: NDArray[np.float64]
 
 
 @dataclass
@@ -44,7 +45,7 @@ class Problem:
 
     tree: Tree
     terms: Terms
-    stage: np.ndarray  # (2, weights)
+    stage: NDArray[np.float64]  # (2, weights)
     damping: float
     root_scale: float
     bank: tuple[Any, ...]  # R_0 (B, 3, 3), t_0 (B, 3), Omega (B, K+1, 3, 3), beta (B, W)

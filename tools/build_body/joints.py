@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...solver.names import BODY_JOINTS, BODY_PARENTS
 from .source import SourceMesh
@@ -29,14 +30,14 @@ class Skeleton:
     name: str
     joint_names: tuple[str, ...]
     parents: tuple[int, ...]
-    regressor: np.ndarray
+    regressor: NDArray[np.float64]
 
     def index(self, joint: str) -> int:
         """Return the index of a joint by its name."""
         return self.joint_names.index(joint)
 
     @property
-    def mirror(self) -> np.ndarray:
+    def mirror(self) -> NDArray[np.intp]:
         """Return (K+1,) the index of the joint on the other side."""
         return np.array([self.index(other_side(name)) for name in self.joint_names])
 
@@ -65,7 +66,7 @@ def make_skeleton(source: SourceMesh, with_hands: bool) -> Skeleton:
     return Skeleton("scope_h" if with_hands else "scope", tuple(names), tuple(parents), regressor)
 
 
-def cube_row(source: SourceMesh, *cubes: str) -> np.ndarray:
+def cube_row(source: SourceMesh, *cubes: str) -> NDArray[np.float64]:
     """Return the regressor (N,) of the mean of the named joint cubes."""
     row = np.zeros(len(source.vertices))
     for cube in cubes:
@@ -73,7 +74,7 @@ def cube_row(source: SourceMesh, *cubes: str) -> np.ndarray:
     return row
 
 
-def _joint_row(source: SourceMesh, name: str) -> np.ndarray:
+def _joint_row(source: SourceMesh, name: str) -> NDArray[np.float64]:
     if name in SPINE:
         # The three spine cubes move inconsistently between the targets: only their mean is used.
         pelvis, neck = cube_row(source, "pelvis"), cube_row(source, "neck")

@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...solver.names import BLAZEPOSE, COCO
 from .joints import Skeleton, cube_row, other_side
@@ -40,7 +41,7 @@ class Keypoint:
     """One keypoint: the regressor (N,) of its position in the source pose, and the part to which it belongs."""
 
     name: str
-    regressor: np.ndarray
+    regressor: NDArray[np.float64]
     part: int
 
 
@@ -54,15 +55,19 @@ def make_keypoints(source: SourceMesh, skeleton: Skeleton) -> list[Keypoint]:
 
 
 def pose_keypoints(
-    keypoints: list[Keypoint], R: np.ndarray, J: np.ndarray, posed_J: np.ndarray, basis: np.ndarray
-) -> np.ndarray:
+    keypoints: list[Keypoint],
+    R: NDArray[np.float64],
+    J: NDArray[np.float64],
+    posed_J: NDArray[np.float64],
+    basis: NDArray[np.float64],
+) -> NDArray[np.float64]:
     """Return T-posed keypoints (B, M, 3), k' = R_i (k − J_i) + J'_i, of source vertex sets ``basis`` (B, N, 3)."""
     part = np.array([keypoint.part for keypoint in keypoints])
     points = np.stack([keypoint.regressor for keypoint in keypoints]) @ basis
     return np.einsum("mxy,bmy->bmx", R[part], points - J[:, part]) + posed_J[:, part]
 
 
-def _body_point(source: SourceMesh, skeleton: Skeleton, name: str) -> tuple[np.ndarray, int]:
+def _body_point(source: SourceMesh, skeleton: Skeleton, name: str) -> tuple[NDArray[np.float64], int]:
     if name in skeleton.joint_names:  # shoulder, elbow, wrist, hip, knee and ankle are the joints themselves
         index = skeleton.index(name)
         return skeleton.regressor[index], index
@@ -82,7 +87,7 @@ def _body_point(source: SourceMesh, skeleton: Skeleton, name: str) -> tuple[np.n
     return row, skeleton.index(part)
 
 
-def _hand(source: SourceMesh, skeleton: Skeleton, side: str) -> list[tuple[str, np.ndarray, int]]:
+def _hand(source: SourceMesh, skeleton: Skeleton, side: str) -> list[tuple[str, NDArray[np.float64], int]]:
     wrist = skeleton.index(f"{side}_wrist")
     points = [(f"{side}_wrist", skeleton.regressor[wrist], wrist)]
     for k, finger in enumerate(HAND_FINGERS, start=1):

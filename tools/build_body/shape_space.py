@@ -18,6 +18,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .source import LENGTHS, SourceMesh
 
@@ -52,11 +53,11 @@ class ShapeSpace:
     ``variance`` (P,): fraction of the area-weighted variance that each component explains.
     """
 
-    basis: np.ndarray
-    variance: np.ndarray
+    basis: NDArray[np.float64]
+    variance: NDArray[np.float64]
 
 
-def build_shape_space(source: SourceMesh, body: np.ndarray, area: np.ndarray) -> ShapeSpace:
+def build_shape_space(source: SourceMesh, body: NDArray[np.intp], area: NDArray[np.float64]) -> ShapeSpace:
     """Compute the principal components of ``PEOPLE`` adults.
 
     :param body: (B,) indices of the vertices whose variance counts.
@@ -92,14 +93,16 @@ def build_shape_space(source: SourceMesh, body: np.ndarray, area: np.ndarray) ->
     return ShapeSpace(np.concatenate([mean[None], components]), variance[:COMPONENTS])
 
 
-def _gain(source: SourceMesh, base: np.ndarray, move: np.ndarray, name: str) -> float:
+def _gain(source: SourceMesh, base: NDArray[np.float64], move: NDArray[np.float64], name: str) -> float:
     """Return the change of a length by its target, relative to that of the base mesh."""
     a, b = (source.cubes[cube] for cube in LENGTHS[name.rpartition("-")[0]])
     before, after = (np.linalg.norm(v[a].mean(axis=0) - v[b].mean(axis=0)) for v in (base, base + move))
     return float(after / before - 1.0)
 
 
-def _draw_people(names: list[str], gains: dict[str, float], base: np.ndarray, moves: np.ndarray) -> np.ndarray:
+def _draw_people(
+    names: list[str], gains: dict[str, float], base: NDArray[np.float64], moves: NDArray[np.float64]
+) -> NDArray[np.float64]:
     """Draw coefficients (PEOPLE, targets). Stature is drawn in metres, and the height slider solved for it.
 
     :param gains: target of a length -> relative change of that length.
@@ -124,7 +127,7 @@ def _draw_people(names: list[str], gains: dict[str, float], base: np.ndarray, mo
     top, bottom = base[:, 1].argmax(), base[:, 1].argmin()
     span = moves[:, top, 1] - moves[:, bottom, 1]
 
-    def stature(height: float) -> np.ndarray:
+    def stature(height: float) -> NDArray[np.float64]:
         sliders["height"] = np.full(PEOPLE, height)
         return base[top, 1] - base[bottom, 1] + _coefficients(names, sliders, lengths) @ span
 
@@ -135,7 +138,9 @@ def _draw_people(names: list[str], gains: dict[str, float], base: np.ndarray, mo
     return _coefficients(names, sliders, lengths)
 
 
-def _coefficients(names: list[str], sliders: dict[str, np.ndarray], lengths: dict[str, np.ndarray]) -> np.ndarray:
+def _coefficients(
+    names: list[str], sliders: dict[str, NDArray[np.float64]], lengths: dict[str, NDArray[np.float64]]
+) -> NDArray[np.float64]:
     """Return (PEOPLE, targets): ``lengths`` are given by target, all others follow from the sliders."""
     weight = {}
     for factor, levels in FACTORS.items():

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from onnx import NodeProto, TensorProto, helper, numpy_helper
 
 from ...solver.errors import ModelFileError
@@ -31,7 +32,7 @@ class Graph:
     """Nodes and initializers so far. ``constants``: folded TFLite tensors; ``names``: the ONNX value of each tensor."""
 
     model: Model
-    constants: dict[int, np.ndarray]
+    constants: dict[int, NDArray[Any]]
     nodes: list[NodeProto] = field(default_factory=list)
     initializers: list[TensorProto] = field(default_factory=list)
     names: dict[int, str] = field(default_factory=dict)
@@ -46,7 +47,7 @@ class Graph:
         """Return the error for an operator that cannot be converted."""
         return ModelFileError(f"{self.model.name}: {operator.kind} writing tensor {operator.outputs[0]}: {why}.")
 
-    def constant(self, operator: Operator, position: int) -> np.ndarray:
+    def constant(self, operator: Operator, position: int) -> NDArray[Any]:
         """Return input ``position`` of the operator as an array.
 
         :raises ModelFileError: when it is not a constant.
@@ -62,7 +63,7 @@ class Graph:
         self.nodes.append(helper.make_node(kind, inputs, [name], name=name, **attributes))
         return name
 
-    def initializer(self, array: np.ndarray) -> str:
+    def initializer(self, array: NDArray[Any]) -> str:
         """Store a constant once; float16 weights are widened by a Cast that onnxruntime folds on loading."""
         array = np.ascontiguousarray(array, array.dtype.newbyteorder("="))
         key = (array.dtype.str, array.tobytes(), array.shape)

@@ -2,8 +2,10 @@
 """One function per TFLite operator, each appending the ONNX nodes that compute the same."""
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .graph import Graph, SpatialPad
 from .tflite import PADDINGS, Operator
@@ -42,7 +44,7 @@ def _window_pads(graph: Graph, operator: Operator, size: tuple[int, ...], kernel
     return before + after
 
 
-def _convolution(graph: Graph, operator: Operator, weights: np.ndarray, groups: int) -> None:
+def _convolution(graph: Graph, operator: Operator, weights: NDArray[Any], groups: int) -> None:
     """Append a convolution with ``weights`` (out, in / groups, height, width) and the input's pending padding."""
     source = operator.inputs[0]
     kernel = weights.shape[2:]

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import tflite
+from numpy.typing import NDArray
 
 from ...solver.errors import ModelFileError
 
@@ -36,8 +37,8 @@ class DimensionMetadata:
     """One level of a sparse tensor: dense with ``size``, or compressed with ``segments`` and ``indices``."""
 
     size: int
-    segments: np.ndarray | None = None
-    indices: np.ndarray | None = None
+    segments: NDArray[Any] | None = None
+    indices: NDArray[Any] | None = None
 
 
 @dataclass(frozen=True)
@@ -143,7 +144,7 @@ def _level(level: Any, name: str) -> DimensionMetadata:
     return DimensionMetadata(0, segments, _index_vector(level.ArrayIndicesType(), level.ArrayIndices(), name))
 
 
-def _index_vector(code: int, table: Any, name: str) -> np.ndarray:
+def _index_vector(code: int, table: Any, name: str) -> NDArray[Any]:
     if code not in _INDEX_VECTORS or table is None:
         raise ModelFileError(f"{name}: a sparse dimension without segments or indices.")
     vector = _INDEX_VECTORS[code]()

@@ -17,6 +17,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...scope_addon.errors import MotionFileError
 from ...solver.rotations import exp
@@ -48,14 +49,16 @@ class Skeleton:
     """Bones in an order in which each follows its parent; bone 0 is ``root``. Lengths in metres."""
 
     bones: tuple[str, ...]
-    parents: np.ndarray  # (B,) −1 for the root
-    offsets: np.ndarray  # (B, 3) start to end of the bone at zero pose; the root's is its rest position
-    axes: np.ndarray  # (B, 3, 3) C_b
+    parents: NDArray[np.intp]  # (B,) −1 for the root
+    offsets: NDArray[np.float64]  # (B, 3) start to end of the bone at zero pose; the root's is its rest position
+    axes: NDArray[np.float64]  # (B, 3, 3) C_b
     dofs: tuple[tuple[str, ...], ...]  # per bone, order of its values: rx, ry, rz and for the root tx, ty, tz
     metres_per_unit: float
     degrees: bool
 
-    def forward_kinematics(self, M: np.ndarray, root: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def forward_kinematics(
+        self, M: NDArray[np.float64], root: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Compute the global pose of every bone.
 
         :param M: (T, B, 3, 3) rotations of the bones in skeleton axes relative to their parents, that is C M Cᵀ above.
@@ -75,7 +78,9 @@ class Skeleton:
         """Return the skeleton with every bone ``scale`` times as long."""
         return replace(self, offsets=self.offsets * scale)
 
-    def named_joints(self, R: np.ndarray, ends: np.ndarray) -> tuple[tuple[str, ...], np.ndarray, np.ndarray]:
+    def named_joints(
+        self, R: NDArray[np.float64], ends: NDArray[np.float64]
+    ) -> tuple[tuple[str, ...], NDArray[np.float64], NDArray[np.float64]]:
         """Return bone poses in the form of ``Take``: names, positions (T, J, 3), orientations (T, J, 3, 3).
 
         :raises MotionFileError: when a bone of CMU's skeleton is missing.
@@ -91,7 +96,7 @@ class Skeleton:
         return JOINT_NAMES, ends[:, at], R[:, bone]
 
 
-def _euler(angles: np.ndarray, order: str) -> np.ndarray:
+def _euler(angles: NDArray[np.float64], order: str) -> NDArray[np.float64]:
     """Return rotations (..., 3, 3) of Euler angles (..., n) radians about fixed axes, ``order`` first to last."""
     R = np.broadcast_to(np.eye(3), (*angles.shape[:-1], 3, 3))
     for k, axis in enumerate(order):
@@ -128,7 +133,7 @@ def _skeleton(sections: Mapping[str, list[list[str]]]) -> Skeleton:
     metres = INCH / float(units.get("length", "1"))
     to_radians = np.pi / 180 if units.get("angle", "deg").startswith("deg") else 1.0
 
-    def rotation(angles: list[str], order: str) -> np.ndarray:
+    def rotation(angles: list[str], order: str) -> NDArray[np.float64]:
         return _euler(np.array(angles, float) * to_radians, order.lower())
 
     root = {words[0]: words[1:] for words in sections["root"]}
@@ -172,7 +177,7 @@ def _blocks(lines: list[list[str]]) -> list[list[list[str]]]:
     return blocks
 
 
-def parse_amc(text: str, skeleton: Skeleton, name: str = "motion") -> tuple[np.ndarray, np.ndarray]:
+def parse_amc(text: str, skeleton: Skeleton, name: str = "motion") -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Read an .amc file.
 
     :return: M (T, B, 3, 3), rotations relative to the parents in skeleton axes, and root (T, 3) metres, as

@@ -13,6 +13,7 @@ import json
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...scope_addon.errors import MotionFileError
 from ...solver.rotations import exp, matrix_from_quaternion
@@ -31,8 +32,8 @@ class Character:
     names: tuple[str, ...]
     types: tuple[str, ...]
     parents: tuple[int, ...]
-    attach: np.ndarray  # (J, 3) in the parent's frame
-    tips: dict[str, tuple[int, np.ndarray]]  # tip -> joint that carries it, position in the joint's frame
+    attach: NDArray[np.float64]  # (J, 3) in the parent's frame
+    tips: dict[str, tuple[int, NDArray[np.float64]]]  # tip -> joint that carries it, position in the joint's frame
 
     @property
     def width(self) -> int:
@@ -66,11 +67,11 @@ def parse_character(text: str, name: str = "character") -> Character:
         raise MotionFileError(f"{name}: not a DeepMimic humanoid character ({error!r})") from error
 
 
-def _attach(item: dict) -> np.ndarray:
+def _attach(item: dict) -> NDArray[np.float64]:
     return np.array([item["AttachX"], item["AttachY"], item["AttachZ"]], float)
 
 
-def parse_motion(text: str, character: Character, name: str = "motion") -> np.ndarray:
+def parse_motion(text: str, character: Character, name: str = "motion") -> NDArray[np.float64]:
     """Read the frames of a motion file, (T, 44).
 
     :raises MotionFileError: when it is not JSON or its frames do not fit the character.
@@ -84,7 +85,9 @@ def parse_motion(text: str, character: Character, name: str = "motion") -> np.nd
     return frames
 
 
-def forward_kinematics(frames: np.ndarray, character: Character) -> tuple[np.ndarray, np.ndarray]:
+def forward_kinematics(
+    frames: NDArray[np.float64], character: Character
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return R (T, J, 3, 3) and t (T, J, 3), joint to world, DeepMimic's axes, of frames (T, 44)."""
     T, J = len(frames), len(character.names)
     R = np.empty((T, J, 3, 3))

@@ -17,6 +17,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...scope_addon.errors import MotionFileError
 from ...solver.rotations import exp
@@ -40,7 +41,7 @@ STANCE_QUANTILE = 0.1  # of the frames, ordered by height of the lower foot
 SCALES = np.linspace(0.75, 1.25, 101)
 
 
-def parse_expmap(text: str, name: str = "motion") -> tuple[np.ndarray, np.ndarray]:
+def parse_expmap(text: str, name: str = "motion") -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Read a file.
 
     :return: φ (T, 38, 3) radians, exactly as in the file but without frame 0, and root (T, 3) in CMU's unit.
@@ -58,7 +59,7 @@ def parse_expmap(text: str, name: str = "motion") -> tuple[np.ndarray, np.ndarra
     return values[1:, 1:], values[1:, 0]
 
 
-def bone_rotations(phi: np.ndarray, skeleton: Skeleton) -> np.ndarray:
+def bone_rotations(phi: NDArray[np.float64], skeleton: Skeleton) -> NDArray[np.float64]:
     """Return rotations (T, B, 3, 3) of the skeleton's bones relative to their parents, from φ (T, 38, 3)."""
     M = np.broadcast_to(np.eye(3), (len(phi), len(skeleton.bones), 3, 3)).copy()
     for k, bone in enumerate(BONES):
@@ -67,7 +68,7 @@ def bone_rotations(phi: np.ndarray, skeleton: Skeleton) -> np.ndarray:
     return M
 
 
-def standing_scale(R: np.ndarray, root: np.ndarray, skeleton: Skeleton) -> float:
+def standing_scale(R: NDArray[np.float64], root: NDArray[np.float64], skeleton: Skeleton) -> float:
     """Return the skeleton's scale at which the lower foot of standing frames is ``STANCE_HEIGHT`` above the floor.
 
     :param R: (T, B, 3, 3) bone to world; root (T, 3) metres.

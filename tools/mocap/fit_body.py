@@ -18,6 +18,7 @@ from itertools import groupby
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...scope_addon.atomic_write import written_beside
 from ...solver import Keypoints3D, Measurements, Options, PosePriors, Priors, Stage, State, Weights, fit_tree, make_tree
@@ -47,19 +48,21 @@ class FittedTake:
     """The body's motion fitted to a take."""
 
     take: Take
-    betas: np.ndarray  # (P,)
-    R: np.ndarray  # (T, K+1, 3, 3) part to world
-    t: np.ndarray  # (T, K+1, 3) joints, world, metres
-    poses: np.ndarray  # (T, 3 (K+1)) axis-angle
-    trans: np.ndarray  # (T, 3)
-    error: np.ndarray  # (T, K+1) metres between joint and target, NaN without target
-    valid: np.ndarray  # (T,) bool, False where the recording is broken
+    betas: NDArray[np.float64]  # (P,)
+    R: NDArray[np.float64]  # (T, K+1, 3, 3) part to world
+    t: NDArray[np.float64]  # (T, K+1, 3) joints, world, metres
+    poses: NDArray[np.float64]  # (T, 3 (K+1)) axis-angle
+    trans: NDArray[np.float64]  # (T, 3)
+    error: NDArray[np.float64]  # (T, K+1) metres between joint and target, NaN without target
+    valid: NDArray[np.bool_]  # (T,) bool, False where the recording is broken
 
 
 class _Fitter:
     """The solver set up for one performer."""
 
-    def __init__(self, body: Body, betas: np.ndarray, found: Correspondence, position_weight: float = 24000.0) -> None:
+    def __init__(
+        self, body: Body, betas: NDArray[np.float64], found: Correspondence, position_weight: float = 24000.0
+    ) -> None:
         self.body, self.betas, self.found, self.tree = body, betas, found, make_tree(body)
         names = list(body.joint_names)
         self.parts = np.array([names.index(p) for p in found.parts])
@@ -77,7 +80,9 @@ class _Fitter:
         stage = Stage(weights, tolerance=1e-4, max_iterations=20)
         self.options = Options(stages=(stage,), robust_keypoints3d=np.inf, damping=1e-3)
 
-    def __call__(self, R_target: np.ndarray, p_target: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def __call__(
+        self, R_target: NDArray[np.float64], p_target: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return part poses R (T, K+1, 3, 3), t (T, K+1, 3) for targets (T, parts, 3, 3) and (T, points, 3)."""
         T, n = len(R_target), self.body.K + 1
         R, t = np.empty((T, n, 3, 3)), np.empty((T, n, 3))
@@ -96,7 +101,7 @@ class _Fitter:
             R[k], t[k] = fit.R_camera_part, fit.t_camera_part
         return R, t
 
-    def _start(self, R_target: np.ndarray, p_target: np.ndarray) -> State:
+    def _start(self, R_target: NDArray[np.float64], p_target: NDArray[np.float64]) -> State:
         """Return the state with every part at its target's rotation and the joints' centroid at their targets'."""
         R = np.empty((self.body.K + 1, 3, 3))
         Omega = np.tile(np.eye(3), (self.body.K + 1, 1, 1))
@@ -117,14 +122,14 @@ def fit_performer(body: Body, takes: list[Take]) -> list[FittedTake]:
     return [_fitted(body, betas, take, fitter) for take in takes]
 
 
-def calibrate_offsets(body: Body, betas: np.ndarray, found: Correspondence, takes: list[Take]) -> None:
+def calibrate_offsets(body: Body, betas: NDArray[np.float64], found: Correspondence, takes: list[Take]) -> None:
     """Set ``found.offset`` to the mean over frames of R_world_sᵀ (t_j − p_s), from fits on some frames of the takes."""
     step = max(1, sum(map(len, takes)) // CALIBRATION_FRAMES)
     some = [Take(t.name, t.subject, t.fps, t.joint_names, t.positions[::step], t.source,
                  orientations=None if t.orientations is None else t.orientations[::step]) for t in takes]  # fmt: skip
     for k in range(ROUNDS):
         fitter = _Fitter(body, betas, found, position_weight=24.0 if k == 0 else 2400.0)
-        left_over: dict[str, list[np.ndarray]] = {joint: [] for joint in found.points}
+        left_over: dict[str, list[NDArray[np.float64]]] = {joint: [] for joint in found.points}
         for take in some:
             _, t = fitter(*targets(take, found))
             for joint, point in found.points.items():
@@ -134,7 +139,7 @@ def calibrate_offsets(body: Body, betas: np.ndarray, found: Correspondence, take
         found.offset = {joint: np.concatenate(gaps).mean(axis=0) for joint, gaps in left_over.items()}
 
 
-def _fitted(body: Body, betas: np.ndarray, take: Take, fitter: _Fitter) -> FittedTake:
+def _fitted(body: Body, betas: NDArray[np.float64], take: Take, fitter: _Fitter) -> FittedTake:
     R_target, p_target = targets(take, fitter.found)
     R, t = fitter(R_target, p_target)
     error = np.full(t.shape[:2], np.nan)
@@ -150,7 +155,7 @@ def _fitted(body: Body, betas: np.ndarray, take: Take, fitter: _Fitter) -> Fitte
     return FittedTake(take, betas, R, t, poses, t[:, 0] - body.rest_joints(betas)[0], error, valid)
 
 
-def plausible(body: Body, Omega: np.ndarray, fps: float) -> np.ndarray:
+def plausible(body: Body, Omega: NDArray[np.float64], fps: float) -> NDArray[np.bool_]:
     """Return (T,) bool: whether all joint states (T, K+1, 3, 3) are within their ranges and speed limit."""
     most = np.array([MOST_DEGREES.get(name.rpartition("_")[2], 180.0) for name in body.joint_names])
     inside = (np.degrees(np.linalg.norm(log(Omega[:, 1:]), axis=-1)) <= most[1:]).all(axis=1)

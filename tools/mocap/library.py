@@ -7,6 +7,7 @@ import tarfile
 from pathlib import Path, PurePosixPath
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...scope_addon.errors import MotionFileError
 from . import asf_amc, deepmimic, expmap
@@ -118,6 +119,8 @@ def _same_recording(take: Take, other: Take) -> bool:
     return False
 
 
-def _cmu_take(name: str, subject: str, source: str, skeleton: Skeleton, M: np.ndarray, root: np.ndarray) -> Take:
+def _cmu_take(
+    name: str, subject: str, source: str, skeleton: Skeleton, M: NDArray[np.float64], root: NDArray[np.float64]
+) -> Take:
     names, positions, orientations = skeleton.named_joints(*skeleton.forward_kinematics(M, root))
     return Take(name, subject, CMU_FPS, names, positions, source, orientations=orientations)

@@ -12,6 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...solver.body import Body
 from ...solver.errors import ShapeError
@@ -56,8 +57,10 @@ class Correspondence:
 
     parts: dict[str, Follow]
     points: dict[str, Point]
-    C: dict[str, np.ndarray] = field(default_factory=dict)  # (3, 3) for each of parts
-    offset: dict[str, np.ndarray] = field(default_factory=dict)  # (3,) metres for each of points, in its segment
+    C: dict[str, NDArray[np.float64]] = field(default_factory=dict)  # (3, 3) for each of parts
+    offset: dict[str, NDArray[np.float64]] = field(
+        default_factory=dict
+    )  # (3,) metres for each of points, in its segment
 
 
 def _sided(table: dict) -> dict:
@@ -102,7 +105,7 @@ DEEPMIMIC_POINTS = _sided({
 })  # fmt: skip
 
 
-def correspond(body: Body, betas: np.ndarray, takes: list[Take]) -> Correspondence:
+def correspond(body: Body, betas: NDArray[np.float64], takes: list[Take]) -> Correspondence:
     """Return the correspondence for one performer's takes, with level feet and upright heads, and zero offsets."""
     cmu = takes[0].source.startswith("cmu_")
     found = Correspondence(CMU_PARTS if cmu else DEEPMIMIC_PARTS, CMU_POINTS if cmu else DEEPMIMIC_POINTS)
@@ -120,7 +123,7 @@ def correspond(body: Body, betas: np.ndarray, takes: list[Take]) -> Corresponden
     return found
 
 
-def segment_rotations(take: Take, follow: Follow) -> np.ndarray:
+def segment_rotations(take: Take, follow: Follow) -> NDArray[np.float64]:
     """Return R_world_segment (T, 3, 3) of the segment or mixture that a part follows.
 
     :raises ShapeError: when the take has positions only.
@@ -134,7 +137,7 @@ def segment_rotations(take: Take, follow: Follow) -> np.ndarray:
     return R
 
 
-def targets(take: Take, found: Correspondence) -> tuple[np.ndarray, np.ndarray]:
+def targets(take: Take, found: Correspondence) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return target rotations (T, parts, 3, 3) of parts and target positions (T, points, 3) of joints."""
     R = np.stack([segment_rotations(take, follow) @ found.C[part] for part, follow in found.parts.items()], axis=1)
     p = np.stack([take.joint(point.joint) + segment_rotations(take, Follow(point.segment)) @ found.offset[joint]
@@ -142,7 +145,7 @@ def targets(take: Take, found: Correspondence) -> tuple[np.ndarray, np.ndarray]:
     return R, p
 
 
-def shape_from_lengths(body: Body, take: Take) -> np.ndarray:
+def shape_from_lengths(body: Body, take: Take) -> NDArray[np.float64]:
     """Fit the shape (P,) to bone lengths and trunk height by Gauss-Newton on (length − measured)/σ and β/1."""
     ours, theirs = ARM_LENGTHS["cmu" if take.source.startswith("cmu_") else "deepmimic"]
     pairs = [*LENGTHS, *((f"{s}_elbow", f"{s}_{ours}", f"{s}_elbow", f"{s}_{theirs}", 0.01) for s in SIDES)]
@@ -178,7 +181,7 @@ def _chain(a: str, b: str) -> list[str]:
     return [a, f"{side}_forearm", f"{side}_wrist", b]
 
 
-def _rest_alignment(body: Body, rest: np.ndarray, part: str, cmu: bool) -> np.ndarray:
+def _rest_alignment(body: Body, rest: NDArray[np.float64], part: str, cmu: bool) -> NDArray[np.float64]:
     """Return C, which takes a limb's rest bone and hinge axis to the source's; identity for upright parts."""
     side, _, name = part.rpartition("_")
     mirror = -1.0 if side == "right" else 1.0
@@ -202,12 +205,12 @@ def _rest_alignment(body: Body, rest: np.ndarray, part: str, cmu: bool) -> np.nd
     return _frame([mirror, 0.0, 0.0], axis) @ ours.T
 
 
-def _hanging(mirror: float) -> np.ndarray:
+def _hanging(mirror: float) -> NDArray[np.float64]:
     """Return the rotation of an arm from the T-pose to hanging, palms to the thighs."""
     return exp([0.0, 0.0, -mirror * np.pi / 2])
 
 
-def _frame(bone: np.ndarray | list[float], axis: np.ndarray | list[float]) -> np.ndarray:
+def _frame(bone: NDArray[np.float64] | list[float], axis: NDArray[np.float64] | list[float]) -> NDArray[np.float64]:
     """Return the rotation with columns (bone, the axis made perpendicular to it, their cross product)."""
     b = np.asarray(bone, float) / np.linalg.norm(bone)
     a = np.asarray(axis, float) - b * (b @ axis)
@@ -215,7 +218,7 @@ def _frame(bone: np.ndarray | list[float], axis: np.ndarray | list[float]) -> np
     return np.stack([b, a, np.cross(b, a)], axis=1)
 
 
-def _levelled(C: np.ndarray, follow: Follow, takes: list[Take], side: str) -> np.ndarray:
+def _levelled(C: NDArray[np.float64], follow: Follow, takes: list[Take], side: str) -> NDArray[np.float64]:
     """Return C turned by the smallest rotation that makes the foot level in the median frame in which it stands."""
     ups = []
     for take in takes:
@@ -235,7 +238,7 @@ def _levelled(C: np.ndarray, follow: Follow, takes: list[Take], side: str) -> np
     return exp(axis / max(sine, 1e-12) * np.arctan2(sine, own @ up)) @ C
 
 
-def _forward_lean(R: np.ndarray) -> np.ndarray:
+def _forward_lean(R: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return (T,) how far a segment's up axis leans in its facing direction, in the horizontal plane."""
     facing = R[:, [0, 2], 2] / np.maximum(np.linalg.norm(R[:, [0, 2], 2], axis=1, keepdims=True), 1e-9)
     return np.einsum("ti,ti->t", facing, R[:, [0, 2], 1])

@@ -13,6 +13,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...solver.errors import ShapeError
 
@@ -25,10 +26,10 @@ class Take:
     subject: str  # the performer; takes of one subject have the same bone lengths
     fps: float
     joint_names: tuple[str, ...]
-    positions: np.ndarray  # (T, J, 3) metres, world, y up
+    positions: NDArray[np.float64]  # (T, J, 3) metres, world, y up
     source: str  # cmu_asf_amc, cmu_expmap or deepmimic
     mirrored: bool = False  # the mirror image of another take in the same source
-    orientations: np.ndarray | None = None  # (T, J, 3, 3) R_world_segment
+    orientations: NDArray[np.float64] | None = None  # (T, J, 3, 3) R_world_segment
 
     def __post_init__(self) -> None:
         """Check the shapes against each other.
@@ -49,7 +50,7 @@ class Take:
         """Return the length of the take."""
         return len(self) / self.fps
 
-    def joint(self, name: str) -> np.ndarray:
+    def joint(self, name: str) -> NDArray[np.float64]:
         """Return positions (T, 3) of one joint, metres."""
         return self.positions[:, self.index(name)]
 

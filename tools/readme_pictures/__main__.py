@@ -10,6 +10,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from ...scope_addon.atomic_write import written_beside
 from ...solver.loaders.body_file import ASSETS
@@ -50,7 +51,7 @@ def main() -> int:
     return 0
 
 
-def _write(path: Path, picture: np.ndarray) -> None:
+def _write(path: Path, picture: NDArray[np.uint8]) -> None:
     """Write a JPEG, as good as its size allows."""
     bgr = cv2.cvtColor(picture, cv2.COLOR_RGB2BGR)
     for quality in range(90, 30, -4):

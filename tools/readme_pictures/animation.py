@@ -7,6 +7,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from ...scope_addon.capture.media.video import open_video
 from ...scope_addon.errors import OutputError
@@ -23,7 +24,7 @@ _CORNER, _TALL = (60.0, 0.0), 480.0  # the part of the footage that is shown: th
 _MIDDLE, _HEIGHT_M = np.array([0.35, 0.0, 0.93]), 2.35  # centre and height of the side view
 
 
-def sample_frames() -> list[np.ndarray]:
+def sample_frames() -> list[NDArray[np.uint8]]:
     """Return (H, W, 3) RGB frames: footage, overlay and side view next to each other."""
     motion = captured(SAMPLE)[0]
     rows = {int(frame): row for row, frame in enumerate(motion.frames)}
@@ -42,7 +43,7 @@ def sample_frames() -> list[np.ndarray]:
     return frames
 
 
-def write_webp(path: Path, frames: list[np.ndarray], frames_per_second: float) -> int:
+def write_webp(path: Path, frames: list[NDArray[np.uint8]], frames_per_second: float) -> int:
     """Write an endless animated WebP, at the best quality that stays below ``LARGEST_BYTES``; returns that quality.
 
     :param frames: (H, W, 3) uint8 RGB, all of one size.

@@ -6,6 +6,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...scope_addon.motion import Motion
 from .clips import DATA, SAMPLE, SAMPLE_TRUTH, camera, captured, default_body, distance_cm, error_mm
@@ -19,10 +20,10 @@ BOTH = [("Scope", OURS), ("ground truth", TRUTH)]
 LEFT_WRIST, HEAD = 20, 15
 
 
-def sample() -> np.ndarray:
+def sample() -> NDArray[np.uint8]:
     """Draw the sample clip: the body over the footage, and from the side with the exact ground truth."""
     motion = captured(SAMPLE)[0]
-    columns: list[np.ndarray] = []
+    columns: list[NDArray[np.uint8]] = []
     for row in (48, 66, 119):
         panel = _with_truth(motion, row, _side(motion, row, (298, 330), 90, 2.35), SAMPLE_TRUTH)
         panel.heading(f"from the side, {error_mm(motion, row, SAMPLE_TRUTH):.0f} mm")
@@ -32,7 +33,7 @@ def sample() -> np.ndarray:
     return next_to_each_other(columns)
 
 
-def against_truth() -> np.ndarray:
+def against_truth() -> NDArray[np.uint8]:
     """Draw camera 2 at a good moment and at an average one: the camera's view and the view from the side."""
     motion, truth = camera(2)
     panels = []
@@ -45,7 +46,7 @@ def against_truth() -> np.ndarray:
     return next_to_each_other([panel.finished() for panel in panels])
 
 
-def in_motion() -> np.ndarray:
+def in_motion() -> NDArray[np.uint8]:
     """Draw a runner every 0.9 s, filmed by a travelling camera, and two people shaking hands."""
     runner = captured(DATA / "clips" / "run_moving_camera.mp4")[0]
     run = _together([(runner, row, OURS) for row in range(4, 180, 27)], (598, 300), 0, 2.75, 12)
@@ -56,17 +57,17 @@ def in_motion() -> np.ndarray:
     return next_to_each_other([run.finished(), pair.finished()])
 
 
-def along_the_view() -> np.ndarray:
+def along_the_view() -> NDArray[np.uint8]:
     """Draw a failure: depth ambiguity, trunk and arms displaced along the line of sight (camera 1)."""
     return _hand_off(1, 52, 90, (14, 28))
 
 
-def from_behind() -> np.ndarray:
+def from_behind() -> NDArray[np.uint8]:
     """Draw a failure: lean and an occluded arm are not visible from behind (camera 4)."""
     return _hand_off(4, 64, -90, (-14, 28))
 
 
-def two_floors() -> np.ndarray:
+def two_floors() -> NDArray[np.uint8]:
     """Draw a failure: one floor for a clip in which a man leaps from a roof (walk_side_static)."""
     acrobat, walker = captured(DATA / "clips" / "walk_side_static.mp4", everybody=True)
     rows = (100, 150, 168, 175, 184, 193, 207)
@@ -83,7 +84,7 @@ def two_floors() -> np.ndarray:
     return panel.finished()
 
 
-def _hand_off(number: int, row: int, turn: float, place: tuple[float, float]) -> np.ndarray:
+def _hand_off(number: int, row: int, turn: float, place: tuple[float, float]) -> NDArray[np.uint8]:
     """Draw a frame of a pose2sim camera: its view, the view from the side, and the error of the left hand."""
     motion, truth = camera(number)
     front = _with_truth(motion, row, _front(motion, row, (449, 380), truth), truth)

@@ -8,6 +8,7 @@ the floor of the world (z up). At zero yaw the person faces world −y, where th
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...scope_addon.kinematics.axes import R_WORLD_MODEL
 from ...solver.body import Body
@@ -20,10 +21,10 @@ TURN = 68.0  # yaw of the walk: to the right of the image and slightly towards t
 FOOT_APART, TOE_OUT = 0.115, 8.0
 SQUAT = (2.2, 2.72, 2.86, 3.28)  # begins, is lowest from .. to, ends
 
-Key = tuple[float, np.ndarray]  # time, value
+Key = tuple[float, NDArray[np.float64]]  # time, value
 
 
-def choreograph(body: Body, betas: np.ndarray, fps: float) -> tuple[np.ndarray, np.ndarray]:
+def choreograph(body: Body, betas: NDArray[np.float64], fps: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the pose of every frame: rotations (T, K+1, 3, 3), row 0 the root in the world; and trans (T, 3)."""
     times = np.arange(round(DURATION * fps)) / fps
     J = body.rest_joints(betas)
@@ -51,7 +52,7 @@ def choreograph(body: Body, betas: np.ndarray, fps: float) -> tuple[np.ndarray, 
     return rotations, trans
 
 
-def standing_feet(times: np.ndarray) -> np.ndarray:
+def standing_feet(times: NDArray[np.float64]) -> NDArray[np.bool_]:
     """Return (T, 2) bool: whether the left and the right foot are flat and at rest at these times."""
     return np.array([[not any(t0 < t < t1 for t0, t1, *_ in _STEPS[s]) for s in ("left", "right")] for t in times])
 
@@ -59,7 +60,7 @@ def standing_feet(times: np.ndarray) -> np.ndarray:
 # Legs
 
 
-def _beside(along: float, side: str, yaw: float) -> np.ndarray:
+def _beside(along: float, side: str, yaw: float) -> NDArray[np.float64]:
     """Return a place on the floor, ``along`` metres into the walk, half the width of the stance to one side."""
     walk, facing = np.radians(TURN), np.radians(yaw)
     ahead = np.array([np.sin(walk), -np.cos(walk)])
@@ -69,7 +70,7 @@ def _beside(along: float, side: str, yaw: float) -> np.ndarray:
 
 _WALK = (3.25, 3.66, 4.08, 4.50, 4.92)  # each step begins where the last one ends
 # Per foot: begin, end, place and yaw at the end.
-_STEPS: dict[str, list[tuple[float, float, np.ndarray, float]]] = {
+_STEPS: dict[str, list[tuple[float, float, NDArray[np.float64], float]]] = {
     "left": [
         (_WALK[0], _WALK[1], _beside(0.22, "left", TURN), TURN),
         (_WALK[2], _WALK[3], _beside(1.12, "left", TURN), TURN),
@@ -81,7 +82,7 @@ _STEPS: dict[str, list[tuple[float, float, np.ndarray, float]]] = {
 }
 
 
-def _foot_at(side: str, t: float) -> tuple[np.ndarray, np.ndarray]:
+def _foot_at(side: str, t: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the ankle above its height on the floor (3,), and the foot's rotation in the world."""
     place, yaw, lift, pitch = _beside(0.0, side, 0.0), 0.0, 0.0, 0.0
     for begin, end, to, to_yaw in _STEPS[side]:
@@ -97,7 +98,7 @@ def _foot_at(side: str, t: float) -> tuple[np.ndarray, np.ndarray]:
     return np.array([*place, lift]), R_foot
 
 
-def _on_path(along: float, back: float = 0.0) -> np.ndarray:
+def _on_path(along: float, back: float = 0.0) -> NDArray[np.float64]:
     return _beside(along, "left", 90.0) - [0.0, FOOT_APART] + [0.0, back]
 
 
@@ -130,7 +131,7 @@ _LEAN = [(0.0, 0.0), (SQUAT[0], 0.0), (SQUAT[1], 32.0), (SQUAT[2], 32.0), (SQUAT
 
 
 def _arm(raised: float, ahead: float = 0.0, pitch: float = 0.0, twist: float = 0.0, elbow: float = 10.0) -> dict:
-    """Return rotations of left collar, shoulder and elbow; ``raised``: −90 hangs, 0 is the T-pose; ``pitch`` > 0: ahead."""
+    """Return rotations of left collar, shoulder and elbow; ``raised``: −90 hangs, 0 T-pose; ``pitch`` > 0: ahead."""
     collar = max(raised, 0) * 0.3
     axes = np.radians([[-pitch, 0, 0], [0, -ahead, 0], [0, 0, raised - collar], [twist, 0, 0]])
     shoulder = exp(axes[0]) @ exp(axes[1]) @ exp(axes[2]) @ exp(axes[3])
@@ -196,13 +197,13 @@ def _eased(keys: list[tuple[float, float]], t: float) -> float:
     return keys[i][1] + _ease(s) * (keys[i + 1][1] - keys[i][1])
 
 
-def _rotation_at(keys: list[Key], t: float) -> np.ndarray:
+def _rotation_at(keys: list[Key], t: float) -> NDArray[np.float64]:
     """Interpolate rotations from key to key about one axis."""
     i, s = _span(keys, t)
     return keys[i][1] @ exp(_ease(s) * log(keys[i][1].T @ keys[i + 1][1]))
 
 
-def _curve(keys: list[Key], t: float) -> np.ndarray:
+def _curve(keys: list[Key], t: float) -> NDArray[np.float64]:
     """Evaluate the monotone cubic through the keys."""
     i, s = _span(keys, t)
     (t0, p0), (t1, p1) = keys[i], keys[i + 1]
@@ -212,7 +213,7 @@ def _curve(keys: list[Key], t: float) -> np.ndarray:
     return from_start + s * s * (3 - 2 * s) * p1 + s * s * (s - 1) * d * v1
 
 
-def _velocity(keys: list[Key], i: int) -> np.ndarray:
+def _velocity(keys: list[Key], i: int) -> NDArray[np.float64]:
     """Return the harmonic mean of the slopes on both sides; zero at ends and turning points. Never overshoots."""
     if i in (0, len(keys) - 1):
         return np.zeros_like(keys[i][1])

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from ...solver.body import Body
 from .stage import LAMPS, build_stage, encode, pose_person, render_part, render_room
@@ -43,7 +44,7 @@ def render_pictures(body: Body, shot: Shot, frames: Iterable[int], folder: Path)
     return pictures
 
 
-def _affected(shot: Shot, vertices_world: np.ndarray, lamps: np.ndarray) -> tuple[int, int, int, int]:
+def _affected(shot: Shot, vertices_world: NDArray[np.float64], lamps: NDArray[np.float64]) -> tuple[int, int, int, int]:
     """Return left, top, right and bottom, in pixels, of the area that person and shadows can change."""
     points = [vertices_world]
     for lamp in lamps:
@@ -55,7 +56,7 @@ def _affected(shot: Shot, vertices_world: np.ndarray, lamps: np.ndarray) -> tupl
     return int(low[0]), int(low[1]), int(high[0]), int(high[1])
 
 
-def _into_room(room: np.ndarray, path: Path, box: tuple[int, int, int, int]) -> None:
+def _into_room(room: NDArray[np.float32], path: Path, box: tuple[int, int, int, int]) -> None:
     """Complete a partly rendered picture with the empty room, without a visible seam."""
     left, top, right, bottom = box
     weight = np.zeros(room.shape[:2], np.float32)

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...solver.rotations import exp
 
@@ -11,8 +12,12 @@ X = np.array([1.0, 0.0, 0.0])
 
 
 def solve_leg(
-    R_world_root: np.ndarray, hip: np.ndarray, ankle: np.ndarray, thigh: np.ndarray, shank: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
+    R_world_root: NDArray[np.float64],
+    hip: NDArray[np.float64],
+    ankle: NDArray[np.float64],
+    thigh: NDArray[np.float64],
+    shank: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the hip and knee rotations that bring the ankle to its target.
 
     The knee is a hinge about the model's x axis, bent by θ ≥ 0 so that |thigh + Rx(θ) shank| is the distance from hip
@@ -37,7 +42,7 @@ def solve_leg(
     return R_hip, R_knee
 
 
-def _frame(direction: np.ndarray) -> np.ndarray:
+def _frame(direction: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the rotation whose first column is the direction and whose second is as near to x as possible."""
     first = direction / np.linalg.norm(direction)
     second = X - first * first[0]

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import bpy
 import numpy as np
+from numpy.typing import NDArray
 
 from ...scope_addon.scene.axes import blender_camera_matrix
 from ...solver.body import Body
@@ -18,7 +19,7 @@ _SAMPLES_ROOM, _SAMPLES_PERSON = 32, 8
 
 
 def build_stage(
-    body: Body, intrinsics: np.ndarray, size: tuple[int, int], world_from_camera: np.ndarray
+    body: Body, intrinsics: NDArray[np.float64], size: tuple[int, int], world_from_camera: NDArray[np.float64]
 ) -> bpy.types.Object:
     """Build the scene, ready to render; return the person's mesh object, whose vertices are in the world frame."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
@@ -30,7 +31,7 @@ def build_stage(
     return _person(body)
 
 
-def pose_person(person: bpy.types.Object, vertices_world: np.ndarray) -> None:
+def pose_person(person: bpy.types.Object, vertices_world: NDArray[np.float64]) -> None:
     """Give the mesh its vertices for the next frame."""
     person.data.vertices.foreach_set("co", np.ascontiguousarray(vertices_world, np.float32).ravel())
     person.data.update()
@@ -103,7 +104,9 @@ def _render_settings(scene: bpy.types.Scene, size: tuple[int, int]) -> None:
     cycles.seed = 1
 
 
-def _camera(scene: bpy.types.Scene, K: np.ndarray, size: tuple[int, int], world_from_camera: np.ndarray) -> None:
+def _camera(
+    scene: bpy.types.Scene, K: NDArray[np.float64], size: tuple[int, int], world_from_camera: NDArray[np.float64]
+) -> None:
     """Add a camera of the given pinhole intrinsics; pixel (u, v) is the centre of a pixel, as in OpenCV."""
     data = bpy.data.cameras.new("camera")
     camera = bpy.data.objects.new("camera", data)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...scope_addon.kinematics.axes import transform_points, world_from_level_camera
 from ...solver.body import Body
@@ -33,33 +34,33 @@ _SIDES = ("left", "right")
 class Shot:
     """A moving body in front of a static camera."""
 
-    rotations: np.ndarray  # (T, K+1, 3, 3) joint states, row 0 the root in the world
-    trans: np.ndarray  # (T, 3) metres, world
-    betas: np.ndarray  # (P,)
-    intrinsics: np.ndarray  # (3, 3) pixels
-    world_from_camera: np.ndarray  # (4, 4)
+    rotations: NDArray[np.float64]  # (T, K+1, 3, 3) joint states, row 0 the root in the world
+    trans: NDArray[np.float64]  # (T, 3) metres, world
+    betas: NDArray[np.float64]  # (P,)
+    intrinsics: NDArray[np.float64]  # (3, 3) pixels
+    world_from_camera: NDArray[np.float64]  # (4, 4)
     size: tuple[int, int]  # width, height
     fps: float
-    standing: np.ndarray  # (T, 2) bool: left, right foot on the floor and at rest
+    standing: NDArray[np.bool_]  # (T, 2) bool: left, right foot on the floor and at rest
 
     def __len__(self) -> int:
         return len(self.trans)
 
-    def to_camera(self, points_world: np.ndarray) -> np.ndarray:
+    def to_camera(self, points_world: NDArray[np.float64]) -> NDArray[np.float64]:
         """Transform points (..., N, 3) to the camera frame, metres."""
         return transform_points(np.linalg.inv(self.world_from_camera), points_world)
 
-    def project(self, points_camera: np.ndarray) -> np.ndarray:
+    def project(self, points_camera: NDArray[np.float64]) -> NDArray[np.float64]:
         """Project points (..., N, 3) to pixels (..., N, 2), without distortion."""
         homogeneous = points_camera @ self.intrinsics.T
         return homogeneous[..., :2] / homogeneous[..., 2:]
 
-    def vertices_world(self, body: Body, frame: int) -> np.ndarray:
+    def vertices_world(self, body: Body, frame: int) -> NDArray[np.float64]:
         """Return the skin's vertices (V, 3) in one frame, world, metres."""
         return body.skin(*body.forward_kinematics(self.rotations[frame], self.trans[frame], self.betas), self.betas)
 
 
-def sample_shot(rotations: np.ndarray, trans: np.ndarray) -> Shot:
+def sample_shot(rotations: NDArray[np.float64], trans: NDArray[np.float64]) -> Shot:
     """Return the shot of the sample clip with this motion."""
     standing = standing_feet(np.arange(len(trans)) / FPS)
     return Shot(rotations, trans, BETAS, INTRINSICS, WORLD_FROM_CAMERA, SIZE, FPS, standing)

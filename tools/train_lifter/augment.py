@@ -12,9 +12,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from ...scope_addon.capture.perception.lifter_window import OFFSETS_S, WINDOW, ends_of_runs
 from ...solver.body import Body
@@ -38,24 +40,24 @@ CLUSTERS = 256
 class Motions:
     """Frames of all takes: ``Omega`` (F, 24, 3, 3) f32, row 0 the root into the world; (F,) ``take``, and ``fps``."""
 
-    Omega: np.ndarray
-    take: np.ndarray
-    fps: np.ndarray
+    Omega: NDArray[np.float32]
+    take: NDArray[np.intp]
+    fps: NDArray[np.float64]
 
     def __len__(self) -> int:
         return len(self.Omega)
 
-    def select(self, frames: np.ndarray) -> Motions:
+    def select(self, frames: NDArray[Any]) -> Motions:
         """Return only these frames (mask or indices)."""
         return Motions(self.Omega[frames], self.take[frames], self.fps[frames])
 
     @cached_property
-    def ends(self) -> tuple[np.ndarray, np.ndarray]:
+    def ends(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
         """Return (F,) the first and (F,) the last frame of each frame's take."""
         return ends_of_runs(self.take)
 
     @cached_property
-    def share(self) -> np.ndarray:
+    def share(self) -> NDArray[np.float64]:
         """Return (F,) the probability of drawing a frame, so that common poses, such as walking, do not dominate.
 
         Proportional to 1/√(frames in the same cluster of joint states), clusters by k-means on Ω.
@@ -94,7 +96,7 @@ class PoseSampler:
         self._parts = [self._below(root) for root in roots]
         self._noise = np.array([next((v for k, v in JOINT_NOISE.items() if k in n), 0.0) for n in names])
 
-    def _below(self, joint: str) -> np.ndarray:
+    def _below(self, joint: str) -> NDArray[np.intp]:
         """Return the indices of the joint and of all its descendants."""
         inside = {self.body.joint_names.index(joint)}
         for i, parent in enumerate(self.body.parents):
@@ -102,12 +104,12 @@ class PoseSampler:
                 inside.add(i)
         return np.array(sorted(inside))
 
-    def mirror(self, Omega: np.ndarray) -> np.ndarray:
+    def mirror(self, Omega: NDArray[np.float32]) -> NDArray[np.float32]:
         """Return the mirror image of poses (..., 24, 3, 3) about the body's (and the world's) x = 0."""
         signs = np.outer(np.diag(_MIRROR), np.diag(_MIRROR)).astype(Omega.dtype)
         return (Omega * signs)[..., self.partner, :, :]
 
-    def _windows(self, rng: np.random.Generator, n: int) -> np.ndarray:
+    def _windows(self, rng: np.random.Generator, n: int) -> NDArray[np.float32]:
         """Draw windows (n, WINDOW, 24, 3, 3) of one recording each."""
         drawn = np.searchsorted(self._cumulative, rng.random(n) * self._cumulative[-1])
         middle = np.minimum(drawn, len(self.motions) - 1)
@@ -119,7 +121,7 @@ class PoseSampler:
         Omega[flip] = self.mirror(Omega[flip])
         return Omega
 
-    def motion_windows(self, rng: np.random.Generator, n: int) -> np.ndarray:
+    def motion_windows(self, rng: np.random.Generator, n: int) -> NDArray[np.float32]:
         """Draw windows (n, WINDOW, 24, 3, 3) f32; row 0 of a pose is R_world_root, y up, with a random heading."""
         Omega = self._windows(rng, n)
         for joints, share in zip(self._parts, (SWAP_UPPER, SWAP_ARM, SWAP_ARM, SWAP_LEG, SWAP_LEG), strict=True):
@@ -140,11 +142,11 @@ class PoseSampler:
         Omega[:, :, 0] = turned[:, None] @ Omega[:, :, 0]
         return Omega
 
-    def pose(self, rng: np.random.Generator) -> np.ndarray:
+    def pose(self, rng: np.random.Generator) -> NDArray[np.float32]:
         """Draw the pose (24, 3, 3) of one moment."""
         return self.motion_windows(rng, 1)[0, WINDOW // 2]
 
-    def proportions(self, rng: np.random.Generator, n: int) -> tuple[np.ndarray, np.ndarray]:
+    def proportions(self, rng: np.random.Generator, n: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """Draw bodies: joints relative to parents (n, 24, 3), BlazePose keypoints relative to joints (n, 33, 3)."""
         body, at = self.body, np.array(list(self.body.keypoint_set("blazepose").values()))
         betas = np.clip(rng.standard_normal((n, body.P)) * SHAPE_SPREAD, -SHAPE_LIMIT, SHAPE_LIMIT)
@@ -156,7 +158,7 @@ class PoseSampler:
 
 
 @njit(fastmath=True)
-def _turn_joints(Omega: np.ndarray, turn: np.ndarray) -> None:
+def _turn_joints(Omega: NDArray[np.float32], turn: NDArray[np.float32]) -> None:
     """Multiply Omega[a, w, k] by turn[a, k] from the right, in place."""
     for a in range(Omega.shape[0]):
         for w in range(Omega.shape[1]):
@@ -167,7 +169,7 @@ def _turn_joints(Omega: np.ndarray, turn: np.ndarray) -> None:
                         Omega[a, w, k, i, j] = x * turn[a, k, 0, j] + y * turn[a, k, 1, j] + z * turn[a, k, 2, j]
 
 
-def small_rotations(phi: np.ndarray) -> np.ndarray:
+def small_rotations(phi: NDArray[np.float32]) -> NDArray[np.float32]:
     """Return exp of rotation vectors (..., 3) in their own precision: I + sin θ/θ [φ] + (1 − cos θ)/θ² [φ]²."""
     x, y, z = np.moveaxis(phi, -1, 0)
     theta = np.sqrt(x * x + y * y + z * z) + 1e-8

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from ...scope_addon.capture.perception.lifter import HIPS, KEYPOINT_COUNT, network_input, person_size, virtual_camera
 from ...scope_addon.capture.perception.lifter_window import MIDDLE, OFFSETS_S, WINDOW
@@ -38,8 +39,8 @@ class Batch:
     axes.
     """
 
-    input: np.ndarray
-    points: np.ndarray
+    input: NDArray[np.float32]
+    points: NDArray[np.float32]
 
 
 @dataclass(frozen=True)
@@ -50,9 +51,9 @@ class Scene:
     camera axes; ``focal_ratio`` (n,) assumed over true focal length.
     """
 
-    points: np.ndarray
-    seen: np.ndarray
-    focal_ratio: np.ndarray
+    points: NDArray[np.float32]
+    seen: NDArray[np.float32]
+    focal_ratio: NDArray[np.float32]
 
 
 class Dataset:
@@ -64,8 +65,12 @@ class Dataset:
         self._parents = np.asarray(body.parents, np.int64)
 
     def keypoints(
-        self, Omega: np.ndarray, bones: np.ndarray, local: np.ndarray, displaced: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
+        self,
+        Omega: NDArray[np.float32],
+        bones: NDArray[np.float32],
+        local: NDArray[np.float32],
+        displaced: NDArray[np.float32],
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """Return BlazePose keypoints of windows of poses, and the same displaced in the axes of their parts.
 
         :param Omega: (n, W, 24, 3, 3);  bones: (n, 24, 3), local: (n, 33, 3) as of `PoseSampler.proportions`;
@@ -126,7 +131,7 @@ class Dataset:
         return Batch(x.astype(np.float32), points.astype(np.float32))
 
 
-def cut_short(rng: np.random.Generator, x: np.ndarray) -> np.ndarray:
+def cut_short(rng: np.random.Generator, x: NDArray[np.float32]) -> NDArray[np.float32]:
     """Truncate some windows (n, WINDOW, ...), so that moments repeat as at a clip's ends or in a still image."""
     n = len(x)
     first = np.where(rng.random(n) < CUT_SHORT_SHARE, rng.integers(0, MIDDLE + 1, n), 0)
@@ -138,16 +143,16 @@ def cut_short(rng: np.random.Generator, x: np.ndarray) -> np.ndarray:
 
 @njit(fastmath=True)
 def _forward(
-    Omega: np.ndarray,
-    bones: np.ndarray,
-    local: np.ndarray,
-    displaced: np.ndarray,
-    parents: np.ndarray,
-    part: np.ndarray,
-    R: np.ndarray,
-    t: np.ndarray,
-    points: np.ndarray,
-    seen: np.ndarray,
+    Omega: NDArray[np.float32],
+    bones: NDArray[np.float32],
+    local: NDArray[np.float32],
+    displaced: NDArray[np.float32],
+    parents: NDArray[np.int64],
+    part: NDArray[np.int64],
+    R: NDArray[np.float32],
+    t: NDArray[np.float32],
+    points: NDArray[np.float32],
+    seen: NDArray[np.float32],
 ) -> None:
     """Compute `Dataset.keypoints`; ``R`` (24, 3, 3) and ``t`` (24, 3) are work arrays."""
     for a in range(Omega.shape[0]):
@@ -173,7 +178,9 @@ def _forward(
                     seen[a, w, j, i] += points[a, w, j, i]
 
 
-def lines_of_sight(rng: np.random.Generator, above_floor: np.ndarray, distance: np.ndarray) -> np.ndarray:
+def lines_of_sight(
+    rng: np.random.Generator, above_floor: NDArray[np.float32], distance: NDArray[np.float32]
+) -> NDArray[np.float32]:
     """Draw the angles (n,) in radians by which the line from the camera to the hips points down.
 
     sin⁻¹((camera's height − hips' height) / distance) for hand-held cameras, any angle for the others.
@@ -184,14 +191,14 @@ def lines_of_sight(rng: np.random.Generator, above_floor: np.ndarray, distance: 
     return np.where(rng.random(n) < HELD_SHARE, held, rng.uniform(PITCH_LOWEST, PITCH_HIGHEST, n))
 
 
-def pitches(rng: np.random.Generator, n: int) -> np.ndarray:
+def pitches(rng: np.random.Generator, n: int) -> NDArray[np.float32]:
     """Draw the pitches (n,), radians, of cameras that point at the person: many nearly level, others of any pitch."""
     common = rng.random(n) < 0.6
     level = PITCH_LEVEL + PITCH_SPREAD * rng.standard_normal(n)
     return np.where(common, level, rng.uniform(PITCH_LOWEST, PITCH_HIGHEST, n))
 
 
-def cameras(rng: np.random.Generator, n: int, pitch: np.ndarray) -> np.ndarray:
+def cameras(rng: np.random.Generator, n: int, pitch: NDArray[np.float32]) -> NDArray[np.float32]:
     """Draw R_camera_world (n, 3, 3) f32: looking along −z of a world with y up, pitched (positive: down) and rolled."""
     zero = np.zeros(n)
     tilted = small_rotations(np.stack([pitch, zero, zero], axis=1).astype(np.float32))

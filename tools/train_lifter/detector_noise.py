@@ -14,8 +14,10 @@ constant within the window, most of the rest changes within a few tenths of a se
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...scope_addon.capture.fitting.keypoint_offsets import offset
 from ...scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES
@@ -66,19 +68,19 @@ class Persistence:
     with c and w_t independent; ``constant`` (n,) is ρ, ``kept`` (n,) is a.
     """
 
-    constant: np.ndarray
-    kept: np.ndarray
+    constant: NDArray[np.float32]
+    kept: NDArray[np.float32]
 
     @staticmethod
     def draw(rng: np.random.Generator, n: int) -> Persistence:
         """Draw, for n people, the constant share of errors and the correlation from one moment to the next."""
         return Persistence(*(rng.uniform(*limits, n).astype(np.float32) for limits in (CONSTANT_SHARE, KEPT)))
 
-    def of(self, rows: np.ndarray) -> Persistence:
+    def of(self, rows: NDArray[Any]) -> Persistence:
         """Return the persistence of some of the people."""
         return Persistence(self.constant[rows], self.kept[rows])
 
-    def mix(self, constant: np.ndarray, white: np.ndarray) -> np.ndarray:
+    def mix(self, constant: NDArray[np.float32], white: NDArray[np.float32]) -> NDArray[np.float32]:
         """Return e_t of c (n, 1, ...) and w_t (n, WINDOW, ...); overwrites the latter."""
         a = self.kept.reshape(-1, *[1] * (white.ndim - 2))
         b = np.sqrt(1 - a * a)
@@ -87,20 +89,20 @@ class Persistence:
         rho = self.constant.reshape(-1, *[1] * (white.ndim - 1))
         return np.sqrt(rho) * constant + np.sqrt(1 - rho) * white
 
-    def normal(self, rng: np.random.Generator, *shape: int) -> np.ndarray:
+    def normal(self, rng: np.random.Generator, *shape: int) -> NDArray[np.float32]:
         """Draw e_t, (n, WINDOW, *shape)."""
         n = len(self.constant)
         constant = rng.standard_normal((n, 1, *shape), np.float32)
         return self.mix(constant, rng.standard_normal((n, WINDOW, *shape), np.float32))
 
 
-def placements(rng: np.random.Generator, n: int) -> np.ndarray:
+def placements(rng: np.random.Generator, n: int) -> NDArray[np.float32]:
     """Draw keypoint offsets (n, 33, 3) f32, metres, of n people, in the axes of their parts."""
     own = PLACEMENT[:, None] * rng.standard_normal((n, len(PLACEMENT), 3))
     return (np.array([offset(name) for name in KEYPOINT_NAMES]) + own).astype(np.float32)
 
 
-def image_errors(rng: np.random.Generator, persistence: Persistence) -> tuple[np.ndarray, np.ndarray]:
+def image_errors(rng: np.random.Generator, persistence: Persistence) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Draw errors (n, WINDOW, 33, 2) of 2D keypoints, in units of the person's size s, and confidences."""
     n = len(persistence.constant)
     constant, lasting = moment_errors(rng, n)
@@ -110,7 +112,7 @@ def image_errors(rng: np.random.Generator, persistence: Persistence) -> tuple[np
     return errors, confidence
 
 
-def moment_errors(rng: np.random.Generator, n: int) -> tuple[np.ndarray, np.ndarray]:
+def moment_errors(rng: np.random.Generator, n: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Draw errors of 2D keypoints (n, 33, 2) in units of the person's size s, and confidences (n, 33)."""
     unsure = rng.random((n, 33)) > CONFIDENT_SHARE + 0.18 * rng.random((n, 1))
     confidence = np.where(unsure, rng.random((n, 33)) ** 0.7, 1 - 0.1 * rng.random((n, 33)) ** 2)
@@ -125,7 +127,9 @@ def moment_errors(rng: np.random.Generator, n: int) -> tuple[np.ndarray, np.ndar
     return own * level * (1 + (UNSURE_FACTOR - 1) * (1 - confidence[..., None])), confidence
 
 
-def cut_by_edge(rng: np.random.Generator, rays: np.ndarray, confidence: np.ndarray, persistence: Persistence) -> None:
+def cut_by_edge(
+    rng: np.random.Generator, rays: NDArray[np.float32], confidence: NDArray[np.float32], persistence: Persistence
+) -> None:
     """Cut some people at the image border, in place: beyond it, the network guesses with low confidence."""
     cut = np.flatnonzero(rng.random(len(rays)) < CUT_SHARE)
     angle = rng.choice(4, len(cut), p=[0.5, 0.1, 0.2, 0.2]) * np.pi / 2
@@ -140,7 +144,7 @@ def cut_by_edge(rng: np.random.Generator, rays: np.ndarray, confidence: np.ndarr
     confidence[cut] *= np.where(beyond > 0, rng.uniform(0, 0.3, (len(cut), WINDOW, 33)), 1.0)
 
 
-def swap_sides(rng: np.random.Generator, rays: np.ndarray) -> None:
+def swap_sides(rng: np.random.Generator, rays: NDArray[np.float32]) -> None:
     """Swap left and right of the arms or the legs of some people (n, WINDOW, 33, 2), in place."""
     n = len(rays)
     for group in (_ARMS, _LEGS):
@@ -148,14 +152,16 @@ def swap_sides(rng: np.random.Generator, rays: np.ndarray) -> None:
         rays[people[:, None], moments[:, None], group] = rays[people[:, None], moments[:, None], SWAPPED[group]]
 
 
-def world_landmarks(rng: np.random.Generator, points: np.ndarray, persistence: Persistence) -> np.ndarray:
+def world_landmarks(
+    rng: np.random.Generator, points: NDArray[np.float32], persistence: Persistence
+) -> NDArray[np.float32]:
     """Distort true keypoints (n, WINDOW, 33, 3), metres, in the axes of a camera that points at the person."""
     n, W = points.shape[:2]
 
-    def normal(*shape: int) -> np.ndarray:
+    def normal(*shape: int) -> NDArray[np.float32]:
         return rng.standard_normal((n, 1, *shape), np.float32)
 
-    def lasting(*shape: int) -> np.ndarray:
+    def lasting(*shape: int) -> NDArray[np.float32]:
         return persistence.normal(rng, *shape)
 
     strength = np.exp(0.4 * normal(1, 1))

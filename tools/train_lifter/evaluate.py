@@ -13,6 +13,7 @@ import json
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...scope_addon.capture.perception.lifter import HIPS, LIFTER_FILE, Lifter, virtual_camera
 from ...scope_addon.capture.perception.lifter_window import MIDDLE
@@ -48,11 +49,11 @@ def measure_takes(lifter: Lifter, motions: Path, n: int = 8192) -> dict:
     return {"takes": n, "with_world_mm": _limb_error(error[known]), "without_world_mm": _limb_error(error[~known])}
 
 
-def _limb_error(error: np.ndarray) -> float:
+def _limb_error(error: NDArray[np.float64]) -> float:
     return round(1000 * float(np.linalg.norm(error[:, MEASURED], axis=-1).mean()), 1)
 
 
-def _deviation(z: np.ndarray) -> float:
+def _deviation(z: NDArray[np.float64]) -> float:
     """Return the root mean square of the 99 % smallest."""
     z = np.sort(np.abs(z[:, MEASURED]).ravel())
     return round(float(np.sqrt(np.square(z[: int(0.99 * len(z))]).mean())), 2)

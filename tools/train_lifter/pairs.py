@@ -6,11 +6,12 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 LEAST_PRESENCE, LEAST_SPREAD, MOST_DISAGREEMENT = 0.9, 0.38, 0.2  # otherwise the tracker would reject the detection
 
 
-def load_pairs(path: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+def load_pairs(path: Path) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]:
     """Return points, rays, confidences and world landmarks of the pairs that a tracker would accept."""
     with np.load(path) as data:
         good = (data["presence"] >= LEAST_PRESENCE) & (data["spread"] >= LEAST_SPREAD)

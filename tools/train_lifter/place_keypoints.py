@@ -11,6 +11,7 @@ import argparse
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...scope_addon.capture.fitting.ablation import Parts
 from ...scope_addon.capture.options import CaptureOptions
@@ -28,7 +29,7 @@ FARTHEST_M = 0.12  # larger errors are outliers
 REFLECTION = np.diag([-1.0, 1.0, 1.0])
 
 
-def normal_equations(body: Body, motion: Motion) -> tuple[np.ndarray, np.ndarray]:
+def normal_equations(body: Body, motion: Motion) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the normal equations (33, 3, 3), (33, 3) of one motion, left and right combined."""
     at = body.keypoint_set("blazepose")
     indices = [at[name] for name in KEYPOINT_NAMES]
@@ -49,7 +50,7 @@ def normal_equations(body: Body, motion: Motion) -> tuple[np.ndarray, np.ndarray
     return A + REFLECTION @ A[SWAPPED] @ REFLECTION, b + b[SWAPPED] @ REFLECTION
 
 
-def offsets(A: np.ndarray, b: np.ndarray) -> np.ndarray:
+def offsets(A: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
     """Solve the normal equations for offsets (33, 3), metres."""
     return np.linalg.solve(A + REGULARIZATION * np.eye(3), b[..., None])[..., 0]
 

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from ...scope_addon.atomic_write import written_beside
 from ...scope_addon.capture.overlay.rasterizer import Canvas, rasterize
@@ -43,7 +44,7 @@ class Renderer:
         self.low = body.v_template[self.triangles].mean(axis=1)[:, 1] < WAIST_M
         self.colors = np.sqrt(body.material_colors[:, :3])
 
-    def clothes(self, rng: np.random.Generator) -> np.ndarray:
+    def clothes(self, rng: np.random.Generator) -> NDArray[np.float64]:
         """Draw colours (F, 3) of the triangles, sRGB."""
         colors = self.colors.copy()
         colors[SKIN] = np.array([0.9, 0.7, 0.6]) * rng.uniform(0.35, 1)
@@ -55,7 +56,9 @@ class Renderer:
             faces[self.low & ((self.material == SUIT) | (self.material == ACCENT))] = rng.uniform(0, 1, 3)
         return faces
 
-    def picture(self, rng: np.random.Generator, vertices: np.ndarray, intrinsics: np.ndarray) -> np.ndarray:
+    def picture(
+        self, rng: np.random.Generator, vertices: NDArray[np.float64], intrinsics: NDArray[np.float64]
+    ) -> NDArray[np.uint8]:
         """Draw the vertices (V, 3), camera frame, in front of a random background; (420, 420, 3) uint8."""
         size = PICTURE_PX
         faces = self.clothes(rng)

@@ -4,13 +4,14 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .augment import Motions
 
 HELD_OUT_EVERY = 10
 
 
-def is_held_out(take: np.ndarray) -> np.ndarray:
+def is_held_out(take: NDArray[np.intp]) -> NDArray[np.bool_]:
     """Return whether the takes with these numbers are held out."""
     return take % HELD_OUT_EVERY == HELD_OUT_EVERY - 1
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...scope_addon.errors import MotionFileError
 from ...solver.loaders.npz import read_npz
@@ -38,11 +39,11 @@ FOLDS = (("cmu_01",), ("cmu_03", "expmap_basketball"), ("expmap_jumping",), ("ex
 class Samples:
     """Samples of one model: rotations (n, 3, 3) and performers (n,) as named by ``group_of``."""
 
-    rotations: np.ndarray
-    group: np.ndarray
+    rotations: NDArray[np.float64]
+    group: NDArray[np.str_]
 
     @property
-    def is_training(self) -> np.ndarray:
+    def is_training(self) -> NDArray[np.bool_]:
         """Return (n,) bool: not by the test performers."""
         return ~np.isin(self.group, TEST)
 
@@ -60,7 +61,7 @@ def group_of(source: str, subject: str) -> str:
     return "expmap_" + together.get(activity, "jumping" if activity == "directing_traffic" else activity)
 
 
-def mirrored(rotations: np.ndarray) -> np.ndarray:
+def mirrored(rotations: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the joint states (n, 3, 3) of the mirror image."""
     return MIRROR @ rotations @ MIRROR
 

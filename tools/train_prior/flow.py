@@ -23,6 +23,7 @@ import math
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor
 
 STEEPEST = 0.95  # bound of |beta|: slopes between 1/20 and 39/20
@@ -76,7 +77,7 @@ class Flow(torch.nn.Module):
                 self.A[k, 0] = torch.linalg.inv(torch.linalg.cholesky(cov))
                 self.b[k, 0] = -self.A[k, 0] @ mean
 
-    def row(self, k: int) -> dict[str, np.ndarray]:
+    def row(self, k: int) -> dict[str, NDArray[np.float64]]:
         """Return the parameters of flow k as float64 arrays, beta itself in place of what it is computed from."""
         tensors = {"mean": self.means, **dict(self.named_parameters()), "beta": self.slopes()}
         return {name: t[k].detach().double().numpy().copy() for name, t in tensors.items()}

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...solver.learned_prior import BUILT_IN, JointPrior, load_joint_prior
 from ...solver.loaders.body_file import load_body
@@ -56,11 +57,13 @@ def held_out(prior: JointPrior, samples: dict[str, Samples]) -> list[Row]:
     return rows
 
 
-def _fit_gaussian(rotations: np.ndarray, weights: np.ndarray) -> Density:
+def _fit_gaussian(rotations: NDArray[np.float64], weights: NDArray[np.float64]) -> Density:
     return gaussian(rotations, weights, mean_rotation(rotations, weights))
 
 
-def _better(fit: Callable[[np.ndarray, np.ndarray], Density], s: Samples, states: np.ndarray) -> np.ndarray:
+def _better(
+    fit: Callable[[NDArray[np.float64], NDArray[np.float64]], Density], s: Samples, states: NDArray[np.float64]
+) -> NDArray[np.float64]:
     """Return the NLL (n,) of the test states under the better of the fits with frames equal and performers balanced."""
     training, group = s.rotations[s.is_training], s.group[s.is_training]
     found = [-fit(training, balanced(group, balance))(states) for balance in (0.0, 0.7)]

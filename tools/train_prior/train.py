@@ -18,6 +18,7 @@ from pathlib import Path
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 
 from ...solver.learned_prior import BUILT_IN
 from ...solver.loaders.body_file import load_body
@@ -132,7 +133,7 @@ def _held_out(
     return torch.tensor(rotations, dtype=torch.float32), torch.tensor(share, dtype=torch.float32)
 
 
-def train_all(samples: dict[str, Samples], choices: dict[str, Choice]) -> dict[str, dict[str, np.ndarray]]:
+def train_all(samples: dict[str, Samples], choices: dict[str, Choice]) -> dict[str, dict[str, NDArray[np.float64]]]:
     """Return the parameters of every model, trained on all training performers."""
     models = list(choices)
     parameters = {}

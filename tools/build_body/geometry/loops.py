@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections import defaultdict
 
 import numpy as np
+from numpy.typing import NDArray
 
 MAX_LENGTH = 400
 
@@ -13,7 +14,7 @@ MAX_LENGTH = 400
 class QuadLoops:
     """Finds edge loops: at a vertex with four quads, a loop continues along the opposite edge."""
 
-    def __init__(self, faces: np.ndarray) -> None:
+    def __init__(self, faces: NDArray[np.intp]) -> None:
         """Index the mesh: ``faces`` (F, 4)."""
         self.faces = faces
         self.faces_at: dict[int, list[int]] = defaultdict(list)
@@ -48,7 +49,9 @@ class QuadLoops:
             loop.append(ahead[0])
         return None
 
-    def nearest(self, vertices: np.ndarray, point: np.ndarray, normal: np.ndarray, radius: float) -> list[int]:
+    def nearest(
+        self, vertices: NDArray[np.float64], point: NDArray[np.float64], normal: NDArray[np.float64], radius: float
+    ) -> list[int]:
         """Return the closed loop around a limb that stays nearest to a plane.
 
         :param vertices: (V, 3) metres; ``point``, ``normal``: the plane, across the limb at its axis.
@@ -78,7 +81,7 @@ class QuadLoops:
             raise ValueError(f"no closed edge loop within {radius} m of {np.round(point, 3)}")
         return best
 
-    def beyond(self, loop: list[int], seed: int) -> np.ndarray:
+    def beyond(self, loop: list[int], seed: int) -> NDArray[np.bool_]:
         """Return (F,) bool: the faces reached from face ``seed`` without crossing ``loop``."""
         border = {frozenset(edge) for edge in zip(loop, loop[1:] + loop[:1], strict=True)}
         reached, queue = np.zeros(len(self.faces), bool), [seed]
@@ -96,7 +99,7 @@ class QuadLoops:
         return reached
 
 
-def _plane_axes(normal: np.ndarray) -> np.ndarray:
+def _plane_axes(normal: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return two axes (3, 2) that span the plane."""
     first = np.cross(normal, np.eye(3)[np.abs(normal).argmin()])
     first /= np.linalg.norm(first)

@@ -5,12 +5,15 @@ from __future__ import annotations
 
 import numba
 import numpy as np
+from numpy.typing import NDArray
 
 DIRECTIONS = 96
 PIXEL = 0.0007  # metres
 
 
-def seen_from_outside(vertices: np.ndarray, triangles: np.ndarray, occluders: np.ndarray) -> np.ndarray:
+def seen_from_outside(
+    vertices: NDArray[np.float64], triangles: NDArray[np.intp], occluders: NDArray[np.intp]
+) -> NDArray[np.bool_]:
     """Return (T,) bool: whether the triangle's front is visible in at least one pixel from one direction.
 
     :param vertices: (N, 3) metres.
@@ -29,7 +32,7 @@ def seen_from_outside(vertices: np.ndarray, triangles: np.ndarray, occluders: np
     return seen[: len(triangles)]
 
 
-def _sphere(count: int) -> np.ndarray:
+def _sphere(count: int) -> NDArray[np.float64]:
     """Return directions spread evenly over the sphere (the golden spiral)."""
     i = np.arange(count) + 0.5
     height, turn = 1.0 - 2.0 * i / count, i * np.pi * (3.0 - np.sqrt(5.0))

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..joints import FINGERS, Skeleton
 from ..source import SourceMesh
@@ -25,7 +26,9 @@ SIDE_BONES = {  # bone without .L / .R -> joint without left_ / right_
 }  # fmt: skip
 
 
-def skin_weights(source: SourceMesh, mesh: Mesh, skeleton: Skeleton, mean_shape: np.ndarray) -> np.ndarray:
+def skin_weights(
+    source: SourceMesh, mesh: Mesh, skeleton: Skeleton, mean_shape: NDArray[np.float64]
+) -> NDArray[np.float64]:
     """Return (V, K+1) weights, rows summing to one, at most four of them above zero, symmetric.
 
     :param mean_shape: (N, 3) all source vertices of the mean shape, in the source pose.
@@ -45,7 +48,7 @@ def skin_weights(source: SourceMesh, mesh: Mesh, skeleton: Skeleton, mean_shape:
     return keep_strongest(W)
 
 
-def keep_strongest(W: np.ndarray) -> np.ndarray:
+def keep_strongest(W: NDArray[np.float64]) -> NDArray[np.float64]:
     """Keep the four largest weights of each row, normalized, without those equal to the fifth, for symmetry."""
     fifth = np.sort(W, axis=1)[:, -INFLUENCES - 1][:, None]
     W = np.where(W > fifth + 1e-9, W, 0.0)
@@ -53,7 +56,7 @@ def keep_strongest(W: np.ndarray) -> np.ndarray:
     return W / W.sum(axis=1, keepdims=True)
 
 
-def pack(W: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def pack(W: NDArray[np.float64]) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
     """Return (V, 4) joint indices and (V, 4) weights, the strongest first; unused slots are joint 0 with weight 0."""
     joints = np.argsort(-W, axis=1, kind="stable")[:, :INFLUENCES]
     weights = np.take_along_axis(W, joints, axis=1)
