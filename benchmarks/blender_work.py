@@ -15,6 +15,7 @@ import time
 from collections.abc import Callable
 from dataclasses import fields, replace
 from pathlib import Path
+from typing import Any
 
 import bpy
 import numpy as np
@@ -62,7 +63,7 @@ def writing(motion: Motion, rounds: int) -> dict[str, float]:
     long = longer(motion, WRITTEN)
     rest = rest_pose(body, long.betas)
     frames = np.arange(WRITTEN, dtype=float)
-    made: dict = {}
+    made: dict[str, Any] = {}
 
     def prepare() -> None:
         fresh()

@@ -16,9 +16,10 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from ..scope_addon.atomic_write import written_beside
 from ..scope_addon.capture.camera.intrinsics import choose_camera
@@ -88,15 +89,23 @@ def write(path: Path, calls: Sequence[tuple[Measurements, Priors]]) -> None:
     rows = [_values(m) for m, _ in calls]
     arrays = {key: np.array([row[k] for row in rows]) for k, key in enumerate(KEYS)}
     m, priors = calls[0]
-    fixed = (m.intrinsics, m.keypoints2d.indices, m.orientation_field.starts, m.orientation_field.ends)
-    arrays |= dict(zip(FIXED, (*fixed, priors.joint_weights), strict=True))
+    a, _, c = _kinds(m)
+    fixed = (m.intrinsics, a.indices, c.starts, c.ends, priors.joint_weights)
+    arrays |= {key: np.asarray(value) for key, value in zip(FIXED, fixed, strict=True)}
     path.parent.mkdir(parents=True, exist_ok=True)
     with written_beside(path) as temporary:
         np.savez(temporary, **arrays)
 
 
-def _values(m: Measurements) -> tuple:
-    a, b, c = m.keypoints2d, m.keypoints3d, m.orientation_field
+def _kinds(m: Measurements) -> tuple[Keypoints2D, Keypoints3D, OrientationField]:
+    assert m.keypoints2d is not None
+    assert m.keypoints3d is not None
+    assert m.orientation_field is not None
+    return m.keypoints2d, m.keypoints3d, m.orientation_field
+
+
+def _values(m: Measurements) -> tuple[ArrayLike, ...]:
+    a, b, c = _kinds(m)
     return a.pixels, a.confidence, b.points, b.confidence, c.directions, c.confidence
 
 
@@ -154,7 +163,7 @@ class Outcome:
 def measure(clips: Sequence[Clip], tolerance: float, triggs: float = 0.0, every: int = 1) -> dict[str, Outcome]:
     """Fit every frame cold and warm; return the outcomes by kind. `every` k-th frame is judged, all are followed."""
     body = load_body("scope")
-    rows: dict[str, list[tuple]] = {"cold": [], "warm": []}
+    rows: dict[str, list[tuple[Any, ...]]] = {"cold": [], "warm": []}
     options = {kind: capture_options(kind == "cold", tolerance, triggs) for kind in rows}
     tight = {kind: capture_options(kind == "cold", 1e-12, triggs, 1000) for kind in rows}
     for clip in clips:

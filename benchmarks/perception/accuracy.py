@@ -9,6 +9,7 @@ import warnings
 from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import numpy as np
 
@@ -30,7 +31,7 @@ SHOWN = {  # key of the evaluation: heading, target
     "flipped": ("flipped share", 0.01),
     "coverage": ("coverage", 1.0),
 }
-ABLATION: dict[str, dict[str, Parts | bool]] = {
+ABLATION: dict[str, dict[str, Any]] = {
     "all parts": {},
     "without the lifter": {"parts": Parts(lifter=False)},
     "lifter without world landmarks": {"parts": Parts(world_landmarks=False)},
@@ -49,13 +50,13 @@ ABLATION: dict[str, dict[str, Parts | bool]] = {
 FLIPS = ("lr_swap", "mirror", "mirror_swap")
 
 
-def evaluate_camera(body: Body, camera: str, options: CaptureOptions) -> dict:
+def evaluate_camera(body: Body, camera: str, options: CaptureOptions) -> dict[str, Any]:
     """Return all figures of the evaluation tool for one camera."""
     folder = DATA / "pose2sim"
     return evaluate_clip(body, folder / f"{camera}.mp4", folder / f"truth_{camera}.npz", options)[1]
 
 
-def evaluate_clip(body: Body, video: Path, truth: Path, options: CaptureOptions) -> tuple[Motion, dict]:
+def evaluate_clip(body: Body, video: Path, truth: Path, options: CaptureOptions) -> tuple[Motion, dict[str, Any]]:
     """Capture a clip; return its motion and all figures of the evaluation tool for it.
 
     :raises NoPersonError: when nobody was found.
@@ -69,7 +70,7 @@ def evaluate_clip(body: Body, video: Path, truth: Path, options: CaptureOptions)
     return motion, figures | {"flipped": max(figures[key] for key in FLIPS)}
 
 
-def evaluate_all(body: Body, options: Callable[[str], CaptureOptions]) -> dict[str, dict]:
+def evaluate_all(body: Body, options: Callable[[str], CaptureOptions]) -> dict[str, dict[str, Any]]:
     """Return the figures of each camera under its name and, under "mean", the means of those in ``SHOWN``.
 
     ``flipped`` is the largest of the three shares of ``FLIPS``, and its mean is that of the worst camera.
@@ -86,7 +87,10 @@ def calibration(camera: str) -> Path:
 
 def _tool() -> ModuleType:
     """Import the evaluation tool next to the checkout."""
-    spec = importlib.util.spec_from_file_location("evaluate", DATA.parent / "tools" / "evaluate.py")
+    path = DATA.parent / "tools" / "evaluate.py"
+    spec = importlib.util.spec_from_file_location("evaluate", path)
+    if spec is None or spec.loader is None:
+        raise ImportError(f"{path} is not a Python file")
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module

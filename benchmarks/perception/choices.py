@@ -82,7 +82,7 @@ def left_out(errors: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.
     return chosen, errors[chosen, np.arange(errors.shape[1])]
 
 
-def choices(quick: bool) -> dict:
+def choices(quick: bool) -> dict[str, Any]:
     """Measure all choices (``quick``: the first three), print the tables and return the figures."""
     if not DATA.is_dir():
         print(f"{DATA} is not beside this checkout: nothing was measured", file=sys.stderr)
@@ -95,7 +95,7 @@ def choices(quick: bool) -> dict:
 
     shipped = errors()
     print(f"As shipped, MPJPE-root / PA-MPJPE mm: {_each(shipped)}\n", flush=True)
-    figures: dict[str, dict] = {"shipped": {"errors": shipped.tolist()}}
+    figures: dict[str, dict[str, Any]] = {"shipped": {"errors": shipped.tolist()}}
     rows, summary = [], []
     for choice in CHOICES[:3] if quick else CHOICES:
         values, found = [choice.shipped, *choice.others], [shipped]

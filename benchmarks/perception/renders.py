@@ -43,7 +43,7 @@ SHOWN = {
 KNOWN = ("nothing given", "focal length given", "height given")
 
 
-def renders(quick: bool) -> dict:
+def renders(quick: bool) -> dict[str, Any]:
     """Render what is missing, measure, print the tables as they come, return the figures by preset and by ``KNOWN``."""
     if not DATA.is_dir():
         print(f"{DATA} is not beside this checkout: nothing was measured", file=sys.stderr)
@@ -54,7 +54,7 @@ def renders(quick: bool) -> dict:
     clips = {take.name: video_and_truth(take.name) for take in held_out_takes(MOTIONS)}
     sample = ASSETS / "sample" / "sample.mp4"
     clips["sample"] = sample, sample.with_name("sample_truth.npz")
-    figures: dict = {}
+    figures: dict[str, Any] = {}
     for quality in (CaptureOptions().quality,) if quick else PRESETS:
         figures[quality] = {}
         for known in KNOWN:
@@ -66,7 +66,7 @@ def renders(quick: bool) -> dict:
     return figures
 
 
-def evaluate_render(body: Body, video: Path, truth: Path, quality: str, known: str) -> dict:
+def evaluate_render(body: Body, video: Path, truth: Path, quality: str, known: str) -> dict[str, Any]:
     """Return the figures of the evaluation tool for one clip, ``size``, and the figures of ``against_world``.
 
     ``known``: one of ``KNOWN``. If nobody was found, only ``coverage``. ``size``: captured over true size, median of
@@ -111,7 +111,7 @@ def against_world(body: Body, motion: Motion, truth: dict[str, NDArray[Any]]) ->
     }
 
 
-def mean_of(rows: list[dict]) -> dict[str, float | None]:
+def mean_of(rows: list[dict[str, Any]]) -> dict[str, float | None]:
     """Return the mean of every figure that is shown, over the rows that have it."""
     means: dict[str, float | None] = {}
     for key in SHOWN:

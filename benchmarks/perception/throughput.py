@@ -102,8 +102,11 @@ def side_by_side(body: Body, video: Path, quality: str, frames: int, rounds: int
         theirs.append(mediapipe(video, quality, frames))
     found: dict[str, float | str | None] = {key: float(np.median([o[key] for o in ours])) for key in ours[0]}
     measured = [t for t in theirs if isinstance(t, float)]
-    found["mediapipe"] = float(np.median(measured)) if measured else theirs[0]
-    found["over_mediapipe"] = found["end_to_end"] / found["mediapipe"] if measured else None
+    mediapipe_fps = float(np.median(measured)) if measured else None
+    found["over_mediapipe"] = (
+        float(np.median([o["end_to_end"] for o in ours])) / mediapipe_fps if mediapipe_fps else None
+    )
+    found["mediapipe"] = theirs[0] if mediapipe_fps is None else mediapipe_fps
     return found
 
 
@@ -124,4 +127,7 @@ def _bring_network(python: Path, name: str) -> None:
         if not packages:
             raise OSError(f"{target.name} is not in build/downloads: run convert_networks --force")
         with tarfile.open(packages[0]) as package, target.open("wb") as out:
-            out.write(package.extractfile(f"package/{target.name}").read())
+            member = package.extractfile(f"package/{target.name}")
+            if member is None:
+                raise OSError(f"{packages[0]} has no file package/{target.name}: run convert_networks --force")
+            out.write(member.read())

@@ -14,7 +14,7 @@ bends. All of R, Q, w and a are constants: what is linear in β before is linear
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from .joints import Skeleton
 
@@ -93,12 +93,12 @@ def _about_z(angle: float) -> NDArray[np.float64]:
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
-def _align(source: tuple, target: tuple) -> NDArray[np.float64]:
+def _align(source: tuple[ArrayLike, ArrayLike], target: tuple[ArrayLike, ArrayLike]) -> NDArray[np.float64]:
     """Return the rotation that takes source[0] to target[0] and source[1] as near to target[1] as possible."""
 
-    def frame(first, second):
+    def frame(first: ArrayLike, second: ArrayLike) -> NDArray[np.float64]:
         x = np.asarray(first, float) / np.linalg.norm(first)
-        z = np.cross(x, second)
+        z = np.cross(x, np.asarray(second, float))
         z /= np.linalg.norm(z)
         return np.stack([x, np.cross(z, x), z], axis=1)
 

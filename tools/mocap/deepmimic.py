@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -67,7 +68,7 @@ def parse_character(text: str, name: str = "character") -> Character:
         raise MotionFileError(f"{name}: not a DeepMimic humanoid character ({error!r})") from error
 
 
-def _attach(item: dict) -> NDArray[np.float64]:
+def _attach(item: dict[str, Any]) -> NDArray[np.float64]:
     return np.array([item["AttachX"], item["AttachY"], item["AttachZ"]], float)
 
 

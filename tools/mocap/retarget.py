@@ -10,6 +10,7 @@ is the distance between the two skeletons' joints (CMU's hip joints are 15-18 cm
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,15 +59,14 @@ class Correspondence:
     parts: dict[str, Follow]
     points: dict[str, Point]
     C: dict[str, NDArray[np.float64]] = field(default_factory=dict)  # (3, 3) for each of parts
-    offset: dict[str, NDArray[np.float64]] = field(
-        default_factory=dict
-    )  # (3,) metres for each of points, in its segment
+    # (3,) metres for each of points, in its segment
+    offset: dict[str, NDArray[np.float64]] = field(default_factory=dict)
 
 
-def _sided(table: dict) -> dict:
+def _sided(table: dict[str, Any]) -> dict[str, Any]:
     """Return both sides' entries of a table whose names begin with ``*_``."""
 
-    def put(value, side):  # type: ignore[no-untyped-def]
+    def put(value: Any, side: str) -> Any:
         changes = {k: v.replace("*", side) for k, v in vars(value).items() if isinstance(v, str)}
         return type(value)(**{**vars(value), **changes})
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from ...scope_addon.atomic_write import written_beside
 from ...solver.loaders.body_file import ASSETS
 from . import animation, pictures
+from .clips import DATA
 
 ANIMATION = "sample"
 PICTURES = {
@@ -39,8 +40,8 @@ def main() -> int:
     if unknown:
         parser.error(f"there is no picture {', '.join(sorted(unknown))}; choose from {', '.join(known)}")
     names = arguments.names or known
-    if names != [ANIMATION] and not pictures.DATA.is_dir():
-        print(f"{pictures.DATA} does not exist: the pictures show captures of its clips", file=sys.stderr)
+    if names != [ANIMATION] and not DATA.is_dir():
+        print(f"{DATA} does not exist: the pictures show captures of its clips", file=sys.stderr)
         return 1
     arguments.out.mkdir(parents=True, exist_ok=True)
     for name in names:

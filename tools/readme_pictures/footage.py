@@ -49,4 +49,4 @@ def cropped(
         body, vertices = default_body(), camera_vertices(motion, default_body(), row)
         K = crop @ motion.intrinsics
         larger = draw_overlay(larger, vertices, body.faces, K, colors=np.array(OURS), opacity=_OPACITY)
-    return cv2.resize(larger, size, interpolation=cv2.INTER_AREA)
+    return cv2.resize(larger, size, interpolation=cv2.INTER_AREA).astype(np.uint8, copy=False)

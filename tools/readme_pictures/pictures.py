@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 from ...scope_addon.motion import Motion
 from .clips import DATA, SAMPLE, SAMPLE_TRUTH, camera, captured, default_body, distance_cm, error_mm
 from .footage import sample_with_body
-from .panel import OURS, TRUTH, Panel, next_to_each_other
+from .panel import OURS, TRUTH, Color, Panel, next_to_each_other
 from .shapes import joints, posed, true_joints
 from .view import View, from_around, from_the_camera
 
@@ -124,7 +125,7 @@ def _with_truth(motion: Motion, row: int, view: View, truth: Path) -> Panel:
 
 
 def _together(
-    people: list[tuple[Motion, int, tuple]], size: tuple[int, int], turn: float, height: float, pitch: float
+    people: Sequence[tuple[Motion, int, Color]], size: tuple[int, int], turn: float, height: float, pitch: float
 ) -> Panel:
     """Draw several poses in one world, farther ones drawn first."""
     bodies = [(posed(motion, default_body(), row), color) for motion, row, color in people]

@@ -65,7 +65,7 @@ def stick_figure(points: dict[str, NDArray[np.float64]], radius: float) -> tuple
 
 def _rod(a: NDArray[np.float64], b: NDArray[np.float64], radius: float) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
     """Return a rod with round ends: rings of vertices whose radius follows a half circle at either end."""
-    length = np.linalg.norm(b - a)
+    length = float(np.linalg.norm(b - a))
     axis = (b - a) / max(length, 1e-9)
     across = np.cross(axis, np.eye(3)[np.argmin(abs(axis))])
     across /= np.linalg.norm(across)

@@ -7,6 +7,9 @@ the floor of the world (z up). At zero yaw the person faces world −y, where th
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -130,7 +133,9 @@ _LEAN = [(0.0, 0.0), (SQUAT[0], 0.0), (SQUAT[1], 32.0), (SQUAT[2], 32.0), (SQUAT
 # Above the hips
 
 
-def _arm(raised: float, ahead: float = 0.0, pitch: float = 0.0, twist: float = 0.0, elbow: float = 10.0) -> dict:
+def _arm(
+    raised: float, ahead: float = 0.0, pitch: float = 0.0, twist: float = 0.0, elbow: float = 10.0
+) -> dict[str, NDArray[np.float64]]:
     """Return rotations of left collar, shoulder and elbow; ``raised``: −90 hangs, 0 T-pose; ``pitch`` > 0: ahead."""
     collar = max(raised, 0) * 0.3
     axes = np.radians([[-pitch, 0, 0], [0, -ahead, 0], [0, 0, raised - collar], [twist, 0, 0]])
@@ -174,7 +179,7 @@ def _upper_body() -> dict[str, list[Key]]:
 
 def _turns(keys: list[tuple[float, float, float]]) -> list[Key]:
     """Convert (time, degrees forward, degrees to the left) to rotations."""
-    return [(t, exp(np.radians([0, turn, 0])) @ exp(np.radians([nod, 0, 0]))) for t, nod, turn in keys]
+    return [(t, np.matmul(exp(np.radians([0, turn, 0])), exp(np.radians([nod, 0, 0])))) for t, nod, turn in keys]
 
 
 # Between keys
@@ -185,7 +190,7 @@ def _ease(s: float) -> float:
     return s * s * s * (10 + s * (6 * s - 15))
 
 
-def _span(keys: list, t: float) -> tuple[int, float]:
+def _span(keys: Sequence[tuple[float, Any]], t: float) -> tuple[int, float]:
     """Return the indices of the two keys around ``t``, and the fraction 0..1 between them."""
     times = [key[0] for key in keys]
     i = int(np.clip(np.searchsorted(times, t, side="right") - 1, 0, len(keys) - 2))

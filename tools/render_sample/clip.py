@@ -6,6 +6,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -56,7 +57,7 @@ def _affected(shot: Shot, vertices_world: NDArray[np.float64], lamps: NDArray[np
     return int(low[0]), int(low[1]), int(high[0]), int(high[1])
 
 
-def _into_room(room: NDArray[np.float32], path: Path, box: tuple[int, int, int, int]) -> None:
+def _into_room(room: NDArray[Any], path: Path, box: tuple[int, int, int, int]) -> None:
     """Complete a partly rendered picture with the empty room, without a visible seam."""
     left, top, right, bottom = box
     weight = np.zeros(room.shape[:2], np.float32)

@@ -16,6 +16,7 @@ LAMPS = {  # name: position (metres, world), power in watts, side in metres
     "skylight": ((-0.7, -1.9, 5.0), 230.0, 1.6),
 }
 _SAMPLES_ROOM, _SAMPLES_PERSON = 32, 8
+Triple = tuple[float, float, float]  # metres, or linear RGB
 
 
 def build_stage(
@@ -158,7 +159,7 @@ def _room() -> None:
     _box("mat", (0.05, -0.1, 0.004), (2.4, 1.5, 0.008), _material("mat", (0.22, 0.26, 0.30), (0.19, 0.22, 0.26)))
 
 
-def _box(name: str, center: tuple, size: tuple, material: bpy.types.Material) -> None:
+def _box(name: str, center: Triple, size: Triple, material: bpy.types.Material) -> None:
     corners = [(x, y, z) for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)]
     faces = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
     mesh = bpy.data.meshes.new(name)
@@ -168,7 +169,10 @@ def _box(name: str, center: tuple, size: tuple, material: bpy.types.Material) ->
 
 
 def _material(
-    name: str, color: tuple, second: tuple | None = None, stretch: tuple = (2.0, 2.0, 2.0)
+    name: str,
+    color: Triple,
+    second: Triple | None = None,
+    stretch: Triple = (2.0, 2.0, 2.0),
 ) -> bpy.types.Material:
     """Return a matt material of one linear colour, or mottled between two."""
     material = bpy.data.materials.new(name)

@@ -11,6 +11,7 @@ from __future__ import annotations
 import argparse
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +27,7 @@ from .split import held_out_frames
 MEASURED = np.array([*range(11, 17), *range(25, 29)])  # shoulders, elbows, wrists, knees, ankles; hips are the origin
 
 
-def measure_renders(lifter: Lifter, pairs: Path) -> dict:
+def measure_renders(lifter: Lifter, pairs: Path) -> dict[str, Any]:
     """Return millimetres on renders (world landmarks, network with and without them), and error over predicted σ."""
     points, rays, confidence, world = (a.astype(float) for a in load_pairs(pairs))
     truth = points - points[:, HIPS].mean(axis=1, keepdims=True)
@@ -41,7 +42,7 @@ def measure_renders(lifter: Lifter, pairs: Path) -> dict:
     return result
 
 
-def measure_takes(lifter: Lifter, motions: Path, n: int = 8192) -> dict:
+def measure_takes(lifter: Lifter, motions: Path, n: int = 8192) -> dict[str, Any]:
     """Return millimetres on held-out takes with simulated errors: all samples, and those with world landmarks."""
     batch = Dataset(load_body("scope"), held_out_frames(load_motions(motions))).batch((2, 0), n)
     points, _ = lifter.run(batch.input)

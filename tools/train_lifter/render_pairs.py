@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -70,12 +71,13 @@ class Renderer:
         rasterize(canvas, vertices, self.triangles, faces, intrinsics)
         covered = canvas.coverage
         image[covered] = canvas.rgba[covered][:, :3] * rng.uniform(0.6, 1.15)
-        return cv2.GaussianBlur(np.clip(image, 0, 255).astype(np.uint8), (0, 0), rng.uniform(0.5, 1.6))
+        blurred = cv2.GaussianBlur(np.clip(image, 0, 255).astype(np.uint8), (0, 0), rng.uniform(0.5, 1.6))
+        return blurred.astype(np.uint8, copy=False)
 
 
 def observe(
     rng: np.random.Generator, sampler: PoseSampler, renderer: Renderer, network: LandmarkNetwork
-) -> dict | None:
+) -> dict[str, Any] | None:
     """Return true points and the network's output (``KEYS``) of one image, or None if the person is too close."""
     body, at = sampler.body, np.array(list(sampler.body.keypoint_set("blazepose").values()))
     Omega = sampler.pose(rng).astype(float)
@@ -105,7 +107,7 @@ def observe(
     return dict(zip(KEYS, found, strict=True))
 
 
-def save(path: Path, pairs: list[dict]) -> None:
+def save(path: Path, pairs: list[dict[str, Any]]) -> None:
     """Write the pairs, replacing what is there."""
     path.parent.mkdir(parents=True, exist_ok=True)
     with written_beside(path) as temporary:

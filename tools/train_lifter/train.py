@@ -17,6 +17,7 @@ from collections import deque
 from collections.abc import Iterator
 from multiprocessing import get_context
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import torch
@@ -76,7 +77,7 @@ def renders(pairs: Path) -> Batch:
 
 
 @torch.no_grad()
-def measure(network: LiftingNetwork, batch: Batch) -> dict:
+def measure(network: LiftingNetwork, batch: Batch) -> dict[str, Any]:
     """Return errors in mm, and the standard deviation of error over σ across and along the line of sight."""
     points, log_sigma = network(torch.from_numpy(batch.input))
     error = (points - torch.from_numpy(batch.points)).numpy()
@@ -137,7 +138,7 @@ def train(
     matrices = {"params": [p for p in network.parameters() if p.ndim > 1], "weight_decay": DECAY}
     others = {"params": [p for p in network.parameters() if p.ndim == 1], "weight_decay": 0.0}
     optimizer = torch.optim.AdamW([matrices, others], rate, (0.9, 0.98))
-    log: list[dict] = []
+    log: list[dict[str, Any]] = []
     start, total = time.perf_counter(), 0.0
     for step, batch in enumerate(batches(motions, seed, steps, workers)):
         done = max(step / steps, (time.perf_counter() - start) / (60 * minutes))

@@ -66,7 +66,7 @@ def vertex_areas(vertices: NDArray[np.float64], quads: NDArray[np.intp]) -> NDAr
     """Return (N,) a third of the area of the triangles around each vertex."""
     a, b, c = vertices[split_quads(quads)].transpose(1, 0, 2)
     area = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 6.0
-    return np.bincount(split_quads(quads).ravel(), np.repeat(area, 3), len(vertices))
+    return np.bincount(split_quads(quads).ravel(), np.repeat(area, 3), len(vertices)).astype(float, copy=False)
 
 
 def edges(quads: NDArray[np.intp]) -> NDArray[np.intp]:

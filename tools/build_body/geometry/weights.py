@@ -56,7 +56,7 @@ def keep_strongest(W: NDArray[np.float64]) -> NDArray[np.float64]:
     return W / W.sum(axis=1, keepdims=True)
 
 
-def pack(W: NDArray[np.float64]) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
+def pack(W: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
     """Return (V, 4) joint indices and (V, 4) weights, the strongest first; unused slots are joint 0 with weight 0."""
     joints = np.argsort(-W, axis=1, kind="stable")[:, :INFLUENCES]
     weights = np.take_along_axis(W, joints, axis=1)
