@@ -8,6 +8,7 @@ import json
 import os
 import sys
 from pathlib import Path
+from typing import Any
 
 for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ[_name] = "1"  # before numpy: everything is measured in one thread
@@ -19,10 +20,10 @@ from .solver import peers, plots, startup, steps  # noqa: E402
 OUT = frames.CACHE
 
 
-def solver(quick: bool) -> dict:
+def solver(quick: bool) -> dict[str, Any]:
     """Measure everything about the solver; return the figures and print them as they come."""
     rounds = 20 if quick else 100
-    figures: dict = steps.target_table(rounds)
+    figures: dict[str, Any] = steps.target_table(rounds)
     figures |= startup.startup()
     experiments = {}
     for number in (1, 2, 3):
@@ -35,13 +36,13 @@ def solver(quick: bool) -> dict:
     figures["peers"] = {} if quick else peers.run_all()
     print(report.target_lines(figures), end="\n\n")
     if figures["peers"]:
-        rows = [[name, found] for name, found in figures["peers"].items()]
-        print(report.table(("one iteration, K=23 P=10 N=120, us", "measured, or why not"), rows), end="\n\n")
+        measured = list(figures["peers"].items())
+        print(report.table(("one iteration, K=23 P=10 N=120, us", "measured, or why not"), measured), end="\n\n")
     print(f"Plots are in {OUT}")
     return figures
 
 
-def _real_frames(quick: bool) -> dict:
+def _real_frames(quick: bool) -> dict[str, Any]:
     """Return cold_frame_ms, warm_frame_ms and the convergence report."""
     names = frames.QUICK_CLIPS if quick else frames.CLIPS
     if not frames.DATA.is_dir():

@@ -11,8 +11,14 @@ from ..made_motion import level_camera, made_motion
 
 BODY = load_body("scope")
 NAMES = list(BODY.joint_names)
+BETAS = np.zeros(BODY.P)
 RATE = 30.0
 ARMS_DOWN = {"left_shoulder": [0, 0, -1.2], "right_shoulder": [0, 0, 1.2]}
+
+
+def angle(a, b):
+    """Angles of the rotations from a (..., 3, 3) to b, in radians."""
+    return np.linalg.norm(log(np.swapaxes(a, -1, -2) @ b), axis=-1)
 
 
 def walk(seconds=4.0, period=1.0, speed=1.2, rate=RATE):

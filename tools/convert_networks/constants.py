@@ -1,14 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Stored tensors as numpy arrays, and the two operators that only unpack weights: DEQUANTIZE and DENSIFY."""
 
+from typing import Any
+
 import numpy as np
+from numpy.typing import NDArray
 
 from ...solver.errors import ModelFileError
 from .tflite import MAX_ELEMENTS, Model, Sparsity, Tensor
 
 
-def fold_constants(model: Model) -> dict[int, np.ndarray]:
-    """Arrays (NHWC layouts as stored) of every tensor known without running the network, by tensor number.
+def fold_constants(model: Model) -> dict[int, NDArray[Any]]:
+    """Return the arrays (NHWC as stored) of all tensors known without running the network, by tensor number.
 
     Half-precision weights stay float16: the ONNX file keeps them so and onnxruntime widens them when loading.
     """
@@ -26,7 +29,7 @@ def fold_constants(model: Model) -> dict[int, np.ndarray]:
     return known
 
 
-def _stored(tensor: Tensor, name: str) -> np.ndarray:
+def _stored(tensor: Tensor, name: str) -> NDArray[Any]:
     dtype = np.dtype(tensor.dtype).newbyteorder("<")
     if len(tensor.data) % dtype.itemsize:
         raise ModelFileError(f"{name}: tensor {tensor.name!r} holds {len(tensor.data)} bytes of {tensor.dtype} items.")
@@ -38,7 +41,7 @@ def _stored(tensor: Tensor, name: str) -> np.ndarray:
     return values.reshape(tensor.shape)
 
 
-def densify(values: np.ndarray, shape: tuple[int, ...], sparsity: Sparsity, label: str) -> np.ndarray:
+def densify(values: NDArray[Any], shape: tuple[int, ...], sparsity: Sparsity, label: str) -> NDArray[Any]:
     """Scatter the stored values of a sparse tensor into a dense array of ``shape``.
 
     Levels are walked in traversal order. A dense level of size n multiplies every position p of the level above
@@ -49,7 +52,7 @@ def densify(values: np.ndarray, shape: tuple[int, ...], sparsity: Sparsity, labe
     rank, blocks = len(shape), len(sparsity.block_map)
     if sorted(sparsity.traversal_order) != list(range(rank + blocks)) or len(sparsity.levels) != rank + blocks:
         raise ModelFileError(f"{label}: sparse traversal order {sparsity.traversal_order} does not fit shape {shape}.")
-    coordinates: dict[int, np.ndarray] = {}
+    coordinates: dict[int, NDArray[Any]] = {}
     block_size = np.ones(rank, np.int64)
     count = 1
     for dimension, level in zip(sparsity.traversal_order, sparsity.levels, strict=True):

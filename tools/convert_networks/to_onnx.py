@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A parsed TFLite model to an ONNX model with named outputs, without the operators that no kept output needs."""
+"""Convert a parsed TFLite model to ONNX with named outputs, without operators that no kept output needs."""
 
 import onnx
 from onnx import TensorProto, helper
@@ -11,16 +11,18 @@ from .operators import CONVERTERS
 from .tflite import Model, Operator
 
 OPSET = 17
-IR_VERSION = 8  # the lowest that goes with the opset: also old releases of onnxruntime read it
+IR_VERSION = 8  # the lowest for this opset, which old releases of onnxruntime also read
 
 
 def convert_model(
     model: Model, input_shape: tuple[int, ...], outputs: tuple[tuple[int, str, tuple[int, ...]], ...]
 ) -> onnx.ModelProto:
-    """ONNX model with one input ``input`` (batch, channels, height, width) and the outputs asked for.
+    """Return an ONNX model with one input ``input`` (batch, channels, height, width) and the given outputs.
 
     ``input_shape`` and the shapes in ``outputs``, (position, name, shape), are TFLite's (NHWC) and are checked. Rank-4
-    outputs come out as NCHW. Raises ModelFileError when the file is not what was expected.
+    outputs become NCHW.
+
+    :raises ModelFileError: when shapes differ from those given, or an operator is not supported.
     """
     input_shapes = [model.tensors[i].shape for i in model.inputs]
     if input_shapes != [input_shape]:
@@ -64,7 +66,7 @@ def _batched(shape: tuple[int, ...]) -> list[int | str]:
 
 
 def _needed(model: Model, outputs: list[int]) -> list[Operator]:
-    """The operators that the outputs depend on, in file order (which is execution order)."""
+    """Return the operators on which the outputs depend, in file order, which is execution order."""
     wanted = set(outputs)
     kept = []
     for operator in reversed(model.operators):

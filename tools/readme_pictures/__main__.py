@@ -10,10 +10,12 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from ...scope_addon.atomic_write import written_beside
 from ...solver.loaders.body_file import ASSETS
 from . import animation, pictures
+from .clips import DATA
 
 ANIMATION = "sample"
 PICTURES = {
@@ -38,8 +40,8 @@ def main() -> int:
     if unknown:
         parser.error(f"there is no picture {', '.join(sorted(unknown))}; choose from {', '.join(known)}")
     names = arguments.names or known
-    if names != [ANIMATION] and not pictures.DATA.is_dir():
-        print(f"{pictures.DATA} does not exist: the pictures show captures of its clips", file=sys.stderr)
+    if names != [ANIMATION] and not DATA.is_dir():
+        print(f"{DATA} does not exist: the pictures show captures of its clips", file=sys.stderr)
         return 1
     arguments.out.mkdir(parents=True, exist_ok=True)
     for name in names:
@@ -50,7 +52,7 @@ def main() -> int:
     return 0
 
 
-def _write(path: Path, picture: np.ndarray) -> None:
+def _write(path: Path, picture: NDArray[np.uint8]) -> None:
     """Write a JPEG, as good as its size allows."""
     bgr = cv2.cvtColor(picture, cv2.COLOR_RGB2BGR)
     for quality in range(90, 30, -4):
@@ -76,4 +78,4 @@ if __name__ == "__main__":
     status = main()
     sys.stdout.flush()
     sys.stderr.flush()
-    os._exit(status)  # footage and onnxruntime's threads may hang at exit
+    os._exit(status)  # footage and onnxruntime's threads can hang at exit
