@@ -24,7 +24,7 @@ _PI_MARGIN = 1e-4  # above cos(angle) = -1 + this, the antisymmetric part of R s
 
 
 @kernel
-def exp3(x: float, y: float, z: float) -> tuple:
+def exp3(x: float, y: float, z: float) -> tuple[float, ...]:
     """Return the nine entries of exp((x, y, z)), row by row.
 
     R = I + a [phi]x + b [phi]x^2 with a = sin(th)/th, b = (1 - cos(th))/th^2; below half a radian both are summed as
@@ -48,7 +48,7 @@ def exp3(x: float, y: float, z: float) -> tuple:
 
 
 @kernel
-def log3(r00, r01, r02, r10, r11, r12, r20, r21, r22) -> tuple:  # type: ignore[no-untyped-def]
+def log3(r00, r01, r02, r10, r11, r12, r20, r21, r22) -> tuple[float, ...]:  # type: ignore[no-untyped-def]
     """Return the rotation vector (3 numbers) of the rotation matrix given row by row, of angle in [0, pi].
 
     Near pi, where the antisymmetric part vanishes, the axis is the largest column of the symmetric part; exactly at
@@ -85,7 +85,7 @@ def log3(r00, r01, r02, r10, r11, r12, r20, r21, r22) -> tuple:  # type: ignore[
 
 
 @kernel
-def left_jacobian_inverse3(x: float, y: float, z: float) -> tuple:
+def left_jacobian_inverse3(x: float, y: float, z: float) -> tuple[float, ...]:
     """Return the nine entries of J^-1 = I - [phi]x / 2 + k [phi]x^2, k = (1 - th/2 cot(th/2)) / th^2; finite at pi."""
     s = x * x + y * y + z * z
     if s < 1e-2:
@@ -142,7 +142,8 @@ def log(rotation: ArrayLike) -> Array:
     n = np.linalg.norm(v, axis=-1, keepdims=True)
     small = n < 1e-6
     # w >= 0, so a small n means w = 1 to rounding: 2 atan(n / w) / n = 2 - 2 n^2 / 3
-    return v * np.where(small, 2.0 - 2.0 / 3.0 * n * n, 2.0 * np.arctan2(n, w) / np.where(small, 1.0, n))
+    phi: Array = v * np.where(small, 2.0 - 2.0 / 3.0 * n * n, 2.0 * np.arctan2(n, w) / np.where(small, 1.0, n))
+    return phi
 
 
 def left_jacobian(phi: ArrayLike) -> Array:
@@ -192,7 +193,8 @@ def matrix_from_quaternion(quaternion: ArrayLike) -> Array:
     q = _array(quaternion, (4,), "A quaternion")
     q = q / np.linalg.norm(q, axis=-1, keepdims=True)
     cross = hat(q[..., 1:])
-    return np.eye(3) + 2.0 * q[..., :1, None] * cross + 2.0 * (cross @ cross)
+    R: Array = np.eye(3) + 2.0 * q[..., :1, None] * cross + 2.0 * (cross @ cross)
+    return R
 
 
 @kernel
@@ -228,7 +230,8 @@ def nearest_rotation(matrix: ArrayLike) -> Array:
     m = np.where(np.isfinite(m).all(axis=(-2, -1), keepdims=True), m, np.eye(3))
     u, _, vt = np.linalg.svd(m)
     u[..., :, 2] *= np.linalg.det(u @ vt)[..., None]
-    return u @ vt
+    R: Array = u @ vt
+    return R
 
 
 def shortest_turn(a: Array, b: Array) -> Array:

@@ -8,8 +8,10 @@ network's joints are a prior of their own: they know the depth that keypoints in
 
 import tempfile
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .. import Body, Keypoints2D, Keypoints3D, Measurements, State, fit_batch, load_body, rotations
 from . import somebody
@@ -39,7 +41,7 @@ def read_states(body: Body, file: Path) -> list[State]:
 def write_network_output(file: Path, body: Body, truth: list[State]) -> None:
     """What a network would say of these people: every joint some 10 degrees off, the shape half guessed."""
     rng = np.random.default_rng(9)
-    rows: dict[str, list] = {"pose": [], "betas": [], "camera": [], "crop": []}
+    rows: dict[str, list[Any]] = {"pose": [], "betas": [], "camera": [], "crop": []}
     f = somebody.INTRINSICS[0, 0]
     for state in truth:
         R = np.concatenate([state.R_camera_root[None], state.Omega])
@@ -85,7 +87,7 @@ def main() -> tuple[float, float]:
     return float(np.mean(before)), float(np.mean(after))
 
 
-def _error(body: Body, joints: np.ndarray, truth: State) -> float:
+def _error(body: Body, joints: NDArray[np.float64], truth: State) -> float:
     """Mean distance of the joints in millimetres, pelvis on pelvis."""
     right = somebody.place(body, truth)[1]
     return float(np.linalg.norm((joints - joints[0]) - (right - right[0]), axis=1).mean() * 1e3)

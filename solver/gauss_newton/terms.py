@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Measurements of one frame as flat arrays: one slot a point, with all that was measured of it, by body part."""
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -41,7 +41,7 @@ class Terms(NamedTuple):
 
 
 @kernel
-def _common_part(tree: Tree, a: int, b: int) -> tuple:
+def _common_part(tree: Tree, a: int, b: int) -> tuple[int, int, int]:
     """Return (part, start joint or -1, end joint or -1): a part that two points are both fixed to.
 
     A joint belongs to its own part, as its origin, and to its parent, where it sits at S beta + l. -1 if none.
@@ -57,7 +57,7 @@ def _common_part(tree: Tree, a: int, b: int) -> tuple:
 
 
 @allocating_kernel
-def _lay_out(tree: Tree, i2, i3, i_start, i_end) -> tuple:  # type: ignore[no-untyped-def]
+def _lay_out(tree: Tree, i2, i3, i_start, i_end) -> tuple[Any, ...]:  # type: ignore[no-untyped-def]
     """Return (starts, shaped, rest, V, slots of 2D, of 3D, of directions, first direction without a common part or -1).
 
     Points measured in several ways share one slot, unless one way repeats. `shaped` is HAS_SHAPE where V is not zero.

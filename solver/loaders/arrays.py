@@ -5,8 +5,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..body import Body
 from ..errors import ModelFileError
@@ -41,7 +43,7 @@ OPTIONAL: dict[str, Form] = {
 }
 
 
-def check_arrays(arrays: Mapping[str, np.ndarray], forms: Mapping[str, Form], path: Path) -> None:
+def check_arrays(arrays: Mapping[str, NDArray[Any]], forms: Mapping[str, Form], path: Path) -> None:
     """What the arrays of a file hold, and their shapes, at the door. Those that are not there may be left out.
 
     :raises ModelFileError: an array of another kind or shape.

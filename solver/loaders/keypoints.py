@@ -11,6 +11,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..body import Body
 from ..names import BLAZEPOSE, BODY_JOINTS, COCO
@@ -26,7 +27,7 @@ _FINGER_JOINTS = {
 }
 _HAND_NAMES = {finger: f"{finger}_finger" if finger in ("index", "middle", "ring") else finger for finger in FINGERS}
 
-Attached = tuple[np.ndarray, str]  # a point (3, 1 + P) and the part it turns with
+Attached = tuple[NDArray[np.float64], str]  # a point (3, 1 + P) and the part it turns with
 
 
 def derive_keypoints(body: Body) -> Body:

@@ -15,8 +15,10 @@ import re
 import zipfile
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..body import Body
 from ..errors import ModelFileError
@@ -42,7 +44,7 @@ _GENDERS = {"m": "male", "f": "female", "male": "male", "female": "female", "neu
 class Tables:
     """What a model file holds, as arrays; ``correctives`` is the last extent of posedirs, 0 when absent."""
 
-    arrays: dict[str, np.ndarray]
+    arrays: dict[str, NDArray[Any]]
     correctives: int
 
 
@@ -102,7 +104,7 @@ def _read_tables(path: Path) -> Tables:
     return Tables(arrays, posedirs[-1] if posedirs else 0)
 
 
-def _check_tables(arrays: dict[str, np.ndarray], path: Path) -> None:
+def _check_tables(arrays: dict[str, NDArray[Any]], path: Path) -> None:
     """Types and shapes, at the door."""
     check_arrays(arrays, {"kintree_table": ("whole numbers", (2, None)), "v_template": ("numbers", (None, 3))}, path)
     vertices, n = len(arrays["v_template"]), arrays["kintree_table"].shape[1]
@@ -149,7 +151,7 @@ def _make_body(tables: Tables, path: Path, max_betas: int) -> Body:
     return derive_keypoints(body)
 
 
-def _parents(kintree: np.ndarray, path: Path) -> np.ndarray:
+def _parents(kintree: NDArray[np.integer[Any]], path: Path) -> NDArray[np.int32]:
     """(K+1,) int32 parents. Row 1 names the joints, row 0 the parent's name; the root's is 2³² − 1, −1 or itself."""
     columns = {int(name): column for column, name in enumerate(kintree[1])}
     if len(columns) != kintree.shape[1]:
@@ -160,7 +162,7 @@ def _parents(kintree: np.ndarray, path: Path) -> np.ndarray:
     return parents
 
 
-def _shapedirs(shapedirs: np.ndarray | None, vertices: int, name: str, max_betas: int) -> np.ndarray:
+def _shapedirs(shapedirs: NDArray[Any] | None, vertices: int, name: str, max_betas: int) -> NDArray[np.float64]:
     """(V, 3, P) leading shape directions; SMPL-X stores facial expressions behind them, which are left out."""
     if shapedirs is None:
         return np.zeros((vertices, 3, 0))
@@ -170,7 +172,7 @@ def _shapedirs(shapedirs: np.ndarray | None, vertices: int, name: str, max_betas
     return shapedirs[:, :, : min(count, max_betas)].astype(np.float64)
 
 
-def reduce_weights(weights: np.ndarray, path: Path) -> tuple[np.ndarray, np.ndarray]:
+def reduce_weights(weights: NDArray[Any], path: Path) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
     """The four largest skin weights of each vertex, scaled to sum to one; weights below zero count as zero.
 
     :param weights: (V, K+1).
@@ -190,19 +192,19 @@ def reduce_weights(weights: np.ndarray, path: Path) -> tuple[np.ndarray, np.ndar
     return joints, kept / total
 
 
-def _faces(faces: np.ndarray, vertices: int, path: Path) -> np.ndarray:
+def _faces(faces: NDArray[np.integer[Any]], vertices: int, path: Path) -> NDArray[np.int32]:
     if faces.size and (int(faces.min()) < 0 or int(faces.max()) >= vertices):
         raise ModelFileError(f"{path}: f points outside 0..{vertices - 1}; download it again")
     return faces.astype(np.int32)
 
 
-def _joint_names(names: np.ndarray | None, count: int) -> tuple[str, ...]:
+def _joint_names(names: NDArray[Any] | None, count: int) -> tuple[str, ...]:
     if names is not None and names.shape == (count,) and names.dtype.kind == "U" and len(set(names.tolist())) == count:
         return tuple(names.tolist())
     return tuple(f"joint_{i:02d}" for i in range(count))
 
 
-def read_gender(stored: np.ndarray | None, path: Path) -> str:
+def read_gender(stored: NDArray[Any] | None, path: Path) -> str:
     """male, female or neutral: as the file says, else as the names of the file and its folder say, else neutral."""
     if stored is not None and stored.size == 1 and stored.dtype.kind in "SU":
         item = stored.reshape(-1)[0]

@@ -10,9 +10,10 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable
-from typing import Any, TypeGuard
+from typing import Any, NoReturn, TypeGuard
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import ModelFileError
 
@@ -70,7 +71,7 @@ class PickledDtype:
 class PickledArray:
     """A numpy array whose bytes lie in the file itself, so that it can never be larger than the file."""
 
-    array: np.ndarray | None = None
+    array: NDArray[Any] | None = None
 
     def __setstate__(self, state: object) -> None:
         """State as numpy writes it: (version,) shape, dtype, is_fortran, bytes."""
@@ -97,7 +98,7 @@ _SPARSE = ("csc", "csr", "coo")
 _CLASSES = {name: type(name, (PickledObject,), {}) for name in (*_SPARSE, "Ch", "Select")}
 
 
-def _refuse(*_: object) -> Any:
+def _refuse(*_: object) -> NoReturn:
     raise ModelFileError("it makes an object in a way that body files do not")
 
 
@@ -105,11 +106,16 @@ _NDARRAY, _OBJECT = Global(_refuse), Global(_refuse)
 
 
 def _reconstruct(kind: object, *_: object) -> PickledArray:
-    return PickledArray() if kind is _NDARRAY else _refuse()
+    if kind is not _NDARRAY:
+        _refuse()
+    return PickledArray()
 
 
 def _reconstructor(kind: Any, base: object, state: object) -> PickledObject:
-    return kind() if kind in _CLASSES.values() and base is _OBJECT and state is None else _refuse()
+    if kind not in _CLASSES.values() or base is not _OBJECT or state is not None:
+        _refuse()
+    made: PickledObject = kind()
+    return made
 
 
 def _from_buffer(raw: object, dtype: object, shape: object, order: object) -> PickledArray:
@@ -143,7 +149,7 @@ def stand_in(dotted: str) -> Any:
     return next((found for pattern, found in _GLOBALS.items() if re.fullmatch(pattern, dotted)), None)
 
 
-def _from_bytes(raw: object, dtype: object, shape: object, is_fortran: bool) -> np.ndarray:
+def _from_bytes(raw: object, dtype: object, shape: object, is_fortran: bool) -> NDArray[Any]:
     """A read-only array over ``raw``; the byte count must agree with the shape exactly."""
     if not isinstance(dtype, PickledDtype):
         raise ModelFileError("it holds a numpy array without a type")
@@ -163,7 +169,7 @@ def _is_shape(shape: object) -> TypeGuard[tuple[int, ...]]:
     return isinstance(shape, tuple) and len(shape) <= 32 and all(type(n) is int and 0 <= n < 1 << 63 for n in shape)
 
 
-def to_array(value: object, depth: int = 0) -> np.ndarray:
+def to_array(value: object, depth: int = 0) -> NDArray[Any]:
     """The numpy array that an unpickled value stands for; sparse matrices become dense.
 
     :raises ModelFileError: not an array, unfinished, too large or inconsistent.
@@ -182,7 +188,7 @@ def to_array(value: object, depth: int = 0) -> np.ndarray:
     raise ModelFileError(f"an array was expected, but a {type(value).__name__} was found, or an unfinished array")
 
 
-def _selected(state: dict[str, Any], depth: int) -> np.ndarray:
+def _selected(state: dict[str, Any], depth: int) -> NDArray[Any]:
     """chumpy's slice of an array: a.ravel()[idxs], reshaped."""
     flat = to_array(state.get("a"), depth).ravel()
     if flat.dtype.kind not in "biuf":
@@ -194,7 +200,7 @@ def _selected(state: dict[str, Any], depth: int) -> np.ndarray:
     return flat[index].reshape(shape)
 
 
-def _dense(kind: str, state: dict[str, Any], depth: int) -> np.ndarray:
+def _dense(kind: str, state: dict[str, Any], depth: int) -> NDArray[np.float64]:
     """A CSC, CSR or COO matrix (row, column) made dense; repeated entries add up."""
     shape = state.get("_shape", state.get("shape"))
     if not isinstance(shape, tuple) or len(shape) != 2 or not all(isinstance(n, int | np.integer) for n in shape):
@@ -230,7 +236,7 @@ def _dense(kind: str, state: dict[str, Any], depth: int) -> np.ndarray:
     return dense
 
 
-def _indices(index: np.ndarray, size: int) -> np.ndarray:
+def _indices(index: NDArray[Any], size: int) -> NDArray[np.intp]:
     if index.dtype.kind not in "iu" or index.ndim != 1 or (index.size and (index.min() < 0 or index.max() >= size)):
         raise ModelFileError(f"it holds indices outside 0..{size - 1}")
     return index.astype(np.intp)

@@ -56,7 +56,7 @@ _FARTHEST = math.sin(0.5 * NEAREST) ** -2.5  # of (1 + w^2) / w^(5/2)
 STATE = 16
 
 
-def chart(q: Callable[[int], Any], s: list) -> list:
+def chart(q: Callable[[int], Any], s: list[Any]) -> list[Any]:
     """The state y from Omega (9) by rows; parameters M."""
     m = [q(MEAN + k) for k in range(9)]
 
@@ -80,7 +80,7 @@ def chart(q: Callable[[int], Any], s: list) -> list:
     return [*y, *J, ww1 / (w * w * root), g * y[0], g * y[1], g * y[2]]
 
 
-def _linear(q: Callable[[int], Any], at: int, x: list, J: list) -> tuple[list, list]:
+def _linear(q: Callable[[int], Any], at: int, x: list[Any], J: list[Any]) -> tuple[list[Any], list[Any]]:
     """A x + b and A J, with A and b from parameter `at` on."""
     A = [q(at + k) for k in range(9)]
     out = [q(at + 9 + r) + A[3 * r] * x[0] + A[3 * r + 1] * x[1] + A[3 * r + 2] * x[2] for r in range(3)]
@@ -88,7 +88,7 @@ def _linear(q: Callable[[int], Any], at: int, x: list, J: list) -> tuple[list, l
     return out, [A[3 * r] * J[c] + A[3 * r + 1] * J[3 + c] + A[3 * r + 2] * J[6 + c] for r, c in entries]
 
 
-def _hidden(q: Callable[[int], Any], at: int, x: list) -> list:
+def _hidden(q: Callable[[int], Any], at: int, x: list[Any]) -> list[Any]:
     """(s, ds/dx.., t, dt/dx..) of the small network whose parameters start at `at`, of one or two inputs x."""
     n, H = len(x), HIDDEN
     out, bias = at + (n + 1) * H, at + (n + 3) * H
@@ -106,7 +106,7 @@ def _hidden(q: Callable[[int], Any], at: int, x: list) -> list:
     return sums
 
 
-def layer(q: Callable[[int], Any], s: list) -> list:
+def layer(q: Callable[[int], Any], s: list[Any]) -> list[Any]:
     """The state after one layer, whose parameters are q(0..LAYER_SIZE - 1)."""
     x, J = _linear(q, 0, s[:3], s[3:12])
     J1, J2, J3 = J[:3], J[3:6], J[6:]
@@ -141,18 +141,18 @@ def layer(q: Callable[[int], Any], s: list) -> list:
     return [*out, *rows, det, *G]
 
 
-def finish(q: Callable[[int], Any], s: list) -> list:
+def finish(q: Callable[[int], Any], s: list[Any]) -> list[Any]:
     """The state z with derivatives in the parent's axes in place of M's."""
     z, J = _linear(q, LAST, s[:3], s[3:12])
     m = [q(MEAN + k) for k in range(9)]
 
-    def turned(row: list) -> list:  # (M row) for a row of derivatives in M's axes
+    def turned(row: list[Any]) -> list[Any]:  # (M row) for a row of derivatives in M's axes
         return [m[3 * r] * row[0] + m[3 * r + 1] * row[1] + m[3 * r + 2] * row[2] for r in range(3)]
 
     return [*z, *turned(J[:3]), *turned(J[3:6]), *turned(J[6:]), s[12], *turned(s[13:16])]
 
 
-def normal(q: Callable[[int], Any], s: list) -> list:
+def normal(q: Callable[[int], Any], s: list[Any]) -> list[Any]:
     """JᵀJ (6, upper), Jᵀz (3), |z|^2, then what `finish` left from entry 10 on: state[12:16] stays."""
     J = [s[3:6], s[6:9], s[9:12]]
 
@@ -286,7 +286,8 @@ def transform(parameters: Array, Omega: Array) -> tuple[Array, Array, Array, Arr
 def log_density(parameters: Array, Omega: Array) -> Array:
     """Return log p (...) against the normalized Haar measure, so that the uniform distribution has 0. Nats."""
     z, _, log_det, _ = transform(parameters, Omega)
-    return -0.5 * np.sum(z * z, axis=-1) - 1.5 * np.log(2.0 * np.pi) + log_det
+    density: Array = -0.5 * np.sum(z * z, axis=-1) - 1.5 * np.log(2.0 * np.pi) + log_det
+    return density
 
 
 def invert(parameters: Array, z: Array) -> Array:
@@ -294,7 +295,9 @@ def invert(parameters: Array, z: Array) -> Array:
     p = np.asarray(parameters, float)
 
     def unmap(at: int, x: Array) -> Array:
-        return (x - p[at + 9 : at + 12]) @ np.linalg.inv(p[at : at + 9].reshape(3, 3)).T
+        inverse: Array = np.linalg.inv(p[at : at + 9].reshape(3, 3))
+        mapped: Array = (x - p[at + 9 : at + 12]) @ inverse.T
+        return mapped
 
     x = unmap(LAST, np.asarray(z, float))
     for k in reversed(range(LAYERS)):
