@@ -109,7 +109,10 @@ def _array(value: ArrayLike, tail: tuple[int, ...], name: str) -> Array:
 
 
 def hat(phi: ArrayLike) -> Array:
-    """Return [phi]x, shape (..., 3, 3), with [phi]x p = phi x p."""
+    """Return [phi]x, shape (..., 3, 3), with [phi]x p = phi x p.
+
+    :raises ShapeError: the vectors have another shape.
+    """
     phi = _array(phi, (3,), "A rotation vector")
     out = np.zeros((*phi.shape, 3))
     out[..., 0, 1], out[..., 0, 2], out[..., 1, 2] = -phi[..., 2], phi[..., 1], -phi[..., 0]
@@ -128,7 +131,10 @@ def _coefficients(phi: Array) -> tuple[Array, ...]:
 
 
 def exp(phi: ArrayLike) -> Array:
-    """Return the rotation matrices (..., 3, 3) of rotation vectors (..., 3)."""
+    """Return the rotation matrices (..., 3, 3) of rotation vectors (..., 3).
+
+    :raises ShapeError: the vectors have another shape.
+    """
     phi = _array(phi, (3,), "A rotation vector")
     a, b, _ = _coefficients(phi)
     cross = hat(phi)
@@ -136,7 +142,10 @@ def exp(phi: ArrayLike) -> Array:
 
 
 def log(rotation: ArrayLike) -> Array:
-    """Return the rotation vectors (..., 3), of angle in [0, pi], of rotation matrices (..., 3, 3)."""
+    """Return the rotation vectors (..., 3), of angle in [0, pi], of rotation matrices (..., 3, 3).
+
+    :raises ShapeError: the matrices have another shape.
+    """
     quaternion = quaternion_from_matrix(rotation)
     w, v = quaternion[..., :1], quaternion[..., 1:]
     n = np.linalg.norm(v, axis=-1, keepdims=True)
@@ -147,7 +156,10 @@ def log(rotation: ArrayLike) -> Array:
 
 
 def left_jacobian(phi: ArrayLike) -> Array:
-    """Return J(phi) = I + b [phi]x + c [phi]x^2, shape (..., 3, 3)."""
+    """Return J(phi) = I + b [phi]x + c [phi]x^2, shape (..., 3, 3).
+
+    :raises ShapeError: the vectors have another shape.
+    """
     phi = _array(phi, (3,), "A rotation vector")
     _, b, c = _coefficients(phi)
     cross = hat(phi)
@@ -155,7 +167,10 @@ def left_jacobian(phi: ArrayLike) -> Array:
 
 
 def left_jacobian_inverse(phi: ArrayLike) -> Array:
-    """Return J^-1(phi), shape (..., 3, 3), for |phi| < 2 pi."""
+    """Return J^-1(phi), shape (..., 3, 3), for |phi| < 2 pi.
+
+    :raises ShapeError: the vectors have another shape.
+    """
     phi = _array(phi, (3,), "A rotation vector")
     s = np.sum(phi * phi, axis=-1)[..., None, None]
     small = s < 1e-2
@@ -170,6 +185,8 @@ def quaternion_from_matrix(rotation: ArrayLike) -> Array:
     """Return unit quaternions (..., 4), w >= 0, of rotation matrices (..., 3, 3).
 
     Of the four ways to divide, each matrix takes the one by its largest component, which is never below 1/2.
+
+    :raises ShapeError: the matrices have another shape.
     """
     r = _array(rotation, (3, 3), "A rotation matrix")
     d = np.diagonal(r, axis1=-2, axis2=-1)
@@ -189,7 +206,10 @@ def quaternion_from_matrix(rotation: ArrayLike) -> Array:
 
 
 def matrix_from_quaternion(quaternion: ArrayLike) -> Array:
-    """Return the rotation matrices (..., 3, 3) of quaternions (..., 4), which need not be normalized."""
+    """Return the rotation matrices (..., 3, 3) of quaternions (..., 4), which need not be normalized.
+
+    :raises ShapeError: the quaternions have another shape.
+    """
     q = _array(quaternion, (4,), "A quaternion")
     q = q / np.linalg.norm(q, axis=-1, keepdims=True)
     cross = hat(q[..., 1:])
@@ -223,7 +243,10 @@ def orthonormalize(R) -> bool:  # type: ignore[no-untyped-def]
 
 
 def nearest_rotation(matrix: ArrayLike) -> Array:
-    """Return the rotations (..., 3, 3) nearest to matrices in the Frobenius norm; the identity for non-finite ones."""
+    """Return the rotations (..., 3, 3) nearest to matrices in the Frobenius norm; the identity for non-finite ones.
+
+    :raises ShapeError: the matrices have another shape.
+    """
     m = np.array(_array(matrix, (3, 3), "A matrix"), order="C")
     if orthonormalize(m.reshape(-1, 3, 3)):
         return m
@@ -235,7 +258,11 @@ def nearest_rotation(matrix: ArrayLike) -> Array:
 
 
 def shortest_turn(a: Array, b: Array) -> Array:
-    """Return the smallest rotations (..., 3, 3) that take directions a (..., 3) to b; half a turn if opposite."""
+    """Return the smallest rotations (..., 3, 3) that take directions a (..., 3) to b (..., 3); half a turn if opposite.
+
+    :raises ShapeError: the directions have another shape.
+    """
+    a, b = _array(a, (3,), "A direction"), _array(b, (3,), "A direction")
     a = a / np.maximum(np.linalg.norm(a, axis=-1, keepdims=True), 1e-12)
     b = b / np.maximum(np.linalg.norm(b, axis=-1, keepdims=True), 1e-12)
     axis, cosine = np.cross(a, b), (a * b).sum(axis=-1)

@@ -17,7 +17,7 @@ OFFSET_M = 0.0095  # of the marker's centre from the skin
 
 
 def with_markers(body: Body, vertices: NDArray[np.intp]) -> Body:
-    """Return the body with one keypoint for each marker, in place of its own."""
+    """Return the body with one keypoint for each marker, at vertices (n,), in place of its own."""
     most = body.skin_weights[vertices].argmax(axis=1)
     part = body.skin_joints[vertices, most]
     outwards = body.v_template[vertices] - body.J_template[part]

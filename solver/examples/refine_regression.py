@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Refining what a regression network says (HMR, SPIN and their kin) by the keypoints that a detector sees.
+"""Refine what a regression network estimates (HMR, SPIN and similar ones) with the keypoints of a detector.
 
 Such a network's file holds, for each picture, pose (24, 3, 3) rotations, betas (10,) and a weak-perspective camera
 (s, t_x, t_y) of a square crop; its body is plausible but lies beside the person. The fit starts there, and the
@@ -39,7 +39,7 @@ def read_states(body: Body, file: Path) -> list[State]:
 
 
 def write_network_output(file: Path, body: Body, truth: list[State]) -> None:
-    """What a network would say of these people: every joint some 10 degrees off, the shape half guessed."""
+    """Write what a network might estimate: every joint some 10 degrees off, and half of the true shape."""
     rng = np.random.default_rng(9)
     rows: dict[str, list[Any]] = {"pose": [], "betas": [], "camera": [], "crop": []}
     f = somebody.INTRINSICS[0, 0]

@@ -31,7 +31,7 @@ _HEADER_READERS: dict[tuple[int, int], Any] = {
 
 
 def npz_keys(path: Path) -> set[str]:
-    """Names of the arrays in a .npz file; empty when it is not a zip file at all."""
+    """Return the names of the arrays in a .npz file; empty when it is not a zip file at all."""
     try:
         with zipfile.ZipFile(path) as archive:
             return {name.removesuffix(".npy") for name in archive.namelist()}

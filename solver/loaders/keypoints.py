@@ -31,7 +31,7 @@ Attached = tuple[NDArray[np.float64], str]  # a point (3, 1 + P) and the part it
 
 
 def derive_keypoints(body: Body) -> Body:
-    """The body with all keypoints, or with none when its tree does not have SMPL's 22 body joints by name."""
+    """Return the body with all keypoints, or with none when its tree does not have SMPL's 22 body joints by name."""
     if not set(BODY_JOINTS) <= set(body.joint_names):
         return replace(body, keypoint_shapedirs=np.zeros((0, 3, body.P)))
     points = RestPoints(body)
@@ -84,7 +84,7 @@ def _feet(points: RestPoints) -> dict[str, Attached]:
 
 
 def _hand(points: RestPoints, side: str) -> dict[str, Attached]:
-    """The 21 points of one hand in MediaPipe's order."""
+    """Return the 21 points of one hand in MediaPipe's order."""
     wrist = points.joint(f"{side}_wrist")
     hand: dict[str, Attached] = {"wrist": (wrist, f"{side}_wrist")}
     palm = f"{side}_hand" if f"{side}_hand" in points.joint_index else f"{side}_wrist"

@@ -105,7 +105,7 @@ def _read_tables(path: Path) -> Tables:
 
 
 def _check_tables(arrays: dict[str, NDArray[Any]], path: Path) -> None:
-    """Types and shapes, at the door."""
+    """Check types and shapes."""
     check_arrays(arrays, {"kintree_table": ("whole numbers", (2, None)), "v_template": ("numbers", (None, 3))}, path)
     vertices, n = len(arrays["v_template"]), arrays["kintree_table"].shape[1]
     if 0 in (vertices, n):
@@ -152,7 +152,7 @@ def _make_body(tables: Tables, path: Path, max_betas: int) -> Body:
 
 
 def _parents(kintree: NDArray[np.integer[Any]], path: Path) -> NDArray[np.int32]:
-    """(K+1,) int32 parents. Row 1 names the joints, row 0 the parent's name; the root's is 2³² − 1, −1 or itself."""
+    """Return the parents (K+1,). Row 1 names the joints, row 0 the parents; the root's is 2³² − 1, −1 or itself."""
     columns = {int(name): column for column, name in enumerate(kintree[1])}
     if len(columns) != kintree.shape[1]:
         raise ModelFileError(f"{path}: kintree_table names a joint twice; download it again")
@@ -163,7 +163,7 @@ def _parents(kintree: NDArray[np.integer[Any]], path: Path) -> NDArray[np.int32]
 
 
 def _shapedirs(shapedirs: NDArray[Any] | None, vertices: int, name: str, max_betas: int) -> NDArray[np.float64]:
-    """(V, 3, P) leading shape directions; SMPL-X stores facial expressions behind them, which are left out."""
+    """Return the leading shape directions (V, 3, P), without the facial expressions that SMPL-X stores after them."""
     if shapedirs is None:
         return np.zeros((vertices, 3, 0))
     count = shapedirs.shape[2]
@@ -173,10 +173,11 @@ def _shapedirs(shapedirs: NDArray[Any] | None, vertices: int, name: str, max_bet
 
 
 def reduce_weights(weights: NDArray[Any], path: Path) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
-    """The four largest skin weights of each vertex, scaled to sum to one; weights below zero count as zero.
+    """Return the four largest skin weights of each vertex, scaled to sum to one; weights below zero count as zero.
 
     :param weights: (V, K+1).
     :return: skin_joints (V, 4) int and skin_weights (V, 4); with fewer than four joints, the rest is joint 0 at zero.
+    :raises ModelFileError: a weight is not finite, or a vertex has none that is positive.
     """
     if not np.isfinite(weights).all():
         raise ModelFileError(f"{path}: weights contains NaN or infinity; download it again")
@@ -205,7 +206,10 @@ def _joint_names(names: NDArray[Any] | None, count: int) -> tuple[str, ...]:
 
 
 def read_gender(stored: NDArray[Any] | None, path: Path) -> str:
-    """male, female or neutral: as the file says, else as the names of the file and its folder say, else neutral."""
+    """Return male, female or neutral: as the file says, else as its name or its folder's says, else neutral.
+
+    :param stored: () text, what the file holds as gender.
+    """
     if stored is not None and stored.size == 1 and stored.dtype.kind in "SU":
         item = stored.reshape(-1)[0]
         text = (item.decode("latin1") if isinstance(item, bytes) else str(item)).strip().lower()

@@ -20,7 +20,7 @@ _BROKEN = (OSError, ValueError, KeyError, EOFError, RuntimeError, MemoryError, z
 
 
 def read_npz(path: Path, error: type[InputError], what: str) -> dict[str, NDArray[Any]]:
-    """All arrays of a .npz file, never unpickling.
+    """Return all arrays of a .npz file, never unpickling.
 
     :param error: class raised for a missing, broken, oversized or pickled file.
     :param what: what the file should have been, for the message, e.g. ``motion file``.

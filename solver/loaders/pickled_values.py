@@ -32,7 +32,7 @@ class Global:
         self._make = make
 
     def __call__(self, *arguments: Any) -> Any:
-        """The stand-in of what the call returns."""
+        """Return the stand-in of what the call would return."""
         return self._make(*arguments)
 
     def __setstate__(self, state: object) -> None:
@@ -52,6 +52,10 @@ class PickledDtype:
     """``numpy.dtype(text)`` for plain numbers and text; structures and Python objects are refused."""
 
     def __init__(self, text: object, *_: object) -> None:
+        """Parse a type as numpy writes it, for instance "<f8".
+
+        :raises ModelFileError: it is none of plain numbers or text.
+        """
         text = text.decode("latin1") if isinstance(text, bytes) else text
         if not isinstance(text, str) or _DTYPE.fullmatch(text) is None:
             shown = repr(text[:40]) if isinstance(text, str) else type(text).__name__
@@ -145,12 +149,12 @@ _GLOBALS: dict[str, Any] = {
 
 
 def stand_in(dotted: str) -> Any:
-    """What stands for an allowed global, by module and name; None for any other."""
+    """Return the stand-in of an allowed global, given by module and name; None for any other."""
     return next((found for pattern, found in _GLOBALS.items() if re.fullmatch(pattern, dotted)), None)
 
 
 def _from_bytes(raw: object, dtype: object, shape: object, is_fortran: bool) -> NDArray[Any]:
-    """A read-only array over ``raw``; the byte count must agree with the shape exactly."""
+    """Return a read-only array over ``raw``; the byte count must agree with the shape exactly."""
     if not isinstance(dtype, PickledDtype):
         raise ModelFileError("it holds a numpy array without a type")
     if not isinstance(raw, bytes):
@@ -170,7 +174,7 @@ def _is_shape(shape: object) -> TypeGuard[tuple[int, ...]]:
 
 
 def to_array(value: object, depth: int = 0) -> NDArray[Any]:
-    """The numpy array that an unpickled value stands for; sparse matrices become dense.
+    """Return the numpy array that an unpickled value stands for; sparse matrices become dense.
 
     :raises ModelFileError: not an array, unfinished, too large or inconsistent.
     """
@@ -189,7 +193,7 @@ def to_array(value: object, depth: int = 0) -> NDArray[Any]:
 
 
 def _selected(state: dict[str, Any], depth: int) -> NDArray[Any]:
-    """chumpy's slice of an array: a.ravel()[idxs], reshaped."""
+    """Return the slice of an array as chumpy has it: a.ravel()[idxs], reshaped."""
     flat = to_array(state.get("a"), depth).ravel()
     if flat.dtype.kind not in "biuf":
         raise ModelFileError("it holds a chumpy slice without numbers")
@@ -201,7 +205,7 @@ def _selected(state: dict[str, Any], depth: int) -> NDArray[Any]:
 
 
 def _dense(kind: str, state: dict[str, Any], depth: int) -> NDArray[np.float64]:
-    """A CSC, CSR or COO matrix (row, column) made dense; repeated entries add up."""
+    """Return a CSC, CSR or COO matrix (row, column) as a dense one; repeated entries add up."""
     shape = state.get("_shape", state.get("shape"))
     if not isinstance(shape, tuple) or len(shape) != 2 or not all(isinstance(n, int | np.integer) for n in shape):
         raise ModelFileError("it holds a sparse matrix without a shape")

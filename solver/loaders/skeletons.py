@@ -50,7 +50,7 @@ SKELETONS = _skeletons()
 
 
 def recognise_skeleton(parents: NDArray[np.integer[Any]]) -> Skeleton | None:
-    """The published skeleton with exactly this tree (K+1,), or None."""
+    """Return the published skeleton with exactly these parents (K+1,), or None."""
     skeleton = SKELETONS.get(len(parents))
     return skeleton if skeleton is not None and skeleton.parents == tuple(int(p) for p in parents) else None
 

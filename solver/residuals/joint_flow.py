@@ -57,7 +57,7 @@ STATE = 16
 
 
 def chart(q: Callable[[int], Any], s: list[Any]) -> list[Any]:
-    """The state y from Omega (9) by rows; parameters M."""
+    """Return the state y from Omega (9) by rows; parameters M."""
     m = [q(MEAN + k) for k in range(9)]
 
     def entry(i: int, j: int) -> Any:  # of MᵀOmega
@@ -81,7 +81,7 @@ def chart(q: Callable[[int], Any], s: list[Any]) -> list[Any]:
 
 
 def _linear(q: Callable[[int], Any], at: int, x: list[Any], J: list[Any]) -> tuple[list[Any], list[Any]]:
-    """A x + b and A J, with A and b from parameter `at` on."""
+    """Return A x + b and A J, with A and b from parameter `at` on."""
     A = [q(at + k) for k in range(9)]
     out = [q(at + 9 + r) + A[3 * r] * x[0] + A[3 * r + 1] * x[1] + A[3 * r + 2] * x[2] for r in range(3)]
     entries = [(r, c) for r in range(3) for c in range(3)]
@@ -89,7 +89,7 @@ def _linear(q: Callable[[int], Any], at: int, x: list[Any], J: list[Any]) -> tup
 
 
 def _hidden(q: Callable[[int], Any], at: int, x: list[Any]) -> list[Any]:
-    """(s, ds/dx.., t, dt/dx..) of the small network whose parameters start at `at`, of one or two inputs x."""
+    """Return (s, ds/dx.., t, dt/dx..) of the small network whose parameters start at `at`, of one or two inputs x."""
     n, H = len(x), HIDDEN
     out, bias = at + (n + 1) * H, at + (n + 3) * H
     sums = [[q(bias + r)] + [None] * n for r in range(2)]
@@ -107,7 +107,7 @@ def _hidden(q: Callable[[int], Any], at: int, x: list[Any]) -> list[Any]:
 
 
 def layer(q: Callable[[int], Any], s: list[Any]) -> list[Any]:
-    """The state after one layer, whose parameters are q(0..LAYER_SIZE - 1)."""
+    """Return the state after one layer, whose parameters are q(0..LAYER_SIZE - 1)."""
     x, J = _linear(q, 0, s[:3], s[3:12])
     J1, J2, J3 = J[:3], J[3:6], J[6:]
     det, G = s[12], s[13:16]
@@ -142,7 +142,7 @@ def layer(q: Callable[[int], Any], s: list[Any]) -> list[Any]:
 
 
 def finish(q: Callable[[int], Any], s: list[Any]) -> list[Any]:
-    """The state z with derivatives in the parent's axes in place of M's."""
+    """Return the state z with derivatives in the parent's axes in place of M's."""
     z, J = _linear(q, LAST, s[:3], s[3:12])
     m = [q(MEAN + k) for k in range(9)]
 
@@ -153,7 +153,7 @@ def finish(q: Callable[[int], Any], s: list[Any]) -> list[Any]:
 
 
 def normal(q: Callable[[int], Any], s: list[Any]) -> list[Any]:
-    """JᵀJ (6, upper), Jᵀz (3), |z|^2, then what `finish` left from entry 10 on: state[12:16] stays."""
+    """Return JᵀJ (6, upper), Jᵀz (3), |z|^2, then what `finish` left from entry 10 on: state[12:16] stays."""
     J = [s[3:6], s[6:9], s[9:12]]
 
     def dot(a: int, b: int) -> Any:
@@ -284,7 +284,11 @@ def transform(parameters: Array, Omega: Array) -> tuple[Array, Array, Array, Arr
 
 
 def log_density(parameters: Array, Omega: Array) -> Array:
-    """Return log p (...) against the normalized Haar measure, so that the uniform distribution has 0. Nats."""
+    """Return log p (...) in nats against the normalized Haar measure, so that the uniform distribution has 0.
+
+    :param parameters: (SIZE,) of one joint.
+    :param Omega: (..., 3, 3) states of the joint.
+    """
     z, _, log_det, _ = transform(parameters, Omega)
     density: Array = -0.5 * np.sum(z * z, axis=-1) - 1.5 * np.log(2.0 * np.pi) + log_det
     return density
@@ -317,7 +321,10 @@ def invert(parameters: Array, z: Array) -> Array:
 
 
 def evaluate(part: Part, parameters: Array, weight: float = 1.0, log_det: float = 0.0) -> Linearization:
-    """Return the residual (4 rows) times sqrt(weight) and its derivatives; the last row is sqrt(h) l, h = log_det."""
+    """Return the residual (4 rows) times sqrt(weight) and its derivatives; the last row is sqrt(h) l, h = log_det.
+
+    :param parameters: (SIZE,) of the joint.
+    """
     z, J, value, gradient = transform(parameters, part.Omega)
     a = parameters[BOUND] - value
     half = 0.5 * (a + np.sqrt(a * a + 1.0))
