@@ -19,7 +19,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..scope_addon.atomic_write import written_beside
+from ..scope_addon.atomic_write import atomic_path
 from ..scope_addon.capture.camera.intrinsics import choose_camera
 from ..scope_addon.capture.fitting import track_fit
 from ..scope_addon.capture.fitting.track_fit import prepare_track
@@ -90,7 +90,7 @@ def write(path: Path, calls: Sequence[tuple[Measurements, Priors]]) -> None:
     fixed = (m.intrinsics, m.keypoints2d.indices, m.orientation_field.starts, m.orientation_field.ends)
     arrays |= dict(zip(FIXED, (*fixed, priors.joint_weights), strict=True))
     path.parent.mkdir(parents=True, exist_ok=True)
-    with written_beside(path) as temporary:
+    with atomic_path(path) as temporary:
         np.savez(temporary, **arrays)
 
 

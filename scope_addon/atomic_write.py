@@ -18,7 +18,7 @@ _unfinished: set[Path] = set()
 
 
 @contextmanager
-def written_beside(path: Path) -> Iterator[Path]:
+def atomic_path(path: Path) -> Iterator[Path]:
     """An empty file in the folder of ``path``, renamed to it at the end, removed if anything fails or stops it.
 
     Where ``path`` is a link, what it leads to is written, and the link stays. The writer may remove or replace the
@@ -26,7 +26,7 @@ def written_beside(path: Path) -> Iterator[Path]:
 
     :raises OSError: it cannot be made or renamed. :raises OutputError: what is there is no ordinary file.
     """
-    target = file_behind(path)
+    target = resolve_link(path)
     start = path.stem[:40]  # whatever its letters take, room is left for the rest
     handle, name = tempfile.mkstemp(prefix=f".{start}.", suffix=path.suffix.lower(), dir=target.parent)
     temporary = Path(name)
@@ -41,7 +41,7 @@ def written_beside(path: Path) -> Iterator[Path]:
         _unfinished.discard(temporary)
 
 
-def file_behind(path: Path) -> Path:
+def resolve_link(path: Path) -> Path:
     """The file that is written: what ``path`` leads to where it is a link, else itself. It need not be there yet.
 
     :raises OutputError: what is there is no ordinary file, which renaming would remove, or the links lead nowhere.
@@ -69,7 +69,7 @@ def reason(error: OSError) -> str:
     return f"{error.strerror or error}; free some space or choose another folder"
 
 
-def remove_unfinished() -> None:
+def remove_temporary_files() -> None:
     """Remove what is being written; for a process that is about to leave without any of its exits."""
     for temporary in list(_unfinished):
         with contextlib.suppress(OSError):

@@ -16,8 +16,8 @@ from typing import NoReturn
 
 from ..solver.errors import ScopeError
 from ..solver.loaders.body_file import ASSETS
-from .command_line.arguments import add_options, body_and_options, given_options, named_path
-from .command_line.outputs import check_blender, check_outputs, each_once, summary, usable_rig, write_outputs
+from .command_line.arguments import add_options, body_and_options, non_default_arguments, path_argument
+from .command_line.outputs import check_blender, check_outputs, checked_rig, distinct_paths, summary, write_outputs
 from .command_line.signals import interrupted, stopped_by_signals
 from .command_line.terminal import ProgressBar, say, stdout_for_report
 from .errors import UsageError, exit_status
@@ -54,7 +54,7 @@ def _add_capture_files(capture: argparse.ArgumentParser) -> None:
     capture.add_argument(
         "video",
         nargs="?",
-        type=named_path,
+        type=path_argument,
         metavar="VIDEO",
         help="video, picture, or numbered pictures as a folder or walk_####.png (default: a sample)",
     )
@@ -62,23 +62,23 @@ def _add_capture_files(capture: argparse.ArgumentParser) -> None:
         "-o",
         "--output",
         action="append",
-        type=named_path,
+        type=path_argument,
         default=[],
         metavar="OUT",
         help=f"result file, may be repeated; its suffix selects the format: {', '.join(SUFFIXES)}"
         " (default: .npz and .glb next to the video)",
     )
     capture.add_argument(
-        "--overlay", type=named_path, metavar="FILE", help="draw the body over the footage: .mp4, .png, .jpg"
+        "--overlay", type=path_argument, metavar="FILE", help="draw the body over the footage: .mp4, .png, .jpg"
     )
     capture.add_argument("--stop-with-stdin", action="store_true", help=argparse.SUPPRESS)  # as a batch starts it
 
 
 def _add_batch_files(batch: argparse.ArgumentParser) -> None:
     batch.add_argument(
-        "folder", type=named_path, metavar="FOLDER", help="folder of videos, pictures and picture sequences"
+        "folder", type=path_argument, metavar="FOLDER", help="folder of videos, pictures and picture sequences"
     )
-    batch.add_argument("--out", type=named_path, required=True, metavar="FOLDER", help="folder of the results")
+    batch.add_argument("--out", type=path_argument, required=True, metavar="FOLDER", help="folder of the results")
     batch.add_argument(
         "--formats",
         default="npz,glb",
@@ -126,10 +126,10 @@ def run_capture(args: argparse.Namespace) -> dict:
     video = args.video or SAMPLE
     if not args.video and not SAMPLE.is_file():
         raise UsageError("the sample clip comes with the repository alone: name the VIDEO to capture")
-    outputs = each_once(args.output) or [video.with_suffix(".npz"), video.with_suffix(".glb")]
+    outputs = distinct_paths(args.output) or [video.with_suffix(".npz"), video.with_suffix(".glb")]
     check_outputs(outputs, args.overlay, video)
     check_blender(outputs)
-    rig = usable_rig(args, outputs)
+    rig = checked_rig(args, outputs)
 
     body, options = body_and_options(args)
     # Imported here, so that --help and a wrong argument answer at once.
@@ -174,10 +174,10 @@ def run_batch(args: argparse.Namespace) -> dict:
         raise UsageError(f"--jobs takes a number of at least 1, not {args.jobs}")
     clips = [args.out / f"clip{suffix}" for suffix in formats]
     check_blender(clips)
-    usable_rig(args, clips)
+    checked_rig(args, clips)
     _, options = body_and_options(args)
     check_networks(options)  # a network that no clip can be captured with is reported once, before the first
-    batch = Batch(args.folder, args.out, args.program, given_options(args), formats, args.overlays)
+    batch = Batch(args.folder, args.out, args.program, non_default_arguments(args), formats, args.overlays)
     with ProgressBar(sys.stderr, show=sys.stderr.isatty() and not args.quiet) as progress:
         with interrupted("finished clips are kept; run the same command again to continue"):
             report = batch.run(args.jobs, recursive=args.recursive, again=args.again, progress=progress, say=say)

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from ..solver.loaders.npz import read_npz
-from .atomic_write import reason, written_beside
+from .atomic_write import atomic_path, reason
 from .errors import MotionFileError, OutputError
 
 
@@ -81,7 +81,7 @@ class Motion:
         path = Path(path)
         arrays = {f.name: np.asarray(getattr(self, f.name)) for f in fields(self)}
         try:
-            with written_beside(path) as temporary, temporary.open("wb") as file:
+            with atomic_path(path) as temporary, temporary.open("wb") as file:
                 np.savez_compressed(file, **arrays)
         except OSError as error:
             raise OutputError(f"cannot write {path}: {reason(error)}") from error

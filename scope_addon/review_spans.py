@@ -28,7 +28,7 @@ class Span:
     last: int
 
 
-def low_confidence_spans(motion: Motion, gap_s: float = 0.0) -> list[Span]:
+def find_review_spans(motion: Motion, gap_s: float = 0.0) -> list[Span]:
     """The spans of each reason in turn, in order of time; a frame has one reason at most.
 
     :param gap_s: spans of one reason that lie nearer together than these seconds are one.

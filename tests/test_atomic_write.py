@@ -7,13 +7,13 @@ import os
 import socket
 
 import pytest
-from scope.scope_addon.atomic_write import written_beside
+from scope.scope_addon.atomic_write import atomic_path
 from scope.scope_addon.errors import OutputError
 from scope.scope_addon.scene.export.output_paths import check_output
 
 
 def write(path, text="new"):
-    with written_beside(path) as temporary:
+    with atomic_path(path) as temporary:
         temporary.write_text(text)
 
 
@@ -49,7 +49,7 @@ def test_a_link_to_a_link_stays_too(link, tmp_path):
 def test_what_a_link_leads_to_survives_a_failure(link, tmp_path):
     target = tmp_path / "disk" / "kept.npz"
     target.write_text("earlier")
-    with pytest.raises(TypeError), written_beside(link) as temporary:
+    with pytest.raises(TypeError), atomic_path(link) as temporary:
         temporary.write_text(b"no text")
     assert link.is_symlink()
     assert target.read_text() == "earlier"

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from ..capture.options import CaptureOptions
 
 
-def named_path(text: str) -> Path:
+def path_argument(text: str) -> Path:
     """Convert an argument to a path. An empty one, such as an unset variable of the shell, is refused.
 
     :raises ArgumentTypeError: it is empty; it would mean the current folder.
@@ -42,7 +42,7 @@ def _add_valued(parser: argparse.ArgumentParser, option: Option) -> None:
     kind = (
         str
         if parsed or isinstance(option.value_type, tuple)
-        else named_path
+        else path_argument
         if option.value_type is Path
         else option.value_type
     )
@@ -79,7 +79,7 @@ def option_values(args: argparse.Namespace) -> dict[str, Any]:
     return {option.name: _value(option, _given(option, args)) for option in options_at(Place.COMMAND_LINE)}
 
 
-def given_options(args: argparse.Namespace) -> dict[str, str | None]:
+def non_default_arguments(args: argparse.Namespace) -> dict[str, str | None]:
     """Return the arguments that differ from their defaults, for a process that captures one clip of a batch.
 
     Flag to text, None where the flag takes no value.

@@ -48,7 +48,7 @@ def check_blender(outputs: list[Path]) -> None:
         check_installed(["bpy"])
 
 
-def each_once(outputs: list[Path]) -> list[Path]:
+def distinct_paths(outputs: list[Path]) -> list[Path]:
     """Return the paths without duplicates of the same file, such as ``out/case.npz`` and ``out/x/../case.npz``."""
     named: dict[str, Path] = {}
     for path in outputs:
@@ -56,7 +56,7 @@ def each_once(outputs: list[Path]) -> list[Path]:
     return list(named.values())
 
 
-def usable_rig(args: argparse.Namespace, outputs: list[Path]) -> RigSource | None:
+def checked_rig(args: argparse.Namespace, outputs: list[Path]) -> RigSource | None:
     """Return the user's rig, checked before the work is done; None if there is no --retarget.
 
     :raises ScopeError: it cannot be used, or the arguments contradict each other.

@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import IO
 
 from ...solver.errors import InputError
-from ..atomic_write import written_beside
+from ..atomic_write import atomic_path
 from ..errors import NO_PERSON, OutputError, UsageError
 from ..footage import FOOTAGE_SUFFIXES, PICTURE_SUFFIXES
 from .clips import OVERLAY, find_clips
@@ -243,7 +243,7 @@ class Batch:
             "exit_status": status,
         }
         try:
-            with written_beside(self.report_file) as temporary:
+            with atomic_path(self.report_file) as temporary:
                 temporary.write_text(json.dumps(report, indent=1), encoding="utf-8")
         except OSError as error:
             raise OutputError(f"cannot write {self.report_file}: {error.strerror}; free some space") from error

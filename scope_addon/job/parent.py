@@ -39,11 +39,11 @@ def stop_with_parent() -> None:
     """Have the main thread stop as by Ctrl-C when the parent is gone, and the process end soon after in any case."""
 
     def stop() -> NoReturn:
-        from ..atomic_write import remove_unfinished
+        from ..atomic_write import remove_temporary_files
 
         _thread.interrupt_main(signal.SIGINT)
         time.sleep(GRACE_S)
-        remove_unfinished()
+        remove_temporary_files()
         os._exit(130)
 
     when_parent_ends(stop)

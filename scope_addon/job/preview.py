@@ -18,7 +18,7 @@ from types import TracebackType
 import cv2
 import numpy as np
 
-from ..atomic_write import written_beside
+from ..atomic_write import atomic_path
 from ..capture.camera.intrinsics import scaled_intrinsics
 from ..capture.fitting.live_body import LiveBody, LivePose
 from ..capture.media.video import Frame
@@ -83,7 +83,7 @@ class PreviewWriter:
             if not self._open:
                 return
             try:
-                with written_beside(self._path) as temporary:
+                with atomic_path(self._path) as temporary:
                     temporary.write_bytes(picture[::-1].tobytes())
             except OSError:
                 return  # a full disk, or Windows while the other side reads: a capture does not fail for its picture

@@ -42,7 +42,7 @@ def register() -> None:
 
 def unregister() -> None:
     """Take everything out of Blender again, a running capture included."""
-    capture_operators.stop_everything()
+    capture_operators.end_capture()
     view_after_undo.detach()
     command.unregister()
     retarget_properties.detach()

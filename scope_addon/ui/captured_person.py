@@ -42,12 +42,12 @@ def captured_people(context: bpy.types.Context) -> list[bpy.types.Object]:
     return [obj for obj in context.scene.objects if obj.type == "ARMATURE" and "scope_source" in obj]
 
 
-def anybody_captured(context: bpy.types.Context) -> bool:
+def has_captured_person(context: bpy.types.Context) -> bool:
     """Whether a captured person is meant, or could be selected."""
     return captured_armature(context) is not None or bool(captured_people(context))
 
 
-def draw_meant(layout: bpy.types.UILayout, context: bpy.types.Context) -> bpy.types.Object | None:
+def draw_active_person(layout: bpy.types.UILayout, context: bpy.types.Context) -> bpy.types.Object | None:
     """Draw which captured armature is meant, or that one has to be selected; returns it."""
     armature = captured_armature(context)
     text = armature.name if armature else "Select a captured person"

@@ -9,7 +9,7 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, StringProperty
 
 from .captured_person import cached_motion
-from .reporting import TellingOperator
+from .reporting import ReportingOperator
 
 FORMATS = (
     ("FBX", "FBX", "For Unreal Engine, Unity, Maya and MotionBuilder: armature, mesh and animation", 0),
@@ -21,7 +21,7 @@ FORMATS = (
 _SUFFIX = {"FBX": ".fbx", "GLB": ".glb", "BVH": ".bvh", "USDC": ".usdc", "NPZ": ".npz"}
 
 
-class SCOPE_OT_export(TellingOperator):
+class SCOPE_OT_export(ReportingOperator):
     """Write captures to a file"""
 
     bl_idname = "scope.export"

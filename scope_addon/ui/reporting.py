@@ -14,7 +14,7 @@ def sentence(error: Exception | str) -> str:
     return text[:1].upper() + text[1:]
 
 
-class TellingOperator(bpy.types.Operator):
+class ReportingOperator(bpy.types.Operator):
     """An operator whose work is one method, ``work``; what goes wrong there is told as a sentence. Not registered."""
 
     bl_options = {"REGISTER", "UNDO"}

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import pytest
 from scope.scope_addon.cli import build_parser
-from scope.scope_addon.command_line.arguments import body_and_options, given_options
+from scope.scope_addon.command_line.arguments import body_and_options, non_default_arguments
 from scope.scope_addon.errors import UsageError
 
 
@@ -39,6 +39,6 @@ def test_what_is_no_height(said):
 def test_a_batch_passes_the_rig_on(tmp_path):
     rig = tmp_path / "rig.glb"
     args = build_parser().parse_args(["batch", ".", "--out", ".", "--retarget", str(rig), "--rig-object", "Rig"])
-    assert given_options(args) == {"--retarget": str(rig), "--rig-object": "Rig"}
+    assert non_default_arguments(args) == {"--retarget": str(rig), "--rig-object": "Rig"}
     args = build_parser().parse_args(["batch", ".", "--out", ".", "--retarget", str(rig), "--retarget-root", "object"])
-    assert given_options(args) == {"--retarget": str(rig), "--retarget-root": "object"}
+    assert non_default_arguments(args) == {"--retarget": str(rig), "--retarget-root": "object"}

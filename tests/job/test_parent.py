@@ -14,12 +14,12 @@ CHILD = """
 import signal, sys, time
 from pathlib import Path
 from scope.scope_addon.job import parent
-from scope.scope_addon.atomic_write import written_beside
+from scope.scope_addon.atomic_write import atomic_path
 parent.GRACE_S = {grace}
 # As the command line does; background jobs of a shell ignore it.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 parent.stop_with_parent()
-with written_beside(Path(sys.argv[1])) as temporary:
+with atomic_path(Path(sys.argv[1])) as temporary:
     temporary.write_text("half of something")
     print("writing", flush=True)
     while True:

@@ -14,7 +14,7 @@ from scope.scope_addon.capture.options import CaptureOptions, capture_options, c
 from scope.scope_addon.capture.perception.execution import CHOICES
 from scope.scope_addon.capture.perception.sessions import LANDMARK_NETWORK_OF_QUALITY
 from scope.scope_addon.cli import build_parser
-from scope.scope_addon.command_line.arguments import body_and_options, given_options, option_values
+from scope.scope_addon.command_line.arguments import body_and_options, non_default_arguments, option_values
 from scope.scope_addon.errors import UsageError
 from scope.scope_addon.job.request import JobRequest
 from scope.scope_addon.options import OPTIONS, Argument, Option, Place, option, options_at
@@ -140,7 +140,7 @@ def test_a_request_gives_the_same_options_as_the_command_line(tmp_path):
 def test_a_batch_passes_on_what_was_given_and_nothing_else():
     argv = ["batch", ".", "--out", ".", "--jobs", "2", "--json", "--quiet", "--no-smoothing", "--people", "all"]
     argv += ["--height", "175,162", "--quality", "best"]  # the last is the default
-    given = given_options(build_parser().parse_args(argv))
+    given = non_default_arguments(build_parser().parse_args(argv))
     assert given == {"--no-smoothing": None, "--people": "all", "--height": "175,162"}
 
 
@@ -148,7 +148,7 @@ def test_a_new_option_needs_its_record_alone(monkeypatch, capsys):
     monkeypatch.setattr(declarations, "OPTIONS", (*OPTIONS, EXTRA))
     args = parsed("--stride", "3")
     assert option_values(args)["stride"] == 3
-    assert given_options(args) == {"--stride": "3"}
+    assert non_default_arguments(args) == {"--stride": "3"}
     with pytest.raises(SystemExit):
         parsed("--help")
     assert "capture every Nth frame (default: 1)" in " ".join(capsys.readouterr().out.split())

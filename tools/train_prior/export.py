@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...scope_addon.atomic_write import written_beside
+from ...scope_addon.atomic_write import atomic_path
 from ...solver.residuals import joint_flow as jf
 from ...solver.rotations import nearest_rotation
 from .data import MIRROR, PAIRED, TRUNK, WITHOUT_DATA, Samples
@@ -67,7 +67,7 @@ def save(path: Path, joints: Mapping[str, np.ndarray], joint_names: Sequence[str
     """Write the parameters by joint, in the order of a body's ``joint_names`` (K+1,)."""
     names = [name for name in joint_names if name in joints]
     path.parent.mkdir(parents=True, exist_ok=True)
-    with written_beside(path) as temporary:
+    with atomic_path(path) as temporary:
         np.savez_compressed(
             temporary,
             joint_names=np.array(names),

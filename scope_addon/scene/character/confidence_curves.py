@@ -12,7 +12,7 @@ import numpy as np
 
 from ....solver.body import Body
 from ...motion import Motion
-from ...review_spans import REASONS, low_confidence_spans
+from ...review_spans import REASONS, find_review_spans
 from ..animation_data.actions import Channels, bone_property_path
 
 CONFIDENCE, CONTACT = "confidence", "contact"
@@ -55,7 +55,7 @@ def mark_low_confidence(scene: bpy.types.Scene, whose: str, motion: Motion, fram
 
     :param whose: put before the name, for several people.
     """
-    spans = sorted(low_confidence_spans(motion, _GAP_S), key=lambda span: span.first - span.last)[:_MOST_MARKERS]
+    spans = sorted(find_review_spans(motion, _GAP_S), key=lambda span: span.first - span.last)[:_MOST_MARKERS]
     there = {(marker.name, marker.frame) for marker in scene.timeline_markers}
     for span in sorted(spans, key=lambda span: span.first):
         first, last = round(float(frames[span.first])), round(float(frames[span.last]))

@@ -122,7 +122,7 @@ class CaptureJob:
             footage = None
         with _window_shows(scene):
             result = build_scene(motions, body, footage, self._options)
-        remember_motions(result, captured.motions, self._request.values["body"])
+        store_motion_paths(result, captured.motions, self._request.values["body"])
         report = dict(captured.report, warnings=warnings + result.warnings)
         show_result(scene.scope.result, self._request.footage, report, result)
 
@@ -170,7 +170,7 @@ def build_options(scene: bpy.types.Scene) -> BuildOptions:
     )
 
 
-def remember_motions(result: BuildResult, paths: Sequence[Path], body: str) -> None:
+def store_motion_paths(result: BuildResult, paths: Sequence[Path], body: str) -> None:
     """Store the paths of the motion files with the capture, and each person's own with its body at the armature."""
     result.collection["scope_motions"] = [str(path) for path in paths]
     for person, path in zip(result.people, paths, strict=True):

@@ -33,7 +33,7 @@ class _State:
 state = _State()
 
 
-def stop_everything() -> None:
+def end_capture() -> None:
     """End a running capture: the extension is being disabled, or a test begins."""
     stop_job()
     clear_status_bar()

@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 
 from ...motion import Motion
-from ...review_spans import REASONS, Span, low_confidence_spans
+from ...review_spans import REASONS, Span, find_review_spans
 from ...scene.build import BuildResult
 from ...scene.camera import pixel_aspect
 from ..reporting import sentence
@@ -49,7 +49,7 @@ def frame_warnings(motion: Motion, frames: np.ndarray) -> dict[str, str]:
     :return: reason, a key of ``REASONS``, to spans as in ``12-18,40``.
     """
     by_reason: dict[str, list[Span]] = {}
-    for span in low_confidence_spans(motion):
+    for span in find_review_spans(motion):
         by_reason.setdefault(span.reason, []).append(span)
     return {reason: _text(spans, frames) for reason, spans in by_reason.items()}
 

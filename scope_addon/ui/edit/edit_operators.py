@@ -14,13 +14,13 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
 
 from ..captured_person import betas_of, body_of, cached_motion, captured_armature, library_of
-from ..reporting import TellingOperator
+from ..reporting import ReportingOperator
 
 if TYPE_CHECKING:
     from ....solver.body import Body
 
 
-class _Edit(TellingOperator):
+class _Edit(ReportingOperator):
     """What the operators share: whom they work on, and that a failure leaves the keys as they were."""
 
     @classmethod

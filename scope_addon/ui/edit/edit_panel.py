@@ -6,7 +6,7 @@ from __future__ import annotations
 import bpy
 
 from ..capture.capture_panel import Tab
-from ..captured_person import anybody_captured, draw_meant
+from ..captured_person import draw_active_person, has_captured_person
 
 
 class SCOPE_PT_edit(Tab, bpy.types.Panel):
@@ -18,12 +18,12 @@ class SCOPE_PT_edit(Tab, bpy.types.Panel):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """There is a captured person."""
-        return anybody_captured(context)
+        return has_captured_person(context)
 
     def draw(self, context: bpy.types.Context) -> None:
         """Draw the panel."""
         layout = self.layout
-        if draw_meant(layout, context) is None:
+        if draw_active_person(layout, context) is None:
             return
         row = layout.row(align=True)
         for text, strength in (("Raw", 0.0), ("Normal", 1.0), ("Calm", 2.5)):

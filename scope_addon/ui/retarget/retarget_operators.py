@@ -9,7 +9,7 @@ import bpy
 from bpy.props import EnumProperty, StringProperty
 
 from ..captured_person import PERSON, betas_of, body_of, captured_armature, captured_people
-from ..reporting import TellingOperator, sentence
+from ..reporting import ReportingOperator, sentence
 
 if TYPE_CHECKING:
     from ...retarget.bone_map import BoneMap
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 _ASIDE = (1.5, 0.0, 0.0)  # metres: to the left of a person who faces the front view
 
 
-class _OnRig(TellingOperator):
+class _OnRig(ReportingOperator):
     """What the operators share: a rig is chosen."""
 
     @classmethod

@@ -6,7 +6,7 @@ from __future__ import annotations
 import bpy
 
 from ..capture.capture_panel import Tab
-from ..captured_person import anybody_captured, draw_meant
+from ..captured_person import draw_active_person, has_captured_person
 
 
 class SCOPE_UL_bone_pairs(bpy.types.UIList):
@@ -40,12 +40,12 @@ class SCOPE_PT_retarget(Tab, bpy.types.Panel):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """There is a captured person."""
-        return anybody_captured(context)
+        return has_captured_person(context)
 
     def draw(self, context: bpy.types.Context) -> None:
         """Draw the panel."""
         layout, settings = self.layout, context.scene.scope_retarget
-        draw_meant(layout, context)
+        draw_active_person(layout, context)
         layout.prop(settings, "rig")
         if settings.rig is None:
             return

@@ -7,7 +7,7 @@ import bpy
 from bpy.props import IntProperty
 from mathutils import Matrix
 
-from ..reporting import TellingOperator
+from ..reporting import ReportingOperator
 
 
 def hide_startup_cube(context: bpy.types.Context) -> None:
@@ -138,7 +138,7 @@ class SCOPE_OT_go_to_frame(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class SCOPE_OT_footage_to_sequencer(TellingOperator):
+class SCOPE_OT_footage_to_sequencer(ReportingOperator):
     """Put the footage, picture and sound, into the video sequencer, in time with the motion"""
 
     bl_idname = "scope.footage_to_sequencer"

@@ -159,7 +159,7 @@ def test_cancel_operator_ends_the_worker_at_once(fake_worker, footage):
     bpy.ops.scope.cancel()
     assert state.job.cancel_requested
     assert not state.job.worker.alive
-    capture_operators.stop_everything()
+    capture_operators.end_capture()
     assert bpy.ops.scope.capture.poll()
 
 
@@ -170,7 +170,7 @@ def test_no_workspace_goes_on_telling_of_a_capture_that_has_ended(monkeypatch):
         told[bpy.context.workspace.name] = text
 
     monkeypatch.setattr(bpy.types.WorkSpace, "status_text_set", tell)
-    capture_operators.stop_everything()
+    capture_operators.end_capture()
     assert len(told) > 1
     assert told == dict.fromkeys((workspace.name for workspace in bpy.data.workspaces), None)
 

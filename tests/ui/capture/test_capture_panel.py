@@ -12,7 +12,7 @@ from scope.scope_addon.motion import Motion
 from scope.scope_addon.scene.footage_strip import strips_of
 from scope.scope_addon.ui import drop
 from scope.scope_addon.ui.capture import capture_job
-from scope.scope_addon.ui.capture.capture_operators import state, stop_everything
+from scope.scope_addon.ui.capture.capture_operators import end_capture, state
 from scope.scope_addon.ui.preferences import cache
 
 FINISH = "finish()"
@@ -271,7 +271,7 @@ def test_the_current_frame_is_shown_while_capturing(fake_worker, footage):
     icon = preview_picture._collection["frame"]
     assert tuple(icon.image_size) == (3, 2)
     assert icon.image_pixels[0] == int.from_bytes(bytes(range(4)), "little")
-    stop_everything()
+    end_capture()
     assert preview_picture.icon_id() == 0
     preview_picture.show(b"half", 3, 2)
     assert preview_picture.icon_id() == 0
