@@ -327,7 +327,7 @@ def test_a_signal_that_nobody_heard_ends_the_batch_too(folder, tmp_path, monkeyp
         time.sleep(3)
         return {"status": "failed", "file": name, "message": ""}
 
-    monkeypatch.setattr(Batch, "_one", runs_on)
+    monkeypatch.setattr(Batch, "_capture_one", runs_on)
     assert main(["batch", str(folder), "--out", str(tmp_path / "out"), "--jobs", "2"]) == 130
     assert "stopped; finished clips are kept" in capsys.readouterr().err
 
@@ -363,7 +363,7 @@ def test_bad_arguments(tmp_path, capsys, argv, says):
     ("argv", "status", "says"),
     [
         (["--people", "40"], 2, "1 to 12"),
-        (["--people", "9" * 9999], 2, "--people takes a number"),
+        (["--people", "9" * 9999], 2, "--people must be a number"),
         (["--calibration", "{tmp}/lens.json"], 1, "lens.json is not a calibration"),
         (["--detector", "{tmp}/net.onnx"], 1, "net.onnx is not an ONNX model"),
         (["--keypoints", "{tmp}/net.onnx"], 1, "net.onnx is not an ONNX model"),

@@ -77,9 +77,9 @@ def test_an_orphan_that_goes_on_writing_leaves_nothing(tmp_path):
     code = (
         "import sys\n"
         "from pathlib import Path\n"
-        "from scope.scope_addon.job.worker import _die_with_parent\n"
+        "from scope.scope_addon.job.worker import _exit_with_parent\n"
         f"folder, number = Path({str(folder)!r}), 0\n"
-        "_die_with_parent(folder)\n"
+        "_exit_with_parent(folder)\n"
         "while True:\n"
         "    number += 1\n"
         "    try:\n"
