@@ -143,7 +143,7 @@ class SCOPE_OT_capture(bpy.types.Operator):
         try:
             from .capture_job import CaptureJob
         except ImportError as error:
-            return self._fail(f"a part of Scope cannot be loaded ({error}); install the extension again")
+            return self._fail(f"a part of Scope cannot be loaded ({error}); reinstall the extension")
         from ....solver.errors import ScopeError
 
         try:
