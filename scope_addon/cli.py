@@ -71,7 +71,9 @@ def _add_capture_files(capture: argparse.ArgumentParser) -> None:
     capture.add_argument(
         "--overlay", type=path_argument, metavar="FILE", help="draw the body over the footage: .mp4, .png, .jpg"
     )
-    capture.add_argument("--stop-with-stdin", action="store_true", help=argparse.SUPPRESS)  # passed by a batch to its processes
+    capture.add_argument(
+        "--stop-with-stdin", action="store_true", help=argparse.SUPPRESS
+    )  # passed by a batch to its processes
 
 
 def _add_batch_files(batch: argparse.ArgumentParser) -> None:
@@ -129,7 +131,9 @@ def run_capture(args: argparse.Namespace) -> dict[str, Any]:
     check_installed(CAPTURE)
     video = args.video or SAMPLE
     if not args.video and not SAMPLE.is_file():
-        raise UsageError("the sample clip is only part of the repository, not of this installation; give the VIDEO to capture")
+        raise UsageError(
+            "the sample clip is only part of the repository, not of this installation; give the VIDEO to capture"
+        )
     outputs = distinct_paths(args.output) or [video.with_suffix(".npz"), video.with_suffix(".glb")]
     check_outputs(outputs, args.overlay, video)
     check_blender(outputs)

@@ -81,7 +81,7 @@ class Motion:
         for name, (shape, dtype) in _SCHEMA.items():
             if dtype is str:
                 continue
-            expected = tuple(sizes.get(s, s) for s in shape)
+            expected = tuple(sizes[s] if isinstance(s, str) else s for s in shape)
             got = getattr(self, name).shape
             if got != expected:
                 raise MotionFileError(f"{where}: {name} must have shape {expected}, but has {got}")

@@ -137,7 +137,7 @@ class Batch:
     def _capture_one(
         self, name: str, path: Path, previous: dict[str, Any] | None, threads: dict[str, str]
     ) -> dict[str, Any]:
-        """Capture a clip unless it is finished, and return its entry in the report. Raises nothing if the clip fails."""
+        """Capture a clip unless it is finished, and return its entry in the report, also if the clip fails."""
         start = time.monotonic()
         entry: dict[str, Any] = {"file": self._relative(path).as_posix(), "name": name}
         try:
@@ -249,9 +249,7 @@ class Batch:
         except (OSError, ValueError, KeyError, TypeError):
             return {}
 
-    def _write_report(
-        self, entries: dict[str, dict[str, Any]], previous: dict[str, dict[str, Any]]
-    ) -> dict[str, Any]:
+    def _write_report(self, entries: dict[str, dict[str, Any]], previous: dict[str, dict[str, Any]]) -> dict[str, Any]:
         """Write and return the report. Clips that are still pending keep their entries of the previous report."""
         counts = Counter(e["status"] for e in entries.values())
         status = 1 if counts["failed"] else NO_PERSON if counts["no_person"] else 0

@@ -14,6 +14,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
+from typing import Any
 
 import cv2
 import numpy as np
@@ -119,12 +120,14 @@ def draw(
     height, width = image_rgb.shape[:2]
     scale = LONGER_SIDE / max(height, width)
     size = max(1, round(width * scale)), max(1, round(height * scale))
-    large = cv2.resize(image_rgb, (size[0] * _SUPERSAMPLE, size[1] * _SUPERSAMPLE), interpolation=cv2.INTER_AREA)
+    large_size = size[0] * _SUPERSAMPLE, size[1] * _SUPERSAMPLE
+    large: NDArray[Any] = cv2.resize(image_rgb, large_size, interpolation=cv2.INTER_AREA)
     if pose is not None:
         large = _with_body(large, pose, scale * _SUPERSAMPLE)
     elif observation is not None:
         _draw_skeleton(large, observation, scale * _SUPERSAMPLE)
-    return cv2.cvtColor(cv2.resize(large, size, interpolation=cv2.INTER_AREA), cv2.COLOR_RGB2RGBA)
+    rgba: NDArray[Any] = cv2.cvtColor(cv2.resize(large, size, interpolation=cv2.INTER_AREA), cv2.COLOR_RGB2RGBA)
+    return rgba
 
 
 def _with_body(image: NDArray[np.uint8], pose: LivePose, scale: float) -> NDArray[np.uint8]:

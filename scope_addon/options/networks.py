@@ -13,7 +13,12 @@ PROVIDERS = (
     Choice("auto", "Automatic", "A supported GPU if there is one, otherwise the CPU", 0),
     Choice("cpu", "CPU", "The processor", 1),
     Choice("cuda", "CUDA", "An NVIDIA GPU", 2),
-    Choice("tensorrt", "TensorRT", "An NVIDIA GPU with TensorRT, which takes minutes to compile each network on first use", 3),
+    Choice(
+        "tensorrt",
+        "TensorRT",
+        "An NVIDIA GPU with TensorRT, which takes minutes to compile each network on first use",
+        3,
+    ),
     Choice("directml", "DirectML", "Any GPU on Windows", 4),
     Choice("coreml", "Core ML", "Apple silicon", 5),
 )
@@ -29,7 +34,7 @@ NETWORK_OPTIONS = (
         blender=Property(
             "detector_file",
             "Person Detector",
-            "Custom detector (.onnx): YOLOX, YOLOv4, YOLOv8 and similar; if empty, the built-in one",
+            "Custom detector (.onnx): YOLOX, YOLOv4, YOLOv8 and similar; built-in if empty",
         ),
     ),
     Option(
@@ -42,7 +47,7 @@ NETWORK_OPTIONS = (
         blender=Property(
             "keypoints_file",
             "Keypoint Network",
-            "Custom keypoint network (.onnx): RTMPose, HRNet, ViTPose and similar; if empty, the built-in one",
+            "Custom keypoint network (.onnx): RTMPose, HRNet, ViTPose and similar; built-in if empty",
         ),
     ),
     Option(
@@ -56,7 +61,7 @@ NETWORK_OPTIONS = (
         argument=Argument(default_text="auto, the fastest available"),
         blender=Property(
             label="Networks Run On",
-            description="What the networks run on; if it is unavailable, the CPU is used and the result shows a warning",
+            description="What the networks run on; if unavailable, the CPU is used and the result shows a warning",
         ),
     ),
     Option(

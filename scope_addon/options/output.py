@@ -11,7 +11,10 @@ SHAPES = (
     Choice("keyed", "Shape Keys", "The body's shape as shape keys with one keyframe each", 0),
     Choice("per_frame", "Shape Keys per Frame", "The same, with a keyframe on every frame", 1),
     Choice(
-        "baked", "In the Mesh", "No shape keys: the shape is applied to the mesh, for engines that limit shape keys to 0..1", 2
+        "baked",
+        "In the Mesh",
+        "No shape keys: the shape is applied to the mesh, for engines that limit shape keys to 0..1",
+        2,
     ),
 )
 ROOTS = (

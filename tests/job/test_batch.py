@@ -294,9 +294,7 @@ def test_the_clips_of_a_killed_batch_end_and_leave_nothing_unfinished(tmp_path, 
 def test_a_signal_ends_the_batch_and_its_clips_whoever_handled_it_before(folder, tmp_path, number):
     """Blender handles Ctrl-C itself, and only takes a note of it."""
     (tmp_path / "clip.py").write_text(
-        "import os, pathlib, sys\n"
-        "pathlib.Path(sys.argv[2] + '.pid').write_text(str(os.getpid()))\n"
-        "sys.stdin.read()\n"
+        "import os, pathlib, sys\npathlib.Path(sys.argv[2] + '.pid').write_text(str(os.getpid()))\nsys.stdin.read()\n"
     )
     code = (
         "import signal, sys\n"

@@ -136,9 +136,9 @@ def test_an_export_that_cannot_be_written_is_told(fake_worker, footage, tmp_path
 @pytest.mark.parametrize("name", ["", ".glb"])
 def test_an_export_without_a_name_asks_for_one(fake_worker, footage, tmp_path, name):
     captured(fake_worker, footage)
-    with pytest.raises(RuntimeError, match="Give the file to write a name"):
+    with pytest.raises(RuntimeError, match="The file has no name; enter one"):
         bpy.ops.scope.export(filepath=f"{tmp_path}/{name}", format="GLB")
-    with pytest.raises(RuntimeError, match="Give the file to write a name"):
+    with pytest.raises(RuntimeError, match="The file has no name; enter one"):
         bpy.ops.scope.export(format="GLB")
 
 

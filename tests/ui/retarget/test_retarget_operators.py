@@ -207,7 +207,7 @@ def test_a_bone_map_that_cannot_be_saved_names_its_place(rig, tmp_path):
 
 def test_without_a_rig_its_export_says_what_to_do(rig, tmp_path):
     bpy.context.scene.scope_retarget.rig = None
-    with pytest.raises(RuntimeError, match="choose yours"):
+    with pytest.raises(RuntimeError, match="choose a rig there"):
         bpy.ops.scope.export(filepath=str(tmp_path / "hero.fbx"), format="FBX", which="RIG")
 
 
