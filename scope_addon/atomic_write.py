@@ -21,7 +21,7 @@ _temporary_files: set[Path] = set()
 def atomic_path(path: Path) -> Iterator[Path]:
     """Create a temporary file in the folder of ``path``, and rename it to ``path`` when the block ends.
 
-    If the block is left by an exception, the temporary file is removed and ``path`` stays as it was. If ``path`` is a
+    If the block is left by an exception, the temporary file is removed and ``path`` is unchanged. If ``path`` is a
     link, its target is written and the link stays.
 
     :return: context manager that gives the temporary file's path. The block may replace the file, which is empty at

@@ -140,7 +140,7 @@ def run_capture(args: argparse.Namespace) -> dict[str, Any]:
     rig = checked_rig(args, outputs)
 
     body, options = body_and_options(args)
-    # Imported here, so that --help and errors in the arguments are printed at once.
+    # Imported here, so that --help and errors in the arguments are printed immediately.
     from .capture.overlay.overlay_video import write_overlay
     from .capture.pipeline import capture
 

@@ -16,7 +16,7 @@ _CLEAR_LINE = "\r\x1b[K"
 
 
 def say(text: str) -> None:
-    """Print a message on a line of its own, even if a progress bar is shown."""
+    """Print a message on a separate line, even if a progress bar is shown."""
     clear = _CLEAR_LINE if sys.stderr.isatty() else ""
     print(f"{clear}scope: {text}", file=sys.stderr, flush=True)
 

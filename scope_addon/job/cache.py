@@ -128,7 +128,7 @@ class Cache:
 
 
 def _by_time(folder: Path) -> list[tuple[Path, float]]:
-    """Return the content of a folder with modification times, newest first. Entries removed meanwhile are skipped."""
+    """Return the content of a folder with modification times, newest first; concurrently removed entries are skipped."""
     found = []
     with suppress(OSError):
         for path in folder.iterdir():
@@ -138,7 +138,7 @@ def _by_time(folder: Path) -> list[tuple[Path, float]]:
 
 
 def _files(folder: Path) -> Iterator[Path]:
-    """Yield every file below a folder. Folders that another process removes meanwhile count as empty."""
+    """Yield every file below a folder. A folder that is concurrently removed counts as empty."""
     for below, _, names in os.walk(folder):
         for name in names:
             yield Path(below, name)
@@ -147,6 +147,6 @@ def _files(folder: Path) -> Iterator[Path]:
 def _size(folder: Path) -> int:
     total = 0
     for path in _files(folder):
-        with suppress(OSError):  # removed meanwhile
+        with suppress(OSError):  # removed by another process
             total += path.stat().st_size
     return total

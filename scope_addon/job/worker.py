@@ -18,7 +18,7 @@ from ..errors import exit_status, system_error_message
 from .parent import when_parent_ends
 from .request import JobRequest
 
-_REMOVAL_ATTEMPTS = 20  # an attempt fails if a file is created meanwhile
+_REMOVAL_ATTEMPTS = 20  # an attempt fails if a file is created during it
 _MIN_INTERVAL_S = 0.05  # between two progress messages of one stage
 
 

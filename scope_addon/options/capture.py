@@ -66,7 +66,7 @@ CAPTURE_OPTIONS = (
         (int, str),
         LARGEST,
         _EVERYWHERE,
-        "who is captured",
+        "people to capture",
         minimum=1,
         maximum=12,
         choices=PEOPLE,

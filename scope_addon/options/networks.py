@@ -55,13 +55,13 @@ NETWORK_OPTIONS = (
         str,
         "auto",
         _NETWORKS,
-        "what the networks run on",
+        "execution provider of the networks",
         choices=PROVIDERS,
         decides_result=False,
         argument=Argument(default_text="auto, the fastest available"),
         blender=Property(
             label="Networks Run On",
-            description="What the networks run on; if unavailable, the CPU is used and the result shows a warning",
+            description="Execution provider; if unavailable, the CPU is used and the result shows a warning",
         ),
     ),
     Option(
