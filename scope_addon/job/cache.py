@@ -128,7 +128,7 @@ class Cache:
 
 
 def _by_time(folder: Path) -> list[tuple[Path, float]]:
-    """Return the content of a folder with modification times, newest first; concurrently removed entries are skipped."""
+    """Return the content of a folder with modification times, newest first, without concurrently removed entries."""
     found = []
     with suppress(OSError):
         for path in folder.iterdir():
