@@ -71,9 +71,8 @@ def _add_capture_files(capture: argparse.ArgumentParser) -> None:
     capture.add_argument(
         "--overlay", type=path_argument, metavar="FILE", help="draw the body over the footage: .mp4, .png, .jpg"
     )
-    capture.add_argument(
-        "--stop-with-stdin", action="store_true", help=argparse.SUPPRESS
-    )  # passed by a batch to its processes
+    # Passed by a batch to its processes.
+    capture.add_argument("--stop-with-stdin", action="store_true", help=argparse.SUPPRESS)
 
 
 def _add_batch_files(batch: argparse.ArgumentParser) -> None:
@@ -94,7 +93,7 @@ def _add_batch_files(batch: argparse.ArgumentParser) -> None:
 
 
 def main(argv: Sequence[str] | None = None, program: Sequence[str] = PROGRAM) -> int:
-    """Run the command line and return the exit status. No error leaves as an exception.
+    """Run the command line and return the exit status. Errors are printed, not raised.
 
     :param argv: arguments; those of the process if None.
     :param program: command that takes these arguments; a batch starts one such process per clip.

@@ -60,8 +60,8 @@ NETWORK_OPTIONS = (
         decides_result=False,
         argument=Argument(default_text="auto, the fastest available"),
         blender=Property(
-            label="Networks Run On",
-            description="Execution provider; if unavailable, the CPU is used and the result shows a warning",
+            label="Execution Provider",
+            description="What the networks run on; if unavailable, the CPU is used and the result shows a warning",
         ),
     ),
     Option(
