@@ -13,7 +13,7 @@ from typing import Any
 for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ[_name] = "1"  # before numpy: everything is measured in one thread
 
-from ..scope_addon.atomic_write import written_beside  # noqa: E402
+from ..scope_addon.atomic_write import atomic_path  # noqa: E402
 from . import frames, report  # noqa: E402
 from .solver import peers, plots, startup, steps  # noqa: E402
 
@@ -92,7 +92,7 @@ def main() -> int:
 
         figures = perception(args.quick)
     if args.json:
-        with written_beside(args.json) as temporary:
+        with atomic_path(args.json) as temporary:
             temporary.write_text(json.dumps(figures, indent=1))
     return 0
 

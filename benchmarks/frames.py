@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..scope_addon.atomic_write import written_beside
+from ..scope_addon.atomic_write import atomic_path
 from ..scope_addon.capture.camera.intrinsics import choose_camera
 from ..scope_addon.capture.fitting import track_fit
 from ..scope_addon.capture.fitting.track_fit import prepare_track
@@ -93,7 +93,7 @@ def write(path: Path, calls: Sequence[tuple[Measurements, Priors]]) -> None:
     fixed = (m.intrinsics, a.indices, c.starts, c.ends, priors.joint_weights)
     arrays |= {key: np.asarray(value) for key, value in zip(FIXED, fixed, strict=True)}
     path.parent.mkdir(parents=True, exist_ok=True)
-    with written_beside(path) as temporary:
+    with atomic_path(path) as temporary:
         np.savez(temporary, **arrays)
 
 

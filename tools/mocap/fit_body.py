@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ...scope_addon.atomic_write import written_beside
+from ...scope_addon.atomic_write import atomic_path
 from ...solver import Keypoints3D, Measurements, Options, PosePriors, Priors, Stage, State, Weights, fit_tree, make_tree
 from ...solver.body import Body
 from ...solver.loaders.body_file import load_body
@@ -178,7 +178,7 @@ def save(path: Path, body: Body, fitted: list[FittedTake]) -> None:
     take_fps and take_betas[k]; up is ``y``.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
-    with written_beside(path) as temporary:
+    with atomic_path(path) as temporary:
         np.savez_compressed(
             temporary,
             poses=np.concatenate([f.poses for f in fitted]).astype(np.float32),

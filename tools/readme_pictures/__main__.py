@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ...scope_addon.atomic_write import written_beside
+from ...scope_addon.atomic_write import atomic_path
 from ...solver.loaders.body_file import ASSETS
 from . import animation, pictures
 from .clips import DATA
@@ -59,7 +59,7 @@ def _write(path: Path, picture: NDArray[np.uint8]) -> None:
         data = cv2.imencode(".jpg", bgr, [cv2.IMWRITE_JPEG_QUALITY, quality])[1].tobytes()
         if len(data) <= LARGEST_BYTES:
             break
-    with written_beside(path) as temporary:
+    with atomic_path(path) as temporary:
         temporary.write_bytes(data)
     print(f"{path}: {picture.shape[1]} x {picture.shape[0]}, {len(data) / 1000:.0f} kB, quality {quality}")
 
@@ -67,7 +67,7 @@ def _write(path: Path, picture: NDArray[np.uint8]) -> None:
 def _write_animation(path: Path) -> None:
     """Write the moving picture."""
     frames = animation.sample_frames()
-    with written_beside(path) as temporary:
+    with atomic_path(path) as temporary:
         quality = animation.write_webp(temporary, frames, 30 / animation.FRAME_STEP)
     height, width = frames[0].shape[:2]
     size_kb = path.stat().st_size / 1000

@@ -12,7 +12,7 @@ import torch
 from numpy.typing import NDArray
 from onnx import TensorProto, helper, numpy_helper
 
-from ...scope_addon.atomic_write import written_beside
+from ...scope_addon.atomic_write import atomic_path
 from ...scope_addon.capture.perception.lifter import INPUT_SIZE, KEYPOINT_COUNT
 from ...scope_addon.capture.perception.lifter_window import WINDOW
 from .network import LOG_SIGMA_RANGE, LiftingNetwork
@@ -97,5 +97,5 @@ def export(network: LiftingNetwork, path: Path) -> None:
     model = helper.make_model(graph, producer_name="scope", opset_imports=opset, ir_version=8)
     onnx.checker.check_model(model, full_check=True)
     path.parent.mkdir(parents=True, exist_ok=True)
-    with written_beside(path) as temporary:
+    with atomic_path(path) as temporary:
         onnx.save(model, str(temporary))

@@ -15,7 +15,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ...scope_addon.atomic_write import written_beside
+from ...scope_addon.atomic_write import atomic_path
 from ...scope_addon.capture.overlay.rasterizer import Canvas, rasterize
 from ...scope_addon.capture.perception.landmark_network import LandmarkNetwork
 from ...scope_addon.capture.perception.region import region_from_points
@@ -110,7 +110,7 @@ def observe(
 def save(path: Path, pairs: list[dict[str, Any]]) -> None:
     """Write the pairs, replacing what is there."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    with written_beside(path) as temporary:
+    with atomic_path(path) as temporary:
         np.savez_compressed(temporary, **{key: np.array([pair[key] for pair in pairs], np.float32) for key in KEYS})
 
 

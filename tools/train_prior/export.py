@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ...scope_addon.atomic_write import written_beside
+from ...scope_addon.atomic_write import atomic_path
 from ...solver.residuals import joint_flow as jf
 from ...solver.rotations import nearest_rotation
 from .data import MIRROR, PAIRED, TRUNK, WITHOUT_DATA, Samples
@@ -70,7 +70,7 @@ def save(path: Path, joints: Mapping[str, NDArray[np.float64]], joint_names: Seq
     """Write the parameters by joint, in the order of a body's ``joint_names`` (K+1,)."""
     names = [name for name in joint_names if name in joints]
     path.parent.mkdir(parents=True, exist_ok=True)
-    with written_beside(path) as temporary:
+    with atomic_path(path) as temporary:
         np.savez_compressed(
             temporary,
             joint_names=np.array(names),

@@ -17,7 +17,7 @@ from numba import njit
 from ....solver.body import Body
 from ....solver.errors import ShapeError
 from ....solver.rotations import exp
-from ...atomic_write import reason, written_beside
+from ...atomic_write import atomic_path, reason
 from ...errors import OutputError
 from ...motion import Motion
 from ..camera.intrinsics import scaled_intrinsics
@@ -66,7 +66,7 @@ def write_overlay(
     with open_video(video_path, wanted) as video:
         painter = _Painter(people, body, video, opacity, even=suffix in VIDEO_SUFFIXES)
         try:
-            with written_beside(path) as temporary:
+            with atomic_path(path) as temporary:
                 if suffix in STILL_SUFFIXES:
                     _write_still(temporary, painter, video, _first_seen(people))
                 else:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ....solver.body import Body
 from ...motion import Motion
-from ...review_spans import REASONS, low_confidence_spans
+from ...review_spans import REASONS, find_review_spans
 from ..animation_data.actions import Channels, bone_property_path
 
 CONFIDENCE, CONTACT = "confidence", "contact"
@@ -58,7 +58,7 @@ def add_review_markers(scene: bpy.types.Scene, prefix: str, motion: Motion, fram
     :param prefix: of the marker's name, to distinguish several people.
     :param frames: (T,) scene frame of each pose.
     """
-    spans = sorted(low_confidence_spans(motion, _GAP_S), key=lambda span: span.first - span.last)[:_MAX_MARKERS]
+    spans = sorted(find_review_spans(motion, _GAP_S), key=lambda span: span.first - span.last)[:_MAX_MARKERS]
     there = {(marker.name, marker.frame) for marker in scene.timeline_markers}
     for span in sorted(spans, key=lambda span: span.first):
         first, last = round(float(frames[span.first])), round(float(frames[span.last]))

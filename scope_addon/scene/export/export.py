@@ -16,7 +16,7 @@ from pathlib import Path
 import bpy
 
 from ....solver.body import Body
-from ...atomic_write import reason, written_beside
+from ...atomic_write import atomic_path, reason
 from ...errors import OutputError, UsageError
 from ...motion import Motion
 from ..animation_data import actions
@@ -197,7 +197,7 @@ def _write(path: Path, writer: Callable[[Path], None]) -> None:
     :raises OutputError: when the file cannot be written.
     """
     try:
-        with written_beside(path) as temporary:
+        with atomic_path(path) as temporary:
             temporary.unlink()  # Blender's writers differ in what they do with an existing file
             with formats.quiet():
                 writer(temporary)

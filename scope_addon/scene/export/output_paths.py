@@ -7,7 +7,7 @@ import errno
 import os
 from pathlib import Path
 
-from ...atomic_write import file_behind, reason
+from ...atomic_write import reason, resolve_link
 from ...errors import OutputError, UsageError
 
 SUFFIXES = (".glb", ".fbx", ".blend", ".bvh", ".usdc", ".npz")
@@ -37,7 +37,7 @@ def check_output(path: str | Path, suffixes: tuple[str, ...] = SUFFIXES) -> Path
             raise OutputError(f"cannot write {path}: {reason(error)}") from error
     if path.is_dir():
         raise OutputError(f"cannot write {path}: a folder of that name exists; choose another name")
-    folder = file_behind(path).parent
+    folder = resolve_link(path).parent
     if not folder.is_dir():
         raise OutputError(f"cannot write {path}: it is a link into {folder}, which does not exist; choose another name")
     if not os.access(folder, os.W_OK):
