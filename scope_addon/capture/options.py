@@ -14,7 +14,7 @@ from ..options import OPTIONS, Place, options_at
 from ..options.capture import ALL, LARGEST
 from .camera.calibration import read_calibration
 from .camera.intrinsics import choose_camera
-from .fitting.ablation import ALL_PARTS, Parts
+from .fitting.ablation import NO_ABLATION, Ablation
 from .fitting.hand_measurements import require_fingers
 from .fitting.stature import require_stature
 from .media.video_range import VideoRange, Wanted, parse_range
@@ -47,7 +47,7 @@ class CaptureOptions:
     provider: str = _DEFAULT["provider"]  # what the networks run on; see `execution`
     detector: Path | None = _DEFAULT["detector"]  # the user's own networks, ONNX files; see `adapters`
     keypoints: Path | None = _DEFAULT["keypoints"]
-    parts: Parts = ALL_PARTS  # for experiments
+    ablation: Ablation = NO_ABLATION  # for experiments
 
 
 def capture_options(values: Mapping[str, Any]) -> CaptureOptions:
@@ -72,7 +72,7 @@ def check_options(body: Body, options: CaptureOptions) -> None:
     most_people(options.people)
     landmark_network_name(options.quality)
     Execution(options.provider)
-    if options.keypoints and not options.parts.lifter:
+    if options.keypoints and not options.ablation.lifter:
         raise UsageError("the lifter cannot be left out with a keypoint file: such a network does not estimate depth")
     if options.hands:
         require_fingers(body)

@@ -47,7 +47,7 @@ def capture(
     with open_video(Path(path), options.wanted) as video:
         footage, tracks = observe(video, body, options, clock, Listeners(progress, watch))
     with clock.stage("solver"):
-        tracks = [repair(track, footage.camera, options.parts) for track in tracks]
+        tracks = [repair(track, footage.camera, options.ablation) for track in tracks]
         solved = solve(_shot(video, body, options, footage), tracks, progress, options.heights_m)
         motions = [replace(motion, timestamps=footage.timestamps) for motion in solved.motions]
     rates = clock.rates(len(footage.timestamps))
@@ -57,7 +57,7 @@ def capture(
 def _shot(video: Video, body: Body, options: CaptureOptions, footage: Footage) -> Shot:
     """Put together what the solver knows of the footage: the camera's path is so far its rotation alone."""
     frames, motion = len(footage.timestamps), footage.camera_motion
-    path = CameraPath.on_a_stand(frames) if motion.is_static else CameraPath.turning(motion.R_first_camera)
+    path = CameraPath.static(frames) if motion.is_static else CameraPath.rotating(motion.R_first_camera)
     return Shot(
         body,
         footage.camera,
@@ -67,5 +67,5 @@ def _shot(video: Video, body: Body, options: CaptureOptions, footage: Footage) -
         (video.width, video.height),
         Path(video.path).name,
         options.smoothing and frames > 1,
-        options.parts,
+        options.ablation,
     )

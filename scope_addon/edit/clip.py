@@ -10,7 +10,7 @@ import numpy as np
 from ...solver.body import Body
 from ...solver.rotations import exp, log
 from ..errors import UsageError
-from ..kinematics.contact_points import SOLES, support_points, with_supports
+from ..kinematics.contact_points import SOLES, contact_point_positions, with_contact_points
 from ..kinematics.smoothing import smooth_rotations
 
 
@@ -28,7 +28,7 @@ class Clip:
     def soles(self, body: Body, betas: np.ndarray) -> np.ndarray:
         """(T, 4, 3) left heel, left toe, right heel, right toe on the floor's side of the foot, world frame."""
         R, t = body.forward_kinematics(self.rotations, self.root - body.rest_joints(betas)[0], betas)
-        return support_points(with_supports(body, betas), R, t)[:, : len(SOLES)]
+        return contact_point_positions(with_contact_points(body, betas), R, t)[:, : len(SOLES)]
 
     def joints(self, body: Body, betas: np.ndarray) -> np.ndarray:
         """(T, K+1, 3) joints, world frame."""

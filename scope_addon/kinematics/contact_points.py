@@ -12,7 +12,7 @@ from ...solver.body import Body
 FOOT_PARTS = ("left_ankle", "left_foot", "right_ankle", "right_foot")
 SOLES = ("sole/left_heel", "sole/left_toe", "sole/right_heel", "sole/right_toe")
 PALMS = ("palm/left", "palm/right")
-SUPPORTS = SOLES + PALMS
+CONTACT_POINTS = SOLES + PALMS
 
 
 def _hand_parts(body: Body) -> tuple[str, str]:
@@ -23,8 +23,8 @@ def _hand_parts(body: Body) -> tuple[str, str]:
     return left, right
 
 
-def with_supports(body: Body, betas: np.ndarray) -> Body:
-    """The body with six more keypoints, `SUPPORTS`.
+def with_contact_points(body: Body, betas: np.ndarray) -> Body:
+    """The body with six more keypoints, `CONTACT_POINTS`.
 
     Each lies on the ankle, foot or hand part, in the middle of the part's lowest centimetre at rest, where it presses
     on the floor: rest poses hold their palms down. Exact for these betas; the points keep their place relative to the
@@ -41,16 +41,16 @@ def with_supports(body: Body, betas: np.ndarray) -> Body:
         local[k] = lowest - J[part]
     return replace(
         body,
-        keypoint_names=(*body.keypoint_names, *SUPPORTS),
+        keypoint_names=(*body.keypoint_names, *CONTACT_POINTS),
         keypoint_part=np.concatenate([body.keypoint_part, parts]),
         keypoint_template=np.concatenate([body.keypoint_template, body.J_template[parts] + local]),
         keypoint_shapedirs=np.concatenate([body.keypoint_shapedirs, body.J_shapedirs[parts]]),
     )
 
 
-def support_points(body_with_supports: Body, R: np.ndarray, t: np.ndarray) -> np.ndarray:
-    """(T, 6, 3) the supports of ``with_supports``'s body.
+def contact_point_positions(body_with_supports: Body, R: np.ndarray, t: np.ndarray) -> np.ndarray:
+    """(T, 6, 3) the contact_points of ``with_contact_points``'s body.
 
     :param R, t: (T, K+1, 3, 3), (T, K+1, 3) part poses in any frame; the result is in that frame.
     """
-    return body_with_supports.keypoints(R, t, which=slice(-len(SUPPORTS), None))
+    return body_with_supports.keypoints(R, t, which=slice(-len(CONTACT_POINTS), None))

@@ -15,7 +15,7 @@ import numpy as np
 Record = TypeVar("Record", bound=Any)
 
 
-def compact(record: Record) -> Record:
+def to_single_precision(record: Record) -> Record:
     """A dataclass with each (T, ...) float64 array of more than a point a frame as float32."""
     large = {}
     for field in fields(record):

@@ -19,7 +19,7 @@ WRONG_DEPTH_M = 0.4
 LEVEL_M = 0.25  # h_l: feet that stand farther above or below stand on something else
 
 
-def along_sight(position: np.ndarray) -> np.ndarray:
+def line_of_sight(position: np.ndarray) -> np.ndarray:
     """(..., 3) unit vectors from the camera's centre to positions (..., 3) about it."""
     return position / np.maximum(np.linalg.norm(position, axis=-1, keepdims=True), 1e-9)
 
@@ -41,22 +41,24 @@ def standing_probability(
     height = height - height.min(axis=1, keepdims=True)
     speed, allowed = _speed(soles, times, center), np.full(height.shape, CONTACT_HEIGHT_M)
     if len(times) > 2 and center is not None:
-        upwards = np.abs(along_sight(soles - np.expand_dims(center, -2)) @ up)
+        upwards = np.abs(line_of_sight(soles - np.expand_dims(center, -2)) @ up)
         mean_speed = np.sqrt(gaussian_smooth(np.square(speed), times, STILL_CUTOFF_HZ))
         allowed += WRONG_DEPTH_M * upwards * logistic(4 * (1 - mean_speed / STILL_M_S))
     return logistic(4 * (1 - speed / CONTACT_SPEED_M_S)) * logistic(4 * (1 - height / allowed))
 
 
-def resting_probability(supports: np.ndarray, up: np.ndarray, times: np.ndarray, center: np.ndarray) -> np.ndarray:
+def resting_probability(
+    contact_points: np.ndarray, up: np.ndarray, times: np.ndarray, center: np.ndarray
+) -> np.ndarray:
     """(T, 6) probability that each sole and palm rests on something: soles as `standing_probability` has them.
 
     A palm rests where it is slow and not higher than the lowest sole: p = s(4(1 − v/v₀)) s(4(1 − h/h_p)), h the height
     above that. Soles that are far above a palm, of one who stands on the hands, do not stand: their p is multiplied by
     s(8(1 − d/2h_l)) / s(8), d ≥ 0 the height of the lowest sole over the lowest palm.
 
-    :param supports: (T, 6, 3) metres, seen from ``center`` (T, 3) or (3,);  up: (3,) unit;  times: (T,) seconds.
+    :param contact_points: (T, 6, 3) metres, seen from ``center`` (T, 3) or (3,);  up: (3,) unit;  times: (T,) seconds.
     """
-    soles, palms = np.split(supports, [len(SOLES)], axis=1)
+    soles, palms = np.split(contact_points, [len(SOLES)], axis=1)
     height = palms @ up - (soles @ up).min(axis=1, keepdims=True)
     stands = standing_probability(soles, up, times, center)
     slow = logistic(4 * (1 - _speed(palms, times, center) / CONTACT_SPEED_M_S))
@@ -72,7 +74,7 @@ def _speed(points: np.ndarray, times: np.ndarray, center: np.ndarray | None) -> 
     velocity = np.gradient(gaussian_smooth(points, times, CONTACT_CUTOFF_HZ), times, axis=0)
     if center is None:
         return np.linalg.norm(velocity, axis=-1)
-    sight = along_sight(points - np.expand_dims(center, -2))
+    sight = line_of_sight(points - np.expand_dims(center, -2))
     return np.linalg.norm(velocity - sight * (velocity * sight).sum(-1, keepdims=True), axis=-1)
 
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 
 
-def cheapest_path(costs: np.ndarray, switching: np.ndarray) -> np.ndarray:
+def least_cost_path(costs: np.ndarray, switching: np.ndarray) -> np.ndarray:
     """The states x that minimise Σ_t costs[t, x_t] + Σ_{t≥1} switching[t−1, x_{t−1}, x_t]; of equals, lower numbers.
 
     :param costs: (T, S) of being in a state.

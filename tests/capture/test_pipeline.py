@@ -172,7 +172,9 @@ def test_a_cancel_comes_through_and_leaves_no_thread(body):
     with pytest.raises(CancelledError):
         capture(SAMPLE, body, CaptureOptions(quality="fast"), cancel)
     deadline = time.monotonic() + 60  # a solver that is not compiled yet is compiled to the end
-    while time.monotonic() < deadline and (left := [t.name for t in threading.enumerate() if "beside" in t.name]):
+    while time.monotonic() < deadline and (
+        left := [t.name for t in threading.enumerate() if "scope-background" in t.name]
+    ):
         time.sleep(0.02)
     assert not left
 

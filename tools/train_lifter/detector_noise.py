@@ -2,8 +2,8 @@
 """What a detector makes of true keypoints: displaced and uncertain 2D keypoints, distorted world landmarks.
 
 The detector's keypoints are not our body's: each lies at a constant offset in its body part, the one of
-`seen_keypoints` and another of each person's own (people differ in build and clothes). To this come errors of the image
-and, in the world landmarks, a whole that is tilted, scaled and flattened, limbs that point elsewhere in depth, and now
+`keypoint_offsets` and another of each person's own (people differ in build and clothes). To this come errors of the
+image and, in the world landmarks, a whole that is tilted, scaled and flattened, limbs that point elsewhere in depth, and now
 and then a limb mirrored in depth.
 
 Errors last. Those of the depth of bones, as `pose_landmark_heavy` sees them on footage and renders with known truth, go

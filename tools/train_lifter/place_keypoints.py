@@ -2,7 +2,7 @@
 """Where the landmark network sees keypoints: ``python -m scope.tools.train_lifter.place_keypoints FOLDER``.
 
 FOLDER holds the clips (../shared/data/clips). Prints, for every person and for all of them, what the least squares of
-`seen_keypoints` find in captures whose keypoints lie at our body's own; the last column belongs into that module.
+`keypoint_offsets` find in captures whose keypoints lie at our body's own; the last column belongs into that module.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...scope_addon.capture.fitting.ablation import Parts
+from ...scope_addon.capture.fitting.ablation import Ablation
 from ...scope_addon.capture.options import CaptureOptions
 from ...scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES
 from ...scope_addon.capture.pipeline import capture
@@ -59,10 +59,10 @@ def main() -> None:
     parser = argparse.ArgumentParser(description="Find where the landmark network sees keypoints.")
     parser.add_argument("clips", type=Path, help="folder of the clips")
     folder: Path = parser.parse_args().clips
-    body, parts = load_body("scope"), Parts(seen_keypoints=False)
+    body, ablation = load_body("scope"), Ablation(keypoint_offsets=False)
     everybody = []
     for clip in CLIPS:
-        found = capture(folder / f"{clip}.mp4", body, CaptureOptions(people="all", parts=parts))
+        found = capture(folder / f"{clip}.mp4", body, CaptureOptions(people="all", ablation=ablation))
         everybody += [normal_equations(body, m) for m in found.motions if m.valid.sum() >= LEAST_FRAMES]
     columns = [offsets(*each) for each in everybody]
     columns.append(offsets(*(np.sum(each, axis=0) for each in zip(*everybody, strict=True))))

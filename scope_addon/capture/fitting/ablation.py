@@ -10,17 +10,17 @@ from ...errors import UsageError
 
 
 @dataclass(frozen=True)
-class Parts:
+class Ablation:
     """All parts by default. Of ``lifter`` and ``world_landmarks``, the two sources of depth, one has to stay."""
 
     lifter: bool = True  # else the landmark network's own world landmarks stand in for it
     world_landmarks: bool = True  # as input of the lifter
-    seen_keypoints: bool = True  # keypoints where the networks see them on a body, instead of at its joints
+    keypoint_offsets: bool = True  # keypoints where the networks see them on a body, instead of at its joints
     keypoints3d: bool = True
     orientation_field: bool = True
     joint_prior: bool = True
     left_right: bool = True  # repair of left and right
-    leaps: bool = True  # repair of keypoints that leap away for a few frames
+    keypoint_jumps: bool = True  # repair of keypoints that leap away for a few frames
     second_pass: bool = True  # the fit again with the distance that floor and feet tell
     balance: bool = True  # in it, weight over feet that stand
     floor: bool = True  # in it, feet that stand on the floor
@@ -42,4 +42,4 @@ class Parts:
         )
 
 
-ALL_PARTS = Parts()
+NO_ABLATION = Ablation()

@@ -26,13 +26,13 @@ from .live_body import LiveBody
 _THREADS = 2  # the background and its edges; the solver has another one: while it is compiled, it holds up neither
 
 
-class BesideTracking:
+class BackgroundEstimators:
     """Takes frames in order. Leaving it on an error, such as a cancel, drops what has not begun; no thread stays."""
 
     def __init__(self, camera: Camera, width: int, height: int, live: LiveBody, fits: FocalFits) -> None:
         self.background = BackgroundTracker(camera, width, height)
         self._given_camera, self._size, self._fits = camera, (width, height), fits
-        self._pool = ThreadPoolExecutor(_THREADS, "scope-beside")
+        self._pool = ThreadPoolExecutor(_THREADS, "scope-background")
         self._solver = ThreadPoolExecutor(1, "scope-solver")
         self._looking: Future[None] | None = None
         self._largest: tuple[float, Observation] | None = None  # when, and who, in the frame that is looked at
@@ -41,7 +41,7 @@ class BesideTracking:
         self._costs: list[Future[np.ndarray | None]] = []
         self._solver.submit(live.load)
 
-    def __enter__(self) -> BesideTracking:
+    def __enter__(self) -> BackgroundEstimators:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
@@ -49,9 +49,7 @@ class BesideTracking:
         for pool in (self._pool, self._solver):
             pool.shutdown(wait=False, cancel_futures=kind is not None)
 
-    def add(
-        self, frame: Frame, people: list[Observation], largest: Observation | None, is_cut: bool = False
-    ) -> None:
+    def add(self, frame: Frame, people: list[Observation], largest: Observation | None, is_cut: bool = False) -> None:
         """Begin with this frame, the first of a scene if ``is_cut``; ``largest``: of the people.
 
         Waits for the background of the one before, and raises what went wrong there.
@@ -70,9 +68,7 @@ class BesideTracking:
             return
         if self._by_edges is None:
             self._longer_px = longer_content_side(self.background.bars, *self._size)
-            self._by_edges = self._pool.submit(
-                camera_by_edges, self.background.segments, *self._size, self._longer_px
-            )
+            self._by_edges = self._pool.submit(camera_by_edges, self.background.segments, *self._size, self._longer_px)
         if self._largest is not None and self._fits.is_due(self._largest[0]):
             self._costs.append(self._solver.submit(self._fits.costs, self._largest[1], self._assumed()))
         self._largest = None

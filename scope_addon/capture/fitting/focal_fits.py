@@ -25,8 +25,8 @@ from ....solver import Body
 from ..camera.intrinsics import Camera, pinhole
 from ..perception.observation import Observation
 from ..tracking.track import single_frame_track
-from .ablation import ALL_PARTS, Parts
-from .track_fit import fit_picture, prepare_track
+from .ablation import NO_ABLATION, Ablation
+from .track_fit import fit_single_frame, prepare_track
 
 LOG_RATIOS = np.array([-0.7, -0.35, 0.0, 0.35, 0.7])  # of the focal lengths that are tried
 SHARE = 0.2  # of 0 to 1.2, 0.2 to 0.3 is best for preset best, 0.1 to 0.2 for fast; see `camera`
@@ -36,8 +36,8 @@ FIRST_GAP_S = 0.2  # between pictures; each further gap is twice as long, so tha
 class FocalFits:
     """Fits single observations of a clip, in whatever thread asks."""
 
-    def __init__(self, body: Body, parts: Parts = ALL_PARTS) -> None:
-        self._body, self._parts = body, parts
+    def __init__(self, body: Body, ablation: Ablation = NO_ABLATION) -> None:
+        self._body, self._ablation = body, ablation
         self._next_s, self._gap_s = -np.inf, FIRST_GAP_S
 
     def is_due(self, timestamp_s: float) -> bool:
@@ -58,9 +58,9 @@ class FocalFits:
         K, costs = camera.intrinsics, []
         for ratio in np.exp(LOG_RATIOS):
             tried = replace(camera, intrinsics=pinhole(2 * K[0, 2], 2 * K[1, 2], ratio * K[0, 0]))
-            prepared = prepare_track(self._body, track, tried, self._parts)
+            prepared = prepare_track(self._body, track, tried, self._ablation)
             weights = replace(prepared.weights, keypoints2d=prepared.weights.keypoints2d * ratio**2)
-            found = fit_picture(replace(prepared, weights=weights))
+            found = fit_single_frame(replace(prepared, weights=weights))
             if found is None:
                 return None
             costs.append(found.cost)

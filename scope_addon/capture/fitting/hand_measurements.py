@@ -3,7 +3,7 @@
 
 Each keypoint is a 2D keypoint. The world landmarks give directions: along every bone of the fingers, and across the
 palm, which tells the wrist's rotation. They are in axes that look along the line of sight to the hand, so they are
-turned into the camera's. Between hands seen, fingers keep calm: `calm_fingers`.
+turned into the camera's. Between hands seen, fingers keep calm: `smooth_fingers`.
 """
 
 from __future__ import annotations
@@ -159,7 +159,7 @@ def with_finger_limits(priors: Priors, body: Body) -> Priors:
 _TIP = {f: f"{f}_tip" if f in ("pinky", "thumb") else f"{f}_finger_tip" for f in FINGERS}
 
 
-def calm_fingers(rotations: np.ndarray, fingers: list[list[int]], seen: np.ndarray, times: np.ndarray) -> np.ndarray:
+def smooth_fingers(rotations: np.ndarray, fingers: list[list[int]], seen: np.ndarray, times: np.ndarray) -> np.ndarray:
     """Rotations (T, K+1, 3, 3) in which the fingers of a hand that is not seen move calmly.
 
     They go on between the frames in which they were seen, and the longer ago or ahead that is, the closer they are to

@@ -44,7 +44,7 @@ OFFSETS_MM = {
 }
 
 
-def as_seen(body: Body) -> Body:
+def with_keypoint_offsets(body: Body) -> Body:
     """The body with BlazePose's keypoints where the landmark networks see them; all else, its joints too, stays."""
     template = body.keypoint_template.copy()
     at = body.keypoint_set("blazepose")

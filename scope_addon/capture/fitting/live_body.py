@@ -18,8 +18,8 @@ from ..perception.lifter import HIPS
 from ..perception.observation import Observation
 from ..perception.region import Region
 from ..tracking.track import single_frame_track
-from .ablation import ALL_PARTS, Parts
-from .track_fit import fit_picture, prepare_track
+from .ablation import NO_ABLATION, Ablation
+from .track_fit import fit_single_frame, prepare_track
 
 
 @dataclass(frozen=True)
@@ -35,9 +35,9 @@ class LiveBody:
     """Fits one body to single observations, in whatever thread asks."""
 
     def __init__(
-        self, body: Body, camera: Camera, parts: Parts = ALL_PARTS, height_m: float | None = None
+        self, body: Body, camera: Camera, ablation: Ablation = NO_ABLATION, height_m: float | None = None
     ) -> None:
-        self._body, self._camera, self._parts, self._height_m = body, camera, parts, height_m
+        self._body, self._camera, self._ablation, self._height_m = body, camera, ablation, height_m
         self.is_ready = False  # whether everything is loaded, and a fit takes some milliseconds
 
     def load(self) -> None:
@@ -57,7 +57,7 @@ class LiveBody:
         track = single_frame_track(observation)
         if not track.seen[0]:
             return None
-        found = fit_picture(prepare_track(self._body, track, self._camera, self._parts, self._height_m))
+        found = fit_single_frame(prepare_track(self._body, track, self._camera, self._ablation, self._height_m))
         return None if found is None else found.state
 
 

@@ -32,15 +32,15 @@ from ....solver import (
     fit_tree,
     make_tree,
 )
-from ...kinematics.contact_points import SUPPORTS, with_supports
+from ...kinematics.contact_points import CONTACT_POINTS, with_contact_points
 from ..camera.intrinsics import Camera
 from ..perception.lifter import Lifted, our_lifter
 from ..perception.lifter_window import windows_around
 from ..tracking.track import Track
-from .ablation import ALL_PARTS, Parts
+from .ablation import NO_ABLATION, Ablation
 from .frame_measurements import DEPTH_SIGMA_M, NEAREST_M, Measurer
-from .hand_measurements import HandMeasurer, calm_fingers, with_finger_limits
-from .keypoint_offsets import as_seen
+from .hand_measurements import HandMeasurer, smooth_fingers, with_finger_limits
+from .keypoint_offsets import with_keypoint_offsets
 from .stature import with_stature
 
 SHAPE_FRAMES = 64  # frames that decide the shape; more of them are more of the same
@@ -90,13 +90,13 @@ class Stance:
     floor_offset: np.ndarray  # (T,) normal . p on the floor
     contact: np.ndarray  # (T, 6) probability that each sole and palm rests on it
 
-    def floor(self, k: int, supports: np.ndarray) -> Floor:
-        """Frame ``k``'s floor for the solver; supports (6,): keypoint indices of soles and palms.
+    def floor(self, k: int, contact_points: np.ndarray) -> Floor:
+        """Frame ``k``'s floor for the solver; contact_points (6,): keypoint indices of soles and palms.
 
         Feet that do not stand are as free below the floor as above it: they may be on a stair.
         """
         contact = self.contact[k]
-        return Floor(supports, self.floor_normal[k], float(self.floor_offset[k]), contact, below=contact)
+        return Floor(contact_points, self.floor_normal[k], float(self.floor_offset[k]), contact, below=contact)
 
 
 @dataclass(frozen=True)
@@ -126,8 +126,8 @@ class PreparedTrack:
         """
         measured = self.measure(k, root_cam)
         if self.stance is not None:
-            supports = np.arange(len(SUPPORTS)) + len(self.body.keypoint_names) - len(SUPPORTS)
-            measured = replace(measured, floor=self.stance.floor(k, supports))
+            contact_points = np.arange(len(CONTACT_POINTS)) + len(self.body.keypoint_names) - len(CONTACT_POINTS)
+            measured = replace(measured, floor=self.stance.floor(k, contact_points))
         if self.hand_measurer is None or self.hands is None:
             return measured
         return self.hand_measurer.add(measured, self.hands[k])
@@ -140,7 +140,7 @@ class PreparedTrack:
 
     def on_floor(self, stance: Stance, betas: np.ndarray) -> PreparedTrack:
         """With the floor, and what rests on it on a body of this shape."""
-        body, K = with_supports(self.body, betas), self.measurer.intrinsics
+        body, K = with_contact_points(self.body, betas), self.measurer.intrinsics
         hands = None if self.hand_measurer is None else HandMeasurer(body, K)
         return replace(self, body=body, measurer=Measurer(body, K), hand_measurer=hands, stance=stance)
 
@@ -150,17 +150,17 @@ class PreparedTrack:
 
 
 def prepare_track(
-    body: Body, track: Track, camera: Camera, parts: Parts = ALL_PARTS, height_m: float | None = None
+    body: Body, track: Track, camera: Camera, ablation: Ablation = NO_ABLATION, height_m: float | None = None
 ) -> PreparedTrack:
     """Undistort and lift a track; the lifting network runs here and nowhere else."""
-    if parts.seen_keypoints and track.has_depth:  # a network that tells depth is BlazePose's
-        body = as_seen(body)
+    if ablation.keypoint_offsets and track.has_depth:  # a network that tells depth is BlazePose's
+        body = with_keypoint_offsets(body)
     measurer, pixels = Measurer(body, camera.intrinsics), camera.undistort(track.keypoints_px)
-    lifted = _lift(measurer, track, pixels, parts)
+    lifted = _lift(measurer, track, pixels, ablation)
     priors = replace(default_priors(body), joint_weights=_joint_weights(body))
     if height_m is not None:
         priors = with_stature(priors, body, height_m)
-    prepared = PreparedTrack(body, track, measurer, pixels, lifted, priors, parts.weights(WEIGHTS))
+    prepared = PreparedTrack(body, track, measurer, pixels, lifted, priors, ablation.weights(WEIGHTS))
     if track.hands is None:
         return prepared
     hands = np.concatenate([camera.undistort(track.hands[..., :2]), track.hands[..., 2:]], axis=-1)
@@ -168,12 +168,12 @@ def prepare_track(
     return replace(prepared, hand_measurer=measurer_of_hands, hands=hands, priors=with_finger_limits(priors, body))
 
 
-def _lift(measurer: Measurer, track: Track, pixels: np.ndarray, parts: Parts) -> Lifted:
-    if not parts.lifter:
+def _lift(measurer: Measurer, track: Track, pixels: np.ndarray, ablation: Ablation) -> Lifted:
+    if not ablation.lifter:
         sigma = np.full(track.confidence.shape, DEPTH_SIGMA_M)
         return Lifted(track.world_landmarks, sigma, sigma)
     rays, windows = measurer.rays(pixels), windows_around(track.times, track.seen)
-    if not (parts.world_landmarks and track.has_depth):
+    if not (ablation.world_landmarks and track.has_depth):
         return our_lifter().lift(rays, track.confidence, None, windows)
     return our_lifter().lift_both_ways(rays, track.confidence, track.world_landmarks, windows)
 
@@ -184,7 +184,7 @@ def fit_track(prepared: PreparedTrack, progress: Callable[[str, int, int], None]
     return _fit_frames(prepared, _fit_shape(prepared).beta, None, progress)
 
 
-def fit_picture(prepared: PreparedTrack) -> Fit | None:
+def fit_single_frame(prepared: PreparedTrack) -> Fit | None:
     """Fit the body to a track of one frame that was seen, with a shape of its own; None if that says nothing."""
     (found,) = _fit_shape(prepared).frames
     return found if _is_usable(found) else None
@@ -269,7 +269,7 @@ class _Frames:
         before, self._first = self._first, first
         init = first
         if first is not None and before is not None and self._last is not None and self._goes_on(k):
-            init = turned_alike(first, before, self._last.state)
+            init = with_same_rotations(first, before, self._last.state)
         self.fit(k, init, known_root=True)
 
     def _goes_on(self, k: int) -> bool:
@@ -308,7 +308,7 @@ class _Frames:
         if prepared.hand_measurer is not None and prepared.hands is not None:
             confidence = np.maximum(confidence, prepared.hand_measurer.joint_confidence(prepared.hands))
             seen = (prepared.hands[:, :, 0, 2] > 0) & valid[:, None]
-            rotations = calm_fingers(rotations, prepared.hand_measurer.fingers, seen, prepared.track.times)
+            rotations = smooth_fingers(rotations, prepared.hand_measurer.fingers, seen, prepared.track.times)
         return FittedTrack(
             rotations=rotations,
             t_camera_root=self._root,
@@ -344,7 +344,7 @@ def _is_usable(fit: Fit) -> bool:
     return fit.status not in (Status.NO_MEASUREMENTS, Status.NON_FINITE)
 
 
-def turned_alike(state: State, before: State, after: State) -> State:
+def with_same_rotations(state: State, before: State, after: State) -> State:
     """A state whose joints are turned as those of a frame close by were, from ``before`` to ``after``."""
     R = after.R_camera_root @ before.R_camera_root.T @ state.R_camera_root
     Omega = after.Omega @ np.swapaxes(before.Omega, 1, 2) @ state.Omega

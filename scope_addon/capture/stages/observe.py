@@ -17,7 +17,7 @@ from ...errors import NoPersonError, VideoError
 from ..camera.camera_rotation import CameraMotion
 from ..camera.intrinsics import Camera, choose_camera
 from ..camera.line_segments import Lines
-from ..fitting.background_estimators import BesideTracking
+from ..fitting.background_estimators import BackgroundEstimators
 from ..fitting.focal_fits import FocalFits
 from ..fitting.live_body import LiveBody
 from ..media.exposure import Exposure
@@ -80,9 +80,9 @@ def observe(
         calibration=options.calibration,
         metadata_focal_mm=video.focal_35mm,
     )
-    live = LiveBody(body, camera, options.parts, next(iter(options.heights_m), None))
-    fits = FocalFits(body, options.parts)
-    with BesideTracking(camera, video.width, video.height, live, fits) as background, _opencv_in_one_thread():
+    live = LiveBody(body, camera, options.ablation, next(iter(options.heights_m), None))
+    fits = FocalFits(body, options.ablation)
+    with BackgroundEstimators(camera, video.width, video.height, live, fits) as background, _opencv_in_one_thread():
         frames = _Frames(_tracker(options, threads, execution), _hands(options, threads, execution), background, clock)
         frames.run(video, live, listeners)
     with clock.stage("solver"):
@@ -110,7 +110,7 @@ class _Frames:
     """Sends each frame through the networks. No frame is kept: an hour takes no more memory than a minute."""
 
     def __init__(
-        self, tracker: PeopleTracker, hands: HandTracker | None, background: BesideTracking, clock: StageClock
+        self, tracker: PeopleTracker, hands: HandTracker | None, background: BackgroundEstimators, clock: StageClock
     ) -> None:
         self._tracker, self._hands, self._background, self._clock = tracker, hands, background, clock
         self.people, self.cuts = PeopleBuilder(), SceneCuts()
@@ -130,9 +130,7 @@ class _Frames:
             listeners.progress("finding the person", len(self.people), max(expected, len(self.people)))
         self._background.wait()
 
-    def _look(
-        self, frame: Frame, lit: np.ndarray, upcoming: tuple[Frame, np.ndarray] | None
-    ) -> Observation | None:
+    def _look(self, frame: Frame, lit: np.ndarray, upcoming: tuple[Frame, np.ndarray] | None) -> Observation | None:
         """Add one frame; return the largest person in it."""
         upcoming_rgb, upcoming_lit = (upcoming[0].image_rgb, upcoming[1]) if upcoming else (None, None)
         with self._clock.stage("networks"):

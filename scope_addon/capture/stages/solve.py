@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-from ...kinematics.single_precision import compact
+from ...kinematics.single_precision import to_single_precision
 from ...motion import Motion
 from ..fitting.track_fit import FittedTrack, PreparedTrack, fit_track, prepare_track, refit_track
 from ..tracking.track import Track
@@ -16,8 +16,8 @@ from ..world.camera_travel import camera_travel
 from ..world.foot_lock import lock_feet
 from ..world.placement import PlacedTrack, place_track
 from ..world.shot import FittedPerson, Shot
-from ..world.stance import corrected_stance
-from ..world.world_frame import SharedWorld, share_world
+from ..world.stance import stance_on_floor
+from ..world.world_frame import SharedWorld, find_world
 
 Progress = Callable[[str, int, int], None]
 
@@ -39,15 +39,15 @@ def solve(shot: Shot, tracks: Sequence[Track], progress: Progress, heights_m: Se
     :param heights_m: of the first people, where they are known, metres.
     """
     prepared = prepare(shot, tracks, heights_m)
-    fits = [compact(fit_track(each, progress)) for each in prepared]
+    fits = [to_single_precision(fit_track(each, progress)) for each in prepared]
     shot = replace(shot, path=find_camera_path(shot, prepared[0], fits[0]))
-    if shot.parts.second_pass and not shot.is_picture:
+    if shot.ablation.second_pass and not shot.is_picture:
         fits = refit(shot, prepared, fits, progress)
     people = [FittedPerson(each.track, fit, each.body) for each, fit in zip(prepared, fits, strict=True)]
     iterations = fits[0].iterations
     del prepared, fits
     placed = [place(shot, person.track, person.fit, shot.smoothing) for person in people]
-    world = share_world(placed, shot.lines)
+    world = find_world(placed, shot.lines)
     motions: list[Motion] = []
     while people:
         motions.append(finish(shot, people.pop(0), placed.pop(0), world, len(motions)))
@@ -58,8 +58,9 @@ def prepare(shot: Shot, tracks: Sequence[Track], heights_m: Sequence[float]) -> 
     """Lift every track to 3D and set up its priors."""
     out = []
     for k, track in enumerate(tracks):
-        each = prepare_track(shot.body, track, shot.camera, shot.parts, heights_m[k] if k < len(heights_m) else None)
-        out.append(compact(replace(each, track=track.without_depth(), lifted=compact(each.lifted))))
+        each = prepare_track(shot.body, track, shot.camera, shot.ablation, heights_m[k] if k < len(heights_m) else None)
+        lifted = to_single_precision(each.lifted)
+        out.append(to_single_precision(replace(each, track=track.without_depth(), lifted=lifted)))
     return out
 
 
@@ -73,7 +74,7 @@ def find_camera_path(shot: Shot, first: PreparedTrack, fit: FittedTrack) -> Came
     if shot.path.is_static or shot.is_picture:
         return shot.path
     placed = place(shot, first.track, fit)
-    up = share_world([placed], shot.lines).up
+    up = find_world([placed], shot.lines).up
     return replace(shot.path, center=camera_travel(placed.soles, placed.valid, up, placed.times))
 
 
@@ -82,12 +83,12 @@ def refit(
 ) -> list[FittedTrack]:
     """Fit everybody once more, with the distance and lean that the floor, the feet and balance determine."""
     placed = [place(shot, each.track, fit) for each, fit in zip(prepared, fits, strict=True)]
-    world = share_world(placed, shot.lines)
+    world = find_world(placed, shot.lines)
     floors = [world.floor_from_camera(k) for k in range(len(placed))]
-    stances = [corrected_stance(*each, shot.parts.balance) for each in zip(placed, floors, strict=True)]
+    stances = [stance_on_floor(*each, shot.ablation.balance) for each in zip(placed, floors, strict=True)]
     del placed
     return [
-        compact(refit_track(each, fit, shot.path.stance_to_frames(stance), progress))
+        to_single_precision(refit_track(each, fit, shot.path.stance_to_frames(stance), progress))
         for each, fit, stance in zip(prepared, fits, stances, strict=True)
     ]
 
@@ -95,6 +96,6 @@ def refit(
 def finish(shot: Shot, person: FittedPerson, placed: PlacedTrack, world: SharedWorld, number: int) -> Motion:
     """Lock the feet of one person, the ``number``-th of the world, and assemble the motion."""
     contact = placed.contact(world.up)
-    if shot.smoothing and shot.parts.contact:
+    if shot.smoothing and shot.ablation.contact:
         placed = lock_feet(placed, contact, world.floor_from_camera(number))
     return assemble_motion(shot, person, placed, contact, world.T_world_camera)

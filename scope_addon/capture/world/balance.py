@@ -25,7 +25,7 @@ from .placement import PlacedTrack
 
 STANDING_M_S = 0.5  # speed of the centre of mass at which little is believed of this
 CUTOFF_HZ = 1.0
-# How far a sole reaches behind its heel point and beyond its toe point (`supports`), in distances between the two.
+# How far a sole extends behind its heel point and beyond its toe point, in units of the distance between the two.
 BEHIND, BEYOND = 1.2, 0.4
 DOUBT = 0.2  # share of standing frames nearby that halves what is believed, roughly
 GRAVITY_M_S2 = 9.81
@@ -74,14 +74,14 @@ def along(body: Body, joints: np.ndarray, a: str, b: str) -> np.ndarray:
     return d / np.maximum(np.linalg.norm(d, axis=1, keepdims=True), 1e-9)
 
 
-def turn_over_feet(placed: PlacedTrack, contact: np.ndarray, up: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def balancing_rotations(placed: PlacedTrack, contact: np.ndarray, up: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """By which rotations (T, 3, 3), about which points (T, 3), the weight comes over the feet; the camera's axes.
 
     :param contact: (T, 6) probability that each sole and palm rests on the floor;  up: (3,) unit.
     """
     times = placed.times
     mass = gaussian_smooth(center_of_mass(placed.body, placed.joints), times, CUTOFF_HZ)
-    pivot = placed.stands_at(contact)
+    pivot = placed.contact_center(contact)
     sight = mass - placed.center
     sight = sight - (sight @ up)[:, None] * up
     sight /= np.maximum(np.linalg.norm(sight, axis=1, keepdims=True), 1e-9)
@@ -93,7 +93,7 @@ def turn_over_feet(placed: PlacedTrack, contact: np.ndarray, up: np.ndarray) -> 
         velocity = np.gradient(mass, times, axis=0)
         believed *= np.exp(-np.square(np.linalg.norm(velocity, axis=1) / STANDING_M_S))
         pressing = mass - np.gradient(velocity, times, axis=0) * (height / GRAVITY_M_S2)[:, None]
-    at, reach = (pressing * sight).sum(axis=1), (_reaches(placed.supports) * sight[:, None]).sum(axis=-1)
+    at, reach = (pressing * sight).sum(axis=1), (_reaches(placed.contact_points) * sight[:, None]).sum(axis=-1)
     somewhere = stands.any(axis=1)
     low = np.where(somewhere, np.where(stands, reach, np.inf).min(axis=1), -np.inf)
     high = np.where(somewhere, np.where(stands, reach, -np.inf).max(axis=1), np.inf)
@@ -104,9 +104,9 @@ def turn_over_feet(placed: PlacedTrack, contact: np.ndarray, up: np.ndarray) -> 
     return exp(angle[:, None] * np.cross(up, sight)), pivot
 
 
-def _reaches(supports: np.ndarray) -> np.ndarray:
+def _reaches(contact_points: np.ndarray) -> np.ndarray:
     """(T, 6, 3) the ends of the soles, whose heel and toe points come first, in the same order, and the palms."""
-    soles, palms = np.split(supports, [len(SOLES)], axis=1)
+    soles, palms = np.split(contact_points, [len(SOLES)], axis=1)
     heel, toe = soles[:, 0::2], soles[:, 1::2]
     ends = np.stack([heel - BEHIND * (toe - heel), toe + BEYOND * (toe - heel)], axis=2).reshape(soles.shape)
     return np.concatenate([ends, palms], axis=1)

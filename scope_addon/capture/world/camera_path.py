@@ -18,14 +18,14 @@ class CameraPath:
     center: np.ndarray  # (T, 3) metres
 
     @classmethod
-    def turning(cls, R_first_camera: np.ndarray) -> CameraPath:
+    def rotating(cls, R_first_camera: np.ndarray) -> CameraPath:
         """A camera that turns on the spot."""
         return cls(R_first_camera, np.zeros((len(R_first_camera), 3)))
 
     @classmethod
-    def on_a_stand(cls, frames: int) -> CameraPath:
+    def static(cls, frames: int) -> CameraPath:
         """A camera that stands still."""
-        return cls.turning(np.tile(np.eye(3), (frames, 1, 1)))
+        return cls.rotating(np.tile(np.eye(3), (frames, 1, 1)))
 
     def __len__(self) -> int:
         """Return the number of frames."""

@@ -29,10 +29,10 @@ from ....solver import (
     make_tree,
 )
 from ....solver.rotations import shortest_turn
-from ...kinematics.contact_points import SOLES, SUPPORTS
+from ...kinematics.contact_points import CONTACT_POINTS, SOLES
 from ...kinematics.frame_blocks import by_blocks
 from ...kinematics.smoothing import smooth_rotations
-from ...kinematics.standing import along_sight
+from ...kinematics.standing import line_of_sight
 from ..fitting.frame_measurements import NEAREST_M
 from .ground_plane import correct_depth, on_floor
 from .placement import PlacedTrack
@@ -77,14 +77,14 @@ def lock_feet(placed: PlacedTrack, contact: np.ndarray, T_world_camera: np.ndarr
 
     :param contact: (T, 6) probability that each sole and palm rests on something.
     :param T_world_camera: (4, 4) camera to world, this person's floor at z = 0.
-    :return: the motion with other rotations and root; its joints and supports are still those of the given motion.
+    :return: the motion with other rotations and root; joints and contact points are still those of the given motion.
     """
     rotations, root = placed.rotations, placed.root
-    supports = placed.place(rotations, root)[1]
-    away = correct_depth(root - placed.center, supports, contact, T_world_camera, placed.times)
-    root = root + away[:, None] * along_sight(root - placed.center)
+    contact_points = placed.place(rotations, root)[1]
+    away = correct_depth(root - placed.center, contact_points, contact, T_world_camera, placed.times)
+    root = root + away[:, None] * line_of_sight(root - placed.center)
     locked = _locked_points(placed.place(rotations, root)[1], contact, T_world_camera)
-    rotations, root = hold_points(replace(placed, root=root), locked)
+    rotations, root = lock_points(replace(placed, root=root), locked)
     names = placed.body.joint_names
     holding = _LEG + _ARM if (contact[:, len(SOLES) :] > 0.5).any() else _LEG
     holds = np.array([k == 0 or any(part in name for part in holding) for k, name in enumerate(names)])
@@ -93,18 +93,18 @@ def lock_feet(placed: PlacedTrack, contact: np.ndarray, T_world_camera: np.ndarr
     return replace(placed, rotations=rotations, root=root)
 
 
-def _locked_points(supports: np.ndarray, contact: np.ndarray, T_world_camera: np.ndarray) -> LockedPoints:
+def _locked_points(contact_points: np.ndarray, contact: np.ndarray, T_world_camera: np.ndarray) -> LockedPoints:
     """Hold each support where it stands; far below the floor, on a stair down, there is no floor.
 
-    :param supports, contact: (T, 6, 3) in the camera frame, metres, and (T, 6).
+    :param contact_points, contact: (T, 6, 3) in the camera frame, metres, and (T, 6).
     """
     R, t = T_world_camera[:3, :3], T_world_camera[:3, 3]
-    held = anchors(supports @ R.T + t, contact)
+    held = anchors(contact_points @ R.T + t, contact)
     lowest = np.minimum(held[..., 2].min(axis=1), 0.0)
     return LockedPoints((held - t) @ R, contact, R[2], lowest * (1 - on_floor(lowest)) - float(t[2]))
 
 
-def hold_points(placed: PlacedTrack, locked: LockedPoints) -> tuple[np.ndarray, np.ndarray]:
+def lock_points(placed: PlacedTrack, locked: LockedPoints) -> tuple[np.ndarray, np.ndarray]:
     """Fit each frame once more with points held above a floor, everything else staying at the given motion.
 
     The projections of head, arms, hips and knees stay where they were, except for wrists whose palms are held: the
@@ -123,13 +123,13 @@ def hold_points(placed: PlacedTrack, locked: LockedPoints) -> tuple[np.ndarray, 
 
 
 class _LockedFrames:
-    """The single-frame problems of `hold_points`."""
+    """The single-frame problems of `lock_points`."""
 
     def __init__(self, placed: PlacedTrack, locked: LockedPoints) -> None:
         body = placed.body
         self._placed, self._locked = placed, locked
         self._tree = make_tree(body)
-        self._supports = np.arange(len(body.keypoint_names) - len(SUPPORTS), len(body.keypoint_names))
+        self._supports = np.arange(len(body.keypoint_names) - len(CONTACT_POINTS), len(body.keypoint_names))
         self._seen = [body.keypoint_set("blazepose")[name] for name in _SEEN]
         self._points = _keypoints(body, placed, self._seen)
         self._priors = replace(

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...kinematics.standing import LEVEL_M, along_sight, logistic
+from ...kinematics.standing import LEVEL_M, line_of_sight, logistic
 
 FLOOR_SIGMA_M = 0.03
 DEPTH_SIGMA_M = 0.1  # how wrong a depth that fits the image may be
@@ -35,7 +35,7 @@ def correct_depth(
     """
     T = len(times)
     R, height0 = T_world_camera[:3, :3], T_world_camera[2, 3]
-    ray_world = along_sight(root_cam) @ R.T
+    ray_world = line_of_sight(root_cam) @ R.T
     points_world = points_cam @ R.T
     height = points_world[..., 2] + height0
     # A foot in the air, doubtful as it may be, says nothing about the floor.

@@ -9,7 +9,7 @@ from fractions import Fraction
 from ....solver.body import Body
 from ..camera.intrinsics import Camera
 from ..camera.line_segments import Lines
-from ..fitting.ablation import ALL_PARTS, Parts
+from ..fitting.ablation import NO_ABLATION, Ablation
 from ..fitting.track_fit import FittedTrack
 from ..tracking.track import Track
 from .camera_path import CameraPath
@@ -27,7 +27,7 @@ class Shot:
     image_size: tuple[int, int]  # width and height, pixels
     source: str  # the footage's name
     smoothing: bool = True  # of the motion over time, with the feet locked
-    parts: Parts = ALL_PARTS
+    ablation: Ablation = NO_ABLATION
 
     @property
     def is_picture(self) -> bool:

@@ -84,7 +84,7 @@ def up_from_bodies(people: Sequence[PlacedTrack]) -> np.ndarray:
         total = np.zeros(3)
         for each, mass, carries in zip(people, masses, carried, strict=True):
             contact = each.contact(up)
-            above = mass - each.stands_at(contact)
+            above = mass - each.contact_center(contact)
             upright = np.maximum(above @ level, 0.0) / np.maximum(np.linalg.norm(above, axis=1), 1e-9)
             on_hands = contact[:, len(SOLES) :].max(axis=1, initial=0.0)
             weight = contact[:, : len(SOLES)].max(axis=1) * (1 - on_hands) * carries * upright**2
@@ -159,7 +159,7 @@ class SharedWorld:
         return T
 
 
-def share_world(placed: list[PlacedTrack], lines: Lines | None = None) -> SharedWorld:
+def find_world(placed: list[PlacedTrack], lines: Lines | None = None) -> SharedWorld:
     """World of a static camera: z up, from the background's lines, or from all bodies and floors together; the floor at
     z = 0 and the origin below the first position of the first, most prominent person.
 

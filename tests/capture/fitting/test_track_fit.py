@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from scope.scope_addon.capture.camera.intrinsics import choose_camera
 from scope.scope_addon.capture.fitting import track_fit
-from scope.scope_addon.capture.fitting.keypoint_offsets import as_seen
+from scope.scope_addon.capture.fitting.keypoint_offsets import with_keypoint_offsets
 from scope.scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES
 from scope.scope_addon.capture.perception.lifter import Lifted, Lifter
 from scope.scope_addon.capture.tracking.track import Track
@@ -29,7 +29,7 @@ def _standing_track(body, camera, bent=()) -> Track:
         rotations[:, body.joint_names.index(joint)] = exp(np.array([angle, 0.0, 0.0]))
     R, t = body.forward_kinematics(rotations, np.array([[0.0, 0.0, 4.0]]), np.zeros(body.P))
     at = body.keypoint_set("blazepose")
-    points = as_seen(body).keypoints(R, t, np.zeros(body.P))[0, [at[name] for name in KEYPOINT_NAMES]]
+    points = with_keypoint_offsets(body).keypoints(R, t, np.zeros(body.P))[0, [at[name] for name in KEYPOINT_NAMES]]
     pixels = points[:, :2] / points[:, 2:] * camera.intrinsics[0, 0] + camera.intrinsics[:2, 2]
     hips = [KEYPOINT_NAMES.index(f"{side}_hip") for side in ("left", "right")]
     J = len(KEYPOINT_NAMES)
@@ -128,13 +128,13 @@ def test_a_frame_is_turned_as_the_one_before_was():
         )
 
     before, now, after = state(), state(), state()
-    same = track_fit.turned_alike(now, before, before)
+    same = track_fit.with_same_rotations(now, before, before)
     np.testing.assert_allclose(same.Omega, now.Omega, atol=1e-12)
-    there = track_fit.turned_alike(before, before, after)
+    there = track_fit.with_same_rotations(before, before, after)
     np.testing.assert_allclose(there.Omega, after.Omega, atol=1e-12)
     np.testing.assert_allclose(there.R_camera_root, after.R_camera_root, atol=1e-12)
     np.testing.assert_array_equal(there.t_camera_root, before.t_camera_root)
-    turned = track_fit.turned_alike(now, before, after)  # by the same rotation, in the parent's axes
+    turned = track_fit.with_same_rotations(now, before, after)  # by the same rotation, in the parent's axes
     by = turned.Omega @ np.swapaxes(now.Omega, 1, 2)
     np.testing.assert_allclose(by, after.Omega @ np.swapaxes(before.Omega, 1, 2), atol=1e-12)
 

@@ -92,7 +92,7 @@ def test_there_and_back_along_a_path():
     local = path.points_to_frames(points)
     through = np.einsum("tij,tkj->tki", frames[:, :3, :3], local) + frames[:, None, :3, 3]
     np.testing.assert_allclose(through, points @ T_world_first[:3, :3].T + T_world_first[:3, 3], atol=1e-12)
-    assert CameraPath.on_a_stand(3).is_static
+    assert CameraPath.static(3).is_static
     assert not path.is_static
 
 
@@ -118,7 +118,7 @@ def test_a_stance_is_the_same_in_every_camera():
     expected = np.einsum("tij,tj->ti", first.turn, points[:, 0] - first.root_cam)
     np.testing.assert_allclose(turned, expected, atol=1e-12)
     np.testing.assert_array_equal(frames.contact, first.contact)
-    assert CameraPath.on_a_stand(5).stance_to_frames(first) is first
+    assert CameraPath.static(5).stance_to_frames(first) is first
 
 
 def test_without_smoothing_the_camera_travels_as_far(shared):
