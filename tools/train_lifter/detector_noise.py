@@ -3,8 +3,8 @@
 
 The detector's keypoints are not our body's: each lies at a constant offset in its body part, the one of
 `keypoint_offsets` and another of each person's own (people differ in build and clothes). To this come errors of the
-image and, in the world landmarks, a whole that is tilted, scaled and flattened, limbs that point elsewhere in depth, and now
-and then a limb mirrored in depth.
+image and, in the world landmarks, a whole that is tilted, scaled and flattened, limbs that point elsewhere in depth,
+and now and then a limb mirrored in depth.
 
 Errors last. Those of the depth of bones, as `pose_landmark_heavy` sees them on footage and renders with known truth, go
 with themselves 0.1, 0.2, 0.4 and 0.8 seconds later by 0.8, 0.65, 0.5 and 0.5: half of an error is the same through the

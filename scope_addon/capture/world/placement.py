@@ -49,7 +49,7 @@ class PlacedTrack:
         return _place(self.body, self.betas, rotations, root)
 
     def contact_center(self, contact: np.ndarray) -> np.ndarray:
-        """(T, 3) mean of the contact points weighted by ``contact`` (T, 6), or of the soles if nothing is in contact."""
+        """(T, 3) mean of the contact points weighted by ``contact`` (T, 6); of the soles if nothing is in contact."""
         weight = contact.copy()
         weight[:, : len(SOLES)] += LEAST_CONTACT
         share = weight / weight.sum(axis=1, keepdims=True)
