@@ -7,7 +7,7 @@ import tracemalloc
 from dataclasses import dataclass
 
 import numpy as np
-from scope.scope_addon.capture.fitting.track_fit import FittedTrack
+from scope.scope_addon.capture.fitting.frame_sequence import FittedTrack
 from scope.scope_addon.capture.tracking.track import Track
 from scope.scope_addon.capture.world.placement import place_track
 from scope.scope_addon.kinematics.single_precision import to_single_precision

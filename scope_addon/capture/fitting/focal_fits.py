@@ -26,7 +26,8 @@ from ..camera.intrinsics import Camera, pinhole
 from ..perception.observation import Observation
 from ..tracking.track import single_frame_track
 from .ablation import NO_ABLATION, Ablation
-from .track_fit import fit_single_frame, prepare_track
+from .prepared_track import prepare_track
+from .track_fit import fit_single_frame
 
 LOG_RATIOS = np.array([-0.7, -0.35, 0.0, 0.35, 0.7])  # of the focal lengths that are tried
 SHARE = 0.2  # of 0 to 1.2, 0.2 to 0.3 is best for preset best, 0.1 to 0.2 for fast; see `camera`

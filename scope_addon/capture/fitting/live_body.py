@@ -19,7 +19,8 @@ from ..perception.observation import Observation
 from ..perception.region import Region
 from ..tracking.track import single_frame_track
 from .ablation import NO_ABLATION, Ablation
-from .track_fit import fit_single_frame, prepare_track
+from .prepared_track import prepare_track
+from .track_fit import fit_single_frame
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,9 @@ from dataclasses import dataclass, replace
 
 from ...kinematics.single_precision import to_single_precision
 from ...motion import Motion
-from ..fitting.track_fit import FittedTrack, PreparedTrack, fit_track, prepare_track, refit_track
+from ..fitting.frame_sequence import FittedTrack
+from ..fitting.prepared_track import PreparedTrack, prepare_track
+from ..fitting.track_fit import fit_track, refit_track
 from ..tracking.track import Track
 from ..world.assemble import assemble_motion
 from ..world.camera_path import CameraPath

@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..fitting.track_fit import FittedTrack, Stance
+from ..fitting.frame_sequence import FittedTrack
+from ..fitting.prepared_track import Stance
 
 
 @dataclass(frozen=True)

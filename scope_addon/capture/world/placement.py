@@ -13,7 +13,7 @@ from ...kinematics.frame_blocks import by_blocks
 from ...kinematics.single_precision import to_single_precision
 from ...kinematics.smoothing import fill_gaps, fill_rotation_gaps, smooth_root, smooth_rotations
 from ...kinematics.standing import resting_probability
-from ..fitting.track_fit import FittedTrack
+from ..fitting.frame_sequence import FittedTrack
 from ..tracking.scene_cuts import SCENE_GAP_S
 from ..tracking.track import Track
 from .camera_path import CameraPath

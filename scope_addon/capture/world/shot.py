@@ -10,7 +10,7 @@ from ....solver.body import Body
 from ..camera.intrinsics import Camera
 from ..camera.line_segments import Lines
 from ..fitting.ablation import NO_ABLATION, Ablation
-from ..fitting.track_fit import FittedTrack
+from ..fitting.frame_sequence import FittedTrack
 from ..tracking.track import Track
 from .camera_path import CameraPath
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from ...kinematics.smoothing import gaussian_smooth
 from ...kinematics.standing import line_of_sight
-from ..fitting.track_fit import Stance
+from ..fitting.prepared_track import Stance
 from .balance import balancing_rotations
 from .ground_plane import correct_depth, on_floor
 from .placement import PlacedTrack

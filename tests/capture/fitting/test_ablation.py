@@ -22,5 +22,5 @@ def test_what_is_left_out_weighs_nothing_and_the_rest_stays(name: str) -> None:
 
 
 def test_some_source_of_depth_has_to_stay() -> None:
-    with pytest.raises(UsageError, match="nothing else tells depth"):
+    with pytest.raises(UsageError, match="without either, depth is unknown"):
         Ablation(lifter=False, world_landmarks=False)

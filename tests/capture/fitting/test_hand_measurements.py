@@ -19,7 +19,7 @@ from scope.scope_addon.capture.fitting.hand_measurements import (
     smooth_fingers,
     with_finger_limits,
 )
-from scope.scope_addon.capture.fitting.track_fit import ROBUST, WEIGHTS, cold_stages
+from scope.scope_addon.capture.fitting.weights import ROBUST, WEIGHTS, cold_stages
 from scope.scope_addon.capture.perception.hand_landmarks import HAND_POINTS
 from scope.scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES
 from scope.scope_addon.capture.perception.observation import Observation

@@ -13,7 +13,7 @@ from scope.scope_addon.capture.camera.intrinsics import choose_camera
 from scope.scope_addon.capture.fitting.ablation import Ablation
 from scope.scope_addon.capture.fitting.frame_measurements import Measurer
 from scope.scope_addon.capture.fitting.keypoint_offsets import offset, with_keypoint_offsets
-from scope.scope_addon.capture.fitting.track_fit import prepare_track
+from scope.scope_addon.capture.fitting.prepared_track import prepare_track
 from scope.scope_addon.capture.media.video_range import VideoRange
 from scope.scope_addon.capture.options import CaptureOptions
 from scope.scope_addon.capture.pipeline import capture

@@ -3,7 +3,8 @@
 
 import numpy as np
 import pytest
-from scope.scope_addon.capture.fitting.track_fit import FittedTrack, Stance
+from scope.scope_addon.capture.fitting.frame_sequence import FittedTrack
+from scope.scope_addon.capture.fitting.prepared_track import Stance
 from scope.scope_addon.capture.media.video_range import VideoRange
 from scope.scope_addon.capture.options import CaptureOptions
 from scope.scope_addon.capture.pipeline import capture
