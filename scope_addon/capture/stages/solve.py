@@ -43,7 +43,7 @@ def solve(shot: Shot, tracks: Sequence[Track], progress: Progress, heights_m: Se
     prepared = prepare(shot, tracks, heights_m)
     fits = [to_single_precision(fit_track(each, progress)) for each in prepared]
     shot = replace(shot, path=find_camera_path(shot, prepared[0], fits[0]))
-    if shot.ablation.second_pass and not shot.is_picture:
+    if shot.ablation.second_pass and not shot.is_still:
         fits = refit(shot, prepared, fits, progress)
     people = [FittedPerson(each.track, fit, each.body) for each, fit in zip(prepared, fits, strict=True)]
     iterations = fits[0].iterations
@@ -73,7 +73,7 @@ def place(shot: Shot, track: Track, fit: FittedTrack, smoothing: bool = True) ->
 
 def find_camera_path(shot: Shot, first: PreparedTrack, fit: FittedTrack) -> CameraPath:
     """Return where the camera was: one that turns may travel as well, which the standing feet of one person tell."""
-    if shot.path.is_static or shot.is_picture:
+    if shot.path.is_static or shot.is_still:
         return shot.path
     placed = place(shot, first.track, fit)
     up = find_world([placed], shot.lines).up
