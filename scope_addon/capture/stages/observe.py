@@ -87,12 +87,12 @@ def observe(
         frames.run(video, live, listeners)
     with clock.stage("solver"):
         camera = background.camera()
-        motion = background.background.motion(camera)
+        motion = background.tracker.motion(camera)
         footage = Footage(
             np.array(frames.people.timestamps),
             camera,
             motion,
-            background.background.lines(motion, camera),
+            background.tracker.lines(motion, camera),
             frames.cuts.times_s,
             execution.describe(threads),
             execution.warnings + list(video.warnings),
