@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Tracks without the errors that networks are known to make for a while."""
+"""Repair of errors that networks typically make for a few frames."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ..tracking.track import Track
 
 
 def repair(track: Track, camera: Camera, ablation: Ablation) -> Track:
-    """Swap left and right back where they were exchanged, and replace keypoints that jump away for a few frames."""
+    """Undo left-right swaps and limb swaps, and replace keypoint jumps."""
     if ablation.left_right:
         track = repair_limb_swaps(repair_left_right(track, camera))
     return repair_keypoint_jumps(track) if ablation.keypoint_jumps else track

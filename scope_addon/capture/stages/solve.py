@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Tracks to motions: every person is fitted in each frame's camera; the world is one for all of them."""
+"""From tracks to motions: each person is fitted in each frame's camera, and all share one world."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ Progress = Callable[[str, int, int], None]
 
 @dataclass(frozen=True)
 class Solved:
-    """The motions, the most prominent person's first, the camera's path, and the solver's mean iterations a frame."""
+    """Motions, the most prominent person first; the camera's path; the solver's mean iterations per frame."""
 
     motions: list[Motion]
     path: CameraPath
@@ -34,11 +34,11 @@ class Solved:
 
 
 def solve(shot: Shot, tracks: Sequence[Track], progress: Progress, heights_m: Sequence[float] = ()) -> Solved:
-    """Fit every person on their own, find the world they share, and move the motions into it.
+    """Fit each person separately, estimate the world they share, and transform the motions to it.
 
-    For a clip of an hour, each list below takes hundreds of megabytes: none stays for longer than it is needed.
+    For a clip of an hour, each list below takes hundreds of megabytes, so it is deleted as soon as possible.
 
-    :param heights_m: of the first people, where they are known, metres.
+    :param heights_m: known statures of the first people, metres.
     """
     prepared = prepare(shot, tracks, heights_m)
     fits = [to_single_precision(fit_track(each, progress)) for each in prepared]
@@ -67,12 +67,12 @@ def prepare(shot: Shot, tracks: Sequence[Track], heights_m: Sequence[float]) -> 
 
 
 def place(shot: Shot, track: Track, fit: FittedTrack, smoothing: bool = True) -> PlacedTrack:
-    """Fill the gaps of a fit, smooth it, and bring it into the first frame's camera axes."""
+    """Fill the gaps of a fit, smooth it, and transform it to the first frame's camera axes."""
     return place_track(shot.body, track, fit, smoothing, shot.path)
 
 
 def find_camera_path(shot: Shot, first: PreparedTrack, fit: FittedTrack) -> CameraPath:
-    """Return where the camera was: one that turns may travel as well, which the standing feet of one person tell."""
+    """Return the camera's path; the travel of a rotating camera is estimated from one person's feet."""
     if shot.path.is_static or shot.is_still:
         return shot.path
     placed = place(shot, first.track, fit)
@@ -83,7 +83,7 @@ def find_camera_path(shot: Shot, first: PreparedTrack, fit: FittedTrack) -> Came
 def refit(
     shot: Shot, prepared: Sequence[PreparedTrack], fits: Sequence[FittedTrack], progress: Progress
 ) -> list[FittedTrack]:
-    """Fit everybody once more, with the distance and lean that the floor, the feet and balance determine."""
+    """Fit each person once more, with the distance and lean estimated from floor, feet and balance."""
     placed = [place(shot, each.track, fit) for each, fit in zip(prepared, fits, strict=True)]
     world = find_world(placed, shot.lines)
     floors = [world.floor_from_camera(k) for k in range(len(placed))]
