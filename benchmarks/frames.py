@@ -23,8 +23,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..scope_addon.atomic_write import atomic_path
 from ..scope_addon.capture.camera.intrinsics import choose_camera
-from ..scope_addon.capture.fitting import track_fit
-from ..scope_addon.capture.fitting.track_fit import prepare_track
+from ..scope_addon.capture.fitting import weights as fit_weights
+from ..scope_addon.capture.fitting.prepared_track import prepare_track
 from ..scope_addon.capture.media.video import open_video
 from ..scope_addon.capture.media.video_range import VideoRange
 from ..scope_addon.capture.tracking.left_right import repair_left_right
@@ -128,9 +128,9 @@ def _read(path: Path) -> Clip:
 
 def capture_options(cold: bool, tolerance: float, triggs: float = 0.0, limit: int = 50) -> Options:
     """Return the capture's options with another end of the last stage."""
-    stages = (track_fit.cold_stages if cold else track_fit.warm_stages)(track_fit.WEIGHTS)
+    stages = (fit_weights.cold_stages if cold else fit_weights.warm_stages)(fit_weights.WEIGHTS)
     last: Stage = replace(stages[-1], tolerance=tolerance, max_iterations=limit)
-    return replace(track_fit.ROBUST, stages=(*stages[:-1], last), triggs=triggs)
+    return replace(fit_weights.ROBUST, stages=(*stages[:-1], last), triggs=triggs)
 
 
 def capture_priors(body: Body, clip: Clip) -> Priors:

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ...scope_addon.capture.fitting.ablation import Parts
+from ...scope_addon.capture.fitting.ablation import Ablation
 from ...scope_addon.capture.options import CaptureOptions
 from ...scope_addon.capture.pipeline import capture
 from ...scope_addon.motion import Motion
@@ -33,18 +33,18 @@ SHOWN = {  # key of the evaluation: heading, target
 }
 ABLATION: dict[str, dict[str, Any]] = {
     "all parts": {},
-    "without the lifter": {"parts": Parts(lifter=False)},
-    "lifter without world landmarks": {"parts": Parts(world_landmarks=False)},
-    "keypoints at the joints": {"parts": Parts(seen_keypoints=False)},
-    "without 3D keypoints": {"parts": Parts(keypoints3d=False)},
-    "without the orientation field": {"parts": Parts(orientation_field=False)},
-    "without the joint prior": {"parts": Parts(joint_prior=False)},
-    "without left-right repair": {"parts": Parts(left_right=False)},
-    "without mended leaps": {"parts": Parts(leaps=False)},
-    "without the second pass": {"parts": Parts(second_pass=False)},
-    "without balance": {"parts": Parts(balance=False)},
-    "without the floor in it": {"parts": Parts(floor=False)},
-    "without contact": {"parts": Parts(contact=False)},
+    "without the lifter": {"ablation": Ablation(lifter=False)},
+    "lifter without world landmarks": {"ablation": Ablation(world_landmarks=False)},
+    "keypoints at the joints": {"ablation": Ablation(keypoint_offsets=False)},
+    "without 3D keypoints": {"ablation": Ablation(keypoints3d=False)},
+    "without the orientation field": {"ablation": Ablation(orientation_field=False)},
+    "without the joint prior": {"ablation": Ablation(joint_prior=False)},
+    "without left-right repair": {"ablation": Ablation(left_right=False)},
+    "without mended leaps": {"ablation": Ablation(keypoint_jumps=False)},
+    "without the second pass": {"ablation": Ablation(second_pass=False)},
+    "without balance": {"ablation": Ablation(balance=False)},
+    "without the floor in it": {"ablation": Ablation(floor=False)},
+    "without contact": {"ablation": Ablation(contact=False)},
     "without smoothing": {"smoothing": False},
 }
 FLIPS = ("lr_swap", "mirror", "mirror_swap")

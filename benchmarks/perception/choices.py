@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...scope_addon.capture.fitting import track_fit
+from ...scope_addon.capture.fitting import prepared_track
 from ...scope_addon.capture.options import CaptureOptions
 from ...scope_addon.capture.perception import lifter
 from ...scope_addon.capture.world import balance, foot_lock, ground_plane
@@ -57,12 +57,12 @@ class Choice:
 
 
 CHOICES = (
-    Choice("weight of 2D keypoints", track_fit, "WEIGHTS", (5e4, 2e5), "keypoints2d"),
-    Choice("weight of 3D keypoints", track_fit, "WEIGHTS", (2.5, 25.0), "keypoints3d"),
-    Choice("weight of the orientation field", track_fit, "WEIGHTS", (250.0, 1000.0), "orientation_field"),
-    Choice("weight of the joint prior", track_fit, "WEIGHTS", (2.0, 8.0), "joint_prior"),
-    Choice("weight of the shape prior", track_fit, "WEIGHTS", (5.0, 20.0), "shape"),
-    Choice("weight of the floor under feet that stand", track_fit, "WEIGHTS", (5e3, 2e4), "floor"),
+    Choice("weight of 2D keypoints", prepared_track, "WEIGHTS", (5e4, 2e5), "keypoints2d"),
+    Choice("weight of 3D keypoints", prepared_track, "WEIGHTS", (2.5, 25.0), "keypoints3d"),
+    Choice("weight of the orientation field", prepared_track, "WEIGHTS", (250.0, 1000.0), "orientation_field"),
+    Choice("weight of the joint prior", prepared_track, "WEIGHTS", (2.0, 8.0), "joint_prior"),
+    Choice("weight of the shape prior", prepared_track, "WEIGHTS", (5.0, 20.0), "shape"),
+    Choice("weight of the floor under feet that stand", prepared_track, "WEIGHTS", (5e3, 2e4), "floor"),
     Choice("share lifted with world landmarks", lifter, "WORLD_SHARE", (0.5, 1.0)),
     Choice("speed at which balance is doubted, m/s", balance, "STANDING_M_S", (0.25, 1.0)),
     Choice("deviation of feet from the floor, m", ground_plane, "FLOOR_SIGMA_M", (0.015, 0.06)),

@@ -51,7 +51,7 @@ def replay(frames: int, people: int) -> dict[str, float]:
     tracks = [repair_left_right(track, camera) for track in builder.build(people)]
     del builder, tracker
     peaks["left and right"] = peak_mib()
-    shot = Shot(body, camera, CameraPath.on_a_stand(frames), Lines.none(), Fraction(fps), size, SAMPLE.name)
+    shot = Shot(body, camera, CameraPath.static(frames), Lines.none(), Fraction(fps), size, SAMPLE.name)
     motions = solve(shot, tracks, lambda *_: None).motions
     peaks["solver"] = peak_mib()
     with tempfile.TemporaryDirectory() as folder:

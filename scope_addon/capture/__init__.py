@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Video in, motion out. OpenCV and onnxruntime live here; bpy never does."""
+"""From video to motion. Uses OpenCV and onnxruntime, never bpy."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The options of a capture as the pipeline reads them, and what can be refused before any footage is opened."""
+"""The options of a capture as the pipeline reads them, and their validation before any footage is opened."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ..options import OPTIONS, Place, options_at
 from ..options.capture import ALL, LARGEST
 from .camera.calibration import read_calibration
 from .camera.intrinsics import choose_camera
-from .fitting.ablation import ALL_PARTS, Parts
+from .fitting.ablation import NO_ABLATION, Ablation
 from .fitting.hand_measurements import require_fingers
 from .fitting.stature import require_stature
 from .media.video_range import VideoRange, Wanted, parse_range
@@ -40,20 +40,20 @@ class CaptureOptions:
     focal_mm: float | None = _DEFAULT["focal_mm"]
     fov_deg: float | None = _DEFAULT["fov_deg"]
     calibration: Path | None = _DEFAULT["calibration"]
-    wanted: Wanted = VideoRange()  # which frames
+    wanted: Wanted = VideoRange()  # range of frames
     smoothing: bool = _DEFAULT["smoothing"]
     threads: int = _DEFAULT["threads"]  # 0: as many as there are cores
     hands: bool = _DEFAULT["hands"]  # the fingers as well; the body needs finger joints
     provider: str = _DEFAULT["provider"]  # what the networks run on; see `execution`
     detector: Path | None = _DEFAULT["detector"]  # the user's own networks, ONNX files; see `adapters`
     keypoints: Path | None = _DEFAULT["keypoints"]
-    parts: Parts = ALL_PARTS  # for experiments
+    ablation: Ablation = NO_ABLATION  # for experiments
 
 
 def capture_options(values: Mapping[str, Any]) -> CaptureOptions:
-    """Convert the values of a command line or of a request to the pipeline's options.
+    """Convert the values of a command line or a request to the pipeline's options.
 
-    :param values: by the names of the options; further ones are ignored.
+    :param values: by option name; other names are ignored.
     :raises UsageError: a time or the frame rate cannot be parsed, or the end does not come after the start.
     """
     fields: dict[str, Any] = {}
@@ -64,7 +64,7 @@ def capture_options(values: Mapping[str, Any]) -> CaptureOptions:
 
 
 def check_options(body: Body, options: CaptureOptions) -> None:
-    """Refuse what no footage can be captured with, as far as it is known without opening a network.
+    """Check the options as far as possible without opening footage or networks.
 
     :raises UsageError: an option has an impossible value, contradicts another one or does not suit the body.
     :raises InputError: the calibration cannot be used.
@@ -72,7 +72,7 @@ def check_options(body: Body, options: CaptureOptions) -> None:
     most_people(options.people)
     landmark_network_name(options.quality)
     Execution(options.provider)
-    if options.keypoints and not options.parts.lifter:
+    if options.keypoints and not options.ablation.lifter:
         raise UsageError("the lifter cannot be left out with a keypoint file: such a network does not estimate depth")
     if options.hands:
         require_fingers(body)
@@ -82,13 +82,13 @@ def check_options(body: Body, options: CaptureOptions) -> None:
         choose_camera(1, 1, focal_mm=options.focal_mm, fov_deg=options.fov_deg, calibration=options.calibration)
     elif options.calibration:
         read_calibration(options.calibration)
-    for option in options_at(Place.CAPTURE):  # ranges without a message of their own above
+    for option in options_at(Place.CAPTURE):  # ranges not checked above
         if problem := option.range_error(getattr(options, option.name)):
             raise UsageError(f"{option.flag} {problem}")
 
 
 def check_networks(options: CaptureOptions) -> None:
-    """Open the user's networks once, for a batch to refuse them before its first clip.
+    """Open the user's networks once, so that a batch fails before its first clip.
 
     :raises ModelFileError: one of them cannot be used.
     """
@@ -99,9 +99,9 @@ def check_networks(options: CaptureOptions) -> None:
 
 
 def most_people(people: int | str) -> int:
-    """Return how many people are captured at most.
+    """Return the maximum number of people to capture.
 
-    :raises UsageError: no number from 1 to `MOST_PEOPLE`, nor one of the words.
+    :raises UsageError: neither a number from 1 to `MOST_PEOPLE` nor one of the words.
     """
     if people == LARGEST:
         return 1

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The main job: footage in, motions and a report out. Knows the order of the stages and nothing of their insides."""
+"""The main job: footage in, motions and a report out. This module only knows the order of the stages."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def capture(
     progress: Progress = lambda *_: None,
     watch: Watch = lambda *_: None,
 ) -> Capture:
-    """Capture the people of a video or picture, the most prominent one first.
+    """Capture the people of a video or still image, the most prominent one first.
 
     :raises UsageError: an option has an impossible value, contradicts another one or does not suit the body.
     :raises VideoError: the footage cannot be used.
@@ -47,7 +47,7 @@ def capture(
     with open_video(Path(path), options.wanted) as video:
         footage, tracks = observe(video, body, options, clock, Listeners(progress, watch))
     with clock.stage("solver"):
-        tracks = [repair(track, footage.camera, options.parts) for track in tracks]
+        tracks = [repair(track, footage.camera, options.ablation) for track in tracks]
         solved = solve(_shot(video, body, options, footage), tracks, progress, options.heights_m)
         motions = [replace(motion, timestamps=footage.timestamps) for motion in solved.motions]
     rates = clock.rates(len(footage.timestamps))
@@ -55,9 +55,9 @@ def capture(
 
 
 def _shot(video: Video, body: Body, options: CaptureOptions, footage: Footage) -> Shot:
-    """Put together what the solver knows of the footage: the camera's path is so far its rotation alone."""
+    """Assemble what is known of the footage; the camera's path so far contains only its rotation."""
     frames, motion = len(footage.timestamps), footage.camera_motion
-    path = CameraPath.on_a_stand(frames) if motion.is_static else CameraPath.turning(motion.R_first_camera)
+    path = CameraPath.static(frames) if motion.is_static else CameraPath.rotating(motion.R_first_camera)
     return Shot(
         body,
         footage.camera,
@@ -67,5 +67,5 @@ def _shot(video: Video, body: Body, options: CaptureOptions, footage: Footage) -
         (video.width, video.height),
         Path(video.path).name,
         options.smoothing and frames > 1,
-        options.parts,
+        options.ablation,
     )

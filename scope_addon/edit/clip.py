@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ...solver.body import Body
 from ...solver.rotations import exp, log
 from ..errors import UsageError
-from ..kinematics.contact_points import SOLES, support_points, with_supports
+from ..kinematics.contact_points import SOLES, contact_point_positions, with_contact_points
 from ..kinematics.smoothing import smooth_rotations
 
 
@@ -33,7 +33,7 @@ class Clip:
         :return: (T, 4, 3) left heel, left toe, right heel, right toe on the sole, metres, world frame.
         """
         R, t = body.forward_kinematics(self.rotations, self.root - body.rest_joints(betas)[0], betas)
-        points: NDArray[np.float64] = support_points(with_supports(body, betas), R, t)[:, : len(SOLES)]
+        points: NDArray[np.float64] = contact_point_positions(with_contact_points(body, betas), R, t)[:, : len(SOLES)]
         return points
 
     def joints(self, body: Body, betas: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -12,7 +12,10 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 # Model y up becomes world z up, (x, y, z) -> (x, -z, y): the person faces world −y, into Blender's front view.
 R_WORLD_MODEL = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
@@ -20,11 +23,11 @@ R_WORLD_MODEL = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 R_WORLD_LEVELCAMERA = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 
 
-def world_from_level_camera(up_camera: np.ndarray, height: float = 0.0) -> np.ndarray:
-    """World frame of a camera whose view of "up" is known: z along ``up``, the camera looking along +y.
+def world_from_level_camera(up_camera: ArrayLike, height: float = 0.0) -> NDArray[np.float64]:
+    """Return the camera pose in a world whose z axis is the given up direction and whose +y the camera faces.
 
-    The heading is the one that keeps the optical axis in the world's y-z plane, so a level camera gives
-    ``R_WORLD_LEVELCAMERA``. The camera sits at (0, 0, height).
+    The heading keeps the optical axis in the world's y-z plane, so a level camera gives ``R_WORLD_LEVELCAMERA``. The
+    camera is at (0, 0, height).
 
     :param up_camera: (3,) up direction in the camera frame, any length.
     :param height: metres of the camera above the floor.
@@ -33,7 +36,7 @@ def world_from_level_camera(up_camera: np.ndarray, height: float = 0.0) -> np.nd
     up = np.asarray(up_camera, float) / np.linalg.norm(up_camera)
     forward = np.array([0.0, 0.0, 1.0])
     forward = forward - up * (forward @ up)
-    if np.linalg.norm(forward) < 1e-6:  # looking straight up or down: head along the image's vertical instead
+    if np.linalg.norm(forward) < 1e-6:  # looking straight up or down: use the image's vertical instead
         forward = np.array([0.0, 1.0, 0.0]) - up * up[1]
     forward /= np.linalg.norm(forward)
     right = np.cross(forward, up)
@@ -43,6 +46,9 @@ def world_from_level_camera(up_camera: np.ndarray, height: float = 0.0) -> np.nd
     return T_world_camera
 
 
-def transform_points(T_a_b: np.ndarray, points_b: np.ndarray) -> np.ndarray:
-    """``p_a = R p_b + t`` for (..., 4, 4) transforms and (..., N, 3) points."""
-    return points_b @ np.swapaxes(T_a_b[..., :3, :3], -1, -2) + T_a_b[..., None, :3, 3]
+def transform_points(
+    T_a_b: NDArray[np.floating[Any]], points_b: NDArray[np.floating[Any]]
+) -> NDArray[np.floating[Any]]:
+    """Return ``p_a = R p_b + t`` for (..., 4, 4) transforms and (..., N, 3) points."""
+    points_a: NDArray[np.floating[Any]] = points_b @ np.swapaxes(T_a_b[..., :3, :3], -1, -2) + T_a_b[..., None, :3, 3]
+    return points_a

@@ -1,38 +1,45 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The points of feet and hands that rest on the floor. Numpy alone: work on a motion in Blender needs them too."""
+"""The points of feet and hands that may rest on the floor: heels, toes and palms.
+
+Depends on numpy and the solver only, because motions are also edited where nothing else is installed.
+"""
 
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...solver.body import Body
 
 FOOT_PARTS = ("left_ankle", "left_foot", "right_ankle", "right_foot")
 SOLES = ("sole/left_heel", "sole/left_toe", "sole/right_heel", "sole/right_toe")
 PALMS = ("palm/left", "palm/right")
-SUPPORTS = SOLES + PALMS
+CONTACT_POINTS = SOLES + PALMS
 
 
-def _hand_parts(body: Body) -> tuple[str, str]:
-    """The parts with the palms: of a body with fingers, these belong to the wrists."""
+def _palm_parts(body: Body) -> tuple[str, str]:
+    """Return the parts that carry the palms: the hands, or the wrists of a body with fingers."""
     left, right = (
         f"{side}_hand" if f"{side}_hand" in body.joint_names else f"{side}_wrist" for side in ("left", "right")
     )
     return left, right
 
 
-def with_supports(body: Body, betas: np.ndarray) -> Body:
-    """The body with six more keypoints, `SUPPORTS`.
+def with_contact_points(body: Body, betas: NDArray[np.floating[Any]]) -> Body:
+    """Add six keypoints to a body, `CONTACT_POINTS`.
 
-    Each lies on the ankle, foot or hand part, in the middle of the part's lowest centimetre at rest, where it presses
-    on the floor: rest poses hold their palms down. Exact for these betas; the points keep their place relative to the
-    joint for others.
+    Each is attached to an ankle, foot or hand part, in the centre of the part's lowest centimetre in the rest pose,
+    which is where it touches the floor: rest poses have their palms down. The points are exact for these betas; for
+    others, they keep their positions relative to the joints.
+
+    :param betas: (P,) shape coefficients.
     """
     v, J = body.rest_vertices(betas), body.rest_joints(betas)
     strongest = body.skin_joints[np.arange(len(v)), body.skin_weights.argmax(1)]
-    parts = np.array([body.joint_names.index(name) for name in FOOT_PARTS + _hand_parts(body)], np.int32)
+    parts = np.array([body.joint_names.index(name) for name in FOOT_PARTS + _palm_parts(body)], np.int32)
     local = np.zeros((len(parts), 3))
     for k, part in enumerate(parts):
         own = v[strongest == part] if (strongest == part).any() else J[part : part + 1]
@@ -41,16 +48,19 @@ def with_supports(body: Body, betas: np.ndarray) -> Body:
         local[k] = lowest - J[part]
     return replace(
         body,
-        keypoint_names=(*body.keypoint_names, *SUPPORTS),
+        keypoint_names=(*body.keypoint_names, *CONTACT_POINTS),
         keypoint_part=np.concatenate([body.keypoint_part, parts]),
         keypoint_template=np.concatenate([body.keypoint_template, body.J_template[parts] + local]),
         keypoint_shapedirs=np.concatenate([body.keypoint_shapedirs, body.J_shapedirs[parts]]),
     )
 
 
-def support_points(body_with_supports: Body, R: np.ndarray, t: np.ndarray) -> np.ndarray:
-    """(T, 6, 3) the supports of ``with_supports``'s body.
+def contact_point_positions(
+    body_with_contact_points: Body, R: NDArray[np.floating[Any]], t: NDArray[np.floating[Any]]
+) -> NDArray[np.floating[Any]]:
+    """Return the (T, 6, 3) positions of the contact points of a posed body.
 
-    :param R, t: (T, K+1, 3, 3), (T, K+1, 3) part poses in any frame; the result is in that frame.
+    :param body_with_contact_points: from `with_contact_points`.
+    :param R, t: (T, K+1, 3, 3) and (T, K+1, 3) part poses in any frame; the result is in that frame.
     """
-    return body_with_supports.keypoints(R, t, which=slice(-len(SUPPORTS), None))
+    return body_with_contact_points.keypoints(R, t, which=slice(-len(CONTACT_POINTS), None))

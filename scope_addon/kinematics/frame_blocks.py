@@ -1,31 +1,34 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Long clips a few thousand frames at a time.
+"""Processing long clips a few thousand frames at a time.
 
-Rotation matrices of an hour's 108,000 frames take 190 MB, and numpy's intermediate results several times that.
+The rotation matrices of an hour's 108,000 frames take 190 MB, and numpy's intermediate results several times that.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 BLOCK_FRAMES = 4096
 
 
-def by_blocks(compute: Callable[..., tuple[np.ndarray, ...]], *arrays: np.ndarray) -> tuple[np.ndarray, ...]:
-    """``compute(*arrays)`` a block of frames at a time, for what treats each frame on its own.
+def by_blocks(compute: Callable[..., tuple[NDArray[Any], ...]], *arrays: NDArray[Any]) -> tuple[NDArray[Any], ...]:
+    """Evaluate ``compute(*arrays)`` one block of frames at a time, for functions that treat frames independently.
 
-    :param compute: arrays (t, ...) to a tuple of arrays (t, ...), for any number t of frames.
+    :param compute: maps arrays (t, ...) to a tuple of arrays (t, ...), for any number t of frames.
     :param arrays: (T, ...) each.
+    :return: arrays (T, ...).
     """
     T = len(arrays[0])
-    out: list[np.ndarray] = []
+    out: list[NDArray[Any]] = []
     for start in range(0, max(T, 1), BLOCK_FRAMES):
         block = slice(start, start + BLOCK_FRAMES)
-        parts = compute(*(array[block] for array in arrays))
+        results = compute(*(array[block] for array in arrays))
         if not out:
-            out = [np.empty((T, *part.shape[1:]), part.dtype) for part in parts]
-        for whole, part in zip(out, parts, strict=True):
-            whole[block] = part
+            out = [np.empty((T, *result.shape[1:]), result.dtype) for result in results]
+        for whole, result in zip(out, results, strict=True):
+            whole[block] = result
     return tuple(out)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is kept of every frame of a long clip, in single precision.
+"""Per-frame results of long clips in single precision.
 
-An hour at 30 frames a second has 108,000 frames: rotation matrices of one person take 190 MB in double precision. Each
-frame is computed in double precision all the same; kept singly, a joint 10 m away is off by a micrometre.
+An hour at 30 frames per second has 108,000 frames: the rotation matrices of one person take 190 MB in double precision.
+Frames are computed in double precision and stored in single precision, which moves a joint 10 m away by a micrometre.
 """
 
 from __future__ import annotations
@@ -15,8 +15,11 @@ import numpy as np
 Record = TypeVar("Record", bound=Any)
 
 
-def compact(record: Record) -> Record:
-    """A dataclass with each (T, ...) float64 array of more than a point a frame as float32."""
+def to_single_precision(record: Record) -> Record:
+    """Convert the float64 arrays (T, ...) of a dataclass with more than three values per frame to float32.
+
+    :return: a copy of the dataclass; itself if there is nothing to convert.
+    """
     large = {}
     for field in fields(record):
         value = getattr(record, field.name)

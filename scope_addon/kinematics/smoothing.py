@@ -1,73 +1,103 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Filling gaps and zero-phase smoothing of a motion in time.
 
-The kernel is a Gaussian over presentation times, so that variable frame rates need no resampling; its gain at the
-cut-off frequency f is 1/√2: σ = √(ln 2) / (2 π f). Rotations are averaged as quaternions on one hemisphere (the
-chordal mean), which stays on the group and has no axis-angle seams.
+The kernel is a Gaussian over presentation times, so variable frame rates need no resampling. Its gain at the cut-off
+frequency f is 1/√2: σ = √(ln 2) / (2 π f). Rotations are averaged as quaternions on one hemisphere and normalized (the
+chordal mean), which has no discontinuities, unlike axis-angle vectors.
 """
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
+from numpy.typing import NDArray
 
 from ...solver.rotations import matrix_from_quaternion, quaternion_from_matrix
 
-# Human limb motion lies below some 6 Hz, detector noise is spread evenly. A Gaussian falls off slowly: with 4.5 Hz it
-# lets as much noise through as the 6 Hz Butterworth filter that is usual for marker data.
+# Human limb motion lies below about 6 Hz; detector noise is white. A Gaussian has a slow roll-off: at 4.5 Hz it passes
+# as much noise as the 6 Hz Butterworth filter that is usual for marker data.
 ROTATION_CUTOFF_HZ = 4.5
-DEPTH_CUTOFF_HZ = 2.0  # a single camera measures depth an order worse than the image position
-_ROTATIONS_AT_ONCE = 50_000  # with what numpy needs in between, some 50 MB; of one joint, as many as there are
+DEPTH_CUTOFF_HZ = 2.0  # from one camera, depth is an order of magnitude less accurate than the image position
+_ROTATIONS_AT_ONCE = 50_000  # some 50 MB with numpy's intermediate results; one joint at a time may exceed it
 
 
-def fill_gaps(values: np.ndarray, valid: np.ndarray, times: np.ndarray) -> np.ndarray:
-    """Linear interpolation over the frames that are not valid, the nearest valid value at both ends.
+def fill_gaps(
+    values: NDArray[np.floating[Any]], valid: NDArray[np.bool_], times: NDArray[np.float64]
+) -> NDArray[np.floating[Any]]:
+    """Interpolate linearly over the frames that are not valid; extend the nearest valid value at both ends.
 
-    :param values: (T, ...);  valid: (T,) bool with at least one True;  times: (T,) seconds.
+    :param values: (T, ...) samples.
+    :param valid: (T,) with at least one True.
+    :param times: (T,) seconds.
+    :return: (T, ...) values; the argument itself if all frames are valid.
     """
     if valid.all():
         return values
     flat = values.reshape(len(values), -1)
     good = np.flatnonzero(valid)
     out = np.stack([np.interp(times, times[good], flat[good, k]) for k in range(flat.shape[1])], axis=1)
-    return out.reshape(values.shape)
+    filled: NDArray[np.float64] = out.reshape(values.shape)
+    return filled
 
 
-def continuous_quaternions(R: np.ndarray) -> np.ndarray:
-    """(T, J, 3, 3) rotations -> (T, J, 4) unit quaternions (w, x, y, z) without sign jumps from frame to frame."""
-    q = quaternion_from_matrix(np.asarray(R, float))
+def continuous_quaternions(R: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
+    """Convert rotations to unit quaternions whose sign does not change from frame to frame.
+
+    :param R: (T, J, 3, 3) rotation matrices.
+    :return: (T, J, 4) quaternions (w, x, y, z).
+    """
+    q: NDArray[np.float64] = quaternion_from_matrix(np.asarray(R, float))
     dots = (q[1:] * q[:-1]).sum(-1)
     signs = np.cumprod(np.where(dots < 0, -1.0, 1.0), axis=0)
     q[1:] *= signs[..., None]
     return q
 
 
-def fill_rotation_gaps(R: np.ndarray, valid: np.ndarray, times: np.ndarray) -> np.ndarray:
-    """``fill_gaps`` for rotations (T, J, 3, 3), along the shorter arc."""
+def fill_rotation_gaps(
+    R: NDArray[np.floating[Any]], valid: NDArray[np.bool_], times: NDArray[np.float64]
+) -> NDArray[np.floating[Any]]:
+    """Interpolate rotations over the frames that are not valid, along the shorter arc; see `fill_gaps`.
+
+    :param R: (T, J, 3, 3) rotation matrices.
+    :param valid: (T,) with at least one True.
+    :param times: (T,) seconds.
+    :return: (T, J, 3, 3) rotation matrices; the argument itself if all frames are valid.
+    """
     if valid.all():
         return R
     good = np.flatnonzero(valid)
-    held = good[np.clip(np.searchsorted(good, np.arange(len(R)), side="right") - 1, 0, None)]
+    last_valid = good[np.clip(np.searchsorted(good, np.arange(len(R)), side="right") - 1, 0, None)]
     out = np.empty_like(R)
-    for joints in _some_joints(R):
-        q = fill_gaps(continuous_quaternions(R[held, joints]), valid, times)
+    for joints in _joint_blocks(R):
+        q = fill_gaps(continuous_quaternions(R[last_valid, joints]), valid, times)
         out[:, joints] = matrix_from_quaternion(q / np.linalg.norm(q, axis=-1, keepdims=True))
     return out
 
 
-def _some_joints(R: np.ndarray) -> list[slice]:
-    """Of rotations (T, J, 3, 3), so many joints at a time that a long clip's intermediate results stay small."""
+def _joint_blocks(R: NDArray[np.floating[Any]]) -> list[slice]:
+    """Divide the joints of rotations (T, J, 3, 3) so that a long clip's intermediate results stay small."""
     T, J = R.shape[:2]
     count = max(1, min(J, _ROTATIONS_AT_ONCE // max(T, 1)))
     return [slice(j, j + count) for j in range(0, J, count)]
 
 
-def gaussian_smooth(values: np.ndarray, times: np.ndarray, cutoff_hz: float) -> np.ndarray:
-    """Zero-phase low-pass of (T, ...) samples at ``times`` (seconds); the gain at ``cutoff_hz`` is 1/√2."""
+def gaussian_smooth(
+    values: NDArray[np.floating[Any]], times: NDArray[np.float64], cutoff_hz: float
+) -> NDArray[np.floating[Any]]:
+    """Apply a zero-phase low-pass filter whose gain at the cut-off frequency is 1/√2.
+
+    :param values: (T, ...) samples.
+    :param times: (T,) seconds.
+    :param cutoff_hz: 0 or less: return a copy.
+    :return: (T, ...) smoothed samples; a copy of fewer than three.
+    """
     T = len(values)
     if T < 3 or cutoff_hz <= 0:
         return values.copy()
     sigma = np.sqrt(np.log(2)) / (2 * np.pi * cutoff_hz)
-    near = np.searchsorted(times, times + 4 * sigma, side="right") - np.arange(T)  # where frames lie closest, the most
+    # The kernel reaches as many frames as it covers where frames are closest together in time.
+    near = np.searchsorted(times, times + 4 * sigma, side="right") - np.arange(T)
     reach = min(int(near.max()), T - 1)
     flat = values.reshape(T, -1)
     total, weight = np.zeros_like(flat, float), np.zeros(T)
@@ -76,27 +106,46 @@ def gaussian_smooth(values: np.ndarray, times: np.ndarray, cutoff_hz: float) -> 
         w = np.exp(-0.5 * ((times[start] - times[to]) / sigma) ** 2)
         total[to] += w[:, None] * flat[start]
         weight[to] += w
-    return (total / weight[:, None]).reshape(values.shape)
+    smooth: NDArray[np.float64] = (total / weight[:, None]).reshape(values.shape)
+    return smooth
 
 
 def smooth_rotations(
-    R: np.ndarray, times: np.ndarray, cutoff_hz: float = ROTATION_CUTOFF_HZ, out: np.ndarray | None = None
-) -> np.ndarray:
-    """Zero-phase low-pass of rotations (T, J, 3, 3); ``out`` may be ``R`` itself."""
+    R: NDArray[np.floating[Any]],
+    times: NDArray[np.float64],
+    cutoff_hz: float = ROTATION_CUTOFF_HZ,
+    out: NDArray[np.floating[Any]] | None = None,
+) -> NDArray[np.floating[Any]]:
+    """Apply a zero-phase low-pass filter to rotations.
+
+    :param R: (T, J, 3, 3) rotation matrices.
+    :param times: (T,) seconds.
+    :param out: (T, J, 3, 3) array for the result; may be ``R`` itself.
+    :return: (T, J, 3, 3) rotation matrices.
+    """
     out = np.empty_like(R) if out is None else out
-    for joints in _some_joints(R):
+    for joints in _joint_blocks(R):
         q = gaussian_smooth(continuous_quaternions(R[:, joints]), times, cutoff_hz)
         out[:, joints] = matrix_from_quaternion(q / np.linalg.norm(q, axis=-1, keepdims=True))
     return out
 
 
-def smooth_root(t_camera_root: np.ndarray, times: np.ndarray, strength: float = 1.0) -> np.ndarray:
-    """Zero-phase low-pass of the root's position (T, 3) about the camera's centre, in axes that do not turn.
+def smooth_root(
+    t_camera_root: NDArray[np.floating[Any]], times: NDArray[np.float64], strength: float = 1.0
+) -> NDArray[np.floating[Any]]:
+    """Apply a zero-phase low-pass filter to the root's position.
 
-    Direction and distance (its logarithm) are filtered apart: distance is the noisier one, and a wrong distance must
-    not move the person off the footage. The cut-off frequencies are divided by ``strength``.
+    Direction and distance (its logarithm) are filtered separately: distance is noisier, and its errors must not move
+    the person in the image. The cut-off frequencies are divided by ``strength``.
+
+    :param t_camera_root: (T, 3) relative to the camera's centre, in axes that do not rotate.
+    :param times: (T,) seconds.
+    :return: (T, 3) smoothed positions.
     """
     distance = np.maximum(np.linalg.norm(t_camera_root, axis=1, keepdims=True), 1e-6)
     ray = gaussian_smooth(t_camera_root / distance, times, ROTATION_CUTOFF_HZ / strength)
     ray /= np.maximum(np.linalg.norm(ray, axis=1, keepdims=True), 1e-6)
-    return ray * np.exp(gaussian_smooth(np.log(distance), times, DEPTH_CUTOFF_HZ / strength))
+    smooth: NDArray[np.floating[Any]] = ray * np.exp(
+        gaussian_smooth(np.log(distance), times, DEPTH_CUTOFF_HZ / strength)
+    )
+    return smooth

@@ -1,17 +1,20 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The sequence of states that costs the least, where each step's cost depends on the state before (Viterbi)."""
+"""The sequence of states with the least total cost, where a step's cost depends on the previous state (Viterbi)."""
 
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 
-def cheapest_path(costs: np.ndarray, switching: np.ndarray) -> np.ndarray:
-    """The states x that minimise Σ_t costs[t, x_t] + Σ_{t≥1} switching[t−1, x_{t−1}, x_t]; of equals, lower numbers.
+def least_cost_path(costs: NDArray[np.float64], switching: NDArray[np.float64]) -> NDArray[np.intp]:
+    """Find the states x that minimize Σ_t costs[t, x_t] + Σ_{t≥1} switching[t−1, x_{t−1}, x_t].
 
-    :param costs: (T, S) of being in a state.
-    :param switching: (T−1, S, S) of going from one state (row) to another (column); inf where there is no way.
-    :return: (T,) int.
+    Ties are resolved in favour of lower state numbers.
+
+    :param costs: (T, S) cost of each state.
+    :param switching: (T−1, S, S) cost of going from one state (row) to another (column); inf: impossible.
+    :return: (T,) states.
     """
     T, S = costs.shape
     path, came_from = np.zeros(T, int), np.zeros((T, S), np.int8)
@@ -19,9 +22,9 @@ def cheapest_path(costs: np.ndarray, switching: np.ndarray) -> np.ndarray:
         return path
     total = costs[0]
     for t in range(1, T):
-        ways = total[:, None] + switching[t - 1]
-        came_from[t] = ways.argmin(axis=0)
-        total = ways.min(axis=0) + costs[t]
+        totals = total[:, None] + switching[t - 1]
+        came_from[t] = totals.argmin(axis=0)
+        total = totals.min(axis=0) + costs[t]
     path[-1] = total.argmin()
     for t in range(T - 1, 0, -1):
         path[t - 1] = came_from[t, path[t]]

@@ -253,5 +253,5 @@ CAPTURE_OPTIONS = (
         argument=Argument(help="keep the per-frame solution: no smoothing, no foot locking"),
         blender=Property(label="Smooth"),
     ),
-    Option("parts", object, None, Place.CAPTURE, "stages of the pipeline that take part; only experiments set it"),
+    Option("ablation", object, None, Place.CAPTURE, "parts of the pipeline to leave out; only experiments set it"),
 )

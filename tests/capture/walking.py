@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scope.scope_addon.capture.fitting.keypoint_offsets import as_seen
+from scope.scope_addon.capture.fitting.keypoint_offsets import with_keypoint_offsets
 from scope.scope_addon.capture.tracking.track import Track
 from scope.solver.loaders.body_file import load_body
 from scope.solver.rotations import exp
@@ -13,7 +13,7 @@ from scope.solver.rotations import exp
 def someone_walking(frames: int, rate: float, heading: float, turn: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
     """(T, 33, 2) pixels and (T, 33, 3) world landmarks of the walking body, one step of each foot per second."""
     body = load_body("scope")
-    seen, at = as_seen(body), list(body.keypoint_set("blazepose").values())
+    seen, at = with_keypoint_offsets(body), list(body.keypoint_set("blazepose").values())
     pixels, world = [], []
     for k in range(frames):
         swing, pose = 0.5 * np.sin(2 * np.pi * k / rate), np.zeros((body.K + 1, 3))

@@ -7,10 +7,10 @@ import tracemalloc
 from dataclasses import dataclass
 
 import numpy as np
-from scope.scope_addon.capture.fitting.track_fit import FittedTrack
+from scope.scope_addon.capture.fitting.frame_sequence import FittedTrack
 from scope.scope_addon.capture.tracking.track import Track
 from scope.scope_addon.capture.world.placement import place_track
-from scope.scope_addon.kinematics.single_precision import compact
+from scope.scope_addon.kinematics.single_precision import to_single_precision
 from scope.solver.loaders.body_file import load_body
 from scope.solver.rotations import exp
 
@@ -29,13 +29,13 @@ def test_only_what_is_large_is_rounded() -> None:
     record = Record(
         rng.normal(0, 5, (50, 33, 3)), rng.normal(0, 5, (50, 3)), np.arange(50) / 30, np.arange(400).reshape(50, 8), "a"
     )
-    small = compact(record)
+    small = to_single_precision(record)
     assert small.large.dtype == np.float32
     np.testing.assert_allclose(small.large, record.large, atol=1e-6)
     assert small.point is record.point
     assert small.times is record.times
     assert small.frames is record.frames
-    assert compact(small) is small
+    assert to_single_precision(small) is small
 
 
 def walk(frames: int) -> tuple[Track, FittedTrack]:
@@ -51,7 +51,7 @@ def walk(frames: int) -> tuple[Track, FittedTrack]:
 
 def test_a_compact_fit_is_placed_within_a_hundredth_of_a_millimetre() -> None:
     body, (track, fitted) = load_body("scope"), walk(120)
-    exact, small = place_track(body, track, fitted, True), place_track(body, track, compact(fitted), True)
+    exact, small = place_track(body, track, fitted, True), place_track(body, track, to_single_precision(fitted), True)
     np.testing.assert_allclose(small.joints, exact.joints, atol=1e-5)
     np.testing.assert_allclose(small.soles, exact.soles, atol=1e-5)
     # and as the same formula in double precision has it
@@ -62,7 +62,7 @@ def test_a_compact_fit_is_placed_within_a_hundredth_of_a_millimetre() -> None:
 def test_placing_a_long_clip_takes_few_kilobytes_a_frame() -> None:
     body, count = load_body("scope"), 30_000
     track, fitted = walk(count)
-    fitted = compact(fitted)
+    fitted = to_single_precision(fitted)
     tracemalloc.start()
     try:
         placed = place_track(body, track, fitted, True)

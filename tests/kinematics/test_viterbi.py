@@ -7,7 +7,7 @@ from itertools import pairwise, product
 
 import numpy as np
 import pytest
-from scope.scope_addon.kinematics.viterbi import cheapest_path
+from scope.scope_addon.kinematics.viterbi import least_cost_path
 
 
 @pytest.mark.parametrize("barred", [0.0, 0.4])
@@ -24,12 +24,12 @@ def test_no_other_path_costs_less(count: int, states: int, barred: float) -> Non
             return there + sum(switching[t, a, b] for t, (a, b) in enumerate(pairwise(path)))
 
         expected = min(product(range(states), repeat=count), key=cost)
-        assert tuple(cheapest_path(costs, switching)) == expected
+        assert tuple(least_cost_path(costs, switching)) == expected
 
 
 def test_of_equals_the_lower_states() -> None:
-    assert cheapest_path(np.zeros((4, 3)), np.zeros((3, 3, 3))).tolist() == [0, 0, 0, 0]
+    assert least_cost_path(np.zeros((4, 3)), np.zeros((3, 3, 3))).tolist() == [0, 0, 0, 0]
 
 
 def test_nothing() -> None:
-    assert cheapest_path(np.zeros((0, 3)), np.zeros((0, 3, 3))).shape == (0,)
+    assert least_cost_path(np.zeros((0, 3)), np.zeros((0, 3, 3))).shape == (0,)

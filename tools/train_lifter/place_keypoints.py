@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ...scope_addon.capture.fitting.ablation import Parts
+from ...scope_addon.capture.fitting.ablation import Ablation
 from ...scope_addon.capture.options import CaptureOptions
 from ...scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES
 from ...scope_addon.capture.pipeline import capture
@@ -60,10 +60,10 @@ def main() -> None:
     parser = argparse.ArgumentParser(description="Find where the landmark network sees keypoints.")
     parser.add_argument("clips", type=Path, help="folder of the clips")
     folder: Path = parser.parse_args().clips
-    body, parts = load_body("scope"), Parts(seen_keypoints=False)
+    body, ablation = load_body("scope"), Ablation(keypoint_offsets=False)
     everybody = []
     for clip in CLIPS:
-        found = capture(folder / f"{clip}.mp4", body, CaptureOptions(people="all", parts=parts))
+        found = capture(folder / f"{clip}.mp4", body, CaptureOptions(people="all", ablation=ablation))
         everybody += [normal_equations(body, m) for m in found.motions if m.valid.sum() >= LEAST_FRAMES]
     columns = [offsets(*each) for each in everybody]
     columns.append(offsets(*(np.sum(each, axis=0) for each in zip(*everybody, strict=True))))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which parts of the pipeline take part, so that an experiment can leave one out and see what it is worth."""
+"""Parts of the pipeline that an experiment can leave out, to measure what each contributes."""
 
 from __future__ import annotations
 
@@ -10,29 +10,32 @@ from ...errors import UsageError
 
 
 @dataclass(frozen=True)
-class Parts:
-    """All parts by default. Of ``lifter`` and ``world_landmarks``, the two sources of depth, one has to stay."""
+class Ablation:
+    """Which parts run; all by default. At least one source of depth is needed: ``lifter`` or ``world_landmarks``.
 
-    lifter: bool = True  # else the landmark network's own world landmarks stand in for it
+    :raises UsageError: both sources of depth are left out.
+    """
+
+    lifter: bool = True  # False: the landmark network's world landmarks replace its output
     world_landmarks: bool = True  # as input of the lifter
-    seen_keypoints: bool = True  # keypoints where the networks see them on a body, instead of at its joints
+    keypoint_offsets: bool = True  # False: keypoints lie at the body's joints, not where the networks place them
     keypoints3d: bool = True
     orientation_field: bool = True
     joint_prior: bool = True
-    left_right: bool = True  # repair of left and right
-    leaps: bool = True  # repair of keypoints that leap away for a few frames
-    second_pass: bool = True  # the fit again with the distance that floor and feet tell
-    balance: bool = True  # in it, weight over feet that stand
-    floor: bool = True  # in it, feet that stand on the floor
-    contact: bool = True  # feet held on the floor at the end
+    left_right: bool = True  # repair of left-right swaps and limb swaps
+    keypoint_jumps: bool = True  # repair of keypoint jumps
+    second_pass: bool = True  # refit with the distance that follows from floor and feet
+    balance: bool = True  # in the second pass: the zero moment point lies between the contact points
+    floor: bool = True  # in the second pass: feet in contact lie on the floor
+    contact: bool = True  # foot locking
 
     def __post_init__(self) -> None:
-        """Refuse to leave out all depth."""
+        """Require a source of depth."""
         if not (self.lifter or self.world_landmarks):
-            raise UsageError("lifter and world_landmarks cannot both be left out: nothing else tells depth")
+            raise UsageError("lifter and world_landmarks cannot both be left out: without either, depth is unknown")
 
     def weights(self, weights: Weights) -> Weights:
-        """The solver's weights, zero for what is left out."""
+        """Return the solver's weights with zeros for the terms that are left out."""
         return replace(
             weights,
             keypoints3d=weights.keypoints3d * self.keypoints3d,
@@ -42,4 +45,4 @@ class Parts:
         )
 
 
-ALL_PARTS = Parts()
+NO_ABLATION = Ablation()

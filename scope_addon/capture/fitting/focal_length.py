@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The focal length by the edges of what people build: most are upright or level, at right angles to each other.
+"""The focal length from the edges of buildings and rooms: most follow three orthogonal directions.
 
-How many edges three directions at right angles explain (`right_angles`) depends on the focal length f:
+How many edges the best Manhattan directions explain (`manhattan`) depends on the focal length f:
 
     p(f) ∝ exp(κ score(f)) N(log f; log f_0, σ²)
 
-f_0 and σ what is assumed without looking. A wall seen straight on fits every f; then p stays as wide as what was
-assumed, and nothing is said.
+with the assumed f_0 and σ. A wall seen frontally fits every f; p is then as wide as the assumption, and the assumed
+focal length is kept.
 
 Source: Caprile and Torre 1990 (f from vanishing points).
 """
@@ -16,6 +16,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..camera.intrinsics import ASSUMED_DEVIATION, Camera, assumed_camera, estimated_camera
 from ..camera.line_segments import Segments
@@ -24,32 +25,34 @@ from .focal_fits import log_likelihood
 
 KAPPA = 4.0
 LOG_RANGE, COARSE_STEP, FINE_STEP = 0.7, 0.05, 0.0125  # of log(f / f_0)
-FITTED_STEP = 0.0025  # where trying one costs nothing
-CERTAIN = 0.1  # deviation of log f: whatever is less certain is no better than what was assumed
+FITTED_STEP = 0.0025  # finer, since evaluating the fits' likelihood costs nothing
+MAX_DEVIATION = 0.1  # of log f; a less certain estimate is no better than the assumption
 
 
 @dataclass(frozen=True)
 class FocalLength:
-    """Mean, and standard deviation of its logarithm: the relative error."""
+    """Estimated focal length in pixels, and standard deviation of its logarithm: the relative error."""
 
     focal_px: float
     deviation: float
 
 
 def camera_by_edges(segments: Segments, width: int, height: int, longer_px: float) -> Camera:
-    """The camera with the focal length that edges tell, if they tell any, else the assumed one.
+    """Return the camera with the focal length estimated from edges or, if that fails, the assumed one.
 
-    ``longer_px``: the longer side of what the camera saw; see `bars`.
+    :param longer_px: longer side of the image without letterbox bars, see `bars`.
     """
     camera = assumed_camera(width, height, longer_px)
     found = focal_from_edges(segments, width, height, camera.intrinsics[0, 0])
     return estimated_camera(width, height, found.focal_px, found.deviation, longer_px) if found else camera
 
 
-def camera_by_fits(camera: Camera, assumed: Camera, costs: list[np.ndarray], longer_px: float) -> Camera:
-    """The camera with what fits to pictures say of its focal length as well.
+def camera_by_fits(camera: Camera, assumed: Camera, costs: list[NDArray[np.float64]], longer_px: float) -> Camera:
+    """Combine the camera's focal length with the likelihood from fits of the body.
 
-    ``costs``: of the fits, about ``assumed``; see `focal_fits`.
+    :param assumed: the camera of the fits.
+    :param costs: (5,) of each fitted frame, see `focal_fits`.
+    :param longer_px: longer side of the image without letterbox bars, see `bars`.
     """
     if not costs:
         return camera
@@ -62,7 +65,7 @@ def camera_by_fits(camera: Camera, assumed: Camera, costs: list[np.ndarray], lon
 
 
 def focal_from_edges(segments: Segments, width: int, height: int, assumed_px: float) -> FocalLength | None:
-    """The focal length that a picture's edges tell; None where they do not tell any."""
+    """Estimate the focal length from an image's edges; None if it is uncertain."""
     edges = Edges.of(segments, width, height)
     coarse = np.arange(-LOG_RANGE, LOG_RANGE + 1e-9, COARSE_STEP)
     scores = [edges.support(assumed_px * np.exp(x)) for x in coarse]
@@ -72,15 +75,16 @@ def focal_from_edges(segments: Segments, width: int, height: int, assumed_px: fl
     known = dict(zip(coarse.tolist(), scores, strict=True))
     scores = [known.get(x) or edges.support(assumed_px * np.exp(x)) for x in log_ratio.tolist()]
     mean, deviation = _moments(log_ratio, _log_posterior(log_ratio, scores))
-    return FocalLength(assumed_px * float(np.exp(mean)), deviation) if deviation < CERTAIN else None
+    return FocalLength(assumed_px * float(np.exp(mean)), deviation) if deviation < MAX_DEVIATION else None
 
 
-def _log_posterior(log_ratio: np.ndarray, scores: list[float]) -> np.ndarray:
-    return KAPPA * np.array(scores) - 0.5 * np.square(log_ratio / ASSUMED_DEVIATION)
+def _log_posterior(log_ratio: NDArray[np.float64], scores: list[float]) -> NDArray[np.float64]:
+    log_p: NDArray[np.float64] = KAPPA * np.array(scores) - 0.5 * np.square(log_ratio / ASSUMED_DEVIATION)
+    return log_p
 
 
-def _moments(log_ratio: np.ndarray, log_p: np.ndarray) -> tuple[float, float]:
-    """Mean and standard deviation of log(f / f_0), by trapezoids over unevenly spaced values."""
+def _moments(log_ratio: NDArray[np.float64], log_p: NDArray[np.float64]) -> tuple[float, float]:
+    """Return mean and standard deviation of log(f / f_0), integrated over unevenly spaced values."""
     order = np.argsort(log_ratio)
     x, log_p = log_ratio[order], log_p[order]
     p = np.exp(log_p - log_p.max()) * np.gradient(x)

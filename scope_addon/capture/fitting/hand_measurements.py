@@ -1,16 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""From the hands' keypoints to the solver's measurements, and what is known of fingers without any.
+"""From the hands' keypoints to the solver's measurements, and the motion of fingers that are not seen.
 
-Each keypoint is a 2D keypoint. The world landmarks give directions: along every bone of the fingers, and across the
-palm, which tells the wrist's rotation. They are in axes that look along the line of sight to the hand, so they are
-turned into the camera's. Between hands seen, fingers keep calm: `calm_fingers`.
+The keypoints are 2D keypoints. The world landmarks give directions: along every bone of the fingers, and across the
+palm, which determines the wrist's rotation. Their axes are aligned with the line of sight to the hand, so directions
+are rotated to camera axes. `smooth_fingers` moves the fingers while a hand is not seen.
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ....solver import Body, Keypoints2D, Measurements, OrientationField, Priors
 from ....solver.residuals import joint_limits
@@ -23,17 +25,18 @@ from ..perception.lifter import KEYPOINT_COUNT, virtual_camera
 
 FINGERS = ("index", "middle", "ring", "pinky", "thumb")
 HAND_KEYPOINT_NAMES = tuple(f"hand/{side}_{name}" for side in SIDES for name in HAND_NAMES)
-PIXEL_TRUST = 0.3  # of a hand's keypoint beside the body's wrist: 21 lie close together and err together
-WRIST_PIXEL_TRUST = 0.05  # the hand's network puts the wrist further into the palm than the body has its joint
-DIRECTION_TRUST = 0.25  # of a bone's direction of presence 1: twice the deviation of a bone of the body
-# Radians that a joint of a finger bends towards the palm, at least and at most, and how far it swings off that.
+# Weights of keypoints relative to the body's wrist: 21 lie close together, with correlated errors. The hand network
+# places the wrist further into the palm than the body has its joint.
+PIXEL_WEIGHT, WRIST_PIXEL_WEIGHT = 0.3, 0.05
+DIRECTION_WEIGHT = 0.25  # of a bone in a hand of presence 1: twice the standard deviation of a bone of the body
+# Flexion of a finger joint towards the palm, at least and at most, and largest deviation from this axis; radians.
 _KNUCKLE, _HINGE = (-0.5, 1.7, 0.4), (-0.2, 2.0, 0.2)
-_THUMB = (-0.4, 0.4, 1.2)  # the same about its own bone: how far it twists, and swings
-SHORT_GAP_S, LONG_GAP_S = 0.3, 1.0  # fingers that are not seen move on until the one, and are at rest from the other
+_THUMB = (-0.4, 0.4, 1.2)  # rotation of a thumb joint about its own bone, and deviation from it
+SHORT_GAP_S, LONG_GAP_S = 0.3, 1.0  # unseen fingers begin to return to rest after the first, and rest after the second
 
 
 def finger_joints(body: Body, side: str) -> list[int]:
-    """The numbers of the 15 joints of a hand's fingers, from the index to the thumb.
+    """Return the indices of the 15 joints of a hand's fingers, from the index finger to the thumb.
 
     :raises UsageError: the body has no fingers.
     """
@@ -47,34 +50,43 @@ def finger_joints(body: Body, side: str) -> list[int]:
 
 
 def require_fingers(body: Body) -> None:
-    """:raises UsageError: the body has no fingers."""
+    """Check that a body has finger joints.
+
+    :raises UsageError: it has none.
+    """
     for side in SIDES:
         finger_joints(body, side)
 
 
 class HandMeasurer:
-    """Makes measurements of one body's hands."""
+    """Converts hand landmarks to measurements of one body.
 
-    def __init__(self, body: Body, intrinsics: np.ndarray) -> None:
+    :raises UsageError: the body has no finger joints.
+    """
+
+    def __init__(self, body: Body, intrinsics: NDArray[np.float64]) -> None:
         self._body, self._unproject = body, np.linalg.inv(intrinsics)
         self.indices = np.array([body.keypoint_names.index(name) for name in HAND_KEYPOINT_NAMES]).reshape(2, -1)
         self.fingers = [finger_joints(body, side) for side in SIDES]
         self.wrists = [body.joint_names.index(f"{side}_wrist") for side in SIDES]
-        # Bones as (from, to): pairs of the hand's keypoints, and the solver's numbers of the same points.
+        # Bones as (from, to): pairs of the hand's keypoints, and the solver's indices of the same points.
         self._from, self._to = np.array(_bones()).T
         self._starts, self._ends = (
             np.array([self._points(side)[pairs] for side in range(len(SIDES))]) for pairs in (self._from, self._to)
         )
 
-    def _points(self, side: int) -> np.ndarray:
-        """(21,) the solver's numbers of a hand's keypoints: joints where they can be, so that bones share a part."""
-        points = self.indices[side].copy()
+    def _points(self, side: int) -> NDArray[np.intp]:
+        """Return the solver's (21,) indices of a hand's keypoints; joints where possible, so that bones share parts."""
+        points: NDArray[np.intp] = self.indices[side].copy()
         joints = [self.wrists[side], *(self.fingers[side][k] for k in (12, 13, 14, *range(12)))]
         points[_JOINTS] = len(self._body.keypoint_names) + np.array(joints)
         return points
 
-    def add(self, measured: Measurements, hands: np.ndarray) -> Measurements:
-        """The measurements of a frame with its hands (2, 21, 6): pixels without distortion, confidence, landmarks."""
+    def add(self, measured: Measurements, hands: NDArray[np.floating[Any]]) -> Measurements:
+        """Add the hands to the measurements of a frame.
+
+        :param hands: (2, 21, 6) undistorted pixels, confidence and world landmarks; confidence 0 where not seen.
+        """
         first, bones = measured.keypoints2d, measured.orientation_field
         assert first is not None
         assert bones is not None
@@ -88,24 +100,25 @@ class HandMeasurer:
             keypoints2d=Keypoints2D(
                 np.concatenate([first.indices, self.indices[seen].ravel()]),
                 np.concatenate([first.pixels, hands[seen, :, :2].reshape(-1, 2)]),
-                np.concatenate([first.confidence, (_PIXEL_TRUST * confidence).ravel()]),
+                np.concatenate([first.confidence, (_PIXEL_WEIGHTS * confidence).ravel()]),
             ),
             orientation_field=OrientationField(
                 np.concatenate([bones.starts, self._starts[seen].ravel()]),
                 np.concatenate([bones.ends, self._ends[seen].ravel()]),
                 np.concatenate([bones.directions, directions.reshape(-1, 3)]),
-                np.concatenate([bones.confidence, DIRECTION_TRUST * confidence[:, self._to].ravel()]),
+                np.concatenate([bones.confidence, DIRECTION_WEIGHT * confidence[:, self._to].ravel()]),
             ),
         )
 
-    def _directions(self, hands: np.ndarray) -> np.ndarray:
-        """(n, bones, 3) along the bones of n hands, camera axes."""
+    def _directions(self, hands: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
+        """Return the (n, bones, 3) vectors along the bones of n hands (n, 21, 6), camera axes."""
         rays = hands[..., :2].mean(axis=1) @ self._unproject[:2, :2].T + self._unproject[:2, 2]
         R_virtual_camera = virtual_camera(np.repeat(rays[:, None], KEYPOINT_COUNT, axis=1))
-        return (hands[:, self._to, 3:] - hands[:, self._from, 3:]) @ R_virtual_camera
+        bones: NDArray[np.floating[Any]] = (hands[:, self._to, 3:] - hands[:, self._from, 3:]) @ R_virtual_camera
+        return bones
 
-    def joint_confidence(self, hands: np.ndarray) -> np.ndarray:
-        """Hands of T frames (T, 2, 21, 6) -> (T, K+1) how far they fix each joint's rotation; 0 beyond the hands."""
+    def joint_confidence(self, hands: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
+        """Return the (T, K+1) confidence of each joint's rotation, given hands (T, 2, 21, 6); 0 for other joints."""
         out = np.zeros((len(hands), self._body.K + 1))
         for side, joints in enumerate(self.fingers):
             for joint in (self.wrists[side], *joints):
@@ -114,24 +127,27 @@ class HandMeasurer:
 
 
 def _bones() -> list[tuple[int, int]]:
-    """Pairs of keypoints whose direction is known: the palm's, then three a finger."""
+    """Return the pairs of keypoints with a known direction: those of the palm, then three per finger."""
     palm = [(0, 5), (0, 9), (0, 13), (0, 17), (5, 17)]
     return palm + [(k, k + 1) for finger in range(5) for k in range(4 * finger + 1, 4 * finger + 4)]
 
 
-# The keypoints that are joints: the wrist, then each finger's three, the thumb first, in the keypoints' order.
+# The keypoints that are joints, in the keypoints' order: the wrist, then three per finger, the thumb first.
 _JOINTS = np.array([0, *(4 * finger + k for finger in range(5) for k in (1, 2, 3))])
 
 
-_PIXEL_TRUST = np.full(HAND_POINTS, PIXEL_TRUST)
-_PIXEL_TRUST[0] = WRIST_PIXEL_TRUST
+_PIXEL_WEIGHTS = np.full(HAND_POINTS, PIXEL_WEIGHT)
+_PIXEL_WEIGHTS[0] = WRIST_PIXEL_WEIGHT
 
 
 def with_finger_limits(priors: Priors, body: Body) -> Priors:
-    """The priors and how far fingers bend: towards the palm, about the axis that is across bone and palm at rest.
+    """Add joint limits of the fingers to the priors.
 
-    The palm's side is that of (index − wrist) × (little finger − wrist) on the right hand, the other on the left. The
-    thumb's joints turn about axes of their own: they are only kept from twisting about their bones and going too far.
+    Fingers bend towards the palm, about the axis perpendicular to bone and palm normal in the rest pose. The normal is
+    (index − wrist) × (little finger − wrist) on the right hand, and its opposite on the left. The thumb's joints have
+    other axes: only their twist about the bone and their deviation from it are limited.
+
+    :raises UsageError: the body has no finger joints.
     """
     J, joints, axes, ranges = body.J_template, [], [], []
     for side, sign in (("left", -1.0), ("right", 1.0)):
@@ -159,26 +175,32 @@ def with_finger_limits(priors: Priors, body: Body) -> Priors:
 _TIP = {f: f"{f}_tip" if f in ("pinky", "thumb") else f"{f}_finger_tip" for f in FINGERS}
 
 
-def calm_fingers(rotations: np.ndarray, fingers: list[list[int]], seen: np.ndarray, times: np.ndarray) -> np.ndarray:
-    """Rotations (T, K+1, 3, 3) in which the fingers of a hand that is not seen move calmly.
+def smooth_fingers(
+    rotations: NDArray[np.floating[Any]], fingers: list[list[int]], seen: NDArray[np.bool_], times: NDArray[np.float64]
+) -> NDArray[np.floating[Any]]:
+    """Fill in the fingers of hands that are not seen with smooth motion.
 
-    They go on between the frames in which they were seen, and the longer ago or ahead that is, the closer they are to
-    rest: wholly from `LONG_GAP_S` on.
+    Rotations are interpolated between the frames in which the hand was seen. The farther these are away in time, the
+    closer the fingers are to the rest pose, which they reach after `LONG_GAP_S`.
 
+    :param rotations: (T, K+1, 3, 3) of all joints.
+    :param fingers: joint indices of each hand's fingers.
     :param seen: (T, 2) whether each hand was seen.
+    :param times: (T,) seconds.
+    :return: (T, K+1, 3, 3) rotations.
     """
     out = rotations.copy()
-    for joints, there in zip(fingers, seen.T, strict=True):
-        if there.all():
+    for joints, hand_seen in zip(fingers, seen.T, strict=True):
+        if hand_seen.all():
             continue
-        if not there.any():
+        if not hand_seen.any():
             out[:, joints] = np.eye(3)
             continue
-        known = np.concatenate([[-np.inf], times[there], [np.inf]])
-        after = np.searchsorted(times[there], times)
-        away = np.minimum(times - known[after], known[after + 1] - times)
-        share = np.clip((away - SHORT_GAP_S) / (LONG_GAP_S - SHORT_GAP_S), 0.0, 1.0)
+        seen_s = np.concatenate([[-np.inf], times[hand_seen], [np.inf]])
+        after = np.searchsorted(times[hand_seen], times)
+        gap_s = np.minimum(times - seen_s[after], seen_s[after + 1] - times)
+        share = np.clip((gap_s - SHORT_GAP_S) / (LONG_GAP_S - SHORT_GAP_S), 0.0, 1.0)
         keep = 1.0 - share * share * (3.0 - 2.0 * share)
-        between = fill_rotation_gaps(rotations[:, joints], there, times)
+        between = fill_rotation_gaps(rotations[:, joints], hand_seen, times)
         out[:, joints] = exp(keep[:, None, None] * log(between))
     return out

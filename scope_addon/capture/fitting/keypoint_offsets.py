@@ -1,16 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where the landmark network sees each keypoint on a body part, beside where our body has it.
+"""Keypoint offsets: where the landmark network places each keypoint, relative to where our body model has it.
 
-    p_seen = R_i (v̄_j + V_j β + d_j) + t_i
+    p_placed = R_i (v̄_j + V_j β + d_j) + t_i
 
-What BlazePose calls a hip lies 2 cm below the default body's hip joint, what it calls an ankle 1 cm above, on everybody
-alike; other networks are not known to. d_j is what the picture left over, on average, of fits without it, symmetric, by
-the least squares
+On everybody, BlazePose's hips lie 2 cm below the default body's hip joints, and its ankles 1 cm above the ankle joints.
+The offsets of other networks are unknown. The d_j minimize the remaining reprojection errors of fits without offsets,
+with left and right as mirror images:
 
     min Σ_people mean_t Σ_j c_jt |Π (R_i(t) d_j) − r_jt|² + 0.3 |d|²
 
-with Π the camera's x and y, and r_jt the distance in metres between keypoint and body there; seven people of five
-clips, none of those that accuracy is measured on (`python -m scope.tools.train_lifter.place_keypoints`).
+where Π takes the camera's x and y, and r_jt is the distance between keypoint and body in metres. Estimated from seven
+people in five clips, none of which accuracy is measured on (`python -m scope.tools.train_lifter.place_keypoints`).
 """
 
 from __future__ import annotations
@@ -18,11 +18,12 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ....solver import Body
 from ..perception.landmark_network import KEYPOINT_NAMES
 
-# Millimetres in the axes of the rest pose: to the person's left, up, forwards. The right side is the mirror image.
+# Millimetres in the axes of the rest pose: to the person's left, up, forwards. The right side is mirrored.
 OFFSETS_MM = {
     "nose": (0, 3, -9),
     "left_eye_inner": (1, -2, -2),
@@ -44,8 +45,8 @@ OFFSETS_MM = {
 }
 
 
-def as_seen(body: Body) -> Body:
-    """The body with BlazePose's keypoints where the landmark networks see them; all else, its joints too, stays."""
+def with_keypoint_offsets(body: Body) -> Body:
+    """Move BlazePose's keypoints of a body to where the landmark networks place them; joints do not move."""
     template = body.keypoint_template.copy()
     at = body.keypoint_set("blazepose")
     for name in KEYPOINT_NAMES:
@@ -53,8 +54,8 @@ def as_seen(body: Body) -> Body:
     return replace(body, keypoint_template=template)
 
 
-def offset(name: str) -> np.ndarray:
-    """(3,) d of a keypoint, metres."""
+def offset(name: str) -> NDArray[np.float64]:
+    """Return the (3,) offset d of a keypoint, metres."""
     if name in OFFSETS_MM:
         return np.array(OFFSETS_MM[name]) / 1000
     return np.array(OFFSETS_MM[name.replace("right", "left")]) * [-1, 1, 1] / 1000

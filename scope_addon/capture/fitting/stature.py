@@ -1,27 +1,28 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""People whose height is known: what no camera tells, the size of everything, is known with it."""
+"""People of known stature, which resolves the scale ambiguity of a single camera."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ....solver import Body, Priors
 from ...errors import UsageError
 
 SIGMA_M = 0.005
-SHORTEST_M, TALLEST_M = 0.5, 2.6  # of what may be meant at all
-FARTHEST = 4.5  # deviations of the population to which a body's shapes can be believed
+SHORTEST_M, TALLEST_M = 0.5, 2.6  # statures outside are input errors
+MAX_DEVIATIONS = 4.5  # standard deviations of the population up to which the shapes of a body are realistic
 _ROUNDS = 3
 
 
 def with_stature(priors: Priors, body: Body, height_m: float) -> Priors:
-    """The priors with the shape of a person of this height: of all shapes so tall, the most common ones.
+    """Return the priors for a person of known stature: the most probable shapes of this height.
 
-    The population's N(0, I) of β, given that the height h(β) of the rest pose's highest vertex over its lowest is
-    known: Λ = I + g gᵀ/σ² and mean Λ⁻¹ g (H − h₀)/σ² = g (H − h₀) / (σ² + g·g), with h(β) = h₀ + g·β while these two
-    vertices stay the same.
+    This is the population's N(0, I) of β, conditioned on the height h(β) of the rest pose's highest vertex above its
+    lowest: Λ = I + g gᵀ/σ² and mean Λ⁻¹ g (H − h₀)/σ² = g (H − h₀) / (σ² + g·g), with h(β) = h₀ + g·β as long as these
+    two vertices stay the same.
     """
     _, h0, g = _shape_of(body, height_m)
     information = np.eye(body.P) + np.outer(g, g) / SIGMA_M**2
@@ -30,22 +31,25 @@ def with_stature(priors: Priors, body: Body, height_m: float) -> Priors:
 
 
 def require_stature(body: Body, height_m: float) -> None:
-    """:raises UsageError: nobody is so tall, or this body cannot be."""
+    """Check that a stature, in metres, is possible for people and for this body.
+
+    :raises UsageError: it is not.
+    """
     if not SHORTEST_M <= height_m <= TALLEST_M:
         most = f"{100 * SHORTEST_M:.0f} to {100 * TALLEST_M:.0f} cm"
         raise UsageError(f"nobody is {100 * height_m:g} cm tall: give a height from {most}")
     if body.P == 0:
         raise UsageError(f"the body '{body.name}' has a single shape, whose height cannot be set: leave the height out")
     betas, *_ = _shape_of(body, height_m)
-    if np.linalg.norm(betas) > FARTHEST:
+    if np.linalg.norm(betas) > MAX_DEVIATIONS:
         unit = betas / np.linalg.norm(betas)
-        low, high = sorted(100 * body.stature(side * FARTHEST * unit) for side in (-1, 1))
+        low, high = sorted(100 * body.stature(side * MAX_DEVIATIONS * unit) for side in (-1, 1))
         what = f"can be {low:.0f} to {high:.0f} cm tall, not {100 * height_m:g}"
         raise UsageError(f"the body '{body.name}' {what}: leave the height out")
 
 
-def _shape_of(body: Body, height_m: float) -> tuple[np.ndarray, float, np.ndarray]:
-    """The most common shape (P,) of this height, and h₀ and g (P,) of its highest and lowest vertices."""
+def _shape_of(body: Body, height_m: float) -> tuple[NDArray[np.float64], float, NDArray[np.float64]]:
+    """Return the most probable shape (P,) of this height, and h₀ and g (P,) of its highest and lowest vertices."""
     betas, h0, g = np.zeros(body.P), 0.0, np.zeros(body.P)
     for _ in range(_ROUNDS):
         heights = body.rest_vertices(betas)[:, 1]

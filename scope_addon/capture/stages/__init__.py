@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The stages of a capture, one module each, in the order of ``pipeline.py``."""
+"""The stages of a capture, one module each; `pipeline` gives their order."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Seconds spent in each stage of a capture."""
+"""The time spent in each stage of a capture."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from contextlib import contextmanager
 
 
 class StageClock:
-    """Adds up the seconds of each stage; of stages that overlap in threads, those that the main thread waited for."""
+    """Adds up the seconds of each stage; of stages in other threads, only the time that the main thread waited for."""
 
     def __init__(self) -> None:
         """Start with no stage."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Everybody in every frame, and what the background says of the camera. Frames are not kept."""
+"""Observation: the people in every frame, and the camera as estimated from the background. No frame is kept."""
 
 from __future__ import annotations
 
@@ -11,19 +11,21 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from ....solver.body import Body
 from ...errors import NoPersonError, VideoError
+from ...options.capture import LARGEST
 from ..camera.camera_rotation import CameraMotion
 from ..camera.intrinsics import Camera, choose_camera
 from ..camera.line_segments import Lines
-from ..fitting.background_estimators import BesideTracking
+from ..fitting.background_estimators import BackgroundEstimators
 from ..fitting.focal_fits import FocalFits
 from ..fitting.live_body import LiveBody
 from ..media.exposure import Exposure
 from ..media.frame import Frame
 from ..media.video import Video
-from ..options import LARGEST, CaptureOptions, most_people
+from ..options import CaptureOptions, most_people
 from ..perception.adapters.description import description_path
 from ..perception.execution import Execution
 from ..perception.observation import Observation
@@ -34,15 +36,15 @@ from ..tracking.track import Track
 from ..tracking.tracker import PeopleTracker
 from .clock import StageClock
 
-# Called with the stage's name, what is done and the total (0: unknown). May raise CancelledError.
+# Called with the stage's name, the steps done and the total (0: unknown). May raise CancelledError.
 Progress = Callable[[str, int, int], None]
-# Called with each decoded frame, the largest person seen in it, and what fits the body to such a person.
+# Called with each decoded frame, its largest person, and the object that fits the body to such an observation.
 Watch = Callable[[Frame, Observation | None, LiveBody], None]
 
 
 @dataclass(frozen=True)
 class Listeners:
-    """What is told of the work while it goes on."""
+    """Callbacks that report the work in progress."""
 
     progress: Progress
     watch: Watch
@@ -50,9 +52,9 @@ class Listeners:
 
 @dataclass(frozen=True)
 class Footage:
-    """What all frames together say of the footage, apart from the people in it."""
+    """What is known of the footage once all frames were observed, apart from its people."""
 
-    timestamps: np.ndarray  # (T,) seconds
+    timestamps: NDArray[np.float64]  # (T,) seconds
     camera: Camera
     camera_motion: CameraMotion
     lines: Lines  # of the background, in the first frame's camera axes
@@ -64,7 +66,7 @@ class Footage:
 def observe(
     video: Video, body: Body, options: CaptureOptions, clock: StageClock, listeners: Listeners
 ) -> tuple[Footage, list[Track]]:
-    """Find the people of every frame and follow them, the most prominent one first.
+    """Detect and track the people of all frames, the most prominent one first.
 
     :raises VideoError: there is no frame in the chosen range.
     :raises NoPersonError: nobody was found.
@@ -80,43 +82,43 @@ def observe(
         calibration=options.calibration,
         metadata_focal_mm=video.focal_35mm,
     )
-    live = LiveBody(body, camera, options.parts, next(iter(options.heights_m), None))
-    fits = FocalFits(body, options.parts)
-    with BesideTracking(camera, video.width, video.height, live, fits) as background, _opencv_in_one_thread():
+    live = LiveBody(body, camera, options.ablation, next(iter(options.heights_m), None))
+    fits = FocalFits(body, options.ablation)
+    with BackgroundEstimators(camera, video.width, video.height, live, fits) as background, _opencv_in_one_thread():
         frames = _Frames(_tracker(options, threads, execution), _hands(options, threads, execution), background, clock)
         frames.run(video, live, listeners)
     with clock.stage("solver"):
         camera = background.camera()
-        motion = background.background.motion(camera)
+        motion = background.tracker.motion(camera)
         footage = Footage(
             np.array(frames.people.timestamps),
             camera,
             motion,
-            background.background.lines(motion, camera),
+            background.tracker.lines(motion, camera),
             frames.cuts.times_s,
             execution.describe(threads),
             execution.warnings + list(video.warnings),
         )
         tracks = frames.people.build(most_people(options.people))
     if not len(footage.timestamps):
-        raise VideoError(f"{video.path} has no frame in the time that was asked for; change the start or the end")
+        raise VideoError(f"{video.path} has no frame in the requested range; change the start or the end")
     if not tracks:
         own_networks = [network for network in (options.detector, options.keypoints) if network]
-        raise _nobody(Path(video.path), len(footage.timestamps), own_networks)
+        raise _no_person_error(Path(video.path), len(footage.timestamps), own_networks)
     return footage, tracks
 
 
 class _Frames:
-    """Sends each frame through the networks. No frame is kept: an hour takes no more memory than a minute."""
+    """Runs the networks on each frame. No frame is kept, so an hour takes no more memory than a minute."""
 
     def __init__(
-        self, tracker: PeopleTracker, hands: HandTracker | None, background: BesideTracking, clock: StageClock
+        self, tracker: PeopleTracker, hands: HandTracker | None, background: BackgroundEstimators, clock: StageClock
     ) -> None:
         self._tracker, self._hands, self._background, self._clock = tracker, hands, background, clock
         self.people, self.cuts = PeopleBuilder(), SceneCuts()
 
     def run(self, video: Video, live: LiveBody, listeners: Listeners) -> None:
-        """Look at every frame, each decoded while the networks run on the one before."""
+        """Process all frames; each is decoded while the networks run on the previous one."""
         expected, exposure = video.expected_frames, Exposure()
         frames = ((frame, exposure.brightened(frame.image_rgb)) for frame in video)
         with self._clock.stage("decode"):
@@ -125,15 +127,15 @@ class _Frames:
             frame, lit = upcoming
             with self._clock.stage("decode"):
                 upcoming = next(frames, None)
-            largest = self._look(frame, lit, upcoming)
+            largest = self._process(frame, lit, upcoming)
             listeners.watch(frame, largest, live)
             listeners.progress("finding the person", len(self.people), max(expected, len(self.people)))
         self._background.wait()
 
-    def _look(
-        self, frame: Frame, lit: np.ndarray, upcoming: tuple[Frame, np.ndarray] | None
+    def _process(
+        self, frame: Frame, lit: NDArray[np.uint8], upcoming: tuple[Frame, NDArray[np.uint8]] | None
     ) -> Observation | None:
-        """Add one frame; return the largest person in it."""
+        """Add one frame and return its largest person."""
         upcoming_rgb, upcoming_lit = (upcoming[0].image_rgb, upcoming[1]) if upcoming else (None, None)
         with self._clock.stage("networks"):
             is_cut = self.cuts.is_cut(frame.image_rgb, upcoming_rgb, frame.timestamp_s)
@@ -153,10 +155,10 @@ class _Frames:
 
 
 def _network_threads(options: CaptureOptions, execution: Execution) -> int:
-    """Use no more threads than there are cores: more would wait for each other."""
+    """Use at most as many threads as there are cores, since more would only wait for each other."""
     cores = os.cpu_count() or 1
     if options.threads > cores:
-        execution.warnings.append(f"{options.threads} threads were asked for, but there are {cores} cores")
+        execution.warnings.append(f"{options.threads} threads were requested, but there are only {cores} cores")
     return min(options.threads or cores, cores)
 
 
@@ -186,13 +188,13 @@ def _opencv_in_one_thread() -> Iterator[None]:
         cv2.setNumThreads(before)
 
 
-def _nobody(path: Path, frames: int, own_networks: list[Path]) -> NoPersonError:
+def _no_person_error(path: Path, frames: int, own_networks: list[Path]) -> NoPersonError:
     where = f"in the {frames} frames of {path.name}" if frames > 1 else f"in {path.name}"
     networks = "".join(
-        f"; if somebody is found without {own.name}, write into {description_path(own).name} which colours it expects"
+        f"; if people are found without {own.name}, state in {description_path(own).name} which colours it expects"
         for own in own_networks
     )
     return NoPersonError(
-        f"no person was found {where}: the footage needs one person who is mostly in the picture and measures "
-        f"at least a fifth of its shorter side; if somebody there is smaller, crop it{networks}"
+        f"no person was found {where}: at least one person must be mostly in the picture and at least "
+        f"a fifth as tall as its shorter side; crop footage of smaller people{networks}"
     )

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The machine-readable report of a capture, and the warnings that a user should see."""
+"""The machine-readable report of a capture, and its warnings to the user."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from ..options import CaptureOptions
 from .observe import Footage
 from .solve import Solved
 
-UNSEEN_LEGS = 0.05  # confidence below which nothing is seen of the shanks
-MOST_TIMES = 4  # cuts whose times are listed
+MIN_LEG_CONFIDENCE = 0.05  # of the shanks; below it, legs count as not seen
+MAX_TIMES = 4  # cuts whose times are listed
 
 
 def make_report(
     video: Video, body: Body, options: CaptureOptions, footage: Footage, solved: Solved, rates: dict[str, float]
 ) -> dict[str, Any]:
-    """Put together what ``--json`` prints of a capture.
+    """Assemble the report that ``--json`` prints.
 
     :param rates: frames per second by stage.
     """
@@ -54,11 +54,11 @@ def make_report(
 
 
 def capture_warnings(name: str, options: CaptureOptions, cuts_s: list[float], motions: list[Motion]) -> list[str]:
-    """List what a user should know of the result, in sentences; ``name``: the footage's."""
+    """List what a user should know about the result, in sentences; ``name`` is the footage's."""
     warnings = []
     if cuts_s:
         times = _at(cuts_s)
-        warnings.append(f"{name} cuts to another scene {times}: capture each scene by itself, by its start and end")
+        warnings.append(f"{name} cuts to another scene {times}: capture each scene separately, with its start and end")
     if len(options.heights_m) > len(motions):
         found = f"{len(motions)} people were found" if len(motions) > 1 else "one person was found"
         warnings.append(f"{name}: {len(options.heights_m)} heights were given, but {found}")
@@ -67,10 +67,12 @@ def capture_warnings(name: str, options: CaptureOptions, cuts_s: list[float], mo
         missing = int((~motion.valid).sum())
         if missing:
             warnings.append(f"{name}: {who} was not seen in {missing} of {len(motion)} frames; these are filled in")
-        if _legs_confidence(motion) < UNSEEN_LEGS:
-            warnings.append(f"{name}: the legs of {who} were not seen, so what they do is a guess")
+        if _legs_confidence(motion) < MIN_LEG_CONFIDENCE:
+            warnings.append(f"{name}: the legs of {who} were not seen, so their motion is a guess")
         if options.hands and not any(hand_frames(motion).values()):
-            warnings.append(f"{name}: no hands of {who} were found; come closer, or show the palms more to the camera")
+            warnings.append(
+                f"{name}: no hands of {who} were found; come closer, or show the palms to the camera more often"
+            )
     return warnings
 
 
@@ -94,14 +96,14 @@ def _about_person(body: Body, motion: Motion) -> dict[str, Any]:
 
 
 def _legs_confidence(motion: Motion) -> float:
-    """Return the better seen leg's mean over the frames in which the person was seen."""
+    """Return the mean confidence of the more visible leg over the frames in which the person was seen."""
     shanks = [BODY_JOINTS.index(f"{side}_knee") for side in ("left", "right")]
     return float(motion.joint_confidence[motion.valid][:, shanks].mean(axis=0).max())
 
 
 def _at(times_s: list[float]) -> str:
-    """List times, such as "at 2.0 s and at 4.1 s"; of many, the first few."""
-    listed = [f"at {t:.1f} s" for t in times_s[:MOST_TIMES]]
+    """Write times as "at 2.0 s and at 4.1 s"; if there are many, only the first few."""
+    listed = [f"at {t:.1f} s" for t in times_s[:MAX_TIMES]]
     more = len(times_s) - len(listed)
-    listed += [f"{more} times more"] if more else []
+    listed += [f"{more} more times"] if more else []
     return listed[0] if len(listed) == 1 else f"{', '.join(listed[:-1])} and {listed[-1]}"

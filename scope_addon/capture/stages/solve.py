@@ -1,14 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Tracks to motions: every person is fitted in each frame's camera; the world is one for all of them."""
+"""From tracks to motions: each person is fitted in each frame's camera, and all share one world."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-from ...kinematics.single_precision import compact
+from ...kinematics.single_precision import to_single_precision
 from ...motion import Motion
-from ..fitting.track_fit import FittedTrack, PreparedTrack, fit_track, prepare_track, refit_track
+from ..fitting.frame_sequence import FittedTrack
+from ..fitting.prepared_track import PreparedTrack, prepare_track
+from ..fitting.track_fit import fit_track, refit_track
 from ..tracking.track import Track
 from ..world.assemble import assemble_motion
 from ..world.camera_path import CameraPath
@@ -16,15 +18,15 @@ from ..world.camera_travel import camera_travel
 from ..world.foot_lock import lock_feet
 from ..world.placement import PlacedTrack, place_track
 from ..world.shot import FittedPerson, Shot
-from ..world.stance import corrected_stance
-from ..world.world_frame import SharedWorld, share_world
+from ..world.stance import stance_on_floor
+from ..world.world_frame import SharedWorld, find_world
 
 Progress = Callable[[str, int, int], None]
 
 
 @dataclass(frozen=True)
 class Solved:
-    """The motions, the most prominent person's first, the camera's path, and the solver's mean iterations a frame."""
+    """Motions, the most prominent person first; the camera's path; the solver's mean iterations per frame."""
 
     motions: list[Motion]
     path: CameraPath
@@ -32,22 +34,22 @@ class Solved:
 
 
 def solve(shot: Shot, tracks: Sequence[Track], progress: Progress, heights_m: Sequence[float] = ()) -> Solved:
-    """Fit every person on their own, find the world they share, and move the motions into it.
+    """Fit each person separately, estimate the world they share, and transform the motions to it.
 
-    For a clip of an hour, each list below takes hundreds of megabytes: none stays for longer than it is needed.
+    For a clip of an hour, each list below takes hundreds of megabytes, so it is deleted as soon as possible.
 
-    :param heights_m: of the first people, where they are known, metres.
+    :param heights_m: known statures of the first people, metres.
     """
     prepared = prepare(shot, tracks, heights_m)
-    fits = [compact(fit_track(each, progress)) for each in prepared]
+    fits = [to_single_precision(fit_track(each, progress)) for each in prepared]
     shot = replace(shot, path=find_camera_path(shot, prepared[0], fits[0]))
-    if shot.parts.second_pass and not shot.is_picture:
+    if shot.ablation.second_pass and not shot.is_still:
         fits = refit(shot, prepared, fits, progress)
     people = [FittedPerson(each.track, fit, each.body) for each, fit in zip(prepared, fits, strict=True)]
     iterations = fits[0].iterations
     del prepared, fits
     placed = [place(shot, person.track, person.fit, shot.smoothing) for person in people]
-    world = share_world(placed, shot.lines)
+    world = find_world(placed, shot.lines)
     motions: list[Motion] = []
     while people:
         motions.append(finish(shot, people.pop(0), placed.pop(0), world, len(motions)))
@@ -58,36 +60,37 @@ def prepare(shot: Shot, tracks: Sequence[Track], heights_m: Sequence[float]) -> 
     """Lift every track to 3D and set up its priors."""
     out = []
     for k, track in enumerate(tracks):
-        each = prepare_track(shot.body, track, shot.camera, shot.parts, heights_m[k] if k < len(heights_m) else None)
-        out.append(compact(replace(each, track=track.without_depth(), lifted=compact(each.lifted))))
+        each = prepare_track(shot.body, track, shot.camera, shot.ablation, heights_m[k] if k < len(heights_m) else None)
+        lifted = to_single_precision(each.lifted)
+        out.append(to_single_precision(replace(each, track=track.without_depth(), lifted=lifted)))
     return out
 
 
 def place(shot: Shot, track: Track, fit: FittedTrack, smoothing: bool = True) -> PlacedTrack:
-    """Fill the gaps of a fit, smooth it, and bring it into the first frame's camera axes."""
+    """Fill the gaps of a fit, smooth it, and transform it to the first frame's camera axes."""
     return place_track(shot.body, track, fit, smoothing, shot.path)
 
 
 def find_camera_path(shot: Shot, first: PreparedTrack, fit: FittedTrack) -> CameraPath:
-    """Return where the camera was: one that turns may travel as well, which the standing feet of one person tell."""
-    if shot.path.is_static or shot.is_picture:
+    """Return the camera's path; the travel of a rotating camera is estimated from one person's feet."""
+    if shot.path.is_static or shot.is_still:
         return shot.path
     placed = place(shot, first.track, fit)
-    up = share_world([placed], shot.lines).up
+    up = find_world([placed], shot.lines).up
     return replace(shot.path, center=camera_travel(placed.soles, placed.valid, up, placed.times))
 
 
 def refit(
     shot: Shot, prepared: Sequence[PreparedTrack], fits: Sequence[FittedTrack], progress: Progress
 ) -> list[FittedTrack]:
-    """Fit everybody once more, with the distance and lean that the floor, the feet and balance determine."""
+    """Fit each person once more, with the distance and lean estimated from floor, feet and balance."""
     placed = [place(shot, each.track, fit) for each, fit in zip(prepared, fits, strict=True)]
-    world = share_world(placed, shot.lines)
+    world = find_world(placed, shot.lines)
     floors = [world.floor_from_camera(k) for k in range(len(placed))]
-    stances = [corrected_stance(*each, shot.parts.balance) for each in zip(placed, floors, strict=True)]
+    stances = [stance_on_floor(*each, shot.ablation.balance) for each in zip(placed, floors, strict=True)]
     del placed
     return [
-        compact(refit_track(each, fit, shot.path.stance_to_frames(stance), progress))
+        to_single_precision(refit_track(each, fit, shot.path.stance_to_frames(stance), progress))
         for each, fit, stance in zip(prepared, fits, stances, strict=True)
     ]
 
@@ -95,6 +98,6 @@ def refit(
 def finish(shot: Shot, person: FittedPerson, placed: PlacedTrack, world: SharedWorld, number: int) -> Motion:
     """Lock the feet of one person, the ``number``-th of the world, and assemble the motion."""
     contact = placed.contact(world.up)
-    if shot.smoothing and shot.parts.contact:
+    if shot.smoothing and shot.ablation.contact:
         placed = lock_feet(placed, contact, world.floor_from_camera(number))
     return assemble_motion(shot, person, placed, contact, world.T_world_camera)

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...kinematics.viterbi import cheapest_path
+from ...kinematics.viterbi import least_cost_path
 from ..camera.intrinsics import Camera
 from ..perception.landmark_network import KEYPOINT_NAMES, PoseEstimate
 from ..perception.lifter import our_lifter
@@ -196,7 +196,7 @@ def _cheapest(
         distance = _mean_distance(readings[..., :3], reference[known][:, _LIMBS]).T
         costs += np.where(np.isfinite(distance), distance, 0.0)
     labels = np.full(len(known), AS_DETECTED)
-    labels[known] = cheapest_path(costs, switching)
+    labels[known] = least_cost_path(costs, switching)
     return labels
 
 

@@ -27,7 +27,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...kinematics.viterbi import cheapest_path
+from ...kinematics.viterbi import least_cost_path
 from ..perception.landmark_network import KEYPOINT_NAMES
 from .keypoint_jumps import scale_px_per_m
 from .left_right import MIRROR_PARTNER, reorder_keypoints, swap_keypoints
@@ -157,6 +157,6 @@ def _cheapest(cost: NDArray[np.float64], label_cost: NDArray[np.floating[Any]]) 
     pairs = np.repeat(label_cost[1:, None], 2, axis=1)  # (N−1, 2, 2)
     pairs[0] += label_cost[0][:, None] + cost[1].mean(axis=0)
     switching = np.where(np.eye(2, dtype=bool)[:, :, None], cost[2:, :, :, None], np.inf)  # (N−2, a, b, b', c)
-    path = cheapest_path(pairs.reshape(-1, 4), switching.reshape(-1, 4, 4))
+    path = least_cost_path(pairs.reshape(-1, 4), switching.reshape(-1, 4, 4))
     labels: NDArray[np.bool_] = np.concatenate([path[:1] // 2, path % 2]).astype(bool)
     return labels

@@ -1,9 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The motion file's content of one person, from a motion in the camera frame and the world."""
+"""The content of one person's motion file, from a motion in the camera frame and the world."""
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
+from numpy.typing import NDArray
 
 from ....solver import rotations
 from ...kinematics.contact_points import SOLES
@@ -16,33 +19,40 @@ from .camera_path import CameraPath
 from .placement import PlacedTrack, raw_motion
 from .shot import FittedPerson, Shot
 
-SURE_KEYPOINT = 0.5  # confidence from which on a keypoint counts in the reprojection error
+MIN_CONFIDENCE = 0.5  # of keypoints that count in the reprojection error
+MIN_DEPTH_M = 1e-3
 
 
 def assemble_motion(
-    shot: Shot, person: FittedPerson, placed: PlacedTrack, contact: np.ndarray, T_world_camera: np.ndarray
+    shot: Shot,
+    person: FittedPerson,
+    placed: PlacedTrack,
+    contact: NDArray[np.floating[Any]],
+    T_world_camera: NDArray[np.float64],
 ) -> Motion:
-    """Move a person's motion into the world, with what is known of each frame.
+    """Transform a person's motion to the world, and add what else is known of each frame.
 
-    Rotations relative to the parent do not depend on the world; the root is smoothed in the camera frame, where image
-    position and depth have their own noise, and then moved into the world: R_world_root = R_world_camera R_camera_root
-    and trans = T_world_camera t_camera_root − J_0(β).
+    Rotations relative to the parent do not depend on the world. The root is smoothed in the camera frame, where image
+    position and depth have different noise, and then transformed: R_world_root = R_world_camera R_camera_root and
+    trans = T_world_camera t_camera_root − J_0(β).
 
-    :param placed: the final motion, its rotations and root, in the first frame's camera axes.
-    :param contact: (T, 6) probability that each sole and palm rests on something.
+    :param placed: the final motion: its rotations and root, in the first frame's camera axes.
+    :param contact: (T, 6) probability that each sole point and palm rests on something.
     :param T_world_camera: (4, 4) the first frame's camera to the world that all people share.
     """
     track, betas, path, J0 = person.track, placed.betas, shot.path, shot.body.rest_joints(placed.betas)[0]
     R_world_camera, t_world_camera = T_world_camera[:3, :3], T_world_camera[:3, 3]
 
-    def in_world(rotation: np.ndarray, position: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def to_world(
+        rotation: NDArray[np.floating[Any]], position: NDArray[np.floating[Any]]
+    ) -> tuple[NDArray[np.float32], NDArray[np.float64]]:
         poses = rotations.log(rotation)
         poses[:, 0] = rotations.log(R_world_camera @ rotation[:, 0])
         trans = position @ R_world_camera.T + t_world_camera - J0
         return poses.reshape(len(poses), -1).astype(np.float32), trans
 
-    poses_raw, trans_raw = by_blocks(in_world, *raw_motion(track, person.fit, path))
-    poses, trans = by_blocks(in_world, placed.rotations, placed.root)
+    poses_raw, trans_raw = by_blocks(to_world, *raw_motion(track, person.fit, path))
+    poses, trans = by_blocks(to_world, placed.rotations, placed.root)
     joints = placed.place(placed.rotations, placed.root)[0]
     return Motion(
         poses=poses,
@@ -70,32 +80,34 @@ def assemble_motion(
     )
 
 
-def _keypoints2d(track: Track) -> np.ndarray:
-    """(T, J, 3) pixels and confidence of the body's keypoints, and of the hands' where they were looked for."""
-    body = np.concatenate([track.keypoints_px, track.confidence[..., None]], axis=-1)
+def _keypoints2d(track: Track) -> NDArray[np.floating[Any]]:
+    """Return the (T, J, 3) pixels and confidence of the body's keypoints, and of the hands' if they were looked for."""
+    body: NDArray[np.floating[Any]] = np.concatenate([track.keypoints_px, track.confidence[..., None]], axis=-1)
     if track.hands is None:
         return body
     return np.concatenate([body, track.hands[..., :3].reshape(len(track), -1, 3)], axis=1)
 
 
-def reprojection_error(shot: Shot, person: FittedPerson, placed: PlacedTrack) -> np.ndarray:
-    """Return the (T,) median distance in pixels between confident keypoints and the body's; 0 where nobody was seen.
+def reprojection_error(shot: Shot, person: FittedPerson, placed: PlacedTrack) -> NDArray[np.float64]:
+    """Return the (T,) median reprojection error of confident keypoints, in pixels; 0 where the person was not seen.
 
-    :param placed: the motion, its rotations and root, in the first frame's camera axes.
+    :param placed: the motion: its rotations and root, in the first frame's camera axes.
     """
-    body, betas, track, camera = person.seen, placed.betas, person.track, shot.camera
+    body, betas, track, camera = person.body, placed.betas, person.track, shot.camera
     at = body.keypoint_set("blazepose")
     order = [at[name] for name in KEYPOINT_NAMES]
     K, J0 = camera.intrinsics, body.rest_joints(betas)[0]
 
-    def error(rotation: np.ndarray, root: np.ndarray, *rows: np.ndarray) -> tuple[np.ndarray]:
+    def error(
+        rotation: NDArray[np.floating[Any]], root: NDArray[np.floating[Any]], *rows: NDArray[Any]
+    ) -> tuple[NDArray[np.float64]]:
         keypoints_px, confidence, valid, R_first_camera, center = rows
         points = body.keypoints(*body.forward_kinematics(rotation, root - J0, betas), betas, order)
         points = CameraPath(R_first_camera, center).points_to_frames(points)
-        depth = np.maximum(points[..., 2:], 1e-3)
+        depth = np.maximum(points[..., 2:], MIN_DEPTH_M)
         projected = points[..., :2] / depth * [K[0, 0], K[1, 1]] + K[:2, 2]
         distance = np.linalg.norm(projected - camera.undistort(keypoints_px), axis=-1)
-        distance[confidence < SURE_KEYPOINT] = np.nan
+        distance[confidence < MIN_CONFIDENCE] = np.nan
         known = valid & np.isfinite(distance).any(1)
         median = np.zeros(len(root))
         median[known] = np.nanmedian(distance[known], axis=1)

@@ -1,21 +1,25 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Weight presses on what stands: how far a body must be turned for that, along the line of sight.
+"""Balance: rotations of the whole body that bring its zero moment point between the contact points.
 
-How a body leans towards the camera or away is hardly seen in the picture. With c the centre of mass, h its height above
-the soles and palms p_i that stand, g gravity and s the level part of the line of sight, weight and inertia press on the
-floor at
+How far a body leans towards the camera or away from it can hardly be seen in the image. With the centre of mass c, its
+height h above the contact points p_i, gravity g and the horizontal direction s of the line of sight, the zero moment
+point, in which weight and inertial forces act on the floor, must satisfy
 
     x = s·(c − c̈ h / g),   min_i s·p_i ≤ x ≤ max_i s·p_i.
 
-What sticks out is taken back by turning the whole body about the middle of these. The faster somebody moves, the less
-is believed of this: there, c̈ is not known well enough. Nor is it of those who may sit or kneel, see `carrying`.
+If it does not, the whole body is rotated about the centre of the contact points. The correction gets weaker the faster
+a person moves, since c̈ is then not known well enough. It is not applied to people who may sit or kneel, see
+`leg_support`.
 
-Sources: Vukobratović and Borovac 2004 (zero moment point); masses of body parts and their centres by Winter 2009.
+Sources: Vukobratović and Borovac 2004 (zero moment point); Winter 2009 (masses of body parts and their centres).
 """
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
+from numpy.typing import NDArray
 
 from ....solver.body import Body
 from ....solver.rotations import exp
@@ -23,14 +27,15 @@ from ...kinematics.contact_points import SOLES
 from ...kinematics.smoothing import gaussian_smooth
 from .placement import PlacedTrack
 
-STANDING_M_S = 0.5  # speed of the centre of mass at which little is believed of this
+STANDING_M_S = 0.5  # speed of the centre of mass at which the weight of the correction has fallen to 1/e
 CUTOFF_HZ = 1.0
-# How far a sole reaches behind its heel point and beyond its toe point (`supports`), in distances between the two.
+# How far a sole extends behind its heel point and beyond its toe point, in units of the distance between the two.
 BEHIND, BEYOND = 1.2, 0.4
-DOUBT = 0.2  # share of standing frames nearby that halves what is believed, roughly
+DOUBT = 0.2  # share of nearby frames in contact at which the correction is halved, roughly
 GRAVITY_M_S2 = 9.81
 LARGEST_TURN = np.radians(10.0)
-# Part of the mass, from joint, to joint, share of the way at which its centre lies.
+MIN_HEIGHT_M = 0.3  # h
+# Share of the body's mass, first joint, second joint, position of the centre of mass between them.
 _LIMBS = (
     (0.028, "shoulder", "elbow", 0.436),
     (0.022, "elbow", "wrist", 0.68),  # with the hand
@@ -39,14 +44,15 @@ _LIMBS = (
     (0.0145, "ankle", "foot", 0.5),
 )
 _HEAD, _TRUNK = 0.081, 0.497
-RESTING_KNEE_COS, CARRYING_KNEE_COS = np.cos(np.radians([75.0, 60.0]))  # bent more, less than that
+# Knees bent by more than the first angle do not support the body; knees bent by less than the second one do.
+RESTING_KNEE_COS, CARRYING_KNEE_COS = np.cos(np.radians([75.0, 60.0]))
 
 
-def center_of_mass(body: Body, joints: np.ndarray) -> np.ndarray:
-    """(T, 3) of a body whose joints are at (T, K+1, 3)."""
+def center_of_mass(body: Body, joints: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
+    """Return the (T, 3) centre of mass of a body with joints (T, K+1, 3), metres."""
     at = {name: i for i, name in enumerate(body.joint_names)}
     trunk = [at[f"{side}_{name}"] for side in ("left", "right") for name in ("hip", "shoulder")]
-    total = _HEAD * joints[:, at["head"]] + _TRUNK * joints[:, trunk].mean(axis=1)
+    total: NDArray[np.floating[Any]] = _HEAD * joints[:, at["head"]] + _TRUNK * joints[:, trunk].mean(axis=1)
     for mass, start, end, share in _LIMBS:
         for side in ("left", "right"):
             a, b = joints[:, at[f"{side}_{start}"]], joints[:, at[f"{side}_{end}"]]
@@ -54,59 +60,97 @@ def center_of_mass(body: Body, joints: np.ndarray) -> np.ndarray:
     return total / (_HEAD + _TRUNK + 2 * sum(mass for mass, *_ in _LIMBS))
 
 
-def carrying(body: Body, joints: np.ndarray) -> np.ndarray:
-    """(T,) how far a leg is straight enough to bear the weight, which may rest on a chair or the shins otherwise."""
-    straight = np.max([(shank * thigh).sum(1) for shank, thigh in legs(body, joints)], axis=0)
-    return np.clip((straight - RESTING_KNEE_COS) / (CARRYING_KNEE_COS - RESTING_KNEE_COS), 0.0, 1.0)
+def leg_support(body: Body, joints: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
+    """Return how far the legs may carry the body's weight: 1 if one is straight enough, 0 if both are bent.
+
+    With bent knees, the weight may rest on a chair or on the shins.
+
+    :param joints: (T, K+1, 3) metres.
+    :return: (T,) 0..1.
+    """
+    straight = np.max([(shank * thigh).sum(1) for shank, thigh in leg_directions(body, joints)], axis=0)
+    support: NDArray[np.floating[Any]] = np.clip(
+        (straight - RESTING_KNEE_COS) / (CARRYING_KNEE_COS - RESTING_KNEE_COS), 0.0, 1.0
+    )
+    return support
 
 
-def legs(body: Body, joints: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Of the left leg and the right one, shank and thigh, (T, 3) unit vectors upwards."""
+def leg_directions(
+    body: Body, joints: NDArray[np.floating[Any]]
+) -> list[tuple[NDArray[np.floating[Any]], NDArray[np.floating[Any]]]]:
+    """Return, for the left and the right leg, the (T, 3) unit vectors along shank and thigh, from below upwards."""
     return [
-        (along(body, joints, f"{side}_ankle", f"{side}_knee"), along(body, joints, f"{side}_knee", f"{side}_hip"))
+        (
+            direction(body, joints, f"{side}_ankle", f"{side}_knee"),
+            direction(body, joints, f"{side}_knee", f"{side}_hip"),
+        )
         for side in ("left", "right")
     ]
 
 
-def along(body: Body, joints: np.ndarray, a: str, b: str) -> np.ndarray:
-    """(T, 3) unit vectors from joint a to joint b."""
+def direction(body: Body, joints: NDArray[np.floating[Any]], a: str, b: str) -> NDArray[np.floating[Any]]:
+    """Return the (T, 3) unit vectors from joint a to joint b, given the joints (T, K+1, 3)."""
     d = joints[:, body.joint_names.index(b)] - joints[:, body.joint_names.index(a)]
-    return d / np.maximum(np.linalg.norm(d, axis=1, keepdims=True), 1e-9)
+    unit: NDArray[np.floating[Any]] = d / np.maximum(np.linalg.norm(d, axis=1, keepdims=True), 1e-9)
+    return unit
 
 
-def turn_over_feet(placed: PlacedTrack, contact: np.ndarray, up: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """By which rotations (T, 3, 3), about which points (T, 3), the weight comes over the feet; the camera's axes.
+def balancing_rotations(
+    placed: PlacedTrack, contact: NDArray[np.floating[Any]], up: NDArray[np.floating[Any]]
+) -> tuple[NDArray[np.floating[Any]], NDArray[np.floating[Any]]]:
+    """Estimate the rotations that balance the body over its contact points.
 
-    :param contact: (T, 6) probability that each sole and palm rests on the floor;  up: (3,) unit.
+    :param contact: (T, 6) probability that each sole point and palm rests on the floor.
+    :param up: (3,) unit vector, in the first frame's camera axes.
+    :return: rotations (T, 3, 3) and the points (T, 3) about which they turn, in the first frame's camera axes.
     """
     times = placed.times
     mass = gaussian_smooth(center_of_mass(placed.body, placed.joints), times, CUTOFF_HZ)
-    pivot = placed.stands_at(contact)
+    pivot = placed.contact_center(contact)
     sight = mass - placed.center
     sight = sight - (sight @ up)[:, None] * up
     sight /= np.maximum(np.linalg.norm(sight, axis=1, keepdims=True), 1e-9)
-    height = np.maximum((mass - pivot) @ up, 0.3)
-    stands = contact > 0.5
-    believed = stands.any(axis=1) * carrying(placed.body, placed.joints)
-    pressing = mass
+    height = np.maximum((mass - pivot) @ up, MIN_HEIGHT_M)
+    in_contact = contact > 0.5
+    certainty = in_contact.any(axis=1) * leg_support(placed.body, placed.joints)
+    zero_moment_point = mass
     if len(times) > 2:
         velocity = np.gradient(mass, times, axis=0)
-        believed *= np.exp(-np.square(np.linalg.norm(velocity, axis=1) / STANDING_M_S))
-        pressing = mass - np.gradient(velocity, times, axis=0) * (height / GRAVITY_M_S2)[:, None]
-    at, reach = (pressing * sight).sum(axis=1), (_reaches(placed.supports) * sight[:, None]).sum(axis=-1)
-    somewhere = stands.any(axis=1)
-    low = np.where(somewhere, np.where(stands, reach, np.inf).min(axis=1), -np.inf)
-    high = np.where(somewhere, np.where(stands, reach, -np.inf).max(axis=1), np.inf)
-    out = np.maximum(at - high, 0) - np.maximum(low - at, 0)
-    angle = gaussian_smooth(-believed * np.arctan2(out, height), times, CUTOFF_HZ)
-    angle /= gaussian_smooth(believed, times, CUTOFF_HZ) + DOUBT
+        certainty *= np.exp(-np.square(np.linalg.norm(velocity, axis=1) / STANDING_M_S))
+        zero_moment_point = mass - np.gradient(velocity, times, axis=0) * (height / GRAVITY_M_S2)[:, None]
+    out = _excess(placed.contact_points, in_contact, zero_moment_point, sight)
+    angle = gaussian_smooth(-certainty * np.arctan2(out, height), times, CUTOFF_HZ)
+    angle /= gaussian_smooth(certainty, times, CUTOFF_HZ) + DOUBT
     angle = np.clip(angle, -LARGEST_TURN, LARGEST_TURN)
     return exp(angle[:, None] * np.cross(up, sight)), pivot
 
 
-def _reaches(supports: np.ndarray) -> np.ndarray:
-    """(T, 6, 3) the ends of the soles, whose heel and toe points come first, in the same order, and the palms."""
-    soles, palms = np.split(supports, [len(SOLES)], axis=1)
+def _excess(
+    contact_points: NDArray[np.floating[Any]],
+    in_contact: NDArray[np.bool_],
+    zero_moment_point: NDArray[np.floating[Any]],
+    sight: NDArray[np.floating[Any]],
+) -> NDArray[np.floating[Any]]:
+    """Return by how much the zero moment point lies beyond the contact points along the line of sight.
+
+    :param contact_points: (T, 6, 3) metres, camera frame.
+    :param in_contact: (T, 6).
+    :param zero_moment_point: (T, 3) metres, camera frame.
+    :param sight: (T, 3) horizontal unit vectors.
+    :return: (T,) metres; negative towards the camera, 0 if nothing is in contact.
+    """
+    at = (zero_moment_point * sight).sum(axis=1)
+    extent = (_sole_ends(contact_points) * sight[:, None]).sum(axis=-1)
+    any_contact = in_contact.any(axis=1)
+    low = np.where(any_contact, np.where(in_contact, extent, np.inf).min(axis=1), -np.inf)
+    high = np.where(any_contact, np.where(in_contact, extent, -np.inf).max(axis=1), np.inf)
+    excess: NDArray[np.floating[Any]] = np.maximum(at - high, 0) - np.maximum(low - at, 0)
+    return excess
+
+
+def _sole_ends(contact_points: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
+    """Move heel and toe points to the ends of the soles; palms stay. (T, 6, 3) in the order of the contact points."""
+    soles, palms = np.split(contact_points, [len(SOLES)], axis=1)
     heel, toe = soles[:, 0::2], soles[:, 1::2]
     ends = np.stack([heel - BEHIND * (toe - heel), toe + BEYOND * (toe - heel)], axis=2).reshape(soles.shape)
     return np.concatenate([ends, palms], axis=1)

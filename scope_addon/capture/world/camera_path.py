@@ -1,31 +1,34 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where a camera was and how it was turned in every frame, in the first frame's axes."""
+"""Position and rotation of the camera in every frame, in the first frame's axes."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ..fitting.track_fit import FittedTrack, Stance
+from ..fitting.frame_sequence import FittedTrack
+from ..fitting.prepared_track import Stance
 
 
 @dataclass(frozen=True)
 class CameraPath:
-    """p_first = R_first_camera p_camera + center for each of T frames; both are identities for a camera on a stand."""
+    """p_first = R_first_camera p_camera + center for each of T frames; identities for a static camera."""
 
-    R_first_camera: np.ndarray  # (T, 3, 3)
-    center: np.ndarray  # (T, 3) metres
+    R_first_camera: NDArray[np.float64]  # (T, 3, 3)
+    center: NDArray[np.float64]  # (T, 3) metres
 
     @classmethod
-    def turning(cls, R_first_camera: np.ndarray) -> CameraPath:
-        """A camera that turns on the spot."""
+    def rotating(cls, R_first_camera: NDArray[np.float64]) -> CameraPath:
+        """Return the path of a camera that rotates (T, 3, 3) but does not travel."""
         return cls(R_first_camera, np.zeros((len(R_first_camera), 3)))
 
     @classmethod
-    def on_a_stand(cls, frames: int) -> CameraPath:
-        """A camera that stands still."""
-        return cls.turning(np.tile(np.eye(3), (frames, 1, 1)))
+    def static(cls, frames: int) -> CameraPath:
+        """Return the path of a camera that does not move."""
+        return cls.rotating(np.tile(np.eye(3), (frames, 1, 1)))
 
     def __len__(self) -> int:
         """Return the number of frames."""
@@ -33,11 +36,11 @@ class CameraPath:
 
     @property
     def is_static(self) -> bool:
-        """Whether it does not move at all."""
+        """Whether the camera neither rotates nor travels."""
         return not self.center.any() and bool((self.R_first_camera == np.eye(3)).all())
 
     def to_first(self, fit: FittedTrack) -> FittedTrack:
-        """A fit in each frame's camera, in the first frame's axes; the fit itself where the camera does not move."""
+        """Transform a fit from each frame's camera to the first frame's axes; the argument for a static camera."""
         if self.is_static:
             return fit
         rotations = fit.rotations.copy()
@@ -45,14 +48,19 @@ class CameraPath:
         root = np.einsum("tij,tj->ti", self.R_first_camera, fit.t_camera_root) + self.center
         return replace(fit, rotations=rotations, t_camera_root=root)
 
-    def points_to_frames(self, points: np.ndarray) -> np.ndarray:
-        """(T, n, 3) points of the first frame's axes in each frame's camera; the points where it does not move."""
+    def points_to_frames(self, points: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
+        """Transform points from the first frame's axes to each frame's camera.
+
+        :param points: (T, n, 3) metres.
+        :return: (T, n, 3) metres; the argument itself for a static camera.
+        """
         if self.is_static:
             return points
-        return np.einsum("tji,tkj->tki", self.R_first_camera, points - self.center[:, None])
+        local: NDArray[np.float64] = np.einsum("tji,tkj->tki", self.R_first_camera, points - self.center[:, None])
+        return local
 
     def stance_to_frames(self, stance: Stance) -> Stance:
-        """A stance in the first frame's axes, in each frame's camera; the stance itself where that does not move."""
+        """Transform a stance from the first frame's axes to each frame's camera; the argument for a static camera."""
         if self.is_static:
             return stance
         return Stance(
@@ -63,8 +71,8 @@ class CameraPath:
             stance.contact,
         )
 
-    def world_from_frames(self, T_world_first: np.ndarray) -> np.ndarray:
-        """(T, 4, 4) world_from_camera of each frame, from that of the first frame's axes (4, 4)."""
+    def world_from_frames(self, T_world_first: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the (T, 4, 4) world_from_camera of all frames, given that of the first frame's axes (4, 4)."""
         out = np.tile(T_world_first, (len(self.center), 1, 1))
         out[:, :3, :3] = T_world_first[:3, :3] @ self.R_first_camera
         out[:, :3, 3] = self.center @ T_world_first[:3, :3].T + T_world_first[:3, 3]

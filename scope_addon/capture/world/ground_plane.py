@@ -1,49 +1,60 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Depth corrected by the floor, for a camera that sees directions well and depth badly.
+"""Correction of depth by the floor.
 
-Where a foot stands, the floor and the foot's own stillness determine how far away the person is, so the depth of every
-frame is corrected by both. Not everything that carries a foot is the floor: people climb stairs and jump off walls. A
-foot that stands at height h stands on the floor with the probability s(4(1 − |h|/h_l)), s the logistic function:
-within the noise of depth nearly 1, beyond nearly 0.
+A camera observes directions accurately and depth poorly. When a foot is in contact, its distance follows from the floor
+and from its being at rest, so both correct the depth of every frame. A foot may also stand on something else: people
+climb stairs and jump off walls. A foot in contact at height h stands on the floor with probability s(4(1 − |h|/h_l)),
+with the logistic function s: nearly 1 within the noise of depth, nearly 0 beyond.
 """
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
+from numpy.typing import NDArray
 
-from ...kinematics.standing import LEVEL_M, along_sight, logistic
+from ...kinematics.standing import LEVEL_M, line_of_sight, logistic
 
-FLOOR_SIGMA_M = 0.03
-DEPTH_SIGMA_M = 0.1  # how wrong a depth that fits the image may be
-DEPTH_RATE_SIGMA = 0.3  # and how fast that error changes, m/s
-SLIDE_SIGMA_M_S = 0.1  # a standing foot's horizontal speed
+FLOOR_SIGMA_M = 0.03  # σ_h, height of a foot on the floor
+DEPTH_SIGMA_M = 0.1  # σ_δ, error of the depth
+DEPTH_RATE_SIGMA_M_S = 0.3  # σ_r, rate of change of this error
+SLIDE_SIGMA_M_S = 0.1  # σ_s, horizontal speed of a foot in contact
 
 
 def correct_depth(
-    root_cam: np.ndarray, points_cam: np.ndarray, contact: np.ndarray, T_world_camera: np.ndarray, times: np.ndarray
-) -> np.ndarray:
-    """(T,) metres by which to move each frame's body along its root's line of sight.
+    root_cam: NDArray[np.floating[Any]],
+    points_cam: NDArray[np.floating[Any]],
+    contact: NDArray[np.floating[Any]],
+    T_world_camera: NDArray[np.float64],
+    times: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Return the (T,) displacement of each frame's body along its root's line of sight, metres.
 
-    With the ray's upward and horizontal parts g and d (world), heights h and horizontal steps s of the points,
-    minimizes over δ
+    With the upward and horizontal components g and d of the line of sight in the world, and heights h and horizontal
+    steps s of the points, it minimizes over δ
         Σ_t max(2 c_t − 1, 0) f_t (h_t + g_t δ_t)²/σ_h² + δ_t²/σ_δ²
         + Σ_t c_t |s_t + d_t (δ_t+1 − δ_t)|²/(σ_s Δt)² + (δ_t+1 − δ_t)²/(σ_r Δt)²,
-    c_t the contact (of a step, the smaller one of its ends), f_t the share with which this height is the floor's: a
-    tridiagonal system, solved in O(T).
+    where c_t is the contact probability (of a step, the smaller one of its ends) and f_t the probability that a point
+    at this height stands on the floor. The system is tridiagonal and solved in O(T).
 
-    :param root_cam: (T, 3), about the camera's centre;  points_cam: (T, F, 3);  contact: (T, F);  times: (T,).
+    :param root_cam: (T, 3) metres, relative to the camera's centre.
+    :param points_cam: (T, F, 3) metres, in the same axes.
+    :param contact: (T, F) contact probability of each point.
+    :param T_world_camera: (4, 4) camera to world, the floor at z = 0.
+    :param times: (T,) seconds.
     """
     T = len(times)
     R, height0 = T_world_camera[:3, :3], T_world_camera[2, 3]
-    ray_world = along_sight(root_cam) @ R.T
+    ray_world = line_of_sight(root_cam) @ R.T
     points_world = points_cam @ R.T
     height = points_world[..., 2] + height0
-    # A foot in the air, doubtful as it may be, says nothing about the floor.
-    sure = np.clip(2 * contact - 1, 0, 1) * on_floor(height)
+    # A foot that is probably in the air says nothing about the floor.
+    certainty = np.clip(2 * contact - 1, 0, 1) * floor_probability(height)
     g, d = ray_world[:, 2], ray_world[:, :2]
 
-    diagonal = np.full(T, 1 / DEPTH_SIGMA_M**2) + sure.sum(1) * g**2 / FLOOR_SIGMA_M**2
-    right = -(sure * height).sum(1) * g / FLOOR_SIGMA_M**2
+    diagonal = np.full(T, 1 / DEPTH_SIGMA_M**2) + certainty.sum(1) * g**2 / FLOOR_SIGMA_M**2
+    right = -(certainty * height).sum(1) * g / FLOOR_SIGMA_M**2
     off = np.zeros(max(T - 1, 0))
     if T > 1:
         step = np.maximum(np.diff(times), 1e-6)
@@ -51,7 +62,7 @@ def correct_depth(
         moved = np.diff(points_world[..., :2], axis=0)
         along = 0.5 * (d[1:] + d[:-1])
         slide = 1 / (SLIDE_SIGMA_M_S * step) ** 2
-        stiffness = 1 / (DEPTH_RATE_SIGMA * step) ** 2 + slide * pair.sum(1) * (along**2).sum(1)
+        stiffness = 1 / (DEPTH_RATE_SIGMA_M_S * step) ** 2 + slide * pair.sum(1) * (along**2).sum(1)
         pull = slide * (pair[..., None] * moved * along[:, None]).sum((1, 2))
         diagonal[:-1] += stiffness
         diagonal[1:] += stiffness
@@ -61,8 +72,13 @@ def correct_depth(
     return _solve_tridiagonal(diagonal, off, right)
 
 
-def _solve_tridiagonal(diagonal: np.ndarray, off: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """Thomas's algorithm for a symmetric positive definite tridiagonal matrix."""
+def _solve_tridiagonal(
+    diagonal: NDArray[np.float64], off: NDArray[np.float64], right: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Solve a symmetric positive definite tridiagonal system by Thomas's algorithm.
+
+    :param diagonal, off, right: (T,) diagonal, (T−1,) off-diagonal and (T,) right-hand side.
+    """
     n = len(diagonal)
     c, x = np.zeros(n), np.zeros(n)
     pivot = diagonal[0]
@@ -76,6 +92,6 @@ def _solve_tridiagonal(diagonal: np.ndarray, off: np.ndarray, right: np.ndarray)
     return x
 
 
-def on_floor(height: np.ndarray) -> np.ndarray:
-    """The share with which a foot that stands at these heights stands on the floor, see above."""
+def floor_probability(height: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
+    """Return the probability that feet in contact at these heights, metres, stand on the floor."""
     return logistic(4 * (1 - np.abs(height) / LEVEL_M))

@@ -1,70 +1,82 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A fitted track as a motion in the first frame's camera axes: gaps filled, smoothed, with its joints and supports."""
+"""A fitted track as a motion in the first frame's camera axes: without gaps, smoothed, with contact points."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ....solver.body import Body
-from ...kinematics.contact_points import FOOT_PARTS, SOLES, support_points, with_supports
+from ...kinematics.contact_points import FOOT_PARTS, SOLES, contact_point_positions, with_contact_points
 from ...kinematics.frame_blocks import by_blocks
-from ...kinematics.single_precision import compact
+from ...kinematics.single_precision import to_single_precision
 from ...kinematics.smoothing import fill_gaps, fill_rotation_gaps, smooth_root, smooth_rotations
 from ...kinematics.standing import resting_probability
-from ..fitting.track_fit import FittedTrack
+from ..fitting.frame_sequence import FittedTrack
 from ..tracking.scene_cuts import SCENE_GAP_S
 from ..tracking.track import Track
 from .camera_path import CameraPath
 
-# From here on a foot is seen, if badly; behind something it has 0.1 and more, beside the picture less than 0.01.
-SEEN_CONFIDENCE = 0.1
-LEAST_CONTACT = 1e-9
-LONGEST_STEP_S, LONGEST_STEP = 1.0, 1.5  # between two frames of one scene; in usual steps, where these are long
+# Confidence from which on a foot counts as visible: an occluded foot has 0.1 and more, one outside the image less than
+# 0.01.
+VISIBLE_CONFIDENCE = 0.1
+MIN_SOLE_WEIGHT = 1e-9
+MAX_STEP_S, MAX_STEP = 1.0, 1.5  # between two frames of one scene; the second in units of the median step
 
 
 @dataclass(frozen=True)
 class PlacedTrack:
-    """T frames without gaps, smoothed if so asked, in the first frame's camera axes, metres."""
+    """T frames without gaps, smoothed on request, in the first frame's camera axes, metres."""
 
-    body: Body  # with supports for these betas
-    betas: np.ndarray  # (P,)
-    times: np.ndarray  # (T,) seconds
-    valid: np.ndarray  # (T,) bool: measured, not filled in
-    rotations: np.ndarray  # (T, K+1, 3, 3); part 0 R_camera_root, the others relative to their parents
-    root: np.ndarray  # (T, 3) the pelvis
-    joints: np.ndarray  # (T, K+1, 3)
-    supports: np.ndarray  # (T, 6, 3) soles and palms
-    supports_seen: np.ndarray  # (T, 6) 0..1
-    center: np.ndarray  # (T, 3) of the camera
+    body: Body  # with the contact points of these betas
+    betas: NDArray[np.floating[Any]]  # (P,)
+    times: NDArray[np.float64]  # (T,) seconds
+    valid: NDArray[np.bool_]  # (T,) measured, not filled in
+    rotations: NDArray[np.floating[Any]]  # (T, K+1, 3, 3); part 0 R_camera_root, the others relative to their parents
+    root: NDArray[np.floating[Any]]  # (T, 3) the pelvis
+    joints: NDArray[np.floating[Any]]  # (T, K+1, 3)
+    contact_points: NDArray[np.floating[Any]]  # (T, 6, 3) sole points and palms
+    contact_points_visible: NDArray[np.floating[Any]]  # (T, 6) 0..1
+    center: NDArray[np.floating[Any]]  # (T, 3) of the camera
 
     @property
-    def soles(self) -> np.ndarray:
-        """(T, 4, 3) of the supports."""
-        return self.supports[:, : len(SOLES)]
+    def soles(self) -> NDArray[np.floating[Any]]:
+        """The (T, 4, 3) contact points of the soles."""
+        return self.contact_points[:, : len(SOLES)]
 
-    def place(self, rotations: np.ndarray, root: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Joints (T, K+1, 3) and supports (T, 6, 3) of another motion of this body, camera frame."""
+    def place(
+        self, rotations: NDArray[np.floating[Any]], root: NDArray[np.floating[Any]]
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Return joints (T, K+1, 3) and contact points (T, 6, 3) of another motion of this body, camera frame.
+
+        :param rotations: (T, K+1, 3, 3), as the field.
+        :param root: (T, 3) the pelvis.
+        """
         return _place(self.body, self.betas, rotations, root)
 
-    def stands_at(self, contact: np.ndarray) -> np.ndarray:
-        """(T, 3) the middle of the supports, weighted by ``contact`` (T, 6); of the soles where nothing stands."""
+    def contact_center(self, contact: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
+        """Return the (T, 3) mean of the contact points weighted by ``contact`` (T, 6); of the soles if all are 0."""
         weight = contact.copy()
-        weight[:, : len(SOLES)] += LEAST_CONTACT
+        weight[:, : len(SOLES)] += MIN_SOLE_WEIGHT
         share = weight / weight.sum(axis=1, keepdims=True)
-        return (share[..., None] * self.supports).sum(axis=1)
+        center: NDArray[np.floating[Any]] = (share[..., None] * self.contact_points).sum(axis=1)
+        return center
 
-    def contact(self, up: np.ndarray) -> np.ndarray:
-        """(T, 6) probability that each support stands, as far as it is seen: imagined feet hold nobody.
+    def contact(self, up: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
+        """Return the (T, 6) probability that each contact point rests on something, 0 for those that are not visible.
 
-        Nothing stands from one scene into the next, or over a pause much longer than from frame to frame.
+        Contacts end at scene cuts, and at pauses much longer than the usual time between frames.
+
+        :param up: (3,) unit vector.
         """
-        contact = resting_probability(self.supports, up, self.times, self.center)
-        contact *= self.supports_seen * self.valid[:, None]
+        contact = resting_probability(self.contact_points, up, self.times, self.center)
+        contact *= self.contact_points_visible * self.valid[:, None]
         steps = np.diff(self.times)
         if len(steps):
-            longest = max(LONGEST_STEP_S, LONGEST_STEP * float(np.median(steps)))
+            longest = max(MAX_STEP_S, MAX_STEP * float(np.median(steps)))
             contact[1:][steps > min(longest, SCENE_GAP_S)] = 0.0
         return contact
 
@@ -72,38 +84,50 @@ class PlacedTrack:
 def place_track(
     body: Body, track: Track, fitted: FittedTrack, smoothing: bool, path: CameraPath | None = None
 ) -> PlacedTrack:
-    """What a world is found from and a motion assembled from, computed once for a fit.
+    """Compute once what the world is estimated from and the motion is assembled from.
 
-    :param fitted: in each frame's camera; path: where that was (None: on a stand).
+    :param fitted: in each frame's camera.
+    :param path: of the camera; None: it is static.
     """
-    path = path or CameraPath.on_a_stand(len(track))
+    path = path or CameraPath.static(len(track))
     times, valid, betas = track.times, fitted.valid, fitted.betas
     rotations, root = raw_motion(track, fitted, path)
     if smoothing:
         rotations = smooth_rotations(rotations, times)
         root = path.center + smooth_root(root - path.center, times)
-    supported = with_supports(body, betas)
-    joints, supports = _place(supported, betas, rotations, root)
+    body_with_contacts = with_contact_points(body, betas)
+    joints, contact_points = _place(body_with_contacts, betas, rotations, root)
     parts = [body.joint_names.index(name) for name in (*FOOT_PARTS, "left_wrist", "right_wrist")]
-    seen = np.clip(fitted.joint_confidence[:, parts] / SEEN_CONFIDENCE, 0.0, 1.0)
-    return compact(PlacedTrack(supported, betas, times, valid, rotations, root, joints, supports, seen, path.center))
+    visible = np.clip(fitted.joint_confidence[:, parts] / VISIBLE_CONFIDENCE, 0.0, 1.0)
+    return to_single_precision(
+        PlacedTrack(
+            body_with_contacts, betas, times, valid, rotations, root, joints, contact_points, visible, path.center
+        )
+    )
 
 
-def raw_motion(track: Track, fitted: FittedTrack, path: CameraPath) -> tuple[np.ndarray, np.ndarray]:
-    """Rotations (T, K+1, 3, 3) and pelvis (T, 3) as fitted, gaps filled, in the first frame's camera axes."""
+def raw_motion(
+    track: Track, fitted: FittedTrack, path: CameraPath
+) -> tuple[NDArray[np.floating[Any]], NDArray[np.floating[Any]]]:
+    """Return rotations (T, K+1, 3, 3) and pelvis (T, 3) as fitted, without gaps, in the first frame's camera axes."""
     fitted = path.to_first(fitted)
     rotations = fill_rotation_gaps(fitted.rotations, fitted.valid, track.times)
     return rotations, fill_gaps(fitted.t_camera_root, fitted.valid, track.times)
 
 
 def _place(
-    supported: Body, betas: np.ndarray, rotations: np.ndarray, root: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    at_rest = supported.rest_joints(betas)[0]
+    body_with_contacts: Body,
+    betas: NDArray[np.floating[Any]],
+    rotations: NDArray[np.floating[Any]],
+    root: NDArray[np.floating[Any]],
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    pelvis_at_rest = body_with_contacts.rest_joints(betas)[0]
 
-    def place(rotations: np.ndarray, root: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        R, t = supported.forward_kinematics(rotations, root - at_rest, betas)
-        return t.astype(np.float32), support_points(supported, R, t).astype(np.float32)
+    def place(
+        rotations: NDArray[np.floating[Any]], root: NDArray[np.floating[Any]]
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        R, t = body_with_contacts.forward_kinematics(rotations, root - pelvis_at_rest, betas)
+        return t.astype(np.float32), contact_point_positions(body_with_contacts, R, t).astype(np.float32)
 
-    joints, supports = by_blocks(place, rotations, root)
-    return joints, supports
+    joints, contact_points = by_blocks(place, rotations, root)
+    return joints, contact_points

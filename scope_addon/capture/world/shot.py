@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the solver knows of the footage as a whole, and of each person once the body is fitted."""
+"""What is known of the footage as a whole, and of each person whom the body was fitted to."""
 
 from __future__ import annotations
 
@@ -9,29 +9,29 @@ from fractions import Fraction
 from ....solver.body import Body
 from ..camera.intrinsics import Camera
 from ..camera.line_segments import Lines
-from ..fitting.ablation import ALL_PARTS, Parts
-from ..fitting.track_fit import FittedTrack
+from ..fitting.ablation import NO_ABLATION, Ablation
+from ..fitting.frame_sequence import FittedTrack
 from ..tracking.track import Track
 from .camera_path import CameraPath
 
 
 @dataclass(frozen=True)
 class Shot:
-    """One continuous recording. "The camera" of a motion in one frame's axes is the first frame's."""
+    """One continuous recording. Where a motion is in the axes of one camera, this is the first frame's camera."""
 
     body: Body  # the one that the motion file names
     camera: Camera
-    path: CameraPath  # where each frame's camera was
+    path: CameraPath  # of the camera, over all frames
     lines: Lines  # of the background, in the first frame's axes
     fps: Fraction
     image_size: tuple[int, int]  # width and height, pixels
-    source: str  # the footage's name
-    smoothing: bool = True  # of the motion over time, with the feet locked
-    parts: Parts = ALL_PARTS
+    source: str  # name of the footage
+    smoothing: bool = True  # of the motion, with foot locking
+    ablation: Ablation = NO_ABLATION
 
     @property
-    def is_picture(self) -> bool:
-        """Whether there is one frame only."""
+    def is_still(self) -> bool:
+        """Whether there is only one frame."""
         return len(self.path) == 1
 
 
@@ -41,4 +41,4 @@ class FittedPerson:
 
     track: Track
     fit: FittedTrack
-    seen: Body  # the body with its keypoints where the network sees them, for the reprojection error
+    body: Body  # with its keypoints where the network places them, for the reprojection error

@@ -1,41 +1,44 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The world of a camera, one for all people: which way is up, where the floor is, and who stands on something else."""
+"""The world that all people share: up direction, floor, and the floors of people who stand on something else."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...kinematics.axes import transform_points, world_from_level_camera
 from ...kinematics.contact_points import SOLES
 from ..camera.line_segments import Lines
 from ..camera.verticals import estimate_up_from_lines
-from .balance import along, carrying, center_of_mass, legs
+from .balance import center_of_mass, direction, leg_directions, leg_support
 from .placement import PlacedTrack
 
-STANDING_KNEE_COS = np.cos(np.radians(30.0))  # thigh and shank within 30 degrees of one line
-FLOOR_NOISE_M = 0.05  # scatter of a supporting foot's depth-borne height
-STANCE_M = 0.2  # what a frame's stance tells of up, as far as the centre of mass of one who stands is over the feet
+STANDING_KNEE_COS = np.cos(np.radians(30.0))  # the straightness of a leg whose knee is bent by 30 degrees is 0
+FLOOR_NOISE_M = 0.05  # σ_floor, scatter of a foot's height on the floor, which depends on its depth
+STANCE_M = 0.2  # a, weight of u_0 relative to the displacement of the centre of mass from the feet
 ROUNDS = 2
-MOMENT_S = 0.1  # length of a clip that halves what its stances tell
-LEAST_CONTACT = 1e-3  # of a frame, beside the probability that a foot stands
-SAME_FLOOR_M = 0.4  # how far apart, for their distances are not known well, the feet of people on one floor may seem
-UP_NOISE_RAD = np.radians(5.0)  # scatter of the body's own up direction over a clip
+MOMENT_S = 0.1  # length of a clip in which the weight b is halved
+MIN_CONTACT = 1e-3  # added to the contact probability of a frame
+SAME_FLOOR_M = 0.4  # the feet of people on one floor may differ so much in height, as their distances are uncertain
+UP_NOISE_RAD = np.radians(5.0)  # σ_up, error of an up direction estimated from bodies
+LEVEL_UP = (0.0, -1.0, 0.0)  # up in the axes of a level camera
 
 
-def up_from_standing(people: Sequence[PlacedTrack]) -> np.ndarray:
-    """Up direction in the camera frame from the bodies themselves: ankles to neck while they stand.
+def up_from_standing(people: Sequence[PlacedTrack]) -> NDArray[np.float64]:
+    """Estimate the up direction from standing bodies: from ankles to neck.
 
-    Frames count by how straight legs and trunk are and, since who lies or does push-ups is straight as well, by how
-    upright they are in the picture; without any such frame the trunk alone decides, as far as it is upright, and a
-    prior of one frame's weight says that cameras are held level.
+    Frames are weighted by how straight legs and trunk are. People lying down or doing push-ups are straight as well, so
+    the weight also depends on how upright a person is in the image. If no frame has weight, the trunk alone is used, as
+    far as it is upright. A prior with the weight of one frame assumes a level camera.
 
-    :return: (3,) unit vector.
+    :return: (3,) unit vector, camera axes.
     """
     trunk, body_up, weight = (np.concatenate(each) for each in zip(*map(_straightness, people), strict=True))
-    level = np.array([0.0, -1.0, 0.0])
+    level = np.array(LEVEL_UP)
     weight *= np.maximum(body_up @ level, 0.0) ** 4
     if weight.sum() < 1.0:
         total = level + (np.maximum(trunk @ level, 0.0)[:, None] ** 2 * trunk).mean(0)
@@ -43,15 +46,17 @@ def up_from_standing(people: Sequence[PlacedTrack]) -> np.ndarray:
         total = level + (weight[:, None] * body_up).sum(0)
     if np.linalg.norm(total) < 1e-6:
         total = level
-    return total / np.linalg.norm(total)
+    return _unit(total)
 
 
-def _straightness(person: PlacedTrack) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Directions (T, 3) of trunk and body, and how straight the body is (T,), in the frames in which it was seen."""
-    trunk = along(person.body, person.joints, "pelvis", "neck")
+def _straightness(
+    person: PlacedTrack,
+) -> tuple[NDArray[np.floating[Any]], NDArray[np.floating[Any]], NDArray[np.floating[Any]]]:
+    """Return directions (n, 3) of trunk and body, and how straight the body is (n,), in the n frames it was seen in."""
+    trunk = direction(person.body, person.joints, "pelvis", "neck")
     straightness = np.ones(len(trunk))
     lower = np.zeros_like(trunk)
-    for shank, thigh in legs(person.body, person.joints):
+    for shank, thigh in leg_directions(person.body, person.joints):
         straight = (shank * thigh).sum(1)
         straightness *= np.clip((straight - STANDING_KNEE_COS) / (1 - STANDING_KNEE_COS), 0, 1)
         lower += 0.5 * (shank + thigh)
@@ -61,80 +66,91 @@ def _straightness(person: PlacedTrack) -> tuple[np.ndarray, np.ndarray, np.ndarr
     return trunk[person.valid], body_up[person.valid], straightness[person.valid]
 
 
-def up_from_bodies(people: Sequence[PlacedTrack]) -> np.ndarray:
-    """Up direction in the camera frame from people who stand, walk or bend: their weight is over their feet.
+def up_from_bodies(people: Sequence[PlacedTrack]) -> NDArray[np.float64]:
+    """Estimate the up direction from people who stand, walk or bend: their weight is above their feet.
 
-    With d_t from the middle of what stands to the centre of mass, w_t the probability that a sole stands and no palm
-    rests, and u_0 what the bodies' own axes say (`up_from_standing`),
+    With d_t from the centre of the contact points to the centre of mass, w_t the probability that a sole is in contact
+    and no palm is, and u_0 the direction of the bodies themselves (`up_from_standing`),
 
         Σ_t (a u_0 + b w_t k_t max(y·d_t / |d_t|, 0)² d_t)
 
-    points up, a being a length (`STANCE_M`). Forces average out over a clip, not in a moment: b grows from 0 to 1 with
-    its length.
-    Those who sit, kneel or lie have feet that keep still as well: k_t, which falls from 1 to 0 where both knees bend by
-    60 to 75 degrees, and y, up in the picture, leave them out as far as they can.
+    points up, where a is a length (`STANCE_M`). Inertial forces average out over a clip, but not in a single moment:
+    b grows from 0 to 1 with the length of the clip. People who sit, kneel or lie have feet at rest as well. They are
+    largely excluded by k_t, which falls from 1 to 0 while both knees bend from 60 to 75 degrees, and by y, up in the
+    image.
 
-    :return: (3,) unit vector.
+    :return: (3,) unit vector, camera axes.
     """
     start = up_from_standing(people)
-    level, up = np.array([0.0, -1.0, 0.0]), start
+    level, up = np.array(LEVEL_UP), start
     masses = [center_of_mass(each.body, each.joints) for each in people]
-    carried = [carrying(each.body, each.joints) for each in people]
+    support = [leg_support(each.body, each.joints) for each in people]
     for _ in range(ROUNDS):
         total = np.zeros(3)
-        for each, mass, carries in zip(people, masses, carried, strict=True):
+        for each, mass, supported in zip(people, masses, support, strict=True):
             contact = each.contact(up)
-            above = mass - each.stands_at(contact)
+            above = mass - each.contact_center(contact)
             upright = np.maximum(above @ level, 0.0) / np.maximum(np.linalg.norm(above, axis=1), 1e-9)
             on_hands = contact[:, len(SOLES) :].max(axis=1, initial=0.0)
-            weight = contact[:, : len(SOLES)].max(axis=1) * (1 - on_hands) * carries * upright**2
-            lasts_s = float(np.ptp(each.times))
-            total += STANCE_M * each.valid.sum() * start + lasts_s / (lasts_s + MOMENT_S) * (weight @ above)
-        up = total / np.linalg.norm(total)
+            weight = contact[:, : len(SOLES)].max(axis=1) * (1 - on_hands) * supported * upright**2
+            duration_s = float(np.ptp(each.times))
+            total += STANCE_M * each.valid.sum() * start + duration_s / (duration_s + MOMENT_S) * (weight @ above)
+        up = _unit(total)
     return up
 
 
-def up_from_floor(feet_cam: np.ndarray, up: np.ndarray) -> np.ndarray:
-    """Turns ``up`` so that the supporting feet lie in one level plane, as far as they are spread over the floor.
+def up_from_floor(feet_cam: NDArray[np.floating[Any]], up: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
+    """Rotate ``up`` so that feet in contact lie in one horizontal plane, as far as they are spread over the floor.
 
-    Minimizes Σ_k (n·p̃_k)²/σ_floor² + N ‖n − up‖²/σ_up² over n, p̃ the lowest foot point of each frame less their median.
+    Minimizes Σ_k (n·p̃_k)²/σ_floor² + N ‖n − up‖²/σ_up² over n, with p̃ the lowest foot point of each frame minus their
+    median.
 
-    :param feet_cam: (T, F, 3) points of the soles in the camera frame.
+    :param feet_cam: (T, F, 3) points of the soles, camera axes, metres.
+    :param up: (3,) unit vector, camera axes.
+    :return: (3,) unit vector, camera axes.
     """
     lowest = _lowest(feet_cam, up)
     p = lowest - np.median(lowest, axis=0)
     off = np.abs(p @ up)
-    p = p[off <= max(3 * np.median(off), 1e-3)]  # jumps and misses do not support anybody
+    p = p[off <= max(3 * np.median(off), 1e-3)]  # without jumps and outliers, in which nothing is in contact
     kappa = len(p) * (FLOOR_NOISE_M / UP_NOISE_RAD) ** 2
-    n = np.linalg.solve(p.T @ p + kappa * np.eye(3), kappa * up)
-    return n / np.linalg.norm(n)
+    return _unit(np.linalg.solve(p.T @ p + kappa * np.eye(3), kappa * up))
 
 
-def upright(up_body: np.ndarray, feet_cam: np.ndarray, lines: Lines | None) -> np.ndarray:
-    """(3,) up, from what bodies say: by the lines of the background, or else by where the feet were.
+def up_from_scene(
+    up_body: NDArray[np.floating[Any]], feet_cam: NDArray[np.floating[Any]], lines: Lines | None
+) -> NDArray[np.floating[Any]]:
+    """Correct the up direction of the bodies by the lines of the background or, failing that, by the feet.
 
-    Lines that only tell what is level in one direction, such as a fence's, take out what is not upright to it.
+    Lines that determine only one horizontal direction, such as a fence's, remove the component along it.
+
+    :param up_body: (3,) unit vector, camera axes.
+    :param feet_cam: (T, F, 3) points of the soles, camera axes, metres.
+    :return: (3,) unit vector, camera axes.
     """
-    told = estimate_up_from_lines(lines or Lines.none(), up_body)
-    if told.up is not None:
-        return told.up
+    estimate = estimate_up_from_lines(lines or Lines.none(), up_body)
+    if estimate.up is not None:
+        return estimate.up
     up = up_from_floor(feet_cam, up_body)
-    if told.level is not None:
-        up = up - (up @ told.level) * told.level
-    return up / np.linalg.norm(up)
+    if estimate.level is not None:
+        up = up - (up @ estimate.level) * estimate.level
+    return _unit(up)
 
 
-def floor_height(soles_cam: np.ndarray, contact: np.ndarray, up: np.ndarray) -> float:
-    """Height, along ``up`` from the camera, of what a person stands on: of each frame's lowest sole, the median.
+def floor_height(
+    soles_cam: NDArray[np.floating[Any]], contact: NDArray[np.floating[Any]], up: NDArray[np.floating[Any]]
+) -> float:
+    """Estimate the height of a person's floor above the camera: the weighted median of each frame's lowest sole point.
 
-    Frames count as far as anything stands in them: who jumps or climbs for most of a clip is not on the floor then.
-    Feet that keep still in the air, of one who hangs by the hands, seem to stand. Where nothing ever stands, all
-    frames count alike.
+    Frames are weighted by contact, because people who jump or climb for most of a clip are not on the floor then. (Feet
+    that hang still in the air seem to be in contact, though.) If there is no contact at all, all frames count equally.
 
-    :param soles_cam, contact: (T, F, 3) and (T, F) the probability that each stands.
+    :param soles_cam: (T, F, 3) points of the soles, camera axes, metres.
+    :param contact: (T, F) contact probability of each point.
+    :param up: (3,) unit vector, camera axes.
     """
     lowest = (soles_cam @ up).min(axis=1)
-    weight = contact.max(axis=1) + LEAST_CONTACT
+    weight = contact.max(axis=1) + MIN_CONTACT
     order = np.argsort(lowest)
     sums = np.cumsum(weight[order])
     return float(lowest[order[np.searchsorted(sums, 0.5 * sums[-1])]])
@@ -142,42 +158,51 @@ def floor_height(soles_cam: np.ndarray, contact: np.ndarray, up: np.ndarray) -> 
 
 @dataclass(frozen=True)
 class SharedWorld:
-    """``T_world_camera`` (4, 4) for everybody, and the height of each person's own floor in it, metres."""
+    """``T_world_camera`` (4, 4) for all people, and the height of each person's own floor in that world, metres."""
 
-    T_world_camera: np.ndarray
+    T_world_camera: NDArray[np.float64]
     floors_m: list[float]
 
     @property
-    def up(self) -> np.ndarray:
-        """(3,) unit vector, in the first frame's camera axes."""
+    def up(self) -> NDArray[np.float64]:
+        """The (3,) unit vector in the first frame's camera axes."""
         return self.T_world_camera[2, :3]
 
-    def floor_from_camera(self, person: int) -> np.ndarray:
-        """(4, 4) as ``T_world_camera``, with the person's own floor at z = 0."""
+    def floor_from_camera(self, person: int) -> NDArray[np.float64]:
+        """Return ``T_world_camera`` (4, 4) with the person's own floor at z = 0."""
         T = self.T_world_camera.copy()
         T[2, 3] -= self.floors_m[person]
         return T
 
 
-def share_world(placed: list[PlacedTrack], lines: Lines | None = None) -> SharedWorld:
-    """World of a static camera: z up, from the background's lines, or from all bodies and floors together; the floor at
-    z = 0 and the origin below the first position of the first, most prominent person.
+def find_world(placed: list[PlacedTrack], lines: Lines | None = None) -> SharedWorld:
+    """Estimate the world: z up, the floor at z = 0, the origin below the first position of the most prominent person.
 
-    Each person's feet count from their own mean place, so that neither a step nor a wrong distance tilts the world.
+    The up direction is estimated from the background's lines, or from all bodies and floors together. Each person's
+    feet are taken relative to their own mean position, so that neither a step nor a wrong distance tilts the world.
+
+    :param placed: the most prominent person first.
+    :param lines: of the background, in the first frame's camera axes.
     """
     all_soles = [person.soles[person.valid] for person in placed]
     up = up_from_bodies(placed)
     centered = [soles - _lowest(soles, up).mean(axis=0) for soles in all_soles]
-    up = upright(up, np.concatenate(centered), lines)
-    stands = [person.contact(up)[person.valid, : len(SOLES)] for person in placed]
-    heights = [floor_height(soles, contact, up) for soles, contact in zip(all_soles, stands, strict=True)]
+    up = up_from_scene(up, np.concatenate(centered), lines)
+    contacts = [person.contact(up)[person.valid, : len(SOLES)] for person in placed]
+    heights = [floor_height(soles, contact, up) for soles, contact in zip(all_soles, contacts, strict=True)]
     T_world_camera = world_from_level_camera(up, height=-heights[0])
     start = transform_points(T_world_camera, placed[0].joints[placed[0].valid.argmax(), :1])[0]
     T_world_camera[:2, 3] -= start[:2]
-    own = [height - heights[0] for height in heights]
-    return SharedWorld(T_world_camera, [h if abs(h) > SAME_FLOOR_M else 0.0 for h in own])
+    relative = [height - heights[0] for height in heights]
+    return SharedWorld(T_world_camera, [h if abs(h) > SAME_FLOOR_M else 0.0 for h in relative])
 
 
-def _lowest(soles_cam: np.ndarray, up: np.ndarray) -> np.ndarray:
-    """(T, 3) the lowest sole point of each frame."""
-    return soles_cam[np.arange(len(soles_cam)), (soles_cam @ up).argmin(axis=1)]
+def _lowest(soles_cam: NDArray[np.floating[Any]], up: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
+    """Return the (T, 3) lowest sole point of each frame."""
+    lowest: NDArray[np.floating[Any]] = soles_cam[np.arange(len(soles_cam)), (soles_cam @ up).argmin(axis=1)]
+    return lowest
+
+
+def _unit(vector: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
+    unit: NDArray[np.float64] = vector / np.linalg.norm(vector)
+    return unit

@@ -4,7 +4,7 @@
 import dataclasses
 
 import pytest
-from scope.scope_addon.capture.fitting.ablation import ALL_PARTS, Parts
+from scope.scope_addon.capture.fitting.ablation import NO_ABLATION, Ablation
 from scope.scope_addon.errors import UsageError
 from scope.solver import Weights
 
@@ -12,15 +12,15 @@ WEIGHTS = Weights(keypoints2d=1e5, keypoints3d=100.0, orientation_field=400.0, j
 
 
 def test_all_parts_change_no_weight() -> None:
-    assert ALL_PARTS.weights(WEIGHTS) == WEIGHTS
+    assert NO_ABLATION.weights(WEIGHTS) == WEIGHTS
 
 
 @pytest.mark.parametrize("name", ["keypoints3d", "orientation_field", "joint_prior"])
 def test_what_is_left_out_weighs_nothing_and_the_rest_stays(name: str) -> None:
-    found = Parts(**{name: False}).weights(WEIGHTS)
+    found = Ablation(**{name: False}).weights(WEIGHTS)
     assert found == dataclasses.replace(WEIGHTS, **{name: 0.0})
 
 
 def test_some_source_of_depth_has_to_stay() -> None:
-    with pytest.raises(UsageError, match="nothing else tells depth"):
-        Parts(lifter=False, world_landmarks=False)
+    with pytest.raises(UsageError, match="without either, depth is unknown"):
+        Ablation(lifter=False, world_landmarks=False)

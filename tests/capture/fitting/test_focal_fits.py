@@ -10,7 +10,7 @@ import pytest
 from scope.scope_addon.capture.camera.intrinsics import assumed_camera, choose_camera
 from scope.scope_addon.capture.fitting.focal_fits import FocalFits
 from scope.scope_addon.capture.fitting.focal_length import camera_by_fits
-from scope.scope_addon.capture.fitting.keypoint_offsets import as_seen
+from scope.scope_addon.capture.fitting.keypoint_offsets import with_keypoint_offsets
 from scope.scope_addon.capture.media.video_range import VideoRange
 from scope.scope_addon.capture.options import CaptureOptions
 from scope.scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES
@@ -38,7 +38,7 @@ def observe(body, pose, ratio: float, distance_m: float, pitch: float = 0.35) ->
         rotations[body.joint_names.index(joint)] = exp(np.array(vector, float))
     R, t = body.forward_kinematics(rotations, np.array([0, 0, distance_m]), np.zeros(body.P))
     at = body.keypoint_set("blazepose")
-    points = as_seen(body).keypoints(R, t, np.zeros(body.P))[[at[name] for name in KEYPOINT_NAMES]]
+    points = with_keypoint_offsets(body).keypoints(R, t, np.zeros(body.P))[[at[name] for name in KEYPOINT_NAMES]]
     pixels = points[:, :2] / points[:, 2:] * ratio * ASSUMED.intrinsics[0, 0] + ASSUMED.intrinsics[:2, 2]
     region = Region((WIDTH / 2, HEIGHT / 2), float(HEIGHT), 0.0)
     return Observation(pixels, np.ones(len(points)), points - points[HIPS].mean(0), 1.0, region, acquired=True)
@@ -53,9 +53,7 @@ def found(body, ratio: float, distance_m: float):
 def test_who_is_near_tells_the_focal_length(body):
     """1.3 m from the camera at half the focal length fills as much of the picture as 2.6 m at the whole one."""
     ratios = [0.6, 1.0, 1.6]
-    log_f = [
-        np.log(found(body, ratio, 2.2 * ratio).intrinsics[0, 0] / ASSUMED.intrinsics[0, 0]) for ratio in ratios
-    ]
+    log_f = [np.log(found(body, ratio, 2.2 * ratio).intrinsics[0, 0] / ASSUMED.intrinsics[0, 0]) for ratio in ratios]
     assert log_f[0] < log_f[1] - 0.1 < log_f[2] - 0.2
     before, after = np.log(ratios), np.log(ratios) - log_f
     assert np.square(after).mean() < 0.7 * np.square(before).mean()

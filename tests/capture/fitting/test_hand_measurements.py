@@ -14,12 +14,12 @@ from scope.scope_addon.capture.fitting.hand_measurements import (
     FINGERS,
     HAND_KEYPOINT_NAMES,
     HandMeasurer,
-    calm_fingers,
     finger_joints,
     require_fingers,
+    smooth_fingers,
     with_finger_limits,
 )
-from scope.scope_addon.capture.fitting.track_fit import ROBUST, WEIGHTS, cold_stages
+from scope.scope_addon.capture.fitting.weights import ROBUST, WEIGHTS, cold_stages
 from scope.scope_addon.capture.perception.hand_landmarks import HAND_POINTS
 from scope.scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES
 from scope.scope_addon.capture.perception.observation import Observation
@@ -61,7 +61,7 @@ def points_of(body, state):
     return body.keypoints(*body.forward_kinematics(R, t, state.beta), state.beta)
 
 
-def along_sight(points):
+def line_of_sight(points):
     """(3, 3) rotation from the camera's axes to those that look at the middle of the points, without roll."""
     z = points.mean(axis=0) / points[:, 2].mean()
     z = z / np.linalg.norm(z)
@@ -78,7 +78,7 @@ def hands_of(body, points):
         p = points[at]
         pixels = p @ K.T
         hands[side, :, :2], hands[side, :, 2] = pixels[:, :2] / pixels[:, 2:], 1.0
-        hands[side, :, 3:] = (p - p.mean(axis=0)) @ along_sight(p).T
+        hands[side, :, 3:] = (p - p.mean(axis=0)) @ line_of_sight(p).T
     return hands
 
 
@@ -139,9 +139,9 @@ def test_the_palm_turns_the_wrist(body):
     truth.Omega[wrist - 1] = exp([0.7, 0.0, 0.3])
     points = points_of(body, truth)
     found = fitted(body, measure(body, points, hands_of(body, points)))
-    R = body.forward_kinematics(
-        np.concatenate([truth.R_camera_root[None], truth.Omega]), np.zeros(3), truth.beta
-    )[0][wrist]
+    R = body.forward_kinematics(np.concatenate([truth.R_camera_root[None], truth.Omega]), np.zeros(3), truth.beta)[0][
+        wrist
+    ]
     assert np.linalg.norm(log(R.T @ found.R_camera_part[wrist])) < 0.2
 
 
@@ -190,7 +190,7 @@ def test_unseen_fingers_are_carried_over_short_gaps_and_rest_in_long_ones(body):
     seen[10:14, 0] = seen[60:200, 0] = False
     seen[:, 1] = False
     rotations[~seen[:, 0]] = np.eye(3)
-    calm = calm_fingers(rotations, fingers, seen, times)
+    calm = smooth_fingers(rotations, fingers, seen, times)
     bend = -log(calm[:, fingers[0]])[..., 2]
     assert np.allclose(bend[10:14], 1.0)
     assert np.allclose(bend[95:165], 0.0, atol=1e-9)
@@ -207,7 +207,7 @@ def test_fingers_of_a_long_clip_take_no_more_memory_than_the_clip(body):
     seen = np.tile((np.arange(T) % 2 == 0)[:, None], (1, 2))
     fingers = [finger_joints(body, side) for side in SIDES]
     tracemalloc.start()
-    calm_fingers(rotations, fingers, seen, np.arange(T) / 30.0)
+    smooth_fingers(rotations, fingers, seen, np.arange(T) / 30.0)
     most = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert most < 4 * rotations.nbytes

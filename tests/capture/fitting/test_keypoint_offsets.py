@@ -10,10 +10,10 @@ import cv2
 import numpy as np
 import pytest
 from scope.scope_addon.capture.camera.intrinsics import choose_camera
-from scope.scope_addon.capture.fitting.ablation import Parts
+from scope.scope_addon.capture.fitting.ablation import Ablation
 from scope.scope_addon.capture.fitting.frame_measurements import Measurer
-from scope.scope_addon.capture.fitting.keypoint_offsets import as_seen, offset
-from scope.scope_addon.capture.fitting.track_fit import prepare_track
+from scope.scope_addon.capture.fitting.keypoint_offsets import offset, with_keypoint_offsets
+from scope.scope_addon.capture.fitting.prepared_track import prepare_track
 from scope.scope_addon.capture.media.video_range import VideoRange
 from scope.scope_addon.capture.options import CaptureOptions
 from scope.scope_addon.capture.pipeline import capture
@@ -27,7 +27,7 @@ from ..walking import someone_walking, track_without_depth
 
 
 def test_left_and_right_are_mirror_images(body):
-    seen = as_seen(body)
+    seen = with_keypoint_offsets(body)
     at = body.keypoint_set("blazepose")
     for name in BLAZEPOSE:
         if name.startswith("left_"):
@@ -36,7 +36,7 @@ def test_left_and_right_are_mirror_images(body):
 
 
 def test_only_what_networks_see_moves(body):
-    seen, at = as_seen(body), body.keypoint_set("blazepose")
+    seen, at = with_keypoint_offsets(body), body.keypoint_set("blazepose")
     moved = np.flatnonzero((seen.keypoint_template != body.keypoint_template).any(axis=1))
     np.testing.assert_array_equal(moved, sorted(at.values()))
     np.testing.assert_array_equal(seen.J_template, body.J_template)
@@ -69,14 +69,14 @@ def test_what_a_network_without_depth_sees_is_not_displaced(body):
     camera = choose_camera(1280, 720)
     pixels, world = someone_walking(3, 30.0, 0.4)
     track = track_without_depth(pixels, 30.0, {})
-    for known, which in ((False, body), (True, as_seen(body))):
+    for known, which in ((False, body), (True, with_keypoint_offsets(body))):
         prepared = prepare_track(body, replace(track, world_landmarks=world * known), camera)
         np.testing.assert_array_equal(prepared.body.keypoint_template, which.keypoint_template)
 
 
 def test_a_hip_is_as_sure_as_the_knee_that_shows_it(body):
     """Keypoints at joints, wherever they are seen, do not tell how these turn; what lies further down does."""
-    measurer = Measurer(as_seen(body), choose_camera(1280, 720).intrinsics)
+    measurer = Measurer(with_keypoint_offsets(body), choose_camera(1280, 720).intrinsics)
     hidden = np.array([any(part in name for part in ("knee", "ankle", "heel", "foot")) for name in BLAZEPOSE])
     confidence = np.ones((1, len(BLAZEPOSE)))
     confidence[:, hidden] = 0.0
@@ -129,7 +129,7 @@ def test_displaced_keypoints_are_found_where_they_were_put(body):
 def test_a_body_covers_a_man_better_of_whom_the_offsets_know_nothing(shared, body, camera):
     video, wanted = shared / "data" / "pose2sim" / f"{camera}.mp4", VideoRange(end_s=0.6)
     left_over = []
-    for which, parts in ((body, Parts(seen_keypoints=False)), (as_seen(body), Parts())):
-        (motion,) = capture(video, body, CaptureOptions(parts=parts, wanted=wanted)).motions
+    for which, ablation in ((body, Ablation(keypoint_offsets=False)), (with_keypoint_offsets(body), Ablation())):
+        (motion,) = capture(video, body, CaptureOptions(ablation=ablation, wanted=wanted)).motions
         left_over.append(left_over_px(which, motion))
     assert left_over[1] < 0.9 * left_over[0]

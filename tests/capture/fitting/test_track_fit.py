@@ -8,7 +8,9 @@ from dataclasses import replace
 import numpy as np
 from scope.scope_addon.capture.camera.intrinsics import choose_camera
 from scope.scope_addon.capture.fitting import track_fit
-from scope.scope_addon.capture.fitting.keypoint_offsets import as_seen
+from scope.scope_addon.capture.fitting.frame_sequence import FittedTrack, with_same_rotations
+from scope.scope_addon.capture.fitting.keypoint_offsets import with_keypoint_offsets
+from scope.scope_addon.capture.fitting.prepared_track import Stance, prepare_track
 from scope.scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES
 from scope.scope_addon.capture.perception.lifter import Lifted, Lifter
 from scope.scope_addon.capture.tracking.track import Track
@@ -29,7 +31,7 @@ def _standing_track(body, camera, bent=()) -> Track:
         rotations[:, body.joint_names.index(joint)] = exp(np.array([angle, 0.0, 0.0]))
     R, t = body.forward_kinematics(rotations, np.array([[0.0, 0.0, 4.0]]), np.zeros(body.P))
     at = body.keypoint_set("blazepose")
-    points = as_seen(body).keypoints(R, t, np.zeros(body.P))[0, [at[name] for name in KEYPOINT_NAMES]]
+    points = with_keypoint_offsets(body).keypoints(R, t, np.zeros(body.P))[0, [at[name] for name in KEYPOINT_NAMES]]
     pixels = points[:, :2] / points[:, 2:] * camera.intrinsics[0, 0] + camera.intrinsics[:2, 2]
     hips = [KEYPOINT_NAMES.index(f"{side}_hip") for side in ("left", "right")]
     J = len(KEYPOINT_NAMES)
@@ -44,9 +46,9 @@ def _standing_track(body, camera, bent=()) -> Track:
     )
 
 
-def _stance(fit: track_fit.FittedTrack, contact: float = 0.0, floor_m: float = 0.0) -> track_fit.Stance:
+def _stance(fit: FittedTrack, contact: float = 0.0, floor_m: float = 0.0) -> Stance:
     """The pelvis where it was fitted; feet that stand so surely on a level floor so far below the camera."""
-    return track_fit.Stance(
+    return Stance(
         root_cam=fit.t_camera_root,
         turn=np.tile(np.eye(3), (FRAMES, 1, 1)),
         floor_normal=np.tile([0.0, -1.0, 0.0], (FRAMES, 1)),
@@ -67,7 +69,7 @@ def test_the_lifting_network_runs_once_for_both_fits(monkeypatch):
         return lift_both_ways(self, *arguments)
 
     monkeypatch.setattr(Lifter, "lift_both_ways", counted)
-    prepared = track_fit.prepare_track(body, track, camera)
+    prepared = prepare_track(body, track, camera)
     first = track_fit.fit_track(prepared, lambda *_: None)
     second = track_fit.refit_track(prepared, first, _stance(first), lambda *_: None)
     assert len(lifts) == 1
@@ -80,7 +82,7 @@ def test_the_lifting_network_runs_once_for_both_fits(monkeypatch):
 def test_who_is_nearer_than_it_seemed_is_smaller():
     """A floor that others stand on tells the distance, and with it the size: the picture stays the same."""
     body, camera = load_body("scope"), choose_camera(1080, 1920)
-    prepared = track_fit.prepare_track(body, _standing_track(body, camera), camera)
+    prepared = prepare_track(body, _standing_track(body, camera), camera)
     first = track_fit.fit_track(prepared, lambda *_: None)
 
     def leg(fit):
@@ -99,7 +101,7 @@ def test_a_limb_goes_where_it_is_seen_to_go_for_sure_and_was_there_before():
     """A leg before the body looks as one behind it, and the first frames are believed to show the wrong one."""
     body, camera = load_body("scope"), choose_camera(1080, 1920)
     track = _standing_track(body, camera, (("right_hip", 0.3), ("right_knee", 0.9)))
-    prepared = track_fit.prepare_track(body, track, camera)
+    prepared = prepare_track(body, track, camera)
     leg = [KEYPOINT_NAMES.index(f"right_{name}") for name in ("knee", "ankle", "heel", "foot_index")]
     hip = KEYPOINT_NAMES.index("right_hip")
     truth, sigma = track.world_landmarks.copy(), np.full((FRAMES, len(KEYPOINT_NAMES)), 0.1)
@@ -128,13 +130,13 @@ def test_a_frame_is_turned_as_the_one_before_was():
         )
 
     before, now, after = state(), state(), state()
-    same = track_fit.turned_alike(now, before, before)
+    same = with_same_rotations(now, before, before)
     np.testing.assert_allclose(same.Omega, now.Omega, atol=1e-12)
-    there = track_fit.turned_alike(before, before, after)
+    there = with_same_rotations(before, before, after)
     np.testing.assert_allclose(there.Omega, after.Omega, atol=1e-12)
     np.testing.assert_allclose(there.R_camera_root, after.R_camera_root, atol=1e-12)
     np.testing.assert_array_equal(there.t_camera_root, before.t_camera_root)
-    turned = track_fit.turned_alike(now, before, after)  # by the same rotation, in the parent's axes
+    turned = with_same_rotations(now, before, after)  # by the same rotation, in the parent's axes
     by = turned.Omega @ np.swapaxes(now.Omega, 1, 2)
     np.testing.assert_allclose(by, after.Omega @ np.swapaxes(before.Omega, 1, 2), atol=1e-12)
 
@@ -143,7 +145,7 @@ def test_of_two_ways_to_bend_a_leg_frames_go_on_with_that_of_the_frame_before():
     """All first fits have it on the wrong side; the first frame is then told better, the others nothing of depth."""
     body, camera = load_body("scope"), choose_camera(1080, 1920)
     track = _standing_track(body, camera, (("right_hip", 0.3), ("right_knee", 0.9)))
-    prepared = track_fit.prepare_track(body, track, camera)
+    prepared = prepare_track(body, track, camera)
     leg = [KEYPOINT_NAMES.index(f"right_{name}") for name in ("knee", "ankle", "heel", "foot_index")]
     hip, ankle = (KEYPOINT_NAMES.index(f"right_{name}") for name in ("hip", "ankle"))
     truth, sure = track.world_landmarks, np.full((FRAMES, len(KEYPOINT_NAMES)), 0.1)
@@ -182,7 +184,7 @@ def test_a_leg_at_a_wrong_depth_is_drawn_to_the_floor_where_it_stands_and_only_t
         world_landmarks=np.tile(world, (FRAMES, 1, 1)),
     )
     up = down @ [0.0, -1.0, 0.0]
-    prepared = track_fit.prepare_track(body, track, camera)
+    prepared = prepare_track(body, track, camera)
     leg = [KEYPOINT_NAMES.index(f"right_{name}") for name in ("knee", "ankle", "heel", "foot_index")]
     lifted, sigma = track.world_landmarks.copy(), np.full((FRAMES, len(KEYPOINT_NAMES)), 0.1)
     good = track_fit.fit_track(replace(prepared, lifted=Lifted(lifted.copy(), sigma, sigma)), lambda *_: None)

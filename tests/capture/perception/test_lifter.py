@@ -3,7 +3,7 @@
 
 import numpy as np
 import pytest
-from scope.scope_addon.capture.fitting.keypoint_offsets import as_seen
+from scope.scope_addon.capture.fitting.keypoint_offsets import with_keypoint_offsets
 from scope.scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES, LandmarkNetwork
 from scope.scope_addon.capture.perception.lifter import (
     HIPS,
@@ -31,7 +31,7 @@ def before_camera(body, R, heading):
     """(2, 33, 3) keypoints of a pose (24, 3, 3) 5 m away, camera frame: the body's own, and where they are seen."""
     R[0] = np.diag([1.0, -1.0, -1.0]) @ exp(np.array([0, heading, 0])) @ R[0]
     pose, at = body.forward_kinematics(R, np.array([0.3, 0.1, 5.0])), list(body.keypoint_set("blazepose").values())
-    return np.array([which.keypoints(*pose)[at] for which in (body, as_seen(body))])
+    return np.array([which.keypoints(*pose)[at] for which in (body, with_keypoint_offsets(body))])
 
 
 def truth_and_rays(moments):

@@ -3,9 +3,9 @@
 
 import numpy as np
 import pytest
-from scope.scope_addon.capture.world.balance import center_of_mass, turn_over_feet
+from scope.scope_addon.capture.world.balance import balancing_rotations, center_of_mass
 from scope.scope_addon.capture.world.placement import PlacedTrack
-from scope.scope_addon.kinematics.contact_points import support_points, with_supports
+from scope.scope_addon.kinematics.contact_points import contact_point_positions, with_contact_points
 from scope.solver import load_body, rotations
 
 UP = np.array([0.0, -1.0, 0.0])  # camera axes, level camera
@@ -22,7 +22,7 @@ def standing(lean_deg=0.0, axis=(1.0, 0.0, 0.0), speed_m_s=0.0, arms=(0.0, 0.0, 
     on, degrees about the joint's x axis.
     """
     body = load_body("scope")
-    supported = with_supports(body, np.zeros(body.P))
+    supported = with_contact_points(body, np.zeros(body.P))
     omega = np.tile(np.eye(3), (T, body.K + 1, 1, 1))
     for side, sign in (("left", -1), ("right", 1)):
         omega[:, body.joint_names.index(f"{side}_shoulder")] = rotations.exp(sign * np.radians(arms))
@@ -35,15 +35,15 @@ def standing(lean_deg=0.0, axis=(1.0, 0.0, 0.0), speed_m_s=0.0, arms=(0.0, 0.0, 
 
     def place(root):
         R, t = body.forward_kinematics(omega, root - J0)
-        return t, support_points(supported, R, t)
+        return t, contact_point_positions(supported, R, t)
 
     root = np.zeros((T, 3))
-    joints, supports = place(root)
-    root += np.array([0, 1.0, 4.0]) - supports[:, :4].mean(axis=(0, 1)) + speed_m_s * TIMES[:, None] * [1.0, 0, 0]
-    joints, supports = place(root)
+    joints, contact_points = place(root)
+    root += np.array([0, 1.0, 4.0]) - contact_points[:, :4].mean(axis=(0, 1)) + speed_m_s * TIMES[:, None] * [1.0, 0, 0]
+    joints, contact_points = place(root)
     seen, center = np.ones((T, 6)), np.zeros((T, 3))
     every = np.ones(T, bool)
-    return PlacedTrack(supported, np.zeros(body.P), TIMES, every, omega, root, joints, supports, seen, center)
+    return PlacedTrack(supported, np.zeros(body.P), TIMES, every, omega, root, joints, contact_points, seen, center)
 
 
 def turned_deg(turn):
@@ -65,7 +65,7 @@ def test_the_center_of_mass_is_that_of_the_volume():
 @pytest.mark.parametrize("lean", [-20.0, 20.0])
 def test_who_would_fall_is_turned_back_over_the_feet(lean):
     placed = standing(lean)
-    turn, pivot = turn_over_feet(placed, FEET, UP)
+    turn, pivot = balancing_rotations(placed, FEET, UP)
     angle = turned_deg(turn)[T // 2]
     assert np.sign(angle) == -np.sign(lean)
     assert 3.0 < abs(angle) < 10.5
@@ -76,18 +76,18 @@ def test_who_would_fall_is_turned_back_over_the_feet(lean):
 
 
 def test_who_stands_upright_is_left_alone():
-    assert np.abs(turned_deg(turn_over_feet(standing(), FEET, UP)[0])).max() < 1.0
+    assert np.abs(turned_deg(balancing_rotations(standing(), FEET, UP)[0])).max() < 1.0
 
 
 def test_a_lean_across_the_line_of_sight_is_seen_and_left_alone():
-    turn, _ = turn_over_feet(standing(20.0, axis=(0.0, 0.0, 1.0)), FEET, UP)
+    turn, _ = balancing_rotations(standing(20.0, axis=(0.0, 0.0, 1.0)), FEET, UP)
     assert np.abs(rotations.log(turn)).max() < np.radians(1.0)
 
 
 def test_who_moves_or_flies_is_left_alone():
-    turn, _ = turn_over_feet(standing(20.0, speed_m_s=1.5), FEET, UP)
+    turn, _ = balancing_rotations(standing(20.0, speed_m_s=1.5), FEET, UP)
     assert np.abs(turned_deg(turn)[10:-10]).max() < 0.5  # the speed at the ends is not known well
-    turn, _ = turn_over_feet(standing(20.0), np.zeros((T, 6)), UP)
+    turn, _ = balancing_rotations(standing(20.0), np.zeros((T, 6)), UP)
     assert np.isfinite(turn).all()
     assert np.abs(turned_deg(turn)).max() < 1e-6
 
@@ -98,29 +98,29 @@ SITS, KNEELS, BENDS = (("hip", -85), ("knee", 85)), (("knee", 90), ("ankle", 50)
 @pytest.mark.parametrize("bends", [SITS, KNEELS], ids=["sits", "kneels"])
 @pytest.mark.parametrize("lean", [-10.0, 0.0, 10.0])
 def test_who_rests_on_a_chair_or_the_shins_is_left_alone(bends, lean):
-    turn, _ = turn_over_feet(standing(lean, bends=bends), FEET, UP)
+    turn, _ = balancing_rotations(standing(lean, bends=bends), FEET, UP)
     assert np.abs(turned_deg(turn)).max() < 0.1
 
 
 def test_who_goes_down_a_little_has_to_keep_balance():
-    turn, _ = turn_over_feet(standing(20.0, bends=BENDS), FEET, UP)
+    turn, _ = balancing_rotations(standing(20.0, bends=BENDS), FEET, UP)
     assert turned_deg(turn)[T // 2] < -3.0
 
 
 def test_who_is_on_hands_and_feet_is_left_alone():
     """A plank towards the camera: the weight is between toes and palms, far from the feet."""
     planks = standing(80.0, arms=(0.0, 90.0, 0.0))
-    assert turned_deg(turn_over_feet(planks, FEET, UP)[0])[T // 2] < -3.0
-    turn, pivot = turn_over_feet(planks, np.ones((T, 6)), UP)
+    assert turned_deg(balancing_rotations(planks, FEET, UP)[0])[T // 2] < -3.0
+    turn, pivot = balancing_rotations(planks, np.ones((T, 6)), UP)
     assert np.abs(turned_deg(turn)).max() < 0.1
-    np.testing.assert_allclose(pivot, planks.supports.mean(axis=1), atol=1e-6)
+    np.testing.assert_allclose(pivot, planks.contact_points.mean(axis=1), atol=1e-6)
 
 
 def test_a_still_is_judged_as_it_stands():
     placed = standing(20.0)
     one = PlacedTrack(*(getattr(placed, n) if n in ("body", "betas") else getattr(placed, n)[:1]
                         for n in placed.__dataclass_fields__))  # fmt: skip
-    turn, _ = turn_over_feet(one, FEET[:1], UP)
+    turn, _ = balancing_rotations(one, FEET[:1], UP)
     assert turned_deg(turn)[0] < -3.0
 
 
@@ -128,5 +128,5 @@ def test_a_frame_in_which_nothing_stands_is_turned_about_its_own_feet_too():
     """As the first one after a cut: those beside it say by how much, and far away is not where it is turned about."""
     placed, contact = standing(20.0), FEET.copy()
     contact[T // 2] = 0.0
-    _, pivot = turn_over_feet(placed, contact, UP)
+    _, pivot = balancing_rotations(placed, contact, UP)
     np.testing.assert_allclose(pivot, placed.soles.mean(axis=1), atol=1e-6)

@@ -3,7 +3,8 @@
 
 import numpy as np
 import pytest
-from scope.scope_addon.capture.fitting.track_fit import FittedTrack, Stance
+from scope.scope_addon.capture.fitting.frame_sequence import FittedTrack
+from scope.scope_addon.capture.fitting.prepared_track import Stance
 from scope.scope_addon.capture.media.video_range import VideoRange
 from scope.scope_addon.capture.options import CaptureOptions
 from scope.scope_addon.capture.pipeline import capture
@@ -92,7 +93,7 @@ def test_there_and_back_along_a_path():
     local = path.points_to_frames(points)
     through = np.einsum("tij,tkj->tki", frames[:, :3, :3], local) + frames[:, None, :3, 3]
     np.testing.assert_allclose(through, points @ T_world_first[:3, :3].T + T_world_first[:3, 3], atol=1e-12)
-    assert CameraPath.on_a_stand(3).is_static
+    assert CameraPath.static(3).is_static
     assert not path.is_static
 
 
@@ -118,7 +119,7 @@ def test_a_stance_is_the_same_in_every_camera():
     expected = np.einsum("tij,tj->ti", first.turn, points[:, 0] - first.root_cam)
     np.testing.assert_allclose(turned, expected, atol=1e-12)
     np.testing.assert_array_equal(frames.contact, first.contact)
-    assert CameraPath.on_a_stand(5).stance_to_frames(first) is first
+    assert CameraPath.static(5).stance_to_frames(first) is first
 
 
 def test_without_smoothing_the_camera_travels_as_far(shared):

@@ -4,11 +4,11 @@
 import numpy as np
 import pytest
 from scope.scope_addon.capture.world import ground_plane
-from scope.scope_addon.capture.world.foot_lock import LockedPoints, hold_points, lock_feet
+from scope.scope_addon.capture.world.foot_lock import LockedPoints, lock_feet, lock_points
 from scope.scope_addon.capture.world.placement import PlacedTrack
 from scope.scope_addon.kinematics import standing
 from scope.scope_addon.kinematics.axes import transform_points, world_from_level_camera
-from scope.scope_addon.kinematics.contact_points import support_points, with_supports
+from scope.scope_addon.kinematics.contact_points import contact_point_positions, with_contact_points
 from scope.scope_addon.kinematics.smoothing import gaussian_smooth
 from scope.solver import rotations
 from scope.solver.loaders.body_file import load_body
@@ -20,9 +20,9 @@ CAMERA = np.zeros(3)
 def placed(supported, omega, root, times, center):
     """A motion of a body of mean shape, seen in every frame."""
     R, t = supported.forward_kinematics(omega, root - supported.rest_joints()[0])
-    supports, seen = support_points(supported, R, t), np.ones((len(root), 6))
+    contact_points, seen = contact_point_positions(supported, R, t), np.ones((len(root), 6))
     betas, valid = np.zeros(supported.P), np.ones(len(root), bool)
-    return PlacedTrack(supported, betas, times, valid, omega, root, t, supports, seen, center)
+    return PlacedTrack(supported, betas, times, valid, omega, root, t, contact_points, seen, center)
 
 
 def locked(supported, omega, root, contact, T_world_camera, times):
@@ -47,11 +47,11 @@ def step():
     omega[:, names.index("left_knee")] = rotations.exp(1.2 * lift[:, None] * x)
     facing = rotations.exp(np.array([np.pi / 2, 0, 0]))  # model y up to world z up
     omega[:, 0] = R_camera_world @ facing
-    supported = with_supports(body, np.zeros(body.P))
+    supported = with_contact_points(body, np.zeros(body.P))
 
     def place(local, root):
         R, t = body.forward_kinematics(local, root)
-        return R, t, support_points(supported, R, t)
+        return R, t, contact_point_positions(supported, R, t)
 
     root_world = np.tile([0.0, 4.0, 0.0], (T, 1))
     lowest = place(omega, np.zeros((T, 3)))[2][:, 2:4] @ T_world_camera[2, :3]
@@ -130,7 +130,7 @@ def test_a_trembling_motion_stands_still_where_it_stands(step):
     noise = gaussian_smooth(rng.normal(size=(len(times), supported.K + 1, 3)), times, 4.5)
     shaken = omega @ rotations.exp(0.06 * noise)
     # across the line of sight, the picture tells better than 3 mm where somebody is
-    sight = standing.along_sight(root)
+    sight = standing.line_of_sight(root)
     trembling = gaussian_smooth(rng.normal(size=root.shape), times, 4.5)
     shaken_root = root + 0.003 * trembling + 0.02 * trembling[:, :1] * sight
     contact = standing.resting_probability(place(omega, root)[2], T_world_camera[2, :3], times, CAMERA)
@@ -156,7 +156,7 @@ def test_the_picture_stays_where_feet_are_held_elsewhere(step, turned):
         weights = np.tile([0.9, 0.9, 0.9, 0.9, 0.0, 0.0], (len(root), 1))
         targets = LockedPoints(held, weights, up, np.full(len(root), float((held @ up).min())))
         times, centers = np.arange(len(root)) / FPS, np.tile(center, (len(root), 1))
-        local, moved = hold_points(placed(supported, omega, root, times, centers), targets)
+        local, moved = lock_points(placed(supported, omega, root, times, centers), targets)
         for joint in ("head", "left_wrist", "right_hip"):
             j = supported.joint_names.index(joint)
             was, now = ((place(*m)[1][:, j] - center) @ R for m in ((omega, root), (local, moved)))
@@ -192,7 +192,7 @@ def test_a_still_and_a_single_frame_pass(step):
 def plank():
     """On toes and palms for two seconds, headed aside, 4 m from a camera 1.5 m high; palms and toes level."""
     body = load_body("scope")
-    supported, times = with_supports(body, np.zeros(body.P)), np.arange(60) / FPS
+    supported, times = with_contact_points(body, np.zeros(body.P)), np.arange(60) / FPS
     T_world_camera = world_from_level_camera(np.array([0.0, -1.0, -0.2]), height=1.5)
     omega = np.tile(np.eye(3), (body.K + 1, 1, 1))
     for side, sign in (("left", 1), ("right", -1)):
@@ -203,7 +203,7 @@ def plank():
 
     def place(local, root):
         R, t = body.forward_kinematics(local, root)
-        return R, t, support_points(supported, R, t)
+        return R, t, contact_point_positions(supported, R, t)
 
     pitch = 0.0
     for _ in range(30):  # until toes and palms are level
@@ -222,10 +222,10 @@ def plank():
 
 def test_palms_rest_where_they_keep_still_on_the_floor(plank):
     _, omega, root, place, T_world_camera, times = plank
-    up, supports = T_world_camera[2, :3], place(omega, root)[2]
-    p = standing.resting_probability(supports, up, times, CAMERA)
+    up, contact_points = T_world_camera[2, :3], place(omega, root)[2]
+    p = standing.resting_probability(contact_points, up, times, CAMERA)
     assert p[:, [1, 3, 4, 5]].min() > 0.8  # toes and palms
-    raised, moved = supports.copy(), supports.copy()
+    raised, moved = contact_points.copy(), contact_points.copy()
     raised[:, 4] += 0.4 * up
     moved[:, 4, 1] += 0.3 * np.sin(2 * np.pi * times)
     for other in (raised, moved):
@@ -236,9 +236,9 @@ def test_palms_rest_where_they_keep_still_on_the_floor(plank):
 
 def test_feet_that_keep_still_above_the_hands_do_not_stand(plank):
     _, omega, root, place, T_world_camera, times = plank
-    up, supports = T_world_camera[2, :3], place(omega, root)[2]
-    supports[:, :4] += 1.5 * up
-    p = standing.resting_probability(supports, up, times, CAMERA)
+    up, contact_points = T_world_camera[2, :3], place(omega, root)[2]
+    contact_points[:, :4] += 1.5 * up
+    p = standing.resting_probability(contact_points, up, times, CAMERA)
     assert p[:, :4].max() < 0.05
     assert p[:, 4:].min() > 0.8
 

@@ -4,7 +4,7 @@
 import numpy as np
 import pytest
 from scope.scope_addon.capture.world.placement import PlacedTrack
-from scope.scope_addon.kinematics.contact_points import support_points, with_supports
+from scope.scope_addon.kinematics.contact_points import contact_point_positions, with_contact_points
 from scope.solver.loaders.body_file import load_body
 from scope.solver.rotations import exp
 
@@ -14,13 +14,13 @@ UP = np.array([0.0, -1.0, 0.0])  # OpenCV's axes, a level camera
 def stands(times):
     """The body at rest, 4 m before a camera on a stand."""
     body, T = load_body("scope"), len(times)
-    supported = with_supports(body, np.zeros(body.P))
+    supported = with_contact_points(body, np.zeros(body.P))
     rotations = np.tile(np.eye(3), (T, body.K + 1, 1, 1))
     rotations[:, 0] = exp([np.pi, 0.0, 0.0])
     R, joints = supported.forward_kinematics(rotations, np.tile([0.0, 0.0, 4.0], (T, 1)))
-    supports, every = support_points(supported, R, joints), np.ones(T, bool)
+    contact_points, every = contact_point_positions(supported, R, joints), np.ones(T, bool)
     return PlacedTrack(
-        supported, np.zeros(body.P), times, every, rotations, joints[:, 0], joints, supports, np.ones((T, 6)),
+        supported, np.zeros(body.P), times, every, rotations, joints[:, 0], joints, contact_points, np.ones((T, 6)),
         np.zeros((T, 3)),
     )  # fmt: skip
 

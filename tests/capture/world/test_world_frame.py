@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from scope.scope_addon.capture.world.placement import PlacedTrack
 from scope.scope_addon.capture.world.world_frame import (
-    share_world,
+    find_world,
     up_from_bodies,
     up_from_standing,
 )
 from scope.scope_addon.kinematics.axes import R_WORLD_MODEL, transform_points, world_from_level_camera
-from scope.scope_addon.kinematics.contact_points import support_points, with_supports
+from scope.scope_addon.kinematics.contact_points import contact_point_positions, with_contact_points
 from scope.solver import rotations
 from scope.solver.loaders.body_file import load_body
 
@@ -26,20 +26,20 @@ def walk(body, T=60, lean_deg=0.0):
         omega[:, body.joint_names.index(f"{side}_hip")] = rotations.exp(sign * swing[:, None] * x)
     omega[:, 0] = R_WORLD_MODEL @ rotations.exp(np.radians(lean_deg) * x)
     R, t = body.forward_kinematics(omega, np.zeros((T, 3)))
-    soles = support_points(with_supports(body, np.zeros(body.P)), R, t)
+    soles = contact_point_positions(with_contact_points(body, np.zeros(body.P)), R, t)
     t = t + np.stack([np.linspace(-1, 1, T), np.linspace(0, 1.5, T), -soles[..., 2].min(1)], 1)[:, None]
     return R, t
 
 
 def seen_by(body, R, t, camera_from_world):
     """The motion of part poses in the world before a camera, 30 frames a second, everything seen."""
-    soled, T = with_supports(body, np.zeros(body.P)), len(t)
+    soled, T = with_contact_points(body, np.zeros(body.P)), len(t)
     joints, R_camera = transform_points(camera_from_world, t), camera_from_world[:3, :3] @ R
-    supports = support_points(soled, R_camera, joints)
+    contact_points = contact_point_positions(soled, R_camera, joints)
     every = np.ones(T, bool)
     return PlacedTrack(
-        soled, np.zeros(body.P), np.arange(T) / 30, every, R_camera, joints[:, 0], joints, supports, np.ones((T, 6)),
-        np.zeros((T, 3)),
+        soled, np.zeros(body.P), np.arange(T) / 30, every, R_camera, joints[:, 0], joints, contact_points,
+        np.ones((T, 6)), np.zeros((T, 3)),
     )  # fmt: skip
 
 
@@ -53,7 +53,7 @@ def test_up_and_floor_are_recovered_from_a_walk(pitch_deg, roll_deg):
     truth[:3, 3] += truth[:3, :3] @ [0, 0, -5.0] * [1, 1, 0]
     camera_from_world = np.linalg.inv(truth)
     placed = seen_by(body, R, t, camera_from_world)
-    got = share_world([placed]).T_world_camera
+    got = find_world([placed]).T_world_camera
     angle = np.degrees(np.arccos(np.clip(got[2, :3] @ truth[2, :3], -1, 1)))
     assert angle < 2.0
     # The person is up to 6.5 m away: the camera's height above the floor is as uncertain as the angle makes it.
@@ -70,7 +70,7 @@ def test_who_leaps_for_most_of_a_clip_stands_on_the_floor_between():
     t[..., 2] += np.where(since < 0.5, 4.9 * since * (0.5 - since), 0.0)[:, None]
     truth = world_from_level_camera(np.array([0, -1.0, 0]), height=1.6)
     placed = seen_by(body, R, t + np.array([0, 5.0, 0]), np.linalg.inv(truth))
-    lowest = transform_points(share_world([placed]).T_world_camera, placed.soles)[..., 2].min(axis=1)
+    lowest = transform_points(find_world([placed]).T_world_camera, placed.soles)[..., 2].min(axis=1)
     assert abs(lowest.min()) < 0.01
     assert np.median(lowest) > 0.1
 
@@ -82,10 +82,11 @@ def test_people_share_a_world_and_each_has_a_floor():
     up = rotations.exp(np.radians([-12.0, 0, 5.0])) @ [0, -1.0, 0]
     camera_from_world = np.linalg.inv(world_from_level_camera(up, height=1.6))
     walker, climber = (seen_by(body, R, t + [0.0, 5.0, z], camera_from_world) for z in (0.0, 1.0))
-    farther = replace(walker, joints=1.04 * walker.joints, supports=1.04 * walker.supports)
+    farther = replace(walker, joints=1.04 * walker.joints, contact_points=1.04 * walker.contact_points)
     valid = np.arange(len(t)) >= 10
-    walker = replace(walker, valid=valid, supports=np.where(valid[:, None, None], walker.supports, walker.supports[10]))
-    world = share_world([walker, climber, farther])
+    points = np.where(valid[:, None, None], walker.contact_points, walker.contact_points[10])
+    walker = replace(walker, valid=valid, contact_points=points)
+    world = find_world([walker, climber, farther])
     assert np.degrees(np.arccos(world.T_world_camera[2, :3] @ up)) < 2.0
     assert abs(world.T_world_camera[2, 3] - 1.6) < 0.25
     np.testing.assert_allclose(transform_points(world.T_world_camera, walker.joints[10, :1])[0, :2], 0, atol=1e-9)
@@ -111,10 +112,10 @@ def test_who_bends_over_is_upright_by_the_weight(pitch_deg):
     for name, degrees in (("hip", -80.0), ("knee", 50.0)):
         for side in ("left", "right"):
             omega[body.joint_names.index(f"{side}_{name}")] = rotations.exp(np.radians([degrees, 0, 0]))
-    soled = with_supports(body, np.zeros(body.P))
+    soled = with_contact_points(body, np.zeros(body.P))
     for _ in range(30):
         R, t = body.forward_kinematics(omega, np.zeros(3))
-        soles = support_points(soled, R[None], t[None])[0, :4]
+        soles = contact_point_positions(soled, R[None], t[None])[0, :4]
         off = centroid(body.skin(R, t), body.triangles()) - soles.mean(axis=0)
         omega[0] = rotations.exp([0.5 * off[1] / off[2], -0.5 * off[0] / off[2], 0]) @ omega[0]
     assert np.hypot(off[0], off[1]) < 0.005
@@ -138,7 +139,7 @@ def test_who_sits_or_kneels_does_not_tilt_the_world(bends, turned_deg):
     R, t = (np.repeat(each[None], 60, axis=0) for each in body.forward_kinematics(omega, np.zeros(3)))
     up = np.array([0, -1.0, 0])
     placed = seen_by(body, R, t + [0.0, 4.0, 0.0], np.linalg.inv(world_from_level_camera(up, height=1.6)))
-    assert np.degrees(np.arccos(share_world([placed]).T_world_camera[2, :3] @ up)) < 2.0
+    assert np.degrees(np.arccos(find_world([placed]).T_world_camera[2, :3] @ up)) < 2.0
 
 
 def test_a_moment_tells_nothing_by_the_weight():
@@ -170,7 +171,7 @@ def test_who_lies_on_the_floor_does_not_tilt_the_world(standing):
 def test_soles_lie_under_the_ankles_on_the_ground():
     body = load_body("scope")
     R, t = body.forward_kinematics(np.tile(np.eye(3), (1, body.K + 1, 1, 1)), np.zeros((1, 3)))
-    soles = support_points(with_supports(body, np.zeros(body.P)), R, t)[0, :4]
+    soles = contact_point_positions(with_contact_points(body, np.zeros(body.P)), R, t)[0, :4]
     lowest = body.v_template[:, 1].min()
     assert np.abs(soles[:, 1] - lowest).max() < 0.02
     assert (soles[:2, 0] > 0).all()  # left
@@ -183,14 +184,14 @@ def test_soles_of_another_shape_are_on_its_own_ground():
     betas = np.array([1.5, -1.0, *np.zeros(body.P - 2)])
     R, t = body.forward_kinematics(np.tile(np.eye(3), (1, body.K + 1, 1, 1)), np.zeros((1, 3)), betas)
     lowest = body.skin(R[0], t[0], betas)[:, 1].min()
-    assert np.abs(support_points(with_supports(body, betas), R, t)[0, :4, 1] - lowest).max() < 0.02
+    assert np.abs(contact_point_positions(with_contact_points(body, betas), R, t)[0, :4, 1] - lowest).max() < 0.02
 
 
 @pytest.mark.parametrize("name", ["scope", "scope_h"])
 def test_palms_lie_under_the_hands_that_are_held_down(name):
     body = load_body(name)
     R, t = body.forward_kinematics(np.tile(np.eye(3), (1, body.K + 1, 1, 1)), np.zeros((1, 3)))
-    palms = support_points(with_supports(body, np.zeros(body.P)), R, t)[0, 4:]
+    palms = contact_point_positions(with_contact_points(body, np.zeros(body.P)), R, t)[0, 4:]
     wrists = t[0, [body.joint_names.index(f"{side}_wrist") for side in ("left", "right")]]
     assert np.sign(palms[:, 0]).tolist() == [1.0, -1.0]
     assert (np.abs(palms[:, 0]) > np.abs(wrists[:, 0]) + 0.02).all()  # further out

@@ -1,0 +1,160 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The frames of a track, fitted one after another with the clip's shape.
+
+A limb bent towards the camera looks in the image like one bent away from it. A warm start from the previous frame stays
+with one of the two poses, however certain the lifting network becomes of the other. When a fit contradicts the lifted
+directions, the frame is therefore fitted again with the stages of a cold start. If this lowers the cost, the previous
+frames are refitted backwards from there, for as long as the refit of a frame costs less than was gained.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ....solver import Fit, Measurements, Options, State, Status, fit_tree, make_tree
+from .hand_measurements import smooth_fingers
+from .prepared_track import PreparedTrack
+from .weights import ROBUST, cold_stages, warm_stages
+
+LONGEST_COAST_S = 0.5  # the last pose says little about a person who has not been seen for longer
+_SAME_POSE_RAD = np.radians(10.0)
+
+
+@dataclass
+class FittedTrack:
+    """Body states of T frames in the camera frame; rows that are not ``valid`` repeat the last valid state."""
+
+    rotations: NDArray[np.floating[Any]]  # (T, K+1, 3, 3); row 0 R_camera_root, the others Ω
+    t_camera_root: NDArray[np.floating[Any]]  # (T, 3) the pelvis, metres
+    betas: NDArray[np.floating[Any]]  # (P,)
+    valid: NDArray[np.bool_]  # (T,)
+    joint_confidence: NDArray[np.floating[Any]]  # (T, K+1) 0..1
+    iterations: float  # mean per frame
+
+
+class FrameSequence:
+    """Fits frames one after another; a frame without a fit repeats the last one."""
+
+    def __init__(self, prepared: PreparedTrack, betas: NDArray[np.floating[Any]]) -> None:
+        T, body = len(prepared.track), prepared.body
+        self._prepared, self._betas = prepared, betas
+        self._tree, self._priors = make_tree(body), prepared.priors_with_shape(betas)
+        self._cold, self._warm = (
+            replace(ROBUST, stages=stages(prepared.weights)) for stages in (cold_stages, warm_stages)
+        )
+        self._rotations = np.tile(np.eye(3), (T, body.K + 1, 1, 1))
+        self._root, self._valid, self._cost = np.zeros((T, 3)), np.zeros(T, bool), np.zeros(T)
+        self._iterations = 0
+        self._initial: State | None = None  # the initial state of the previous frame's refit
+        self._last: Fit | None = None
+        self._last_s = -np.inf
+
+    def fit_next(self, k: int) -> None:
+        """Fit frame ``k`` from the previous frame, or from a cold start if that is too long ago.
+
+        If a cold start improves on the warm one, refit the frames before it as well.
+        """
+        gain = self._fit(k, self._last.state if self._last is not None and self._is_continued(k) else None)
+        if gain > 0.0 and self._last is not None:
+            self._refit_backwards(k, self._last.state, gain)
+
+    def refit(self, k: int, initial: State | None) -> None:
+        """Fit frame ``k`` with known root, from a state of an earlier pass, or from a cold start.
+
+        If two poses explain a frame equally well, the frame must keep the one of the previous frame. The initial state
+        is therefore first changed by what the refit changed in the previous frame.
+        """
+        previous, self._initial = self._initial, initial
+        start = initial
+        if initial is not None and previous is not None and self._last is not None and self._is_continued(k):
+            start = with_same_rotations(initial, previous, self._last.state)
+        self._fit(k, start, known_root=True)
+
+    def repeat_last(self, k: int) -> None:
+        """Give frame ``k`` the state of the last frame that was fitted."""
+        if self._last is not None:
+            self._store(k, self._last)
+
+    def fitted(self) -> FittedTrack:
+        """Return the states of all frames."""
+        prepared, rotations, valid = self._prepared, self._rotations, self._valid
+        confidence = prepared.measurer.joint_confidence(prepared.track.confidence)
+        if prepared.hand_measurer is not None and prepared.hands is not None:
+            confidence = np.maximum(confidence, prepared.hand_measurer.joint_confidence(prepared.hands))
+            seen = (prepared.hands[:, :, 0, 2] > 0) & valid[:, None]
+            rotations = smooth_fingers(rotations, prepared.hand_measurer.fingers, seen, prepared.track.times)
+        return FittedTrack(
+            rotations=rotations,
+            t_camera_root=self._root,
+            betas=self._betas,
+            valid=valid,
+            joint_confidence=confidence * valid[:, None],
+            iterations=self._iterations / max(int(valid.sum()), 1),
+        )
+
+    def _is_continued(self, k: int) -> bool:
+        """Whether frame ``k`` follows the last fit closely enough to start from it."""
+        track = self._prepared.track
+        return bool(not track.acquired[k] and track.times[k] - self._last_s <= LONGEST_COAST_S)
+
+    def _fit(self, k: int, initial: State | None, known_root: bool = False) -> float:
+        """Fit frame ``k`` from an initial state, or from a cold start if there is none.
+
+        :return: by how much the stages of a cold start lowered the cost of a warm start that contradicted the lifter.
+        """
+        prepared = self._prepared
+        root_cam = initial.t_camera_root if initial is not None and known_root else None
+        measurements = prepared.measure_all(k, root_cam)
+        found = self._solve(measurements, initial, self._cold if initial is None else self._warm)
+        if not is_usable(found):
+            return 0.0
+        self._last, self._last_s, self._valid[k] = found, float(prepared.track.times[k]), True
+        if initial is None or not prepared.measurer.contradicts(measurements, found.t_camera_part):
+            return 0.0
+        restarted = self._solve(measurements, initial, self._cold)
+        if restarted.cost < found.cost:
+            self._last = restarted
+            return float(found.cost - restarted.cost)
+        return 0.0
+
+    def _refit_backwards(self, k: int, later: State, gain: float) -> None:
+        """Refit the frames before ``k``, each from the frame after it, while a refit costs less than was gained."""
+        track = self._prepared.track
+        while k > 0 and self._valid[k - 1] and not track.acquired[k]:
+            k -= 1
+            found = self._solve(self._prepared.measure_all(k), later, self._warm)
+            is_worth_it = is_usable(found) and found.cost - self._cost[k] <= gain
+            if not is_worth_it or _is_same_pose(found.state.Omega, self._rotations[k, 1:]):
+                return
+            self._store(k, found)
+            later = found.state
+
+    def _solve(self, measurements: Measurements, initial: State | None, options: Options) -> Fit:
+        found = fit_tree(self._tree, measurements, initial, self._priors, options)
+        self._iterations += found.iterations
+        return found
+
+    def _store(self, k: int, fit: Fit) -> None:
+        self._rotations[k, 0], self._rotations[k, 1:] = fit.state.R_camera_root, fit.state.Omega
+        self._root[k], self._cost[k] = fit.state.t_camera_root, fit.cost
+
+
+def is_usable(fit: Fit) -> bool:
+    """Whether a fit had measurements and gave finite values."""
+    return fit.status not in (Status.NO_MEASUREMENTS, Status.NON_FINITE)
+
+
+def with_same_rotations(state: State, before: State, after: State) -> State:
+    """Apply to a state the rotations that lead from ``before`` to ``after``, for the root and every joint."""
+    R = after.R_camera_root @ before.R_camera_root.T @ state.R_camera_root
+    Omega = after.Omega @ np.swapaxes(before.Omega, 1, 2) @ state.Omega
+    return replace(state, R_camera_root=R, Omega=Omega)
+
+
+def _is_same_pose(a: NDArray[np.floating[Any]], b: NDArray[np.floating[Any]]) -> bool:
+    """Whether no joint differs by more than 10 degrees between two poses (K, 3, 3)."""
+    return bool((np.einsum("kij,kij->k", a, b) > 1 + 2 * np.cos(_SAME_POSE_RAD)).all())

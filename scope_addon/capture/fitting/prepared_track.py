@@ -1,0 +1,144 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A track prepared for fitting: undistorted and lifted keypoints, the measurers and priors of the body."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ....solver import Body, Floor, Measurements, Priors, Weights, default_priors
+from ...kinematics.contact_points import CONTACT_POINTS, with_contact_points
+from ..camera.intrinsics import Camera
+from ..perception.lifter import Lifted, our_lifter
+from ..perception.lifter_window import windows_around
+from ..tracking.track import Track
+from .ablation import NO_ABLATION, Ablation
+from .frame_measurements import DEPTH_SIGMA_M, Measurer
+from .hand_measurements import HandMeasurer, with_finger_limits
+from .keypoint_offsets import with_keypoint_offsets
+from .stature import with_stature
+from .weights import WEIGHTS, joint_weights
+
+SHAPE_CERTAINTY = 1e6  # information (1/σ² per coefficient) that fixes the shape once it is known
+
+
+@dataclass(frozen=True)
+class Stance:
+    """Pelvis, rotation and floor of T frames, estimated from floor, feet and balance; metres.
+
+    In each frame's camera or in the first frame's axes.
+    """
+
+    root_cam: NDArray[np.floating[Any]]  # (T, 3) the pelvis
+    turn: NDArray[np.floating[Any]]  # (T, 3, 3) rotations to apply to the whole body
+    floor_normal: NDArray[np.floating[Any]]  # (T, 3) unit, upwards
+    floor_offset: NDArray[np.floating[Any]]  # (T,) normal . p on the floor
+    contact: NDArray[np.floating[Any]]  # (T, 6) probability that each contact point rests on the floor
+
+    def floor(self, k: int, indices: NDArray[np.intp]) -> Floor:
+        """Return the floor of frame ``k`` for the solver.
+
+        Feet that are not in contact may be below the floor as well as above it, as on stairs.
+
+        :param indices: (6,) keypoint indices of the contact points.
+        """
+        contact = self.contact[k]
+        return Floor(indices, self.floor_normal[k], float(self.floor_offset[k]), contact, below=contact)
+
+
+@dataclass(frozen=True)
+class PreparedTrack:
+    """What every pass over a track needs, computed once: undistorted keypoints, the lifter's points, priors."""
+
+    body: Body  # with keypoints where the network places them
+    track: Track
+    measurer: Measurer
+    pixels: NDArray[np.floating[Any]]  # (T, J, 2) keypoints without lens distortion
+    lifted: Lifted
+    priors: Priors  # with unknown shape
+    weights: Weights
+    hand_measurer: HandMeasurer | None = None
+    hands: NDArray[np.floating[Any]] | None = None  # (T, 2, 21, 6) as in the track, undistorted; None: not looked for
+    stance: Stance | None = None  # in each frame's camera; the body's last keypoints are then its contact points
+
+    def measure(self, k: int, root_cam: NDArray[np.floating[Any]] | None = None) -> Measurements:
+        """Return the measurements of the body in frame ``k``.
+
+        :param root_cam: (3,) known position of the pelvis, camera frame, metres.
+        """
+        points, sigma = self.lifted.points[k], self.lifted.sigma_along[k]
+        return self.measurer.measure(self.pixels[k], self.track.confidence[k], points, sigma, root_cam)
+
+    def measure_all(self, k: int, root_cam: NDArray[np.floating[Any]] | None = None) -> Measurements:
+        """Return the measurements of frame ``k`` with the floor and the hands, where these are known.
+
+        The shape is estimated without them, because they hardly depend on it.
+
+        :param root_cam: (3,) known position of the pelvis, camera frame, metres.
+        """
+        measured = self.measure(k, root_cam)
+        if self.stance is not None:
+            indices = np.arange(len(CONTACT_POINTS)) + len(self.body.keypoint_names) - len(CONTACT_POINTS)
+            measured = replace(measured, floor=self.stance.floor(k, indices))
+        if self.hand_measurer is None or self.hands is None:
+            return measured
+        return self.hand_measurer.add(measured, self.hands[k])
+
+    def rotated(self, R: NDArray[np.floating[Any]]) -> PreparedTrack:
+        """Rotate the lifted points about the hips; the image measurements stay as they are.
+
+        :param R: (T, 3, 3) rotations in camera axes.
+        """
+        points = self.lifted.points
+        rotated = (points @ np.swapaxes(R, 1, 2).astype(points.dtype)).astype(points.dtype)
+        return replace(self, lifted=replace(self.lifted, points=rotated))
+
+    def with_floor(self, stance: Stance, betas: NDArray[np.floating[Any]]) -> PreparedTrack:
+        """Add the floor, and to the body the contact points of this shape.
+
+        :param stance: in each frame's camera.
+        :param betas: (P,) shape coefficients.
+        """
+        body, K = with_contact_points(self.body, betas), self.measurer.intrinsics
+        hands = None if self.hand_measurer is None else HandMeasurer(body, K)
+        return replace(self, body=body, measurer=Measurer(body, K), hand_measurer=hands, stance=stance)
+
+    def priors_with_shape(self, betas: NDArray[np.floating[Any]]) -> Priors:
+        """Return the priors for a known shape (P,)."""
+        return replace(self.priors, shape_mean=betas, shape_information=np.eye(self.body.P) * SHAPE_CERTAINTY)
+
+
+def prepare_track(
+    body: Body, track: Track, camera: Camera, ablation: Ablation = NO_ABLATION, height_m: float | None = None
+) -> PreparedTrack:
+    """Undistort and lift a track. The lifting network runs only here.
+
+    :param height_m: the person's stature, if it is known, metres.
+    :raises UsageError: hands were looked for, but the body has no finger joints.
+    """
+    if ablation.keypoint_offsets and track.has_depth:  # only BlazePose estimates depth, and the offsets are BlazePose's
+        body = with_keypoint_offsets(body)
+    measurer, pixels = Measurer(body, camera.intrinsics), camera.undistort(track.keypoints_px)
+    lifted = _lift(measurer, track, pixels, ablation)
+    priors = replace(default_priors(body), joint_weights=joint_weights(body))
+    if height_m is not None:
+        priors = with_stature(priors, body, height_m)
+    prepared = PreparedTrack(body, track, measurer, pixels, lifted, priors, ablation.weights(WEIGHTS))
+    if track.hands is None:
+        return prepared
+    hands = np.concatenate([camera.undistort(track.hands[..., :2]), track.hands[..., 2:]], axis=-1)
+    hand_measurer = HandMeasurer(body, camera.intrinsics)
+    return replace(prepared, hand_measurer=hand_measurer, hands=hands, priors=with_finger_limits(priors, body))
+
+
+def _lift(measurer: Measurer, track: Track, pixels: NDArray[np.floating[Any]], ablation: Ablation) -> Lifted:
+    if not ablation.lifter:
+        sigma = np.full(track.confidence.shape, DEPTH_SIGMA_M)
+        return Lifted(track.world_landmarks, sigma, sigma)
+    rays, windows = measurer.rays(pixels), windows_around(track.times, track.seen)
+    if not (ablation.world_landmarks and track.has_depth):
+        return our_lifter().lift(rays, track.confidence, None, windows)
+    return our_lifter().lift_both_ways(rays, track.confidence, track.world_landmarks, windows)
