@@ -34,7 +34,7 @@ from ....solver import (
 )
 from ...kinematics.contact_points import SUPPORTS, with_supports
 from ..camera.intrinsics import Camera
-from ..perception.lifter import Lifted, our_lifter
+from ..perception.lifter import Lifted, default_lifter
 from ..perception.lifter_window import windows_around
 from ..tracking.track import Track
 from .ablation import ALL_PARTS, Parts
@@ -174,8 +174,8 @@ def _lift(measurer: Measurer, track: Track, pixels: np.ndarray, parts: Parts) ->
         return Lifted(track.world_landmarks, sigma, sigma)
     rays, windows = measurer.rays(pixels), windows_around(track.times, track.seen)
     if not (parts.world_landmarks and track.knows_depth):
-        return our_lifter().lift(rays, track.confidence, None, windows)
-    return our_lifter().lift_both_ways(rays, track.confidence, track.world_landmarks, windows)
+        return default_lifter().lift(rays, track.confidence, None, windows)
+    return default_lifter().lift_mixture(rays, track.confidence, track.world_landmarks, windows)
 
 
 def fit_track(prepared: PreparedTrack, progress: Callable[[str, int, int], None]) -> FittedTrack:

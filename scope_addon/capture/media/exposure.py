@@ -15,13 +15,13 @@ _STEP = 16  # every so many pixels and lines are looked at
 _BRIGHTER = 0.98  # share of the picture that is darker than its brightest places
 
 
-class Exposure:
+class AutoExposure:
     """Frames come in order."""
 
     def __init__(self) -> None:
         self._gain = 0.0
 
-    def brightened(self, image_rgb: np.ndarray) -> np.ndarray:
+    def brighten(self, image_rgb: np.ndarray) -> np.ndarray:
         """The frame itself, or a copy that is brighter: gain times each channel, BRIGHT over the brightest places."""
         size = max(1, image_rgb.shape[1] // _STEP), max(1, image_rgb.shape[0] // _STEP)
         few = cv2.cvtColor(cv2.resize(image_rgb, size, interpolation=cv2.INTER_NEAREST), cv2.COLOR_RGB2GRAY).ravel()

@@ -33,7 +33,7 @@ from .frame_readers import FrameReader, open_reader, presented_s
 from .image_sequence import PictureSequence, SequenceReader, find_sequence
 from .quicktime import focal_35mm
 from .still_images import is_picture, read_picture
-from .video_range import VideoRange, Wanted
+from .video_range import FootageRange, VideoRange
 
 cv2.setLogLevel(0)  # silent: failures are reported by exception, in one sentence
 
@@ -101,7 +101,7 @@ class Video:
         self.close()
 
 
-def open_video(path: str | Path, wanted: Wanted | None = None) -> Video:
+def open_video(path: str | Path, wanted: FootageRange | None = None) -> Video:
     """Open a video or a picture (JPEG, HEIC, PNG, WebP, TIFF, ...; 16-bit and alpha too) and decode its first frame.
 
     Numbered pictures are a video as well (`image_sequence`); what is wanted then says their rate, else it is 30.
@@ -135,7 +135,7 @@ def open_video(path: str | Path, wanted: Wanted | None = None) -> Video:
     return _open_still(path, wanted) if is_picture(path) else _open_moving(path, wanted)
 
 
-def _open_sequence(path: Path, sequence: PictureSequence, asked: Wanted) -> Video:
+def _open_sequence(path: Path, sequence: PictureSequence, asked: FootageRange) -> Video:
     fps = asked.fps or STILL_FPS
     wanted = asked.at_rate(fps)
     first = read_picture(sequence.paths[0])
@@ -154,7 +154,7 @@ def _open_sequence(path: Path, sequence: PictureSequence, asked: Wanted) -> Vide
     return video
 
 
-def _open_still(path: Path, asked: Wanted) -> Video:
+def _open_still(path: Path, asked: FootageRange) -> Video:
     picture = read_picture(path)
     if picture is None:
         raise _damaged(path)
@@ -174,7 +174,7 @@ def _damaged(picture: Path) -> VideoError:
     return VideoError(f"{picture} is a picture that cannot be decoded; it may be damaged, so export it again, as JPEG")
 
 
-def _open_moving(path: Path, asked: Wanted) -> Video:
+def _open_moving(path: Path, asked: FootageRange) -> Video:
     with closing(open_reader(path)) as reader:
         first = reader.read()
         if first is None:

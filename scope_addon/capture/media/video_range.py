@@ -60,7 +60,7 @@ class TimecodeRange:
         return VideoRange(start, end, self.fps)
 
 
-Wanted = VideoRange | TimecodeRange
+FootageRange = VideoRange | TimecodeRange
 
 
 class FrameChooser:
@@ -109,7 +109,7 @@ class FrameChooser:
         self._next = max(self._next + 1, int((time - self._start) * float(self._fps) + 0.5) + 1)
 
 
-def parse_range(start: str | None, end: str | None, fps: str | None) -> Wanted:
+def parse_range(start: str | None, end: str | None, fps: str | None) -> FootageRange:
     """What ``--start``, ``--end`` and ``--fps`` say; None: from the beginning, to the end, all frames.
 
     :raises UsageError: one of them is none, or the end does not come after the start.

@@ -22,7 +22,7 @@ from ...errors import OutputError
 from ...motion import Motion
 from ..camera.intrinsics import scaled_intrinsics
 from ..media.video import Frame, Video, open_video
-from ..media.video_range import Wanted
+from ..media.video_range import FootageRange
 from ..perception.landmark_network import KEYPOINT_COUNT
 from .rasterizer import Canvas, rasterize
 
@@ -46,7 +46,7 @@ def write_overlay(
     *,
     opacity: float = 0.6,
     progress: Progress | None = None,
-    wanted: Wanted | None = None,
+    wanted: FootageRange | None = None,
 ) -> None:
     """Write the footage with every person's body over it.
 

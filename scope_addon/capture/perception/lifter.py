@@ -111,7 +111,7 @@ def mixture(ways: list[Lifted], shares: list[float], R_virtual_camera: np.ndarra
 
 
 @cache
-def our_lifter() -> Lifter:
+def default_lifter() -> Lifter:
     """The lifting network of the repository, opened once."""
     return Lifter()
 
@@ -145,7 +145,7 @@ class Lifter:
 
         return Lifted(*by_blocks(lift, np.arange(len(rays))))
 
-    def lift_both_ways(
+    def lift_mixture(
         self, rays: np.ndarray, confidence: np.ndarray, world: np.ndarray, windows: Windows | None = None
     ) -> Lifted:
         """What the network finds with the world landmarks and without them, mixed: better than either on real clips."""

@@ -22,7 +22,7 @@ import numpy as np
 from ...kinematics.viterbi import cheapest_path
 from ..camera.intrinsics import Camera
 from ..perception.landmark_network import KEYPOINT_NAMES, PoseEstimate
-from ..perception.lifter import our_lifter
+from ..perception.lifter import default_lifter
 from .track import Track
 
 _PARTNERS = {"left": "right", "right": "left"}
@@ -144,7 +144,7 @@ def _find_lifted_labels(track: Track, camera: Camera, judged: np.ndarray | None)
     The lifting network may move one reading less than the other, which says nothing: the mean counts. The confidences
     count beside the positions.
     """
-    rays, lifter = camera.rays(track.keypoints_px)[..., :2], our_lifter()
+    rays, lifter = camera.rays(track.keypoints_px)[..., :2], default_lifter()
     readings = []
     for order in (np.arange(len(SWAPPED)), SWAPPED):
         body = lifter.lift(rays[:, order], track.confidence[:, order], None).points
