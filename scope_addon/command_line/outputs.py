@@ -110,11 +110,10 @@ def write_outputs(
         options = replace(NEW_SCENE, name=video.stem, shape=args.shape_keys)
         separate = ExportOptions(separate=args.file_per_person)
         if rig is not None:
-            from ..scene.rigs.rig_export import export_on_rig
+            from ..scene.rigs.rig_export import RigExportOptions, export_on_rig
 
-            files, warnings = export_on_rig(
-                motions, body, scene_files, rig, options, args.retarget_root, footage, separate
-            )
+            rig_options = RigExportOptions(options, args.retarget_root, separate)
+            files, warnings = export_on_rig(motions, body, scene_files, rig, rig_options, footage)
         else:
             files, warnings = export_motions(motions, body, scene_files, footage, options, separate)
         written += files

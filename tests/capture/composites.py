@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Videos of two people, put together from real clips of one man whose true places are known."""
+"""Videos of two people, composed of real clips of one man whose true position is known."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ FPS = 60  # of the clips
 
 @cache
 def panels(shared: Path, camera: str) -> tuple[list[np.ndarray], np.ndarray]:
-    """The middle of a clip, 500 pixels high, and the true middle of the trunk in each frame, (100, 2) pixels."""
+    """The middle of a clip, 500 pixels high, and the true centre of the trunk in each frame, (100, 2) pixels."""
     truth = np.load(shared / f"data/pose2sim/truth_{camera}.npz")
     names = [str(n) for n in truth["names"]]
     trunk = [names.index(n) for n in ("LShoulder", "RShoulder", "LHip", "RHip")]
@@ -28,7 +28,7 @@ def panels(shared: Path, camera: str) -> tuple[list[np.ndarray], np.ndarray]:
 
 
 def composite(shared: Path, cameras: tuple[str, str], crossing: bool) -> Iterator[tuple[np.ndarray, np.ndarray, bool]]:
-    """Frames, the true places (2, 2) and whether the first one is hidden; the second clip passes in front."""
+    """Frames, true positions (2, 2), and whether the first person is occluded; the second one passes in front."""
     (back, back_at), (front, front_at) = (panels(shared, camera) for camera in cameras)
     for t in range(100):
         x = [round(11 * t), round(11 * (99 - t))] if crossing else [0, 700]
@@ -40,9 +40,9 @@ def composite(shared: Path, cameras: tuple[str, str], crossing: bool) -> Iterato
 
 
 def visit(shared: Path) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Frames, and the true places (2, 2): the first one stays; the second comes in at the right edge, and leaves there.
+    """Frames and true positions (2, 2): the first person stays, the second enters and leaves at the right edge.
 
-    Before a background with enough in it to tell that the camera stands still.
+    The background has enough texture to show that the camera is static.
     """
     (stays, stays_at), (visits, visits_at) = (panels(shared, camera) for camera in ("cam3", "cam2"))
     noise = np.random.default_rng(3).integers(60, 200, (26, 60, 3), np.uint8)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Invented people for tests of tracking: pictures of coloured boxes, and networks that see people in them.
+"""Synthetic people for tests of tracking: images of coloured boxes, and networks that see people in them.
 
-The fake networks know where everybody is, and fail as the real ones do: whoever is hidden is not detected, and the
-landmarks in a region are those of the visible person nearest to its middle, whoever that is.
+The fake networks know where everybody is, and fail as the real ones do: an occluded person is not detected, and the
+landmarks in a region are those of the visible person nearest to its centre, whoever that is.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ import numpy as np
 from scope.scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES, PoseEstimate
 from scope.scope_addon.capture.perception.person_detector import Detection
 from scope.scope_addon.capture.perception.region import Region
+from scope.scope_addon.capture.tracking.left_right import MIRROR_PARTNER
 
 _HEIGHTS = {"shoulder": -0.5, "elbow": -0.3, "wrist": -0.1, "hip": 0.0, "knee": 0.45, "ankle": 0.85, "heel": 0.9}
 _HEIGHTS |= {"foot": 0.9, "pinky": -0.05, "index": -0.05, "thumb": -0.05}
@@ -31,9 +32,9 @@ _BODY = np.array([_joint(name) for name in KEYPOINT_NAMES])
 
 @dataclass
 class Person:
-    """``center_px(t)`` of the hips, None while out of the picture; ``size_px`` of a metre; hidden while t is in it.
+    """``center_px(t)`` of the hips, None outside the image; ``size_px``, pixels per metre; ``hidden`` frames.
 
-    In the frames ``swapped`` and ``lost``, the small network takes left for right, or sees nobody.
+    In the frames ``swapped`` the small network confuses left and right, in the frames ``lost`` it sees nobody.
     """
 
     center_px: Callable[[int], tuple[float, float] | None]
@@ -87,33 +88,31 @@ class FakeDetector:
 
 
 class FakeLandmarks:
-    def __init__(self, people: list[Person], right: bool = False) -> None:
-        self.people, self.right, self.batches = people, right, []
-        self.ahead = 0
+    def __init__(self, people: list[Person], is_reliable: bool = False) -> None:
+        self.people, self.is_reliable, self.batches = people, is_reliable, []
+        self.begun = 0
 
     def estimate(self, image: np.ndarray, regions: list[Region]) -> list[PoseEstimate]:
         self.batches.append(len(regions))
         return [self._one(_time(image), region) for region in regions]
 
     def begin(self, image: np.ndarray, region: Region) -> Future[PoseEstimate]:
-        look: Future[PoseEstimate] = Future()
-        look.set_result(self._one(_time(image), region))
-        self.ahead += 1
-        return look
+        call: Future[PoseEstimate] = Future()
+        call.set_result(self._one(_time(image), region))
+        self.begun += 1
+        return call
 
     def _one(self, t: int, region: Region) -> PoseEstimate:
-        def far(person: Person) -> float:
+        def distance(person: Person) -> float:
             place = person.place(t)
             return np.inf if place is None else float(np.linalg.norm(place - region.center_px)) / region.side_px
 
-        person = min(self.people, key=far)
-        seen = far(person) < 0.4 and (self.right or t not in person.lost)
+        person = min(self.people, key=distance)
+        seen = distance(person) < 0.4 and (self.is_reliable or t not in person.lost)
         place = person.place(t) if seen else np.asarray(region.center_px)
         body = person.body(t)
-        if t in person.swapped and not self.right:
-            from scope.scope_addon.capture.tracking.left_right import SWAPPED
-
-            body = body[SWAPPED]
+        if t in person.swapped and not self.is_reliable:
+            body = body[MIRROR_PARTNER]
         there = Region((float(place[0]), float(place[1])), 2.5 * person.size_px, 0.0)
         return PoseEstimate(
             keypoints_px=place + body[:, :2] * person.size_px,

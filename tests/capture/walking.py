@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Our body as it walks before a camera, and what a network makes of it that tells nothing of depth."""
+"""The default body walking in front of a camera, and the track of a network without depth."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from scope.solver.rotations import exp
 
 
 def someone_walking(frames: int, rate: float, heading: float, turn: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
-    """(T, 33, 2) pixels and (T, 33, 3) world landmarks of the body as it walks, a step of each foot in a second."""
+    """(T, 33, 2) pixels and (T, 33, 3) world landmarks of the walking body, one step of each foot per second."""
     body = load_body("scope")
     seen, at = as_seen(body), list(body.keypoint_set("blazepose").values())
     pixels, world = [], []
@@ -36,7 +36,7 @@ def someone_walking(frames: int, rate: float, heading: float, turn: float = 0.0)
     return np.array(pixels), np.array(world)
 
 
-def track_without_depth(pixels: np.ndarray, rate: float, judged: dict[int, np.ndarray]) -> Track:
+def track_without_depth(pixels: np.ndarray, rate: float, references: dict[int, np.ndarray]) -> Track:
     count = len(pixels)
     return Track(
         frames=np.arange(count),
@@ -46,6 +46,6 @@ def track_without_depth(pixels: np.ndarray, rate: float, judged: dict[int, np.nd
         confidence=np.tile(np.where(np.arange(33) % 2 == 0, 0.9, 0.8), (count, 1)),
         world_landmarks=np.zeros((count, 33, 3)),
         acquired=np.arange(count) == 0,
-        judged_rows=np.array(list(judged), np.int64),
-        judged_landmarks=np.array(list(judged.values())).reshape(-1, 33, 3),
+        reference_rows=np.array(list(references), np.int64),
+        reference_landmarks=np.array(list(references.values())).reshape(-1, 33, 3),
     )

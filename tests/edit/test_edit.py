@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Editing a motion, against motions made on purpose: what was broken is mended, what was right stays."""
+"""Editing synthetic motions with known ground truth: defects are repaired, the rest is unchanged."""
 
 import numpy as np
 import pytest
 from scope.scope_addon.edit import floor, loop, reduce, root_motion, spans
-from scope.scope_addon.edit.clip import Clip, between, resample, sample
+from scope.scope_addon.edit.clip import Clip, interpolate_rotations, resample, sample
 from scope.scope_addon.errors import UsageError
 from scope.solver import load_body
 from scope.solver.rotations import exp, log, matrix_from_quaternion, quaternion_from_matrix
@@ -20,40 +20,40 @@ def angle(a, b):
     return np.linalg.norm(log(np.swapaxes(a, -1, -2) @ b), axis=-1)
 
 
-def test_sampling_meets_the_keys_and_goes_along_the_arc_between_them():
+def test_sampling_reproduces_the_keys_and_interpolates_along_the_arc():
     clip = walk(1.0)
     same = sample(clip, clip.times)
     np.testing.assert_allclose(same.rotations, clip.rotations, atol=1e-12)
     a, b = exp([0, 0, 0.2]), exp([0, 0, 1.0])
-    np.testing.assert_allclose(between(a, b, 0.25), exp([0, 0, 0.4]), atol=1e-12)
+    np.testing.assert_allclose(interpolate_rotations(a, b, 0.25), exp([0, 0, 0.4]), atol=1e-12)
     beyond = sample(clip, np.array([-5.0, 99.0]))
     np.testing.assert_allclose(beyond.root, clip.root[[0, -1]])
 
 
-def test_baking_to_another_rate_keeps_the_motion_and_drops_what_the_rate_cannot_show():
+def test_baking_to_another_rate_keeps_the_motion_and_removes_frequencies_above_the_rate():
     clip = walk(4.0, rate=60.0)
     baked = resample(clip, 24.0)
     np.testing.assert_allclose(np.diff(baked.times), 1 / 24)
     truth = walk(4.0, rate=24.0)
     assert angle(baked.rotations, truth.rotations[: len(baked)]).max() < np.radians(1.5)
-    shaking = walk(4.0, rate=60.0)
-    shaking.rotations[:, 3] = exp(0.3 * np.cos(2 * np.pi * 29.0 * shaking.times)[:, None] * [1.0, 0, 0])
-    assert angle(resample(shaking, 24.0).rotations[2:-2, 3], np.eye(3)).max() < 0.06  # of 0.3
+    oscillating = walk(4.0, rate=60.0)
+    oscillating.rotations[:, 3] = exp(0.3 * np.cos(2 * np.pi * 29.0 * oscillating.times)[:, None] * [1.0, 0, 0])
+    assert angle(resample(oscillating, 24.0).rotations[2:-2, 3], np.eye(3)).max() < 0.06  # of 0.3
     with pytest.raises(UsageError, match="above zero"):
         resample(clip, 0.0)
 
 
-def test_a_broken_span_is_gone_over_as_the_neighbours_move():
+def test_a_broken_span_is_interpolated_from_its_neighbours():
     clip = walk(2.0)
     broken = Clip(clip.times, clip.rotations.copy(), clip.root.copy())
     bad = slice(20, 26)
     broken.rotations[bad] = exp(np.random.default_rng(0).standard_normal((6, len(NAMES), 3)))
     broken.root[bad] += 1.0
-    mended = spans.interpolate(broken, 20 / RATE, 25 / RATE)
-    assert angle(mended.rotations, clip.rotations).max() < np.radians(6.0)  # of a swing of 23 degrees
-    assert np.abs(mended.root - clip.root).max() < 0.03
+    repaired = spans.interpolate(broken, 20 / RATE, 25 / RATE)
+    assert angle(repaired.rotations, clip.rotations).max() < np.radians(6.0)  # of a swing of 23 degrees
+    assert np.abs(repaired.root - clip.root).max() < 0.03
     outside = np.r_[0:20, 26 : len(clip)]
-    np.testing.assert_array_equal(mended.rotations[outside], broken.rotations[outside])
+    np.testing.assert_array_equal(repaired.rotations[outside], broken.rotations[outside])
     with pytest.raises(UsageError, match="reaches the motion's end"):
         spans.interpolate(clip, 0.0, 0.5)
     with pytest.raises(UsageError, match="no keys"):
@@ -61,7 +61,7 @@ def test_a_broken_span_is_gone_over_as_the_neighbours_move():
 
 
 @pytest.mark.parametrize("limbs", ["arms", "legs", "both"])
-def test_swapping_puts_each_limb_where_the_other_one_was(limbs):
+def test_swapping_moves_each_limb_to_the_place_of_the_other(limbs):
     clip = walk(1.0)
     rng = np.random.default_rng(1)
     clip.rotations[:, 1:] = clip.rotations[:, 1:] @ exp(0.2 * rng.standard_normal((len(NAMES) - 1, 3)))
@@ -71,6 +71,7 @@ def test_swapping_puts_each_limb_where_the_other_one_was(limbs):
     for kind, chain in (("legs", ("hip", "knee", "ankle", "foot")), ("arms", ("shoulder", "elbow", "wrist"))):
         for a, b in zip(chain, chain[1:], strict=False):
             for side, other in (("left", "right"), ("right", "left")):
+
                 def bone(joints, which, a=a, b=b):
                     d = joints[:, NAMES.index(f"{which}_{b}")] - joints[:, NAMES.index(f"{which}_{a}")]
                     return d / np.linalg.norm(d, axis=1, keepdims=True)
@@ -90,7 +91,7 @@ def test_a_swapped_elbow_still_bends_forwards():
     assert log(out.rotations[0, NAMES.index("left_elbow")])[1] == pytest.approx(-1.0)
 
 
-def test_feet_come_back_to_the_floor():
+def test_feet_are_moved_to_the_floor():
     stand = walk(2.0, speed=0.0)
     stand.rotations[:, 1:] = exp(np.array([ARMS_DOWN.get(n, [0, 0, 0]) for n in NAMES[1:]]))
     stand.root[:, 2] = 0.95
@@ -99,13 +100,13 @@ def test_feet_come_back_to_the_floor():
     np.testing.assert_allclose(floor.refloor(floating, BODY, BETAS).root, stand.root, atol=1e-3)
     sunk = Clip(stand.times, stand.rotations, stand.root.copy())
     sunk.root[25:32, 2] -= 0.08
-    mended = floor.refloor(sunk, BODY, BETAS)
-    assert mended.soles(BODY, BETAS)[..., 2].min() > -1e-6
-    assert np.abs(np.diff(mended.root[:, 2], 2)).max() < 0.08
+    repaired = floor.refloor(sunk, BODY, BETAS)
+    assert repaired.soles(BODY, BETAS)[..., 2].min() > -1e-6
+    assert np.abs(np.diff(repaired.root[:, 2], 2)).max() < 0.08
 
 
 def test_a_sloping_world_is_levelled():
-    clip = walk(6.0, speed=0.2)  # so slow that a foot which is down counts as standing
+    clip = walk(6.0, speed=0.2)  # slow enough for feet on the floor to count as standing
     clip.root[:, 0] = 0.4 * np.sin(0.5 * clip.times)
     clip.root[:, 2] -= clip.soles(BODY, BETAS)[..., 2].min(axis=1)
     tilt = exp([0.1, 0.05, 0.0])
@@ -114,26 +115,26 @@ def test_a_sloping_world_is_levelled():
     level = floor.refloor(tilted, BODY, BETAS, level=True)
     up = level.rotations[:, 0] @ np.swapaxes(clip.rotations[:, 0], 1, 2)
     assert np.degrees(np.arccos(np.clip(up[:, 2, 2], -1, 1))).max() < 1.5
-    spot = walk(2.0, speed=0.0)  # standing on one spot says nothing of the floor's slope: no turn
+    spot = walk(2.0, speed=0.0)  # the slope is unobservable from one spot: no rotation
     np.testing.assert_array_equal(floor.refloor(spot, BODY, BETAS, level=True).rotations, spot.rotations)
 
 
-def test_the_path_and_what_is_left_make_the_motion_again():
+def test_the_trajectory_and_the_relative_motion_recompose_the_motion():
     clip = walk(3.0)
     turn = np.linspace(0, 7.0, len(clip))  # more than a whole turn
     clip.rotations[:, 0] = exp(turn[:, None] * [0, 0, 1.0]) @ clip.rotations[:, 0]
-    positions, angles = root_motion.floor_path(clip)
+    positions, angles = root_motion.floor_trajectory(clip)
     assert np.abs(angles[30:-30] - turn[30:-30]).max() < 0.02
     np.testing.assert_array_equal(positions[:, 2], 0.0)
-    local = root_motion.relative_to_path(clip, positions, angles)
+    local = root_motion.relative_to_trajectory(clip, positions, angles)
     assert np.abs(local.root[:, :2]).max() < 1e-12
     assert np.abs(np.diff(angles)).max() < 0.1
     facing = local.rotations[30:-30, 0] @ [0.0, 0.0, 1.0]
     np.testing.assert_allclose(facing, np.broadcast_to([0.0, -1.0, 0.0], facing.shape), atol=0.03)
-    again = root_motion.with_path(local, positions, angles)
+    again = root_motion.with_trajectory(local, positions, angles)
     np.testing.assert_allclose(again.rotations, clip.rotations, atol=1e-12)
     np.testing.assert_allclose(again.root, clip.root, atol=1e-12)
-    assert not root_motion.floor_path(clip, heading=False)[1].any()
+    assert not root_motion.floor_trajectory(clip, heading=False)[1].any()
 
 
 def test_the_cycle_of_a_walk_is_found_and_closed():
@@ -148,7 +149,7 @@ def test_the_cycle_of_a_walk_is_found_and_closed():
     np.testing.assert_allclose(closed.rotations[-1], closed.rotations[0], atol=1e-9)
     assert closed.root[-1, 2] == pytest.approx(closed.root[0, 2])
     travelled = closed.root[-1, 1] - closed.root[0, 1]
-    assert travelled == pytest.approx(-1.2 * length, abs=0.02)  # the way is kept
+    assert travelled == pytest.approx(-1.2 * length, abs=0.02)  # the root trajectory is kept
     assert closed.times[0] == 0.0
     with pytest.raises(UsageError, match="does not fit"):
         loop.best_cycle(clip, BODY, BETAS, 0.0, 0.2)
@@ -168,17 +169,17 @@ def test_reduced_keys_stay_within_the_bound(degrees):
     clip = walk(4.0)
     q = quaternion_from_matrix(clip.rotations[:, NAMES.index("left_hip")])
     q *= np.where((q[:, :1] < 0), -1, 1)
-    keep = reduce.keep_of_quaternions(clip.times, q, np.radians(degrees))
+    keep = reduce.select_quaternion_keys(clip.times, q, np.radians(degrees))
     assert len(keep) < len(q)
-    # Blender's interpolation, written again: every number linear, then normalized
+    # Blender's interpolation: every component linear, then normalized
     rebuilt = np.stack([np.interp(clip.times, clip.times[keep], q[keep, k]) for k in range(4)], axis=1)
     rebuilt /= np.linalg.norm(rebuilt, axis=1, keepdims=True)
     off = angle(matrix_from_quaternion(rebuilt), matrix_from_quaternion(q))
     assert off.max() <= np.radians(degrees) * (1 + 1e-6)
     still = np.tile([1.0, 0, 0, 0], (50, 1))
-    assert len(reduce.keep_of_quaternions(np.arange(50.0), still, 0.01)) == 2
-    keep = reduce.keep_of_positions(clip.times, clip.root, 0.005)
+    assert len(reduce.select_quaternion_keys(np.arange(50.0), still, 0.01)) == 2
+    keep = reduce.select_position_keys(clip.times, clip.root, 0.005)
     rebuilt = np.stack([np.interp(clip.times, clip.times[keep], clip.root[keep, k]) for k in range(3)], axis=1)
     assert np.linalg.norm(rebuilt - clip.root, axis=1).max() <= 0.005
     with pytest.raises(UsageError, match="above zero"):
-        reduce.keep_of_positions(clip.times, clip.root, 0.0)
+        reduce.select_position_keys(clip.times, clip.root, 0.0)

@@ -78,7 +78,7 @@ def test_a_track_without_depth() -> None:
     track, _ = walk(5)
     track.world_landmarks[:] = 1.0
     flat = track.without_depth()
-    assert track.knows_depth
-    assert not flat.knows_depth
+    assert track.has_depth
+    assert not flat.has_depth
     assert flat.world_landmarks.shape == (5, 33, 3)
-    assert len(flat.judged_rows) == len(flat.judged_landmarks) == 0
+    assert len(flat.reference_rows) == len(flat.reference_landmarks) == 0

@@ -56,21 +56,21 @@ def test_proportions_without_spread_are_the_body_with_its_shapes(body, motions, 
 def test_a_mirrored_pose_has_mirrored_keypoints(body, dataset, motions):
     at = list(body.keypoint_set("blazepose").values())
     symmetric = body.v_bar[at].copy()
-    symmetric[detector_noise.SWAPPED] = (symmetric[detector_noise.SWAPPED] + symmetric * [-1, 1, 1]) / 2
-    symmetric = (symmetric + symmetric[detector_noise.SWAPPED] * [-1, 1, 1]) / 2
+    symmetric[detector_noise.MIRROR_PARTNER] = (symmetric[detector_noise.MIRROR_PARTNER] + symmetric * [-1, 1, 1]) / 2
+    symmetric = (symmetric + symmetric[detector_noise.MIRROR_PARTNER] * [-1, 1, 1]) / 2
     bones = (body.l + body.l[dataset.sampler.partner] * [-1, 1, 1]) / 2
     give = [np.repeat(a[None], 5, 0).astype(np.float32) for a in (bones, symmetric, 0 * symmetric)]
     Omega = motions.Omega[:5, None]
     plain, _ = dataset.keypoints(Omega, *give)
     mirrored, _ = dataset.keypoints(dataset.sampler.mirror(Omega), *give)
-    assert np.allclose(mirrored, plain[:, :, detector_noise.SWAPPED] * [-1, 1, 1], atol=1e-5)
+    assert np.allclose(mirrored, plain[:, :, detector_noise.MIRROR_PARTNER] * [-1, 1, 1], atol=1e-5)
 
 
 def test_left_and_right_are_exchanged_by_name():
     other = {"left": "right", "right": "left"}
     for k, name in enumerate(KEYPOINT_NAMES):
         partner = "_".join(other.get(word, word) for word in name.split("_"))
-        assert KEYPOINT_NAMES[detector_noise.SWAPPED[k]] == partner
+        assert KEYPOINT_NAMES[detector_noise.MIRROR_PARTNER[k]] == partner
 
 
 def test_a_camera_that_looks_down_sees_the_world_s_up_tip_towards_it():

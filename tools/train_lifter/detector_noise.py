@@ -52,7 +52,7 @@ LIMBS = (
     ((23, 25), (25, 27), (27, 29), (27, 31)),
     ((24, 26), (26, 28), (28, 30), (28, 32)),
 )
-SWAPPED = np.array([0, 4, 5, 6, 1, 2, 3, 8, 7, 10, 9, *(i + 1 - 2 * (i % 2 == 0) for i in range(11, 33))])
+MIRROR_PARTNER = np.array([0, 4, 5, 6, 1, 2, 3, 8, 7, 10, 9, *(i + 1 - 2 * (i % 2 == 0) for i in range(11, 33))])
 _ARMS = np.arange(11, 23)
 _LEGS = np.arange(23, 33)
 
@@ -145,7 +145,7 @@ def swap_sides(rng: np.random.Generator, rays: np.ndarray) -> None:
     n = len(rays)
     for group in (_ARMS, _LEGS):
         people, moments = np.nonzero((rng.random(n) < SWAP_SHARE)[:, None] & (rng.random((n, WINDOW)) < SWAP_LASTS))
-        rays[people[:, None], moments[:, None], group] = rays[people[:, None], moments[:, None], SWAPPED[group]]
+        rays[people[:, None], moments[:, None], group] = rays[people[:, None], moments[:, None], MIRROR_PARTNER[group]]
 
 
 def world_landmarks(rng: np.random.Generator, points: np.ndarray, persistence: Persistence) -> np.ndarray:

@@ -19,7 +19,7 @@ from ...scope_addon.capture.pipeline import capture
 from ...scope_addon.motion import Motion
 from ...solver import Body, load_body
 from ...solver.rotations import exp
-from .detector_noise import SWAPPED
+from .detector_noise import MIRROR_PARTNER
 
 CLIPS = ("walk_side_static", "run_moving_camera", "squats_5fps", "gesture_square", "two_people_portrait")
 LEAST_FRAMES = 20  # of a person who counts
@@ -46,7 +46,7 @@ def normal_equations(body: Body, motion: Motion) -> tuple[np.ndarray, np.ndarray
     across = R[:, part, :2]
     A = np.einsum("tk,tkia,tkib->kab", weight, across, across)
     b = np.einsum("tk,tkia,tki->ka", weight, across, left_over)
-    return A + REFLECTION @ A[SWAPPED] @ REFLECTION, b + b[SWAPPED] @ REFLECTION
+    return A + REFLECTION @ A[MIRROR_PARTNER] @ REFLECTION, b + b[MIRROR_PARTNER] @ REFLECTION
 
 
 def offsets(A: np.ndarray, b: np.ndarray) -> np.ndarray:

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The camera: intrinsics, calibration, rotation from the background, vanishing points and vertical lines."""
+"""The camera: intrinsics, calibration, rotation from the background, Manhattan directions and verticals."""

@@ -3,8 +3,8 @@
 
     {"intrinsics": [[fx, 0, cx], [0, fy, cy], [0, 0, 1]], "dist": [k1, k2, p1, p2, k3], "size": [width, height]}
 
-Nothing in it that tells of the lens is ignored: what cannot be meant is refused, because a wrong lens looks like a
-wrong person. Other keys, such as a name or a date, do no harm.
+Keys that describe the lens are never ignored, and impossible values are refused, because a wrong lens gives a wrong
+person. Other keys, such as a name or a date, are allowed.
 """
 
 from __future__ import annotations
@@ -17,45 +17,47 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ....solver.errors import InputError
 
-# The name in our files, and what OpenCV's examples and other programs call the same.
+# The name in our files, and the names that OpenCV's examples and other programs use.
 _NAMES = {
     "intrinsics": ("intrinsics", "camera_matrix", "K"),
     "dist": ("dist", "dist_coeffs", "distortion", "distortion_coefficients"),
     "size": ("size", "image_size"),
 }
-# Keys of other names that say something of the lens or the picture, by words in them or as a whole.
-_OF_THE_LENS = re.compile(
+# Other keys that describe the lens or the picture, by words in them or as a whole.
+_LENS_KEY = re.compile(
     r".*(dist|coef|matrix|intrin|skew|fish|model|focal|resolution|size|width|height).*|[kp]_?\d|f_?[xy]?|c_?[xy]|[wh]",
     re.I | re.S,
 )
 _OPENCV_COUNTS = (0, 4, 5, 8, 12, 14)
-_BROWN = 5  # k1, k2, p1, p2, k3: what a motion file holds
+_BROWN_COUNT = 5  # k1, k2, p1, p2, k3, as in a motion file
 _FOCAL_RANGE = (0.01, 100.0)  # in longer sides of the picture: fields of view of 178 and 0.6 degrees
 _LARGEST_PIXEL_ASPECT = 4.0
-_FARTHEST = 10.0  # tangent of the angle, 84 degrees, by which the picture's middle may lie off the optical axis
+_LARGEST_OFFSET = 10.0  # tangent of the angle, 84 degrees, between the picture's middle and the optical axis
 _LARGEST_TANGENTIAL = 0.5
-_LARGEST_MAGNIFICATION = 3.0  # that distortion may make at half the shorter side
+_LARGEST_MAGNIFICATION = 3.0  # by distortion, at half the shorter side
 _LARGEST_SKEW = 1e-3  # of the focal length; less than a pixel at the picture's edge
 _LARGEST_SIDE = 1e6
-_ONE_PIXEL = 1.0  # by which a size may be rounded
+_SIZE_TOLERANCE_PX = 1.0  # for sizes that were rounded
 
 
 @dataclass(frozen=True)
 class Calibration:
-    """What the file says. ``size`` is (width, height) of the pictures it was made with, None: not said."""
+    """The contents of the file. ``size`` is (width, height) of the calibration pictures; None: unknown."""
 
     path: Path
-    intrinsics: np.ndarray  # (3, 3)
-    dist: np.ndarray  # (5,) OpenCV's k1, k2, p1, p2, k3
+    intrinsics: NDArray[np.float64]  # (3, 3)
+    dist: NDArray[np.float64]  # (5,) OpenCV's k1, k2, p1, p2, k3
     size: tuple[float, float] | None
 
-    def intrinsics_for(self, width: int, height: int) -> np.ndarray:
-        """(3, 3) in pixels of footage of this size.
+    def intrinsics_for(self, width: int, height: int) -> NDArray[np.float64]:
+        """Return the intrinsics (3, 3) in pixels of footage of this size.
 
-        :raises InputError: the footage shows another part of the world than the pictures of the calibration.
+        :raises InputError: the footage has other proportions than the calibration pictures, or the values are
+            impossible for pictures of their size.
         """
         K = self.intrinsics
         if self.size is None:
@@ -70,18 +72,20 @@ class Calibration:
         if not _same_proportions((known_width, known_height), (width, height)):
             raise InputError(
                 f"{self.path} is for pictures of {known_width:g} x {known_height:g}, the footage has {width} x {height}"
-                f" pixels, which are other proportions; {_what_to_do(known_width, known_height, width, height)}"
+                f" pixels, which are other proportions; {_advice(known_width, known_height, width, height)}"
             )
         longer = max(known_width, known_height)
         if not all(_FOCAL_RANGE[0] * longer <= K[i, i] <= _FOCAL_RANGE[1] * longer for i in (0, 1)):
             raise InputError(
                 f"{self.path}: no lens has focal lengths of {K[0, 0]:g} and {K[1, 1]:g} pixels in pictures of "
-                f"{known_width:g} x {known_height:g}; give them in pixels, and the size they belong to"
+                f"{known_width:g} x {known_height:g}; give them in pixels, with the size of the calibration pictures"
             )
         if not 1 / _LARGEST_PIXEL_ASPECT <= K[0, 0] / K[1, 1] <= _LARGEST_PIXEL_ASPECT:
-            raise InputError(f"{self.path}: focal lengths of {K[0, 0]:g} and {K[1, 1]:g} pixels do not go together")
+            raise InputError(
+                f"{self.path}: focal lengths of {K[0, 0]:g} and {K[1, 1]:g} pixels differ too much; calibrate again"
+            )
         off_axis = (np.array([known_width, known_height]) / 2 - K[:2, 2]) / K[[0, 1], [0, 1]]
-        if np.abs(off_axis).max() > _FARTHEST:
+        if np.abs(off_axis).max() > _LARGEST_OFFSET:
             raise InputError(
                 f"{self.path}: the principal point ({K[0, 2]:g}, {K[1, 2]:g}) is too far from pictures of "
                 f"{known_width:g} x {known_height:g}; give it in pixels from their top left corner"
@@ -89,53 +93,54 @@ class Calibration:
         if not _can_be_undistorted(self.dist, min(known_width, known_height) / (K[0, 0] + K[1, 1])):
             raise InputError(
                 f"{self.path}: dist {self.dist.tolist()} folds or tears the picture; give OpenCV's k1, k2, p1, p2, k3, "
-                "in this order, that belong to these intrinsics"
+                "in this order, from the same calibration as the intrinsics"
             )
-        return np.diag([width / known_width, height / known_height, 1.0]) @ K
+        scaled: NDArray[np.float64] = np.diag([width / known_width, height / known_height, 1.0]) @ K
+        return scaled
 
 
 def read_calibration(path: Path) -> Calibration:
-    """The calibration in a JSON file.
+    """Read a calibration from a JSON file.
 
-    :raises InputError: it cannot be read, or holds something that cannot be meant.
+    :raises InputError: the file cannot be read, or holds an unknown key or an impossible value.
     """
     try:
         data = json.loads(path.read_text("utf-8-sig"))
     except OSError as error:
         raise InputError(f"cannot read the calibration {path}: {error.strerror}") from error
     except (ValueError, RecursionError) as error:
-        raise InputError(f"{path} is not a calibration: it is no JSON file; {_wanted()}") from error
+        raise InputError(f"{path} is not a calibration: it is not a JSON file; {_format()}") from error
     if not isinstance(data, dict):
-        raise InputError(f"{path} is not a calibration: it holds no JSON object; {_wanted()}")
+        raise InputError(f"{path} is not a calibration: it does not hold a JSON object; {_format()}")
     values = _by_our_names(path, data)
     if "intrinsics" not in values:
-        raise InputError(f'{path} is not a calibration: it has no "intrinsics"; {_wanted()}')
+        raise InputError(f'{path} is not a calibration: it has no "intrinsics"; {_format()}')
     intrinsics = _intrinsics(path, values["intrinsics"])
     return Calibration(path, intrinsics, _distortion(path, values.get("dist")), _size(path, values.get("size")))
 
 
-def _wanted() -> str:
+def _format() -> str:
     return 'write {"intrinsics": [[fx, 0, cx], [0, fy, cy], [0, 0, 1]], "dist": [k1, k2, p1, p2, k3], "size": [w, h]}'
 
 
-def _by_our_names(path: Path, data: dict) -> dict[str, Any]:
+def _by_our_names(path: Path, data: dict[str, Any]) -> dict[str, Any]:
     values: dict[str, Any] = {}
     ours = {name: key for key, names in _NAMES.items() for name in names}
     for name, value in data.items():
         if name not in ours:
-            if _OF_THE_LENS.fullmatch(name):
+            if _LENS_KEY.fullmatch(name):
                 known = ", ".join(name for names in _NAMES.values() for name in names)
-                raise InputError(f"{path}: {name[:80]!r} is not known; say it with one of {known}, or leave it out")
+                raise InputError(f"{path}: {name[:80]!r} is unknown; use one of {known}, or remove it")
             continue
         if ours[name] in values:
             twice = " and ".join(n for n in data if n in _NAMES[ours[name]])
-            raise InputError(f"{path} says the same twice, as {twice}; leave one of them out")
+            raise InputError(f"{path} gives the same value twice, as {twice}; remove one of them")
         values[ours[name]] = value
     return values
 
 
-def _numbers(value: Any) -> np.ndarray | None:
-    """An array of finite numbers of any shape, None where the value is something else."""
+def _numbers(value: Any) -> NDArray[np.float64] | None:
+    """Return an array of finite numbers of any shape, or None if the value is something else."""
     try:
         array = np.asarray(value, float)
     except (ValueError, TypeError, OverflowError):
@@ -143,10 +148,10 @@ def _numbers(value: Any) -> np.ndarray | None:
     return array if np.isfinite(array).all() else None
 
 
-def _intrinsics(path: Path, value: Any) -> np.ndarray:
+def _intrinsics(path: Path, value: Any) -> NDArray[np.float64]:
     K = _numbers(value)
     if K is None or K.shape != (3, 3):
-        raise InputError(f"{path}: intrinsics must be three rows of three numbers; {_wanted()}")
+        raise InputError(f"{path}: intrinsics must be three rows of three numbers; {_format()}")
     if K[0, 0] <= 0 or K[1, 1] <= 0:
         raise InputError(f"{path}: intrinsics have focal lengths {K[0, 0]:g} and {K[1, 1]:g}, which must be above 0")
     if np.array_equal(K[:, 2], [0, 0, 1]) and K[2, :2].any():
@@ -159,21 +164,21 @@ def _intrinsics(path: Path, value: Any) -> np.ndarray:
     return K
 
 
-def _distortion(path: Path, value: Any) -> np.ndarray:
+def _distortion(path: Path, value: Any) -> NDArray[np.float64]:
     if value is None:
-        return np.zeros(_BROWN)
+        return np.zeros(_BROWN_COUNT)
     dist = _numbers(value)
     if dist is None or max(dist.shape, default=0) != dist.size:  # a row or a column, as OpenCV writes it
         raise InputError(f"{path}: dist must be a list of numbers, OpenCV's k1, k2, p1, p2, k3")
     dist = dist.ravel()
-    if dist.size > _BROWN and dist.size in _OPENCV_COUNTS and not dist[_BROWN:].any():
-        dist = dist[:_BROWN]
-    if dist.size > _BROWN:
+    if dist.size > _BROWN_COUNT and dist.size in _OPENCV_COUNTS and not dist[_BROWN_COUNT:].any():
+        dist = dist[:_BROWN_COUNT]
+    if dist.size > _BROWN_COUNT:
         raise InputError(
-            f"{path}: dist has {dist.size} numbers, but motion files and Blender's lens know k1, k2, p1, p2, k3 alone; "
-            "calibrate again with these five (OpenCV's calibrateCamera without flags), or undistort the video first"
+            f"{path}: dist has {dist.size} numbers, but motion files and Blender's lens support only k1, k2, p1, p2, "
+            "k3; calibrate again with these five (OpenCV's calibrateCamera without flags), or undistort the video first"
         )
-    return np.concatenate([dist, np.zeros(_BROWN - dist.size)])
+    return np.concatenate([dist, np.zeros(_BROWN_COUNT - dist.size)])
 
 
 def _size(path: Path, value: Any) -> tuple[float, float] | None:
@@ -185,35 +190,38 @@ def _size(path: Path, value: Any) -> tuple[float, float] | None:
     return float(size[0]), float(size[1])
 
 
-def _can_be_undistorted(dist: np.ndarray, radius: float) -> bool:
-    """Whether the picture's points up to a radius, as tangent of the angle, each come from one direction nearby.
+def _can_be_undistorted(dist: NDArray[np.float64], radius: float) -> bool:
+    """Return whether each point of the picture up to a radius corresponds to one direction nearby.
 
-    Those of r come to lie at r (1 + k1 r² + k2 r⁴ + k3 r⁶), which has to grow with r and to reach the radius.
+    A point at r is imaged at r (1 + k1 r² + k2 r⁴ + k3 r⁶), which has to grow with r and to reach the radius.
+
+    :param dist: (5,)
+    :param radius: tangent of the angle to the optical axis.
     """
     k1, k2, p1, p2, k3 = dist
     if max(abs(p1), abs(p2)) > _LARGEST_TANGENTIAL:
         return False
     r = np.linspace(0.0, _LARGEST_MAGNIFICATION * radius, 1000)
     with np.errstate(all="ignore"):
-        seen = r * (1 + k1 * r**2 + k2 * r**4 + k3 * r**6)
-    there = np.flatnonzero(~(seen < radius))
+        imaged = r * (1 + k1 * r**2 + k2 * r**4 + k3 * r**6)
+    reached = np.flatnonzero(~(imaged < radius))
     return (
-        len(there) > 0
-        and bool((np.diff(seen[: there[0] + 1]) > 0).all())
-        and bool(r[there[0]] * _LARGEST_MAGNIFICATION >= radius)
+        len(reached) > 0
+        and bool((np.diff(imaged[: reached[0] + 1]) > 0).all())
+        and bool(r[reached[0]] * _LARGEST_MAGNIFICATION >= radius)
     )
 
 
 def _same_proportions(a: tuple[float, float], b: tuple[float, float]) -> bool:
-    """Whether one size is the other one scaled, but for rounding to whole pixels of the smaller."""
+    """Return whether one size is the other one scaled, up to rounding to whole pixels of the smaller one."""
     (width, height), (larger_width, larger_height) = sorted((a, b), key=math.prod)
     return (
-        abs(larger_height * width / larger_width - height) <= _ONE_PIXEL
-        or abs(larger_width * height / larger_height - width) <= _ONE_PIXEL
+        abs(larger_height * width / larger_width - height) <= _SIZE_TOLERANCE_PX
+        or abs(larger_width * height / larger_height - width) <= _SIZE_TOLERANCE_PX
     )
 
 
-def _what_to_do(known_width: float, known_height: float, width: int, height: int) -> str:
+def _advice(known_width: float, known_height: float, width: int, height: int) -> str:
     if _same_proportions((known_height, known_width), (width, height)):
-        return "the clip is rotated against them: calibrate with pictures that the camera took upright, as the clip"
-    return "calibrate with pictures from the same mode of the camera, since another one crops them"
+        return "the clip is rotated relative to them: calibrate with pictures in the orientation of the clip"
+    return "calibrate with pictures from the same camera mode, because another one crops them"

@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The camera's turning without its drift, by the edges of what people build.
+"""Heading drift: removes the slowly growing error of the camera's rotation with the edges of buildings.
 
-A camera that travels along a wall sees it pass by, which looks like a turn, however many corners are followed. The
-directions of the wall's edges do not depend on where the camera is: where three of them at right angles are seen
-(`right_angles`), they tell how it is turned at any time. With the normals n_i of the edges' planes in axes that drift,
-turned by the drift δ into the first frame's, and the three directions d,
+A camera that travels along a wall sees it pass by, which looks like a rotation, however many corners are followed. The
+directions of the wall's edges do not depend on the camera's position: where three orthogonal ones are visible
+(`manhattan`), they give the camera's rotation at any time. Let n_i be the normals of the edges' planes in the axes
+that drift, δ the drift that rotates these axes into the first frame's, and d the three directions. Then
 
     min over δ of Σ_i w_i ρ(min_d |n_i · δᵀ d|)
 
-from what it was half a second before, by Gauss-Newton steps that narrow ρ. The drift is smooth, errors of single looks
-are not.
+is solved from the drift half a second before, by Gauss-Newton steps with a narrowing robust kernel ρ. The drift is
+smooth, unlike the errors in single frames.
 """
 
 from __future__ import annotations
@@ -18,70 +18,83 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ....solver.rotations import exp, log
 from ...kinematics.smoothing import gaussian_smooth
 from .intrinsics import Camera
 from .line_segments import Lines, Segments
-from .manhattan import Edges, line_pull
+from .manhattan import Edges, line_normal_equations
 
-LOOKS_EVERY_S = 0.5
-LOOK_SIDE_PX = 640  # the longer side of the picture in looks after the first one: half the time, as right
-NARROWING = np.radians([4.0, 3.0, 2.0, 1.2, 1.0, 1.0])  # ρ's width in one step after the other
-LEAST_SUPPORT = 1.5  # sides of the picture that the three directions must explain at first
-LEAST_SHARE = 0.5  # of the edges' length, likewise: a third finds three directions by chance
-KEPT_SUPPORT = 0.4  # of that, in a later look
-SECOND_SUPPORT = 0.25  # sides along the second best of them: one alone leaves a turn about itself open
-FEWEST_LOOKS = 3
+EDGE_INTERVAL_S = 0.5  # between two frames in which edges are detected
+EDGE_SIDE_PX = 640  # the longer side of the image after the first of these frames: half the time, equally accurate
+KERNEL_WIDTHS = np.radians([4.0, 3.0, 2.0, 1.2, 1.0, 1.0])  # of ρ, one per step
+MIN_SUPPORT = 1.5  # sides of the picture that the three directions must explain in the first frame
+MIN_SUPPORT_SHARE = 0.5  # of the edges' length, likewise: three directions explain a third by chance
+KEPT_SUPPORT = 0.4  # of that, in a later frame
+MIN_SECOND_SUPPORT = 0.25  # sides along the second best direction: one alone leaves the rotation about itself open
+MIN_FRAMES = 3
 DRIFT_CUTOFF_HZ = 1.0
 
 
 @dataclass(frozen=True)
-class Look:
-    """The edges in one frame."""
+class FrameEdges:
+    """The edges in one frame of a clip."""
 
     row: int
     segments: Segments
 
 
-def without_drift(
-    R_first_camera: np.ndarray, times: np.ndarray, looks: Sequence[Look], camera: Camera, width: int, height: int
-) -> np.ndarray:
-    """(T, 3, 3) the camera's axes in the first frame's, corrected where the looks agree on three directions.
+def remove_heading_drift(
+    R_first_camera: NDArray[np.float64],
+    times: NDArray[np.float64],
+    edge_frames: Sequence[FrameEdges],
+    camera: Camera,
+    image_size: tuple[int, int],
+) -> NDArray[np.float64]:
+    """Correct the camera's rotation where the edges of enough frames agree on three directions.
 
-    :param R_first_camera: (T, 3, 3) with drift;  times: (T,) seconds;  looks: in order, the first one at small drift.
+    :param R_first_camera: (T, 3, 3) the camera's axes in the first frame's, with drift.
+    :param times: (T,) seconds.
+    :param edge_frames: in order; the drift at the first one is small.
+    :param camera: the intrinsics.
+    :param image_size: (width, height) in pixels.
+    :return: (T, 3, 3); the input itself where there is nothing to correct.
     """
-    if len(looks) < FEWEST_LOOKS:
+    if len(edge_frames) < MIN_FRAMES:
         return R_first_camera
-    first = looks[0]
-    edges = Edges.of(first.segments, width, height)
+    first = edge_frames[0]
+    edges = Edges.of(first.segments, *image_size)
     support, axes = edges.axes(float(camera.intrinsics[0, 0]))
-    if support < max(LEAST_SUPPORT, LEAST_SHARE * float(edges.weight.sum())):
+    if support < max(MIN_SUPPORT, MIN_SUPPORT_SHARE * float(edges.weight.sum())):
         return R_first_camera
     axes = axes @ R_first_camera[first.row].T
     drift, known = np.eye(3), []
-    for look in looks:
-        lines = look.segments.lines(camera).turned(R_first_camera[look.row])
+    for frame in edge_frames:
+        lines = frame.segments.lines(camera).rotated(R_first_camera[frame.row])
         found, supports = _drift(lines, axes, drift)
-        if look is first:  # the directions themselves, to a fraction of a degree
+        if frame is first:  # refine the directions themselves, to a fraction of a degree
             axes = axes @ found
-        elif supports.sum() > KEPT_SUPPORT * support and np.sort(supports)[-2] > SECOND_SUPPORT:
+        elif supports.sum() > KEPT_SUPPORT * support and np.sort(supports)[-2] > MIN_SECOND_SUPPORT:
             drift = found
-            known.append((look.row, log(drift)))
-    if len(known) < FEWEST_LOOKS - 1:
+            known.append((frame.row, log(drift)))
+    if len(known) < MIN_FRAMES - 1:
         return R_first_camera
     rows = np.array([first.row, *(row for row, _ in known)])
     vectors = np.array([np.zeros(3), *(vector for _, vector in known)])
     drifts = np.stack([np.interp(times, times[rows], vectors[:, k]) for k in range(3)], axis=1)
-    corrected = exp(gaussian_smooth(drifts, times, DRIFT_CUTOFF_HZ)) @ R_first_camera
-    return corrected[0].T @ corrected
+    corrected: NDArray[np.float64] = exp(gaussian_smooth(drifts, times, DRIFT_CUTOFF_HZ)) @ R_first_camera
+    aligned: NDArray[np.float64] = corrected[0].T @ corrected
+    return aligned
 
 
-def _drift(lines: Lines, axes: np.ndarray, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """δ (3, 3) from ``start``, and how much each of the directions ``axes`` (3, 3) explains, in sides."""
+def _drift(
+    lines: Lines, axes: NDArray[np.float64], start: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return δ (3, 3) from ``start``, and how much each of the directions ``axes`` (3, 3) explains, in sides."""
     E = start.T
-    supports: np.ndarray = np.zeros(3)
-    for sigma in NARROWING:
-        H, g, supports = line_pull(lines, axes @ E.T, sigma)
+    supports: NDArray[np.float64] = np.zeros(3)
+    for sigma in KERNEL_WIDTHS:
+        H, g, supports = line_normal_equations(lines, axes @ E.T, sigma)
         E = exp(np.linalg.solve(H + 1e-3 * np.eye(3), g)) @ E
     return E.T, supports

@@ -1,24 +1,26 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The camera's intrinsics: from the user, from the file, or the most likely ones for a phone or a camera."""
+"""The camera's intrinsics: given by the user, from the file's metadata, or assumed."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...errors import UsageError
 from .calibration import read_calibration
 
-# Without any better knowledge: a field of view of 60 degrees along the longer side, between a phone's main camera
-# (65-70 degrees, less the crop of its video stabilization) and a camera's standard lens (40-54 degrees).
-# Where the background has edges, these tell more (focal_length.py). The body says a little (focal_fits.py), for it
-# leans on the lifted points, and these on the assumed focal length: in 19 clips of known focal length (four calibrated
-# cameras, of 59.4 to 60.1 degrees, fifteen renders) the default is off by 0.33 (root mean square of the logarithm),
-# both together by 0.30; renders 0.33 instead of 0.37, cameras 0.06 instead of 0.01. Assuming 50 or 70 degrees for these
-# put the person 0.6 to 0.8 m wrong in the camera frame, but changed the error relative to the pelvis by 7 mm at most.
+# The default is a field of view of 60 degrees along the longer side, between a phone's main camera (65-70 degrees, less
+# the crop of its video stabilization) and a camera's standard lens (40-54 degrees). Edges of the background give a
+# better estimate (focal_length.py). The body adds little (focal_fits.py), because it depends on the lifted points, and
+# these on the assumed focal length. In 19 clips of known focal length (four calibrated cameras of 59.4 to 60.1 degrees,
+# fifteen renders) the root mean square error of its logarithm is 0.33 by default, and 0.30 with both estimates: for the
+# renders 0.33 instead of 0.37, for the cameras 0.06 instead of 0.01. Assuming 50 or 70 degrees for the cameras moved
+# the person by 0.6 to 0.8 m in camera axes, but changed the error relative to the pelvis by 7 mm at most.
 DEFAULT_FOV_DEG = 60.0
 ASSUMED_DEVIATION = 0.25  # relative error of the default, one standard deviation: 48 to 74 degrees
 FILM_WIDTH_MM = 36.0  # "35 mm equivalent" focal lengths refer to this width along the longer side
@@ -26,37 +28,41 @@ FILM_WIDTH_MM = 36.0  # "35 mm equivalent" focal lengths refer to this width alo
 
 @dataclass(frozen=True)
 class Camera:
-    """Pinhole intrinsics (pixels of the decoded, upright frame) and OpenCV distortion, with where they came from."""
+    """Pinhole intrinsics (pixels of the decoded, upright frame) and OpenCV distortion, and their source."""
 
-    intrinsics: np.ndarray  # (3, 3)
-    dist: np.ndarray  # (5,)
-    source: str  # said in the report
+    intrinsics: NDArray[np.float64]  # (3, 3)
+    dist: NDArray[np.float64]  # (5,)
+    source: str  # as the report gives it
     focal_deviation: float = 0.0  # relative error of the focal length, one standard deviation; 0: given
 
-    def undistort(self, points_px: np.ndarray) -> np.ndarray:
-        """Pixels (..., 2) as an ideal pinhole with the same intrinsics would see them."""
-        if not self.dist.any() or not points_px.size:  # OpenCV refuses to undistort nothing
+    def undistort(self, points_px: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
+        """Return pixels (..., 2) as an ideal pinhole camera with the same intrinsics would see them."""
+        if not self.dist.any() or not points_px.size:  # OpenCV raises an error for no points
             return points_px
         import cv2
 
         flat = np.ascontiguousarray(points_px, float).reshape(-1, 1, 2)
-        return cv2.undistortPoints(flat, self.intrinsics, self.dist, P=self.intrinsics).reshape(points_px.shape)
+        undistorted = cv2.undistortPoints(flat, self.intrinsics, self.dist, P=self.intrinsics)
+        reshaped: NDArray[Any] = undistorted.reshape(points_px.shape)
+        return reshaped
 
-    def rays(self, points_px: np.ndarray) -> np.ndarray:
-        """(..., 3) directions with z = 1, camera frame, in which pixels (..., 2) were seen."""
+    def rays(self, points_px: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
+        """Return the (..., 3) lines of sight of pixels (..., 2), in camera axes, with z = 1."""
         K = self.intrinsics
         flat = (self.undistort(points_px) - K[:2, 2]) / [K[0, 0], K[1, 1]]
         return np.concatenate([flat, np.ones((*flat.shape[:-1], 1))], axis=-1)
 
 
-def pinhole(width: int, height: int, focal_px: float) -> np.ndarray:
-    """(3, 3) intrinsics with square pixels and the principal point in the middle."""
+def pinhole(width: int, height: int, focal_px: float) -> NDArray[np.float64]:
+    """Return (3, 3) intrinsics with square pixels and the principal point in the middle of the image."""
     return np.array([[focal_px, 0.0, width / 2], [0.0, focal_px, height / 2], [0.0, 0.0, 1.0]])
 
 
-def scaled_intrinsics(intrinsics: np.ndarray, scale: float) -> np.ndarray:
-    """(3, 3) of the same picture made smaller or larger; pixel centres are whole numbers, its corner is at -1/2."""
-    return np.array([[scale, 0, (scale - 1) / 2], [0, scale, (scale - 1) / 2], [0, 0, 1]]) @ intrinsics
+def scaled_intrinsics(intrinsics: NDArray[np.float64], scale: float) -> NDArray[np.float64]:
+    """Return the intrinsics (3, 3) of a scaled image; pixel centres have integer coordinates, the corner is at -1/2."""
+    scaling = np.array([[scale, 0, (scale - 1) / 2], [0, scale, (scale - 1) / 2], [0, 0, 1]])
+    scaled: NDArray[np.float64] = scaling @ intrinsics
+    return scaled
 
 
 def choose_camera(
@@ -68,17 +74,19 @@ def choose_camera(
     calibration: str | Path | None = None,
     metadata_focal_mm: float | None = None,
 ) -> Camera:
-    """The best known camera for footage of this size: the user's word first, then the file's, then the default.
+    """Choose the camera for footage of this size: from the user, otherwise the metadata, otherwise the default.
 
+    :param width: of the footage in pixels.
+    :param height: likewise.
     :param focal_mm: 35 mm equivalent focal length along the longer side, f_px = f_mm / 36 · max(width, height).
     :param fov_deg: field of view along the longer side, f_px = max(width, height) / (2 tan(fov / 2)).
     :param calibration: JSON file; see `calibration`.
     :param metadata_focal_mm: as ``focal_mm``, from the file's own metadata.
-    :raises UsageError: more than one of the user's ways at once, or an impossible value.
+    :raises UsageError: the user's values contradict each other, or one is impossible.
     :raises InputError: the calibration cannot be used for footage of this size.
     """
-    ways = {"--focal-mm": focal_mm, "--fov": fov_deg, "--calibration": calibration}
-    given = [name for name, value in ways.items() if value is not None]
+    options = {"--focal-mm": focal_mm, "--fov": fov_deg, "--calibration": calibration}
+    given = [name for name, value in options.items() if value is not None]
     if len(given) > 1:
         raise UsageError(f"{' and '.join(given)} contradict each other: give one of them")
     longer = max(width, height)
@@ -101,7 +109,12 @@ def choose_camera(
 
 
 def assumed_camera(width: int, height: int, longer_px: float) -> Camera:
-    """The most likely camera; ``longer_px``: the longer side of what it saw, less than the picture's between bars."""
+    """Return the camera with the default field of view.
+
+    :param width: of the footage in pixels.
+    :param height: likewise.
+    :param longer_px: the longer side of the camera's image, which is smaller than the footage's between bars.
+    """
     source = f"assumed, {DEFAULT_FOV_DEG:g} degrees"
     if longer_px < max(width, height):
         source += " between the bars"
@@ -110,9 +123,13 @@ def assumed_camera(width: int, height: int, longer_px: float) -> Camera:
 
 
 def estimated_camera(width: int, height: int, focal_px: float, deviation: float, longer_px: float) -> Camera:
-    """The camera with a focal length told by the background's edges, ``deviation`` its relative error.
+    """Return the camera with an estimated focal length.
 
-    ``longer_px``: as for `assumed_camera`.
+    :param width: of the footage in pixels.
+    :param height: likewise.
+    :param focal_px: focal length in pixels.
+    :param deviation: its relative error, one standard deviation.
+    :param longer_px: as for `assumed_camera`.
     """
     fov_deg = 2 * math.degrees(math.atan(longer_px / (2 * focal_px)))
     source = f"estimated, {fov_deg:.0f} degrees ± {100 * deviation:.0f} %"

@@ -8,33 +8,35 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from ..perception.region import inside, surroundings
 from .intrinsics import Camera
 
 WORKING_SIDE_PX = 960
-SHORTEST = 0.03  # of the longer side
-MOST_SEGMENTS = 250
-BAR_MARGIN_PX = 6.0  # by which the edge of a bar may be off
+MIN_LENGTH = 0.03  # of the longer side
+MAX_SEGMENTS = 250
+BAR_MARGIN_PX = 6.0  # uncertainty of a bar's edge
 
 
 @dataclass(frozen=True)
 class Lines:
     """Straight lines as a camera sees them, the longest first."""
 
-    normals: np.ndarray  # (N, 3) of the planes that they span with the camera's centre
-    lengths: np.ndarray  # (N,) in sides of the picture
+    normals: NDArray[np.float64]  # (N, 3) of the planes that they span with the camera's centre
+    lengths: NDArray[np.float64]  # (N,) in sides of the picture
 
     @classmethod
     def none(cls) -> Lines:
-        """Nothing is known."""
+        """Return no lines."""
         return cls(np.zeros((0, 3)), np.zeros(0))
 
-    def turned(self, R_new_camera: np.ndarray) -> Lines:
-        """The same in other axes."""
+    def rotated(self, R_new_camera: NDArray[np.float64]) -> Lines:
+        """Return the lines in other axes, those of ``R_new_camera`` (3, 3)."""
         return Lines(self.normals @ R_new_camera.T, self.lengths)
 
 
@@ -42,36 +44,41 @@ class Lines:
 class Segments:
     """Straight edges in a picture, the longest first."""
 
-    ends_px: np.ndarray  # (N, 2, 2)
-    lengths: np.ndarray  # (N,) in sides of the picture
+    ends_px: NDArray[np.float64]  # (N, 2, 2)
+    lengths: NDArray[np.float64]  # (N,) in sides of the picture
 
     @classmethod
     def none(cls) -> Segments:
-        """Nothing was found."""
+        """Return no segments."""
         return cls(np.zeros((0, 2, 2)), np.zeros(0))
 
     def lines(self, camera: Camera) -> Lines:
-        """What they are to a camera, in its frame."""
+        """Return the lines of the segments, in the camera's axes."""
         return Lines(plane_normals(camera.rays(self.ends_px)), self.lengths)
 
 
-def plane_normals(rays: np.ndarray) -> np.ndarray:
-    """(N, 3) unit normals of the planes through the camera's centre that hold both rays (N, 2, 3) to an edge's ends."""
+def plane_normals(rays: NDArray[np.floating[Any]]) -> NDArray[Any]:
+    """Return the (N, 3) unit normals of the planes through the camera's centre and each edge.
+
+    :param rays: (N, 2, 3) directions to the ends of each edge.
+    """
     normals = np.cross(rays[:, 0], rays[:, 1])
-    return normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
+    unit: NDArray[Any] = normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
+    return unit
 
 
 def find_segments(
-    image_rgb: np.ndarray,
-    people: Sequence[np.ndarray],
+    image_rgb: NDArray[np.uint8],
+    people: Sequence[NDArray[Any]],
     working_side_px: int = WORKING_SIDE_PX,
-    bars: Sequence[np.ndarray] = (),
+    bars: Sequence[NDArray[np.float64]] = (),
 ) -> Segments:
-    """The straight edges of a picture.
+    """Find the straight edges of a picture's background.
 
-    :param people: (n, 2) points of each person in pixels; edges within their boxes are left out.
+    :param image_rgb: (H, W, 3).
+    :param people: (n, 2) points of each person in pixels; edges inside their bounding boxes are left out.
+    :param working_side_px: the longer side to which the picture is reduced; the time grows with its square.
     :param bars: see `bars`; their edges are left out.
-    :param working_side_px: the longer side of the picture that is looked at; the time it takes grows with its square.
     """
     height, width = image_rgb.shape[:2]
     scale = min(1.0, working_side_px / max(width, height))
@@ -83,10 +90,10 @@ def find_segments(
         return Segments.none()
     ends = (found.reshape(-1, 2, 2) + 0.5) / scale - 0.5
     lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) / max(width, height)
-    keep = lengths > SHORTEST
+    keep = lengths > MIN_LENGTH
     middle = ends.mean(axis=1)
     margin = max(BAR_MARGIN_PX, 1.5 / scale) * np.array([-1, -1, 1, 1])
     keep &= ~inside(middle, [*(surroundings(points) for points in people), *(bar + margin for bar in bars)])
     chosen = np.flatnonzero(keep)
-    chosen = chosen[np.argsort(-lengths[chosen])[:MOST_SEGMENTS]]
+    chosen = chosen[np.argsort(-lengths[chosen])[:MAX_SEGMENTS]]
     return Segments(ends[chosen].astype(float), lengths[chosen].astype(float))

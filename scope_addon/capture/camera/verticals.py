@@ -1,18 +1,21 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which way is up by the edges of what people build: walls, doors and posts are upright, the rest is level.
+"""The up direction from the edges of buildings: walls, doors and posts are vertical, most other edges horizontal.
 
-A line in the picture and the camera's centre span a plane with unit normal n; an edge along direction d has n·d = 0.
-With u_0 what the body says is up, up u and two level directions h and u × h, all at right angles, maximize
+A line in the picture and the camera's centre span a plane with unit normal n; an edge along direction d satisfies
+n·d = 0. Given the body's up direction u_0, find up u and two horizontal directions h and u × h, all orthogonal, that
+maximize
 
     −∠(u, u_0)² / 2σ² + κ Σ_i w_i max(2 c_i(u), c_i(h), c_i(u × h)),   c_i(d) = exp(−(n_i·d)² / 2s²),
 
-w_i the line's length in sides of the picture. Lines that agree by chance are more often level than upright, where two
-directions are to choose from. Directions around u_0 are tried, the best of them refined, each line then counted of the
-direction that is nearest to it (`line_pull`). Nothing is said where three directions would explain as much of lines
-drawn at random, or where too little that is upright is to be seen, unless both level directions are, and no other ones
-do nearly as well: then they tell what is upright to both.
+with w_i the line's length in sides of the picture. Vertical lines count twice, because lines agree with one of two
+horizontal directions by chance more often. A grid of directions around u_0 is evaluated, and the best ones are refined
+with each line assigned to the nearest direction (`line_normal_equations`).
 
-What is level in one direction is told wherever long lines agree on it, for up may be unclear about it alone.
+The result is rejected if three directions would explain as much of random lines. It is also rejected if little of it is
+vertical, unless both horizontal directions are supported and no other solution is nearly as good: then up is what is
+orthogonal to both.
+
+A single horizontal direction is reported wherever long lines agree on it, because up may be ambiguous only about it.
 
 Source: Coughlan and Yuille 2003.
 """
@@ -22,97 +25,104 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ....solver.rotations import exp
 from .line_segments import Lines
-from .manhattan import NEARLY, line_pull
+from .manhattan import PLANE_SIGMA, line_normal_equations
 
-LARGEST_LEAN = np.radians(35.0)  # between what the body says and what lines may say
-BODY_SIGMA = np.radians(10.0)
+MAX_LEAN = np.radians(35.0)  # between the body's up direction and the lines'
+BODY_SIGMA = np.radians(10.0)  # σ
 KAPPA = 4.0
-WORTH = np.array([2.0, 1.0, 1.0])  # of a line along u, h and u × h
-MOST_LINES = 120
-LEVEL_LINES = 24  # of which each may be level, the longest ones
-STEP = np.radians(3.0)  # between the directions that are tried
-TRIED_SIGMA = np.radians(2.2)  # s while they are
-REFINED = 16
-STEPS = 8
-CHANCE_SHARE, CHANCE_SIGMAS = 0.25, 1.5  # of the lines that three directions explain by chance, and how certainly more
-LEAST_UPRIGHT = 0.25  # sides of the picture, all upright lines together
-LEAST_LEVEL = 1.0  # likewise, along each level direction, where less is upright
-LEAST_MARGIN = 3.0  # and by how much any other up must be worse
-OTHER = np.radians(4.0)  # at least so far off
-LARGEST_SLOPE = np.radians(15.0)  # of level edges, by what the body says is up: steeper ones may be stairs
+VALUE = np.array([2.0, 1.0, 1.0])  # of a line along u, h and u × h
+MAX_LINES = 120
+HORIZONTAL_CANDIDATES = 24  # lines, the longest ones, each of which may be horizontal
+GRID_STEP = np.radians(3.0)
+GRID_SIGMA = np.radians(2.2)  # s on the grid; PLANE_SIGMA in the refinement
+MAX_REFINED = 16
+REFINEMENT_STEPS = 8
+CHANCE_SHARE, CHANCE_SIGMAS = 0.25, 1.5  # of the lines, explained by chance; standard deviations above it
+MIN_VERTICAL = 0.25  # sides of the picture, all vertical lines together
+MIN_HORIZONTAL = 1.0  # likewise, along each horizontal direction, where less is vertical
+MIN_MARGIN = 3.0  # in score, to any other solution
+MIN_ANGLE_TO_OTHER = np.radians(4.0)  # of that solution's up direction
+MAX_SLOPE = np.radians(15.0)  # of horizontal edges against the body's up direction: steeper ones may be stairs
 
 
 @dataclass(frozen=True)
-class Told:
-    """What lines say. Where ``up`` is not clear, ``level`` may be right nevertheless: up may still turn about it."""
+class UpEstimate:
+    """Directions estimated from lines. Where ``up`` is ambiguous, it may be so only about ``level``."""
 
-    up: np.ndarray | None = None  # (3,) the upright direction
-    level: np.ndarray | None = None  # (3,) the level one that most lines have, such as a wall's or a fence's
+    up: NDArray[np.float64] | None = None  # (3,)
+    level: NDArray[np.float64] | None = None  # (3,) the horizontal direction of most lines, such as a fence's
 
 
 @dataclass(frozen=True)
 class _Axes:
-    directions: np.ndarray  # (3, 3) rows u, h, u × h
-    supports: np.ndarray  # (3,) sides along each
+    directions: NDArray[np.float64]  # (3, 3) rows u, h, u × h
+    supports: NDArray[np.float64]  # (3,) sides of the picture along each
     score: float
 
 
-def told_by_lines(lines: Lines, up: np.ndarray) -> Told:
-    """What lines say of up and level, near ``up``, what the body says; None for what they do not say."""
+def estimate_up_from_lines(lines: Lines, up: NDArray[np.float64]) -> UpEstimate:
+    """Estimate the up direction and a horizontal direction; None for what the lines do not determine.
+
+    :param lines: of the background.
+    :param up: (3,) unit vector, the body's up direction, in the lines' axes.
+    """
     if not len(lines.lengths):
-        return Told()
-    lines = Lines(lines.normals[:MOST_LINES], lines.lengths[:MOST_LINES])
-    tried = sorted((_about(u, lines, up) for u in _around(up)), key=lambda scored: -scored[0])[:REFINED]
-    best, *others = sorted((_refined(axes, lines, up) for _, axes in tried), key=lambda axes: -axes.score)
+        return UpEstimate()
+    lines = Lines(lines.normals[:MAX_LINES], lines.lengths[:MAX_LINES])
+    coarse = sorted((_best_with_up(u, lines, up) for u in _grid(up)), key=lambda scored: -scored[0])[:MAX_REFINED]
+    best, *others = sorted((_refined(axes, lines, up) for _, axes in coarse), key=lambda axes: -axes.score)
     share = best.supports.sum() / lines.lengths.sum()
     count = np.square(lines.lengths.sum()) / np.square(lines.lengths).sum()
     found = best.directions[0]
-    if share < CHANCE_SHARE + CHANCE_SIGMAS / np.sqrt(count) or found @ up < np.cos(LARGEST_LEAN):
-        return Told()
-    second = max((o.score for o in others if o.directions[0] @ found < np.cos(OTHER)), default=-np.inf)
-    is_clear = best.supports[1:].min() >= LEAST_LEVEL and best.score - second > LEAST_MARGIN
+    if share < CHANCE_SHARE + CHANCE_SIGMAS / np.sqrt(count) or found @ up < np.cos(MAX_LEAN):
+        return UpEstimate()
+    second = max((o.score for o in others if o.directions[0] @ found < np.cos(MIN_ANGLE_TO_OTHER)), default=-np.inf)
+    is_clear = best.supports[1:].min() >= MIN_HORIZONTAL and best.score - second > MIN_MARGIN
     which = 1 + int(best.supports[1:].argmax())
     level = best.directions[which]
-    is_level = best.supports[which] >= LEAST_LEVEL and abs(level @ up) < np.sin(LARGEST_SLOPE)
-    return Told(found if best.supports[0] >= LEAST_UPRIGHT or is_clear else None, level if is_level else None)
+    has_level = best.supports[which] >= MIN_HORIZONTAL and abs(level @ up) < np.sin(MAX_SLOPE)
+    has_up = best.supports[0] >= MIN_VERTICAL or is_clear
+    return UpEstimate(found if has_up else None, level if has_level else None)
 
 
-def _around(up: np.ndarray) -> np.ndarray:
-    """(n, 3) unit vectors about one."""
+def _grid(up: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return (n, 3) unit vectors around one."""
     across = np.linalg.svd(up[None])[2][1:]
-    steps = np.tan(np.arange(-LARGEST_LEAN, LARGEST_LEAN + 1e-9, STEP))
+    steps = np.tan(np.arange(-MAX_LEAN, MAX_LEAN + 1e-9, GRID_STEP))
     v = up + (steps[:, None, None] * across[0] + steps[:, None] * across[1]).reshape(-1, 3)
     v /= np.linalg.norm(v, axis=1, keepdims=True)
-    return v[v @ up > np.cos(LARGEST_LEAN)]
+    near: NDArray[np.float64] = v[v @ up > np.cos(MAX_LEAN)]
+    return near
 
 
-def _about(u: np.ndarray, lines: Lines, up: np.ndarray) -> tuple[float, np.ndarray]:
-    """The best directions (3, 3) with this up, roughly, after their score."""
-    level = np.cross(np.concatenate([lines.normals[:LEVEL_LINES], np.eye(3)]), u)  # along the line, if it is level
+def _best_with_up(u: NDArray[np.float64], lines: Lines, up: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
+    """Return the score and the axes (3, 3) of the best horizontal directions for an up direction u."""
+    level = np.cross(np.concatenate([lines.normals[:HORIZONTAL_CANDIDATES], np.eye(3)]), u)  # along a horizontal line
     size = np.linalg.norm(level, axis=1)
     level = level[size > 0.1] / size[size > 0.1, None]
     across = np.cross(u, level)
     off2 = np.minimum(np.square(level @ lines.normals.T), np.square(across @ lines.normals.T))
-    explained = np.exp(-0.5 / TRIED_SIGMA**2 * off2)
-    explained = np.maximum(explained, WORTH[0] * np.exp(-0.5 / TRIED_SIGMA**2 * np.square(lines.normals @ u)))
+    explained = np.exp(-0.5 / GRID_SIGMA**2 * off2)
+    explained = np.maximum(explained, VALUE[0] * np.exp(-0.5 / GRID_SIGMA**2 * np.square(lines.normals @ u)))
     support = explained @ lines.lengths
     best = int(support.argmax())
     return _score(float(support[best]), u, up), np.array([u, level[best], across[best]])
 
 
-def _refined(directions: np.ndarray, lines: Lines, up: np.ndarray) -> _Axes:
-    for _ in range(STEPS):
-        H, g, _ = line_pull(lines, directions, NEARLY, WORTH)
+def _refined(directions: NDArray[np.float64], lines: Lines, up: NDArray[np.float64]) -> _Axes:
+    for _ in range(REFINEMENT_STEPS):
+        H, g, _ = line_normal_equations(lines, directions, PLANE_SIGMA, VALUE)
         u = directions[0]
-        H = KAPPA / NEARLY**2 * H + (np.eye(3) - np.outer(u, u)) / BODY_SIGMA**2 + 1e-9 * np.eye(3)
-        g = KAPPA / NEARLY**2 * g + np.cross(u, up) / BODY_SIGMA**2
+        H = KAPPA / PLANE_SIGMA**2 * H + (np.eye(3) - np.outer(u, u)) / BODY_SIGMA**2 + 1e-9 * np.eye(3)
+        g = KAPPA / PLANE_SIGMA**2 * g + np.cross(u, up) / BODY_SIGMA**2
         directions = directions @ exp(np.linalg.solve(H, g)).T
-    supports = line_pull(lines, directions, NEARLY)[2]
-    return _Axes(directions, supports, _score(float(WORTH @ supports), directions[0], up))
+    supports = line_normal_equations(lines, directions, PLANE_SIGMA)[2]
+    return _Axes(directions, supports, _score(float(VALUE @ supports), directions[0], up))
 
 
-def _score(support: float, u: np.ndarray, up: np.ndarray) -> float:
+def _score(support: float, u: NDArray[np.float64], up: NDArray[np.float64]) -> float:
     return KAPPA * support - 0.5 * float(np.arccos(np.clip(u @ up, -1.0, 1.0)) / BODY_SIGMA) ** 2

@@ -14,7 +14,7 @@ from types import TracebackType
 
 import numpy as np
 
-from ..camera.bars import longer_side_between
+from ..camera.bars import longer_content_side
 from ..camera.camera_rotation import BackgroundTracker
 from ..camera.intrinsics import Camera, assumed_camera
 from ..media.video import Frame
@@ -66,10 +66,10 @@ class BesideTracking:
         """Until the backgrounds of the frames so far have been looked at."""
         if self._looking is not None:
             self._looking.result()
-        if self._given_camera.focal_deviation == 0.0 or not self.background.has_looked:
+        if self._given_camera.focal_deviation == 0.0 or not self.background.has_searched_edges:
             return
         if self._by_edges is None:
-            self._longer_px = longer_side_between(self.background.bars, *self._size)
+            self._longer_px = longer_content_side(self.background.bars, *self._size)
             self._by_edges = self._pool.submit(
                 camera_by_edges, self.background.segments, *self._size, self._longer_px
             )

@@ -24,7 +24,7 @@ import numpy as np
 from ....solver import Body
 from ..camera.intrinsics import Camera, pinhole
 from ..perception.observation import Observation
-from ..tracking.track import track_of_one
+from ..tracking.track import single_frame_track
 from .ablation import ALL_PARTS, Parts
 from .track_fit import fit_picture, prepare_track
 
@@ -52,7 +52,7 @@ class FocalFits:
 
         Square pixels and a principal point in the middle are assumed, as for any camera that nothing is known of.
         """
-        track = track_of_one(observation)
+        track = single_frame_track(observation)
         if not track.seen[0]:
             return None
         K, costs = camera.intrinsics, []

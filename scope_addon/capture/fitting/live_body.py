@@ -17,7 +17,7 @@ from ..perception.landmark_network import KEYPOINT_NAMES
 from ..perception.lifter import HIPS
 from ..perception.observation import Observation
 from ..perception.region import Region
-from ..tracking.track import track_of_one
+from ..tracking.track import single_frame_track
 from .ablation import ALL_PARTS, Parts
 from .track_fit import fit_picture, prepare_track
 
@@ -54,7 +54,7 @@ class LiveBody:
         return LivePose(self._body.skin(R, t, state.beta), self._body, self._camera)
 
     def _solve(self, observation: Observation) -> State | None:
-        track = track_of_one(observation)
+        track = single_frame_track(observation)
         if not track.seen[0]:
             return None
         found = fit_picture(prepare_track(self._body, track, self._camera, self._parts, self._height_m))

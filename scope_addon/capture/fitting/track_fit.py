@@ -153,7 +153,7 @@ def prepare_track(
     body: Body, track: Track, camera: Camera, parts: Parts = ALL_PARTS, height_m: float | None = None
 ) -> PreparedTrack:
     """Undistort and lift a track; the lifting network runs here and nowhere else."""
-    if parts.seen_keypoints and track.knows_depth:  # a network that tells depth is BlazePose's
+    if parts.seen_keypoints and track.has_depth:  # a network that tells depth is BlazePose's
         body = as_seen(body)
     measurer, pixels = Measurer(body, camera.intrinsics), camera.undistort(track.keypoints_px)
     lifted = _lift(measurer, track, pixels, parts)
@@ -173,7 +173,7 @@ def _lift(measurer: Measurer, track: Track, pixels: np.ndarray, parts: Parts) ->
         sigma = np.full(track.confidence.shape, DEPTH_SIGMA_M)
         return Lifted(track.world_landmarks, sigma, sigma)
     rays, windows = measurer.rays(pixels), windows_around(track.times, track.seen)
-    if not (parts.world_landmarks and track.knows_depth):
+    if not (parts.world_landmarks and track.has_depth):
         return default_lifter().lift(rays, track.confidence, None, windows)
     return default_lifter().lift_mixture(rays, track.confidence, track.world_landmarks, windows)
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from .region import Region
 
-Judgement = Future[np.ndarray | None]
+PendingReference = Future[np.ndarray | None]
 """World landmarks (33, 3) that will be there, or None if there is nobody."""
 
 
@@ -22,7 +22,7 @@ class Observation:
     metres, the middle of the hips at 0, in camera axes (x right, y down, z forward), or all 0 where depth is unknown;
     ``presence``: the network's probability that there is a person; ``region``: where it looked; ``acquired``: the
     person was not followed from the frame before; ``appearance``: see `appearance`, in some frames;
-    ``judged_landmarks``: what the strong network will say in place of ``world_landmarks``, in few frames. Order:
+    ``reference_landmarks``: what the strong network will say in place of ``world_landmarks``, in few frames. Order:
     `KEYPOINT_NAMES`. ``hands`` (2, 21, 6), when they are asked for: pixels, confidence and world landmarks of the left
     and right hand, see `hand_tracker`; zeros where not seen.
     """
@@ -34,5 +34,5 @@ class Observation:
     region: Region
     acquired: bool
     appearance: np.ndarray | None = None
-    judged_landmarks: Judgement | None = None
+    reference_landmarks: PendingReference | None = None
     hands: np.ndarray | None = None

@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which tracklet goes on with which: people who were lost behind somebody, or were away for a while.
+"""Association of tracklets: which ones belong to a person who was occluded, or away for a while.
 
-The end of a tracklet and the start of a later one are the same person's when place, motion, size and clothes fit:
+The end of a tracklet and the start of a later one are linked when position, motion, size and appearance match:
 
-    cost = |Δplace| / (0.15 + 0.8 · gap) + 3 · Δappearance + |log(size ratio)|
+    cost = |Δposition| / (0.15 + 0.8 · gap) + 3 · Δappearance + |log(size ratio)|
 
-with Δplace in sides of the region: the mean of how far the start lies from where the end's motion leads and the end
-from where the start's motion comes from; the gap in seconds. All links together are chosen for the least sum.
+with the gap in seconds and Δposition in sides of the region. Δposition is the mean of two distances: from the start to
+the end's position extrapolated forward, and from the end to the start's position extrapolated backward. The links of a
+clip are chosen together, for the least total cost.
 """
 
 from __future__ import annotations
@@ -15,19 +16,21 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .appearance import distance
 from .track import Tracklet
 
-PLACE_SIGMA = 0.15  # sides of the region
-SPEED_SIGMA = 0.8  # sides a second: nobody goes on exactly as before
+POSITION_SIGMA = 0.15  # sides of the region
+SPEED_SIGMA = 0.8  # sides per second: nobody keeps exactly the same velocity
 APPEARANCE_WEIGHT = 3.0
-MOST_COST = 3.0  # of a link
-LONG_GAP_S = 2.0  # from then on place says nothing, so that the clothes have to be very alike
-MOST_APPEARANCE_LONG = 0.35
-LONG_LINK_COST = 2.0
-_MOTION_S = 0.25  # of a tracklet's end that its velocity is taken from
-_LONGEST_MOTION_S = 0.5  # that it goes on for
+MAX_LINK_COST = 3.0
+LONG_GAP_S = 2.0  # after a longer gap the position carries no information, so the appearance has to match closely
+LONG_GAP_MAX_APPEARANCE = 0.35
+LONG_GAP_COST = 2.0
+_VELOCITY_WINDOW_S = 0.25  # of a tracklet's end, for its velocity
+_MAX_EXTRAPOLATION_S = 0.5
+_MAX_VELOCITY_FRAMES = 60
 _NO_LINK = 1e6
 
 
@@ -36,13 +39,18 @@ class End:
     """One end of a tracklet: seconds, trunk (2,) px, velocity (2,) px/s forward in time, side of the region px."""
 
     time: float
-    center_px: np.ndarray
-    velocity_px: np.ndarray
+    center_px: NDArray[np.float64]
+    velocity_px: NDArray[np.float64]
     side_px: float
 
 
 def link(tracklets: Sequence[Tracklet], times: Sequence[float]) -> list[list[int]]:
-    """People as lists of tracklet numbers in order of time; every tracklet that has a frame is in exactly one."""
+    """Group tracklets into people.
+
+    :param tracklets: in any order; their rows index ``times``.
+    :param times: seconds of each frame of the clip.
+    :return: each person's tracklet numbers in order of time. Every tracklet that has a frame is in exactly one list.
+    """
     used = [k for k, t in enumerate(tracklets) if t.rows]
     starts = [_end(tracklets[k], times, first=True) for k in used]
     ends = [_end(tracklets[k], times, first=False) for k in used]
@@ -50,67 +58,80 @@ def link(tracklets: Sequence[Tracklet], times: Sequence[float]) -> list[list[int
     for i, end in enumerate(ends):
         for j, start in enumerate(starts):
             if start.time > end.time:
-                unlike = distance(tracklets[used[i]].appearance, tracklets[used[j]].appearance)
-                cost[i, j] = link_cost(end, start, unlike)
-    following = cheapest_links(cost, MOST_COST)
-    has_before = set(following.values())
+                difference = distance(tracklets[used[i]].appearance, tracklets[used[j]].appearance)
+                cost[i, j] = link_cost(end, start, difference)
+    successor = cheapest_links(cost, MAX_LINK_COST)
+    has_predecessor = set(successor.values())
     people = []
     for first in range(len(used)):
-        if first in has_before:
+        if first in has_predecessor:
             continue
         chain = [first]
-        while chain[-1] in following:
-            chain.append(following[chain[-1]])
+        while chain[-1] in successor:
+            chain.append(successor[chain[-1]])
         people.append([used[k] for k in chain])
     return people
 
 
-def link_cost(end: End, start: End, unlike: float) -> float:
-    """See the module's equation; ``unlike`` is the distance of the appearances, 0..1."""
-    gap = start.time - end.time
-    resized = abs(float(np.log(start.side_px / end.side_px)))
-    if gap > LONG_GAP_S:
-        if unlike > MOST_APPEARANCE_LONG:
-            return _NO_LINK
-        return LONG_LINK_COST * (0.5 + 0.5 * unlike / MOST_APPEARANCE_LONG) + 0.5 * resized
-    side, moved = (start.side_px + end.side_px) / 2, min(gap, _LONGEST_MOTION_S)
-    forward = np.linalg.norm(start.center_px - end.center_px - end.velocity_px * moved)
-    back = np.linalg.norm(start.center_px - start.velocity_px * moved - end.center_px)
-    place = float(forward + back) / (2 * side) / (PLACE_SIGMA + SPEED_SIGMA * gap)
-    return place + APPEARANCE_WEIGHT * unlike + resized
+def link_cost(end: End, start: End, appearance_distance: float) -> float:
+    """Compute the cost of the module's equation.
 
-
-def cheapest_links(cost: np.ndarray, most: float) -> dict[int, int]:
-    """For each row its column in the assignment with the least sum of ``cost - most`` over links cheaper than ``most``.
-
-    Rows and columns that cannot be linked to each other are independent of each other and solved on their own.
+    :param end: of the earlier tracklet.
+    :param start: of the later tracklet.
+    :param appearance_distance: 0..1, see `appearance.distance`.
     """
-    open_links = cost < most
+    gap = start.time - end.time
+    size_change = abs(float(np.log(start.side_px / end.side_px)))
+    if gap > LONG_GAP_S:
+        if appearance_distance > LONG_GAP_MAX_APPEARANCE:
+            return _NO_LINK
+        return LONG_GAP_COST * (0.5 + 0.5 * appearance_distance / LONG_GAP_MAX_APPEARANCE) + 0.5 * size_change
+    side, elapsed = (start.side_px + end.side_px) / 2, min(gap, _MAX_EXTRAPOLATION_S)
+    forward = np.linalg.norm(start.center_px - end.center_px - end.velocity_px * elapsed)
+    backward = np.linalg.norm(start.center_px - start.velocity_px * elapsed - end.center_px)
+    position = float(forward + backward) / (2 * side) / (POSITION_SIGMA + SPEED_SIGMA * gap)
+    return position + APPEARANCE_WEIGHT * appearance_distance + size_change
+
+
+def cheapest_links(cost: NDArray[np.float64], max_cost: float) -> dict[int, int]:
+    """Choose the links with the least sum of ``cost - max_cost``, among those cheaper than ``max_cost``.
+
+    The problem splits into groups of rows and columns that can be linked to each other; each is solved separately.
+
+    :param cost: (N, M) of linking a row to a column.
+    :param max_cost: a link that costs as much is no better than none.
+    :return: the column of each linked row.
+    """
+    is_open = cost < max_cost
     links: dict[int, int] = {}
-    todo = set(np.flatnonzero(open_links.any(axis=1)).tolist())
-    while todo:
-        rows, columns = {todo.pop()}, np.zeros(cost.shape[1], bool)
+    remaining = set(np.flatnonzero(is_open.any(axis=1)).tolist())
+    while remaining:
+        rows, columns = {remaining.pop()}, np.zeros(cost.shape[1], bool)
         while True:
-            columns = open_links[sorted(rows)].any(axis=0)
-            grown = set(np.flatnonzero(open_links[:, columns].any(axis=1)).tolist())
+            columns = is_open[sorted(rows)].any(axis=0)
+            grown = set(np.flatnonzero(is_open[:, columns].any(axis=1)).tolist())
             if grown == rows:
                 break
             rows = grown
-        todo -= rows
+        remaining -= rows
         r, c = np.array(sorted(rows)), np.flatnonzero(columns)
-        # a column of its own for each row that stays without a link
-        square = np.concatenate([cost[np.ix_(r, c)] - most, np.zeros((len(r), len(r)))], axis=1)
-        for i, j in enumerate(assign(square)):
-            if j < len(c) and open_links[r[i], c[j]]:
+        # an extra column for each row that stays without a link
+        padded = np.concatenate([cost[np.ix_(r, c)] - max_cost, np.zeros((len(r), len(r)))], axis=1)
+        for i, j in enumerate(assign(padded)):
+            if j < len(c) and is_open[r[i], c[j]]:
                 links[int(r[i])] = int(c[j])
     return links
 
 
-def assign(cost: np.ndarray) -> list[int]:
-    """The column of each row, all different, with the least sum; (N, M), N <= M. Shortest augmenting paths, O(N²M)."""
+def assign(cost: NDArray[np.float64]) -> list[int]:
+    """Solve the assignment problem by shortest augmenting paths, in O(N²M).
+
+    :param cost: (N, M), N <= M.
+    :return: the column of each row, all different, with the least total cost.
+    """
     rows, columns = cost.shape
     row_price, column_price = np.zeros(rows + 1), np.zeros(columns + 1)
-    row_of = np.full(columns + 1, -1)  # the last column is where each new row waits
+    row_of = np.full(columns + 1, -1)  # the last column holds the row that is being added
     for new in range(rows):
         row_of[columns], at = new, columns
         shortest, came_from = np.full(columns, np.inf), np.full(columns, columns)
@@ -138,8 +159,9 @@ def assign(cost: np.ndarray) -> list[int]:
 
 def _end(tracklet: Tracklet, times: Sequence[float], first: bool) -> End:
     rows = tracklet.rows if first else tracklet.rows[::-1]
-    edge = times[rows[0]]
-    near = [k for k, row in zip(range(60), rows, strict=False) if abs(times[row] - edge) <= _MOTION_S]
+    time = times[rows[0]]
+    counted = zip(range(_MAX_VELOCITY_FRAMES), rows, strict=False)
+    near = [k for k, row in counted if abs(times[row] - time) <= _VELOCITY_WINDOW_S]
     index = np.array(near) if first else len(tracklet.rows) - 1 - np.array(near)
     t = np.array([times[tracklet.rows[k]] for k in index])
     centers = np.array([tracklet.centers_px[k] for k in index])
@@ -147,4 +169,4 @@ def _end(tracklet: Tracklet, times: Sequence[float], first: bool) -> End:
     if len(t) > 2:
         off = t - t.mean()
         velocity = off @ (centers - centers.mean(axis=0)) / max(float(off @ off), 1e-9)
-    return End(edge, centers[0], velocity, float(np.median([tracklet.sides_px[k] for k in index])))
+    return End(time, centers[0], velocity, float(np.median([tracklet.sides_px[k] for k in index])))

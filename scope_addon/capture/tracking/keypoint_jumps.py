@@ -1,88 +1,99 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Keypoints that leap away for a few frames and come back, as when a network sees an arm in something else.
+"""Keypoint jumps: keypoints that leave their path for a few frames and return, because the network was mistaken.
 
-To stray from the straight way by D and be back on it n + 1 frames after the last one on it takes an acceleration of at
-least
+To deviate from the straight line by D, and to be back on it n + 1 frames after the last point on it, takes an
+acceleration of at least
 
     a = 8 D / ((n + 1) Δt)²,
 
-that of a ball thrown up. What would ask more than anybody's limbs can do was seen wrongly: such a keypoint goes on
-along the straight way, with less confidence. The largest network leaps rarely, the smaller ones where left and right
-are in doubt.
+as for a ball thrown up. If that is more than a person's limbs can reach, the keypoint is an outlier. It is replaced by
+the point on the line, with less confidence. The largest network rarely jumps, the smaller ones do where left and right
+are uncertain.
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..perception.lifter import person_size
 from .track import Track
 
-MOST_M_S2 = 200.0  # a boxer's fist; more, but not for long, where it hits
-LEAST_M = 0.06  # noise
-LONGEST_S = 0.12
-LONGEST_FRAMES = 8  # at a high frame rate
-CONFIDENCE = 0.3  # share that is left
+MAX_ACCELERATION_M_S2 = 200.0  # a boxer's fist; more only at the moment in which it hits
+MIN_JUMP_M = 0.06  # less is noise
+MAX_JUMP_S = 0.12
+MAX_JUMP_FRAMES = 8  # at a high frame rate
+CONFIDENCE = 0.3  # factor for a replaced keypoint
 SPREAD_M = 0.5  # root mean square distance of a standing adult's limbs from their middle
-SPREAD_S = 1.0  # people who bend for a moment do not shrink
+SPREAD_S = 1.0  # window of the scale: people who bend for a moment do not shrink
 
 
-def mend_leaps(track: Track) -> Track:
-    """The track with leaping keypoints and landmarks moved onto the straight way, see above."""
+def repair_keypoint_jumps(track: Track) -> Track:
+    """Return the track with outlying keypoints and landmarks moved onto the straight line, see the module."""
     if len(track) < 3:
         return track
     step_s = float(np.median(np.diff(track.times)))
-    in_picture = find_leaps(track.keypoints_px / metre_px(track)[:, None, None], track.seen, step_s)
-    in_space = in_picture | find_leaps(track.world_landmarks, track.seen, step_s)
+    in_image = find_keypoint_jumps(track.keypoints_px / scale_px_per_m(track)[:, None, None], track.seen, step_s)
+    in_space = in_image | find_keypoint_jumps(track.world_landmarks, track.seen, step_s)
     if not in_space.any():
         return track
     return replace(
         track,
-        keypoints_px=_straightened(track.keypoints_px, in_picture, track.seen),
-        confidence=np.where(in_picture, np.float32(CONFIDENCE) * track.confidence, track.confidence),
-        world_landmarks=_straightened(track.world_landmarks, in_space, track.seen),
+        keypoints_px=_interpolated(track.keypoints_px, in_image, track.seen),
+        confidence=np.where(in_image, np.float32(CONFIDENCE) * track.confidence, track.confidence),
+        world_landmarks=_interpolated(track.world_landmarks, in_space, track.seen),
     )
 
 
-def find_leaps(points: np.ndarray, seen: np.ndarray, step_s: float) -> np.ndarray:
-    """(T, J) which points (T, J, n), metres, leap; those seen without a gap from the frame before to the one after.
+def find_keypoint_jumps(points: NDArray[np.floating[Any]], seen: NDArray[np.bool_], step_s: float) -> NDArray[np.bool_]:
+    """Find the points that jump.
 
-    They stray by more than the two are apart: what goes elsewhere and stays there does not leap.
+    Only points that are seen without a gap from the frame before to the frame after count. They deviate by more than
+    the distance of these two: a point that moves elsewhere and stays there does not jump.
+
+    :param points: (T, J, n) metres.
+    :param seen: (T,)
+    :param step_s: seconds between two frames.
+    :return: (T, J)
     """
     T, J = points.shape[:2]
-    leaps = np.zeros((T, J), bool)
-    for n in range(1, min(LONGEST_FRAMES, int(LONGEST_S / max(step_s, 1e-6)), T - 2) + 1):
-        least = max(MOST_M_S2 * ((n + 1) * step_s) ** 2 / 8, LEAST_M)
-        whole = np.lib.stride_tricks.sliding_window_view(seen, n + 2).all(axis=1)
+    jumps = np.zeros((T, J), bool)
+    for n in range(1, min(MAX_JUMP_FRAMES, int(MAX_JUMP_S / max(step_s, 1e-6)), T - 2) + 1):
+        least = max(MAX_ACCELERATION_M_S2 * ((n + 1) * step_s) ** 2 / 8, MIN_JUMP_M)
+        is_seen = np.lib.stride_tricks.sliding_window_view(seen, n + 2).all(axis=1)
         for j in range(J):
             p = points[:, j]
             before, after = p[: T - n - 1], p[n + 1 :]
-            off, far = whole.copy(), np.maximum(np.linalg.norm(after - before, axis=1), least)
+            off, limit = is_seen.copy(), np.maximum(np.linalg.norm(after - before, axis=1), least)
             for i in range(1, n + 1):
-                way = before + (i / (n + 1)) * (after - before)
-                off &= np.linalg.norm(p[i : T - n - 1 + i] - way, axis=1) > far
+                line = before + (i / (n + 1)) * (after - before)
+                off &= np.linalg.norm(p[i : T - n - 1 + i] - line, axis=1) > limit
             for start in np.flatnonzero(off) + 1:
-                leaps[start : start + n, j] = True
-    return leaps
+                jumps[start : start + n, j] = True
+    return jumps
 
 
-def metre_px(track: Track) -> np.ndarray:
-    """(T,) pixels that a metre takes at the person's distance, roughly."""
+def scale_px_per_m(track: Track) -> NDArray[np.float64]:
+    """Estimate the (T,) pixels per metre at the person's distance, roughly, from the size of the body."""
     size = np.where(track.seen, person_size(track.keypoints_px), 0.0)
-    near = round(SPREAD_S / max(float(np.median(np.diff(track.times))), 1e-3)) if len(track) > 1 else 0
-    padded = np.pad(size, near, mode="edge")
-    largest = np.lib.stride_tricks.sliding_window_view(padded, 2 * near + 1).max(axis=1)
-    return np.maximum(largest / SPREAD_M, 1e-3)
+    reach = round(SPREAD_S / max(float(np.median(np.diff(track.times))), 1e-3)) if len(track) > 1 else 0
+    padded = np.pad(size, reach, mode="edge")
+    largest = np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1).max(axis=1)
+    scale: NDArray[np.float64] = np.maximum(largest / SPREAD_M, 1e-3)
+    return scale
 
 
-def _straightened(values: np.ndarray, leaps: np.ndarray, seen: np.ndarray) -> np.ndarray:
-    """Values (T, J, n) with those that leap interpolated between the frames before and after."""
+def _interpolated(
+    values: NDArray[np.floating[Any]], jumps: NDArray[np.bool_], seen: NDArray[np.bool_]
+) -> NDArray[np.floating[Any]]:
+    """Return values (T, J, n) with those that jump interpolated between the frames before and after."""
     out, rows = values.copy(), np.arange(len(values))
-    for j in np.flatnonzero(leaps.any(axis=0)):
-        good = np.flatnonzero(seen & ~leaps[:, j])
-        bad = np.flatnonzero(leaps[:, j])
+    for j in np.flatnonzero(jumps.any(axis=0)):
+        good = np.flatnonzero(seen & ~jumps[:, j])
+        bad = np.flatnonzero(jumps[:, j])
         for k in range(values.shape[2]):
             out[bad, j, k] = np.interp(rows[bad], good, values[good, j, k])
     return out

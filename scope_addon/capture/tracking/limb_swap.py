@@ -1,144 +1,162 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Finds the frames in which the legs alone, or the arms alone, have changed sides, and changes them back.
+"""Limb swaps: finds the frames in which left and right of the legs alone, or the arms alone, are swapped.
 
-Networks that know a body's left and right still take one leg for the other where the legs pass each other. The rest of
-the body then goes on as before, so this comes after `left_right`, which looks at all of it at once.
+Networks that know a body's left and right still confuse its legs where these pass each other. The rest of the body is
+continuous then, so this comes after `left_right`, which considers all of it at once.
 
-Which way a limb was going tells them apart where they meet. With f_t the place of knees and ankles (elbows and wrists)
-from the middle of the hips (shoulders), in metres, and their confidence, all as x_t says (left and right as said, or
-exchanged), the labels are those with the least
+The limbs' motion distinguishes them where they meet. Let f_t be the position of knees and ankles (elbows and wrists)
+relative to the middle of the hips (shoulders), in metres, and their confidence, read as the label x_t says: 0 as
+detected, 1 swapped. The labels minimize
 
-    Σ_t own · x_t + Σ_t change · [x_t ≠ x_{t−1}] + Σ_t r_t + Σ_{t judged} j_t,
-    r_t = mean over the joints of min(most, |f_t − p_t| / (σ₀ + σ₁ Δt)),   p_t = f_{t−1} + a (f_{t−1} − f_{t−2}),
+    Σ_t swap · x_t + Σ_t change · [x_t ≠ x_{t−1}] + Σ_t r_t + Σ_{t in A} j_t,
+    r_t = mean over the joints of min(limit, |f_t − p_t| / (σ₀ + σ₁ Δt)),   p_t = f_{t−1} + a (f_{t−1} − f_{t−2}),
 
-a = max(0, 1 − Δt / τ) times the ratio of the two frames' durations, for at a low rate a limb turns back before the next
-frame; j_t the same for the distance from what the judge saw, over σ_j. By the cheapest path through pairs of labels.
+with a = max(0, 1 − Δt / τ) times the ratio of the two frames' durations, because at a low rate a limb reverses before
+the next frame. j_t is the same as r_t for the distance from the reference network's landmarks in the frames A, in
+units of σ_j. The solution is the cheapest path through pairs of labels.
 
-An exchange has to pay for two changes and for every frame: a wrong repair is worse than none. At ten frames a second
-walking legs leave so much doubt that half of what is exchanged stays so, below seven everything.
+A swap has to pay for two changes and for every frame: a wrong repair is worse than none. At ten frames per second,
+walking legs are so ambiguous that half of the swaps remain, below seven all of them.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...kinematics.viterbi import cheapest_path
 from ..perception.landmark_network import KEYPOINT_NAMES
-from .keypoint_jumps import metre_px
-from .left_right import SWAPPED, exchanged, reordered
+from .keypoint_jumps import scale_px_per_m
+from .left_right import MIRROR_PARTNER, reorder_keypoints, swap_keypoints
 from .track import Track
 
-SIGMA_M, SIGMA_M_S = 0.02, 0.35  # σ₀ and σ₁: of what a limb does against expectation
+SIGMA_M, SIGMA_M_S = 0.02, 0.35  # σ₀ and σ₁ of the prediction
 VELOCITY_S = 0.2  # τ
-LONGEST_S = 0.15  # from one frame to the next: after that a walking leg may be where the other one was
-MOST = 6.0  # what one joint can say against going on
-CHANGE = 3.0
-OWN = 0.3
-M_PER_CONFIDENCE = 0.6  # what is hidden stays hidden
-JUDGE_SIGMA_M = 0.1
+MAX_STEP_S = 0.15  # from one frame to the next: after that a walking leg may be where the other one was
+LIMIT = 6.0  # of one joint's residual
+CHANGE_COST = 3.0
+SWAP_COST = 0.3
+M_PER_CONFIDENCE = 0.6  # an occluded joint stays occluded
+REFERENCE_SIGMA_M = 0.1  # σ_j
 _PARTNER = np.array([1, 0, 3, 2])  # of the joints below
 
 
 @dataclass(frozen=True)
 class _Limbs:
-    """``joints`` (4,) that tell, left and right in turn; ``anchors`` (2,), whose middle they are seen from."""
+    """A pair of limbs; left and right alternate in each array of keypoint indices."""
 
-    joints: np.ndarray
-    anchors: np.ndarray
-    all_points: np.ndarray  # that change sides with them
+    joints: NDArray[np.intp]  # (4,) that are compared
+    anchors: NDArray[np.intp]  # (2,) whose middle their positions are relative to
+    all_points: NDArray[np.intp]  # that are swapped with them
 
 
-def _numbers(*parts: str) -> np.ndarray:
-    """Of these keypoints, left and right in turn."""
+def _indices(*parts: str) -> NDArray[np.intp]:
+    """Return the indices of these keypoints, left and right alternating."""
     return np.array([KEYPOINT_NAMES.index(f"{side}_{part}") for part in parts for side in ("left", "right")])
 
 
-LEGS = _Limbs(_numbers("knee", "ankle"), _numbers("hip"), _numbers("knee", "ankle", "heel", "foot_index"))
-ARMS = _Limbs(_numbers("elbow", "wrist"), _numbers("shoulder"), _numbers("elbow", "wrist", "pinky", "index", "thumb"))
+LEGS = _Limbs(_indices("knee", "ankle"), _indices("hip"), _indices("knee", "ankle", "heel", "foot_index"))
+ARMS = _Limbs(_indices("elbow", "wrist"), _indices("shoulder"), _indices("elbow", "wrist", "pinky", "index", "thumb"))
 
 
-def repair_limbs(track: Track) -> Track:
-    """The track with legs and arms exchanged where `find_exchanged` says so; hands go with the arms."""
+def repair_limb_swaps(track: Track) -> Track:
+    """Return the track with legs and arms swapped where `find_limb_swaps` says so; hands go with the arms."""
     for limbs in (LEGS, ARMS):
-        where = find_exchanged(track, limbs)
+        where = find_limb_swaps(track, limbs)
         if where.any():
-            track = _exchange(track, limbs, where)
+            track = _swap(track, limbs, where)
     return track
 
 
-def _exchange(track: Track, limbs: _Limbs, where: np.ndarray) -> Track:
+def _swap(track: Track, limbs: _Limbs, where: NDArray[np.bool_]) -> Track:
     order = np.arange(len(KEYPOINT_NAMES))
-    order[limbs.all_points] = SWAPPED[limbs.all_points]
-    track = exchanged(track, where, order, with_hands=limbs is ARMS)
-    if not track.knows_depth:
+    order[limbs.all_points] = MIRROR_PARTNER[limbs.all_points]
+    track = swap_keypoints(track, where, order, with_hands=limbs is ARMS)
+    if not track.has_depth:
         return track
-    return replace(track, world_landmarks=reordered(track.world_landmarks, where, order))
+    return replace(track, world_landmarks=reorder_keypoints(track.world_landmarks, where, order))
 
 
-def find_exchanged(track: Track, limbs: _Limbs) -> np.ndarray:
-    """(T,) bool, where left and right of these limbs have to be exchanged: see the module's equation."""
+def find_limb_swaps(track: Track, limbs: _Limbs) -> NDArray[np.bool_]:
+    """Find the frames in which left and right of these limbs are swapped, see the module's equation.
+
+    :param limbs: LEGS or ARMS.
+    :return: (T,)
+    """
     where = np.zeros(len(track), bool)
     rows = np.flatnonzero(track.seen)
     if len(rows) < 3:
         return where
-    places, judged = _places(track, limbs)
-    f = np.stack([places, places[:, _PARTNER]])[:, rows]  # (2, N, 4, n): as said, exchanged
-    own = np.array([0.0, OWN]) + _judgement(f, judged[rows])
-    cost = _going_on(f, track.times[rows], track.acquired[rows])
-    where[rows] = _cheapest(cost, own)
+    features, reference = _features(track, limbs)
+    f = np.stack([features, features[:, _PARTNER]])[:, rows]  # (2, N, 4, n): as detected, swapped
+    label_cost = np.array([0.0, SWAP_COST]) + _reference_cost(f, reference[rows])
+    cost = _continuity_cost(f, track.times[rows], track.acquired[rows])
+    where[rows] = _cheapest(cost, label_cost)
     return where
 
 
-def _places(track: Track, limbs: _Limbs) -> tuple[np.ndarray, np.ndarray]:
-    """(T, 4, 3 or 4) x, y, (z,) confidence of the module's equation, and the judge's (T, 4, 2 or 3), else NaN."""
+def _features(track: Track, limbs: _Limbs) -> tuple[NDArray[np.floating[Any]], NDArray[np.float64]]:
+    """Return f: (T, 4, 3 or 4) x, y, (z,) confidence; and the reference network's (T, 4, 2 or 3), NaN elsewhere."""
 
-    def from_anchor(points: np.ndarray) -> np.ndarray:
-        return points[:, limbs.joints] - points[:, limbs.anchors].mean(axis=1, keepdims=True)
+    def from_anchor(points: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
+        relative: NDArray[np.floating[Any]] = points[:, limbs.joints] - points[:, limbs.anchors].mean(
+            axis=1, keepdims=True
+        )
+        return relative
 
-    deep = 3 if track.knows_depth else 2
-    in_picture = from_anchor(track.keypoints_px) / metre_px(track)[:, None, None]
-    in_space = from_anchor(track.world_landmarks)[..., 2:deep]
-    sureness = M_PER_CONFIDENCE * track.confidence[:, limbs.joints, None]
-    judged = np.full((len(track), 4, deep), np.nan)
-    judged[track.judged_rows] = from_anchor(track.judged_landmarks)[..., :deep]
-    return np.concatenate([in_picture, in_space, sureness], axis=-1), judged
-
-
-def _judgement(f: np.ndarray, judged: np.ndarray) -> np.ndarray:
-    """(N, 2) how far the limbs are by label from where the judge saw them, over σ_j; 0 where it did not look."""
-    far = np.linalg.norm(f[..., : judged.shape[-1]] - judged, axis=-1) / JUDGE_SIGMA_M
-    return np.where(np.isfinite(far), np.minimum(far, MOST), 0.0).mean(axis=-1).T
+    dimensions = 3 if track.has_depth else 2
+    in_image = from_anchor(track.keypoints_px) / scale_px_per_m(track)[:, None, None]
+    depth = from_anchor(track.world_landmarks)[..., 2:dimensions]
+    certainty = M_PER_CONFIDENCE * track.confidence[:, limbs.joints, None]
+    reference = np.full((len(track), 4, dimensions), np.nan)
+    reference[track.reference_rows] = from_anchor(track.reference_landmarks)[..., :dimensions]
+    return np.concatenate([in_image, depth, certainty], axis=-1), reference
 
 
-def _going_on(f: np.ndarray, times: np.ndarray, acquired: np.ndarray) -> np.ndarray:
-    """(N, 2, 2, 2) r_t and the price of a change, by the labels of the frame before the last, the last and this one.
-
-    0 where the person was found anew, and r_t where too much time went by; the first frame's are of no use, the
-    second's do not go by the one before.
-    """
-    step = np.diff(times, prepend=times[0])
-    before = np.concatenate([step[:1], step[:-1]])
-    followed = ~acquired & ~np.roll(acquired, 1) & (before > 0)
-    keeps = np.where(followed, np.maximum(1 - step / VELOCITY_S, 0.0) * step / np.maximum(before, 1e-6), 0.0)
-    sigma = SIGMA_M + SIGMA_M_S * step
-    cost = np.zeros((len(times), 2, 2, 2))
-    for a, b, c in np.ndindex(2, 2, 2):
-        last, foregoing = np.roll(f[b], 1, axis=0), np.roll(f[a], 2, axis=0)
-        off = f[c] - last - keeps[:, None, None] * (last - foregoing)
-        r = np.minimum(np.linalg.norm(off, axis=-1) / sigma[:, None], MOST).mean(axis=-1)
-        cost[:, a, b, c] = np.where(acquired, 0.0, np.where(step > LONGEST_S, 0.0, r) + CHANGE * (b != c))
+def _reference_cost(f: NDArray[np.floating[Any]], reference: NDArray[np.float64]) -> NDArray[np.floating[Any]]:
+    """Return j_t by label, (N, 2); 0 in frames without a reference."""
+    residual = np.linalg.norm(f[..., : reference.shape[-1]] - reference, axis=-1) / REFERENCE_SIGMA_M
+    cost: NDArray[np.floating[Any]] = np.where(np.isfinite(residual), np.minimum(residual, LIMIT), 0.0).mean(axis=-1).T
     return cost
 
 
-def _cheapest(cost: np.ndarray, own: np.ndarray) -> np.ndarray:
-    """(N,) bool labels with the least sum of ``cost`` (N, 2, 2, 2) by three labels in a row and ``own`` (N, 2).
+def _continuity_cost(
+    f: NDArray[np.floating[Any]], times: NDArray[np.float64], acquired: NDArray[np.bool_]
+) -> NDArray[np.float64]:
+    """Return r_t and the cost of a change, (N, 2, 2, 2) by the labels of the frames t − 2, t − 1 and t.
 
-    A state of the path is two labels in a row, so the first of one state is the second of the one before.
+    0 where the person was found again, and without r_t after too long a step. The first frame's values are not used,
+    and the second's do not depend on the frame before the first.
     """
-    pairs = np.repeat(own[1:, None], 2, axis=1)  # (N−1, 2, 2)
-    pairs[0] += own[0][:, None] + cost[1].mean(axis=0)
+    step = np.diff(times, prepend=times[0])
+    step_before = np.concatenate([step[:1], step[:-1]])
+    has_velocity = ~acquired & ~np.roll(acquired, 1) & (step_before > 0)
+    extrapolation = np.maximum(1 - step / VELOCITY_S, 0.0) * step / np.maximum(step_before, 1e-6)
+    extrapolation = np.where(has_velocity, extrapolation, 0.0)
+    sigma = SIGMA_M + SIGMA_M_S * step
+    cost = np.zeros((len(times), 2, 2, 2))
+    for a, b, c in np.ndindex(2, 2, 2):
+        last, second_last = np.roll(f[b], 1, axis=0), np.roll(f[a], 2, axis=0)
+        off = f[c] - last - extrapolation[:, None, None] * (last - second_last)
+        r = np.minimum(np.linalg.norm(off, axis=-1) / sigma[:, None], LIMIT).mean(axis=-1)
+        cost[:, a, b, c] = np.where(acquired, 0.0, np.where(step > MAX_STEP_S, 0.0, r) + CHANGE_COST * (b != c))
+    return cost
+
+
+def _cheapest(cost: NDArray[np.float64], label_cost: NDArray[np.floating[Any]]) -> NDArray[np.bool_]:
+    """Return the (N,) labels with the least total cost.
+
+    A state of the path is a pair of successive labels, so the first label of a state is the second of the one before.
+
+    :param cost: (N, 2, 2, 2) of three labels in a row.
+    :param label_cost: (N, 2) of each label.
+    """
+    pairs = np.repeat(label_cost[1:, None], 2, axis=1)  # (N−1, 2, 2)
+    pairs[0] += label_cost[0][:, None] + cost[1].mean(axis=0)
     switching = np.where(np.eye(2, dtype=bool)[:, :, None], cost[2:, :, :, None], np.inf)  # (N−2, a, b, b', c)
     path = cheapest_path(pairs.reshape(-1, 4), switching.reshape(-1, 4, 4))
-    return np.concatenate([path[:1] // 2, path % 2]).astype(bool)
+    labels: NDArray[np.bool_] = np.concatenate([path[:1] // 2, path % 2]).astype(bool)
+    return labels

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where footage cuts from one scene to another: whoever was followed is not there any more, though others may be.
+"""Detection of scene cuts, at which tracking starts again.
 
-A cut is a frame that differs from the one before by far more than frames differ before and after it, and so does the
-next one: a flash passes, a camera that swings differs all the time. What is nearly of one colour is a gap, no scene.
+A frame begins another scene if it, and the frame after it, differ from the frame before by far more than successive
+frames differ before and after. A flash lasts one frame, and a camera that pans quickly changes every frame: neither is
+a cut. Frames of nearly one colour are a gap in the footage, not a scene.
 """
 
 from __future__ import annotations
@@ -11,53 +12,61 @@ from collections import deque
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
-_SIZE = (32, 32)  # of the small pictures that are compared
-_STEP = 8  # every so many pixels and lines are looked at
-DIFFERENT = 22.0  # of 255, mean over the picture and colours
-TIMES_USUAL = 4.0
-LASTS = 0.7  # of the difference that is left a frame later
-LATE = 15  # frames that say what is usual
-PLAIN = 8.0  # deviation within a picture that shows nothing
-BETWEEN_SCENES_S = 10.0  # added to a track's times at a cut, so that nothing is drawn from one scene into the next
+_SIZE = (32, 32)  # of the thumbnails that are compared
+_STRIDE = 8  # pixels between samples of a large picture
+MIN_DIFFERENCE = 22.0  # of 255, mean over the picture and colours
+MIN_RATIO = 4.0  # to the usual difference
+PERSISTENCE = 0.7  # share of the difference that is left a frame later
+HISTORY_FRAMES = 15  # from which the usual difference is taken
+MIN_CONTRAST = 8.0  # standard deviation within a picture; a blank one has less
+SCENE_GAP_S = 10.0  # added to a track's times at a cut, so that nothing is interpolated across it
 
 
 class SceneCuts:
-    """Frames come in order, each with the one after it; ``times_s`` of the first frames after cuts."""
+    """Detects cuts in frames that come in order; ``times_s`` holds the times of the first frames after cuts."""
 
     def __init__(self) -> None:
         self.times_s: list[float] = []
-        self._before: np.ndarray | None = None
-        self._upcoming: np.ndarray | None = None
-        self._usual: deque[float] = deque(maxlen=LATE)
+        self._before: NDArray[np.float32] | None = None
+        self._upcoming: NDArray[np.float32] | None = None
+        self._differences: deque[float] = deque(maxlen=HISTORY_FRAMES)
 
-    def is_cut(self, image_rgb: np.ndarray, upcoming_rgb: np.ndarray | None, time_s: float) -> bool:
-        """Whether this frame begins another scene; a clip's first frame does not."""
-        now = _small(image_rgb) if self._upcoming is None else self._upcoming
-        self._upcoming = None if upcoming_rgb is None else _small(upcoming_rgb)
+    def is_cut(self, image_rgb: NDArray[np.uint8], upcoming_rgb: NDArray[np.uint8] | None, time_s: float) -> bool:
+        """Return whether this frame begins another scene; the first frame of a clip does not.
+
+        :param image_rgb: (H, W, 3).
+        :param upcoming_rgb: (H, W, 3) the frame after it; None at the end of the clip.
+        :param time_s: when the frame is shown.
+        """
+        now = _thumbnail(image_rgb) if self._upcoming is None else self._upcoming
+        self._upcoming = None if upcoming_rgb is None else _thumbnail(upcoming_rgb)
         before, self._before = self._before, now
         if before is None:
             return False
-        change, usual = _difference(before, now), float(np.median(self._usual)) if self._usual else 0.0
-        shows = min(before.std(), now.std()) >= PLAIN
+        change, usual = _difference(before, now), float(np.median(self._differences)) if self._differences else 0.0
+        has_contrast = min(before.std(), now.std()) >= MIN_CONTRAST
         if self._upcoming is not None:
-            if change >= DIFFERENT and _difference(before, self._upcoming) < LASTS * change:
-                self._before = before  # something passes; what is behind it may go on
+            if change >= MIN_DIFFERENCE and _difference(before, self._upcoming) < PERSISTENCE * change:
+                self._before = before  # a short disturbance, after which the scene may continue
                 return False
             usual = max(usual, _difference(now, self._upcoming))
-        if not shows or change < max(DIFFERENT, TIMES_USUAL * usual):
-            self._usual.append(change)
+        if not has_contrast or change < max(MIN_DIFFERENCE, MIN_RATIO * usual):
+            self._differences.append(change)
             return False
         self.times_s.append(time_s)
         return True
 
 
-def _small(image_rgb: np.ndarray) -> np.ndarray:
+def _thumbnail(image_rgb: NDArray[np.uint8]) -> NDArray[np.float32]:
     height, width = image_rgb.shape[:2]
-    if min(height, width) >= _STEP * max(_SIZE):
-        image_rgb = cv2.resize(image_rgb, (width // _STEP, height // _STEP), interpolation=cv2.INTER_NEAREST)
-    return cv2.resize(image_rgb, _SIZE, interpolation=cv2.INTER_AREA).astype(np.float32)
+    is_large = min(height, width) >= _STRIDE * max(_SIZE)
+    coarse = (width // _STRIDE, height // _STRIDE)
+    source = cv2.resize(image_rgb, coarse, interpolation=cv2.INTER_NEAREST) if is_large else image_rgb
+    thumbnail: NDArray[np.float32] = cv2.resize(source, _SIZE, interpolation=cv2.INTER_AREA).astype(np.float32)
+    return thumbnail
 
 
-def _difference(a: np.ndarray, b: np.ndarray) -> float:
+def _difference(a: NDArray[np.float32], b: NDArray[np.float32]) -> float:
     return float(np.abs(a - b).mean())

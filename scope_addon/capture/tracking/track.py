@@ -1,97 +1,114 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the networks saw of one person: over an unbroken stretch of frames (tracklet), and over a clip (track)."""
+"""What the networks report of one person: in an interval without interruption (tracklet), and in a clip (track)."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..perception.landmark_network import KEYPOINT_COUNT
-from ..perception.observation import Judgement, Observation
+from ..perception.observation import Observation, PendingReference
 from .appearance import SIZE as APPEARANCE_SIZE
+
+_TRUNK = [11, 12, 23, 24]  # shoulders and hips
 
 
 @dataclass
 class Track:
-    """Observations of one person in T frames; rows where nobody was seen hold zeros and ``seen`` is False."""
+    """Observations of one person in T frames; rows where they were not seen hold zeros, and ``seen`` is False.
 
-    frames: np.ndarray  # (T,) i64 source frame index
-    times: np.ndarray  # (T,) seconds
-    seen: np.ndarray  # (T,) bool
-    keypoints_px: np.ndarray  # (T, 33, 2) pixels of the decoded, upright frame
-    confidence: np.ndarray  # (T, 33) 0..1
-    world_landmarks: np.ndarray  # (T, 33, 3) metres, hip-centred, axes of the camera; all 0: unknown
-    acquired: np.ndarray  # (T,) the person was not followed from the frame before, but found (again) in this one
-    # The strong network's world landmarks, in few frames: rows (A,) and (A, 33, 3). See `left_right`.
-    judged_rows: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int64))
-    judged_landmarks: np.ndarray = field(default_factory=lambda: np.zeros((0, KEYPOINT_COUNT, 3)))
-    # (T, 2, 21, 6) pixels, confidence, world landmarks of the left and right hand; None: they were not looked for.
-    hands: np.ndarray | None = None
+    ``acquired`` marks frames in which the person was found (again) rather than followed from the frame before.
+    ``reference_rows`` and ``reference_landmarks`` are the reference network's world landmarks in a few frames, see
+    `left_right`. ``hands`` holds pixels, confidence and world landmarks of the left and the right hand; None: hands
+    were not looked for.
+    """
+
+    frames: NDArray[np.int64]  # (T,) source frame index
+    times: NDArray[np.float64]  # (T,) seconds
+    seen: NDArray[np.bool_]  # (T,)
+    keypoints_px: NDArray[np.floating[Any]]  # (T, 33, 2) pixels of the decoded, upright frame
+    confidence: NDArray[np.floating[Any]]  # (T, 33) 0..1
+    world_landmarks: NDArray[np.floating[Any]]  # (T, 33, 3) metres, hip-centred, camera axes; all 0: unknown
+    acquired: NDArray[np.bool_]  # (T,)
+    reference_rows: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))  # (A,)
+    reference_landmarks: NDArray[np.floating[Any]] = field(  # (A, 33, 3)
+        default_factory=lambda: np.zeros((0, KEYPOINT_COUNT, 3))
+    )
+    hands: NDArray[np.floating[Any]] | None = None  # (T, 2, 21, 6)
 
     def __len__(self) -> int:
         return len(self.frames)
 
     @property
-    def knows_depth(self) -> bool:
-        """Whether the landmark network told depth; a user's keypoint network does not."""
+    def has_depth(self) -> bool:
+        """Whether the landmark network estimated depth; a user's keypoint network does not."""
         return bool(self.world_landmarks.any())
 
     def without_depth(self) -> Track:
-        """The same, the world landmarks forgotten: of an hour they take 43 MB."""
+        """Return the track without world landmarks, which take 43 MB for an hour."""
         nothing = np.broadcast_to(np.float32(0.0), self.world_landmarks.shape)
-        return replace(self, world_landmarks=nothing, judged_rows=self.judged_rows[:0], judged_landmarks=nothing[:0])
+        return replace(
+            self, world_landmarks=nothing, reference_rows=self.reference_rows[:0], reference_landmarks=nothing[:0]
+        )
 
 
 @dataclass
 class Tracklet:
-    """Grows frame by frame, in float32: an hour of one person takes some 90 MB, and no picture is kept."""
+    """Grows frame by frame, in single precision: one person takes some 90 MB for an hour, and no image is kept."""
 
-    rows: list[int] = field(default_factory=list)  # place of each frame in the clip
-    values: list[np.ndarray] = field(default_factory=list)  # (33, 6) pixels, confidence, world landmarks
-    centers_px: list[np.ndarray] = field(default_factory=list)  # (2,) middle of the trunk
+    rows: list[int] = field(default_factory=list)  # index of each frame in the clip
+    values: list[NDArray[np.float32]] = field(default_factory=list)  # (33, 6) pixels, confidence, world landmarks
+    centers_px: list[NDArray[np.floating[Any]]] = field(default_factory=list)  # (2,) middle of the trunk
     sides_px: list[float] = field(default_factory=list)  # of the region
-    appearance: np.ndarray = field(default_factory=lambda: np.zeros(APPEARANCE_SIZE))  # sum over the frames
-    judged: list[tuple[int, Judgement]] = field(default_factory=list)
-    hands: list[np.ndarray] = field(default_factory=list)  # (2, 21, 6) each; none when they are not looked for
+    appearance: NDArray[np.float64] = field(default_factory=lambda: np.zeros(APPEARANCE_SIZE))  # sum over the frames
+    references: list[tuple[int, PendingReference]] = field(default_factory=list)  # each with its row
+    hands: list[NDArray[np.float32]] = field(default_factory=list)  # (2, 21, 6); empty if hands are not looked for
 
     def add(self, row: int, observation: Observation) -> None:
-        """Append the frame in place ``row``; what is not finite counts as not seen."""
+        """Append the frame with index ``row``; an observation that is not finite counts as not seen."""
         o = observation
         values = np.concatenate([o.keypoints_px, o.keypoints_confidence[:, None], o.world_landmarks], axis=1)
         if not np.isfinite(values).all():
             return
         self.rows.append(row)
         self.values.append(values.astype(np.float32))
-        self.centers_px.append(o.keypoints_px[[11, 12, 23, 24]].mean(axis=0))
+        self.centers_px.append(o.keypoints_px[_TRUNK].mean(axis=0))
         self.sides_px.append(o.region.side_px)
         if o.appearance is not None:
             self.appearance = self.appearance + o.appearance
-        if o.judged_landmarks is not None:
-            self.judged.append((row, o.judged_landmarks))
+        if o.reference_landmarks is not None:
+            self.references.append((row, o.reference_landmarks))
         if o.hands is not None:
             self.hands.append(np.where(np.isfinite(o.hands), o.hands, 0.0).astype(np.float32))
 
-    def cut(self, count: int) -> None:
+    def truncate(self, count: int) -> None:
         """Keep the first ``count`` frames."""
         if count < len(self.rows):
             end = self.rows[count]
-            self.judged = [(row, w) for row, w in self.judged if row < end]
+            self.references = [(row, call) for row, call in self.references if row < end]
             del self.rows[count:], self.values[count:], self.centers_px[count:], self.sides_px[count:]
             del self.hands[count:]
 
     @property
     def prominence(self) -> float:
-        """Size in the picture, summed over the frames."""
+        """Size in the image, summed over the frames."""
         return float(np.sum(self.sides_px))
 
 
 def make_track(frames: Sequence[int], times: Sequence[float], tracklets: Sequence[Tracklet]) -> Track:
-    """One person's track from tracklets that follow each other, in a clip of these frames."""
+    """Join one person's tracklets; waits for the reference network.
+
+    :param frames: source frame index of each of the clip's T frames.
+    :param times: their times in seconds.
+    :param tracklets: in order of time; their rows index ``frames``.
+    """
     keypoints, confidence, world = (np.zeros((len(frames), KEYPOINT_COUNT, n), np.float32) for n in (2, 1, 3))
     seen, acquired = np.zeros(len(frames), bool), np.zeros(len(frames), bool)
-    judged: list[tuple[int, np.ndarray]] = []
+    references: list[tuple[int, NDArray[Any]]] = []
     shapes = {hands.shape for tracklet in tracklets for hands in tracklet.hands[:1]}
     hands = np.zeros((len(frames), *shapes.pop()), np.float32) if shapes else None
     for tracklet in tracklets:
@@ -100,8 +117,8 @@ def make_track(frames: Sequence[int], times: Sequence[float], tracklets: Sequenc
                 keypoints[row], confidence[row], world[row] = np.split(value, (2, 3), axis=1)
             seen[tracklet.rows] = True
             acquired[tracklet.rows[0]] = True
-            results = [(row, look.result()) for row, look in tracklet.judged]
-            judged += [(row, landmarks) for row, landmarks in results if landmarks is not None]
+            results = [(row, call.result()) for row, call in tracklet.references]
+            references += [(row, landmarks) for row, landmarks in results if landmarks is not None]
         if hands is not None and tracklet.hands:
             hands[tracklet.rows] = tracklet.hands
     return Track(
@@ -112,14 +129,14 @@ def make_track(frames: Sequence[int], times: Sequence[float], tracklets: Sequenc
         confidence=confidence[..., 0],
         world_landmarks=world,
         acquired=acquired,
-        judged_rows=np.array([row for row, _ in judged], np.int64),
-        judged_landmarks=np.array([w for _, w in judged], float).reshape(-1, KEYPOINT_COUNT, 3),
+        reference_rows=np.array([row for row, _ in references], np.int64),
+        reference_landmarks=np.array([w for _, w in references], float).reshape(-1, KEYPOINT_COUNT, 3),
         hands=hands,
     )
 
 
-def track_of_one(observation: Observation) -> Track:
-    """A track of one frame, without the judgement, which may still be awaited, and without fingers."""
+def single_frame_track(observation: Observation) -> Track:
+    """Make a track of one frame, without hands, and without reference landmarks, which may still be pending."""
     tracklet = Tracklet()
-    tracklet.add(0, replace(observation, judged_landmarks=None, hands=None))
+    tracklet.add(0, replace(observation, reference_landmarks=None, hands=None))
     return make_track([0], [0.0], [tracklet])

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Somebody whom the tracker follows: where they are expected, and how they go behind something.
+"""The tracker's state of one person: prediction, estimate, confidence, occlusion.
 
-Who goes behind something is seen with less and less certainty, until the landmarks leap onto what hides them. From then
-on the networks imagine a body there, for seconds at times, and believe in it.
+A person who becomes occluded is seen with less and less confidence, until the landmarks jump onto the occluder. From
+then on the networks may report a body there for seconds, with full confidence.
 """
 
 from __future__ import annotations
@@ -10,105 +10,113 @@ from __future__ import annotations
 import math
 from concurrent.futures import Future
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..perception.landmark_network import PoseEstimate
 from ..perception.region import Region
 
-STARTLE = 0.08  # mean distance of the keypoints from where motion foretold them, in sides of the region
-FALLEN = 0.8  # share of the confidence of late, below which it has fallen
-LATE_S, LATE_FRAMES = 0.5, 5  # of late: so long, but so many frames at least
-HIDING_PLACE = 0.5  # how far from where they are foretold, or were seen last, in sides of the region
-SETTLED_FRAMES = 2  # after which the velocity says something
+OCCLUSION_INNOVATION = 0.08  # see `TrackedTarget.innovation`
+CONFIDENCE_DROP = 0.8  # share of the recent confidence below which it has dropped
+RECENT_S, RECENT_FRAMES = 0.5, 5  # over which confidence is remembered, and the least number of frames
+OCCLUSION_DISTANCE = 0.5  # from where the person is predicted, or was last seen, in sides of the region
+MIN_VELOCITY_FRAMES = 2  # after which the velocity is meaningful
 _VELOCITY_MEMORY = 0.7
 
 
 @dataclass
-class Followed:
-    """Somebody who was seen in the last frame, or lost ``lost`` frames ago.
+class TrackedTarget:
+    """A person who was seen in the last frame, or lost ``frames_lost`` frames ago.
 
-    ``seen_s`` is the time of the frame in which they were seen last; ``followed_s`` for how long they were seen so far,
-    and on that clock are ``judged_s``, when the strong network looked, and ``clothes_s``, when their clothes were
-    looked at.
+    ``seen_s`` is the time of the frame in which they were last seen, ``tracked_s`` the total time for which they were
+    seen. ``reference_s`` and ``appearance_s`` are values of ``tracked_s``: when the reference network was asked, and
+    when the appearance was sampled.
     """
 
     tracklet: int
     estimate: PoseEstimate
-    velocity_px: np.ndarray  # (2,) per frame, smoothed
+    velocity_px: NDArray[np.float64]  # (2,) per frame, smoothed
     seen_s: float
     age: int = 0  # frames
-    lost: int = 0
-    followed_s: float = 0.0
-    judged_s: float = -math.inf
-    clothes_s: float = -math.inf
-    swapped: bool = False  # whether left and right changed places since the strong network looked
-    doubt_s: float = -math.inf  # the time since which the strong network stands in
-    foreseen: Future[PoseEstimate] | None = None  # in the next frame, where it was expected
-    confidences: list[tuple[float, float]] = field(default_factory=list)  # of late, each with its time
-    is_hidden: bool = False  # lost, and behind something as it seems
+    frames_lost: int = 0
+    tracked_s: float = 0.0
+    reference_s: float = -math.inf
+    appearance_s: float = -math.inf
+    swapped: bool = False  # whether left and right were swapped since the reference network was asked
+    fallback_s: float = -math.inf  # time since which the fallback network is in use
+    pending: Future[PoseEstimate] | None = None  # the estimate in the next frame, at the predicted region
+    confidences: list[tuple[float, float]] = field(default_factory=list)  # recent ones, each with its time
+    is_occluded: bool = False  # lost, and apparently behind something
 
     def __post_init__(self) -> None:
-        self._remember(self.seen_s)
+        self._remember_confidence(self.seen_s)
 
-    def _remember(self, time_s: float) -> None:
-        """The confidence of this frame, and forget those of long ago."""
+    def _remember_confidence(self, time_s: float) -> None:
+        """Append the confidence of this frame, and drop those that are no longer recent."""
         self.confidences.append((time_s, _confidence(self.estimate)))
-        while len(self.confidences) > LATE_FRAMES and self.confidences[0][0] < time_s - LATE_S:
+        while len(self.confidences) > RECENT_FRAMES and self.confidences[0][0] < time_s - RECENT_S:
             del self.confidences[0]
 
-    def is_as_sure(self, estimate: PoseEstimate) -> bool:
-        """Whether the estimate's confidence has not fallen."""
-        return _confidence(estimate) >= FALLEN * float(np.median([c for _, c in self.confidences]))
+    def keeps_confidence(self, estimate: PoseEstimate) -> bool:
+        """Return whether the estimate's confidence has not dropped below the recent one."""
+        return _confidence(estimate) >= CONFIDENCE_DROP * float(np.median([c for _, c in self.confidences]))
 
-    def goes_behind(self, estimate: PoseEstimate) -> bool:
-        """Whether the estimate is of what hides this person: unforeseen, and with a confidence that has fallen.
+    def becomes_occluded(self, estimate: PoseEstimate) -> bool:
+        """Return whether the estimate shows the occluder: far from the prediction, and with less confidence.
 
-        Either alone is not enough: a somersault is unforeseen, whoever turns away from the light is less sure.
+        Neither is enough on its own. A somersault is far from the prediction, and a person who turns away from the
+        light is seen with less confidence.
         """
-        unforeseen = self.age >= SETTLED_FRAMES and self.surprise(estimate) > STARTLE
-        return unforeseen and not self.is_as_sure(estimate)
+        is_unexpected = self.age >= MIN_VELOCITY_FRAMES and self.innovation(estimate) > OCCLUSION_INNOVATION
+        return is_unexpected and not self.keeps_confidence(estimate)
 
-    def is_hidden_by(self, estimate: PoseEstimate) -> bool:
-        """Whether a body was found where this person is hidden, no surer than when they were lost."""
-        places = self.foretold, self.estimate.next_region
-        near = any(estimate.region.resembles(place, HIDING_PLACE) for place in places)
-        return self.is_hidden and near and not self.is_as_sure(estimate)
+    def is_occluded_by(self, estimate: PoseEstimate) -> bool:
+        """Return whether a body was found where this person is occluded, with no more confidence than they had."""
+        regions = self.predicted_region, self.estimate.next_region
+        is_near = any(estimate.region.resembles(region, OCCLUSION_DISTANCE) for region in regions)
+        return self.is_occluded and is_near and not self.keeps_confidence(estimate)
 
     @property
-    def expected(self) -> Region:
-        """Where to look in the frame after the next one, before the next one is known."""
+    def prefetch_region(self) -> Region:
+        """Predict the region for the frame after the next one, before the next one is known."""
         region = self.estimate.next_region
         x, y = np.asarray(region.center_px) + self.velocity_px
         return replace(region, center_px=(float(x), float(y)))
 
     @property
-    def foretold(self) -> Region:
-        """Where to look ``lost`` frames later: the middle goes on as it went."""
+    def predicted_region(self) -> Region:
+        """Predict the region ``frames_lost`` frames later, at constant velocity."""
         region = self.estimate.next_region
-        x, y = np.asarray(region.center_px) + self.velocity_px * self.lost
+        x, y = np.asarray(region.center_px) + self.velocity_px * self.frames_lost
         return replace(region, center_px=(float(x), float(y)))
 
-    def surprise(self, estimate: PoseEstimate) -> float:
-        """Mean distance of the keypoints from where motion foretold them, in sides of the region."""
-        foretold = self.estimate.keypoints_px + self.velocity_px * max(self.lost, 1)
-        return apart(estimate.keypoints_px, foretold) / self.estimate.region.side_px
+    def innovation(self, estimate: PoseEstimate) -> float:
+        """Return the mean distance of the keypoints from the prediction, in sides of the region."""
+        predicted_px = self.estimate.keypoints_px + self.velocity_px * max(self.frames_lost, 1)
+        return mean_distance(estimate.keypoints_px, predicted_px) / self.estimate.region.side_px
 
-    def go_on(self, estimate: PoseEstimate, swapped: bool, time_s: float, step_s: float) -> None:
-        """Be there in this frame; ``swapped``: left and right changed places since the one before."""
+    def update(self, estimate: PoseEstimate, swapped: bool, time_s: float, step_s: float) -> None:
+        """Take over the estimate of the next frame.
+
+        :param swapped: whether left and right were swapped since the frame before.
+        :param time_s: when the frame is shown.
+        :param step_s: seconds since the frame before.
+        """
         step = (estimate.keypoints_px - self.estimate.keypoints_px).mean(axis=0)
         memory = min(_VELOCITY_MEMORY, self.age / (self.age + 1))
         self.velocity_px = memory * self.velocity_px + (1 - memory) * step
         self.swapped |= swapped
         self.estimate, self.age = estimate, self.age + 1
-        self.seen_s, self.followed_s = time_s, self.followed_s + step_s
-        self._remember(time_s)
+        self.seen_s, self.tracked_s = time_s, self.tracked_s + step_s
+        self._remember_confidence(time_s)
 
 
 def _confidence(estimate: PoseEstimate) -> float:
     return float(estimate.keypoints_confidence.mean())
 
 
-def apart(a: np.ndarray, b: np.ndarray) -> float:
-    """Mean distance of points (..., n)."""
+def mean_distance(a: NDArray[np.floating[Any]], b: NDArray[np.floating[Any]]) -> float:
+    """Return the mean distance of corresponding points (..., n)."""
     return float(np.linalg.norm(a - b, axis=-1).mean())

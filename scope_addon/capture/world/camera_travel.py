@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...kinematics.smoothing import gaussian_smooth
-from ..tracking.scene_cuts import BETWEEN_SCENES_S
+from ..tracking.scene_cuts import SCENE_GAP_S
 
 LEAST_M_S = 0.25  # slower sliding is the error of one camera's depth
 STEADY = 0.8  # of its median, that half of the standing feet's velocities may be off it by
@@ -53,6 +53,6 @@ def camera_travel(soles: np.ndarray, valid: np.ndarray, up: np.ndarray, times: n
     total = gaussian_smooth(weight[:, None] * v + 0.02 * middle, times, SMOOTH_HZ)
     speed = total / (gaussian_smooth(weight[:, None], times, SMOOTH_HZ) + 0.02)
     lasts = np.diff(times)
-    lasts[lasts > BETWEEN_SCENES_S] = 0.0  # a cut: the camera counts as where it was last
+    lasts[lasts > SCENE_GAP_S] = 0.0  # a cut: the camera counts as where it was last
     steps = 0.5 * (speed[1:] + speed[:-1]) * lasts[:, None]
     return np.concatenate([np.zeros((1, 3)), -np.cumsum(steps, axis=0)])

@@ -14,7 +14,7 @@ from ...kinematics.single_precision import compact
 from ...kinematics.smoothing import fill_gaps, fill_rotation_gaps, smooth_root, smooth_rotations
 from ...kinematics.standing import resting_probability
 from ..fitting.track_fit import FittedTrack
-from ..tracking.scene_cuts import BETWEEN_SCENES_S
+from ..tracking.scene_cuts import SCENE_GAP_S
 from ..tracking.track import Track
 from .camera_path import CameraPath
 
@@ -65,7 +65,7 @@ class PlacedTrack:
         steps = np.diff(self.times)
         if len(steps):
             longest = max(LONGEST_STEP_S, LONGEST_STEP * float(np.median(steps)))
-            contact[1:][steps > min(longest, BETWEEN_SCENES_S)] = 0.0
+            contact[1:][steps > min(longest, SCENE_GAP_S)] = 0.0
         return contact
 
 

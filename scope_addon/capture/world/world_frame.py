@@ -11,7 +11,7 @@ import numpy as np
 from ...kinematics.axes import transform_points, world_from_level_camera
 from ...kinematics.contact_points import SOLES
 from ..camera.line_segments import Lines
-from ..camera.verticals import told_by_lines
+from ..camera.verticals import estimate_up_from_lines
 from .balance import along, carrying, center_of_mass, legs
 from .placement import PlacedTrack
 
@@ -115,7 +115,7 @@ def upright(up_body: np.ndarray, feet_cam: np.ndarray, lines: Lines | None) -> n
 
     Lines that only tell what is level in one direction, such as a fence's, take out what is not upright to it.
     """
-    told = told_by_lines(lines or Lines.none(), up_body)
+    told = estimate_up_from_lines(lines or Lines.none(), up_body)
     if told.up is not None:
         return told.up
     up = up_from_floor(feet_cam, up_body)

@@ -93,19 +93,19 @@ class SCOPE_OT_smooth(_Edit):
     def edit(self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float) -> str:
         """From the cached motion."""
         from ...edit.smooth import smoothed
-        from ...scene.animation_data.actions import repeat_no_more
-        from ...scene.animation_data.timing import key_frames, play_whole
+        from ...scene.animation_data.actions import remove_cycles
+        from ...scene.animation_data.timing import key_frames, restore_scene_range
         from ...scene.character.keys import bake_whole_frames, write_clip
-        from ...scene.character.root_object import drop_root
+        from ...scene.character.root_object import remove_root_object
 
         motion = cached_motion(armature)
         clip = smoothed(body, motion, self.strength)
         write_clip(armature, body, clip, key_frames(motion.timestamps, rate, float(armature.get("scope_start", 0.0))))
-        repeat_no_more(armature)  # what was a loop is the whole motion again
+        remove_cycles(armature)  # what was a loop is the whole motion again
         if armature.get("scope_resampled"):
             bake_whole_frames(armature, body, rate)
-        play_whole(context.scene, armature)
-        drop_root(armature)
+        restore_scene_range(context.scene, armature)
+        remove_root_object(armature)
         return ""
 
 
@@ -170,15 +170,17 @@ class SCOPE_OT_refloor(_Edit):
     def edit(self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float) -> str:
         """All keys."""
         from ...edit.floor import refloor
-        from ...edit.root_motion import relative_to_path, with_path
+        from ...edit.root_motion import relative_to_trajectory, with_trajectory
         from ...scene.character.keys import read_clip, write_clip
-        from ...scene.character.root_object import whole_path
+        from ...scene.character.root_object import removed_root_motion
 
         clip, frames = read_clip(armature, body, rate)
-        positions, angles = whole_path(armature, frames)
+        positions, angles = removed_root_motion(armature, frames)
         path = positions * [1.0, 1.0, 0.0], angles  # feet that stand are still only where the person goes
-        floored = refloor(with_path(clip, *path), body, betas_of(armature, body), level=self.level, lift=self.lift)
-        write_clip(armature, body, relative_to_path(floored, *path), frames)
+        floored = refloor(
+            with_trajectory(clip, *path), body, betas_of(armature, body), level=self.level, lift=self.lift
+        )
+        write_clip(armature, body, relative_to_trajectory(floored, *path), frames)
         return ""
 
 
@@ -204,12 +206,12 @@ class SCOPE_OT_root_motion(_Edit):
 
     def edit(self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float) -> str:
         """All keys."""
-        from ...scene.character.root_object import to_bones, to_root_object
+        from ...scene.character.root_object import move_root_motion_to_bones, move_root_motion_to_object
 
         if self.mode == "BONES":
-            to_bones(armature, body, rate)
+            move_root_motion_to_bones(armature, body, rate)
         else:
-            to_root_object(armature, body, rate, in_place=self.mode == "IN_PLACE", heading=self.heading)
+            move_root_motion_to_object(armature, body, rate, in_place=self.mode == "IN_PLACE", heading=self.heading)
         return ""
 
 
@@ -247,22 +249,22 @@ class SCOPE_OT_loop(_Span):
         """Find, cut, close."""
         from ...edit.clip import Clip
         from ...edit.loop import best_cycle, close_cycle
-        from ...scene.animation_data.actions import repeat_for_ever
+        from ...scene.animation_data.actions import add_cycles
         from ...scene.animation_data.timing import play_cycle
         from ...scene.character.keys import location_path, read_clip, write_clip
-        from ...scene.character.root_object import drop_root, whole_clip
+        from ...scene.character.root_object import clip_with_root_motion, remove_root_object
 
         clip, frames = read_clip(armature, body, rate)
-        clip = whole_clip(armature, clip, frames)
+        clip = clip_with_root_motion(armature, clip, frames)
         betas = betas_of(armature, body)
         cycle = best_cycle(clip, body, betas, self.start / rate, self.end / rate, self.shortest)
         closed: Clip = close_cycle(clip, cycle, self.blend)
         first, last = float(frames[cycle.first]), float(frames[cycle.last])
         write_clip(armature, body, closed, frames[cycle.first : cycle.last + 1])
         if self.repeat:
-            repeat_for_ever(armature, onwards={(location_path(body), 0), (location_path(body), 1)})
+            add_cycles(armature, offset_curves={(location_path(body), 0), (location_path(body), 1)})
         play_cycle(context.scene, armature, math.ceil(first), math.floor(last) - 1)
-        drop_root(armature)
+        remove_root_object(armature)
         return f"A cycle of {closed.times[-1]:.2f} s, its ends {100 * cycle.error_m:.1f} cm apart before closing"
 
 

@@ -88,7 +88,7 @@ class SCOPE_OT_look_through(bpy.types.Operator):
         bpy.ops.object.select_all(action="DESELECT")
         for obj in list(collection.all_objects):  # which hiding and showing invalidates
             if "scope_source" in obj:  # perhaps hidden while a rig moves instead
-                show(obj, context.view_layer, for_now=True)
+                show(obj, context.view_layer, temporarily=True)
             obj.select_set(True)
         bpy.ops.view3d.localview(frame_selected=False)
         bpy.ops.object.select_all(action="DESELECT")

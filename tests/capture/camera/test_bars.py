@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Bars: found where they are, not in dark scenes or doorways, and what the camera is then taken to be."""
+"""Bars: found where they are, not in dark scenes or doorways; and the camera that is assumed between them."""
 
 from fractions import Fraction
 
 import cv2
 import numpy as np
 import pytest
-from scope.scope_addon.capture.camera.bars import find_bars, longer_side_between
+from scope.scope_addon.capture.camera.bars import find_bars, longer_content_side
 from scope.scope_addon.capture.camera.camera_rotation import BackgroundTracker
 from scope.scope_addon.capture.camera.intrinsics import choose_camera
 from scope.scope_addon.capture.camera.line_segments import Segments, find_segments
@@ -37,13 +37,13 @@ def test_bars_are_found(sides: tuple[int, int, int, int]) -> None:
     expected[top : HEIGHT - bottom, left : WIDTH - right] = True
     assert (inside == expected).mean() > 0.995
     longer = max(WIDTH - left - right, HEIGHT - top - bottom)
-    assert longer_side_between(bars, WIDTH, HEIGHT) == pytest.approx(longer, abs=4)
+    assert longer_content_side(bars, WIDTH, HEIGHT) == pytest.approx(longer, abs=4)
 
 
 @pytest.mark.parametrize("upright", [False, True])
 @pytest.mark.parametrize("kind", ["blurred", "white"])
 def test_bars_of_other_kinds_are_found(kind: str, upright: bool) -> None:
-    """An upright clip before its own blurred copy, as broadcasters show it; or beside a colour."""
+    """A portrait clip in front of its own blurred copy, as broadcasters show it, or of a plain colour."""
     clip = cv2.resize(scene(30, 54), (300, 540), interpolation=cv2.INTER_CUBIC)
     picture = np.full((540, 960, 3), 235, np.uint8)
     if kind == "blurred":
@@ -54,11 +54,11 @@ def test_bars_of_other_kinds_are_found(kind: str, upright: bool) -> None:
     bars = find_bars(cv2.imdecode(cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, 80])[1], cv2.IMREAD_COLOR))
     sizes = [bar[[3, 2]] if upright else bar[[2, 3]] for bar in bars]
     assert sizes[0][0] == pytest.approx(330, abs=2)
-    assert longer_side_between(bars, *picture.shape[1::-1]) == pytest.approx(540)
+    assert longer_content_side(bars, *picture.shape[1::-1]) == pytest.approx(540)
 
 
 @pytest.mark.parametrize("detail", [40, 0], ids=["a pattern on the wall", "a plain wall, a door off the middle"])
-def test_a_door_frame_is_no_picture_between_bars(detail: int) -> None:
+def test_a_door_frame_is_not_a_picture_between_bars(detail: int) -> None:
     picture = np.full((HEIGHT, WIDTH, 3), 160, np.uint8)
     picture += np.random.default_rng(0).integers(0, detail + 1, picture.shape, dtype=np.uint8)
     left = 300 if detail else 340
@@ -77,26 +77,26 @@ def test_a_door_frame_is_no_picture_between_bars(detail: int) -> None:
     ],
     ids=["none", "black", "one side", "of two widths", "thin"],
 )
-def test_other_pictures_have_none(picture: np.ndarray) -> None:
+def test_other_pictures_have_no_bars(picture: np.ndarray) -> None:
     assert find_bars(picture) == []
-    assert longer_side_between([], WIDTH, HEIGHT) == WIDTH
+    assert longer_content_side([], WIDTH, HEIGHT) == WIDTH
 
 
-def test_somebody_in_a_spotlight_is_no_picture_between_bars() -> None:
+def test_a_spotlight_is_not_a_picture_between_bars() -> None:
     y, x = np.mgrid[:HEIGHT, :WIDTH]
     picture = np.where(np.hypot(x - WIDTH / 2, y - HEIGHT / 2) < 200, 200, 5).astype(np.uint8)
     assert find_bars(np.repeat(picture[..., None], 3, axis=2)) == []
 
 
-def test_the_assumed_angle_is_that_of_what_lies_between() -> None:
+def test_the_assumed_field_of_view_is_that_of_the_content() -> None:
     found = camera_by_edges(Segments.none(), WIDTH, HEIGHT, float(HEIGHT))
     assert found.intrinsics[0, 0] == pytest.approx(choose_camera(HEIGHT, 300).intrinsics[0, 0])
     assert found.intrinsics[:2, 2] == pytest.approx([WIDTH / 2, HEIGHT / 2])
     assert "between the bars" in found.source
 
 
-def test_their_edges_are_neither_lines_nor_corners() -> None:
-    """A picture that moves between bars that stay: a camera that turns."""
+def test_edges_of_bars_are_neither_lines_nor_corners() -> None:
+    """A picture that moves between fixed bars: a camera that rotates."""
     camera, wide = choose_camera(WIDTH, HEIGHT), np.kron(scene(80, 36), np.ones((15, 15, 1), np.uint8))
     person = [np.array([[470.0, 200.0], [490.0, 340.0]])]
     tracker = BackgroundTracker(camera, WIDTH, HEIGHT)
@@ -107,5 +107,5 @@ def test_their_edges_are_neither_lines_nor_corners() -> None:
     assert len(tracker.bars) == 2
     edges = find_segments(picture, person, bars=tracker.bars)
     assert not (np.abs(edges.ends_px[:, :, 0].mean(axis=1)[:, None] - [328, 632]) < 4).any()
-    turned = np.degrees(np.arctan(6 * 11 / camera.intrinsics[0, 0]))
-    assert tracker.motion(camera).largest_turn_deg == pytest.approx(turned, rel=0.1)
+    angle = np.degrees(np.arctan(6 * 11 / camera.intrinsics[0, 0]))
+    assert tracker.motion(camera).largest_turn_deg == pytest.approx(angle, rel=0.1)

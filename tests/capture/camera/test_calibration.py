@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Calibration files: what they mean, written out, and what is refused instead of being taken for something else."""
+"""Calibration files: their meaning, written out, and which ones are refused rather than misread."""
 
 import json
 import re
@@ -23,8 +23,8 @@ def camera(path, content, width=1000, height=600):
     return choose_camera(width, height, calibration=path)
 
 
-def refused(path, content, says, width=1000, height=600):
-    with pytest.raises(InputError, match=says) as caught:
+def refused(path, content, message, width=1000, height=600):
+    with pytest.raises(InputError, match=message) as caught:
         camera(path, content, width, height)
     text = str(caught.value)
     assert "cam.json" in text
@@ -70,14 +70,14 @@ def test_sizes_may_be_rounded(path, size, footage):
         ("K", "dist_coeffs", "size"),
     ],
 )
-def test_the_same_by_other_names(path, names):
+def test_other_key_names(path, names):
     expected = camera(path, KNOWN)
     got = camera(path, dict(zip(names, KNOWN.values(), strict=True)) | {"fps": 60, "rms": 0.2, "name": "left"})
     np.testing.assert_array_equal(got.intrinsics, expected.intrinsics)
     np.testing.assert_array_equal(got.dist, expected.dist)
 
 
-def test_coefficients_in_a_row_and_those_that_are_zero(path):
+def test_nested_and_trailing_zero_coefficients(path):
     assert camera(path, KNOWN | {"dist": [[0.1, 0.2, 0, 0, 0.3]]}).dist.tolist() == [0.1, 0.2, 0, 0, 0.3]
     assert camera(path, KNOWN | {"dist": [[0.1], [0.2], [0], [0]]}).dist.tolist() == [0.1, 0.2, 0, 0, 0]
     assert camera(path, KNOWN | {"dist": [0.1, 0.2, 0, 0, 0.3, 0, 0, 0]}).dist.tolist() == [0.1, 0.2, 0, 0, 0.3]
@@ -91,19 +91,19 @@ def test_coefficients_in_a_row_and_those_that_are_zero(path):
         (9000, [-0.5, 30, 0, 0, 900]),  # a long lens, whose radii are small
     ],
 )
-def test_lenses_that_there_are(path, focal, dist):
+def test_real_lenses_are_accepted(path, focal, dist):
     content = {"intrinsics": [[focal, 0, 960], [0, focal, 540], [0, 0, 1]], "dist": dist}
     assert camera(path, content, 1920, 1080).dist.tolist() == dist
 
 
-def test_another_shape_of_the_picture_is_refused(path):
-    refused(path, KNOWN | {"size": [1920, 1080]}, "1920 x 1080.*576 x 576.*same mode", 576, 576)
+def test_other_proportions_are_refused(path):
+    refused(path, KNOWN | {"size": [1920, 1080]}, "1920 x 1080.*576 x 576.*same camera mode", 576, 576)
     refused(path, KNOWN | {"size": [1920, 1080]}, "1920 x 1080.*1080 x 1920.*rotated", 1080, 1920)
     refused(path, {"intrinsics": [[1400, 0, 960], [0, 1400, 540], [0, 0, 1]]}, 'principal point.*"size"', 576, 576)
 
 
 @pytest.mark.parametrize(
-    ("changed", "says"),
+    ("changed", "message"),
     [
         ({"intrinsics": np.transpose(K).tolist()}, "transposed"),
         ({"intrinsics": [[1000, 0, 500], [0, 1100, 300], [0, 0, 0]]}, "must be"),
@@ -111,7 +111,7 @@ def test_another_shape_of_the_picture_is_refused(path):
         ({"intrinsics": [[1000, 40, 500], [0, 1100, 300], [0, 0, 1]]}, "skew"),
         ({"intrinsics": [[0, 0, 0], [0, 0, 0], [0, 0, 1]]}, "above 0"),
         ({"intrinsics": [[0.9, 0, 0.5], [0, 0.9, 0.5], [0, 0, 1]]}, "in pixels"),
-        ({"intrinsics": [[10000, 0, 500], [0, 1100, 300], [0, 0, 1]]}, "do not go together"),
+        ({"intrinsics": [[10000, 0, 500], [0, 1100, 300], [0, 0, 1]]}, "differ too much"),
         ({"intrinsics": [[1000, 0, 1e300], [0, 1100, 300], [0, 0, 1]]}, "too far"),
         ({"intrinsics": [[1000, 0, 500], [0, 1100, -12000], [0, 0, 1]]}, "too far"),
         ({"intrinsics": [[1e300, 0, 500], [0, 1100, 300], [0, 0, 1]]}, "no lens"),
@@ -129,10 +129,10 @@ def test_another_shape_of_the_picture_is_refused(path):
         ({"dist": [-5, 2]}, "folds or tears"),
         ({"dist": [0, 0, 0.9, 0]}, "folds or tears"),
         ({"distortion": [0.1]}, "twice, as dist and distortion"),
-        ({"distorsion": [0.1]}, "'distorsion' is not known"),
-        ({"k1": 0.1}, "'k1' is not known"),
-        ({"camera_model": "fisheye"}, "'camera_model' is not known"),
-        ({"resolution": [1000, 600]}, "'resolution' is not known"),
+        ({"distorsion": [0.1]}, "'distorsion' is unknown"),
+        ({"k1": 0.1}, "'k1' is unknown"),
+        ({"camera_model": "fisheye"}, "'camera_model' is unknown"),
+        ({"resolution": [1000, 600]}, "'resolution' is unknown"),
         ({"size": [float("nan"), 576]}, "size must be"),
         ({"size": [0, 0]}, "size must be"),
         ({"size": [1e200, 1e200]}, "size must be"),
@@ -140,16 +140,16 @@ def test_another_shape_of_the_picture_is_refused(path):
         ({"size": {"0": 1000}}, "size must be"),
     ],
 )
-def test_what_cannot_be_meant_is_refused(path, changed, says):
-    refused(path, KNOWN | changed, says)
+def test_impossible_values_are_refused(path, changed, message):
+    refused(path, KNOWN | changed, message)
 
 
 @pytest.mark.parametrize("text", ["", "[]", "{}", "null", "[" * 100_000, '{"K":' * 100_000, "\x00", "9" * 9999])
-def test_what_is_no_calibration_is_named(path, text):
+def test_other_files_are_refused_by_name(path, text):
     refused(path, text, re.escape(f"{path} is not a calibration"))
 
 
-def test_no_file(path, tmp_path):
+def test_a_missing_file_is_refused(path, tmp_path):
     for missing in (path, tmp_path):
         with pytest.raises(InputError, match="cannot read the calibration"):
             choose_camera(640, 480, calibration=missing)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The camera's turning, on pictures of a wall and a room seen by a camera whose turns are known."""
+"""The camera's rotation, on pictures of a wall and a room seen by a camera of known rotation."""
 
 import cv2
 import numpy as np
@@ -16,15 +16,17 @@ FPS = 30.0
 
 @pytest.fixture(scope="module")
 def panorama():
-    """A texture with corners all over: blocks of noise at three sizes, seen by a still wide camera."""
+    """A texture with corners everywhere: blocks of noise at three sizes, seen by a static wide camera."""
     rng = np.random.default_rng(0)
-    layers = [cv2.resize(rng.integers(0, 255, (n, 2 * n, 3), np.uint8), (3600, 1800), interpolation=cv2.INTER_CUBIC)
-              for n in (20, 60, 180)]
+    layers = [
+        cv2.resize(rng.integers(0, 255, (n, 2 * n, 3), np.uint8), (3600, 1800), interpolation=cv2.INTER_CUBIC)
+        for n in (20, 60, 180)
+    ]
     return np.mean(layers, axis=0).astype(np.uint8)
 
 
 def view(panorama, R_first_camera):
-    """What a camera sees that has turned: the panorama is a plane at infinity before the first camera."""
+    """The image of a rotated camera: the panorama is a plane at infinity in front of the first camera."""
     wide = pinhole(3600, 1800, FOCAL)
     H = wide @ R_first_camera @ np.linalg.inv(K)
     return cv2.warpPerspective(panorama, np.linalg.inv(H), (WIDTH, HEIGHT), flags=cv2.INTER_LINEAR)
@@ -52,7 +54,7 @@ def test_a_pan_with_tilt_and_roll_is_found(panorama):
 
 
 @pytest.mark.parametrize("ratio", [0.85, 1.2])
-def test_a_pan_is_right_once_the_focal_length_is_known(panorama, ratio):
+def test_a_pan_is_accurate_once_the_focal_length_is_known(panorama, ratio):
     s = np.linspace(0, 1, 60)[:, None]
     truth = exp(np.concatenate([0.05 * np.sin(3 * s), 0.5 * s, 0.05 * s], axis=1))
     wrong = Camera(pinhole(WIDTH, HEIGHT, ratio * FOCAL), np.zeros(5), "assumed", 0.25)
@@ -60,7 +62,7 @@ def test_a_pan_is_right_once_the_focal_length_is_known(panorama, ratio):
     assert angle_deg(found.R_first_camera, truth).max() < 1.0  # 4 to 6 degrees without
 
 
-def test_a_camera_on_a_stand_is_static_in_spite_of_noise_and_of_somebody_who_walks_through(panorama):
+def test_a_camera_on_a_tripod_is_static_despite_noise_and_a_passer_by(panorama):
     rng = np.random.default_rng(1)
     still = view(panorama, np.eye(3))
     walker = rng.integers(0, 255, (300, 120, 3), np.uint8)
@@ -77,8 +79,8 @@ def test_a_camera_on_a_stand_is_static_in_spite_of_noise_and_of_somebody_who_wal
     assert found.is_static, found.largest_turn_deg
 
 
-def test_something_large_that_moves_does_not_take_the_background_with_it(panorama):
-    """A third of the picture moves against the pan, and nobody said that it is a person."""
+def test_a_large_moving_object_does_not_disturb_the_estimate(panorama):
+    """A third of the picture moves against the pan, and is not marked as a person."""
     T = 45
     truth = exp(np.linspace(0, 0.25, T)[:, None] * [0.0, 1.0, 0.0])
     rng = np.random.default_rng(2)
@@ -93,7 +95,7 @@ def test_something_large_that_moves_does_not_take_the_background_with_it(panoram
     assert angle_deg(found.R_first_camera, truth).max() < 0.4
 
 
-def test_nothing_to_see_is_static_and_said_to_be_unknown():
+def test_a_blank_picture_is_static_and_unknown():
     found = follow(np.full((HEIGHT, WIDTH, 3), 90, np.uint8) for _ in range(10))
     assert found.is_static
     np.testing.assert_array_equal(found.R_first_camera, np.tile(np.eye(3), (10, 1, 1)))
@@ -101,7 +103,7 @@ def test_nothing_to_see_is_static_and_said_to_be_unknown():
 
 
 @pytest.mark.parametrize(("width", "height"), [(2000, 2), (2, 2000), (9000, 4), (1, 1)])
-def test_the_narrowest_pictures_tell_nothing(width, height):
+def test_the_narrowest_pictures_are_unknown(width, height):
     camera = Camera(pinhole(width, height, 1000.0), np.zeros(5), "given")
     tracker = BackgroundTracker(camera, width, height)
     for k in range(3):
@@ -109,7 +111,7 @@ def test_the_narrowest_pictures_tell_nothing(width, height):
     assert tracker.motion(camera).is_static
 
 
-def test_a_moment_without_sight_is_bridged(panorama):
+def test_a_short_blackout_is_bridged(panorama):
     T = 60
     truth = exp(np.linspace(0, 0.3, T)[:, None] * [0.0, 1.0, 0.0])
 
@@ -118,12 +120,12 @@ def test_a_moment_without_sight_is_bridged(panorama):
 
     found = follow(picture(k) for k in range(T))
     assert not found.is_static
-    # what the camera did in the dark is lost, not more
+    # only the rotation during the blackout is lost
     lost = angle_deg(truth[28:29], truth[36:37])[0]
     assert angle_deg(found.R_first_camera, truth).max() < lost + 0.4
 
 
-def test_most_directions_decide():
+def test_the_majority_of_directions_decides():
     rng = np.random.default_rng(3)
     a = rng.standard_normal((60, 3))
     a /= np.linalg.norm(a, axis=1, keepdims=True)

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Turning without drift: edges of a hall seen by a camera whose turns are known, and a runner who runs straight on."""
+"""Heading drift: the edges of a hall seen by a camera of known rotation, and a runner on a straight path."""
 
 import numpy as np
 import pytest
-from scope.scope_addon.capture.camera.heading_drift import Look, without_drift
+from scope.scope_addon.capture.camera.heading_drift import FrameEdges, remove_heading_drift
 from scope.scope_addon.capture.camera.intrinsics import Camera, pinhole
 from scope.scope_addon.capture.camera.line_segments import Segments
 from scope.scope_addon.capture.options import CaptureOptions
@@ -34,7 +34,7 @@ def seen(rng, ends, R_camera_hall, center, noise_px=0.5):
 
 
 def run(clutter, directions=None):
-    """Errors in degrees before and after, of a camera that pans, travels, and is thought to turn more."""
+    """Errors in degrees before and after, of a camera that pans and travels, and whose rotation is overestimated."""
     rng = np.random.default_rng(3)
     T = 150
     times = np.arange(T) / 25
@@ -44,17 +44,17 @@ def run(clutter, directions=None):
     drifted = exp(s * [0.01, 0.4, 0.02]) @ truth
     ends = edges(rng, np.eye(3) if directions is None else directions)
     ends = np.concatenate([ends, edges(rng, rng.standard_normal((clutter, 3)), 1)]) if clutter else ends
-    looks = [
-        Look(k, seen(rng, ends, truth[k].T @ hall, np.array([4.0 * k / T, 0, 0]))) for k in (0, *range(12, T, 12))
+    edge_frames = [
+        FrameEdges(k, seen(rng, ends, truth[k].T @ hall, np.array([4.0 * k / T, 0, 0]))) for k in (0, *range(12, T, 12))
     ]
-    found = without_drift(drifted, times, looks, CAMERA, WIDTH, HEIGHT)
+    found = remove_heading_drift(drifted, times, edge_frames, CAMERA, (WIDTH, HEIGHT))
     error = [np.degrees(np.linalg.norm(log(np.swapaxes(truth, 1, 2) @ R), axis=1)).max() for R in (drifted, found)]
     np.testing.assert_allclose(found[0], np.eye(3), atol=1e-9)
     return error, found, drifted
 
 
 @pytest.mark.parametrize("clutter", [0, 25])
-def test_edges_at_right_angles_take_the_drift_out(clutter):
+def test_orthogonal_edges_remove_the_drift(clutter):
     (before, after), *_ = run(clutter)
     assert before > 20
     assert after < 1.6
@@ -66,23 +66,23 @@ def test_edges_in_any_direction_change_nothing():
     assert found is drifted
 
 
-def test_few_looks_change_nothing():
+def test_few_frames_with_edges_change_nothing():
     R = exp(np.linspace(0, 0.3, 10)[:, None] * [0, 1.0, 0])
     times = np.arange(10) / 25
-    assert without_drift(R, times, [], CAMERA, WIDTH, HEIGHT) is R
-    none = [Look(k, Segments.none()) for k in (0, 4, 8)]
-    assert without_drift(R, times, none, CAMERA, WIDTH, HEIGHT) is R
+    assert remove_heading_drift(R, times, [], CAMERA, (WIDTH, HEIGHT)) is R
+    none = [FrameEdges(k, Segments.none()) for k in (0, 4, 8)]
+    assert remove_heading_drift(R, times, none, CAMERA, (WIDTH, HEIGHT)) is R
 
 
-def test_a_runner_beside_whom_the_camera_runs_goes_straight_on(shared):
+def test_a_runner_alongside_the_camera_stays_on_a_straight_path(shared):
     clip = shared / "data/clips/run_moving_camera.mp4"
     motion = capture(clip, load_body("scope"), CaptureOptions(quality="fast")).motions[0]
     facing = exp(motion.poses[:, :3].astype(float))[:, :2, 2]
     angle = np.degrees(np.unwrap(np.arctan2(facing[:, 1], facing[:, 0])))
-    stride = np.ones(22) / 22  # two steps: the pelvis turns to and fro
+    stride = np.ones(22) / 22  # two steps, in which the pelvis rotates to and fro
     assert np.ptp(np.convolve(angle, stride, "valid")) < 12
-    way = motion.trans[:, :2] - motion.trans[0, :2]
-    along = way[-1] / np.linalg.norm(way[-1])
-    across = way @ [-along[1], along[0]]
-    assert np.linalg.norm(way[-1]) > 3
+    path = motion.trans[:, :2] - motion.trans[0, :2]
+    along = path[-1] / np.linalg.norm(path[-1])
+    across = path @ [-along[1], along[0]]
+    assert np.linalg.norm(path[-1]) > 3
     assert np.abs(np.convolve(across, stride, "valid")).max() < 0.35

@@ -19,7 +19,7 @@ def test_focal_mm_is_35_mm_equivalent():
     assert np.isclose(choose_camera(1800, 1000, focal_mm=36).intrinsics[0, 0], 1800)
 
 
-def test_metadata_counts_only_without_the_users_word():
+def test_metadata_counts_only_without_the_users_value():
     assert np.isclose(choose_camera(3600, 2000, metadata_focal_mm=26).intrinsics[0, 0], 2600)
     assert np.isclose(choose_camera(3600, 2000, metadata_focal_mm=26, focal_mm=50).intrinsics[0, 0], 5000)
     assert "assumed" in choose_camera(640, 480).source
@@ -33,8 +33,8 @@ def test_contradictory_or_impossible_values_are_refused(options):
         choose_camera(640, 480, **options)
 
 
-def test_a_lens_that_distorts_before_a_black_picture_and_a_bare_wall():
-    """Neither has corners or edges: no points are undistorted to none, and nothing is said of how the camera turns."""
+def test_a_distorting_lens_and_a_background_without_features():
+    """A black picture and a bare wall have no corners or edges: the camera is static."""
     camera = Camera(pinhole(320, 240, 300.0), np.array([-0.2, 0.05, 0.0, 0.0, 0.0]), "calibration")
     assert camera.rays(np.zeros((0, 2))).shape == (0, 3)
     background = BackgroundTracker(camera, 320, 240)

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Up by upright and level edges: drawn rooms whose camera is known, and real pictures whose true up is."""
+"""Up from vertical and horizontal edges: drawn rooms with a known camera, and real pictures with known up."""
 
 import cv2
 import numpy as np
 import pytest
 from scope.scope_addon.capture.camera.intrinsics import Camera, choose_camera, pinhole
 from scope.scope_addon.capture.camera.line_segments import Lines, Segments, find_segments
-from scope.scope_addon.capture.camera.verticals import told_by_lines
+from scope.scope_addon.capture.camera.verticals import estimate_up_from_lines
 from scope.scope_addon.capture.world.world_frame import upright
 from scope.solver.rotations import exp
 
@@ -17,7 +17,7 @@ LEVEL_UP = np.array([0.0, -1.0, 0.0])
 
 
 def room(R_camera_level, posts=14, clutter=0, seed=0, across=10, tiles=0):
-    """A picture of posts, of level edges across it, of a tiled floor, and clutter, by a camera turned from level."""
+    """A picture of posts, horizontal edges, a tiled floor and clutter, seen by a rotated camera."""
     rng = np.random.default_rng(seed)
     picture = np.full((HEIGHT, WIDTH, 3), 120, np.uint8)
 
@@ -49,35 +49,35 @@ def angle_deg(a, b):
 
 
 @pytest.mark.parametrize("turn", [[0, 0, 0], [0.25, 0, 0.0], [-0.15, 0.3, 0.2], [0.3, -0.5, -0.25]])
-def test_posts_correct_a_body_that_leans(turn):
+def test_posts_correct_a_leaning_body(turn):
     R = exp(turn)
     truth = R @ LEVEL_UP
     lines = find_segments(room(R, clutter=25), []).lines(CAMERA)
     leaning = exp([0.12, 0.0, 0.15]) @ truth
-    found = told_by_lines(lines, leaning).up
+    found = estimate_up_from_lines(lines, leaning).up
     assert angle_deg(leaning, truth) > 9
     assert angle_deg(found, truth) < 1.0
 
 
 @pytest.mark.parametrize("turn", [[0, 0, 0], [0.25, 0, 0.0], [-0.1, 0.3, 0.2], [0.2, -0.5, -0.2]])
-def test_a_tiled_floor_tells_up_without_anything_upright(turn):
+def test_a_tiled_floor_determines_up_without_vertical_edges(turn):
     R = exp(turn)
     truth = R @ LEVEL_UP
     picture = room(R, posts=0, across=0, tiles=8, clutter=10)
     leaning = exp([0.12, 0.0, 0.15]) @ truth
-    assert angle_deg(told_by_lines(find_segments(picture, []).lines(CAMERA), leaning).up, truth) < 1.0
+    assert angle_deg(estimate_up_from_lines(find_segments(picture, []).lines(CAMERA), leaning).up, truth) < 1.0
 
 
 def test_a_body_that_leans_by_thirty_degrees_is_corrected():
-    """As bodies seem to before a camera that looks down steeply."""
+    """Bodies appear to lean when the camera looks down steeply."""
     truth = LEVEL_UP
     lines = find_segments(room(np.eye(3), tiles=4), []).lines(CAMERA)
-    assert angle_deg(told_by_lines(lines, exp([np.radians(30), 0.0, 0.0]) @ truth).up, truth) < 1.0
+    assert angle_deg(estimate_up_from_lines(lines, exp([np.radians(30), 0.0, 0.0]) @ truth).up, truth) < 1.0
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_a_ramp_beside_a_floor_leaves_open_which_is_level(seed):
-    """Edges across both, and as many along the one as along the other: either alone tells, both together do not."""
+def test_a_ramp_next_to_a_floor_is_ambiguous(seed):
+    """Edges across both, and as many along either: one of them determines up, both together do not."""
     rng = np.random.default_rng(seed)
     up_of = {"floor": LEVEL_UP, "ramp": exp([np.radians(16), 0, 0]) @ LEVEL_UP}
     R = exp([0.0, 0.5, 0.0])
@@ -92,65 +92,67 @@ def test_a_ramp_beside_a_floor_leaves_open_which_is_level(seed):
     along = {name: edges(R @ np.cross(up, [1.0, 0, 0]), 16) for name, up in up_of.items()}
     for name, up in up_of.items():
         normals = np.concatenate([across, along[name]])
-        assert angle_deg(told_by_lines(Lines(normals, np.full(len(normals), 0.1)), R @ between).up, R @ up) < 1.0
+        assert (
+            angle_deg(estimate_up_from_lines(Lines(normals, np.full(len(normals), 0.1)), R @ between).up, R @ up) < 1.0
+        )
     normals = np.concatenate([across, *along.values()])
-    assert told_by_lines(Lines(normals, np.full(len(normals), 0.1)), R @ between).up is None
+    assert estimate_up_from_lines(Lines(normals, np.full(len(normals), 0.1)), R @ between).up is None
 
 
 @pytest.mark.parametrize("turn", [[0, 0, 0.12], [-0.1, 0.1, -0.1]])
-def test_a_fence_tells_what_is_level_though_not_what_is_up(turn):
+def test_a_fence_determines_a_horizontal_direction_but_not_up(turn):
     R = exp(turn)
     lines = find_segments(room(R, posts=0, clutter=10), []).lines(CAMERA)
     leaning = exp([0.1, 0.0, 0.15]) @ R @ LEVEL_UP
-    assert told_by_lines(lines, leaning).up is None
-    assert abs(90 - angle_deg(told_by_lines(lines, leaning).level, R @ LEVEL_UP)) < 0.5
+    assert estimate_up_from_lines(lines, leaning).up is None
+    assert abs(90 - angle_deg(estimate_up_from_lines(lines, leaning).level, R @ LEVEL_UP)) < 0.5
     feet = np.zeros((5, 4, 3))
     off_deg = angle_deg(upright(leaning, feet, lines), R @ LEVEL_UP)
     assert off_deg < 0.8 * angle_deg(leaning, R @ LEVEL_UP)
-    assert off_deg == pytest.approx(np.degrees(0.1), abs=1.2)  # the pitch, which no edge tells, stays
+    assert off_deg == pytest.approx(np.degrees(0.1), abs=1.2)  # the pitch, which no edge determines, remains
 
 
-def test_a_banister_is_not_level():
+def test_a_banister_is_not_horizontal():
     R = exp([0.0, 0.0, 0.5])  # of the edges, not of the camera
-    assert told_by_lines(find_segments(room(R, posts=0), []).lines(CAMERA), LEVEL_UP).level is None
+    assert estimate_up_from_lines(find_segments(room(R, posts=0), []).lines(CAMERA), LEVEL_UP).level is None
 
 
-def test_few_posts_are_believed_where_level_edges_agree():
+def test_few_posts_are_enough_where_horizontal_edges_agree():
     R = exp([0.2, 0.1, 0.1])
     lines = find_segments(room(R, posts=3, across=12, tiles=4), []).lines(CAMERA)
     truth = R @ LEVEL_UP
-    assert angle_deg(told_by_lines(lines, exp([0.15, 0.0, 0.1]) @ truth).up, truth) < 1.0
+    assert angle_deg(estimate_up_from_lines(lines, exp([0.15, 0.0, 0.1]) @ truth).up, truth) < 1.0
 
 
 @pytest.mark.parametrize("count", [12, 60, 200])
 @pytest.mark.parametrize("seed", range(4))
-def test_lines_at_random_say_nothing(count, seed):
+def test_random_lines_determine_nothing(count, seed):
     rng = np.random.default_rng(seed)
     middle, angle = rng.uniform([0, 0], [WIDTH, HEIGHT], (count, 2)), rng.uniform(0, np.pi, count)
     lengths = np.sort(0.03 + rng.exponential(0.08, count))[::-1]
     half = 0.5 * WIDTH * lengths[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
     lines = Segments(np.stack([middle - half, middle + half], axis=1), lengths).lines(CAMERA)
-    assert told_by_lines(lines, LEVEL_UP).up is None
-    assert told_by_lines(lines, LEVEL_UP).level is None
+    assert estimate_up_from_lines(lines, LEVEL_UP).up is None
+    assert estimate_up_from_lines(lines, LEVEL_UP).level is None
 
 
-def test_a_picture_without_anything_upright_says_nothing():
-    assert told_by_lines(Lines.none(), LEVEL_UP).up is None
+def test_a_picture_without_vertical_edges_determines_nothing():
+    assert estimate_up_from_lines(Lines.none(), LEVEL_UP).up is None
     blank = np.full((HEIGHT, WIDTH, 3), 90, np.uint8)
-    assert told_by_lines(find_segments(blank, []).lines(CAMERA), LEVEL_UP).up is None
-    level_edges_alone = room(np.eye(3), posts=0)
-    assert told_by_lines(find_segments(level_edges_alone, []).lines(CAMERA), LEVEL_UP).up is None
+    assert estimate_up_from_lines(find_segments(blank, []).lines(CAMERA), LEVEL_UP).up is None
+    horizontal_edges_only = room(np.eye(3), posts=0)
+    assert estimate_up_from_lines(find_segments(horizontal_edges_only, []).lines(CAMERA), LEVEL_UP).up is None
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_leaves_and_rubbish_do_not_turn_the_world(seed):
+def test_leaves_and_rubbish_do_not_tilt_the_world(seed):
     rubbish = room(np.eye(3), posts=0, clutter=60, seed=seed)
-    told = told_by_lines(find_segments(rubbish, []).lines(CAMERA), LEVEL_UP)
-    assert told.up is None
-    assert angle_deg(told.level, LEVEL_UP) == pytest.approx(90, abs=0.2)  # the level edges among it
+    estimate = estimate_up_from_lines(find_segments(rubbish, []).lines(CAMERA), LEVEL_UP)
+    assert estimate.up is None
+    assert angle_deg(estimate.level, LEVEL_UP) == pytest.approx(90, abs=0.2)  # the level edges among it
 
 
-def test_the_lines_of_people_do_not_count():
+def test_lines_on_people_are_left_out():
     picture = room(np.eye(3), posts=0)
     for k in range(12):
         cv2.line(picture, (600 + 8 * k, 200), (500 + 8 * k, 520), (0, 0, 0), 3)  # somebody's striped coat
@@ -158,23 +160,23 @@ def test_the_lines_of_people_do_not_count():
     assert len(find_segments(picture, []).lengths) > len(find_segments(picture, [box]).lengths) + 5
 
 
-def test_lines_turn_with_their_axes():
+def test_the_estimate_rotates_with_the_axes():
     R = exp([0.1, 0.4, -0.2])
     lines = find_segments(room(np.eye(3)), []).lines(CAMERA)
-    turned = told_by_lines(lines.turned(R), R @ LEVEL_UP).up
-    np.testing.assert_allclose(turned, R @ told_by_lines(lines, LEVEL_UP).up, atol=1e-6)
+    rotated = estimate_up_from_lines(lines.rotated(R), R @ LEVEL_UP).up
+    np.testing.assert_allclose(rotated, R @ estimate_up_from_lines(lines, LEVEL_UP).up, atol=1e-6)
 
 
 @pytest.mark.parametrize("number", [1, 2, 3, 4])
-def test_real_cameras_that_are_rolled_and_pitched(shared, number):
-    """Four pictures of a laboratory; their truth says which way is up."""
+def test_real_cameras_with_roll_and_pitch(shared, number):
+    """Four pictures of a laboratory with known up directions."""
     folder = shared / "data" / "pose2sim"
     ok, picture = cv2.VideoCapture(str(folder / f"cam{number}.mp4")).read()
     assert ok
     truth = np.load(folder / f"truth_cam{number}.npz")["up"]
-    camera = choose_camera(picture.shape[1], picture.shape[0])  # the focal length is not known
+    camera = choose_camera(picture.shape[1], picture.shape[0])  # the focal length is unknown
     lines = find_segments(cv2.cvtColor(picture, cv2.COLOR_BGR2RGB), []).lines(camera)
     rng = np.random.default_rng(number)
     for _ in range(3):
         leaning = exp(np.radians(7) * rng.standard_normal(3)) @ truth
-        assert angle_deg(told_by_lines(lines, leaning).up, truth) < 2.0
+        assert angle_deg(estimate_up_from_lines(lines, leaning).up, truth) < 2.0

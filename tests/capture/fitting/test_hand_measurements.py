@@ -24,7 +24,7 @@ from scope.scope_addon.capture.perception.hand_landmarks import HAND_POINTS
 from scope.scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES
 from scope.scope_addon.capture.perception.observation import Observation
 from scope.scope_addon.capture.perception.region import Region
-from scope.scope_addon.capture.tracking.left_right import SWAPPED, repair_left_right
+from scope.scope_addon.capture.tracking.left_right import MIRROR_PARTNER, repair_left_right
 from scope.scope_addon.capture.tracking.track import Tracklet, make_track
 from scope.scope_addon.errors import UsageError
 from scope.solver import State, default_priors, fit, load_body
@@ -240,8 +240,9 @@ def test_tracks_keep_hands_in_their_rows_and_exchange_them_with_left_and_right()
     assert [track.hands[k, 0].max() for k in range(3)] == [0, 1, 2]
     assert track.hands.dtype == np.float32  # an hour of one person's take 110 MB
     assert make_track([0], [0.0], [Tracklet()]).hands is None
-    # the strong network says of both frames that left and right are exchanged
-    judged = replace(track, judged_rows=np.array([1, 2]), judged_landmarks=track.world_landmarks[[1, 2]][:, SWAPPED])
+    # the reference network has left and right swapped in both frames
+    landmarks = track.world_landmarks[[1, 2]][:, MIRROR_PARTNER]
+    judged = replace(track, reference_rows=np.array([1, 2]), reference_landmarks=landmarks)
     repaired = repair_left_right(judged, choose_camera(640, 480))
     assert repaired.hands[1, 1].max() == 1
     assert repaired.hands[1, 0].max() == 0

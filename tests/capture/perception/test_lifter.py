@@ -16,7 +16,7 @@ from scope.scope_addon.capture.perception.lifter import (
 )
 from scope.scope_addon.capture.perception.lifter_window import windows_around
 from scope.scope_addon.capture.perception.person_detector import PersonDetector
-from scope.scope_addon.capture.tracking.left_right import SWAPPED
+from scope.scope_addon.capture.tracking.left_right import MIRROR_PARTNER
 from scope.scope_addon.errors import SetupError
 from scope.solver.errors import ModelFileError, ShapeError
 from scope.solver.rotations import exp
@@ -201,8 +201,8 @@ def test_the_mirror_image_is_lifted_to_the_mirror_image(lifter, people):
     people, rays = people
     ones = np.ones(people.shape[:2])
     plain = lifter.lift(rays, ones, None).points
-    mirrored = lifter.lift(rays[:, SWAPPED] * [-1, 1], ones, None).points
-    assert np.linalg.norm(mirrored - plain[:, SWAPPED] * [-1, 1, 1], axis=-1).mean() < 0.05
+    mirrored = lifter.lift(rays[:, MIRROR_PARTNER] * [-1, 1], ones, None).points
+    assert np.linalg.norm(mirrored - plain[:, MIRROR_PARTNER] * [-1, 1, 1], axis=-1).mean() < 0.05
 
 
 def test_the_virtual_camera_looks_at_the_person_and_stands_upright():

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hands followed through real footage, and with invented networks: lost and found, strangers, two on one hand."""
+"""Hands in real footage, and with fake networks: lost and found, of another person, of both sides at once."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ IMAGE = np.zeros((1000, 1000, 3), np.uint8)
 
 
 def hand_at(wrist, left=0.95, presence=0.95):
-    """An upright hand as the network would say it."""
+    """An upright hand as the network would report it."""
     points = np.array([[0.0, 0.0], *([x, y] for x in (-0.25, -0.12, 0, 0.12, 0.24) for y in (-0.5, -0.65, -0.8, -1))])
     region = Region((wrist[0], wrist[1] - LENGTH / 2), 2 * LENGTH, 0.0)
     world = np.pad(points * HAND_LENGTH_M, ((0, 0), (0, 1)))
@@ -46,13 +46,13 @@ def person(left_wrist=(300, 500), right_wrist=(700, 500)):
 
 
 class FakeHands:
-    """Sees the hand whose middle is nearest to the region's, if it lies inside; nothing else."""
+    """Sees only the hand whose centre is nearest to the region's, if it is inside."""
 
     def __init__(self, hands):
-        self.hands, self.looks = hands, 0
+        self.hands, self.calls = hands, 0
 
     def estimate(self, _image, region):
-        self.looks += 1
+        self.calls += 1
         inside = [h for h in self.hands if np.hypot(*(h.keypoints_px[9] - region.center_px)) < region.side_px / 3]
         if not inside:
             return hand_at(region.center_px, presence=0.0)
@@ -61,10 +61,10 @@ class FakeHands:
 
 class FakePalms:
     def __init__(self, hands):
-        self.hands, self.looks = hands, 0
+        self.hands, self.calls = hands, 0
 
     def detect(self, _image, where):
-        self.looks += 1
+        self.calls += 1
         near = [h for h in self.hands if np.hypot(*(h.keypoints_px[9] - where.center_px)) < where.side_px / 2]
         return [Palm(0.9, h.region) for h in near]
 
@@ -86,19 +86,19 @@ def seen(tracker, observation):
     return found.hands[:, 0, 2] > 0
 
 
-def test_each_hand_goes_to_its_own_side_and_then_needs_one_look_a_frame(follow):
+def test_each_hand_goes_to_its_own_side_and_then_needs_one_call_per_frame(follow):
     left, right = hand_at((300, 500)), hand_at((700, 500), left=0.05)
     tracker = follow([left, right])
     (_, found), *_ = tracker.step(IMAGE, [(0, person())])
     assert np.array_equal(found.hands[0, :, :2], left.keypoints_px)
     assert np.array_equal(found.hands[1, :, :2], right.keypoints_px)
-    palms, looks = tracker._palms.looks, tracker._network.looks
+    palms, calls = tracker._palms.calls, tracker._network.calls
     assert seen(tracker, person()).all()
-    assert tracker._palms.looks == palms
-    assert tracker._network.looks == looks + 2
+    assert tracker._palms.calls == palms
+    assert tracker._network.calls == calls + 2
 
 
-def test_a_hand_is_found_again_after_it_was_gone_and_zeros_stand_for_it_meanwhile(follow):
+def test_a_hand_is_found_again_and_zeros_mark_the_frames_without_it(follow):
     hands = [hand_at((300, 500))]
     tracker = follow(hands)
     assert list(seen(tracker, person())) == [True, False]
@@ -112,34 +112,34 @@ def test_a_hand_is_found_again_after_it_was_gone_and_zeros_stand_for_it_meanwhil
 
 
 @pytest.mark.parametrize("rate", [12, 30, 60])
-def test_a_hand_that_stays_away_is_looked_for_as_often_at_any_frame_rate(follow, rate):
-    """In every frame for a third of a second, then six to eight times a second, each hand."""
+def test_a_missing_hand_is_searched_equally_often_at_any_frame_rate(follow, rate):
+    """Each hand in every frame for a third of a second, then six to eight times per second."""
     tracker = follow([])
-    looks = []
+    calls = []
     for k in range(3 * rate):
         tracker.step(IMAGE, [(0, person())], k / rate)
-        looks.append(tracker._palms.looks)
-    assert looks[rate // 3] == 2 * (rate // 3 + 1)
-    assert 22 <= looks[3 * rate - 1] - looks[rate - 1] <= 32  # in two seconds, both hands
+        calls.append(tracker._palms.calls)
+    assert calls[rate // 3] == 2 * (rate // 3 + 1)
+    assert 22 <= calls[3 * rate - 1] - calls[rate - 1] <= 32  # in two seconds, both hands
 
 
-def test_a_hand_far_from_the_bodys_wrist_is_let_go(follow):
+def test_a_hand_far_from_the_bodys_wrist_is_dropped(follow):
     tracker = follow([hand_at((300, 500))])
     assert seen(tracker, person())[0]
     assert not seen(tracker, person(left_wrist=(300, 900)))[0]
 
 
-def test_a_hand_of_the_other_side_is_not_taken(follow):
+def test_a_hand_of_the_other_side_is_rejected(follow):
     assert not seen(follow([hand_at((300, 500), left=0.02)]), person())[0]
 
 
-def test_one_hand_is_not_given_to_both_sides(follow):
+def test_one_hand_is_not_assigned_to_both_sides(follow):
     tracker = follow([hand_at((500, 500), left=0.5)])
     assert list(seen(tracker, person(left_wrist=(495, 500), right_wrist=(540, 500)))) == [True, False]
 
 
-def test_hands_are_found_in_most_frames_of_somebody_who_gestures(frames):
-    """Small ones: some 25 pixels. In the first second they hang edge-on; from the second on they are raised."""
+def test_hands_are_found_in_most_frames_of_a_gesturing_person(frames):
+    """They measure some 25 pixels. In the first second they hang down edge-on, afterwards they are raised."""
     people, hands = PeopleTracker("fast", 1), HandTracker(1)
     found, apart = [], []
     for image in frames("clips/gesture_square", stop=72):
@@ -152,13 +152,13 @@ def test_hands_are_found_in_most_frames_of_somebody_who_gestures(frames):
     assert np.median(apart) < 10  # pixels, between the body's and the hand's wrist
 
 
-def test_nothing_is_made_up_where_nobody_is():
+def test_no_hands_without_people():
     tracker = HandTracker(1)
     assert tracker.step(IMAGE, []) == []
     assert not seen(tracker, person()).any()
 
 
-def test_a_hand_that_contradicts_itself_is_imagined(follow):
+def test_an_inconsistent_hand_is_rejected(follow):
     hand = hand_at((300, 500))
     hand.world_landmarks[:] = hand.world_landmarks[:, [1, 0, 2]]
     assert hand.disagreement > 0.5
@@ -167,7 +167,7 @@ def test_a_hand_that_contradicts_itself_is_imagined(follow):
 
 
 def test_a_capture_with_hands_from_file_to_motion(shared):
-    """Fingers near the keypoints in the image, and everything of the motion in step with each other."""
+    """Fingers are near the keypoints in the image, and all arrays of the motion are consistent."""
     body = load_body("scope_h")
     wanted = VideoRange(1.4, 2.0, None)
     options = CaptureOptions(quality="fast", hands=True, threads=1, smoothing=False, wanted=wanted)

@@ -1,20 +1,25 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Leaps that nobody can make are mended; what a body can do, noise, and what was not seen are left alone."""
+"""Impossible jumps are repaired; possible motion, noise and unseen frames are left alone."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 from scope.scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES
-from scope.scope_addon.capture.tracking.keypoint_jumps import CONFIDENCE, find_leaps, mend_leaps, metre_px
+from scope.scope_addon.capture.tracking.keypoint_jumps import (
+    CONFIDENCE,
+    find_keypoint_jumps,
+    repair_keypoint_jumps,
+    scale_px_per_m,
+)
 from scope.scope_addon.capture.tracking.track import Track
 
 WRIST, ANKLE = KEYPOINT_NAMES.index("left_wrist"), KEYPOINT_NAMES.index("right_ankle")
-PX = 400.0  # a metre
+PX = 400.0  # per metre
 
 
 def standing(count: int, rate: float) -> Track:
-    """Somebody whose left wrist swings by 0.4 m, 1.5 times a second, with a detector's noise."""
+    """A person whose left wrist swings by 0.4 m, 1.5 times per second, with a detector's noise."""
     rng = np.random.default_rng(1)
     heights = {"shoulder": -0.5, "elbow": -0.3, "wrist": -0.1, "hip": 0.0, "knee": 0.45, "ankle": 0.9}
     body = np.array([[0.2 if "left" in n else -0.2, 0.0, 0.0] for n in KEYPOINT_NAMES])
@@ -35,30 +40,30 @@ def standing(count: int, rate: float) -> Track:
 
 @pytest.mark.parametrize("rate", [25.0, 30.0, 60.0, 120.0])
 @pytest.mark.parametrize("frames", [1, 2])
-def test_a_leap_goes_back_onto_its_way(rate: float, frames: int) -> None:
+def test_a_jump_is_moved_back_onto_the_path(rate: float, frames: int) -> None:
     track = standing(90, rate)
     right, off = track.keypoints_px.copy(), slice(40, 40 + frames)
     track.keypoints_px[off, ANKLE] += [0.6 * PX, 0.0]
-    mended = mend_leaps(track)
-    np.testing.assert_allclose(mended.keypoints_px[off, ANKLE], right[off, ANKLE], atol=0.03 * PX)
-    np.testing.assert_allclose(mended.confidence[off, ANKLE], 0.9 * CONFIDENCE, rtol=1e-5)
+    repaired = repair_keypoint_jumps(track)
+    np.testing.assert_allclose(repaired.keypoints_px[off, ANKLE], right[off, ANKLE], atol=0.03 * PX)
+    np.testing.assert_allclose(repaired.confidence[off, ANKLE], 0.9 * CONFIDENCE, rtol=1e-5)
     others = np.arange(33) != ANKLE
-    np.testing.assert_array_equal(mended.keypoints_px[:, others], right[:, others])
-    assert (mended.confidence[:, others] == track.confidence[:, others]).all()
-    assert mended.keypoints_px.dtype == mended.confidence.dtype == np.float32
+    np.testing.assert_array_equal(repaired.keypoints_px[:, others], right[:, others])
+    assert (repaired.confidence[:, others] == track.confidence[:, others]).all()
+    assert repaired.keypoints_px.dtype == repaired.confidence.dtype == np.float32
 
 
-def test_depth_leaps_alone() -> None:
+def test_a_jump_in_depth_alone() -> None:
     track = standing(90, 60.0)
     track.world_landmarks[50, WRIST, 2] += 0.5
-    mended = mend_leaps(track)
-    assert abs(mended.world_landmarks[50, WRIST, 2]) < 0.05
-    np.testing.assert_array_equal(mended.keypoints_px, track.keypoints_px)
-    np.testing.assert_array_equal(mended.confidence, track.confidence)
+    repaired = repair_keypoint_jumps(track)
+    assert abs(repaired.world_landmarks[50, WRIST, 2]) < 0.05
+    np.testing.assert_array_equal(repaired.keypoints_px, track.keypoints_px)
+    np.testing.assert_array_equal(repaired.confidence, track.confidence)
 
 
 @pytest.mark.parametrize("rate", [6.0, 15.0, 30.0, 60.0])
-def test_what_a_body_can_do_is_left_alone(rate: float) -> None:
+def test_possible_motion_is_left_alone(rate: float) -> None:
     """A swing, a punch of 0.5 m to and fro in 0.25 s (some 130 m/s2), a step of 0.6 m in 0.15 s."""
     track = standing(120, rate)
     time = track.times
@@ -66,26 +71,26 @@ def test_what_a_body_can_do_is_left_alone(rate: float) -> None:
     for values, metre in ((track.keypoints_px, PX), (track.world_landmarks, 1.0)):
         values[:, WRIST, 1] += metre * punch
         values[:, ANKLE, 0] += metre * 0.3 * (1 - np.cos(np.pi * np.clip((time - 1.6) / 0.15, 0, 1)))
-    assert mend_leaps(track) is track
+    assert repair_keypoint_jumps(track) is track
 
 
 @pytest.mark.parametrize("rate", [1.0, 30.0, 240.0])
-def test_who_crouches_for_a_moment_does_not_shrink(rate: float) -> None:
+def test_a_short_crouch_does_not_change_the_scale(rate: float) -> None:
     track = standing(max(2, int(4 * rate)), rate)
-    usual = metre_px(track)
+    usual = scale_px_per_m(track)
     crouches = np.abs(track.times - 2.0) < 0.4
     middle = track.keypoints_px.mean(axis=1, keepdims=True)
     track.keypoints_px[crouches] = (middle + 0.4 * (track.keypoints_px - middle))[crouches]
-    np.testing.assert_allclose(metre_px(track), usual, rtol=0.05)
+    np.testing.assert_allclose(scale_px_per_m(track), usual, rtol=0.05)
 
 
 def test_gaps_and_ends() -> None:
     points = np.zeros((12, 1, 2))
     points[[0, 5, 11]] = 3.0
     seen = np.ones(12, bool)
-    np.testing.assert_array_equal(np.flatnonzero(find_leaps(points, seen, 1 / 30)[:, 0]), [5])
+    np.testing.assert_array_equal(np.flatnonzero(find_keypoint_jumps(points, seen, 1 / 30)[:, 0]), [5])
     seen[6] = False
-    assert not find_leaps(points, seen, 1 / 30).any()
-    assert not find_leaps(points[:2], seen[:2], 1 / 30).any()
+    assert not find_keypoint_jumps(points, seen, 1 / 30).any()
+    assert not find_keypoint_jumps(points[:2], seen[:2], 1 / 30).any()
     short = standing(2, 30.0)
-    assert mend_leaps(short) is short
+    assert repair_keypoint_jumps(short) is short

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Exchanged left and right are found, and real turns are left alone."""
+"""Left-right swaps are found, and real turns are left alone."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ import pytest
 from scope.scope_addon.capture.camera.intrinsics import Camera, pinhole
 from scope.scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES
 from scope.scope_addon.capture.tracking.left_right import (
-    EXCHANGED,
-    SWAPPED,
-    TURNED,
+    DEPTH_REVERSED,
+    LEFT_RIGHT_SWAPPED,
+    MIRROR_PARTNER,
+    apply_labels,
     find_labels,
-    labelled,
     repair_left_right,
 )
 from scope.scope_addon.capture.tracking.track import Track
@@ -33,55 +33,55 @@ def walker(count: int, turn_rad: float = 0.0) -> np.ndarray:
     return np.einsum("tij,kj->tki", turns, body) + rng.normal(0, 0.01, (count, 33, 3))
 
 
-def test_partners() -> None:
-    assert SWAPPED[0] == 0
-    assert KEYPOINT_NAMES[SWAPPED[KEYPOINT_NAMES.index("mouth_left")]] == "mouth_right"
-    np.testing.assert_array_equal(SWAPPED[SWAPPED], np.arange(33))
+def test_mirror_partners() -> None:
+    assert MIRROR_PARTNER[0] == 0
+    assert KEYPOINT_NAMES[MIRROR_PARTNER[KEYPOINT_NAMES.index("mouth_left")]] == "mouth_right"
+    np.testing.assert_array_equal(MIRROR_PARTNER[MIRROR_PARTNER], np.arange(33))
 
 
 @pytest.mark.parametrize("turn_rad", [0.0, 2 * np.pi])
 @pytest.mark.parametrize("stretch", [slice(0, 0), slice(20, 21), slice(30, 75), slice(0, 25), slice(90, 120)])
-def test_minority_stretch_is_found(stretch: slice, turn_rad: float) -> None:
+def test_a_swap_of_less_than_half_the_clip_is_found(stretch: slice, turn_rad: float) -> None:
     world = walker(120, turn_rad)
     expected = np.zeros(120, bool)
     expected[stretch] = True
-    world[stretch] = world[stretch][:, SWAPPED]
-    np.testing.assert_array_equal(find_labels(world) == EXCHANGED, expected)
+    world[stretch] = world[stretch][:, MIRROR_PARTNER]
+    np.testing.assert_array_equal(find_labels(world) == LEFT_RIGHT_SWAPPED, expected)
 
 
 def test_gaps_and_new_people() -> None:
     world = walker(60)
     expected = np.zeros(60, bool)
     expected[10:30] = True
-    world[expected] = world[expected][:, SWAPPED]
+    world[expected] = world[expected][:, MIRROR_PARTNER]
     world[28:33] = np.nan
     expected[28:30] = False
-    np.testing.assert_array_equal(find_labels(world) == EXCHANGED, expected)
-    # someone else, seen from behind, for the second half: no exchange
-    other = np.concatenate([walker(40), walker(30)[:, SWAPPED]])
+    np.testing.assert_array_equal(find_labels(world) == LEFT_RIGHT_SWAPPED, expected)
+    # another person, seen from behind, in the second half: no swap
+    other = np.concatenate([walker(40), walker(30)[:, MIRROR_PARTNER]])
     starts = np.arange(70) == 40
     assert not find_labels(other, starts).any()
     assert find_labels(other)[40:].all()
 
 
 @pytest.mark.parametrize("turn_rad", [0.0, np.pi])
-def test_few_judged_frames_overrule_the_majority(turn_rad: float) -> None:
+def test_few_reference_frames_overrule_the_majority(turn_rad: float) -> None:
     right = walker(120, turn_rad)
     expected = np.zeros(120, int)
-    expected[20:100] = EXCHANGED
-    expected[40:60] = TURNED
-    wrong = labelled(right, expected)  # both exchanges undo themselves
-    judged = np.full_like(right, np.nan)
-    judged[::30] = right[::30] + np.random.default_rng(0).normal(0, 0.05, (4, 33, 3))
-    np.testing.assert_array_equal(find_labels(wrong, judged=judged), expected)
-    np.testing.assert_allclose(labelled(wrong, expected), right)
+    expected[20:100] = LEFT_RIGHT_SWAPPED
+    expected[40:60] = DEPTH_REVERSED
+    wrong = apply_labels(right, expected)  # both operations are their own inverse
+    reference = np.full_like(right, np.nan)
+    reference[::30] = right[::30] + np.random.default_rng(0).normal(0, 0.05, (4, 33, 3))
+    np.testing.assert_array_equal(find_labels(wrong, reference=reference), expected)
+    np.testing.assert_allclose(apply_labels(wrong, expected), right)
 
 
 def test_a_track_is_repaired_and_left_alone_where_nobody_was_seen() -> None:
     right = walker(90)
     wrong, seen = right.copy(), np.ones(90, bool)
-    wrong[10:70] = wrong[10:70][:, SWAPPED]
-    wrong[80:85] += [0.0, 0.0, 0.5]  # what the judge sees otherwise
+    wrong[10:70] = wrong[10:70][:, MIRROR_PARTNER]
+    wrong[80:85] += [0.0, 0.0, 0.5]  # the reference differs
     seen[40:44] = False
     rows = np.array([0, 30, 60, 82])
     track = Track(
@@ -92,14 +92,14 @@ def test_a_track_is_repaired_and_left_alone_where_nobody_was_seen() -> None:
         confidence=np.where(seen[:, None], wrong[..., 0], 0),
         world_landmarks=np.where(seen[:, None, None], wrong, 0),
         acquired=np.arange(90) == 0,
-        judged_rows=rows,
-        judged_landmarks=right[rows],
+        reference_rows=rows,
+        reference_landmarks=right[rows],
     )
     repaired = repair_left_right(track, CAMERA)
-    calm = seen & (np.arange(90) < 75)
-    np.testing.assert_allclose(repaired.world_landmarks[calm], right[calm], atol=1e-9)
-    np.testing.assert_allclose(repaired.keypoints_px[calm], right[calm][..., :2])
-    np.testing.assert_allclose(repaired.confidence[calm], right[calm][..., 0])
+    undisturbed = seen & (np.arange(90) < 75)
+    np.testing.assert_allclose(repaired.world_landmarks[undisturbed], right[undisturbed], atol=1e-9)
+    np.testing.assert_allclose(repaired.keypoints_px[undisturbed], right[undisturbed][..., :2])
+    np.testing.assert_allclose(repaired.confidence[undisturbed], right[undisturbed][..., 0])
     np.testing.assert_allclose(repaired.world_landmarks[82], right[82], atol=1e-9)
     assert (np.abs(repaired.world_landmarks - wrong)[81:84, :, 2].mean(axis=1) > 0.3).all()
     assert not repaired.world_landmarks[~seen].any()
@@ -115,28 +115,29 @@ def test_nothing_to_do() -> None:
 HEADINGS = {"front": 0.0, "aslant": 0.8, "side": np.pi / 2, "back": np.pi}
 
 
-# Seen from the side, either reading goes on as steadily where the legs pass each other: only the judge knows.
+# In a side view both readings are equally continuous where the legs pass each other: only the reference decides.
 @pytest.mark.parametrize(
-    ("name", "is_judged"), [*((name, True) for name in HEADINGS), ("front", False), ("aslant", False), ("back", False)]
+    ("name", "has_reference"),
+    [*((name, True) for name in HEADINGS), ("front", False), ("aslant", False), ("back", False)],
 )
-def test_keypoints_without_depth_are_repaired(name: str, is_judged: bool) -> None:
-    """What a user's network exchanged: found by steadiness alone, or for most of the clip, by few judged frames."""
+def test_keypoints_without_depth_are_repaired(name: str, has_reference: bool) -> None:
+    """Swaps by a user's network are found by continuity, or with few reference frames even for most of the clip."""
     right, world = someone_walking(90, 30.0, HEADINGS[name])
-    stretch = slice(8, 85) if is_judged else slice(30, 55)
+    stretch = slice(8, 85) if has_reference else slice(30, 55)
     wrong = right.copy()
-    wrong[stretch] = wrong[stretch][:, SWAPPED]
-    track = track_without_depth(wrong, 30.0, {k: world[k] for k in (5, 35, 65)} if is_judged else {})
+    wrong[stretch] = wrong[stretch][:, MIRROR_PARTNER]
+    track = track_without_depth(wrong, 30.0, {k: world[k] for k in (5, 35, 65)} if has_reference else {})
     repaired = repair_left_right(track, CAMERA)
     off = np.linalg.norm(repaired.keypoints_px - right, axis=-1)[:, 11:29].mean(axis=1)
     assert (off > 1.0).mean() <= 0.01
-    np.testing.assert_array_equal(repaired.confidence[40], track.confidence[40][SWAPPED])
+    np.testing.assert_array_equal(repaired.confidence[40], track.confidence[40][MIRROR_PARTNER])
     assert not repaired.world_landmarks.any()
 
 
 @pytest.mark.parametrize("rate", [30.0, 10.0, 6.0])
 @pytest.mark.parametrize("turn", [0.0, 1.5])
-def test_whoever_walks_and_turns_is_left_alone(rate: float, turn: float) -> None:
-    """At a low rate, exchanged legs are often nearer to those of the frame before, in the picture."""
+def test_walking_and_turning_are_left_alone(rate: float, turn: float) -> None:
+    """At a low rate, swapped legs are often nearer to those of the frame before, in the image."""
     pixels, _ = someone_walking(60, rate, np.pi / 2, turn)
     track = track_without_depth(pixels, rate, {})
     assert repair_left_right(track, CAMERA) is track

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Who is who: invented people who meet, hide, leave and come back, and two real clips moved across each other."""
+"""Identities: synthetic people who meet, hide, leave and return, and two real clips that cross each other."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ import pytest
 from scope.scope_addon.capture.perception.landmark_network import PoseEstimate
 from scope.scope_addon.capture.perception.person_detector import Detection
 from scope.scope_addon.capture.perception.region import Region
-from scope.scope_addon.capture.tracking import tracker as tracker_module
-from scope.scope_addon.capture.tracking.people import PeopleBuilder, trim_flickering_end
+from scope.scope_addon.capture.tracking.landmarks import tracking_networks
+from scope.scope_addon.capture.tracking.people import PeopleBuilder, frames_before_flicker
 from scope.scope_addon.capture.tracking.track import Track, Tracklet
 from scope.scope_addon.capture.tracking.tracker import PeopleTracker
 
@@ -26,11 +26,13 @@ FPS = 30
 
 @pytest.fixture
 def follow(monkeypatch: pytest.MonkeyPatch) -> Callable[..., list[Track]]:
-    """``follow(people, count, wanted=None, fps=30)``: the tracks of the invented people."""
+    """``follow(people, count, wanted=None, fps=30)``: the tracks of the synthetic people."""
 
     def run(people: list[Person], count: int, wanted: int | None = None, fps: float = FPS) -> list[Track]:
-        monkeypatch.setattr(tracker_module, "LandmarkNetwork", lambda name, *_: FakeLandmarks(people, "heavy" in name))
-        monkeypatch.setattr(tracker_module, "PersonDetector", lambda *_: FakeDetector(people))
+        monkeypatch.setattr(
+            tracking_networks, "LandmarkNetwork", lambda name, *_: FakeLandmarks(people, "heavy" in name)
+        )
+        monkeypatch.setattr(tracking_networks, "PersonDetector", lambda *_: FakeDetector(people))
         tracker, builder = PeopleTracker("fast", 1, wanted), PeopleBuilder()
         for t, image in enumerate(pictures(people, count)):
             builder.add(t, t / fps, tracker.step(image, time_s=t / fps))
@@ -39,8 +41,8 @@ def follow(monkeypatch: pytest.MonkeyPatch) -> Callable[..., list[Track]]:
     return run
 
 
-def who(track: Track, people: list[Person]) -> set[int]:
-    """The people whose hips the track's hips were at, in any of its frames."""
+def identities(track: Track, people: list[Person]) -> set[int]:
+    """The indices of the people at whose hips the track's hips are in any frame."""
     out = set()
     for t in np.flatnonzero(track.seen):
         hips = track.keypoints_px[t, [23, 24]].mean(axis=0)
@@ -52,85 +54,87 @@ def who(track: Track, people: list[Person]) -> set[int]:
 
 @pytest.mark.parametrize("colors", [(RED, BLUE), (RED, RED)], ids=["different clothes", "same clothes"])
 @pytest.mark.parametrize("hidden", [0, 10, 20])
-def test_a_crossing(follow: Callable[..., list[Track]], colors: tuple, hidden: int) -> None:
-    """The one behind is hidden for some frames, in which the network sees the one in front in the region of both."""
+def test_identities_survive_a_crossing(follow: Callable[..., list[Track]], colors: tuple, hidden: int) -> None:
+    """The person behind is occluded for some frames, in which the network sees the other one in both regions."""
     meets = 60
     back = Person(lambda t: (200 + 6.0 * t, 200), colors[0], hidden=range(meets - hidden // 2, meets + hidden // 2))
     front = Person(lambda t: (920 - 6.0 * t, 205), colors[1], size_px=110)
     tracks = follow([back, front], 120, wanted=2)
-    assert [who(track, [back, front]) for track in tracks] == [{1}, {0}]
+    assert [identities(track, [back, front]) for track in tracks] == [{1}, {0}]
     assert tracks[0].seen.mean() >= 0.98
-    assert tracks[1].seen.sum() >= 120 - hidden - 22  # not while the two bodies cannot be told apart
+    assert tracks[1].seen.sum() >= 120 - hidden - 22  # not while the two bodies are indistinguishable
 
 
 @pytest.mark.parametrize("count", [2, 8])
 @pytest.mark.parametrize("fps", [1, 2])
-def test_who_is_elsewhere_in_each_frame_at_a_low_rate(follow: Callable[..., list[Track]], fps: int, count: int) -> None:
+def test_a_person_who_is_elsewhere_in_each_frame_is_tracked_at_a_low_rate(
+    follow: Callable[..., list[Track]], fps: int, count: int
+) -> None:
     walks = Person(lambda t: (100 + 90.0 * t, 200), RED)
     (track,) = follow([walks], count, fps=fps)
     assert track.seen.all()
 
 
-def test_a_single_frame_is_not_enough_beside_somebody_who_was_followed(follow: Callable[..., list[Track]]) -> None:
+def test_a_single_frame_is_not_enough_next_to_a_person_who_was_tracked(follow: Callable[..., list[Track]]) -> None:
     stands = Person(lambda t: (300, 200), BLUE)
     flickers = Person(lambda t: (900, 200) if t == 4 else None, RED)
     (track,) = follow([stands, flickers], 8, wanted=3, fps=2)
-    assert who(track, [stands, flickers]) == {0}
+    assert identities(track, [stands, flickers]) == {0}
 
 
-def test_overtaken_by_somebody_just_found(follow: Callable[..., list[Track]]) -> None:
-    """Whom the newcomer hides slides onto them, and is not them because of having been followed for longer."""
+def test_a_newcomer_who_occludes_a_person_does_not_take_the_identity(follow: Callable[..., list[Track]]) -> None:
+    """The occluded target drifts onto the newcomer; that it was tracked for longer must not decide."""
     stands = Person(lambda t: (500, 200), RED, hidden=range(46, 56))
     passes = Person(lambda t: (540 - 12.0 * (t - 46), 205) if t >= 40 else None, RED, size_px=110)
     tracks = follow([stands, passes], 80, wanted=3)
-    assert sorted(tuple(who(track, [stands, passes])) for track in tracks) == [(0,), (1,)]
+    assert sorted(tuple(identities(track, [stands, passes])) for track in tracks) == [(0,), (1,)]
 
 
-def test_a_person_who_comes_and_goes(follow: Callable[..., list[Track]]) -> None:
+def test_a_person_who_enters_and_leaves(follow: Callable[..., list[Track]]) -> None:
     stays = Person(lambda t: (300, 200), BLUE)
     visits = Person(lambda t: (1100 - 4.0 * (t - 40), 200) if 40 <= t < 100 else None, RED)
     tracks = follow([stays, visits], 150, wanted=4)
     assert len(tracks) == 2
-    assert [who(track, [stays, visits]) for track in tracks] == [{0}, {1}]
+    assert [identities(track, [stays, visits]) for track in tracks] == [{0}, {1}]
     seen = np.flatnonzero(tracks[1].seen)
-    assert 40 <= seen[0] <= 49  # the others are looked for every 0.27 s
+    assert 40 <= seen[0] <= 49  # a search every 0.27 s
     assert seen[-1] == 99
 
 
 @pytest.mark.parametrize("fps", [5, 24, 30, 60, 120])
 @pytest.mark.parametrize(("wanted", "within_s"), [(4, 0.27), (None, 0.67)], ids=["all", "largest"])
-def test_a_newcomer_is_found_as_soon_at_any_rate(
+def test_a_newcomer_is_found_equally_soon_at_any_rate(
     follow: Callable[..., list[Track]], fps: int, wanted: int | None, within_s: float
 ) -> None:
-    """Half a frame later at most."""
+    """At most half a frame later."""
     first = Person(lambda t: (300, 200), BLUE, size_px=70)
     second = Person(lambda t: (900, 200) if t >= fps else None, RED)
     tracks = follow([first, second], 6 * fps, wanted, fps)
-    (track,) = (track for track in tracks if who(track, [first, second]) == {1})
+    (track,) = (track for track in tracks if identities(track, [first, second]) == {1})
     comes, found = np.ceil(fps) / fps, track.times[track.seen][0]
     assert comes <= found <= 1 + within_s + 0.5 / fps
 
 
 @pytest.mark.parametrize("fps", [5, 24, 30, 60, 120])
-def test_the_networks_look_as_often_at_any_rate(monkeypatch: pytest.MonkeyPatch, fps: int) -> None:
-    """For newcomers every 0.27 s, or in every frame; left and right once a second; the clothes every 0.13 s."""
+def test_the_networks_run_equally_often_at_any_rate(monkeypatch: pytest.MonkeyPatch, fps: int) -> None:
+    """The detector every 0.27 s, or in every frame; the reference network every second; the appearance every 0.13 s."""
     people = [Person(lambda t: (300, 200), BLUE)]
     detector = FakeDetector(people)
-    monkeypatch.setattr(tracker_module, "LandmarkNetwork", lambda name, *_: FakeLandmarks(people, "heavy" in name))
-    monkeypatch.setattr(tracker_module, "PersonDetector", lambda *_: detector)
+    monkeypatch.setattr(tracking_networks, "LandmarkNetwork", lambda name, *_: FakeLandmarks(people, "heavy" in name))
+    monkeypatch.setattr(tracking_networks, "PersonDetector", lambda *_: detector)
     tracker = PeopleTracker("fast", 1, 2)
     seen = [tracker.step(image, time_s=t / fps)[0][1] for t, image in enumerate(pictures(people, 4 * fps))]
     assert abs(detector.calls - 4 * fps / max(1, round(fps * 8 / 30))) <= 1
-    assert [t / fps for t, o in enumerate(seen) if o.judged_landmarks is not None] == [0.0, 1.0, 2.0, 3.0]
+    assert [t / fps for t, o in enumerate(seen) if o.reference_landmarks is not None] == [0.0, 1.0, 2.0, 3.0]
     assert abs(sum(o.appearance is not None for o in seen) - 4 * fps / max(1, round(fps * 4 / 30))) <= 1
 
 
-def test_newcomers_are_looked_for_less_often_beside_all_who_are_wanted(monkeypatch: pytest.MonkeyPatch) -> None:
-    """After the opening of two seconds, every 0.67 s, as beside the most prominent one; at once when one is lost."""
+def test_searches_are_less_frequent_once_all_wanted_people_are_tracked(monkeypatch: pytest.MonkeyPatch) -> None:
+    """After the opening of two seconds every 0.67 s, as with one wanted person; at once when one is lost."""
     people = [Person(lambda t: (300, 200), BLUE), Person(lambda t: (900, 200) if t < 180 else None, RED)]
     detector = FakeDetector(people)
-    monkeypatch.setattr(tracker_module, "LandmarkNetwork", lambda name, *_: FakeLandmarks(people))
-    monkeypatch.setattr(tracker_module, "PersonDetector", lambda *_: detector)
+    monkeypatch.setattr(tracking_networks, "LandmarkNetwork", lambda name, *_: FakeLandmarks(people))
+    monkeypatch.setattr(tracking_networks, "PersonDetector", lambda *_: detector)
     tracker, calls = PeopleTracker("fast", 1, people=2), []
     for t, image in enumerate(pictures(people, 184)):
         before = detector.calls
@@ -141,50 +145,50 @@ def test_newcomers_are_looked_for_less_often_beside_all_who_are_wanted(monkeypat
     assert [t for t in calls if t >= 180] == [180, 181, 182, 183]
 
 
-def test_nobody_of_all_is_complete(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_searches_stay_frequent_while_fewer_than_wanted_are_tracked(monkeypatch: pytest.MonkeyPatch) -> None:
     people = [Person(lambda t, k=k: (90 * k + 60, 200), BLUE, size_px=30) for k in range(11)]
     detector = FakeDetector(people)
-    monkeypatch.setattr(tracker_module, "LandmarkNetwork", lambda name, *_: FakeLandmarks(people))
-    monkeypatch.setattr(tracker_module, "PersonDetector", lambda *_: detector)
+    monkeypatch.setattr(tracking_networks, "LandmarkNetwork", lambda name, *_: FakeLandmarks(people))
+    monkeypatch.setattr(tracking_networks, "PersonDetector", lambda *_: detector)
     tracker = PeopleTracker("fast", 1, people=12)
     for t, image in enumerate(pictures(people, 120)):
         assert len(tracker.step(image, time_s=t / FPS)) == 11
     assert detector.calls == 120 // 8
 
 
-def test_every_look_for_somebody_just_lost_is_close(monkeypatch: pytest.MonkeyPatch) -> None:
-    """At 30 frames a second all others too; where frames are few, some of the others look at the whole picture."""
+def test_every_search_for_a_person_who_was_just_lost_is_close(monkeypatch: pytest.MonkeyPatch) -> None:
+    """At 30 frames per second all other searches are close too; at a low rate some of them are not."""
     stays = Person(lambda t: (300, 200), BLUE)
     for fps, close_alone in ((30, True), (6, False)):
         leaves = Person(lambda t, fps=fps: (900, 200) if t < fps else None, RED)
         detector = FakeDetector([stays, leaves])
-        monkeypatch.setattr(tracker_module, "LandmarkNetwork", lambda *_, d=detector: FakeLandmarks(d.people))
-        monkeypatch.setattr(tracker_module, "PersonDetector", lambda *_, d=detector: d)
-        tracker, looks = PeopleTracker("fast", 1, 2), []
+        monkeypatch.setattr(tracking_networks, "LandmarkNetwork", lambda *_, d=detector: FakeLandmarks(d.people))
+        monkeypatch.setattr(tracking_networks, "PersonDetector", lambda *_, d=detector: d)
+        tracker, searches = PeopleTracker("fast", 1, 2), []
         for t, image in enumerate(pictures([stays, leaves], 2 * fps)):
             before = detector.calls, detector.close_calls
             tracker.step(image, time_s=t / fps)
-            looks.append((detector.calls - before[0], detector.close_calls - before[1]))
-        assert looks[fps : fps + fps // 2] == [(1, 1)] * (fps // 2)  # lost for less than half a second
-        assert all(look == close for look, close in looks[:fps]) == close_alone
+            searches.append((detector.calls - before[0], detector.close_calls - before[1]))
+        assert searches[fps : fps + fps // 2] == [(1, 1)] * (fps // 2)  # lost for less than half a second
+        assert all(calls == close for calls, close in searches[:fps]) == close_alone
 
 
-def test_known_again_by_the_clothes_after_a_long_time(follow: Callable[..., list[Track]]) -> None:
+def test_a_person_is_recognized_by_appearance_after_a_long_time(follow: Callable[..., list[Track]]) -> None:
     red = Person(lambda t: (200, 200) if not 40 <= t < 140 else None, RED)
     blue = Person(lambda t: (700, 200) if not 30 <= t < 160 else None, BLUE)
     moved = Person(lambda t: (640, 200) if t >= 140 else (200, 200) if t < 40 else None, RED)
     tracks = follow([red, blue], 220, wanted=2)
-    assert [who(track, [red, blue]) for track in tracks] == [{0}, {1}]
-    tracks = follow([moved, blue], 220, wanted=2)  # comes back where the other one was
-    assert [who(track, [moved, blue]) for track in tracks] == [{0}, {1}]
+    assert [identities(track, [red, blue]) for track in tracks] == [{0}, {1}]
+    tracks = follow([moved, blue], 220, wanted=2)  # returns where the other person was
+    assert [identities(track, [moved, blue]) for track in tracks] == [{0}, {1}]
 
 
-def test_the_most_prominent_one_is_chosen_over_the_clip_and_kept(follow: Callable[..., list[Track]]) -> None:
-    """Neither the first nor the largest at some time, and a gap rather than somebody else."""
+def test_the_most_prominent_person_of_the_whole_clip_is_kept(follow: Callable[..., list[Track]]) -> None:
+    """Neither the first nor the largest one at some time; a gap is not filled with somebody else."""
     first = Person(lambda t: (200, 200) if t < 60 else None, RED)
     main = Person(lambda t: (900, 200) if t >= 20 else None, BLUE, hidden=range(100, 110))
     (track,) = follow([first, main], 200)
-    assert who(track, [first, main]) == {1}
+    assert identities(track, [first, main]) == {1}
     assert not track.seen[:20].any()
     assert not track.seen[100:110].any()
     assert track.seen[45:100].all()
@@ -192,8 +196,8 @@ def test_the_most_prominent_one_is_chosen_over_the_clip_and_kept(follow: Callabl
 
 
 @pytest.mark.parametrize("comes_s", [0, 3])
-def test_a_rival_from_the_start_is_looked_for_closely(monkeypatch: pytest.MonkeyPatch, comes_s: int) -> None:
-    """Who is hard to detect may be the most prominent person too, if they are there before the clip has settled."""
+def test_a_rival_at_the_start_is_searched_for_closely(monkeypatch: pytest.MonkeyPatch, comes_s: int) -> None:
+    """A person who is hard to detect may be the most prominent one, if they are visible in the opening."""
     leaves = Person(lambda t: (300, 200) if t < 150 else None, BLUE)
     stays = Person(lambda t: (900, 200) if t >= comes_s * FPS else None, RED, size_px=80)
 
@@ -202,22 +206,22 @@ def test_a_rival_from_the_start_is_looked_for_closely(monkeypatch: pytest.Monkey
             return super().detect(image, threshold)[: None if closely else 1]
 
     people = [leaves, stays]
-    monkeypatch.setattr(tracker_module, "LandmarkNetwork", lambda name, *_: FakeLandmarks(people))
-    monkeypatch.setattr(tracker_module, "PersonDetector", lambda *_: Detector(people))
+    monkeypatch.setattr(tracking_networks, "LandmarkNetwork", lambda name, *_: FakeLandmarks(people))
+    monkeypatch.setattr(tracking_networks, "PersonDetector", lambda *_: Detector(people))
     tracker, builder = PeopleTracker("best", 1), PeopleBuilder()
     for t, image in enumerate(pictures(people, 240)):
         builder.add(t, t / FPS, tracker.step(image, time_s=t / FPS))
     (track,) = builder.build(1)
-    assert who(track, people) == ({1} if comes_s == 0 else {0})
+    assert identities(track, people) == ({1} if comes_s == 0 else {0})
     if comes_s == 0:
         assert track.seen[4:].all()
 
 
-def test_someone_small_beside_the_most_prominent_one_costs_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_small_person_next_to_the_most_prominent_one_costs_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     people = [Person(lambda t: (300, 200), BLUE), Person(lambda t: (900, 200), RED, size_px=40)]
     networks = FakeLandmarks(people)
-    monkeypatch.setattr(tracker_module, "LandmarkNetwork", lambda name, *_: networks)
-    monkeypatch.setattr(tracker_module, "PersonDetector", lambda *_: FakeDetector(people))
+    monkeypatch.setattr(tracking_networks, "LandmarkNetwork", lambda name, *_: networks)
+    monkeypatch.setattr(tracking_networks, "PersonDetector", lambda *_: FakeDetector(people))
     tracker = PeopleTracker("best", 1)
     for image in pictures(people, 100):
         assert len(tracker.step(image)) == 1
@@ -227,51 +231,51 @@ def test_someone_small_beside_the_most_prominent_one_costs_nothing(monkeypatch: 
     assert networks.batches[-1] == 2  # both in one batch
 
 
-@pytest.mark.parametrize("leap", [0, 90], ids=["steady", "leaps"])
-@pytest.mark.parametrize(("quality", "again"), [("best", 8), ("fast", 0)])
-def test_looking_ahead_changes_nothing_but_the_order(
-    monkeypatch: pytest.MonkeyPatch, quality: str, again: int, leap: int
+@pytest.mark.parametrize("jump", [0, 90], ids=["steady", "jumps"])
+@pytest.mark.parametrize(("quality", "repeats"), [("best", 8), ("fast", 0)])
+def test_pending_estimates_do_not_change_the_result(
+    monkeypatch: pytest.MonkeyPatch, quality: str, repeats: int, jump: int
 ) -> None:
-    """What was foretold is used where the person goes on as before, and looked at again where not.
+    """A prefetched estimate is used where the prediction was right, and repeated where it was not.
 
-    The small networks look ahead only once they know where: nothing is looked at twice.
+    The small networks start early only in regions that are certain: no region is estimated twice.
     """
-    people = [Person(lambda t: (200 + 3.0 * t + (leap if t >= 20 else 0), 200), BLUE)]
+    people = [Person(lambda t: (200 + 3.0 * t + (jump if t >= 20 else 0), 200), BLUE)]
     networks, strong = FakeLandmarks(people), FakeLandmarks(people)
     if quality == "best":
         strong = networks
-    monkeypatch.setattr(tracker_module, "LandmarkNetwork", lambda name, *_: strong if "heavy" in name else networks)
-    monkeypatch.setattr(tracker_module, "PersonDetector", lambda *_: FakeDetector(people))
+    monkeypatch.setattr(tracking_networks, "LandmarkNetwork", lambda name, *_: strong if "heavy" in name else networks)
+    monkeypatch.setattr(tracking_networks, "PersonDetector", lambda *_: FakeDetector(people))
     images = list(pictures(people, 60))
-    plain, ahead = PeopleTracker(quality, 1), PeopleTracker(quality, 1)
+    plain, early = PeopleTracker(quality, 1), PeopleTracker(quality, 1)
     expected = [plain.step(image) for image in images]
     networks.batches.clear()
-    found = [ahead.step(image, upcoming) for image, upcoming in zip(images, [*images[1:], None], strict=True)]
+    found = [early.step(image, upcoming) for image, upcoming in zip(images, [*images[1:], None], strict=True)]
     for one, other in zip(expected, found, strict=True):
         np.testing.assert_allclose(one[0][1].keypoints_px, other[0][1].keypoints_px)
         assert [number for number, _ in one] == [number for number, _ in other]
-    assert networks.ahead >= 50
-    assert sum(networks.batches) <= 8 + (again if leap else 0)
+    assert networks.begun >= 50
+    assert sum(networks.batches) <= 8 + (repeats if jump else 0)
 
 
-def test_a_flicker_is_nobody(follow: Callable[..., list[Track]]) -> None:
+def test_flickering_detections_are_nobody(follow: Callable[..., list[Track]]) -> None:
     blinks = Person(lambda t: (200 + 30 * (t // 20), 200) if t % 20 < 3 else None, RED)
     assert follow([blinks], 200, wanted=3) == []
 
 
-def test_the_strong_network_stands_in_where_left_and_right_change_places(follow: Callable[..., list[Track]]) -> None:
+def test_the_fallback_network_prevents_left_right_swaps(follow: Callable[..., list[Track]]) -> None:
     person = Person(lambda t: (300 + t, 200), BLUE, swapped=[*range(40, 70), 80])
     (track,) = follow([person], 120)
     assert (track.keypoints_px[:, 11, 0] > track.keypoints_px[:, 12, 0]).all()
 
 
-def test_the_strong_network_stands_in_where_a_smaller_one_loses_somebody(follow: Callable[..., list[Track]]) -> None:
+def test_the_fallback_network_keeps_a_person_whom_the_smaller_one_loses(follow: Callable[..., list[Track]]) -> None:
     (track,) = follow([Person(lambda t: (300 + t, 200), BLUE, lost=range(40, 80))], 120)
     assert track.seen.all()
     assert track.acquired.sum() == 1
 
 
-def test_exchanged_left_and_right_are_judged(follow: Callable[..., list[Track]]) -> None:
+def test_the_reference_network_repairs_swaps_of_most_of_a_clip(follow: Callable[..., list[Track]]) -> None:
     from scope.scope_addon.capture.camera.intrinsics import choose_camera
     from scope.scope_addon.capture.tracking.left_right import repair_left_right
 
@@ -281,29 +285,29 @@ def test_exchanged_left_and_right_are_judged(follow: Callable[..., list[Track]])
     assert (left < right).sum() == 110
     repaired = repair_left_right(track, choose_camera(1200, 400))
     assert (repaired.keypoints_px[:, 11, 0] > repaired.keypoints_px[:, 12, 0]).all()
-    assert len(track.judged_rows) <= 120 // 30 + 3
+    assert len(track.reference_rows) <= 120 // 30 + 3
 
 
-def test_nobody_waits_for_the_judge(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Its judgement of the first frame arrives after the last one."""
+def test_tracking_does_not_wait_for_the_reference_network(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its result for the first frame arrives after the last frame."""
     person, free = Person(lambda t: (300 + t, 200), BLUE), threading.Event()
 
-    class SlowJudge(FakeLandmarks):
+    class SlowNetwork(FakeLandmarks):
         def estimate(self, image: np.ndarray, regions: list[Region]) -> list[PoseEstimate]:
             free.wait(60)
             return super().estimate(image, regions)
 
-    networks = {True: SlowJudge([person], right=True), False: FakeLandmarks([person])}
-    monkeypatch.setattr(tracker_module, "LandmarkNetwork", lambda name, *_: networks["heavy" in name])
-    monkeypatch.setattr(tracker_module, "PersonDetector", lambda *_: FakeDetector([person]))
+    networks = {True: SlowNetwork([person], is_reliable=True), False: FakeLandmarks([person])}
+    monkeypatch.setattr(tracking_networks, "LandmarkNetwork", lambda name, *_: networks["heavy" in name])
+    monkeypatch.setattr(tracking_networks, "PersonDetector", lambda *_: FakeDetector([person]))
     tracker, builder = PeopleTracker("fast", 1), PeopleBuilder()
     for t, image in enumerate(pictures([person], 20)):
         builder.add(t, t / FPS, tracker.step(image))
     assert networks[True].batches == []
     free.set()
     (track,) = builder.build(1)
-    assert track.judged_rows.tolist() == [0]
-    np.testing.assert_allclose(track.judged_landmarks[0], person.body(0))
+    assert track.reference_rows.tolist() == [0]
+    np.testing.assert_allclose(track.reference_landmarks[0], person.body(0))
 
 
 @pytest.mark.parametrize(
@@ -317,15 +321,14 @@ def test_nobody_waits_for_the_judge(monkeypatch: pytest.MonkeyPatch) -> None:
         ([], 0),
     ],
 )
-def test_who_is_seen_again_for_a_moment_only_ends_before_it(rows: list[int], kept: int) -> None:
+def test_a_short_reappearance_is_cut_off(rows: list[int], kept: int) -> None:
     tracklet = Tracklet(rows=list(rows), values=[np.zeros((33, 6), np.float32)] * len(rows))
-    trim_flickering_end(tracklet, np.arange(60) / FPS)
-    assert tracklet.rows == list(rows)[:kept]
+    assert frames_before_flicker(tracklet, (np.arange(60) / FPS).tolist()) == kept
 
 
 @pytest.mark.usefixtures("networks")
 @pytest.mark.parametrize("every", [2, 12], ids=["30 fps", "5 fps"])
-def test_a_real_newcomer_is_found_as_soon_at_any_rate(shared: Path, every: int) -> None:
+def test_a_real_newcomer_is_found_equally_soon_at_any_rate(shared: Path, every: int) -> None:
     tracker = PeopleTracker("fast", threads=2, people=4)
     comes_s, found_s = 0.5, None
     for t, (image, places, _) in enumerate(composite(shared, ("cam1", "cam3"), crossing=False)):
@@ -345,8 +348,8 @@ def test_a_real_newcomer_is_found_as_soon_at_any_rate(shared: Path, every: int) 
 @pytest.mark.parametrize(
     ("cameras", "crossing"), [(("cam2", "cam3"), True), (("cam4", "cam1"), True), (("cam1", "cam3"), False)]
 )
-def test_real_people_are_never_mixed_up(shared: Path, cameras: tuple[str, str], crossing: bool) -> None:
-    """The same man twice, so that clothes say nothing; hidden for some twenty frames where the clips cross."""
+def test_identities_of_real_people_are_never_switched(shared: Path, cameras: tuple[str, str], crossing: bool) -> None:
+    """The same man twice, so that appearance does not help; occluded for some twenty frames where the clips cross."""
     tracker, builder = PeopleTracker("fast", threads=2, people=2), PeopleBuilder()
     places, hidden = [], []
     for t, (image, at, is_hidden) in enumerate(composite(shared, cameras, crossing)):

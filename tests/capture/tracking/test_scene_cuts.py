@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Cuts are found, and what only looks like one is none; what follows a cut is captured for itself."""
+"""Cuts are found, similar events are not mistaken for them, and scenes are captured separately."""
 
 from __future__ import annotations
 
@@ -44,15 +44,15 @@ def test_each_scene_begins_with_a_cut() -> None:
         [cv2.addWeighted(scene(0), 1 - k / 20, scene(1), k / 20, 0) for k in range(21)],
         [np.clip(scene(0) * (k / 20), 0, 255).astype(np.uint8) for k in range(30)],
     ],
-    ids=["a flash", "a frame of something else", "a gap", "a camera that swings", "a dissolve", "a fade"],
+    ids=["a flash", "a frame of something else", "a gap", "a fast pan", "a dissolve", "a fade"],
 )
-def test_what_is_no_cut(frames: list[np.ndarray]) -> None:
+def test_other_changes_are_not_cuts(frames: list[np.ndarray]) -> None:
     assert cuts(frames) == []
 
 
 @pytest.mark.usefixtures("networks")
-def test_what_follows_a_cut_is_captured_for_itself(shared: Path, body: Body, tmp_path: Path) -> None:
-    """A man from two sides, one after the other: told, and on him up to the cut and from it on."""
+def test_scenes_are_captured_separately(shared: Path, body: Body, tmp_path: Path) -> None:
+    """A man from two sides, one after the other: the cut is reported, and he is followed before and after it."""
     clip = tmp_path / "two.mp4"
     writer = cv2.VideoWriter(str(clip), cv2.VideoWriter.fourcc(*"mp4v"), 30, (540, 960))
     for camera in ("cam3", "cam1"):

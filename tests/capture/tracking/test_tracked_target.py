@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Somebody who is followed and goes behind something: an invented body whose landmarks leap, fade, or both."""
+"""A target that becomes occluded: a synthetic body whose landmarks jump, lose confidence, or both."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scope.scope_addon.capture.perception.landmark_network import PoseEstimate
 from scope.scope_addon.capture.perception.region import Region
-from scope.scope_addon.capture.tracking.tracked_target import LATE_FRAMES, Followed
+from scope.scope_addon.capture.tracking.tracked_target import RECENT_FRAMES, TrackedTarget
 
 SIDE = 400.0
 BODY = np.random.default_rng(1).normal(scale=0.2 * SIDE, size=(33, 2))
@@ -21,43 +21,43 @@ def at(x: float, confidence: float = 0.9) -> PoseEstimate:
     return PoseEstimate(BODY + [x, 300.0], sure, np.ones(33), np.zeros((33, 3)), 0.99, region, region)
 
 
-def walker(frames: int, fps: float, speed_px: float = 12.0) -> Followed:
-    """Followed for so many frames, and would be at ``frames * speed_px`` in the next one."""
-    followed = Followed(0, at(0.0), np.zeros(2), 0.0)
+def walker(frames: int, fps: float, speed_px: float = 12.0) -> TrackedTarget:
+    """A target that was tracked for some frames, predicted at ``frames * speed_px`` in the next one."""
+    target = TrackedTarget(0, at(0.0), np.zeros(2), 0.0)
     for t in range(1, frames):
-        followed.go_on(at(speed_px * t), False, t / fps, 1 / fps)
-    return followed
+        target.update(at(speed_px * t), False, t / fps, 1 / fps)
+    return target
 
 
 @pytest.mark.parametrize(
-    ("leap", "confidence", "behind"), [(0, 0.9, False), (60, 0.9, False), (0, 0.4, False), (60, 0.4, True)]
+    ("jump", "confidence", "occluded"), [(0, 0.9, False), (60, 0.9, False), (0, 0.4, False), (60, 0.4, True)]
 )
-def test_who_leaps_and_fades_at_once_goes_behind_something(leap: float, confidence: float, behind: bool) -> None:
-    assert walker(30, 30).goes_behind(at(30 * 12.0 + leap, confidence)) == behind
+def test_a_jump_with_less_confidence_is_an_occlusion(jump: float, confidence: float, occluded: bool) -> None:
+    assert walker(30, 30).becomes_occluded(at(30 * 12.0 + jump, confidence)) == occluded
 
 
-def test_somebody_dim_all_the_time_is_not_hidden() -> None:
-    followed = Followed(0, at(0.0, 0.4), np.zeros(2), 0.0)
+def test_a_person_with_low_confidence_throughout_is_not_occluded() -> None:
+    target = TrackedTarget(0, at(0.0, 0.4), np.zeros(2), 0.0)
     for t in range(1, 30):
-        followed.go_on(at(0.0, 0.4), False, t / 30, 1 / 30)
-    assert not followed.goes_behind(at(60.0, 0.38))
+        target.update(at(0.0, 0.4), False, t / 30, 1 / 30)
+    assert not target.becomes_occluded(at(60.0, 0.38))
 
 
 @pytest.mark.parametrize("fps", [5, 30, 120])
-def test_the_confidence_of_late_is_that_of_half_a_second(fps: int) -> None:
-    followed = walker(3 * fps, fps)
-    times = [time for time, _ in followed.confidences]
-    assert len(times) == max(LATE_FRAMES, fps // 2 + 1)
-    assert times[-1] == followed.seen_s
+def test_recent_confidences_cover_half_a_second(fps: int) -> None:
+    target = walker(3 * fps, fps)
+    times = [time for time, _ in target.confidences]
+    assert len(times) == max(RECENT_FRAMES, fps // 2 + 1)
+    assert times[-1] == target.seen_s
 
 
-def test_what_hides_somebody_is_told_from_them_by_confidence_and_place() -> None:
-    followed = walker(30, 30)
+def test_an_occluder_is_distinguished_by_confidence_and_position() -> None:
+    target = walker(30, 30)
     dim, sure, elsewhere = at(360.0, 0.4), at(360.0), at(360.0 + SIDE, 0.4)
-    assert not followed.is_hidden_by(dim)  # they were lost for another reason
-    followed.is_hidden, followed.lost = True, 3
-    assert followed.is_hidden_by(dim)
-    assert not followed.is_hidden_by(sure)
-    assert not followed.is_hidden_by(elsewhere)
+    assert not target.is_occluded_by(dim)  # lost for another reason
+    target.is_occluded, target.frames_lost = True, 3
+    assert target.is_occluded_by(dim)
+    assert not target.is_occluded_by(sure)
+    assert not target.is_occluded_by(elsewhere)
     larger = replace(dim, region=replace(dim.region, side_px=3 * SIDE))
-    assert not followed.is_hidden_by(larger)
+    assert not target.is_occluded_by(larger)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Following people through real clips, frame by frame."""
+"""Tracking people through real clips, frame by frame."""
 
 from __future__ import annotations
 
@@ -41,11 +41,11 @@ def test_person_is_found_once_and_kept(tracker: PeopleTracker, frames: Frames, c
     assert found[-1].keypoints_px.shape == (33, 2)
     assert found[-1].world_landmarks.shape == (33, 3)
     assert all(((o.keypoints_confidence >= 0) & (o.keypoints_confidence <= 1)).all() for o in found)
-    assert found[0].judged_landmarks is not None  # left and right are told from the first frame on
-    assert sum(o.judged_landmarks is not None for o in found) <= 1 + len(found) // 8
+    assert found[0].reference_landmarks is not None  # left and right are checked from the first frame on
+    assert sum(o.reference_landmarks is not None for o in found) <= 1 + len(found) // 8
 
 
-def test_two_people_are_followed_and_nobody_twice(frames: Frames) -> None:
+def test_two_people_are_tracked_and_nobody_twice(frames: Frames) -> None:
     tracker = PeopleTracker("fast", threads=2, people=4)
     for image in frames("clips/two_people_portrait"):
         observations = dict(tracker.step(image))
@@ -53,7 +53,7 @@ def test_two_people_are_followed_and_nobody_twice(frames: Frames) -> None:
         assert observations[0].region.center_px[0] > 500 > observations[1].region.center_px[0]
 
 
-def test_a_hand_is_no_person(tracker: PeopleTracker, frames: Frames) -> None:
+def test_a_hand_is_not_a_person(tracker: PeopleTracker, frames: Frames) -> None:
     seen = [tracker.step(image) for image in frames("clips/hand_closeup", every=9)]
     assert sum(len(observations) > 0 for observations in seen) <= 0.1 * len(seen)
 
@@ -89,7 +89,7 @@ def test_odd_images(tracker: PeopleTracker) -> None:
         tracker.step(np.zeros((5, 5), np.uint8))
 
 
-def test_a_somersault_is_followed_all_the_way_round(frames: Frames) -> None:
+def test_a_somersault_is_tracked_all_the_way_round(frames: Frames) -> None:
     """The man turns over once in the air, against the sun, between frames 165 and 183."""
     tracker, seen = PeopleTracker("best", threads=2), {}
     for index, image in enumerate(frames("clips/walk_side_static", start=100, stop=187), 100):
@@ -104,17 +104,17 @@ def test_a_somersault_is_followed_all_the_way_round(frames: Frames) -> None:
     assert head_above_hips[186] > 0
 
 
-def test_who_walks_out_of_the_picture_is_gone(frames: Frames) -> None:
-    """The woman on the grass leaves at the left edge between frames 195 and 207, and nothing comes in her stead.
+def test_a_person_who_walks_out_of_the_picture_is_lost(frames: Frames) -> None:
+    """The woman on the grass leaves at the left edge between frames 195 and 207, and nothing replaces her.
 
-    The man runs behind a tree between frames 223 and 229, and is not seen in its bark.
+    The man runs behind a tree between frames 223 and 229, and no person is found in its bark.
     """
     tracker, seen = PeopleTracker("best", 2, 2), {}
     for index, image in enumerate(frames("clips/walk_side_static", start=185), 185):
         for tracklet, _ in tracker.step(image):
             seen.setdefault(tracklet, []).append(index)
-    # somebody is a person from a third of a second on
+    # a tracklet of a third of a second or more is a person
     lasting = sorted((frames for frames in seen.values() if len(frames) >= 10), key=lambda frames: frames[-1])
     woman, man = lasting
     assert 195 <= woman[-1] <= 207
-    assert 223 <= man[-1] <= 226  # behind a tree, where nobody is made out any more
+    assert 223 <= man[-1] <= 226  # behind a tree

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The main job with everybody of a video, one of whom comes in after a while and leaves before the end."""
+"""A capture of two people, one of whom enters after a while and leaves before the end."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from scope.solver.body import Body
 
 from ..composites import visit
 
-EVERY = 2  # of the frames, so that there are 30 a second
+EVERY = 2  # of the frames, for 30 per second
 EDGE = 1200.0
 
 
 @pytest.fixture(scope="module")
 def footage(shared: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, np.ndarray]:
-    """A video, and the true places of the two, (T, 2, 2) pixels."""
+    """A video, and the true positions of the two, (T, 2, 2) pixels."""
     path, places, writer = tmp_path_factory.mktemp("visit") / "visit.avi", [], None
     for t, (image, at) in enumerate(visit(shared)):
         if t % EVERY == 0:
@@ -49,7 +49,7 @@ def test_the_visitor_is_valid_while_in_the_picture_and_only_then(
     inside, outside = places[:, 1, 0] < EDGE - 150, ~(places[:, 1, 0] < EDGE + 30)
     assert inside.sum() >= 15
     assert outside.sum() >= 12
-    assert visitor.valid[inside][8:].all()  # newcomers are looked for every 0.27 s
+    assert visitor.valid[inside][8:].all()  # a search every 0.27 s
     assert not visitor.valid[outside].any()
     for motion, at in zip(everybody.motions, np.moveaxis(places, 1, 0), strict=True):
         trunk = projected_trunk(motion)
@@ -57,7 +57,7 @@ def test_the_visitor_is_valid_while_in_the_picture_and_only_then(
         assert np.percentile(np.linalg.norm(trunk - at, axis=1)[rows], 90) < 40
 
 
-def test_nobody_is_flung_where_they_come_and_go(everybody: Capture) -> None:
+def test_nobody_jumps_when_entering_or_leaving(everybody: Capture) -> None:
     for motion in everybody.motions:
         steps = np.linalg.norm(np.diff(motion.joints_cam[:, 0], axis=0), axis=1)
         assert steps.max() < 0.25  # metres a frame; the visitor slides in and out at up to 0.15
@@ -76,6 +76,6 @@ def test_the_visitor_is_the_same_at_six_frames_a_second(footage: tuple[Path, np.
 
 
 def projected_trunk(motion) -> np.ndarray:
-    """(T, 2) pixels of the middle of hips and shoulders."""
+    """(T, 2) pixels, the middle of hips and shoulders."""
     middle = motion.joints_cam[:, [1, 2, 16, 17]].mean(axis=1) @ motion.intrinsics.T
     return middle[:, :2] / middle[:, 2:]

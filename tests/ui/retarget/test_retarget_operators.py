@@ -75,7 +75,7 @@ def test_what_is_hidden_is_shown_for_now_and_hidden_again(rig):
     layer = bpy.context.view_layer
     source = next(obj for obj in bpy.context.scene.objects if "scope_source" in obj)
     bpy.ops.scope.retarget()
-    show(source, layer, for_now=True)
+    show(source, layer, temporarily=True)
     assert not source.hide_get()
     hide_again(source, layer)
     assert source.hide_get()

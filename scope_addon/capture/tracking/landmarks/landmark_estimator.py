@@ -1,0 +1,80 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Landmarks of the people who are tracked, estimated one frame ahead in the background where that is possible."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...perception.landmark_network import PoseEstimate
+from ...perception.region import Region
+from ..tracked_target import MIN_VELOCITY_FRAMES, TrackedTarget
+from .plausibility import is_in_image, is_plausible, is_same_region
+from .tracking_networks import TrackingNetworks
+
+
+class LandmarkEstimator:
+    """Runs the landmark network, and keeps pending estimates in the targets."""
+
+    def __init__(self, networks: TrackingNetworks) -> None:
+        self._landmarks, self._early = networks.landmarks, networks.begins_early
+        self._prefetches = networks.prefetches
+
+    def estimate(
+        self, image_rgb: NDArray[np.uint8], regions: Sequence[Region], sure: bool = True
+    ) -> list[PoseEstimate | None]:
+        """Estimate the landmarks in each region in one batch.
+
+        :param image_rgb: (H, W, 3).
+        :param sure: see `is_plausible`.
+        :return: an estimate for each region; None where the landmarks are not those of a body.
+        """
+        useful = [k for k, region in enumerate(regions) if is_in_image(region, image_rgb)]
+        estimates = self._landmarks.estimate(image_rgb, [regions[k] for k in useful])
+        out: list[PoseEstimate | None] = [None] * len(regions)
+        for k, estimate in zip(useful, estimates, strict=True):
+            out[k] = estimate if is_plausible(estimate, sure) else None
+        return out
+
+    def estimate_live(
+        self, image_rgb: NDArray[np.uint8], upcoming_rgb: NDArray[np.uint8] | None, live: Sequence[TrackedTarget]
+    ) -> list[PoseEstimate | None]:
+        """Estimate everybody who is tracked in this frame, and start the estimates of the upcoming one.
+
+        A pending estimate counts if the frame before confirms its region.
+
+        :param image_rgb: (H, W, 3).
+        :param upcoming_rgb: (H, W, 3) or None; the largest network starts on it in predicted regions.
+        :param live: in the state of the frame before; their ``pending`` is replaced.
+        :return: an estimate for each target; None where the landmarks are not those of a body.
+        """
+        calls = [f.pending for f in live]
+        for f in live:
+            f.pending = None
+            if upcoming_rgb is None or self._early is None or not self._prefetches or f.age < MIN_VELOCITY_FRAMES:
+                continue
+            if is_in_image(f.prefetch_region, upcoming_rgb):
+                f.pending = self._early.begin(upcoming_rgb, f.prefetch_region)
+        found: dict[int, PoseEstimate | None] = {}
+        for f, call in zip(live, calls, strict=True):
+            estimate = call.result() if call is not None else None
+            if estimate is not None and is_same_region(estimate.region, f.estimate.next_region):
+                found[f.tracklet] = estimate if is_plausible(estimate) else None
+        missing = [f for f in live if f.tracklet not in found]
+        estimates = self.estimate(image_rgb, [f.estimate.next_region for f in missing])
+        found |= {f.tracklet: estimate for f, estimate in zip(missing, estimates, strict=True)}
+        return [found[f.tracklet] for f in live]
+
+    def begin_upcoming(self, upcoming_rgb: NDArray[np.uint8] | None, live: Sequence[TrackedTarget]) -> None:
+        """Start the estimates of the next frame that are not pending yet; they run in parallel with this one's rest.
+
+        :param upcoming_rgb: (H, W, 3) or None.
+        :param live: in the state of this frame; their ``pending`` is set.
+        """
+        if upcoming_rgb is None or self._early is None:
+            return
+        for f in live:
+            if f.pending is None and is_in_image(f.estimate.next_region, upcoming_rgb):
+                f.pending = self._early.begin(upcoming_rgb, f.estimate.next_region)

@@ -1,0 +1,85 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""When the detector searches a frame for people who are not tracked, and when it searches closely."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .frame_clock import FRAME_S, FrameClock
+from .tracked_target import TrackedTarget
+
+SEARCH_S = 8 * FRAME_S  # between two searches for people who have entered the picture
+SEARCH_LARGEST_S = 20 * FRAME_S
+SEARCH_LOST_S = 4 * FRAME_S  # the same while a lost person is remembered, and for rivals in the opening
+OPENING_S = 2.0  # of the clip: a person who is visible from the start may be the most prominent one over the clip
+SMALL_SHARE = 0.39  # of the picture's longer side
+EAGER_S = 15 * FRAME_S  # for which a lost person is looked for in every frame
+
+
+class SearchSchedule:
+    """Decides for each frame whether and how to search.
+
+    :param clock: of the tracker.
+    :param people: how many people are wanted; None: only the most prominent one of the clip.
+    """
+
+    def __init__(self, clock: FrameClock, people: int | None) -> None:
+        self._clock = clock
+        self._largest_only, self._wanted = people is None, people or 1
+        self.forget()
+
+    def forget(self) -> None:
+        """Forget when the last searches were."""
+        self._search_s = self._close_search_s = -math.inf
+
+    def is_due(
+        self, image_rgb: NDArray[np.uint8], live: Sequence[TrackedTarget], lost: Sequence[TrackedTarget]
+    ) -> bool:
+        """Return whether to search this frame.
+
+        :param image_rgb: (H, W, 3).
+        :param live: the people who are tracked.
+        :param lost: the people who are remembered.
+        """
+        return self._clock.has_passed(self._interval_s(image_rgb, live, lost), self._clock.time_s - self._search_s)
+
+    def begin(self, image_rgb: NDArray[np.uint8], live: Sequence[TrackedTarget], lost: Sequence[TrackedTarget]) -> bool:
+        """Note a search in this frame, with the parameters of `is_due`.
+
+        :return: whether to search closely: where somebody small may be, and less often at a low frame rate, because
+            it costs more.
+        """
+        clock = self._clock
+        self._search_s = clock.time_s
+        closely = not self._largest_only or self._searches_for_rivals(image_rgb, live)
+        if closely:
+            interval_s = self._interval_s(image_rgb, live, lost) * max(1.0, math.sqrt(clock.step_s / FRAME_S))
+            closely = clock.has_passed(interval_s, clock.time_s - self._close_search_s)
+        if closely:
+            self._close_search_s = clock.time_s
+        return closely
+
+    def _interval_s(
+        self, image_rgb: NDArray[np.uint8], live: Sequence[TrackedTarget], lost: Sequence[TrackedTarget]
+    ) -> float:
+        """Return the seconds between two searches at present; 0: in every frame."""
+        if not live or any(self._clock.is_within(EAGER_S, f.seen_s) for f in lost):
+            return 0.0
+        if lost or self._searches_for_rivals(image_rgb, live):
+            return SEARCH_LOST_S
+        if self._largest_only:
+            return SEARCH_LARGEST_S
+        # As many as are wanted are tracked: a newcomer counts only if they become more prominent.
+        complete = len(live) >= self._wanted and self._clock.time_s >= self._clock.begin_s + OPENING_S
+        return SEARCH_LARGEST_S if complete else SEARCH_S
+
+    def _searches_for_rivals(self, image_rgb: NDArray[np.uint8], live: Sequence[TrackedTarget]) -> bool:
+        """Return whether somebody half as large as the most prominent person would be missed by a plain detection."""
+        if not self._largest_only or self._clock.time_s >= self._clock.begin_s + OPENING_S:
+            return False
+        sides = [f.estimate.next_region.side_px for f in live]
+        return bool(sides) and max(sides) < SMALL_SHARE * max(image_rgb.shape[:2])

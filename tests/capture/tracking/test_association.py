@@ -1,0 +1,61 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Assignment against all permutations, and links of tracklets whose people are known."""
+
+from __future__ import annotations
+
+from itertools import permutations
+
+import numpy as np
+import pytest
+from scope.scope_addon.capture.tracking.appearance import SIZE
+from scope.scope_addon.capture.tracking.association import assign, cheapest_links, link
+from scope.scope_addon.capture.tracking.track import Tracklet
+
+RATE = 30.0
+RED, BLUE = np.eye(SIZE)[0] + np.eye(SIZE)[SIZE // 2], np.eye(SIZE)[3] + np.eye(SIZE)[SIZE // 2 + 3]
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (3, 3), (4, 6)])
+@pytest.mark.parametrize("seed", range(5))
+def test_the_assignment_is_the_cheapest_of_all(shape: tuple[int, int], seed: int) -> None:
+    cost = np.random.default_rng(seed).normal(size=shape)
+    chosen = assign(cost)
+    assert len(set(chosen)) == shape[0]
+    rows = range(shape[0])
+    best = min(cost[rows, list(columns)].sum() for columns in permutations(range(shape[1]), shape[0]))
+    assert cost[rows, chosen].sum() == pytest.approx(best)
+
+
+def test_links_that_cost_too_much_are_left_out() -> None:
+    cost = np.array([[1.0, 9.0, 2.0], [9.0, 9.0, 9.0], [1.5, 9.0, 9.0]])
+    assert cheapest_links(cost, 3.0) == {0: 2, 2: 0}
+    assert cheapest_links(cost, 0.5) == {}
+
+
+def tracklet(first: int, last: int, start_px: float, speed_px: float, appearance: np.ndarray) -> Tracklet:
+    """A person who moves horizontally at ``speed_px`` per frame, and would be at ``start_px`` in frame 0."""
+    rows = list(range(first, last))
+    centers = [np.array([start_px + speed_px * row, 200.0]) for row in rows]
+    values = [np.zeros((33, 6), np.float32)] * len(rows)
+    return Tracklet(rows=rows, values=values, centers_px=centers, sides_px=[200.0] * len(rows), appearance=appearance)
+
+
+def test_a_crossing_is_resolved_by_motion() -> None:
+    """Two people in the same clothes pass each other between frames 50 and 60, where neither is seen."""
+    times = (np.arange(120) / RATE).tolist()
+    right, left = (0.0, 8.0), (880.0, -8.0)
+    tracklets = [tracklet(*rows, *motion, RED) for rows in ((0, 50), (60, 120)) for motion in (right, left)]
+    assert sorted(link(tracklets, times)) == [[0, 2], [1, 3]]
+
+
+@pytest.mark.parametrize(("returns", "people"), [(RED, [[0, 1]]), (BLUE, [[0], [1]])])
+def test_after_a_long_time_the_appearance_decides(returns: np.ndarray, people: list[list[int]]) -> None:
+    times = (np.arange(240) / RATE).tolist()
+    tracklets = [tracklet(0, 60, 100.0, 0.0, RED), tracklet(180, 240, 900.0, 0.0, returns)]
+    assert sorted(link(tracklets, times)) == people
+
+
+def test_tracklets_at_the_same_time_are_different_people() -> None:
+    times = (np.arange(60) / RATE).tolist()
+    tracklets = [tracklet(0, 60, 100.0, 0.0, RED), tracklet(20, 60, 100.0, 0.0, RED), Tracklet()]
+    assert sorted(link(tracklets, times)) == [[0], [1]]
