@@ -9,7 +9,7 @@ from types import SimpleNamespace
 
 import pytest
 from scope.scope_addon.capture.perception import sessions
-from scope.scope_addon.capture.perception.execution import CHOICES, CPU, PROVIDERS, Execution, OneAtATime
+from scope.scope_addon.capture.perception.execution import CHOICES, CPU, PROVIDERS, Execution, SerializedSession
 from scope.scope_addon.capture.perception.sessions import network_path, open_session
 from scope.scope_addon.errors import UsageError
 from scope.scope_addon.options import option
@@ -95,7 +95,7 @@ def test_a_provider_that_fails_gives_way_once_and_for_all(runtime, how: str) -> 
 def test_directml_runs_one_at_a_time(runtime) -> None:
     runtime("directml")
     session = open_session(Path("m.onnx"), 1, Execution("auto"))
-    assert isinstance(session, OneAtATime)
+    assert isinstance(session, SerializedSession)
     assert session.options.enable_mem_pattern is False
     inside = threading.Semaphore()
 

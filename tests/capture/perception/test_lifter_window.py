@@ -7,7 +7,7 @@ from scope.scope_addon.capture.perception.lifter_window import (
     MIDDLE,
     OFFSETS_S,
     WINDOW,
-    standing_still,
+    single_frame_windows,
     windows_around,
 )
 
@@ -67,7 +67,7 @@ def test_sparse_frames_and_single_pictures_stand_still():
     assert np.allclose(moments(times, np.ones(5, bool)), times[:, None])
     assert np.allclose(moments(np.zeros(1), np.ones(1, bool)), 0)
     assert np.allclose(moments(times, np.zeros(5, bool))[:, MIDDLE], times)  # nobody was seen: nothing fails
-    still = standing_still(3)
+    still = single_frame_windows(3)
     x = np.arange(3.0)[:, None]
     assert np.array_equal(still.of(x, np.arange(3), 0)[..., 0], np.repeat(x, WINDOW, axis=1))
 

@@ -34,9 +34,7 @@ FEWEST = 4  # keypoints that say where to look next
 _BODY = np.array([KEYPOINT_NAMES.index(name) for name in COCO_17])
 _SHOULDERS = np.array([KEYPOINT_NAMES.index(f"{side}_shoulder") for side in ("left", "right")])
 _HIPS = np.array([KEYPOINT_NAMES.index(f"{side}_hip") for side in ("left", "right")])
-_LEGS = [
-    [KEYPOINT_NAMES.index(f"{side}_{joint}") for joint in ("hip", "knee", "ankle")] for side in ("left", "right")
-]
+_LEGS = [[KEYPOINT_NAMES.index(f"{side}_{joint}") for joint in ("hip", "knee", "ankle")] for side in ("left", "right")]
 
 Decode = Callable[[list[np.ndarray], Graph], tuple[np.ndarray, np.ndarray]]
 

@@ -174,9 +174,7 @@ def test_the_next_region_holds_the_keypoints(tmp_path: Path) -> None:
     assert network._next_region(upright(), confidence * 0.05, region) is region
     # legs hidden: shrink slowly
     legs = np.array(["knee" in n or "ankle" in n or "hip" in n for n in KEYPOINT_NAMES])
-    assert network._next_region(upright(), confidence * ~legs, region).side_px == pytest.approx(
-        0.97 * region.side_px
-    )
+    assert network._next_region(upright(), confidence * ~legs, region).side_px == pytest.approx(0.97 * region.side_px)
     # crouching: the box stays as large as the person will be
     low = upright()
     ankles = [KEYPOINT_NAMES.index(f"{side}_ankle") for side in ("left", "right")]
