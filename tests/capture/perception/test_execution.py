@@ -77,7 +77,7 @@ def test_what_is_not_there_is_said_once(runtime) -> None:
     open_session(Path("m.onnx"), 1, execution)
     assert fake.asked == [[CPU_NAME]] * 2
     (warning,) = execution.warnings
-    assert "CUDA was asked for, but this onnxruntime has only CoreML, CPU" in warning
+    assert "CUDA was requested, but this onnxruntime has only CoreML, CPU" in warning
 
 
 @pytest.mark.parametrize("how", ["broken", "silent"])
@@ -136,4 +136,4 @@ def test_the_real_processor() -> None:
         pytest.skip("this machine has TensorRT")
     assert session.get_session_options().intra_op_num_threads == 2
     assert execution.used == [CPU]
-    assert "TensorRT was asked for" in execution.warnings[0]
+    assert "TensorRT was requested" in execution.warnings[0]
