@@ -44,7 +44,8 @@ def cropped(
     scale = FINER * size[1] / height
     crop = np.array([[scale, 0, -corner[0] * scale], [0, scale, -corner[1] * scale], [0, 0, 1.0]])
     wide = (FINER * size[0], FINER * size[1])
-    larger = cv2.warpAffine(image, crop[:2], wide, flags=cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)
+    enlarged = cv2.warpAffine(image, crop[:2], wide, flags=cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)
+    larger = np.asarray(enlarged, np.uint8)
     if motion is not None:
         body, vertices = default_body(), camera_vertices(motion, default_body(), row)
         K = crop @ motion.intrinsics

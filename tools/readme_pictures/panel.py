@@ -48,8 +48,8 @@ class Panel:
         """Draw a stick figure; parts within or behind a body show through it."""
         vertices, triangles = stick_figure(points, radius)
         canvas = self._rasterized(self.view.to_camera(vertices), triangles, color)
-        alpha = np.where(canvas.depth < self._depth, 1.0, _HIDDEN) * canvas.coverage
-        alpha = cv2.blur(alpha, (3, 3))[..., None]
+        drawn = np.where(canvas.depth < self._depth, 1.0, _HIDDEN) * canvas.coverage.astype(float)
+        alpha = cv2.blur(drawn, (3, 3))[..., None]
         mixed = self.image * (1 - alpha) + cv2.blur(canvas.rgba[..., :3], (3, 3)) * alpha
         self.image = (mixed + 0.5).astype(np.uint8)
 
