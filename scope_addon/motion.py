@@ -29,26 +29,26 @@ class Motion:
     :raises MotionFileError: an array has the wrong shape.
     """
 
-    poses: NDArray[np.float32]  # (T, 3(K+1))
-    trans: NDArray[np.float32]  # (T, 3)
-    poses_raw: NDArray[np.float32]  # (T, 3(K+1)), before smoothing and contact
-    trans_raw: NDArray[np.float32]  # (T, 3)
-    betas: NDArray[np.float32]  # (P,)
+    poses: NDArray[np.floating[Any]]  # (T, 3(K+1))
+    trans: NDArray[np.floating[Any]]  # (T, 3)
+    poses_raw: NDArray[np.floating[Any]]  # (T, 3(K+1)), before smoothing and contact
+    trans_raw: NDArray[np.floating[Any]]  # (T, 3)
+    betas: NDArray[np.floating[Any]]  # (P,)
     body_model: str
     gender: str
     mocap_framerate: float
     frames: NDArray[np.int64]  # (T,) source frame index
     timestamps: NDArray[np.float64]  # (T,) seconds
     valid: NDArray[np.bool_]  # (T,)
-    joints_cam: NDArray[np.float32]  # (T, K+1, 3) metres, camera frame
-    keypoints2d: NDArray[np.float32]  # (T, J, 3) pixels and confidence
+    joints_cam: NDArray[np.floating[Any]]  # (T, K+1, 3) metres, camera frame
+    keypoints2d: NDArray[np.floating[Any]]  # (T, J, 3) pixels and confidence
     keypoints2d_names: NDArray[np.str_]  # (J,)
     intrinsics: NDArray[np.float64]  # (3, 3)
     dist: NDArray[np.float64]  # (5,)
-    joint_confidence: NDArray[np.float32]  # (T, K+1)
+    joint_confidence: NDArray[np.floating[Any]]  # (T, K+1)
     world_from_camera: NDArray[np.float64]  # (T, 4, 4)
-    foot_contact: NDArray[np.float32]  # (T, 4) left heel, left toe, right heel, right toe
-    residual_px: NDArray[np.float32]  # (T,)
+    foot_contact: NDArray[np.floating[Any]]  # (T, 4) left heel, left toe, right heel, right toe
+    residual_px: NDArray[np.floating[Any]]  # (T,)
     image_size: NDArray[np.int64]  # (2,) width, height of the decoded, upright frame
     source: str = ""  # file name of the footage
 

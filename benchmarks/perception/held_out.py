@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,7 +42,7 @@ class Take:
     poses: NDArray[np.float64]  # (T, 3(K+1)) axis-angle
     trans: NDArray[np.float64]  # (T, 3) metres
     valid: NDArray[np.bool_]  # (T,) bool
-    betas: NDArray[np.float64]  # (P,)
+    betas: NDArray[np.floating[Any]]  # (P,)
     fps: float
 
 
@@ -93,7 +94,7 @@ def standing_feet(body: Body, shot: Shot) -> NDArray[np.bool_]:
 
 
 def feet_world(
-    body: Body, rotations: NDArray[np.float64], trans: NDArray[np.float64], betas: NDArray[np.float64]
+    body: Body, rotations: NDArray[np.float64], trans: NDArray[np.float64], betas: NDArray[np.floating[Any]]
 ) -> NDArray[np.float64]:
     """Return (T, 2, 3), the midpoints of heel and toe, left and right, in the world, in metres."""
     points = body.keypoints(*body.forward_kinematics(rotations, trans, betas), betas)
@@ -115,7 +116,7 @@ def _stretch(rng: np.random.Generator, body: Body, take: Take) -> NDArray[np.int
     raise ValueError(f"take {take.name} has no {least} sound frames in a row")
 
 
-def _leg_length(body: Body, betas: NDArray[np.float64]) -> float:
+def _leg_length(body: Body, betas: NDArray[np.floating[Any]]) -> float:
     J = body.rest_joints(betas)
     chain = [body.joint_names.index(f"left_{part}") for part in ("hip", "knee", "ankle")]
     return float(np.linalg.norm(np.diff(J[chain], axis=0), axis=1).sum())

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +27,7 @@ class Clip:
     def __len__(self) -> int:
         return len(self.times)
 
-    def soles(self, body: Body, betas: NDArray[np.float64]) -> NDArray[np.float64]:
+    def soles(self, body: Body, betas: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
         """Return the contact points of the feet.
 
         :param betas: (P,) shape coefficients.
@@ -36,7 +37,7 @@ class Clip:
         points: NDArray[np.float64] = contact_point_positions(with_contact_points(body, betas), R, t)[:, : len(SOLES)]
         return points
 
-    def joints(self, body: Body, betas: NDArray[np.float64]) -> NDArray[np.float64]:
+    def joints(self, body: Body, betas: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
         """Return the joint positions.
 
         :param betas: (P,) shape coefficients.

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,7 +30,7 @@ class Cycle:
 
 
 def best_cycle(
-    clip: Clip, body: Body, betas: NDArray[np.float64], start: float, end: float, shortest: float = 0.4
+    clip: Clip, body: Body, betas: NDArray[np.floating[Any]], start: float, end: float, shortest: float = 0.4
 ) -> Cycle:
     """Find the two keys within a span whose poses and velocities differ least.
 

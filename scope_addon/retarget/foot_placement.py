@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,7 +36,7 @@ class RigMotion:
     heads: NDArray[np.float64]  # (T, B, 3)
 
 
-def body_feet(body: Body, betas: NDArray[np.float64], joints: NDArray[np.float64]) -> BodyFeet:
+def body_feet(body: Body, betas: NDArray[np.floating[Any]], joints: NDArray[np.float64]) -> BodyFeet:
     """Measure the feet of the body at rest and collect the ankles of its motion.
 
     The heel is the rear end of what the foot, without its toes, stands on.

@@ -15,6 +15,8 @@ right axes.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -28,7 +30,7 @@ from .skeleton import Pose, Skeleton, head_positions
 
 
 def transfer(
-    clip: Clip, body: Body, betas: NDArray[np.float64], rig: Skeleton, bone_map: BoneMap, *, feet: bool = True
+    clip: Clip, body: Body, betas: NDArray[np.floating[Any]], rig: Skeleton, bone_map: BoneMap, *, feet: bool = True
 ) -> Pose:
     """Compute the rig's motion.
 
@@ -87,6 +89,6 @@ def _turns(D: NDArray[np.float64], part_of: list[str], index: dict[str, int]) ->
     return out
 
 
-def _sole_height(body: Body, betas: NDArray[np.float64]) -> float:
+def _sole_height(body: Body, betas: NDArray[np.floating[Any]]) -> float:
     """Return the height of the lowest point of the body at rest, metres, world axes."""
     return float((body.rest_vertices(betas) @ R_WORLD_MODEL.T)[:, 2].min())

@@ -10,6 +10,7 @@ converts SMPL's rotations to those axes.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import bpy
 import numpy as np
@@ -31,7 +32,7 @@ class RestPose:
     lift: NDArray[np.float64]  # (3,) metres, added to R_world_model · model so that the lowest vertex lies at z = 0
 
 
-def rest_pose(body: Body, betas: NDArray[np.float64]) -> RestPose:
+def rest_pose(body: Body, betas: NDArray[np.floating[Any]]) -> RestPose:
     """Return joints, bone tails and lift of the body at shape ``betas`` (P,)."""
     vertices = body.rest_vertices(betas) @ R_WORLD_MODEL.T
     lift = np.array([0.0, 0.0, -vertices[:, 2].min()])

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import bpy
 import numpy as np
 from numpy.typing import NDArray
@@ -41,7 +43,7 @@ def build_mesh(
 
 
 def rest_vertices_world(
-    body: Body, lift: NDArray[np.float64], betas: NDArray[np.float64] | None = None
+    body: Body, lift: NDArray[np.float64], betas: NDArray[np.floating[Any]] | None = None
 ) -> NDArray[np.float64]:
     """Return the vertices of the rest mesh in the world frame.
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import bpy
 import numpy as np
@@ -111,7 +112,7 @@ class Reduction:
 
 
 def reduce_keys(
-    armature: bpy.types.Object, body: Body, betas: NDArray[np.float64], rate: float, angle: float, distance: float
+    armature: bpy.types.Object, body: Body, betas: NDArray[np.floating[Any]], rate: float, angle: float, distance: float
 ) -> Reduction:
     """Remove the keys that linear interpolation does not need, separately for each bone.
 

@@ -7,6 +7,8 @@ shape, so at the fitted values Blender's deformation is exactly SMPL's.
 
 from __future__ import annotations
 
+from typing import Any
+
 import bpy
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +27,7 @@ def shape_key_name(coefficient: int) -> str:
     return f"Shape{coefficient:03d}"
 
 
-def add_shape_keys(mesh: bpy.types.Object, body: Body, betas: NDArray[np.float64]) -> None:
+def add_shape_keys(mesh: bpy.types.Object, body: Body, betas: NDArray[np.floating[Any]]) -> None:
     """Add ``Basis`` (the current mesh: β = 0) and one key per coefficient, each at its fitted value.
 
     :param betas: (P,) the fitted shape.
@@ -52,7 +54,7 @@ def add_shape_keys(mesh: bpy.types.Object, body: Body, betas: NDArray[np.float64
 def key_shape(
     mesh: bpy.types.Object,
     action: bpy.types.Action,
-    betas: NDArray[np.float64],
+    betas: NDArray[np.floating[Any]],
     frames: NDArray[np.float64],
     per_frame: bool = False,
 ) -> None:

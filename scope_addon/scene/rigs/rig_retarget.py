@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import bpy
 import numpy as np
@@ -85,7 +86,7 @@ def guess_bone_map(rig: bpy.types.Object) -> BoneMap:
 def retarget(
     source: bpy.types.Object,
     body: Body,
-    betas: NDArray[np.float64],
+    betas: NDArray[np.floating[Any]],
     rig: bpy.types.Object,
     bone_map: BoneMap,
     rate: float,
