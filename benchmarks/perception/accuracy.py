@@ -33,18 +33,18 @@ SHOWN = {  # key of the evaluation: heading, target
 }
 ABLATION: dict[str, dict[str, Any]] = {
     "all parts": {},
-    "without the lifter": {"parts": Parts(lifter=False)},
-    "lifter without world landmarks": {"parts": Parts(world_landmarks=False)},
-    "keypoints at the joints": {"parts": Parts(seen_keypoints=False)},
+    "without the lifting network": {"parts": Parts(lifter=False)},
+    "lifting network without world landmarks": {"parts": Parts(world_landmarks=False)},
+    "without keypoint offsets": {"parts": Parts(seen_keypoints=False)},
     "without 3D keypoints": {"parts": Parts(keypoints3d=False)},
     "without the orientation field": {"parts": Parts(orientation_field=False)},
     "without the joint prior": {"parts": Parts(joint_prior=False)},
     "without left-right repair": {"parts": Parts(left_right=False)},
-    "without mended leaps": {"parts": Parts(leaps=False)},
+    "without keypoint-jump repair": {"parts": Parts(leaps=False)},
     "without the second pass": {"parts": Parts(second_pass=False)},
-    "without balance": {"parts": Parts(balance=False)},
+    "without balance in it": {"parts": Parts(balance=False)},
     "without the floor in it": {"parts": Parts(floor=False)},
-    "without contact": {"parts": Parts(contact=False)},
+    "without foot locking": {"parts": Parts(contact=False)},
     "without smoothing": {"smoothing": False},
 }
 FLIPS = ("lr_swap", "mirror", "mirror_swap")

@@ -186,7 +186,7 @@ def edits() -> dict[str, Callable[[], object]]:
         "bake to rate": lambda: use(scope.bake_rate, rate=10.0),
         "guess bones": lambda: use(scope.guess_bones),
         "retarget": lambda: use(scope.retarget),
-        "retarget, way on an object, beside": retarget_beside,
+        "retarget, root motion on an object, next to the person": retarget_beside,
         "footage to sequencer": lambda: use(scope.footage_to_sequencer),
     }
 
