@@ -111,7 +111,7 @@ def same(found: State, expected: State, when: str) -> None:
     different = [key for key in sorted(found.keys() | expected.keys()) if found.get(key) != expected.get(key)]
     if different:
         told = [f"{key}: {found.get(key)!r:.150} is not {expected.get(key)!r:.150}" for key in different[:12]]
-        raise AssertionError(f"{when}, {len(different)} things are not as they were:\n" + "\n".join(told))
+        raise AssertionError(f"{when}, {len(different)} values differ from before:\n" + "\n".join(told))
 
 
 def view() -> tuple[bool, str]:
