@@ -37,7 +37,10 @@ def solver(quick: bool) -> dict[str, Any]:
     print(report.target_lines(figures), end="\n\n")
     if figures["peers"]:
         measured = list(figures["peers"].items())
-        print(report.table(("one iteration, K=23 P=10 N=120, us", "measured, or why not"), measured), end="\n\n")
+        print(
+            report.table(("one iteration, K=23 P=10 N=120, us", "measured, or the reason why not"), measured),
+            end="\n\n",
+        )
     print(f"Plots are in {OUT}")
     return figures
 
@@ -46,7 +49,7 @@ def _real_frames(quick: bool) -> dict[str, Any]:
     """Return cold_frame_ms, warm_frame_ms and the convergence report."""
     names = frames.QUICK_CLIPS if quick else frames.CLIPS
     if not frames.DATA.is_dir():
-        print(f"{frames.DATA} is not beside this checkout: no real frames were measured", file=sys.stderr)
+        print(f"{frames.DATA} does not exist: no real frames were measured; put the clips there", file=sys.stderr)
         return {"cold_frame_ms": None, "warm_frame_ms": None, "convergence": []}
     clips = frames.load_clips(names)
     rows, figures = [], {}
@@ -59,7 +62,7 @@ def _real_frames(quick: bool) -> dict[str, Any]:
     print(report.frame_lines(rows), end="\n\n", flush=True)
     batch = frames.throughput(clips)
     print(
-        f"Batch of cold frames: {batch['one_thread']:.0f} a second in one thread, {batch['all_cores']:.0f} on "
+        f"Batch of cold frames: {batch['one_thread']:.0f} per second in one thread, {batch['all_cores']:.0f} on "
         f"{batch['cores']} cores, {batch['ratio']:.2f} x",
         end="\n\n",
     )

@@ -33,18 +33,18 @@ SHOWN = {  # key of the evaluation: heading, target
 }
 ABLATION: dict[str, dict[str, Any]] = {
     "all parts": {},
-    "without the lifter": {"ablation": Ablation(lifter=False)},
-    "lifter without world landmarks": {"ablation": Ablation(world_landmarks=False)},
-    "keypoints at the joints": {"ablation": Ablation(keypoint_offsets=False)},
+    "without the lifting network": {"ablation": Ablation(lifter=False)},
+    "lifting network without world landmarks": {"ablation": Ablation(world_landmarks=False)},
+    "without keypoint offsets": {"ablation": Ablation(keypoint_offsets=False)},
     "without 3D keypoints": {"ablation": Ablation(keypoints3d=False)},
     "without the orientation field": {"ablation": Ablation(orientation_field=False)},
     "without the joint prior": {"ablation": Ablation(joint_prior=False)},
     "without left-right repair": {"ablation": Ablation(left_right=False)},
-    "without mended leaps": {"ablation": Ablation(keypoint_jumps=False)},
+    "without keypoint-jump repair": {"ablation": Ablation(keypoint_jumps=False)},
     "without the second pass": {"ablation": Ablation(second_pass=False)},
-    "without balance": {"ablation": Ablation(balance=False)},
+    "without balance in it": {"ablation": Ablation(balance=False)},
     "without the floor in it": {"ablation": Ablation(floor=False)},
-    "without contact": {"ablation": Ablation(contact=False)},
+    "without foot locking": {"ablation": Ablation(contact=False)},
     "without smoothing": {"smoothing": False},
 }
 FLIPS = ("lr_swap", "mirror", "mirror_swap")

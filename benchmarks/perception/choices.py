@@ -62,12 +62,12 @@ CHOICES = (
     Choice("weight of the orientation field", prepared_track, "WEIGHTS", (250.0, 1000.0), "orientation_field"),
     Choice("weight of the joint prior", prepared_track, "WEIGHTS", (2.0, 8.0), "joint_prior"),
     Choice("weight of the shape prior", prepared_track, "WEIGHTS", (5.0, 20.0), "shape"),
-    Choice("weight of the floor under feet that stand", prepared_track, "WEIGHTS", (5e3, 2e4), "floor"),
+    Choice("weight of the floor under standing feet", prepared_track, "WEIGHTS", (5e3, 2e4), "floor"),
     Choice("share lifted with world landmarks", lifter, "WORLD_SHARE", (0.5, 1.0)),
     Choice("speed at which balance is doubted, m/s", balance, "STANDING_M_S", (0.25, 1.0)),
     Choice("deviation of feet from the floor, m", ground_plane, "FLOOR_SIGMA_M", (0.015, 0.06)),
-    Choice("wrong depth that a still foot may have, m", standing, "WRONG_DEPTH_M", (0.2, 0.8)),
-    Choice("what held feet may move in the picture, m", foot_lock, "PICTURE_SIGMA_M", (0.001, 0.01)),
+    Choice("depth error that a still foot may have, m", standing, "WRONG_DEPTH_M", (0.2, 0.8)),
+    Choice("image motion allowed to locked feet, m", foot_lock, "PICTURE_SIGMA_M", (0.001, 0.01)),
 )
 
 
@@ -85,7 +85,7 @@ def left_out(errors: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.
 def choices(quick: bool) -> dict[str, Any]:
     """Measure all choices (``quick``: the first three), print the tables and return the figures."""
     if not DATA.is_dir():
-        print(f"{DATA} is not beside this checkout: nothing was measured", file=sys.stderr)
+        print(f"{DATA} does not exist: nothing was measured; put the clips there", file=sys.stderr)
         return {}
     body = load_body("scope")
 

@@ -62,7 +62,7 @@ def replay(frames: int, people: int) -> dict[str, float]:
 
 
 def moved(observation: Observation, pixels: float) -> Observation:
-    """Return a copy of an observation, as a tracker would make it anew, of somebody further to the right."""
+    """Return a copy of an observation, with new arrays as from a tracker, of a person further to the right."""
     return replace(observation, keypoints_px=observation.keypoints_px + [pixels, 0.0])
 
 

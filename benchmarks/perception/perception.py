@@ -22,7 +22,7 @@ SPEED_TARGETS = {"fast": 60.0, CaptureOptions().quality: 30.0}
 def perception(quick: bool) -> dict[str, Any]:
     """Measure everything, print the tables as they come, return the figures."""
     if not DATA.is_dir():
-        print(f"{DATA} is not beside this checkout: nothing was measured", file=sys.stderr)
+        print(f"{DATA} does not exist: nothing was measured; put the clips there", file=sys.stderr)
         return {}
     body = load_body("scope")
     warm_up(body)

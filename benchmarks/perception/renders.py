@@ -46,7 +46,7 @@ KNOWN = ("nothing given", "focal length given", "height given")
 def renders(quick: bool) -> dict[str, Any]:
     """Render what is missing, measure, print the tables as they come, return the figures by preset and by ``KNOWN``."""
     if not DATA.is_dir():
-        print(f"{DATA} is not beside this checkout: nothing was measured", file=sys.stderr)
+        print(f"{DATA} does not exist: nothing was measured; put the clips there", file=sys.stderr)
         return {}
     command = (sys.executable, "-m", "scope.benchmarks.perception.render_shots")
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL)

@@ -31,7 +31,7 @@ PEER = "mediapipe==0.10.14"
 
 
 def looped(clip: str, frames: int, fps: float | None = None) -> Path:
-    """Return the clip repeated to at least so many frames, at its own or another rate; written once, to build/bench."""
+    """Return the clip repeated to at least ``frames`` frames, at its own or another rate; cached in build/bench."""
     target = CACHE / f"{Path(clip).stem}_{frames}{'' if fps is None else f'_{fps:g}fps'}.mp4"
     if target.exists():
         return target

@@ -131,7 +131,7 @@ def full_disk() -> Iterator[float]:
 
 
 def fill(leave: int = 0) -> None:
-    """Take all the room there is, but for so many bytes."""
+    """Fill the disk except for the given number of bytes."""
     with (SMALL / "all_of_it").open("wb", buffering=0) as file:
         try:
             while file.write(b"x" * 4096):

@@ -111,7 +111,7 @@ def same(found: State, expected: State, when: str) -> None:
     different = [key for key in sorted(found.keys() | expected.keys()) if found.get(key) != expected.get(key)]
     if different:
         told = [f"{key}: {found.get(key)!r:.150} is not {expected.get(key)!r:.150}" for key in different[:12]]
-        raise AssertionError(f"{when}, {len(different)} things are not as they were:\n" + "\n".join(told))
+        raise AssertionError(f"{when}, {len(different)} values differ from before:\n" + "\n".join(told))
 
 
 def view() -> tuple[bool, str]:
@@ -186,7 +186,7 @@ def edits() -> dict[str, Callable[[], object]]:
         "bake to rate": lambda: use(scope.bake_rate, rate=10.0),
         "guess bones": lambda: use(scope.guess_bones),
         "retarget": lambda: use(scope.retarget),
-        "retarget, way on an object, beside": retarget_beside,
+        "retarget, root motion on an object, next to the person": retarget_beside,
         "footage to sequencer": lambda: use(scope.footage_to_sequencer),
     }
 

@@ -20,7 +20,7 @@ GRID = 2.0**-20  # metres: steps of one micrometre, which compress far better th
 
 
 def write_body(path: Path, arrays: dict[str, NDArray[Any]]) -> None:
-    """Write beside ``path``, then put in place; the bytes depend on the arrays alone."""
+    """Write atomically; the bytes depend only on the arrays."""
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     with atomic_path(path) as temporary:

@@ -67,13 +67,9 @@ def densify(values: NDArray[Any], shape: tuple[int, ...], sparsity: Sparsity, la
                     raise ModelFileError(f"{label}: block map {sparsity.block_map} does not fit shape {shape}.")
                 block_size[along] = level.size
         else:
-            lengths = np.diff(level.segments)
-            ends = (0, len(level.indices))
-            if len(lengths) != count or (lengths < 0).any() or tuple(level.segments[[0, -1]]) != ends:
-                raise ModelFileError(f"{label}: sparse segments do not match their indices.")
+            parent, index = _compressed(level.segments, level.indices, count, label)
             if dimension >= rank:
                 raise ModelFileError(f"{label}: a block dimension is sparse, which TFLite does not define.")
-            parent, index = np.repeat(np.arange(count), lengths), level.indices
         coordinates = {key: value[parent] for key, value in coordinates.items()}
         coordinates[dimension] = index
         count = len(index)
@@ -84,7 +80,17 @@ def densify(values: NDArray[Any], shape: tuple[int, ...], sparsity: Sparsity, la
         place[along] = place[along] + coordinates[rank + b]
     for d in range(rank):
         if count and not (0 <= place[d].min() and place[d].max() < shape[d]):
-            raise ModelFileError(f"{label}: a sparse index lies outside shape {shape}.")
+            raise ModelFileError(f"{label}: a sparse index is outside shape {shape}.")
     dense = np.zeros(shape, values.dtype)
     dense[tuple(place)] = values
     return dense
+
+
+def _compressed(
+    segments: NDArray[Any], indices: NDArray[Any], count: int, label: str
+) -> tuple[NDArray[np.intp], NDArray[Any]]:
+    """Return the position in the level above, and the coordinate, of each entry of a compressed level."""
+    lengths = np.diff(segments)
+    if len(lengths) != count or (lengths < 0).any() or tuple(segments[[0, -1]]) != (0, len(indices)):
+        raise ModelFileError(f"{label}: sparse segments do not match their indices.")
+    return np.repeat(np.arange(count), lengths), indices

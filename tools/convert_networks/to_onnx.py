@@ -35,16 +35,8 @@ def convert_model(
     graph.names[model.inputs[0]] = "input"
     kept = [model.outputs[position] for position, _, _ in outputs]
     for operator in _needed(model, kept):
-        if operator.outputs[0] in graph.constants:
-            continue
-        if not operator.inputs or operator.inputs[0] < 0:
-            raise graph.fail(operator, "it has no input")
-        if operator.kind not in CONVERTERS:
-            raise graph.fail(operator, "this operator is not supported")
-        try:
-            CONVERTERS[operator.kind](graph, operator)
-        except (ValueError, IndexError) as error:
-            raise graph.fail(operator, f"its tensors do not fit it ({error})") from error
+        if operator.outputs[0] not in graph.constants:
+            _append(graph, operator)
     described = []
     for tensor, (_, name, shape) in zip(kept, outputs, strict=True):
         graph.nodes.append(helper.make_node("Identity", [graph.value(tensor)], [name], name=f"output_{name}"))
@@ -58,6 +50,17 @@ def convert_model(
     except (onnx.checker.ValidationError, onnx.shape_inference.InferenceError) as error:
         raise ModelFileError(f"{model.name}: the converted graph is not valid ONNX: {error}") from error
     return result
+
+
+def _append(graph: Graph, operator: Operator) -> None:
+    if not operator.inputs or operator.inputs[0] < 0:
+        raise graph.fail(operator, "it has no input")
+    if operator.kind not in CONVERTERS:
+        raise graph.fail(operator, "this operator is not supported")
+    try:
+        CONVERTERS[operator.kind](graph, operator)
+    except (ValueError, IndexError) as error:
+        raise graph.fail(operator, f"its tensors do not fit it ({error})") from error
 
 
 def _batched(shape: tuple[int, ...]) -> list[int | str]:

@@ -59,7 +59,7 @@ def load_asf_amc(texts: dict[str, str]) -> tuple[list[Take], list[Skeleton]]:
     for path in sorted(p for p in texts if p.endswith(".amc")):
         subject = PurePosixPath(path).parent.name
         if subject not in skeletons:
-            raise MotionFileError(f"{path}: there is no skeleton {subject}.asf beside it")
+            raise MotionFileError(f"{path}: its skeleton {subject}.asf is missing in the same folder")
         skeleton = skeletons[subject]
         M, root = asf_amc.parse_amc(texts[path], skeleton, path)
         takes.append(_cmu_take(PurePosixPath(path).stem, f"cmu_{subject}", "cmu_asf_amc", skeleton, M, root))

@@ -129,7 +129,7 @@ def segment_rotations(take: Take, follow: Follow) -> NDArray[np.float64]:
     :raises ShapeError: when the take has positions only.
     """
     if take.orientations is None:
-        raise ShapeError(f"{take.name} has no orientations: our body cannot be fitted to joint positions alone")
+        raise ShapeError(f"{take.name} has no orientations: the body cannot be fitted to joint positions alone")
     R = take.orientations[:, take.index(follow.first)]
     if follow.second:
         between = np.swapaxes(R, -1, -2) @ take.orientations[:, take.index(follow.second)]

@@ -69,7 +69,7 @@ def from_behind() -> NDArray[np.uint8]:
 
 
 def two_floors() -> NDArray[np.uint8]:
-    """Draw a failure: one floor for a clip in which a man leaps from a roof (walk_side_static)."""
+    """Draw a failure: one floor for a clip in which a man jumps from a roof (walk_side_static)."""
     acrobat, walker = captured(DATA / "clips" / "walk_side_static.mp4", everybody=True)
     rows = (100, 150, 168, 175, 184, 193, 207)
     people = [(acrobat, row, OURS if acrobat.valid[row] else FAINT) for row in rows] + [(walker, 42, AMBER)]

@@ -116,7 +116,7 @@ def save(path: Path, pairs: list[dict[str, Any]]) -> None:
 
 def main() -> None:
     """Run the command line."""
-    parser = argparse.ArgumentParser(description="Observe the landmark network's errors on renders of our body.")
+    parser = argparse.ArgumentParser(description="Observe the landmark network's errors on renders of the body.")
     parser.add_argument("motions", type=Path, help="file written by scope.tools.mocap.fit_body")
     parser.add_argument("-o", "--output", type=Path, default=Path("build/lifter/pairs.npz"))
     parser.add_argument("-n", "--count", type=int, default=4000)

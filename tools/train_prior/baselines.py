@@ -63,7 +63,7 @@ _NODES = tuple(0.5 * (a + b) for a, b in zip(np.polynomial.legendre.leggauss(200
 def log_fisher_constant(s: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
     """Return log c(s) and its gradient (3,), for proper singular values s_1 >= s_2 >= |s_3|.
 
-    u is integrated by Gauss-Legendre in sqrt(1 - u): the mass lies within 1 / (s_2 + s_3) of u = 1.
+    u is integrated by Gauss-Legendre in sqrt(1 - u): the mass is within 1 / (s_2 + s_3) of u = 1.
     """
     return _log_c(s), np.array([_slope(s, k) for k in range(3)])
 
