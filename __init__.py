@@ -3,14 +3,14 @@
 
 
 def register() -> None:
-    """Called by Blender when the extension is enabled."""
+    """Register the extension; Blender calls this when it is enabled."""
     from .scope_addon import ui
 
     ui.register()
 
 
 def unregister() -> None:
-    """Called by Blender when the extension is disabled."""
+    """Unregister the extension; Blender calls this when it is disabled."""
     from .scope_addon import ui
 
     ui.unregister()

@@ -20,7 +20,9 @@ _MIN_SPREAD_M = 0.3  # the slope of the floor is unobservable from soles closer 
 _LIFT_CUTOFF_HZ = 3.0
 
 
-def refloor(clip: Clip, body: Body, betas: NDArray[np.floating[Any]], *, level: bool = False, lift: bool = True) -> Clip:
+def refloor(
+    clip: Clip, body: Body, betas: NDArray[np.floating[Any]], *, level: bool = False, lift: bool = True
+) -> Clip:
     """Move the motion so that the feet in contact are on z = 0.
 
     :param betas: (P,) shape coefficients.

@@ -132,6 +132,8 @@ def heic(
     for content, within in zip(contents, inside, strict=True):
         places.append((0 if within else at, len(content)))
         at += 0 if within else len(content)
-    return begin + meta(places) + box(
-        b"mdat", b"".join(content for content, within in zip(contents, inside, strict=True) if not within)
+    return (
+        begin
+        + meta(places)
+        + box(b"mdat", b"".join(content for content, within in zip(contents, inside, strict=True) if not within))
     )
