@@ -121,7 +121,7 @@ def test_a_confident_direction_corrects_a_limb_in_earlier_frames_as_well():
 
 
 def test_with_an_ambiguous_leg_frames_keep_the_pose_of_the_previous_frame():
-    """First, all frames have the leg on the wrong side; then the first is lifted correctly, the others without depth."""
+    """At first, all frames have the leg on the wrong side; then one is lifted correctly, the others without depth."""
     body, camera = load_body("scope"), choose_camera(1080, 1920)
     track = _standing_track(body, camera, (("right_hip", 0.3), ("right_knee", 0.9)))
     prepared = prepare_track(body, track, camera)
