@@ -105,7 +105,7 @@ def centroid(vertices, faces):
 
 @pytest.mark.parametrize("pitch_deg", [-25.0, 0.0, 20.0])
 def test_up_of_a_person_who_bends_follows_from_the_centre_of_mass(pitch_deg):
-    """Knees and hips are bent, so that no axis of the body is upright; the mesh's centre of volume is above the soles."""
+    """Knees and hips bent, no axis of the body upright, and the mesh's centre of volume above the soles."""
     body = load_body("scope")
     omega = np.tile(np.eye(3), (body.K + 1, 1, 1))
     omega[0] = R_WORLD_MODEL
