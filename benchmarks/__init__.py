@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How fast the solver is, beside what else there is: `./scripts/bench solver`."""
+"""Measure the speed and accuracy of solver and captures: `./scripts/bench`."""

@@ -8,21 +8,22 @@ import json
 import os
 import sys
 from pathlib import Path
+from typing import Any
 
 for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ[_name] = "1"  # before numpy: everything is measured in one thread
 
-from ..scope_addon.atomic_write import written_beside  # noqa: E402
+from ..scope_addon.atomic_write import atomic_path  # noqa: E402
 from . import frames, report  # noqa: E402
 from .solver import peers, plots, startup, steps  # noqa: E402
 
 OUT = frames.CACHE
 
 
-def solver(quick: bool) -> dict:
+def solver(quick: bool) -> dict[str, Any]:
     """Measure everything about the solver; return the figures and print them as they come."""
     rounds = 20 if quick else 100
-    figures: dict = steps.target_table(rounds)
+    figures: dict[str, Any] = steps.target_table(rounds)
     figures |= startup.startup()
     experiments = {}
     for number in (1, 2, 3):
@@ -35,17 +36,20 @@ def solver(quick: bool) -> dict:
     figures["peers"] = {} if quick else peers.run_all()
     print(report.target_lines(figures), end="\n\n")
     if figures["peers"]:
-        rows = [[name, found] for name, found in figures["peers"].items()]
-        print(report.table(("one iteration, K=23 P=10 N=120, us", "measured, or why not"), rows), end="\n\n")
+        measured = list(figures["peers"].items())
+        print(
+            report.table(("one iteration, K=23 P=10 N=120, us", "measured, or the reason why not"), measured),
+            end="\n\n",
+        )
     print(f"Plots are in {OUT}")
     return figures
 
 
-def _real_frames(quick: bool) -> dict:
+def _real_frames(quick: bool) -> dict[str, Any]:
     """Return cold_frame_ms, warm_frame_ms and the convergence report."""
     names = frames.QUICK_CLIPS if quick else frames.CLIPS
     if not frames.DATA.is_dir():
-        print(f"{frames.DATA} is not beside this checkout: no real frames were measured", file=sys.stderr)
+        print(f"{frames.DATA} does not exist: no real frames were measured; put the clips there", file=sys.stderr)
         return {"cold_frame_ms": None, "warm_frame_ms": None, "convergence": []}
     clips = frames.load_clips(names)
     rows, figures = [], {}
@@ -58,7 +62,7 @@ def _real_frames(quick: bool) -> dict:
     print(report.frame_lines(rows), end="\n\n", flush=True)
     batch = frames.throughput(clips)
     print(
-        f"Batch of cold frames: {batch['one_thread']:.0f} a second in one thread, {batch['all_cores']:.0f} on "
+        f"Batch of cold frames: {batch['one_thread']:.0f} per second in one thread, {batch['all_cores']:.0f} on "
         f"{batch['cores']} cores, {batch['ratio']:.2f} x",
         end="\n\n",
     )
@@ -91,7 +95,7 @@ def main() -> int:
 
         figures = perception(args.quick)
     if args.json:
-        with written_beside(args.json) as temporary:
+        with atomic_path(args.json) as temporary:
             temporary.write_text(json.dumps(figures, indent=1))
     return 0
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What an animator waits for: keys written, work on a captured motion, Blender opening, its window in a capture."""
+"""Times for which an animator waits: writing keys, editing a captured motion, opening Blender, and capturing in it."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 from . import frames
 from .report import table
@@ -17,8 +18,8 @@ REAL = ROOT / "build" / "blender" / "root" / "scope" / "out"  # what ./scripts/b
 TARGETS = {"writing": 1.5, "working again": 1.0, "opening": 50.0, "timer gaps": 100.0}
 
 
-def blender(quick: bool) -> dict:
-    """Measure, print the table, return the figures; what cannot be had here is None."""
+def blender(quick: bool) -> dict[str, Any]:
+    """Measure, print the table and return the figures; those that cannot be measured on this machine are None."""
     figures = _work(3 if quick else 11)
     figures["opening"] = _in_real_blender("startup", "startup.json")
     panel = None if quick else _in_real_blender("panel", "report.json")
@@ -41,24 +42,26 @@ def blender(quick: bool) -> dict:
     return figures
 
 
-def _work(rounds: int) -> dict:
-    """The figures of ``blender_work``, in a process of its own: Blender's module can hang at exit."""
+def _work(rounds: int) -> dict[str, Any]:
+    """Return the figures of ``blender_work``, run in a separate process because Blender's module can hang at exit."""
     frames.CACHE.mkdir(parents=True, exist_ok=True)
     motion = frames.CACHE / "sample.npz"
     if not motion.is_file():
         command = ("scope.scope_addon.cli", "capture", "--quality", "fast", "--quiet", "-o", str(motion))
         subprocess.run([sys.executable, "-m", *command], check=True)
-    command = ("scope.benchmarks.blender_work", str(motion), str(rounds))
-    done = subprocess.run([sys.executable, "-m", *command], stdout=subprocess.PIPE, text=True, check=True)
-    return json.loads(next(line for line in done.stdout.splitlines() if line.startswith("{")))
+    work = ("scope.benchmarks.blender_work", str(motion), str(rounds))
+    done = subprocess.run([sys.executable, "-m", *work], stdout=subprocess.PIPE, text=True, check=True)
+    figures: dict[str, Any] = json.loads(next(line for line in done.stdout.splitlines() if line.startswith("{")))
+    return figures
 
 
-def _in_real_blender(part: str, file: str) -> dict | None:
-    """One part of ./scripts/blender, which needs root and Debian; None with a reason where it does not run."""
+def _in_real_blender(part: str, file: str) -> dict[str, Any] | None:
+    """Run one part of ./scripts/blender, which needs root and Debian; return None, and print why, if it fails."""
     environment = {name: value for name, value in os.environ.items() if not name.endswith("_NUM_THREADS")}
     command = [str(ROOT / "scripts" / "blender"), "--part", part]
     done = subprocess.run(command, env=environment, stdout=subprocess.DEVNULL, check=False)
     if done.returncode:
         print(f"{part}: not measured, see above", file=sys.stderr)
         return None
-    return json.loads((REAL / file).read_text())
+    figures: dict[str, Any] = json.loads((REAL / file).read_text())
+    return figures

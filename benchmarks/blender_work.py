@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Writing keys and working on them again, by Blender's own module: run in a process of its own, prints JSON.
+"""Time writing and editing keys with Blender's own module; runs in a separate process and prints JSON.
 
-python -m scope.benchmarks.blender_work MOTION ROUNDS    MOTION: a captured .npz, which is played to and fro
+python -m scope.benchmarks.blender_work MOTION ROUNDS    MOTION: a captured .npz, which is played forwards and backwards
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import time
 from collections.abc import Callable
 from dataclasses import fields, replace
 from pathlib import Path
+from typing import Any
 
 import bpy
 import numpy as np
@@ -26,11 +27,11 @@ from ..scope_addon.scene.character.armature import build_armature, rest_pose
 from ..solver.loaders.body_file import load_body
 
 WRITTEN = 10_000  # frames
-LENGTHS = {"half_a_minute": 900, "five_minutes": 9000}  # frames, at 30 a second
+LENGTHS = {"half_a_minute": 900, "five_minutes": 9000}  # frames, at 30 per second
 
 
 def longer(motion: Motion, count: int) -> Motion:
-    """The motion played to and fro until it has so many frames."""
+    """Return the motion played forwards and backwards until it has ``count`` frames."""
     there = np.arange(len(motion))
     rows = np.resize(np.concatenate([there, there[-2:0:-1]]), count)
     arrays = {f.name: v for f in fields(motion) if isinstance(v := getattr(motion, f.name), np.ndarray)}
@@ -40,7 +41,7 @@ def longer(motion: Motion, count: int) -> Motion:
 
 
 def median_s(rounds: int, work: Callable[[], object], before: Callable[[], object] = lambda: None) -> float:
-    """Median seconds of some work; what comes before it does not count."""
+    """Return the median duration of ``work`` in seconds; ``before`` is called before each round and not timed."""
     times = []
     for _ in range(rounds):
         before()
@@ -51,18 +52,18 @@ def median_s(rounds: int, work: Callable[[], object], before: Callable[[], objec
 
 
 def fresh() -> None:
-    """An empty file at 30 frames a second."""
+    """Open an empty file at 30 frames per second."""
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     bpy.context.scene.render.fps, bpy.context.scene.render.fps_base = 30, 1.0
 
 
 def writing(motion: Motion, rounds: int) -> dict[str, float]:
-    """Keys alone, and the whole scene: body, shape keys, camera, confidence of every bone."""
+    """Time the keys alone, and the whole scene: body, shape keys, camera, confidence of every bone."""
     body = load_body("scope")
     long = longer(motion, WRITTEN)
     rest = rest_pose(body, long.betas)
     frames = np.arange(WRITTEN, dtype=float)
-    made: dict = {}
+    made: dict[str, Any] = {}
 
     def prepare() -> None:
         fresh()
@@ -75,7 +76,7 @@ def writing(motion: Motion, rounds: int) -> dict[str, float]:
 
 
 def working_again(motion: Motion, rounds: int, folder: Path) -> dict[str, dict[str, float]]:
-    """The panel's operators on a capture whose motion is in the cache."""
+    """Time the panel's operators on a capture whose motion is in the cache."""
     body, figures = load_body("scope"), {}
     for name, count in LENGTHS.items():
         fresh()

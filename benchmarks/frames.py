@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Cold and warm fits of real frames: iterations, time, and how many converge.
 
-The measurements are those that the capture hands to the solver: the clips beside the checkout go through its networks
-once, and what arrives at the solver is kept in build/bench. Weights, stages and robust scales are the capture's; the
-shape is unknown in every frame. Cold: without an earlier estimate, from `initial_state` through all stages. Warm: from
-the frame before. Converged: cost within 0.1 % and joints within 1 mm of the same start run to a relative decrease of
-1e-12.
+The measurements are those that the capture passes to the solver: its networks process the clips next to the checkout
+once, and the measurements are kept in build/bench. Weights, stages and robust scales are the capture's; the shape is
+unknown in every frame. Cold: without an earlier estimate, from `initial_state` through all stages. Warm: from the
+previous frame. Converged: cost within 0.1 % and joints within 1 mm of the result of the same start at a relative
+decrease of 1e-12.
 """
 
 from __future__ import annotations
@@ -16,10 +16,12 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
-from ..scope_addon.atomic_write import written_beside
+from ..scope_addon.atomic_write import atomic_path
 from ..scope_addon.capture.camera.intrinsics import choose_camera
 from ..scope_addon.capture.fitting import weights as fit_weights
 from ..scope_addon.capture.fitting.prepared_track import prepare_track
@@ -51,7 +53,7 @@ class Clip:
     """The measurements of one clip's frames in order, and the joint prior's weights."""
 
     frames: list[Measurements]
-    joint_weights: np.ndarray  # (K,)
+    joint_weights: NDArray[np.float64]  # (K,)
 
 
 def load_clips(names: Sequence[str]) -> list[Clip]:
@@ -87,15 +89,23 @@ def write(path: Path, calls: Sequence[tuple[Measurements, Priors]]) -> None:
     rows = [_values(m) for m, _ in calls]
     arrays = {key: np.array([row[k] for row in rows]) for k, key in enumerate(KEYS)}
     m, priors = calls[0]
-    fixed = (m.intrinsics, m.keypoints2d.indices, m.orientation_field.starts, m.orientation_field.ends)
-    arrays |= dict(zip(FIXED, (*fixed, priors.joint_weights), strict=True))
+    a, _, c = _kinds(m)
+    fixed = (m.intrinsics, a.indices, c.starts, c.ends, priors.joint_weights)
+    arrays |= {key: np.asarray(value) for key, value in zip(FIXED, fixed, strict=True)}
     path.parent.mkdir(parents=True, exist_ok=True)
-    with written_beside(path) as temporary:
+    with atomic_path(path) as temporary:
         np.savez(temporary, **arrays)
 
 
-def _values(m: Measurements) -> tuple:
-    a, b, c = m.keypoints2d, m.keypoints3d, m.orientation_field
+def _kinds(m: Measurements) -> tuple[Keypoints2D, Keypoints3D, OrientationField]:
+    assert m.keypoints2d is not None
+    assert m.keypoints3d is not None
+    assert m.orientation_field is not None
+    return m.keypoints2d, m.keypoints3d, m.orientation_field
+
+
+def _values(m: Measurements) -> tuple[ArrayLike, ...]:
+    a, b, c = _kinds(m)
     return a.pixels, a.confidence, b.points, b.confidence, c.directions, c.confidence
 
 
@@ -132,12 +142,12 @@ def capture_priors(body: Body, clip: Clip) -> Priors:
 
 @dataclass
 class Outcome:
-    """What became of the fits of one kind, cold or warm, at one tolerance; one entry a frame."""
+    """Results of the fits of one kind, cold or warm, at one tolerance; one entry per frame."""
 
-    milliseconds: np.ndarray
-    iterations: np.ndarray
-    converged: np.ndarray  # bool
-    cost: np.ndarray
+    milliseconds: NDArray[np.float64]
+    iterations: NDArray[np.int64]
+    converged: NDArray[np.bool_]  # bool
+    cost: NDArray[np.float64]
 
     def summary(self) -> dict[str, float]:
         """Return medians and shares."""
@@ -153,7 +163,7 @@ class Outcome:
 def measure(clips: Sequence[Clip], tolerance: float, triggs: float = 0.0, every: int = 1) -> dict[str, Outcome]:
     """Fit every frame cold and warm; return the outcomes by kind. `every` k-th frame is judged, all are followed."""
     body = load_body("scope")
-    rows: dict[str, list[tuple]] = {"cold": [], "warm": []}
+    rows: dict[str, list[tuple[Any, ...]]] = {"cold": [], "warm": []}
     options = {kind: capture_options(kind == "cold", tolerance, triggs) for kind in rows}
     tight = {kind: capture_options(kind == "cold", 1e-12, triggs, 1000) for kind in rows}
     for clip in clips:
@@ -175,13 +185,13 @@ def measure(clips: Sequence[Clip], tolerance: float, triggs: float = 0.0, every:
 
 
 def same(found: Fit, best: Fit) -> bool:
-    """Whether a fit has converged to `best`."""
+    """Return whether a fit has converged to `best`."""
     apart = np.linalg.norm(found.t_camera_part - best.t_camera_part, axis=1).max()
     return bool(abs(found.cost - best.cost) <= COST_SHARE * best.cost and apart <= JOINTS_M)
 
 
 def throughput(clips: Sequence[Clip], repeats: int = 5) -> dict[str, float]:
-    """Frames fitted in a second, each by itself from no earlier estimate: one thread, all cores, and their ratio."""
+    """Return the cold frames fitted per second by one thread and by all cores, and their ratio."""
     body = load_body("scope")
     priors = capture_priors(body, clips[0])
     frames = [m for clip in clips for m in clip.frames]

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 from .solver.steps import TARGETS, growth, growth_in_joints
 
@@ -23,7 +24,7 @@ def _cell(x: object) -> str:
     return f"{x:.3g}" if isinstance(x, float) and x < 100 else f"{x:.0f}" if isinstance(x, float) else str(x)
 
 
-def target_lines(figures: dict) -> str:
+def target_lines(figures: dict[str, Any]) -> str:
     """Return the target table, from whatever of it was measured."""
     rows: list[list[object]] = []
     for name, (_, _, _, _, target) in TARGETS.items():
@@ -55,7 +56,7 @@ def experiment_lines(number: int, rows: list[dict[str, float]]) -> str:
     return text + "\n\nGrowth from K = 23 to 51: " + ", ".join(joints)
 
 
-def frame_lines(convergence: list[dict]) -> str:
+def frame_lines(convergence: list[dict[str, Any]]) -> str:
     """Return the convergence report on real frames."""
     keys = ("kind", "tolerance", "triggs", "frames", "milliseconds", "iterations", "converged", "cost")
     return table(keys, [[_exact(row[k]) for k in keys] for row in convergence])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Files that are written whole or not at all: beside their place, and renamed into it; and why one could not be."""
+"""Atomic writes: a file is written under a temporary name and renamed, so that it is complete or absent."""
 
 from __future__ import annotations
 
@@ -14,23 +14,26 @@ from pathlib import Path
 
 from .errors import OutputError
 
-_unfinished: set[Path] = set()
+_temporary_files: set[Path] = set()
 
 
 @contextmanager
-def written_beside(path: Path) -> Iterator[Path]:
-    """An empty file in the folder of ``path``, renamed to it at the end, removed if anything fails or stops it.
+def atomic_path(path: Path) -> Iterator[Path]:
+    """Create a temporary file in the folder of ``path``, and rename it to ``path`` when the block ends.
 
-    Where ``path`` is a link, what it leads to is written, and the link stays. The writer may remove or replace the
-    empty file, but has to leave a file of that name.
+    If the block is left by an exception, the temporary file is removed and ``path`` is unchanged. If ``path`` is a
+    link, its target is written and the link stays.
 
-    :raises OSError: it cannot be made or renamed. :raises OutputError: what is there is no ordinary file.
+    :return: context manager that gives the temporary file's path. The block may replace the file, which is empty at
+        first, but has to leave a file of that name.
+    :raises OSError: the file cannot be created or renamed.
+    :raises OutputError: ``path`` exists and is not a regular file.
     """
-    target = file_behind(path)
-    start = path.stem[:40]  # whatever its letters take, room is left for the rest
+    target = resolve_link(path)
+    start = path.stem[:40]  # short enough for the limit on file names, even where a letter takes several bytes
     handle, name = tempfile.mkstemp(prefix=f".{start}.", suffix=path.suffix.lower(), dir=target.parent)
     temporary = Path(name)
-    _unfinished.add(temporary)
+    _temporary_files.add(temporary)
     try:
         os.close(handle)
         yield temporary
@@ -38,13 +41,13 @@ def written_beside(path: Path) -> Iterator[Path]:
         os.replace(temporary, target)
     finally:
         temporary.unlink(missing_ok=True)
-        _unfinished.discard(temporary)
+        _temporary_files.discard(temporary)
 
 
-def file_behind(path: Path) -> Path:
-    """The file that is written: what ``path`` leads to where it is a link, else itself. It need not be there yet.
+def resolve_link(path: Path) -> Path:
+    """Return the file that writing to ``path`` changes: the target of a link, otherwise ``path``. It may not exist yet.
 
-    :raises OutputError: what is there is no ordinary file, which renaming would remove, or the links lead nowhere.
+    :raises OutputError: the file exists and is not a regular one, which renaming would replace; or links form a circle.
     """
     target = Path(os.path.realpath(path)) if path.is_symlink() else path
     link = f"it is a link to {target}, and that" if target != path else "it"
@@ -52,16 +55,16 @@ def file_behind(path: Path) -> Path:
         mode = target.stat().st_mode
     except OSError as error:
         if error.errno == errno.ELOOP:
-            raise OutputError(f"cannot write {path}: its links lead in a circle; choose another name") from error
-        return target  # nothing is there, or why it cannot be written is told when it is
+            raise OutputError(f"cannot write {path}: its links form a circle; choose another name") from error
+        return target  # it does not exist; any other problem is reported when it is written
     if not stat.S_ISREG(mode):
         what = "a folder" if stat.S_ISDIR(mode) else "a device, a pipe or a socket"
-        raise OutputError(f"cannot write {path}: {link} is {what}, not an ordinary file; choose another name")
+        raise OutputError(f"cannot write {path}: {link} is {what}, not a regular file; choose another name")
     return target
 
 
 def reason(error: OSError) -> str:
-    """Why a file could not be written, and what to do."""
+    """Describe why a file could not be written, and what to do."""
     if error.errno == errno.ENAMETOOLONG:
         return f"{error.strerror}; choose a shorter name"
     if error.errno == errno.ENOENT:
@@ -69,9 +72,9 @@ def reason(error: OSError) -> str:
     return f"{error.strerror or error}; free some space or choose another folder"
 
 
-def remove_unfinished() -> None:
-    """Remove what is being written; for a process that is about to leave without any of its exits."""
-    for temporary in list(_unfinished):
+def remove_temporary_files() -> None:
+    """Remove the files that are being written, in a process that is about to exit without cleaning up."""
+    for temporary in list(_temporary_files):
         with contextlib.suppress(OSError):
             temporary.unlink(missing_ok=True)
 

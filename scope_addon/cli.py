@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The command line: one argparse tree, used by the shell and by Blender's ``--command scope``.
 
-Exit status: 0 done, 1 failed, 2 bad arguments, 3 no person found. Progress and the one sentence about a failure go to
-stderr; with ``--json`` stdout carries the report alone.
+Exit status: 0 done, 1 failed, 2 invalid arguments, 3 no person found. Progress and error messages go to stderr; with
+``--json``, stdout carries nothing but the report.
 """
 
 from __future__ import annotations
@@ -12,15 +12,15 @@ import json
 import os
 import sys
 from collections.abc import Sequence
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from ..solver.errors import ScopeError
 from ..solver.loaders.body_file import ASSETS
-from .command_line.arguments import add_options, body_and_options, given_options, named_path
-from .command_line.outputs import check_blender, check_outputs, each_once, summary, usable_rig, write_outputs
+from .command_line.arguments import add_options, body_and_options, non_default_arguments, path_argument
+from .command_line.outputs import check_blender, check_outputs, checked_rig, distinct_paths, summary, write_outputs
 from .command_line.signals import interrupted, stopped_by_signals
 from .command_line.terminal import ProgressBar, say, stdout_for_report
-from .errors import UsageError, exit_status
+from .errors import UsageError, exit_status, system_error_message
 from .installed import CAPTURE, check_installed
 from .job.parent import stop_with_parent
 from .scene.export.output_paths import SUFFIXES
@@ -31,12 +31,12 @@ PROGRAM = (sys.executable, "-m", f"{__package__}.cli")
 
 class _Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
-        """Report one sentence instead of the whole usage."""
+        """Raise UsageError instead of printing the whole usage."""
         raise UsageError(f"{message} (see {self.prog} --help)")
 
 
 def build_parser() -> argparse.ArgumentParser:
-    """Make the whole argparse tree."""
+    """Build the whole argparse tree."""
     parser = _Parser(prog="scope", description="Markerless motion capture: video in, animated body out.")
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND", parser_class=_Parser)
     capture = commands.add_parser("capture", help="capture the people in a video or picture")
@@ -54,7 +54,7 @@ def _add_capture_files(capture: argparse.ArgumentParser) -> None:
     capture.add_argument(
         "video",
         nargs="?",
-        type=named_path,
+        type=path_argument,
         metavar="VIDEO",
         help="video, picture, or numbered pictures as a folder or walk_####.png (default: a sample)",
     )
@@ -62,23 +62,24 @@ def _add_capture_files(capture: argparse.ArgumentParser) -> None:
         "-o",
         "--output",
         action="append",
-        type=named_path,
+        type=path_argument,
         default=[],
         metavar="OUT",
         help=f"result file, may be repeated; its suffix selects the format: {', '.join(SUFFIXES)}"
         " (default: .npz and .glb next to the video)",
     )
     capture.add_argument(
-        "--overlay", type=named_path, metavar="FILE", help="draw the body over the footage: .mp4, .png, .jpg"
+        "--overlay", type=path_argument, metavar="FILE", help="draw the body over the footage: .mp4, .png, .jpg"
     )
-    capture.add_argument("--stop-with-stdin", action="store_true", help=argparse.SUPPRESS)  # as a batch starts it
+    # Passed by a batch to its processes.
+    capture.add_argument("--stop-with-stdin", action="store_true", help=argparse.SUPPRESS)
 
 
 def _add_batch_files(batch: argparse.ArgumentParser) -> None:
     batch.add_argument(
-        "folder", type=named_path, metavar="FOLDER", help="folder of videos, pictures and picture sequences"
+        "folder", type=path_argument, metavar="FOLDER", help="folder of videos, pictures and picture sequences"
     )
-    batch.add_argument("--out", type=named_path, required=True, metavar="FOLDER", help="folder of the results")
+    batch.add_argument("--out", type=path_argument, required=True, metavar="FOLDER", help="output folder")
     batch.add_argument(
         "--formats",
         default="npz,glb",
@@ -86,21 +87,22 @@ def _add_batch_files(batch: argparse.ArgumentParser) -> None:
         help=f"formats to write for every clip: {', '.join(s[1:] for s in SUFFIXES)} (default: npz,glb)",
     )
     batch.add_argument("--overlays", action="store_true", help="also write NAME.overlay.mp4 for every video")
-    batch.add_argument("--recursive", action="store_true", help="include the folders below")
+    batch.add_argument("--recursive", action="store_true", help="include subfolders")
     batch.add_argument("--jobs", type=int, default=1, metavar="N", help="clips captured in parallel (default: 1)")
-    batch.add_argument("--again", action="store_true", help="capture everything again, finished clips included")
+    batch.add_argument("--again", action="store_true", help="capture every clip again, including finished ones")
 
 
 def main(argv: Sequence[str] | None = None, program: Sequence[str] = PROGRAM) -> int:
-    """Run the command line and return the exit status.
+    """Run the command line and return the exit status. Errors are printed, not raised.
 
+    :param argv: arguments; those of the process if None.
     :param program: command that takes these arguments; a batch starts one such process per clip.
     """
     try:
         args, unknown = build_parser().parse_known_args(argv)
         if unknown:
-            several = "; a folder of clips is for scope batch" if not unknown[0].startswith("-") else ""
-            raise UsageError(f"cannot use {' '.join(unknown)} (see scope {args.command} --help{several})")
+            several = "; use scope batch for several clips" if not unknown[0].startswith("-") else ""
+            raise UsageError(f"unknown arguments: {' '.join(unknown)} (see scope {args.command} --help{several})")
         args.program = list(program)
         with stopped_by_signals(), stdout_for_report() as stdout:
             if getattr(args, "stop_with_stdin", False):
@@ -108,7 +110,7 @@ def main(argv: Sequence[str] | None = None, program: Sequence[str] = PROGRAM) ->
             report = args.run(args)
             if args.json:
                 print(json.dumps(report), file=stdout, flush=True)
-        return report.pop("exit_status", 0)
+        return int(report.get("exit_status", 0))
     except ScopeError as error:
         print(f"scope: {error}", file=sys.stderr)
         return exit_status(error)
@@ -116,23 +118,28 @@ def main(argv: Sequence[str] | None = None, program: Sequence[str] = PROGRAM) ->
         print(f"scope: stopped; {str(stop) or 'nothing was written'}", file=sys.stderr)
         return 130
     except (OSError, MemoryError) as error:
-        print(f"scope: the system refused: {error}; free space or memory and try again", file=sys.stderr)
+        print(f"scope: {system_error_message(error)}", file=sys.stderr)
         return 1
 
 
-def run_capture(args: argparse.Namespace) -> dict:
-    """``scope capture``: check the arguments, capture, write every output; returns the report."""
+def run_capture(args: argparse.Namespace) -> dict[str, Any]:
+    """Run ``scope capture``: check the arguments, capture, write every output; return the report.
+
+    :raises ScopeError: an argument is invalid, or the capture or an output failed.
+    """
     check_installed(CAPTURE)
     video = args.video or SAMPLE
     if not args.video and not SAMPLE.is_file():
-        raise UsageError("the sample clip comes with the repository alone: name the VIDEO to capture")
-    outputs = each_once(args.output) or [video.with_suffix(".npz"), video.with_suffix(".glb")]
+        raise UsageError(
+            "the sample clip is only part of the repository, not of this installation; give the VIDEO to capture"
+        )
+    outputs = distinct_paths(args.output) or [video.with_suffix(".npz"), video.with_suffix(".glb")]
     check_outputs(outputs, args.overlay, video)
     check_blender(outputs)
-    rig = usable_rig(args, outputs)
+    rig = checked_rig(args, outputs)
 
     body, options = body_and_options(args)
-    # Imported here, so that --help and a wrong argument answer at once.
+    # Imported here, so that --help and errors in the arguments are printed immediately.
     from .capture.overlay.overlay_video import write_overlay
     from .capture.pipeline import capture
 
@@ -159,8 +166,11 @@ def run_capture(args: argparse.Namespace) -> dict:
     return report
 
 
-def run_batch(args: argparse.Namespace) -> dict:
-    """``scope batch``: one process per clip, so that none can harm another; returns the report of all."""
+def run_batch(args: argparse.Namespace) -> dict[str, Any]:
+    """Run ``scope batch``: capture each clip in its own process; return the report on all of them.
+
+    :raises ScopeError: an argument is invalid, there is no footage, or the report cannot be written.
+    """
     check_installed(CAPTURE)
     from .capture.options import check_networks
     from .job.batch import Batch
@@ -169,29 +179,29 @@ def run_batch(args: argparse.Namespace) -> dict:
     for suffix in formats or ["."]:
         if suffix not in SUFFIXES:
             known = ",".join(s[1:] for s in SUFFIXES)
-            raise UsageError(f"--formats takes a list of {known}, not {args.formats!r}")
+            raise UsageError(f"--formats must be a list of formats among {known}, not {args.formats!r}")
     if args.jobs < 1:
-        raise UsageError(f"--jobs takes a number of at least 1, not {args.jobs}")
+        raise UsageError(f"--jobs must be at least 1, not {args.jobs}")
     clips = [args.out / f"clip{suffix}" for suffix in formats]
     check_blender(clips)
-    usable_rig(args, clips)
+    checked_rig(args, clips)
     _, options = body_and_options(args)
-    check_networks(options)  # a network that no clip can be captured with is reported once, before the first
-    batch = Batch(args.folder, args.out, args.program, given_options(args), formats, args.overlays)
+    check_networks(options)  # an unusable network is reported once, before the first clip
+    batch = Batch(args.folder, args.out, args.program, non_default_arguments(args), formats, args.overlays)
     with ProgressBar(sys.stderr, show=sys.stderr.isatty() and not args.quiet) as progress:
         with interrupted("finished clips are kept; run the same command again to continue"):
             report = batch.run(args.jobs, recursive=args.recursive, again=args.again, progress=progress, say=say)
     if not args.json:
-        counts = ", ".join(f"{n} {what.replace('_', ' ')}" for what, n in report["counts"].items() if n)
+        counts = ", ".join(f"{count} {status.replace('_', ' ')}" for status, count in report["counts"].items() if count)
         say(f"{counts or 'nothing to capture'}; report in {batch.report_file}")
     return report
 
 
 def run() -> NoReturn:
-    """Entry point of a process of our own: ``main``, then an exit that cannot hang.
+    """Run ``main`` as the entry point of a process, and exit in a way that cannot hang.
 
-    Blender's module destroys a condition variable at exit while one of its own threads still waits on it, which blocks
-    forever; everything of ours is written and closed by then, so the process leaves without those destructors.
+    When bpy is unloaded, it destroys a condition variable on which one of its own threads still waits, which blocks
+    forever. All our files are written and closed at this point, so the process exits without running destructors.
     """
     status = main()
     sys.stdout.flush()

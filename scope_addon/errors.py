@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Every error of the application, beside the solver's own, and the exit status that each one leads to.
+"""The errors of the application, in addition to those of the solver, and the exit status of each.
 
     ScopeError                  (solver)                                          exit 1
     ├── InputError              (solver) the user's file or value cannot be used
@@ -7,11 +7,11 @@
     │   ├── VideoError          a video or picture cannot be opened or decoded
     │   └── MotionFileError     a motion file is missing or malformed
     ├── ShapeError              (solver) an array of the wrong shape or type
-    ├── UsageError              arguments that contradict or do not exist         exit 2
-    ├── NoPersonError           nobody was found in the footage                   exit 3
+    ├── UsageError              invalid or contradictory arguments                exit 2
+    ├── NoPersonError           no person was found in the footage                exit 3
     ├── OutputError             a result cannot be written
-    ├── SetupError              something Scope needs is not installed or built
-    └── CancelledError          the user asked to stop; nothing was written
+    ├── SetupError              something that Scope needs is not installed or built
+    └── CancelledError          the user cancelled; nothing was written
 
 Each message says what was wrong, with which file or value, and what to do about it.
 """
@@ -32,11 +32,11 @@ class MotionFileError(InputError):
 
 
 class UsageError(ScopeError):
-    """Arguments that contradict each other or name something that does not exist."""
+    """Invalid arguments: they contradict each other or name something that does not exist."""
 
 
 class NoPersonError(ScopeError):
-    """Nobody was found in the footage."""
+    """No person was found in the footage."""
 
 
 class OutputError(ScopeError):
@@ -44,15 +44,21 @@ class OutputError(ScopeError):
 
 
 class SetupError(ScopeError):
-    """Something Scope needs is not installed or was not built."""
+    """Something that Scope needs is not installed or was not built."""
 
 
 class CancelledError(ScopeError):
-    """The user asked to stop; nothing was written."""
+    """The user cancelled; nothing was written."""
 
 
 def exit_status(error: ScopeError) -> int:
-    """Return the status that a command line ends with after this error."""
+    """Return the exit status of a command that failed with this error."""
     if isinstance(error, UsageError):
         return BAD_ARGUMENTS
     return NO_PERSON if isinstance(error, NoPersonError) else FAILED
+
+
+def system_error_message(error: OSError | MemoryError) -> str:
+    """Describe an error of the operating system, and what to do."""
+    cause = str(error) or "out of memory"
+    return f"the operating system reports an error: {cause}; free disk space or memory and try again"

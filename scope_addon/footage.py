@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which files are footage, by their names. Imports nothing of ours, so that menus and command lines can ask."""
+"""Recognize footage by file names. Standard library only, so that menus and command lines load quickly."""
 
 import re
 from pathlib import Path
@@ -13,30 +13,33 @@ LAST_NUMBER = re.compile(r"(\d+)(?!.*\d)")
 
 
 def sequence_pattern(picture: Path) -> str:
-    """The name of a picture but for its last number: the same for all pictures of one numbered sequence."""
+    """Return the picture's name with its last number replaced by #: the same for all pictures of a sequence."""
     return LAST_NUMBER.sub("#", picture.stem) + picture.suffix.lower()
 
 
 def pictures_in(folder: Path) -> list[Path]:
-    """The pictures in a folder, frame 10 after frame 9."""
+    """Return the pictures in a folder in natural order: frame 10 comes after frame 9."""
     found = [p for p in folder.iterdir() if p.suffix.lower() in PICTURE_SUFFIXES and not p.name.startswith(".")]
-    return sorted((p for p in found if p.is_file()), key=_in_order)
+    return sorted((p for p in found if p.is_file()), key=_natural_order)
 
 
 def is_sequence(pictures: list[Path]) -> bool:
-    """Whether pictures of a folder are a numbered sequence: several, whose names differ in their last number alone."""
+    """Return whether these pictures are one numbered sequence: their names differ in the last number only."""
     return len(pictures) > 1 and len({sequence_pattern(p) for p in pictures}) == 1
 
 
 def numbered(folder: Path, before: str, after: str, first: int = 0) -> list[Path]:
-    """The pictures in a folder whose names are a number from ``first`` on between these, in its order."""
+    """Return the pictures in a folder named ``before``, a number, ``after``, in order of the number.
+
+    :param first: smallest number.
+    """
     name = re.compile(re.escape(before) + r"(\d+)" + re.escape(after))
     found = [(int(m.group(1)), p) for p in folder.iterdir() if (m := name.fullmatch(p.name))]
     return [p for number, p in sorted(found) if number >= first and p.suffix.lower() in PICTURE_SUFFIXES]
 
 
 def numbered_from(first: Path) -> list[Path]:
-    """A picture and those of the same name but for a higher last number; nothing where it has no number."""
+    """Return a picture and those that continue its sequence; empty if its name has no number."""
     number = LAST_NUMBER.search(first.stem)
     if number is None:
         return []
@@ -44,5 +47,5 @@ def numbered_from(first: Path) -> list[Path]:
     return numbered(first.parent, before, after, int(number.group()))
 
 
-def _in_order(path: Path) -> list[tuple[int, int, str]]:
+def _natural_order(path: Path) -> list[tuple[int, int, str]]:
     return [(0, int(part), "") if part.isdecimal() else (1, 0, part) for part in re.split(r"(\d+)", path.name)]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a capture needs beside numpy and numba, and which extra of the distribution installs it."""
+"""The packages that a capture needs in addition to numpy and numba, and the extras that install them."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ EXTRAS = {**dict.fromkeys(CAPTURE, "capture"), "bpy": "bpy"}
 
 
 def check_installed(modules: Sequence[str]) -> None:
-    """Refuse to start what would fail for want of a package.
+    """Check that packages are installed, before work starts that would fail without them.
 
-    :param modules: names of ``EXTRAS``.
-    :raises SetupError: one of them is not installed; the message has the command that installs all of them.
+    :param modules: keys of ``EXTRAS``.
+    :raises SetupError: at least one is not installed; the message gives the command that installs them.
     """
     missing = [name for name in modules if name not in sys.modules and find_spec(name) is None]
     if missing:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The motion file: the one interface between capture, solver, scene and other people's tools.
+"""The motion file: the interface between capture, solver, scene and other tools.
 
 Plain arrays in a compressed .npz, AMASS-style keys, one row per source frame. Frames: world is z up with the floor
 at z = 0; camera is OpenCV's (x right, y down, z forward). ``poses`` holds axis-angle vectors, the root's in the
@@ -13,37 +13,43 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..solver.loaders.npz import read_npz
-from .atomic_write import reason, written_beside
+from .atomic_write import atomic_path, reason
 from .errors import MotionFileError, OutputError
 
 
 @dataclass
 class Motion:
-    """One person's motion over T frames; K joints, P shape coefficients, J keypoints. Keys as in the file."""
+    """One person's motion over T frames. Fields are named like the keys of the file.
 
-    poses: np.ndarray  # (T, 3(K+1)) f32
-    trans: np.ndarray  # (T, 3) f32
-    poses_raw: np.ndarray  # (T, 3(K+1)) f32, before smoothing and contact
-    trans_raw: np.ndarray  # (T, 3) f32
-    betas: np.ndarray  # (P,) f32
+    K + 1 joints including the root, P shape coefficients, J keypoints; lengths in metres, angles in radians.
+
+    :raises MotionFileError: an array has the wrong shape.
+    """
+
+    poses: NDArray[np.floating[Any]]  # (T, 3(K+1))
+    trans: NDArray[np.floating[Any]]  # (T, 3)
+    poses_raw: NDArray[np.floating[Any]]  # (T, 3(K+1)), before smoothing and contact
+    trans_raw: NDArray[np.floating[Any]]  # (T, 3)
+    betas: NDArray[np.floating[Any]]  # (P,)
     body_model: str
     gender: str
     mocap_framerate: float
-    frames: np.ndarray  # (T,) i64 source frame index
-    timestamps: np.ndarray  # (T,) f64 seconds
-    valid: np.ndarray  # (T,) bool
-    joints_cam: np.ndarray  # (T, K+1, 3) f32 metres, camera frame
-    keypoints2d: np.ndarray  # (T, J, 3) f32 pixels and confidence
-    keypoints2d_names: np.ndarray  # (J,) str
-    intrinsics: np.ndarray  # (3, 3) f64
-    dist: np.ndarray  # (5,) f64
-    joint_confidence: np.ndarray  # (T, K+1) f32
-    world_from_camera: np.ndarray  # (T, 4, 4) f64
-    foot_contact: np.ndarray  # (T, 4) f32 left heel, left toe, right heel, right toe
-    residual_px: np.ndarray  # (T,) f32
-    image_size: np.ndarray  # (2,) i64 width, height of the decoded, upright frame
+    frames: NDArray[np.int64]  # (T,) source frame index
+    timestamps: NDArray[np.float64]  # (T,) seconds
+    valid: NDArray[np.bool_]  # (T,)
+    joints_cam: NDArray[np.floating[Any]]  # (T, K+1, 3) metres, camera frame
+    keypoints2d: NDArray[np.floating[Any]]  # (T, J, 3) pixels and confidence
+    keypoints2d_names: NDArray[np.str_]  # (J,)
+    intrinsics: NDArray[np.float64]  # (3, 3)
+    dist: NDArray[np.float64]  # (5,)
+    joint_confidence: NDArray[np.floating[Any]]  # (T, K+1)
+    world_from_camera: NDArray[np.float64]  # (T, 4, 4)
+    foot_contact: NDArray[np.floating[Any]]  # (T, 4) left heel, left toe, right heel, right toe
+    residual_px: NDArray[np.floating[Any]]  # (T,)
+    image_size: NDArray[np.int64]  # (2,) width, height of the decoded, upright frame
     source: str = ""  # file name of the footage
 
     def __post_init__(self) -> None:
@@ -62,7 +68,11 @@ class Motion:
         return len(self.frames)
 
     def validate(self, where: str = "motion") -> None:
-        """Raise ``MotionFileError`` naming the first array whose shape does not fit the others."""
+        """Check that the shapes of all arrays agree.
+
+        :param where: what the message names as the source of the arrays.
+        :raises MotionFileError: an array has the wrong shape; the message names it.
+        """
         T = len(self.frames)
         if self.joints_cam.ndim != 3 or self.keypoints2d.ndim != 3:
             raise MotionFileError(f"{where}: joints_cam and keypoints2d must have three dimensions")
@@ -71,24 +81,30 @@ class Motion:
         for name, (shape, dtype) in _SCHEMA.items():
             if dtype is str:
                 continue
-            expected = tuple(sizes.get(s, s) for s in shape)
+            expected = tuple(sizes[s] if isinstance(s, str) else s for s in shape)
             got = getattr(self, name).shape
             if got != expected:
                 raise MotionFileError(f"{where}: {name} must have shape {expected}, but has {got}")
 
     def save(self, path: str | Path) -> None:
-        """Write the .npz beside its final place and rename it there, so that a failure never leaves half a file."""
+        """Write the motion to an .npz file. The write is atomic, so that a failure never leaves a partial file.
+
+        :raises OutputError: the file cannot be written.
+        """
         path = Path(path)
         arrays = {f.name: np.asarray(getattr(self, f.name)) for f in fields(self)}
         try:
-            with written_beside(path) as temporary, temporary.open("wb") as file:
+            with atomic_path(path) as temporary, temporary.open("wb") as file:
                 np.savez_compressed(file, **arrays)
         except OSError as error:
             raise OutputError(f"cannot write {path}: {reason(error)}") from error
 
     @classmethod
     def load(cls, path: str | Path) -> Motion:
-        """Read and check a motion file. Never unpickles."""
+        """Read and check a motion file. Nothing is unpickled.
+
+        :raises MotionFileError: the file is missing or damaged, or is not a motion file of this version.
+        """
         path = Path(path)
         data = read_npz(path, MotionFileError, "motion file")
         known = {f.name for f in fields(cls)}
@@ -99,7 +115,7 @@ class Motion:
         return cls(**values)
 
 
-_SCHEMA: dict[str, tuple[tuple, type]] = {
+_SCHEMA: dict[str, tuple[tuple[str | int, ...], type]] = {
     "poses": (("T", "3K1"), np.float32),
     "trans": (("T", 3), np.float32),
     "poses_raw": (("T", "3K1"), np.float32),

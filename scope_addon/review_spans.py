@@ -1,37 +1,39 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which frames of a motion deserve a look: filled in, far from the footage, or hardly seen. Numpy alone."""
+"""Spans of frames that should be reviewed: filled in, far from the footage, or with low confidence. Numpy only."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..solver.names import BODY_JOINTS
 from .motion import Motion
 
-FAR_SHARE = 0.03  # of the picture's longer side: a body this far off its keypoints is worth a look
-LOW_CONFIDENCE = 0.35  # mean over the joints that keypoints can show
+FAR_SHARE = 0.03  # reprojection error above which a frame should be reviewed, as a share of the image's longer side
+LOW_CONFIDENCE = 0.35  # mean over the joints that keypoints determine
 REASONS = {
-    "unseen": "filled in without being seen",
-    "far": "far from the footage, worth a look",
-    "unsure": "hardly visible, worth a look",
+    "unseen": "not visible, the pose is filled in",
+    "far": "large reprojection error, should be checked",
+    "unsure": "low confidence, should be checked",
 }
 
 
 @dataclass(frozen=True)
 class Span:
-    """Rows ``first`` to ``last`` of a motion, both included, and why: a key of ``REASONS``."""
+    """Rows ``first`` to ``last`` of a motion, inclusive, and why they should be reviewed: a key of ``REASONS``."""
 
     reason: str
     first: int
     last: int
 
 
-def low_confidence_spans(motion: Motion, gap_s: float = 0.0) -> list[Span]:
-    """The spans of each reason in turn, in order of time; a frame has one reason at most.
+def find_review_spans(motion: Motion, gap_s: float = 0.0) -> list[Span]:
+    """Find the spans of a motion that should be reviewed.
 
-    :param gap_s: spans of one reason that lie nearer together than these seconds are one.
+    :param gap_s: spans of the same reason that are less than this many seconds apart are merged.
+    :return: the spans of each reason in turn, in chronological order; a frame has at most one reason.
     """
     unseen = ~motion.valid
     far = ~unseen & (motion.residual_px > FAR_SHARE * motion.image_size.max())
@@ -40,14 +42,18 @@ def low_confidence_spans(motion: Motion, gap_s: float = 0.0) -> list[Span]:
     return [Span(why, *pair) for why, mask in masks.items() for pair in _spans(mask, motion.timestamps, gap_s)]
 
 
-def body_confidence(motion: Motion) -> np.ndarray:
-    """(T,) mean confidence over the body's joints that are ever seen; fingers, which often hide, do not count."""
+def body_confidence(motion: Motion) -> NDArray[np.float32] | NDArray[np.float64]:
+    """Return the mean confidence of each frame, (T,), over the body's joints that are seen in at least one frame.
+
+    Fingers, which are often occluded, do not count.
+    """
     confidence = motion.joint_confidence[:, : len(BODY_JOINTS)]
     shown = confidence.max(axis=0) > 0
     return confidence[:, shown].mean(axis=1) if shown.any() else np.zeros(len(motion))
 
 
-def _spans(mask: np.ndarray, timestamps: np.ndarray, gap_s: float) -> list[tuple[int, int]]:
+def _spans(mask: NDArray[np.bool_], timestamps: NDArray[np.float64], gap_s: float) -> list[tuple[int, int]]:
+    """Return the first and last row of each run of True in ``mask``, (T,)."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], np.asarray(mask, int), [0]])))
     out: list[tuple[int, int]] = []
     for first, end in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Builds the extension: a staging copy with the wheels of every platform, zipped and validated by Blender's own tool.
+"""Build the extension: a staging copy with the wheels of every platform, zipped and validated by Blender's own tool.
 
 Blender's ``extension build`` is one Python file that needs no running Blender; PyPI's bpy carries it.
 """
@@ -21,22 +21,22 @@ ROOT = Path(__file__).resolve().parent.parent
 BUILD = ROOT / "build"
 WHEELS, STAGING, DIST = BUILD / "wheels", BUILD / "staging", BUILD / "dist"
 
-# pip's names of the platforms a wheel may be for, newest first; the oldest systems that onnxruntime and llvmlite serve.
+# pip's platform tags, newest first, down to the oldest systems that onnxruntime and llvmlite support.
 PLATFORMS = {
     "windows-x64": ["win_amd64"],
     "macos-arm64": ["macosx_14_0_arm64"],
     "linux-x64": ["manylinux_2_28_x86_64", "manylinux_2_27_x86_64", "manylinux_2_17_x86_64", "manylinux2014_x86_64"],
 }
 PYTHONS = ("3.13", "3.11")  # Blender 5.1 and later; 4.2 to 5.0
-# Everything that is imported. onnxruntime's metadata asks for flatbuffers, packaging and protobuf too, but running a
-# network imports none of them. numpy is Blender's own, always.
+# All imported packages. onnxruntime's metadata also requires flatbuffers, packaging and protobuf, but running a network
+# imports none of them. numpy is always Blender's own.
 PACKAGES = ("numba", "llvmlite", "onnxruntime", "opencv-contrib-python-headless", "av")
 CONTENT = ("__init__.py", "LICENSE", "THIRD_PARTY.md", "solver", "scope_addon", "assets")
 LEFT_OUT = ("__pycache__", "*.pyc", ".*", "sample_truth.npz", "pictures", "guide", "examples")
 
 
 def main() -> int:
-    """Build; returns the exit status."""
+    """Build the extension; return the exit status."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("platforms", nargs="*", metavar="PLATFORM", help=f"of {', '.join(PLATFORMS)} (default: all)")
     platforms = parser.parse_args().platforms or list(PLATFORMS)
@@ -59,7 +59,7 @@ def main() -> int:
 
 
 def download_wheels(platform: str) -> list[Path]:
-    """The platform's wheels for every Python, as the locks name and hash them; nothing is fetched twice."""
+    """Return the platform's wheels for every Python, as locked; download only those that are missing."""
     paths: list[Path] = []
     for python in PYTHONS:
         folder = WHEELS / platform / python
@@ -82,8 +82,8 @@ def download_wheels(platform: str) -> list[Path]:
 
 
 def locked(python: str) -> str:
-    """The entries of our packages in the lock of a Python, hashes included."""
-    text = (ROOT / "scripts" / f"requirements-{python}.txt").read_text()
+    """Return the entries of the shipped packages in a Python's lock, with their hashes."""
+    text = (ROOT / "scripts" / "requirements" / f"{python}.txt").read_text()
     entries = re.findall(r"^(\S+?)==\S+(?:.*\\\n)*.*$", text, flags=re.M)
     blocks = re.findall(r"^\S+?==\S+(?:.*\\\n)*.*$", text, flags=re.M)
     found = {name: block for name, block in zip(entries, blocks, strict=True) if name in PACKAGES}
@@ -94,11 +94,11 @@ def locked(python: str) -> str:
 
 
 def shipped_name(wheel: str) -> str:
-    """The file name under which every Blender since 4.2.0 takes the right wheel; the content stays as it is.
+    """Return the file name with which every Blender since 4.2.0 chooses the right wheel; the content is unchanged.
 
-    - Until 4.4 Blender compares a wheel's Python tag with its own Python, also for the stable ABI, and would pass over
-      a ``cp37-abi3``; such a wheel gets the tags of the Pythons we ship for as well.
-    - 4.2's first releases do not look at the tag, and take of two wheels of one version the one whose name sorts last.
+    - Until 4.4 Blender compares a wheel's Python tag with its own Python, also for the stable ABI, and would skip a
+      ``cp37-abi3`` wheel; such a wheel also gets the tags of the supported Pythons.
+    - 4.2's first releases ignore the tag and, of two wheels of one version, take the one whose name sorts last.
       Their Python is 3.11, so the others get a build number, which sorts before it.
     """
     name, version, *build, python, abi, platform = wheel.removesuffix(".whl").split("-")
@@ -111,7 +111,7 @@ def shipped_name(wheel: str) -> str:
 
 
 def stage(wheels: dict[str, list[Path]]) -> None:
-    """A copy of what is shipped, with the wheels beside it and the manifest that lists them."""
+    """Copy the shipped files and wheels into the staging folder, with a manifest that lists the wheels."""
     shutil.rmtree(STAGING, ignore_errors=True)
     (STAGING / "wheels").mkdir(parents=True)
     for name in CONTENT:
@@ -123,7 +123,7 @@ def stage(wheels: dict[str, list[Path]]) -> None:
     names = []
     for path in (p for paths in wheels.values() for p in paths):
         target = STAGING / "wheels" / shipped_name(path.name)
-        if not target.exists():  # the stable ABI's wheel is there for both Pythons
+        if not target.exists():  # a wheel for the stable ABI serves both Pythons
             os.link(path, target)
             names.append(f"./wheels/{target.name}")
     manifest = (ROOT / "blender_manifest.toml").read_text()
@@ -131,7 +131,7 @@ def stage(wheels: dict[str, list[Path]]) -> None:
     lists = {"platforms": list(wheels), "wheels": names}
     for key, values in lists.items():
         top += f"\n{key} = [\n" + "".join(f'    "{value}",\n' for value in values) + "]\n"
-    tables = tables.split("\n[build]")[0]  # everything in the staging folder is meant
+    tables = tables.split("\n[build]")[0]  # the staging folder holds only what is shipped
     (STAGING / "blender_manifest.toml").write_text(f"{top}\n[{tables}\n")
 
 
@@ -141,18 +141,18 @@ def blender_extension(*arguments: str) -> None:
     package = Path(spec.origin).parent if spec and spec.origin else ROOT / "no bpy"
     found = sorted(package.glob("*/scripts/**/blender_ext.py"))
     if not found:
-        raise SystemExit("build: bpy is not installed, which carries Blender's extension tool; run ./scripts/setup")
+        raise SystemExit("build: bpy, which contains Blender's extension tool, is not installed; run ./scripts/setup")
     done = subprocess.run([sys.executable, str(found[0]), *arguments], capture_output=True, text=True, check=False)
     if done.returncode:
         raise SystemExit(f"build: Blender's extension tool refused:\n{done.stdout}{done.stderr}")
 
 
 def check(archive: Path) -> None:
-    """What Blender's tool cannot know: everything a capture needs is in, numpy is not."""
+    """Check what Blender's tool cannot: the archive contains everything that a capture needs, and not numpy."""
     with zipfile.ZipFile(archive) as file:
         names = file.namelist()
         manifest = tomllib.loads(file.read(next(n for n in names if n.endswith("blender_manifest.toml"))).decode())
-    generated = manifest["build"]["generated"]  # what Blender's tool left of the lists for this platform
+    generated = manifest["build"]["generated"]  # the part of the lists that Blender's tool kept for this platform
     wheels = [Path(w).name for w in generated["wheels"]]
     problems = [f"{w} is listed but not there" for w in wheels if not any(n.endswith(f"wheels/{w}") for n in names)]
     for python in PYTHONS:

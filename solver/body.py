@@ -15,11 +15,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .errors import ModelFileError, ShapeError
 from .validation import as_array
+
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -31,23 +35,23 @@ class Body:
 
     name: str
     joint_names: tuple[str, ...]
-    parents: np.ndarray  # (K+1,) int32, −1 for the root, par(i) < i
-    J_template: np.ndarray  # (K+1, 3)
-    J_shapedirs: np.ndarray  # (K+1, 3, P)
-    v_template: np.ndarray  # (V, 3)
-    shapedirs: np.ndarray  # (V, 3, P)
-    skin_joints: np.ndarray  # (V, 4) int
-    skin_weights: np.ndarray  # (V, 4)
-    faces: np.ndarray  # (F, 4) int32, or (F, 3)
+    parents: NDArray[np.int32]  # (K+1,) int32, −1 for the root, par(i) < i
+    J_template: Array  # (K+1, 3)
+    J_shapedirs: Array  # (K+1, 3, P)
+    v_template: Array  # (V, 3)
+    shapedirs: Array  # (V, 3, P)
+    skin_joints: NDArray[np.integer[Any]]  # (V, 4) int
+    skin_weights: Array  # (V, 4)
+    faces: NDArray[np.int32]  # (F, 4) int32, or (F, 3)
     keypoint_names: tuple[str, ...] = ()
-    keypoint_part: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int32))  # (M,)
-    keypoint_template: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))  # (M, 3)
-    keypoint_shapedirs: np.ndarray = field(default_factory=lambda: np.zeros((0, 3, 0)))  # (M, 3, P)
-    uv: np.ndarray | None = None  # (U, 2)
-    uv_faces: np.ndarray | None = None  # as faces, into uv
-    face_material: np.ndarray | None = None  # (F,), into material_names
+    keypoint_part: NDArray[np.integer[Any]] = field(default_factory=lambda: np.zeros(0, np.int32))  # (M,)
+    keypoint_template: Array = field(default_factory=lambda: np.zeros((0, 3)))  # (M, 3)
+    keypoint_shapedirs: Array = field(default_factory=lambda: np.zeros((0, 3, 0)))  # (M, 3, P)
+    uv: Array | None = None  # (U, 2)
+    uv_faces: NDArray[np.integer[Any]] | None = None  # as faces, into uv
+    face_material: NDArray[np.integer[Any]] | None = None  # (F,), into material_names
     material_names: tuple[str, ...] = ()
-    material_colors: np.ndarray | None = None  # (C, 4) linear RGBA
+    material_colors: Array | None = None  # (C, 4) linear RGBA
     license: str = ""
     gender: str = "neutral"
     file: str = ""  # of the user's, absolute; empty for a built-in body
@@ -63,26 +67,28 @@ class Body:
         return int(self.J_shapedirs.shape[2])
 
     @cached_property
-    def S(self) -> np.ndarray:
+    def S(self) -> Array:
         """(K+1, 3, P) shape derivative of each joint's offset from its parent; the root's is J_s of the root."""
         return self._minus_parent(self.J_shapedirs)
 
     @cached_property
-    def l(self) -> np.ndarray:  # noqa: E743 - the paper's symbol
+    def l(self) -> Array:  # noqa: E743 - the paper's symbol
         """(K+1, 3) offset of each joint from its parent at β = 0; the root's is its rest position."""
         return self._minus_parent(self.J_template)
 
     @cached_property
-    def V(self) -> np.ndarray:
+    def V(self) -> Array:
         """(M, 3, P) V_j: shape derivative of keypoint j relative to its part's joint."""
-        return self.keypoint_shapedirs - self.J_shapedirs[self.keypoint_part]
+        V: Array = self.keypoint_shapedirs - self.J_shapedirs[self.keypoint_part]
+        return V
 
     @cached_property
-    def v_bar(self) -> np.ndarray:
+    def v_bar(self) -> Array:
         """(M, 3) v̄_j: keypoint j relative to its part's joint at β = 0."""
-        return self.keypoint_template - self.J_template[self.keypoint_part]
+        v_bar: Array = self.keypoint_template - self.J_template[self.keypoint_part]
+        return v_bar
 
-    def _minus_parent(self, rest: np.ndarray) -> np.ndarray:
+    def _minus_parent(self, rest: Array) -> Array:
         out = rest.copy()
         out[1:] -= rest[self.parents[1:]]
         return out
@@ -98,7 +104,7 @@ class Body:
             raise ModelFileError(f"body '{self.name}' has no keypoints '{prefix}'; it has {', '.join(sets) or 'none'}")
         return found
 
-    def rest_joints(self, betas: np.ndarray | None = None) -> np.ndarray:
+    def rest_joints(self, betas: Array | None = None) -> Array:
         """J(β): (K+1, 3) metres, model frame.
 
         :param betas: (P,); zeros if None.
@@ -106,7 +112,7 @@ class Body:
         """
         return self.J_template if betas is None else self.J_template + self.J_shapedirs @ self._betas(betas)
 
-    def rest_vertices(self, betas: np.ndarray | None = None) -> np.ndarray:
+    def rest_vertices(self, betas: Array | None = None) -> Array:
         """v̄(β): (V, 3) metres, model frame.
 
         :param betas: (P,); zeros if None.
@@ -114,7 +120,7 @@ class Body:
         """
         return self.v_template if betas is None else self.v_template + self.shapedirs @ self._betas(betas)
 
-    def stature(self, betas: np.ndarray | None = None) -> float:
+    def stature(self, betas: Array | None = None) -> float:
         """Height of who stands: from the lowest to the highest vertex of v̄(β), metres.
 
         :param betas: (P,); zeros if None.
@@ -122,12 +128,10 @@ class Body:
         """
         return float(np.ptp(self.rest_vertices(betas)[:, 1]))
 
-    def _betas(self, betas: np.ndarray) -> np.ndarray:
+    def _betas(self, betas: Array) -> Array:
         return as_array(betas, (self.P,), f"betas of body '{self.name}'")
 
-    def forward_kinematics(
-        self, rotations: np.ndarray, trans: np.ndarray, betas: np.ndarray | None = None
-    ) -> tuple[np.ndarray, np.ndarray]:
+    def forward_kinematics(self, rotations: Array, trans: Array, betas: Array | None = None) -> tuple[Array, Array]:
         """Pose of every part.
 
         :param rotations: (..., K+1, 3, 3); row 0 the root's rotation into the target frame, the others Ω_i.
@@ -150,7 +154,7 @@ class Body:
             t[..., i, :] = t[..., p, :] + R[..., p, :, :] @ (J[i] - J[p])
         return R, t
 
-    def skin(self, R: np.ndarray, t: np.ndarray, betas: np.ndarray | None = None) -> np.ndarray:
+    def skin(self, R: Array, t: Array, betas: Array | None = None) -> Array:
         """Linear blend skinning of one frame.
 
         :param R, t: (K+1, 3, 3), (K+1, 3) part poses from ``forward_kinematics``.
@@ -161,11 +165,12 @@ class Body:
         offset = t - np.einsum("kij,kj->ki", R, self.rest_joints(betas))
         A = np.concatenate([R, offset[..., None]], axis=2).reshape(len(R), 12)
         blended = np.einsum("vs,vsa->va", self.skin_weights, A[self.skin_joints]).reshape(-1, 3, 4)
-        return np.einsum("vij,vj->vi", blended[:, :, :3], self.rest_vertices(betas)) + blended[:, :, 3]
+        v: Array = np.einsum("vij,vj->vi", blended[:, :, :3], self.rest_vertices(betas)) + blended[:, :, 3]
+        return v
 
     def keypoints(
-        self, R: np.ndarray, t: np.ndarray, betas: np.ndarray | None = None, which: Sequence[int] | slice = slice(None)
-    ) -> np.ndarray:
+        self, R: Array, t: Array, betas: Array | None = None, which: Sequence[int] | slice = slice(None)
+    ) -> Array:
         """Keypoints, metres.
 
         :param R, t: (..., K+1, 3, 3), (..., K+1, 3) part poses from ``forward_kinematics``.
@@ -176,11 +181,13 @@ class Body:
         """
         local = self.v_bar[which] if betas is None else self.v_bar[which] + self.V[which] @ self._betas(betas)
         part = self.keypoint_part[which]
-        return np.einsum("...mij,mj->...mi", R[..., part, :, :], local) + t[..., part, :]
+        p: Array = np.einsum("...mij,mj->...mi", R[..., part, :, :], local) + t[..., part, :]
+        return p
 
-    def triangles(self) -> np.ndarray:
+    def triangles(self) -> NDArray[np.int32]:
         """(F', 3) int32: the faces split along the first diagonal."""
         f = self.faces
         if f.shape[1] == 3:
             return f
-        return np.concatenate([f[:, [0, 1, 2]], f[:, [0, 2, 3]]]).astype(np.int32)
+        halves: NDArray[np.int32] = np.concatenate([f[:, [0, 1, 2]], f[:, [0, 2, 3]]]).astype(np.int32)
+        return halves

@@ -44,7 +44,8 @@ class JointPrior:
         """
         if joint not in self.names:
             raise InvalidValueError(f"The prior has no joint {joint!r}; it has {', '.join(self.names)}.")
-        return self.parameters[self.names.index(joint)]
+        row: Array = self.parameters[self.names.index(joint)]
+        return row
 
     def tables(
         self, joint_names: Sequence[str], weights: Mapping[str, float] | None = None, log_det: float = 0.0

@@ -136,7 +136,8 @@ class Floor:
 class Measurements:
     """Everything measured in one frame. `intrinsics` (3, 3) is needed with 2D keypoints.
 
-    `tables` holds (ints, floats) of further registered residuals by name; see residuals/registry.py.
+    `tables` holds (ints, floats), int64 (n, columns) and float64 (n, columns), of further registered residuals by name;
+    see residuals/registry.py. Residuals that have a field of their own are given there alone.
     """
 
     intrinsics: ArrayLike | None = None
@@ -151,12 +152,18 @@ class Measurements:
     def __post_init__(self) -> None:
         """Check what kinds of measurements the fields hold; their arrays are checked against the body by a fit.
 
-        :raises InvalidValueError: a field holds something else.
+        :raises InvalidValueError: a field holds something else, or `tables` holds a residual that has its own field.
         """
         for name, kind in _KINDS.items():
             value = getattr(self, name)
             if value is not None and not isinstance(value, kind):
                 check_type(value, (kind, type(None)), f"Measurements.{name}")
+        for name in self.tables or ():
+            if name in _FIELDS:
+                raise InvalidValueError(
+                    f"Measurements.tables must not hold {name!r}, which has a field of its own; "
+                    f"give it as Measurements.{_FIELDS[name]}."
+                )
 
     def packed2d(self, points: int) -> tuple[Array, Array]:
         """Return indices (n,) and (n, 3) of normalized image coordinates and confidence.
@@ -244,6 +251,10 @@ _KINDS = {
 }
 
 
+# Residuals that have a field of their own.
+_FIELDS = {"pose_prior": "pose_priors", "foot_contact": "foot_contacts", "floor": "floor"}
+
+
 def _pose_prior_rows(m: PosePriors, K: int) -> tuple[Array, Array]:
     parts = as_indices(m.parts, K + 1, "Parts of pose priors")
     n = len(parts)
@@ -289,7 +300,7 @@ def _floor_rows(m: Floor, points: int) -> tuple[Array, Array]:
 
 
 def _usable_rows(table: tuple[Array, Array]) -> tuple[Array, Array]:
-    """The rows of a residual's table in which everything is a number below `LARGEST`."""
+    """Return the rows of a residual's table in which everything is a number below `LARGEST`."""
     ints, floats = table
     if _all_usable(floats.ravel()):
         return table

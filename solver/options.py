@@ -105,8 +105,13 @@ _LAST = Weights()
 COLD_STAGES = (
     Stage(
         replace(
-            _LAST, orientation_field=1e4, keypoints3d=2400.0, keypoints2d=1e4,
-            joint_prior=1000.0, joint_flow=10.0, shape=1000.0,
+            _LAST,
+            orientation_field=1e4,
+            keypoints3d=2400.0,
+            keypoints2d=1e4,
+            joint_prior=1000.0,
+            joint_flow=10.0,
+            shape=1000.0,
         ),  # fmt: skip
         5e-2,
         10,

@@ -24,7 +24,7 @@ _PI_MARGIN = 1e-4  # above cos(angle) = -1 + this, the antisymmetric part of R s
 
 
 @kernel
-def exp3(x: float, y: float, z: float) -> tuple:
+def exp3(x: float, y: float, z: float) -> tuple[float, ...]:
     """Return the nine entries of exp((x, y, z)), row by row.
 
     R = I + a [phi]x + b [phi]x^2 with a = sin(th)/th, b = (1 - cos(th))/th^2; below half a radian both are summed as
@@ -48,7 +48,7 @@ def exp3(x: float, y: float, z: float) -> tuple:
 
 
 @kernel
-def log3(r00, r01, r02, r10, r11, r12, r20, r21, r22) -> tuple:  # type: ignore[no-untyped-def]
+def log3(r00, r01, r02, r10, r11, r12, r20, r21, r22) -> tuple[float, ...]:  # type: ignore[no-untyped-def]
     """Return the rotation vector (3 numbers) of the rotation matrix given row by row, of angle in [0, pi].
 
     Near pi, where the antisymmetric part vanishes, the axis is the largest column of the symmetric part; exactly at
@@ -85,7 +85,7 @@ def log3(r00, r01, r02, r10, r11, r12, r20, r21, r22) -> tuple:  # type: ignore[
 
 
 @kernel
-def left_jacobian_inverse3(x: float, y: float, z: float) -> tuple:
+def left_jacobian_inverse3(x: float, y: float, z: float) -> tuple[float, ...]:
     """Return the nine entries of J^-1 = I - [phi]x / 2 + k [phi]x^2, k = (1 - th/2 cot(th/2)) / th^2; finite at pi."""
     s = x * x + y * y + z * z
     if s < 1e-2:
@@ -109,7 +109,10 @@ def _array(value: ArrayLike, tail: tuple[int, ...], name: str) -> Array:
 
 
 def hat(phi: ArrayLike) -> Array:
-    """Return [phi]x, shape (..., 3, 3), with [phi]x p = phi x p."""
+    """Return [phi]x, shape (..., 3, 3), with [phi]x p = phi x p.
+
+    :raises ShapeError: the vectors have another shape.
+    """
     phi = _array(phi, (3,), "A rotation vector")
     out = np.zeros((*phi.shape, 3))
     out[..., 0, 1], out[..., 0, 2], out[..., 1, 2] = -phi[..., 2], phi[..., 1], -phi[..., 0]
@@ -128,7 +131,10 @@ def _coefficients(phi: Array) -> tuple[Array, ...]:
 
 
 def exp(phi: ArrayLike) -> Array:
-    """Return the rotation matrices (..., 3, 3) of rotation vectors (..., 3)."""
+    """Return the rotation matrices (..., 3, 3) of rotation vectors (..., 3).
+
+    :raises ShapeError: the vectors have another shape.
+    """
     phi = _array(phi, (3,), "A rotation vector")
     a, b, _ = _coefficients(phi)
     cross = hat(phi)
@@ -136,17 +142,24 @@ def exp(phi: ArrayLike) -> Array:
 
 
 def log(rotation: ArrayLike) -> Array:
-    """Return the rotation vectors (..., 3), of angle in [0, pi], of rotation matrices (..., 3, 3)."""
+    """Return the rotation vectors (..., 3), of angle in [0, pi], of rotation matrices (..., 3, 3).
+
+    :raises ShapeError: the matrices have another shape.
+    """
     quaternion = quaternion_from_matrix(rotation)
     w, v = quaternion[..., :1], quaternion[..., 1:]
     n = np.linalg.norm(v, axis=-1, keepdims=True)
     small = n < 1e-6
     # w >= 0, so a small n means w = 1 to rounding: 2 atan(n / w) / n = 2 - 2 n^2 / 3
-    return v * np.where(small, 2.0 - 2.0 / 3.0 * n * n, 2.0 * np.arctan2(n, w) / np.where(small, 1.0, n))
+    phi: Array = v * np.where(small, 2.0 - 2.0 / 3.0 * n * n, 2.0 * np.arctan2(n, w) / np.where(small, 1.0, n))
+    return phi
 
 
 def left_jacobian(phi: ArrayLike) -> Array:
-    """Return J(phi) = I + b [phi]x + c [phi]x^2, shape (..., 3, 3)."""
+    """Return J(phi) = I + b [phi]x + c [phi]x^2, shape (..., 3, 3).
+
+    :raises ShapeError: the vectors have another shape.
+    """
     phi = _array(phi, (3,), "A rotation vector")
     _, b, c = _coefficients(phi)
     cross = hat(phi)
@@ -154,7 +167,10 @@ def left_jacobian(phi: ArrayLike) -> Array:
 
 
 def left_jacobian_inverse(phi: ArrayLike) -> Array:
-    """Return J^-1(phi), shape (..., 3, 3), for |phi| < 2 pi."""
+    """Return J^-1(phi), shape (..., 3, 3), for |phi| < 2 pi.
+
+    :raises ShapeError: the vectors have another shape.
+    """
     phi = _array(phi, (3,), "A rotation vector")
     s = np.sum(phi * phi, axis=-1)[..., None, None]
     small = s < 1e-2
@@ -169,6 +185,8 @@ def quaternion_from_matrix(rotation: ArrayLike) -> Array:
     """Return unit quaternions (..., 4), w >= 0, of rotation matrices (..., 3, 3).
 
     Of the four ways to divide, each matrix takes the one by its largest component, which is never below 1/2.
+
+    :raises ShapeError: the matrices have another shape.
     """
     r = _array(rotation, (3, 3), "A rotation matrix")
     d = np.diagonal(r, axis1=-2, axis2=-1)
@@ -188,11 +206,15 @@ def quaternion_from_matrix(rotation: ArrayLike) -> Array:
 
 
 def matrix_from_quaternion(quaternion: ArrayLike) -> Array:
-    """Return the rotation matrices (..., 3, 3) of quaternions (..., 4), which need not be normalized."""
+    """Return the rotation matrices (..., 3, 3) of quaternions (..., 4), which need not be normalized.
+
+    :raises ShapeError: the quaternions have another shape.
+    """
     q = _array(quaternion, (4,), "A quaternion")
     q = q / np.linalg.norm(q, axis=-1, keepdims=True)
     cross = hat(q[..., 1:])
-    return np.eye(3) + 2.0 * q[..., :1, None] * cross + 2.0 * (cross @ cross)
+    R: Array = np.eye(3) + 2.0 * q[..., :1, None] * cross + 2.0 * (cross @ cross)
+    return R
 
 
 @kernel
@@ -221,18 +243,26 @@ def orthonormalize(R) -> bool:  # type: ignore[no-untyped-def]
 
 
 def nearest_rotation(matrix: ArrayLike) -> Array:
-    """Return the rotations (..., 3, 3) nearest to matrices in the Frobenius norm; the identity for non-finite ones."""
+    """Return the rotations (..., 3, 3) nearest to matrices in the Frobenius norm; the identity for non-finite ones.
+
+    :raises ShapeError: the matrices have another shape.
+    """
     m = np.array(_array(matrix, (3, 3), "A matrix"), order="C")
     if orthonormalize(m.reshape(-1, 3, 3)):
         return m
     m = np.where(np.isfinite(m).all(axis=(-2, -1), keepdims=True), m, np.eye(3))
     u, _, vt = np.linalg.svd(m)
     u[..., :, 2] *= np.linalg.det(u @ vt)[..., None]
-    return u @ vt
+    R: Array = u @ vt
+    return R
 
 
 def shortest_turn(a: Array, b: Array) -> Array:
-    """Return the smallest rotations (..., 3, 3) that take directions a (..., 3) to b; half a turn if opposite."""
+    """Return the smallest rotations (..., 3, 3) that take directions a (..., 3) to b (..., 3); half a turn if opposite.
+
+    :raises ShapeError: the directions have another shape.
+    """
+    a, b = _array(a, (3,), "A direction"), _array(b, (3,), "A direction")
     a = a / np.maximum(np.linalg.norm(a, axis=-1, keepdims=True), 1e-12)
     b = b / np.maximum(np.linalg.norm(b, axis=-1, keepdims=True), 1e-12)
     axis, cosine = np.cross(a, b), (a * b).sum(axis=-1)

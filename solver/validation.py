@@ -30,7 +30,7 @@ def as_array(value: ArrayLike, shape: tuple[int | None, ...], name: str) -> Arra
     """Return `value` as contiguous float64.
 
     :param value: an array, or lists of numbers, of `shape`.
-    :param shape: the expected shape; None is any length.
+    :param shape: the expected one, for instance (None, 3) for (n, 3): None is any length.
     :param name: what the array is, as a message begins.
     :raises ShapeError: it has another shape, or is no array of numbers.
     """
@@ -119,7 +119,7 @@ def check_not_negative(values: Array, name: str) -> None:
 
 
 def check_finite(values: Array, name: str) -> None:
-    """Check an array of any shape.
+    """Check an array (...) of any shape.
 
     :raises InvalidValueError: a value is NaN or infinite.
     """
@@ -324,12 +324,12 @@ def _refuse_unless_numbers(value: Any, kinds: str, what: str, shape: tuple[int |
 
 
 def _written(shape: tuple[int | None, ...]) -> str:
-    """A shape as numpy writes it, with n for any length."""
+    """Return a shape as numpy writes it, with n for any length."""
     return f"({', '.join('n' if n is None else str(n) for n in shape)}{',' if len(shape) == 1 else ''})"
 
 
 def _described(value: Any) -> str:
-    """What a message says of a value of the wrong kind."""
+    """Return the words for a value of the wrong kind in a message."""
     if value is None:
         return "None"
     if isinstance(value, str):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What to do where something that a test needs is not there: skip on a developer's machine, fail in CI."""
+"""Handle missing requirements of tests: skip on a developer's machine, fail in CI."""
 
 from __future__ import annotations
 
@@ -12,9 +12,10 @@ import pytest
 
 
 def missing(reason: str, allowed_by: str | None = None) -> NoReturn:
-    """End the running test because of something it needs: skip it, but fail it where ``CI`` is set.
+    """Skip the running test because of a missing requirement, or fail it if ``CI`` is set.
 
-    :param allowed_by: environment variable that, where it is set, allows the test to be skipped in CI too.
+    :param reason: what is missing, and what to do.
+    :param allowed_by: environment variable that, if set, allows the test to be skipped in CI too.
     """
     if os.environ.get("CI") and not (allowed_by and os.environ.get(allowed_by)):
         pytest.fail(f"{reason}; this may not be skipped in CI", pytrace=False)
@@ -22,7 +23,7 @@ def missing(reason: str, allowed_by: str | None = None) -> NoReturn:
 
 
 def package(name: str) -> ModuleType:
-    """Import a package of the development environment; where it is not installed, see ``missing``."""
+    """Import a package of the development environment; if it is not installed, call ``missing``."""
     try:
         return importlib.import_module(name)
     except ImportError as error:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Results are whole or not there at all, links to them stay links, and what is no file stays what it is."""
+"""Files are complete or absent, links stay links, and what is not a regular file is not replaced."""
 
 from __future__ import annotations
 
@@ -7,19 +7,19 @@ import os
 import socket
 
 import pytest
-from scope.scope_addon.atomic_write import written_beside
+from scope.scope_addon.atomic_write import atomic_path
 from scope.scope_addon.errors import OutputError
 from scope.scope_addon.scene.export.output_paths import check_output
 
 
 def write(path, text="new"):
-    with written_beside(path) as temporary:
+    with atomic_path(path) as temporary:
         temporary.write_text(text)
 
 
 @pytest.fixture
 def link(tmp_path):
-    """A link beside a folder, to a file in it that is not there yet, as who keeps results on another disk makes it."""
+    """A link to a file that does not exist yet, in another folder: results are to be stored on another disk."""
     (tmp_path / "disk").mkdir()
     path = tmp_path / "walk.npz"
     path.symlink_to("disk/kept.npz")
@@ -46,10 +46,10 @@ def test_a_link_to_a_link_stays_too(link, tmp_path):
     assert (tmp_path / "disk" / "kept.npz").read_text() == "new"
 
 
-def test_what_a_link_leads_to_survives_a_failure(link, tmp_path):
+def test_a_failure_keeps_the_target_of_a_link(link, tmp_path):
     target = tmp_path / "disk" / "kept.npz"
     target.write_text("earlier")
-    with pytest.raises(TypeError), written_beside(link) as temporary:
+    with pytest.raises(TypeError), atomic_path(link) as temporary:
         temporary.write_text(b"no text")
     assert link.is_symlink()
     assert target.read_text() == "earlier"
@@ -57,17 +57,17 @@ def test_what_a_link_leads_to_survives_a_failure(link, tmp_path):
     assert os.listdir(target.parent) == ["kept.npz"]
 
 
-def test_a_link_into_a_folder_that_is_not_there_is_told_before_the_work(link, tmp_path):
+def test_a_link_into_a_missing_folder_is_an_error_before_the_capture(link, tmp_path):
     (tmp_path / "disk").rmdir()
     with pytest.raises(OutputError, match="disk, which does not exist"):
         check_output(link)
 
 
-def test_links_that_lead_in_a_circle_are_told(tmp_path):
+def test_circular_links_are_an_error(tmp_path):
     path = tmp_path / "walk.npz"
     path.symlink_to(path)
     for refused in (check_output, write):
-        with pytest.raises(OutputError, match="in a circle"):
+        with pytest.raises(OutputError, match="form a circle"):
             refused(path)
 
 
@@ -83,7 +83,7 @@ def make_socket(path):
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="Windows keeps its pipes in no folder")
 @pytest.mark.parametrize("linked", [False, True])
 @pytest.mark.parametrize("make", [make_pipe, make_socket, os.mkdir])
-def test_what_is_no_file_is_neither_written_nor_replaced(tmp_path, monkeypatch, make, linked):
+def test_folders_pipes_and_sockets_are_neither_written_nor_replaced(tmp_path, monkeypatch, make, linked):
     monkeypatch.chdir(tmp_path)  # a socket's name has to be short
     other = tmp_path / "other"
     make(other.relative_to(tmp_path))
@@ -101,7 +101,7 @@ def test_what_is_no_file_is_neither_written_nor_replaced(tmp_path, monkeypatch, 
 
 
 @pytest.mark.skipif(not os.path.exists("/dev/null"), reason="Windows has no such device")
-def test_a_device_is_refused(tmp_path):
+def test_writing_to_a_device_is_an_error(tmp_path):
     path = tmp_path / "walk.npz"
     path.symlink_to("/dev/null")
     with pytest.raises(OutputError, match="it is a link to /dev/null, and that is a device"):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The command line as a user meets it: exit status, one clear sentence, nothing half-written."""
+"""The command line as users see it: exit status, one sentence on stderr, no partial files."""
 
 import json
 import os
@@ -33,7 +33,7 @@ BROKEN = {
 
 
 @pytest.mark.parametrize("name", BROKEN)
-def test_bad_footage_gives_one_sentence_status_1_and_no_file(tmp_path, capsys, name):
+def test_unreadable_footage_gives_one_sentence_status_1_and_no_file(tmp_path, capsys, name):
     content = BROKEN[name]
     if content == "truncated":
         content = SAMPLE.read_bytes()[:4000]
@@ -57,32 +57,32 @@ def test_bad_footage_gives_one_sentence_status_1_and_no_file(tmp_path, capsys, n
         (["capture", "--overlay", "{tmp}/a.avi"], 2, ".avi"),
         (["capture", "-o", "{tmp}/none/a.npz"], 1, "none"),
         (["capture", "-o", "{tmp}"], 2, "suffix"),
-        (["capture", "", "-o", "{tmp}/a.npz"], 2, "VIDEO: the name is empty"),
-        (["capture", "-o", ""], 2, "--output: the name is empty"),
-        (["capture", "--overlay", "", "-o", "{tmp}/a.npz"], 2, "--overlay: the name is empty"),
-        (["capture", "--calibration=", "-o", "{tmp}/a.npz"], 2, "--calibration: the name is empty"),
-        (["capture", "--retarget", "", "-o", "{tmp}/a.glb"], 2, "--retarget: the name is empty"),
-        (["capture", "--bone-map", "", "-o", "{tmp}/a.glb"], 2, "--bone-map: the name is empty"),
-        (["capture", "--detector", "", "-o", "{tmp}/a.npz"], 2, "--detector: the name is empty"),
-        (["capture", "--keypoints", "", "-o", "{tmp}/a.npz"], 2, "--keypoints: the name is empty"),
-        (["batch", "", "--out", "{tmp}"], 2, "FOLDER: the name is empty"),
-        (["batch", "{tmp}", "--out", ""], 2, "--out: the name is empty"),
+        (["capture", "", "-o", "{tmp}/a.npz"], 2, "VIDEO: the path is empty"),
+        (["capture", "-o", ""], 2, "--output: the path is empty"),
+        (["capture", "--overlay", "", "-o", "{tmp}/a.npz"], 2, "--overlay: the path is empty"),
+        (["capture", "--calibration=", "-o", "{tmp}/a.npz"], 2, "--calibration: the path is empty"),
+        (["capture", "--retarget", "", "-o", "{tmp}/a.glb"], 2, "--retarget: the path is empty"),
+        (["capture", "--bone-map", "", "-o", "{tmp}/a.glb"], 2, "--bone-map: the path is empty"),
+        (["capture", "--detector", "", "-o", "{tmp}/a.npz"], 2, "--detector: the path is empty"),
+        (["capture", "--keypoints", "", "-o", "{tmp}/a.npz"], 2, "--keypoints: the path is empty"),
+        (["batch", "", "--out", "{tmp}"], 2, "FOLDER: the path is empty"),
+        (["batch", "{tmp}", "--out", ""], 2, "--out: the path is empty"),
         (["capture", "--quality", "superb"], 2, "superb"),
         (["capture", "--fov", "60", "--focal-mm", "26", "-o", "{tmp}/a.npz"], 2, "contradict"),
         (["capture", "--fov", "wide"], 2, "wide"),
         (["capture", "--height", "1,82", "-o", "{tmp}/a.npz"], 2, "nobody is 1 cm tall"),
-        (["capture", "--height", "tall", "-o", "{tmp}/a.npz"], 2, "centimetres, say 175"),
+        (["capture", "--height", "tall", "-o", "{tmp}/a.npz"], 2, "centimetres such as 175"),
         (["capture", "--body", "nobody", "-o", "{tmp}/a.npz"], 1, "nobody"),
         (["capture", "--retarget", "{tmp}/rig.glb", "-o", "{tmp}/a.glb"], 1, "rig.glb"),
         (["capture", "--retarget", "{tmp}/rig.obj", "-o", "{tmp}/a.glb"], 2, ".obj"),
         (["capture", "--retarget", str(SAMPLE.parent / "LICENSE.md"), "-o", "{tmp}/a.glb"], 2, ".md"),
         (["capture", "--bone-map", "{tmp}/map.json", "-o", "{tmp}/a.glb"], 2, "--retarget"),
         (["capture", "--rig-object", "Rig", "-o", "{tmp}/a.glb"], 2, "--retarget"),
-        (["capture", str(SAMPLE), "second.mp4"], 2, "second.mp4 (see scope capture --help; a folder of clips"),
+        (["capture", str(SAMPLE), "second.mp4"], 2, "second.mp4 (see scope capture --help; use scope batch"),
         (["capture", "--frobnicate"], 2, "--frobnicate (see scope capture --help)"),
         (["capture", "--threads", "-2", "-o", "{tmp}/a.npz"], 2, "--threads"),
-        (["capture", "--start", "", "-o", "{tmp}/a.npz"], 2, "'' is no time"),
-        (["capture", "--fps", "", "-o", "{tmp}/a.npz"], 2, "'' is no frame rate"),
+        (["capture", "--start", "", "-o", "{tmp}/a.npz"], 2, "'' is not a time"),
+        (["capture", "--fps", "", "-o", "{tmp}/a.npz"], 2, "'' is not a frame rate"),
         (["capture", "--start", "00:00:00:99", "-o", "{tmp}/a.npz"], 2, "00:00:00:99 does not exist"),
         (["capture", "https://example.com/walk.mp4", "-o", "{tmp}/a.npz"], 1, "download"),
         (["frobnicate"], 2, "frobnicate"),
@@ -98,7 +98,7 @@ def test_bad_arguments(tmp_path, capsys, argv, status, says):
     assert files_below(tmp_path) == []
 
 
-def test_a_picture_of_nobody_ends_with_status_3(tmp_path, capsys):
+def test_a_picture_without_a_person_ends_with_status_3(tmp_path, capsys):
     import cv2
 
     cv2.imwrite(str(tmp_path / "wall.png"), np.full((240, 320, 3), 128, np.uint8))
@@ -108,7 +108,7 @@ def test_a_picture_of_nobody_ends_with_status_3(tmp_path, capsys):
     assert files_below(tmp_path) == ["wall.png"]
 
 
-def test_a_failing_writer_keeps_the_earlier_result(tmp_path, capsys, monkeypatch):
+def test_a_failed_write_keeps_the_earlier_result(tmp_path, capsys, monkeypatch):
     import cv2
 
     picture = tmp_path / "person.png"
@@ -128,7 +128,7 @@ def test_a_failing_writer_keeps_the_earlier_result(tmp_path, capsys, monkeypatch
     assert files_below(tmp_path) == ["out.npz", "person.png"]
 
 
-def test_names_of_the_same_output_are_one(tmp_path, capfd, monkeypatch):
+def test_outputs_that_are_the_same_file_are_written_once(tmp_path, capfd, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "out").mkdir()
     (tmp_path / "linked").symlink_to("out")
@@ -140,7 +140,7 @@ def test_names_of_the_same_output_are_one(tmp_path, capfd, monkeypatch):
     assert files_below(tmp_path) == ["case.npz", "linked", "out", "out/case.npz"]
 
 
-def test_an_interrupt_while_the_overlay_is_drawn_leaves_whole_files_and_says_so(tmp_path, capsys, monkeypatch):
+def test_an_interrupt_during_the_overlay_leaves_complete_files(tmp_path, capsys, monkeypatch):
     def interrupted(*_, **__):
         raise KeyboardInterrupt
 
@@ -153,7 +153,7 @@ def test_an_interrupt_while_the_overlay_is_drawn_leaves_whole_files_and_says_so(
     assert files_below(tmp_path) == ["a.npz"]
 
 
-def test_a_picture_gives_a_motion_of_one_frame_and_json_alone_on_stdout(tmp_path):
+def test_a_picture_gives_a_motion_of_one_frame_and_only_json_on_stdout(tmp_path):
     import cv2
 
     picture = tmp_path / "person.png"
@@ -187,7 +187,7 @@ def test_a_picture_gives_a_motion_of_one_frame_and_json_alone_on_stdout(tmp_path
     assert cv2.imread(str(tmp_path / "o.png")).shape == frame.shape
 
 
-def test_help_names_every_option(capsys):
+def test_help_lists_every_option(capsys):
     with pytest.raises(SystemExit) as stop:
         cli.build_parser().parse_args(["capture", "--help"])
     assert stop.value.code == 0
@@ -207,8 +207,8 @@ def test_hands_need_a_body_with_fingers(tmp_path, capsys):
 
 
 @pytest.mark.skipif(os.name == "nt", reason="needs the C library by its POSIX name")
-def test_what_c_prints_before_and_meanwhile_is_no_part_of_the_report():
-    """Blender's version waits in C's buffer when the command begins."""
+def test_output_of_c_libraries_is_not_part_of_the_report():
+    """Blender's version is in C's buffer when the command begins."""
     code = (
         "import ctypes\n"
         "from scope.scope_addon.command_line.terminal import stdout_for_report\n"

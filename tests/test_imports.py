@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Each room needs only its own libraries, and the package works under two names; see also ``test_rooms``."""
+"""Each package needs only its own libraries, and Scope works under two names; see also ``test_rooms``."""
 
 import ast
 import subprocess
@@ -95,6 +95,6 @@ def imported(path: Path) -> list[tuple[int, str]]:
 def test_imports_are_relative(path):
     here = path.relative_to(ROOT).as_posix()
     for level, module in imported(path):
-        # The worker's start is a script, run by path in a process where the package has no name yet: it gives it one.
+        # The worker's start script runs by path, in a process where the package has not been loaded yet.
         if path.name != "start_worker.py":
             assert module.split(".")[0] != "scope" or level, f"{here}: 'import {module}' is not relative"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The motion file: what goes in comes out, and broken files are named."""
+"""The motion file: a saved motion loads unchanged, and damaged files are errors."""
 
 import pickle
 
@@ -48,7 +48,7 @@ def test_a_saved_motion_loads_the_same(tmp_path):
     assert [p.name for p in tmp_path.iterdir()] == ["a.npz"]
 
 
-def test_the_file_holds_plain_arrays_under_the_documented_names_and_types(tmp_path):
+def test_the_file_contains_plain_arrays_with_the_documented_names_and_types(tmp_path):
     make_motion().save(tmp_path / "a.npz")
     with np.load(tmp_path / "a.npz", allow_pickle=False) as file:
         types = {k: file[k].dtype.kind + str(file[k].dtype.itemsize) for k in file.files if file[k].dtype.kind != "U"}
@@ -66,7 +66,7 @@ def test_a_wrong_shape_is_named():
 
 
 @pytest.mark.parametrize("content", [b"", b"not a zip", b"PK\x03\x04broken"])
-def test_a_broken_file_is_refused_by_name(tmp_path, content):
+def test_a_damaged_file_is_an_error_that_names_it(tmp_path, content):
     path = tmp_path / "bad.npz"
     path.write_bytes(content)
     with pytest.raises(MotionFileError, match="bad.npz"):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is missing skips a test, fails it in CI, and skips it there too where that was asked for."""
+"""A missing requirement skips a test, fails it in CI, and skips it there too if that is requested."""
 
 from __future__ import annotations
 

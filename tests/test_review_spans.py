@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which frames of a motion deserve a look, and why."""
+"""Review spans of motions with known defects."""
 
 import sys
 from subprocess import run
 
 import numpy as np
-from scope.scope_addon.review_spans import Span, body_confidence, low_confidence_spans
+from scope.scope_addon.review_spans import Span, body_confidence, find_review_spans
 from scope.solver.loaders.body_file import load_body
 
 from .made_motion import made_motion
@@ -18,8 +18,8 @@ def motion(count: int = 30):
     return m
 
 
-def test_a_good_motion_has_none():
-    assert low_confidence_spans(motion()) == []
+def test_a_good_motion_has_no_review_spans():
+    assert find_review_spans(motion()) == []
 
 
 def test_each_frame_has_one_reason():
@@ -28,33 +28,33 @@ def test_each_frame_has_one_reason():
     m.residual_px[:5] = 100.0
     m.joint_confidence[:8] *= 0.1
     expected = [Span("unseen", 0, 1), Span("unseen", 29, 29), Span("far", 2, 4), Span("unsure", 5, 7)]
-    assert low_confidence_spans(m) == expected
+    assert find_review_spans(m) == expected
 
 
-def test_near_spans_become_one():
+def test_close_spans_are_merged():
     m = motion()
     m.valid[[3, 6, 20]] = False
-    assert low_confidence_spans(m, gap_s=0.2) == [Span("unseen", 3, 6), Span("unseen", 20, 20)]
+    assert find_review_spans(m, gap_s=0.2) == [Span("unseen", 3, 6), Span("unseen", 20, 20)]
 
 
-def test_joints_that_nothing_measures_do_not_count():
+def test_joints_without_measurements_do_not_count():
     np.testing.assert_array_equal(body_confidence(motion()), 1.0)
 
 
-def test_a_body_of_which_nothing_is_measured_is_unsure_throughout():
+def test_a_body_without_measurements_has_low_confidence_throughout():
     m = motion()
     m.joint_confidence[:] = 0.0
     np.testing.assert_array_equal(body_confidence(m), np.zeros(30))
-    assert low_confidence_spans(m) == [Span("unsure", 0, 29)]
+    assert find_review_spans(m) == [Span("unsure", 0, 29)]
 
 
-def test_fingers_that_are_not_seen_leave_the_body_sure():
+def test_unseen_fingers_do_not_lower_the_confidence_of_the_body():
     m = motion()
     m.joint_confidence = np.ones((30, 52))
     m.joint_confidence[5:, 22:] = 0.0
     np.testing.assert_array_equal(body_confidence(m), 1.0)
 
 
-def test_it_needs_no_blender():
+def test_it_does_not_import_bpy():
     code = "import sys, scope.scope_addon.review_spans; sys.exit('bpy' in sys.modules)"
     assert run([sys.executable, "-c", code], check=False).returncode == 0

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The wheel holds the product and nothing else, and its solver works beside numpy and numba alone."""
+"""The wheel contains the product and nothing else, and its solver works with only numpy and numba."""
 
 import os
 import shutil
@@ -45,14 +45,14 @@ print(np.abs(found.t_camera_part - joints).max())
 
 
 def folders() -> set[str]:
-    """Every folder of the product that holds a module, as a package's path in the wheel."""
+    """Every folder of the product that contains a module, as a path in the wheel."""
     found = {path.parent for name in PRODUCT for path in (ROOT / name).rglob("*.py")}
     return {f"scope/{folder.relative_to(ROOT).as_posix()}" for folder in found}
 
 
 @pytest.fixture(scope="session")
 def wheel(tmp_path_factory) -> Path:
-    """The wheel, built from a copy of what it is made of, so that nothing is written into the checkout."""
+    """The wheel, built from a copy of the sources, so that nothing is written into the checkout."""
     place = tmp_path_factory.mktemp("wheel")
     source = place / "source"
     ignored = shutil.ignore_patterns("__pycache__", "*.onnx", "pictures", "guide", "sample")
@@ -100,11 +100,11 @@ def test_the_wheel_has_every_package_of_the_product_and_its_data(wheel):
 
 
 def test_every_folder_of_modules_is_a_package():
-    """Without its `__init__.py` a folder would be left out of the wheel, though it can be imported here."""
+    """A folder without `__init__.py` can be imported here, but would be missing in the wheel."""
     assert [f for f in sorted(folders()) if not (ROOT / f.removeprefix("scope/") / "__init__.py").is_file()] == []
 
 
-def test_the_wheel_asks_for_numpy_and_numba_alone(wheel):
+def test_the_wheel_requires_only_numpy_and_numba(wheel):
     with zipfile.ZipFile(wheel) as archive:
         metadata = next(name for name in archive.namelist() if name.endswith(".dist-info/METADATA"))
         lines = archive.read(metadata).decode().splitlines()
@@ -112,7 +112,7 @@ def test_the_wheel_asks_for_numpy_and_numba_alone(wheel):
     assert [name for name in needed if "extra ==" not in name] == ["numpy", "numba"]
 
 
-def test_the_extras_name_every_package_that_a_missing_module_asks_for():
+def test_the_extras_contain_every_package_of_a_missing_module():
     from scope.scope_addon.installed import EXTRAS
 
     extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
@@ -120,7 +120,7 @@ def test_the_extras_name_every_package_that_a_missing_module_asks_for():
     assert set(EXTRAS) == set(CAPTURE_MODULES)
 
 
-def test_the_solver_fits_beside_numpy_and_numba_alone(installed):
+def test_the_solver_fits_with_only_numpy_and_numba(installed):
     """A body at rest, whose joints are known without the solver."""
     done = run(installed, "-W", "error", "-c", FIT.format(capture=CAPTURE_MODULES))
     assert done.returncode == 0, done.stderr
@@ -128,7 +128,7 @@ def test_the_solver_fits_beside_numpy_and_numba_alone(installed):
 
 
 @pytest.mark.parametrize("command", [["capture", "walk.mp4", "-o", "walk.npz"], ["batch", ".", "--out", "."]])
-def test_the_command_line_says_what_a_capture_still_needs(installed, command):
+def test_the_command_line_reports_missing_packages(installed, command):
     done = run(installed, "-m", "scope.scope_addon.cli", *command)
     assert done.returncode == 1
     assert done.stderr == (

@@ -2,7 +2,7 @@
 """``python -m scope.tools.solver_reference``: write docs/solver_api.md from the solver's source.
 
 Every name of ``scope.solver.__all__`` appears exactly once, with its parameters and docstring. A test compares the page
-with what this would write.
+with this tool's output.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ output:
 .venv/bin/python -m scope.solver.examples.from_markers
 ```
 """
-# Headings, and the names below each. A name that is missing here comes last.
+# Headings, and the names below each. Names not listed here come last.
 _SECTIONS = {
     "Body models": ("load_body", "Body", "BodyArrays", "Tree", "make_tree"),
     "Measurements": (
@@ -68,7 +68,7 @@ _ERRORS, _ROTATIONS, _OTHER = "Errors", "Rotations", "Other names"
 
 
 def reference() -> str:
-    """The page as Markdown."""
+    """Return the page as Markdown."""
     listed = [name for names in _SECTIONS.values() for name in names]
     errors = sorted(name for name in solver.__all__ if _is_error(getattr(solver, name)))
     sections = {heading: [n for n in names if n in solver.__all__] for heading, names in _SECTIONS.items()}
@@ -84,7 +84,7 @@ def reference() -> str:
 
 
 def _entry(name: str, value: Any) -> str:
-    """Heading, and as a block of text the parameters and docstring of one name."""
+    """Return the heading of one name and, as a block of text, its parameters and docstring."""
     if inspect.isclass(value):
         lines = _class(value)
     elif inspect.isfunction(value):
@@ -97,14 +97,14 @@ def _entry(name: str, value: Any) -> str:
 
 
 def _function(function: Any) -> list[str]:
-    """Signature and docstring."""
+    """Return signature and docstring."""
     tree = ast.parse(textwrap.dedent(inspect.getsource(function))).body[0]
     assert isinstance(tree, ast.FunctionDef)
     return [*_signature(tree), *_documentation(tree)]
 
 
 def _class(cls: type) -> list[str]:
-    """Docstring, then fields with their comments, then public methods and properties that have a docstring."""
+    """Return the docstring, fields with their comments, and public methods and properties that have a docstring."""
     source = textwrap.dedent(inspect.getsource(cls)).splitlines()
     tree = ast.parse("\n".join(source)).body[0]
     assert isinstance(tree, ast.ClassDef)
@@ -121,7 +121,7 @@ def _class(cls: type) -> list[str]:
 
 
 def _signature(node: ast.FunctionDef) -> list[str]:
-    """The name with its parameters and result, in one line where it fits."""
+    """Return the name with its parameters and result, in one line where it fits."""
     names = {d.id for d in node.decorator_list if isinstance(d, ast.Name)}
     result = f" -> {ast.unparse(node.returns)}" if node.returns else ""
     if names & {"property", "cached_property"}:
@@ -134,13 +134,13 @@ def _signature(node: ast.FunctionDef) -> list[str]:
 
 
 def _documentation(node: ast.FunctionDef | ast.ClassDef) -> list[str]:
-    """The docstring, indented."""
+    """Return the docstring, indented."""
     text = ast.get_docstring(node)
     return _indented(text.splitlines()) if text else []
 
 
 def _functions(module: Any) -> list[tuple[str, Any]]:
-    """Public functions that take arrays; the module's kernels are for other kernels."""
+    """Return the public functions that take arrays; kernels are called by other kernels only."""
     return [
         (name, value)
         for name, value in vars(module).items()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How far the captured bodies are from the truth of the four pose2sim cameras, and what each part brings."""
+"""Errors of captured bodies against ground truth of the four pose2sim cameras, and the ablation."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import warnings
 from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import numpy as np
 
@@ -30,49 +31,49 @@ SHOWN = {  # key of the evaluation: heading, target
     "flipped": ("flipped share", 0.01),
     "coverage": ("coverage", 1.0),
 }
-ABLATION: dict[str, dict[str, Ablation | bool]] = {
+ABLATION: dict[str, dict[str, Any]] = {
     "all parts": {},
-    "without the lifter": {"ablation": Ablation(lifter=False)},
-    "lifter without world landmarks": {"ablation": Ablation(world_landmarks=False)},
-    "keypoints at the joints": {"ablation": Ablation(keypoint_offsets=False)},
+    "without the lifting network": {"ablation": Ablation(lifter=False)},
+    "lifting network without world landmarks": {"ablation": Ablation(world_landmarks=False)},
+    "without keypoint offsets": {"ablation": Ablation(keypoint_offsets=False)},
     "without 3D keypoints": {"ablation": Ablation(keypoints3d=False)},
     "without the orientation field": {"ablation": Ablation(orientation_field=False)},
     "without the joint prior": {"ablation": Ablation(joint_prior=False)},
     "without left-right repair": {"ablation": Ablation(left_right=False)},
-    "without mended leaps": {"ablation": Ablation(keypoint_jumps=False)},
+    "without keypoint-jump repair": {"ablation": Ablation(keypoint_jumps=False)},
     "without the second pass": {"ablation": Ablation(second_pass=False)},
-    "without balance": {"ablation": Ablation(balance=False)},
+    "without balance in it": {"ablation": Ablation(balance=False)},
     "without the floor in it": {"ablation": Ablation(floor=False)},
-    "without contact": {"ablation": Ablation(contact=False)},
+    "without foot locking": {"ablation": Ablation(contact=False)},
     "without smoothing": {"smoothing": False},
 }
 FLIPS = ("lr_swap", "mirror", "mirror_swap")
 
 
-def evaluate_camera(body: Body, camera: str, options: CaptureOptions) -> dict:
-    """Return everything that the evaluation tool says about one camera."""
+def evaluate_camera(body: Body, camera: str, options: CaptureOptions) -> dict[str, Any]:
+    """Return all figures of the evaluation tool for one camera."""
     folder = DATA / "pose2sim"
     return evaluate_clip(body, folder / f"{camera}.mp4", folder / f"truth_{camera}.npz", options)[1]
 
 
-def evaluate_clip(body: Body, video: Path, truth: Path, options: CaptureOptions) -> tuple[Motion, dict]:
-    """Capture a clip; return its motion and everything that the evaluation tool says about it.
+def evaluate_clip(body: Body, video: Path, truth: Path, options: CaptureOptions) -> tuple[Motion, dict[str, Any]]:
+    """Capture a clip; return its motion and all figures of the evaluation tool for it.
 
-    :raises NoPersonError: nobody was found.
+    :raises NoPersonError: when nobody was found.
     """
     motion = capture(video, body, options).motions[0]
     with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
-        warnings.simplefilter("ignore", RuntimeWarning)  # of means over nothing, in the tool
+        warnings.simplefilter("ignore", RuntimeWarning)  # of means of no values, in the tool
         result = Path(folder) / "result.npz"
         motion.save(result)
         figures = _tool().evaluate(str(truth), str(result))
     return motion, figures | {"flipped": max(figures[key] for key in FLIPS)}
 
 
-def evaluate_all(body: Body, options: Callable[[str], CaptureOptions]) -> dict[str, dict]:
-    """Return the figures of each camera under its name and, under "mean", the means of what is shown.
+def evaluate_all(body: Body, options: Callable[[str], CaptureOptions]) -> dict[str, dict[str, Any]]:
+    """Return the figures of each camera under its name and, under "mean", the means of those in ``SHOWN``.
 
-    ``flipped`` is the worst of its kinds, and its mean the worst camera's.
+    ``flipped`` is the largest of the three shares of ``FLIPS``, and its mean is that of the worst camera.
     """
     found = {camera: evaluate_camera(body, camera, options(camera)) for camera in CAMERAS}
     mean = {key: float(np.mean([f[key] for f in found.values()])) for key in SHOWN}
@@ -85,8 +86,11 @@ def calibration(camera: str) -> Path:
 
 
 def _tool() -> ModuleType:
-    """The evaluation tool beside the checkout."""
-    spec = importlib.util.spec_from_file_location("evaluate", DATA.parent / "tools" / "evaluate.py")
+    """Import the evaluation tool next to the checkout."""
+    path = DATA.parent / "tools" / "evaluate.py"
+    spec = importlib.util.spec_from_file_location("evaluate", path)
+    if spec is None or spec.loader is None:
+        raise ImportError(f"{path} is not a Python file")
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module

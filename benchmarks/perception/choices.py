@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`./scripts/bench choices`: would another camera have chosen the same weights?
+"""`./scripts/bench choices`: cross-validate weights and thresholds over cameras.
 
-Every weight, deviation or share that was chosen by measuring is set to values around its own. For each of the four
-pose2sim cameras in turn, the value is taken that is best for the other three, and what it has on the camera that was
-left out is compared with what ships: a choice that only fits the clips it was made on would lose there.
+Every weight, deviation or share that was chosen by measuring is set to values around the shipped one. For each of the
+four pose2sim cameras in turn, the value that is best for the other three is evaluated on the camera that was left out
+and compared with the shipped value. A value that is overfitted to the clips on which it was chosen loses there.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from types import ModuleType
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...scope_addon.capture.fitting import prepared_track
 from ...scope_addon.capture.options import CaptureOptions
@@ -30,7 +31,7 @@ from .accuracy import CAMERAS, evaluate_camera
 
 @dataclass(frozen=True)
 class Choice:
-    """A constant of the pipeline and what else it could be: ``module.name``, or the field of it named ``field``."""
+    """A constant of the pipeline, ``module.name`` or its field ``field``, and alternative values."""
 
     what: str
     module: ModuleType
@@ -40,13 +41,13 @@ class Choice:
 
     @property
     def shipped(self) -> float:
-        """Its value."""
+        """The shipped value."""
         value = getattr(self.module, self.name)
         return float(getattr(value, self.field) if self.field else value)
 
     @contextmanager
     def set_to(self, value: float) -> Iterator[None]:
-        """Another value, for as long as the context lasts."""
+        """Set another value while the context lasts."""
         before: Any = getattr(self.module, self.name)
         setattr(self.module, self.name, replace(before, **{self.field: value}) if self.field else value)
         try:
@@ -61,17 +62,17 @@ CHOICES = (
     Choice("weight of the orientation field", prepared_track, "WEIGHTS", (250.0, 1000.0), "orientation_field"),
     Choice("weight of the joint prior", prepared_track, "WEIGHTS", (2.0, 8.0), "joint_prior"),
     Choice("weight of the shape prior", prepared_track, "WEIGHTS", (5.0, 20.0), "shape"),
-    Choice("weight of the floor under feet that stand", prepared_track, "WEIGHTS", (5e3, 2e4), "floor"),
+    Choice("weight of the floor under standing feet", prepared_track, "WEIGHTS", (5e3, 2e4), "floor"),
     Choice("share lifted with world landmarks", lifter, "WORLD_SHARE", (0.5, 1.0)),
     Choice("speed at which balance is doubted, m/s", balance, "STANDING_M_S", (0.25, 1.0)),
     Choice("deviation of feet from the floor, m", ground_plane, "FLOOR_SIGMA_M", (0.015, 0.06)),
-    Choice("wrong depth that a still foot may have, m", standing, "WRONG_DEPTH_M", (0.2, 0.8)),
-    Choice("what held feet may move in the picture, m", foot_lock, "PICTURE_SIGMA_M", (0.001, 0.01)),
+    Choice("depth error that a still foot may have, m", standing, "WRONG_DEPTH_M", (0.2, 0.8)),
+    Choice("image motion allowed to locked feet, m", foot_lock, "PICTURE_SIGMA_M", (0.001, 0.01)),
 )
 
 
-def left_out(errors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Which value the other cameras choose, and what it has on the camera left out.
+def left_out(errors: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+    """Return the value that the other cameras choose, and its error on the camera left out.
 
     :param errors: (V, C) error with each value on each camera.
     :return: (C,) index of the value and (C,) its error.
@@ -81,20 +82,20 @@ def left_out(errors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return chosen, errors[chosen, np.arange(errors.shape[1])]
 
 
-def choices(quick: bool) -> dict:
-    """Measure everything (``quick``: the first choices alone), print the tables, return the figures."""
+def choices(quick: bool) -> dict[str, Any]:
+    """Measure all choices (``quick``: the first three), print the tables and return the figures."""
     if not DATA.is_dir():
-        print(f"{DATA} is not beside this checkout: nothing was measured", file=sys.stderr)
+        print(f"{DATA} does not exist: nothing was measured; put the clips there", file=sys.stderr)
         return {}
     body = load_body("scope")
 
-    def errors() -> np.ndarray:
+    def errors() -> NDArray[np.float64]:
         found = [evaluate_camera(body, camera, CaptureOptions()) for camera in CAMERAS]
         return np.array([[f["mpjpe_root"], f["pa_mpjpe"]] for f in found])
 
     shipped = errors()
     print(f"As shipped, MPJPE-root / PA-MPJPE mm: {_each(shipped)}\n", flush=True)
-    figures: dict[str, dict] = {"shipped": {"errors": shipped.tolist()}}
+    figures: dict[str, dict[str, Any]] = {"shipped": {"errors": shipped.tolist()}}
     rows, summary = [], []
     for choice in CHOICES[:3] if quick else CHOICES:
         values, found = [choice.shipped, *choice.others], [shipped]
@@ -112,9 +113,9 @@ def choices(quick: bool) -> dict:
     return figures
 
 
-def _cells(errors: np.ndarray) -> list[str]:
+def _cells(errors: NDArray[np.float64]) -> list[str]:
     return [f"{a:.1f} / {b:.1f}" for a, b in (*errors, errors.mean(axis=0))]
 
 
-def _each(errors: np.ndarray) -> str:
+def _each(errors: NDArray[np.float64]) -> str:
     return ", ".join(f"{name} {cell}" for name, cell in zip((*CAMERAS, "mean"), _cells(errors), strict=True))

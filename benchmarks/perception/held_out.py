@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Shots of the motion-capture takes that trained nothing: one stretch of each, a random body and a random camera."""
+"""Shots of the held-out motion-capture takes: one section of each, with a random body and a random camera."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...scope_addon.kinematics.axes import R_WORLD_MODEL, world_from_level_camera
 from ...solver import Body
@@ -17,15 +19,15 @@ from ...tools.train_lifter.split import is_held_out
 SEED = 7
 SIZE = (640, 480)
 SECONDS, LEAST_SECONDS = 1.5, 0.7
-SUNK_M = 0.12  # under the floor as recorded: the fit left a hand of our body there, which the performer's model lacks
+SUNK_M = 0.12  # under the recorded floor: the fit left a hand there, which the performer's model lacks
 MOST_BETA = 2.5  # of a standard normal distribution
-FOCAL_PX = (470.0, 1000.0)  # of the width 0.73 to 1.56: a phone's main camera to twice that
+FOCAL_PX = (470.0, 1000.0)  # 0.73 to 1.56 of the width: a phone's main camera to twice its focal length
 HEIGHT_M, DISTANCE_M, TILT_DEG = (0.8, 2.0), (3.0, 6.5), (0.0, 15.0)  # of the camera; it looks down
-LEAST_FILL = 0.45  # the person's longer side over the picture's height, median of the frames
-MARGIN_PX = 12.0  # around everything that the person does
-FARTHEST_M = 1.7  # behind it stand bench and wall
+LEAST_FILL = 0.45  # longer side of the person's box over the image height, median of the frames
+MARGIN_PX = 12.0  # around the person in all frames
+FARTHEST_M = 1.7  # bench and wall are behind it
 NEAREST_M = 1.2  # to the camera
-FEW = 40  # points of the skin to one that is looked at first
+FEW = 40  # every 40th point of the skin is tested first
 FLOOR_QUANTILE = 0.05  # of the frames, ordered by the height of the lowest point of the feet's skin
 STILL_M_PER_S, STANDS_BELOW_M = 0.15, 0.1  # middle of heel and toe
 TRIES = 20000
@@ -37,15 +39,15 @@ class Take:
 
     number: int
     name: str
-    poses: np.ndarray  # (T, 3(K+1)) axis-angle
-    trans: np.ndarray  # (T, 3) metres
-    valid: np.ndarray  # (T,) bool
-    betas: np.ndarray  # (P,)
+    poses: NDArray[np.float64]  # (T, 3(K+1)) axis-angle
+    trans: NDArray[np.float64]  # (T, 3) metres
+    valid: NDArray[np.bool_]  # (T,) bool
+    betas: NDArray[np.floating[Any]]  # (P,)
     fps: float
 
 
 def held_out_takes(path: Path) -> list[Take]:
-    """The takes of a file written by ``tools.mocap.fit_body`` that measure."""
+    """Read the held-out takes of a file written by ``tools.mocap.fit_body``."""
     with np.load(path) as data:
         arrays = {key: data[key] for key in ("poses", "trans", "valid")}
         start, names, betas, fps = (data[f"take_{key}"] for key in ("start", "name", "betas", "fps"))
@@ -57,12 +59,12 @@ def held_out_takes(path: Path) -> list[Take]:
 
 
 def draw_shot(body: Body, take: Take, seed: int = SEED) -> Shot:
-    """A stretch of the take with a random body before a random camera; the same for the same seed.
+    """Return a section of the take with a random body in front of a random camera, reproducible by its seed.
 
-    The root's path is the performer's times the ratio of the legs' lengths, so that feet that stand go on standing.
-    Camera, heading and place are drawn until the person is well inside the picture and the room.
+    The root trajectory is the performer's times the ratio of leg lengths, so that feet at rest remain at rest.
+    Camera, heading and place are drawn until the person is well inside the image and the room.
 
-    :raises ValueError: no such camera was found, or the take has no sound stretch.
+    :raises ValueError: when no such camera was found, or the take has no section of valid frames.
     """
     rng = np.random.default_rng([seed, take.number])
     frames = _stretch(rng, body, take)
@@ -84,23 +86,25 @@ def draw_shot(body: Body, take: Take, seed: int = SEED) -> Shot:
     return replace(shot, standing=standing_feet(body, shot))
 
 
-def standing_feet(body: Body, shot: Shot) -> np.ndarray:
-    """(T, 2) bool: whether the middle of heel and toe of the left and the right foot is low and still."""
+def standing_feet(body: Body, shot: Shot) -> NDArray[np.bool_]:
+    """Return (T, 2) bool: whether the midpoint of heel and toe of the left and the right foot is low and at rest."""
     feet = feet_world(body, shot.rotations, shot.trans, shot.betas)
     speed = np.linalg.norm(np.gradient(feet, axis=0), axis=-1) * shot.fps
     return (speed < STILL_M_PER_S) & (feet[..., 2] < STANDS_BELOW_M)
 
 
-def feet_world(body: Body, rotations: np.ndarray, trans: np.ndarray, betas: np.ndarray) -> np.ndarray:
-    """(T, 2, 3) the middle of heel and toe, left and right, in metres of the world."""
+def feet_world(
+    body: Body, rotations: NDArray[np.float64], trans: NDArray[np.float64], betas: NDArray[np.floating[Any]]
+) -> NDArray[np.float64]:
+    """Return (T, 2, 3), the midpoints of heel and toe, left and right, in the world, in metres."""
     points = body.keypoints(*body.forward_kinematics(rotations, trans, betas), betas)
     at = body.keypoint_set("blazepose")
     sides = [[at[f"{side}_{point}"] for point in FEET.values()] for side in ("left", "right")]
     return points[:, sides].mean(axis=2)
 
 
-def _stretch(rng: np.random.Generator, body: Body, take: Take) -> np.ndarray:
-    """Consecutive sound frames of the take, as many as a shot has or, failing that, as many as there are."""
+def _stretch(rng: np.random.Generator, body: Body, take: Take) -> NDArray[np.intp]:
+    """Return the indices (n,) of consecutive valid frames: as many as a shot has, or fewer if the take has no more."""
     states = exp(take.poses.reshape(len(take.poses), -1, 3).astype(float))
     points = body.keypoints(*body.forward_kinematics(states, take.trans, take.betas), take.betas)
     unsound = np.concatenate([[0], np.cumsum(~take.valid | (points[..., 1].min(axis=1) < -SUNK_M))])
@@ -112,21 +116,21 @@ def _stretch(rng: np.random.Generator, body: Body, take: Take) -> np.ndarray:
     raise ValueError(f"take {take.name} has no {least} sound frames in a row")
 
 
-def _leg_length(body: Body, betas: np.ndarray) -> float:
+def _leg_length(body: Body, betas: NDArray[np.floating[Any]]) -> float:
     J = body.rest_joints(betas)
     chain = [body.joint_names.index(f"left_{part}") for part in ("hip", "knee", "ankle")]
     return float(np.linalg.norm(np.diff(J[chain], axis=0), axis=1).sum())
 
 
-def _skin_of_feet(body: Body) -> np.ndarray:
-    """The vertices that follow a foot more than anything else."""
+def _skin_of_feet(body: Body) -> NDArray[np.intp]:
+    """Return the indices (n,) of the vertices whose largest skinning weight is a foot's."""
     part = np.take_along_axis(body.skin_joints, body.skin_weights.argmax(axis=1)[:, None], axis=1)[:, 0]
     feet = [k for k, name in enumerate(body.joint_names) if name.endswith(("_ankle", "_foot"))]
     return np.flatnonzero(np.isin(part, feet))
 
 
-def _draw_camera(rng: np.random.Generator, shot: Shot, skin: np.ndarray) -> tuple[Shot, np.ndarray]:
-    """A random camera that has all of the skin (T, V, 3) in its picture once the world is turned by a heading."""
+def _draw_camera(rng: np.random.Generator, shot: Shot, skin: NDArray[np.float64]) -> tuple[Shot, NDArray[np.float64]]:
+    """Draw a camera, and a heading by which the world is turned, with all of the skin (T, V, 3) in the image."""
     few = skin[:, ::FEW]
     for _ in range(TRIES):
         R_heading, tilt = exp(np.array([0.0, 0.0, rng.uniform(0, 2 * np.pi)])), np.radians(rng.uniform(*TILT_DEG))
@@ -140,7 +144,7 @@ def _draw_camera(rng: np.random.Generator, shot: Shot, skin: np.ndarray) -> tupl
     raise ValueError("no camera was found: the person moves too far, or the limits are too narrow")
 
 
-def _well_inside(shot: Shot, skin: np.ndarray) -> bool:
+def _well_inside(shot: Shot, skin: NDArray[np.float64]) -> bool:
     camera = shot.to_camera(skin)
     if camera[..., 2].min() < NEAREST_M or skin[..., 1].max() > FARTHEST_M:
         return False

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How much memory an hour takes: a few seconds of tracking, repeated, through everything that comes after it.
+"""Measure the memory for an hour of video: a few seconds of tracking are repeated and processed to the end.
 
     python -m scope.benchmarks.perception.memory [--frames 108000] [--people 2]
 
-Everybody is the person of the sample clip, in a place of their own. The networks of the default preset stay loaded, as
-in a capture; what they take while they run is not in the figure.
+All people are copies of the sample clip's person, each in a different place. The networks of the default preset stay
+loaded, as in a capture; their working memory is not included.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ def replay(frames: int, people: int) -> dict[str, float]:
 
 
 def moved(observation: Observation, pixels: float) -> Observation:
-    """Return a copy of an observation, as a tracker would make it anew, of somebody further to the right."""
+    """Return a copy of an observation, with new arrays as from a tracker, of a person further to the right."""
     return replace(observation, keypoints_px=observation.keypoints_px + [pixels, 0.0])
 
 

@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`./scripts/bench perception`: accuracy against truth, what each part brings, frames per second."""
+"""`./scripts/bench perception`: accuracy against ground truth, ablation, frames per second."""
 
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
+from typing import Any
 
 from ...scope_addon.capture.options import CaptureOptions
 from ...solver import Body, load_body
@@ -17,30 +19,30 @@ PRESETS = ("fast", "balanced", "best")
 SPEED_TARGETS = {"fast": 60.0, CaptureOptions().quality: 30.0}
 
 
-def perception(quick: bool) -> dict:
+def perception(quick: bool) -> dict[str, Any]:
     """Measure everything, print the tables as they come, return the figures."""
     if not DATA.is_dir():
-        print(f"{DATA} is not beside this checkout: nothing was measured", file=sys.stderr)
+        print(f"{DATA} does not exist: nothing was measured; put the clips there", file=sys.stderr)
         return {}
     body = load_body("scope")
     warm_up(body)
     figures = _speed(body, quick)
     figures |= _accuracy(body)
     if not quick:
-        presets = {q: evaluate_all(body, lambda _, q=q: CaptureOptions(quality=q)) for q in PRESETS}
+        presets = {q: evaluate_all(body, _always(CaptureOptions(quality=q))) for q in PRESETS}
         figures["presets"] = {q: _show(q, found) for q, found in presets.items()}
         figures["ablation"] = _ablation(body)
     return figures
 
 
-def _speed(body: Body, quick: bool) -> dict:
+def _speed(body: Body, quick: bool) -> dict[str, Any]:
     default = CaptureOptions().quality
     frames, rounds = (450, 1) if quick else (1800, 3)
     video = looped(LONG_CLIP, frames)
     presets = {}
     for quality in (default,) if quick else PRESETS:
         presets[quality] = side_by_side(body, video, quality, 300, rounds)
-    # The clip has 12 frames a second: more looks for newcomers, and at left and right, fall on each of its frames.
+    # The clip has 12 frames per second, so detection and left-right decisions take a larger share of each frame.
     pairs = {
         name: end_to_end(body, looped(TWO_PEOPLE, 300 if quick else 600, fps), "fast", 2)
         for name, fps in (("30 a second", 30.0), ("12 a second", None))
@@ -62,11 +64,11 @@ def _speed(body: Body, quick: bool) -> dict:
     head = ("preset", "end to end", "target", "networks", "solver", "CPU ms/frame", "MediaPipe", "ratio, target 1.5")
     print(f"Frames per second, {frames} frames of 1080p; decoding alone {fps['decode']:.0f}; default: {default}\n")
     print(table(head, rows), end="\n\n", flush=True)
-    presets |= {"two_people_fast": pair, "two_people_fast_12": pairs["12 a second"]}
-    return {"fps": fps, "fps_presets": presets, "default": default}
+    both = {"two_people_fast": pair, "two_people_fast_12": pairs["12 a second"]}
+    return {"fps": fps, "fps_presets": {**presets, **both}, "default": default}
 
 
-def _accuracy(body: Body) -> dict:
+def _accuracy(body: Body) -> dict[str, Any]:
     estimated = evaluate_all(body, lambda _: CaptureOptions())
     given = evaluate_all(body, lambda camera: CaptureOptions(calibration=calibration(camera)))
     head = ("default preset", *(heading for heading, _ in SHOWN.values()))
@@ -77,10 +79,10 @@ def _accuracy(body: Body) -> dict:
     return {"clips": estimated, "clips_given_intrinsics": given}
 
 
-def _ablation(body: Body) -> dict:
+def _ablation(body: Body) -> dict[str, Any]:
     found, rows, by_camera = {}, [], []
     for name, options in ABLATION.items():
-        each = evaluate_all(body, lambda _, options=options: CaptureOptions(**options))
+        each = evaluate_all(body, _always(CaptureOptions(**options)))
         found[name] = each["mean"]
         rows.append([name, *_row(each["mean"])])
         by_camera.append([name, *(f"{f['mpjpe_root']:.1f} / {f['pa_mpjpe']:.1f}" for f in (each[c] for c in CAMERAS))])
@@ -89,10 +91,14 @@ def _ablation(body: Body) -> dict:
     return found
 
 
-def _show(quality: str, found: dict[str, dict]) -> dict:
+def _always(options: CaptureOptions) -> Callable[[str], CaptureOptions]:
+    return lambda _: options
+
+
+def _show(quality: str, found: dict[str, dict[str, Any]]) -> dict[str, Any]:
     print(table((quality, *(heading for heading, _ in SHOWN.values())), [["mean", *_row(found["mean"])]]), end="\n\n")
     return found["mean"]
 
 
-def _row(figures: dict) -> list[float]:
+def _row(figures: dict[str, Any]) -> list[float]:
     return [figures[key] for key in SHOWN]

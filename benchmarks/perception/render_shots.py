@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Render the held-out shots that build/bench/renders lacks: ``python -m scope.benchmarks.perception.render_shots``.
 
-A process of its own: Blender's module talks on standard output and can hang at exit. NAME.mp4 and NAME_truth.npz of a
-shot stay as long as the truth is what would be written today.
+Runs as a separate process, because Blender's module prints on standard output and can hang at exit. NAME.mp4 and
+NAME_truth.npz of a shot are kept while the ground truth is unchanged.
 """
 
 from __future__ import annotations
@@ -15,24 +15,24 @@ from pathlib import Path
 
 import numpy as np
 
-from ...scope_addon.atomic_write import written_beside
+from ...scope_addon.atomic_write import atomic_path
 from ...solver import Body, load_body
 from ...tools.render_sample.truth import Shot, write_truth
 from ..frames import CACHE, DATA, ROOT
 from .held_out import draw_shot, held_out_takes
 
 RENDERS, MOTIONS = CACHE / "renders", ROOT / "build" / "mocap" / "motions.npz"
-SAME = ("joints_cam", "betas", "intrinsics", "frame_index")  # in two truths of one clip
+SAME = ("joints_cam", "betas", "intrinsics", "frame_index")  # between two versions of a clip's ground truth
 SAME_M = 1e-3
 
 
 def video_and_truth(name: str) -> tuple[Path, Path]:
-    """Where the render of a take and its truth lie."""
+    """Return the paths of a take's rendered clip and its ground truth."""
     return RENDERS / f"{name}.mp4", RENDERS / f"{name}_truth.npz"
 
 
 def shots(body: Body) -> dict[str, Shot]:
-    """The shot of every held-out take by the take's name."""
+    """Return the shot of every held-out take, by the take's name."""
     if not MOTIONS.is_file():
         print(f"fitting the body to the recordings in {DATA / 'mocap'}, once", file=sys.stderr, flush=True)
         command = ("scope.tools.mocap.fit_body", str(DATA / "mocap"), "-o", str(MOTIONS))
@@ -53,8 +53,8 @@ def render_missing(body: Body) -> None:
             print(f"rendering {name}", file=sys.stderr, flush=True)
             from ...tools.render_sample.clip import render_clip
 
-            truth.unlink(missing_ok=True)  # a video without truth is rendered again
-            with written_beside(video) as part:
+            truth.unlink(missing_ok=True)  # a video without ground truth is rendered again
+            with atomic_path(video) as part:
                 render_clip(body, shot, part, Path(scratch))
             os.replace(drawn, truth)
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`./scripts/bench renders`: captures of rendered clips, whose truth is exact, with and without focal length or height.
+"""`./scripts/bench renders`: captures of rendered clips with exact ground truth, given focal length, height or neither.
 
-The clips are `held_out`'s shots, and the sample clip, which no mean contains.
+The clips are the shots of `held_out` and the sample clip, which the means leave out.
 """
 
 from __future__ import annotations
@@ -10,8 +10,10 @@ import math
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...scope_addon.capture.options import CaptureOptions
 from ...scope_addon.errors import NoPersonError
@@ -41,10 +43,10 @@ SHOWN = {
 KNOWN = ("nothing given", "focal length given", "height given")
 
 
-def renders(quick: bool) -> dict:
+def renders(quick: bool) -> dict[str, Any]:
     """Render what is missing, measure, print the tables as they come, return the figures by preset and by ``KNOWN``."""
     if not DATA.is_dir():
-        print(f"{DATA} is not beside this checkout: nothing was measured", file=sys.stderr)
+        print(f"{DATA} does not exist: nothing was measured; put the clips there", file=sys.stderr)
         return {}
     command = (sys.executable, "-m", "scope.benchmarks.perception.render_shots")
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
@@ -52,7 +54,7 @@ def renders(quick: bool) -> dict:
     clips = {take.name: video_and_truth(take.name) for take in held_out_takes(MOTIONS)}
     sample = ASSETS / "sample" / "sample.mp4"
     clips["sample"] = sample, sample.with_name("sample_truth.npz")
-    figures: dict = {}
+    figures: dict[str, Any] = {}
     for quality in (CaptureOptions().quality,) if quick else PRESETS:
         figures[quality] = {}
         for known in KNOWN:
@@ -64,11 +66,11 @@ def renders(quick: bool) -> dict:
     return figures
 
 
-def evaluate_render(body: Body, video: Path, truth: Path, quality: str, known: str) -> dict:
-    """Return what the evaluation tool says about one clip, ``size``, and what ``against_world`` says.
+def evaluate_render(body: Body, video: Path, truth: Path, quality: str, known: str) -> dict[str, Any]:
+    """Return the figures of the evaluation tool for one clip, ``size``, and the figures of ``against_world``.
 
-    ``known``: one of ``KNOWN``. Where nobody was found, ``coverage`` alone. ``size``: the result's over the truth's,
-    median of the frames.
+    ``known``: one of ``KNOWN``. If nobody was found, only ``coverage``. ``size``: captured over true size, median of
+    the frames.
     """
     with np.load(truth) as data:
         true = {key: data[key] for key in data.files}
@@ -84,12 +86,12 @@ def evaluate_render(body: Body, video: Path, truth: Path, quality: str, known: s
     return figures | {"size": 1 / figures["pa_scale"]} | against_world(body, motion, true)
 
 
-def against_world(body: Body, motion: Motion, truth: dict[str, np.ndarray]) -> dict[str, float | None]:
-    """Compare a motion's world and camera with the truth's, over the frames that both have.
+def against_world(body: Body, motion: Motion, truth: dict[str, NDArray[Any]]) -> dict[str, float | None]:
+    """Compare a motion's world and camera with ground truth, over the frames that both have.
 
     ``up_deg``: mean angle between the two upward directions, seen from the camera. ``floor_cm``: mean error of the
-    height over the floor of feet that stand (middle of heel and toe), None if none does. ``focal``: the ratio of the
-    focal lengths.
+    height above the floor of standing feet (midpoint of heel and toe), None if no foot stands. ``focal``: the ratio of
+    the focal lengths.
     """
     rows = np.flatnonzero(motion.valid & np.isin(motion.frames, truth["frame_index"]))
     at = np.searchsorted(truth["frame_index"], motion.frames[rows])
@@ -109,8 +111,8 @@ def against_world(body: Body, motion: Motion, truth: dict[str, np.ndarray]) -> d
     }
 
 
-def mean_of(rows: list[dict]) -> dict[str, float | None]:
-    """The mean of what is shown, over the rows that have it."""
+def mean_of(rows: list[dict[str, Any]]) -> dict[str, float | None]:
+    """Return the mean of every figure that is shown, over the rows that have it."""
     means: dict[str, float | None] = {}
     for key in SHOWN:
         values = [row[key] for row in rows if row.get(key) is not None]
@@ -118,6 +120,6 @@ def mean_of(rows: list[dict]) -> dict[str, float | None]:
     return means
 
 
-def _field_of_view(truth: dict[str, np.ndarray]) -> float:
-    """Degrees along the picture's longer side."""
+def _field_of_view(truth: dict[str, NDArray[Any]]) -> float:
+    """Return the field of view along the longer side of the image, in degrees."""
     return math.degrees(2 * math.atan(max(truth["size"]) / (2 * truth["intrinsics"][0, 0])))

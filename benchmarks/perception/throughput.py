@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Frames per second from the file to the motion file, by stage, beside MediaPipe's own pipeline with the same network.
+"""Frames per second from video to motion file, by stage, compared with MediaPipe's pipeline with the same network.
 
-Short clips are looped to a length at which starting up does not count. Loading the networks is left out on both sides.
-Ours and MediaPipe's take turns, so that what else the machine does falls on both.
+Short clips are looped until start-up no longer matters. Loading the networks is not timed on either side. Scope and
+MediaPipe alternate, so that other load on the machine affects both alike.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from ...scope_addon.atomic_write import written_beside
+from ...scope_addon.atomic_write import atomic_path
 from ...scope_addon.capture.media.video import open_video
 from ...scope_addon.capture.media.video_range import VideoRange
 from ...scope_addon.capture.options import CaptureOptions
@@ -31,7 +31,7 @@ PEER = "mediapipe==0.10.14"
 
 
 def looped(clip: str, frames: int, fps: float | None = None) -> Path:
-    """Return the clip repeated to at least so many frames, at its own or another rate; written once, to build/bench."""
+    """Return the clip repeated to at least ``frames`` frames, at its own or another rate; cached in build/bench."""
     target = CACHE / f"{Path(clip).stem}_{frames}{'' if fps is None else f'_{fps:g}fps'}.mp4"
     if target.exists():
         return target
@@ -41,7 +41,7 @@ def looped(clip: str, frames: int, fps: float | None = None) -> Path:
     while (got := source.read())[0]:
         pictures.append(got[1])
     size = pictures[0].shape[1::-1]
-    with written_beside(target) as temporary:
+    with atomic_path(target) as temporary:
         rate = fps or source.get(cv2.CAP_PROP_FPS)
         writer = cv2.VideoWriter(str(temporary), cv2.VideoWriter.fourcc(*"mp4v"), rate, size)
         for k in range(frames):
@@ -76,7 +76,7 @@ def end_to_end(body: Body, video: Path, quality: str, people: int | str = "large
 
 
 def warm_up(body: Body) -> None:
-    """Compile and cache what the first capture would."""
+    """Compile and cache everything that the first capture would."""
     capture(DATA / "clips/run_moving_camera.mp4", body, CaptureOptions(quality="fast", wanted=VideoRange(0, 1.0)))
 
 
@@ -102,8 +102,11 @@ def side_by_side(body: Body, video: Path, quality: str, frames: int, rounds: int
         theirs.append(mediapipe(video, quality, frames))
     found: dict[str, float | str | None] = {key: float(np.median([o[key] for o in ours])) for key in ours[0]}
     measured = [t for t in theirs if isinstance(t, float)]
-    found["mediapipe"] = float(np.median(measured)) if measured else theirs[0]
-    found["over_mediapipe"] = found["end_to_end"] / found["mediapipe"] if measured else None
+    mediapipe_fps = float(np.median(measured)) if measured else None
+    found["over_mediapipe"] = (
+        float(np.median([o["end_to_end"] for o in ours])) / mediapipe_fps if mediapipe_fps else None
+    )
+    found["mediapipe"] = theirs[0] if mediapipe_fps is None else mediapipe_fps
     return found
 
 
@@ -116,7 +119,7 @@ def _save_all(result: Capture) -> float:
 
 
 def _bring_network(python: Path, name: str) -> None:
-    """MediaPipe would download the networks that its wheel lacks; the capture's own download has them."""
+    """Copy the networks that MediaPipe's wheel lacks, and that it would download, from the capture's own package."""
     folder = next((python.parent.parent / "lib").glob("python*/site-packages/mediapipe/modules/pose_landmark"))
     target = folder / f"pose_landmark_{name}.tflite"
     if not target.exists():
@@ -124,4 +127,7 @@ def _bring_network(python: Path, name: str) -> None:
         if not packages:
             raise OSError(f"{target.name} is not in build/downloads: run convert_networks --force")
         with tarfile.open(packages[0]) as package, target.open("wb") as out:
-            out.write(package.extractfile(f"package/{target.name}").read())
+            member = package.extractfile(f"package/{target.name}")
+            if member is None:
+                raise OSError(f"{packages[0]} has no file package/{target.name}: run convert_networks --force")
+            out.write(member.read())

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The solver's speed, beside a dense solver and other libraries."""
+"""Speed of the solver, compared with a dense solver and other libraries."""

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the sparse formulation is compared with: the dense, unconstrained one of the paper, made as fast as it goes.
+"""Baseline for the sparse formulation: the paper's dense, unconstrained one, optimized as far as possible.
 
 The poses of the parts are functions of the root, the joint states and the shape, so a keypoint's residual depends on
-every joint above it. The Jacobian J (rows, 6 + 3K + P) is written out in compiled code, only where it is not zero; the
+every joint above it. The Jacobian J (rows, 6 + 3K + P) is filled by compiled code, only where it is not zero; the
 normal equations are one BLAS call (numpy makes JᵀJ a symmetric rank-k update), solved by Cholesky (LAPACK).
-Unknowns are those of the solver, so that both give the same direction: the root's twist about the pelvis, u_1..K, beta.
+The unknowns are the solver's, so that both give the same step: the root's twist about the pelvis, u_1..K, beta.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...solver.compiled.kernel import kernel
 from ...solver.compiled.part import GRADIENT
@@ -26,9 +27,9 @@ from .problem import Problem
 
 @kernel
 def _write_row(tree, pose, J, row, i, p, o, gx, gy, gz, moved, part_moves) -> None:  # type: ignore[no-untyped-def]
-    """One row of J for a gradient g by the point p of part i; `moved` (3, P) is dp/dbeta.
+    """Write one row of J for a gradient g with respect to the point p of part i; `moved` (3, P) is dp/dbeta.
 
-    With `part_moves` = 0 only the direction of a lever counts, which translations leave alone.
+    With `part_moves` = 0 the residual depends on the lever's direction only, which translations do not change.
     """
     ex, ey, ez = p[0] - o[0], p[1] - o[1], p[2] - o[2]
     k = i
@@ -118,7 +119,7 @@ def fill(tree, terms, stage, pose, J, r, moved) -> None:  # type: ignore[no-unty
 
 @kernel
 def _solve(L, g, out) -> None:  # type: ignore[no-untyped-def]
-    """out = -(L Lᵀ)^-1 g."""
+    """Solve L Lᵀ out = -g."""
     n = g.shape[0]
     for i in range(n):
         s = -g[i]
@@ -147,7 +148,7 @@ def _add_priors(tree, terms, stage, pose, blocks, H, g) -> None:  # type: ignore
 
 @dataclass
 class Dense:
-    """The dense step on a benchmark problem, with its memory."""
+    """The dense step on a benchmark problem, with its buffers."""
 
     problem: Problem
 
@@ -166,7 +167,7 @@ class Dense:
         damped[6 + 3 * K :] = 0.0
         self.damping = np.diag(self.problem.damping * damped)
 
-    def step(self, k: int) -> np.ndarray:
+    def step(self, k: int) -> NDArray[np.float64]:
         """Return the damped Gauss-Newton direction (6 + 3K + P) at state k of the bank."""
         p = self.problem
         put(p.bank, k, self.pose)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Compiled loops around what is timed, so that no call from Python is inside the measurement."""
+"""Compiled loops around the timed code, so that no call from Python is part of the measurement."""
 
 from ...solver.compiled.kernel import kernel
 from ...solver.gauss_newton.curvature import apply_correction, set_current, update

@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Meta's momentum on the benchmark problem, in its own environment: prints the microseconds of one iteration.
+"""Run Meta's momentum on the benchmark problem, in its own environment; print the microseconds of one iteration.
 
     python momentum_run.py PROBLEM.npz        (numpy and pymomentum alone; nothing of Scope is imported)
 
-As close as momentum's error functions come: the same tree, N / 3 points with a position, a projection and an axis
-each, beta moving the joints through the parameter transform. What differs: Euler angles for joint states, no beta in
-the points themselves (V_j = 0, which saves momentum work), no robust kernel on the projections, single precision.
+As close to the problem as momentum's error functions allow: the same tree, N / 3 points with a position, a projection
+and an axis each; beta moves the joints through the parameter transform. Differences: Euler angles for joint states, no
+beta in the points themselves (V_j = 0, which saves momentum work), no robust kernel on the projections, single
+precision.
 """
 
 from __future__ import annotations

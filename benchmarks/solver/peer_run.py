@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One peer on the benchmark problem, in the peer's own environment: prints the microseconds of one iteration.
+"""Run one peer on the benchmark problem, in the peer's own environment; print the microseconds of one iteration.
 
 Unknowns are the coordinates d of a step away from a state of the bank, as in dense.py; residuals and Jacobian come
 from the same compiled code as there.
@@ -14,6 +14,7 @@ import time
 os.environ["OPENBLAS_NUM_THREADS"] = os.environ["OMP_NUM_THREADS"] = "1"
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...solver.gauss_newton.linearize import make_pose, place_parts
 from ...solver.gauss_newton.recursion import make_workspace, retract
@@ -25,7 +26,7 @@ REPEATS, ITERATIONS = 30, 10
 
 
 class Residuals:
-    """r(d) and its Jacobian about a state of the bank."""
+    """Residuals r(d) and their Jacobian at a state of the bank."""
 
     def __init__(self) -> None:
         """Make the problem K = 23, P = 10, N = 120."""
@@ -40,7 +41,7 @@ class Residuals:
         put(self.problem.bank, k, self.base)
         place_parts(self.problem.tree, self.base)
 
-    def at(self, d: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def at(self, d: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return r and J at d."""
         p, work = self.problem, self.work
         n = len(work.u)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Other optimizers on the same problem, one thread: each in an environment of its own.
 
-scipy and Ceres get our residuals and Jacobian; momentum has its own (see momentum_run.py). Environments are made once
-in build/bench. What cannot be installed is left out, with the reason. Not for CI.
+scipy and Ceres use the dense baseline's residuals and Jacobian; momentum has its own (see momentum_run.py).
+Environments are made once in build/bench. A peer that cannot be installed is left out, with the reason. Not for CI.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ def _run(name: str, package: str) -> float:
 
 
 def _run_momentum() -> float:
-    """Meta's momentum: its packages exist for Python 3.12 alone."""
+    """Run Meta's momentum, whose packages exist for Python 3.12 only."""
     python = make_environment("momentum", MOMENTUM, interpreter=_python312())
     problem = make_problem(23, 10, 120)
     body, measured = problem.body, problem.measurements
@@ -78,13 +78,13 @@ def _run_momentum() -> float:
 
 
 def _python312() -> str:
-    """A Python 3.12, also one of pyenv's, which keeps them off the PATH."""
+    """Return the path of a Python 3.12, on the PATH or among pyenv's versions, which are not on it."""
     pyenv = Path(os.environ.get("PYENV_ROOT", Path.home() / ".pyenv")) / "versions"
     for candidate in ("python3.12", *sorted(str(p) for p in pyenv.glob("3.12*/bin/python"))):
         if not shutil.which(candidate):
             continue
         done = subprocess.run([candidate, "-c", "import venv"], capture_output=True, check=False)
-        if done.returncode == 0:  # pyenv's stand-ins are there and do nothing
+        if done.returncode == 0:  # pyenv's shims exist but run no Python
             return candidate
     raise OSError("momentum needs Python 3.12, which is not here")
 

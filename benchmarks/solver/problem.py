@@ -2,8 +2,8 @@
 """The benchmark problem: a real kinematic tree with N terms spread evenly over it.
 
 Every keypoint has a dense, non-zero V_j and one term of each kind (2D, 3D, orientation field), so N terms are N / 3
-keypoints. Weights come in at run time, the robust kernel is on, and the states of `Problem.bank` take turns, so that
-every step is linearized somewhere else. N = 52 are 19 2D, 17 3D and 16 orientation terms on 20 keypoints.
+keypoints. Weights are set at run time, the robust kernel is on, and the states of `Problem.bank` alternate, so that
+each step is linearized at a different state. N = 52 are 19 2D, 17 3D and 16 orientation terms on 20 keypoints.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...solver import Measurements, Options, Priors, Stage, State, Tree, Weights, load_body, make_tree, rotations
 from ...solver.gauss_newton.terms import Terms, make_terms
@@ -23,19 +24,19 @@ from ...solver.residuals.registry import RESIDUALS
 BODIES = {23: "scope", 51: "scope_h"}
 INTRINSICS = np.array([[1100.0, 0.0, 640.0], [0.0, 1100.0, 360.0], [0.0, 0.0, 1.0]])
 SPLIT = {52: (19, 17, 16)}  # 2D, 3D, orientation; a third of N each otherwise
-BANK = 16  # states that take turns
+BANK = 16  # states that alternate
 
 
 @dataclass
 class Arrays:
-    """What the solver reads of a body: see `BodyArrays`."""
+    """The arrays of a body that the solver reads: see `BodyArrays`."""
 
-    parents: np.ndarray
-    S: np.ndarray
-    l: np.ndarray
-    keypoint_part: np.ndarray
-    v_bar: np.ndarray
-    V: np.ndarray
+    parents: NDArray[np.intp]
+    S: NDArray[np.float64]
+    l: NDArray[np.float64]
+    keypoint_part: NDArray[np.intp]
+    v_bar: NDArray[np.float64]
+    V: NDArray[np.float64]
 
 
 @dataclass
@@ -44,7 +45,7 @@ class Problem:
 
     tree: Tree
     terms: Terms
-    stage: np.ndarray  # (2, weights)
+    stage: NDArray[np.float64]  # (2, weights)
     damping: float
     root_scale: float
     bank: tuple[Any, ...]  # R_0 (B, 3, 3), t_0 (B, 3), Omega (B, K+1, 3, 3), beta (B, W)
@@ -85,7 +86,7 @@ def make_problem(K: int, P: int, N: int, joint_flow: bool = False, everything: b
         root = PosePriors([0], pose.R[:1], pose.t[:1], [100.0], [100.0])
         measurements = replace(measurements, pose_priors=root)
     terms = make_terms(tree, measurements, priors)
-    if not everything:  # the pull of all joints towards the rest pose is no part of it
+    if not everything:  # the rest-pose prior of all joints is not part of the problem
         rest = list(RESIDUALS).index("joint_prior")
         terms = terms._replace(
             ints=tuple(t[:0] if k == rest else t for k, t in enumerate(terms.ints)),
@@ -107,7 +108,7 @@ def _state(rng: np.random.Generator, K: int, P: int) -> State:
 
 
 def _bank(rng: np.random.Generator, truth: State, tree: Tree) -> tuple[Any, ...]:
-    """States near the truth, where an optimizer would be."""
+    """Return states near the truth, as during an optimization."""
     poses = []
     for _ in range(BANK):
         moved = State(

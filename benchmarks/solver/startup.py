@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The first call after installation, which compiles, and the first call of a later session, which finds it compiled."""
+"""Time of the first call after installation, which compiles, and of the first call in a later session."""
 
 from __future__ import annotations
 

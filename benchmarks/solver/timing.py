@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Times that bear a busy machine: many short batches, taken in turns, and their medians."""
+"""Timing that tolerates a busy machine: medians over many short, alternating batches."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ def take_turns(runs: Mapping[str, Callable[[int], object]], counts: Mapping[str,
     """Return the median time of one repetition of each run, in microseconds.
 
     runs[name](n) repeats its work n times; counts[name] is n in one batch. The batches of all runs alternate, so that
-    what else the machine does falls on all alike and ratios stay true.
+    other load on the machine affects all alike and ratios stay meaningful.
     """
     times: dict[str, list[float]] = {name: [] for name in runs}
     for run in runs.values():
-        run(2)  # compiled, and its memory touched
+        run(2)  # compile, and touch the memory
     for _ in range(rounds):
         for name, run in runs.items():
             n = counts[name]

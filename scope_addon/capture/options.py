@@ -17,7 +17,7 @@ from .camera.intrinsics import choose_camera
 from .fitting.ablation import NO_ABLATION, Ablation
 from .fitting.hand_measurements import require_fingers
 from .fitting.stature import require_stature
-from .media.video_range import VideoRange, Wanted, parse_range
+from .media.video_range import FootageRange, VideoRange, parse_range
 from .perception.adapters.detectors.box_detector import BoxDetector
 from .perception.adapters.keypoints.keypoint_network import KeypointNetwork
 from .perception.execution import Execution
@@ -40,7 +40,7 @@ class CaptureOptions:
     focal_mm: float | None = _DEFAULT["focal_mm"]
     fov_deg: float | None = _DEFAULT["fov_deg"]
     calibration: Path | None = _DEFAULT["calibration"]
-    wanted: Wanted = VideoRange()  # range of frames
+    wanted: FootageRange = VideoRange()  # range of frames
     smoothing: bool = _DEFAULT["smoothing"]
     threads: int = _DEFAULT["threads"]  # 0: as many as there are cores
     hands: bool = _DEFAULT["hands"]  # the fingers as well; the body needs finger joints

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the commands of `cli` share: arguments made from the declared options, the terminal, signals, result files."""
+"""Shared by the commands of `cli`: arguments made from the declared options, the terminal, signals, output files."""

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The options of a capture on a command line, made from their declarations: for one clip and for a folder of them."""
+"""Command-line arguments made from the declared options, for one clip and for a folder of clips."""
 
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,13 +17,13 @@ if TYPE_CHECKING:
     from ..capture.options import CaptureOptions
 
 
-def named_path(text: str) -> Path:
-    """Convert an argument to a path. An empty one, such as an unset variable of the shell, is refused.
+def path_argument(text: str) -> Path:
+    """Convert an argument to a path.
 
-    :raises ArgumentTypeError: it is empty; it would mean the current folder.
+    :raises ArgumentTypeError: it is empty, as an unset variable of the shell is; it would mean the current folder.
     """
     if not text:
-        raise argparse.ArgumentTypeError("the name is empty; give that of a file or folder")
+        raise argparse.ArgumentTypeError("the path is empty; give a file or folder")
     return Path(text)
 
 
@@ -36,30 +37,29 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_valued(parser: argparse.ArgumentParser, option: Option) -> None:
-    argument, parsed = option.argument, option.argument.parse is not None
-    default = _default(option)
+    argument, default = option.argument, _default(option)
     text = argument.default_text or (str(default) if default else "")
-    kind = (
-        str
-        if parsed or isinstance(option.value_type, tuple)
-        else named_path
-        if option.value_type is Path
-        else option.value_type
-    )
     parser.add_argument(
         option.flag,
-        type=kind,
-        choices=None if parsed else option.values or None,
+        type=_argument_type(option),
+        choices=None if argument.parse is not None else option.values or None,
         default=default,
         metavar=argument.metavar,
         help=(argument.help or option.help) + (f" (default: {text})" if text else ""),
     )
 
 
+def _argument_type(option: Option) -> Callable[[str], Any]:
+    """Return the function by which argparse converts the argument's text."""
+    if option.argument.parse is not None or isinstance(option.value_type, tuple):
+        return str
+    return path_argument if option.value_type is Path else option.value_type
+
+
 def body_and_options(args: argparse.Namespace) -> tuple[Body, CaptureOptions]:
     """Load the body and convert the arguments to the options of a capture.
 
-    :raises ScopeError: an argument has an impossible value, or there is no such body.
+    :raises ScopeError: an argument has an invalid value, or the body does not exist.
     """
     from ...solver.loaders.body_file import load_body
     from ..capture.options import capture_options, check_options
@@ -76,28 +76,28 @@ def option_values(args: argparse.Namespace) -> dict[str, Any]:
 
     :raises UsageError: an argument cannot be parsed.
     """
-    return {option.name: _value(option, _given(option, args)) for option in options_at(Place.COMMAND_LINE)}
+    return {option.name: _value(option, _argument(option, args)) for option in options_at(Place.COMMAND_LINE)}
 
 
-def given_options(args: argparse.Namespace) -> dict[str, str | None]:
-    """Return the arguments that differ from their defaults, for a process that captures one clip of a batch.
+def non_default_arguments(args: argparse.Namespace) -> dict[str, str | None]:
+    """Return the arguments that differ from their defaults, for the process that captures one clip of a batch.
 
-    Flag to text, None where the flag takes no value.
+    :return: flag to text; None for a flag that takes no value.
     """
-    given: dict[str, str | None] = {}
+    arguments: dict[str, str | None] = {}
     for option in options_at(Place.COMMAND_LINE):
-        value = _given(option, args)
+        value = _argument(option, args)
         if value != _default(option) and option.argument.inherited:
-            given[option.flag] = None if option.value_type is bool else str(value)
-    return given
+            arguments[option.flag] = None if option.value_type is bool else str(value)
+    return arguments
 
 
-def _given(option: Option, args: argparse.Namespace) -> Any:
+def _argument(option: Option, args: argparse.Namespace) -> Any:
     return getattr(args, option.flag.lstrip("-").replace("-", "_"))
 
 
 def _default(option: Option) -> Any:
-    """What argparse returns where the argument is not given."""
+    """Return what argparse returns for an argument that is not given."""
     if option.value_type is bool:
         return False
     return None if option.several else option.default
@@ -105,7 +105,7 @@ def _default(option: Option) -> Any:
 
 def _value(option: Option, given: Any) -> Any:
     if option.value_type is bool:
-        return given != option.default  # --no-smoothing turns off what is on by default
+        return given != option.default  # --no-smoothing turns off smoothing, which is on by default
     if given is None or option.argument.parse is None:
         return option.default if given is None else given
     try:

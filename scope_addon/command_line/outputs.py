@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The result files of a capture: what can be refused before the work, writing them, and the summary."""
+"""The output files of a capture: checks before the capture starts, writing, and the summary."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import argparse
 import os
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ...solver.body import Body
 from ..errors import UsageError
@@ -25,9 +25,10 @@ OVERLAY_SUFFIXES = (".mp4", ".png", ".jpg")
 
 
 def check_outputs(outputs: list[Path], overlay: Path | None, video: Path) -> None:
-    """Refuse, before the work, what could not be written after it.
+    """Check, before the capture starts, that the outputs can be written after it.
 
-    :raises UsageError: an unknown suffix, a folder, or the footage itself. :raises OutputError: see `check_output`.
+    :raises UsageError: an output has an unknown suffix, is a folder, or is the footage itself.
+    :raises OutputError: see `check_output`.
     """
     for path in outputs:
         check_output(path)
@@ -40,33 +41,33 @@ def check_outputs(outputs: list[Path], overlay: Path | None, video: Path) -> Non
 
 
 def check_blender(outputs: list[Path]) -> None:
-    """Refuse outputs that Blender writes, which is all but motion files, where it is not installed.
+    """Check that bpy is installed if an output needs it, as all do except motion files.
 
-    :raises SetupError: it is not; the message has the command that installs it.
+    :raises SetupError: it is not installed; the message gives the command that installs it.
     """
     if any(path.suffix.lower() not in MOTION_SUFFIXES for path in outputs):
         check_installed(["bpy"])
 
 
-def each_once(outputs: list[Path]) -> list[Path]:
+def distinct_paths(outputs: list[Path]) -> list[Path]:
     """Return the paths without duplicates of the same file, such as ``out/case.npz`` and ``out/x/../case.npz``."""
-    named: dict[str, Path] = {}
+    by_real_path: dict[str, Path] = {}
     for path in outputs:
-        named.setdefault(os.path.normcase(os.path.realpath(path)), path)
-    return list(named.values())
+        by_real_path.setdefault(os.path.normcase(os.path.realpath(path)), path)
+    return list(by_real_path.values())
 
 
-def usable_rig(args: argparse.Namespace, outputs: list[Path]) -> RigSource | None:
-    """Return the user's rig, checked before the work is done; None if there is no --retarget.
+def checked_rig(args: argparse.Namespace, outputs: list[Path]) -> RigSource | None:
+    """Check the user's rig before the capture starts and return it; None without --retarget.
 
-    :raises ScopeError: it cannot be used, or the arguments contradict each other.
+    :raises ScopeError: the rig cannot be used, or the arguments contradict each other.
     """
     if args.retarget is None:
         given = {"--bone-map": args.bone_map, "--rig-object": args.rig_object}
         given["--retarget-root"] = args.retarget_root != option("retarget_root").default
         for flag, value in given.items():
             if value:
-                raise UsageError(f"{flag} applies to a rig: give its file with --retarget")
+                raise UsageError(f"{flag} applies to a rig: give the rig's file with --retarget")
         return None
     from ..retarget.rig_source import rig_source
 
@@ -91,7 +92,10 @@ def write_outputs(
     args: argparse.Namespace,
     rig: RigSource | None = None,
 ) -> list[Path]:
-    """Write every result file and return their paths; bpy is loaded only if one of them needs a scene."""
+    """Write every output and return the paths of the files; bpy is loaded only if an output needs a scene.
+
+    :raises OutputError: a file cannot be written.
+    """
     motion_files = [p for p in outputs if p.suffix.lower() in MOTION_SUFFIXES]
     scene_files = [p for p in outputs if p not in motion_files]
     written: list[Path] = []
@@ -110,11 +114,10 @@ def write_outputs(
         options = replace(NEW_SCENE, name=video.stem, shape=args.shape_keys)
         separate = ExportOptions(separate=args.file_per_person)
         if rig is not None:
-            from ..scene.rigs.rig_export import export_on_rig
+            from ..scene.rigs.rig_export import RigExportOptions, export_on_rig
 
-            files, warnings = export_on_rig(
-                motions, body, scene_files, rig, options, args.retarget_root, footage, separate
-            )
+            rig_options = RigExportOptions(options, args.retarget_root, separate)
+            files, warnings = export_on_rig(motions, body, scene_files, rig, rig_options, footage)
         else:
             files, warnings = export_motions(motions, body, scene_files, footage, options, separate)
         written += files
@@ -123,7 +126,7 @@ def write_outputs(
     return written
 
 
-def summary(report: dict) -> str:
+def summary(report: dict[str, Any]) -> str:
     """Describe a capture in one line."""
     people = "1 person" if report["people"] == 1 else f"{report['people']} people"
     frames = "1 frame" if report["frames"] == 1 else f"{report['frames']} frames"

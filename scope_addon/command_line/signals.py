@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Ctrl-C and requests to end, as a KeyboardInterrupt that states what was left behind."""
+"""Convert SIGINT and SIGTERM to a KeyboardInterrupt whose message says what has been written."""
 
 from __future__ import annotations
 
@@ -9,29 +9,34 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
 
-received: list[int] = []  # the signals that asked to stop
+received: list[int] = []  # signals that arrived since `stopped_by_signals` began
 
 
 @contextmanager
-def interrupted(what: str) -> Iterator[None]:
-    """Make an interrupt in this block state what it left behind."""
+def interrupted(message: str) -> Iterator[None]:
+    """Give a KeyboardInterrupt that is raised in this block a message about what has been written.
+
+    :raises KeyboardInterrupt: the block was interrupted.
+    """
     try:
         yield
     except KeyboardInterrupt:
-        raise KeyboardInterrupt(what) from None
+        raise KeyboardInterrupt(message) from None
 
 
 def _interrupt(number: int, _: FrameType | None) -> None:
-    """Record it as well: an exception raised within a callback of the interpreter is lost."""
+    """Record the signal and raise: an exception raised within a callback of the interpreter is lost."""
     received.append(number)
     raise KeyboardInterrupt
 
 
 @contextmanager
 def stopped_by_signals() -> Iterator[None]:
-    """Raise KeyboardInterrupt on SIGINT and SIGTERM, so that no partial file and no process stays behind.
+    """Raise KeyboardInterrupt on SIGINT and SIGTERM, so that no partial file and no process is left behind.
 
-    Blender's own handler of Ctrl-C only sets a flag: a batch would run to its end.
+    Blender's own handler of Ctrl-C only sets a flag, with which a batch would run to its end.
+
+    :raises KeyboardInterrupt: a signal arrived.
     """
     received.clear()
     if threading.current_thread() is not threading.main_thread():
@@ -42,5 +47,5 @@ def stopped_by_signals() -> Iterator[None]:
         yield
     finally:
         for number, handler in before.items():
-            if handler is not None:  # None: not installed by Python, which cannot restore it
+            if handler is not None:  # None: it was not installed by Python and cannot be restored
                 signal.signal(number, handler)

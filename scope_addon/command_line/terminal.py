@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The terminal: messages, the progress bar, and a stdout that carries the report alone."""
+"""The terminal: messages, the progress bar, and a stdout that carries nothing but the report."""
 
 from __future__ import annotations
 
@@ -16,21 +16,21 @@ _CLEAR_LINE = "\r\x1b[K"
 
 
 def say(text: str) -> None:
-    """Print a message on a line of its own, even if a progress bar is shown."""
+    """Print a message on a separate line, even if a progress bar is shown."""
     clear = _CLEAR_LINE if sys.stderr.isatty() else ""
     print(f"{clear}scope: {text}", file=sys.stderr, flush=True)
 
 
 class ProgressBar:
-    """A one-line progress bar on a terminal; silent elsewhere. Interrupts work that goes on after a signal."""
+    """A one-line progress bar on a terminal; silent elsewhere. Stops work that continues after a signal."""
 
     def __init__(self, stream: TextIO, *, show: bool) -> None:
         self.stream, self.show = stream, show
 
     def __call__(self, stage: str, done: int, total: int) -> None:
-        """Show ``done`` of ``total`` (0: unknown) of a stage.
+        """Show the progress of a stage: ``done`` of ``total``, which is 0 if unknown.
 
-        :raises KeyboardInterrupt: a signal arrived whose own exception was lost.
+        :raises KeyboardInterrupt: a signal arrived, but its own KeyboardInterrupt was lost.
         """
         if signals.received:
             raise KeyboardInterrupt
@@ -54,15 +54,18 @@ class ProgressBar:
 
 @contextmanager
 def stdout_for_report() -> Iterator[TextIO]:
-    """Redirect what libraries print to stdout, also from C, to stderr; the report gets the real stdout."""
+    """Redirect everything that libraries print to stdout, including from C, to stderr.
+
+    :return: context manager that gives the real stdout, for the report.
+    """
     sys.stdout.flush()
     try:
         real = os.dup(1)
-    except OSError:  # a shell without any stdout
+    except OSError:  # stdout is closed
         yield sys.stdout
         return
     os.dup2(2, 1)
-    _flush_c()  # its buffer, with Blender's version for example, is no part of the report either
+    _flush_c()  # output buffered before, such as Blender's version, is not part of the report either
     try:
         with os.fdopen(os.dup(real), "w", encoding="utf-8") as stream:
             yield stream

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Work on a motion after its capture, in plain numpy: smoothing, spans, floor, root motion, loops, keys. Never bpy."""
+"""Editing a captured motion in numpy, without bpy: smoothing, spans, floor, root motion, loops, key reduction."""

@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The motion of one person as its keys hold it, and how rotations are taken between two keys."""
+"""One person's motion as keys, and its interpolation between keys."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...solver.body import Body
 from ...solver.rotations import exp, log
@@ -18,27 +20,36 @@ from ..kinematics.smoothing import smooth_rotations
 class Clip:
     """T keys of a body with K+1 parts, in the world frame (z up, metres)."""
 
-    times: np.ndarray  # (T,) seconds, increasing
-    rotations: np.ndarray  # (T, K+1, 3, 3): R_world_root, then the joints' states Omega_i
-    root: np.ndarray  # (T, 3) the pelvis
+    times: NDArray[np.float64]  # (T,) seconds, increasing
+    rotations: NDArray[np.float64]  # (T, K+1, 3, 3): R_world_root, then the joint states Omega_i
+    root: NDArray[np.float64]  # (T, 3) position of the pelvis, metres
 
     def __len__(self) -> int:
         return len(self.times)
 
-    def soles(self, body: Body, betas: np.ndarray) -> np.ndarray:
-        """(T, 4, 3) left heel, left toe, right heel, right toe on the floor's side of the foot, world frame."""
-        R, t = body.forward_kinematics(self.rotations, self.root - body.rest_joints(betas)[0], betas)
-        return contact_point_positions(with_contact_points(body, betas), R, t)[:, : len(SOLES)]
+    def soles(self, body: Body, betas: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
+        """Return the contact points of the feet.
 
-    def joints(self, body: Body, betas: np.ndarray) -> np.ndarray:
-        """(T, K+1, 3) joints, world frame."""
+        :param betas: (P,) shape coefficients.
+        :return: (T, 4, 3) left heel, left toe, right heel, right toe on the sole, metres, world frame.
+        """
+        R, t = body.forward_kinematics(self.rotations, self.root - body.rest_joints(betas)[0], betas)
+        points: NDArray[np.float64] = contact_point_positions(with_contact_points(body, betas), R, t)[:, : len(SOLES)]
+        return points
+
+    def joints(self, body: Body, betas: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
+        """Return the joint positions.
+
+        :param betas: (P,) shape coefficients.
+        :return: (T, K+1, 3) metres, world frame.
+        """
         return body.forward_kinematics(self.rotations, self.root - body.rest_joints(betas)[0], betas)[1]
 
 
-def inside(clip: Clip, start: float, end: float) -> np.ndarray:
-    """Indices of the keys from ``start`` to ``end`` seconds, both included.
+def keys_within(clip: Clip, start: float, end: float) -> NDArray[np.intp]:
+    """Return the indices of the keys from ``start`` to ``end`` seconds, both inclusive.
 
-    :raises UsageError: there is none.
+    :raises UsageError: when there is none.
     """
     found = np.flatnonzero((clip.times >= start - 1e-6) & (clip.times <= end + 1e-6))
     if not len(found):
@@ -46,14 +57,26 @@ def inside(clip: Clip, start: float, end: float) -> np.ndarray:
     return found
 
 
-def between(a: np.ndarray, b: np.ndarray, share: np.ndarray | float) -> np.ndarray:
-    """Rotations (..., 3, 3) a share of the way from a to b, along the shorter arc: a exp(share log(aᵀ b))."""
+def interpolate_rotations(
+    a: NDArray[np.float64], b: NDArray[np.float64], share: NDArray[np.float64] | float
+) -> NDArray[np.float64]:
+    """Interpolate along the shorter arc: ``a exp(share log(aᵀ b))``.
+
+    :param a: (..., 3, 3) rotations at share 0.
+    :param b: (..., 3, 3) rotations at share 1.
+    :param share: (...) interpolation parameter, 0 to 1.
+    :return: (..., 3, 3) rotations.
+    """
     turn = log(np.swapaxes(a, -1, -2) @ b)
     return a @ exp(np.asarray(share)[..., None] * turn)
 
 
-def sample(clip: Clip, times: np.ndarray) -> Clip:
-    """The motion at other times (T',), between the first and the last key; rotations along the shorter arc."""
+def sample(clip: Clip, times: NDArray[np.float64]) -> Clip:
+    """Interpolate the motion at other times: rotations along the shorter arc, positions linearly.
+
+    :param times: (T',) seconds; clamped to the first and the last key.
+    :return: a clip of T' keys.
+    """
     times = np.clip(times, clip.times[0], clip.times[-1])
     after = np.clip(np.searchsorted(clip.times, times, side="right"), 1, max(len(clip) - 1, 1))
     before = after - 1
@@ -61,15 +84,16 @@ def sample(clip: Clip, times: np.ndarray) -> Clip:
         after = before = np.zeros(len(times), int)
     length = clip.times[after] - clip.times[before]
     share = np.where(length > 0, (times - clip.times[before]) / np.where(length > 0, length, 1.0), 0.0)
-    rotations = between(clip.rotations[before], clip.rotations[after], share[:, None])
+    rotations = interpolate_rotations(clip.rotations[before], clip.rotations[after], share[:, None])
     root = clip.root[before] + share[:, None] * (clip.root[after] - clip.root[before])
     return Clip(times.astype(float), rotations, root)
 
 
 def resample(clip: Clip, rate: float) -> Clip:
-    """A key at every 1/rate seconds from the first key on. Detail that the new rate cannot show is smoothed away first.
+    """Resample to a constant rate, from the first key on, with a low-pass filter against aliasing.
 
-    :raises UsageError: the rate is not positive.
+    :param rate: keys per second.
+    :raises UsageError: when the rate is not positive.
     """
     if not np.isfinite(rate) or rate <= 0:
         raise UsageError(f"a motion cannot be baked to {rate} frames a second; choose a rate above zero")
@@ -79,9 +103,9 @@ def resample(clip: Clip, rate: float) -> Clip:
 
 
 def band_limited(clip: Clip, rate: float) -> Clip:
-    """The clip without rotations faster than ``rate`` keys a second can show, where it has many more keys than that.
+    """Low-pass filter the rotations for sampling at ``rate`` keys per second, where the clip has many more keys.
 
-    Else what swings between two new keys would show as slow motion.
+    Without the filter, oscillations faster than the new rate would alias into slow motion.
     """
     step = np.median(np.diff(clip.times)) if len(clip) > 1 else 1.0 / rate
     if 1.0 / rate <= 1.5 * step:

@@ -1,9 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Putting the feet back on the floor: raising, levelling, and keeping them out of it."""
+"""Aligning the feet with the floor: height, level, and removing penetration."""
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
+from numpy.typing import NDArray
 
 from ...solver.body import Body
 from ...solver.rotations import shortest_turn
@@ -12,17 +15,18 @@ from ..kinematics.standing import standing_probability
 from .clip import Clip
 
 UP = np.array([0.0, 0.0, 1.0])
-_MOST_TILT = np.radians(20.0)  # beyond that the plane through the soles is no floor
-_SPREAD_M = 0.3  # soles closer together than that say nothing about the floor's slope
+_MAX_TILT = np.radians(20.0)  # a plane through the soles that is steeper is not the floor
+_MIN_SPREAD_M = 0.3  # the slope of the floor is unobservable from soles closer together than this
 _LIFT_CUTOFF_HZ = 3.0
 
 
-def refloor(clip: Clip, body: Body, betas: np.ndarray, *, level: bool = False, lift: bool = True) -> Clip:
-    """The motion moved so that its standing feet are on z = 0.
+def refloor(clip: Clip, body: Body, betas: NDArray[np.floating[Any]], *, level: bool = False, lift: bool = True) -> Clip:
+    """Move the motion so that the feet in contact are on z = 0.
 
-    :param level: also turn the whole motion so that the soles that stand lie in a level plane, as far as they are
-        spread over the floor; about the middle of where they stood.
-    :param lift: also raise the frames whose feet are below the floor, smoothly.
+    :param betas: (P,) shape coefficients.
+    :param level: also rotate the whole motion about the mean contact point so that the soles in contact lie in a
+        horizontal plane, if they are spread widely enough to determine one.
+    :param lift: also raise frames whose feet penetrate the floor, smoothly.
     """
     soles = clip.soles(body, betas)
     weight = standing_probability(soles, UP, clip.times)
@@ -43,16 +47,23 @@ def refloor(clip: Clip, body: Body, betas: np.ndarray, *, level: bool = False, l
     return out
 
 
-def _levelling(soles: np.ndarray, weight: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Rotation (3, 3) about a point (3,) that lays the plane through the standing soles level."""
+def _levelling(
+    soles: NDArray[np.float64], weight: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Fit a plane to the soles in contact and return the rotation that levels it.
+
+    :param soles: (T, 4, 3) metres, world frame.
+    :param weight: (T, 4) standing probabilities.
+    :return: rotation (3, 3), and the point (3,) about which it rotates.
+    """
     points, w = soles[weight > 0.5], weight[weight > 0.5]
     if len(points) < 3:
         return np.eye(3), np.zeros(3)
     middle = (w[:, None] * points).sum(0) / w.sum()
     values, vectors = np.linalg.eigh((w[:, None] * (points - middle)).T @ (points - middle) / w.sum())
-    if np.sqrt(max(values[1], 0.0)) < _SPREAD_M / 2:
+    if np.sqrt(max(values[1], 0.0)) < _MIN_SPREAD_M / 2:
         return np.eye(3), middle
     normal = vectors[:, 0] * (1.0 if vectors[2, 0] > 0 else -1.0)
-    if np.arccos(np.clip(normal @ UP, -1.0, 1.0)) > _MOST_TILT:
+    if np.arccos(np.clip(normal @ UP, -1.0, 1.0)) > _MAX_TILT:
         return np.eye(3), middle
     return shortest_turn(normal, UP), middle

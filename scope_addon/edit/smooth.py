@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Smoothing more or less, always from the motion as it was solved, so that trying costs nothing."""
+"""Changing the amount of smoothing, always from the raw motion, so that repeated changes do not accumulate."""
 
 from __future__ import annotations
 
@@ -10,32 +10,32 @@ from ...solver.rotations import exp
 from ..errors import UsageError
 from ..kinematics.smoothing import ROTATION_CUTOFF_HZ, smooth_root, smooth_rotations
 from ..motion import Motion
-from .clip import Clip, between
+from .clip import Clip, interpolate_rotations
 
 
-def clip_of(body: Body, motion: Motion, raw: bool) -> Clip:
-    """The motion as keys: as it was finished, or as it was solved (``raw``)."""
+def clip_from_motion(body: Body, motion: Motion, raw: bool) -> Clip:
+    """Convert a motion to keys: the finished one, or the one before smoothing (``raw``)."""
     poses, trans = (motion.poses_raw, motion.trans_raw) if raw else (motion.poses, motion.trans)
     rotations = exp(poses.reshape(len(motion), -1, 3).astype(float))
     return Clip(motion.timestamps, rotations, body.rest_joints(motion.betas)[0] + trans)
 
 
 def smoothed(body: Body, motion: Motion, strength: float) -> Clip:
-    """Zero-phase smoothing from the raw motion.
+    """Smooth the raw motion without phase shift.
 
-    The cut-off frequency is 4.5 Hz / strength: 0 leaves the raw motion, 1 is what a capture does, 3 is calm. What the
-    capture did besides, holding the feet that stand, is kept as its difference from the plain smoothing at strength 1,
-    and fades out below it. The distance from the camera, which one camera measures badly, is smoothed more than the
-    position in the picture.
+    The cut-off frequency is 4.5 Hz / strength: 0 leaves the raw motion, 1 is what a capture does, 3 is very smooth. The
+    capture also locks feet in contact. That correction is the difference between the finished motion and plain
+    smoothing at strength 1; it is added to the result, and fades out below strength 1. The distance from the camera,
+    which a single camera measures inaccurately, is smoothed more than the position in the image.
 
-    :raises UsageError: the strength is negative or not a number.
+    :raises UsageError: when the strength is negative or not a number.
     """
     if not np.isfinite(strength) or strength < 0:
         raise UsageError(f"smoothing takes a strength from 0 on, not {strength}")
-    raw = clip_of(body, motion, raw=True)
+    raw = clip_from_motion(body, motion, raw=True)
     if strength == 0 or len(raw) < 3:
         return raw
-    finished = clip_of(body, motion, raw=False)
+    finished = clip_from_motion(body, motion, raw=False)
     if strength == 1:
         return finished
     plain, wanted = _plain(raw, motion, 1.0), _plain(raw, motion, strength)
@@ -43,12 +43,12 @@ def smoothed(body: Body, motion: Motion, strength: float) -> Clip:
     correction = np.swapaxes(plain.rotations, -1, -2) @ finished.rotations
     if share < 1.0:
         none = np.broadcast_to(np.eye(3), correction.shape)
-        correction = between(none, correction, np.full(correction.shape[:2], share))
+        correction = interpolate_rotations(none, correction, np.full(correction.shape[:2], share))
     return Clip(raw.times, wanted.rotations @ correction, wanted.root + share * (finished.root - plain.root))
 
 
 def _plain(raw: Clip, motion: Motion, strength: float) -> Clip:
-    """Smoothing alone; the position about the camera, which may turn but not travel."""
+    """Smooth without corrections; the position is taken relative to the camera, which may rotate but not travel."""
     rotations = smooth_rotations(raw.rotations, raw.times, ROTATION_CUTOFF_HZ / strength)
     center = motion.world_from_camera[:, :3, 3]
     return Clip(raw.times, rotations, center + smooth_root(raw.root - center, raw.times, strength))

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The folder where finished captures are kept, so that the same footage is never captured twice.
+"""The folder of finished captures, so that the same footage is never captured twice. Its content:
 
-    ROOT/captures/<key>/report.json, person1.npz, …    finished, complete
-    ROOT/jobs/<name>/                                  being written; moved to captures/ when complete
-    ROOT/kernels/                                      numba's machine code
+- ``captures/<key>/report.json``, ``person1.npz``, …: a finished capture
+- ``jobs/<name>/``: a capture that is being written; it is moved to ``captures`` when it is complete
+- ``kernels/``: the machine code that numba compiled
 """
 
 from __future__ import annotations
@@ -17,9 +17,10 @@ from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 REPORT = "report.json"
-_ABANDONED_S = 24 * 3600.0  # a job folder this old belongs to nobody
+_ABANDONED_S = 24 * 3600.0  # age above which a job folder belongs to no running process
 
 
 @dataclass(frozen=True)
@@ -27,27 +28,27 @@ class CachedCapture:
     """A finished capture on disk."""
 
     motions: list[Path]
-    report: dict
+    report: dict[str, Any]
 
 
 class Cache:
-    """One cache folder. Only files that the cache itself made are ever removed."""
+    """A cache folder. Only files that the cache itself created are ever removed."""
 
     def __init__(self, root: Path) -> None:
         self.root = Path(root)
 
     @property
     def kernels(self) -> Path:
-        """Where the worker's numba keeps compiled code."""
+        """Folder where the worker's numba stores compiled code."""
         return self.root / "kernels"
 
     @property
     def has_kernels(self) -> bool:
-        """Whether a capture has compiled the solver here before."""
+        """Whether an earlier capture has compiled the solver."""
         return any(file.suffix == ".nbi" for file in _files(self.kernels))
 
     def find(self, key: str) -> CachedCapture | None:
-        """A finished capture, or None."""
+        """Return the finished capture with this key; None if there is none."""
         folder = self.root / "captures" / key
         try:
             content = json.loads((folder / REPORT).read_text(encoding="utf-8"))
@@ -58,11 +59,11 @@ class Cache:
         if not motions or not all(m.is_file() for m in motions):
             return None
         with suppress(OSError):
-            os.utime(folder)  # used now: the last to be pruned
+            os.utime(folder)  # mark as used, so that it is pruned last
         return CachedCapture(motions, report)
 
     def new_job_folder(self) -> Path:
-        """An empty folder for a worker to write in.
+        """Create an empty folder for the files of a worker, and remove abandoned ones.
 
         :raises OutputError: the cache folder cannot be written to.
         """
@@ -77,10 +78,11 @@ class Cache:
         except OSError as error:
             raise self._not_writable(error) from error
 
-    def keep(self, job_folder: Path, key: str, motions: list[str], report: dict) -> CachedCapture:
-        """Turn a job's folder into a finished capture.
+    def keep(self, job_folder: Path, key: str, motions: list[str], report: dict[str, Any]) -> CachedCapture:
+        """Move a job's folder to the finished captures.
 
-        :raises OutputError: the folder cannot be written to.
+        :param motions: names of the motion files in the folder.
+        :raises OutputError: the cache folder cannot be written to.
         """
         target = self.root / "captures" / key
         try:
@@ -94,30 +96,30 @@ class Cache:
         return CachedCapture([target / name for name in motions], report)
 
     def size(self) -> int:
-        """Bytes of finished captures and compiled code."""
+        """Return the size of finished captures and compiled code in bytes."""
         return sum(_size(folder) for folder in self._owned())
 
     def clear(self) -> int:
-        """Remove finished captures and compiled code; returns the bytes freed. Running jobs are left alone."""
+        """Remove finished captures and compiled code, but not running jobs; return the number of bytes freed."""
         before = self.size()
         for folder in self._owned():
             shutil.rmtree(folder, ignore_errors=True)
         return before - self.size()
 
     def prune(self, limit: int) -> None:
-        """Remove the captures that were used longest ago until all of them fit into ``limit`` bytes."""
+        """Remove the least recently used captures until the others fit into ``limit`` bytes."""
         total = 0
         for index, (folder, _) in enumerate(_by_time(self.root / "captures")):
             total += _size(folder)
-            if index and total > limit:  # the newest stays: it was captured just now
+            if index and total > limit:  # the newest is kept: it has just been captured
                 shutil.rmtree(folder, ignore_errors=True)
 
     def _not_writable(self, error: OSError) -> Exception:
-        from ..errors import OutputError  # here: it loads numba, and the preferences need only the rest
+        from ..errors import OutputError  # imported here because it loads numba, which the preferences do not need
 
         reason = error.strerror or error
         return OutputError(
-            f"cannot write in the cache folder {self.root}: {reason}; free some space, or choose another folder in the "
+            f"cannot write to the cache folder {self.root}: {reason}; free some space or choose another folder in the "
             "preferences"
         )
 
@@ -126,7 +128,7 @@ class Cache:
 
 
 def _by_time(folder: Path) -> list[tuple[Path, float]]:
-    """What is in a folder and when it was used, the newest first; without what another process removes meanwhile."""
+    """Return the content of a folder with modification times, newest first, without concurrently removed entries."""
     found = []
     with suppress(OSError):
         for path in folder.iterdir():
@@ -136,7 +138,7 @@ def _by_time(folder: Path) -> list[tuple[Path, float]]:
 
 
 def _files(folder: Path) -> Iterator[Path]:
-    """Every file below a folder. Folders that another process removes meanwhile count as empty."""
+    """Yield every file below a folder. A folder that is concurrently removed counts as empty."""
     for below, _, names in os.walk(folder):
         for name in names:
             yield Path(below, name)
@@ -145,6 +147,6 @@ def _files(folder: Path) -> Iterator[Path]:
 def _size(folder: Path) -> int:
     total = 0
     for path in _files(folder):
-        with suppress(OSError):  # removed meanwhile
+        with suppress(OSError):  # removed by another process
             total += path.stat().st_size
     return total

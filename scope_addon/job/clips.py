@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The footage of a folder, and a name for the results of each clip that no other clip shares."""
+"""Find the clips in a folder, and give the results of each clip a unique name."""
 
 from __future__ import annotations
 
@@ -9,15 +9,16 @@ from pathlib import Path
 
 from ..footage import FOOTAGE_SUFFIXES, VIDEO_SUFFIXES, is_sequence, pictures_in
 
-OVERLAY = ".overlay"  # before the suffix of an overlay, which is not footage
+OVERLAY = ".overlay"  # precedes the suffix of an overlay, which is not footage
 _PERSON = re.compile(r"(.+)\.person[0-9]+")  # as person_paths names the results of one of several people
 
 
 def find_clips(folder: Path, out: Path, *, recursive: bool, several_people: bool) -> dict[str, Path]:
-    """Return the footage in ``folder`` by the name of its results, without suffix, in alphabetical order of the files.
+    """Return the clips in ``folder`` by the name of their results, without suffix, in alphabetical order of the files.
 
-    :param out: folder of the results, which are not footage.
-    :param several_people: whether a clip may have a result for each of several people.
+    :param out: output folder, whose files are not footage.
+    :param recursive: include subfolders.
+    :param several_people: whether a clip may have one result per person.
     """
     found = sorted(_footage_below(folder, out, recursive))
     stems = Counter(_stem(folder, path) for path in found)
@@ -32,7 +33,7 @@ def find_clips(folder: Path, out: Path, *, recursive: bool, several_people: bool
 
 
 def _full_names_of_shared(folder: Path, names: dict[Path, str], several_people: bool) -> dict[Path, str]:
-    """Full names for clips whose short name is that of another clip, or of a result of one of its people."""
+    """Return full names for clips whose short name is also used by another clip, or by one person's result of it."""
     folded = {path: name.casefold() for path, name in names.items()}
     counts = Counter(folded.values())
     full = {}
@@ -44,11 +45,12 @@ def _full_names_of_shared(folder: Path, names: dict[Path, str], several_people: 
 
 
 def _stem(folder: Path, path: Path) -> str:
-    """Name that two clips must not share; case-insensitive, as many file systems are."""
+    """Return the name that must be unique among clips; case-insensitive, as many file systems are."""
     return path.relative_to(folder).with_suffix("").as_posix().casefold()
 
 
 def _footage_below(folder: Path, out: Path, recursive: bool) -> list[Path]:
+    """Return the videos, pictures and picture sequences in a folder."""
     found: list[Path] = []
     for path in folder.iterdir():
         suffix = path.suffix.lower()
@@ -59,14 +61,14 @@ def _footage_below(folder: Path, out: Path, recursive: bool) -> list[Path]:
                 found.append(path)
             elif recursive:
                 found += _footage_below(path, out, recursive)
-        # Opening a pipe would wait for a writer; a broken link is reported as a clip that fails.
+        # Pipes are skipped, because opening one would block; a broken link is kept, to be reported as a failed clip.
         elif suffix in FOOTAGE_SUFFIXES and (path.is_file() or not path.exists()):
             found.append(path)
     return found
 
 
 def _is_sequence_folder(folder: Path) -> bool:
-    """Whether a folder contains one numbered sequence, and neither videos nor folders."""
+    """Return whether a folder contains one numbered sequence, and neither videos nor subfolders."""
     try:
         others = [p for p in folder.iterdir() if p.is_dir() or p.suffix.lower() in VIDEO_SUFFIXES]
         return is_sequence(pictures_in(folder)) and all(p.name.startswith(".") for p in others)

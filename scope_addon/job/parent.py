@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A process that ends with the one that started it, on every system, however that one ends.
+"""End a process when its parent ends, on every operating system and even if the parent crashes.
 
-The parent keeps the other end of the child's standard input and writes nothing more into it. The system closes it when
-the parent is gone, also one that was killed or crashed; the child waits for that in a thread.
+The parent keeps the other end of the child's standard input open without writing to it. The operating system closes
+that end when the parent ends, killed or crashed parents included; the child waits for this in a thread.
 """
 
 from __future__ import annotations
@@ -16,34 +16,34 @@ import time
 from collections.abc import Callable
 from typing import NoReturn
 
-GRACE_S = 5.0  # that the main thread has to clean up; then the process ends without
-_PEEK_S = 0.2  # between two looks at the pipe, on Windows
+GRACE_S = 5.0  # time for the main thread to clean up, after which the process ends in any case
+_POLLING_INTERVAL_S = 0.2  # of the pipe, on Windows
 
 
 def when_parent_ends(end: Callable[[], object]) -> None:
-    """Call ``end`` in a thread of its own when standard input, a pipe, closes; at once where it is closed already."""
+    """Call ``end`` in a new thread when standard input, a pipe, is closed; immediately if it is closed already."""
 
     def wait() -> None:
         try:
             _wait_for_end_of_stdin()
-        except BrokenPipeError:  # the end, in Windows' words
+        except BrokenPipeError:  # Windows reports the end of the pipe this way
             pass
         except OSError:
-            return  # no pipe, and so no parent to wait for
+            return  # not a pipe, so there is no parent to wait for
         end()
 
     threading.Thread(target=wait, name="scope-parent", daemon=True).start()
 
 
 def stop_with_parent() -> None:
-    """Have the main thread stop as by Ctrl-C when the parent is gone, and the process end soon after in any case."""
+    """Interrupt the main thread, as Ctrl-C does, when the parent ends; end the process ``GRACE_S`` later."""
 
     def stop() -> NoReturn:
-        from ..atomic_write import remove_unfinished
+        from ..atomic_write import remove_temporary_files
 
         _thread.interrupt_main(signal.SIGINT)
         time.sleep(GRACE_S)
-        remove_unfinished()
+        remove_temporary_files()
         os._exit(130)
 
     when_parent_ends(stop)
@@ -51,15 +51,15 @@ def stop_with_parent() -> None:
 
 def _wait_for_end_of_stdin() -> None:
     if sys.platform == "win32":
-        # A read would hold the pipe for itself, and numpy's libraries, which ask for its state while they are loaded,
-        # would wait for the read to end: https://github.com/numpy/numpy/issues/24290
+        # A blocking read would lock the pipe, and numpy's libraries, which query its state while they are loaded, would
+        # wait for the read to end: https://github.com/numpy/numpy/issues/24290
         import _winapi
         import msvcrt
 
         handle = msvcrt.get_osfhandle(0)
         while True:
             _winapi.PeekNamedPipe(handle, 0)
-            time.sleep(_PEEK_S)
-    # Not sys.stdin, whose lock would hold up the exit of the interpreter.
+            time.sleep(_POLLING_INTERVAL_S)
+    # Not sys.stdin, whose lock would block the exit of the interpreter.
     while os.read(0, 4096):
         pass

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The parent's side of a job: start the worker, read its messages without blocking, end it."""
+"""The parent's side of a job: start the worker, read its messages without blocking, and end it."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ import sys
 import threading
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from ...solver.errors import ScopeError
 from ..errors import SetupError
@@ -29,7 +30,7 @@ class WorkerFailedError(ScopeError):
 
 
 class WorkerProcess:
-    """One running worker. Call ``poll`` regularly; ``close`` ends it and removes its folder, in any state."""
+    """A worker process. Call ``poll`` regularly; ``close`` ends the process and removes its folder in any state."""
 
     def __init__(
         self,
@@ -41,13 +42,15 @@ class WorkerProcess:
     ) -> None:
         """Start the worker.
 
-        :param kernels: folder of numba's compiled code; next to the sources if None.
+        :param job_folder: folder for the worker's files.
+        :param kernels: folder for the code that numba compiles; if None, next to the sources.
         :param python: interpreter and its arguments; inside Blender ``[sys.executable, *bpy.app.python_args]``.
+        :param script: what the interpreter runs.
         :raises SetupError: the process cannot be started.
         """
         self.job_folder = job_folder
         self.finished = False
-        # An entry "" is the current folder, which isolated Python leaves out on purpose.
+        # An empty entry means the current folder, which isolated Python omits on purpose.
         search_path = [p for p in sys.path if p and os.path.exists(p)]
         command = [*python, str(script), str(ROOT), str(job_folder), *search_path]
         environment = dict(os.environ, **({"NUMBA_CACHE_DIR": str(kernels)} if kernels else {}))
@@ -63,10 +66,10 @@ class WorkerProcess:
                 )
         except OSError as error:
             shutil.rmtree(job_folder, ignore_errors=True)
-            raise SetupError(f"cannot start {python[0]}: {error.strerror}; install Blender again") from error
+            raise SetupError(f"cannot start {python[0]}: {error.strerror}; reinstall Blender") from error
         self._lines: queue.SimpleQueue[bytes | None] = queue.SimpleQueue()
         threading.Thread(target=self._read, name="scope-worker-lines", daemon=True).start()
-        with contextlib.suppress(OSError):  # it has ended already; poll() reports that
+        with contextlib.suppress(OSError):  # the worker has ended already; poll() reports that
             assert self._process.stdin is not None
             self._process.stdin.write(request.to_json().encode() + b"\n")
             self._process.stdin.flush()
@@ -81,12 +84,12 @@ class WorkerProcess:
         """Whether the process is still running."""
         return self._process.poll() is None
 
-    def poll(self) -> list[dict]:
-        """Return the messages since the last call; ``finished`` is True after the result.
+    def poll(self) -> list[dict[str, Any]]:
+        """Return the messages since the last call, and set ``finished`` when the result is among them.
 
         :raises WorkerFailedError: the worker reported an error or ended without a result.
         """
-        messages: list[dict] = []
+        messages: list[dict[str, Any]] = []
         while True:
             try:
                 line = self._lines.get_nowait()
@@ -105,14 +108,14 @@ class WorkerProcess:
             messages.append(message)
 
     def wait(self, timeout_s: float = 5.0) -> None:
-        """After the result, wait for the worker to end, so that its files are closed when they are moved."""
+        """Wait for the worker to end after its result, so that its files are closed before they are moved."""
         with contextlib.suppress(subprocess.TimeoutExpired):
             self._process.wait(timeout_s)
         self._end()
         (self.job_folder / LOG).unlink(missing_ok=True)
 
     def close(self) -> None:
-        """End the worker if it still runs, and remove its folder if it is still there."""
+        """End the worker if it is running, and remove its folder if it exists."""
         self._end()
         shutil.rmtree(self.job_folder, ignore_errors=True)
 
@@ -126,7 +129,7 @@ class WorkerProcess:
             self._process.wait(timeout=5)
 
     def _read(self) -> None:
-        """Read in a thread: not every system can read pipes without blocking."""
+        """Read the messages in a thread, because not every system can read pipes without blocking."""
         assert self._process.stdout is not None
         with contextlib.suppress(OSError, ValueError), self._process.stdout as stream:
             for line in stream:
@@ -134,20 +137,21 @@ class WorkerProcess:
         self._lines.put(None)
 
     def _cause_of_end(self) -> str:
-        """Describe in one sentence how a worker ended that reported no error."""
+        """Describe how a worker ended that reported no error."""
         with contextlib.suppress(subprocess.TimeoutExpired):
             self._process.wait(timeout=5)
         code = self._process.returncode
-        how = f"was ended by signal {-code}" if code is not None and code < 0 else f"ended with status {code}"
+        how = f"was terminated by signal {-code}" if code is not None and code < 0 else f"ended with status {code}"
         log = b""
         with contextlib.suppress(OSError):
             log = (self.job_folder / LOG).read_bytes()[-2000:]
         last = next((text for text in reversed(log.decode("utf-8", "replace").splitlines()) if text.strip()), "")
         hint = f" ({last.strip()[:200]})" if last else "; the system may have run out of memory"
-        return f"the capture process {how} before it was done{hint}; capture again"
+        return f"the capture process {how} before it was finished{hint}; capture again"
 
 
-def _parse(line: bytes) -> dict | None:
+def _parse(line: bytes) -> dict[str, Any] | None:
+    """Return a message; None for a line that is not one."""
     try:
         message = json.loads(line)
     except ValueError:

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How far a job is: fraction of the whole, frames a second, time left."""
+"""The progress of a job: completed fraction, frames per second, remaining time."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable
 
-# Share of the whole that each stage of a capture takes, in order; measured on clips of 10 to 40 seconds.
+# Share of the total time that each stage of a capture takes, in order; measured on clips of 10 to 40 seconds.
 STAGES = {
     "starting": 0.02,
     "finding the person": 0.56,
@@ -18,30 +18,34 @@ STAGES = {
 
 
 class JobProgress:
-    """Takes the worker's progress messages and says what a user wants to know."""
+    """Convert the worker's progress messages to what the panel shows."""
 
     def __init__(self, first_use: bool = False, clock: Callable[[], float] = time.monotonic) -> None:
-        """:param first_use: no compiled solver is in the cache yet."""
+        """Begin at 0.
+
+        :param first_use: whether the cache contains no compiled solver yet.
+        :param clock: returns the time in seconds.
+        """
         self._clock, self._first_use = clock, first_use
-        self._began = self._stage_began = clock()
-        self._stage_first = 0
+        self._start = self._stage_start = clock()
+        self._stage_first = 0  # frames done when the stage began
         self.stage, self.done, self.total = "starting", 0, 0
-        self.fraction = 0.0  # of the whole job, 0..1; it never goes back, though stages repeat for each person
+        self.fraction = 0.0  # of the whole job, 0..1; it never decreases, although stages repeat for each person
 
     def update(self, stage: str, done: int, total: int) -> None:
-        """One message of the worker."""
+        """Take one progress message of the worker: ``done`` of ``total``, which is 0 if unknown."""
         if stage != self.stage:
-            self.stage, self._stage_began, self._stage_first = stage, self._clock(), done
+            self.stage, self._stage_start, self._stage_first = stage, self._clock(), done
         self.done, self.total = done, total
-        self.fraction = max(self.fraction, self._reached())
+        self.fraction = max(self.fraction, self._fraction_at_stage())
 
     @property
     def compiling(self) -> bool:
-        """Whether the solver is being compiled, which happens in the first capture after installing."""
+        """Whether the solver is being compiled, as in the first capture after installation."""
         return self._first_use and self.stage == "finding the shape"
 
-    def _reached(self) -> float:
-        """A stage without a total stands still at its beginning."""
+    def _fraction_at_stage(self) -> float:
+        """Return the completed fraction of the job. A stage without a total counts as not begun."""
         if self.stage not in STAGES:
             return 0.0
         names = list(STAGES)
@@ -51,26 +55,26 @@ class JobProgress:
 
     @property
     def frames_per_second(self) -> float | None:
-        """Of the present stage; None before there is anything to say."""
-        elapsed, frames = self._clock() - self._stage_began, self.done - self._stage_first
+        """Speed of the current stage; None until it can be measured."""
+        elapsed, frames = self._clock() - self._stage_start, self.done - self._stage_first
         return frames / elapsed if self.total > 1 and frames > 0 and elapsed > 0.5 else None
 
     @property
     def seconds_left(self) -> float | None:
-        """Estimate for the whole job; None while it would be a guess."""
-        elapsed, fraction = self._clock() - self._began, self.fraction
+        """Estimated remaining time of the job; None until it can be estimated."""
+        elapsed, fraction = self._clock() - self._start, self.fraction
         if elapsed < 2 or fraction < 0.05 or self.total == 0:
             return None
         return elapsed * (1 - fraction) / fraction
 
     def lines(self) -> list[str]:
-        """What is being done, and, where known, how fast and for how long."""
-        doing = self.stage.capitalize()
+        """Return the lines to show: the stage, and speed and remaining time if they are known."""
+        stage = self.stage.capitalize()
         if self.total > 0:
-            doing += f", {self.done} of {self.total}"
-        lines = [doing]
+            stage += f", {self.done} of {self.total}"
+        lines = [stage]
         if self.compiling:
-            lines.append("First use: preparing the solver takes a minute")
+            lines.append("First use: compiling the solver takes a minute")
         speed = [f"{self.frames_per_second:.1f} frames/s"] if self.frames_per_second else []
         left = [f"{duration(self.seconds_left)} left"] if self.seconds_left is not None else []
         if speed or left:
@@ -79,7 +83,7 @@ class JobProgress:
 
 
 def duration(seconds: float) -> str:
-    """``45 s``, ``3 min 05 s``, ``1 h 02 min``."""
+    """Format a duration: ``45 s``, ``3 min 05 s``, ``1 h 02 min``."""
     seconds = max(0, round(seconds))
     if seconds < 60:
         return f"{seconds} s"

@@ -12,42 +12,45 @@ from typing import Any
 from ..errors import UsageError
 from ..options import Place, options_at
 
-_SAMPLE_BYTES = 1 << 20  # of the footage's beginning and end; reading gigabytes would hold up the window
+_SAMPLE_BYTES = 1 << 20  # hashed at the beginning and end of the footage; reading gigabytes would block the window
 
 
 class JobRequest:
     """One capture: the footage, and a value for each option of `Place.WORKER`."""
 
     def __init__(self, footage: str, **values: Any) -> None:
-        """Fill in the defaults.
+        """Check the values, and fill in the defaults of the others.
 
-        :raises UsageError: there is no such option, or a value is of the wrong type or none of the choices.
+        :raises UsageError: an option does not exist, or its value has the wrong type or is none of the choices.
         """
         self.footage = footage
         self.values: dict[str, Any] = _checked(values)
 
     def __eq__(self, other: object) -> bool:
-        """Same footage and same values."""
+        """Compare footage and values."""
         return isinstance(other, JobRequest) and (self.footage, self.values) == (other.footage, other.values)
 
     __hash__ = None  # type: ignore[assignment]
 
     def to_json(self) -> str:
-        """One line."""
+        """Return the request as one line of JSON."""
         return json.dumps({"footage": self.footage, **self.values})
 
     @classmethod
     def from_json(cls, text: str) -> JobRequest:
-        """:raises UsageError: not a request."""
+        """Parse a request.
+
+        :raises UsageError: the text is not a request.
+        """
         try:
             return cls(**json.loads(text))
         except (ValueError, TypeError) as error:
             raise UsageError(f"this is not a capture request: {error}") from error
 
     def key(self, code_version: str) -> str:
-        """Hexadecimal key of the result: equal only for the same footage, options and program.
+        """Return the hexadecimal key of the result: equal only for the same footage, options and program.
 
-        :param code_version: changes whenever the program might capture differently.
+        :param code_version: differs between programs whose results may differ; see `code_version`.
         :raises OSError: the footage cannot be read.
         """
         options = [option for option in options_at(Place.WORKER) if option.decides_result]
@@ -63,6 +66,7 @@ class JobRequest:
 
 
 def _checked(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the value of each option of the worker, with defaults."""
     options = {option.name: option for option in options_at(Place.WORKER)}
     for name, value in values.items():
         if name not in options:
@@ -74,7 +78,7 @@ def _checked(values: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _add_file(digest: hashlib._Hash, path: Path) -> None:
-    """Add size, modification time, first and last megabyte."""
+    """Add name, size, modification time, first and last megabyte."""
     status = path.stat()
     digest.update(f"{path.name} {status.st_size} {status.st_mtime_ns}".encode())
     with path.open("rb") as file:
@@ -87,8 +91,8 @@ def code_version(root: Path) -> str:
     """Hash the installed program: names, sizes and modification times of sources, networks, bodies and priors."""
     files = [*(root / "solver").rglob("*.py"), *(root / "scope_addon").rglob("*.py")]
     files += [f for kind in ("*.onnx", "*.npz", "*.json") for f in (root / "assets").rglob(kind)]
-    # Neither the panel nor the sample, which is footage like any other, changes the result of a capture.
-    apart = (root / "scope_addon" / "ui", root / "assets" / "sample")
-    status = {f.relative_to(root).as_posix(): f.stat() for f in files if not any(map(f.is_relative_to, apart))}
+    # Neither the panel nor the sample clip changes the result of a capture.
+    excluded = (root / "scope_addon" / "ui", root / "assets" / "sample")
+    status = {f.relative_to(root).as_posix(): f.stat() for f in files if not any(map(f.is_relative_to, excluded))}
     stamps = sorted((name, s.st_size, s.st_mtime_ns) for name, s in status.items())
     return hashlib.sha256(json.dumps(stamps).encode()).hexdigest()

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The script a worker process starts with; run by Blender's Python, isolated (``-I``), without Blender.
+"""The script that a worker process runs, in Blender's Python, isolated (``-I``) and without Blender.
 
-    python -I start_worker.py ROOT JOB_FOLDER SEARCH_PATH...      the request on stdin, one line
+    python -I start_worker.py ROOT JOB_FOLDER SEARCH_PATH...      one line on stdin: the request
 
-Blender calls the extension ``bl_ext.<repository>.scope``, below a parent that exists only inside Blender; here its root
-folder is loaded as the package ``scope``. Isolated Python ignores PYTHONPATH, so the folders of numpy and of the
-extension's wheels come as arguments.
+Inside Blender the extension is the package ``bl_ext.<repository>.scope``, whose parent exists only there; this script
+loads the extension's root folder as the package ``scope``. Isolated Python ignores PYTHONPATH, so that the folders of
+numpy and of the extension's wheels are passed as arguments.
 """
 
 import importlib.util
@@ -25,8 +25,8 @@ def load_package(root: Path) -> None:
 
 if __name__ == "__main__":
     root, job_folder, *search_path = sys.argv[1:]
-    # The parent's order decides: an extension's own wheels come before what else is installed. The script's own folder
-    # is not among them, or its modules would shadow others.
+    # The parent's order is kept: the extension's wheels precede other installed packages. The script's own folder is
+    # removed, because its modules would shadow others.
     own = str(Path(__file__).resolve().parent)
     sys.path[:] = search_path + [p for p in sys.path if p not in search_path and p != own]
     load_package(Path(root))

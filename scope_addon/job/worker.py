@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The worker's side of a job: read the request, capture, write motion files, report progress."""
+"""The worker's side of a job: read the request, capture, write motion files, and report progress."""
 
 from __future__ import annotations
 
@@ -14,31 +14,31 @@ from pathlib import Path
 from typing import IO, NoReturn
 
 from ...solver.errors import ScopeError
-from ..errors import exit_status
+from ..errors import exit_status, system_error_message
 from .parent import when_parent_ends
 from .request import JobRequest
 
-_REMOVALS = 20  # attempts, any of which fails if a file is opened meanwhile
-_MIN_INTERVAL_S = 0.05  # between two progress lines of one stage
+_REMOVAL_ATTEMPTS = 20  # an attempt fails if a file is created during it
+_MIN_INTERVAL_S = 0.05  # between two progress messages of one stage
 
 
 class Reporter:
-    """Write JSON lines for the parent."""
+    """Write messages to the parent as JSON lines."""
 
     def __init__(self, stream: IO[str]) -> None:
         self._stream = stream
         self._last_stage, self._last_time = "", 0.0
-        self._writing = threading.Lock()
+        self._lock = threading.Lock()
 
     def send(self, event: str, **values: object) -> None:
-        """Send one line immediately, from any thread."""
+        """Send a message immediately; thread-safe."""
         line = json.dumps({"event": event, **values}) + "\n"
-        with self._writing:
+        with self._lock:
             self._stream.write(line)
             self._stream.flush()
 
     def progress(self, stage: str, done: int, total: int) -> None:
-        """Report the progress of a stage; of frequent calls, those that begin or end a stage and some in between."""
+        """Report the progress of a stage, at most every ``_MIN_INTERVAL_S`` except at its beginning and end."""
         now = time.monotonic()
         if stage == self._last_stage and done != total and now - self._last_time < _MIN_INTERVAL_S:
             return
@@ -47,10 +47,10 @@ class Reporter:
 
 
 def run(request: JobRequest, job_folder: Path, reporter: Reporter) -> int:
-    """Capture, write the results and return the exit status. Every failure becomes one ``error`` line."""
+    """Capture, write the results and return the exit status. Every failure is reported as an ``error`` message."""
     try:
         reporter.progress("starting", 0, 0)
-        # Imported here, so that a missing wheel is reported in the panel as well.
+        # Imported here, so that a missing package is reported in the panel.
         from ...solver.loaders.body_file import load_body
         from ..capture.options import capture_options
         from ..capture.pipeline import capture
@@ -69,10 +69,10 @@ def run(request: JobRequest, job_folder: Path, reporter: Reporter) -> int:
         reporter.send("error", message=str(error))
         return exit_status(error)
     except ImportError as error:
-        reporter.send("error", message=f"a part of Scope cannot be loaded ({error}); install the extension again")
+        reporter.send("error", message=f"a part of Scope cannot be loaded ({error}); reinstall the extension")
     except (OSError, MemoryError) as error:
-        reporter.send("error", message=f"the system refused: {error}; free space or memory and try again")
-    except Exception as error:  # a defect must be reported in the panel as well; the log has the traceback
+        reporter.send("error", message=system_error_message(error))
+    except Exception as error:  # a defect is reported in the panel; the log has the traceback
         import traceback
 
         traceback.print_exc()
@@ -81,15 +81,15 @@ def run(request: JobRequest, job_folder: Path, reporter: Reporter) -> int:
 
 
 def main(job_folder: Path) -> NoReturn:
-    """Run the worker process: the request on stdin, JSON lines on stdout, everything else on stderr."""
-    # What libraries print to stdout, also from C, goes to stderr; the JSON lines get the real stdout.
+    """Run the worker process: the request on stdin, messages on stdout, everything else on stderr."""
+    # Everything that libraries print to stdout, including from C, goes to stderr; the messages get the real stdout.
     stream = os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(2, 1)
     line = sys.stdin.readline()
     if not line:  # the parent ended before it sent the request
         _remove(job_folder)
-        _leave(1)
-    _die_with_parent(job_folder)
+        _exit(1)
+    _exit_with_parent(job_folder)
     _lower_priority()
     status = 1
     reporter = Reporter(stream)
@@ -98,18 +98,18 @@ def main(job_folder: Path) -> NoReturn:
             status = run(JobRequest.from_json(line), job_folder, reporter)
         except ScopeError as error:
             reporter.send("error", message=str(error))
-    _leave(status)
+    _exit(status)
 
 
-def _leave(status: int) -> NoReturn:
+def _exit(status: int) -> NoReturn:
     """Exit without exit handlers, which would wait for threads of the networks and of the decoder."""
     with contextlib.suppress(OSError):
         sys.stderr.flush()
     os._exit(status)
 
 
-def _die_with_parent(job_folder: Path) -> None:
-    """End, and remove the job's folder, when the parent ends or closes the job."""
+def _exit_with_parent(job_folder: Path) -> None:
+    """Exit and remove the job's folder when the parent ends or closes the job."""
 
     def end() -> NoReturn:
         _remove(job_folder)
@@ -119,19 +119,19 @@ def _die_with_parent(job_folder: Path) -> None:
 
 
 def _remove(job_folder: Path) -> None:
-    """Remove the folder while the main thread writes to it; it is renamed first, so that new files fail."""
-    gone = job_folder.with_name(f"{job_folder.name}.gone")
+    """Remove the folder, even while another thread writes to it: once renamed, no new file can be created in it."""
+    renamed = job_folder.with_name(f"{job_folder.name}.gone")
     with contextlib.suppress(OSError):
-        job_folder.rename(gone)
-    for _ in range(_REMOVALS):
-        for folder in (gone, job_folder):
+        job_folder.rename(renamed)
+    for _ in range(_REMOVAL_ATTEMPTS):
+        for folder in (renamed, job_folder):
             shutil.rmtree(folder, ignore_errors=True)
-        if not gone.exists() and not job_folder.exists():
+        if not renamed.exists() and not job_folder.exists():
             return
 
 
 def _lower_priority() -> None:
-    """Lower the priority, so that Blender stays responsive. (On Windows the parent does so at the start.)"""
+    """Lower the priority, so that Blender stays responsive; on Windows the parent starts the process with it."""
     if hasattr(os, "nice"):
         with contextlib.suppress(OSError):
             os.nice(5)

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Every option of a capture, declared once. Standard library only: neither bpy nor numpy, nor other parts of Scope.
+"""The options of a capture, each declared once. Standard library only: no bpy, no numpy, no other part of Scope.
 
-Made from these records: the arguments of the command line (`command_line.arguments`), the request to the worker
-(`job.request`), and the properties of the panel and of the preferences (`ui.declared_properties`). The typed fields of
-`capture.options.CaptureOptions` take their defaults from them, and a test compares the two. To add an option, add its
+The arguments of the command line (`command_line.arguments`), the request to the worker (`job.request`), and the
+properties of the panel and of the preferences (`ui.declared_properties`) are made from these records. The typed fields
+of `capture.options.CaptureOptions` take their defaults from them; a test compares the two. To add an option, add a
 record to `capture`, `networks` or `output`.
 """
 
@@ -21,14 +21,14 @@ __all__ = ["OPTIONS", "Argument", "Choice", "Option", "Place", "Property", "opti
 
 
 def options_at(place: Place) -> tuple[Option, ...]:
-    """Return the options that apply at a place (at all of them, if several are combined)."""
+    """Return the options that apply at a place; if several places are combined, at all of them."""
     return tuple(option for option in OPTIONS if place in option.places)
 
 
 def option(name: str) -> Option:
-    """Return the option of this name.
+    """Return the option with this name.
 
-    :raises KeyError: there is none.
+    :raises KeyError: there is no such option.
     """
     for each in OPTIONS:
         if each.name == name:

@@ -41,19 +41,19 @@ def _parse_people(text: str) -> int | str:
     if text in (LARGEST, ALL):
         return text
     if not re.fullmatch("[0-9]{1,6}", text) or int(text) < 1:
-        raise ValueError("takes a number of at least 1, all or largest")
+        raise ValueError("must be a number of at least 1, all or largest")
     return int(text)
 
 
 def _parse_heights(text: str) -> tuple[float, ...]:
-    """Metres from centimetres, one number for each person."""
+    """Convert a list in centimetres, one number for each person, to metres."""
     try:
         return tuple(float(number) / 100 for number in text.split(","))
     except ValueError as error:
-        raise ValueError("takes centimetres, say 175, or 175,162 for two people") from error
+        raise ValueError("must be in centimetres such as 175, or 175,162 for two people") from error
 
 
-def _seconds(settings: Any, name: str) -> str | None:
+def _range_limit(settings: Any, name: str) -> str | None:
     return f"{getattr(settings, name):.6f}" if settings.use_range else None
 
 
@@ -66,7 +66,7 @@ CAPTURE_OPTIONS = (
         (int, str),
         LARGEST,
         _EVERYWHERE,
-        "who is captured",
+        "people to capture",
         minimum=1,
         maximum=12,
         choices=PEOPLE,
@@ -86,7 +86,7 @@ CAPTURE_OPTIONS = (
         int,
         2,
         Place.PANEL,
-        "how many people are captured at most",
+        "maximum number of people",
         minimum=1,
         maximum=12,
         blender=Property(label="At Most"),
@@ -104,7 +104,7 @@ CAPTURE_OPTIONS = (
             unit="s",
             default=0.0,
             minimum=0.0,
-            value=lambda settings: _seconds(settings, "range_start"),
+            value=lambda settings: _range_limit(settings, "range_start"),
             keywords=_TIME,
         ),
     ),
@@ -121,7 +121,7 @@ CAPTURE_OPTIONS = (
             unit="s",
             default=10.0,
             minimum=0.0,
-            value=lambda settings: _seconds(settings, "range_end"),
+            value=lambda settings: _range_limit(settings, "range_end"),
             keywords=_TIME,
         ),
     ),
@@ -155,7 +155,7 @@ CAPTURE_OPTIONS = (
         Path,
         None,
         Place.PANEL,
-        "SMPL, SMPL+H, SMPL-X or STAR model (.npz or .pkl); the one in the preferences if empty",
+        "SMPL, SMPL+H, SMPL-X or STAR model (.npz or .pkl); if empty, the one in the preferences",
     ),
     Option(
         "hands",
@@ -176,12 +176,12 @@ CAPTURE_OPTIONS = (
         maximum=2.6,
         several=True,
         argument=Argument("--height", "CM[,CM...]", parse=_parse_heights, default_text="estimated"),
-        # Not of unit LENGTH, which would be shown and entered in the scene's units.
+        # Not Blender's unit LENGTH, which would display the value in the scene's units.
         blender=Property(
             "height_cm",
             "Height (cm)",
-            "Height of the person in centimetres, of the most prominent one if there are several; sets the scale of the"
-            " scene. 0: estimated from the footage, usually within 10 %",
+            "Height of the most prominent person in centimetres; sets the scale of the scene. 0: estimated from the"
+            " footage, usually within 10 %",
             unit="cm",
             default=0.0,
             minimum=0.0,
@@ -249,8 +249,8 @@ CAPTURE_OPTIONS = (
         bool,
         True,
         _EVERYWHERE,
-        "remove jitter and hold planted feet; off keeps the raw per-frame solution",
-        argument=Argument(help="keep the raw per-frame solution: no smoothing, no foot contact"),
+        "remove jitter and lock feet in contact with the floor; off keeps the per-frame solution",
+        argument=Argument(help="keep the per-frame solution: no smoothing, no foot locking"),
         blender=Property(label="Smooth"),
     ),
     Option("ablation", object, None, Place.CAPTURE, "parts of the pipeline to leave out; only experiments set it"),

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The options of the networks: the user's own, and what they run on."""
+"""The options of the networks: custom networks and execution providers."""
 
 from __future__ import annotations
 
@@ -13,7 +13,12 @@ PROVIDERS = (
     Choice("auto", "Automatic", "A supported GPU if there is one, otherwise the CPU", 0),
     Choice("cpu", "CPU", "The processor", 1),
     Choice("cuda", "CUDA", "An NVIDIA GPU", 2),
-    Choice("tensorrt", "TensorRT", "An NVIDIA GPU with TensorRT, which first compiles each network for minutes", 3),
+    Choice(
+        "tensorrt",
+        "TensorRT",
+        "An NVIDIA GPU with TensorRT, which takes minutes to compile each network on first use",
+        3,
+    ),
     Choice("directml", "DirectML", "Any GPU on Windows", 4),
     Choice("coreml", "Core ML", "Apple silicon", 5),
 )
@@ -29,7 +34,7 @@ NETWORK_OPTIONS = (
         blender=Property(
             "detector_file",
             "Person Detector",
-            "Your own detector (.onnx): YOLOX, YOLOv4, YOLOv8 and similar; the built-in one if empty",
+            "Custom detector (.onnx): YOLOX, YOLOv4, YOLOv8 and similar; built-in if empty",
         ),
     ),
     Option(
@@ -42,7 +47,7 @@ NETWORK_OPTIONS = (
         blender=Property(
             "keypoints_file",
             "Keypoint Network",
-            "Your own keypoint network (.onnx): RTMPose, HRNet, ViTPose and similar; the built-in one if empty",
+            "Custom keypoint network (.onnx): RTMPose, HRNet, ViTPose and similar; built-in if empty",
         ),
     ),
     Option(
@@ -50,13 +55,13 @@ NETWORK_OPTIONS = (
         str,
         "auto",
         _NETWORKS,
-        "what the networks run on",
+        "execution provider of the networks",
         choices=PROVIDERS,
         decides_result=False,
         argument=Argument(default_text="auto, the fastest available"),
         blender=Property(
-            label="Networks Run On",
-            description="If it is not available, the networks run on the CPU, and the result shows a warning",
+            label="Execution Provider",
+            description="What the networks run on; if unavailable, the CPU is used and the result shows a warning",
         ),
     ),
     Option(

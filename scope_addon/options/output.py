@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The options that decide what is made of a captured motion: files, rigs, the scene, the report."""
+"""The options of the outputs: files, rigs, the scene, the report."""
 
 from __future__ import annotations
 
@@ -11,7 +11,10 @@ SHAPES = (
     Choice("keyed", "Shape Keys", "The body's shape as shape keys with one keyframe each", 0),
     Choice("per_frame", "Shape Keys per Frame", "The same, with a keyframe on every frame", 1),
     Choice(
-        "baked", "In the Mesh", "No shape keys: the shape is the mesh, for engines that limit shape keys to 0..1", 2
+        "baked",
+        "In the Mesh",
+        "No shape keys: the shape is applied to the mesh, for engines that limit shape keys to 0..1",
+        2,
     ),
 )
 ROOTS = (

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The record that declares one option, and how it appears on the command line and in Blender."""
+"""The record that declares an option, and its appearance on the command line and in Blender."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class Place(enum.Flag):
 
 @dataclass(frozen=True)
 class Choice:
-    """One of the values of an option. ``number`` is what a .blend stores, so it must never change."""
+    """One value of an option. A .blend file stores its ``number``, which therefore must never change."""
 
     value: str
     label: str
@@ -31,16 +31,16 @@ class Choice:
 
     @property
     def identifier(self) -> str:
-        """Name of the value in Blender."""
+        """Identifier of the value in Blender."""
         return self.value.upper()
 
 
 @dataclass(frozen=True)
 class Argument:
-    """How an option appears on the command line, where that does not follow from its name and type.
+    """Appearance of an option on the command line, where it does not follow from the option's name and type.
 
-    :param flag: such as ``--fov``; by default the option's name, with ``no-`` before it if the option is on by default.
-    :param parse: from the argument's text to the option's value; ValueError states what the argument takes.
+    :param flag: such as ``--fov``; by default the option's name, with prefix ``no-`` if the option is on by default.
+    :param parse: converts the argument's text to the option's value; its ValueError says what the argument must be.
     :param default_text: how the help describes the default; by default its value.
     :param inherited: whether a batch passes the argument on to the process of each clip.
     """
@@ -55,11 +55,11 @@ class Argument:
 
 @dataclass(frozen=True)
 class Property:
-    """How an option appears in Blender, where that does not follow from its name and type.
+    """Appearance of an option in Blender, where it does not follow from the option's name and type.
 
-    ``default``, ``minimum`` and ``maximum`` are in ``unit``, the option's own where it is empty.
+    ``default``, ``minimum`` and ``maximum`` are in ``unit``; if it is empty, in the option's own unit.
 
-    :param value: from the properties of the panel (or the preferences) to the option's value.
+    :param value: returns the option's value, given the properties of the panel or of the preferences.
     :param keywords: further arguments of Blender's property, such as ``subtype``.
     """
 
@@ -79,9 +79,9 @@ class Property:
 class Option:
     """One option of a capture. A default of None means that the option is not set.
 
-    :param value_type: of the value, or of its elements if ``several``; a Path is text in requests.
-    :param choices: the texts that are allowed, if not all are.
-    :param decides_result: False if captures that differ in this option alone have the same result.
+    :param value_type: type of the value, or of its elements if ``several``; in requests, a Path is a string.
+    :param choices: the strings that are allowed; empty if all are.
+    :param decides_result: False if the option does not change the result of a capture.
     """
 
     name: str
@@ -100,17 +100,17 @@ class Option:
 
     @property
     def flag(self) -> str:
-        """Of the command line: ``--shape-keys``."""
+        """Flag on the command line, such as ``--shape-keys``."""
         negated = "no-" if self.default is True else ""
         return self.argument.flag or f"--{negated}{self.name.replace('_', '-')}"
 
     @property
     def values(self) -> tuple[str, ...]:
-        """The texts that are allowed; empty if all are."""
+        """The strings that are allowed; empty if all are."""
         return tuple(choice.value for choice in self.choices)
 
     def type_error(self, value: object) -> str:
-        """State what a value of the wrong type, or outside the choices, should have been; empty if it is right."""
+        """Describe what is wrong with a value's type or choice; empty if nothing is."""
         if value is None and self.default is None:
             return ""
         if self.several:
@@ -120,7 +120,7 @@ class Option:
         return self._element_error(value)
 
     def range_error(self, value: object) -> str:
-        """State the allowed range if a number, or an element of a list, is outside of it; else empty."""
+        """Describe the allowed range if a number, or an element of a list, is outside of it; empty otherwise."""
         for each in value if isinstance(value, list | tuple) else (value,):
             if isinstance(each, int | float) and not isinstance(each, bool):
                 low = self.minimum is None or each >= self.minimum

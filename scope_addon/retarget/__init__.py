@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A body's motion on another skeleton, in numpy: which bone is which body part, and how their rotations follow."""
+"""Retargeting in numpy: mapping a rig's bones to body parts and transferring the body's motion to them."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which bone of a rig follows which part of the body, and its file."""
+"""The bone map: which bone of a rig follows which body part. Reading and writing it as a file."""
 
 from __future__ import annotations
 
@@ -8,55 +8,60 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from ...solver.errors import InputError
-from ..atomic_write import reason, written_beside
+from ..atomic_write import atomic_path, reason
 from ..errors import OutputError
 
-SIDED = ("hip", "knee", "ankle", "foot", "collar", "shoulder", "elbow", "wrist")
+SIDED_PARTS = ("hip", "knee", "ankle", "foot", "collar", "shoulder", "elbow", "wrist")
 SPINE = ("spine1", "spine2", "spine3")
 FINGERS = ("thumb", "index", "middle", "ring", "pinky")
-PHALANGES = tuple(f"{finger}{k}" for finger in FINGERS for k in (1, 2, 3))  # as SMPL+H calls them, from the knuckle on
+PHALANGES = tuple(f"{finger}{k}" for finger in FINGERS for k in (1, 2, 3))  # named as in SMPL+H, from the knuckle on
 PARTS = (
     *("pelvis", *SPINE, "neck", "head"),
-    *(f"{side}_{part}" for side in ("left", "right") for part in (*SIDED, *PHALANGES)),
+    *(f"{side}_{part}" for side in ("left", "right") for part in (*SIDED_PARTS, *PHALANGES)),
 )
-NEEDED = ("pelvis", *(f"{side}_{part}" for side in ("left", "right") for part in ("hip", "knee")))
+REQUIRED = ("pelvis", *(f"{side}_{part}" for side in ("left", "right") for part in ("hip", "knee")))
 _FORMAT, _LARGEST_BYTES = "scope bone map", 1_000_000
 
 
 @dataclass
 class BoneMap:
-    """``parts``: bone name -> body part. Several bones may share the spine or the neck; others have one bone each."""
+    """Bones and their body parts. Several bones may share a part of the spine, or the neck; other parts have one."""
 
-    parts: dict[str, str]
-    confidence: dict[str, float] = field(default_factory=dict)  # 0..1 where it was guessed
+    parts: dict[str, str]  # bone name -> body part
+    confidence: dict[str, float] = field(default_factory=dict)  # by bone name, 0 to 1; empty unless guessed
 
     def bone(self, part: str) -> str | None:
-        """The first bone of a part, None where the rig has none."""
+        """Return the first bone of a part, or None."""
         return next((bone for bone, p in self.parts.items() if p == part), None)
 
     def check(self) -> None:
-        """Refuse what cannot be retargeted.
+        """Check that the map can be used for retargeting.
 
-        :raises InputError: an unknown part, a limb with two bones, or no pelvis or legs.
+        :raises InputError: when a part is unknown, a part of a limb has two bones, or pelvis or legs are missing.
         """
         for bone, part in self.parts.items():
             if part not in PARTS:
-                raise InputError(f"bone '{bone}' is mapped to '{part}', which is no body part; use {', '.join(PARTS)}")
+                raise InputError(
+                    f"bone '{bone}' is mapped to '{part}', which is not a body part; use one of {', '.join(PARTS)}"
+                )
         for part in PARTS:
             bones = [bone for bone, p in self.parts.items() if p == part]
             if len(bones) > 1 and part not in SPINE and part != "neck":
-                raise InputError(f"'{part}' has {len(bones)} bones, {' and '.join(bones)}; keep one of them")
-        missing = [part for part in NEEDED if self.bone(part) is None]
+                raise InputError(f"'{part}' has {len(bones)} bones, {' and '.join(bones)}; keep only one of them")
+        missing = [part for part in REQUIRED if self.bone(part) is None]
         if missing:
             raise InputError(f"the bone map has no bone for {', '.join(missing)}; choose one for each in the list")
 
 
 def save_bone_map(bone_map: BoneMap, path: str | Path) -> None:
-    """Write JSON, whole or not at all. :raises OutputError: it cannot be written."""
+    """Write the map as JSON, atomically.
+
+    :raises OutputError: when the file cannot be written.
+    """
     path = Path(path)
     text = json.dumps({"format": _FORMAT, "version": 1, "bones": bone_map.parts}, indent=2, ensure_ascii=False)
     try:
-        with written_beside(path) as temporary:
+        with atomic_path(path) as temporary:
             temporary.write_text(text + "\n", encoding="utf-8")
     except OSError as error:
         raise OutputError(f"cannot write {path}: {reason(error)}") from error
@@ -65,22 +70,22 @@ def save_bone_map(bone_map: BoneMap, path: str | Path) -> None:
 def load_bone_map(path: str | Path) -> BoneMap:
     """Read what ``save_bone_map`` wrote.
 
-    :raises InputError: the file is not such a map; the message says why.
+    :raises InputError: when the file cannot be read or is not a valid map.
     """
     path = Path(path)
     try:
         if path.stat().st_size > _LARGEST_BYTES:
-            raise InputError(f"{path}: too large for a bone map; choose a file that Scope has saved")
-        content = json.loads(path.read_text(encoding="utf-8-sig"))  # editors may have put a mark first
+            raise InputError(f"{path}: too large for a bone map; choose a file that Scope saved")
+        content = json.loads(path.read_text(encoding="utf-8-sig"))  # some editors write a byte order mark
     except OSError as error:
         raise InputError(f"{path}: the bone map cannot be read ({error.strerror}); choose another file") from error
     except (ValueError, RecursionError) as error:
-        raise InputError(f"{path}: this is not JSON ({error}); choose a bone map that Scope has saved") from error
+        raise InputError(f"{path}: this is not JSON ({error}); choose a bone map that Scope saved") from error
     bones = content.get("bones") if isinstance(content, dict) else None
     if not isinstance(content, dict) or content.get("format") != _FORMAT or content.get("version") != 1:
-        raise InputError(f"{path}: this JSON is no bone map of Scope, version 1; choose another file")
+        raise InputError(f"{path}: this JSON file is not a Scope bone map, version 1; choose another file")
     if not isinstance(bones, dict) or not all(_is_name(bone) and _is_name(part) for bone, part in bones.items()):
-        raise InputError(f"{path}: 'bones' must pair names of bones with body parts")
+        raise InputError(f"{path}: 'bones' must be an object that maps bone names to body parts; correct the file")
     out = BoneMap(dict(bones))
     try:
         out.check()
@@ -90,5 +95,5 @@ def load_bone_map(path: str | Path) -> BoneMap:
 
 
 def _is_name(text: object) -> bool:
-    """Whether Blender can hold it: JSON may escape zeros and halves of letters."""
+    """Return whether Blender can store the name: JSON may escape null characters and lone surrogates."""
     return isinstance(text, str) and text != "" and not any(c == "\0" or "\ud800" <= c <= "\udfff" for c in text)

@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which bones of a rig are the fingers' phalanges, below the wrists that are known: by name, else by geometry."""
+"""Finding the phalanges of a rig's fingers below the known wrists: by name, else by geometry."""
 
 from __future__ import annotations
 
 import re
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .bone_map import FINGERS
 
@@ -16,17 +17,23 @@ _WORDS = {
     "ring": ("ring",),
     "pinky": ("pinky", "pinkie", "little"),
 }
-# Bones of a hand that are no phalanges; a thumb's metacarpal moves, and counts as its first one.
+# Bones of a hand that are not phalanges. A thumb's metacarpal moves, and counts as its first phalanx.
 _NO_PHALANX = re.compile(r"end|nub|tip|site|master|palm|twist|pole|ik|target", re.IGNORECASE)
 _METACARPAL = re.compile(r"carpal|\bmeta\b", re.IGNORECASE)
 _NUMBERED = re.compile(r"finger[ _.-]*(\d)", re.IGNORECASE)
 _PHALANGES = 3
 
 
-def find_fingers(names: list[str], parents: np.ndarray, heads: np.ndarray, wrists: dict[str, int]) -> dict[str, str]:
-    """Bone -> part (``left_index1``, ...) for the fingers below each wrist.
+def find_fingers(
+    names: list[str], parents: NDArray[np.intp], heads: NDArray[np.float64], wrists: dict[str, int]
+) -> dict[str, str]:
+    """Find the bones of the fingers below each wrist.
 
-    :param parents: (B,) indices, -1: none; heads: (B, 3) at rest; wrists: row of the hand's bone by side.
+    :param names: of the B bones, parents before children.
+    :param parents: (B,) indices, -1 for none.
+    :param heads: (B, 3) at rest.
+    :param wrists: index of the hand's bone, by side.
+    :return: bone name -> part (``left_index1``, ...).
     """
     found: dict[str, str] = {}
     for side, wrist in wrists.items():
@@ -37,8 +44,8 @@ def find_fingers(names: list[str], parents: np.ndarray, heads: np.ndarray, wrist
     return found
 
 
-def _by_name(names: list[str], parents: np.ndarray, below: list[int]) -> dict[str, list[int]]:
-    """Finger -> its bones from the knuckle on; empty where the names tell of no finger."""
+def _by_name(names: list[str], parents: NDArray[np.intp], below: list[int]) -> dict[str, list[int]]:
+    """Return the bones of each finger from the knuckle on; empty if no name is that of a finger."""
     own: dict[str, set[int]] = {}
     numbered: dict[int, set[int]] = {}
     for i in below:
@@ -58,8 +65,10 @@ def _by_name(names: list[str], parents: np.ndarray, below: list[int]) -> dict[st
     return {finger: _longest(parents, bones) for finger, bones in own.items()}
 
 
-def _by_geometry(parents: np.ndarray, heads: np.ndarray, wrist: int, below: list[int]) -> dict[str, list[int]]:
-    """Five chains below a wrist: the one that points aside is the thumb, the others follow by their distance to it."""
+def _by_geometry(
+    parents: NDArray[np.intp], heads: NDArray[np.float64], wrist: int, below: list[int]
+) -> dict[str, list[int]]:
+    """Identify five chains: the thumb is the one that diverges most, the others are ordered by distance from it."""
     leaves = [i for i in below if i not in set(parents[below].tolist())]
     chains = []
     for leaf in leaves:
@@ -83,8 +92,8 @@ def _by_geometry(parents: np.ndarray, heads: np.ndarray, wrist: int, below: list
     return out
 
 
-def _below(parents: np.ndarray, wrist: int) -> list[int]:
-    """Rows of everything that hangs on the wrist."""
+def _below(parents: NDArray[np.intp], wrist: int) -> list[int]:
+    """Return the indices of all descendants of the wrist."""
     found = {wrist}
     for i in range(len(parents)):  # parents come before children
         if int(parents[i]) in found:
@@ -92,8 +101,8 @@ def _below(parents: np.ndarray, wrist: int) -> list[int]:
     return sorted(found - {wrist})
 
 
-def _longest(parents: np.ndarray, bones: set[int]) -> list[int]:
-    """The longest line of descent within ``bones``, from the top."""
+def _longest(parents: NDArray[np.intp], bones: set[int]) -> list[int]:
+    """Return the longest chain of parents and children within ``bones``, from the top."""
     best: list[int] = []
     for i in sorted(bones):
         chain = [i]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Guess which bone is which body part, by name and by where the bones rest."""
+"""Guessing the bone map of a rig from the names and the rest positions of its bones."""
 
 from __future__ import annotations
 
@@ -7,12 +7,13 @@ import re
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .bone_map import FINGERS, BoneMap
 from .fingers import find_fingers
 
 _SIDES = {"l": "left", "left": "left", "r": "right", "right": "right"}
-# What comes before the names proper: Biped, Valve's, VRoid's (with C for the centre), Character Creator's.
+# Prefixes of Biped, Valve, VRoid (with C for the centre) and Character Creator.
 _PREFIXES = {"bip", "valve", "biped", "j", "c", "cc", "base", "def", "bind", "jnt"}
 _CENTRE = {
     "pelvis": ("pelvis", "hips", "hip"),
@@ -24,7 +25,7 @@ _LIMBS = {
     "hip": ("thigh", "upleg", "upperleg", "hip"),
     "knee": ("shin", "calf", "leg", "lowerleg", "knee"),
     "ankle": ("ankle", "foot"),
-    "foot": ("toe", "toes", "toebase", "ball", "foot"),  # SMPL calls the toes "foot" beside an "ankle"
+    "foot": ("toe", "toes", "toebase", "ball", "foot"),  # SMPL calls the toes "foot", and the foot "ankle"
     "collar": ("clavicle", "collar", "shoulder"),
     "shoulder": ("upperarm", "uparm", "arm", "shoulder"),
     "elbow": ("forearm", "lowerarm", "elbow"),
@@ -34,15 +35,15 @@ _LIMBS = {
 
 @dataclass(frozen=True)
 class RestBones:
-    """A rig's bones at rest, parents before children: names, parents' indices (-1: none), heads (B, 3), z up."""
+    """The B bones of a rig at rest, parents before children."""
 
     names: list[str]
-    parents: np.ndarray
-    heads: np.ndarray
+    parents: NDArray[np.intp]  # (B,) indices, -1 for none
+    heads: NDArray[np.float64]  # (B, 3), world axes, z up
 
 
 def tokens(name: str) -> tuple[str, str]:
-    """The name without prefix, side, digits and case, and its side ('left', 'right' or '')."""
+    """Return the name without prefix, side, digits and case, and its side ('left', 'right' or '')."""
     words = re.findall(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+", name.rsplit(":", 1)[-1])
     words = [word.lower() for word in words]
     while len(words) > 1 and words[0] in _PREFIXES:
@@ -52,7 +53,7 @@ def tokens(name: str) -> tuple[str, str]:
 
 
 def guess(bones: RestBones) -> BoneMap:
-    """The most likely map: by name, and by geometry where the names say nothing.
+    """Guess the most likely map: by name, or by geometry if too few names are known.
 
     Confidence is 1 where name and geometry agree, 0.8 for a name alone, 0.5 for geometry alone.
     """
@@ -67,13 +68,13 @@ def guess(bones: RestBones) -> BoneMap:
 
 
 def _fingers(bones: RestBones, parts: dict[str, str]) -> dict[str, str]:
-    """The fingers below the wrists of a map."""
+    """Find the fingers below the wrists of a map."""
     wrists = {part.partition("_")[0]: bones.names.index(b) for b, part in parts.items() if part.endswith("_wrist")}
     return find_fingers(bones.names, bones.parents, bones.heads, wrists)
 
 
 def _rigify(bones: RestBones) -> dict[str, str] | None:
-    """Rigify's names, which number trunk, neck and head alike; None for other rigs."""
+    """Map Rigify's bones, whose trunk, neck and head are numbered consecutively; None for other rigs."""
     names = set(bones.names)
     if {"torso", "thigh_fk.L", "spine_fk.002"} <= names:
         found = {"torso": "pelvis", "spine_fk.002": "spine1", "spine_fk.003": "spine3"}
@@ -93,19 +94,38 @@ def _rigify(bones: RestBones) -> dict[str, str] | None:
         for finger in FINGERS:
             bone = finger if finger == "thumb" else f"f_{finger}"
             found |= {f"{bone}.{k:02d}.{letter}": f"{side}_{finger}{k}" for k in (1, 2, 3)}
-    prefix = "" if "thigh.L" in names or suffix else "DEF-"  # the metarig's names, or those of bones for a game alone
+    prefix = "" if "thigh.L" in names or suffix else "DEF-"  # the metarig, or an export of the deform bones alone
     return {prefix + bone: part for bone, part in found.items() if prefix + bone in names}
 
 
 def by_name(bones: RestBones) -> dict[str, str]:
-    """Bones whose names say what they are; of several candidates the one nearest to the root."""
+    """Map the bones whose names are known; of several candidates for a part, the one nearest to the root.
+
+    :return: bone name -> body part.
+    """
     cores = [tokens(name) for name in bones.names]
     depth = _depths(bones.parents)
     order = sorted(range(len(cores)), key=lambda i: (depth[i], bones.names[i]))
+    found = _limbs_by_name(bones, cores, order)
+    found |= _centre_by_name(bones, cores, order)
+    thighs = [bones.names.index(b) for b, part in found.items() if part.endswith("_hip")]
+    if "pelvis" not in found.values() and len(thighs) == 2:  # the nearest common ancestor of both legs
+        shared = [i for i in _ancestors(bones.parents, thighs[0]) if i in _ancestors(bones.parents, thighs[1])]
+        if shared:
+            found[bones.names[shared[0]]] = "pelvis"
+    return found
+
+
+def _limbs_by_name(bones: RestBones, cores: list[tuple[str, str]], order: list[int]) -> dict[str, str]:
+    """Map arms and legs.
+
+    :param cores: the ``tokens`` of every bone.
+    :param order: the bones, nearest to the root first.
+    """
     found: dict[str, str] = {}
     for side in ("left", "right"):
         sided = {i for i in order if cores[i][1] == side}
-        # "hip, knee, ..., collar, shoulder" as SMPL says it: there a shoulder is the upper arm.
+        # In SMPL's naming (hip, knee, ..., collar, shoulder) a shoulder is the upper arm.
         with_collar = any(cores[i][0] in ("clavicle", "collar") for i in sided)
         for part, words in _LIMBS.items():
             if part == "collar" and with_collar:
@@ -115,6 +135,12 @@ def by_name(bones: RestBones) -> dict[str, str]:
                 if first is not None and bones.names[first] not in found:
                     found[bones.names[first]] = f"{side}_{part}"
                     break
+    return found
+
+
+def _centre_by_name(bones: RestBones, cores: list[tuple[str, str]], order: list[int]) -> dict[str, str]:
+    """Map pelvis, spine, neck and head; parameters as in ``_limbs_by_name``."""
+    found: dict[str, str] = {}
     for part, words in _CENTRE.items():
         candidates = [i for i in order if not cores[i][1] and cores[i][0] in words]
         if part == "spine":
@@ -123,21 +149,19 @@ def by_name(bones: RestBones) -> dict[str, str]:
             found |= {bones.names[i]: "neck" for i in candidates}
         elif candidates:
             found[bones.names[candidates[0]]] = part
-    thighs = [bones.names.index(b) for b, part in found.items() if part.endswith("_hip")]
-    if "pelvis" not in found.values() and len(thighs) == 2:  # the bone from which both legs hang
-        shared = [i for i in _ancestors(bones.parents, thighs[0]) if i in _ancestors(bones.parents, thighs[1])]
-        if shared:
-            found[bones.names[shared[0]]] = "pelvis"
     return found
 
 
 def by_geometry(bones: RestBones) -> dict[str, str]:
-    """Legs are the chains to the lowest ends on either side, arms those to the widest, the head is the highest end."""
+    """Map bones by their positions: legs end lowest on either side, arms extend farthest, the head is highest.
+
+    :return: bone name -> body part; empty if no pair of legs is found.
+    """
     heads, parents = bones.heads, bones.parents
     leaves = [i for i in range(len(parents)) if i not in set(parents.tolist())]
     height = max(float(np.ptp(heads[:, 2])), 1e-9)
     z = (heads[:, 2] - heads[:, 2].min()) / height
-    axis = int(np.argmax(np.ptp(heads[:, :2], axis=0)))  # arms make a person wider than deep
+    axis = int(np.argmax(np.ptp(heads[:, :2], axis=0)))  # the arms extend along the wider axis
     across = heads[:, axis] - np.median(heads[:, axis])
     across = across if axis == 0 else -across
     found: dict[str, str] = {}
@@ -178,11 +202,11 @@ def by_geometry(bones: RestBones) -> dict[str, str]:
 
 
 def _spread(count: int) -> list[str]:
-    """Parts of the spine for so many bones: the last one always carries the chest."""
+    """Return the parts of the spine for ``count`` bones; the last is always the chest."""
     return [f"spine{int(np.ceil(3 * (k + 1) / count))}" for k in range(count)]
 
 
-def _ancestors(parents: np.ndarray, i: int) -> list[int]:
+def _ancestors(parents: NDArray[np.intp], i: int) -> list[int]:
     found = []
     while parents[i] >= 0:
         i = int(parents[i])
@@ -190,9 +214,9 @@ def _ancestors(parents: np.ndarray, i: int) -> list[int]:
     return found
 
 
-def _chain(parents: np.ndarray, i: int) -> list[int]:
+def _chain(parents: NDArray[np.intp], i: int) -> list[int]:
     return [*reversed(_ancestors(parents, i)), i]
 
 
-def _depths(parents: np.ndarray) -> list[int]:
+def _depths(parents: NDArray[np.intp]) -> list[int]:
     return [len(_ancestors(parents, i)) for i in range(len(parents))]

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Motion in, Blender data out. bpy lives here; OpenCV and onnxruntime never do."""
+"""Converting motions to Blender data. Uses bpy, but neither OpenCV nor onnxruntime."""

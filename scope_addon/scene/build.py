@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Motions to a Blender scene: one collection per capture with an armature and a mesh per person, and the camera."""
+"""Building a Blender scene from motions: a collection with a camera, and an armature and a mesh for each person."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from pathlib import Path
 
 import bpy
 import numpy as np
+from numpy.typing import NDArray
 
 from ...solver.body import Body
 from ..errors import MotionFileError, UsageError
@@ -19,28 +20,31 @@ from .animation_data.transaction import all_or_nothing
 from .character import animation, armature, body_mesh, bone_display, confidence_curves, shape_keys
 from .character.keys import bake_whole_frames
 
-CAPTURE_TAG = "scope_capture"  # custom property of a capture's collection; exporters find captures by it
+CAPTURE_TAG = "scope_capture"  # custom property that marks a capture's collection, for exporters
 Progress = Callable[[float, str], None]
 
 
 @dataclass(frozen=True)
 class BuildOptions:
-    """What building may change in the scene, and how the shape is stored."""
+    """Options of ``build_scene``."""
 
     name: str = ""  # of the capture; empty: the footage's or the motion's source name
-    # "keep" the scene's rate, keys where the pictures were; "resample": keep it, a key on every whole frame;
-    # "set" it to the motion's.
+    # "keep": the scene's rate, with keys at the times of the pictures. "resample": the scene's rate, with a key on
+    # every whole frame. "set": the motion's rate.
     frame_rate: str = "keep"
-    resolution: str = "keep"  # "keep" the scene's, or "set" the footage's size and pixel aspect
+    resolution: str = "keep"  # "keep": the scene's. "set": the footage's size and pixel aspect
     set_frame_range: bool = True
-    active_camera: bool = False  # make the capture's camera the scene's
+    active_camera: bool = False  # make the capture's camera the scene's active camera
     start_frame: float = 0.0  # the scene frame of timestamp 0
-    shape: str = "keyed"  # "keyed" once, "per_frame", or "baked" into the mesh
+    shape: str = "keyed"  # "keyed": one key. "per_frame": a key per pose. "baked": into the mesh
     with_camera: bool = True
-    with_markers: bool = True  # on the timeline, where the motion deserves a look
+    with_markers: bool = True  # at the review spans, on the timeline
 
     def __post_init__(self) -> None:
-        """Refuse values that are not offered."""
+        """Check the values.
+
+        :raises UsageError: when a value is unknown.
+        """
         choices = {"frame_rate": timing.RATE_POLICIES, "resolution": timing.POLICIES, "shape": shape_keys.MODES}
         for option, valid in choices.items():
             if getattr(self, option) not in valid:
@@ -58,16 +62,16 @@ class Person:
     mesh: bpy.types.Object
     camera: bpy.types.Object | None
     motion: Motion = field(repr=False)
-    frames: np.ndarray = field(repr=False)  # (T,) scene frame of each pose
+    frames: NDArray[np.float64] = field(repr=False)  # (T,) scene frame of each pose
 
 
 @dataclass
 class BuildResult:
-    """What ``build_scene`` made."""
+    """The result of ``build_scene``."""
 
     collection: bpy.types.Collection
     people: list[Person]
-    frame_rate: float  # of the scene, frames a second
+    frame_rate: float  # of the scene, frames per second
     frame_range: tuple[float, float]  # first and last key
     warnings: list[str] = field(default_factory=list)
 
@@ -81,13 +85,15 @@ def build_scene(
 ) -> BuildResult:
     """Build the motions of one capture in the active scene.
 
-    The scene's frame rate and resolution are only changed when the options say so. When anything fails, or
-    ``progress`` raises ``CancelledError``, the scene is left as it was.
+    The options determine whether the scene's frame rate and resolution change. When anything fails, or ``progress``
+    raises ``CancelledError``, the scene is left as it was.
 
-    :param body: the body the motions were fitted with; its joints and coefficients must be the motions'.
-    :param footage: video or picture to show behind the scene, through the camera.
-    :param progress: called with a fraction 0..1 and what is being done; may raise to stop.
-    :raises MotionFileError: a motion does not belong to the body. :raises VideoError: the footage is missing.
+    :param body: the body that the motions were fitted with; it must have their joints and shape coefficients.
+    :param footage: video or picture to show as the camera's background.
+    :param progress: called with a fraction 0..1 and the current step; may raise to stop.
+    :raises UsageError: when there are no motions.
+    :raises MotionFileError: when a motion does not belong to the body.
+    :raises VideoError: when the footage is missing.
     """
     options = options or BuildOptions()
     report = progress or (lambda fraction, message: None)
@@ -115,7 +121,7 @@ def _build(
     rate = timing.scene_rate(scene)
     collection = bpy.data.collections.new(name)
     collection[CAPTURE_TAG] = motions[0].source or name
-    camera.remember_resolution(collection, motions[0])
+    camera.store_resolution(collection, motions[0])
     scene.collection.children.link(collection)
     people: list[Person] = []
     for index, motion in enumerate(motions):
@@ -124,15 +130,15 @@ def _build(
         people.append(_build_person(label, motion, body, collection, rate, options))
     if options.with_markers:
         for index, person in enumerate(people):
-            whose = "" if len(people) == 1 else f"person {index + 1} "
-            confidence_curves.mark_low_confidence(scene, whose, person.motion, person.frames)
+            prefix = "" if len(people) == 1 else f"person {index + 1} "
+            confidence_curves.add_review_markers(scene, prefix, person.motion, person.frames)
     if options.with_camera:
         warnings += _build_cameras(name, people, collection, footage, options)
     unit = scene.unit_settings.scale_length
     if abs(unit - 1.0) > 1e-6:
         warnings.append(
-            f"the scene takes {unit:g} m for its unit, and the capture one for a metre: scale what was built by "
-            f"{1 / unit:g}, or set Unit Scale to 1 in the scene's properties; exported files have the true size"
+            f"the scene's unit is {unit:g} m, but the capture is in metres: scale the new objects by {1 / unit:g}, or "
+            "set Unit Scale to 1 in the scene's properties; exported files have the true size"
         )
     if options.resolution == "set":
         camera.set_resolution(scene, collection)
@@ -160,12 +166,12 @@ def _build_person(
     shaped = vertices if baked else body_mesh.rest_vertices_world(body, rest.lift, motion.betas)
     bone_display.show_bones(rig, body, rest, shaped)
     action = bpy.data.actions.new(label)
-    action.use_fake_user = True  # stays when the armature goes on to another action or to NLA strips
+    action.use_fake_user = True  # kept in the file when the armature gets another action or NLA strips
     channels = animation.animate_armature(rig, action, body, motion, rest, frames)
     confidence_curves.key_measurements(rig, channels, body, motion, frames)
     if options.frame_rate == "resample":
         bake_whole_frames(rig, body, rate)
-        rig["scope_resampled"] = True  # smoothing again keeps to it
+        rig["scope_resampled"] = True  # smoothing again resamples too
     if not baked and body.P:
         shape_keys.add_shape_keys(mesh, body, motion.betas)
         shape_keys.key_shape(mesh, action, motion.betas, frames, per_frame=options.shape == "per_frame")
@@ -185,7 +191,7 @@ def _build_cameras(
     footage: str | Path | None,
     options: BuildOptions,
 ) -> list[str]:
-    """Give every person the camera that saw them; people of one picture share one. Returns warnings."""
+    """Create the camera of every person, shared by people in the same clip; return warnings."""
     warnings: list[str] = []
     for index, person in enumerate(people):
         shared = next((p.camera for p in people[:index] if camera.same_camera(p.motion, person.motion)), None)
@@ -195,7 +201,7 @@ def _build_cameras(
         person.camera = camera.build_camera(f"{name}_camera", person.motion, collection, person.frames)
         if camera.pixel_aspect(person.motion) != (1.0, 1.0) and options.resolution == "keep":
             warnings.append(
-                "the footage's pixels are not square, which Blender keeps with the scene, not the camera: "
+                "the footage's pixels are not square, and the pixel aspect belongs to the scene, not the camera: "
                 "set the scene's resolution from the footage, as Compare with Footage does, for an exact overlay"
             )
         if footage is not None:
@@ -204,7 +210,7 @@ def _build_cameras(
 
 
 def _select(people: list[Person]) -> None:
-    """Leave the new armatures selected, the first one active, as Blender's importers do."""
+    """Select the new armatures and activate the first one, as Blender's importers do."""
     view_layer = bpy.context.view_layer
     for obj in view_layer.objects:
         obj.select_set(False, view_layer=view_layer)
@@ -214,7 +220,10 @@ def _select(people: list[Person]) -> None:
 
 
 def _check(motion: Motion, body: Body) -> None:
-    """The motion was made with a body of these joints and coefficients, and holds numbers."""
+    """Check that a motion has the body's joints and shape coefficients, and finite numbers.
+
+    :raises MotionFileError: when it has not.
+    """
     if motion.joint_count != body.K + 1 or motion.betas.size != body.P:
         raise MotionFileError(
             f"the motion has {motion.joint_count} joints and {motion.betas.size} shape coefficients (body "

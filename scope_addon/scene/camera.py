@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A Blender camera that sees what the footage's camera saw, with the footage behind the scene.
+"""A Blender camera with the view of the footage's camera, and the footage in the background.
 
 OpenCV's pinhole ``u = fx x/z + cx, v = fy y/z + cy`` in a W × H picture is, with the horizontal sensor fit,
 
@@ -7,9 +7,9 @@ OpenCV's pinhole ``u = fx x/z + cx, v = fy y/z + cy`` in a W × H picture is, wi
     pixel_aspect_x / pixel_aspect_y = fy / fx,     shift_y = (cy − H/2) / W · fx / fy.
 
 Pixel aspect and resolution belong to the scene in Blender; the camera alone is exact for square pixels. The footage has
-a display aspect of its own, without which it would not fill the scene's picture, and its lens, which counts rows in
-units of columns, a third one: fy / fx. Source: Blender's BKE_camera_params_compute_viewplane, overlay_image.cc and
-tracking.cc.
+a display aspect of its own, without which it would not fill the picture. The clip's lens has a third one, fy / fx,
+because it measures rows in units of columns. Source: Blender's BKE_camera_params_compute_viewplane, overlay_image.cc
+and tracking.cc.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from pathlib import Path
 
 import bpy
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import VideoError
 from ..footage import LAST_NUMBER, PICTURE_SUFFIXES, numbered_from
@@ -26,15 +27,15 @@ from .animation_data.actions import Channels
 from .axes import blender_brown_distortion, blender_camera_matrix
 from .character.animation import on_one_hemisphere, quaternion_from_matrix
 
-_IN_STEP = 0.6  # frames that footage may be off and counts as in step; half of one is rounding
-_LONG = 1_000_000  # frames, beyond which Blender would show the last one
-# Custom property of a capture's collection: columns, rows and pixel aspect of the footage.
+_MAX_OFFSET = 0.6  # frames; footage that deviates less counts as synchronized, because 0.5 is rounding
+_MAX_DURATION = 1_000_000  # frames; after this duration Blender would show the last frame
+# Custom property of a capture's collection: width, height and pixel aspect of the footage.
 _PICTURE = "scope_picture"
 SENSOR_WIDTH = 36.0  # millimetres; only its ratio to the focal length matters
 
 
 def pixel_aspect(motion: Motion) -> tuple[float, float]:
-    """The scene's ``pixel_aspect_x, pixel_aspect_y`` for these intrinsics; Blender wants both at least 1."""
+    """Return the scene's ``pixel_aspect_x, pixel_aspect_y`` for the intrinsics; Blender requires at least 1."""
     fx, fy = motion.intrinsics[0, 0], motion.intrinsics[1, 1]
     ratio = fy / fx
     if abs(ratio - 1.0) < 1e-6:
@@ -42,13 +43,13 @@ def pixel_aspect(motion: Motion) -> tuple[float, float]:
     return (float(ratio), 1.0) if ratio > 1 else (1.0, float(1 / ratio))
 
 
-def remember_resolution(collection: bpy.types.Collection, motion: Motion) -> None:
-    """Have a capture's collection tell the size and pixel aspect of the footage."""
+def store_resolution(collection: bpy.types.Collection, motion: Motion) -> None:
+    """Store the size and pixel aspect of the footage in a capture's collection."""
     collection[_PICTURE] = [*(float(n) for n in motion.image_size), *pixel_aspect(motion)]
 
 
 def set_resolution(scene: bpy.types.Scene, collection: bpy.types.Collection) -> None:
-    """Give the scene's picture the size and pixel aspect of the footage, where the capture's collection tells them."""
+    """Set the scene's resolution and pixel aspect to those of the footage, if the collection stores them."""
     if _PICTURE not in collection:
         return
     width, height, aspect_x, aspect_y = collection[_PICTURE]
@@ -58,9 +59,9 @@ def set_resolution(scene: bpy.types.Scene, collection: bpy.types.Collection) -> 
 
 
 def build_camera(
-    name: str, motion: Motion, collection: bpy.types.Collection, frames: np.ndarray
+    name: str, motion: Motion, collection: bpy.types.Collection, frames: NDArray[np.float64]
 ) -> bpy.types.Object:
-    """A camera object with the motion's intrinsics, standing where the footage's camera stood.
+    """Create a camera object with the intrinsics and the pose of the footage's camera.
 
     :param frames: (T,) scene frame of each pose; a moving camera is keyed there.
     """
@@ -82,7 +83,7 @@ def build_camera(
 
 
 def set_lens(data: bpy.types.Camera, motion: Motion) -> None:
-    """Focal length, sensor and principal point of ``motion.intrinsics`` on a Blender camera."""
+    """Set focal length, sensor and principal point of a Blender camera from ``motion.intrinsics``."""
     width, height = (float(n) for n in motion.image_size)
     fx, fy, cx, cy = motion.intrinsics[[0, 1, 0, 1], [0, 1, 2, 2]]
     data.type = "PERSP"
@@ -97,7 +98,7 @@ def set_lens(data: bpy.types.Camera, motion: Motion) -> None:
 
 
 def same_camera(a: Motion, b: Motion) -> bool:
-    """Whether two motions were seen by one camera, as those of several people in one picture are."""
+    """Return whether two motions were captured with the same camera, as those of several people in one clip are."""
     return (
         np.array_equal(a.image_size, b.image_size)
         and np.allclose(a.intrinsics, b.intrinsics, rtol=0, atol=1e-6)
@@ -107,17 +108,19 @@ def same_camera(a: Motion, b: Motion) -> bool:
     )
 
 
-def show_footage(camera: bpy.types.Object, footage: str | Path, motion: Motion, frames: np.ndarray) -> list[str]:
-    """Put the footage behind the scene when one looks through the camera.
+def show_footage(
+    camera: bpy.types.Object, footage: str | Path, motion: Motion, frames: NDArray[np.float64]
+) -> list[str]:
+    """Show the footage as the camera's background.
 
-    Blender shows one frame of a clip per frame of the scene, so it agrees with the motion where the scene's rate is
-    the footage's and constant. Elsewhere the footage is shown as an image, whose frame can be keyed. Only a clip can
-    be undistorted: that of a distorting lens drifts there, and a picture of one is a clip too, seen in its own frame.
+    Blender shows one frame of a movie clip per frame of the scene, so a clip is synchronized only if the scene has the
+    constant rate of the footage. Otherwise, the footage is shown as an image, whose frame can be keyed. Only a clip can
+    be undistorted; therefore footage of a distorting lens is always a clip, even if it drifts or is a single picture.
 
-    :param footage: video or picture; of numbered pictures the first one.
+    :param footage: video or picture; the first one of numbered pictures.
     :param frames: (T,) scene frame of each pose.
-    :return: warnings: what will not line up.
-    :raises VideoError: the file is missing.
+    :return: warnings about what will not align.
+    :raises VideoError: when the file is missing.
     """
     path = Path(footage).resolve()
     if not path.is_file():
@@ -134,16 +137,17 @@ def show_footage(camera: bpy.types.Object, footage: str | Path, motion: Motion, 
         background.image.display_aspect = pixel_aspect(motion)
         size = tuple(background.image.size)
         if len(motion.frames) > 1:
-            warnings += _show_pictures_in_step(camera.data, background, path, motion, frames)
+            warnings += _show_picture_sequence(camera.data, background, path, motion, frames)
     else:
-        clip = bpy.data.movieclips.load(str(path))  # its own: another capture may begin elsewhere or have another lens
+        # Always a new clip, because another capture may have another start or lens.
+        clip = bpy.data.movieclips.load(str(path))
         clip.frame_start = round(frames[0] - motion.frames[0])
         drift = float(np.abs(frames - (clip.frame_start + motion.frames)).max())
         size = tuple(clip.size)
-        if drift > _IN_STEP and min(size) and not motion.dist.any():
+        if drift > _MAX_OFFSET and min(size) and not motion.dist.any():
             rate = clip.fps
             bpy.data.movieclips.remove(clip)
-            _show_in_step(camera.data, background, path, motion, frames, rate)
+            _show_synchronized(camera.data, background, path, motion, frames, rate)
         else:
             background.source = "MOVIE_CLIP"
             background.clip = clip
@@ -151,9 +155,9 @@ def show_footage(camera: bpy.types.Object, footage: str | Path, motion: Motion, 
             _set_lens_distortion(clip, background, motion)
             if drift > 1.0:
                 warnings.append(
-                    f"the picture behind the scene drifts from the motion by up to {drift:.0f} frames, because the "
-                    "scene does not play at the footage's constant frame rate and the lens distorts; the motion keeps "
-                    "its speed"
+                    f"the background picture drifts from the motion by up to {drift:.0f} frames, because the scene "
+                    "does not have the footage's constant frame rate and the lens distorts; the motion keeps its "
+                    "speed"
                 )
     if not min(size):
         warnings = [f"Blender cannot decode {path.name}, so the camera shows no footage"]
@@ -165,19 +169,19 @@ def show_footage(camera: bpy.types.Object, footage: str | Path, motion: Motion, 
     return warnings
 
 
-def _show_in_step(
+def _show_synchronized(
     camera: bpy.types.Camera,
     background: bpy.types.CameraBackgroundImage,
     footage: Path,
     motion: Motion,
-    frames: np.ndarray,
+    frames: NDArray[np.float64],
     rate: float,
 ) -> None:
-    """Show a video as an image whose frame is keyed, so that it keeps step with the motion at any frame rate.
+    """Show a video as an image whose frame is keyed, so that it is synchronized at any frame rate.
 
     At scene frame s Blender shows frame s − frame_start + frame_offset of an image, counted from 0.
 
-    :param rate: frames a second by which Blender numbers the video's frames.
+    :param rate: frames per second at which Blender counts the video's frames.
     """
     background.source = "IMAGE"
     background.image = image = bpy.data.images.load(str(footage), check_existing=True)
@@ -186,24 +190,27 @@ def _show_in_step(
     _key_footage(camera, background, scene_frames, np.round(np.interp(scene_frames, frames, motion.timestamps) * rate))
 
 
-def _show_pictures_in_step(
+def _show_picture_sequence(
     camera: bpy.types.Camera,
     background: bpy.types.CameraBackgroundImage,
     first: Path,
     motion: Motion,
-    frames: np.ndarray,
+    frames: NDArray[np.float64],
 ) -> list[str]:
-    """Go on from the first of numbered pictures to those of the other poses; returns warnings."""
+    """Show numbered pictures in step with the poses, from the first one on; return warnings."""
     found = [LAST_NUMBER.search(picture.stem) for picture in numbered_from(first)]
     numbers = np.array([int(match.group()) for match in found if match])
-    if len(numbers) == 0:  # a picture by itself
+    if len(numbers) == 0:  # a single picture
         return []
-    if len(numbers) <= motion.frames.max() or numbers[-1] >= _LONG:
-        return [f"Blender cannot count as the pictures from {first.name} on do, so the camera shows that one alone"]
+    if len(numbers) <= motion.frames.max() or numbers[-1] >= _MAX_DURATION:
+        return [
+            f"Blender cannot show the picture sequence from {first.name} on, because pictures are missing or their "
+            "numbers are too large, so the camera shows that picture only; renumber the files consecutively to show all"
+        ]
     background.image.source = "SEQUENCE"
     scene_frames = np.arange(np.floor(frames[0]), np.ceil(frames[-1]) + 1)
     poses = np.round(np.interp(scene_frames, frames, np.arange(len(frames)))).astype(int)
-    # Blender counts a video's frames from 0, but names pictures by the count from 1.
+    # Blender counts a video's frames from 0, but those of an image sequence from 1.
     _key_footage(camera, background, scene_frames, numbers[motion.frames[poses]] - 1)
     return []
 
@@ -211,12 +218,12 @@ def _show_pictures_in_step(
 def _key_footage(
     camera: bpy.types.Camera,
     background: bpy.types.CameraBackgroundImage,
-    scene_frames: np.ndarray,
-    shown: np.ndarray,
+    scene_frames: NDArray[np.float64],
+    shown: NDArray[np.float64],
 ) -> None:
-    """Have the image behind the scene show these of its frames, counted from 0, at these frames of the scene."""
+    """Key the background image to show the frames ``shown`` (counted from 0) at ``scene_frames``, both (N,)."""
     user = background.image_user
-    user.frame_start, user.frame_duration = int(scene_frames[0]), _LONG
+    user.frame_start, user.frame_duration = int(scene_frames[0]), _MAX_DURATION
     user.use_auto_refresh, user.use_cyclic = True, False
     offsets = shown - (scene_frames - scene_frames[0])
     changes = np.flatnonzero(np.diff(offsets, prepend=np.inf))
@@ -228,9 +235,9 @@ def _key_footage(
 def _set_lens_distortion(
     clip: bpy.types.MovieClip, background: bpy.types.CameraBackgroundImage, motion: Motion
 ) -> None:
-    """Tell the clip its lens, and show it undistorted when the lens distorts: Blender's cameras are pinholes.
+    """Set the clip's lens, and show it undistorted when the lens distorts: Blender's cameras are pinholes.
 
-    :param motion: its ``dist`` is OpenCV's, for which ``blender_brown_distortion`` has Blender's names.
+    :param motion: with OpenCV's distortion in ``dist``.
     """
     width, height = (float(n) for n in motion.image_size)
     lens = clip.tracking.camera
@@ -238,7 +245,7 @@ def _set_lens_distortion(
     lens.units = "MILLIMETERS"
     lens.focal_length = SENSOR_WIDTH * motion.intrinsics[0, 0] / width
     lens.pixel_aspect = motion.intrinsics[1, 1] / motion.intrinsics[0, 0]
-    # Blender counts the principal point's v from the bottom.
+    # Blender measures the principal point's v from the bottom.
     lens.principal_point_pixels = motion.intrinsics[0, 2], height - motion.intrinsics[1, 2]
     lens.distortion_model = "BROWN"
     k1, k2, k3, p1, p2 = blender_brown_distortion(motion.dist)

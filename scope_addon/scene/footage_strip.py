@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The footage in the video sequencer: picture and sound, in time with the motion."""
+"""The footage in the video sequencer: picture and sound, synchronized with the motion."""
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import bpy
 
@@ -12,16 +13,16 @@ from ..footage import PICTURE_SUFFIXES
 
 
 def add_footage_strips(scene: bpy.types.Scene, footage: str | Path, start_frame: float) -> list[bpy.types.Strip]:
-    """Put the footage on free channels above what is there; returns the new strips.
+    """Add the footage on free channels above existing strips; return the new strips.
 
-    A scene that had no strips goes on rendering its camera: without that, rendering would give the footage alone.
+    A scene without strips continues to render its camera; otherwise, the render would show the footage alone.
 
     :param start_frame: scene frame of timestamp 0.
-    :raises VideoError: the file is missing, or Blender cannot read it.
+    :raises VideoError: when the file is missing, or Blender cannot read it.
     """
     path = Path(footage)
     if not path.is_file():
-        raise VideoError(f"the footage {path} does not exist; choose the video or picture again and capture it anew")
+        raise VideoError(f"the footage {path} does not exist; choose the video or picture again and repeat the capture")
     editor = scene.sequence_editor or scene.sequence_editor_create()
     strips = strips_of(editor)
     if not len(strips):
@@ -36,7 +37,7 @@ def add_footage_strips(scene: bpy.types.Scene, footage: str | Path, start_frame:
             sound = _sound(strips, path, channel, start)
             added += [sound] if sound else []
             added.append(strips.new_movie(path.stem, str(path), channel + len(added), start))
-        if not added[-1].elements[0].orig_width:  # how Blender tells of what it cannot open
+        if not added[-1].elements[0].orig_width:  # Blender's only sign that it cannot open the file
             raise RuntimeError
     except RuntimeError as error:
         for strip in added:
@@ -45,13 +46,13 @@ def add_footage_strips(scene: bpy.types.Scene, footage: str | Path, start_frame:
     return added
 
 
-def strips_of(editor: bpy.types.SequenceEditor):  # type: ignore[no-untyped-def]
-    """The editor's own strips; the name changed after 4.3 and the old one went with 5.0."""
+def strips_of(editor: bpy.types.SequenceEditor) -> Any:
+    """Return the editor's top-level strips; the attribute was renamed after 4.3, and the old one removed in 5.0."""
     return editor.strips if hasattr(editor, "strips") else editor.sequences
 
 
-def _sound(strips, path: Path, channel: int, start: int) -> bpy.types.Strip | None:  # type: ignore[no-untyped-def]
-    """The sound's strip; None for silent footage, which Blender tells by a failure or by a strip without length."""
+def _sound(strips: Any, path: Path, channel: int, start: int) -> bpy.types.Strip | None:
+    """Add the sound; return None for silent footage, for which Blender fails or adds a strip without length."""
     try:
         strip = strips.new_sound(path.stem, str(path), channel, start)
     except RuntimeError:

@@ -1,17 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hide a captured person while a rig moves in their place, and show them again."""
+"""Hiding a captured person while a retargeted rig replaces them, and showing them again."""
 
 from __future__ import annotations
 
 import bpy
 
-# Custom property of what was hidden here, so that what the user hides stays hidden; its value says what is to come.
+# Custom property of objects hidden here, so that those hidden by the user stay hidden. Its value says whether the
+# object stays hidden or is only shown temporarily.
 _HIDDEN = "scope_hidden"
 _STAYS, _COMES_BACK = 1, 2
 
 
 def hide(armature: bpy.types.Object, view_layer: bpy.types.ViewLayer) -> None:
-    """Hide a captured armature and its body, in viewports and in renders."""
+    """Hide a captured armature and its body in viewports and renders."""
     for obj in _person(armature, view_layer):
         if not obj.hide_get(view_layer=view_layer) or not obj.hide_render:
             obj[_HIDDEN] = _STAYS
@@ -19,12 +20,15 @@ def hide(armature: bpy.types.Object, view_layer: bpy.types.ViewLayer) -> None:
         obj.hide_render = True
 
 
-def show(armature: bpy.types.Object, view_layer: bpy.types.ViewLayer, *, for_now: bool = False) -> None:
-    """Show what ``hide`` has hidden; ``for_now``: until ``hide_again``."""
+def show(armature: bpy.types.Object, view_layer: bpy.types.ViewLayer, *, temporarily: bool = False) -> None:
+    """Show what ``hide`` has hidden.
+
+    :param temporarily: until ``hide_again``.
+    """
     for obj in _person(armature, view_layer):
         if _HIDDEN not in obj:
             continue
-        if not for_now:
+        if not temporarily:
             del obj[_HIDDEN]
         elif obj.hide_get(view_layer=view_layer):
             obj[_HIDDEN] = _COMES_BACK
@@ -33,7 +37,7 @@ def show(armature: bpy.types.Object, view_layer: bpy.types.ViewLayer, *, for_now
 
 
 def hide_again(armature: bpy.types.Object, view_layer: bpy.types.ViewLayer) -> None:
-    """Hide what was shown for now."""
+    """Hide what was shown temporarily."""
     if armature.get(_HIDDEN) == _COMES_BACK:
         hide(armature, view_layer)
         for obj in _person(armature, view_layer):
@@ -41,6 +45,6 @@ def hide_again(armature: bpy.types.Object, view_layer: bpy.types.ViewLayer) -> N
 
 
 def _person(armature: bpy.types.Object, view_layer: bpy.types.ViewLayer) -> list[bpy.types.Object]:
-    """Armature and body, but for what the view layer leaves out: that is not seen, nor can it be hidden."""
+    """Return armature and body, without objects outside the view layer, which cannot be hidden."""
     person = [armature, *(obj for obj in armature.children if obj.type == "MESH")]
     return [obj for obj in person if obj.name in view_layer.objects]

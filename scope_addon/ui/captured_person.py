@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The captured person that the user means, and what the armature remembers of the capture."""
+"""The active captured person, and the data of the capture that is stored with its armature."""
 
 from __future__ import annotations
 
@@ -10,16 +10,17 @@ import bpy
 
 if TYPE_CHECKING:
     import numpy as np
+    from numpy.typing import NDArray
 
     from ...solver.body import Body
     from ..motion import Motion
 
 
-PERSON = "scope_person"  # custom property of a rig: the name of the captured armature that it moves as
+PERSON = "scope_person"  # custom property of a rig: the name of the captured armature that it was retargeted from
 
 
 def captured_armature(context: bpy.types.Context) -> bpy.types.Object | None:
-    """The armature that is meant: the active object's, else the only one of the last capture or of the whole scene."""
+    """Return the captured armature of the active object, or else the only one of the last capture or of the scene."""
     obj = context.view_layer.objects.active if context.view_layer else None
     while obj is not None:
         if "scope_source" in obj:
@@ -38,25 +39,25 @@ def captured_armature(context: bpy.types.Context) -> bpy.types.Object | None:
 
 
 def captured_people(context: bpy.types.Context) -> list[bpy.types.Object]:
-    """The captured armatures of the scene."""
+    """Return the captured armatures of the scene."""
     return [obj for obj in context.scene.objects if obj.type == "ARMATURE" and "scope_source" in obj]
 
 
-def anybody_captured(context: bpy.types.Context) -> bool:
-    """Whether a captured person is meant, or could be selected."""
+def has_captured_person(context: bpy.types.Context) -> bool:
+    """Return whether the scene contains a captured person, or one is active."""
     return captured_armature(context) is not None or bool(captured_people(context))
 
 
-def draw_meant(layout: bpy.types.UILayout, context: bpy.types.Context) -> bpy.types.Object | None:
-    """Draw which captured armature is meant, or that one has to be selected; returns it."""
+def draw_active_person(layout: bpy.types.UILayout, context: bpy.types.Context) -> bpy.types.Object | None:
+    """Draw the name of the active captured armature, or a request to select one; return the armature."""
     armature = captured_armature(context)
-    text = armature.name if armature else "Select a captured person"
+    text = armature.name if armature else "Select a Captured Person"
     layout.label(text=text, icon="OUTLINER_OB_ARMATURE" if armature else "INFO")
     return armature
 
 
 def library_of(armature: bpy.types.Object) -> bpy.types.Library | None:
-    """The file that the armature or its action is linked from, overridden or not; None: both are this file's own."""
+    """Return the library that the armature or its action is linked from, overridden or not; None if both are local."""
     blocks = [armature, armature.animation_data.action if armature.animation_data else None]
     for block in filter(None, blocks):
         original = block.override_library.reference if block.override_library else block
@@ -66,30 +67,40 @@ def library_of(armature: bpy.types.Object) -> bpy.types.Library | None:
 
 
 def body_of(armature: bpy.types.Object) -> Body:
-    """The body that the person was captured with. :raises ModelFileError: its file has gone."""
+    """Return the body that the person was captured with.
+
+    :raises ModelFileError: the body's file no longer exists or cannot be read.
+    """
     from ...solver.loaders.body_file import load_body
 
     return load_body(armature.get("scope_body_file") or armature["scope_body"])
 
 
-def betas_of(armature: bpy.types.Object, body: Body) -> np.ndarray:
-    """(P,) the person's shape. :raises UsageError: the armature does not say it."""
+def betas_of(armature: bpy.types.Object, body: Body) -> NDArray[np.float64]:
+    """Return the person's shape coefficients, (P,).
+
+    :raises UsageError: the armature does not store them.
+    """
     import numpy as np
 
     from ..errors import UsageError
 
     betas = np.array(list(armature.get("scope_betas", ())), float)
     if betas.shape != (body.P,):
-        raise UsageError(f"'{armature.name}' does not say its body's shape; capture again")
+        raise UsageError(f"'{armature.name}' lacks its body's shape coefficients; capture again")
     return betas
 
 
 def cached_motion(armature: bpy.types.Object) -> Motion:
-    """The motion as it was solved. :raises UsageError: it is no longer in the cache."""
+    """Return the captured motion, before any editing.
+
+    :raises UsageError: it is no longer in the cache.
+    :raises MotionFileError: its file is damaged.
+    """
     from ..errors import UsageError
     from ..motion import Motion
 
     path = armature.get("scope_motion", "")
     if not path or not Path(path).is_file():
-        raise UsageError("the motion as it was solved is no longer in the cache; capture the footage again")
+        raise UsageError("the captured motion is no longer in the cache; capture the footage again")
     return Motion.load(path)

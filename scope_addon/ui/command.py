@@ -11,25 +11,25 @@ _handle: object | None = None
 
 
 def run(argv: list[str]) -> int:
-    """Called by Blender with the arguments after ``scope``; returns the exit status."""
+    """Run the command line with the arguments after ``scope``; return the exit status. Blender calls this."""
     from .preferences import cache
 
-    # Not the worker's folder: compiled code remembers the package's name, which differs.
+    # Not the worker's folder: compiled code contains the package's name, which differs.
     os.environ.setdefault("NUMBA_CACHE_DIR", str(cache().root / "kernels" / "command"))
     from ..cli import main
 
-    # A batch starts one process per clip, each a Blender, because exports need one.
+    # A batch starts one Blender process per clip, because exports need Blender.
     return main(argv, program=(bpy.app.binary_path, "--background", "--command", "scope"))
 
 
 def register() -> None:
-    """Add the command."""
+    """Register the command."""
     global _handle
     _handle = bpy.utils.register_cli_command("scope", run)
 
 
 def unregister() -> None:
-    """Take it away."""
+    """Unregister the command."""
     global _handle
     if _handle is not None:
         bpy.utils.unregister_cli_command(_handle)

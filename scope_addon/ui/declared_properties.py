@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Blender's properties of the declared options, and the options' values from these properties."""
+"""Make Blender properties from the declared options, and read the options' values from them."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, St
 
 from ..options import Choice, Option, Place, options_at
 
-_FIXED: set[str] = set()  # not animatable: a keyframe on a setting would only confuse
-# Since 4.5, a property says whether its path may begin with "//", the folder of the .blend.
+_NOT_ANIMATABLE: set[str] = set()  # the options of a property without ANIMATABLE
+# Since 4.5, properties declare whether their path may begin with "//", the folder of the .blend file.
 PATH_OPTIONS = {"PATH_SUPPORTS_BLEND_RELATIVE"} if bpy.app.version >= (4, 5, 0) else set()
 _Class = TypeVar("_Class", bound=type)
 
 
 def with_options(place: Place) -> Callable[[_Class], _Class]:
-    """Decorate a class of properties: it gets one property for each option of ``place``."""
+    """Return a class decorator that adds one property for each option of ``place``."""
 
     def add(cls: _Class) -> _Class:
         for option in options_at(place):
@@ -30,12 +30,15 @@ def with_options(place: Place) -> Callable[[_Class], _Class]:
 
 
 def property_name(option: Option) -> str:
-    """Name of the property in Blender, which a .blend stores."""
+    """Return the name of the property in Blender, which .blend files store."""
     return option.blender.name or option.name
 
 
 def blender_property(option: Option, place_keywords: dict[str, Any]) -> Any:
-    """Make the property of an option; ``place_keywords`` are those of all properties of the same place."""
+    """Make the property of an option.
+
+    :param place_keywords: arguments of all properties of the same place.
+    """
     declared = option.blender
     keywords: dict[str, Any] = {
         "name": declared.label or property_name(option).replace("_", " ").title(),
@@ -60,12 +63,12 @@ def blender_property(option: Option, place_keywords: dict[str, Any]) -> Any:
 
 
 def choices_of(option: Option) -> tuple[Choice, ...]:
-    """What the property offers; empty if it is no enumeration."""
+    """Return the choices of the property; empty if it is not an enumeration."""
     return option.blender.choices or option.choices
 
 
 def limits_of(option: Option) -> tuple[float | None, float | None]:
-    """Lowest and highest value of the property, in its own unit."""
+    """Return the minimum and maximum of the property, in its own unit."""
     declared, same_unit = option.blender, not option.blender.unit
     low = option.minimum if declared.minimum is None and same_unit else declared.minimum
     high = option.maximum if declared.maximum is None and same_unit else declared.maximum
@@ -73,9 +76,9 @@ def limits_of(option: Option) -> tuple[float | None, float | None]:
 
 
 def option_values(settings: Any, place: Place) -> dict[str, Any]:
-    """Return the values of the worker's options that have their properties at ``place``.
+    """Return the values of the worker's options whose properties are at ``place``.
 
-    :param settings: what has these properties; None: the defaults.
+    :param settings: object with these properties; None gives the defaults.
     """
     options = options_at(place | Place.WORKER)
     if settings is None:
@@ -95,4 +98,4 @@ def _value(option: Option, settings: Any) -> Any:
 
 
 def _keywords(place: Place) -> dict[str, Any]:
-    return {"options": _FIXED} if place is Place.PANEL else {}
+    return {"options": _NOT_ANIMATABLE} if place is Place.PANEL else {}

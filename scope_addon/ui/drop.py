@@ -9,7 +9,7 @@ from ..footage import FOOTAGE_SUFFIXES
 
 
 class SCOPE_FH_footage(bpy.types.FileHandler):
-    """Videos and pictures become the scene's footage."""
+    """Make a dropped video or picture the scene's footage."""
 
     bl_idname = "SCOPE_FH_footage"
     bl_label = "Capture with Scope"
@@ -18,7 +18,7 @@ class SCOPE_FH_footage(bpy.types.FileHandler):
 
     @classmethod
     def poll_drop(cls, context: bpy.types.Context) -> bool:
-        """Over a 3D viewport, where the panel is."""
+        """Accept files over a 3D viewport, where the panel is."""
         return bool(context.area) and context.area.type == "VIEW_3D"
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Writing captures to files, from the panel and from File > Export."""
+"""The operator that exports captures."""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, StringProperty
 
 from .captured_person import cached_motion
-from .reporting import TellingOperator
+from .reporting import ReportingOperator
 
 FORMATS = (
     ("FBX", "FBX", "For Unreal Engine, Unity, Maya and MotionBuilder: armature, mesh and animation", 0),
     ("GLB", "glTF", "For the web, Godot and other engines: one .glb file with everything", 1),
-    ("BVH", "BVH", "The skeleton's motion alone, one file per person", 2),
+    ("BVH", "BVH", "Only the motion of the skeleton, one file per person", 2),
     ("USDC", "USD", "For Omniverse, Houdini and other studio tools", 3),
-    ("NPZ", "NPZ", "For research: SMPL-style arrays of what was captured, before any editing; one file per person", 4),
+    ("NPZ", "NPZ", "For research: SMPL-style arrays of the captured motion before any editing, one file per person", 4),
 )
 _SUFFIX = {"FBX": ".fbx", "GLB": ".glb", "BVH": ".bvh", "USDC": ".usdc", "NPZ": ".npz"}
 
 
-class SCOPE_OT_export(TellingOperator):
+class SCOPE_OT_export(ReportingOperator):
     """Write captures to a file"""
 
     bl_idname = "scope.export"
@@ -39,41 +39,39 @@ class SCOPE_OT_export(TellingOperator):
         items=(
             ("ALL", "All in the Scene", "Every capture of the scene, with all its people", 0),
             ("ACTIVE", "Active", "The capture that the active object belongs to", 1),
-            ("RIG", "My Rig", "The rig chosen under Retarget as it moves now, with its meshes", 2),
+            ("RIG", "My Rig", "The rig chosen under Retarget, with its current animation and its meshes", 2),
         ),
         default="ALL",
-        description="What to write",
+        description="What to export",
     )
     shape: EnumProperty(
         name="Shape",
         items=(
-            ("AUTO", "Automatic", "Shape keys; in the mesh where the format's readers limit shape keys", 0),
-            ("KEYS", "Shape Keys", "As morph targets whose value is the shape coefficient", 1),
+            ("AUTO", "Automatic", "Shape keys, or in the mesh for formats whose readers limit shape keys", 0),
+            ("KEYS", "Shape Keys", "Morph targets whose values are the shape coefficients", 1),
             ("BAKED", "In the Mesh", "For engines that limit morph targets to 0..1", 2),
         ),
         default="AUTO",
-        description="How the body's shape is written",
+        description="How the body's shape is exported",
     )
-    camera: BoolProperty(name="Camera", default=False, description="Write the footage's camera too")
-    separate: BoolProperty(
-        name="File per Person", default=False, description="Write a file for each of several people instead of one"
-    )
+    camera: BoolProperty(name="Camera", default=False, description="Export the estimated camera")
+    separate: BoolProperty(name="File per Person", default=False, description="Write a separate file for each person")
 
     @classmethod
     def description(cls, context: bpy.types.Context, properties: bpy.types.OperatorProperties) -> str:
-        """The tooltip of each button."""
+        """Return the tooltip of the button for the format."""
         return next(text for key, _, text, _ in FORMATS if key == properties.format)
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """The scene holds a capture."""
+        """Require a capture in the scene."""
         if not any("scope_capture" in c for c in context.scene.collection.children_recursive):
-            cls.poll_message_set("The scene holds no capture yet")
+            cls.poll_message_set("The scene contains no capture yet")
             return False
         return True
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        """Ask where to."""
+        """Ask for the file."""
         suffix = _SUFFIX[self.format]
         name = Path(context.scene.scope.result.footage).stem or "capture"
         folder = Path(bpy.data.filepath).parent if bpy.data.filepath else Path.home()
@@ -82,13 +80,13 @@ class SCOPE_OT_export(TellingOperator):
         return {"RUNNING_MODAL"}
 
     def check(self, context: bpy.types.Context) -> bool:
-        """Keep the suffix right while the name is typed."""
-        wanted = bpy.path.ensure_ext(self.filepath, _SUFFIX[self.format])
-        changed, self.filepath = wanted != self.filepath, wanted
-        return changed
+        """Correct the suffix while the name is typed."""
+        path: str = bpy.path.ensure_ext(self.filepath, _SUFFIX[self.format])
+        changed, self.filepath = path != self.filepath, path
+        return bool(changed)
 
     def draw(self, context: bpy.types.Context) -> None:
-        """Options beside the file browser."""
+        """Draw the options in the sidebar of the file browser."""
         layout = self.layout
         layout.use_property_split = True
         layout.use_property_decorate = False
@@ -100,20 +98,20 @@ class SCOPE_OT_export(TellingOperator):
                 layout.prop(self, "separate")
 
     def work(self, context: bpy.types.Context) -> str:
-        """Write."""
+        """Write the files."""
         from ..errors import UsageError
         from ..scene.export.export import ExportOptions, captures, export
         from ..scene.rigs.rig_export import export_rig
 
         if not bpy.path.basename(self.filepath).removesuffix(_SUFFIX[self.format]):
-            raise UsageError("give the file to write a name")
+            raise UsageError("the file has no name; enter one")
         path = Path(bpy.path.ensure_ext(bpy.path.abspath(self.filepath), _SUFFIX[self.format]))
         options = ExportOptions(camera=self.camera, shape=self.shape.lower(), separate=self.separate)
         collections, rig = captures(context.scene), context.scene.scope_retarget.rig
         if self.which == "RIG" and self.format == "NPZ":
-            raise UsageError("a motion file holds what was captured, not a rig; choose another format")
+            raise UsageError("a motion file contains the captured motion, not a rig; choose another format")
         if self.which == "RIG" and rig is None:
-            raise UsageError("no rig is chosen under Retarget; choose yours there and press Retarget first")
+            raise UsageError("no rig is chosen under Retarget; choose a rig there and press Retarget first")
         if self.which == "ACTIVE":
             active = context.view_layer.objects.active
             collections = [c for c in collections if active and active.name in c.all_objects]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The extension's preferences, and the folder where it keeps its files."""
+"""The extension's preferences, and the folder of its files."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from .declared_properties import with_options
 
 PACKAGE = __package__.rpartition(".scope_addon")[0]  # "bl_ext.<repository>.scope" in Blender, "scope" outside
 DEFAULT_CACHE_GB = 2
-_measured: dict[Path, tuple[int, float]] = {}  # cache folder: bytes, and when they were counted
+_measured: dict[Path, tuple[int, float]] = {}  # cache folder: bytes, and time of the measurement
 
 
 @with_options(Place.PREFERENCES)
@@ -29,12 +29,12 @@ class SCOPE_AP_preferences(bpy.types.AddonPreferences):
     body_file: StringProperty(
         name="Body File",
         subtype="FILE_PATH",
-        description="Your own SMPL, SMPL+H, SMPL-X or STAR model, for scenes that name no other",
+        description="Custom SMPL, SMPL+H, SMPL-X or STAR model, for scenes without a body file of their own",
     )
     cache_folder: StringProperty(
         name="Cache Folder",
         subtype="DIR_PATH",
-        description="Where captured motion is kept, so that none is captured twice; Blender's user folder when empty",
+        description="Folder for captured motion, so that nothing is captured twice; if empty, Blender's user folder",
     )
     cache_limit_gb: IntProperty(
         name="Cache Size",
@@ -42,11 +42,11 @@ class SCOPE_AP_preferences(bpy.types.AddonPreferences):
         min=1,
         max=1000,
         subtype="UNSIGNED",
-        description="Gigabytes of captured motion to keep; the motion used longest ago goes first",
+        description="Gigabytes of captured motion to keep; the least recently used is removed first",
     )
 
     def draw(self, context: bpy.types.Context) -> None:
-        """In the preferences window."""
+        """Draw the preferences."""
         layout = self.layout
         layout.use_property_split = True
         layout.use_property_decorate = False
@@ -64,7 +64,7 @@ class SCOPE_AP_preferences(bpy.types.AddonPreferences):
 
 
 class SCOPE_OT_clear_cache(bpy.types.Operator):
-    """Remove captured motion from the cache. Scenes that were built from it stay as they are"""
+    """Remove captured motion from the cache. Existing scenes are not affected"""
 
     bl_idname = "scope.clear_cache"
     bl_label = "Clear Cache"
@@ -73,27 +73,27 @@ class SCOPE_OT_clear_cache(bpy.types.Operator):
         """Remove the files."""
         freed = cache().clear()
         _measured.clear()
-        self.report({"INFO"}, f"{_size_text(freed)} freed")
+        self.report({"INFO"}, f"Freed {_size_text(freed)}")
         return {"FINISHED"}
 
 
 def preferences() -> SCOPE_AP_preferences | None:
-    """The user's preferences; None where the package was registered without being enabled as an extension."""
+    """Return the user's preferences; None if the package is registered without being enabled as an extension."""
     addon = bpy.context.preferences.addons.get(PACKAGE)
     return addon.preferences if addon else None
 
 
 def cache() -> Cache:
-    """The cache in the folder of the preferences, of the extension, or of the system."""
+    """Return the cache: in the folder of the preferences, or else in the user folder."""
     chosen = preferences()
     if chosen and chosen.cache_folder:
-        # A folder of our own inside: clearing the cache must never touch the user's files.
+        # In a subfolder, because clearing the cache must never remove the user's files.
         return Cache(Path(bpy.path.abspath(chosen.cache_folder)) / "scope-cache")
     return Cache(user_folder() / "cache")
 
 
 def user_folder() -> Path:
-    """A folder of ours that upgrades leave alone; under the system's temporary files when Scope is no extension."""
+    """Return a folder that upgrades keep; in the system's temporary folder if Scope is not enabled as an extension."""
     try:
         return Path(bpy.utils.extension_path_user(PACKAGE, create=True))
     except ValueError:
@@ -101,7 +101,7 @@ def user_folder() -> Path:
 
 
 def _cache_size(root: Path) -> int:
-    """Measured every few seconds at most: the window is drawn at every move of the mouse."""
+    """Measure the cache, at most every few seconds: the window is redrawn at every movement of the mouse."""
     size, when = _measured.get(root, (0, -math.inf))
     if time.monotonic() - when > 3.0:
         size = Cache(root).size()

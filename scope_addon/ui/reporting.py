@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How an operator tells what it did, and what went wrong."""
+"""Operators that report their result or error as a message."""
 
 from __future__ import annotations
 
@@ -9,30 +9,30 @@ import bpy
 
 
 def sentence(error: Exception | str) -> str:
-    """An error's message as the panel shows it."""
+    """Return an error's message with a capital first letter, as the panel shows it."""
     text = str(error).strip() or type(error).__name__
     return text[:1].upper() + text[1:]
 
 
-class TellingOperator(bpy.types.Operator):
-    """An operator whose work is one method, ``work``; what goes wrong there is told as a sentence. Not registered."""
+class ReportingOperator(bpy.types.Operator):
+    """An operator that runs ``work`` and reports the result, or the error's message. Not registered."""
 
     bl_options = {"REGISTER", "UNDO"}
 
-    if TYPE_CHECKING:  # each operator has its own
+    if TYPE_CHECKING:  # implemented by each operator
 
         def work(self, context: bpy.types.Context) -> str:
-            """Do it; returns what to tell, or nothing."""
+            """Do the work and return a message for the user, which may be empty."""
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        """Do it and tell."""
+        """Run ``work`` and report."""
         from ...solver.errors import ScopeError
 
         try:
-            said = self.work(context)
+            message = self.work(context)
         except (ScopeError, OSError) as error:
             self.report({"ERROR"}, sentence(error))
             return {"CANCELLED"}
-        if said:
-            self.report({"INFO"}, said)
+        if message:
+            self.report({"INFO"}, message)
         return {"FINISHED"}

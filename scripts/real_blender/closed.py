@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A Blender that is closed, or crashes, while it captures: ``closed.py -- VIDEO OUT_FOLDER quit|crash``."""
+"""Close Blender, or let it crash, while it captures: ``closed.py -- VIDEO OUT_FOLDER quit|crash``."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from session import ARGUMENTS, FOOTAGE, OUT, addon, invoke, run, until, use
 
 
 def steps() -> Iterator[float]:
-    """The session; yields seconds to wait."""
+    """Run the session; yield the seconds to wait before each next step."""
     yield 0.5
     bpy.context.scene.scope.quality = "FAST"
     bpy.ops.scope.choose_footage(filepath=FOOTAGE)

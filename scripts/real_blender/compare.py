@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the real Blender's parts wrote, against the shell's results: ``compare.py VIDEO WORK_FOLDER PART...``."""
+"""Compare the files written by the real Blender with the shell's results: ``compare.py VIDEO WORK_FOLDER PART...``."""
 
 from __future__ import annotations
 
@@ -10,24 +10,24 @@ from pathlib import Path
 import numpy as np
 from scope.scope_addon.cli import main as shell
 
-TOLERANCE_M = 0.001  # the median joint; another build of the same libraries rounds otherwise
+TOLERANCE_M = 0.001  # median over joints; another build of the same libraries rounds differently
 
 
 def apart(a: Path, b: Path) -> dict[str, float]:
-    """Millimetres between two motions' joints."""
+    """Return the distances between two motions' joints, in millimetres."""
     with np.load(a) as one, np.load(b) as other:
         distance = np.abs(one["joints_cam"] - other["joints_cam"]).max(axis=-1)
     return {"median": float(np.median(distance) * 1e3), "largest": float(distance.max() * 1e3)}
 
 
 def missing(folder: Path, names: list[str]) -> list[str]:
-    """Those that are not there, or are empty."""
+    """Return a message for each file that is missing or empty."""
     sizes = {name: (folder / name).stat().st_size if (folder / name).is_file() else 0 for name in names}
     return [f"{name} was not written" for name, size in sizes.items() if not size]
 
 
 def panel(video: Path, out: Path, shell_out: Path, report: dict) -> list[str]:
-    """The window's session."""
+    """Return the report of the session in the window."""
     report |= json.loads((out / "report.json").read_text())
     shell(["capture", str(video), "--quality", "fast", "--quiet", "-o", str(shell_out / "panel.npz")])
     distance = report["window_from_shell_mm"] = apart(out / "motion.npz", shell_out / "panel.npz")
@@ -44,7 +44,7 @@ def panel(video: Path, out: Path, shell_out: Path, report: dict) -> list[str]:
 
 
 def headless(clips: Path, out: Path, shell_out: Path, report: dict) -> list[str]:
-    """Blender's command line: one clip, and a folder with a failing file, a picture of a wall and a clip."""
+    """Check Blender's command line: one clip, and a folder with a broken file, an image of a wall and a clip."""
     arguments = ["batch", str(clips), "--out", str(shell_out / "batch"), "--quality", "fast", "--quiet", "--again"]
     status = shell([*arguments, "--formats", "npz"])
     theirs = json.loads((out / "batch.json").read_text())

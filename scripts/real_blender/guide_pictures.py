@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Cut the pictures of docs/guide.md, which lie in assets/guide, out of the screenshots of a real Blender."""
+"""Crop the pictures of docs/guide.md (assets/guide) from the screenshots of a real Blender."""
 
 from pathlib import Path
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""``blender --background --command scope``: one clip, a folder with clips that fail, stopped and gone on with.
+"""``blender --background --command scope``: one clip, and a folder with failing clips, interrupted and resumed.
 
-Runs in the Debian by its own Python, in /scope; what it wrote is compared with the shell's by ``compare.py``.
+Runs in the Debian with its own Python, in /scope; ``compare.py`` compares its files with the shell's.
 """
 
 from __future__ import annotations
@@ -28,12 +28,12 @@ def command(*arguments: str, status: int) -> dict | None:
 
 
 def statuses(report: dict) -> dict[str, str]:
-    """What became of each file of a batch."""
+    """Return the outcome of each file of a batch."""
     return {entry["file"]: entry["status"] for entry in report["files"]}
 
 
 def one_clip() -> None:
-    """A capture, and the ways it can fail."""
+    """Try a capture and the ways in which it can fail."""
     report = command(
         "capture", "clips/walk.mp4", *FAST, "-o", "out/command.npz", "-o", "out/command.glb", "--json", status=0
     )
@@ -47,7 +47,7 @@ def one_clip() -> None:
 
 
 def running(what: bytes) -> list[str]:
-    """Processes of our command line that do this."""
+    """Return the ids of this command line's processes with these arguments."""
     found = []
     for path in Path("/proc").glob("[0-9]*/cmdline"):
         try:
@@ -58,13 +58,13 @@ def running(what: bytes) -> list[str]:
 
 
 def stopped(name: str) -> None:
-    """A batch that is interrupted, asked to end or killed: its clips end with it, and nothing is half-written."""
+    """Interrupt, terminate or kill a batch: its captures end with it, and no file is left incomplete."""
     out = OUT / f"stopped_{name}"
     arguments = ("batch", "clips", "--out", str(out), "--jobs", "2", "--formats", "npz", "--quality", "best")
     print("scope", *arguments, name, flush=True)
     process = subprocess.Popen([*COMMAND, *arguments], stderr=subprocess.PIPE, text=True)
     end = time.monotonic() + 120.0
-    while not running(b"capture"):  # before that Blender itself takes the signals
+    while not running(b"capture"):  # earlier, Blender itself would receive the signals
         assert process.poll() is None, process.returncode
         assert time.monotonic() < end, "the batch began no clip"
         time.sleep(0.1)
@@ -80,7 +80,7 @@ def stopped(name: str) -> None:
 
 
 def folder() -> None:
-    """A folder, one of whose clips fails and one of which shows nobody; the second time only that is tried again."""
+    """Capture a folder with a clip that fails and one without people; a second run repeats only the failed one."""
     arguments = ("batch", "clips", "--out", "out/batch", "--jobs", "2", *FAST, "--json")
     first = command(*arguments, status=1)
     assert first is not None

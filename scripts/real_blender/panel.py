@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A capture through the panel in a Blender with a window, as a person does it, and a picture of every state.
+"""Capture from the panel of a Blender with a window, as a person would, and take a screenshot of every state.
 
-    blender --python panel.py -- VIDEO OUT_FOLDER
+Usage: ``blender --python panel.py -- VIDEO OUT_FOLDER``
 """
 
 from __future__ import annotations
@@ -25,13 +25,13 @@ report: dict = {"blender": bpy.app.version_string, "python": sys.version.split()
 
 
 def tracked_half() -> bool:
-    """Whether half of the frames of the running capture have been looked at, or it has ended."""
+    """Return whether the running capture has processed half of its frames, or has ended."""
     job = addon().state.job
     return job is None or (job.progress.total > 0 and job.progress.done >= 0.5 * job.progress.total)
 
 
 def steps() -> Iterator[float]:
-    """The session; yields seconds to wait."""
+    """Run the session; yield the seconds to wait before each next step."""
     scene = bpy.context.scene
     area = viewport()["area"]
     area.spaces.active.show_region_ui = True
@@ -145,7 +145,7 @@ def steps() -> Iterator[float]:
     picture("9_undone")
 
     scene = bpy.context.scene
-    scene.scope.quality = "BALANCED"  # captured anew, now that the solver is compiled: the preview shows the body
+    scene.scope.quality = "BALANCED"  # captured again, now that the solver is compiled: the preview shows the body
     invoke(bpy.ops.scope.capture, "INVOKE_DEFAULT")
     yield from until(tracked_half, 120, "the preview of the body")
     picture("9_body_over_footage")
@@ -158,7 +158,7 @@ def steps() -> Iterator[float]:
         invoke(bpy.ops.scope.capture, "INVOKE_DEFAULT")
     except RuntimeError as error:
         report["missing_footage"] = str(error).strip()
-    yield 5.0  # Blender moves the panels below to their new places by and by
+    yield 5.0  # Blender moves the panels below gradually
     picture("10_missing_footage")
     bpy.ops.screen.userpref_show()
     bpy.context.preferences.active_section = "ADDONS"

@@ -5,7 +5,7 @@ set -euo pipefail
 cd /scope
 log=out/$1.log
 
-on_screen() { # a command, with a screen of its own
+on_screen() { # a command, with a separate virtual screen
     local status=0
     Xvfb :7 -screen 0 1600x1000x24 >/dev/null 2>&1 &
     local screen=$!
@@ -16,7 +16,7 @@ on_screen() { # a command, with a screen of its own
     return $status
 }
 
-in_window() { # a script of ours in a Blender
+in_window() { # a script of this folder in a Blender
     local script=$1
     shift
     on_screen blender --python-exit-code 1 --python "parts/$script" -- "$@"

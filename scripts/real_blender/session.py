@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the parts with a window share: Blender's timers drive a session of steps, which looks, presses and asserts."""
+"""Shared code of the parts with a window: Blender's timers drive the steps of a session."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ FOOTAGE, OUT = ARGUMENTS[0], Path(ARGUMENTS[1])
 
 
 def viewport() -> dict:
-    """Context of the 3D viewport's main region."""
+    """Return the context of the 3D viewport's main region."""
     window = bpy.context.window_manager.windows[0]
     area = next(a for a in window.screen.areas if a.type == "VIEW_3D")
     return {"window": window, "area": area, "region": next(r for r in area.regions if r.type == "WINDOW")}
@@ -38,7 +38,7 @@ def show_tab() -> bool:
 
 
 def picture(name: str) -> None:
-    """Of the whole screen."""
+    """Take a screenshot of the whole screen."""
     subprocess.run(["import", "-window", "root", str(OUT / f"{name}.png")], check=True)
 
 
@@ -48,7 +48,7 @@ def key(name: str) -> None:
 
 
 def click(x: int, y: int) -> None:
-    """The left button, in the screen's pixels from its top left; as slowly as a hand, while Blender goes on."""
+    """Click the left button, in screen pixels from the top left, as slowly as a hand, while Blender keeps running."""
     steps = ["mousemove", str(x), str(y), "sleep", "0.4", "mousedown", "1", "sleep", "0.1", "mouseup", "1"]
     subprocess.Popen(["xdotool", *steps])
 
@@ -65,7 +65,7 @@ def press(place: tuple[int, int], happened: Callable[[], bool]) -> Iterator[floa
 
 
 def addon():
-    """The extension's module of operators, for looking at the job."""
+    """Return the extension's module of operators, to inspect the job."""
     module = ".scope_addon.ui.capture.capture_operators"
     name = next(n for n in sys.modules if n.startswith("bl_ext.") and n.endswith(module))
     return sys.modules[name]
@@ -91,20 +91,20 @@ def until(happened: Callable[[], bool], seconds: float, what: str) -> Iterator[f
 
 
 def captured(seconds: float = 600.0) -> Iterator[float]:
-    """Press Capture by its operator and wait for the end."""
+    """Start a capture through its operator and wait for its end."""
     use(bpy.ops.scope.capture, "INVOKE_DEFAULT")
     yield from until(lambda: addon().state.job is None, seconds, "the capture to end")
     yield 0.5
 
 
 def inventory() -> dict:
-    """What the file holds; cancelling must not change it."""
+    """Return the file's data-blocks, which cancelling must not change."""
     kinds = ("objects", "meshes", "armatures", "cameras", "actions", "collections", "images", "movieclips", "materials")
     return {kind: sorted(b.name for b in getattr(bpy.data, kind)) for kind in kinds}
 
 
 def run(steps: Iterator[float]) -> None:
-    """Drive ``steps``, which yield seconds to wait, by Blender's timers, and leave."""
+    """Run ``steps``, which yield seconds to wait, from Blender's timers, then quit."""
 
     def advance() -> float | None:
         status = 0

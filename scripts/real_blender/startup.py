@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How long Blender takes to open with the extension enabled and without, in turns: ``startup.py ROUNDS``.
+"""Time how long Blender takes to open with the extension enabled and disabled, alternating: ``startup.py ROUNDS``.
 
-Runs in the Debian by its own Python, in /scope. Both have the extension's files; only one has it enabled. A window is
-opened each time, on a screen of its own, and Blender's first timer, which runs once the window is there, ends it.
+Runs in the Debian with its own Python, in /scope. Both have the extension's files; only one has it enabled. Each start
+opens a window on a separate screen, and Blender's first timer, which runs once the window exists, ends it.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ bpy.app.timers.register(end, first_interval=0.0)
 
 
 def opened(kind: str) -> float:
-    """Seconds from the start of the process to the window's first timer."""
+    """Return the seconds from the start of the process to the window's first timer."""
     began = time.monotonic()
     done = subprocess.run(
         ["blender", "--python-expr", END],
@@ -50,14 +50,14 @@ def main(rounds: int) -> None:
     shutil.rmtree(HOMES["without"], ignore_errors=True)
     shutil.copytree(HOMES["enabled"], HOMES["without"], copy_function=os.link, symlinks=True)
     for preferences in HOMES["without"].rglob("userpref.blend"):
-        preferences.unlink()  # a link as yet: the copy is changed, not the original
+        preferences.unlink()  # still a link: the copy is changed, not the original
         shutil.copy(HOMES["enabled"] / preferences.relative_to(HOMES["without"]), preferences)
     environment = dict(os.environ, HOME=str(HOMES["without"]))
     command = ["blender", "--background", "--python-exit-code", "1", "--python-expr", DISABLE]
     subprocess.run(command, env=environment, capture_output=True, check=True)
     times: dict[str, list[float]] = {kind: [] for kind in HOMES}
     for kind in HOMES:
-        opened(kind)  # its files read once
+        opened(kind)  # read its files once
     for turn in range(rounds):
         for kind in sorted(HOMES, reverse=bool(turn % 2)):
             times[kind].append(opened(kind))

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What goes wrong while a Blender with a window captures: nothing may stay behind, and the next capture must work.
+"""Failures while a Blender with a window captures: nothing may be left behind, and the next capture must work.
 
-    blender --python trouble.py -- VIDEO OUT_FOLDER
+Usage: ``blender --python trouble.py -- VIDEO OUT_FOLDER``
 """
 
 from __future__ import annotations
@@ -20,22 +20,22 @@ import bpy
 sys.path.insert(0, str(Path(__file__).parent))
 from session import FOOTAGE, OUT, addon, captured, inventory, invoke, picture, run, show_tab, until, use
 
-SMALL = Path("/scope/small")  # a disk of its own
+SMALL = Path("/scope/small")  # a separate disk
 report: dict[str, str] = {}
 
 
 def cache():
-    """The keeper of the cache folder that the preferences name now."""
+    """Return the cache of the folder that the preferences name now."""
     return sys.modules[addon().__name__.replace("capture.capture_operators", "preferences")].cache()
 
 
 def preferences() -> bpy.types.AddonPreferences:
-    """The extension's."""
+    """Return the extension's preferences."""
     return next(a for a in bpy.context.preferences.addons if a.module.endswith(".scope")).preferences
 
 
 def workers() -> list[int]:
-    """Processes of captures, also of a Blender that is gone."""
+    """Return the ids of capture processes, also those of a Blender that has ended."""
     found = []
     for path in Path("/proc").glob("[0-9]*/cmdline"):
         try:
@@ -46,7 +46,7 @@ def workers() -> list[int]:
 
 
 def nothing_left(when: str) -> None:
-    """No process and no unfinished file."""
+    """Check that no process and no incomplete file is left."""
     assert not workers(), f"{when}, the worker still runs"
     left = list((cache().root / "jobs").iterdir())
     assert not left, f"{when}, {left} are left"
@@ -67,7 +67,7 @@ def ended() -> Iterator[float]:
 
 
 def failed(name: str, before: dict, says: str) -> None:
-    """The last capture failed, said so and left nothing."""
+    """Check that the last capture failed with a message and left nothing behind."""
     message = addon().state.message
     assert says in message, f"{name}: {message!r} does not say {says!r}"
     assert inventory() == before, f"{name} changed the file"
@@ -76,7 +76,7 @@ def failed(name: str, before: dict, says: str) -> None:
 
 
 def killed_worker() -> Iterator[float]:
-    """The system ends the worker, as it does when memory runs out."""
+    """Kill the worker, as the system does when memory runs out."""
     before = inventory()
     yield from begun()
     os.kill(addon().state.job.worker.pid, signal.SIGKILL)
@@ -86,7 +86,7 @@ def killed_worker() -> Iterator[float]:
 
 
 def removed_footage() -> Iterator[float]:
-    """The video goes while it is being read."""
+    """Remove the video while it is being read."""
     scene, video = bpy.context.scene, Path("/scope/gone.mp4")
     shutil.copy(FOOTAGE, video)
     scene.scope.footage = str(video)
@@ -101,7 +101,7 @@ def removed_footage() -> Iterator[float]:
 
 
 def full_disk() -> Iterator[float]:
-    """No room for what the worker writes, then none for an export."""
+    """Fill the disk for the worker's files, then for an export."""
     yield from captured()
     kernels, size = cache().kernels, cache().size()
     SMALL.mkdir(exist_ok=True)
@@ -131,7 +131,7 @@ def full_disk() -> Iterator[float]:
 
 
 def fill(leave: int = 0) -> None:
-    """Take all the room there is, but for so many bytes."""
+    """Fill the disk except for the given number of bytes."""
     with (SMALL / "all_of_it").open("wb", buffering=0) as file:
         try:
             while file.write(b"x" * 4096):
@@ -142,7 +142,7 @@ def fill(leave: int = 0) -> None:
 
 
 def closed(how: str) -> Iterator[float]:
-    """Another Blender is closed, or crashes, while it captures."""
+    """Close another Blender, or let it crash, while it captures."""
     shutil.rmtree(cache().root / "captures", ignore_errors=True)
     script = str(Path(__file__).with_name("closed.py"))
     other = subprocess.Popen(["blender", "--python", script, "--", FOOTAGE, str(OUT), how])
@@ -155,7 +155,7 @@ def closed(how: str) -> Iterator[float]:
 
 
 def steps() -> Iterator[float]:
-    """The session; yields seconds to wait."""
+    """Run the session; yield the seconds to wait before each next step."""
     show_tab()
     yield 1.0
     show_tab()

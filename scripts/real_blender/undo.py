@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Every operator of the panel, undone and redone in a Blender with a window: the file must be what it was.
+"""Undo and redo every operator of the panel in a Blender with a window: the file must be the same as before.
 
-    blender --python undo.py -- VIDEO OUT_FOLDER
+Usage: ``blender --python undo.py -- VIDEO OUT_FOLDER``
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ report: dict[str, list[str]] = {"undone_and_redone": []}
 
 
 def state() -> State:
-    """All that an operator may change in the file, and the pose as Blender evaluates it, flat: what to its value."""
+    """Return everything in the file that an operator may change, and the evaluated pose, as a flat table of values."""
     scene = bpy.context.window_manager.windows[0].scene
     bpy.context.window_manager.windows[0].view_layer.update()
     found: State = {}
@@ -63,7 +63,7 @@ def state() -> State:
 
 
 def _group(name: str, group: bpy.types.PropertyGroup) -> State:
-    """A property group's values, those of the groups in it too."""
+    """Return a property group's values, including those of nested groups."""
     found: State = {}
     for prop in group.bl_rna.properties:
         if prop.identifier in _NOT_KEPT:
@@ -107,38 +107,38 @@ def _keys(curve: bpy.types.FCurve) -> tuple[str, int, list[float], list[str]]:
 
 
 def same(found: State, expected: State, when: str) -> None:
-    """Assert it, and say what differs."""
+    """Assert that two states are equal; name the differences."""
     different = [key for key in sorted(found.keys() | expected.keys()) if found.get(key) != expected.get(key)]
     if different:
         told = [f"{key}: {found.get(key)!r:.150} is not {expected.get(key)!r:.150}" for key in different[:12]]
-        raise AssertionError(f"{when}, {len(different)} things are not as they were:\n" + "\n".join(told))
+        raise AssertionError(f"{when}, {len(different)} values differ from before:\n" + "\n".join(told))
 
 
 def view() -> tuple[bool, str]:
-    """Whether the viewport shows a part of the scene alone, and through what."""
+    """Return whether the viewport is in local view, and its perspective."""
     space = viewport()["area"].spaces.active
     return space.local_view is not None, space.region_3d.view_perspective
 
 
 def undo() -> None:
-    """Ctrl-Z."""
+    """Press Ctrl-Z."""
     invoke(bpy.ops.ed.undo)
 
 
 def redo() -> None:
-    """Ctrl-Shift-Z."""
+    """Press Ctrl-Shift-Z."""
     invoke(bpy.ops.ed.redo)
 
 
 def tried(name: str, action: Callable[[], object], keep: bool = False) -> Iterator[float]:
-    """Do it, undo it, redo it, and unless it is kept, undo it again."""
+    """Run an operator, undo it, redo it and, unless its result is kept, undo it again."""
     before = state()
     action()
     yield from settled(name, before, keep)
 
 
 def settled(name: str, before: State, keep: bool = False) -> Iterator[float]:
-    """What ``tried`` does once the operator is through."""
+    """Continue ``tried`` once the operator has finished."""
     yield 0.2
     after = state()
     assert after != before, f"{name} changed nothing"
@@ -156,12 +156,12 @@ def settled(name: str, before: State, keep: bool = False) -> Iterator[float]:
 
 
 def armature() -> bpy.types.Object:
-    """The captured one; undoing makes what was found before invalid."""
+    """Return the captured armature; references from before an undo are invalid."""
     return next(o for o in bpy.data.objects if o.type == "ARMATURE" and "scope_source" in o)
 
 
 def add_rig() -> None:
-    """A rig of the user's own: the captured skeleton a fifth larger, as an object that knows nothing of us."""
+    """Make a user's own rig: the captured skeleton a fifth larger, without any of the extension's properties."""
     source = armature()
     rig = bpy.data.objects.new("rig", source.data.copy())
     bpy.context.scene.collection.objects.link(rig)
@@ -172,7 +172,7 @@ def add_rig() -> None:
 
 
 def edits() -> dict[str, Callable[[], object]]:
-    """The buttons that work on a captured motion."""
+    """Try the buttons that edit a captured motion."""
     scope = bpy.ops.scope
     return {
         "smooth": lambda: use(scope.smooth, strength=2.5),
@@ -186,20 +186,20 @@ def edits() -> dict[str, Callable[[], object]]:
         "bake to rate": lambda: use(scope.bake_rate, rate=10.0),
         "guess bones": lambda: use(scope.guess_bones),
         "retarget": lambda: use(scope.retarget),
-        "retarget, way on an object, beside": retarget_beside,
+        "retarget, root motion on an object, next to the person": retarget_beside,
         "footage to sequencer": lambda: use(scope.footage_to_sequencer),
     }
 
 
 def retarget_beside() -> None:
-    """With root motion, beside the captured person."""
+    """Retarget with root motion, next to the captured person."""
     settings = bpy.context.scene.scope_retarget
     settings.root, settings.captured = "object", "beside"
     use(bpy.ops.scope.retarget)
 
 
 def capturing() -> Iterator[float]:
-    """The capture, and undoing something else while it runs."""
+    """Try the capture, and undoing something else while it runs."""
     yield from tried("choose footage", lambda: use(bpy.ops.scope.choose_footage, filepath=FOOTAGE), keep=True)
     bpy.context.scene.scope.quality = "FAST"
     invoke(bpy.ops.ed.undo_push, message="Quality")
@@ -221,13 +221,13 @@ def capturing() -> Iterator[float]:
 
 
 def forget_captures() -> None:
-    """Empty the cache, compiled code aside, so that the footage is captured again."""
+    """Empty the cache, except for compiled code, so that the footage is captured again."""
     preferences = sys.modules[addon().__name__.replace("capture.capture_operators", "preferences")]
     shutil.rmtree(preferences.cache().root / "captures")
 
 
 def steps() -> Iterator[float]:
-    """The session; yields seconds to wait."""
+    """Run the session; yield the seconds to wait before each next step."""
     show_tab()
     yield 1.0
     show_tab()

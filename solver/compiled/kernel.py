@@ -13,7 +13,7 @@ from numba import njit
 _OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": {"reassoc", "contract", "arcp", "nsz"}}
 
 
-def source_stamp() -> tuple:
+def source_stamp() -> tuple[tuple[str, float, int], ...]:
     """Return name, modification time and size of every source file that kernels may come from."""
     files = sorted(Path(__file__).parent.parent.rglob("*.py"))
     return tuple((f.name, s.st_mtime, s.st_size) for f in files for s in [f.stat()])

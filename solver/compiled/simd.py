@@ -21,6 +21,7 @@ from numba.extending import intrinsic as _intrinsic
 WIDTH = 8
 _VECTOR = ir.VectorType(ir.DoubleType(), WIDTH)
 _FLAGS = ("contract", "nsz")
+_declared: Any = cgutils.get_or_insert_function  # untyped
 intrinsic: Any = _intrinsic  # its first parameter is the compiler's, which type checkers do not see
 
 
@@ -65,7 +66,7 @@ class Vector:
     def sqrt(self) -> Vector:
         """Square root, by one instruction."""
         kind = ir.FunctionType(_VECTOR, [_VECTOR])
-        function = cgutils.get_or_insert_function(self.builder.module, kind, f"llvm.sqrt.v{WIDTH}f64")
+        function = _declared(self.builder.module, kind, f"llvm.sqrt.v{WIDTH}f64")
         return Vector(self.builder, self.builder.call(function, [self.value]))
 
 
@@ -74,7 +75,7 @@ def sqrt(x: Any) -> Any:
     return x.sqrt() if isinstance(x, Vector) else np.sqrt(x)
 
 
-def vectorized(formula: Callable[[Callable[[int], Any], list], Sequence[Any]], reads: int) -> Any:
+def vectorized(formula: Callable[[Callable[[int], Any], list[Any]], Sequence[Any]], reads: int) -> Any:
     """Return `apply(table, at, state)` for kernels: state <- formula(q, state[:reads]), written from entry 0 on.
 
     q(k) is the vector of `table`'s elements at + k WIDTH and following. Both arrays are C-contiguous float64 of any

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The kinematic tree as flat arrays for the kernels. Any number of joints, any shape basis, any tree par(i) < i."""
 
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,17 +20,17 @@ class BodyArrays(Protocol):
     """
 
     @property
-    def parents(self) -> np.ndarray: ...  # noqa: D102
+    def parents(self) -> NDArray[np.integer[Any]]: ...  # noqa: D102
     @property
-    def S(self) -> np.ndarray: ...  # noqa: D102
+    def S(self) -> NDArray[np.floating[Any]]: ...  # noqa: D102
     @property
-    def l(self) -> np.ndarray: ...  # noqa: D102, E743
+    def l(self) -> NDArray[np.floating[Any]]: ...  # noqa: D102, E743
     @property
-    def keypoint_part(self) -> np.ndarray: ...  # noqa: D102
+    def keypoint_part(self) -> NDArray[np.integer[Any]]: ...  # noqa: D102
     @property
-    def v_bar(self) -> np.ndarray: ...  # noqa: D102
+    def v_bar(self) -> NDArray[np.floating[Any]]: ...  # noqa: D102
     @property
-    def V(self) -> np.ndarray: ...  # noqa: D102
+    def V(self) -> NDArray[np.floating[Any]]: ...  # noqa: D102
 
 
 class Tree(NamedTuple):

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from llvmlite import ir
-from numba import carray, cfunc, types
+from numba import carray, cfunc, types  # type: ignore[attr-defined]
 from numba.core.errors import NumbaError
 from numba.extending import intrinsic
 
@@ -28,7 +28,7 @@ MOST = 16  # external residuals; each has a column of the weights
 INDEXES = ("points", "parts", "joints")
 
 _I, _F = types.int64, types.float64
-_PI, _PF = types.CPointer(_I), types.CPointer(_F)
+_PI, _PF = types.CPointer(_I), types.CPointer(_F)  # type: ignore[no-untyped-call]
 _PROTOTYPE = _F(
     _PI, _I, _PF, _F, _F, _F,  # ints, how many rows, floats, weight, inv_sigma, triggs
     _I, _I, _I, _I, _I, _I,  # parts, points, W, and keypoints, shape and globals of `Tree`

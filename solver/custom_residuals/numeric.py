@@ -98,7 +98,7 @@ def accumulate(
 
 
 def _numbers(value: Any, n: int | None) -> Array:
-    """What the user's function returned, checked."""
+    """Return the user's function's result (n,), checked."""
     try:
         r = np.asarray(value, dtype=np.float64)
     except (TypeError, ValueError):
@@ -112,7 +112,7 @@ def _numbers(value: Any, n: int | None) -> Array:
 
 
 def _view(address: int, *shape: int, whole: bool = False) -> Array:
-    """The kernels' own memory as an array."""
+    """Return the kernels' own memory as an array."""
     size = math.prod(shape)
     if size == 0:
         return np.zeros(shape)

@@ -8,6 +8,7 @@ bends, and no point of the solver does: markers on it cost a few millimetres.
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .. import Body, Keypoints3D, Measurements, Options, Stage, Weights, fit, load_body
 from . import somebody
@@ -15,8 +16,8 @@ from . import somebody
 OFFSET_M = 0.0095  # of the marker's centre from the skin
 
 
-def with_markers(body: Body, vertices: np.ndarray) -> Body:
-    """Return the body with one keypoint for each marker, in place of its own."""
+def with_markers(body: Body, vertices: NDArray[np.intp]) -> Body:
+    """Return the body with one keypoint for each marker, at vertices (n,), in place of its own."""
     most = body.skin_weights[vertices].argmax(axis=1)
     part = body.skin_joints[vertices, most]
     outwards = body.v_template[vertices] - body.J_template[part]
@@ -51,7 +52,7 @@ def main() -> float:
     return error
 
 
-def _spread(points: np.ndarray, among: np.ndarray, n: int) -> np.ndarray:
+def _spread(points: NDArray[np.float64], among: NDArray[np.intp], n: int) -> NDArray[np.intp]:
     """Choose n indices far from each other: always the one farthest from those chosen."""
     chosen = [int(among[0])]
     apart = np.full(len(among), np.inf)

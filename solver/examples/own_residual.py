@@ -8,6 +8,7 @@ Once as a kernel, as fast as the solver's own, and once as a plain function of t
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .. import Keypoints3D, Measurements, Options, Stage, Weights, fit, load_body, register_residual
 from ..compiled.part import Part
@@ -27,9 +28,10 @@ def accumulate(tree, ints, floats, weight, inv_sigma, triggs, pose, blocks):  # 
     return cost
 
 
-def height(part: Part, ints: np.ndarray, floats: np.ndarray) -> np.ndarray:
+def height(part: Part, ints: NDArray[np.int64], floats: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return r (1,) of one row: ints (1,), floats (2,)."""
-    return np.sqrt(floats[1]) * (part.t[1:2] - floats[0])
+    r: NDArray[np.float64] = np.sqrt(floats[1]) * (part.t[1:2] - floats[0])
+    return r
 
 
 def register() -> None:

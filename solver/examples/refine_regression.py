@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Refining what a regression network says (HMR, SPIN and their kin) by the keypoints that a detector sees.
+"""Refine what a regression network estimates (HMR, SPIN and similar ones) with the keypoints of a detector.
 
 Such a network's file holds, for each picture, pose (24, 3, 3) rotations, betas (10,) and a weak-perspective camera
 (s, t_x, t_y) of a square crop; its body is plausible but lies beside the person. The fit starts there, and the
@@ -8,8 +8,10 @@ network's joints are a prior of their own: they know the depth that keypoints in
 
 import tempfile
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .. import Body, Keypoints2D, Keypoints3D, Measurements, State, fit_batch, load_body, rotations
 from . import somebody
@@ -37,9 +39,9 @@ def read_states(body: Body, file: Path) -> list[State]:
 
 
 def write_network_output(file: Path, body: Body, truth: list[State]) -> None:
-    """What a network would say of these people: every joint some 10 degrees off, the shape half guessed."""
+    """Write what a network might estimate: every joint some 10 degrees off, and half of the true shape."""
     rng = np.random.default_rng(9)
-    rows: dict[str, list] = {"pose": [], "betas": [], "camera": [], "crop": []}
+    rows: dict[str, list[Any]] = {"pose": [], "betas": [], "camera": [], "crop": []}
     f = somebody.INTRINSICS[0, 0]
     for state in truth:
         R = np.concatenate([state.R_camera_root[None], state.Omega])
@@ -85,7 +87,7 @@ def main() -> tuple[float, float]:
     return float(np.mean(before)), float(np.mean(after))
 
 
-def _error(body: Body, joints: np.ndarray, truth: State) -> float:
+def _error(body: Body, joints: NDArray[np.float64], truth: State) -> float:
     """Mean distance of the joints in millimetres, pelvis on pelvis."""
     right = somebody.place(body, truth)[1]
     return float(np.linalg.norm((joints - joints[0]) - (right - right[0]), axis=1).mean() * 1e3)

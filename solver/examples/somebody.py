@@ -2,6 +2,7 @@
 """A person whose pose and shape are known, and what a camera, a lab or a network would see of them."""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .. import Body, State, rotations
 
@@ -29,18 +30,19 @@ def pose(body: Body, seed: int = 0, bend: float = 0.05) -> State:
     )
 
 
-def place(body: Body, state: State) -> tuple[np.ndarray, np.ndarray]:
+def place(body: Body, state: State) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return R_camera_part (K+1, 3, 3) and the joints t_camera_part (K+1, 3)."""
     R = np.concatenate([state.R_camera_root[None], state.Omega])
     return body.forward_kinematics(R, state.t_camera_root - body.rest_joints(state.beta)[0], state.beta)
 
 
-def project(points: np.ndarray) -> np.ndarray:
+def project(points: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return pixels (n, 2) of points (n, 3) in the camera frame."""
     p = points @ INTRINSICS.T
-    return p[:, :2] / p[:, 2:]
+    pixels: NDArray[np.float64] = p[:, :2] / p[:, 2:]
+    return pixels
 
 
-def joint_error_mm(body: Body, found: np.ndarray, truth: State) -> float:
+def joint_error_mm(body: Body, found: NDArray[np.float64], truth: State) -> float:
     """Mean distance of joints (K+1, 3) from the truth's, in millimetres."""
     return float(np.linalg.norm(found - place(body, truth)[1], axis=1).mean() * 1e3)

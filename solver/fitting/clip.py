@@ -32,11 +32,12 @@ from ..gauss_newton.optimizer import (
 )
 from ..gauss_newton.recursion import Workspace, eliminate, make_workspace, retract, solve_globals, substitute
 from ..gauss_newton.terms import Terms, fill_terms, pack_priors, usable
-from ..measurements import Measurements, as_array
+from ..measurements import Measurements
 from ..options import Options, Priors, default_priors
 from ..residuals.registry import SHAPE_PRIOR
 from ..state import ClipFit, Fit, State, Status
 from ..temporal import Temporal, with_previous
+from ..validation import as_array
 from .frame_solver import fit_tree
 from .report import Outcome, cost_by_term, make_fit
 
@@ -248,7 +249,7 @@ class _Joint:
 
     def _linearize(self, s: int, trial: bool) -> float:
         """Linearize every frame at its pose or its trial pose and return the clip's cost."""
-        total = 0.0
+        total: float = 0.0
         for f in self.frames:
             pose = f.trial if trial else f.pose
             f.cost = linearize(self.tree, f.terms, self.stages[s], self.settings.triggs, pose, f.blocks, f.work.scratch)
@@ -257,7 +258,8 @@ class _Joint:
         pose = self.frames[0].trial if trial else self.frames[0].pose
         offset = pose.beta[: self.P] - self.mean
         total += 0.5 * self.shape_weights[s] * float(offset @ self.prior @ offset)
-        return total + 0.5 * self.focal_weight * float(pose.log_focal[0]) ** 2
+        total += 0.5 * self.focal_weight * float(pose.log_focal[0]) ** 2
+        return total
 
     def _reduced(self, s: int, damping: float) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
         """Eliminate every frame's pose; return the summed system of the global columns and the sum of |q~|^2."""
@@ -276,6 +278,7 @@ class _Joint:
 
     def _step(self, s: int, damping: float) -> float:
         """Write every frame's trial pose and return the predicted decrease."""
+        squares: float
         C, c, squares = self._reduced(s, damping)
         dbeta = np.zeros_like(self.beta)
         squares += solve_globals(self.tree, C, c, dbeta)
@@ -317,7 +320,8 @@ class _Joint:
         """Return the information matrix of beta (P, P), prior included, poses and focal length eliminated."""
         P = self.P
         if not self.frames:
-            return self.shape_weights[-1] * self.prior
+            prior: NDArray[np.float64] = self.shape_weights[-1] * self.prior
+            return prior
         C, _, _ = self._reduced(len(self.stages) - 1, DAMPING_LEAST)
         out = C[:P, :P].copy()
         if self.tree.globals > P and C[P, P] > 0.0:

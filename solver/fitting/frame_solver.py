@@ -15,11 +15,12 @@ from ..gauss_newton.linearize import make_blocks, make_pose
 from ..gauss_newton.optimizer import Memory, Settings, make_settings, optimize
 from ..gauss_newton.recursion import make_workspace
 from ..gauss_newton.terms import Layout, PackedPriors, fill_terms, pack_priors
-from ..measurements import Measurements, as_array
+from ..measurements import Measurements
 from ..options import Options, Priors, Stage, default_priors
 from ..residuals.registry import SHAPE_PRIOR
 from ..rotations import nearest_rotation, orthonormalize
 from ..state import Fit, State, Status
+from ..validation import as_array
 from .initialize import initial_state
 from .report import Outcome, cost_by_term, make_fit
 
@@ -147,7 +148,7 @@ _last = threading.local()
 
 
 @kernel
-def _enter(R, t, Omega, beta, pose) -> bool:  # type: ignore[no-untyped-def]
+def _enter(R, t, Omega, beta, pose):  # type: ignore[no-untyped-def]
     """Copy a state to `pose`; return whether its rotations are orthonormal now, which fails for singular ones."""
     for r in range(3):
         pose.t[0, r] = t[r]

@@ -90,7 +90,8 @@ def _rotation_onto(products: NDArray[np.float64]) -> NDArray[np.float64] | None:
     if not s[0] > 0 or s[1] < 1e-4 * s[0]:
         return None
     u[:, 2] *= np.linalg.det(u @ vt)
-    return u @ vt
+    R: NDArray[np.float64] = u @ vt
+    return R
 
 
 def initial_state(tree: Tree, terms: Terms, joint_mean: NDArray[np.float64], beta: NDArray[np.float64]) -> State:

@@ -64,7 +64,10 @@ def cost_by_term(
 ) -> dict[str, float]:
     """Return the cost of each kind of residual at `pose`; they add up to what `linearize` returns there.
 
-    Arguments as of `linearize`; the blocks are overwritten. Kinds whose weight is zero are left out.
+    Kinds whose weight is zero are left out.
+
+    :param stage: (2, C) a row of weights and a row of 1/sigma, in the registry's order.
+    :param scratch: (2 QUEUE, W) of `make_scratch`. :param blocks: overwritten. Others as of `linearize`.
     """
     found = {}
     measured = terms.external.calls[:, 4]  # columns of external residuals that have rows

@@ -67,7 +67,7 @@ def _store(M, m):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _positive(h00, h01, h02, h11, h12, h22) -> bool:  # type: ignore[no-untyped-def]
+def _positive(h00, h01, h02, h11, h12, h22):  # type: ignore[no-untyped-def]
     """Whether a symmetric matrix is positive definite; False for NaN."""
     minor = h00 * h11 - h01 * h01
     det = h22 * minor - h00 * h12 * h12 + 2.0 * h01 * h02 * h12 - h11 * h02 * h02

@@ -13,6 +13,8 @@ from numba.core import cgutils
 from ..compiled.kernel import kernel
 from ..compiled.rows import VECTOR, WIDTH, intrinsic, splat_of
 
+_variable: Any = cgutils.alloca_once_value  # untyped
+
 
 def _tile(vectors: int, sign: int) -> Any:
     """Return `tile(C, at, c_row, X, x, x_row, Z, z, z_row, count)`: four rows of C, `vectors` wide, += sign XᵀZ."""
@@ -29,7 +31,7 @@ def _tile(vectors: int, sign: int) -> Any:
         for _ in range(3):
             starts.append(builder.add(starts[-1], c_row))
         targets = [[vector_at(c_data, start, v) for v in range(vectors)] for start in starts]
-        sums = [[cgutils.alloca_once_value(builder, builder.load(p, align=8)) for p in row] for row in targets]
+        sums = [[_variable(builder, builder.load(p, align=8)) for p in row] for row in targets]
         with cgutils.for_range(builder, count) as loop:
             left = builder.gep(x_data, [builder.add(x, builder.mul(loop.index, x_row))])
             right = builder.add(z, builder.mul(loop.index, z_row))

@@ -9,6 +9,8 @@ about its own origin, are then shifted to the pelvis, the origin of all twists. 
 pairs of rows and multiplied many at a time.
 """
 
+from typing import Any
+
 import numpy as np
 
 from ..compiled.kernel import kernel
@@ -30,7 +32,7 @@ def make_scratch(tree: Tree) -> Array:
     return np.zeros((2 * QUEUE, tree.S.shape[2]))
 
 
-def _dot(a, b):  # type: ignore[no-untyped-def]
+def _dot(a: Any, b: Any) -> Any:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
@@ -146,7 +148,7 @@ def linearize(
     clear_blocks(blocks)
     waiting = 0  # pairs in the queue
     ox, oy, oz = pose.t[0, 0], pose.t[0, 1], pose.t[0, 2]
-    cost = 0.0
+    cost: float = 0.0
     for i in range(tree.parents.shape[0]):
         base = 6 * i * row
         clear(A, base, 6 * row)

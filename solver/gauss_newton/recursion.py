@@ -215,7 +215,7 @@ def substitute(tree: Tree, pose: Pose, damping: float, root_scale: float, work: 
             s -= root[r, j] * x[0, j]
         x[0, r] = s * root[r, r]
     ox, oy, oz = pose.t[0, 0], pose.t[0, 1], pose.t[0, 2]
-    squares = x[0, 0] ** 2 + x[0, 1] ** 2 + x[0, 2] ** 2
+    squares: float = x[0, 0] ** 2 + x[0, 1] ** 2 + x[0, 2] ** 2
     squares += root_scale**2 * (x[0, 3] ** 2 + x[0, 4] ** 2 + x[0, 5] ** 2)
     for i in range(1, tree.parents.shape[0]):
         T, z, F = Y[i], x[tree.parents[i]], work.L[i]
@@ -236,7 +236,8 @@ def substitute(tree: Tree, pose: Pose, damping: float, root_scale: float, work: 
         x[i, 3] = z[3] + sy * u2 - sz * u1
         x[i, 4] = z[4] + sz * u0 - sx * u2
         x[i, 5] = z[5] + sx * u1 - sy * u0
-    return damping * squares
+    damped: float = damping * squares
+    return damped
 
 
 @kernel
@@ -247,7 +248,8 @@ def step(tree: Tree, pose: Pose, blocks: Blocks, damping: float, root_scale: flo
     """
     squares = eliminate(tree, pose, blocks, damping, root_scale, work)
     squares += solve_globals(tree, work.C, work.c, work.dbeta)
-    return 0.5 * (squares + substitute(tree, pose, damping, root_scale, work))
+    decrease: float = 0.5 * (squares + substitute(tree, pose, damping, root_scale, work))
+    return decrease
 
 
 @kernel

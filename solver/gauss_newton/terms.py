@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Measurements of one frame as flat arrays: one slot a point, with all that was measured of it, by body part."""
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -41,7 +41,7 @@ class Terms(NamedTuple):
 
 
 @kernel
-def _common_part(tree: Tree, a: int, b: int) -> tuple:
+def _common_part(tree: Tree, a: int, b: int) -> tuple[int, int, int]:
     """Return (part, start joint or -1, end joint or -1): a part that two points are both fixed to.
 
     A joint belongs to its own part, as its origin, and to its parent, where it sits at S beta + l. -1 if none.
@@ -57,7 +57,7 @@ def _common_part(tree: Tree, a: int, b: int) -> tuple:
 
 
 @allocating_kernel
-def _lay_out(tree: Tree, i2, i3, i_start, i_end) -> tuple:  # type: ignore[no-untyped-def]
+def _lay_out(tree: Tree, i2, i3, i_start, i_end) -> tuple[Any, ...]:  # type: ignore[no-untyped-def]
     """Return (starts, shaped, rest, V, slots of 2D, of 3D, of directions, first direction without a common part or -1).
 
     Points measured in several ways share one slot, unless one way repeats. `shaped` is HAS_SHAPE where V is not zero.
@@ -185,7 +185,11 @@ class Layout:
     """Which slot every measurement goes to: the part of `Terms` that stays while the same points are measured."""
 
     def __init__(self, tree: Tree, indices: tuple[Array, ...]) -> None:
-        """Lay out the slots for indices of 2D, 3D, and starts and ends of directions. Raises ShapeError."""
+        """Lay out the slots.
+
+        :param indices: four arrays (n,): indices of 2D and of 3D keypoints, starts and ends of directions.
+        :raises ShapeError: the two ends of a direction are not fixed to one part.
+        """
         self.indices = tuple(index.copy() for index in indices)
         self.starts, self.shaped, self.rest, self.V, *slots, bad = _lay_out(tree, *self.indices)
         self.slots = tuple(slots)
@@ -198,7 +202,7 @@ class Layout:
         self.values = np.zeros(n, np.int64), np.zeros((n, 3)), np.zeros((n, 4)), np.zeros((n, 4))
 
     def fits(self, indices: tuple[Array, ...]) -> bool:
-        """Whether it is the layout of these indices."""
+        """Whether it is the layout of these indices, four arrays (n,) as of `__init__`."""
         return all(_same(a, b) for a, b in zip(self.indices, indices, strict=True))
 
 
@@ -211,7 +215,10 @@ class PackedPriors(NamedTuple):
 
 
 def pack_priors(tree: Tree, priors: "Priors") -> PackedPriors:
-    """Check and lay out the priors. Raises ShapeError."""
+    """Check and lay out the priors.
+
+    :raises ShapeError: a prior does not fit the body.
+    """
     tables = empty_tables()
     for name, table in priors.packed_tables(len(tree.parents) - 1).items():
         tables[name] = _checked_table(tree, name, table)
@@ -240,7 +247,11 @@ def _checked_table(tree: Tree, name: str, table: tuple[Array, Array]) -> tuple[A
 
 
 def make_terms(tree: Tree, measurements: Measurements, priors: "Priors") -> Terms:
-    """Pack one frame's measurements and priors. Raises ShapeError naming the array that does not fit the body."""
+    """Pack one frame's measurements and priors.
+
+    :raises ShapeError: an array does not fit the body; the message names it.
+    :raises InvalidValueError: a measurement has a value that no fit can use.
+    """
     return fill_terms(tree, measurements, pack_priors(tree, priors), None)[0]
 
 
@@ -250,6 +261,9 @@ def fill_terms(
     """Return the terms, how many slots are in use, and the layout, whose arrays the terms share.
 
     `layout` is an earlier frame's: it is used again where the same points were measured.
+
+    :raises ShapeError: an array does not fit the body; the message names it.
+    :raises InvalidValueError: a measurement has a value that no fit can use.
     """
     m = measurements
     n_points = len(tree.point_part)

@@ -12,9 +12,10 @@ import zipfile
 import zlib
 from collections.abc import Collection
 from pathlib import Path
-from typing import IO
+from typing import IO, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import ModelFileError
 
@@ -23,11 +24,14 @@ LARGEST_ARRAY = 1 << 28  # bytes unpacked; SMPL-X's 400 shape directions in floa
 # What zipfile and numpy's header reader raise on damaged files.
 _UNREADABLE: tuple[type[Exception], ...] = (OSError, EOFError, LookupError, ValueError, TypeError, ArithmeticError)
 _UNREADABLE += (RuntimeError, MemoryError, zipfile.BadZipFile, zlib.error, struct.error)
-_HEADER_READERS = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}
+_HEADER_READERS: dict[tuple[int, int], Any] = {
+    (1, 0): np.lib.format.read_array_header_1_0,
+    (2, 0): np.lib.format.read_array_header_2_0,
+}
 
 
 def npz_keys(path: Path) -> set[str]:
-    """Names of the arrays in a .npz file; empty when it is not a zip file at all."""
+    """Return the names of the arrays in a .npz file; empty when it is not a zip file at all."""
     try:
         with zipfile.ZipFile(path) as archive:
             return {name.removesuffix(".npy") for name in archive.namelist()}
@@ -35,13 +39,13 @@ def npz_keys(path: Path) -> set[str]:
         return set()
 
 
-def read_members(path: Path, wanted: Collection[str], shape_of: str) -> tuple[dict[str, np.ndarray], tuple[int, ...]]:
+def read_members(path: Path, wanted: Collection[str], shape_of: str) -> tuple[dict[str, NDArray[Any]], tuple[int, ...]]:
     """Read the arrays of a .npz file that are wanted and present.
 
     :param shape_of: an array of which only the shape is returned, () when absent.
     :raises ModelFileError: damaged, too large, or a wanted array holds Python objects.
     """
-    arrays: dict[str, np.ndarray] = {}
+    arrays: dict[str, NDArray[Any]] = {}
     shape: tuple[int, ...] = ()
     try:
         with zipfile.ZipFile(path) as archive:
@@ -64,14 +68,15 @@ def read_members(path: Path, wanted: Collection[str], shape_of: str) -> tuple[di
     return arrays, shape
 
 
-def _read_header(file: IO[bytes], key: str) -> tuple[tuple[int, ...], bool, np.dtype]:
-    version = np.lib.format.read_magic(file)
+def _read_header(file: IO[bytes], key: str) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
+    version = np.lib.format.read_magic(file)  # type: ignore[no-untyped-call]
     if version not in _HEADER_READERS:
         raise ModelFileError(f"{key} is stored in version {version} of numpy's format; save it with a current numpy")
-    return _HEADER_READERS[version](file)
+    header: tuple[tuple[int, ...], bool, np.dtype[Any]] = _HEADER_READERS[version](file)
+    return header
 
 
-def _read_array(file: IO[bytes], size: int, key: str) -> np.ndarray:
+def _read_array(file: IO[bytes], size: int, key: str) -> NDArray[Any]:
     shape, fortran, dtype = _read_header(file, key)
     if dtype.hasobject:
         raise ModelFileError(f"{key} is stored as a Python object; use the publisher's own .npz or .pkl file")

@@ -5,8 +5,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..body import Body
 from ..errors import ModelFileError
@@ -41,9 +43,10 @@ OPTIONAL: dict[str, Form] = {
 }
 
 
-def check_arrays(arrays: Mapping[str, np.ndarray], forms: Mapping[str, Form], path: Path) -> None:
-    """What the arrays of a file hold, and their shapes, at the door. Those that are not there may be left out.
+def check_arrays(arrays: Mapping[str, NDArray[Any]], forms: Mapping[str, Form], path: Path) -> None:
+    """Check what the arrays of a file hold, and their shapes; arrays that are not in the file are not checked.
 
+    :param arrays: by name, of the shapes in `forms`: (None, 3) is any number of rows of three.
     :raises ModelFileError: an array of another kind or shape.
     """
     for key, (kind, shape) in forms.items():
@@ -59,7 +62,10 @@ def check_arrays(arrays: Mapping[str, np.ndarray], forms: Mapping[str, Form], pa
 
 
 def check_body(body: Body, path: Path) -> None:
-    """Shapes and index ranges of a file that may be hostile."""
+    """Check shapes and index ranges of a body from a file that may be hostile.
+
+    :raises ModelFileError: an array has another shape, points outside, or is not finite.
+    """
     n, p, v, m = len(body.parents), body.P, len(body.v_template), len(body.keypoint_names)
     materials = max(1, len(body.material_names))
     if body.faces.shape[1] not in (3, 4):

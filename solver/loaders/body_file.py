@@ -18,7 +18,7 @@ BUILT_IN = {"scope": ASSETS / "body" / "scope.npz", "scope_h": ASSETS / "body" /
 
 
 def body_with_hands(which: str) -> str:
-    """The built-in body with fingers instead of the one without; any other stays."""
+    """Return the name of the built-in body with fingers for that of the one without; any other name as it is."""
     return "scope_h" if which == "scope" else which
 
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..body import Body
 from ..names import BLAZEPOSE, BODY_JOINTS, COCO
@@ -26,11 +27,11 @@ _FINGER_JOINTS = {
 }
 _HAND_NAMES = {finger: f"{finger}_finger" if finger in ("index", "middle", "ring") else finger for finger in FINGERS}
 
-Attached = tuple[np.ndarray, str]  # a point (3, 1 + P) and the part it turns with
+Attached = tuple[NDArray[np.float64], str]  # a point (3, 1 + P) and the part it turns with
 
 
 def derive_keypoints(body: Body) -> Body:
-    """The body with all keypoints, or with none when its tree does not have SMPL's 22 body joints by name."""
+    """Return the body with all keypoints, or with none when its tree does not have SMPL's 22 body joints by name."""
     if not set(BODY_JOINTS) <= set(body.joint_names):
         return replace(body, keypoint_shapedirs=np.zeros((0, 3, body.P)))
     points = RestPoints(body)
@@ -83,7 +84,7 @@ def _feet(points: RestPoints) -> dict[str, Attached]:
 
 
 def _hand(points: RestPoints, side: str) -> dict[str, Attached]:
-    """The 21 points of one hand in MediaPipe's order."""
+    """Return the 21 points of one hand in MediaPipe's order."""
     wrist = points.joint(f"{side}_wrist")
     hand: dict[str, Attached] = {"wrist": (wrist, f"{side}_wrist")}
     palm = f"{side}_hand" if f"{side}_hand" in points.joint_index else f"{side}_wrist"

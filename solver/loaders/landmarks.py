@@ -12,6 +12,7 @@ largest skin weight is its own. The proportions below were taken from the defaul
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..body import Body
 from .skeletons import LANDMARK_VERTICES, recognise_skeleton
@@ -40,20 +41,20 @@ class RestPoints:
         known = LANDMARK_VERTICES.get(len(body.v_template)) if recognise_skeleton(body.parents) else None
         self._vertices = dict(known) if known else self._search()
 
-    def vertex(self, index: int) -> np.ndarray:
+    def vertex(self, index: int) -> NDArray[np.float64]:
         """(3, 1 + P) one vertex."""
         return np.concatenate([self.body.v_template[index][:, None], self.body.shapedirs[index]], axis=1)
 
-    def joint(self, name: str) -> np.ndarray:
+    def joint(self, name: str) -> NDArray[np.float64]:
         """(3, 1 + P) one joint."""
         i = self.joint_index[name]
         return np.concatenate([self.body.J_template[i][:, None], self.body.J_shapedirs[i]], axis=1)
 
-    def landmark(self, name: str) -> np.ndarray:
+    def landmark(self, name: str) -> NDArray[np.float64]:
         """(3, 1 + P) one of ``LANDMARKS``."""
         return self.vertex(self._vertices[name])
 
-    def fingertip(self, side: str, finger: str) -> np.ndarray:
+    def fingertip(self, side: str, finger: str) -> NDArray[np.float64]:
         """(3, 1 + P) a fingertip: a known vertex, else beyond the last joint, else by the hand's proportions."""
         known = self._vertices.get(f"{side}_{finger}_tip")
         if known is not None:
@@ -71,7 +72,7 @@ class RestPoints:
 
     # searching
 
-    def _part(self, *joints: str) -> np.ndarray:
+    def _part(self, *joints: str) -> NDArray[np.intp]:
         """Vertices of some parts; when they have none, of the nearest ancestor that has, at last the whole mesh."""
         wanted = {self.joint_index[name] for name in joints if name in self.joint_index}
         while wanted:
@@ -89,7 +90,7 @@ class RestPoints:
     def _search(self) -> dict[str, int]:
         return {**self._search_head(), **self._search_foot("left"), **self._search_foot("right")}
 
-    def _nearest(self, vertices: np.ndarray, target: np.ndarray) -> int:
+    def _nearest(self, vertices: NDArray[np.intp], target: NDArray[np.float64]) -> int:
         return int(vertices[np.argmin(np.sum((self.body.v_template[vertices] - target) ** 2, axis=1))])
 
     def _search_head(self) -> dict[str, int]:

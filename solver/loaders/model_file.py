@@ -15,8 +15,10 @@ import re
 import zipfile
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..body import Body
 from ..errors import ModelFileError
@@ -42,7 +44,7 @@ _GENDERS = {"m": "male", "f": "female", "male": "male", "female": "female", "neu
 class Tables:
     """What a model file holds, as arrays; ``correctives`` is the last extent of posedirs, 0 when absent."""
 
-    arrays: dict[str, np.ndarray]
+    arrays: dict[str, NDArray[Any]]
     correctives: int
 
 
@@ -102,8 +104,8 @@ def _read_tables(path: Path) -> Tables:
     return Tables(arrays, posedirs[-1] if posedirs else 0)
 
 
-def _check_tables(arrays: dict[str, np.ndarray], path: Path) -> None:
-    """Types and shapes, at the door."""
+def _check_tables(arrays: dict[str, NDArray[Any]], path: Path) -> None:
+    """Check types and shapes."""
     check_arrays(arrays, {"kintree_table": ("whole numbers", (2, None)), "v_template": ("numbers", (None, 3))}, path)
     vertices, n = len(arrays["v_template"]), arrays["kintree_table"].shape[1]
     if 0 in (vertices, n):
@@ -149,8 +151,8 @@ def _make_body(tables: Tables, path: Path, max_betas: int) -> Body:
     return derive_keypoints(body)
 
 
-def _parents(kintree: np.ndarray, path: Path) -> np.ndarray:
-    """(K+1,) int32 parents. Row 1 names the joints, row 0 the parent's name; the root's is 2³² − 1, −1 or itself."""
+def _parents(kintree: NDArray[np.integer[Any]], path: Path) -> NDArray[np.int32]:
+    """Return the parents (K+1,). Row 1 names the joints, row 0 the parents; the root's is 2³² − 1, −1 or itself."""
     columns = {int(name): column for column, name in enumerate(kintree[1])}
     if len(columns) != kintree.shape[1]:
         raise ModelFileError(f"{path}: kintree_table names a joint twice; download it again")
@@ -160,8 +162,8 @@ def _parents(kintree: np.ndarray, path: Path) -> np.ndarray:
     return parents
 
 
-def _shapedirs(shapedirs: np.ndarray | None, vertices: int, name: str, max_betas: int) -> np.ndarray:
-    """(V, 3, P) leading shape directions; SMPL-X stores facial expressions behind them, which are left out."""
+def _shapedirs(shapedirs: NDArray[Any] | None, vertices: int, name: str, max_betas: int) -> NDArray[np.float64]:
+    """Return the leading shape directions (V, 3, P), without the facial expressions that SMPL-X stores after them."""
     if shapedirs is None:
         return np.zeros((vertices, 3, 0))
     count = shapedirs.shape[2]
@@ -170,11 +172,12 @@ def _shapedirs(shapedirs: np.ndarray | None, vertices: int, name: str, max_betas
     return shapedirs[:, :, : min(count, max_betas)].astype(np.float64)
 
 
-def reduce_weights(weights: np.ndarray, path: Path) -> tuple[np.ndarray, np.ndarray]:
-    """The four largest skin weights of each vertex, scaled to sum to one; weights below zero count as zero.
+def reduce_weights(weights: NDArray[Any], path: Path) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+    """Return the four largest skin weights of each vertex, scaled to sum to one; weights below zero count as zero.
 
     :param weights: (V, K+1).
     :return: skin_joints (V, 4) int and skin_weights (V, 4); with fewer than four joints, the rest is joint 0 at zero.
+    :raises ModelFileError: a weight is not finite, or a vertex has none that is positive.
     """
     if not np.isfinite(weights).all():
         raise ModelFileError(f"{path}: weights contains NaN or infinity; download it again")
@@ -190,20 +193,23 @@ def reduce_weights(weights: np.ndarray, path: Path) -> tuple[np.ndarray, np.ndar
     return joints, kept / total
 
 
-def _faces(faces: np.ndarray, vertices: int, path: Path) -> np.ndarray:
+def _faces(faces: NDArray[np.integer[Any]], vertices: int, path: Path) -> NDArray[np.int32]:
     if faces.size and (int(faces.min()) < 0 or int(faces.max()) >= vertices):
         raise ModelFileError(f"{path}: f points outside 0..{vertices - 1}; download it again")
     return faces.astype(np.int32)
 
 
-def _joint_names(names: np.ndarray | None, count: int) -> tuple[str, ...]:
+def _joint_names(names: NDArray[Any] | None, count: int) -> tuple[str, ...]:
     if names is not None and names.shape == (count,) and names.dtype.kind == "U" and len(set(names.tolist())) == count:
         return tuple(names.tolist())
     return tuple(f"joint_{i:02d}" for i in range(count))
 
 
-def read_gender(stored: np.ndarray | None, path: Path) -> str:
-    """male, female or neutral: as the file says, else as the names of the file and its folder say, else neutral."""
+def read_gender(stored: NDArray[Any] | None, path: Path) -> str:
+    """Return male, female or neutral: as the file says, else as its name or its folder's says, else neutral.
+
+    :param stored: () text, what the file holds as gender.
+    """
     if stored is not None and stored.size == 1 and stored.dtype.kind in "SU":
         item = stored.reshape(-1)[0]
         text = (item.decode("latin1") if isinstance(item, bytes) else str(item)).strip().lower()

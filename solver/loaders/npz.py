@@ -6,8 +6,10 @@ from __future__ import annotations
 import zipfile
 import zlib
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import InputError
 
@@ -17,8 +19,8 @@ LARGEST_BYTES = 4 << 30  # unpacked; an hour of SMPL+H motion at 60 fps takes a 
 _BROKEN = (OSError, ValueError, KeyError, EOFError, RuntimeError, MemoryError, zipfile.BadZipFile, zlib.error)
 
 
-def read_npz(path: Path, error: type[InputError], what: str) -> dict[str, np.ndarray]:
-    """All arrays of a .npz file, never unpickling.
+def read_npz(path: Path, error: type[InputError], what: str) -> dict[str, NDArray[Any]]:
+    """Return all arrays of a .npz file, never unpickling.
 
     :param error: class raised for a missing, broken, oversized or pickled file.
     :param what: what the file should have been, for the message, e.g. ``motion file``.

@@ -10,9 +10,10 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable
-from typing import Any, TypeGuard
+from typing import Any, NoReturn, TypeGuard
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import ModelFileError
 
@@ -31,7 +32,7 @@ class Global:
         self._make = make
 
     def __call__(self, *arguments: Any) -> Any:
-        """The stand-in of what the call returns."""
+        """Return the stand-in of what the call would return."""
         return self._make(*arguments)
 
     def __setstate__(self, state: object) -> None:
@@ -51,6 +52,10 @@ class PickledDtype:
     """``numpy.dtype(text)`` for plain numbers and text; structures and Python objects are refused."""
 
     def __init__(self, text: object, *_: object) -> None:
+        """Parse a type as numpy writes it, for instance "<f8".
+
+        :raises ModelFileError: it is none of plain numbers or text.
+        """
         text = text.decode("latin1") if isinstance(text, bytes) else text
         if not isinstance(text, str) or _DTYPE.fullmatch(text) is None:
             shown = repr(text[:40]) if isinstance(text, str) else type(text).__name__
@@ -70,7 +75,7 @@ class PickledDtype:
 class PickledArray:
     """A numpy array whose bytes lie in the file itself, so that it can never be larger than the file."""
 
-    array: np.ndarray | None = None
+    array: NDArray[Any] | None = None
 
     def __setstate__(self, state: object) -> None:
         """State as numpy writes it: (version,) shape, dtype, is_fortran, bytes."""
@@ -97,7 +102,7 @@ _SPARSE = ("csc", "csr", "coo")
 _CLASSES = {name: type(name, (PickledObject,), {}) for name in (*_SPARSE, "Ch", "Select")}
 
 
-def _refuse(*_: object) -> Any:
+def _refuse(*_: object) -> NoReturn:
     raise ModelFileError("it makes an object in a way that body files do not")
 
 
@@ -105,11 +110,16 @@ _NDARRAY, _OBJECT = Global(_refuse), Global(_refuse)
 
 
 def _reconstruct(kind: object, *_: object) -> PickledArray:
-    return PickledArray() if kind is _NDARRAY else _refuse()
+    if kind is not _NDARRAY:
+        _refuse()
+    return PickledArray()
 
 
 def _reconstructor(kind: Any, base: object, state: object) -> PickledObject:
-    return kind() if kind in _CLASSES.values() and base is _OBJECT and state is None else _refuse()
+    if kind not in _CLASSES.values() or base is not _OBJECT or state is not None:
+        _refuse()
+    made: PickledObject = kind()
+    return made
 
 
 def _from_buffer(raw: object, dtype: object, shape: object, order: object) -> PickledArray:
@@ -139,12 +149,12 @@ _GLOBALS: dict[str, Any] = {
 
 
 def stand_in(dotted: str) -> Any:
-    """What stands for an allowed global, by module and name; None for any other."""
+    """Return the stand-in of an allowed global, given by module and name; None for any other."""
     return next((found for pattern, found in _GLOBALS.items() if re.fullmatch(pattern, dotted)), None)
 
 
-def _from_bytes(raw: object, dtype: object, shape: object, is_fortran: bool) -> np.ndarray:
-    """A read-only array over ``raw``; the byte count must agree with the shape exactly."""
+def _from_bytes(raw: object, dtype: object, shape: object, is_fortran: bool) -> NDArray[Any]:
+    """Return a read-only array over ``raw``; the byte count must agree with the shape exactly."""
     if not isinstance(dtype, PickledDtype):
         raise ModelFileError("it holds a numpy array without a type")
     if not isinstance(raw, bytes):
@@ -163,8 +173,8 @@ def _is_shape(shape: object) -> TypeGuard[tuple[int, ...]]:
     return isinstance(shape, tuple) and len(shape) <= 32 and all(type(n) is int and 0 <= n < 1 << 63 for n in shape)
 
 
-def to_array(value: object, depth: int = 0) -> np.ndarray:
-    """The numpy array that an unpickled value stands for; sparse matrices become dense.
+def to_array(value: object, depth: int = 0) -> NDArray[Any]:
+    """Return the numpy array that an unpickled value stands for; sparse matrices become dense.
 
     :raises ModelFileError: not an array, unfinished, too large or inconsistent.
     """
@@ -182,8 +192,8 @@ def to_array(value: object, depth: int = 0) -> np.ndarray:
     raise ModelFileError(f"an array was expected, but a {type(value).__name__} was found, or an unfinished array")
 
 
-def _selected(state: dict[str, Any], depth: int) -> np.ndarray:
-    """chumpy's slice of an array: a.ravel()[idxs], reshaped."""
+def _selected(state: dict[str, Any], depth: int) -> NDArray[Any]:
+    """Return the slice of an array as chumpy has it: a.ravel()[idxs], reshaped."""
     flat = to_array(state.get("a"), depth).ravel()
     if flat.dtype.kind not in "biuf":
         raise ModelFileError("it holds a chumpy slice without numbers")
@@ -194,8 +204,8 @@ def _selected(state: dict[str, Any], depth: int) -> np.ndarray:
     return flat[index].reshape(shape)
 
 
-def _dense(kind: str, state: dict[str, Any], depth: int) -> np.ndarray:
-    """A CSC, CSR or COO matrix (row, column) made dense; repeated entries add up."""
+def _dense(kind: str, state: dict[str, Any], depth: int) -> NDArray[np.float64]:
+    """Return a CSC, CSR or COO matrix (row, column) as a dense one; repeated entries add up."""
     shape = state.get("_shape", state.get("shape"))
     if not isinstance(shape, tuple) or len(shape) != 2 or not all(isinstance(n, int | np.integer) for n in shape):
         raise ModelFileError("it holds a sparse matrix without a shape")
@@ -230,7 +240,7 @@ def _dense(kind: str, state: dict[str, Any], depth: int) -> np.ndarray:
     return dense
 
 
-def _indices(index: np.ndarray, size: int) -> np.ndarray:
+def _indices(index: NDArray[Any], size: int) -> NDArray[np.intp]:
     if index.dtype.kind not in "iu" or index.ndim != 1 or (index.size and (index.min() < 0 or index.max() >= size)):
         raise ModelFileError(f"it holds indices outside 0..{size - 1}")
     return index.astype(np.intp)

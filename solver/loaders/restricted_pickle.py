@@ -31,7 +31,7 @@ _REFUSED |= {pickle.NEXT_BUFFER, pickle.READONLY_BUFFER}
 
 
 def read_pickle(path: Path) -> dict[str, Any]:
-    """The dictionary at the top of a body pickle, e.g. of an SMPL .pkl file; values as in ``pickled_values``.
+    """Return the dictionary at the top of a body pickle, e.g. of an SMPL .pkl file; values as in ``pickled_values``.
 
     :raises ModelFileError: unreadable, too large, damaged, or asks for anything but arrays; nothing has run then.
     """
@@ -67,7 +67,10 @@ class _BodyUnpickler(pickle._Unpickler):
         self._recodable = len(data)
 
     def find_class(self, module: str, name: str) -> Any:
-        """The stand-in of an allowed global; anything else is refused by name, without importing it."""
+        """Return the stand-in of an allowed global; refuse anything else by name, without importing it.
+
+        :raises ModelFileError: the name is not allowed.
+        """
         if (module, name) == ("_codecs", "encode"):
             return Global(self._encode)
         if module in ("builtins", "__builtin__") and name in ("bytes", "bytearray"):
@@ -79,7 +82,7 @@ class _BodyUnpickler(pickle._Unpickler):
         return found
 
     def _encode(self, text: str, codec: str | bytes) -> bytes:
-        """Bytes that Python 3 wrote as text for old protocols; each at most once, or the sum could grow without end."""
+        """Return bytes that Python 3 wrote as text for old protocols; each at most once, so that the sum is bounded."""
         if not isinstance(text, str) or codec not in ("latin1", "latin-1", b"latin1"):
             raise ModelFileError("it recodes text in a way that body files do not")
         self._recodable -= len(text)
@@ -88,7 +91,10 @@ class _BodyUnpickler(pickle._Unpickler):
         return text.encode("latin1")
 
     def set_items(self, items: list[Any]) -> None:
-        """Add alternating keys and values to the table on top; Python 2 string keys become text."""
+        """Add alternating keys and values to the table on top; Python 2 string keys become text.
+
+        :raises ModelFileError: there is no table on top, a value is missing, or a key is no plain value.
+        """
         table = self.stack[-1]
         if type(table) is not dict or len(items) % 2:
             raise ModelFileError("it adds keys to something that is not a table, or without values")
@@ -98,22 +104,22 @@ class _BodyUnpickler(pickle._Unpickler):
         table.update(zip(keys, items[1::2], strict=True))
 
     def load_setitem(self) -> None:
-        """SETITEM."""
+        """Handle SETITEM."""
         value, key = self.stack.pop(), self.stack.pop()
         self.set_items([key, value])
 
     def load_dict(self) -> None:
-        """DICT."""
+        """Handle DICT."""
         items = self.pop_mark()
         self.append({})
         self.set_items(items)
 
     def load_bytearray8(self) -> None:
-        """BYTEARRAY8; Python's own allocates before it reads."""
+        """Handle BYTEARRAY8; Python's own allocates before it reads."""
         self.append(self.read(struct.unpack("<Q", self.read(8))[0]))
 
     def load_frozenset(self) -> None:
-        """FROZENSET."""
+        """Handle FROZENSET."""
         self.pop_mark()
         self.append(Discarded())
 

@@ -4,8 +4,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..names import BODY_JOINTS, BODY_PARENTS
 
@@ -47,8 +49,8 @@ def _skeletons() -> dict[int, Skeleton]:
 SKELETONS = _skeletons()
 
 
-def recognise_skeleton(parents: np.ndarray) -> Skeleton | None:
-    """The published skeleton with exactly this tree (K+1,), or None."""
+def recognise_skeleton(parents: NDArray[np.integer[Any]]) -> Skeleton | None:
+    """Return the published skeleton with exactly these parents (K+1,), or None."""
     skeleton = SKELETONS.get(len(parents))
     return skeleton if skeleton is not None and skeleton.parents == tuple(int(p) for p in parents) else None
 

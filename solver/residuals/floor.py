@@ -43,7 +43,12 @@ def accumulate(tree, ints, floats, weight, inv_sigma, triggs, pose, blocks):  # 
 
 
 def pack(points: Array, normal: Array, offset: float, w_below: Array, w_above: Array) -> tuple[Array, Array]:
-    """Return the tables of `accumulate` from points (n,), the plane's unit normal (3,) and offset, and weights (n,)."""
+    """Return the tables of `accumulate`: int64 (n, 1) and float64 (n, 6).
+
+    :param points: (n,) which points, as in the measurements.
+    :param normal, offset: of the plane normal^T p = offset in camera axes; (3,), a unit vector pointing up, and metres.
+    :param w_below: (n,) weights of points that are below the plane. :param w_above: (n,) of those above.
+    """
     n = len(points)
     floats = np.empty((n, 6))
     floats[:, :3], floats[:, 3] = normal, offset
@@ -61,7 +66,11 @@ def evaluate(
     w_above: float,
     weight: float = 1.0,
 ) -> Linearization:
-    """Return the residual (1 row) times sqrt(weight) and its derivatives."""
+    """Return the residual (1 row) times sqrt(weight) and its derivatives.
+
+    :param v_bar, V: (3,), (3, P) of the point relative to its part's origin, metres.
+    :param normal, offset: of the plane normal^T p = offset in camera axes; (3,), a unit vector pointing up, and metres.
+    """
     p = part.R @ (V @ part.beta + v_bar) + part.t
     J_x, J_beta = point_jacobian(part, p, V)
     h = float(normal @ p) - offset

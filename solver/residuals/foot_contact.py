@@ -46,7 +46,11 @@ def pack(points: Array, p_stand: Array, weights: Array) -> tuple[Array, Array]:
 
 
 def evaluate(part: Part, v_bar: Array, V: Array, p_stand: Array, weight: float = 1.0) -> Linearization:
-    """Return the residual (3 rows) times sqrt(weight) and its derivatives."""
+    """Return the residual (3 rows) times sqrt(weight) and its derivatives.
+
+    :param v_bar, V: (3,), (3, P) of the point relative to its part's origin, metres.
+    :param p_stand: (3,) where the point rests, metres, camera frame.
+    """
     p = part.R @ (V @ part.beta + v_bar) + part.t
     J_x, J_beta = point_jacobian(part, p, V)
     g = np.sqrt(weight)

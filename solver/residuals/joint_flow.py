@@ -56,8 +56,8 @@ _FARTHEST = math.sin(0.5 * NEAREST) ** -2.5  # of (1 + w^2) / w^(5/2)
 STATE = 16
 
 
-def chart(q: Callable[[int], Any], s: list) -> list:
-    """The state y from Omega (9) by rows; parameters M."""
+def chart(q: Callable[[int], Any], s: list[Any]) -> list[Any]:
+    """Return the state y from Omega (9) by rows; parameters M."""
     m = [q(MEAN + k) for k in range(9)]
 
     def entry(i: int, j: int) -> Any:  # of MᵀOmega
@@ -80,16 +80,16 @@ def chart(q: Callable[[int], Any], s: list) -> list:
     return [*y, *J, ww1 / (w * w * root), g * y[0], g * y[1], g * y[2]]
 
 
-def _linear(q: Callable[[int], Any], at: int, x: list, J: list) -> tuple[list, list]:
-    """A x + b and A J, with A and b from parameter `at` on."""
+def _linear(q: Callable[[int], Any], at: int, x: list[Any], J: list[Any]) -> tuple[list[Any], list[Any]]:
+    """Return A x + b and A J, with A and b from parameter `at` on."""
     A = [q(at + k) for k in range(9)]
     out = [q(at + 9 + r) + A[3 * r] * x[0] + A[3 * r + 1] * x[1] + A[3 * r + 2] * x[2] for r in range(3)]
     entries = [(r, c) for r in range(3) for c in range(3)]
     return out, [A[3 * r] * J[c] + A[3 * r + 1] * J[3 + c] + A[3 * r + 2] * J[6 + c] for r, c in entries]
 
 
-def _hidden(q: Callable[[int], Any], at: int, x: list) -> list:
-    """(s, ds/dx.., t, dt/dx..) of the small network whose parameters start at `at`, of one or two inputs x."""
+def _hidden(q: Callable[[int], Any], at: int, x: list[Any]) -> list[Any]:
+    """Return (s, ds/dx.., t, dt/dx..) of the small network whose parameters start at `at`, of one or two inputs x."""
     n, H = len(x), HIDDEN
     out, bias = at + (n + 1) * H, at + (n + 3) * H
     sums = [[q(bias + r)] + [None] * n for r in range(2)]
@@ -106,8 +106,8 @@ def _hidden(q: Callable[[int], Any], at: int, x: list) -> list:
     return sums
 
 
-def layer(q: Callable[[int], Any], s: list) -> list:
-    """The state after one layer, whose parameters are q(0..LAYER_SIZE - 1)."""
+def layer(q: Callable[[int], Any], s: list[Any]) -> list[Any]:
+    """Return the state after one layer, whose parameters are q(0..LAYER_SIZE - 1)."""
     x, J = _linear(q, 0, s[:3], s[3:12])
     J1, J2, J3 = J[:3], J[3:6], J[6:]
     det, G = s[12], s[13:16]
@@ -141,19 +141,19 @@ def layer(q: Callable[[int], Any], s: list) -> list:
     return [*out, *rows, det, *G]
 
 
-def finish(q: Callable[[int], Any], s: list) -> list:
-    """The state z with derivatives in the parent's axes in place of M's."""
+def finish(q: Callable[[int], Any], s: list[Any]) -> list[Any]:
+    """Return the state z with derivatives in the parent's axes in place of M's."""
     z, J = _linear(q, LAST, s[:3], s[3:12])
     m = [q(MEAN + k) for k in range(9)]
 
-    def turned(row: list) -> list:  # (M row) for a row of derivatives in M's axes
+    def turned(row: list[Any]) -> list[Any]:  # (M row) for a row of derivatives in M's axes
         return [m[3 * r] * row[0] + m[3 * r + 1] * row[1] + m[3 * r + 2] * row[2] for r in range(3)]
 
     return [*z, *turned(J[:3]), *turned(J[3:6]), *turned(J[6:]), s[12], *turned(s[13:16])]
 
 
-def normal(q: Callable[[int], Any], s: list) -> list:
-    """JᵀJ (6, upper), Jᵀz (3), |z|^2, then what `finish` left from entry 10 on: state[12:16] stays."""
+def normal(q: Callable[[int], Any], s: list[Any]) -> list[Any]:
+    """Return JᵀJ (6, upper), Jᵀz (3), |z|^2, then what `finish` left from entry 10 on: state[12:16] stays."""
     J = [s[3:6], s[6:9], s[9:12]]
 
     def dot(a: int, b: int) -> Any:
@@ -284,9 +284,14 @@ def transform(parameters: Array, Omega: Array) -> tuple[Array, Array, Array, Arr
 
 
 def log_density(parameters: Array, Omega: Array) -> Array:
-    """Return log p (...) against the normalized Haar measure, so that the uniform distribution has 0. Nats."""
+    """Return log p (...) in nats against the normalized Haar measure, so that the uniform distribution has 0.
+
+    :param parameters: (SIZE,) of one joint.
+    :param Omega: (..., 3, 3) states of the joint.
+    """
     z, _, log_det, _ = transform(parameters, Omega)
-    return -0.5 * np.sum(z * z, axis=-1) - 1.5 * np.log(2.0 * np.pi) + log_det
+    density: Array = -0.5 * np.sum(z * z, axis=-1) - 1.5 * np.log(2.0 * np.pi) + log_det
+    return density
 
 
 def invert(parameters: Array, z: Array) -> Array:
@@ -294,7 +299,9 @@ def invert(parameters: Array, z: Array) -> Array:
     p = np.asarray(parameters, float)
 
     def unmap(at: int, x: Array) -> Array:
-        return (x - p[at + 9 : at + 12]) @ np.linalg.inv(p[at : at + 9].reshape(3, 3)).T
+        inverse: Array = np.linalg.inv(p[at : at + 9].reshape(3, 3))
+        mapped: Array = (x - p[at + 9 : at + 12]) @ inverse.T
+        return mapped
 
     x = unmap(LAST, np.asarray(z, float))
     for k in reversed(range(LAYERS)):
@@ -314,7 +321,10 @@ def invert(parameters: Array, z: Array) -> Array:
 
 
 def evaluate(part: Part, parameters: Array, weight: float = 1.0, log_det: float = 0.0) -> Linearization:
-    """Return the residual (4 rows) times sqrt(weight) and its derivatives; the last row is sqrt(h) l, h = log_det."""
+    """Return the residual (4 rows) times sqrt(weight) and its derivatives; the last row is sqrt(h) l, h = log_det.
+
+    :param parameters: (SIZE,) of the joint.
+    """
     z, J, value, gradient = transform(parameters, part.Omega)
     a = parameters[BOUND] - value
     half = 0.5 * (a + np.sqrt(a * a + 1.0))

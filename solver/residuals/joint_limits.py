@@ -86,7 +86,14 @@ def accumulate(tree, ints, floats, weight, inv_sigma, triggs, pose, blocks):  # 
 def pack(
     joints: Array, axes: Array, lower: Array, upper: Array, swing_limit: Array, w: Array, w_swing: Array
 ) -> tuple[Array, Array]:
-    """Return the tables of `accumulate` from joints (n,), unit axes (n, 3), and columns (n,) of limits and weights."""
+    """Return the tables of `accumulate`: int64 (n, 1) and float64 (n, 8).
+
+    :param joints: (n,) in 1..K.
+    :param axes: (n, 3) unit vectors, in the parent's rest axes.
+    :param lower, upper: (n,), (n,) bounds of the twist about the axis, radians.
+    :param swing_limit: (n,) bound of the turn of the axis itself, radians.
+    :param w, w_swing: (n,), (n,) weights of the two.
+    """
     n = len(joints)
     floats = np.hstack(
         [np.reshape(axes, (n, 3)), np.c_[lower], np.c_[upper], np.c_[swing_limit], np.c_[w], np.c_[w_swing]]
@@ -114,7 +121,11 @@ def evaluate(
     w_swing: float,
     weight: float = 1.0,
 ) -> Linearization:
-    """Return the residual (4 rows) times sqrt(weight) and its derivatives."""
+    """Return the residual (4 rows) times sqrt(weight) and its derivatives.
+
+    :param axis: (3,) a unit vector, in the parent's rest axes.
+    :param lower, upper, swing_limit: radians.
+    """
     phi = log(part.Omega)
     J = left_jacobian_inverse(phi) @ part.R_parent.T
     angle = float(axis @ phi)

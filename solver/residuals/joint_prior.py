@@ -61,7 +61,7 @@ def pack(joints: Array, Omega_mean: Array, weights: Array) -> tuple[Array, Array
 
 
 def evaluate(part: Part, Omega_mean: Array, weight: float = 1.0) -> Linearization:
-    """Return the residual (3 rows) times sqrt(weight) and its derivatives."""
+    """Return the residual (3 rows) times sqrt(weight) and its derivatives; `Omega_mean` (3, 3) is a joint state."""
     phi = log(Omega_mean.T @ part.Omega)
     g = np.sqrt(weight)
     J_u = g * left_jacobian_inverse(phi) @ Omega_mean.T @ part.R_parent.T

@@ -28,7 +28,11 @@ def term(x, y, z, mx, my, mz, weight, inv_sigma, triggs):  # type: ignore[no-unt
 
 
 def evaluate(part: Part, v_bar: Array, V: Array, point: Array, weight: float = 1.0) -> Linearization:
-    """Return r sqrt(weight) (3 rows), without robust kernel, and its derivatives; `point` (3,) metres, camera frame."""
+    """Return r sqrt(weight) (3 rows), without robust kernel, and its derivatives.
+
+    :param v_bar, V: (3,), (3, P) of the point relative to its part's origin, metres.
+    :param point: (3,) where it was measured, metres, camera frame.
+    """
     p = part.R @ (V @ part.beta + v_bar) + part.t
     J_x, J_beta = point_jacobian(part, p, V)
     g = np.sqrt(weight)

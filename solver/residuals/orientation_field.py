@@ -45,7 +45,11 @@ def term(dx, dy, dz, nx, ny, nz, weight, inv_sigma, triggs):  # type: ignore[no-
 
 
 def evaluate(part: Part, v_bar: Array, V: Array, direction: Array, weight: float = 1.0) -> Linearization:
-    """Return r sqrt(weight) (3 rows), without robust kernel, and its derivatives; `direction` (3,) in the camera."""
+    """Return r sqrt(weight) (3 rows), without robust kernel, and its derivatives.
+
+    :param v_bar, V: (3,), (3, P) of the second point relative to the first, metres.
+    :param direction: (3,) measured unit vector, camera frame.
+    """
     d = part.R @ (V @ part.beta + v_bar)
     length = np.linalg.norm(d)
     zeros = np.zeros((3, 3))

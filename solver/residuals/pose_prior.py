@@ -57,7 +57,12 @@ def accumulate(tree, ints, floats, weight, inv_sigma, triggs, pose, blocks):  # 
 
 
 def pack(parts: Array, R_camera_part: Array, t_camera_part: Array, w_R: Array, w_t: Array) -> tuple[Array, Array]:
-    """Return the tables of `accumulate` from parts (n,), rotations (n, 3, 3), positions (n, 3) and weights (n,)."""
+    """Return the tables of `accumulate`: int64 (n, 1) and float64 (n, 14).
+
+    :param parts: (n,) in 0..K.
+    :param R_camera_part, t_camera_part: (n, 3, 3), (n, 3) the expected poses, metres, camera frame.
+    :param w_R, w_t: (n,), (n,) weights per radian^2 and per metre^2.
+    """
     n = len(parts)
     floats = np.empty((n, 14))
     floats[:, :9], floats[:, 9:12] = np.reshape(R_camera_part, (n, 9)), t_camera_part
@@ -66,7 +71,10 @@ def pack(parts: Array, R_camera_part: Array, t_camera_part: Array, w_R: Array, w
 
 
 def evaluate(part: Part, R_hat: Array, t_hat: Array, w_R: float, w_t: float, weight: float = 1.0) -> Linearization:
-    """Return the residual (6 rows) times sqrt(weight) and its derivatives."""
+    """Return the residual (6 rows) times sqrt(weight) and its derivatives.
+
+    :param R_hat, t_hat: (3, 3), (3,) the expected pose of the part, metres, camera frame.
+    """
     phi = log(R_hat.T @ part.R)
     a, b = np.sqrt(weight * w_R), np.sqrt(weight * w_t)
     J_x = np.zeros((6, 6))

@@ -9,7 +9,8 @@ A residual r_i(T_i, Omega_i, beta) beside the measurements is a module with
                                              compiled with @kernel; adds JᵀJ and Jᵀr to `Blocks` (see part.py)
     evaluate(part, ...) -> Linearization     the same in plain numpy, for the derivative test
 To add it here: its import, and one line, its module in RESIDUALS. Its tables come in through
-`Measurements.tables[name]`, its weight through `Weights.tables[name]`. A residual with no rows costs one call.
+`Measurements.tables[name]`, or through a field of `Measurements` or `Priors` of its own; its weight through
+`Weights.tables[name]`. A residual with no rows costs one call.
 
 The three measurements (keypoint2d, keypoint3d, orientation_field) are not here: the hot path in linearize.py merges
 those of one point into one term.

@@ -29,7 +29,7 @@ def accumulate(mean, information, weight, pose, blocks):  # type: ignore[no-unty
 
 
 def evaluate(part: Part, mean: Array, information: Array, weight: float = 1.0) -> Linearization:
-    """Return the residual (P rows) and its derivatives; `information` (P, P) must be positive definite."""
+    """Return the residual (P rows) and its derivatives for `mean` (P,) and `information` (P, P), positive definite."""
     root = np.sqrt(weight) * np.linalg.cholesky(information).T
     n = len(part.beta)
     return Linearization(root @ (part.beta - mean), np.zeros((n, 6)), np.zeros((n, 3)), root)

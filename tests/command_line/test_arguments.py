@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the options of a capture mean, and how a batch passes them on."""
+"""Values of the capture options, and the arguments that a batch passes on."""
 
 from __future__ import annotations
 
 import pytest
 from scope.scope_addon.cli import build_parser
-from scope.scope_addon.command_line.arguments import body_and_options, given_options
+from scope.scope_addon.command_line.arguments import body_and_options, non_default_arguments
 from scope.scope_addon.errors import UsageError
 
 
@@ -15,12 +15,12 @@ def options(*argv):
 
 
 @pytest.mark.parametrize(("said", "meant"), [("2", 2), ("all", "all"), ("largest", "largest")])
-def test_how_many_people(said, meant):
+def test_the_number_of_people(said, meant):
     assert options("--people", said).people == meant
 
 
 @pytest.mark.parametrize("said", ["0", "-1", "1.5", "two", "", "9999999", "\u0663"])
-def test_what_is_no_number_of_people(said):
+def test_an_invalid_number_of_people_is_an_error(said):
     with pytest.raises(UsageError, match="people"):
         options(f"--people={said}")
 
@@ -31,7 +31,7 @@ def test_heights_are_centimetres(said, meant):
 
 
 @pytest.mark.parametrize("said", ["", "175,", "1,75", "tall", "nan", "inf", "175;162"])
-def test_what_is_no_height(said):
+def test_an_invalid_height_is_an_error(said):
     with pytest.raises(UsageError):
         options(f"--height={said}")
 
@@ -39,6 +39,6 @@ def test_what_is_no_height(said):
 def test_a_batch_passes_the_rig_on(tmp_path):
     rig = tmp_path / "rig.glb"
     args = build_parser().parse_args(["batch", ".", "--out", ".", "--retarget", str(rig), "--rig-object", "Rig"])
-    assert given_options(args) == {"--retarget": str(rig), "--rig-object": "Rig"}
+    assert non_default_arguments(args) == {"--retarget": str(rig), "--rig-object": "Rig"}
     args = build_parser().parse_args(["batch", ".", "--out", ".", "--retarget", str(rig), "--retarget-root", "object"])
-    assert given_options(args) == {"--retarget": str(rig), "--retarget-root": "object"}
+    assert non_default_arguments(args) == {"--retarget": str(rig), "--retarget-root": "object"}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A walk whose feet roll from the heel over the sole onto the ball, each of them at rest on the floor in its turn."""
+"""A synthetic walk whose feet roll from heel to ball; each is at rest on the floor while it is in contact."""
 
 import numpy as np
 from scope.scope_addon.edit.clip import Clip
@@ -12,7 +12,7 @@ J = BODY.rest_joints(ZERO) @ R_WORLD_MODEL.T
 V = BODY.rest_vertices(ZERO) @ R_WORLD_MODEL.T
 FLOOR = V[:, 2].min()
 PERIOD, STANCE, STRIDE = 1.2, 0.62, 1.0
-FLAT, RISE = 0.2, 0.55  # shares of the stance at which the sole is down, and at which the heel leaves
+FLAT, RISE = 0.2, 0.55  # shares of the stance at which the sole is flat, and at which the heel lifts
 
 
 def joint(part):
@@ -20,14 +20,14 @@ def joint(part):
 
 
 def heel_of(side):
-    """On the floor, a centimetre before the rear end of the sole."""
+    """Return the heel on the floor, a centimetre in front of the rear end of the sole."""
     ankle = joint(f"{side}_ankle")
     own = V[(np.sign(V[:, 0]) == np.sign(ankle[0])) & (V[:, 2] < FLOOR + 0.01)]
     return np.array([ankle[0], own[:, 1].max() - 0.01, FLOOR])
 
 
 def turn_by(vector):
-    """(3, 3) of a rotation vector, by Rodrigues' formula."""
+    """Return the rotation (3, 3) of a rotation vector, by Rodrigues' formula."""
     angle = np.linalg.norm(vector)
     x, y, z = vector / max(angle, 1e-12)
     K = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
@@ -35,12 +35,12 @@ def turn_by(vector):
 
 
 def pitch(degrees):
-    """Toes down about the sideways axis of a person who looks along −y."""
+    """Return the rotation that pitches the toes of a person facing −y down by ``degrees``."""
     return turn_by(np.array([np.radians(degrees), 0, 0]))
 
 
 def foot(side, step):
-    """(ankle, turn of the foot, turn of the toes, heel stands, ball stands) at a time in steps of this foot."""
+    """Return ankle, rotations of foot and toes, contact of heel and of ball, at a time in steps of this foot."""
     number, phase = np.floor(step), step % 1 / STANCE
     place = joint(f"{side}_ankle") + [0, -STRIDE * number, -FLOOR]
     heel, ball = heel_of(side) - joint(f"{side}_ankle"), joint(f"{side}_foot") - joint(f"{side}_ankle")
@@ -68,9 +68,9 @@ def shortest(a, b):
 
 
 def rolling_walk(seconds=2.6, stiff_toes=False):
-    """The clip, and per side where heel and ball stand: (T, 2) bool.
+    """Return the clip, and per side the contact of heel and ball: (T, 2) bool.
 
-    :param stiff_toes: the toes do not bend, as in a capture that cannot see them.
+    :param stiff_toes: keep the toes from bending, as in a capture without toe keypoints.
     """
     times = np.arange(int(seconds * RATE) + 1) / RATE
     rotations = np.tile(np.eye(3), (len(times), len(NAMES), 1, 1))
@@ -92,14 +92,14 @@ def rolling_walk(seconds=2.6, stiff_toes=False):
             hip = root[t] + joint(f"{side}_hip") - J[0]
             upper = joint(f"{side}_knee") - joint(f"{side}_hip")
             lower = joint(f"{side}_ankle") - joint(f"{side}_knee")
-            a, b, way = np.linalg.norm(upper), np.linalg.norm(lower), ankle - hip
-            c = np.linalg.norm(way)
+            a, b, leg = np.linalg.norm(upper), np.linalg.norm(lower), ankle - hip
+            c = np.linalg.norm(leg)
             assert c < a + b, "the walk's legs are too short"
             along = (a * a - b * b + c * c) / (2 * c)
-            front = np.cross(np.cross(way, [0, -1, 0]), way)
-            knee = way / c * along + front / np.linalg.norm(front) * np.sqrt(a * a - along * along)
+            front = np.cross(np.cross(leg, [0, -1, 0]), leg)
+            knee = leg / c * along + front / np.linalg.norm(front) * np.sqrt(a * a - along * along)
             D[f"{side}_hip"] = shortest(upper, knee)
-            D[f"{side}_knee"] = shortest(D[f"{side}_hip"] @ lower, way - knee) @ D[f"{side}_hip"]
+            D[f"{side}_knee"] = shortest(D[f"{side}_hip"] @ lower, leg - knee) @ D[f"{side}_hip"]
         for i, name in enumerate(NAMES):
             parent = BODY.parents[i]
             R = D[name] if parent < 0 else D[NAMES[parent]].T @ D[name]

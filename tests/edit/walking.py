@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A walk made of sines, as a clip and as a captured motion."""
+"""A synthetic walk of sinusoids, as a clip and as a captured motion."""
 
 import numpy as np
 from scope.scope_addon.edit.clip import Clip
@@ -11,12 +11,18 @@ from ..made_motion import level_camera, made_motion
 
 BODY = load_body("scope")
 NAMES = list(BODY.joint_names)
+BETAS = np.zeros(BODY.P)
 RATE = 30.0
 ARMS_DOWN = {"left_shoulder": [0, 0, -1.2], "right_shoulder": [0, 0, 1.2]}
 
 
+def angle(a, b):
+    """Angles of the rotations from a (..., 3, 3) to b, in radians."""
+    return np.linalg.norm(log(np.swapaxes(a, -1, -2) @ b), axis=-1)
+
+
 def walk(seconds=4.0, period=1.0, speed=1.2, rate=RATE):
-    """A walk along −y: legs and arms swing, knees bend, the pelvis bobs."""
+    """Return a walk along −y: hips swing, knees bend, the pelvis moves up and down."""
     t = np.arange(int(seconds * rate) + 1) / rate
     w = np.zeros((len(t), len(NAMES), 3))
     for name, value in ARMS_DOWN.items():
@@ -32,7 +38,7 @@ def walk(seconds=4.0, period=1.0, speed=1.2, rate=RATE):
 
 
 def motion_of(clip, noise=0.0, seed=0, body=BODY):
-    """A capture of the clip by a level camera 4 m away; its raw motion has noise in radians."""
+    """Return a capture of the clip by a level camera 4 m away; its raw motion has ``noise`` in radians."""
     rng = np.random.default_rng(seed)
     T, K1 = clip.rotations.shape[:2]
     shaken = clip.rotations @ exp(noise * rng.standard_normal((T, K1, 3)))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Watching processes that a test did not start itself."""
+"""Observe processes that a test did not start itself."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pathlib import Path
 
 
 def wait_for(condition: Callable[[], object], timeout_s: float = 300.0) -> None:
-    """Until the condition holds."""
+    """Wait until the condition holds."""
     end = time.monotonic() + timeout_s
     while not condition():
         assert time.monotonic() < end
@@ -18,7 +18,7 @@ def wait_for(condition: Callable[[], object], timeout_s: float = 300.0) -> None:
 
 
 def runs(pid: int) -> bool:
-    """Whether a process exists and, where /proc tells, is not a zombie that nobody waited for."""
+    """Return whether a process exists and, where there is /proc, is not a zombie."""
     if not Path("/proc/self").exists():  # macOS
         try:
             os.kill(pid, 0)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A folder of footage: nothing is done twice, nothing that fails stops the rest, whatever the clips do."""
+"""A folder of footage: no clip is captured twice, and no failure affects other clips."""
 
 import io
 import json
@@ -23,7 +23,7 @@ from scope.solver.loaders.body_file import BUILT_IN
 
 from .processes import runs, wait_for
 
-# Stands for the capture: what the clip's text says happens, and every call is noted beside the clips.
+# Replaces the capture: the clip's text decides the outcome, and every call is logged in the folder of the clips.
 PROGRAM = """
 import json, sys, pathlib
 clip = pathlib.Path(sys.argv[2])
@@ -68,7 +68,7 @@ def batch(folder, out, options=None, suffixes=(".npz", ".glb")):
 
 
 @pytest.mark.parametrize("jobs", [1, 3])
-def test_every_clip_has_its_own_fate(folder, tmp_path, jobs):
+def test_every_clip_has_its_own_outcome(folder, tmp_path, jobs):
     out = tmp_path / "out"
     report = batch(folder, out).run(jobs)
     statuses = {e["file"]: e["status"] for e in report["files"]}
@@ -82,14 +82,14 @@ def test_every_clip_has_its_own_fate(folder, tmp_path, jobs):
     assert sorted(p.name for p in out.iterdir()) == ["a.glb", "a.npz", "e.glb", "e.npz", REPORT_NAME]
 
 
-def test_what_a_clip_warns_of_is_said(folder, tmp_path):
+def test_warnings_of_a_clip_are_shown(folder, tmp_path):
     (folder / "a.mp4").write_text("dark")
     said = []
     batch(folder, tmp_path / "out").run(1, say=said.append)
     assert said.index("warning: too dark") == said.index("1/5 a.mp4 done") + 1
 
 
-def test_on_a_terminal_no_line_hangs_on_the_progress_bar(folder, tmp_path, monkeypatch):
+def test_on_a_terminal_every_message_has_its_own_line(folder, tmp_path, monkeypatch):
     terminal = io.StringIO()
     monkeypatch.setattr(terminal, "isatty", lambda: True)
     monkeypatch.setattr(sys, "stderr", terminal)
@@ -99,12 +99,12 @@ def test_on_a_terminal_no_line_hangs_on_the_progress_bar(folder, tmp_path, monke
     assert [line[:9] for line in lines] == [f"scope: {i}/" for i in range(1, 6)] + ["scope: 2 "]
 
 
-def test_what_is_finished_is_not_done_again_and_what_changed_is(folder, tmp_path):
+def test_finished_clips_are_skipped_and_changed_ones_captured(folder, tmp_path):
     out = tmp_path / "out"
     batch(folder, out).run(1)
     assert len(calls(folder)) == 5
     report = batch(folder, out).run(1)
-    assert calls(folder) == ["b.mov", "d.avi"]  # what failed is tried again
+    assert calls(folder) == ["b.mov", "d.avi"]  # failed clips are captured again
     assert report["counts"] == {"done": 0, "skipped": 2, "no_person": 1, "failed": 2}
 
     (folder / "b.mov").write_text("mended")
@@ -112,16 +112,16 @@ def test_what_is_finished_is_not_done_again_and_what_changed_is(folder, tmp_path
     (out / "e.glb").unlink()
     report = batch(folder, out).run(1)
     assert calls(folder) == ["b.mov", "e.webm"]
-    assert report["exit_status"] == 3  # only the picture of nobody is left
+    assert report["exit_status"] == 3  # only the picture without a person is left
 
-    (folder / "a.mp4").touch()  # a later time, the same content
+    (folder / "a.mp4").touch()  # newer, with the same content
     batch(folder, out).run(1)
     assert calls(folder) == []
     batch(folder, out, {"--quality": "fast"}).run(1)
     assert calls(folder) == ["a.mp4", "b.mov", "c.png", "e.webm"]
 
 
-def test_pictures_that_cannot_be_read_are_not_passed_over(tmp_path):
+def test_unreadable_pictures_are_clips_too(tmp_path):
     (tmp_path / "IMG_0001.HEIC").write_bytes(b"heic")
     (tmp_path / "IMG_0002.avif").write_bytes(b"avif")
     found = Batch(tmp_path, tmp_path / "out", [], {}, [".npz"]).clips(recursive=False)
@@ -129,15 +129,15 @@ def test_pictures_that_cannot_be_read_are_not_passed_over(tmp_path):
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="Windows keeps its pipes in no folder")
-def test_a_pipe_is_no_clip_and_a_link_that_leads_nowhere_is_told(tmp_path):
+def test_a_pipe_is_not_a_clip_and_a_broken_link_is(tmp_path):
     os.mkfifo(tmp_path / "pipe.mp4")
     (tmp_path / "gone.mp4").symlink_to(tmp_path / "nowhere.mp4")
     found = Batch(tmp_path, tmp_path / "out", [], {}, [".npz"]).clips(recursive=False)
     assert sorted(found) == ["gone.mp4"]
 
 
-def test_results_may_lie_on_another_disk(folder, tmp_path):
-    """A folder of the results is a link to elsewhere, as who runs out of space makes it."""
+def test_results_may_be_on_another_disk(folder, tmp_path):
+    """A folder inside the output folder is a link, as users make it who run out of space."""
     (folder / "later").mkdir()
     (folder / "later" / "f.mp4").write_text("ok")
     out, elsewhere = tmp_path / "out", tmp_path / "elsewhere"
@@ -162,7 +162,7 @@ def test_a_moved_folder_of_footage_is_still_finished(folder, tmp_path):
     assert calls(moved) == ["b.mov", "d.avi"]
 
 
-def test_a_damaged_report_is_no_obstacle(folder, tmp_path):
+def test_a_damaged_report_is_ignored(folder, tmp_path):
     out = tmp_path / "out"
     batch(folder, out).run(1)
     for text in ("", "{", "[]", '{"files": 3}', '{"files": [{"name": "a", "status": {}, "key": 1}]}'):
@@ -196,7 +196,7 @@ def test_names(tmp_path):
     assert (out / "below" / "deep" / "d.npz").is_file()
 
 
-def test_names_that_differ_in_case_alone_are_the_same_to_many_systems(tmp_path):
+def test_names_that_differ_only_in_case_are_the_same(tmp_path):
     clips = tmp_path / "clips"
     clips.mkdir()
     for name in ("Walk.mov", "walk.mp4", "Run.mp4"):
@@ -204,7 +204,7 @@ def test_names_that_differ_in_case_alone_are_the_same_to_many_systems(tmp_path):
     assert list(batch(clips, tmp_path / "out").clips(recursive=False)) == ["Run", "Walk.mov", "walk.mp4"]
 
 
-def test_every_clip_has_a_name_of_its_own_where_one_is_called_as_another_without_suffix(tmp_path):
+def test_names_are_unique_where_one_equals_another_without_suffix(tmp_path):
     clips = tmp_path / "clips"
     (clips / "b.mp4").mkdir(parents=True)
     for i in range(3):
@@ -218,7 +218,7 @@ def test_every_clip_has_a_name_of_its_own_where_one_is_called_as_another_without
     }
 
 
-def test_a_clip_called_as_one_of_anothers_people_keeps_its_result(tmp_path):
+def test_names_are_unique_where_one_equals_another_clips_person(tmp_path):
     clips = tmp_path / "clips"
     clips.mkdir()
     for name in ("walk.mp4", "walk.person2.mp4", "run.person1.mp4"):
@@ -244,7 +244,7 @@ def test_an_interrupt_stops_the_running_clips_and_keeps_the_finished(folder, tmp
     assert "a.mp4" not in calls(folder)
 
 
-def test_an_option_may_have_a_value_that_begins_with_a_hyphen(folder, tmp_path):
+def test_a_value_may_begin_with_a_hyphen(folder, tmp_path):
     options = {"--rig-object": "-Rig", "--quality": "fast", "--hands": None}
     batch(folder, tmp_path / "out", options).run(1)
     passed = json.loads((folder / "calls.log").read_text().splitlines()[0])
@@ -254,8 +254,8 @@ def test_an_option_may_have_a_value_that_begins_with_a_hyphen(folder, tmp_path):
 
 @pytest.mark.skipif(os.name == "nt", reason="looks at /proc")
 @pytest.mark.parametrize("at", ["finding the person", "overlay"])
-def test_the_clips_of_a_killed_batch_end_and_leave_nothing_unfinished(tmp_path, at):
-    """Killed while the networks run, and while a result is half written."""
+def test_the_clips_of_a_killed_batch_end_and_leave_no_partial_file(tmp_path, at):
+    """It is killed while the networks run, and while a result is being written."""
     clips, out = tmp_path / "clips", tmp_path / "out"
     clips.mkdir()
     for name in ("a.mp4", "b.mp4"):
@@ -265,9 +265,9 @@ def test_the_clips_of_a_killed_batch_end_and_leave_nothing_unfinished(tmp_path, 
         "from scope.scope_addon import cli\n"
         "from scope.scope_addon.command_line import terminal\n"
         "pid = pathlib.Path(sys.argv[2] + '.pid')\n"
-        "def told(self, stage, done, total):\n"
+        "def record(self, stage, done, total):\n"
         f"    if stage == {at!r} and done > 2 and not pid.exists(): pid.write_text(str(os.getpid()))\n"
-        "terminal.ProgressBar.__call__ = told\n"
+        "terminal.ProgressBar.__call__ = record\n"
         "cli.run()\n"
     )
     argv = ["batch", str(clips), "--out", str(out), "--jobs", "2", "--formats", "npz", "--overlays"]
@@ -291,12 +291,10 @@ def test_the_clips_of_a_killed_batch_end_and_leave_nothing_unfinished(tmp_path, 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no signals to send")
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_signal_ends_the_batch_and_its_clips_whoever_handled_it_before(folder, tmp_path, number):
-    """Blender handles Ctrl-C itself, and only takes a note of it."""
+def test_a_signal_ends_the_batch_and_its_clips_despite_an_earlier_handler(folder, tmp_path, number):
+    """Blender handles Ctrl-C itself, and only sets a flag."""
     (tmp_path / "clip.py").write_text(
-        "import os, pathlib, sys\n"
-        "pathlib.Path(sys.argv[2] + '.pid').write_text(str(os.getpid()))\n"
-        "sys.stdin.read()\n"
+        "import os, pathlib, sys\npathlib.Path(sys.argv[2] + '.pid').write_text(str(os.getpid()))\nsys.stdin.read()\n"
     )
     code = (
         "import signal, sys\n"
@@ -319,20 +317,20 @@ def test_a_signal_ends_the_batch_and_its_clips_whoever_handled_it_before(folder,
     assert not any(runs(int(pid)) for pid in pids)
 
 
-def test_a_signal_that_nobody_heard_ends_the_batch_too(folder, tmp_path, monkeypatch, capsys):
-    """Its exception is lost, as within a weak reference's callback, while clips run."""
+def test_a_signal_whose_exception_is_lost_ends_the_batch_too(folder, tmp_path, monkeypatch, capsys):
+    """The exception is lost while clips run, as in a callback of a weak reference."""
 
     def runs_on(batch, name, *_):
         signals.received.append(signal.SIGINT)
         time.sleep(3)
         return {"status": "failed", "file": name, "message": ""}
 
-    monkeypatch.setattr(Batch, "_one", runs_on)
+    monkeypatch.setattr(Batch, "_capture_one", runs_on)
     assert main(["batch", str(folder), "--out", str(tmp_path / "out"), "--jobs", "2"]) == 130
     assert "stopped; finished clips are kept" in capsys.readouterr().err
 
 
-def test_nothing_to_do_is_said(tmp_path):
+def test_a_folder_without_footage_is_an_error(tmp_path):
     with pytest.raises(InputError, match="nowhere"):
         batch(tmp_path / "nowhere", tmp_path / "out")
     (tmp_path / "empty").mkdir()
@@ -363,14 +361,14 @@ def test_bad_arguments(tmp_path, capsys, argv, says):
     ("argv", "status", "says"),
     [
         (["--people", "40"], 2, "1 to 12"),
-        (["--people", "9" * 9999], 2, "--people takes a number"),
+        (["--people", "9" * 9999], 2, "--people must be a number"),
         (["--calibration", "{tmp}/lens.json"], 1, "lens.json is not a calibration"),
         (["--detector", "{tmp}/net.onnx"], 1, "net.onnx is not an ONNX model"),
         (["--keypoints", "{tmp}/net.onnx"], 1, "net.onnx is not an ONNX model"),
         (["--hands", "--body", str(BUILT_IN["scope"])], 2, "no finger joints"),
     ],
 )
-def test_what_no_clip_can_be_captured_with_is_said_once_before_the_first(folder, tmp_path, capsys, argv, status, says):
+def test_invalid_options_are_reported_once_before_the_first_clip(folder, tmp_path, capsys, argv, status, says):
     (tmp_path / "lens.json").write_text("{}")
     (tmp_path / "net.onnx").write_bytes(b"no network")
     given = [a.format(tmp=tmp_path) for a in argv]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Finished captures are found again, half-finished ones never, and the oldest go first."""
+"""Finished captures are found, unfinished ones never, and the least recently used are pruned first."""
 
 import os
 import shutil
@@ -49,20 +49,20 @@ def test_names_from_a_report_cannot_leave_the_folder(cache):
     assert cache.find("a") is None
 
 
-def test_pruning_removes_what_was_used_longest_ago(cache):
+def test_pruning_removes_the_least_recently_used(cache):
     for age, key in enumerate(["new", "middle", "old"]):
         add(cache, key)
         os.utime(cache.root / "captures" / key, (time.time() - 100 * age,) * 2)
     cache.prune(2500)
     assert [k for k in ("new", "middle", "old") if cache.find(k)] == ["new", "middle"]
     os.utime(cache.root / "captures" / "new", (time.time() - 100,) * 2)
-    cache.prune(1)  # the one used last stays, however large it is
+    cache.prune(1)  # the most recently used is kept, however large it is
     assert [k for k in ("new", "middle") if cache.find(k)] == ["middle"]
 
 
 @pytest.fixture
 def vanishing(monkeypatch):
-    """A folder of that name is listed, and gone when it is looked at: another Blender has removed it."""
+    """A folder of that name is listed, but removed by another Blender before it is read."""
     before = Path.stat
 
     def stat(path, **how):
@@ -87,7 +87,7 @@ def test_another_blenders_job_may_end_at_the_same_time(cache, vanishing):
     assert cache.new_job_folder().is_dir()
 
 
-def test_abandoned_jobs_are_removed_and_running_ones_left(cache):
+def test_abandoned_jobs_are_removed_and_running_ones_kept(cache):
     running, abandoned = cache.new_job_folder(), cache.new_job_folder()
     os.utime(abandoned, (1, 1))
     cache.clear()
@@ -96,7 +96,7 @@ def test_abandoned_jobs_are_removed_and_running_ones_left(cache):
     assert not abandoned.exists()
 
 
-def test_a_folder_that_cannot_be_written_to_is_told(tmp_path):
+def test_an_unwritable_folder_is_an_error(tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(OutputError, match="choose another folder"):
         Cache(tmp_path / "file" / "cache").new_job_folder()

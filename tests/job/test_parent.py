@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a process does when the one that started it is gone."""
+"""A process ends when its parent ends."""
 
 import subprocess
 import sys
@@ -9,17 +9,17 @@ import types
 import pytest
 from scope.scope_addon.job import parent
 
-# Writes half a file, and {meanwhile} until it is told to end.
+# Writes part of a file, and waits until it is interrupted.
 CHILD = """
 import signal, sys, time
 from pathlib import Path
 from scope.scope_addon.job import parent
-from scope.scope_addon.atomic_write import written_beside
+from scope.scope_addon.atomic_write import atomic_path
 parent.GRACE_S = {grace}
-# As the command line does; background jobs of a shell ignore it.
+# As the command line does; background jobs of a shell ignore SIGINT.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 parent.stop_with_parent()
-with written_beside(Path(sys.argv[1])) as temporary:
+with atomic_path(Path(sys.argv[1])) as temporary:
     temporary.write_text("half of something")
     print("writing", flush=True)
     while True:
@@ -32,7 +32,7 @@ with written_beside(Path(sys.argv[1])) as temporary:
 
 
 @pytest.mark.parametrize(("grace", "swallowed"), [(60.0, "ZeroDivisionError"), (0.2, "KeyboardInterrupt")])
-def test_nothing_half_written_stays_whether_the_main_thread_hears_of_it_or_not(tmp_path, grace, swallowed):
+def test_no_partial_file_is_left_whether_or_not_the_main_thread_stops(tmp_path, grace, swallowed):
     code = CHILD.format(grace=grace, swallowed=swallowed)
     command = [sys.executable, "-c", code, str(tmp_path / "result.npz")]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL) as child:
@@ -46,7 +46,7 @@ def test_nothing_half_written_stays_whether_the_main_thread_hears_of_it_or_not(t
 
 
 @pytest.mark.parametrize(("error", "ends"), [(BrokenPipeError(), True), (OSError(9, "Bad file descriptor"), False)])
-def test_only_the_end_of_the_pipe_is_an_end(monkeypatch, error, ends):
+def test_only_the_end_of_the_pipe_ends_the_process(monkeypatch, error, ends):
     def fails():
         raise error
 
@@ -59,8 +59,8 @@ def test_only_the_end_of_the_pipe_is_an_end(monkeypatch, error, ends):
     assert ended.is_set() == ends
 
 
-def test_on_windows_the_pipe_is_looked_at_and_never_read(monkeypatch):
-    """A pending read would stop numpy's libraries from being loaded there."""
+def test_on_windows_the_pipe_is_polled_and_never_read(monkeypatch):
+    """A pending read would block the loading of numpy's libraries there."""
     looks = []
 
     def peek(handle, size):
@@ -74,7 +74,7 @@ def test_on_windows_the_pipe_is_looked_at_and_never_read(monkeypatch):
 
     monkeypatch.setattr(sys, "platform", "win32")
     monkeypatch.setattr(parent.os, "read", read)
-    monkeypatch.setattr(parent, "_PEEK_S", 0.0)
+    monkeypatch.setattr(parent, "_POLLING_INTERVAL_S", 0.0)
     monkeypatch.setitem(sys.modules, "_winapi", types.SimpleNamespace(PeekNamedPipe=peek))
     monkeypatch.setitem(sys.modules, "msvcrt", types.SimpleNamespace(get_osfhandle=lambda fd: 100 + fd))
     with pytest.raises(BrokenPipeError):

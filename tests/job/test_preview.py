@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The picture of the current frame: whole, small, upside down for Blender, skeleton or body where the person is."""
+"""The preview: complete, small, bottom row first, and with the skeleton or body where the person is."""
 
 import threading
 
@@ -39,20 +39,20 @@ def test_lines_join_the_keypoints():
 
 
 class NotReady:
-    """A live body that has still to be loaded."""
+    """A live body that is not loaded yet."""
 
     is_ready = False
 
 
-def test_the_file_is_whole_and_lowest_row_first(tmp_path):
+def test_the_file_is_complete_and_bottom_row_first(tmp_path):
     image = np.zeros((100, 50, 3), np.uint8)
     image[50:] = 200  # the lower half
-    told = []
-    with PreviewWriter(tmp_path, lambda event, **values: told.append((event, values))) as writer:
+    sent = []
+    with PreviewWriter(tmp_path, lambda event, **values: sent.append((event, values))) as writer:
         writer(Frame(7, 0.1, image), None, NotReady())
         writer(Frame(8, 0.2, image), None, NotReady())  # too soon
-        wait_for(lambda: told)
-        assert told == [("preview", {"file": FILE, "width": 128, "height": 256, "frame": 7})]
+        wait_for(lambda: sent)
+        assert sent == [("preview", {"file": FILE, "width": 128, "height": 256, "frame": 7})]
         pixels = np.frombuffer((tmp_path / FILE).read_bytes(), np.uint8).reshape(256, 128, 4)
         assert pixels[0, 0, 0] == 200
         assert pixels[-1, 0, 0] == 0
@@ -62,71 +62,71 @@ def test_the_file_is_whole_and_lowest_row_first(tmp_path):
 
 def test_a_full_disk_does_not_stop_the_capture(tmp_path, monkeypatch):
     monkeypatch.setattr(preview, "INTERVAL_S", 0.0)
-    told, image = [], np.zeros((10, 10, 3), np.uint8)
-    with PreviewWriter(tmp_path / "gone", lambda event, **values: told.append(event)) as writer:
+    sent, image = [], np.zeros((10, 10, 3), np.uint8)
+    with PreviewWriter(tmp_path / "gone", lambda event, **values: sent.append(event)) as writer:
         writer(Frame(0, 0.0, image), None, NotReady())
         wait_for(writer._drawing.done)
-        assert told == []
+        assert sent == []
         (tmp_path / "gone").mkdir()
         writer(Frame(1, 0.1, image), None, NotReady())
-        wait_for(lambda: told == ["preview"])
+        wait_for(lambda: sent == ["preview"])
 
 
-def test_a_picture_that_is_being_read_does_not_stop_the_capture_at_its_end(tmp_path, monkeypatch):
-    """Windows removes no file that somebody has open."""
-    told, refused = [], []
+def test_a_preview_that_is_being_read_does_not_stop_the_capture(tmp_path, monkeypatch):
+    """Windows does not remove a file that is open."""
+    sent, refused = [], []
 
     def in_use(self, missing_ok=False):
         refused.append(self)
         raise PermissionError(13, "it is being used by another process")
 
-    with PreviewWriter(tmp_path, lambda event, **values: told.append(event)) as writer:
+    with PreviewWriter(tmp_path, lambda event, **values: sent.append(event)) as writer:
         writer(Frame(0, 0.0, np.zeros((10, 10, 3), np.uint8)), None, NotReady())
-        wait_for(lambda: told == ["preview"])
+        wait_for(lambda: sent == ["preview"])
         monkeypatch.setattr(preview.Path, "unlink", in_use)
     assert refused == [tmp_path / FILE]
     assert (tmp_path / FILE).is_file()
 
 
-def test_a_body_that_cannot_be_fitted_gives_way_to_the_skeleton(tmp_path):
+def test_the_skeleton_is_drawn_if_the_body_cannot_be_fitted(tmp_path):
     class Broken:
         is_ready = True
 
         def fit(self, observation):
             raise ArithmeticError("a defect")
 
-    told = []
-    with PreviewWriter(tmp_path, lambda event, **values: told.append(event)) as writer:
+    sent = []
+    with PreviewWriter(tmp_path, lambda event, **values: sent.append(event)) as writer:
         writer._rasterizer.result()
         image, seen = np.zeros((50, 50, 3), np.uint8), observation(np.linspace([5.0, 5.0], [45.0, 40.0], 33))
         writer(Frame(0, 0.0, image), seen, Broken())
-        wait_for(lambda: told == ["preview"])
+        wait_for(lambda: sent == ["preview"])
         shown = np.frombuffer((tmp_path / FILE).read_bytes(), np.uint8).reshape(LONGER_SIDE, LONGER_SIDE, 4)
     np.testing.assert_array_equal(shown[::-1], draw(image, seen))
     assert shown[..., :3].max() > 200
 
 
-def test_pictures_do_not_wait_for_a_rasterizer_that_compiles(tmp_path, monkeypatch):
+def test_previews_do_not_wait_for_the_rasterizer_to_compile(tmp_path, monkeypatch):
     class Ready:
         is_ready = True
 
         def fit(self, observation):
-            told.append("fitted")
+            sent.append("fitted")
 
-    told, compiled = [], threading.Event()
+    sent, compiled = [], threading.Event()
     monkeypatch.setattr(preview, "INTERVAL_S", 0.0)
     monkeypatch.setattr(preview, "_load_rasterizer", compiled.wait)
-    with PreviewWriter(tmp_path, lambda event, **values: told.append(event)) as writer:
+    with PreviewWriter(tmp_path, lambda event, **values: sent.append(event)) as writer:
         for k, expected in ((0, ["preview"]), (1, ["preview", "fitted", "preview"])):
             writer(Frame(k, 0.0, np.zeros((50, 50, 3), np.uint8)), observation(np.full((33, 2), 20.0)), Ready())
             writer._drawing.result()
-            assert told == expected
+            assert sent == expected
             compiled.set()
             writer._rasterizer.result()
 
 
-def test_the_picture_shows_the_body_where_the_truth_has_it(body):
-    """At the joints the picture takes on the body's colour, and it stays as it is away from them."""
+def test_the_preview_shows_the_body_at_the_ground_truth(body):
+    """The image has the body's colour at the joints, and is unchanged away from them."""
     truth, checked = np.load(SAMPLE.with_name("sample_truth.npz")), []
 
     def watch(frame, seen, live):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The real worker process without Blender: its search path, its messages, and its end when the parent is gone."""
+"""The real worker process without Blender: search path, messages, and its end when the parent ends."""
 
 import inspect
 import json
@@ -35,7 +35,7 @@ def folder(tmp_path):
 
 
 def test_an_isolated_worker_starts_and_reports(folder):
-    """-I drops PYTHONPATH, the script's and the current folder, as inside Blender."""
+    """-I ignores PYTHONPATH, the script's folder and the current folder, as inside Blender."""
     worker = WorkerProcess(JobRequest(SAMPLE, quality="fast"), folder, None, [sys.executable, "-I"])
     messages = []
     wait_for(lambda: messages.extend(worker.poll()) or {"progress", "preview"} <= {m["event"] for m in messages})
@@ -65,21 +65,21 @@ def test_the_worker_ends_when_its_parent_is_killed(folder):
     wait_for(lambda: not folder.exists())
 
 
-def test_a_worker_whose_parent_died_before_it_asked_leaves_nothing(folder):
+def test_a_worker_without_a_request_leaves_nothing_behind(folder):
     command = [sys.executable, str(START_SCRIPT), str(ROOT), str(folder), *(p for p in sys.path if p)]
     assert subprocess.run(command, stdin=subprocess.DEVNULL, check=False).returncode == 1
     assert not folder.exists()
 
 
-def test_an_orphan_that_goes_on_writing_leaves_nothing(tmp_path):
+def test_a_worker_that_keeps_writing_without_a_parent_leaves_nothing_behind(tmp_path):
     folder = tmp_path / "jobs" / "job-1"
     folder.mkdir(parents=True)
     code = (
         "import sys\n"
         "from pathlib import Path\n"
-        "from scope.scope_addon.job.worker import _die_with_parent\n"
+        "from scope.scope_addon.job.worker import _exit_with_parent\n"
         f"folder, number = Path({str(folder)!r}), 0\n"
-        "_die_with_parent(folder)\n"
+        "_exit_with_parent(folder)\n"
         "while True:\n"
         "    number += 1\n"
         "    try:\n"
@@ -94,23 +94,23 @@ def test_an_orphan_that_goes_on_writing_leaves_nothing(tmp_path):
     assert list((tmp_path / "jobs").iterdir()) == []
 
 
-def test_a_missing_library_is_told(folder, tmp_path, monkeypatch):
+def test_a_missing_library_is_reported(folder, tmp_path, monkeypatch):
     (tmp_path / "cv2").mkdir()
     (tmp_path / "cv2" / "__init__.py").write_text("raise ImportError('wrong platform')")
     monkeypatch.syspath_prepend(str(tmp_path))
     worker = WorkerProcess(JobRequest(SAMPLE), folder, None, [sys.executable, "-I"])
-    with pytest.raises(WorkerFailedError, match=r"wrong platform.*install the extension again"):
+    with pytest.raises(WorkerFailedError, match=r"wrong platform.*reinstall the extension"):
         wait_for(lambda: worker.poll() and False)
     worker.close()
 
 
-def test_a_python_that_is_not_there_is_told(folder):
+def test_a_missing_interpreter_is_an_error(folder):
     with pytest.raises(SetupError, match="nowhere"):
         WorkerProcess(JobRequest(SAMPLE), folder, None, ["/nowhere/python"])
     assert not folder.exists()
 
 
-def test_requests_travel_as_one_line():
+def test_requests_are_sent_as_one_line():
     request = JobRequest("a\nb.mp4", quality="fast", fov_deg=60.0, heights_m=(1.8, 1.7), calibration="lens.json")
     assert "\n" not in request.to_json()
     assert JobRequest.from_json(request.to_json()) == request
@@ -118,7 +118,7 @@ def test_requests_travel_as_one_line():
 
 
 @pytest.mark.parametrize("text", ["", "[]", "{}", '{"footage": "a", "footage": '])
-def test_what_is_no_request_is_refused(text):
+def test_an_invalid_request_is_an_error(text):
     with pytest.raises(UsageError, match="not a capture request"):
         JobRequest.from_json(text)
 
@@ -127,7 +127,7 @@ def test_what_is_no_request_is_refused(text):
     ("values", "message"),
     [
         ({"colour": 1}, "no option 'colour'"),
-        ({"shape": "keyed"}, "no option 'shape'"),  # of the command line and the panel alone
+        ({"shape": "keyed"}, "no option 'shape'"),  # only of the command line and the panel
         ({"quality": "superb"}, "quality must be one of fast, balanced, best, not 'superb'"),
         ({"people": "some"}, "people must be one of largest, all, not 'some'"),
         ({"people": 1.5}, "people must be int or str, not 1.5"),
@@ -139,12 +139,12 @@ def test_what_is_no_request_is_refused(text):
         ({"calibration": 3}, "calibration must be str, not 3"),
     ],
 )
-def test_a_request_states_which_value_is_wrong(values, message):
+def test_an_invalid_value_of_a_request_is_an_error_that_names_it(values, message):
     with pytest.raises(UsageError, match=message):
         JobRequest.from_json(json.dumps({"footage": "a", **values}))
 
 
-def test_keys_tell_what_changes_the_result(tmp_path):
+def test_keys_differ_if_the_result_may_differ(tmp_path):
     clip = tmp_path / "clip.mp4"
     clip.write_bytes(b"x" * 100)
     request = JobRequest(str(clip))
@@ -159,7 +159,7 @@ def test_keys_tell_what_changes_the_result(tmp_path):
     assert request.key("1") != key
 
 
-def test_the_program_is_another_one_when_anything_changes_that_decides_the_result(tmp_path):
+def test_the_code_version_changes_with_every_file_that_decides_the_result(tmp_path):
     networks = [network_path(name) for name in (*LANDMARK_NETWORK_OF_QUALITY.values(), *OTHER_NETWORKS)]
     deciding = [*networks, *BUILT_IN.values(), LIFTER_FILE, learned_prior.BUILT_IN]
     deciding += [Path(inspect.getfile(part)) for part in (learned_prior, pipeline, export, Motion)]
@@ -171,13 +171,13 @@ def test_the_program_is_another_one_when_anything_changes_that_decides_the_resul
     versions = [code_version(tmp_path)]
     for copy in copies:
         copy.write_bytes(b"after!")
-        os.utime(copy, ns=(1, 1))  # as long as before, and written at another time
+        os.utime(copy, ns=(1, 1))  # same size, another modification time
         versions.append(code_version(tmp_path))
     assert len(set(versions)) == 1 + len(deciding)
     assert len(set(versions[len(deciding) :])) == 1
 
 
-def test_compiled_code_goes_where_it_is_told(folder, tmp_path):
+def test_compiled_code_is_stored_in_the_given_folder(folder, tmp_path):
     script = tmp_path / "script.py"
     script.write_text("import json, os; print(json.dumps({'event': 'result', 'at': os.environ['NUMBA_CACHE_DIR']}))")
     worker = WorkerProcess(JobRequest(SAMPLE), folder, tmp_path / "kernels", [sys.executable, "-I"], script)

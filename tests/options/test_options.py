@@ -14,14 +14,14 @@ from scope.scope_addon.capture.options import CaptureOptions, capture_options, c
 from scope.scope_addon.capture.perception.execution import CHOICES
 from scope.scope_addon.capture.perception.sessions import LANDMARK_NETWORK_OF_QUALITY
 from scope.scope_addon.cli import build_parser
-from scope.scope_addon.command_line.arguments import body_and_options, given_options, option_values
+from scope.scope_addon.command_line.arguments import body_and_options, non_default_arguments, option_values
 from scope.scope_addon.errors import UsageError
 from scope.scope_addon.job.request import JobRequest
 from scope.scope_addon.options import OPTIONS, Argument, Option, Place, option, options_at
 from scope.scope_addon.retarget.rig_source import ROOTS
 from scope.solver.loaders.body_file import load_body
 
-# Repeated here on purpose: users' scripts rely on the flags.
+# Listed again on purpose, because users' scripts rely on the flags.
 FLAGS = """
 --quality --people --start --end --fps --body --hands --height --focal-mm --fov --calibration --no-smoothing
 --shape-keys --file-per-person --retarget --rig-object --bone-map --retarget-root --detector --keypoints --provider
@@ -47,7 +47,7 @@ def parsed(*argv):
     return build_parser().parse_args(["capture", *argv])
 
 
-def test_the_flags_are_those_that_scripts_know(capsys):
+def test_the_flags_do_not_change(capsys):
     assert [each.flag for each in options_at(Place.COMMAND_LINE)] == FLAGS
     with pytest.raises(SystemExit):
         parsed("--help")
@@ -101,14 +101,14 @@ def test_the_declared_range_is_what_the_capture_accepts(body, name, step):
 
 
 @pytest.mark.parametrize("outside", [0.499, 2.601])
-def test_nobody_is_taller_or_smaller_than_the_declared_range(body, outside):
+def test_heights_outside_the_declared_range_are_errors(body, outside):
     declared = option("heights_m")
     assert (declared.minimum, declared.maximum) == (0.5, 2.6)
     with pytest.raises(UsageError, match="from 50 to 260 cm"):
         check_options(body, CaptureOptions(heights_m=(outside,)))
 
 
-def test_what_the_command_line_gives_reaches_the_pipeline(tmp_path):
+def test_arguments_reach_the_pipeline(tmp_path):
     lens = tmp_path / "lens.json"
     argv = ["--quality", "fast", "--people", "2", "--start", "1.5", "--end", "3", "--fps", "12", "--fov", "60"]
     argv += ["--height", "175,162", "--no-smoothing", "--threads", "2", "--provider", "cpu"]
@@ -137,18 +137,18 @@ def test_a_request_gives_the_same_options_as_the_command_line(tmp_path):
     assert capture_options(travelled.values) == capture_options(option_values(parsed(*argv)))
 
 
-def test_a_batch_passes_on_what_was_given_and_nothing_else():
+def test_a_batch_passes_on_only_arguments_that_were_given():
     argv = ["batch", ".", "--out", ".", "--jobs", "2", "--json", "--quiet", "--no-smoothing", "--people", "all"]
     argv += ["--height", "175,162", "--quality", "best"]  # the last is the default
-    given = given_options(build_parser().parse_args(argv))
+    given = non_default_arguments(build_parser().parse_args(argv))
     assert given == {"--no-smoothing": None, "--people": "all", "--height": "175,162"}
 
 
-def test_a_new_option_needs_its_record_alone(monkeypatch, capsys):
+def test_a_new_option_needs_only_its_record(monkeypatch, capsys):
     monkeypatch.setattr(declarations, "OPTIONS", (*OPTIONS, EXTRA))
     args = parsed("--stride", "3")
     assert option_values(args)["stride"] == 3
-    assert given_options(args) == {"--stride": "3"}
+    assert non_default_arguments(args) == {"--stride": "3"}
     with pytest.raises(SystemExit):
         parsed("--help")
     assert "capture every Nth frame (default: 1)" in " ".join(capsys.readouterr().out.split())
@@ -161,7 +161,7 @@ def test_a_new_option_needs_its_record_alone(monkeypatch, capsys):
     assert EXTRA.range_error(0) == "must be at least 1, not 0"
 
 
-def test_an_undeclared_option_is_unknown():
+def test_an_undeclared_option_is_an_error():
     with pytest.raises(UsageError, match="stride"):
         JobRequest("walk.mp4", stride=3)
     with pytest.raises(KeyError):

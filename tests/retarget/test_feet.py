@@ -1,27 +1,27 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A pelvis that has to sink for the legs to reach the floor."""
+"""Lowering the pelvis for the legs to reach the floor."""
 
 import numpy as np
 import pytest
-from scope.scope_addon.retarget.feet import sinking
+from scope.scope_addon.retarget.feet import pelvis_drop
 
 
-def sunk(fps, seconds=2.0):
-    """Times, and what `sinking` makes of a leg that is 5 cm too short for a fifth of a second."""
+def lowered(fps, seconds=2.0):
+    """Return times, needed and computed drop for a leg that is 5 cm too short for a fifth of a second."""
     times = np.arange(round(seconds * fps)) / fps
     needed = np.where(np.abs(times - 1.0) < 0.1, 0.05, 0.0)
     hips, goals = np.zeros((len(times), 1, 3)), np.zeros((len(times), 1, 3))
     hips[:, 0, 2] = 1.0 + needed
-    return times, needed, sinking(hips, goals, np.array([1.0]), times)
+    return times, needed, pelvis_drop(hips, goals, np.array([1.0]), times)
 
 
 @pytest.mark.parametrize("fps", [24, 30, 60, 120, 240])
-def test_a_pelvis_sinks_as_smoothly_at_any_frame_rate(fps):
-    times, needed, found = sunk(fps)
+def test_the_pelvis_is_lowered_equally_smoothly_at_any_frame_rate(fps):
+    times, needed, found = lowered(fps)
     assert (found >= needed - 1e-9).all()
     assert np.abs(np.gradient(found, times)).max() < 0.4
     assert 0.6 < (found > 1e-6).sum() / fps < 0.8
 
 
-def test_one_key_is_sunk_by_itself():
-    assert sunk(1, 2.0)[2].tolist() == pytest.approx([0.0, 0.05])
+def test_a_single_key_gets_its_own_drop():
+    assert lowered(1, 2.0)[2].tolist() == pytest.approx([0.0, 0.05])

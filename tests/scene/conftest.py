@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A fresh Blender for every test, and motions whose truth is computed here."""
+"""A fresh Blender for every test, and synthetic motions with ground truth."""
 
 from __future__ import annotations
 
@@ -112,7 +112,7 @@ def dance(
 
 
 class Blender:
-    """What a test reads from the open scene."""
+    """Reads joints and meshes from the open scene."""
 
     @staticmethod
     def go_to(frame: float) -> None:
@@ -120,7 +120,7 @@ class Blender:
 
     @staticmethod
     def only(kind: str) -> bpy.types.Object:
-        """The scene's one object of a type."""
+        """Return the only object of a type in the scene."""
         found = [obj for obj in bpy.context.scene.objects if obj.type == kind]
         assert len(found) == 1, [obj.name for obj in bpy.context.scene.objects]
         return found[0]

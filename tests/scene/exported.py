@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Exported files as Blender's importers read them."""
+"""Reading exported files with Blender's importers."""
 
 from pathlib import Path
 
@@ -12,7 +12,7 @@ JOINT_TOLERANCE, SKIN_TOLERANCE = 1e-3, 2e-3  # metres
 
 
 def read_back(path: Path, rate: float = 30.0) -> float:
-    """Open the file in an empty scene of this rate; the frame at which its motion's first frame lies."""
+    """Open the file in an empty scene of this rate; return the scene frame of the motion's first frame."""
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     render = bpy.context.scene.render
     render.fps, render.fps_base = round(rate), round(rate) / rate
@@ -57,7 +57,7 @@ def nearest_indices(points: np.ndarray, among: np.ndarray) -> np.ndarray:
 
 
 def corresponding(mesh: bpy.types.Object, body, betas: np.ndarray) -> np.ndarray:
-    """For each vertex of a read-back mesh, the body's vertex: formats may split or reorder them."""
+    """Return the body's vertex for each vertex of an imported mesh; formats may split or reorder them."""
     if len(mesh.data.vertices) == len(body.v_template):
         return np.arange(len(body.v_template))
     rest = np.empty(3 * len(mesh.data.vertices), np.float32)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Rigs of other people's naming and proportions, a capture to move them, and where bones and joints then are."""
+"""Rigs with common naming schemes and other proportions, a capture to retarget, and positions of bones and joints."""
 
 import math
 
@@ -78,7 +78,7 @@ SCHEMES = {
 
 
 def names_of(scheme):
-    """Part -> bone."""
+    """Return the bone of each part."""
     centre, sided, spell = SCHEMES[scheme]
     found = {part: spell(name, "") for part, name in zip(CENTRE, centre, strict=True)}
     for side in ("left", "right"):
@@ -87,7 +87,7 @@ def names_of(scheme):
 
 
 def build_rig(scheme, size=1.3, drop=40.0, seed=1, matrix=None):
-    """A rig of other proportions in an A-pose, its rolls random; in mode Euler for every fifth bone."""
+    """Build a rig of other proportions in an A-pose with random rolls; every fifth bone uses Euler angles."""
     rng = np.random.default_rng(seed)
     matrix = matrix or Matrix()
     bones = names_of(scheme)
@@ -129,14 +129,14 @@ def build_rig(scheme, size=1.3, drop=40.0, seed=1, matrix=None):
 
 
 def captured(motion, body=BODY):
-    """The armature of a capture, built at the scene's frame 1 and at its own rate."""
+    """Return the armature of a capture, built at the scene's frame 1 and at its own rate."""
     scene = bpy.context.scene
     scene.render.fps, scene.render.fps_base = int(RATE), 1.0
     return build_scene([motion], body, None, BuildOptions(start_frame=1.0)).people[0].armature
 
 
 def truth(motion=None, body=BODY):
-    """(T, K+1, 3) joints by plain forward kinematics of the motion file."""
+    """Return the joints (T, K+1, 3) by forward kinematics of the motion."""
     motion, rest = motion or motion_of(walk(2.0)), body.rest_joints(np.zeros(body.P))
     out = np.empty((len(motion), body.K + 1, 3))
     for t, row in enumerate(motion.poses.reshape(len(motion), -1, 3)):
@@ -154,7 +154,7 @@ def truth(motion=None, body=BODY):
 
 
 def seen(rig, bones, frames=FRAMES):
-    """(T, B, 3) heads in the world."""
+    """Return the heads (T, B, 3) in the world."""
     out = []
     for frame in frames:
         bpy.context.scene.frame_set(frame)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Blender's and glTF's axes against facts that can be said in words."""
+"""Blender's and glTF's axes against known facts."""
 
 import numpy as np
 import pytest

@@ -105,9 +105,7 @@ def test_variable_frame_rate_keeps_its_timing(body, make_motion, truth, blender)
     expected = truth(body, motion)
     for t in range(len(stamps)):
         blender.go_to(stamps[t] * 25)
-        np.testing.assert_allclose(
-            blender.joints(person.armature, body.joint_names), expected.joints[t], atol=1e-4
-        )
+        np.testing.assert_allclose(blender.joints(person.armature, body.joint_names), expected.joints[t], atol=1e-4)
     assert (bpy.context.scene.frame_start, bpy.context.scene.frame_end) == (0, 7)
 
 
@@ -132,7 +130,7 @@ def test_a_new_scene_takes_rate_size_and_range(body, make_motion):
     assert scene.camera == result.people[0].camera
 
 
-def test_a_scene_that_counts_in_centimetres_is_told_of(body, make_motion):
+def test_a_scene_in_centimetres_gives_a_warning(body, make_motion):
     assert build_scene([make_motion(body, 2)], body).warnings == []
     bpy.context.scene.unit_settings.scale_length = 0.01
     warnings = build_scene([make_motion(body, 2)], body).warnings

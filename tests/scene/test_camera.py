@@ -73,7 +73,7 @@ def test_a_static_camera_has_no_keys(body, make_motion):
 
 @pytest.fixture
 def clip(tmp_path) -> Path:
-    """A film of five frames of 64 x 48 at 30 frames a second, encoded by Blender."""
+    """A video of five frames of 64 x 48 at 30 frames per second, encoded by Blender."""
     render = bpy.context.scene.render
     if bpy.app.version >= (5, 0, 0):
         render.image_settings.media_type = "VIDEO"
@@ -94,7 +94,7 @@ def clip(tmp_path) -> Path:
     return film
 
 
-def test_footage_shows_behind_the_scene(body, make_motion, clip):
+def test_footage_is_shown_in_the_background(body, make_motion, clip):
     motion = make_motion(body, 5, image_size=(64, 48))
     result = build_scene([motion], body, footage=clip, options=BuildOptions(frame_rate="set", start_frame=1.0))
     camera = result.people[0].camera
@@ -146,7 +146,7 @@ def distorted_by_opencv(points: np.ndarray, K: np.ndarray, dist: np.ndarray) -> 
 
 
 def undistorted_by_blender(clip: bpy.types.MovieClip, folder: Path) -> np.ndarray:
-    """(H, W) the clip's picture as Blender shows it undistorted, rows from the top.
+    """Return the clip's picture (H, W) as Blender shows it undistorted, rows from the top.
 
     Through the sequencer, which asks for it as the viewport does. The compositor does not: it forgets the pixel aspect.
     """
@@ -167,7 +167,7 @@ def undistorted_by_blender(clip: bpy.types.MovieClip, folder: Path) -> np.ndarra
 @pytest.mark.parametrize("fy", [300.0, 360.0, 255.0])
 @pytest.mark.parametrize("dist", [[-0.2, 0.05, 0.0, 0.0, 0.01], [-0.1, 0.03, 0.02, -0.03, 0.0]])
 def test_blender_undistorts_as_opencv_distorts(body, make_motion, tmp_path, dist, fy):
-    """Blobs painted where OpenCV's lens sees five points come out where a pinhole sees them."""
+    """Blobs at five points distorted by OpenCV's model are undistorted to the pinhole projection."""
     width, height = 320, 240
     K = np.array([[300.0, 0, 150], [0, fy, 130], [0, 0, 1]])
     points = np.array([[90.0, 70], [230, 80], [100, 170], [220, 165], [160, 60]])
@@ -215,7 +215,7 @@ def test_captures_of_the_same_footage_do_not_disturb_each_other(body, make_motio
 
 
 def frame_shown(camera: bpy.types.Object, scene_frame: int) -> int:
-    """Which frame of a video Blender shows, counted from 0: BKE_image_user_frame_get."""
+    """Return the frame of a video that Blender shows, counted from 0: BKE_image_user_frame_get."""
     bpy.context.scene.frame_set(scene_frame)
     user = camera.evaluated_get(bpy.context.evaluated_depsgraph_get()).data.background_images[0].image_user
     count = min(max(scene_frame - user.frame_start + 1, 0), user.frame_duration)
@@ -224,7 +224,7 @@ def frame_shown(camera: bpy.types.Object, scene_frame: int) -> int:
 
 @pytest.mark.parametrize("rate", [24, 12, 60])
 @pytest.mark.parametrize("start", [1.0, -20.0])
-def test_footage_keeps_step_at_another_rate_than_the_scenes(body, make_motion, clip, rate, start):
+def test_footage_is_synchronized_at_a_rate_other_than_the_scenes(body, make_motion, clip, rate, start):
     scene = bpy.context.scene
     scene.render.fps = rate
     motion = make_motion(body, 20, rate=30.0, image_size=(64, 48))
@@ -246,7 +246,7 @@ def test_footage_of_a_distorting_lens_at_another_rate_is_warned_about(body, make
     assert "drifts from the motion by up to 4 frames" in result.warnings[0]
 
 
-def test_a_picture_shows_behind_the_scene(body, make_motion, tmp_path):
+def test_a_picture_is_shown_in_the_background(body, make_motion, tmp_path):
     picture = tmp_path / "still.png"
     image = bpy.data.images.new("still", 64, 48)
     image.filepath_raw, image.file_format = str(picture), "PNG"
@@ -258,7 +258,7 @@ def test_a_picture_shows_behind_the_scene(body, make_motion, tmp_path):
     assert result.warnings == []
 
 
-def test_numbered_pictures_go_on_behind_the_scene(body, make_motion, tmp_path):
+def test_numbered_pictures_are_shown_in_sequence(body, make_motion, tmp_path):
     numbers = [7, 8, 10, 11]  # one is missing
     for number in numbers:
         image = bpy.data.images.new("picture", 64, 48)
@@ -285,7 +285,7 @@ def test_pictures_numbered_beyond_blenders_frames_are_warned_about(body, make_mo
     result = build_scene([motion], body, footage=tmp_path / "20261122101500.png", options=NEW_SCENE)
     assert result.people[0].camera.data.background_images[0].image.source == "FILE"
     assert len(result.warnings) == 1
-    assert "the camera shows that one alone" in result.warnings[0]
+    assert "the camera shows that picture only" in result.warnings[0]
 
 
 def test_a_picture_of_another_size_is_warned_about(body, make_motion, tmp_path):

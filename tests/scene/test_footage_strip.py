@@ -17,7 +17,7 @@ def test_the_footage_begins_where_the_motion_does():
     assert not scene.render.use_sequencer  # else a render would give the footage alone
 
 
-def test_strips_that_are_there_stay_and_go_on_rendering():
+def test_existing_strips_are_kept_and_rendered():
     scene = bpy.context.scene
     strips = strips_of(scene.sequence_editor_create())
     strips.new_effect("mine", "COLOR", 2, 1, **effect_end(60))
@@ -33,7 +33,7 @@ def effect_end(frame: int) -> dict:
 
 
 @pytest.mark.skipif(not bpy.app.build_options.audaspace, reason="this Blender was built without sound")
-def test_sound_comes_along(shared):
+def test_sound_is_added(shared):
     added = add_footage_strips(bpy.context.scene, shared / "data" / "clips" / "walk_side_static.mp4", 1.0)
     assert [s.type for s in added] == ["SOUND", "MOVIE"]
     assert added[0].channel != added[1].channel
@@ -46,7 +46,7 @@ def test_a_picture_becomes_an_image_strip(tmp_path):
     assert add_footage_strips(bpy.context.scene, tmp_path / "still.png", 1.0)[0].type == "IMAGE"
 
 
-def test_footage_that_is_gone_or_no_video_is_told(tmp_path):
+def test_missing_or_unreadable_footage_is_reported(tmp_path):
     with pytest.raises(VideoError, match="does not exist"):
         add_footage_strips(bpy.context.scene, tmp_path / "gone.mp4", 1.0)
     broken = tmp_path / "broken.mp4"

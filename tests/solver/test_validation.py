@@ -179,12 +179,23 @@ MEASURED_REFUSED = {
     ),
     "3D for 2D": (lambda: Measurements(keypoints2d=SEEN.keypoints3d), "Measurements.keypoints2d must be Keypoints2D"),
     "tables": (lambda: Measurements(tables=[1]), "Measurements.tables must be Mapping or None, but is a list"),
-    "a table of text": (seen(tables={"floor": "rows"}), "Tables of 'floor' must be a pair of arrays"),
+    "a table of text": (seen(tables={"joint_limits": "rows"}), "Tables of 'joint_limits' must be a pair of arrays"),
     "a table's indices": (
-        seen(tables={"floor": ([[0.7]], np.ones((1, 6)))}),
-        r"Whole numbers of 'floor' must be integers of shape \(n, 1\), but got float64",
+        seen(tables={"joint_limits": ([[0.7]], np.ones((1, 6)))}),
+        r"Whole numbers of 'joint_limits' must be integers of shape \(n, 1\), but got float64",
     ),
-    "a table's numbers": (seen(tables={"floor": ([[0]], [["a"] * 6])}), "Numbers of 'floor' must be numbers"),
+    "a table's numbers": (
+        seen(tables={"joint_limits": ([[1]], [["a"] * 6])}),
+        "Numbers of 'joint_limits' must be numbers",
+    ),
+    "a table of a field": (
+        lambda: Measurements(tables={"floor": ([[0]], np.ones((1, 6)))}),
+        "tables must not hold 'floor', which has a field of its own; give it as Measurements.floor",
+    ),
+    "a table of a field, joints": (
+        lambda: Measurements(tables={"pose_prior": ([], [])}),
+        "give it as Measurements.pose_priors",
+    ),
     "a batch's frame": (lambda: fit_batch(BODY, [SEEN, None]), r"measurements\[1\] must be Measurements, but is None"),
     "a batch's state": (
         lambda: fit_batch(BODY, [SEEN], init=[np.eye(3)]),

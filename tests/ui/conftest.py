@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The extension registered in a fresh Blender, a cache of its own, and workers that do as they are told."""
+"""Fixtures: the extension registered in a fresh Blender, with its own cache, and scripted workers."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def root() -> Path:
 
 @pytest.fixture(autouse=True)
 def registered(tmp_path, monkeypatch):
-    """A fresh Blender with the extension. The cache is this test's, the compiled solver everybody's."""
+    """Register the extension in a fresh Blender. Each test has its own cache; all share the compiled solver."""
     from scope.scope_addon.ui import preferences
     from scope.scope_addon.ui.capture import capture_job
 
@@ -50,7 +50,7 @@ def registered(tmp_path, monkeypatch):
 
 @pytest.fixture
 def footage(tmp_path) -> Path:
-    """A file that a fake worker takes for footage: the sample's first frame."""
+    """The first frame of the sample as a picture file."""
     import cv2
 
     ok, image = cv2.VideoCapture(str(ROOT / "assets" / "sample" / "sample.mp4")).read()
@@ -62,7 +62,7 @@ def footage(tmp_path) -> Path:
 
 @pytest.fixture(scope="session")
 def standing() -> Motion:
-    """A body that stands still for ten frames, three of which nobody saw."""
+    """A body at rest for ten frames, three of which are not valid."""
     body, count = load_body("scope"), 10
     poses = np.zeros((count, 3 * (body.K + 1)))
     poses[:, 0] = np.pi / 2
@@ -82,9 +82,9 @@ def standing() -> Motion:
 
 @pytest.fixture
 def fake_worker(tmp_path, monkeypatch, standing):
-    """Make the next captures run a script instead of the worker; its body is given as text.
+    """Replace the worker of the next captures by a script.
 
-    It finds ``folder``, ``request``, ``send(event, **values)`` and ``finish()``, which sends the standing body.
+    The script may use ``folder``, ``request``, ``send(event, **values)`` and ``finish()``, which sends ``standing``.
     """
     from scope.scope_addon.ui.capture import capture_job
 
@@ -118,7 +118,7 @@ def python() -> list[str]:
 
 
 def inventory() -> dict:
-    """What the file holds and how the scene is set."""
+    """Return the names of the file's data-blocks, and settings of the scene."""
     kinds = ("objects", "meshes", "armatures", "cameras", "actions", "collections", "images", "movieclips", "materials")
     scene = bpy.context.scene
     blocks = {kind: sorted(b.name for b in getattr(bpy.data, kind)) for kind in kinds}

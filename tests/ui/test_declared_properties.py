@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Blender's properties agree with the declared options, and with what .blend files already store."""
+"""Blender's properties agree with the declared options, and with the values that .blend files store."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ LABELS = {
     "with_markers": "Markers",
     "with_camera": "Camera with Footage",
 }
-# Of a property's unit in one of the option's.
+# Number of the property's units in one of the option's.
 UNITS = {("m", "cm"): 100.0, ("degrees", "radians"): math.pi / 180, ("", "s"): 1.0}
 PLACES = [(each, place) for place in (Place.PANEL, Place.PREFERENCES) for each in options_at(place)]
 IDS = [each.name for each, _ in PLACES]
@@ -90,7 +90,7 @@ def test_defaults_and_ranges_of_the_properties_are_within_the_options(declared, 
         assert found.hard_max <= declared.maximum * scale * (1 + 1e-6)
 
 
-def test_an_untouched_panel_asks_for_the_defaults(footage):
+def test_an_unchanged_panel_requests_the_defaults(footage):
     scene = bpy.context.scene
     scene.scope.footage = str(footage)
     defaults = {each.name: each.default for each in options_at(Place.WORKER)}
@@ -114,7 +114,7 @@ def test_an_untouched_panel_asks_for_the_defaults(footage):
         ({"smoothing": False}, "smoothing", False),
     ],
 )
-def test_the_panel_decides_what_the_worker_is_asked_for(footage, settings, name, value):
+def test_settings_of_the_panel_are_sent_to_the_worker(footage, settings, name, value):
     scene = bpy.context.scene
     scene.scope.footage = str(footage)
     for key, setting in settings.items():
@@ -122,7 +122,7 @@ def test_the_panel_decides_what_the_worker_is_asked_for(footage, settings, name,
     assert capture_request(scene).values[name] == value
 
 
-def test_what_building_the_scene_offers_is_what_it_can_do():
+def test_choices_of_the_scene_are_those_that_building_supports():
     assert set(option("shape").values) == set(MODES)
     assert set(option("frame_rate").values) - {"auto"} <= set(RATE_POLICIES)
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Builds the default body, assets/body/scope.npz and scope_h.npz, from CC0 MakeHuman data.
+"""Build the default body, assets/body/scope.npz and scope_h.npz, from CC0 MakeHuman data.
 
 Run it with ``python -m scope.tools.build_body``. The steps, in order, one module each:
 
@@ -11,6 +11,6 @@ Run it with ``python -m scope.tools.build_body``. The steps, in order, one modul
     pose          from the source's A-pose to the T-pose, linear in the vertices
     keypoints     detector keypoints rigidly attached to body parts
     materials     the two-tone suit, bounded by edge loops (loops)
-    build         the steps put together
+    build         all steps
     write         the .npz files
 """

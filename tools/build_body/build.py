@@ -5,8 +5,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .geometry.materials import MATERIALS, face_materials
 from .geometry.mesh import Mesh, body_and_eyes, keep_visible, smooth_nipples, smooth_perineum, vertex_areas
@@ -21,15 +23,15 @@ from .write import LICENSE, lengths
 
 @dataclass(frozen=True)
 class ShapedMesh:
-    """The source pose before any skeleton: ``basis`` (1 + P, N, 3), the mean and the components over all vertices."""
+    """The mesh in the source pose: ``basis`` (1 + P, N, 3), the mean and the components over all vertices."""
 
     source: SourceMesh
     mesh: Mesh
-    basis: np.ndarray
+    basis: NDArray[np.float64]
 
 
-def build_bodies(downloads: Path = DOWNLOADS) -> dict[str, dict[str, np.ndarray]]:
-    """The arrays of both bodies, ``scope`` (24 joints) and ``scope_h`` (52), by file key."""
+def build_bodies(downloads: Path = DOWNLOADS) -> dict[str, dict[str, NDArray[Any]]]:
+    """Return the arrays of both bodies, ``scope`` (24 joints) and ``scope_h`` (52), by file key."""
     shaped = shape_mesh(downloads)
     skeletons = (make_skeleton(shaped.source, with_hands) for with_hands in (False, True))
     return {skeleton.name: rig_body(shaped, skeleton) for skeleton in skeletons}
@@ -47,7 +49,7 @@ def shape_mesh(downloads: Path = DOWNLOADS) -> ShapedMesh:
     return ShapedMesh(source, mesh, smooth_perineum(mesh, basis))
 
 
-def rig_body(shaped: ShapedMesh, skeleton: Skeleton) -> dict[str, np.ndarray]:
+def rig_body(shaped: ShapedMesh, skeleton: Skeleton) -> dict[str, NDArray[Any]]:
     """Place the joints, weight the skin, turn everything into the T-pose; the arrays of the body file."""
     source, mesh, basis = shaped.source, shaped.mesh, shaped.basis
     J = skeleton.regressor @ basis
@@ -81,5 +83,5 @@ def rig_body(shaped: ShapedMesh, skeleton: Skeleton) -> dict[str, np.ndarray]:
     }
 
 
-def _shaped(template: str, shapedirs: str, basis: np.ndarray) -> dict[str, np.ndarray]:
+def _shaped(template: str, shapedirs: str, basis: NDArray[np.float64]) -> dict[str, NDArray[Any]]:
     return {template: lengths(basis[0]), shapedirs: lengths(basis[1:].transpose(1, 2, 0))}

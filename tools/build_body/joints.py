@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The two skeletons, SMPL's 24 joints and SMPL+H's 52, and their joints as linear functions of the vertices.
 
-    J = A V,  A (K+1, N), rows summing to one, so that joints follow every shape exactly
+J = A V with A (K+1, N), whose rows sum to one, so that joints follow every shape exactly.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...solver.names import BODY_JOINTS, BODY_PARENTS
 from .source import SourceMesh
@@ -29,27 +30,27 @@ class Skeleton:
     name: str
     joint_names: tuple[str, ...]
     parents: tuple[int, ...]
-    regressor: np.ndarray
+    regressor: NDArray[np.float64]
 
     def index(self, joint: str) -> int:
-        """Index of a joint by its name."""
+        """Return the index of a joint by its name."""
         return self.joint_names.index(joint)
 
     @property
-    def mirror(self) -> np.ndarray:
-        """(K+1,) index of the joint on the other side."""
+    def mirror(self) -> NDArray[np.intp]:
+        """Return (K+1,) the index of the joint on the other side."""
         return np.array([self.index(other_side(name)) for name in self.joint_names])
 
 
 def other_side(name: str) -> str:
-    """The name with left and right exchanged."""
+    """Return the name with left and right swapped."""
     if "left" in name:
         return name.replace("left", "right")
     return name.replace("right", "left")
 
 
 def make_skeleton(source: SourceMesh, with_hands: bool) -> Skeleton:
-    """SMPL's topology (24 joints), or SMPL+H's (52) ``with_hands``."""
+    """Return SMPL's topology (24 joints), or SMPL+H's (52) ``with_hands``."""
     names, parents = list(BODY_JOINTS), list(BODY_PARENTS)
     for side in ("left", "right"):
         wrist = names.index(f"{side}_wrist")
@@ -65,15 +66,15 @@ def make_skeleton(source: SourceMesh, with_hands: bool) -> Skeleton:
     return Skeleton("scope_h" if with_hands else "scope", tuple(names), tuple(parents), regressor)
 
 
-def cube_row(source: SourceMesh, *cubes: str) -> np.ndarray:
-    """(N,) regressor of the mean of the named joint cubes."""
+def cube_row(source: SourceMesh, *cubes: str) -> NDArray[np.float64]:
+    """Return the regressor (N,) of the mean of the named joint cubes."""
     row = np.zeros(len(source.vertices))
     for cube in cubes:
         row[source.cubes[cube]] += 1.0 / (len(source.cubes[cube]) * len(cubes))
     return row
 
 
-def _joint_row(source: SourceMesh, name: str) -> np.ndarray:
+def _joint_row(source: SourceMesh, name: str) -> NDArray[np.float64]:
     if name in SPINE:
         # The three spine cubes move inconsistently between the targets: only their mean is used.
         pelvis, neck = cube_row(source, "pelvis"), cube_row(source, "neck")

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the 2D detectors find, as points rigidly attached to body parts (Assumption 1 of the paper).
+"""The keypoints of the 2D detectors, as points rigidly attached to body parts (Assumption 1 of the paper).
 
-Three sets: BlazePose-33, COCO-17 with six feet points, and 21 points a hand in MediaPipe's order. A keypoint is a
+Three sets: BlazePose-33, COCO-17 with six feet points, and 21 points per hand in MediaPipe's order. A keypoint is a
 joint, the mean of some surface vertices, or a joint cube inside the mesh; its place is linear in the shape.
 """
 
@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...solver.names import BLAZEPOSE, COCO
 from .joints import Skeleton, cube_row, other_side
@@ -37,15 +38,15 @@ CUBE_POINTS = {"left_index": "finger-2-1", "left_pinky": "finger-5-1", "left_thu
 
 @dataclass(frozen=True)
 class Keypoint:
-    """One keypoint: the regressor (N,) of its place in the source pose, and the part it turns with."""
+    """One keypoint: the regressor (N,) of its position in the source pose, and the part to which it belongs."""
 
     name: str
-    regressor: np.ndarray
+    regressor: NDArray[np.float64]
     part: int
 
 
 def make_keypoints(source: SourceMesh, skeleton: Skeleton) -> list[Keypoint]:
-    """All keypoints of the three sets, in file order, names with the set's prefix."""
+    """Return all keypoints of the three sets, in file order, names with the set's prefix."""
     named = [(f"blazepose/{name}", *_body_point(source, skeleton, name)) for name in BLAZEPOSE]
     named += [(f"coco/{name}", *_body_point(source, skeleton, name)) for name in COCO]
     for side in ("left", "right"):
@@ -54,15 +55,19 @@ def make_keypoints(source: SourceMesh, skeleton: Skeleton) -> list[Keypoint]:
 
 
 def pose_keypoints(
-    keypoints: list[Keypoint], R: np.ndarray, J: np.ndarray, posed_J: np.ndarray, basis: np.ndarray
-) -> np.ndarray:
-    """(B, M, 3) T-posed keypoints, k' = R_i (k − J_i) + J'_i, for a stack of source vertex sets ``basis`` (B, N, 3)."""
+    keypoints: list[Keypoint],
+    R: NDArray[np.float64],
+    J: NDArray[np.float64],
+    posed_J: NDArray[np.float64],
+    basis: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Return T-posed keypoints (B, M, 3), k' = R_i (k − J_i) + J'_i, of source vertex sets ``basis`` (B, N, 3)."""
     part = np.array([keypoint.part for keypoint in keypoints])
     points = np.stack([keypoint.regressor for keypoint in keypoints]) @ basis
     return np.einsum("mxy,bmy->bmx", R[part], points - J[:, part]) + posed_J[:, part]
 
 
-def _body_point(source: SourceMesh, skeleton: Skeleton, name: str) -> tuple[np.ndarray, int]:
+def _body_point(source: SourceMesh, skeleton: Skeleton, name: str) -> tuple[NDArray[np.float64], int]:
     if name in skeleton.joint_names:  # shoulder, elbow, wrist, hip, knee and ankle are the joints themselves
         index = skeleton.index(name)
         return skeleton.regressor[index], index
@@ -82,7 +87,7 @@ def _body_point(source: SourceMesh, skeleton: Skeleton, name: str) -> tuple[np.n
     return row, skeleton.index(part)
 
 
-def _hand(source: SourceMesh, skeleton: Skeleton, side: str) -> list[tuple[str, np.ndarray, int]]:
+def _hand(source: SourceMesh, skeleton: Skeleton, side: str) -> list[tuple[str, NDArray[np.float64], int]]:
     wrist = skeleton.index(f"{side}_wrist")
     points = [(f"{side}_wrist", skeleton.regressor[wrist], wrist)]
     for k, finger in enumerate(HAND_FINGERS, start=1):

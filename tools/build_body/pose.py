@@ -14,19 +14,21 @@ bends. All of R, Q, w and a are constants: what is linear in β before is linear
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from .joints import Skeleton
 
 MIRROR = np.diag([-1.0, 1.0, 1.0])
 
 
-def part_rotations(skeleton: Skeleton, J: np.ndarray, across_hand: np.ndarray) -> np.ndarray:
-    """(K+1, 3, 3) global rotations that take the mean shape's parts into the T-pose.
+def part_rotations(skeleton: Skeleton, J: NDArray[np.float64], across_hand: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return (K+1, 3, 3) global rotations that take the mean shape's parts into the T-pose.
 
     :param J: (K+1, 3) joints of the mean shape.
     :param across_hand: (3,) direction from the left little to the left index knuckle.
     """
-    def joint(name: str) -> np.ndarray:
+
+    def joint(name: str) -> NDArray[np.float64]:
         return J[skeleton.index(name)]
 
     leg = joint("left_ankle") - joint("left_hip")
@@ -52,8 +54,8 @@ def part_rotations(skeleton: Skeleton, J: np.ndarray, across_hand: np.ndarray) -
     return R
 
 
-def pose_joints(skeleton: Skeleton, R: np.ndarray, J: np.ndarray) -> np.ndarray:
-    """J' for a stack of joint sets J (B, K+1, 3): the mean and each component."""
+def pose_joints(skeleton: Skeleton, R: NDArray[np.float64], J: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return J' of a stack of joint sets J (B, K+1, 3): the mean and each component."""
     posed = J.copy()
     for i, parent in enumerate(skeleton.parents):
         if parent >= 0:
@@ -62,13 +64,18 @@ def pose_joints(skeleton: Skeleton, R: np.ndarray, J: np.ndarray) -> np.ndarray:
 
 
 def pose_vertices(
-    skeleton: Skeleton, R: np.ndarray, W: np.ndarray, J: np.ndarray, posed_J: np.ndarray, basis: np.ndarray
-) -> np.ndarray:
-    """v' for a stack of vertex sets ``basis`` (B, V, 3); ``J`` (B, K+1, 3) and ``posed_J`` as in ``pose_joints``."""
+    skeleton: Skeleton,
+    R: NDArray[np.float64],
+    W: NDArray[np.float64],
+    J: NDArray[np.float64],
+    posed_J: NDArray[np.float64],
+    basis: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Return v' of a stack of vertex sets ``basis`` (B, V, 3); ``J`` (B, K+1, 3), ``posed_J`` as in ``pose_joints``."""
     A = _centre_weights(skeleton, W)
     Q = _blend_rotations(R, W)
     centre = np.einsum("vi,bix->bvx", A, J)
-    # Where each part takes the centre, blended: Σ w (R_i c + d_i), d_i = J'_i − R_i J_i.
+    # The blended positions to which the parts move the centre: Σ w (R_i c + d_i), d_i = J'_i − R_i J_i.
     shift = posed_J - np.einsum("ixy,biy->bix", R, J)
     blended = np.einsum("vi,ixy->vxy", W, R)
     moved_centre = np.einsum("vxy,bvy->bvx", blended, centre) + np.einsum("vi,bix->bvx", W, shift)
@@ -81,25 +88,25 @@ def _knuckles(skeleton: Skeleton) -> tuple[str, ...]:
     return ("left_index1", "left_middle1", "left_ring1", "left_pinky1")
 
 
-def _about_z(angle: float) -> np.ndarray:
+def _about_z(angle: float) -> NDArray[np.float64]:
     c, s = np.cos(angle), np.sin(angle)
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
-def _align(source: tuple, target: tuple) -> np.ndarray:
-    """The rotation that takes source[0] to target[0] and source[1] as near to target[1] as it can."""
+def _align(source: tuple[ArrayLike, ArrayLike], target: tuple[ArrayLike, ArrayLike]) -> NDArray[np.float64]:
+    """Return the rotation that takes source[0] to target[0] and source[1] as near to target[1] as possible."""
 
-    def frame(first, second):
+    def frame(first: ArrayLike, second: ArrayLike) -> NDArray[np.float64]:
         x = np.asarray(first, float) / np.linalg.norm(first)
-        z = np.cross(x, second)
+        z = np.cross(x, np.asarray(second, float))
         z /= np.linalg.norm(z)
         return np.stack([x, np.cross(z, x), z], axis=1)
 
     return frame(*target) @ frame(*source).T
 
 
-def _centre_weights(skeleton: Skeleton, W: np.ndarray) -> np.ndarray:
-    """(V, K+1): a_vi from the products of the weights of a joint's part and its parent's; rows sum to one."""
+def _centre_weights(skeleton: Skeleton, W: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return a_vi (V, K+1): products of the weights of a joint's part and its parent's; rows sum to one."""
     A = 1e-9 * W
     for i, parent in enumerate(skeleton.parents):
         if parent >= 0:
@@ -107,8 +114,8 @@ def _centre_weights(skeleton: Skeleton, W: np.ndarray) -> np.ndarray:
     return A / A.sum(axis=1, keepdims=True)
 
 
-def _blend_rotations(R: np.ndarray, W: np.ndarray) -> np.ndarray:
-    """(V, 3, 3): the weighted quaternion mean of the part rotations (all less than 180° apart)."""
+def _blend_rotations(R: NDArray[np.float64], W: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return (V, 3, 3), the weighted quaternion mean of the part rotations (all less than 180° apart)."""
     q = np.array([_quaternion(each) for each in R])
     mean = W @ q
     w, x, y, z = (mean / np.linalg.norm(mean, axis=1, keepdims=True)).T
@@ -120,7 +127,7 @@ def _blend_rotations(R: np.ndarray, W: np.ndarray) -> np.ndarray:
     return np.array(rows).transpose(2, 0, 1)
 
 
-def _quaternion(R: np.ndarray) -> np.ndarray:
-    """(w, x, y, z) with w > 0; the rotations here are far from 180°."""
+def _quaternion(R: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return (w, x, y, z) with w > 0; the rotations here are far from 180°."""
     w = 0.5 * np.sqrt(1.0 + np.trace(R))
     return np.array([w, *(np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]]) / (4.0 * w))])

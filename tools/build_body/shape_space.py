@@ -6,9 +6,9 @@ in its slider, its weights summing to one (MakeHuman's rule):
 
     vertices(person) = base + Σ_t Π_f weight_f,t(person) · target_t
 
-To these come MakeHuman's targets of single lengths (``source.LENGTHS``), because the sliders alone give people of one
-stature the same upper arms and trunks, and arms whose span is 0.99 of the stature. Of adults who are measured it is
-1.03 to 1.04, and upper arm and forearm are 0.16 and 0.15 of it (de Leva 1996; 0.145 and 0.140 with the sliders).
+MakeHuman's targets of single lengths (``source.LENGTHS``) are added, because the sliders alone give people of one
+stature the same upper arms and trunks, and an arm span of 0.99 of the stature. In measured adults it is 1.03 to 1.04,
+and upper arm and forearm are 0.16 and 0.15 of it (de Leva 1996; 0.145 and 0.140 with the sliders).
 
 Every shape is shifted so that the pelvis joint stays at the origin.
 """
@@ -18,6 +18,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .source import LENGTHS, SourceMesh
 
@@ -34,8 +35,8 @@ FACTORS = {  # factor -> its levels; the first and last levels lie at slider 0 a
 }
 RACES = ("african", "asian", "caucasian")
 STATURE = {"female": (1.625, 0.068), "male": (1.755, 0.071)}  # mean and standard deviation in metres
-# Length target -> mean and standard deviation, relative, of what it adds. The mean body's span becomes 1.03 of its
-# stature; what people's limbs differ in once their stature is known becomes some 3 % of each.
+# Length target -> relative mean and standard deviation of its change. The mean body's arm span becomes 1.03 of its
+# stature; the variation of limb lengths among people of one stature becomes about 3 %.
 LENGTHENING = {
     "arms/measure-upperarm-length": (0.076, 0.03),
     "arms/measure-lowerarm-length": (0.076, 0.02),
@@ -52,12 +53,12 @@ class ShapeSpace:
     ``variance`` (P,): fraction of the area-weighted variance that each component explains.
     """
 
-    basis: np.ndarray
-    variance: np.ndarray
+    basis: NDArray[np.float64]
+    variance: NDArray[np.float64]
 
 
-def build_shape_space(source: SourceMesh, body: np.ndarray, area: np.ndarray) -> ShapeSpace:
-    """Principal components of ``PEOPLE`` adults.
+def build_shape_space(source: SourceMesh, body: NDArray[np.intp], area: NDArray[np.float64]) -> ShapeSpace:
+    """Compute the principal components of ``PEOPLE`` adults.
 
     :param body: (B,) indices of the vertices whose variance counts.
     :param area: (B,) their areas, the weights of the variance.
@@ -92,15 +93,17 @@ def build_shape_space(source: SourceMesh, body: np.ndarray, area: np.ndarray) ->
     return ShapeSpace(np.concatenate([mean[None], components]), variance[:COMPONENTS])
 
 
-def _gain(source: SourceMesh, base: np.ndarray, move: np.ndarray, name: str) -> float:
-    """By how much a length target changes its length, relative to that of the base mesh."""
+def _gain(source: SourceMesh, base: NDArray[np.float64], move: NDArray[np.float64], name: str) -> float:
+    """Return the change of a length by its target, relative to that of the base mesh."""
     a, b = (source.cubes[cube] for cube in LENGTHS[name.rpartition("-")[0]])
     before, after = (np.linalg.norm(v[a].mean(axis=0) - v[b].mean(axis=0)) for v in (base, base + move))
     return float(after / before - 1.0)
 
 
-def _draw_people(names: list[str], gains: dict[str, float], base: np.ndarray, moves: np.ndarray) -> np.ndarray:
-    """(PEOPLE, targets) coefficients. Stature is drawn in metres and the height slider solved for it.
+def _draw_people(
+    names: list[str], gains: dict[str, float], base: NDArray[np.float64], moves: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Draw coefficients (PEOPLE, targets). Stature is drawn in metres, and the height slider solved for it.
 
     :param gains: target of a length -> relative change of that length.
     """
@@ -124,7 +127,7 @@ def _draw_people(names: list[str], gains: dict[str, float], base: np.ndarray, mo
     top, bottom = base[:, 1].argmax(), base[:, 1].argmin()
     span = moves[:, top, 1] - moves[:, bottom, 1]
 
-    def stature(height: float) -> np.ndarray:
+    def stature(height: float) -> NDArray[np.float64]:
         sliders["height"] = np.full(PEOPLE, height)
         return base[top, 1] - base[bottom, 1] + _coefficients(names, sliders, lengths) @ span
 
@@ -135,8 +138,10 @@ def _draw_people(names: list[str], gains: dict[str, float], base: np.ndarray, mo
     return _coefficients(names, sliders, lengths)
 
 
-def _coefficients(names: list[str], sliders: dict[str, np.ndarray], lengths: dict[str, np.ndarray]) -> np.ndarray:
-    """(PEOPLE, targets): ``lengths`` are known by target, all others follow from the sliders."""
+def _coefficients(
+    names: list[str], sliders: dict[str, NDArray[np.float64]], lengths: dict[str, NDArray[np.float64]]
+) -> NDArray[np.float64]:
+    """Return (PEOPLE, targets): ``lengths`` are given by target, all others follow from the sliders."""
     weight = {}
     for factor, levels in FACTORS.items():
         knots = np.linspace(0.0, 1.0, len(levels))
@@ -145,9 +150,7 @@ def _coefficients(names: list[str], sliders: dict[str, np.ndarray], lengths: dic
     weight |= dict.fromkeys(RACES, np.full(PEOPLE, 1.0 / len(RACES)))
     weight["universal"] = np.ones(PEOPLE)
     columns = [
-        lengths[name]
-        if name in lengths
-        else np.prod([weight[word] for word in name.split("/")[-1].split("-")], axis=0)
+        lengths[name] if name in lengths else np.prod([weight[word] for word in name.split("/")[-1].split("-")], axis=0)
         for name in names
     ]
     return np.stack(columns, axis=1)

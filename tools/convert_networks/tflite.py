@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import tflite
+from numpy.typing import NDArray
 
 from ...solver.errors import ModelFileError
 
@@ -36,8 +37,8 @@ class DimensionMetadata:
     """One level of a sparse tensor: dense with ``size``, or compressed with ``segments`` and ``indices``."""
 
     size: int
-    segments: np.ndarray | None = None
-    indices: np.ndarray | None = None
+    segments: NDArray[Any] | None = None
+    indices: NDArray[Any] | None = None
 
 
 @dataclass(frozen=True)
@@ -84,13 +85,13 @@ class Model:
 def read_model(data: bytes, name: str) -> Model:
     """Parse a TFLite file.
 
-    :raises ModelFileError: names what is broken or not supported.
+    :raises ModelFileError: when the file is broken or has unsupported content.
     """
     try:
         if not tflite.Model.ModelBufferHasIdentifier(data, 0):
             raise ModelFileError(f"{name}: not a TFL3 FlatBuffer; fetch the file again.")
         return _model(tflite.Model.GetRootAs(data), name)
-    except (struct.error, ValueError, TypeError, OverflowError) as error:  # what the readers raise on damaged files
+    except (struct.error, ValueError, TypeError, OverflowError) as error:  # raised by the readers for damaged files
         raise ModelFileError(f"{name}: broken FlatBuffer ({error}); fetch the file again.") from error
 
 
@@ -111,7 +112,7 @@ def _model(root: Any, name: str) -> Model:
 
 
 def _integers(vector: Any) -> tuple[int, ...]:
-    """A vector of the file; one that is absent is read as 0."""
+    """Return a vector of the file; one that is absent is read as 0."""
     return tuple(vector.tolist()) if isinstance(vector, np.ndarray) else ()
 
 
@@ -143,7 +144,7 @@ def _level(level: Any, name: str) -> DimensionMetadata:
     return DimensionMetadata(0, segments, _index_vector(level.ArrayIndicesType(), level.ArrayIndices(), name))
 
 
-def _index_vector(code: int, table: Any, name: str) -> np.ndarray:
+def _index_vector(code: int, table: Any, name: str) -> NDArray[Any]:
     if code not in _INDEX_VECTORS or table is None:
         raise ModelFileError(f"{name}: a sparse dimension without segments or indices.")
     vector = _INDEX_VECTORS[code]()
@@ -162,7 +163,7 @@ def _operator(table: Any, kinds: list[str], tensor_count: int, name: str) -> Ope
 
 
 def _options(kind: str, table: Any) -> dict[str, int]:
-    """Every field of the operator's options, which are all numbers: StrideW becomes stride_w."""
+    """Return every field of the operator's options, which are all numbers: StrideW becomes stride_w."""
     if kind not in _OPTIONS:
         return {}
     options = _OPTIONS[kind]()

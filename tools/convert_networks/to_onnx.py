@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A parsed TFLite model to an ONNX model with named outputs, without the operators that no kept output needs."""
+"""Convert a parsed TFLite model to ONNX with named outputs, without operators that no kept output needs."""
 
 import onnx
 from onnx import TensorProto, helper
@@ -11,16 +11,18 @@ from .operators import CONVERTERS
 from .tflite import Model, Operator
 
 OPSET = 17
-IR_VERSION = 8  # the lowest that goes with the opset: also old releases of onnxruntime read it
+IR_VERSION = 8  # the lowest for this opset, which old releases of onnxruntime also read
 
 
 def convert_model(
     model: Model, input_shape: tuple[int, ...], outputs: tuple[tuple[int, str, tuple[int, ...]], ...]
 ) -> onnx.ModelProto:
-    """ONNX model with one input ``input`` (batch, channels, height, width) and the outputs asked for.
+    """Return an ONNX model with one input ``input`` (batch, channels, height, width) and the given outputs.
 
     ``input_shape`` and the shapes in ``outputs``, (position, name, shape), are TFLite's (NHWC) and are checked. Rank-4
-    outputs come out as NCHW. Raises ModelFileError when the file is not what was expected.
+    outputs become NCHW.
+
+    :raises ModelFileError: when shapes differ from those given, or an operator is not supported.
     """
     input_shapes = [model.tensors[i].shape for i in model.inputs]
     if input_shapes != [input_shape]:
@@ -33,16 +35,8 @@ def convert_model(
     graph.names[model.inputs[0]] = "input"
     kept = [model.outputs[position] for position, _, _ in outputs]
     for operator in _needed(model, kept):
-        if operator.outputs[0] in graph.constants:
-            continue
-        if not operator.inputs or operator.inputs[0] < 0:
-            raise graph.fail(operator, "it has no input")
-        if operator.kind not in CONVERTERS:
-            raise graph.fail(operator, "this operator is not supported")
-        try:
-            CONVERTERS[operator.kind](graph, operator)
-        except (ValueError, IndexError) as error:
-            raise graph.fail(operator, f"its tensors do not fit it ({error})") from error
+        if operator.outputs[0] not in graph.constants:
+            _append(graph, operator)
     described = []
     for tensor, (_, name, shape) in zip(kept, outputs, strict=True):
         graph.nodes.append(helper.make_node("Identity", [graph.value(tensor)], [name], name=f"output_{name}"))
@@ -58,13 +52,24 @@ def convert_model(
     return result
 
 
+def _append(graph: Graph, operator: Operator) -> None:
+    if not operator.inputs or operator.inputs[0] < 0:
+        raise graph.fail(operator, "it has no input")
+    if operator.kind not in CONVERTERS:
+        raise graph.fail(operator, "this operator is not supported")
+    try:
+        CONVERTERS[operator.kind](graph, operator)
+    except (ValueError, IndexError) as error:
+        raise graph.fail(operator, f"its tensors do not fit it ({error})") from error
+
+
 def _batched(shape: tuple[int, ...]) -> list[int | str]:
     order = (0, 3, 1, 2) if len(shape) == 4 else range(len(shape))
     return ["batch", *(shape[i] for i in list(order)[1:])]
 
 
 def _needed(model: Model, outputs: list[int]) -> list[Operator]:
-    """The operators that the outputs depend on, in file order (which is execution order)."""
+    """Return the operators on which the outputs depend, in file order, which is execution order."""
     wanted = set(outputs)
     kept = []
     for operator in reversed(model.operators):

@@ -17,6 +17,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...scope_addon.errors import MotionFileError
 from ...solver.rotations import exp
@@ -24,7 +25,7 @@ from ...solver.rotations import exp
 INCH = 0.0254
 AXES = {"x": 0, "y": 1, "z": 2}
 
-# CMU's bones by the joint they turn about. A bone that cannot turn (hip joint) only carries its children.
+# CMU's bones by the joint about which they rotate. A bone that cannot rotate (hip joint) only moves its children.
 _SIDE = {
     "hip": "femur", "knee": "tibia", "ankle": "foot", "foot": "toes", "collar": "clavicle", "shoulder": "humerus",
     "elbow": "radius", "forearm": "wrist", "wrist": "hand", "knuckle": "fingers", "thumb": "thumb",
@@ -48,15 +49,17 @@ class Skeleton:
     """Bones in an order in which each follows its parent; bone 0 is ``root``. Lengths in metres."""
 
     bones: tuple[str, ...]
-    parents: np.ndarray  # (B,) −1 for the root
-    offsets: np.ndarray  # (B, 3) start to end of the bone at zero pose; the root's is its rest position
-    axes: np.ndarray  # (B, 3, 3) C_b
+    parents: NDArray[np.intp]  # (B,) −1 for the root
+    offsets: NDArray[np.float64]  # (B, 3) start to end of the bone at zero pose; the root's is its rest position
+    axes: NDArray[np.float64]  # (B, 3, 3) C_b
     dofs: tuple[tuple[str, ...], ...]  # per bone, order of its values: rx, ry, rz and for the root tx, ty, tz
     metres_per_unit: float
     degrees: bool
 
-    def forward_kinematics(self, M: np.ndarray, root: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Global pose of every bone.
+    def forward_kinematics(
+        self, M: NDArray[np.float64], root: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Compute the global pose of every bone.
 
         :param M: (T, B, 3, 3) rotations of the bones in skeleton axes relative to their parents, that is C M Cᵀ above.
         :param root: (T, 3) metres, position of the root.
@@ -72,13 +75,15 @@ class Skeleton:
         return R, ends
 
     def scaled(self, scale: float) -> Skeleton:
-        """The skeleton with every bone ``scale`` times as long."""
+        """Return the skeleton with every bone ``scale`` times as long."""
         return replace(self, offsets=self.offsets * scale)
 
-    def named_joints(self, R: np.ndarray, ends: np.ndarray) -> tuple[tuple[str, ...], np.ndarray, np.ndarray]:
-        """Bone poses as ``Take`` wants them: names, positions (T, J, 3), orientations (T, J, 3, 3).
+    def named_joints(
+        self, R: NDArray[np.float64], ends: NDArray[np.float64]
+    ) -> tuple[tuple[str, ...], NDArray[np.float64], NDArray[np.float64]]:
+        """Return bone poses in the form of ``Take``: names, positions (T, J, 3), orientations (T, J, 3, 3).
 
-        :raises MotionFileError: a bone of CMU's skeleton is missing.
+        :raises MotionFileError: when a bone of CMU's skeleton is missing.
         """
         names = (*SEGMENT_OF_JOINT.values(), *TIPS.values())
         missing = [n for n in names if n not in self.bones]
@@ -91,8 +96,8 @@ class Skeleton:
         return JOINT_NAMES, ends[:, at], R[:, bone]
 
 
-def _euler(angles: np.ndarray, order: str) -> np.ndarray:
-    """Rotations (..., 3, 3) of Euler angles (..., n) radians about fixed axes, ``order`` first to last."""
+def _euler(angles: NDArray[np.float64], order: str) -> NDArray[np.float64]:
+    """Return rotations (..., 3, 3) of Euler angles (..., n) radians about fixed axes, ``order`` first to last."""
     R = np.broadcast_to(np.eye(3), (*angles.shape[:-1], 3, 3))
     for k, axis in enumerate(order):
         R = exp(angles[..., k, None] * np.eye(3)[AXES[axis]]) @ R
@@ -102,8 +107,8 @@ def _euler(angles: np.ndarray, order: str) -> np.ndarray:
 def parse_asf(text: str, name: str = "skeleton") -> Skeleton:
     """Read an .asf file.
 
-    :param text: the file's text; ``name`` is what messages call it.
-    :raises MotionFileError: a section or value is missing or malformed.
+    :param text: the file's text; ``name``: its name in messages.
+    :raises MotionFileError: when a section or value is missing or malformed.
     """
     sections: dict[str, list[list[str]]] = {}
     current: list[list[str]] = []
@@ -128,7 +133,7 @@ def _skeleton(sections: Mapping[str, list[list[str]]]) -> Skeleton:
     metres = INCH / float(units.get("length", "1"))
     to_radians = np.pi / 180 if units.get("angle", "deg").startswith("deg") else 1.0
 
-    def rotation(angles: list[str], order: str) -> np.ndarray:
+    def rotation(angles: list[str], order: str) -> NDArray[np.float64]:
         return _euler(np.array(angles, float) * to_radians, order.lower())
 
     root = {words[0]: words[1:] for words in sections["root"]}
@@ -172,12 +177,12 @@ def _blocks(lines: list[list[str]]) -> list[list[list[str]]]:
     return blocks
 
 
-def parse_amc(text: str, skeleton: Skeleton, name: str = "motion") -> tuple[np.ndarray, np.ndarray]:
+def parse_amc(text: str, skeleton: Skeleton, name: str = "motion") -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Read an .amc file.
 
     :return: M (T, B, 3, 3), rotations relative to the parents in skeleton axes, and root (T, 3) metres, as
         ``Skeleton.forward_kinematics`` takes them.
-    :raises MotionFileError: bones or values do not match the skeleton, or frames are missing or incomplete.
+    :raises MotionFileError: when bones or values do not match the skeleton, or frames are missing or incomplete.
     """
     words = [w for line in text.splitlines() if line and line[0] not in "#:" for w in line.split()]
     if not words:

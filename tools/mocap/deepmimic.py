@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""DeepMimic's humanoid: a character file with joints and bodies, and motions of 44 numbers a frame.
+"""DeepMimic's humanoid: a character file with joints and bodies, and motions of 44 numbers per frame.
 
-A frame is its duration (s), the root's position (m) and quaternion (w, x, y, z), and then, in the order of the
-character's joints, a quaternion for a spherical joint, an angle about z for a revolute joint and nothing for a fixed
+A frame is its duration (s), the root's position (m) and quaternion (w, x, y, z), followed, in the order of the
+character's joints, by a quaternion for a spherical joint, an angle about z for a revolute joint and nothing for a fixed
 one. R_j = R_parent · R_state, t_j = t_parent + R_parent · attach. Axes: x forward, y up, z right; zero pose standing
 with hanging arms. Feet and head have no joint beyond them; their tips come from the bodies' shapes.
 """
@@ -11,8 +11,10 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...scope_addon.errors import MotionFileError
 from ...solver.rotations import exp, matrix_from_quaternion
@@ -20,7 +22,7 @@ from .take import Take
 
 # x forward, y up, z right -> x left, y up, z forward
 R_SHARED_DEEPMIMIC = np.array([[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]])
-NAMES = {"root": "pelvis", "chest": "chest", "neck": "neck"}  # the others are named as ours
+NAMES = {"root": "pelvis", "chest": "chest", "neck": "neck"}  # the others have the names used here
 VALUES = {"none": 4, "spherical": 4, "revolute": 1, "fixed": 0}
 
 
@@ -31,19 +33,19 @@ class Character:
     names: tuple[str, ...]
     types: tuple[str, ...]
     parents: tuple[int, ...]
-    attach: np.ndarray  # (J, 3) in the parent's frame
-    tips: dict[str, tuple[int, np.ndarray]]  # tip -> joint that carries it, position in the joint's frame
+    attach: NDArray[np.float64]  # (J, 3) in the parent's frame
+    tips: dict[str, tuple[int, NDArray[np.float64]]]  # tip -> joint that carries it, position in the joint's frame
 
     @property
     def width(self) -> int:
-        """Numbers in a frame."""
+        """Return the count of numbers in a frame."""
         return 4 + sum(VALUES[t] for t in self.types)
 
 
 def parse_character(text: str, name: str = "character") -> Character:
     """Read a character file.
 
-    :raises MotionFileError: it is not JSON, or lacks joints or bodies.
+    :raises MotionFileError: when it is not JSON, or lacks joints or bodies.
     """
     try:
         data = json.loads(text)
@@ -66,14 +68,14 @@ def parse_character(text: str, name: str = "character") -> Character:
         raise MotionFileError(f"{name}: not a DeepMimic humanoid character ({error!r})") from error
 
 
-def _attach(item: dict) -> np.ndarray:
+def _attach(item: dict[str, Any]) -> NDArray[np.float64]:
     return np.array([item["AttachX"], item["AttachY"], item["AttachZ"]], float)
 
 
-def parse_motion(text: str, character: Character, name: str = "motion") -> np.ndarray:
+def parse_motion(text: str, character: Character, name: str = "motion") -> NDArray[np.float64]:
     """Read the frames of a motion file, (T, 44).
 
-    :raises MotionFileError: it is not JSON or its frames do not fit the character.
+    :raises MotionFileError: when it is not JSON or its frames do not fit the character.
     """
     try:
         frames = np.array(json.loads(text)["Frames"], dtype=float)
@@ -84,8 +86,10 @@ def parse_motion(text: str, character: Character, name: str = "motion") -> np.nd
     return frames
 
 
-def forward_kinematics(frames: np.ndarray, character: Character) -> tuple[np.ndarray, np.ndarray]:
-    """R (T, J, 3, 3) and t (T, J, 3), joint to world, DeepMimic's axes, of frames (T, 44)."""
+def forward_kinematics(
+    frames: NDArray[np.float64], character: Character
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return R (T, J, 3, 3) and t (T, J, 3), joint to world, DeepMimic's axes, of frames (T, 44)."""
     T, J = len(frames), len(character.names)
     R = np.empty((T, J, 3, 3))
     t = np.empty((T, J, 3))
@@ -103,7 +107,7 @@ def forward_kinematics(frames: np.ndarray, character: Character) -> tuple[np.nda
 
 
 def read_take(text: str, character: Character, name: str) -> Take:
-    """A motion file as a take. Frames are assumed to be evenly spaced, which they are in every file of the archive."""
+    """Read a motion file as a take. Frames are assumed to be evenly spaced, as in every file of the archive."""
     frames = parse_motion(text, character, name)
     R, t = forward_kinematics(frames, character)
     tips = [t[:, j] + R[:, j] @ at for j, at in character.tips.values()]

@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""CMU motions as comma separated exponential maps: 39 x 3 values a frame.
+"""CMU motions as comma separated exponential maps: 39 x 3 values per frame.
 
 The first triple is the root's position in CMU's length unit, the others are rotations of 38 joints relative to their
 parents. They come from a conversion to .bvh of the .amc files that kept the rest axes of the .asf skeletons, so the
 triples follow the bones of the .asf hierarchy, with an extra, motionless one after each chain (tips) and one for each
-hip bone. The matrices were written for row vectors: as ours, which multiply columns, R = exp(−φ).
+hip bone. The matrices are for row vectors: for column vectors, as here, R = exp(−φ).
 
-The archive has no skeletons and does not name the performers. The offset table that circulates with it drops the
+The archive has no skeletons and does not name the performers. The commonly used offset table omits the
 length of each bone that branches, thorax (11.6 cm) and wrist (9.4 cm), because a .bvh joint has a single offset.
 Here the bones are those of the .asf skeletons, scaled per file until the feet stand on the floor at y = 0.
-Frame 0 of each file is the conversion's reference pose and is left out. Rate: 120 fps, found by gait.
+Frame 0 of each file is the conversion's reference pose and is left out. The rate, 120 fps, follows from the gait.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...scope_addon.errors import MotionFileError
 from ...solver.rotations import exp
@@ -40,11 +41,11 @@ STANCE_QUANTILE = 0.1  # of the frames, ordered by height of the lower foot
 SCALES = np.linspace(0.75, 1.25, 101)
 
 
-def parse_expmap(text: str, name: str = "motion") -> tuple[np.ndarray, np.ndarray]:
+def parse_expmap(text: str, name: str = "motion") -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Read a file.
 
     :return: φ (T, 38, 3) radians, exactly as in the file but without frame 0, and root (T, 3) in CMU's unit.
-    :raises MotionFileError: a line does not have 117 numbers, or there are fewer than 2 lines.
+    :raises MotionFileError: when a line does not have 117 numbers, or there are fewer than 2 lines.
     """
     lines = text.split()
     if any(line.count(",") != COLUMNS - 1 for line in lines):
@@ -58,8 +59,8 @@ def parse_expmap(text: str, name: str = "motion") -> tuple[np.ndarray, np.ndarra
     return values[1:, 1:], values[1:, 0]
 
 
-def bone_rotations(phi: np.ndarray, skeleton: Skeleton) -> np.ndarray:
-    """Rotations (T, B, 3, 3) of the skeleton's bones relative to their parents, from φ (T, 38, 3)."""
+def bone_rotations(phi: NDArray[np.float64], skeleton: Skeleton) -> NDArray[np.float64]:
+    """Return rotations (T, B, 3, 3) of the skeleton's bones relative to their parents, from φ (T, 38, 3)."""
     M = np.broadcast_to(np.eye(3), (len(phi), len(skeleton.bones), 3, 3)).copy()
     for k, bone in enumerate(BONES):
         if bone:
@@ -67,8 +68,8 @@ def bone_rotations(phi: np.ndarray, skeleton: Skeleton) -> np.ndarray:
     return M
 
 
-def standing_scale(R: np.ndarray, root: np.ndarray, skeleton: Skeleton) -> float:
-    """Scale of the skeleton with which the lower foot of the standing frames is ``STANCE_HEIGHT`` above the floor.
+def standing_scale(R: NDArray[np.float64], root: NDArray[np.float64], skeleton: Skeleton) -> float:
+    """Return the skeleton's scale at which the lower foot of standing frames is ``STANCE_HEIGHT`` above the floor.
 
     :param R: (T, B, 3, 3) bone to world; root (T, 3) metres.
     """
@@ -82,7 +83,7 @@ def standing_scale(R: np.ndarray, root: np.ndarray, skeleton: Skeleton) -> float
 
 
 def average_skeleton(skeletons: list[Skeleton]) -> Skeleton:
-    """The skeleton with the mean of the bone offsets, left and right made mirror images."""
+    """Return the skeleton with the mean of the bone offsets; left and right are made mirror images."""
     first = skeletons[0]
     offsets = np.mean([s.offsets for s in skeletons], axis=0)
     mirror = [first.bones.index({"l": "r", "r": "l"}[b[0]] + b[1:]) if _is_sided(b) else i

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Fit our body to every take: ``python -m scope.tools.mocap.fit_body ARCHIVES -o build/mocap/motions.npz``.
+"""Fit the default body to every take: ``python -m scope.tools.mocap.fit_body ARCHIVES -o build/mocap/motions.npz``.
 
-For each performer one shape from the bone lengths, then for each frame our own solver on
+For each performer, one shape from the bone lengths; then, for each frame, the solver minimizes
 
     24000 Σ_j c_j |t_j − p̂_j|² + Σ_i w_i |log(R̂_iᵀ R_i)|² + joint limits + rest-pose prior
 
-with p̂ and R̂ from ``retarget.py``. The offsets o_j are the performer's mean of what a first pass over some frames, in
-which rotations outweigh positions, leaves over. The world has y up; poses and trans are as SMPL means them.
+with p̂ and R̂ from ``retarget.py``. The offsets o_j are the performer's mean residual in a first pass over some frames,
+in which rotations outweigh positions. The world has y up; poses and trans follow SMPL's convention.
 """
 
 from __future__ import annotations
@@ -18,8 +18,9 @@ from itertools import groupby
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ...scope_addon.atomic_write import written_beside
+from ...scope_addon.atomic_write import atomic_path
 from ...solver import Keypoints3D, Measurements, Options, PosePriors, Priors, Stage, State, Weights, fit_tree, make_tree
 from ...solver.body import Body
 from ...solver.loaders.body_file import load_body
@@ -36,7 +37,7 @@ FREE_JOINT_WEIGHT = 50.0  # per radian^2, towards rest: parts that the source do
 FOLLOWING_JOINT_WEIGHT = 0.5
 FLOOR_QUANTILE = 0.05  # of the frames, ordered by the height of the lowest point of the feet
 SOLES = ("heel", "foot_index")
-# Degrees a joint's state can reach; beyond, the recording is broken (a left foot turned around in 01_12, for one).
+# Largest plausible angle of a joint, degrees; beyond, the recording is broken (as a reversed left foot in 01_12).
 MOST_DEGREES = {"ankle": 75.0, "foot": 70.0, "wrist": 85.0, "hand": 60.0, "head": 60.0, "neck": 75.0, "collar": 50.0}
 MOST_DEGREES |= {"hip": 140.0, "knee": 155.0, "elbow": 160.0, "shoulder": 175.0}
 MOST_DEGREES_PER_SECOND = 1700.0  # of a joint; kicks and flips reach 1400
@@ -44,22 +45,24 @@ MOST_DEGREES_PER_SECOND = 1700.0  # of a joint; kicks and flips reach 1400
 
 @dataclass
 class FittedTake:
-    """Our body's motion for a take."""
+    """The body's motion fitted to a take."""
 
     take: Take
-    betas: np.ndarray  # (P,)
-    R: np.ndarray  # (T, K+1, 3, 3) part to world
-    t: np.ndarray  # (T, K+1, 3) joints, world, metres
-    poses: np.ndarray  # (T, 3 (K+1)) axis-angle
-    trans: np.ndarray  # (T, 3)
-    error: np.ndarray  # (T, K+1) metres between joint and target, NaN without target
-    valid: np.ndarray  # (T,) bool, False where the recording is broken
+    betas: NDArray[np.float64]  # (P,)
+    R: NDArray[np.float64]  # (T, K+1, 3, 3) part to world
+    t: NDArray[np.float64]  # (T, K+1, 3) joints, world, metres
+    poses: NDArray[np.float64]  # (T, 3 (K+1)) axis-angle
+    trans: NDArray[np.float64]  # (T, 3)
+    error: NDArray[np.float64]  # (T, K+1) metres between joint and target, NaN without target
+    valid: NDArray[np.bool_]  # (T,) bool, False where the recording is broken
 
 
 class _Fitter:
     """The solver set up for one performer."""
 
-    def __init__(self, body: Body, betas: np.ndarray, found: Correspondence, position_weight: float = 24000.0) -> None:
+    def __init__(
+        self, body: Body, betas: NDArray[np.float64], found: Correspondence, position_weight: float = 24000.0
+    ) -> None:
         self.body, self.betas, self.found, self.tree = body, betas, found, make_tree(body)
         names = list(body.joint_names)
         self.parts = np.array([names.index(p) for p in found.parts])
@@ -77,8 +80,10 @@ class _Fitter:
         stage = Stage(weights, tolerance=1e-4, max_iterations=20)
         self.options = Options(stages=(stage,), robust_keypoints3d=np.inf, damping=1e-3)
 
-    def __call__(self, R_target: np.ndarray, p_target: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Part poses R (T, K+1, 3, 3), t (T, K+1, 3) for targets (T, parts, 3, 3) and (T, points, 3)."""
+    def __call__(
+        self, R_target: NDArray[np.float64], p_target: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return part poses R (T, K+1, 3, 3), t (T, K+1, 3) for targets (T, parts, 3, 3) and (T, points, 3)."""
         T, n = len(R_target), self.body.K + 1
         R, t = np.empty((T, n, 3, 3)), np.empty((T, n, 3))
         none = np.zeros((len(self.parts), 3))
@@ -96,8 +101,8 @@ class _Fitter:
             R[k], t[k] = fit.R_camera_part, fit.t_camera_part
         return R, t
 
-    def _start(self, R_target: np.ndarray, p_target: np.ndarray) -> State:
-        """The state in which every part has its target's rotation and the joints their targets' centroid."""
+    def _start(self, R_target: NDArray[np.float64], p_target: NDArray[np.float64]) -> State:
+        """Return the state with every part at its target's rotation and the joints' centroid at their targets'."""
         R = np.empty((self.body.K + 1, 3, 3))
         Omega = np.tile(np.eye(3), (self.body.K + 1, 1, 1))
         for i, parent in enumerate(self.body.parents):
@@ -117,14 +122,14 @@ def fit_performer(body: Body, takes: list[Take]) -> list[FittedTake]:
     return [_fitted(body, betas, take, fitter) for take in takes]
 
 
-def calibrate_offsets(body: Body, betas: np.ndarray, found: Correspondence, takes: list[Take]) -> None:
+def calibrate_offsets(body: Body, betas: NDArray[np.float64], found: Correspondence, takes: list[Take]) -> None:
     """Set ``found.offset`` to the mean over frames of R_world_sᵀ (t_j − p_s), from fits on some frames of the takes."""
     step = max(1, sum(map(len, takes)) // CALIBRATION_FRAMES)
     some = [Take(t.name, t.subject, t.fps, t.joint_names, t.positions[::step], t.source,
                  orientations=None if t.orientations is None else t.orientations[::step]) for t in takes]  # fmt: skip
     for k in range(ROUNDS):
         fitter = _Fitter(body, betas, found, position_weight=24.0 if k == 0 else 2400.0)
-        left_over: dict[str, list[np.ndarray]] = {joint: [] for joint in found.points}
+        left_over: dict[str, list[NDArray[np.float64]]] = {joint: [] for joint in found.points}
         for take in some:
             _, t = fitter(*targets(take, found))
             for joint, point in found.points.items():
@@ -134,7 +139,7 @@ def calibrate_offsets(body: Body, betas: np.ndarray, found: Correspondence, take
         found.offset = {joint: np.concatenate(gaps).mean(axis=0) for joint, gaps in left_over.items()}
 
 
-def _fitted(body: Body, betas: np.ndarray, take: Take, fitter: _Fitter) -> FittedTake:
+def _fitted(body: Body, betas: NDArray[np.float64], take: Take, fitter: _Fitter) -> FittedTake:
     R_target, p_target = targets(take, fitter.found)
     R, t = fitter(R_target, p_target)
     error = np.full(t.shape[:2], np.nan)
@@ -150,8 +155,8 @@ def _fitted(body: Body, betas: np.ndarray, take: Take, fitter: _Fitter) -> Fitte
     return FittedTake(take, betas, R, t, poses, t[:, 0] - body.rest_joints(betas)[0], error, valid)
 
 
-def plausible(body: Body, Omega: np.ndarray, fps: float) -> np.ndarray:
-    """(T,) bool: every joint of (T, K+1, 3, 3) states is within its range, and turns no faster than joints do."""
+def plausible(body: Body, Omega: NDArray[np.float64], fps: float) -> NDArray[np.bool_]:
+    """Return (T,) bool: whether all joint states (T, K+1, 3, 3) are within their ranges and speed limit."""
     most = np.array([MOST_DEGREES.get(name.rpartition("_")[2], 180.0) for name in body.joint_names])
     inside = (np.degrees(np.linalg.norm(log(Omega[:, 1:]), axis=-1)) <= most[1:]).all(axis=1)
     turns = log(np.swapaxes(Omega[:-1, 1:], -1, -2) @ Omega[1:, 1:])
@@ -173,7 +178,7 @@ def save(path: Path, body: Body, fitted: list[FittedTake]) -> None:
     take_fps and take_betas[k]; up is ``y``.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
-    with written_beside(path) as temporary:
+    with atomic_path(path) as temporary:
         np.savez_compressed(
             temporary,
             poses=np.concatenate([f.poses for f in fitted]).astype(np.float32),
@@ -192,7 +197,7 @@ def save(path: Path, body: Body, fitted: list[FittedTake]) -> None:
 
 
 def report(body: Body, fitted: list[FittedTake]) -> str:
-    """Minutes and joint errors (median / 95 %) for each source, and the errors of each joint."""
+    """Print minutes and joint errors (median / 95 %) for each source, and the errors of each joint."""
     lines = []
     for source, group in groupby(fitted, key=lambda f: f.take.source):
         of_source = list(group)
@@ -209,7 +214,7 @@ def report(body: Body, fitted: list[FittedTake]) -> str:
 
 
 def main() -> None:
-    """Command line."""
+    """Run the command line."""
     parser = argparse.ArgumentParser(description="Fit the default body to the motion archives.")
     parser.add_argument("archives", type=Path, help="folder with the three .tar.xz")
     parser.add_argument("-o", "--output", type=Path, default=Path("build/mocap/motions.npz"))

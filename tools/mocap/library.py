@@ -7,6 +7,7 @@ import tarfile
 from pathlib import Path, PurePosixPath
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...scope_addon.errors import MotionFileError
 from . import asf_amc, deepmimic, expmap
@@ -18,12 +19,12 @@ CMU_FPS = 120.0
 
 
 def load_library(folder: str | Path, fps: float | None = None) -> list[Take]:
-    """Every take of the archives, in the shared frame of ``Take`` (y up, metres).
+    """Return every take of the archives, in the common coordinate frame of ``Take`` (y up, metres).
 
-    :param folder: where the three .tar.xz lie.
+    :param folder: the folder of the three .tar.xz.
     :param fps: leave out frames so that takes have about this rate; None keeps all.
-    :return: takes without doubles, ordered by source and name.
-    :raises MotionFileError: an archive is missing or a file in it cannot be read.
+    :return: takes without duplicates, ordered by source and name.
+    :raises MotionFileError: when an archive is missing or a file in it cannot be read.
     """
     texts = {archive: read_archive(Path(folder) / f"{archive}.tar.xz") for archive in ARCHIVES}
     amc, skeletons = load_asf_amc(texts["cmu_asf_amc"])
@@ -34,9 +35,9 @@ def load_library(folder: str | Path, fps: float | None = None) -> list[Take]:
 
 
 def read_archive(path: Path) -> dict[str, str]:
-    """Text of every file in a .tar.xz by its path inside; nothing is unpacked to disk.
+    """Return the text of every file in a .tar.xz by its path inside; nothing is unpacked to disk.
 
-    :raises MotionFileError: the archive is missing or broken.
+    :raises MotionFileError: when the archive is missing or broken.
     """
     try:
         with tarfile.open(path, "r:xz") as archive:
@@ -51,14 +52,14 @@ def read_archive(path: Path) -> dict[str, str]:
 
 
 def load_asf_amc(texts: dict[str, str]) -> tuple[list[Take], list[Skeleton]]:
-    """Takes and skeletons of the Acclaim archive; ``02/02_01.amc`` belongs to ``02/02.asf``."""
+    """Read the takes and skeletons of the Acclaim archive; ``02/02_01.amc`` belongs to ``02/02.asf``."""
     takes, skeletons = [], {}
     for path in sorted(p for p in texts if p.endswith(".asf")):
         skeletons[PurePosixPath(path).stem] = asf_amc.parse_asf(texts[path], path)
     for path in sorted(p for p in texts if p.endswith(".amc")):
         subject = PurePosixPath(path).parent.name
         if subject not in skeletons:
-            raise MotionFileError(f"{path}: there is no skeleton {subject}.asf beside it")
+            raise MotionFileError(f"{path}: its skeleton {subject}.asf is missing in the same folder")
         skeleton = skeletons[subject]
         M, root = asf_amc.parse_amc(texts[path], skeleton, path)
         takes.append(_cmu_take(PurePosixPath(path).stem, f"cmu_{subject}", "cmu_asf_amc", skeleton, M, root))
@@ -66,7 +67,7 @@ def load_asf_amc(texts: dict[str, str]) -> tuple[list[Take], list[Skeleton]]:
 
 
 def load_expmap(texts: dict[str, str], skeleton: Skeleton) -> list[Take]:
-    """Takes of the exponential-map archive on a skeleton scaled for each: the performers are unknown."""
+    """Read the exponential-map archive; each take has a scaled skeleton of its own, because performers are unknown."""
     takes = []
     for path in sorted(p for p in texts if p.endswith(".txt")):
         phi, root = expmap.parse_expmap(texts[path], path)
@@ -80,7 +81,7 @@ def load_expmap(texts: dict[str, str], skeleton: Skeleton) -> list[Take]:
 
 
 def load_deepmimic(texts: dict[str, str]) -> list[Take]:
-    """Takes of the DeepMimic archive's humanoid; other characters are passed over."""
+    """Read the takes of the DeepMimic archive's humanoid; other characters are skipped."""
     path = "characters/humanoid3d.txt"
     if path not in texts:
         raise MotionFileError(f"the DeepMimic archive has no {path}")
@@ -95,8 +96,8 @@ def load_deepmimic(texts: dict[str, str]) -> list[Take]:
 def without_doubles(takes: list[Take]) -> list[Take]:
     """Leave out each take that repeats an earlier one of the same length.
 
-    CMU's root path (120 values a second, the same unit in both CMU archives) identifies a recording: two takes are
-    the same if the path of one occurs in the other to half a millimetre.
+    CMU's root trajectory (120 values per second, the same unit in both CMU archives) identifies a recording: two takes
+    are the same if the trajectory of one occurs in the other to within half a millimetre.
     """
     kept: list[Take] = []
     for take in takes:
@@ -106,7 +107,7 @@ def without_doubles(takes: list[Take]) -> list[Take]:
 
 
 def _same_recording(take: Take, other: Take) -> bool:
-    """True if the root's path of ``take`` is a stretch of that of ``other``."""
+    """Return whether the root trajectory of ``take`` is a section of that of ``other``."""
     path, longer = take.joint("pelvis"), other.joint("pelvis")
     if take.source == "deepmimic" or len(path) > len(longer) + 1:
         return False
@@ -118,6 +119,8 @@ def _same_recording(take: Take, other: Take) -> bool:
     return False
 
 
-def _cmu_take(name: str, subject: str, source: str, skeleton: Skeleton, M: np.ndarray, root: np.ndarray) -> Take:
+def _cmu_take(
+    name: str, subject: str, source: str, skeleton: Skeleton, M: NDArray[np.float64], root: NDArray[np.float64]
+) -> Take:
     names, positions, orientations = skeleton.named_joints(*skeleton.forward_kinematics(M, root))
     return Take(name, subject, CMU_FPS, names, positions, source, orientations=orientations)

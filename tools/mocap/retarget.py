@@ -1,17 +1,19 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How a source's skeleton corresponds to our body's parts, and the shape that gives our body its bone lengths.
+"""Correspondence between a source's skeleton and the body's parts, and the shape with the source's bone lengths.
 
 Rotations: part i follows a segment s of the source, R_world_part = R_world_s · C_i, where the constant C_i takes the
 part's rest bone and hinge axis to the segment's. It fixes the twist, which joint positions alone leave open.
 Positions: joint j follows a point fixed to a segment, p_world_j = p_world_s + R_world_s · o_j; the constant o_j
-bridges what the two skeletons mean by a joint (CMU's hip joints lie 15-18 cm apart, ours 21 cm).
+is the distance between the two skeletons' joints (CMU's hip joints are 15-18 cm apart, the body's 21 cm).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...solver.body import Body
 from ...solver.errors import ShapeError
@@ -21,14 +23,14 @@ from .take import Take
 SIDES = ("left", "right")
 CMU_SPLAY = np.radians(20.0)  # of CMU's thighs at zero pose
 CMU_ELBOW_ROLL = np.radians(30.0)  # of CMU's elbow axis about the outstretched arm at zero pose, up at the front
-HEAD_PITCH = np.radians(5.0)  # median forward pitch that heads are set to: people look a little down
+HEAD_PITCH = np.radians(5.0)  # median forward pitch to which heads are set: people look slightly down
 MOST_HEAD_PITCH = np.radians(25.0)
 STANCE_SPEED = 0.12  # m/s: a foot slower than this stands
 LENGTHS = (  # joint, joint, source joint, source joint, standard deviation in metres
     *((f"{s}_{a}", f"{s}_{b}", f"{s}_{a}", f"{s}_{b}", 0.01)
       for s in SIDES for a, b in (("hip", "knee"), ("knee", "ankle"), ("shoulder", "elbow"))),
 )  # fmt: skip
-ARM_LENGTHS = {"cmu": ("hand", "knuckle"), "deepmimic": ("wrist", "wrist")}  # our and the source's end of the forearm
+ARM_LENGTHS = {"cmu": ("hand", "knuckle"), "deepmimic": ("wrist", "wrist")}  # ends of the forearm: body, source
 
 
 @dataclass(frozen=True)
@@ -38,7 +40,7 @@ class Follow:
     first: str
     second: str = ""
     share: float = 0.0
-    weight: float = 300.0  # per radian^2, beside 24000 per metre^2 of a joint: 300 is a lever of 11 cm
+    weight: float = 300.0  # per radian^2, against 24000 per metre^2 of a joint: 300 is a lever of 11 cm
 
 
 @dataclass(frozen=True)
@@ -52,17 +54,19 @@ class Point:
 
 @dataclass
 class Correspondence:
-    """Everything that relates one performer to our body."""
+    """The correspondence between one performer's skeleton and the body."""
 
     parts: dict[str, Follow]
     points: dict[str, Point]
-    C: dict[str, np.ndarray] = field(default_factory=dict)  # (3, 3) for each of parts
-    offset: dict[str, np.ndarray] = field(default_factory=dict)  # (3,) metres for each of points, in its segment
+    C: dict[str, NDArray[np.float64]] = field(default_factory=dict)  # (3, 3) for each of parts
+    # (3,) metres for each of points, in its segment
+    offset: dict[str, NDArray[np.float64]] = field(default_factory=dict)
 
 
-def _sided(table: dict) -> dict:
-    """Both sides' entries of a table whose names begin with ``*_``."""
-    def put(value, side):  # type: ignore[no-untyped-def]
+def _sided(table: dict[str, Any]) -> dict[str, Any]:
+    """Return both sides' entries of a table whose names begin with ``*_``."""
+
+    def put(value: Any, side: str) -> Any:
         changes = {k: v.replace("*", side) for k, v in vars(value).items() if isinstance(v, str)}
         return type(value)(**{**vars(value), **changes})
 
@@ -101,8 +105,8 @@ DEEPMIMIC_POINTS = _sided({
 })  # fmt: skip
 
 
-def correspond(body: Body, betas: np.ndarray, takes: list[Take]) -> Correspondence:
-    """The correspondence for one performer's takes, with feet levelled and heads upright; offsets are still zero."""
+def correspond(body: Body, betas: NDArray[np.float64], takes: list[Take]) -> Correspondence:
+    """Return the correspondence for one performer's takes, with level feet and upright heads, and zero offsets."""
     cmu = takes[0].source.startswith("cmu_")
     found = Correspondence(CMU_PARTS if cmu else DEEPMIMIC_PARTS, CMU_POINTS if cmu else DEEPMIMIC_POINTS)
     rest = body.rest_joints(betas)
@@ -119,13 +123,13 @@ def correspond(body: Body, betas: np.ndarray, takes: list[Take]) -> Corresponden
     return found
 
 
-def segment_rotations(take: Take, follow: Follow) -> np.ndarray:
-    """(T, 3, 3) R_world_segment of the segment or mixture that a part follows.
+def segment_rotations(take: Take, follow: Follow) -> NDArray[np.float64]:
+    """Return R_world_segment (T, 3, 3) of the segment or mixture that a part follows.
 
-    :raises ShapeError: the take has positions only.
+    :raises ShapeError: when the take has positions only.
     """
     if take.orientations is None:
-        raise ShapeError(f"{take.name} has no orientations: our body cannot be fitted to joint positions alone")
+        raise ShapeError(f"{take.name} has no orientations: the body cannot be fitted to joint positions alone")
     R = take.orientations[:, take.index(follow.first)]
     if follow.second:
         between = np.swapaxes(R, -1, -2) @ take.orientations[:, take.index(follow.second)]
@@ -133,16 +137,16 @@ def segment_rotations(take: Take, follow: Follow) -> np.ndarray:
     return R
 
 
-def targets(take: Take, found: Correspondence) -> tuple[np.ndarray, np.ndarray]:
-    """Rotations (T, parts, 3, 3) and positions (T, points, 3) that our parts and joints shall have."""
+def targets(take: Take, found: Correspondence) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return target rotations (T, parts, 3, 3) of parts and target positions (T, points, 3) of joints."""
     R = np.stack([segment_rotations(take, follow) @ found.C[part] for part, follow in found.parts.items()], axis=1)
     p = np.stack([take.joint(point.joint) + segment_rotations(take, Follow(point.segment)) @ found.offset[joint]
                   for joint, point in found.points.items()], axis=1)  # fmt: skip
     return R, p
 
 
-def shape_from_lengths(body: Body, take: Take) -> np.ndarray:
-    """Shape (P,) with the take's bone lengths and trunk height: Gauss-Newton on (length − measured)/σ and β/1."""
+def shape_from_lengths(body: Body, take: Take) -> NDArray[np.float64]:
+    """Fit the shape (P,) to bone lengths and trunk height by Gauss-Newton on (length − measured)/σ and β/1."""
     ours, theirs = ARM_LENGTHS["cmu" if take.source.startswith("cmu_") else "deepmimic"]
     pairs = [*LENGTHS, *((f"{s}_elbow", f"{s}_{ours}", f"{s}_elbow", f"{s}_{theirs}", 0.01) for s in SIDES)]
     index = {name: i for i, name in enumerate(body.joint_names)}
@@ -170,15 +174,15 @@ def shape_from_lengths(body: Body, take: Take) -> np.ndarray:
 
 
 def _chain(a: str, b: str) -> list[str]:
-    """The source's joints from a to b: its forearm is two bones, and then comes the hand."""
+    """Return the source's joints from a to b: its forearm is two bones, followed by the hand."""
     if not b.endswith("_knuckle"):
         return [a, b]
     side = b.split("_")[0]
     return [a, f"{side}_forearm", f"{side}_wrist", b]
 
 
-def _rest_alignment(body: Body, rest: np.ndarray, part: str, cmu: bool) -> np.ndarray:
-    """C that takes a limb's rest bone and hinge axis to the source's; identity elsewhere, as all stand upright."""
+def _rest_alignment(body: Body, rest: NDArray[np.float64], part: str, cmu: bool) -> NDArray[np.float64]:
+    """Return C, which takes a limb's rest bone and hinge axis to the source's; identity for upright parts."""
     side, _, name = part.rpartition("_")
     mirror = -1.0 if side == "right" else 1.0
     child = {"hip": "knee", "knee": "ankle", "shoulder": "elbow", "elbow": "wrist"}.get(name)
@@ -201,21 +205,21 @@ def _rest_alignment(body: Body, rest: np.ndarray, part: str, cmu: bool) -> np.nd
     return _frame([mirror, 0.0, 0.0], axis) @ ours.T
 
 
-def _hanging(mirror: float) -> np.ndarray:
-    """Rotation of an arm from the T-pose to hanging, palms to the thighs."""
+def _hanging(mirror: float) -> NDArray[np.float64]:
+    """Return the rotation of an arm from the T-pose to hanging, palms to the thighs."""
     return exp([0.0, 0.0, -mirror * np.pi / 2])
 
 
-def _frame(bone: np.ndarray | list[float], axis: np.ndarray | list[float]) -> np.ndarray:
-    """Rotation with columns (bone, the axis made perpendicular to it, their cross product)."""
+def _frame(bone: NDArray[np.float64] | list[float], axis: NDArray[np.float64] | list[float]) -> NDArray[np.float64]:
+    """Return the rotation with columns (bone, the axis made perpendicular to it, their cross product)."""
     b = np.asarray(bone, float) / np.linalg.norm(bone)
     a = np.asarray(axis, float) - b * (b @ axis)
     a /= np.linalg.norm(a)
     return np.stack([b, a, np.cross(b, a)], axis=1)
 
 
-def _levelled(C: np.ndarray, follow: Follow, takes: list[Take], side: str) -> np.ndarray:
-    """C turned by the least rotation that makes the foot level in the median frame in which it stands."""
+def _levelled(C: NDArray[np.float64], follow: Follow, takes: list[Take], side: str) -> NDArray[np.float64]:
+    """Return C turned by the smallest rotation that makes the foot level in the median frame in which it stands."""
     ups = []
     for take in takes:
         ball = f"{side}_foot" if f"{side}_foot" in take.joint_names else f"{side}_foot_end"
@@ -234,7 +238,7 @@ def _levelled(C: np.ndarray, follow: Follow, takes: list[Take], side: str) -> np
     return exp(axis / max(sine, 1e-12) * np.arctan2(sine, own @ up)) @ C
 
 
-def _forward_lean(R: np.ndarray) -> np.ndarray:
-    """(T,) how far a segment's up axis leans towards where the segment faces, in the horizontal plane."""
+def _forward_lean(R: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return (T,) how far a segment's up axis leans in its facing direction, in the horizontal plane."""
     facing = R[:, [0, 2], 2] / np.maximum(np.linalg.norm(R[:, [0, 2], 2], axis=1, keepdims=True), 1e-9)
     return np.einsum("ti,ti->t", facing, R[:, [0, 2], 1])

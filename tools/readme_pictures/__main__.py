@@ -10,10 +10,12 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
-from ...scope_addon.atomic_write import written_beside
+from ...scope_addon.atomic_write import atomic_path
 from ...solver.loaders.body_file import ASSETS
 from . import animation, pictures
+from .clips import DATA
 
 ANIMATION = "sample"
 PICTURES = {
@@ -38,8 +40,8 @@ def main() -> int:
     if unknown:
         parser.error(f"there is no picture {', '.join(sorted(unknown))}; choose from {', '.join(known)}")
     names = arguments.names or known
-    if names != [ANIMATION] and not pictures.DATA.is_dir():
-        print(f"{pictures.DATA} does not exist: the pictures show captures of its clips", file=sys.stderr)
+    if names != [ANIMATION] and not DATA.is_dir():
+        print(f"{DATA} does not exist: the pictures show captures of its clips", file=sys.stderr)
         return 1
     arguments.out.mkdir(parents=True, exist_ok=True)
     for name in names:
@@ -50,14 +52,14 @@ def main() -> int:
     return 0
 
 
-def _write(path: Path, picture: np.ndarray) -> None:
+def _write(path: Path, picture: NDArray[np.uint8]) -> None:
     """Write a JPEG, as good as its size allows."""
     bgr = cv2.cvtColor(picture, cv2.COLOR_RGB2BGR)
     for quality in range(90, 30, -4):
         data = cv2.imencode(".jpg", bgr, [cv2.IMWRITE_JPEG_QUALITY, quality])[1].tobytes()
         if len(data) <= LARGEST_BYTES:
             break
-    with written_beside(path) as temporary:
+    with atomic_path(path) as temporary:
         temporary.write_bytes(data)
     print(f"{path}: {picture.shape[1]} x {picture.shape[0]}, {len(data) / 1000:.0f} kB, quality {quality}")
 
@@ -65,7 +67,7 @@ def _write(path: Path, picture: np.ndarray) -> None:
 def _write_animation(path: Path) -> None:
     """Write the moving picture."""
     frames = animation.sample_frames()
-    with written_beside(path) as temporary:
+    with atomic_path(path) as temporary:
         quality = animation.write_webp(temporary, frames, 30 / animation.FRAME_STEP)
     height, width = frames[0].shape[:2]
     size_kb = path.stat().st_size / 1000
@@ -76,4 +78,4 @@ if __name__ == "__main__":
     status = main()
     sys.stdout.flush()
     sys.stderr.flush()
-    os._exit(status)  # footage and onnxruntime's threads may hang at exit
+    os._exit(status)  # footage and onnxruntime's threads can hang at exit

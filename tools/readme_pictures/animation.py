@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The README's moving picture: the sample clip, the captured body over it, and the same motion from the side."""
+"""The README's animation: the sample clip, the captured body over it, and the same motion from the side."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from ...scope_addon.capture.media.video import open_video
 from ...scope_addon.errors import OutputError
@@ -20,11 +21,11 @@ FRAME_STEP = 2  # every second frame: 15 frames per second
 LARGEST_BYTES = 3_000_000
 _SIZE = (300, 306)  # of one panel, pixels
 _CORNER, _TALL = (60.0, 0.0), 480.0  # the part of the footage that is shown: the person stays inside it
-_MIDDLE, _HEIGHT_M = np.array([0.35, 0.0, 0.93]), 2.35  # what the side view looks at, and how much of it
+_MIDDLE, _HEIGHT_M = np.array([0.35, 0.0, 0.93]), 2.35  # centre and height of the side view
 
 
-def sample_frames() -> list[np.ndarray]:
-    """(H, W, 3) RGB frames: footage, overlay and side view next to each other."""
+def sample_frames() -> list[NDArray[np.uint8]]:
+    """Return (H, W, 3) RGB frames: footage, overlay and side view next to each other."""
     motion = captured(SAMPLE)[0]
     rows = {int(frame): row for row, frame in enumerate(motion.frames)}
     view = from_around(motion, 0, _MIDDLE, _SIZE, 90, _HEIGHT_M)
@@ -42,11 +43,11 @@ def sample_frames() -> list[np.ndarray]:
     return frames
 
 
-def write_webp(path: Path, frames: list[np.ndarray], frames_per_second: float) -> int:
+def write_webp(path: Path, frames: list[NDArray[np.uint8]], frames_per_second: float) -> int:
     """Write an endless animated WebP, at the best quality that stays below ``LARGEST_BYTES``; returns that quality.
 
     :param frames: (H, W, 3) uint8 RGB, all of one size.
-    :raises OutputError: the file cannot be written, or is too large at every quality.
+    :raises OutputError: when the file cannot be written, or is too large at every quality.
     """
     animation = cv2.Animation()
     animation.frames = [cv2.cvtColor(frame, cv2.COLOR_RGB2BGR) for frame in frames]

@@ -25,7 +25,7 @@ _LIMBS = {  # name in the ground truth: SMPL's joint
 
 @cache
 def default_body() -> Body:
-    """Scope's own body."""
+    """Load Scope's own body."""
     return load_body("scope")
 
 
@@ -36,17 +36,17 @@ def captured(video: Path, everybody: bool = False) -> list[Motion]:
 
 
 def camera(number: int) -> tuple[Motion, Path]:
-    """The motion captured from one of the four pose2sim cameras, and the file of its ground truth."""
+    """Return the motion captured from one of the four pose2sim cameras, and the file of its ground truth."""
     folder = DATA / "pose2sim"
     return captured(folder / f"cam{number}.mp4")[0], folder / f"truth_cam{number}.npz"
 
 
 def error_mm(motion: Motion, row: int, truth: Path) -> float:
-    """Mean distance of the twelve limb joints from ground truth, with the middle of the hips aligned."""
+    """Return the mean distance of the twelve limb joints from ground truth, with the middle of the hips aligned."""
     true, found = true_joints(motion, row, truth), joints(motion, row)
     return 1000 * float(np.mean([np.linalg.norm(found[k] - true[name]) for name, k in _LIMBS.items() if name in true]))
 
 
 def distance_cm(motion: Motion, row: int, truth: Path, name: str) -> float:
-    """Distance of one joint from ground truth, aligned in the same way."""
+    """Return the distance of one joint from ground truth, aligned in the same way."""
     return 100 * float(np.linalg.norm(joints(motion, row)[_LIMBS[name]] - true_joints(motion, row, truth)[name]))

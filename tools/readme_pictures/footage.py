@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from ...scope_addon.capture.media.video import open_video
 from ...scope_addon.capture.overlay.overlay_video import camera_vertices, draw_overlay
@@ -16,8 +17,8 @@ _TALL = 446  # pixels of the footage that fill the picture's height
 _OPACITY = 0.72
 
 
-def sample_with_body(motion: Motion, row: int, size: tuple[int, int]) -> np.ndarray:
-    """(H, W, 3) RGB: a frame of the sample clip with the body, cropped to the person."""
+def sample_with_body(motion: Motion, row: int, size: tuple[int, int]) -> NDArray[np.uint8]:
+    """Return (H, W, 3) RGB: a frame of the sample clip with the body, cropped to the person."""
     with open_video(SAMPLE) as video:
         image = next(frame.image_rgb for frame in video if frame.index == motion.frames[row])
     vertices = camera_vertices(motion, default_body(), row)
@@ -27,14 +28,14 @@ def sample_with_body(motion: Motion, row: int, size: tuple[int, int]) -> np.ndar
 
 
 def cropped(
-    image: np.ndarray,
+    image: NDArray[np.uint8],
     corner: tuple[float, float],
     height: float,
     size: tuple[int, int],
     motion: Motion | None = None,
     row: int = 0,
-) -> np.ndarray:
-    """(H, W, 3) RGB: a part of a frame, with the body over it where a motion is given.
+) -> NDArray[np.uint8]:
+    """Return (H, W, 3) RGB: a part of a frame, with the body over it where a motion is given.
 
     :param corner: upper left corner of the part, pixels of the frame.
     :param height: of the part, pixels of the frame.
@@ -43,9 +44,10 @@ def cropped(
     scale = FINER * size[1] / height
     crop = np.array([[scale, 0, -corner[0] * scale], [0, scale, -corner[1] * scale], [0, 0, 1.0]])
     wide = (FINER * size[0], FINER * size[1])
-    larger = cv2.warpAffine(image, crop[:2], wide, flags=cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)
+    enlarged = cv2.warpAffine(image, crop[:2], wide, flags=cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)
+    larger = np.asarray(enlarged, np.uint8)
     if motion is not None:
         body, vertices = default_body(), camera_vertices(motion, default_body(), row)
         K = crop @ motion.intrinsics
         larger = draw_overlay(larger, vertices, body.faces, K, colors=np.array(OURS), opacity=_OPACITY)
-    return cv2.resize(larger, size, interpolation=cv2.INTER_AREA)
+    return cv2.resize(larger, size, interpolation=cv2.INTER_AREA).astype(np.uint8, copy=False)

@@ -3,14 +3,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...scope_addon.motion import Motion
 from .clips import DATA, SAMPLE, SAMPLE_TRUTH, camera, captured, default_body, distance_cm, error_mm
 from .footage import sample_with_body
-from .panel import OURS, TRUTH, Panel, next_to_each_other
+from .panel import OURS, TRUTH, Color, Panel, next_to_each_other
 from .shapes import joints, posed, true_joints
 from .view import View, from_around, from_the_camera
 
@@ -19,10 +21,10 @@ BOTH = [("Scope", OURS), ("ground truth", TRUTH)]
 LEFT_WRIST, HEAD = 20, 15
 
 
-def sample() -> np.ndarray:
-    """The sample clip: the body over the footage, and from the side with the exact ground truth."""
+def sample() -> NDArray[np.uint8]:
+    """Draw the sample clip: the body over the footage, and from the side with the exact ground truth."""
     motion = captured(SAMPLE)[0]
-    columns: list[np.ndarray] = []
+    columns: list[NDArray[np.uint8]] = []
     for row in (48, 66, 119):
         panel = _with_truth(motion, row, _side(motion, row, (298, 330), 90, 2.35), SAMPLE_TRUTH)
         panel.heading(f"from the side, {error_mm(motion, row, SAMPLE_TRUTH):.0f} mm")
@@ -32,8 +34,8 @@ def sample() -> np.ndarray:
     return next_to_each_other(columns)
 
 
-def against_truth() -> np.ndarray:
-    """Camera 2 at a good moment and at an average one: the camera's view and the view from the side."""
+def against_truth() -> NDArray[np.uint8]:
+    """Draw camera 2 at a good moment and at an average one: the camera's view and the view from the side."""
     motion, truth = camera(2)
     panels = []
     for row in (37, 75):
@@ -45,8 +47,8 @@ def against_truth() -> np.ndarray:
     return next_to_each_other([panel.finished() for panel in panels])
 
 
-def in_motion() -> np.ndarray:
-    """A runner every 0.9 s, filmed by a travelling camera, and two people shaking hands."""
+def in_motion() -> NDArray[np.uint8]:
+    """Draw a runner every 0.9 s, filmed by a travelling camera, and two people shaking hands."""
     runner = captured(DATA / "clips" / "run_moving_camera.mp4")[0]
     run = _together([(runner, row, OURS) for row in range(4, 180, 27)], (598, 300), 0, 2.75, 12)
     run.heading("runner, travelling camera")
@@ -56,18 +58,18 @@ def in_motion() -> np.ndarray:
     return next_to_each_other([run.finished(), pair.finished()])
 
 
-def along_the_view() -> np.ndarray:
-    """Failure: depth ambiguity, trunk and arms displaced along the line of sight (camera 1)."""
+def along_the_view() -> NDArray[np.uint8]:
+    """Draw a failure: depth ambiguity, trunk and arms displaced along the line of sight (camera 1)."""
     return _hand_off(1, 52, 90, (14, 28))
 
 
-def from_behind() -> np.ndarray:
-    """Failure: lean and an occluded arm are not visible from behind (camera 4)."""
+def from_behind() -> NDArray[np.uint8]:
+    """Draw a failure: lean and an occluded arm are not visible from behind (camera 4)."""
     return _hand_off(4, 64, -90, (-14, 28))
 
 
-def two_floors() -> np.ndarray:
-    """Failure: one floor for a clip in which a man leaps from a roof (walk_side_static)."""
+def two_floors() -> NDArray[np.uint8]:
+    """Draw a failure: one floor for a clip in which a man jumps from a roof (walk_side_static)."""
     acrobat, walker = captured(DATA / "clips" / "walk_side_static.mp4", everybody=True)
     rows = (100, 150, 168, 175, 184, 193, 207)
     people = [(acrobat, row, OURS if acrobat.valid[row] else FAINT) for row in rows] + [(walker, 42, AMBER)]
@@ -83,8 +85,8 @@ def two_floors() -> np.ndarray:
     return panel.finished()
 
 
-def _hand_off(number: int, row: int, turn: float, place: tuple[float, float]) -> np.ndarray:
-    """A frame of a pose2sim camera: its view, the view from the side, and the error of the left hand."""
+def _hand_off(number: int, row: int, turn: float, place: tuple[float, float]) -> NDArray[np.uint8]:
+    """Draw a frame of a pose2sim camera: its view, the view from the side, and the error of the left hand."""
     motion, truth = camera(number)
     front = _with_truth(motion, row, _front(motion, row, (449, 380), truth), truth)
     front.heading(f"view of camera {number}")
@@ -123,9 +125,9 @@ def _with_truth(motion: Motion, row: int, view: View, truth: Path) -> Panel:
 
 
 def _together(
-    people: list[tuple[Motion, int, tuple]], size: tuple[int, int], turn: float, height: float, pitch: float
+    people: Sequence[tuple[Motion, int, Color]], size: tuple[int, int], turn: float, height: float, pitch: float
 ) -> Panel:
-    """Several poses in one world, farther ones drawn first."""
+    """Draw several poses in one world, farther ones drawn first."""
     bodies = [(posed(motion, default_body(), row), color) for motion, row, color in people]
     everything = np.concatenate([vertices for vertices, _ in bodies])
     middle = (everything.min(0) + everything.max(0)) / 2

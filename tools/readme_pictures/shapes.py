@@ -6,6 +6,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...scope_addon.capture.overlay.overlay_video import camera_vertices
 from ...scope_addon.motion import Motion
@@ -22,28 +23,28 @@ HIPS = (1, 2)  # SMPL's joints
 _SIDES = 12  # of a stick
 
 
-def posed(motion: Motion, body: Body, row: int) -> np.ndarray:
-    """(V, 3) the body's vertices at a row, metres, world."""
+def posed(motion: Motion, body: Body, row: int) -> NDArray[np.float64]:
+    """Return the body's vertices (V, 3) at a row, metres, world."""
     return to_world(motion, row, camera_vertices(motion, body, row))
 
 
-def joints(motion: Motion, row: int) -> np.ndarray:
-    """(K+1, 3) metres, world."""
+def joints(motion: Motion, row: int) -> NDArray[np.float64]:
+    """Return the captured joints (K+1, 3), metres, world."""
     return to_world(motion, row, motion.joints_cam[row])
 
 
-def to_world(motion: Motion, row: int, points_camera: np.ndarray) -> np.ndarray:
-    """Points of a row's camera frame in the motion's world."""
+def to_world(motion: Motion, row: int, points_camera: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Transform points (..., 3) from a row's camera frame to the motion's world."""
     T = motion.world_from_camera[row]
     return np.asarray(points_camera, float) @ T[:3, :3].T + T[:3, 3]
 
 
-def true_joints(motion: Motion, row: int, truth: Path) -> dict[str, np.ndarray]:
-    """True joints by name, with the middle of the hips aligned to the captured one; world, metres.
+def true_joints(motion: Motion, row: int, truth: Path) -> dict[str, NDArray[np.float64]]:
+    """Return the true joints by name, moved so that the middle of the hips is the captured one; world, metres.
 
     The same alignment as MPJPE-root's: nothing is rotated or scaled.
 
-    :raises ValueError: the ground truth does not have this frame.
+    :raises ValueError: when the ground truth does not have this frame.
     """
     with np.load(truth) as file:
         rows = np.flatnonzero(file["frame_index"] == motion.frames[row])
@@ -54,17 +55,17 @@ def true_joints(motion: Motion, row: int, truth: Path) -> dict[str, np.ndarray]:
     return {name: to_world(motion, row, p + shift) for name, p in found.items() if np.isfinite(p).all()}
 
 
-def stick_figure(points: dict[str, np.ndarray], radius: float) -> tuple[np.ndarray, np.ndarray]:
-    """A mesh of rods between joints: (V, 3) vertices and (F, 3) triangles, counter-clockwise from outside."""
+def stick_figure(points: dict[str, NDArray[np.float64]], radius: float) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
+    """Return a mesh of rods between joints: (V, 3) vertices and (F, 3) triangles, counter-clockwise from outside."""
     rods = [_rod(points[a], points[b], radius) for a, b in STICKS if a in points and b in points]
     vertices = np.concatenate([v for v, _ in rods])
     first = np.cumsum([0] + [len(v) for v, _ in rods[:-1]])
     return vertices, np.concatenate([t + k for (_, t), k in zip(rods, first, strict=True)])
 
 
-def _rod(a: np.ndarray, b: np.ndarray, radius: float) -> tuple[np.ndarray, np.ndarray]:
-    """A rod with round ends: rings of vertices whose radius follows a half circle at either end."""
-    length = np.linalg.norm(b - a)
+def _rod(a: NDArray[np.float64], b: NDArray[np.float64], radius: float) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
+    """Return a rod with round ends: rings of vertices whose radius follows a half circle at either end."""
+    length = float(np.linalg.norm(b - a))
     axis = (b - a) / max(length, 1e-9)
     across = np.cross(axis, np.eye(3)[np.argmin(abs(axis))])
     across /= np.linalg.norm(across)

@@ -6,6 +6,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...scope_addon.motion import Motion
 
@@ -16,24 +17,26 @@ _FAR = 14.0  # distance of the virtual camera in metres, so that there is little
 class View:
     """A pinhole camera in the motion's world (z up): K in pixels of a picture of ``size`` (width, height)."""
 
-    intrinsics: np.ndarray
-    world_from_camera: np.ndarray
+    intrinsics: NDArray[np.float64]
+    world_from_camera: NDArray[np.float64]
     size: tuple[int, int]
 
-    def to_camera(self, points_world: np.ndarray) -> np.ndarray:
-        """(..., 3) metres, OpenCV's axes."""
+    def to_camera(self, points_world: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Transform points (..., 3) to the camera frame, metres, OpenCV's axes."""
         R, t = self.world_from_camera[:3, :3], self.world_from_camera[:3, 3]
         return (points_world - t) @ R
 
-    def project(self, points_world: np.ndarray) -> np.ndarray:
-        """(..., 2) pixels; NaN behind the camera."""
+    def project(self, points_world: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Project points (..., 3) to pixels (..., 2); NaN behind the camera."""
         points = self.to_camera(np.asarray(points_world, float))
         depth = np.where(points[..., 2:] > 0.1, points[..., 2:], np.nan)
         return (points / depth @ self.intrinsics.T)[..., :2]
 
 
-def from_the_camera(motion: Motion, row: int, points_world: np.ndarray, size: tuple[int, int], fill: float) -> View:
-    """The footage's camera at a row of the motion, cropped so that the points' image takes ``fill`` of the height."""
+def from_the_camera(
+    motion: Motion, row: int, points_world: NDArray[np.float64], size: tuple[int, int], fill: float
+) -> View:
+    """Return the footage's camera at a row of the motion, cropped so that the points take ``fill`` of the height."""
     whole = View(motion.intrinsics, motion.world_from_camera[row], size)
     pixels = whole.project(points_world)
     low, high = pixels.min(0), pixels.max(0)
@@ -44,9 +47,15 @@ def from_the_camera(motion: Motion, row: int, points_world: np.ndarray, size: tu
 
 
 def from_around(
-    motion: Motion, row: int, center: np.ndarray, size: tuple[int, int], turn: float, height: float, pitch: float = 7.0
+    motion: Motion,
+    row: int,
+    center: NDArray[np.float64],
+    size: tuple[int, int],
+    turn: float,
+    height: float,
+    pitch: float = 7.0,
 ) -> View:
-    """A camera that looks at ``center`` from far away.
+    """Return a camera that looks at ``center`` from far away.
 
     :param turn: degrees around the vertical, away from the footage's camera; 90 sees the person from that camera's
         right, -90 from its left.

@@ -7,7 +7,11 @@ the floor of the world (z up). At zero yaw the person faces world −y, where th
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import Any
+
 import numpy as np
+from numpy.typing import NDArray
 
 from ...scope_addon.kinematics.axes import R_WORLD_MODEL
 from ...solver.body import Body
@@ -16,15 +20,15 @@ from .leg import solve_leg
 
 DURATION = 5.0
 START = np.array([-0.50, 0.0])
-TURN = 68.0  # yaw of the walk: to the right of the picture and a little towards the camera
+TURN = 68.0  # yaw of the walk: to the right of the image and slightly towards the camera
 FOOT_APART, TOE_OUT = 0.115, 8.0
 SQUAT = (2.2, 2.72, 2.86, 3.28)  # begins, is lowest from .. to, ends
 
-Key = tuple[float, np.ndarray]  # time, value
+Key = tuple[float, NDArray[np.float64]]  # time, value
 
 
-def choreograph(body: Body, betas: np.ndarray, fps: float) -> tuple[np.ndarray, np.ndarray]:
-    """Pose of every frame: rotations (T, K+1, 3, 3), row 0 the root in the world; and trans (T, 3)."""
+def choreograph(body: Body, betas: NDArray[np.float64], fps: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the pose of every frame: rotations (T, K+1, 3, 3), row 0 the root in the world; and trans (T, 3)."""
     times = np.arange(round(DURATION * fps)) / fps
     J = body.rest_joints(betas)
     index = {name: i for i, name in enumerate(body.joint_names)}
@@ -51,16 +55,16 @@ def choreograph(body: Body, betas: np.ndarray, fps: float) -> tuple[np.ndarray, 
     return rotations, trans
 
 
-def standing_feet(times: np.ndarray) -> np.ndarray:
-    """(T, 2) bool: whether the left and the right foot stand flat and still at these times."""
+def standing_feet(times: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Return (T, 2) bool: whether the left and the right foot are flat and at rest at these times."""
     return np.array([[not any(t0 < t < t1 for t0, t1, *_ in _STEPS[s]) for s in ("left", "right")] for t in times])
 
 
 # Legs
 
 
-def _beside(along: float, side: str, yaw: float) -> np.ndarray:
-    """A place on the floor, ``along`` metres into the walk, half the width of the stance to one side."""
+def _beside(along: float, side: str, yaw: float) -> NDArray[np.float64]:
+    """Return a place on the floor, ``along`` metres into the walk, half the width of the stance to one side."""
     walk, facing = np.radians(TURN), np.radians(yaw)
     ahead = np.array([np.sin(walk), -np.cos(walk)])
     left = np.array([np.cos(facing), np.sin(facing)])
@@ -69,7 +73,7 @@ def _beside(along: float, side: str, yaw: float) -> np.ndarray:
 
 _WALK = (3.25, 3.66, 4.08, 4.50, 4.92)  # each step begins where the last one ends
 # Per foot: begin, end, place and yaw at the end.
-_STEPS: dict[str, list[tuple[float, float, np.ndarray, float]]] = {
+_STEPS: dict[str, list[tuple[float, float, NDArray[np.float64], float]]] = {
     "left": [
         (_WALK[0], _WALK[1], _beside(0.22, "left", TURN), TURN),
         (_WALK[2], _WALK[3], _beside(1.12, "left", TURN), TURN),
@@ -81,8 +85,8 @@ _STEPS: dict[str, list[tuple[float, float, np.ndarray, float]]] = {
 }
 
 
-def _foot_at(side: str, t: float) -> tuple[np.ndarray, np.ndarray]:
-    """Ankle above its height on the floor (3,), and the foot's rotation in the world."""
+def _foot_at(side: str, t: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the ankle above its height on the floor (3,), and the foot's rotation in the world."""
     place, yaw, lift, pitch = _beside(0.0, side, 0.0), 0.0, 0.0, 0.0
     for begin, end, to, to_yaw in _STEPS[side]:
         if t >= end:
@@ -97,7 +101,7 @@ def _foot_at(side: str, t: float) -> tuple[np.ndarray, np.ndarray]:
     return np.array([*place, lift]), R_foot
 
 
-def _on_path(along: float, back: float = 0.0) -> np.ndarray:
+def _on_path(along: float, back: float = 0.0) -> NDArray[np.float64]:
     return _beside(along, "left", 90.0) - [0.0, FOOT_APART] + [0.0, back]
 
 
@@ -129,8 +133,10 @@ _LEAN = [(0.0, 0.0), (SQUAT[0], 0.0), (SQUAT[1], 32.0), (SQUAT[2], 32.0), (SQUAT
 # Above the hips
 
 
-def _arm(raised: float, ahead: float = 0.0, pitch: float = 0.0, twist: float = 0.0, elbow: float = 10.0) -> dict:
-    """Left collar, shoulder and elbow. ``raised``: −90 hangs, 0 is the T-pose; ``pitch`` > 0 swings ahead."""
+def _arm(
+    raised: float, ahead: float = 0.0, pitch: float = 0.0, twist: float = 0.0, elbow: float = 10.0
+) -> dict[str, NDArray[np.float64]]:
+    """Return rotations of left collar, shoulder and elbow; ``raised``: −90 hangs, 0 T-pose; ``pitch`` > 0: ahead."""
     collar = max(raised, 0) * 0.3
     axes = np.radians([[-pitch, 0, 0], [0, -ahead, 0], [0, 0, raised - collar], [twist, 0, 0]])
     shoulder = exp(axes[0]) @ exp(axes[1]) @ exp(axes[2]) @ exp(axes[3])
@@ -172,20 +178,20 @@ def _upper_body() -> dict[str, list[Key]]:
 
 
 def _turns(keys: list[tuple[float, float, float]]) -> list[Key]:
-    """(time, degrees forward, degrees to the left) as rotations."""
-    return [(t, exp(np.radians([0, turn, 0])) @ exp(np.radians([nod, 0, 0]))) for t, nod, turn in keys]
+    """Convert (time, degrees forward, degrees to the left) to rotations."""
+    return [(t, np.matmul(exp(np.radians([0, turn, 0])), exp(np.radians([nod, 0, 0])))) for t, nod, turn in keys]
 
 
 # Between keys
 
 
 def _ease(s: float) -> float:
-    """From 0 to 1 without velocity or acceleration at either end."""
+    """Ease from 0 to 1 without velocity or acceleration at either end."""
     return s * s * s * (10 + s * (6 * s - 15))
 
 
-def _span(keys: list, t: float) -> tuple[int, float]:
-    """Which two keys ``t`` lies between, and how far along, 0..1."""
+def _span(keys: Sequence[tuple[float, Any]], t: float) -> tuple[int, float]:
+    """Return the indices of the two keys around ``t``, and the fraction 0..1 between them."""
     times = [key[0] for key in keys]
     i = int(np.clip(np.searchsorted(times, t, side="right") - 1, 0, len(keys) - 2))
     return i, float(np.clip((t - times[i]) / (times[i + 1] - times[i]), 0, 1))
@@ -196,14 +202,14 @@ def _eased(keys: list[tuple[float, float]], t: float) -> float:
     return keys[i][1] + _ease(s) * (keys[i + 1][1] - keys[i][1])
 
 
-def _rotation_at(keys: list[Key], t: float) -> np.ndarray:
-    """Turns from key to key about one axis."""
+def _rotation_at(keys: list[Key], t: float) -> NDArray[np.float64]:
+    """Interpolate rotations from key to key about one axis."""
     i, s = _span(keys, t)
     return keys[i][1] @ exp(_ease(s) * log(keys[i][1].T @ keys[i + 1][1]))
 
 
-def _curve(keys: list[Key], t: float) -> np.ndarray:
-    """Monotone cubic through the keys."""
+def _curve(keys: list[Key], t: float) -> NDArray[np.float64]:
+    """Evaluate the monotone cubic through the keys."""
     i, s = _span(keys, t)
     (t0, p0), (t1, p1) = keys[i], keys[i + 1]
     d = t1 - t0
@@ -212,8 +218,8 @@ def _curve(keys: list[Key], t: float) -> np.ndarray:
     return from_start + s * s * (3 - 2 * s) * p1 + s * s * (s - 1) * d * v1
 
 
-def _velocity(keys: list[Key], i: int) -> np.ndarray:
-    """Harmonic mean of the slopes on both sides; zero at the ends and at turning points. Never overshoots."""
+def _velocity(keys: list[Key], i: int) -> NDArray[np.float64]:
+    """Return the harmonic mean of the slopes on both sides; zero at ends and turning points. Never overshoots."""
     if i in (0, len(keys) - 1):
         return np.zeros_like(keys[i][1])
     before, after = ((keys[j + 1][1] - keys[j][1]) / (keys[j + 1][0] - keys[j][0]) for j in (i - 1, i))

@@ -1,21 +1,23 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A shot as pictures: the empty room rendered once, the person into it frame by frame. Needs bpy."""
+"""Render a shot: the empty room once, and the person in it frame by frame. Needs bpy."""
 
 from __future__ import annotations
 
 import sys
 from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from ...solver.body import Body
 from .stage import LAMPS, build_stage, encode, pose_person, render_part, render_room
 from .truth import Shot
 
 KBIT_PER_S = 2000  # 5 s: 1.2 MB
-_MARGIN, _FEATHER = 24, 16  # pixels around the person that are rendered, and over which they pass into the room
+_MARGIN, _FEATHER = 24, 16  # pixels around the person that are rendered, and over which they are blended with the room
 
 
 def render_clip(body: Body, shot: Shot, path: Path, scratch: Path) -> None:
@@ -43,8 +45,8 @@ def render_pictures(body: Body, shot: Shot, frames: Iterable[int], folder: Path)
     return pictures
 
 
-def _affected(shot: Shot, vertices_world: np.ndarray, lamps: np.ndarray) -> tuple[int, int, int, int]:
-    """Left, top, right, bottom in pixels of what the person and the person's shadows on the floor can change."""
+def _affected(shot: Shot, vertices_world: NDArray[np.float64], lamps: NDArray[np.float64]) -> tuple[int, int, int, int]:
+    """Return left, top, right and bottom, in pixels, of the area that person and shadows can change."""
     points = [vertices_world]
     for lamp in lamps:
         share = lamp[2] / (lamp[2] - vertices_world[:, 2:])
@@ -55,7 +57,7 @@ def _affected(shot: Shot, vertices_world: np.ndarray, lamps: np.ndarray) -> tupl
     return int(low[0]), int(low[1]), int(high[0]), int(high[1])
 
 
-def _into_room(room: np.ndarray, path: Path, box: tuple[int, int, int, int]) -> None:
+def _into_room(room: NDArray[Any], path: Path, box: tuple[int, int, int, int]) -> None:
     """Complete a partly rendered picture with the empty room, without a visible seam."""
     left, top, right, bottom = box
     weight = np.zeros(room.shape[:2], np.float32)

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...solver.rotations import exp
 
@@ -11,17 +12,21 @@ X = np.array([1.0, 0.0, 0.0])
 
 
 def solve_leg(
-    R_world_root: np.ndarray, hip: np.ndarray, ankle: np.ndarray, thigh: np.ndarray, shank: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Hip and knee rotations that bring the ankle to its target.
+    R_world_root: NDArray[np.float64],
+    hip: NDArray[np.float64],
+    ankle: NDArray[np.float64],
+    thigh: NDArray[np.float64],
+    shank: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the hip and knee rotations that bring the ankle to its target.
 
     The knee is a hinge about the model's x axis, bent by θ ≥ 0 so that |thigh + Rx(θ) shank| is the distance from hip
-    to ankle. The hip then turns that vector onto the target, with the hinge as near to the root's x axis as it can be.
+    to ankle. The hip then turns that vector onto the target, with the hinge as near to the root's x axis as possible.
 
     :param R_world_root: (3, 3); hip, ankle: (3,) world, metres.
     :param thigh, shank: (3,) bone vectors at rest, model frame.
     :return: Ω_hip, Ω_knee (3, 3), relative to the parent.
-    :raises ValueError: the ankle is farther away than the leg is long.
+    :raises ValueError: when the ankle is farther away than the leg is long.
     """
     target = R_world_root.T @ (ankle - hip)
     # With y and z across the hinge: |thigh + Rx(θ) shank|² = a + b cos θ + c sin θ.
@@ -37,8 +42,8 @@ def solve_leg(
     return R_hip, R_knee
 
 
-def _frame(direction: np.ndarray) -> np.ndarray:
-    """Rotation whose first column is the direction and whose second is as near to x as that allows."""
+def _frame(direction: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the rotation whose first column is the direction and whose second is as near to x as possible."""
     first = direction / np.linalg.norm(direction)
     second = X - first * first[0]
     second /= np.linalg.norm(second)

@@ -7,20 +7,22 @@ from pathlib import Path
 
 import bpy
 import numpy as np
+from numpy.typing import NDArray
 
 from ...scope_addon.scene.axes import blender_camera_matrix
 from ...solver.body import Body
 
-LAMPS = {  # name: place (metres, world), power in watts, side in metres
+LAMPS = {  # name: position (metres, world), power in watts, side in metres
     "skylight": ((-0.7, -1.9, 5.0), 230.0, 1.6),
 }
 _SAMPLES_ROOM, _SAMPLES_PERSON = 32, 8
+Triple = tuple[float, float, float]  # metres, or linear RGB
 
 
 def build_stage(
-    body: Body, intrinsics: np.ndarray, size: tuple[int, int], world_from_camera: np.ndarray
+    body: Body, intrinsics: NDArray[np.float64], size: tuple[int, int], world_from_camera: NDArray[np.float64]
 ) -> bpy.types.Object:
-    """A fresh scene, ready to render; returns the person's mesh object, whose vertices lie in the world frame."""
+    """Build the scene, ready to render; return the person's mesh object, whose vertices are in the world frame."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     scene = bpy.context.scene
     _render_settings(scene, size)
@@ -30,7 +32,7 @@ def build_stage(
     return _person(body)
 
 
-def pose_person(person: bpy.types.Object, vertices_world: np.ndarray) -> None:
+def pose_person(person: bpy.types.Object, vertices_world: NDArray[np.float64]) -> None:
     """Give the mesh its vertices for the next frame."""
     person.data.vertices.foreach_set("co", np.ascontiguousarray(vertices_world, np.float32).ravel())
     person.data.update()
@@ -103,8 +105,10 @@ def _render_settings(scene: bpy.types.Scene, size: tuple[int, int]) -> None:
     cycles.seed = 1
 
 
-def _camera(scene: bpy.types.Scene, K: np.ndarray, size: tuple[int, int], world_from_camera: np.ndarray) -> None:
-    """A camera of the given pinhole intrinsics: pixel (u, v) is the centre of a pixel, as OpenCV counts."""
+def _camera(
+    scene: bpy.types.Scene, K: NDArray[np.float64], size: tuple[int, int], world_from_camera: NDArray[np.float64]
+) -> None:
+    """Add a camera of the given pinhole intrinsics; pixel (u, v) is the centre of a pixel, as in OpenCV."""
     data = bpy.data.cameras.new("camera")
     camera = bpy.data.objects.new("camera", data)
     scene.collection.objects.link(camera)
@@ -155,7 +159,7 @@ def _room() -> None:
     _box("mat", (0.05, -0.1, 0.004), (2.4, 1.5, 0.008), _material("mat", (0.22, 0.26, 0.30), (0.19, 0.22, 0.26)))
 
 
-def _box(name: str, center: tuple, size: tuple, material: bpy.types.Material) -> None:
+def _box(name: str, center: Triple, size: Triple, material: bpy.types.Material) -> None:
     corners = [(x, y, z) for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)]
     faces = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
     mesh = bpy.data.meshes.new(name)
@@ -165,9 +169,12 @@ def _box(name: str, center: tuple, size: tuple, material: bpy.types.Material) ->
 
 
 def _material(
-    name: str, color: tuple, second: tuple | None = None, stretch: tuple = (2.0, 2.0, 2.0)
+    name: str,
+    color: Triple,
+    second: Triple | None = None,
+    stretch: Triple = (2.0, 2.0, 2.0),
 ) -> bpy.types.Material:
-    """A matt surface of one linear colour, or mottled between two."""
+    """Return a matt material of one linear colour, or mottled between two."""
     material = bpy.data.materials.new(name)
     material.use_nodes = True
     nodes, links = material.node_tree.nodes, material.node_tree.links

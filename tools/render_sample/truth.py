@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is known exactly about a rendered clip: camera, shape, pose and joints of every frame; and the sample clip's."""
+"""Ground truth of a rendered clip: camera, shape, pose and joints of every frame; and the sample clip's."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...scope_addon.kinematics.axes import transform_points, world_from_level_camera
 from ...solver.body import Body
@@ -17,13 +18,13 @@ FPS = 30
 SIZE = (640, 480)
 INTRINSICS = np.array([[940.0, 0.0, 319.5], [0.0, 940.0, 239.5], [0.0, 0.0, 1.0]])
 BETAS = np.zeros(10)
-_TILT = np.radians(6.3)  # the camera looks down a little
+_TILT = np.radians(6.3)  # the camera looks slightly down
 _HEIGHT, _DISTANCE = 1.45, 4.9
 
 WORLD_FROM_CAMERA = world_from_level_camera(np.array([0.0, -np.cos(_TILT), -np.sin(_TILT)]), _HEIGHT)
 WORLD_FROM_CAMERA[1, 3] = -_DISTANCE
 
-# The twelve limb joints by the names that keypoint data sets use, and ours; and points of the feet's skin.
+# The twelve limb joints by their names in keypoint data sets and in the body; and points of the feet's skin.
 LIMBS = {"Shoulder": "shoulder", "Elbow": "elbow", "Wrist": "wrist", "Hip": "hip", "Knee": "knee", "Ankle": "ankle"}
 FEET = {"Heel": "heel", "BigToe": "foot_index"}
 _SIDES = ("left", "right")
@@ -31,47 +32,46 @@ _SIDES = ("left", "right")
 
 @dataclass(frozen=True)
 class Shot:
-    """A body that moves before a camera that stands."""
+    """A moving body in front of a static camera."""
 
-    rotations: np.ndarray  # (T, K+1, 3, 3) joint states, row 0 the root in the world
-    trans: np.ndarray  # (T, 3) metres, world
-    betas: np.ndarray  # (P,)
-    intrinsics: np.ndarray  # (3, 3) pixels
-    world_from_camera: np.ndarray  # (4, 4)
+    rotations: NDArray[np.float64]  # (T, K+1, 3, 3) joint states, row 0 the root in the world
+    trans: NDArray[np.float64]  # (T, 3) metres, world
+    betas: NDArray[np.float64]  # (P,)
+    intrinsics: NDArray[np.float64]  # (3, 3) pixels
+    world_from_camera: NDArray[np.float64]  # (4, 4)
     size: tuple[int, int]  # width, height
     fps: float
-    standing: np.ndarray  # (T, 2) bool: left, right foot on the floor and still
+    standing: NDArray[np.bool_]  # (T, 2) bool: left, right foot on the floor and at rest
 
     def __len__(self) -> int:
         return len(self.trans)
 
-    def to_camera(self, points_world: np.ndarray) -> np.ndarray:
-        """(..., N, 3) points in the camera's frame."""
+    def to_camera(self, points_world: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Transform points (..., N, 3) to the camera frame, metres."""
         return transform_points(np.linalg.inv(self.world_from_camera), points_world)
 
-    def project(self, points_camera: np.ndarray) -> np.ndarray:
-        """(..., N, 2) pixels, without distortion."""
+    def project(self, points_camera: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Project points (..., N, 3) to pixels (..., N, 2), without distortion."""
         homogeneous = points_camera @ self.intrinsics.T
         return homogeneous[..., :2] / homogeneous[..., 2:]
 
-    def vertices_world(self, body: Body, frame: int) -> np.ndarray:
-        """(V, 3) the skin in one frame."""
+    def vertices_world(self, body: Body, frame: int) -> NDArray[np.float64]:
+        """Return the skin's vertices (V, 3) in one frame, world, metres."""
         return body.skin(*body.forward_kinematics(self.rotations[frame], self.trans[frame], self.betas), self.betas)
 
 
-def sample_shot(rotations: np.ndarray, trans: np.ndarray) -> Shot:
-    """The sample clip with this motion."""
+def sample_shot(rotations: NDArray[np.float64], trans: NDArray[np.float64]) -> Shot:
+    """Return the shot of the sample clip with this motion."""
     standing = standing_feet(np.arange(len(trans)) / FPS)
     return Shot(rotations, trans, BETAS, INTRINSICS, WORLD_FROM_CAMERA, SIZE, FPS, standing)
 
 
 def write_truth(path: Path, body: Body, shot: Shot) -> None:
-    """Write the truth as plain arrays.
+    """Write the ground truth as plain arrays.
 
     Keys of the motion file: poses (T, 3(K+1)), trans, betas, joints_cam (T, K+1, 3), intrinsics, dist,
-    world_from_camera. Beside them frame_index (T,), fps, size, joint_names, standing (T, 2: left, right foot flat on
-    the floor); and joints (T, 16, 3), names (16,), uv (T, 16, 2): limbs, heels and toes as data sets with keypoints
-    have them.
+    world_from_camera. In addition frame_index (T,), fps, size, joint_names, standing (T, 2: left, right foot flat on
+    the floor); and joints (T, 16, 3), names (16,), uv (T, 16, 2): limbs, heels and toes as in keypoint data sets.
     """
     R_world, t_world = body.forward_kinematics(shot.rotations, shot.trans, shot.betas)
     joints_cam = shot.to_camera(t_world)

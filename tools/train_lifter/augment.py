@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Many motions and proportions from few recordings.
+"""Augment few recordings to many motions and proportions.
 
 A pose is a state of each joint, Ω (24, 3, 3), and a root rotation into a world with y up; a motion is a window of poses
-at the lifter's moments. Torso, arms and legs come from different recordings now and then, joints are turned at random
-by what stays the same through the window, the body leans, some motions run slower, faster or backwards, and half of
-everything is mirrored.
+at the lifter's moments. Torso, arms and legs sometimes come from different recordings, joints are rotated at random
+by a constant of the window, the body leans, some motions run slower, faster or backwards, and half of all samples are
+mirrored.
 """
 
 from __future__ import annotations
@@ -12,23 +12,25 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from ...scope_addon.capture.perception.lifter_window import OFFSETS_S, WINDOW, ends_of_runs
 from ...solver.body import Body
 from ...solver.rotations import exp
 
 _MIRROR = np.diag([-1.0, 1.0, 1.0])
-# Share of samples in which a part comes from a frame of its own.
+# Share of samples in which a part comes from another frame.
 SWAP_UPPER, SWAP_ARM, SWAP_LEG = 0.5, 0.4, 0.2
 # Radians about a random axis, times a factor per sample of |N(0, 1)|.
 JOINT_NOISE = {"shoulder": 0.45, "collar": 0.1, "elbow": 0.25, "wrist": 0.3, "hand": 0.2, "hip": 0.2, "knee": 0.2}
 JOINT_NOISE |= {"ankle": 0.2, "foot": 0.1, "spine": 0.08, "neck": 0.15, "head": 0.2}
 LEAN, STRONG_LEAN, STRONG_LEAN_SHARE = np.radians(7.0), np.radians(45.0), 0.1
-AS_RECORDED = 0.25  # share of samples whose joints are not turned
-SPEED_SPREAD = 0.2  # of the logarithm of how fast a motion is played
+AS_RECORDED = 0.25  # share of samples whose joints are not rotated
+SPEED_SPREAD = 0.2  # of the logarithm of a motion's speed
 SHAPE_SPREAD, SHAPE_LIMIT = 1.0, 2.5
 BONE_SPREAD = 0.04  # of the logarithm of each bone's length, left and right alike
 CLUSTERS = 256
@@ -38,25 +40,25 @@ CLUSTERS = 256
 class Motions:
     """Frames of all takes: ``Omega`` (F, 24, 3, 3) f32, row 0 the root into the world; (F,) ``take``, and ``fps``."""
 
-    Omega: np.ndarray
-    take: np.ndarray
-    fps: np.ndarray
+    Omega: NDArray[np.float32]
+    take: NDArray[np.intp]
+    fps: NDArray[np.float64]
 
     def __len__(self) -> int:
         return len(self.Omega)
 
-    def select(self, frames: np.ndarray) -> Motions:
-        """Only these frames (mask or indices)."""
+    def select(self, frames: NDArray[Any]) -> Motions:
+        """Return only these frames (mask or indices)."""
         return Motions(self.Omega[frames], self.take[frames], self.fps[frames])
 
     @cached_property
-    def ends(self) -> tuple[np.ndarray, np.ndarray]:
-        """(F,) the first and (F,) the last frame of each frame's take."""
+    def ends(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        """Return (F,) the first and (F,) the last frame of each frame's take."""
         return ends_of_runs(self.take)
 
     @cached_property
-    def share(self) -> np.ndarray:
-        """(F,) probability with which a frame is drawn: common poses, such as walking, do not crowd out rare ones.
+    def share(self) -> NDArray[np.float64]:
+        """Return (F,) the probability of drawing a frame, so that common poses, such as walking, do not dominate.
 
         Proportional to 1/√(frames in the same cluster of joint states), clusters by k-means on Ω.
         """
@@ -73,7 +75,7 @@ class Motions:
 
 
 def load_motions(path: Path) -> Motions:
-    """The sound frames of a file written by ``tools.mocap.fit_body``."""
+    """Read the valid frames of a file written by ``tools.mocap.fit_body``."""
     with np.load(path) as data:
         poses, valid, start, fps = data["poses"], data["valid"], data["take_start"], data["take_fps"]
     take = np.repeat(np.arange(len(start) - 1), np.diff(start))
@@ -94,21 +96,21 @@ class PoseSampler:
         self._parts = [self._below(root) for root in roots]
         self._noise = np.array([next((v for k, v in JOINT_NOISE.items() if k in n), 0.0) for n in names])
 
-    def _below(self, joint: str) -> np.ndarray:
-        """The joint and all that hang on it."""
+    def _below(self, joint: str) -> NDArray[np.intp]:
+        """Return the indices of the joint and of all its descendants."""
         inside = {self.body.joint_names.index(joint)}
         for i, parent in enumerate(self.body.parents):
             if int(parent) in inside:
                 inside.add(i)
         return np.array(sorted(inside))
 
-    def mirror(self, Omega: np.ndarray) -> np.ndarray:
-        """The mirror image of poses (..., 24, 3, 3) about the body's (and the world's) x = 0."""
+    def mirror(self, Omega: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Return the mirror image of poses (..., 24, 3, 3) about the body's (and the world's) x = 0."""
         signs = np.outer(np.diag(_MIRROR), np.diag(_MIRROR)).astype(Omega.dtype)
         return (Omega * signs)[..., self.partner, :, :]
 
-    def _windows(self, rng: np.random.Generator, n: int) -> np.ndarray:
-        """(n, WINDOW, 24, 3, 3) of one recording each."""
+    def _windows(self, rng: np.random.Generator, n: int) -> NDArray[np.float32]:
+        """Draw windows (n, WINDOW, 24, 3, 3) of one recording each."""
         drawn = np.searchsorted(self._cumulative, rng.random(n) * self._cumulative[-1])
         middle = np.minimum(drawn, len(self.motions) - 1)
         speed = np.exp(SPEED_SPREAD * rng.standard_normal(n)) * np.where(rng.random(n) < 0.5, 1, -1)
@@ -119,8 +121,8 @@ class PoseSampler:
         Omega[flip] = self.mirror(Omega[flip])
         return Omega
 
-    def motion_windows(self, rng: np.random.Generator, n: int) -> np.ndarray:
-        """(n, WINDOW, 24, 3, 3) f32; row 0 of a pose turns the root into a world with y up, heading at random."""
+    def motion_windows(self, rng: np.random.Generator, n: int) -> NDArray[np.float32]:
+        """Draw windows (n, WINDOW, 24, 3, 3) f32; row 0 of a pose is R_world_root, y up, with a random heading."""
         Omega = self._windows(rng, n)
         for joints, share in zip(self._parts, (SWAP_UPPER, SWAP_ARM, SWAP_ARM, SWAP_LEG, SWAP_LEG), strict=True):
             rows = np.flatnonzero(rng.random(n) < share)
@@ -140,12 +142,12 @@ class PoseSampler:
         Omega[:, :, 0] = turned[:, None] @ Omega[:, :, 0]
         return Omega
 
-    def pose(self, rng: np.random.Generator) -> np.ndarray:
-        """(24, 3, 3) of one moment."""
+    def pose(self, rng: np.random.Generator) -> NDArray[np.float32]:
+        """Draw the pose (24, 3, 3) of one moment."""
         return self.motion_windows(rng, 1)[0, WINDOW // 2]
 
-    def proportions(self, rng: np.random.Generator, n: int) -> tuple[np.ndarray, np.ndarray]:
-        """Random bodies: joints from their parents (n, 24, 3), BlazePose keypoints from their joints (n, 33, 3)."""
+    def proportions(self, rng: np.random.Generator, n: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Draw bodies: joints relative to parents (n, 24, 3), BlazePose keypoints relative to joints (n, 33, 3)."""
         body, at = self.body, np.array(list(self.body.keypoint_set("blazepose").values()))
         betas = np.clip(rng.standard_normal((n, body.P)) * SHAPE_SPREAD, -SHAPE_LIMIT, SHAPE_LIMIT)
         factor = np.exp(rng.standard_normal((n, body.K + 1)) * BONE_SPREAD)
@@ -156,8 +158,8 @@ class PoseSampler:
 
 
 @njit(fastmath=True)
-def _turn_joints(Omega: np.ndarray, turn: np.ndarray) -> None:
-    """Omega[a, w, k] @ turn[a, k], in place."""
+def _turn_joints(Omega: NDArray[np.float32], turn: NDArray[np.float32]) -> None:
+    """Multiply Omega[a, w, k] by turn[a, k] from the right, in place."""
     for a in range(Omega.shape[0]):
         for w in range(Omega.shape[1]):
             for k in range(Omega.shape[2]):
@@ -167,8 +169,8 @@ def _turn_joints(Omega: np.ndarray, turn: np.ndarray) -> None:
                         Omega[a, w, k, i, j] = x * turn[a, k, 0, j] + y * turn[a, k, 1, j] + z * turn[a, k, 2, j]
 
 
-def small_rotations(phi: np.ndarray) -> np.ndarray:
-    """exp of rotation vectors (..., 3) in their own precision: I + sin θ/θ [φ] + (1 − cos θ)/θ² [φ]²."""
+def small_rotations(phi: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Return exp of rotation vectors (..., 3) in their own precision: I + sin θ/θ [φ] + (1 − cos θ)/θ² [φ]²."""
     x, y, z = np.moveaxis(phi, -1, 0)
     theta = np.sqrt(x * x + y * y + z * z) + 1e-8
     a, b = np.sin(theta) / theta, (1 - np.cos(theta)) / (theta * theta)

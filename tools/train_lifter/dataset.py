@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Training batches: our body moving in front of a random camera, as the detector would report it.
+"""Training batches: the body moving in front of a random camera, as the detector would report it.
 
-A batch is a function of its seed alone, so that any number of processes can make them in any order.
+A batch depends only on its seed, so that any number of processes can make batches in any order.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from ...scope_addon.capture.perception.lifter import HIPS, KEYPOINT_COUNT, network_input, person_size, virtual_camera
 from ...scope_addon.capture.perception.lifter_window import MIDDLE, OFFSETS_S, WINDOW
@@ -21,32 +22,38 @@ from .detector_noise import Persistence
 NEAREST_M, FARTHEST_M = 1.8, 12.0
 PITCH_LEVEL, PITCH_SPREAD = np.radians(8.0), np.radians(9.0)
 PITCH_LOWEST, PITCH_HIGHEST = np.radians(-15.0), np.radians(45.0)
-# Most cameras are held or stand: how steeply they look at a person follows from height and distance.
+# Most cameras are hand-held or on a stand: their pitch towards a person follows from height and distance.
 HELD_SHARE, HELD_HEIGHT_M, HELD_SPREAD_M, LOWEST_M = 0.7, 1.3, 0.4, 0.1
 ROLL_SPREAD = np.radians(3.0)
-FIELD = (0.5, 0.4)  # |x/z| and |y/z| of the person's place in the picture
+FIELD = (0.5, 0.4)  # |x/z| and |y/z| of the person's position in the image
 DRIFT_PER_S = (0.1, 0.03, 0.08)  # one standard deviation, of x/z, y/z and the logarithm of the distance
-# Windows that a clip's start, or its end, cuts short, and windows of pictures.
+# Windows truncated at a clip's start or end, and windows of still images.
 CUT_SHORT_SHARE, STILL_SHARE = 0.06, 0.06
 
 
 @dataclass(frozen=True)
 class Batch:
-    """n samples: ``input`` (n, WINDOW, 200) and, of the middle, ``points`` (n, 33, 3): metres, hips' middle at 0,
-    virtual camera's axes."""
+    """Samples for training, n of them.
 
-    input: np.ndarray
-    points: np.ndarray
+    ``input`` (n, WINDOW, 200); ``points`` (n, 33, 3) of the middle moment: metres, mid-hip at 0, the virtual camera's
+    axes.
+    """
+
+    input: NDArray[np.float32]
+    points: NDArray[np.float32]
 
 
 @dataclass(frozen=True)
 class Scene:
-    """n people before a camera: ``points`` (n, WINDOW, 33, 3) true keypoints and ``seen`` (n, WINDOW, 33, 3) where the
-    detector looks for them, metres, camera axes; ``focal_ratio`` (n,) assumed focal length over the true one."""
+    """People in front of a camera, n of them.
 
-    points: np.ndarray
-    seen: np.ndarray
-    focal_ratio: np.ndarray
+    ``points`` (n, WINDOW, 33, 3) true keypoints and ``seen`` (n, WINDOW, 33, 3) the detector's keypoints, metres,
+    camera axes; ``focal_ratio`` (n,) assumed over true focal length.
+    """
+
+    points: NDArray[np.float32]
+    seen: NDArray[np.float32]
+    focal_ratio: NDArray[np.float32]
 
 
 class Dataset:
@@ -58,9 +65,13 @@ class Dataset:
         self._parents = np.asarray(body.parents, np.int64)
 
     def keypoints(
-        self, Omega: np.ndarray, bones: np.ndarray, local: np.ndarray, displaced: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """BlazePose keypoints of windows of poses, and the same displaced in the axes of their parts.
+        self,
+        Omega: NDArray[np.float32],
+        bones: NDArray[np.float32],
+        local: NDArray[np.float32],
+        displaced: NDArray[np.float32],
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Return BlazePose keypoints of windows of poses, and the same displaced in the axes of their parts.
 
         :param Omega: (n, W, 24, 3, 3);  bones: (n, 24, 3), local: (n, 33, 3) as of `PoseSampler.proportions`;
             displaced: (n, 33, 3) metres.  All f32.
@@ -73,7 +84,7 @@ class Dataset:
         return points, seen
 
     def scene(self, rng: np.random.Generator, n: int) -> Scene:
-        """n people of random motion, shape and place."""
+        """Draw n people of random motion, shape and position."""
         Omega = self.sampler.motion_windows(rng, n)
         bones, local = self.sampler.proportions(rng, n)
         displaced = detector_noise.placements(rng, n)
@@ -92,7 +103,7 @@ class Dataset:
         return Scene((points - middle) @ into + place, (seen - middle) @ into + place, focal_ratio)
 
     def batch(self, seed: tuple[int, ...], n: int) -> Batch:
-        """n samples that depend on the seed alone."""
+        """Draw n samples that depend on the seed only."""
         rng = np.random.default_rng(seed)
         scene = self.scene(rng, n)
         persistence = Persistence.draw(rng, n)
@@ -101,7 +112,7 @@ class Dataset:
         size = person_size(rays.reshape(*flat, 2)).reshape(n, WINDOW, 1, 1)
         errors, confidence = detector_noise.image_errors(rng, persistence)
         relative = scene.seen - scene.seen[:, :, HIPS].mean(axis=2, keepdims=True)
-        # Landmark networks look at a crop, as if the camera looked straight at the person.
+        # Landmark networks see a crop, as of a camera that points at the person.
         straight = np.swapaxes(virtual_camera(rays.reshape(*flat, 2)), 1, 2).reshape(n, WINDOW, 3, 3)
         relative = (relative @ straight.astype(np.float32)).astype(np.float32)
         world = detector_noise.world_landmarks(rng, relative, persistence)
@@ -120,8 +131,8 @@ class Dataset:
         return Batch(x.astype(np.float32), points.astype(np.float32))
 
 
-def cut_short(rng: np.random.Generator, x: np.ndarray) -> np.ndarray:
-    """Windows (n, WINDOW, ...) of which a clip's ends cut some short, so that moments repeat; some are of pictures."""
+def cut_short(rng: np.random.Generator, x: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Truncate some windows (n, WINDOW, ...), so that moments repeat as at a clip's ends or in a still image."""
     n = len(x)
     first = np.where(rng.random(n) < CUT_SHORT_SHARE, rng.integers(0, MIDDLE + 1, n), 0)
     last = np.where(rng.random(n) < CUT_SHORT_SHARE, rng.integers(MIDDLE, WINDOW, n), WINDOW - 1)
@@ -132,18 +143,18 @@ def cut_short(rng: np.random.Generator, x: np.ndarray) -> np.ndarray:
 
 @njit(fastmath=True)
 def _forward(
-    Omega: np.ndarray,
-    bones: np.ndarray,
-    local: np.ndarray,
-    displaced: np.ndarray,
-    parents: np.ndarray,
-    part: np.ndarray,
-    R: np.ndarray,
-    t: np.ndarray,
-    points: np.ndarray,
-    seen: np.ndarray,
+    Omega: NDArray[np.float32],
+    bones: NDArray[np.float32],
+    local: NDArray[np.float32],
+    displaced: NDArray[np.float32],
+    parents: NDArray[np.int64],
+    part: NDArray[np.int64],
+    R: NDArray[np.float32],
+    t: NDArray[np.float32],
+    points: NDArray[np.float32],
+    seen: NDArray[np.float32],
 ) -> None:
-    """Forward kinematics of `Dataset.keypoints`; ``R`` (24, 3, 3) and ``t`` (24, 3) are room to work in."""
+    """Compute `Dataset.keypoints`; ``R`` (24, 3, 3) and ``t`` (24, 3) are work arrays."""
     for a in range(Omega.shape[0]):
         for w in range(Omega.shape[1]):
             R[0], t[0] = Omega[a, w, 0], 0.0
@@ -167,10 +178,12 @@ def _forward(
                     seen[a, w, j, i] += points[a, w, j, i]
 
 
-def lines_of_sight(rng: np.random.Generator, above_floor: np.ndarray, distance: np.ndarray) -> np.ndarray:
-    """(n,) radians by which the line from the camera to the hips points down.
+def lines_of_sight(
+    rng: np.random.Generator, above_floor: NDArray[np.float32], distance: NDArray[np.float32]
+) -> NDArray[np.float32]:
+    """Draw the angles (n,) in radians by which the line from the camera to the hips points down.
 
-    sin⁻¹((camera's height − hips' height) / distance) for cameras that are held, any angle for the others.
+    sin⁻¹((camera's height − hips' height) / distance) for hand-held cameras, any angle for the others.
     """
     n = len(distance)
     height = np.maximum(HELD_HEIGHT_M + HELD_SPREAD_M * rng.standard_normal(n), LOWEST_M)
@@ -178,15 +191,15 @@ def lines_of_sight(rng: np.random.Generator, above_floor: np.ndarray, distance: 
     return np.where(rng.random(n) < HELD_SHARE, held, rng.uniform(PITCH_LOWEST, PITCH_HIGHEST, n))
 
 
-def pitches(rng: np.random.Generator, n: int) -> np.ndarray:
-    """(n,) radians of cameras that look straight at the person: many nearly level, the others of any pitch."""
+def pitches(rng: np.random.Generator, n: int) -> NDArray[np.float32]:
+    """Draw the pitches (n,), radians, of cameras that point at the person: many nearly level, others of any pitch."""
     common = rng.random(n) < 0.6
     level = PITCH_LEVEL + PITCH_SPREAD * rng.standard_normal(n)
     return np.where(common, level, rng.uniform(PITCH_LOWEST, PITCH_HIGHEST, n))
 
 
-def cameras(rng: np.random.Generator, n: int, pitch: np.ndarray) -> np.ndarray:
-    """(n, 3, 3) f32 R_camera_world: looking along −z of a world with y up, pitched (positive: down) and rolled."""
+def cameras(rng: np.random.Generator, n: int, pitch: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Draw R_camera_world (n, 3, 3) f32: looking along −z of a world with y up, pitched (positive: down) and rolled."""
     zero = np.zeros(n)
     tilted = small_rotations(np.stack([pitch, zero, zero], axis=1).astype(np.float32))
     rolled = small_rotations(np.stack([zero, zero, ROLL_SPREAD * rng.standard_normal(n)], axis=1).astype(np.float32))

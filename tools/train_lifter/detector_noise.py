@@ -1,39 +1,41 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a detector makes of true keypoints: displaced and uncertain 2D keypoints, distorted world landmarks.
+"""Simulated detector errors: displaced and uncertain 2D keypoints, distorted world landmarks.
 
-The detector's keypoints are not our body's: each lies at a constant offset in its body part, the one of
-`keypoint_offsets` and another of each person's own (people differ in build and clothes). To this come errors of the
-image and, in the world landmarks, a whole that is tilted, scaled and flattened, limbs that point elsewhere in depth,
-and now and then a limb mirrored in depth.
+The detector's keypoints differ from the body's: each has a constant offset in its body part, that of
+`keypoint_offsets` and one specific to the person (people differ in build and clothes). Image errors are added and, in
+the world landmarks, a tilt, scale and flattening of the whole, errors in the depth of limbs, and sometimes a limb
+mirrored in depth.
 
-Errors last. Those of the depth of bones, as `pose_landmark_heavy` sees them on footage and renders with known truth, go
-with themselves 0.1, 0.2, 0.4 and 0.8 seconds later by 0.8, 0.65, 0.5 and 0.5: half of an error is the same through the
-window, most of the rest changes within a few tenths of a second, see `Persistence`.
+Errors are correlated in time. The autocorrelation of errors in the depth of bones, of `pose_landmark_heavy` on footage
+and renders with ground truth, is 0.8, 0.65, 0.5 and 0.5 after 0.1, 0.2, 0.4 and 0.8 seconds: half of the variance is
+constant within the window, most of the rest changes within a few tenths of a second, see `Persistence`.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...scope_addon.capture.fitting.keypoint_offsets import offset
 from ...scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES
 from ...scope_addon.capture.perception.lifter_window import WINDOW
 from .augment import small_rotations
 
-# Metres, one standard deviation per coordinate, of where the detector sees a keypoint of one person's body part.
+# Metres, one standard deviation per coordinate, of a person's keypoint offsets.
 PLACEMENT = np.full(33, 0.012)
 PLACEMENT[[11, 12]], PLACEMENT[[23, 24]], PLACEMENT[25:33] = 0.02, 0.025, 0.015
 IMAGE_NOISE = 0.03  # of the person's size s (see lifter.py), times a factor per sample of exp(N(0, 0.5))
 CONFIDENT_SHARE = 0.8
 UNSURE_FACTOR = 3.5  # on the image noise of a keypoint with no confidence
-SWAP_SHARE = 0.01  # samples in which the arms, or the legs, have left and right exchanged
-CUT_SHARE = 0.12  # samples in which part of the body lies outside the picture
+SWAP_SHARE = 0.01  # samples in which the arms, or the legs, have left and right swapped
+CUT_SHARE = 0.12  # samples in which part of the body is outside the image
 SWAP_LASTS = 0.7  # of the window's moments
-CONFIDENCE_LASTS = 0.7  # of the keypoints keep theirs through the window
-FOCAL_SPREAD = 0.1  # of the logarithm of the focal length assumed over the true one
-# World landmarks. Depth is mostly too shallow: on renders the slope of arms is right by 0.3, of trunk and legs by 0.6.
+CONFIDENCE_LASTS = 0.7  # of the keypoints keep their confidence through the window
+FOCAL_SPREAD = 0.1  # of the logarithm of assumed over true focal length
+# World landmarks. Depth is mostly too small: on renders by a factor of 0.3 for arms, 0.6 for trunk and legs.
 UNKNOWN_SHARE = 0.3
 TILT, TURN = np.radians(10.0), np.radians(9.0)
 SCALE_SPREAD = 0.07
@@ -45,7 +47,7 @@ FLIP_SHARE = 0.05  # per limb: its depth relative to shoulder or hip has the wro
 FLIP_LASTS = 0.8  # of the window's moments
 CONSTANT_SHARE, KEPT = (0.2, 0.8), (0.4, 0.9)  # see `Persistence`
 
-# Each limb from the trunk outwards with what hangs on its ends.
+# Each limb from the trunk outwards, with the keypoints attached to its ends.
 LIMBS = (
     ((11, 13), (13, 15), (15, 17), (15, 19), (15, 21)),
     ((12, 14), (14, 16), (16, 18), (16, 20), (16, 22)),
@@ -59,27 +61,27 @@ _LEGS = np.arange(23, 33)
 
 @dataclass(frozen=True)
 class Persistence:
-    """How the errors of n people last through a window of WINDOW moments, standard normal at each of them.
+    """Correlation in time of the errors of n people in a window of WINDOW moments, each standard normal.
 
         e_t = √ρ c + √(1 − ρ) z_t,   z_t = a z_{t−1} + √(1 − a²) w_t
 
     with c and w_t independent; ``constant`` (n,) is ρ, ``kept`` (n,) is a.
     """
 
-    constant: np.ndarray
-    kept: np.ndarray
+    constant: NDArray[np.float32]
+    kept: NDArray[np.float32]
 
     @staticmethod
     def draw(rng: np.random.Generator, n: int) -> Persistence:
-        """Some errors hold still, some flicker."""
+        """Draw, for n people, the constant share of errors and the correlation from one moment to the next."""
         return Persistence(*(rng.uniform(*limits, n).astype(np.float32) for limits in (CONSTANT_SHARE, KEPT)))
 
-    def of(self, rows: np.ndarray) -> Persistence:
-        """Of some of the people."""
+    def of(self, rows: NDArray[Any]) -> Persistence:
+        """Return the persistence of some of the people."""
         return Persistence(self.constant[rows], self.kept[rows])
 
-    def mix(self, constant: np.ndarray, white: np.ndarray) -> np.ndarray:
-        """e_t of c (n, 1, ...) and w_t (n, WINDOW, ...); overwrites the latter."""
+    def mix(self, constant: NDArray[np.float32], white: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Return e_t of c (n, 1, ...) and w_t (n, WINDOW, ...); overwrites the latter."""
         a = self.kept.reshape(-1, *[1] * (white.ndim - 2))
         b = np.sqrt(1 - a * a)
         for t in range(1, white.shape[1]):
@@ -87,21 +89,21 @@ class Persistence:
         rho = self.constant.reshape(-1, *[1] * (white.ndim - 1))
         return np.sqrt(rho) * constant + np.sqrt(1 - rho) * white
 
-    def normal(self, rng: np.random.Generator, *shape: int) -> np.ndarray:
-        """e_t, (n, WINDOW, *shape)."""
+    def normal(self, rng: np.random.Generator, *shape: int) -> NDArray[np.float32]:
+        """Draw e_t, (n, WINDOW, *shape)."""
         n = len(self.constant)
         constant = rng.standard_normal((n, 1, *shape), np.float32)
         return self.mix(constant, rng.standard_normal((n, WINDOW, *shape), np.float32))
 
 
-def placements(rng: np.random.Generator, n: int) -> np.ndarray:
-    """(n, 33, 3) f32 metres: where n people's keypoints are seen, beside our body's, in the axes of their parts."""
+def placements(rng: np.random.Generator, n: int) -> NDArray[np.float32]:
+    """Draw keypoint offsets (n, 33, 3) f32, metres, of n people, in the axes of their parts."""
     own = PLACEMENT[:, None] * rng.standard_normal((n, len(PLACEMENT), 3))
     return (np.array([offset(name) for name in KEYPOINT_NAMES]) + own).astype(np.float32)
 
 
-def image_errors(rng: np.random.Generator, persistence: Persistence) -> tuple[np.ndarray, np.ndarray]:
-    """Errors of 2D keypoints (n, WINDOW, 33, 2) in units of the person's size s, and confidences (n, WINDOW, 33)."""
+def image_errors(rng: np.random.Generator, persistence: Persistence) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Draw errors (n, WINDOW, 33, 2) of 2D keypoints, in units of the person's size s, and confidences."""
     n = len(persistence.constant)
     constant, lasting = moment_errors(rng, n)
     white, passing = (x.reshape(n, WINDOW, *x.shape[1:]) for x in moment_errors(rng, n * WINDOW))
@@ -110,8 +112,8 @@ def image_errors(rng: np.random.Generator, persistence: Persistence) -> tuple[np
     return errors, confidence
 
 
-def moment_errors(rng: np.random.Generator, n: int) -> tuple[np.ndarray, np.ndarray]:
-    """Errors of 2D keypoints (n, 33, 2) in units of the person's size s, and confidences (n, 33), of single moments."""
+def moment_errors(rng: np.random.Generator, n: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Draw errors of 2D keypoints (n, 33, 2) in units of the person's size s, and confidences (n, 33)."""
     unsure = rng.random((n, 33)) > CONFIDENT_SHARE + 0.18 * rng.random((n, 1))
     confidence = np.where(unsure, rng.random((n, 33)) ** 0.7, 1 - 0.1 * rng.random((n, 33)) ** 2)
     # Half of the error of a hand or foot is that of the joint before it.
@@ -125,8 +127,10 @@ def moment_errors(rng: np.random.Generator, n: int) -> tuple[np.ndarray, np.ndar
     return own * level * (1 + (UNSURE_FACTOR - 1) * (1 - confidence[..., None])), confidence
 
 
-def cut_by_edge(rng: np.random.Generator, rays: np.ndarray, confidence: np.ndarray, persistence: Persistence) -> None:
-    """Let the picture's edge cut some people, in place: beyond it, the network guesses with low confidence."""
+def cut_by_edge(
+    rng: np.random.Generator, rays: NDArray[np.float32], confidence: NDArray[np.float32], persistence: Persistence
+) -> None:
+    """Cut some people at the image border, in place: beyond it, the network guesses with low confidence."""
     cut = np.flatnonzero(rng.random(len(rays)) < CUT_SHARE)
     angle = rng.choice(4, len(cut), p=[0.5, 0.1, 0.2, 0.2]) * np.pi / 2
     normal = np.stack([np.sin(angle), np.cos(angle)], axis=1)
@@ -140,27 +144,29 @@ def cut_by_edge(rng: np.random.Generator, rays: np.ndarray, confidence: np.ndarr
     confidence[cut] *= np.where(beyond > 0, rng.uniform(0, 0.3, (len(cut), WINDOW, 33)), 1.0)
 
 
-def swap_sides(rng: np.random.Generator, rays: np.ndarray) -> None:
-    """Exchange left and right of the arms or the legs of some people (n, WINDOW, 33, 2), in place."""
+def swap_sides(rng: np.random.Generator, rays: NDArray[np.float32]) -> None:
+    """Swap left and right of the arms or the legs of some people (n, WINDOW, 33, 2), in place."""
     n = len(rays)
     for group in (_ARMS, _LEGS):
         people, moments = np.nonzero((rng.random(n) < SWAP_SHARE)[:, None] & (rng.random((n, WINDOW)) < SWAP_LASTS))
         rays[people[:, None], moments[:, None], group] = rays[people[:, None], moments[:, None], MIRROR_PARTNER[group]]
 
 
-def world_landmarks(rng: np.random.Generator, points: np.ndarray, persistence: Persistence) -> np.ndarray:
-    """Distorted landmarks (n, WINDOW, 33, 3) of true keypoints, metres, in axes that look straight at the person."""
+def world_landmarks(
+    rng: np.random.Generator, points: NDArray[np.float32], persistence: Persistence
+) -> NDArray[np.float32]:
+    """Distort true keypoints (n, WINDOW, 33, 3), metres, in the axes of a camera that points at the person."""
     n, W = points.shape[:2]
 
-    def normal(*shape: int) -> np.ndarray:
+    def normal(*shape: int) -> NDArray[np.float32]:
         return rng.standard_normal((n, 1, *shape), np.float32)
 
-    def lasting(*shape: int) -> np.ndarray:
+    def lasting(*shape: int) -> NDArray[np.float32]:
         return persistence.normal(rng, *shape)
 
     strength = np.exp(0.4 * normal(1, 1))
     out = points.copy()
-    # The trunk leans to and fro in depth as one, shoulders turn less than they should.
+    # The trunk tilts in depth as one; shoulders turn too little.
     hips = points[:, :, [23, 24]].mean(axis=2, keepdims=True)
     upper = points[:, :, :23] - hips
     middle = upper[:, :, [11, 12]].mean(axis=2)[..., 2:]

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Measure a lifting network: ``python -m scope.tools.train_lifter.evaluate MOTIONS PAIRS [--network lifter.onnx]``.
 
-On held-out takes with the detector's errors imitated, and on renders that the landmark network really saw:
-the error of the limbs' keypoints beside that of the world landmarks, and how well the deviations foretell errors.
+On held-out takes with simulated detector errors, and on renders processed by the landmark network:
+the error of the limbs' keypoints compared with the world landmarks', and the calibration of the predicted deviations.
 Needs neither PyTorch nor onnx.
 """
 
@@ -11,8 +11,10 @@ from __future__ import annotations
 import argparse
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...scope_addon.capture.perception.lifter import HIPS, LIFTER_FILE, Lifter, virtual_camera
 from ...scope_addon.capture.perception.lifter_window import MIDDLE
@@ -25,8 +27,8 @@ from .split import held_out_frames
 MEASURED = np.array([*range(11, 17), *range(25, 29)])  # shoulders, elbows, wrists, knees, ankles; hips are the origin
 
 
-def measure_renders(lifter: Lifter, pairs: Path) -> dict:
-    """Millimetres on renders: world landmarks, network with and without them; deviation of error over predicted σ."""
+def measure_renders(lifter: Lifter, pairs: Path) -> dict[str, Any]:
+    """Return millimetres on renders (world landmarks, network with and without them), and error over predicted σ."""
     points, rays, confidence, world = (a.astype(float) for a in load_pairs(pairs))
     truth = points - points[:, HIPS].mean(axis=1, keepdims=True)
     result = {"renders": len(points), "world_landmarks_mm": _limb_error(world - truth)}
@@ -40,26 +42,26 @@ def measure_renders(lifter: Lifter, pairs: Path) -> dict:
     return result
 
 
-def measure_takes(lifter: Lifter, motions: Path, n: int = 8192) -> dict:
-    """Millimetres on held-out takes with imitated errors, all of them and those with known world landmarks."""
+def measure_takes(lifter: Lifter, motions: Path, n: int = 8192) -> dict[str, Any]:
+    """Return millimetres on held-out takes with simulated errors: all samples, and those with world landmarks."""
     batch = Dataset(load_body("scope"), held_out_frames(load_motions(motions))).batch((2, 0), n)
     points, _ = lifter.run(batch.input)
     error, known = points - batch.points, batch.input[:, MIDDLE, -2] > 0.5
     return {"takes": n, "with_world_mm": _limb_error(error[known]), "without_world_mm": _limb_error(error[~known])}
 
 
-def _limb_error(error: np.ndarray) -> float:
+def _limb_error(error: NDArray[np.float64]) -> float:
     return round(1000 * float(np.linalg.norm(error[:, MEASURED], axis=-1).mean()), 1)
 
 
-def _deviation(z: np.ndarray) -> float:
-    """Root mean square of the 99 % smallest."""
+def _deviation(z: NDArray[np.float64]) -> float:
+    """Return the root mean square of the 99 % smallest."""
     z = np.sort(np.abs(z[:, MEASURED]).ravel())
     return round(float(np.sqrt(np.square(z[: int(0.99 * len(z))]).mean())), 2)
 
 
 def main() -> None:
-    """Command line."""
+    """Run the command line."""
     parser = argparse.ArgumentParser(description="Measure a lifting network.")
     parser.add_argument("motions", type=Path)
     parser.add_argument("pairs", type=Path)

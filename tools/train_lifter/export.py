@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Writes the network as ONNX: matrices as half floats with a Cast behind them, the rest in single precision."""
+"""Write the network as ONNX: matrices in half precision followed by a Cast, the rest in single precision."""
 
 from __future__ import annotations
 
@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 import onnx
 import torch
+from numpy.typing import NDArray
 from onnx import TensorProto, helper, numpy_helper
 
-from ...scope_addon.atomic_write import written_beside
+from ...scope_addon.atomic_write import atomic_path
 from ...scope_addon.capture.perception.lifter import INPUT_SIZE, KEYPOINT_COUNT
 from ...scope_addon.capture.perception.lifter_window import WINDOW
 from .network import LOG_SIGMA_RANGE, LiftingNetwork
@@ -24,7 +25,7 @@ class _Graph:
         self.nodes: list[onnx.NodeProto] = []
         self.weights: list[onnx.TensorProto] = []
 
-    def constant(self, name: str, value: np.ndarray) -> str:
+    def constant(self, name: str, value: NDArray[np.float32]) -> str:
         self.weights.append(numpy_helper.from_array(np.asarray(value, order="C"), name))
         return name
 
@@ -32,7 +33,7 @@ class _Graph:
         self.nodes.append(helper.make_node(kind, inputs, [output], **attributes))
         return output
 
-    def linear(self, x: str, name: str, weight: np.ndarray, bias: np.ndarray) -> str:
+    def linear(self, x: str, name: str, weight: NDArray[np.float32], bias: NDArray[np.float32]) -> str:
         half = self.constant(f"{name}.weight", weight.astype(np.float16))
         single = self.add("Cast", [half], f"{name}.weight32", to=TensorProto.FLOAT)
         return self.add("Gemm", [x, single, self.constant(f"{name}.bias", bias)], name, transB=1)
@@ -96,5 +97,5 @@ def export(network: LiftingNetwork, path: Path) -> None:
     model = helper.make_model(graph, producer_name="scope", opset_imports=opset, ir_version=8)
     onnx.checker.check_model(model, full_check=True)
     path.parent.mkdir(parents=True, exist_ok=True)
-    with written_beside(path) as temporary:
+    with atomic_path(path) as temporary:
         onnx.save(model, str(temporary))

@@ -27,7 +27,7 @@ class Block(nn.Module):
         nn.init.zeros_(self.second.weight)
 
     def forward(self, x: Tensor) -> Tensor:
-        """(n, width) -> (n, width)."""
+        """Map (n, width) to (n, width)."""
         return x + self.second(torch.relu(self.first(self.norm(x))))
 
 
@@ -40,7 +40,7 @@ class Merge(nn.Module):
         nn.init.zeros_(self.second.weight)
 
     def forward(self, x: Tensor) -> Tensor:
-        """(n, 3 m, width) -> (n, m, width)."""
+        """Map (n, 3 m, width) to (n, m, width)."""
         n, moments, width = x.shape
         together = self.norm(x).reshape(n, moments // 3, 3 * width)
         return x[:, 1::3] + self.second(torch.relu(self.first(together)))
@@ -50,9 +50,9 @@ class LiftingNetwork(nn.Module):
     """(n, 9, 200) -> points (n, 33, 3) metres and log σ (n, 33, 2), across and along the line of sight.
 
     After VideoPose3D (Pavllo et al., CVPR 2019): a residual network whose convolutions over time, three moments wide,
-    shrink the window to its middle; the strided form, since each window has moments of its own. What differs: layer
-    normalization before each layer instead of batch normalization behind it, further residual blocks once the window
-    is one moment, and deviations beside the points.
+    shrink the window to its middle; the strided form, since windows do not share moments. Differences: layer
+    normalization before each layer instead of batch normalization after it, further residual blocks once the window
+    is one moment, and deviations in addition to the points.
     """
 
     def __init__(self, width: int = WIDTH, blocks: int = BLOCKS) -> None:
@@ -67,7 +67,7 @@ class LiftingNetwork(nn.Module):
         self.leave = nn.Linear(width, KEYPOINT_COUNT * 5)
 
     def forward(self, x: Tensor) -> tuple[Tensor, Tensor]:
-        """Points and log σ."""
+        """Return points and log σ."""
         moments = self.merges(self.enter((x - self.mean) / self.spread))
         out = self.leave(self.norm(self.blocks(moments[:, 0]))).float()
         points, log_sigma = out[:, : KEYPOINT_COUNT * 3], out[:, KEYPOINT_COUNT * 3 :]
@@ -76,7 +76,7 @@ class LiftingNetwork(nn.Module):
 
 
 def loss(points: Tensor, log_sigma: Tensor, truth: Tensor) -> Tensor:
-    """Σ over coordinates of the Laplace density's −log, and 1 − cos of the bones' directions; the mean over samples.
+    """Return the mean over samples of the Laplace density's −log, summed over coordinates, and bones' 1 − cos.
 
     −log p(e) = √2 |e| / σ + log σ (+ const), with one σ for both coordinates across the line of sight.
     """
@@ -87,5 +87,5 @@ def loss(points: Tensor, log_sigma: Tensor, truth: Tensor) -> Tensor:
 
 
 def bones(points: Tensor) -> Tensor:
-    """(n, 33, 3) -> (n, 12, 3) from a bone's start to its end."""
+    """Return the vectors (n, 12, 3) of bones from start to end, of points (n, 33, 3)."""
     return points[:, BONES[:, 1]] - points[:, BONES[:, 0]]

@@ -1,17 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Reads what ``render_pairs`` wrote."""
+"""Read the file of ``render_pairs``."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
-LEAST_PRESENCE, LEAST_SPREAD, MOST_DISAGREEMENT = 0.9, 0.38, 0.2  # else the tracker would not believe its eyes
+LEAST_PRESENCE, LEAST_SPREAD, MOST_DISAGREEMENT = 0.9, 0.38, 0.2  # otherwise the tracker would reject the detection
 
 
-def load_pairs(path: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Points, rays, confidences and world landmarks of the pairs that a tracker would accept."""
+def load_pairs(path: Path) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]:
+    """Return points, rays, confidences and world landmarks of the pairs that a tracker would accept."""
     with np.load(path) as data:
         good = (data["presence"] >= LEAST_PRESENCE) & (data["spread"] >= LEAST_SPREAD)
         good &= data["disagreement"] <= MOST_DISAGREEMENT

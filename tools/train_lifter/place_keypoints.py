@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where the landmark network sees keypoints: ``python -m scope.tools.train_lifter.place_keypoints FOLDER``.
+"""Estimate the landmark network's keypoint offsets: ``python -m scope.tools.train_lifter.place_keypoints FOLDER``.
 
-FOLDER holds the clips (../shared/data/clips). Prints, for every person and for all of them, what the least squares of
-`keypoint_offsets` find in captures whose keypoints lie at our body's own; the last column belongs into that module.
+FOLDER holds the clips (../shared/data/clips). Prints, for each person and for all, the least-squares offsets found in
+captures without keypoint offsets; the last column belongs in `keypoint_offsets`.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ import argparse
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...scope_addon.capture.fitting.ablation import Ablation
 from ...scope_addon.capture.options import CaptureOptions
@@ -22,14 +23,14 @@ from ...solver.rotations import exp
 from .detector_noise import MIRROR_PARTNER
 
 CLIPS = ("walk_side_static", "run_moving_camera", "squats_5fps", "gesture_square", "two_people_portrait")
-LEAST_FRAMES = 20  # of a person who counts
+LEAST_FRAMES = 20  # of a person who is included
 REGULARIZATION = 0.3
-FARTHEST_M = 0.12  # a keypoint that is further off is a mistake
+FARTHEST_M = 0.12  # larger errors are outliers
 REFLECTION = np.diag([-1.0, 1.0, 1.0])
 
 
-def normal_equations(body: Body, motion: Motion) -> tuple[np.ndarray, np.ndarray]:
-    """(33, 3, 3) and (33, 3) of the least squares over one motion, left and right together."""
+def normal_equations(body: Body, motion: Motion) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the normal equations (33, 3, 3), (33, 3) of one motion, left and right combined."""
     at = body.keypoint_set("blazepose")
     indices = [at[name] for name in KEYPOINT_NAMES]
     part, betas = body.keypoint_part[indices], motion.betas.astype(float)
@@ -49,13 +50,13 @@ def normal_equations(body: Body, motion: Motion) -> tuple[np.ndarray, np.ndarray
     return A + REFLECTION @ A[MIRROR_PARTNER] @ REFLECTION, b + b[MIRROR_PARTNER] @ REFLECTION
 
 
-def offsets(A: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """(33, 3) metres, the solution of the normal equations."""
+def offsets(A: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Solve the normal equations for offsets (33, 3), metres."""
     return np.linalg.solve(A + REGULARIZATION * np.eye(3), b[..., None])[..., 0]
 
 
 def main() -> None:
-    """Command line."""
+    """Run the command line."""
     parser = argparse.ArgumentParser(description="Find where the landmark network sees keypoints.")
     parser.add_argument("clips", type=Path, help="folder of the clips")
     folder: Path = parser.parse_args().clips

@@ -1,19 +1,21 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Show renders of our body to the landmark network: ``python -m scope.tools.train_lifter.render_pairs MOTIONS``.
+"""Run the landmark network on renders of the body: ``python -m scope.tools.train_lifter.render_pairs MOTIONS``.
 
-Our body in augmented poses, random clothes and before random backgrounds, drawn with the add-on's own rasterizer; for
-each picture the true keypoints and what the network reports. This is how the detector's errors are known.
+The body in augmented poses and random clothes in front of random backgrounds, drawn with the add-on's own rasterizer;
+for each image the true keypoints and the network's output, from which the detector's errors follow.
 """
 
 from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
-from ...scope_addon.atomic_write import written_beside
+from ...scope_addon.atomic_write import atomic_path
 from ...scope_addon.capture.overlay.rasterizer import Canvas, rasterize
 from ...scope_addon.capture.perception.landmark_network import LandmarkNetwork
 from ...scope_addon.capture.perception.region import region_from_points
@@ -24,11 +26,11 @@ from .dataset import cameras, pitches
 from .split import training_frames
 
 PICTURE_PX = 420
-FILL = 0.72  # of the picture, the person's longer side
+FILL = 0.72  # of the image, the person's longer side
 NEAREST_M, FARTHEST_M = 2.2, 9.0
 SAVE_EVERY = 500
 SKIN, HAIR, SUIT, ACCENT = range(4)  # the body's materials
-WAIST_M = 0.05  # faces of the suit that lie lower, in the model frame, are trousers
+WAIST_M = 0.05  # faces of the suit below, in the model frame, are trousers
 KEYS = ("points", "rays", "confidence", "world", "presence", "spread", "disagreement")
 
 
@@ -43,8 +45,8 @@ class Renderer:
         self.low = body.v_template[self.triangles].mean(axis=1)[:, 1] < WAIST_M
         self.colors = np.sqrt(body.material_colors[:, :3])
 
-    def clothes(self, rng: np.random.Generator) -> np.ndarray:
-        """(F, 3) colours of the triangles, sRGB."""
+    def clothes(self, rng: np.random.Generator) -> NDArray[np.float64]:
+        """Draw colours (F, 3) of the triangles, sRGB."""
         colors = self.colors.copy()
         colors[SKIN] = np.array([0.9, 0.7, 0.6]) * rng.uniform(0.35, 1)
         colors[HAIR] = rng.uniform(0, 0.6) * np.array([1, 0.8, 0.6])
@@ -55,8 +57,10 @@ class Renderer:
             faces[self.low & ((self.material == SUIT) | (self.material == ACCENT))] = rng.uniform(0, 1, 3)
         return faces
 
-    def picture(self, rng: np.random.Generator, vertices: np.ndarray, intrinsics: np.ndarray) -> np.ndarray:
-        """(420, 420, 3) uint8 of the vertices (V, 3) in the camera frame before a random background."""
+    def picture(
+        self, rng: np.random.Generator, vertices: NDArray[np.float64], intrinsics: NDArray[np.float64]
+    ) -> NDArray[np.uint8]:
+        """Draw the vertices (V, 3), camera frame, in front of a random background; (420, 420, 3) uint8."""
         size = PICTURE_PX
         faces = self.clothes(rng)
         cells = rng.uniform(0, 255, (rng.integers(2, 12), rng.integers(2, 12), 3)).astype(np.float32)
@@ -67,13 +71,14 @@ class Renderer:
         rasterize(canvas, vertices, self.triangles, faces, intrinsics)
         covered = canvas.coverage
         image[covered] = canvas.rgba[covered][:, :3] * rng.uniform(0.6, 1.15)
-        return cv2.GaussianBlur(np.clip(image, 0, 255).astype(np.uint8), (0, 0), rng.uniform(0.5, 1.6))
+        blurred = cv2.GaussianBlur(np.clip(image, 0, 255).astype(np.uint8), (0, 0), rng.uniform(0.5, 1.6))
+        return blurred.astype(np.uint8, copy=False)
 
 
 def observe(
     rng: np.random.Generator, sampler: PoseSampler, renderer: Renderer, network: LandmarkNetwork
-) -> dict | None:
-    """One picture: true points and the network's report (``KEYS``), or None if the person stands too close."""
+) -> dict[str, Any] | None:
+    """Return true points and the network's output (``KEYS``) of one image, or None if the person is too close."""
     body, at = sampler.body, np.array(list(sampler.body.keypoint_set("blazepose").values()))
     Omega = sampler.pose(rng).astype(float)
     betas = np.clip(rng.standard_normal(body.P), -2.5, 2.5)
@@ -102,16 +107,16 @@ def observe(
     return dict(zip(KEYS, found, strict=True))
 
 
-def save(path: Path, pairs: list[dict]) -> None:
+def save(path: Path, pairs: list[dict[str, Any]]) -> None:
     """Write the pairs, replacing what is there."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    with written_beside(path) as temporary:
+    with atomic_path(path) as temporary:
         np.savez_compressed(temporary, **{key: np.array([pair[key] for pair in pairs], np.float32) for key in KEYS})
 
 
 def main() -> None:
-    """Command line."""
-    parser = argparse.ArgumentParser(description="Observe the landmark network's errors on renders of our body.")
+    """Run the command line."""
+    parser = argparse.ArgumentParser(description="Observe the landmark network's errors on renders of the body.")
     parser.add_argument("motions", type=Path, help="file written by scope.tools.mocap.fit_body")
     parser.add_argument("-o", "--output", type=Path, default=Path("build/lifter/pairs.npz"))
     parser.add_argument("-n", "--count", type=int, default=4000)

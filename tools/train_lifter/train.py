@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Train the lifting network: ``python -m scope.tools.train_lifter.train MOTIONS PAIRS -o assets/lifter``.
 
-AdamW with a cosine schedule in bfloat16; what is exported is the exponential mean of the weights. Every tenth take
-is held out, to measure and to calibrate the uncertainties; renders that the landmark network saw only measure. The
-weights are kept beside the exported network, for another training to go on from (``--start``).
+AdamW with a cosine schedule in bfloat16; the exponential mean of the weights is exported. Every tenth take is held out,
+to evaluate and to calibrate the uncertainties; the landmark network's renders only evaluate. The weights are kept next
+to the exported network, from which another training can continue (``--start``).
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from collections import deque
 from collections.abc import Iterator
 from multiprocessing import get_context
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import torch
@@ -52,7 +53,7 @@ def _make(seed: tuple[int, ...]) -> Batch:
 
 
 def batches(motions: Path, seed: int, steps: int, workers: int) -> Iterator[Batch]:
-    """The batches of a training, in order, whatever the number of processes."""
+    """Yield the batches of a training, in an order that does not depend on the number of processes."""
     with get_context("spawn").Pool(workers, _start, (motions,)) as pool:
         waiting = deque(pool.apply_async(_make, ((_TRAINING, seed, k),)) for k in range(min(AHEAD, steps)))
         for k in range(len(waiting), steps + len(waiting)):
@@ -62,12 +63,12 @@ def batches(motions: Path, seed: int, steps: int, workers: int) -> Iterator[Batc
 
 
 def held_out_batch(motions: Path, n: int = 8192) -> Batch:
-    """Samples of the takes that are kept from training."""
+    """Return samples of the held-out takes."""
     return Dataset(load_body("scope"), held_out_frames(load_motions(motions))).batch((_VALIDATION, 0), n)
 
 
 def renders(pairs: Path) -> Batch:
-    """What the landmark network saw of renders of our body, pictures that do not move; world landmarks known."""
+    """Return the landmark network's output on rendered stills of the default body, with known world landmarks."""
     points, rays, confidence, world = load_pairs(pairs)
     x, R = network_input(rays, confidence, world, np.ones(len(rays)))
     relative = points - points[:, HIPS].mean(axis=1, keepdims=True)
@@ -76,8 +77,8 @@ def renders(pairs: Path) -> Batch:
 
 
 @torch.no_grad()
-def measure(network: LiftingNetwork, batch: Batch) -> dict:
-    """Errors in mm on a batch, and the standard deviation of error over σ, across and along the line of sight."""
+def measure(network: LiftingNetwork, batch: Batch) -> dict[str, Any]:
+    """Return errors in mm, and the standard deviation of error over σ across and along the line of sight."""
     points, log_sigma = network(torch.from_numpy(batch.input))
     error = (points - torch.from_numpy(batch.points)).numpy()
     z = error / np.exp(log_sigma.numpy())[..., [0, 0, 1]]
@@ -137,7 +138,7 @@ def train(
     matrices = {"params": [p for p in network.parameters() if p.ndim > 1], "weight_decay": DECAY}
     others = {"params": [p for p in network.parameters() if p.ndim == 1], "weight_decay": 0.0}
     optimizer = torch.optim.AdamW([matrices, others], rate, (0.9, 0.98))
-    log: list[dict] = []
+    log: list[dict[str, Any]] = []
     start, total = time.perf_counter(), 0.0
     for step, batch in enumerate(batches(motions, seed, steps, workers)):
         done = max(step / steps, (time.perf_counter() - start) / (60 * minutes))
@@ -176,7 +177,7 @@ def train(
 
 
 def main() -> None:
-    """Command line."""
+    """Run the command line."""
     parser = argparse.ArgumentParser(description="Train the lifting network.")
     parser.add_argument("motions", type=Path, help="file written by scope.tools.mocap.fit_body")
     parser.add_argument("pairs", type=Path, help="file written by scope.tools.train_lifter.render_pairs")

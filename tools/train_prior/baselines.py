@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the flow is measured against, each by maximum likelihood: log densities against the normalized Haar measure.
+"""Baselines for the flow, fitted by maximum likelihood: log densities against the normalized Haar measure.
 
 Gaussian in the tangent space of the mean M, phi = log(MᵀOmega) ~ N(m, C), with the volume factor of the chart:
     dmu = (1 - cos|phi|) / (4 pi^2 |phi|^2) d^3phi
@@ -16,13 +16,14 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...solver.rotations import log
 
-Density = Callable[[np.ndarray], np.ndarray]  # rotations (n, 3, 3) -> log densities (n,)
+Density = Callable[[NDArray[np.float64]], NDArray[np.float64]]  # rotations (n, 3, 3) -> log densities (n,)
 
 
-def gaussian(rotations: np.ndarray, weights: np.ndarray, mean: np.ndarray) -> Density:
+def gaussian(rotations: NDArray[np.float64], weights: NDArray[np.float64], mean: NDArray[np.float64]) -> Density:
     """Fit a Gaussian in the tangent space of ``mean`` (3, 3) to rotations (n, 3, 3) with probabilities (n,)."""
     phi = log(mean.T @ rotations)
     m = weights @ phi
@@ -33,7 +34,7 @@ def gaussian(rotations: np.ndarray, weights: np.ndarray, mean: np.ndarray) -> De
     inside = np.linalg.norm(m + _normal_grid() @ L.T, axis=1) < np.pi
     mass = inside.mean()
 
-    def density(omega: np.ndarray) -> np.ndarray:
+    def density(omega: NDArray[np.float64]) -> NDArray[np.float64]:
         x = log(mean.T @ omega)
         squared = (x * x).sum(-1)
         volume = np.where(squared < 1e-6, 0.5, (1.0 - np.cos(np.sqrt(squared))) / np.maximum(squared, 1e-12))
@@ -43,11 +44,11 @@ def gaussian(rotations: np.ndarray, weights: np.ndarray, mean: np.ndarray) -> De
     return density
 
 
-def _normal_grid() -> np.ndarray:
+def _normal_grid() -> NDArray[np.float64]:
     return np.random.default_rng(0).standard_normal((200_000, 3))
 
 
-def log_i0e(x: np.ndarray) -> np.ndarray:
+def log_i0e(x: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return log(I_0(x) exp(-|x|)) of the modified Bessel function."""
     a = np.abs(x)
     far = np.maximum(a, 100.0)
@@ -59,15 +60,15 @@ def log_i0e(x: np.ndarray) -> np.ndarray:
 _NODES = tuple(0.5 * (a + b) for a, b in zip(np.polynomial.legendre.leggauss(200), (1.0, 0.0), strict=True))
 
 
-def log_fisher_constant(s: np.ndarray) -> tuple[float, np.ndarray]:
+def log_fisher_constant(s: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
     """Return log c(s) and its gradient (3,), for proper singular values s_1 >= s_2 >= |s_3|.
 
-    u is integrated by Gauss-Legendre in sqrt(1 - u): the mass lies within 1 / (s_2 + s_3) of u = 1.
+    u is integrated by Gauss-Legendre in sqrt(1 - u): the mass is within 1 / (s_2 + s_3) of u = 1.
     """
     return _log_c(s), np.array([_slope(s, k) for k in range(3)])
 
 
-def _log_c(s: np.ndarray) -> float:
+def _log_c(s: NDArray[np.float64]) -> float:
     x, w = _NODES
     scale = min(1.0, 6.0 / np.sqrt(1.0 + max(s[0] + s[2], 1.0)))  # of sqrt((1 - u) / 2)
     total = []
@@ -83,15 +84,13 @@ def _log_c(s: np.ndarray) -> float:
     return float(s.sum() + top + np.log(np.exp(all_terms - top).sum()))
 
 
-
-
-def _slope(s: np.ndarray, k: int) -> float:
+def _slope(s: NDArray[np.float64], k: int) -> float:
     h = 1e-4 * max(1.0, abs(s[k]))
     step = h * np.eye(3)[k]
     return (_log_c(s + step) - _log_c(s - step)) / (2.0 * h)
 
 
-def matrix_fisher(rotations: np.ndarray, weights: np.ndarray) -> Density:
+def matrix_fisher(rotations: NDArray[np.float64], weights: NDArray[np.float64]) -> Density:
     """Fit a matrix Fisher distribution to rotations (n, 3, 3) with probabilities (n,)."""
     U, d, Vt = np.linalg.svd(np.einsum("n,nij->ij", weights, rotations))
     if np.linalg.det(U) < 0:
@@ -103,7 +102,7 @@ def matrix_fisher(rotations: np.ndarray, weights: np.ndarray) -> Density:
     return lambda omega: np.einsum("ij,nij->n", F, omega) - constant
 
 
-def _from_moments(d: np.ndarray) -> np.ndarray:
+def _from_moments(d: NDArray[np.float64]) -> NDArray[np.float64]:
     """Solve d log c / ds = d by damped Newton steps on the convex log c(s) - s d, from the concentrated limit.
 
     There 1 - d_k = (1/(s_k + s_i) + 1/(s_k + s_j)) / 2.

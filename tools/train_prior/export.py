@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Trained flows -> assets/prior/joint_prior.npz: one row of parameters for each of SMPL's joints."""
+"""Write trained flows to assets/prior/joint_prior.npz: one row of parameters for each of SMPL's joints."""
 
 from __future__ import annotations
 
@@ -7,8 +7,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ...scope_addon.atomic_write import written_beside
+from ...scope_addon.atomic_write import atomic_path
 from ...solver.residuals import joint_flow as jf
 from ...solver.rotations import nearest_rotation
 from .data import MIRROR, PAIRED, TRUNK, WITHOUT_DATA, Samples
@@ -20,7 +21,7 @@ LICENSE = (
 )
 
 
-def flat(parameters: Mapping[str, np.ndarray], rotations: np.ndarray) -> np.ndarray:
+def flat(parameters: Mapping[str, NDArray[np.float64]], rotations: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return a flow's parameters (SIZE,) from those of ``Flow.row``; rotations (n, 3, 3) give the bound B."""
     out = np.zeros(jf.SIZE)
     out[jf.MEAN : jf.MEAN + 9] = nearest_rotation(parameters["mean"]).ravel()
@@ -35,7 +36,7 @@ def flat(parameters: Mapping[str, np.ndarray], rotations: np.ndarray) -> np.ndar
     return out
 
 
-def fixed(deviation: float) -> np.ndarray:
+def fixed(deviation: float) -> NDArray[np.float64]:
     """Return the parameters (SIZE,) of a Gaussian of y / (deviation / 2) about rest: y is half the angle near it."""
     A = np.eye(3)
     parameters = {name: np.zeros((jf.LAYERS, *shape)) for name, shape in jf.LAYER_SHAPES.items()}
@@ -43,7 +44,7 @@ def fixed(deviation: float) -> np.ndarray:
     return flat(parameters, A[None])
 
 
-def mirrored(parameters: np.ndarray) -> np.ndarray:
+def mirrored(parameters: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the parameters of the mirror image, z(Omega) = z_left(S Omega S)."""
     out = parameters.copy()
     M = out[jf.MEAN : jf.MEAN + 9].reshape(3, 3)
@@ -53,7 +54,9 @@ def mirrored(parameters: np.ndarray) -> np.ndarray:
     return out
 
 
-def by_joint(models: Mapping[str, Mapping[str, np.ndarray]], samples: Mapping[str, Samples]) -> dict[str, np.ndarray]:
+def by_joint(
+    models: Mapping[str, Mapping[str, NDArray[np.float64]]], samples: Mapping[str, Samples]
+) -> dict[str, NDArray[np.float64]]:
     """Return the parameters (SIZE,) of every joint by name."""
     rows = {m: flat(p, samples[m].rotations[samples[m].is_training]) for m, p in models.items()}
     rows |= {name: fixed(HAND_DEVIATION) for name in WITHOUT_DATA}
@@ -63,11 +66,11 @@ def by_joint(models: Mapping[str, Mapping[str, np.ndarray]], samples: Mapping[st
     return out
 
 
-def save(path: Path, joints: Mapping[str, np.ndarray], joint_names: Sequence[str]) -> None:
+def save(path: Path, joints: Mapping[str, NDArray[np.float64]], joint_names: Sequence[str]) -> None:
     """Write the parameters by joint, in the order of a body's ``joint_names`` (K+1,)."""
     names = [name for name in joint_names if name in joints]
     path.parent.mkdir(parents=True, exist_ok=True)
-    with written_beside(path) as temporary:
+    with atomic_path(path) as temporary:
         np.savez_compressed(
             temporary,
             joint_names=np.array(names),

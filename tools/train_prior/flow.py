@@ -23,6 +23,7 @@ import math
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor
 
 STEEPEST = 0.95  # bound of |beta|: slopes between 1/20 and 39/20
@@ -39,12 +40,12 @@ def chart(rotations: Tensor, mean: Tensor) -> tuple[Tensor, Tensor]:
 
 
 def tau(u: Tensor) -> Tensor:
-    """A wave that dies off: far from the data the layers become linear."""
+    """Return u / (1 + u²), which vanishes for large |u|: far from the data, the layers become linear."""
     return u / (1.0 + u * u)
 
 
 class Flow(torch.nn.Module):
-    """Flows of G models side by side; tensors are (G, n, 3)."""
+    """Flows of G models, evaluated in parallel; tensors are (G, n, 3)."""
 
     def __init__(self, means: Tensor, layers: int, hidden: int, seed: int) -> None:
         """Set up near the identity. means (G, 3, 3)."""
@@ -76,13 +77,13 @@ class Flow(torch.nn.Module):
                 self.A[k, 0] = torch.linalg.inv(torch.linalg.cholesky(cov))
                 self.b[k, 0] = -self.A[k, 0] @ mean
 
-    def row(self, k: int) -> dict[str, np.ndarray]:
-        """Parameters of flow k as float64 arrays, beta itself in place of what it is computed from."""
+    def row(self, k: int) -> dict[str, NDArray[np.float64]]:
+        """Return the parameters of flow k as float64 arrays, beta itself in place of what it is computed from."""
         tensors = {"mean": self.means, **dict(self.named_parameters()), "beta": self.slopes()}
         return {name: t[k].detach().double().numpy().copy() for name, t in tensors.items()}
 
     def slopes(self) -> Tensor:
-        """beta, (G, layers, 3)."""
+        """Return beta, (G, layers, 3)."""
         return STEEPEST * torch.tanh(self.beta)
 
     def forward(self, y: Tensor) -> tuple[Tensor, Tensor]:
@@ -107,7 +108,7 @@ class Flow(torch.nn.Module):
         return x @ self.A_last.transpose(-1, -2) + self.b_last[:, None], logdet
 
     def log_likelihood(self, rotations: Tensor) -> Tensor:
-        """Log density (G, n) against the normalized Haar measure, of rotations (G, n, 3, 3)."""
+        """Return the log density (G, n) against the normalized Haar measure, of rotations (G, n, 3, 3)."""
         y, log_measure = chart(rotations, self.means[:, None])
         z, logdet = self(y)
         return -0.5 * (z * z).sum(-1) - 1.5 * math.log(2.0 * math.pi) + logdet - log_measure

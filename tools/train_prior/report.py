@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Held-out likelihoods of the prior beside the baselines: ``python -m scope.tools.train_prior.report MOTIONS``.
+"""Held-out likelihoods of the prior and the baselines: ``python -m scope.tools.train_prior.report MOTIONS``.
 
 Prints the table of assets/prior/README.md: mean negative log-likelihood, in nats against the normalized Haar measure,
-of the test performers' states as they were recorded. The baselines are fitted to the same training performers without
+of the test performers' states as recorded. The baselines are fitted to the same training performers without
 blur, each with the better of two weightings of the performers. Needs no PyTorch.
 """
 
@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...solver.learned_prior import BUILT_IN, JointPrior, load_joint_prior
 from ...solver.loaders.body_file import load_body
@@ -34,7 +35,7 @@ class Row:
 
     @property
     def best(self) -> bool:
-        """Whether the flow has the least."""
+        """Return whether the flow has the smallest."""
         return self.flow < min(self.gaussian, self.fisher)
 
 
@@ -56,12 +57,14 @@ def held_out(prior: JointPrior, samples: dict[str, Samples]) -> list[Row]:
     return rows
 
 
-def _fit_gaussian(rotations: np.ndarray, weights: np.ndarray) -> Density:
+def _fit_gaussian(rotations: NDArray[np.float64], weights: NDArray[np.float64]) -> Density:
     return gaussian(rotations, weights, mean_rotation(rotations, weights))
 
 
-def _better(fit: Callable[[np.ndarray, np.ndarray], Density], s: Samples, states: np.ndarray) -> np.ndarray:
-    """NLL (n,) of the test states under the better of the fits with frames equal and performers balanced."""
+def _better(
+    fit: Callable[[NDArray[np.float64], NDArray[np.float64]], Density], s: Samples, states: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return the NLL (n,) of the test states under the better of the fits with frames equal and performers balanced."""
     training, group = s.rotations[s.is_training], s.group[s.is_training]
     found = [-fit(training, balanced(group, balance))(states) for balance in (0.0, 0.7)]
     return min(found, key=np.mean)
@@ -94,7 +97,7 @@ def _bold(value: float, best: bool) -> str:
 
 
 def main() -> None:
-    """Command line."""
+    """Run the command line."""
     parser = argparse.ArgumentParser(description="Measure the joint-state prior on performers it has not seen.")
     parser.add_argument("motions", type=Path, help="motions.npz of tools/mocap")
     parser.add_argument("--prior", type=Path, default=BUILT_IN, help="(default: %(default)s)")

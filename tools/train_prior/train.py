@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Train the joint-state prior: ``python -m scope.tools.train_prior.train build/mocap/motions.npz``.
 
-Maximum likelihood on the training performers. How far each model's samples are blurred, how strongly its nonlinear part
-is held back, and when training stops, are chosen by leaving performers out in turn; then one flow for each model is
-trained on all of them. The test performers are looked at by report.py alone.
+Maximum likelihood on the training performers. Each model's blur of samples, regularization of its nonlinear part and
+number of steps are chosen by leaving performers out in turn; then one flow for each model is
+trained on all of them. Only report.py uses the test performers.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from pathlib import Path
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 
 from ...solver.learned_prior import BUILT_IN
 from ...solver.loaders.body_file import load_body
@@ -29,7 +30,7 @@ from .rotation_statistics import balanced, blurred, mean_rotation
 SEED = 0
 LAYERS, HIDDEN = 4, 4
 BLURS = (0.3, 1.0, 3.0)  # degrees: fits of recordings with one axis scatter by 0.3; 3 hides a performer's habits
-PENALTIES = (0.05, 0.5)  # on the squares of the parameters that make a layer nonlinear
+PENALTIES = (0.05, 0.5)  # penalty on the squares of the parameters that make a layer nonlinear
 STEPS, BATCH, LEARNING_RATE = 800, 256, 3e-3
 EVALUATE_EVERY = 50
 AVERAGE = 0.98  # of the parameters over steps
@@ -40,7 +41,7 @@ CONDITIONERS = ("out2", "out3", "bias2", "bias3", "beta")
 
 @dataclass(frozen=True)
 class Candidate:
-    """One way to train one model."""
+    """Hyperparameters of one model."""
 
     model: str
     blur: float  # degrees
@@ -49,7 +50,7 @@ class Candidate:
 
 @dataclass(frozen=True)
 class Choice:
-    """The way and the number of steps that suit a model best, and what they gave on the performers left out."""
+    """The best hyperparameters and number of steps of a model, and their result on the performers left out."""
 
     candidate: Candidate
     step: int
@@ -120,7 +121,7 @@ def choose(samples: dict[str, Samples]) -> dict[str, Choice]:
 def _held_out(
     samples: dict[str, Samples], candidates: list[Candidate], fold: tuple[str, ...]
 ) -> tuple[torch.Tensor, torch.Tensor]:
-    """Rotations (candidates, n, 3, 3) of a fold, every second one and not blurred, and weights (candidates, n)."""
+    """Return every second rotation of a fold (candidates, n, 3, 3), not blurred, and weights (candidates, n)."""
     chosen = {c.model: np.flatnonzero(np.isin(samples[c.model].group, fold))[::2] for c in candidates}
     n = max(len(rows) for rows in chosen.values())
     rotations = np.tile(np.eye(3), (len(candidates), n, 1, 1))
@@ -132,7 +133,7 @@ def _held_out(
     return torch.tensor(rotations, dtype=torch.float32), torch.tensor(share, dtype=torch.float32)
 
 
-def train_all(samples: dict[str, Samples], choices: dict[str, Choice]) -> dict[str, dict[str, np.ndarray]]:
+def train_all(samples: dict[str, Samples], choices: dict[str, Choice]) -> dict[str, dict[str, NDArray[np.float64]]]:
     """Return the parameters of every model, trained on all training performers."""
     models = list(choices)
     parameters = {}
@@ -142,7 +143,7 @@ def train_all(samples: dict[str, Samples], choices: dict[str, Choice]) -> dict[s
 
 
 def main() -> None:
-    """Command line."""
+    """Run the command line."""
     parser = argparse.ArgumentParser(description="Train the joint-state prior.")
     parser.add_argument("motions", type=Path, help="motions.npz of tools/mocap")
     parser.add_argument("-o", "--output", type=Path, default=BUILT_IN, help="(default: %(default)s)")

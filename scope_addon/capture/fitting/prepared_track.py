@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ....solver import Body, Floor, Measurements, Priors, Weights, default_priors
 from ...kinematics.contact_points import CONTACT_POINTS, with_contact_points
 from ..camera.intrinsics import Camera
-from ..perception.lifter import Lifted, our_lifter
+from ..perception.lifter import Lifted, default_lifter
 from ..perception.lifter_window import windows_around
 from ..tracking.track import Track
 from .ablation import NO_ABLATION, Ablation
@@ -140,5 +140,5 @@ def _lift(measurer: Measurer, track: Track, pixels: NDArray[np.floating[Any]], a
         return Lifted(track.world_landmarks, sigma, sigma)
     rays, windows = measurer.rays(pixels), windows_around(track.times, track.seen)
     if not (ablation.world_landmarks and track.has_depth):
-        return our_lifter().lift(rays, track.confidence, None, windows)
-    return our_lifter().lift_both_ways(rays, track.confidence, track.world_landmarks, windows)
+        return default_lifter().lift(rays, track.confidence, None, windows)
+    return default_lifter().lift_mixture(rays, track.confidence, track.world_landmarks, windows)

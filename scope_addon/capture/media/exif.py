@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What capture needs to know of a picture's file: which way is up, the focal length, and whether it is an animation.
+"""Metadata of a picture file: orientation, focal length, and whether it is an animation.
 
-EXIF is a TIFF directory wherever it lies: the whole of a .tif, the APP1 segment of a JPEG, the eXIf chunk of a PNG,
-the EXIF chunk of a WebP. Anything damaged counts as absent: a picture without EXIF is still a picture.
+EXIF is a TIFF directory: the whole of a .tif, the APP1 segment of a JPEG, the eXIf chunk of a PNG, the EXIF chunk of a
+WebP. Damaged EXIF counts as absent: the picture can still be used.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ class Exif:
 
 
 def read_exif(data: bytes) -> Exif:
-    """Orientation and focal length of an encoded picture (the bytes of the file)."""
+    """Read the orientation and the focal length of an encoded picture (the bytes of the file)."""
     try:
         tiff = _find_tiff(data)
         return _parse(tiff) if tiff else Exif()
@@ -33,7 +33,7 @@ def read_exif(data: bytes) -> Exif:
 
 
 def animation_length(data: bytes) -> int:
-    """How many pictures follow each other in an animated PNG or WebP; 1 for every other picture."""
+    """Count the frames of an animated PNG or WebP; 1 for every other picture."""
     if data[:8] == b"\x89PNG\r\n\x1a\n":
         control = next((d for name, d in _png_chunks(data) if name == b"acTL"), b"")
         return max(1, int.from_bytes(control[:4], "big"))
@@ -55,7 +55,7 @@ def _find_tiff(data: bytes) -> bytes:
 
 def _jpeg_app1(data: bytes) -> bytes:
     at = 2
-    while at + 4 <= len(data) and data[at] == 0xFF and data[at + 1] != 0xDA:  # 0xDA: the picture itself begins
+    while at + 4 <= len(data) and data[at] == 0xFF and data[at + 1] != 0xDA:  # 0xDA: start of the image data
         length = struct.unpack_from(">H", data, at + 2)[0]
         if data[at + 1] == 0xE1 and data[at + 4 : at + 10] == b"Exif\0\0":
             return data[at + 10 : at + 2 + length]
@@ -64,7 +64,7 @@ def _jpeg_app1(data: bytes) -> bytes:
 
 
 def _png_chunks(data: bytes) -> Iterator[tuple[bytes, bytes]]:
-    """Name and content of each chunk: (size, name, data, checksum)."""
+    """Iterate over the chunks of a PNG, stored as (size, name, data, checksum); yield name and data."""
     at = 8
     while at + 8 <= len(data):
         size = int.from_bytes(data[at : at + 4], "big")
@@ -73,7 +73,7 @@ def _png_chunks(data: bytes) -> Iterator[tuple[bytes, bytes]]:
 
 
 def _riff_chunks(data: bytes) -> Iterator[tuple[bytes, bytes]]:
-    """The same of a WebP: (name, size, data, padding to an even size)."""
+    """Iterate over the chunks of a WebP, stored as (name, size, data, padding to an even size); yield name and data."""
     at = 12
     while at + 8 <= len(data):
         size = int.from_bytes(data[at + 4 : at + 8], "little")
@@ -93,7 +93,7 @@ def _parse(tiff: bytes) -> Exif:
 
 
 def _directory(tiff: bytes, at: int, endian: str) -> dict[int, int]:
-    """Integer tags of one TIFF directory; each entry is 12 bytes: tag, type, count, value."""
+    """Read the integer tags of one TIFF directory, whose entries are 12 bytes: tag, type, count, value."""
     tags = {}
     for i in range(struct.unpack_from(endian + "H", tiff, at)[0]):
         tag, kind, count = struct.unpack_from(endian + "HHI", tiff, at + 2 + 12 * i)

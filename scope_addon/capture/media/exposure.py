@@ -1,36 +1,45 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Dark footage brightened for the networks, which see wrong limbs, or nobody, where people still see a person."""
+"""Brightens dark footage for the networks, which miss people in the dark or misplace their limbs."""
 
 from __future__ import annotations
 
+from typing import cast
+
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
-DARK, BRIGHT = 110.0, 200.0  # of 255: brightest places below which a picture is dark, and what they become
-BLACK = 4.0  # below which there is nothing to see
-MOST_GAIN = 16.0
-FOLLOWS = 0.1  # of the change from one frame to the next, so that brightness does not flicker
-LEAP = 2.0  # a factor by which light changes at once
-_STEP = 16  # every so many pixels and lines are looked at
-_BRIGHTER = 0.98  # share of the picture that is darker than its brightest places
+DARK, BRIGHT = 110.0, 200.0  # of 255: highlights below DARK are raised to BRIGHT
+BLACK = 4.0  # highlights below which a frame shows nothing
+MAX_GAIN = 16.0
+SMOOTHING = 0.1  # share of the change of gain that is applied per frame, so that brightness does not flicker
+LIGHT_CHANGE = 2.0  # factor from which the light was switched and the gain changes at once
+_STEP = 16  # pixels and lines between samples
+_HIGHLIGHT_QUANTILE = 0.98  # of the brightness, above which pixels are highlights
 
 
-class Exposure:
-    """Frames come in order."""
+class AutoExposure:
+    """Automatic gain for the frames of one clip, which are passed in order."""
 
     def __init__(self) -> None:
         self._gain = 0.0
 
-    def brightened(self, image_rgb: np.ndarray) -> np.ndarray:
-        """The frame itself, or a copy that is brighter: gain times each channel, BRIGHT over the brightest places."""
+    def brighten(self, image_rgb: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        """Return the frame itself, or a brighter copy: each channel times BRIGHT / highlights, at most `MAX_GAIN`.
+
+        :param image_rgb: (H, W, 3) uint8.
+        :return: (H, W, 3) uint8.
+        """
         size = max(1, image_rgb.shape[1] // _STEP), max(1, image_rgb.shape[0] // _STEP)
-        few = cv2.cvtColor(cv2.resize(image_rgb, size, interpolation=cv2.INTER_NEAREST), cv2.COLOR_RGB2GRAY).ravel()
-        bright = int(_BRIGHTER * len(few))
-        level = float(np.partition(few, bright)[bright])
+        samples = cv2.cvtColor(cv2.resize(image_rgb, size, interpolation=cv2.INTER_NEAREST), cv2.COLOR_RGB2GRAY).ravel()
+        rank = int(_HIGHLIGHT_QUANTILE * len(samples))
+        level = float(np.partition(samples, rank)[rank])
         if level < BLACK:
             return image_rgb
-        wanted = min(BRIGHT / level, MOST_GAIN) if level < DARK else 1.0
-        if self._gain == 0.0 or not 1 / LEAP < wanted / self._gain < LEAP:
+        wanted = min(BRIGHT / level, MAX_GAIN) if level < DARK else 1.0
+        if self._gain == 0.0 or not 1 / LIGHT_CHANGE < wanted / self._gain < LIGHT_CHANGE:
             self._gain = wanted
-        self._gain += FOLLOWS * (wanted - self._gain)
-        return image_rgb if self._gain < 1.05 else cv2.convertScaleAbs(image_rgb, alpha=self._gain)
+        self._gain += SMOOTHING * (wanted - self._gain)
+        if self._gain < 1.05:
+            return image_rgb
+        return cast(NDArray[np.uint8], cv2.convertScaleAbs(image_rgb, alpha=self._gain))

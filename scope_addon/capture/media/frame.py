@@ -6,12 +6,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 
 @dataclass(frozen=True)
 class Frame:
-    """One frame: source index, presentation time in seconds, and the upright picture (H, W, 3) uint8 RGB."""
+    """One frame: source index, presentation time in seconds, and the upright image (H, W, 3) uint8 RGB."""
 
     index: int
     timestamp_s: float
-    image_rgb: np.ndarray
+    image_rgb: NDArray[np.uint8]

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Frames of a video file one after the other, upright and with square pixels, by whatever can decode it.
+"""Decoders of video files: frames in order, upright and with square pixels.
 
-OpenCV reads nearly everything; its packages carry no decoder for AV1, which PyAV reads, as it does pictures of phones.
+OpenCV decodes most files. Its packages have no decoder for AV1 and HEIC, which PyAV decodes.
 """
 
 from __future__ import annotations
@@ -13,13 +13,14 @@ from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol, cast
 
-# Read by OpenCV when it first opens a video. -8 silences ffmpeg's own notes: what matters is said in our words. A
-# playlist that calls itself .mp4 may not reach for the network: footage is read from files and from nowhere else.
+# OpenCV reads these when it first opens a video. -8 silences ffmpeg's own messages, which repeat ours. A playlist named
+# .mp4 must not access the network: footage is read from files only.
 os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
 os.environ.setdefault("OPENCV_FFMPEG_CAPTURE_OPTIONS", "protocol_whitelist;file")
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from ...errors import VideoError
 
@@ -28,32 +29,39 @@ if TYPE_CHECKING:
     from av.container import InputContainer
 
 _PROTOCOLS = {"protocol_whitelist": "file"}
-_WORTH_A_JUMP_S = 20.0
+_MIN_SEEK_S = 20.0  # below this, decoding every frame is as fast as seeking
 _AV1 = ("av01", "AV01")
-# Degrees clockwise by which a picture is to be turned.
-_TURN = {90: cv2.ROTATE_90_CLOCKWISE, 180: cv2.ROTATE_180, 270: cv2.ROTATE_90_COUNTERCLOCKWISE}
+# Degrees clockwise by which an image has to be rotated to be upright.
+_ROTATIONS = {90: cv2.ROTATE_90_CLOCKWISE, 180: cv2.ROTATE_180, 270: cv2.ROTATE_90_COUNTERCLOCKWISE}
 
 
 class FrameReader(Protocol):
-    """What decodes a file."""
+    """Decoder of one file."""
 
-    rate: float  # frames a second as the container says; 0 where it does not
-    frame_count: float  # what the container claims
+    rate: float  # frames per second according to the container; 0 if it does not say
+    frame_count: float  # according to the container
 
-    def read(self) -> tuple[float, np.ndarray] | None:
-        """Next frame: seconds and upright RGB; None at the end, or where decoding stops."""
+    def read(self) -> tuple[float, NDArray[np.uint8]] | None:
+        """Decode the next frame.
+
+        :return: time in seconds and the upright image (H, W, 3) uint8 RGB; None at the end, or where decoding fails.
+        """
 
     def skip_to(self, seconds: float, fps: Fraction) -> int:
-        """Go on to the first frame at or after that time; returns its index, or where the video ends."""
+        """Skip to the first frame at or after a time.
+
+        :param fps: rate by which an index is converted to a time.
+        :return: index of the frame that is read next; the number of frames if the video ends before.
+        """
 
     def close(self) -> None:
-        """Let go of the file."""
+        """Close the file."""
 
 
 def open_reader(path: Path) -> FrameReader:
-    """The first reader that can decode the file.
+    """Open the file with the first reader that can decode it.
 
-    :raises VideoError: none can.
+    :raises VideoError: no reader can.
     """
     reader = OpencvReader(path)
     if reader.codec not in _AV1:
@@ -62,18 +70,21 @@ def open_reader(path: Path) -> FrameReader:
     return PyavReader(path)
 
 
-def _upright(image: np.ndarray, aspect: float, clockwise_deg: int) -> np.ndarray:
-    """With square pixels, the shorter side stretched so that no detail is lost, and turned."""
+def _upright(image: NDArray[np.uint8], aspect: float, clockwise_deg: int) -> NDArray[np.uint8]:
+    """Stretch the side with the coarser pixels until pixels are square, then rotate the image."""
     if abs(aspect - 1) > 1e-3:
         height, width = image.shape[:2]
         size = (round(width * aspect), height) if aspect > 1 else (width, round(height / aspect))
-        image = cv2.resize(image, size, interpolation=cv2.INTER_LINEAR)
-    turn = _TURN.get(clockwise_deg % 360)
-    return image if turn is None else cv2.rotate(image, turn)
+        image = cast(NDArray[np.uint8], cv2.resize(image, size, interpolation=cv2.INTER_LINEAR))
+    rotation = _ROTATIONS.get(clockwise_deg % 360)
+    return image if rotation is None else cast(NDArray[np.uint8], cv2.rotate(image, rotation))
 
 
 class OpencvReader:
-    """cv2.VideoCapture with rotation and pixel aspect applied here: which backends do it varies between versions."""
+    """cv2.VideoCapture with rotation and pixel aspect applied here, because OpenCV versions differ in applying them.
+
+    :raises VideoError: OpenCV cannot open the file.
+    """
 
     def __init__(self, path: Path) -> None:
         self._capture = cv2.VideoCapture(str(path.absolute()), cv2.CAP_FFMPEG)
@@ -83,39 +94,39 @@ class OpencvReader:
                 "convert it to an H.264 .mp4"
             )
         self._capture.set(cv2.CAP_PROP_ORIENTATION_AUTO, 0)
-        self._turn = round(self._get(cv2.CAP_PROP_ORIENTATION_META))
+        self._rotation_deg = round(self._get(cv2.CAP_PROP_ORIENTATION_META))
         num, den = self._get(cv2.CAP_PROP_SAR_NUM), self._get(cv2.CAP_PROP_SAR_DEN)
         self._aspect = num / den if num > 0 and den > 0 else 1.0
         self._grabbed = False
-        self._bgr: np.ndarray | None = None  # decoded into again and again: new memory takes time
+        self._bgr: NDArray[np.uint8] | None = None  # reused for every frame: allocating memory takes time
         self.rate, self.frame_count = self._get(cv2.CAP_PROP_FPS), self._get(cv2.CAP_PROP_FRAME_COUNT)
 
     @property
     def codec(self) -> str:
-        """Four letters that name it."""
+        """The FourCC of the video stream."""
         code = int(self._get(cv2.CAP_PROP_FOURCC)) & 0xFFFFFFFF
         return code.to_bytes(4, "little").decode("ascii", "replace")
 
     def _get(self, prop: int) -> float:
-        return self._capture.get(prop)
+        return float(self._capture.get(prop))
 
-    def read(self) -> tuple[float, np.ndarray] | None:
+    def read(self) -> tuple[float, NDArray[np.uint8]] | None:
         """See `FrameReader`."""
-        ok, image = self._capture.retrieve(self._bgr) if self._grabbed else self._capture.read(self._bgr)
+        ok, decoded = self._capture.retrieve(self._bgr) if self._grabbed else self._capture.read(self._bgr)
         self._grabbed = False
-        if not ok or image is None:
+        if not ok or decoded is None:
             return None
-        self._bgr = image
-        image = _upright(image, self._aspect, self._turn)
-        return self._get(cv2.CAP_PROP_POS_MSEC) / 1000, cv2.cvtColor(image, cv2.COLOR_BGR2RGB)
+        self._bgr = cast(NDArray[np.uint8], decoded)
+        image = cv2.cvtColor(_upright(self._bgr, self._aspect, self._rotation_deg), cv2.COLOR_BGR2RGB)
+        return self._get(cv2.CAP_PROP_POS_MSEC) / 1000, cast(NDArray[np.uint8], image)
 
     def skip_to(self, seconds: float, fps: Fraction) -> int:
         """See `FrameReader`.
 
-        A jump saves decoding what comes before, where the container knows where it leads; else frame by frame.
+        Seeks if the container reports where the seek has led, which saves decoding; else reads frame by frame.
         """
-        if seconds > _WORTH_A_JUMP_S:
-            early = seconds - _WORTH_A_JUMP_S / 2
+        if seconds > _MIN_SEEK_S:
+            early = seconds - _MIN_SEEK_S / 2
             self._capture.set(cv2.CAP_PROP_POS_FRAMES, int(early * fps))
             index = round(self._get(cv2.CAP_PROP_POS_FRAMES))
             landed = self._capture.grab()
@@ -128,7 +139,7 @@ class OpencvReader:
         return self._grab_to(seconds, 0, self._get(cv2.CAP_PROP_POS_MSEC) / 1000, fps)
 
     def _grab_to(self, seconds: float, index: int, time: float, fps: Fraction) -> int:
-        """From the frame that was just grabbed. The next ``read`` gives the frame whose index is returned."""
+        """Skip from the frame that was just grabbed. The next ``read`` gives the frame whose index is returned."""
         while time < seconds - 1e-6 and self._capture.grab():
             stamp = self._get(cv2.CAP_PROP_POS_MSEC) / 1000
             index, time = index + 1, stamp if stamp > time else time + float(1 / fps)
@@ -141,9 +152,10 @@ class OpencvReader:
 
 
 def _open_with_pyav(path: Path) -> tuple[type[Exception], InputContainer | None]:
-    """What PyAV raises, and the file, opened; None where it is nothing that it knows. Imported here: few files need it.
+    """Open a file with PyAV, which is imported here because few files need it.
 
-    :raises VideoError: PyAV is missing.
+    :return: the base of PyAV's exceptions, and the container; None if PyAV cannot open the file.
+    :raises VideoError: PyAV is not installed.
     """
     try:
         import av
@@ -159,10 +171,15 @@ def _open_with_pyav(path: Path) -> tuple[type[Exception], InputContainer | None]
     return av.error.FFmpegError, container
 
 
-def presented_s(path: Path) -> float | None:
-    """How long a video is shown: less than it holds where it was cut without being coded anew; None if it is not known.
+def _rgb(frame: av.VideoFrame) -> NDArray[np.uint8]:
+    return cast(NDArray[np.uint8], frame.to_ndarray(format="rgb24"))
 
-    OpenCV counts frames that an edit list leaves out, and in Matroska those before the first one.
+
+def presented_duration_s(path: Path) -> float | None:
+    """Read for how many seconds a video is shown; None if that is unknown.
+
+    A video that was cut without re-encoding holds more frames than it shows. OpenCV also counts the frames that an edit
+    list leaves out, and in Matroska those before the start.
     """
     try:
         _, container = _open_with_pyav(path)
@@ -179,30 +196,34 @@ def presented_s(path: Path) -> float | None:
         return length_s if length_s > 0 else None
 
 
-def decode_items(path: Path, numbers: Collection[int], most_pixels: int) -> dict[int, np.ndarray]:
-    """The coded pictures of a HEIF file (`heif`) by item, (h, w, 3) RGB; of a damaged file, those that were decoded.
+def decode_items(path: Path, numbers: Collection[int], max_pixels: int) -> dict[int, NDArray[np.uint8]]:
+    """Decode items of a HEIF file (see `heif`).
 
-    Gives up at ``most_pixels`` in all. PyAV's streams bear the numbers of the items, of which the first counts: what
-    moves in an animation has a number of its own, which may be the same.
+    PyAV's stream ids are the item numbers. Of several streams with one id, the first is the item; the others belong to
+    an animation.
 
-    :raises VideoError: PyAV is missing.
+    :param numbers: of the items to decode.
+    :param max_pixels: the limit for all items together, beyond which nothing is returned.
+    :return: (h, w, 3) uint8 RGB by item number; for a damaged file, the items that could be decoded.
+    :raises VideoError: PyAV is not installed.
     """
-    pictures: dict[int, np.ndarray] = {}
+    pictures: dict[int, NDArray[np.uint8]] = {}
+    pixels_left = max_pixels
     failure, container = _open_with_pyav(path)
     if container is None:
         return pictures
     with container:
         streams = {stream.id: stream for stream in reversed(container.streams.video) if stream.id in numbers}
         for stream in streams.values():
-            stream.codec_context.thread_count = 1  # each has threads of its own, and there are hundreds of streams
+            stream.codec_context.thread_count = 1  # there may be hundreds of streams, each with its own threads
         try:
             for packet in container.demux(list(streams.values())) if streams else ():
                 for frame in cast("list[av.VideoFrame]", packet.decode()):
-                    most_pixels -= frame.width * frame.height
-                    if most_pixels < 0:
+                    pixels_left -= frame.width * frame.height
+                    if pixels_left < 0:
                         return {}
                     if packet.stream.id not in pictures:
-                        pictures[packet.stream.id] = frame.to_ndarray(format="rgb24")
+                        pictures[packet.stream.id] = _rgb(frame)
                 if len(pictures) == len(streams):
                     break
         except (failure, OSError, ValueError):
@@ -211,7 +232,10 @@ def decode_items(path: Path, numbers: Collection[int], most_pixels: int) -> dict
 
 
 class PyavReader:
-    """PyAV's decoders: AV1 and more."""
+    """PyAV's decoders, for AV1.
+
+    :raises VideoError: PyAV is not installed or cannot open the file.
+    """
 
     def __init__(self, path: Path) -> None:
         self._failure, container = _open_with_pyav(path)
@@ -228,18 +252,18 @@ class PyavReader:
     def _next(self) -> av.VideoFrame | None:
         try:
             return next(self._frames, None)
-        except (self._failure, OSError, ValueError):  # damaged: what came before counts
+        except (self._failure, OSError, ValueError):  # damaged: the video ends here
             return None
 
     def _time(self, frame: av.VideoFrame) -> float:
         return 0.0 if frame.time is None else float(frame.time) - self._start_s
 
-    def read(self) -> tuple[float, np.ndarray] | None:
+    def read(self) -> tuple[float, NDArray[np.uint8]] | None:
         """See `FrameReader`."""
         frame = self._next()
         if frame is None:
             return None
-        image = _upright(frame.to_ndarray(format="rgb24"), self._aspect, -round(frame.rotation))
+        image = _upright(_rgb(frame), self._aspect, -round(frame.rotation))
         return self._time(frame), image
 
     def skip_to(self, seconds: float, fps: Fraction) -> int:

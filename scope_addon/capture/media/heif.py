@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The primary picture of a HEIF file (.heic, .avif): of which items it is made, how it is turned, and its EXIF.
+"""The primary picture of a HEIF file (.heic, .avif): its items, its rotation and its EXIF.
 
-A file has items: coded pictures, grids made of them (phones code pictures in tiles), thumbnails, depth, EXIF. Which one
-is the picture, and how the others belong to it, is told by boxes within its ``meta`` box. Decoders give the items that
-are coded; what a grid makes of them is here. Crops (``clap``) and overlays (``iovl``) are not known. PyAV does
-not say how tiles belong together, and libheif's packages for Python can crash where a file's boxes are damaged.
+A file has items: coded pictures, grids of coded pictures (phones code pictures in tiles), thumbnails, depth, EXIF. The
+boxes within its ``meta`` box identify the primary picture and its relations to the other items. A decoder decodes the
+coded items; this module assembles a grid from them. Crops (``clap``) and overlays (``iovl``) are not supported. PyAV
+does not report how tiles belong together, and libheif's Python packages can crash if a file's boxes are damaged.
 
 Sources: ISO/IEC 23008-12 (items, grids, irot, imir), ISO/IEC 14496-12 (boxes, iloc, iinf, iref).
 """
@@ -16,39 +16,45 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
 CODED = (b"hvc1", b"av01")
-MOST_TILES = 1000  # as many as ffmpeg opens
-MOST_PIXELS = 1 << 28  # more than any camera has; a few bytes of a hostile file can ask for any number
-_MOST_BOXES = 10_000  # of one level; a file that has more is not a picture
-_MOST_PARTS = 20_000  # in which the items of a file lie, together
-_MOST_TURNS = 16
+MAX_TILES = 1000  # ffmpeg's limit
+MAX_PIXELS = 1 << 28  # more than any camera has; a few bytes of a malicious file can declare any number
+_MAX_BOXES = 10_000  # on one level; a file with more is not a picture
+_MAX_EXTENTS = 20_000  # of all items of a file together
+_MAX_TRANSFORMS = 16
 
 
 @dataclass(frozen=True)
 class Layout:
-    """How the picture is made. ``tiles`` (rows, columns) numbers of items; ``size`` (width, height) of what they hold.
+    """How the primary picture is assembled from items.
 
-    ``size`` is None for a picture in one piece. ``turns`` are what is done with the whole, in order: ("irot", quarter
-    turns anticlockwise) or ("imir", 0: upside down, 1: left for right). ``exif`` is a TIFF directory, or empty.
+    ``tiles`` (rows, columns) item numbers; ``size`` (width, height) of the assembled picture, None if it is not a grid;
+    ``transforms`` to apply to the whole in order: ("irot", number of 90° rotations anticlockwise) or ("imir", axis to
+    flip: 0 vertical, 1 horizontal); ``exif``: a TIFF directory, or empty.
     """
 
-    tiles: np.ndarray
+    tiles: NDArray[np.int64]
     size: tuple[int, int] | None
-    turns: tuple[tuple[str, int], ...] = ()
+    transforms: tuple[tuple[str, int], ...] = ()
     exif: bytes = b""
 
 
 def read_layout(data: bytes) -> Layout | None:
-    """The layout of a whole file's primary picture; None where it is damaged, or of a kind that is not known."""
+    """Read the layout of the primary picture from the bytes of a file; None if it is damaged or not supported."""
     try:
-        return _Items(data).layout()
+        return _MetaBox(data).layout()
     except (struct.error, IndexError, KeyError, ValueError, StopIteration):
         return None
 
 
-def assemble(layout: Layout, pictures: Mapping[int, np.ndarray]) -> np.ndarray | None:
-    """The upright picture (H, W, 3) of decoded items (h, w, 3); None where they do not fit each other."""
+def assemble(layout: Layout, pictures: Mapping[int, NDArray[np.uint8]]) -> NDArray[np.uint8] | None:
+    """Assemble the primary picture and rotate it upright.
+
+    :param pictures: the decoded items by number, (h, w, 3) uint8 RGB.
+    :return: (H, W, 3) uint8 RGB; None if an item is missing or the sizes do not match the layout.
+    """
     if any(number not in pictures for number in layout.tiles.ravel().tolist()):
         return None
     shape = pictures[int(layout.tiles[0, 0])].shape
@@ -58,12 +64,13 @@ def assemble(layout: Layout, pictures: Mapping[int, np.ndarray]) -> np.ndarray |
     if not ((rows - 1) * tall < height <= rows * tall and (columns - 1) * wide < width <= columns * wide):
         return None
     whole = np.empty((height, width, 3), np.uint8)
-    for (row, column), number in np.ndenumerate(layout.tiles):
+    for (row, column), item in np.ndenumerate(layout.tiles):
+        number = int(item)
         if pictures[number].shape != shape:
             return None
-        place = whole[row * tall : (row + 1) * tall, column * wide : (column + 1) * wide]
-        place[:] = pictures[number][: place.shape[0], : place.shape[1]]
-    for kind, value in layout.turns:
+        target = whole[row * tall : (row + 1) * tall, column * wide : (column + 1) * wide]
+        target[:] = pictures[number][: target.shape[0], : target.shape[1]]
+    for kind, value in layout.transforms:
         whole = np.rot90(whole, value) if kind == "irot" else np.flip(whole, axis=value)
     return np.ascontiguousarray(whole)
 
@@ -71,66 +78,72 @@ def assemble(layout: Layout, pictures: Mapping[int, np.ndarray]) -> np.ndarray |
 @dataclass
 class _Item:
     kind: bytes = b""
-    parts: list[tuple[int, int]] = field(default_factory=list)  # offset and length
-    is_inside: bool = False  # offsets count from the idat box
+    extents: list[tuple[int, int]] = field(default_factory=list)  # offset and length
+    is_in_idat: bool = False  # offsets are relative to the idat box
     tiles: list[int] = field(default_factory=list)
 
 
-class _Items:
-    """The meta box of a file."""
+class _MetaBox:
+    """Parser of the meta box of a file.
+
+    :raises ValueError: it is damaged; also struct.error, IndexError, KeyError and StopIteration.
+    """
 
     def __init__(self, data: bytes) -> None:
         self._data = data
         self._items: dict[int, _Item] = {}
         start, end = next((a, b) for name, a, b in self._boxes(0, len(data)) if name == b"meta")
         boxes = {name: (a, b) for name, a, b in self._boxes(start + 4, end)}
-        self._inside = boxes.get(b"idat", (0, 0))
+        self._idat = boxes.get(b"idat", (0, 0))
         read = _Reader(data, *boxes[b"pitm"])
         self._primary = read.integer(2 if read.version == 0 else 4)
         self._read_kinds(*boxes[b"iinf"])
-        self._read_places(_Reader(data, *boxes[b"iloc"]))
-        self._about: list[tuple[int, int]] = []  # which item tells about which
-        self._turns: list[tuple[str, int]] = []  # of the primary item
+        self._read_locations(_Reader(data, *boxes[b"iloc"]))
+        self._descriptions: list[tuple[int, int]] = []  # describing item, described item
+        self._transforms: list[tuple[str, int]] = []  # of the primary item
         if b"iref" in boxes:
             self._read_references(*boxes[b"iref"])
         if b"iprp" in boxes:
-            self._read_turns(*boxes[b"iprp"])
+            self._read_transforms(*boxes[b"iprp"])
 
     def layout(self) -> Layout:
-        """Of the primary item."""
+        """Read the layout of the primary item.
+
+        :raises ValueError: it is damaged, too large or not supported; also struct.error, IndexError and KeyError.
+        """
         item = self._items[self._primary]
         exif = b""
-        tellers = [self._items.get(teller, _Item()) for teller, told in self._about if told == self._primary]
-        teller = next((item for item in tellers if item.kind == b"Exif"), None)
-        if teller is not None:
-            content = self._content(teller)
+        metadata = [self._items.get(number, _Item()) for number, of in self._descriptions if of == self._primary]
+        exif_item = next((item for item in metadata if item.kind == b"Exif"), None)
+        if exif_item is not None:
+            content = self._content(exif_item)
             exif = content[4 + int.from_bytes(content[:4], "big") :]
         if item.kind in CODED:
-            return Layout(np.array([[self._primary]]), None, tuple(self._turns), exif)
+            return Layout(np.array([[self._primary]]), None, tuple(self._transforms), exif)
         if item.kind != b"grid":
-            raise ValueError(item.kind)
+            raise ValueError(f"items of type {item.kind!r} are not supported")
         grid = self._content(item)
         rows, columns = grid[2] + 1, grid[3] + 1
         width, height = struct.unpack_from(">II" if grid[1] & 1 else ">HH", grid, 4)
-        if not 0 < width * height <= MOST_PIXELS or rows * columns > MOST_TILES:
-            raise ValueError("too large")
+        if not 0 < width * height <= MAX_PIXELS or rows * columns > MAX_TILES:
+            raise ValueError("the grid is empty or too large")
         tiles = np.array(item.tiles).reshape(rows, columns)
         if any(self._items[number].kind not in CODED for number in item.tiles):
-            raise ValueError("tiles of another kind")
-        return Layout(tiles, (width, height), tuple(self._turns), exif)
+            raise ValueError("a tile is not a coded picture")
+        return Layout(tiles, (width, height), tuple(self._transforms), exif)
 
     def _boxes(self, start: int, end: int) -> Iterator[tuple[bytes, int, int]]:
-        """Name, start and end of the content of each box of a level."""
-        for _ in range(_MOST_BOXES):
+        """Iterate over the boxes of one level; yield name, start and end of the content."""
+        for _ in range(_MAX_BOXES):
             if start + 8 > end:
                 return
-            size, name, head = *struct.unpack_from(">I4s", self._data, start), 8
+            size, name, header = *struct.unpack_from(">I4s", self._data, start), 8
             if size == 1:
-                size, head = struct.unpack_from(">Q", self._data, start + 8)[0], 16
-            size = size or end - start  # 0: to the end
-            if size < head or start + size > end:
-                raise ValueError("a box does not fit")
-            yield name, start + head, start + size
+                size, header = struct.unpack_from(">Q", self._data, start + 8)[0], 16
+            size = size or end - start  # 0: up to the end
+            if size < header or start + size > end:
+                raise ValueError("a box does not fit into its parent")
+            yield name, start + header, start + size
             start += size
 
     def _read_kinds(self, start: int, end: int) -> None:
@@ -143,22 +156,22 @@ class _Items:
                 entry.integer(2)
                 self._items[number] = _Item(entry.take(4))
 
-    def _read_places(self, read: _Reader) -> None:
+    def _read_locations(self, read: _Reader) -> None:
         sizes = read.integer(2)
         offset, length, base, index = (sizes >> shift & 15 for shift in (12, 8, 4, 0))
-        wide, parts = read.version == 2, 0
-        for _ in range(read.integer(4 if wide else 2)):
-            item = self._items.setdefault(read.integer(4 if wide else 2), _Item())
-            item.is_inside = bool(read.version and read.integer(2) & 15 == 1)
+        is_wide, extents = read.version == 2, 0
+        for _ in range(read.integer(4 if is_wide else 2)):
+            item = self._items.setdefault(read.integer(4 if is_wide else 2), _Item())
+            item.is_in_idat = bool(read.version and read.integer(2) & 15 == 1)
             read.integer(2)
             begin = read.integer(base)
             count = read.integer(2)
-            parts += count
-            if parts > _MOST_PARTS:
-                raise ValueError("too many parts")
+            extents += count
+            if extents > _MAX_EXTENTS:
+                raise ValueError("too many extents")
             for _ in range(count):
                 read.integer(index if read.version else 0)
-                item.parts.append((begin + read.integer(offset), read.integer(length)))
+                item.extents.append((begin + read.integer(offset), read.integer(length)))
 
     def _read_references(self, start: int, end: int) -> None:
         size = 2 if _Reader(self._data, start, end).version == 0 else 4
@@ -169,33 +182,33 @@ class _Items:
             if name == b"dimg":
                 self._items[number].tiles = to
             elif name == b"cdsc":
-                self._about += [(number, other) for other in to]
+                self._descriptions += [(number, other) for other in to]
 
-    def _read_turns(self, start: int, end: int) -> None:
+    def _read_transforms(self, start: int, end: int) -> None:
         boxes = list(self._boxes(start, end))
         a, b = next((a, b) for name, a, b in boxes if name == b"ipco")
-        turning = (b"irot", b"imir")
-        properties = [(name, self._data[at]) if name in turning else None for name, at, _ in self._boxes(a, b)]
+        supported = (b"irot", b"imir")
+        properties = [(name, self._data[at]) if name in supported else None for name, at, _ in self._boxes(a, b)]
         for a, b in ((a, b) for name, a, b in boxes if name == b"ipma"):
             read = _Reader(self._data, a, b)
             for _ in range(read.integer(4)):
                 number = read.integer(2 if read.version == 0 else 4)
                 for _ in range(read.integer(1)):
                     which = read.integer(2) & 0x7FFF if read.flags & 1 else read.integer(1) & 0x7F
-                    turn = properties[which - 1] if which else None
-                    if turn is not None and number == self._primary and len(self._turns) < _MOST_TURNS:
-                        name, value = turn
-                        self._turns.append((name.decode(), value & (3 if name == b"irot" else 1)))
+                    transform = properties[which - 1] if which else None
+                    if transform is not None and number == self._primary and len(self._transforms) < _MAX_TRANSFORMS:
+                        name, value = transform
+                        self._transforms.append((name.decode(), value & (3 if name == b"irot" else 1)))
 
     def _content(self, item: _Item) -> bytes:
-        if sum(length for _, length in item.parts) > len(self._data):
+        if sum(length for _, length in item.extents) > len(self._data):
             raise ValueError("an item is larger than the file")
-        start, end = self._inside if item.is_inside else (0, len(self._data))
-        return b"".join(self._data[start + at : min(start + at + length, end)] for at, length in item.parts)
+        start, end = self._idat if item.is_in_idat else (0, len(self._data))
+        return b"".join(self._data[start + at : min(start + at + length, end)] for at, length in item.extents)
 
 
 class _Reader:
-    """Integers of a box one after the other, big end first; ``is_full``: version and flags come first."""
+    """Reads the big-endian integers of a box in order; ``is_full``: the box begins with version and flags."""
 
     def __init__(self, data: bytes, start: int, end: int, is_full: bool = True) -> None:
         self._data, self.at, self._end = data, start, end

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Numbered pictures as a video: a folder, a pattern (walk_####.png, walk_%04d.png), or the first one with a rate."""
+"""Image sequences as footage: a folder, a pattern (walk_####.png, walk_%04d.png), or the first picture and a rate."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...errors import VideoError
 from ...footage import LAST_NUMBER, is_sequence, numbered, numbered_from, pictures_in, sequence_pattern
@@ -20,40 +21,45 @@ _NUMBER_SIGN = re.compile(r"#+|%0?\d*d")
 
 @dataclass(frozen=True)
 class PictureSequence:
-    """Numbered pictures in order, and the place of each in time: picture k is shown at ``places[k]`` / fps seconds.
+    """Numbered pictures in order: picture k is shown at ``slots[k]`` / fps seconds.
 
-    Places follow from the numbers, so that time goes on where pictures are missing; numbers in steps of ten are taken
-    for ones in steps of one. Where more than half are missing the numbers count something else, and are only an order.
+    Slots follow from the numbers, so that a missing picture leaves a gap in time. Numbers in constant steps, such as
+    tens, count as consecutive. If more than half of the numbers are missing, they only give the order.
     """
 
     paths: list[Path]
-    places: list[int]
+    slots: list[int]
     warnings: list[str]
 
     @classmethod
-    def of(cls, paths: list[Path], name: str) -> PictureSequence:
-        """Of pictures in order of their last numbers; ``name`` is what warnings call them."""
+    def from_paths(cls, paths: list[Path], name: str) -> PictureSequence:
+        """Derive the slots from the last number of each file name.
+
+        :param paths: pictures, ordered by their last numbers.
+        :param name: of the sequence, for warnings.
+        """
         found = [LAST_NUMBER.search(path.stem) for path in paths]
         numbers = [int(match.group()) if match else 0 for match in found]
         step = math.gcd(*(number - numbers[0] for number in numbers)) or 1
-        places = [(number - numbers[0]) // step for number in numbers]
-        missing = places[-1] + 1 - len(paths)
+        slots = [(number - numbers[0]) // step for number in numbers]
+        missing = slots[-1] + 1 - len(paths)
         if missing <= 0:
-            return cls(paths, places, [])
+            return cls(paths, slots, [])
         between = f"{name}: {missing} numbers between {numbers[0]} and {numbers[-1]} have no picture"
-        if 2 * missing > places[-1] + 1:
-            return cls(paths, list(range(len(paths))), [f"{between}, so the pictures were taken one after the other"])
-        return cls(paths, places, [f"{between}; the time that they would take is left for them"])
+        if 2 * missing > slots[-1] + 1:
+            return cls(paths, list(range(len(paths))), [f"{between}, so the pictures were read as consecutive frames"])
+        return cls(paths, slots, [f"{between}; the time of these frames was kept free"])
 
     def time(self, index: int, fps: Fraction) -> float:
-        """Seconds at which a picture is shown."""
-        return float(self.places[index] / fps)
+        """Calculate at how many seconds a picture is shown."""
+        return float(self.slots[index] / fps)
 
 
 def find_sequence(path: Path, rate_given: bool) -> PictureSequence | None:
-    """The pictures of a sequence; None where the path is no sequence.
+    """Find the pictures of a sequence; None if the path is not a sequence.
 
-    A folder or a pattern is one. A single picture stands for itself, unless a rate is given and others follow it.
+    A folder of pictures or a pattern is a sequence. A single picture is one only if a rate is given and numbered
+    pictures follow it.
 
     :raises VideoError: a folder's pictures differ in more than their last number.
     """
@@ -63,25 +69,29 @@ def find_sequence(path: Path, rate_given: bool) -> PictureSequence | None:
         if len(found) > 1 and not is_sequence(found):
             kinds = {sequence_pattern(p): p.name for p in reversed(found)}
             raise VideoError(
-                f"{path} holds pictures that are no numbered sequence ({', '.join(sorted(kinds.values())[:3])}, …); "
-                "give the pattern of the one that is meant, such as walk_####.png, or a single picture"
+                f"{path} holds pictures that are not a numbered sequence ({', '.join(sorted(kinds.values())[:3])}, …); "
+                "give the pattern of one sequence, such as walk_####.png, or a single picture"
             )
     elif (sign := _NUMBER_SIGN.search(path.name)) and not path.exists() and path.parent.is_dir():
         found = numbered(path.parent, path.name[: sign.start()], path.name[sign.end() :])
     elif rate_given and path.is_file():
         following = numbered_from(path)
         found = following if len(following) > 1 else []
-    return PictureSequence.of(found, path.name) if found else None
+    return PictureSequence.from_paths(found, path.name) if found else None
 
 
 class SequenceReader:
-    """The pictures one after the other, as ``video`` reads a file: ``read``, ``skip_to``, ``close``."""
+    """Reads the pictures in order, with the interface of `FrameReader` that decoding needs."""
 
     def __init__(self, sequence: PictureSequence, fps: Fraction) -> None:
         self._sequence, self._fps, self._next = sequence, fps, 0
 
-    def read(self) -> tuple[float, np.ndarray] | None:
-        """Next picture: seconds and RGB; None after the last one, or where one cannot be decoded."""
+    def read(self) -> tuple[float, NDArray[np.uint8]] | None:
+        """Read the next picture.
+
+        :return: time in seconds and the upright image (H, W, 3) uint8 RGB; None after the last one, or if the picture
+            cannot be decoded.
+        """
         if self._next >= len(self._sequence.paths):
             return None
         picture = read_picture(self._sequence.paths[self._next])
@@ -92,10 +102,10 @@ class SequenceReader:
         return time, picture.rgb
 
     def skip_to(self, seconds: float, fps: Fraction) -> int:
-        """Go to the first picture at or after that time; returns its index."""
+        """Skip to the first picture at or after a time, and return its index."""
         while self._next < len(self._sequence.paths) and self._sequence.time(self._next, fps) < seconds - 1e-6:
             self._next += 1
         return self._next
 
     def close(self) -> None:
-        """Nothing is open between two pictures."""
+        """Do nothing: no file is open between two pictures."""

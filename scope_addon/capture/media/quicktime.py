@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The focal length that telephones write into their .mov and .mp4 files.
+"""The focal length that phones write into their .mov and .mp4 files.
 
-QuickTime metadata: a ``meta`` box, of the film (``moov``) or of a track (``trak``), holds ``keys`` (names) and ``ilst``
-(values, numbered as the names are). Anything damaged or unknown counts as absent. Telephones write the focal length
+QuickTime metadata: a ``meta`` box, of the movie (``moov``) or of a track (``trak``), holds ``keys`` (names) and
+``ilst`` (values, numbered like the names). Damaged or unknown metadata counts as absent. Phones write the focal length
 into the track, whose keys FFmpeg does not report.
 """
 
@@ -20,7 +20,7 @@ _NUMBERS = {23: ">f", 24: ">d", 65: ">b", 66: ">h", 67: ">i", 74: ">q", 75: ">B"
 
 
 def focal_35mm(path: Path) -> float | None:
-    """Focal length in mm on a 36 × 24 mm frame, if the file says; None otherwise."""
+    """Read the focal length in mm on a 36 × 24 mm frame; None if the file does not have it."""
     try:
         with path.open("rb") as file:
             moov = _find_moov(file)
@@ -34,7 +34,7 @@ def focal_35mm(path: Path) -> float | None:
 
 
 def _find_moov(file: BinaryIO) -> bytes:
-    """Payload of the film's index, read without the pictures around it."""
+    """Read the payload of the ``moov`` box, skipping the media data around it."""
     while len(head := file.read(8)) == 8:
         size, name = struct.unpack(">I4s", head)
         payload = size - 8
@@ -49,7 +49,7 @@ def _find_moov(file: BinaryIO) -> bytes:
 
 
 def _boxes(data: bytes) -> Iterator[tuple[bytes, bytes]]:
-    """Name and payload of the boxes that follow each other in ``data``."""
+    """Iterate over the consecutive boxes in ``data``; yield name and payload."""
     at = 0
     while at + 8 <= len(data):
         size, name = struct.unpack_from(">I4s", data, at)
@@ -68,7 +68,7 @@ def _metas(moov: bytes) -> Iterator[bytes]:
 
 
 def _value(meta: bytes) -> float | None:
-    if meta[:4] == b"\0\0\0\0":  # MP4 writes a version here, QuickTime does not
+    if meta[:4] == b"\0\0\0\0":  # MP4 has a version here, QuickTime has none
         meta = meta[4:]
     parts = dict(_boxes(meta))
     names = [name for _, name in _boxes(parts.get(b"keys", b"")[8:])]  # after version and count; each "mdta", name

@@ -1,24 +1,26 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One picture's file as upright 8-bit RGB, whether it is footage by itself or one of a sequence.
+"""Reads a picture file as upright 8-bit RGB: a still, or one frame of an image sequence.
 
-OpenCV reads JPEG, PNG, WebP, TIFF, BMP and others; AVIF and HEIC, which its packages leave out, go to PyAV.
+OpenCV reads JPEG, PNG, WebP, TIFF, BMP and others. Its packages do not read AVIF and HEIC, which PyAV decodes.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any, cast
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from ...errors import VideoError
 from .exif import animation_length, read_exif
 from .frame_readers import decode_items
-from .heif import MOST_PIXELS, assemble, read_layout
+from .heif import MAX_PIXELS, assemble, read_layout
 
-_JPEG_STREAMS = (".mjpeg", ".mjpg")  # begin like a picture, but are many
-_HEIF_BRANDS = {b"mif1", b"heic", b"heix", b"heim", b"heis", b"avif"}  # ISO 23008-12's, and AVIF's
+_JPEG_STREAMS = (".mjpeg", ".mjpg")  # begin like a JPEG, but are videos
+_HEIF_BRANDS = {b"mif1", b"heic", b"heix", b"heim", b"heis", b"avif"}  # of ISO 23008-12 and of AVIF
 _OPENEXR, _GIF = b"v/1\x01", b"GIF8"
 
 
@@ -26,15 +28,15 @@ _OPENEXR, _GIF = b"v/1\x01", b"GIF8"
 class Picture:
     """``rgb`` (H, W, 3) uint8; ``focal_35mm`` in mm on a 36 × 24 mm frame; ``length`` more than 1 for an animation."""
 
-    rgb: np.ndarray
+    rgb: NDArray[np.uint8]
     focal_35mm: float | None = None
     length: int = 1
 
 
 def is_picture(path: Path) -> bool:
-    """Whether a file's content is a picture that can be read, rather than a video or none of both.
+    """Check by its content whether a file is a picture that can be read, rather than a video or anything else.
 
-    :raises VideoError: it is a picture of a kind that cannot be read.
+    :raises VideoError: it is a picture in a format that is not supported (OpenEXR).
     """
     with path.open("rb") as file:
         head = file.read(64)
@@ -48,9 +50,9 @@ def is_picture(path: Path) -> bool:
 
 
 def read_picture(path: Path) -> Picture | None:
-    """The picture in a file, None where it cannot be decoded; what is transparent shows white, but in AVIF and HEIC.
+    """Decode a picture; None if that fails. Transparent parts become white, except in AVIF and HEIC.
 
-    :raises VideoError: it is AVIF or HEIC, and PyAV is missing.
+    :raises VideoError: it is AVIF or HEIC, and PyAV is not installed.
     """
     data = path.read_bytes()
     if _brands(data[:64]) & _HEIF_BRANDS:
@@ -63,13 +65,13 @@ def read_picture(path: Path) -> Picture | None:
         return None
     exif = read_exif(data)
     rgb = _as_rgb8(image)
-    if data[:4] not in (b"II*\0", b"MM\0*"):  # OpenCV turns a TIFF upright even when told not to
+    if data[:4] not in (b"II*\0", b"MM\0*"):  # OpenCV rotates a TIFF upright even with IMREAD_UNCHANGED
         rgb = _upright(rgb, exif.orientation)
     return Picture(rgb, exif.focal_35mm, animation_length(data))
 
 
 def _brands(head: bytes) -> set[bytes]:
-    """What an ISO base media file (MP4, HEIC, AVIF, ...) says it is compatible with; empty for others."""
+    """Read the compatible brands of an ISO base media file (MP4, HEIC, AVIF, ...); empty for other files."""
     if head[4:8] != b"ftyp":
         return set()
     size = min(int.from_bytes(head[:4], "big"), len(head))
@@ -80,25 +82,25 @@ def _read_heif(path: Path, data: bytes) -> Picture | None:
     layout = read_layout(data)
     if layout is None:
         return None
-    whole = assemble(layout, decode_items(path, set(layout.tiles.ravel().tolist()), MOST_PIXELS))
+    whole = assemble(layout, decode_items(path, set(layout.tiles.ravel().tolist()), MAX_PIXELS))
     return None if whole is None else Picture(whole, read_exif(layout.exif).focal_35mm)
 
 
-def _as_rgb8(image: np.ndarray) -> np.ndarray:
-    """Grey, BGR or BGRA of any depth -> RGB uint8; what is transparent shows white."""
+def _as_rgb8(image: NDArray[Any]) -> NDArray[np.uint8]:
+    """Convert grey, BGR or BGRA of any depth to RGB uint8, on white where it is transparent."""
     if image.dtype == np.uint16:
         image = cv2.convertScaleAbs(image, alpha=1 / 257)
     elif image.dtype != np.uint8:
         image = (np.clip(np.nan_to_num(image), 0, 1) * 255 + 0.5).astype(np.uint8)
     if image.ndim == 2:
-        return cv2.cvtColor(image, cv2.COLOR_GRAY2RGB)
+        return cast(NDArray[np.uint8], cv2.cvtColor(image, cv2.COLOR_GRAY2RGB))
     if image.shape[2] == 4:
         alpha = image[:, :, 3:].astype(np.float32) / 255
         image = (image[:, :, :3] * alpha + 255 * (1 - alpha) + 0.5).astype(np.uint8)
-    return cv2.cvtColor(image, cv2.COLOR_BGR2RGB)
+    return cast(NDArray[np.uint8], cv2.cvtColor(image, cv2.COLOR_BGR2RGB))
 
 
-def _upright(image: np.ndarray, orientation: int) -> np.ndarray:
+def _upright(image: NDArray[np.uint8], orientation: int) -> NDArray[np.uint8]:
     """Undo an EXIF orientation (1..8)."""
     if orientation in (5, 6, 7, 8):
         image = image.transpose(1, 0, 2)

@@ -1,15 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Videos and pictures as a sequence of upright RGB frames with square pixels and presentation timestamps.
+"""Footage as a sequence of upright RGB frames with square pixels and presentation timestamps.
 
     with open_video("dance.mp4") as video:
-        for frame in video:            # decoded ahead in a thread, a few frames at most in memory
+        for frame in video:            # decoded ahead in a thread; at most a few frames in memory
             frame.index, frame.timestamp_s, frame.image_rgb
-    video.warnings                     # what the user should hear: stopped early, changed size, ...
+    video.warnings                     # for the user: decoding stopped early, the frame size changed, ...
 
-``open_video("dance.mp4", VideoRange(start_s=60, end_s=90, fps=Fraction(25)))`` gives a part of it, or fewer frames;
-index and time of each frame stay those of the whole video.
-
-OpenCV says the frame rate as a float; ``video.fps`` is the rational the container meant (30000/1001, not 29.97003).
+``open_video("dance.mp4", VideoRange(start_s=60, end_s=90, fps=Fraction(25)))`` gives a part of it at a
+lower rate; the index and time of each frame are still those of the whole video.
 """
 
 from __future__ import annotations
@@ -23,33 +21,33 @@ from contextlib import closing
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from pathlib import Path
+from typing import cast
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from ...errors import VideoError
 from .frame import Frame
-from .frame_readers import FrameReader, open_reader, presented_s
+from .frame_rate import DEFAULT_FPS, estimate_fps, exact_fps
+from .frame_readers import FrameReader, open_reader, presented_duration_s
 from .image_sequence import PictureSequence, SequenceReader, find_sequence
 from .quicktime import focal_35mm
 from .still_images import is_picture, read_picture
-from .video_range import VideoRange, Wanted
+from .video_range import FootageRange, VideoRange
 
-cv2.setLogLevel(0)  # silent: failures are reported by exception, in one sentence
+cv2.setLogLevel(0)  # silent: failures are reported as exceptions
 
-STILL_FPS = Fraction(30)  # a picture has no rate; one frame of the commonest does no harm in a scene
-_AHEAD = 4  # decoded frames waiting: a 4K frame takes 25 MB
-_STANDARD_RATES = [Fraction(n) for n in (24, 25, 30, 48, 50, 60, 120, 240)]
-_STANDARD_RATES += [Fraction(n * 1000, 1001) for n in (24, 30, 48, 60, 120, 240)]
+_QUEUED_FRAMES = 4  # decoded ahead; a 4K frame takes 25 MB
 
 
 @dataclass
 class Video:
-    """Footage that was opened and whose first frame was decoded. Each iteration starts at the first frame of the range.
+    """Open footage, whose first frame could be decoded. Each iteration starts at the first frame of the range.
 
-    ``frame_count`` is what the container claims of the whole and may be wrong; ``expected_frames`` is what follows
-    from it for the range. ``fps`` is of the frames that come out, ``source_fps`` of those in the file. ``focal_35mm``
-    is in mm on a 36 × 24 mm frame.
+    ``width``, ``height`` in pixels of the upright frames; ``frame_count`` of the whole footage according to the
+    container, which may be wrong; ``fps``: rational rate of the frames that an iteration yields, ``source_fps`` of
+    those in the file; ``focal_35mm`` in mm on a 36 × 24 mm frame, or None; ``wanted``: the range.
     """
 
     path: Path
@@ -62,17 +60,17 @@ class Video:
     wanted: VideoRange = field(default_factory=VideoRange)
     _source_fps: Fraction | None = field(default=None, repr=False)
     _sequence: PictureSequence | None = field(default=None, repr=False)
-    _still: np.ndarray | None = field(default=None, repr=False)
+    _still: NDArray[np.uint8] | None = field(default=None, repr=False)
     _decoders: list[_Decoder] = field(default_factory=list, repr=False)
 
     @property
     def source_fps(self) -> Fraction:
-        """Frame rate of the file."""
+        """Frame rate of the file, frames per second."""
         return self._source_fps or self.fps
 
     @property
     def expected_frames(self) -> int:
-        """How many frames an iteration gives, as far as the container is right."""
+        """Number of frames that an iteration yields, if the container's frame count is right."""
         if self._sequence is not None:
             times = [self._sequence.time(k, self.fps) for k in range(self.frame_count)]
             return max(1, sum(self.wanted.start_s - 1e-6 <= t <= self.wanted.end_s + 1e-6 for t in times))
@@ -90,7 +88,7 @@ class Video:
             yield from decoder
 
     def close(self) -> None:
-        """Stop every decoding thread of this video; an iteration under way ends."""
+        """Stop the decoding threads of this video; a running iteration ends."""
         while self._decoders:
             self._decoders.pop().close()
 
@@ -101,12 +99,14 @@ class Video:
         self.close()
 
 
-def open_video(path: str | Path, wanted: Wanted | None = None) -> Video:
-    """Open a video or a picture (JPEG, HEIC, PNG, WebP, TIFF, ...; 16-bit and alpha too) and decode its first frame.
+def open_video(path: str | Path, wanted: FootageRange | None = None) -> Video:
+    """Open a video or a picture (JPEG, HEIC, PNG, WebP, TIFF, ..., also 16-bit and with alpha); decode its first frame.
 
-    Numbered pictures are a video as well (`image_sequence`); what is wanted then says their rate, else it is 30.
+    Image sequences (see `image_sequence`) count as videos, with the rate of ``wanted``, or else 30.
 
+    :param wanted: the range of frames and their rate; None for all.
     :raises VideoError: it does not exist, is not a file, holds nothing that can be decoded, or ends before the range.
+    :raises UsageError: a timecode of the range does not exist at the footage's rate.
     """
     path = Path(path)
     wanted = wanted or VideoRange()
@@ -119,25 +119,25 @@ def open_video(path: str | Path, wanted: Wanted | None = None) -> Video:
             " or capture a folder of videos with scope batch"
         )
     try:
-        found = path.stat()
-        if not stat.S_ISREG(found.st_mode):  # opening a pipe would wait for a writer
+        status = path.stat()
+        if not stat.S_ISREG(status.st_mode):  # opening a pipe would wait for a writer
             raise VideoError(f"{path} is a pipe or a device, and footage is read from files; save it as one first")
         with path.open("rb"):
             pass
     except FileNotFoundError as error:
         web = re.match(r"\w{2,}:[/\\]", str(path))
-        what = "download it first, because footage is read from files" if web else "check the path"
-        raise VideoError(f"{path} does not exist; {what}") from error
+        advice = "download it first, because footage is read from files" if web else "check the path"
+        raise VideoError(f"{path} does not exist; {advice}") from error
     except OSError as error:
         raise VideoError(f"{path} cannot be read ({error.strerror}); check its permissions") from error
-    if found.st_size == 0:
+    if status.st_size == 0:
         raise VideoError(f"{path} is empty (0 bytes); export or download it again")
     return _open_still(path, wanted) if is_picture(path) else _open_moving(path, wanted)
 
 
-def _open_sequence(path: Path, sequence: PictureSequence, asked: Wanted) -> Video:
-    fps = asked.fps or STILL_FPS
-    wanted = asked.at_rate(fps)
+def _open_sequence(path: Path, sequence: PictureSequence, requested: FootageRange) -> Video:
+    fps = requested.fps or DEFAULT_FPS
+    wanted = requested.at_rate(fps)
     first = read_picture(sequence.paths[0])
     if first is None:
         raise _damaged(sequence.paths[0])
@@ -146,46 +146,46 @@ def _open_sequence(path: Path, sequence: PictureSequence, asked: Wanted) -> Vide
     video = Video(path, width, height, fps, count, first.focal_35mm, wanted=replace(wanted, fps=None))
     video._sequence = sequence
     video.warnings += sequence.warnings
-    if asked.fps is None and count > 1:
+    if requested.fps is None and count > 1:
         video.warnings.append(
-            f"{path.name}: pictures have no frame rate, so 30 a second were taken; another is said by --fps on the "
-            "command line"
+            f"{path.name}: pictures have no frame rate, so 30 frames per second were assumed; give another rate with "
+            "--fps on the command line"
         )
     return video
 
 
-def _open_still(path: Path, asked: Wanted) -> Video:
+def _open_still(path: Path, requested: FootageRange) -> Video:
     picture = read_picture(path)
     if picture is None:
         raise _damaged(path)
     height, width = picture.rgb.shape[:2]
-    video = Video(path, width, height, STILL_FPS, 1, picture.focal_35mm, _still=picture.rgb)
-    if asked != VideoRange():
+    video = Video(path, width, height, DEFAULT_FPS, 1, picture.focal_35mm, _still=picture.rgb)
+    if requested != VideoRange():
         video.warnings.append(f"{path.name} is a single picture: a start, an end or a frame rate changes nothing")
     if picture.length > 1:
         video.warnings.append(
-            f"{path.name} is an animation of {picture.length} pictures, of which the first alone was captured; "
-            "convert it to an .mp4 or a .gif for all of them"
+            f"{path.name} is an animation of {picture.length} pictures, of which only the first was captured; "
+            "convert it to an .mp4 or a .gif to capture all of them"
         )
     return video
 
 
 def _damaged(picture: Path) -> VideoError:
-    return VideoError(f"{picture} is a picture that cannot be decoded; it may be damaged, so export it again, as JPEG")
+    return VideoError(f"{picture} is a picture that cannot be decoded; it may be damaged, so export it again as JPEG")
 
 
-def _open_moving(path: Path, asked: Wanted) -> Video:
+def _open_moving(path: Path, requested: FootageRange) -> Video:
     with closing(open_reader(path)) as reader:
         first = reader.read()
         if first is None:
-            raise VideoError(f"{path} opens but no frame of it can be decoded; convert it to H.264 .mp4 and try again")
-        fps = exact_fps(reader.rate) or _fps_from_timestamps(reader)
+            raise VideoError(f"{path} can be opened, but none of its frames can be decoded; convert it to H.264 .mp4")
+        fps = exact_fps(reader.rate) or estimate_fps(reader)
         count = reader.frame_count
     height, width = first[1].shape[:2]
-    shown_s = presented_s(path)
+    shown_s = presented_duration_s(path)
     claimed = shown_s * fps if shown_s else count
     frame_count = max(1, round(claimed)) if 0 < claimed < 1e9 else 1
-    wanted = asked.at_rate(fps)
+    wanted = requested.at_rate(fps)
     video = Video(path, width, height, fps, frame_count, focal_35mm(path), wanted=wanted)
     if wanted.start_s > 0 and count > 0 and wanted.start_s * fps > frame_count + fps:
         raise VideoError(
@@ -197,44 +197,17 @@ def _open_moving(path: Path, asked: Wanted) -> Video:
         if wanted.fps > fps:
             video.warnings.append(
                 f"{path.name} has {float(fps):g} frames per second; {float(wanted.fps):g} would repeat some, "
-                "so all were used once"
+                "so each was used once"
             )
     return video
 
 
-def exact_fps(fps: float) -> Fraction | None:
-    """The rational behind a float frame rate; None if it is no frame rate (0, NaN, a clock's 90000).
-
-    A ratio of small numbers comes through a float unharmed and is taken as it is (30000/1001, 2997/100). A rate
-    averaged over a file's duration is not such a ratio: it becomes the standard rate within 0.001 % if there is one.
-    """
-    if not 0.01 < fps <= 1000:  # also False for NaN
-        return None
-    simple = Fraction(fps).limit_denominator(1001)
-    if abs(simple - Fraction(fps)) < Fraction(fps) / 10**11:
-        return simple
-    nearest = min(_STANDARD_RATES, key=lambda rate: abs(rate - Fraction(fps)))
-    if abs(nearest - Fraction(fps)) < nearest / 10**5:
-        return nearest
-    return Fraction(fps).limit_denominator(100_000)
-
-
-def _fps_from_timestamps(reader: FrameReader) -> Fraction:
-    """Rate from the first second or so of frames, for a container that does not say."""
-    times: list[float] = []
-    while len(times) < 30 and (got := reader.read()) is not None:
-        times.append(got[0])
-    steps = np.diff(times)
-    steps = steps[steps > 0]
-    return (exact_fps(round(1 / float(np.median(steps)), 2)) if len(steps) else None) or STILL_FPS
-
-
 class _Decoder:
-    """Decodes a video in a thread of its own into a bounded queue, so that decoding overlaps with inference."""
+    """Decodes a video in its own thread into a bounded queue, so that decoding and inference overlap."""
 
     def __init__(self, video: Video) -> None:
         self._video = video
-        self._queue: queue.Queue[Frame | BaseException | None] = queue.Queue(_AHEAD)
+        self._queue: queue.Queue[Frame | BaseException | None] = queue.Queue(_QUEUED_FRAMES)
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, name="scope-decode", daemon=True)
         self._thread.start()
@@ -272,31 +245,32 @@ class _Decoder:
             with closing(source) as reader:
                 self._decode(reader)
             self._put(None)
-        except Exception as error:  # carried to the thread that iterates, which raises it
+        except Exception as error:  # raised again by the thread that iterates
             self._put(error)
 
     def _decode(self, reader: FrameReader | SequenceReader) -> None:
         video, index, time = self._video, 0, 0.0
-        chooser = video.wanted.chooser()
+        sampler = video.wanted.sampler()
         resized = False
         first = index = reader.skip_to(video.wanted.start_s, video.source_fps) if video.wanted.start_s > 0 else 0
-        while not self._stop.is_set() and (got := reader.read()) is not None:
-            # Some containers have no timestamps, others repeat one: time then goes on at the frame rate.
-            time = got[0] if index == first or got[0] > time else time + float(1 / video.source_fps)
-            image = got[1]
+        while not self._stop.is_set() and (decoded := reader.read()) is not None:
+            # Some containers have no timestamps, others repeat one: time then advances by the frame rate.
+            time = decoded[0] if index == first or decoded[0] > time else time + float(1 / video.source_fps)
+            image = decoded[1]
             if time > video.wanted.end_s + 1e-6:
                 break
             if image.shape[:2] != (video.height, video.width):
-                image, resized = cv2.resize(image, (video.width, video.height)), True
-            for frame in chooser.choose(Frame(index, time, image)):
+                image = cast(NDArray[np.uint8], cv2.resize(image, (video.width, video.height)))
+                resized = True
+            for frame in sampler.add(Frame(index, time, image)):
                 self._put(frame)
             index += 1
-        for frame in chooser.rest():
+        for frame in sampler.flush():
             self._put(frame)
         if self._stop.is_set():
             return
         if resized:
-            self._warn(f"the picture size changes within {video.path.name}; all frames were scaled to the first")
+            self._warn(f"the frame size changes within {video.path.name}; all frames were scaled to the first one's")
         # Both tests: a container that counts frames from its duration is wrong for a variable frame rate.
         missing = video.frame_count - index
         last = min(float((video.frame_count - 1) / video.source_fps), video.wanted.end_s)

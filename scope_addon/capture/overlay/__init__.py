@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The captured bodies drawn over the footage."""
+"""Draws the captured bodies over the footage."""

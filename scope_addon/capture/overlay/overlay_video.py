@@ -1,38 +1,41 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The fitted bodies drawn over the footage, to see at a glance whether a capture is right.
+"""Draws the fitted bodies over the footage, to show at a glance whether a capture is right.
 
-The mesh is posed in the world from the motion file and brought into each frame's camera with the inverse of
-``world_from_camera``, so that the overlay checks what other programs will read, not what the solver remembers.
+The mesh is posed in the world from the motion file and transformed into each frame's camera by the inverse of
+``world_from_camera``, so that the overlay checks the data that other programs read, not the state of the solver.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any, cast
 
 import cv2
 import numpy as np
 from numba import njit
+from numpy.typing import ArrayLike, NDArray
 
 from ....solver.body import Body
 from ....solver.errors import ShapeError
 from ....solver.rotations import exp
-from ...atomic_write import reason, written_beside
+from ...atomic_write import atomic_path, reason
 from ...errors import OutputError
 from ...motion import Motion
 from ..camera.intrinsics import scaled_intrinsics
-from ..media.video import Frame, Video, open_video
-from ..media.video_range import Wanted
+from ..media.frame import Frame
+from ..media.video import Video, open_video
+from ..media.video_range import FootageRange
 from ..perception.landmark_network import KEYPOINT_COUNT
 from .rasterizer import Canvas, rasterize
 
 VIDEO_SUFFIXES = (".mp4", ".mov", ".mkv")
 STILL_SUFFIXES = (".png", ".jpg", ".jpeg", ".webp")
 LONGEST_SIDE = 1920
-_FAINT = 0.35  # opacity of a pose that was filled in, relative to one that was seen
+_FAINT = 0.35  # opacity of a filled-in pose, relative to one that was seen
 _TINTS = np.array([[1.0, 0.55, 0.15], [0.2, 0.75, 1.0], [0.55, 0.9, 0.3], [0.95, 0.4, 0.75], [0.95, 0.85, 0.25]])
-# H.264 plays everywhere, but the Linux wheels of OpenCV have no encoder for it; MPEG-4 Part 2 is in all of them and
-# plays in desktop players, editors and Blender. VP9, which they also have, takes 60 times as long.
+# H.264 plays everywhere, but OpenCV's Linux wheels have no encoder for it. All wheels have MPEG-4 Part 2, which plays
+# in desktop players, editors and Blender. VP9, which they also have, takes 60 times as long.
 _CODECS = (("avc1", cv2.CAP_ANY), ("mp4v", cv2.CAP_FFMPEG), ("mp4v", cv2.CAP_ANY))
 
 Progress = Callable[[int, int], None]
@@ -46,16 +49,20 @@ def write_overlay(
     *,
     opacity: float = 0.6,
     progress: Progress | None = None,
-    wanted: Wanted | None = None,
+    wanted: FootageRange | None = None,
 ) -> None:
     """Write the footage with every person's body over it.
 
-    The video has the footage's rate and size (at most 1920 pixels along the longer side, both sides even). A picture
-    suffix (.png, .jpg, .webp) gives the first frame in which somebody was seen.
+    The video has the footage's rate and size (at most 1920 pixels along the longer side, both sides even). With the
+    suffix of a picture (.png, .jpg, .webp), only the first frame in which a person was seen is written.
 
-    :param wanted: the part of the footage that was captured.
-    :param progress: called with (frames done, frames expected); what it raises stops the work, and nothing is left.
-    :raises OutputError: the suffix is none of ours, or the file cannot be written.
+    :param opacity: of the bodies, 0..1.
+    :param wanted: the range of the footage that was captured.
+    :param progress: called with (frames done, frames expected). An exception that it raises stops the work, and no file
+        is left behind.
+    :raises OutputError: the suffix is not supported, or the file cannot be written.
+    :raises VideoError: the footage cannot be read.
+    :raises ShapeError: a motion does not have the joints of the body.
     """
     path = Path(path)
     people = [motions] if isinstance(motions, Motion) else list(motions)
@@ -66,7 +73,7 @@ def write_overlay(
     with open_video(video_path, wanted) as video:
         painter = _Painter(people, body, video, opacity, even=suffix in VIDEO_SUFFIXES)
         try:
-            with written_beside(path) as temporary:
+            with atomic_path(path) as temporary:
                 if suffix in STILL_SUFFIXES:
                     _write_still(temporary, painter, video, _first_seen(people))
                 else:
@@ -76,63 +83,83 @@ def write_overlay(
 
 
 def draw_overlay(
-    image_rgb: np.ndarray,
-    vertices_cam: np.ndarray | Sequence[np.ndarray],
-    faces: np.ndarray,
-    intrinsics: np.ndarray,
-    dist: np.ndarray | None = None,
-    colors: np.ndarray | Sequence[np.ndarray] | None = None,
+    image_rgb: NDArray[np.uint8],
+    vertices_cam: NDArray[np.floating[Any]] | Sequence[NDArray[np.floating[Any]]],
+    faces: NDArray[np.integer[Any]],
+    intrinsics: NDArray[np.float64],
+    dist: NDArray[np.float64] | None = None,
+    colors: ArrayLike | Sequence[ArrayLike] | None = None,
     opacity: float | Sequence[float] = 0.6,
-    canvas: Canvas | None = None,
-) -> np.ndarray:
-    """Bodies over one picture, solid and shaded, those in front hiding those behind.
+) -> NDArray[np.uint8]:
+    """Draw shaded bodies over one image, with occlusion between them.
 
     :param image_rgb: (H, W, 3) uint8.
-    :param vertices_cam: (V, 3), or one such array per person: metres, camera frame (OpenCV axes).
+    :param vertices_cam: (V, 3), or one such array per person: metres, camera axes (OpenCV's).
     :param faces: (F, 3) or (F, 4), counter-clockwise seen from outside.
+    :param intrinsics: (3, 3) K in pixels of the image.
+    :param dist: up to (5,) distortion coefficients; None for none.
     :param colors: per person (3,) or (F, 3) sRGB in 0..1; None: a tint each.
     :param opacity: 0..1, one for all or one per person.
-    :param canvas: kept between frames by a caller who draws many.
-    :return: a new picture of the same size.
+    :return: a new image of the same size.
     """
-    people = [vertices_cam] if np.ndim(vertices_cam) == 2 else list(vertices_cam)
+    people = [np.asarray(vertices_cam)] if np.ndim(vertices_cam) == 2 else [np.asarray(v) for v in vertices_cam]
     if colors is None:
         colors = [tint(i) for i in range(len(people))]
     elif isinstance(colors, np.ndarray) and len(people) == 1 and colors.ndim <= 2:
         colors = [colors]
-    opacities = np.broadcast_to(np.asarray(opacity, float), (len(people),))
-    height, width = image_rgb.shape[:2]
-    if canvas is None or canvas.depth.shape != (height, width):
-        canvas = Canvas.blank(width, height)
-    else:
-        canvas.clear()
+    per_person = list(cast("Sequence[ArrayLike]", colors))
+    opacities = np.broadcast_to(np.asarray(opacity, float), (len(people),)).tolist()
+    canvas = Canvas.blank(image_rgb.shape[1], image_rgb.shape[0])
+    draw_bodies(canvas, people, faces, intrinsics, dist, per_person, opacities)
+    return blended(image_rgb, canvas)
+
+
+def draw_bodies(
+    canvas: Canvas,
+    vertices_cam: Sequence[NDArray[np.floating[Any]]],
+    faces: NDArray[np.integer[Any]],
+    intrinsics: NDArray[np.float64],
+    dist: NDArray[np.float64] | None,
+    colors: Sequence[ArrayLike],
+    opacities: Sequence[float],
+) -> None:
+    """Draw the bodies of several people into a canvas.
+
+    For the parameters see `draw_overlay`; here they are lists with one element per person.
+    """
     triangles = _triangles(faces)
-    for person, color, alpha in zip(people, colors, opacities, strict=True):
+    for vertices, color, opacity in zip(vertices_cam, colors, opacities, strict=True):
         per_face = np.asarray(color, np.float32)
         if per_face.ndim == 2 and len(per_face) != len(triangles):
             per_face = np.concatenate([per_face, per_face])  # a quad's two halves
-        rasterize(canvas, np.asarray(person), triangles, per_face, intrinsics, dist, float(alpha))
+        rasterize(canvas, vertices, triangles, per_face, intrinsics, dist, opacity)
+
+
+def blended(image_rgb: NDArray[np.uint8], canvas: Canvas) -> NDArray[np.uint8]:
+    """Return a copy of an (H, W, 3) uint8 image with the canvas over it."""
     out = np.ascontiguousarray(image_rgb).copy()
     _blend(out, canvas.rgba)
     return out
 
 
-def tint(person: int) -> np.ndarray:
-    """(3,) sRGB colour of the person with this number."""
-    return _TINTS[person % len(_TINTS)]
+def tint(person: int) -> NDArray[np.float64]:
+    """Return the (3,) sRGB colour of the person with this index."""
+    color: NDArray[np.float64] = _TINTS[person % len(_TINTS)]
+    return color
 
 
-def body_colors(body: Body, person: int) -> np.ndarray:
-    """(F, 3) sRGB face colours: the body's materials, washed in the person's tint."""
+def body_colors(body: Body, person: int) -> NDArray[np.float64]:
+    """Calculate the (F, 3) sRGB colours of the faces: the body's materials mixed with the person's tint."""
     if body.face_material is None or body.material_colors is None:
         return np.tile(tint(person), (len(body.faces), 1))
     linear = np.clip(body.material_colors[:, :3], 0, 1)
     srgb = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
-    return (0.85 * tint(person) + 0.15 * srgb)[body.face_material]
+    colors: NDArray[np.float64] = (0.85 * tint(person) + 0.15 * srgb)[body.face_material]
+    return colors
 
 
-def camera_vertices(motion: Motion, body: Body, row: int) -> np.ndarray:
-    """(V, 3) the posed mesh of one row of a motion, in that row's camera frame, metres."""
+def camera_vertices(motion: Motion, body: Body, row: int) -> NDArray[np.float64]:
+    """Pose the mesh of one row of a motion: (V, 3) metres, in the axes of that row's camera."""
     betas = motion.betas.astype(float)
     rotations = exp(motion.poses[row].reshape(-1, 3).astype(float))
     R_world, t_world = body.forward_kinematics(rotations, motion.trans[row].astype(float), betas)
@@ -141,15 +168,15 @@ def camera_vertices(motion: Motion, body: Body, row: int) -> np.ndarray:
     return body.skin(R_camera_world @ R_world, (t_world - T[:3, 3]) @ T[:3, :3], betas)
 
 
-def _triangles(faces: np.ndarray) -> np.ndarray:
+def _triangles(faces: NDArray[np.integer[Any]]) -> NDArray[np.integer[Any]]:
     if faces.shape[1] == 3:
         return faces
     return np.concatenate([faces[:, [0, 1, 2]], faces[:, [0, 2, 3]]])
 
 
 @njit(cache=True, nogil=True)
-def _blend(image, rgba):
-    """Lay ``rgba`` over ``image`` in place; a pixel at the edge counts by how much of its surroundings is covered."""
+def _blend(image: NDArray[np.uint8], rgba: NDArray[np.uint8]) -> None:
+    """Blend ``rgba`` over ``image`` in place; at outlines, opacity is scaled by the covered share of the neighbours."""
     height, width = image.shape[:2]
     for v in range(height):
         for u in range(width):
@@ -167,7 +194,7 @@ def _blend(image, rgba):
 
 
 class _Painter:
-    """Paints the frames of one clip; scales the camera with the picture."""
+    """Draws the overlay of the frames of one clip; scales the intrinsics with the image."""
 
     def __init__(self, people: list[Motion], body: Body, video: Video, opacity: float, even: bool) -> None:
         for motion in people:
@@ -179,53 +206,56 @@ class _Painter:
         self._scale = min(1.0, LONGEST_SIDE / max(video.width, video.height))
         width, height = (max(2, round(side * self._scale)) for side in (video.width, video.height))
         self._resized = (width, height)
-        # Encoders want even sides. The last row or column is cut off, which leaves the camera as it is.
+        # Encoders need even sides. Cropping the last row or column does not change the intrinsics.
         self._size = (width - width % 2, height - height % 2) if even else self._resized
         self._canvas = Canvas.blank(*self._size)
 
-    def paint(self, frame: Frame) -> np.ndarray:
+    def paint(self, frame: Frame) -> NDArray[np.uint8]:
         image = frame.image_rgb
         if image.shape[1::-1] != self._resized:
-            image = cv2.resize(image, self._resized, interpolation=cv2.INTER_AREA)
+            image = cast(NDArray[np.uint8], cv2.resize(image, self._resized, interpolation=cv2.INTER_AREA))
         width, height = self._size
         image = np.ascontiguousarray(image[:height, :width])
         shown = [(i, rows[frame.index]) for i, rows in enumerate(self._rows) if frame.index in rows]
         if not shown:
             return image
-        # Everybody of one clip was filmed by the same camera.
+        # All people of one clip have the same camera.
         motion = self._people[shown[0][0]]
-        image = draw_overlay(
-            image,
+        self._canvas.clear()
+        draw_bodies(
+            self._canvas,
             [camera_vertices(self._people[i], self._body, row) for i, row in shown],
             self._body.faces,
             scaled_intrinsics(motion.intrinsics, self._scale),
             motion.dist,
             [self._colors[i] for i, _ in shown],
             [self._opacity * (1.0 if self._people[i].valid[row] else _FAINT) for i, row in shown],
-            self._canvas,
         )
+        image = blended(image, self._canvas)
         for i, row in shown:
             if self._people[i].valid[row]:
-                self._dots(image, self._people[i].keypoints2d[row], tint(i))
+                self._draw_keypoints(image, self._people[i].keypoints2d[row], tint(i))
         return image
 
-    def _dots(self, image: np.ndarray, keypoints: np.ndarray, color: np.ndarray) -> None:
+    def _draw_keypoints(
+        self, image: NDArray[np.uint8], keypoints: NDArray[np.floating[Any]], color: NDArray[np.float64]
+    ) -> None:
         radius = max(1, round(max(image.shape[:2]) / 500))
         for k, (u, v, confidence) in enumerate(keypoints):
             if confidence > 0.3 and np.isfinite((u, v)).all() and max(abs(u), abs(v)) < 1e5:
                 center = (round(float(u * self._scale)), round(float(v * self._scale)))
-                if k < KEYPOINT_COUNT:  # a hand's lie close together: they go without the rim
+                if k < KEYPOINT_COUNT:  # those of a hand are too close together for a dark rim
                     cv2.circle(image, center, radius + 1, (20, 20, 20), -1, cv2.LINE_AA)
                 cv2.circle(image, center, radius, tuple(int(c) for c in 255 * (0.5 + 0.5 * color)), -1, cv2.LINE_AA)
 
 
 def _first_seen(people: list[Motion]) -> int:
-    """Index of the first frame in which somebody was seen; 0 if nobody ever was."""
+    """Find the index of the first frame in which a person was seen; 0 if there is none."""
     return min((int(m.frames[m.valid][0]) for m in people if m.valid.any()), default=0)
 
 
 def _write_still(path: Path, painter: _Painter, video: Video, index: int) -> None:
-    for frame in video:  # the last one is kept
+    for frame in video:  # keeps the last one
         if frame.index >= index:
             break
     ok, data = cv2.imencode(path.suffix, cv2.cvtColor(painter.paint(frame), cv2.COLOR_RGB2BGR))
@@ -247,8 +277,8 @@ def _write_video(temporary: Path, painter: _Painter, video: Video, path: Path, p
     finally:
         if writer is not None:
             writer.release()
-    if not _is_readable(temporary):  # the encoder says nothing about what it could not write
-        raise OutputError(f"cannot write {path} to its end; free some space or choose another folder")
+    if not _is_readable(temporary):  # the encoder does not report what it could not write
+        raise OutputError(f"cannot write {path} completely; free some space or choose another folder")
 
 
 def _open_writer(temporary: Path, fps: float, width: int, height: int, path: Path) -> cv2.VideoWriter:
@@ -262,7 +292,7 @@ def _open_writer(temporary: Path, fps: float, width: int, height: int, path: Pat
 
 
 def _is_readable(video: Path) -> bool:
-    """Whether a video has its table of contents, which is written last."""
+    """Check if a video can be read: its index is written last."""
     reader = cv2.VideoCapture(str(video))
     try:
         return reader.isOpened() and reader.grab()

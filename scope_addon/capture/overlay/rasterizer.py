@@ -1,43 +1,46 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A small z-buffer rasterizer: triangles in the camera frame -> colour, opacity and depth images.
+"""A small z-buffer rasterizer: from triangles in camera axes to images of colour, opacity and depth.
 
 A vertex (x, y, z) in camera axes (OpenCV: x right, y down, z forward, metres) appears at
 
-    (u, v) = K · distort(x / z, y / z)          pixel centres at whole numbers, as OpenCV has them
+    (u, v) = K · distort(x / z, y / z)          pixel centres at integers, as in OpenCV
 
 with OpenCV's five distortion coefficients (k1, k2, p1, p2, k3). Within a triangle 1/z is linear in (u, v), and an
-attribute a is interpolated with perspective: a = Σ λᵢ aᵢ/zᵢ / Σ λᵢ/zᵢ. Distortion bends vertices, not edges.
-Shading is Lambert's, from a light above the camera's left shoulder, plus a rim where the surface turns away.
+attribute a is interpolated with perspective: a = Σ λᵢ aᵢ/zᵢ / Σ λᵢ/zᵢ. Distortion is applied to vertices, so that
+edges stay straight. Shading is Lambertian, with a light above and to the left of the camera, plus a rim light at
+grazing angles.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
-NEAR = 0.05  # metres; what is closer is cut off
+NEAR = 0.05  # metres; the near plane, at which triangles are clipped
 _TO_LIGHT = np.array([-0.40, -0.66, -0.63]) / np.linalg.norm([-0.40, -0.66, -0.63])
 _AMBIENT, _DIFFUSE, _RIM = 0.42, 0.58, 0.30
-_IN_FRONT, _BEHIND, _OUTSIDE = 0, 1, 2  # where a vertex lies: visible, behind the near plane, beyond the lens model
+_IN_FRONT, _BEHIND, _OUTSIDE = 0, 1, 2  # vertex: visible, behind the near plane, beyond the distortion model
 
 
 @dataclass
 class Canvas:
-    """What was drawn: ``rgba`` (H, W, 4) uint8, sRGB and opacity, and ``depth`` (H, W) float32 metres, inf if empty."""
+    """The drawing: ``rgba`` (H, W, 4) uint8, sRGB and opacity, and ``depth`` (H, W) float32 metres, inf if empty."""
 
-    rgba: np.ndarray
-    depth: np.ndarray
+    rgba: NDArray[np.uint8]
+    depth: NDArray[np.float32]
 
     @classmethod
     def blank(cls, width: int, height: int) -> Canvas:
-        """An empty canvas."""
+        """Create an empty canvas; width and height in pixels."""
         return cls(np.zeros((height, width, 4), np.uint8), np.full((height, width), np.inf, np.float32))
 
     @property
-    def coverage(self) -> np.ndarray:
-        """(H, W) bool: where something was drawn."""
+    def coverage(self) -> NDArray[np.bool_]:
+        """(H, W) bool: True where something was drawn."""
         return np.isfinite(self.depth)
 
     def clear(self) -> None:
@@ -48,38 +51,44 @@ class Canvas:
 
 def rasterize(
     canvas: Canvas,
-    vertices_cam: np.ndarray,
-    triangles: np.ndarray,
-    face_colors: np.ndarray,
-    intrinsics: np.ndarray,
-    dist: np.ndarray | None = None,
+    vertices_cam: NDArray[np.floating[Any]],
+    triangles: NDArray[np.integer[Any]],
+    face_colors: NDArray[np.floating[Any]],
+    intrinsics: NDArray[np.float64],
+    dist: NDArray[np.float64] | None = None,
     opacity: float = 1.0,
 ) -> None:
-    """Draw a mesh into the canvas, in front of or behind what is there already. Faces seen from behind are left out.
+    """Draw a mesh into the canvas, with depth test and back-face culling.
 
-    :param vertices_cam: (V, 3) metres, camera frame.
+    :param canvas: modified in place.
+    :param vertices_cam: (V, 3) metres, camera axes.
     :param triangles: (F, 3) vertex indices, counter-clockwise seen from outside.
     :param face_colors: (F, 3) sRGB, 0..1; or (3,), one colour for all.
-    :param intrinsics: (3, 3) K in pixels of the canvas; dist: up to (5,), none if None.
+    :param intrinsics: (3, 3) K in pixels of the canvas.
+    :param dist: up to (5,) distortion coefficients; None for none.
     :param opacity: 0..1, written to the canvas's fourth channel.
     """
     vertices = np.ascontiguousarray(vertices_cam, np.float64)
-    triangles = np.ascontiguousarray(triangles, np.int32)
-    colors = np.broadcast_to(np.asarray(face_colors, np.float32), (len(triangles), 3))
+    corners = np.ascontiguousarray(triangles, np.int32)
+    colors = np.broadcast_to(np.asarray(face_colors, np.float32), (len(corners), 3))
     lens = np.zeros(5)
     if dist is not None:
-        given = np.ravel(dist)[:5]
-        lens[: len(given)] = given
+        coefficients = np.ravel(dist)[:5]
+        lens[: len(coefficients)] = coefficients
     K = np.ascontiguousarray(intrinsics, np.float64)
-    shading = shade(vertices, vertex_normals(vertices, triangles))
+    shading = shade(vertices, vertex_normals(vertices, corners))
     screen, where = _project(vertices, K, lens, _largest_radius2(lens))
     alpha = np.uint8(round(255 * min(max(opacity, 0.0), 1.0)))
-    _draw(canvas.rgba, canvas.depth, vertices, screen, where, shading, triangles, colors, K, lens, alpha)
+    _draw(canvas.rgba, canvas.depth, vertices, screen, where, shading, corners, colors, K, lens, alpha)
 
 
 @njit(cache=True, nogil=True)
-def vertex_normals(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """(V, 3) unit normals, each the area-weighted mean of the triangles around a vertex (zero where there are none)."""
+def vertex_normals(vertices: NDArray[np.float64], triangles: NDArray[np.int32]) -> NDArray[np.float64]:
+    """Calculate unit normals (V, 3), area-weighted means of the triangles around each vertex (zero without triangles).
+
+    :param vertices: (V, 3).
+    :param triangles: (F, 3) vertex indices.
+    """
     normals = np.zeros_like(vertices)
     for f in range(len(triangles)):
         a, b, c = triangles[f]
@@ -98,8 +107,12 @@ def vertex_normals(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
 
 
 @njit(cache=True, nogil=True)
-def shade(vertices: np.ndarray, normals: np.ndarray) -> np.ndarray:
-    """(V, 2): factor on the surface's colour (ambient + Lambert), and white to add (rim)."""
+def shade(vertices: NDArray[np.float64], normals: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Calculate the shading (V, 2): factor on the surface's colour (ambient + Lambert), and white to add (rim).
+
+    :param vertices: (V, 3) metres, camera axes.
+    :param normals: (V, 3) unit vectors.
+    """
     out = np.empty((len(vertices), 2))
     for i in range(len(vertices)):
         x, y, z = vertices[i]
@@ -111,8 +124,8 @@ def shade(vertices: np.ndarray, normals: np.ndarray) -> np.ndarray:
     return out
 
 
-def _largest_radius2(lens: np.ndarray) -> float:
-    """Squared x/z radius up to which radial distortion grows; beyond it the polynomial folds the image back."""
+def _largest_radius2(lens: NDArray[np.float64]) -> float:
+    """Calculate the squared normalized radius beyond which radial distortion is no longer monotonic."""
     k1, k2, _, _, k3 = lens
     roots = np.roots([7 * k3, 5 * k2, 3 * k1, 1.0])
     real = roots[(abs(roots.imag) < 1e-9) & (roots.real > 0)].real
@@ -120,8 +133,8 @@ def _largest_radius2(lens: np.ndarray) -> float:
 
 
 @njit(cache=True, nogil=True)
-def _pixel(x: float, y: float, K: np.ndarray, lens: np.ndarray) -> tuple[float, float]:
-    """Pixel of the normalized image point (x, y)."""
+def _pixel(x: float, y: float, K: NDArray[np.float64], lens: NDArray[np.float64]) -> tuple[float, float]:
+    """Project the normalized image point (x, y) to a pixel."""
     r2 = x * x + y * y
     radial = 1 + r2 * (lens[0] + r2 * (lens[1] + r2 * lens[4]))
     u = x * radial + 2 * lens[2] * x * y + lens[3] * (r2 + 2 * x * x)
@@ -130,8 +143,10 @@ def _pixel(x: float, y: float, K: np.ndarray, lens: np.ndarray) -> tuple[float, 
 
 
 @njit(cache=True, nogil=True)
-def _project(vertices: np.ndarray, K: np.ndarray, lens: np.ndarray, largest: float) -> tuple[np.ndarray, np.ndarray]:
-    """(V, 3) pixels and 1/z, and (V,) where each vertex lies."""
+def _project(
+    vertices: NDArray[np.float64], K: NDArray[np.float64], lens: NDArray[np.float64], largest: float
+) -> tuple[NDArray[np.float64], NDArray[np.uint8]]:
+    """Project the vertices: (V, 3) pixels and 1/z, and (V,) whether they are in front, behind or outside."""
     screen = np.zeros((len(vertices), 3))
     where = np.zeros(len(vertices), np.uint8)
     for i in range(len(vertices)):
@@ -147,7 +162,19 @@ def _project(vertices: np.ndarray, K: np.ndarray, lens: np.ndarray, largest: flo
 
 
 @njit(cache=True, nogil=True)
-def _draw(rgba, depth, vertices, screen, where, shading, triangles, colors, K, lens, alpha):
+def _draw(
+    rgba: NDArray[np.uint8],
+    depth: NDArray[np.float32],
+    vertices: NDArray[np.float64],
+    screen: NDArray[np.float64],
+    where: NDArray[np.uint8],
+    shading: NDArray[np.float64],
+    triangles: NDArray[np.int32],
+    colors: NDArray[np.float32],
+    K: NDArray[np.float64],
+    lens: NDArray[np.float64],
+    alpha: np.uint8,
+) -> None:
     cut = np.empty((4, 5))
     for f in range(len(triangles)):
         a, b, c = triangles[f]
@@ -157,15 +184,22 @@ def _draw(rgba, depth, vertices, screen, where, shading, triangles, colors, K, l
         if behind == 0:
             _fill(rgba, depth, screen[a], screen[b], screen[c], shading[a], shading[b], shading[c], colors[f], alpha)
             continue
-        n = _cut_at_near(cut, vertices, shading, triangles[f], K, lens)
+        n = _clip_at_near(cut, vertices, shading, triangles[f], K, lens)
         for k in range(1, n - 1):
             p, q, r = cut[0], cut[k], cut[k + 1]
             _fill(rgba, depth, p[:3], q[:3], r[:3], p[3:], q[3:], r[3:], colors[f], alpha)
 
 
 @njit(cache=True, nogil=True)
-def _cut_at_near(cut, vertices, shading, triangle, K, lens):
-    """The part of a triangle beyond the near plane, as a fan of 3 or 4 corners (u, v, 1/z, shading); their number."""
+def _clip_at_near(
+    cut: NDArray[np.float64],
+    vertices: NDArray[np.float64],
+    shading: NDArray[np.float64],
+    triangle: NDArray[np.int32],
+    K: NDArray[np.float64],
+    lens: NDArray[np.float64],
+) -> int:
+    """Clip a triangle at the near plane to a fan of 3 or 4 corners (u, v, 1/z, shading); return their number."""
     n = 0
     for i in range(3):
         a, b = triangle[i], triangle[(i + 1) % 3]
@@ -187,11 +221,22 @@ def _cut_at_near(cut, vertices, shading, triangle, K, lens):
 
 
 @njit(cache=True, nogil=True)
-def _fill(rgba, depth, a, b, c, shade_a, shade_b, shade_c, color, alpha):
-    """One triangle from screen corners (u, v, 1/z): every pixel centre inside it that is nearer than what is there."""
+def _fill(
+    rgba: NDArray[np.uint8],
+    depth: NDArray[np.float32],
+    a: NDArray[np.float64],
+    b: NDArray[np.float64],
+    c: NDArray[np.float64],
+    shade_a: NDArray[np.float64],
+    shade_b: NDArray[np.float64],
+    shade_c: NDArray[np.float64],
+    color: NDArray[np.float32],
+    alpha: np.uint8,
+) -> None:
+    """Fill one triangle with corners (u, v, 1/z): the pixels whose centres it covers and that pass the depth test."""
     height, width = depth.shape
     area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
-    # Seen from outside, a counter-clockwise triangle turns the other way here, since v points down.
+    # A triangle that is counter-clockwise seen from outside is clockwise here, since v points down.
     if not (area < 0 and abs(area) < 1e18):
         return
     u0 = int(np.ceil(min(max(min(a[0], b[0], c[0]), 0.0), width)))
@@ -205,7 +250,7 @@ def _fill(rgba, depth, a, b, c, shade_a, shade_b, shade_c, color, alpha):
         lb = du_b * (u0 - c[0]) + dv_b * (v - c[1])
         for u in range(u0, u1 + 1):
             lc = 1.0 - la - lb
-            # A hair of tolerance, so that rounding leaves no gap between neighbours.
+            # The tolerance prevents gaps between neighbours by rounding.
             if la >= -1e-9 and lb >= -1e-9 and lc >= -1e-9:
                 wa, wb, wc = la * a[2], lb * b[2], lc * c[2]
                 z = 1.0 / (wa + wb + wc)

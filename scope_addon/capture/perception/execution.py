@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the networks are computed on: the processor, or a graphics card through one of onnxruntime's providers."""
+"""Where networks run: on the CPU, or on a GPU through one of onnxruntime's execution providers."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Any
 from ...errors import UsageError
 
 AUTO, CPU, DIRECTML = "auto", "cpu", "directml"
-# Our name: onnxruntime's, and how people write it.
+# Our name: onnxruntime's name and the label in messages.
 PROVIDERS = {
     "cuda": ("CUDAExecutionProvider", "CUDA"),
     "tensorrt": ("TensorrtExecutionProvider", "TensorRT"),
@@ -20,15 +20,18 @@ PROVIDERS = {
     CPU: ("CPUExecutionProvider", "CPU"),
 }
 CHOICES = (AUTO, *(name for name in reversed(PROVIDERS)))
-# TensorRT compiles every network for minutes before it is fast, so nobody gets it who did not ask for it.
-_BY_ITSELF = ("cuda", DIRECTML, "coreml")
+# TensorRT compiles every network for minutes first, so it is used only on request.
+_AUTOMATIC = ("cuda", DIRECTML, "coreml")
 
 
 @dataclass
 class Execution:
-    """The provider that was asked for, and what became of it while sessions were opened.
+    """The requested execution provider, and which providers opened sessions or failed to.
 
-    ``failed`` are providers that could not make a session, ``used`` our names of those that did, in order.
+    ``provider``: one of `CHOICES`; ``used``, ``failed``: our names of the providers that opened a session, in order, or
+    could not.
+
+    :raises UsageError: the provider does not exist.
     """
 
     provider: str = CPU
@@ -37,33 +40,33 @@ class Execution:
     failed: set[str] = field(default_factory=set)
 
     def __post_init__(self) -> None:
-        """Refuse a provider that does not exist."""
+        """Check that the provider exists."""
         if self.provider not in CHOICES:
             raise UsageError(f"provider {self.provider!r} does not exist; choose one of {', '.join(CHOICES)}")
 
     def candidates(self, available: Sequence[str]) -> list[str]:
-        """Our names of the providers to try in order, the processor last.
+        """List our names of the providers to try, in order, the CPU last.
 
-        :param available: what onnxruntime says is there, by its own names.
+        :param available: onnxruntime's names of the providers that it was built with.
         """
-        wanted = _BY_ITSELF if self.provider == AUTO else (self.provider,)
-        there = [name for name in wanted if PROVIDERS[name][0] in available and name != CPU]
-        if self.provider not in (AUTO, CPU) and not there:
-            named = [label for ort_name, label in PROVIDERS.values() if ort_name in available]
+        requested = _AUTOMATIC if self.provider == AUTO else (self.provider,)
+        usable = [name for name in requested if PROVIDERS[name][0] in available and name != CPU]
+        if self.provider not in (AUTO, CPU) and not usable:
+            labels = [label for ort_name, label in PROVIDERS.values() if ort_name in available]
             self._warn(
                 self.provider,
-                f"{PROVIDERS[self.provider][1]} was asked for, but this onnxruntime has only {', '.join(named)}; "
+                f"{PROVIDERS[self.provider][1]} was requested, but this onnxruntime has only {', '.join(labels)}; "
                 "the networks run on the CPU",
             )
-        return [*(name for name in there if name not in self.failed), CPU]
+        return [*(name for name in usable if name not in self.failed), CPU]
 
     def succeeded(self, name: str) -> None:
-        """A session was made."""
+        """Record that a session was opened on this provider."""
         if name not in self.used:
             self.used.append(name)
 
     def fell_back(self, name: str, why: object) -> None:
-        """No session could be made; this provider is not tried again."""
+        """Record that no session could be opened on this provider, which is not tried again, and warn."""
         text = " ".join(str(why).split())
         self._warn(name, f"{PROVIDERS[name][1]} cannot run the networks ({text}); they run on the CPU instead")
 
@@ -73,21 +76,22 @@ class Execution:
             self.warnings.append(text)
 
     def describe(self, threads: int) -> str:
-        """What was used, in words: "CUDA", or "CPU, 2 threads"."""
+        """Describe the providers that were used, such as "CUDA" or "CPU, 2 threads"."""
         count = "1 thread" if threads == 1 else f"{threads} threads"
         return " and ".join(PROVIDERS[n][1] + (f", {count}" if n == CPU else "") for n in self.used or [CPU])
 
 
-class OneAtATime:
-    """A session whose runs wait for each other: DirectML cannot run one session in two threads at once."""
+class SerializedSession:
+    """A session that runs in one thread at a time, because DirectML sessions are not thread-safe."""
 
     def __init__(self, session: Any) -> None:
         self._session, self._lock = session, threading.Lock()
 
-    def run(self, *arguments: Any) -> list:
-        """As onnxruntime's."""
+    def run(self, *arguments: Any) -> list[Any]:
+        """Run the network, with the arguments and results of onnxruntime's ``run``."""
         with self._lock:
-            return self._session.run(*arguments)
+            outputs: list[Any] = self._session.run(*arguments)
+        return outputs
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._session, name)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The hand landmark network: a region of the image to the 21 keypoints of one hand, in the image and in space."""
+"""The hand landmark network: from a region of the image to the 21 keypoints of one hand, in 2D and 3D."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from .execution import Execution
 from .hand_region import region_from_landmarks
@@ -29,46 +30,50 @@ _OUTPUTS = ["landmarks", "presence", "handedness", "world"]
 
 @dataclass(frozen=True)
 class HandEstimate:
-    """What the network says about one region.
+    """The network's estimate for one region.
 
     ``keypoints_px`` (21, 2) image pixels; ``world_landmarks`` (21, 3) metres in camera axes (x right, y down,
-    z forward), the middle of the hand at 0; ``presence``: probability that there is a hand; ``left``: probability that
-    it is a left hand; ``region``: where it looked. Order: `HAND_NAMES`.
+    z forward), the hand's centre at 0; ``presence``: probability that there is a hand; ``left``: probability that it is
+    a left hand; ``region``: the input region. Order: `HAND_NAMES`.
     """
 
-    keypoints_px: np.ndarray
-    world_landmarks: np.ndarray
+    keypoints_px: NDArray[np.float64]
+    world_landmarks: NDArray[np.float64]
     presence: float
     left: float
     region: Region
 
     @property
     def next_region(self) -> Region:
-        """Where to look in the next frame."""
+        """The region to look at in the next frame."""
         return region_from_landmarks(self.keypoints_px)
 
     @property
     def disagreement(self) -> float:
-        """How far the keypoints in the image and in space contradict each other, see `PoseEstimate.disagreement`.
+        """Inconsistency of the keypoints in the image and in space, see `PoseEstimate.disagreement`.
 
-        0.08..0.2 for hands that show; up to 0.5 for hidden ones that the network imagines.
+        0.08..0.2 for visible hands; up to 0.5 for occluded ones, which the network guesses.
         """
         return disagreement(self.keypoints_px, self.world_landmarks)
 
     @property
     def size_px(self) -> float:
-        """Side of the box round the keypoints, upright in the region: what distances are compared with."""
+        """Longer side in pixels of the keypoints' bounding box in the axes of the region; the unit of distances."""
         return float(np.ptp(self.region.crop_from_image(self.keypoints_px), axis=0).max() * self.region.side_px)
 
 
 class HandNetwork:
-    """The hand landmark network on the CPU; keeps nothing between calls."""
+    """The hand landmark network; stateless between calls.
+
+    :raises SetupError: the network has not been built.
+    :raises ModelFileError: its file is damaged.
+    """
 
     def __init__(self, threads: int, folder: Path | None = None, execution: Execution | None = None) -> None:
         self._session = open_session(network_path("hand_landmark", folder), threads, execution)
 
-    def estimate(self, image_rgb: np.ndarray, region: Region) -> HandEstimate:
-        """The hand in a region of an (H, W, 3) uint8 image."""
+    def estimate(self, image_rgb: NDArray[np.uint8], region: Region) -> HandEstimate:
+        """Estimate the hand in a region of an (H, W, 3) uint8 RGB image."""
         blob = cv2.dnn.blobFromImage(region.cut(image_rgb, INPUT_SIZE), 1 / 255.0)
         landmarks, presence, handedness, world = self._session.run(_OUTPUTS, {"input": blob})
         points = landmarks.reshape(HAND_POINTS, 3)[:, :2].astype(float) / INPUT_SIZE
@@ -76,7 +81,7 @@ class HandNetwork:
             keypoints_px=region.image_from_crop(points),
             world_landmarks=region.rotate_to_camera(world.reshape(HAND_POINTS, 3).astype(float)),
             presence=float(presence[0, 0]),
-            # The network was trained on mirrored pictures of oneself: what it calls left is a right hand.
+            # The network was trained on mirrored selfies: its left hand is a right hand.
             left=1.0 - float(handedness[0, 0]),
             region=region,
         )

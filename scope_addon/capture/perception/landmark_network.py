@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""BlazePose's landmark network: a region of the image to 33 keypoints in the image and in space."""
+"""BlazePose's landmark network: from a region of the image to 33 keypoints in 2D and 3D."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from ....solver.names import BLAZEPOSE
 from .execution import Execution
@@ -23,45 +24,45 @@ if TYPE_CHECKING:
 INPUT_SIZE = 256
 KEYPOINT_NAMES = BLAZEPOSE  # the network's order
 KEYPOINT_COUNT = 33
-_POINTS = 39  # the keypoints, two auxiliary points, four that are not used
-_HIP_CENTER, _BODY_CIRCLE = 33, 34  # auxiliary points: middle of the hips; on the circle about it that holds the body
+_POINTS = 39  # the keypoints, two auxiliary points and four unused ones
+_HIP_CENTER, _BODY_CIRCLE = 33, 34  # auxiliary points: hip centre; a point on the body circle around it
 _HIPS = (23, 24)
-_WINDOW = 7  # cells of the heatmap that refine one keypoint
+_WINDOW = 7  # side in heatmap cells of the window that refines a keypoint
 _HEAT_THRESHOLD = 0.5
-_WORKERS = 2  # regions looked at in parallel
+_WORKERS = 2  # regions processed in parallel
 _WORTH_ALL_THREADS = ("pose_landmark_heavy",)
 _OUTPUTS = ["landmarks", "presence", "heatmap", "world"]
 
 
 @dataclass(frozen=True)
 class PoseEstimate:
-    """What the network says about one region.
+    """The network's estimate for one region.
 
-    ``keypoints_px`` (33, 2) image pixels; ``visibility``, ``in_frame`` (33,) probabilities that a keypoint is seen
-    and that it lies inside the picture; ``world_landmarks`` (33, 3) metres in camera axes (x right, y down,
-    z forward), the middle of the hips at 0, or all 0 from a network that knows nothing of depth; ``presence``:
-    probability that there is a person at all; ``region``: where it looked; ``next_region``: where to look in the next
-    frame.
+    ``keypoints_px`` (33, 2) image pixels; ``visibility``, ``in_frame`` (33,) probabilities that a keypoint is not
+    occluded and that it lies inside the image; ``world_landmarks`` (33, 3) metres in camera axes (x right, y down,
+    z forward), the hip centre at 0, or all 0 from a network without depth; ``presence``: probability that there is a
+    person; ``region``: the input region; ``next_region``: the region for the next frame.
     """
 
-    keypoints_px: np.ndarray
-    visibility: np.ndarray
-    in_frame: np.ndarray
-    world_landmarks: np.ndarray
+    keypoints_px: NDArray[np.float64]
+    visibility: NDArray[np.float64]
+    in_frame: NDArray[np.float64]
+    world_landmarks: NDArray[np.float64]
     presence: float
     region: Region
     next_region: Region
 
     @property
-    def keypoints_confidence(self) -> np.ndarray:
-        """(33,) probability that a keypoint is in the picture and seen there."""
-        return self.visibility * self.in_frame
+    def keypoints_confidence(self) -> NDArray[np.float64]:
+        """(33,) probability that a keypoint is in the image and not occluded."""
+        confidence: NDArray[np.float64] = self.visibility * self.in_frame
+        return confidence
 
     @property
     def spread(self) -> float:
         """Root mean square distance of the keypoints from their centre over the radius of the body circle.
 
-        0.5..0.8 for people, less when they curl up; 0.1..0.35 where the network imagines a body in something else.
+        0.5..0.8 for people, less when they curl up; 0.1..0.35 for something else that the network mistakes for a body.
         """
         offsets = self.keypoints_px - self.keypoints_px.mean(axis=0)
         radius = self.region.side_px / (2 * MARGIN)
@@ -69,16 +70,21 @@ class PoseEstimate:
 
     @property
     def disagreement(self) -> float:
-        """How far the keypoints in the image and in space contradict each other, relative to the keypoints' spread.
+        """Inconsistency of the keypoints in the image and in space, relative to the keypoints' spread.
 
-        min over s, t of ‖p − s·w_xy − t‖ / ‖p − mean(p)‖: a scaled orthographic view of the world landmarks w. Below
-        0.15 for people; perspective adds some. 0 where the world landmarks are not known.
+        min over s, t of ‖p − s·w_xy − t‖ / ‖p − mean(p)‖, by scaled orthographic projection of the world landmarks w.
+        Below 0.15 for people; perspective adds some. 0 without world landmarks.
         """
         return disagreement(self.keypoints_px, self.world_landmarks) if self.world_landmarks.any() else 0.0
 
 
-def disagreement(keypoints_px: np.ndarray, world_landmarks: np.ndarray) -> float:
-    """How far keypoints (n, 2) are from a scaled orthographic view of (n, 3), see `PoseEstimate.disagreement`."""
+def disagreement(keypoints_px: NDArray[np.float64], world_landmarks: NDArray[np.float64]) -> float:
+    """Calculate how inconsistent keypoints in the image and in space are, see `PoseEstimate.disagreement`.
+
+    :param keypoints_px: (n, 2) pixels.
+    :param world_landmarks: (n, 3) metres in camera axes.
+    :return: dimensionless; 0 for a perfect scaled orthographic projection.
+    """
     image = keypoints_px - keypoints_px.mean(axis=0)
     space = world_landmarks[:, :2] - world_landmarks[:, :2].mean(axis=0)
     scale = (image * space).sum() / np.maximum((space**2).sum(), 1e-12)
@@ -86,21 +92,22 @@ def disagreement(keypoints_px: np.ndarray, world_landmarks: np.ndarray) -> float
 
 
 class LandmarkNetwork:
-    """A landmark network (``pose_landmark_lite``, ``_full`` or ``_heavy``) on the CPU; keeps nothing between calls.
+    """A landmark network (``pose_landmark_lite``, ``_full`` or ``_heavy``); stateless between calls.
 
-    Several regions are looked at in parallel with one half of the threads each, which takes less time than one after
-    the other with all: threads that share a region wait for each other at every layer. A region alone gets all threads
-    of the strong network; those of the small ones would wait for as long as they work, and decoding needs a core.
+    Several regions are processed in parallel with half of the threads each, which is faster than sequentially with all
+    threads: threads that share a region synchronize at every layer. A single region gets all threads only in the heavy
+    network; in the small ones they would mostly wait for each other, and decoding needs a core.
+
+    :raises SetupError: the network has not been built.
+    :raises ModelFileError: its file is damaged.
     """
 
-    def __init__(
-        self, name: str, threads: int, folder: Path | None = None, execution: Execution | None = None
-    ) -> None:
+    def __init__(self, name: str, threads: int, folder: Path | None = None, execution: Execution | None = None) -> None:
         self._path, self._threads, self._execution = network_path(name, folder), threads, execution
         self._threads_alone = threads if name in _WORTH_ALL_THREADS else max(1, threads // _WORKERS)
         self._pool = ThreadPoolExecutor(min(_WORKERS, threads), "scope-landmarks")
         self._sessions: dict[int, onnxruntime.InferenceSession] = {}
-        self._session(self._threads_alone)  # opened now, so that a bad file is told before the first frame
+        self._session(self._threads_alone)  # opened now, so that a damaged file is reported before the first frame
 
     def _session(self, threads: int) -> onnxruntime.InferenceSession:
         if threads not in self._sessions:
@@ -115,30 +122,37 @@ class LandmarkNetwork:
     def _shared(self) -> onnxruntime.InferenceSession:
         return self._session(max(1, self._threads // _WORKERS))
 
-    def estimate(self, image_rgb: np.ndarray, regions: Sequence[Region]) -> list[PoseEstimate]:
-        """One estimate per region of an (H, W, 3) uint8 image."""
+    def estimate(self, image_rgb: NDArray[np.uint8], regions: Sequence[Region]) -> list[PoseEstimate]:
+        """Estimate one pose per region of an (H, W, 3) uint8 RGB image."""
         if len(regions) < 2 or self._threads == 1:
             return [self._estimate(self._alone, image_rgb, region) for region in regions]
-        return [look.result() for look in [self.begin(image_rgb, region) for region in regions]]
+        return [pending.result() for pending in [self.begin(image_rgb, region) for region in regions]]
 
-    def begin(self, image_rgb: np.ndarray, region: Region) -> Future[PoseEstimate]:
-        """Look at one region while the caller does something else; the image must stay as it is until then."""
+    def begin(self, image_rgb: NDArray[np.uint8], region: Region) -> Future[PoseEstimate]:
+        """Start the estimate of one region in another thread; the image must not change until it is done."""
         return self._pool.submit(self._estimate, self._shared, image_rgb, region)
 
     @staticmethod
-    def _estimate(session: onnxruntime.InferenceSession, image_rgb: np.ndarray, region: Region) -> PoseEstimate:
+    def _estimate(session: onnxruntime.InferenceSession, image_rgb: NDArray[np.uint8], region: Region) -> PoseEstimate:
         blob = cv2.dnn.blobFromImage(region.cut(image_rgb, INPUT_SIZE), 1 / 255.0)
         landmarks, presence, heatmap, world = session.run(_OUTPUTS, {"input": blob})
         return interpret(landmarks[0], float(presence[0, 0]), heatmap[0], world[0], region)
 
 
 def interpret(
-    landmarks: np.ndarray, presence: float, heatmaps: np.ndarray, world: np.ndarray, region: Region
+    landmarks: NDArray[np.float32],
+    presence: float,
+    heatmaps: NDArray[np.float32],
+    world: NDArray[np.float32],
+    region: Region,
 ) -> PoseEstimate:
-    """The raw outputs of one region in image and camera coordinates.
+    """Convert the network's raw outputs for one region to image and camera coordinates.
 
-    ``landmarks`` (195,): 39 × (x, y, z in crop pixels, visibility logit, in-frame logit); ``heatmaps`` (39, 64, 64)
-    logits; ``world`` (117,): 39 × (x, y, z) metres in the crop's axes.
+    :param landmarks: (195,): 39 × (x, y, z in crop pixels, visibility logit, in-frame logit).
+    :param presence: probability that there is a person.
+    :param heatmaps: (39, 64, 64) logits.
+    :param world: (117,): 39 × (x, y, z) metres in the crop's axes.
+    :param region: the network's input region.
     """
     rows = landmarks.reshape(_POINTS, 5).astype(float)
     points_px = region.image_from_crop(refine(rows[:, :2] / INPUT_SIZE, heatmaps))
@@ -155,10 +169,15 @@ def interpret(
     )
 
 
-def refine(points: np.ndarray, heatmaps: np.ndarray) -> np.ndarray:
-    """Move each crop point (N, 2) to the centroid of its heatmap (N, rows, columns; logits), 7 × 7 cells about it.
+def refine(points: NDArray[np.float64], heatmaps: NDArray[np.float32]) -> NDArray[np.float64]:
+    """Move each point to the centroid of its heatmap within 7 × 7 cells around it.
 
-    Only where a cell there is hotter than 0.5. The network was trained for cell c at c / columns, not at its middle.
+    Points without a cell of at least 0.5 in this window stay. The network was trained with cell c at c / columns, not
+    at its centre.
+
+    :param points: (N, 2) crop coordinates, 0..1.
+    :param heatmaps: (N, rows, columns) logits.
+    :return: (N, 2) crop coordinates.
     """
     count, rows, columns = heatmaps.shape
     size = np.array([columns, rows])

@@ -1,33 +1,52 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""An image within the picture that a network looks at, and the way back."""
+"""Fits an image into a network's input (letterboxing), and maps positions back."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import cast
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
-_HALVED_FROM = 4.0  # times the size
+_HALVING_FROM = 4.0  # ratio of the sizes
 
 
 @dataclass(frozen=True)
 class Letterbox:
-    """Where the image lies in the network's picture: picture = scale · (pixel + ½) + offset."""
+    """The network's input and its mapping from image pixels: input = scale · (pixel + ½) + offset.
 
-    picture_rgb: np.ndarray
-    scale: np.ndarray  # (x, y)
-    offset: np.ndarray  # (x, y)
+    ``picture_rgb`` (height, width, 3) uint8; ``scale``, ``offset`` (2,) in x and y.
+    """
 
-    def to_image(self, points: np.ndarray) -> np.ndarray:
-        """Positions (..., 2) in the network's picture to pixels of the image."""
-        return (points - self.offset) / self.scale - 0.5
+    picture_rgb: NDArray[np.uint8]
+    scale: NDArray[np.float64]
+    offset: NDArray[np.float64]
+
+    def to_image(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Convert positions (..., 2) in the network's input to pixels (..., 2) of the image."""
+        pixels: NDArray[np.float64] = (points - self.offset) / self.scale - 0.5
+        return pixels
 
 
 def fit_in(
-    image_rgb: np.ndarray, width: int, height: int, *, border: int, centered: bool = True, stretched: bool = False
+    image_rgb: NDArray[np.uint8],
+    width: int,
+    height: int,
+    *,
+    border: int,
+    centered: bool = True,
+    stretched: bool = False,
 ) -> Letterbox:
-    """The image at one scale within a picture of one grey, in its middle or top left corner; or stretched over it."""
+    """Resize the image to a network's input.
+
+    :param image_rgb: (H, W, 3) uint8.
+    :param width: of the input, pixels;  height: likewise.
+    :param border: grey level around the image.
+    :param centered: place the image in the middle rather than in the top left corner.
+    :param stretched: fill the input regardless of the aspect ratio.
+    """
     rows, columns = image_rgb.shape[:2]
     if stretched:
         size = width, height
@@ -36,19 +55,20 @@ def fit_in(
         size = max(1, round(columns * scale)), max(1, round(rows * scale))
     left, top = ((width - size[0]) // 2, (height - size[1]) // 2) if centered else (0, 0)
     picture = np.full((height, width, 3), border, np.uint8)
-    picture[top : top + size[1], left : left + size[0]] = _resized(image_rgb, *size)
+    picture[top : top + size[1], left : left + size[0]] = _resize(image_rgb, *size)
     return Letterbox(picture, np.array([size[0] / columns, size[1] / rows]), np.array([left, top], float))
 
 
-def _resized(image: np.ndarray, width: int, height: int) -> np.ndarray:
-    """Of that size, without aliasing."""
+def _resize(image: NDArray[np.uint8], width: int, height: int) -> NDArray[np.uint8]:
+    """Resize without aliasing."""
     if width >= image.shape[1]:
-        return cv2.resize(image, (width, height), interpolation=cv2.INTER_LINEAR)
-    while min(image.shape[1] / width, image.shape[0] / height) >= _HALVED_FROM:
+        return cast(NDArray[np.uint8], cv2.resize(image, (width, height), interpolation=cv2.INTER_LINEAR))
+    while min(image.shape[1] / width, image.shape[0] / height) >= _HALVING_FROM:
         image = halved(image)
-    return cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA)
+    return cast(NDArray[np.uint8], cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA))
 
 
-def halved(image: np.ndarray) -> np.ndarray:
-    """Two by two pixels in one, which OpenCV averages several times as fast as any other number."""
-    return cv2.resize(image, (image.shape[1] // 2, image.shape[0] // 2), interpolation=cv2.INTER_AREA)
+def halved(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Halve an (H, W, 3) image by averaging 2 × 2 pixels, OpenCV's fast path of INTER_AREA."""
+    size = image.shape[1] // 2, image.shape[0] // 2
+    return cast(NDArray[np.uint8], cv2.resize(image, size, interpolation=cv2.INTER_AREA))

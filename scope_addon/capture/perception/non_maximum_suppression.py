@@ -1,15 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which boxes of a detector show the same thing: what every non-maximum suppression starts with."""
+"""Clusters of overlapping boxes, the first step of non-maximum suppression."""
 
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 
-def overlap_clusters(corners: np.ndarray, threshold: float) -> list[np.ndarray]:
-    """Indices of boxes (N, 4 left, top, right, bottom; best first), cluster by cluster, each with its best one first.
+def overlap_clusters(corners: NDArray[np.float64], threshold: float) -> list[NDArray[np.intp]]:
+    """Cluster boxes: the best remaining box and all whose intersection over union with it exceeds the threshold.
 
-    A cluster is the best remaining box and all whose intersection over union with it exceeds the threshold.
+    :param corners: (N, 4+) left, top, right, bottom; best box first.
+    :return: indices of the boxes of each cluster, the best first.
     """
     low, high = corners[:, :2], corners[:, 2:4]
     area = np.maximum(high - low, 0).prod(axis=1)

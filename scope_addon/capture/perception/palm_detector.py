@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Finds palms in a square of the image: a box and seven points each."""
+"""The palm detector: finds palms in a square of the image, a box and seven points each."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from .execution import Execution
 from .hand_region import region_from_palm
@@ -17,35 +18,39 @@ from .sessions import network_path, open_session
 
 INPUT_SIZE = 192
 SCORE_THRESHOLD = 0.5
-_LAYERS = ((8, 2), (16, 6))  # stride, anchors per cell; the three stride-16 layers lie together
+_LAYERS = ((8, 2), (16, 6))  # stride, anchors per cell; the three stride-16 layers are merged
 
 
 @dataclass(frozen=True)
 class Palm:
-    """``score`` 0..1 and the region in which the hand network should look."""
+    """A detected palm: ``score`` 0..1, and the ``region`` for the hand network."""
 
     score: float
     region: Region
 
 
 class PalmDetector:
-    """The palm detection network on the CPU; keeps nothing between calls."""
+    """The palm detection network; stateless between calls.
+
+    :raises SetupError: the network has not been built.
+    :raises ModelFileError: its file is damaged.
+    """
 
     def __init__(self, threads: int, folder: Path | None = None, execution: Execution | None = None) -> None:
         self._session = open_session(network_path("palm_detection", folder), threads, execution)
         self._anchors = make_anchors(INPUT_SIZE, _LAYERS)
 
-    def detect(self, image_rgb: np.ndarray, where: Region, threshold: float = SCORE_THRESHOLD) -> list[Palm]:
-        """All palms in a square of an (H, W, 3) uint8 image, best first."""
-        blob = cv2.dnn.blobFromImage(where.cut(image_rgb, INPUT_SIZE), 1 / 255.0)
+    def detect(self, image_rgb: NDArray[np.uint8], square: Region, threshold: float = SCORE_THRESHOLD) -> list[Palm]:
+        """Detect all palms in a square of an (H, W, 3) uint8 RGB image, best first."""
+        blob = cv2.dnn.blobFromImage(square.cut(image_rgb, INPUT_SIZE), 1 / 255.0)
         boxes, scores = self._session.run(["boxes", "scores"], {"input": blob})
         score, values = merge_overlapping(*decode(boxes[0], scores[0, :, 0], self._anchors, threshold))
-        return [Palm(float(s), _in_image(v, where)) for s, v in zip(score, values, strict=True)]
+        return [Palm(float(s), _in_image(v, square)) for s, v in zip(score, values, strict=True)]
 
 
-def _in_image(values: np.ndarray, where: Region) -> Region:
-    """The hand's region in the image from a box and points (18,) in the square's input pixels."""
+def _in_image(values: NDArray[np.float64], square: Region) -> Region:
+    """Calculate the hand's region in the image from a box and points (18,) in the network's input pixels."""
     unit = values / INPUT_SIZE
-    there = region_from_palm(unit[:4], unit[4:].reshape(-1, 2))
-    x, y = where.image_from_crop(np.array(there.center_px))
-    return Region((float(x), float(y)), there.side_px * where.side_px, there.rotation + where.rotation)
+    in_square = region_from_palm(unit[:4], unit[4:].reshape(-1, 2))
+    x, y = square.image_from_crop(np.array(in_square.center_px))
+    return Region((float(x), float(y)), in_square.side_px * square.side_px, in_square.rotation + square.rotation)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Finds people in a whole image with BlazePose's detector: a box round the face and the circle round the body."""
+"""BlazePose's person detector: the face box and the body circle of every person in an image."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from .execution import Execution
 from .letterbox import fit_in
@@ -19,43 +20,51 @@ from .sessions import network_path, open_session
 INPUT_SIZE = 224
 SCORE_THRESHOLD = 0.5
 OVERLAP_THRESHOLD = 0.3
-_LAYERS = ((8, 2), (16, 2), (32, 6))  # stride, anchors per cell; the three stride-32 layers lie together
+_LAYERS = ((8, 2), (16, 2), (32, 6))  # stride, anchors per cell; the three stride-32 layers are merged
 _SCORE_LIMIT = 100.0
-_SURE_SCORE = 0.8  # of a person who fills a good part of the image
-_SQUARES_FROM = 1.2  # ratio of the sides from which squares show anything larger
+_SURE_SCORE = 0.8  # from which no closer search is needed: the person fills a good part of the image
+_SQUARES_FROM = 1.2  # aspect ratio from which squares show people larger
 
 
 @dataclass(frozen=True)
 class Detection:
-    """One person: ``score`` 0..1, face box (left, top, right, bottom) and 4 points (x, y), all in image pixels.
+    """One detected person.
 
-    Point 0 is the middle of the hips, point 1 lies on the circle about it that holds the body, above the head.
+    ``score`` 0..1; ``box_px`` (4,) left, top, right, bottom of the face; ``points_px`` (4, 2), both in image pixels.
+    Point 0 is the hip centre, point 1 lies on the body circle around it, above the head.
     """
 
     score: float
-    box_px: np.ndarray
-    points_px: np.ndarray
+    box_px: NDArray[np.float64]
+    points_px: NDArray[np.float64]
 
     @property
     def region(self) -> Region:
-        """Where the landmark network should look."""
+        """The region for the landmark network."""
         return region_from_points(self.points_px[0], self.points_px[1])
 
 
 class PersonDetector:
-    """The detection network on the CPU. One call looks at one image; nothing is kept between calls."""
+    """The detection network; stateless between calls.
+
+    :raises SetupError: the network has not been built.
+    :raises ModelFileError: its file is damaged.
+    """
 
     def __init__(self, threads: int, folder: Path | None = None, execution: Execution | None = None) -> None:
         self._session = open_session(network_path("pose_detection", folder), threads, execution)
         self._anchors = make_anchors()
 
     def detect(
-        self, image_rgb: np.ndarray, threshold: float = SCORE_THRESHOLD, closely: bool = False
+        self, image_rgb: NDArray[np.uint8], threshold: float = SCORE_THRESHOLD, closely: bool = False
     ) -> list[Detection]:
-        """All people in an (H, W, 3) uint8 image with a score of at least ``threshold``, best first.
+        """Detect all people in an (H, W, 3) uint8 RGB image, best first.
 
-        Looks once at the whole image. Where that finds nobody it is sure of, or ``closely`` is asked for, and the image
-        is oblong, overlapping squares of its shorter side follow: they show the people larger.
+        Searches the whole image. If that finds nobody with a high score, or with ``closely``, the search continues in
+        overlapping squares of an oblong image, which show people larger.
+
+        :param threshold: least score.
+        :param closely: search the squares in any case.
         """
         found = self._detect_in(image_rgb, threshold, (0, 0))
         if closely or not found or found[0].score < _SURE_SCORE:
@@ -64,7 +73,7 @@ class PersonDetector:
             found = unique(found)
         return found
 
-    def _detect_in(self, image_rgb: np.ndarray, threshold: float, corner: tuple[int, int]) -> list[Detection]:
+    def _detect_in(self, image_rgb: NDArray[np.uint8], threshold: float, corner: tuple[int, int]) -> list[Detection]:
         picture, scale, offset = letterbox(image_rgb)
         blob = cv2.dnn.blobFromImage(picture, 1 / 127.5, mean=(127.5, 127.5, 127.5))
         boxes, scores = self._session.run(["boxes", "scores"], {"input": blob})
@@ -75,16 +84,16 @@ class PersonDetector:
 
 
 def squares(height: int, width: int) -> list[tuple[int, int, int]]:
-    """(left, top, side) of the overlapping squares that cover an oblong image along its longer side; none if square."""
+    """Calculate (left, top, side) of the overlapping squares that cover an image; none if it is nearly square."""
     side, length = min(height, width), max(height, width)
     if length < _SQUARES_FROM * side:
         return []
-    places = np.linspace(0, length - side, math.ceil(length / side)).astype(int).tolist()
-    return [(place, 0, side) if width > height else (0, place, side) for place in places]
+    starts = np.linspace(0, length - side, math.ceil(length / side)).astype(int).tolist()
+    return [(start, 0, side) if width > height else (0, start, side) for start in starts]
 
 
 def unique(detections: list[Detection]) -> list[Detection]:
-    """Drop every detection whose hips lie well inside the body circle of a better one of similar size; best first."""
+    """Drop detections whose hips are well inside the body circle of a better one of similar size; best first."""
     kept: list[Detection] = []
     for detection in sorted(detections, key=lambda d: -d.score):
         if not any(detection.region.resembles(other.region, 0.25) for other in kept):
@@ -92,19 +101,22 @@ def unique(detections: list[Detection]) -> list[Detection]:
     return kept
 
 
-def letterbox(image_rgb: np.ndarray) -> tuple[np.ndarray, float, np.ndarray]:
+def letterbox(image_rgb: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], float, NDArray[np.float64]]:
     """Fit the image into the centre of a black 224 × 224 square.
 
-    Returns the square, the scale and the (x, y) offset: square = scale · (pixel + ½) + offset.
+    :param image_rgb: (H, W, 3) uint8.
+    :return: the square (224, 224, 3), the scale and the (x, y) offset: square = scale · (pixel + ½) + offset.
     """
     fitted = fit_in(image_rgb, INPUT_SIZE, INPUT_SIZE, border=0)
     return fitted.picture_rgb, INPUT_SIZE / max(image_rgb.shape[:2]), fitted.offset
 
 
-def make_anchors(size: int = INPUT_SIZE, strides: tuple[tuple[int, int], ...] = _LAYERS) -> np.ndarray:
-    """(N, 2) anchor centres in input pixels, in the network's order: by layer, row, column, anchor of the cell.
+def make_anchors(size: int = INPUT_SIZE, strides: tuple[tuple[int, int], ...] = _LAYERS) -> NDArray[np.float64]:
+    """Calculate the anchor centres in the network's order: by layer, row, column, anchor of the cell.
 
-    ``strides``: stride and anchors per cell of each layer; the person detector has 2254 anchors.
+    :param size: side of the network's input, pixels.
+    :param strides: stride and anchors per cell of each layer.
+    :return: (N, 2) x, y in input pixels; N = 2254 for the person detector.
     """
     layers = []
     for stride, per_cell in strides:
@@ -115,11 +127,15 @@ def make_anchors(size: int = INPUT_SIZE, strides: tuple[tuple[int, int], ...] = 
 
 
 def decode(
-    boxes: np.ndarray, logits: np.ndarray, anchors: np.ndarray, threshold: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """Scores (N,) and values (N, 4 + 2n) = left, top, right, bottom, n × (x, y) in input pixels, best first.
+    boxes: NDArray[np.float32], logits: NDArray[np.float32], anchors: NDArray[np.float64], threshold: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Convert the network's raw outputs to boxes and points.
 
-    The network gives per anchor the box's centre and the points relative to the anchor, and the box's size.
+    :param boxes: (A, 4 + 2n): box centre relative to the anchor, box size, n points relative to the anchor.
+    :param logits: (A,) of the scores.
+    :param anchors: (A, 2), see `make_anchors`.
+    :param threshold: least score.
+    :return: scores (N,) and values (N, 4 + 2n): left, top, right, bottom, n × (x, y) in input pixels; best first.
     """
     score = 1.0 / (1.0 + np.exp(-np.clip(logits.astype(float), -_SCORE_LIMIT, _SCORE_LIMIT)))
     chosen = np.flatnonzero(score >= threshold)
@@ -130,10 +146,14 @@ def decode(
     return score[chosen], np.concatenate([center - half, center + half, points], axis=1)
 
 
-def merge_overlapping(score: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Weighted non-maximum suppression: each cluster becomes its score-weighted mean with its best score.
+def merge_overlapping(
+    score: NDArray[np.float64], values: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Merge each cluster of boxes to its score-weighted mean with its best score (weighted non-maximum suppression).
 
-    See `overlap_clusters`; ``score`` descends.
+    :param score: (N,) descending.
+    :param values: (N, 4 + 2n), see `decode`.
+    :return: scores (M,) and values (M, 4 + 2n), see `overlap_clusters`.
     """
     clusters = overlap_clusters(values[:, :4], OVERLAP_THRESHOLD)
     merged = [score[cluster] @ values[cluster] / score[cluster].sum() for cluster in clusters]

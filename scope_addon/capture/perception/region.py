@@ -10,74 +10,84 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any, cast
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from .letterbox import halved
 
-MARGIN = 1.25  # the square is this much larger than twice the distance between the two points
+MARGIN = 1.25  # side of the square over the body circle's diameter
 
 
 @dataclass(frozen=True)
 class Region:
-    """A square of ``side_px`` about ``center_px`` (x, y), turned by ``rotation`` radians, clockwise on screen."""
+    """A square of ``side_px`` around ``center_px`` (x, y), rotated by ``rotation`` radians, clockwise on screen."""
 
     center_px: tuple[float, float]
     side_px: float
     rotation: float
 
     @property
-    def R_image_crop(self) -> np.ndarray:
-        """(2, 2) directions in the square to directions in the image: [[c, −s], [s, c]]."""
+    def R_image_crop(self) -> NDArray[np.float64]:
+        """(2, 2) rotation from the square's axes to the image's: [[c, −s], [s, c]]."""
         c, s = math.cos(self.rotation), math.sin(self.rotation)
         return np.array([[c, -s], [s, c]])
 
-    def image_from_crop(self, points: np.ndarray) -> np.ndarray:
-        """Pixels of crop points (..., 2): p = center + side · R · (s − ½)."""
-        return np.asarray(self.center_px) + self.side_px * (np.asarray(points) - 0.5) @ self.R_image_crop.T
+    def image_from_crop(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Convert crop coordinates (..., 2) to pixels: p = center + side · R · (s − ½)."""
+        offset = self.side_px * (np.asarray(points) - 0.5) @ self.R_image_crop.T
+        pixels: NDArray[np.float64] = np.asarray(self.center_px) + offset
+        return pixels
 
-    def crop_from_image(self, points: np.ndarray) -> np.ndarray:
-        """Crop points of pixels (..., 2), the inverse of `image_from_crop`."""
-        return (np.asarray(points) - np.asarray(self.center_px)) @ self.R_image_crop / self.side_px + 0.5
+    def crop_from_image(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Convert pixels (..., 2) to crop coordinates, the inverse of `image_from_crop`."""
+        offset = np.asarray(points) - np.asarray(self.center_px)
+        cropped: NDArray[np.float64] = offset @ self.R_image_crop / self.side_px + 0.5
+        return cropped
 
-    def cut(self, image_rgb: np.ndarray, size: int) -> np.ndarray:
-        """The square as a (size, size, 3) picture; beyond the image's edge, its outermost pixels go on.
+    def cut(self, image_rgb: NDArray[np.uint8], size: int) -> NDArray[np.uint8]:
+        """Resample the square to a (size, size, 3) uint8 image; outside the image, its border pixels are repeated.
 
-        Black instead costs the landmark networks 3 mm on people who touch the edge.
+        A black border would cost the landmark networks 3 mm of accuracy on people at the edge.
         """
         source, A = image_rgb, self._image_from_pixel(size)
         if self.side_px >= 2 * size:
             source, A = _shrink(image_rgb, A, size, int(self.side_px / size).bit_length() - 1)
         flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
-        return cv2.warpAffine(source, A, (size, size), flags=flags, borderMode=cv2.BORDER_REPLICATE)
+        crop = cv2.warpAffine(source, A, (size, size), flags=flags, borderMode=cv2.BORDER_REPLICATE)
+        return cast(NDArray[np.uint8], crop)
 
-    def rotate_to_camera(self, vectors: np.ndarray) -> np.ndarray:
-        """3D vectors (..., 3) in the square's axes (x right, y down, z forward) turned into the camera's axes."""
+    def rotate_to_camera(self, vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Rotate 3D vectors (..., 3) from the square's axes (x right, y down, z forward) to the camera's axes."""
         R_camera_crop = np.eye(3)
         R_camera_crop[:2, :2] = self.R_image_crop
-        return np.asarray(vectors) @ R_camera_crop.T
+        rotated: NDArray[np.float64] = np.asarray(vectors) @ R_camera_crop.T
+        return rotated
 
     def is_near(self, other: Region) -> bool:
-        """Whether somebody in the one may hide somebody in the other: centres within three quarters of a side."""
+        """Check if a person in one may occlude one in the other: centres within three quarters of a side."""
         return math.dist(self.center_px, other.center_px) <= 0.75 * max(self.side_px, other.side_px)
 
     def resembles(self, other: Region, distance: float) -> bool:
-        """Whether both may hold the same person: centres within ``distance`` sides, sides within a factor of two."""
+        """Check if both may show the same person: centres within ``distance`` sides, sides within a factor of two."""
         apart = math.dist(self.center_px, other.center_px)
         larger, smaller = max(self.side_px, other.side_px), min(self.side_px, other.side_px)
         return apart <= distance * larger and larger <= 2 * smaller
 
-    def _image_from_pixel(self, size: int) -> np.ndarray:
-        """(2, 3) affine map of pixel indices of a ``size`` crop to image coordinates."""
+    def _image_from_pixel(self, size: int) -> NDArray[np.float64]:
+        """Calculate the (2, 3) affine map from pixel indices of a ``size`` crop to image coordinates."""
         A = self.R_image_crop * (self.side_px / size)
         return np.column_stack([A, np.asarray(self.center_px) + A @ np.full(2, 0.5 - size / 2)])
 
 
-def _shrink(image: np.ndarray, A: np.ndarray, size: int, halvings: int) -> tuple[np.ndarray, np.ndarray]:
-    """Halve what is under the square first, so that a large square is sampled without aliasing.
+def _shrink(
+    image: NDArray[np.uint8], A: NDArray[np.float64], size: int, halvings: int
+) -> tuple[NDArray[np.uint8], NDArray[np.float64]]:
+    """Shrink the image under the square by powers of two, so that a large square is sampled without aliasing.
 
-    Returns the smaller picture and the affine map onto it.
+    :return: the smaller image, and the affine map onto it.
     """
     step = 1 << halvings
     height, width = image.shape[:2]
@@ -97,31 +107,34 @@ def _shrink(image: np.ndarray, A: np.ndarray, size: int, halvings: int) -> tuple
     return small, B
 
 
-def region_from_points(center_px: np.ndarray, top_px: np.ndarray) -> Region:
-    """The region of a person: centred on the hips, ``top_px`` straight above in the crop.
+def region_from_points(center_px: NDArray[np.float64], top_px: NDArray[np.float64]) -> Region:
+    """Calculate the region of a person, centred on the hips, with ``top_px`` straight above in the crop.
 
-    side = 2 · |top − center| · 1.25; the rotation makes center → top point up: atan2(dx, −dy). ``top_px`` lies on the
-    circle about the hips that holds the whole person (MediaPipe's second detection point and auxiliary landmark).
+    side = 2 · |top − center| · 1.25; the rotation makes center → top point up: atan2(dx, −dy).
+
+    :param center_px: (2,) hip centre, pixels.
+    :param top_px: (2,) on the circle around the hips that encloses the whole person (MediaPipe's second detection point
+        and auxiliary landmark).
     """
     dx, dy = (np.asarray(top_px, float) - np.asarray(center_px, float)).tolist()
     side = 2.0 * MARGIN * math.hypot(dx, dy)
     return Region((float(center_px[0]), float(center_px[1])), side, math.atan2(dx, -dy))
 
 
-def bounds(points: np.ndarray) -> np.ndarray:
-    """(4,) x0, y0, x1, y1 of the box about points (n, 2)."""
+def bounds(points: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
+    """Calculate the bounding box (4,) x0, y0, x1, y1 of points (n, 2)."""
     return np.concatenate([points.min(axis=0), points.max(axis=0)])
 
 
-def surroundings(points: np.ndarray) -> np.ndarray:
-    """The same about a person's points, a tenth of its size larger on every side."""
+def surroundings(points: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
+    """Calculate the bounding box (4,) of a person's points (n, 2), with a margin of a tenth of its longer side."""
     low, high = np.split(bounds(points), 2)
     margin = 0.1 * (high - low).max()
     return np.concatenate([low - margin, high + margin])
 
 
-def inside(points: np.ndarray, boxes: Sequence[np.ndarray]) -> np.ndarray:
-    """(n,) whether each point (n, 2) lies in one of the boxes."""
+def inside(points: NDArray[np.floating[Any]], boxes: Sequence[NDArray[np.floating[Any]]]) -> NDArray[np.bool_]:
+    """Check (n,) whether each point (n, 2) is in one of the boxes (4,) x0, y0, x1, y1."""
     found = np.zeros(len(points), bool)
     for box in boxes:
         found |= ((points >= box[:2]) & (points <= box[2:])).all(1)

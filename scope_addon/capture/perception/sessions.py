@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where the ONNX networks lie, and onnxruntime sessions on them."""
+"""Locates the ONNX networks and opens onnxruntime sessions on them."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from ....solver.errors import ModelFileError
 from ...errors import SetupError, UsageError
-from .execution import CPU, DIRECTML, PROVIDERS, Execution, OneAtATime
+from .execution import CPU, DIRECTML, PROVIDERS, Execution, SerializedSession
 
 if TYPE_CHECKING:
     import onnxruntime
@@ -24,14 +24,20 @@ LANDMARK_NETWORK_OF_QUALITY = {
 
 
 def landmark_network_name(quality: str) -> str:
-    """The landmark network behind a quality preset; UsageError names the presets there are."""
+    """Look up the landmark network of a quality preset.
+
+    :raises UsageError: there is no such preset.
+    """
     if quality not in LANDMARK_NETWORK_OF_QUALITY:
         raise UsageError(f"Quality {quality!r} does not exist; choose one of {', '.join(LANDMARK_NETWORK_OF_QUALITY)}.")
     return LANDMARK_NETWORK_OF_QUALITY[quality]
 
 
 def network_path(name: str, folder: Path | None = None) -> Path:
-    """The file of a network; SetupError when it has not been built."""
+    """Locate the file of a network.
+
+    :raises SetupError: it has not been built.
+    """
     path = (folder or NETWORKS_FOLDER) / f"{name}.onnx"
     if not path.is_file():
         raise SetupError(
@@ -41,22 +47,24 @@ def network_path(name: str, folder: Path | None = None) -> Path:
 
 
 def open_session(path: Path, threads: int, execution: Execution | None = None) -> onnxruntime.InferenceSession:
-    """An onnxruntime session with ``threads`` threads, on what ``execution`` asks for if that is there.
+    """Open an onnxruntime session with ``threads`` threads, on the requested provider if it is available.
 
-    :raises ModelFileError: the file is not sound, or uses operators that onnxruntime does not have.
+    :raises ModelFileError: the file is damaged, or uses operators that onnxruntime does not have.
+    :raises SetupError: onnxruntime cannot be imported.
+    :raises UsageError: there are fewer than 1 thread.
     """
     if threads < 1:
-        raise UsageError(f"{threads} threads were asked for; at least 1 is needed.")
+        raise UsageError(f"{threads} threads were requested; at least 1 is needed.")
     runtime, execution = _runtime(), execution or Execution()
     for name in execution.candidates(runtime.get_available_providers()):
         try:
             session = _open_on(name, path, threads)
-        except Exception as error:  # onnxruntime's exceptions share no base of their own
+        except Exception as error:  # onnxruntime's exceptions have no common base
             if name == CPU:
                 raise ModelFileError(_cannot_load(path, error)) from error
             execution.fell_back(name, error)
             continue
-        if session.get_providers()[0] != PROVIDERS[name][0]:  # onnxruntime went on without it, and only logged that
+        if session.get_providers()[0] != PROVIDERS[name][0]:  # onnxruntime fell back silently
             execution.fell_back(name, "its libraries or its device are missing")
             if name != CPU:
                 continue
@@ -70,13 +78,13 @@ def _open_on(name: str, path: Path, threads: int) -> onnxruntime.InferenceSessio
     options = runtime.SessionOptions()
     options.intra_op_num_threads = threads
     options.inter_op_num_threads = 1
-    # Threads of one network that wait in a busy loop would take the cores from the next one.
+    # Threads of one network that spin while waiting would take the cores from the next one.
     options.add_session_config_entry("session.force_spinning_stop", "1")
-    options.log_severity_level = 4  # errors arrive as exceptions, with our words around them
-    options.enable_mem_pattern = name != DIRECTML  # which cannot have it
+    options.log_severity_level = 4  # errors are raised as exceptions, with our messages
+    options.enable_mem_pattern = name != DIRECTML  # which does not support it
     providers = [PROVIDERS[n][0] for n in dict.fromkeys((name, CPU))]
     session = runtime.InferenceSession(str(path), options, providers=providers)
-    return OneAtATime(session) if name == DIRECTML else session
+    return SerializedSession(session) if name == DIRECTML else session
 
 
 def _cannot_load(path: Path, error: Exception) -> str:
@@ -94,4 +102,5 @@ def _runtime() -> ModuleType:
         raise SetupError(
             f"onnxruntime cannot be imported ({error}). Run ./scripts/capture, which installs it."
         ) from error
-    return onnxruntime
+    module: ModuleType = onnxruntime
+    return module

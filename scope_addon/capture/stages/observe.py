@@ -22,7 +22,7 @@ from ..camera.line_segments import Lines
 from ..fitting.background_estimators import BackgroundEstimators
 from ..fitting.focal_fits import FocalFits
 from ..fitting.live_body import LiveBody
-from ..media.exposure import Exposure
+from ..media.exposure import AutoExposure
 from ..media.frame import Frame
 from ..media.video import Video
 from ..options import CaptureOptions, most_people
@@ -119,8 +119,8 @@ class _Frames:
 
     def run(self, video: Video, live: LiveBody, listeners: Listeners) -> None:
         """Process all frames; each is decoded while the networks run on the previous one."""
-        expected, exposure = video.expected_frames, Exposure()
-        frames = ((frame, exposure.brightened(frame.image_rgb)) for frame in video)
+        expected, exposure = video.expected_frames, AutoExposure()
+        frames = ((frame, exposure.brighten(frame.image_rgb)) for frame in video)
         with self._clock.stage("decode"):
             upcoming = next(frames, None)
         while upcoming is not None:

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from ...kinematics.viterbi import least_cost_path
 from ..camera.intrinsics import Camera
 from ..perception.landmark_network import KEYPOINT_NAMES, PoseEstimate
-from ..perception.lifter import our_lifter
+from ..perception.lifter import default_lifter
 from .track import Track
 
 _OPPOSITE = {"left": "right", "right": "left"}
@@ -160,7 +160,7 @@ def _find_lifted_labels(track: Track, camera: Camera, reference: NDArray[np.floa
     The lifting network may move less in one reading than in the other, which means nothing: the mean of the two
     counts. Confidences count in addition to positions.
     """
-    rays, lifter = camera.rays(track.keypoints_px)[..., :2], our_lifter()
+    rays, lifter = camera.rays(track.keypoints_px)[..., :2], default_lifter()
     readings = []
     for order in (np.arange(len(MIRROR_PARTNER)), MIRROR_PARTNER):
         body = lifter.lift(rays[:, order], track.confidence[:, order], None).points

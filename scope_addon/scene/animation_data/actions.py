@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Keyframes in bulk, and the only file that knows how Blender stores them.
+"""Reading and writing keyframes in bulk. Only this module depends on how Blender stores them.
 
 Since 4.4 an action holds layers -> strips -> one channelbag per slot, and each animated datablock picks a slot.
 Before, an action held F-curves directly and served one type of datablock; 5.0 removed that older interface.
@@ -14,13 +14,14 @@ from contextlib import contextmanager
 import bpy
 import numpy as np
 from bpy_extras import anim_utils
+from numpy.typing import NDArray
 
 # Values of Blender's keyframe interpolation enum, which foreach_set takes as integers.
 INTERPOLATION = {"CONSTANT": 0, "LINEAR": 1, "BEZIER": 2}
 
 
 def has_slots() -> bool:
-    """Whether this Blender stores F-curves in slots and channelbags (4.4 and later)."""
+    """Return whether this Blender stores F-curves in slots and channelbags (4.4 and later)."""
     return "slots" in bpy.types.Action.bl_rna.properties
 
 
@@ -28,10 +29,10 @@ class Channels:
     """The F-curves of one datablock in one action."""
 
     def __init__(self, datablock: bpy.types.ID, action: bpy.types.Action) -> None:
-        """Let ``action`` animate ``datablock`` (an object, a shape-key block, a camera's data, ...).
+        """Assign ``action`` to ``datablock`` (an object, a shape-key block, a camera's data, ...).
 
-        One action may serve several datablocks where Blender has slots. Where it has not, the second datablock gets
-        an action of its own.
+        In a Blender with slots, one action may serve several datablocks; otherwise, the second datablock gets a new
+        action.
         """
         animation = datablock.animation_data or datablock.animation_data_create()
         if has_slots():
@@ -53,12 +54,12 @@ class Channels:
     def write(
         self,
         data_path: str,
-        frames: np.ndarray,
-        values: np.ndarray,
+        frames: NDArray[np.float64],
+        values: NDArray[np.float64],
         interpolation: str = "LINEAR",
         group: str = "",
     ) -> list[bpy.types.FCurve]:
-        """Write one property: a curve per column, which are returned.
+        """Write the keys of one property and return its curves, one per column.
 
         :param data_path: RNA path from the datablock, e.g. from ``bone_path``.
         :param frames: (T,) scene frames, increasing, fractions allowed.
@@ -92,23 +93,23 @@ class Channels:
 
 
 def bone_path(bone_name: str, channel: str) -> str:
-    """RNA path of a pose bone's channel; quotes and backslashes in the name are escaped."""
+    """Return the RNA path of a pose bone's channel; quotes and backslashes in the name are escaped."""
     return f'pose.bones["{bpy.utils.escape_identifier(bone_name)}"].{channel}'
 
 
 def bone_property_path(bone_name: str, name: str) -> str:
-    """RNA path of a pose bone's custom property."""
+    """Return the RNA path of a pose bone's custom property."""
     bone, key = bpy.utils.escape_identifier(bone_name), bpy.utils.escape_identifier(name)
     return f'pose.bones["{bone}"]["{key}"]'
 
 
 def shape_key_path(key_name: str) -> str:
-    """RNA path of a shape key's value, from the shape-key block."""
+    """Return the RNA path of a shape key's value, from the shape-key block."""
     return f'key_blocks["{bpy.utils.escape_identifier(key_name)}"].value'
 
 
 def fcurves(datablock: bpy.types.ID) -> list[bpy.types.FCurve]:
-    """The F-curves that animate a datablock, in any Blender; empty when there are none."""
+    """Return the F-curves that animate a datablock, in any supported Blender."""
     animation = datablock.animation_data
     if animation is None or animation.action is None:
         return []
@@ -125,24 +126,29 @@ def fcurves(datablock: bpy.types.ID) -> list[bpy.types.FCurve]:
 
 
 def fcurves_of(action: bpy.types.Action) -> list[bpy.types.FCurve]:
-    """Every F-curve of an action, whatever it animates, in any Blender."""
+    """Return every F-curve of an action, whatever it animates, in any supported Blender."""
     if not has_slots():
         return list(action.fcurves)
     strips = [strip for layer in action.layers for strip in layer.strips]
     return [curve for strip in strips for bag in strip.channelbags for curve in bag.fcurves]
 
 
-def read_keys(curve: bpy.types.FCurve) -> np.ndarray:
-    """(T, 2) frame and value of each key."""
+def read_keys(curve: bpy.types.FCurve) -> NDArray[np.float32]:
+    """Return (T, 2): frame and value of each key."""
     coordinates = np.empty(2 * len(curve.keyframe_points), np.float32)
     curve.keyframe_points.foreach_get("co", coordinates)
     return coordinates.reshape(-1, 2)
 
 
 def rewrite_keys(
-    curve: bpy.types.FCurve, frames: np.ndarray, values: np.ndarray, interpolation: str = "LINEAR"
+    curve: bpy.types.FCurve, frames: NDArray[np.float64], values: NDArray[np.float64], interpolation: str = "LINEAR"
 ) -> None:
-    """Replace a curve's keys by values (T,) at frames (T,)."""
+    """Replace the keys of a curve.
+
+    :param frames: (T,) scene frames, increasing.
+    :param values: (T,) in the unit of the property.
+    :param interpolation: a key of ``INTERPOLATION``, for every key.
+    """
     keys = curve.keyframe_points
     keys.clear()
     keys.add(len(frames))
@@ -151,27 +157,27 @@ def rewrite_keys(
     curve.update()
 
 
-def repeat_for_ever(datablock: bpy.types.ID, onwards: set[tuple[str, int]] | None = None) -> None:
-    """Let every curve of a datablock repeat.
+def add_cycles(datablock: bpy.types.ID, offset_curves: set[tuple[str, int]] | None = None) -> None:
+    """Make every curve of a datablock cyclic.
 
-    :param onwards: data paths and indices of the curves that go on from where a repetition ended.
+    :param offset_curves: data paths and indices of the curves to which each cycle adds an offset.
     """
-    repeat_no_more(datablock)
+    remove_cycles(datablock)
     for curve in fcurves(datablock):
         modifier = curve.modifiers.new("CYCLES")
-        going = (curve.data_path, curve.array_index) in (onwards or set())
-        modifier.mode_before = modifier.mode_after = "REPEAT_OFFSET" if going else "REPEAT"
+        offset = (curve.data_path, curve.array_index) in (offset_curves or set())
+        modifier.mode_before = modifier.mode_after = "REPEAT_OFFSET" if offset else "REPEAT"
 
 
-def repeat_no_more(datablock: bpy.types.ID) -> None:
-    """Let every curve of a datablock go from its first key to its last, once."""
+def remove_cycles(datablock: bpy.types.ID) -> None:
+    """Remove the cycles from every curve of a datablock."""
     for curve in fcurves(datablock):
         for modifier in [m for m in curve.modifiers if m.type == "CYCLES"]:
             curve.modifiers.remove(modifier)
 
 
 def nla_strips(datablock: bpy.types.ID) -> list[bpy.types.NlaStrip]:
-    """The strips of the NLA that play for a datablock; none while one is open for editing and plays alone."""
+    """Return the NLA strips in effect for a datablock; none in Tweak Mode, where one strip plays alone."""
     animation = datablock.animation_data
     if animation is None or not animation.use_nla or animation.use_tweak_mode:
         return []
@@ -182,7 +188,7 @@ def nla_strips(datablock: bpy.types.ID) -> list[bpy.types.NlaStrip]:
 
 @contextmanager
 def nla_as_actions(scene: bpy.types.Scene) -> Iterator[None]:
-    """Let the scene's objects do by an action for a while what they do by their NLA, on whole frames."""
+    """Bake the NLA of the scene's objects to actions for the duration of the block, on whole frames."""
     options = anim_utils.BakeOptions(
         only_selected=False,
         do_pose=True,
@@ -203,7 +209,7 @@ def nla_as_actions(scene: bpy.types.Scene) -> Iterator[None]:
     baked: list[bpy.types.Action] = []
     try:
         frames = range(scene.frame_start, scene.frame_end + 1)
-        for posed in (True, False):  # an object without bones turns do_pose off for all that share the options
+        for posed in (True, False):  # an object without bones disables do_pose for all objects that share the options
             pairs = [(obj, None) for obj in blended if (obj.pose is not None) is posed]
             if pairs:
                 baked += anim_utils.bake_action_objects(pairs, frames=frames, bake_options=options)
@@ -220,9 +226,9 @@ def nla_as_actions(scene: bpy.types.Scene) -> Iterator[None]:
 
 
 def frame_range(datablocks: Iterable[bpy.types.ID]) -> tuple[float, float] | None:
-    """First and last key over the datablocks' curves and NLA strips; None when nothing is keyed.
+    """Return the first and last keyed frame over the datablocks' curves and NLA strips; None without keys.
 
-    Where there are others, custom properties' curves do not count: of a loop that was cut out they are the longer ones.
+    Curves of custom properties are ignored unless there are no others: a loop leaves them longer than the motion.
     """
     datablocks = list(datablocks)
     curves = [curve for datablock in datablocks for curve in fcurves(datablock) if len(curve.keyframe_points)]

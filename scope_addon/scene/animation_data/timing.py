@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Frame rates and the place of each key on Blender's timeline.
+"""Frame rates, and the position of each key on Blender's timeline.
 
-Blender holds a rate as the integer ``fps`` over the float ``fps_base``; 29.97 is 30 / 1.001 there, never 29 or 30.
+Blender stores a rate as the integer ``fps`` over the float ``fps_base``; 29.97 is 30 / 1.001 there, never 29 or 30.
 A pose seen at ``timestamp`` seconds is keyed at ``start_frame + timestamp · rate``, so footage of variable frame rate
 keeps its timing; keys then lie between whole frames.
 """
@@ -13,21 +13,22 @@ from fractions import Fraction
 
 import bpy
 import numpy as np
+from numpy.typing import NDArray
 
 from ...errors import MotionFileError, UsageError
 
-# Rates this near (frames a second) to a standard one are taken to be that one: 23.976 and 23.98 are 24 / 1.001.
+# Rates within this tolerance (frames per second) of a standard one are taken to be it: 23.98 is 24 / 1.001.
 TOLERANCE = 0.005
 BROADCAST = tuple(Fraction(n * 1000, 1001) for n in (24, 30, 48, 60, 72, 96, 120, 240))
 POLICIES = ("keep", "set")
 RATE_POLICIES = (*POLICIES, "resample")
-_CYCLE = "scope_cycle"  # custom property of an armature: the cycle's first and last frame, and the scene's before it
+_CYCLE = "scope_cycle"  # custom property of an armature: the frame range of the cycle, and that of the scene before it
 
 
 def blender_rate(frames_per_second: float) -> tuple[int, float]:
-    """``(fps, fps_base)`` with fps / fps_base the rate.
+    """Return ``(fps, fps_base)``, whose quotient is the rate.
 
-    :raises UsageError: the rate is not a positive number Blender can hold.
+    :raises UsageError: when Blender cannot store the rate.
     """
     if not math.isfinite(frames_per_second) or not 0.01 <= frames_per_second <= 32767:
         raise UsageError(f"the frame rate must lie between 0.01 and 32767 frames a second, but is {frames_per_second}")
@@ -42,24 +43,31 @@ def blender_rate(frames_per_second: float) -> tuple[int, float]:
 
 
 def scene_rate(scene: bpy.types.Scene) -> float:
-    """Frames a second of a scene."""
+    """Return the frame rate of a scene, frames per second."""
     fps, base = scene.render.fps, scene.render.fps_base
-    # fps_base is a 32-bit float; of the broadcast rates we know the exact value.
+    # fps_base is a 32-bit float; the exact value is known for broadcast rates.
     exact = min(BROADCAST, key=lambda rate: abs(float(rate) - fps / base))
     return float(exact) if abs(float(exact) - fps / base) < 1e-5 else fps / base
 
 
 def set_scene_rate(scene: bpy.types.Scene, frames_per_second: float) -> None:
-    """Give the scene this frame rate."""
+    """Set the frame rate of a scene.
+
+    :raises UsageError: when Blender cannot store the rate.
+    """
     scene.render.fps, scene.render.fps_base = blender_rate(frames_per_second)
 
 
-def key_frames(timestamps: np.ndarray, rate: float, start_frame: float = 0.0) -> np.ndarray:
-    """(T,) scene frame of each pose: ``start_frame + timestamp · rate``, fractions kept.
+def key_frames(timestamps: NDArray[np.float64], rate: float, start_frame: float = 0.0) -> NDArray[np.float64]:
+    """Return the scene frame of each pose: ``start_frame + timestamp · rate``, fractions kept.
 
-    Keys that miss a whole frame by less than a thousandth, which is what rounding of timestamps makes, are put on it.
+    Keys within a thousandth of a whole frame are snapped to it, because timestamps are rounded.
 
-    :raises MotionFileError: timestamps are not finite and increasing.
+    :param timestamps: (T,) seconds.
+    :param rate: frames per second of the scene.
+    :param start_frame: the scene frame of timestamp 0.
+    :return: (T,) scene frames.
+    :raises MotionFileError: when timestamps are not finite and increasing.
     """
     timestamps = np.asarray(timestamps, float)
     if not np.isfinite(timestamps).all() or (np.diff(timestamps) <= 0).any():
@@ -70,7 +78,7 @@ def key_frames(timestamps: np.ndarray, rate: float, start_frame: float = 0.0) ->
 
 
 def set_frame_range(scene: bpy.types.Scene, first: float, last: float) -> None:
-    """Let the scene play from the first key to the last, whole frames outwards."""
+    """Set the scene's frame range to that of the keys, rounded outwards to whole frames."""
     start, end = math.floor(first), math.ceil(last)
     scene.frame_end = max(end, scene.frame_start)  # Blender keeps start <= end at every step
     scene.frame_start = start
@@ -78,24 +86,24 @@ def set_frame_range(scene: bpy.types.Scene, first: float, last: float) -> None:
 
 
 def play_cycle(scene: bpy.types.Scene, armature: bpy.types.Object, first: int, last: int) -> None:
-    """Let the scene play a cycle that was cut out of an armature's motion, and remember what it played before."""
-    cycle, before = _remembered(armature)
+    """Set the scene's frame range to a cycle of an armature's motion, and store the range before it."""
+    cycle, before = _stored_ranges(armature)
     if cycle != (scene.frame_start, scene.frame_end):
         before = scene.frame_start, scene.frame_end
     scene.frame_start, scene.frame_end = first, last
     armature[_CYCLE] = f"{scene.frame_start} {scene.frame_end} {before[0]} {before[1]}"
 
 
-def play_whole(scene: bpy.types.Scene, armature: bpy.types.Object) -> None:
-    """Let the scene play again what it played before the cycle, unless other frames have been chosen meanwhile."""
-    cycle, before = _remembered(armature)
+def restore_scene_range(scene: bpy.types.Scene, armature: bpy.types.Object) -> None:
+    """Restore the scene's frame range from before the cycle, unless the user has changed it meanwhile."""
+    cycle, before = _stored_ranges(armature)
     if _CYCLE in armature:
         del armature[_CYCLE]
     if cycle == (scene.frame_start, scene.frame_end):
         set_frame_range(scene, *before)
 
 
-def _remembered(armature: bpy.types.Object) -> tuple[tuple[int, ...], tuple[int, ...]]:
-    """The cycle's frames and those before, empty without a cycle."""
+def _stored_ranges(armature: bpy.types.Object) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    """Return the frame range of the cycle and the one before it; both are empty without a cycle."""
     frames = tuple(int(frame) for frame in armature.get(_CYCLE, "").split())
     return frames[:2], frames[2:]

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""All or nothing: what failed or cancelled work has made is removed, and what it has changed is put back.
+"""Rolling back work that fails or is cancelled: new datablocks are removed, and changed ones are restored.
 
-What is removed stays removed, so work removes last.
+Removed datablocks cannot be restored, so code under a transaction must remove them last.
 """
 
 from __future__ import annotations
@@ -22,33 +22,34 @@ _RENDER = ("fps", "fps_base", "resolution_x", "resolution_y", "pixel_aspect_x", 
 
 @contextmanager
 def all_or_nothing(scene: bpy.types.Scene, *objects: bpy.types.Object) -> Iterator[None]:
-    """Undo every new datablock, every scene setting and what was done to ``objects`` when the block raises; raise on.
+    """Roll back new datablocks, scene settings and changes of ``objects`` when the block raises; re-raise.
 
-    :param objects: whose keys, action, parent, place and custom properties, their bones' too, the block may change.
+    :param objects: the block may change their keys, action, parent, transform and custom properties, and the custom
+        properties of their bones.
     """
-    each = list(dict.fromkeys(objects))
-    animated = [_KeptAnimation(obj) for obj in each]
+    unique = list(dict.fromkeys(objects))
+    animated = [_SavedAnimation(obj) for obj in unique]
     before = {kind: {block.session_uid for block in getattr(bpy.data, kind)} for kind in _KINDS}
-    settings = _KeptScene(scene)
-    places = [_KeptPlace(obj) for obj in each]
+    settings = _SavedScene(scene)
+    transforms = [_SavedTransform(obj) for obj in unique]
     try:
         yield
     except BaseException:
         settings.leave_edit_mode()
-        for place in places:
-            place.restore()
-        for kept in animated:
-            kept.restore()
+        for transform in transforms:
+            transform.restore()
+        for saved in animated:
+            saved.restore()
         new = [b for kind in _KINDS for b in getattr(bpy.data, kind) if b.session_uid not in before[kind]]
         bpy.data.batch_remove(new)
         settings.restore()
         raise
-    for kept in animated:
-        kept.forget()
+    for saved in animated:
+        saved.discard_copy()
 
 
-class _KeptScene:
-    """The scene's settings and markers, what is selected, and the active object's mode."""
+class _SavedScene:
+    """A scene's settings and markers, the selection, and the active object's mode."""
 
     def __init__(self, scene: bpy.types.Scene) -> None:
         self._scene, self._layer = scene, bpy.context.view_layer
@@ -61,13 +62,13 @@ class _KeptScene:
         self._selected = [obj for obj in self._layer.objects if obj.select_get(view_layer=self._layer)]
 
     def leave_edit_mode(self) -> None:
-        """What is being edited cannot be removed."""
+        """Leave Edit Mode, in which the active object cannot be removed."""
         now = self._layer.objects.active
         if now is not None and now.mode != "OBJECT":
             bpy.ops.object.mode_set(mode="OBJECT")
 
     def restore(self) -> None:
-        """After the new objects have gone."""
+        """Restore the scene; the new objects must have been removed."""
         scene = self._scene
         for marker in [m for m in scene.timeline_markers if m not in self._markers]:
             scene.timeline_markers.remove(marker)
@@ -84,20 +85,21 @@ class _KeptScene:
             bpy.ops.object.mode_set(mode=self._mode)
 
 
-class _KeptPlace:
-    """An object's parent, place and custom properties, and those of its bones."""
+class _SavedTransform:
+    """An object's parent, transform and custom properties, and the custom properties of its bones."""
 
     def __init__(self, obj: bpy.types.Object) -> None:
         self._obj, self._parent = obj, obj.parent
-        self._hangs = obj.parent_type, obj.parent_bone
+        self._parenting = obj.parent_type, obj.parent_bone
         self._matrices = obj.matrix_parent_inverse.copy(), obj.matrix_basis.copy()
         owners = [obj, *(obj.pose.bones if obj.pose else ())]
         self._properties = [(owner, _scalars(owner)) for owner in owners]
 
     def restore(self) -> None:
+        """Restore the object."""
         obj = self._obj
         obj.parent = self._parent
-        obj.parent_type, obj.parent_bone = self._hangs
+        obj.parent_type, obj.parent_bone = self._parenting
         obj.matrix_parent_inverse, obj.matrix_basis = self._matrices
         for owner, properties in self._properties:
             for name in [name for name in _scalars(owner) if name not in properties]:
@@ -107,8 +109,8 @@ class _KeptPlace:
         obj.update_tag()
 
 
-class _KeptAnimation:
-    """Which action animates an object, and a copy of it, in case the work changes the action itself."""
+class _SavedAnimation:
+    """The action assigned to an object, and a copy of it in case the block changes the action itself."""
 
     def __init__(self, obj: bpy.types.Object) -> None:
         self._obj, data = obj, obj.animation_data
@@ -120,7 +122,7 @@ class _KeptAnimation:
         self._copy = self._action.copy() if self._action else None
 
     def restore(self) -> None:
-        """The action as it was, on everything that it animates."""
+        """Restore the action as it was, for every object that it animates."""
         if not self._had_data:
             self._obj.animation_data_clear()
             return
@@ -141,8 +143,8 @@ class _KeptAnimation:
             data.action_slot = next(slot for slot in action.slots if slot.identifier == self._slot)
         action.use_fake_user = self._fake_user
 
-    def forget(self) -> None:
-        """The work is done."""
+    def discard_copy(self) -> None:
+        """Remove the copy after success."""
         if self._copy is not None:
             bpy.data.actions.remove(self._copy)
 
@@ -152,7 +154,7 @@ def _scalars(owner: bpy.types.bpy_struct) -> dict[str, bool | int | float | str]
 
 
 def _same_keys(a: bpy.types.Action, b: bpy.types.Action) -> bool:
-    """Whether two actions hold the same keys for the same properties."""
+    """Return whether two actions have the same keys for the same properties."""
     one, other = fcurves_of(a), fcurves_of(b)
     return len(one) == len(other) and all(
         (p.data_path, p.array_index, len(p.modifiers)) == (q.data_path, q.array_index, len(q.modifiers))

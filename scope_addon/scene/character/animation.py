@@ -2,18 +2,19 @@
 """Joint rotations and root motion as keyframes.
 
 With M_i the rest orientation of bone i in armature space (= world), Ω_i = exp(w_i) SMPL's rotation of joint i and
-R_0 the root part's rotation into the world, Blender's pose channels are
+R_0 the rotation of the root part to the world, Blender's pose channels are
 
     i > 0:  B_i = C_i Ω_i C_iᵀ,  C_i = M_iᵀ R_world_model          (so B_i = exp(C_i w_i))
     root:   B_0 = C_0 (R_world_modelᵀ R_0) C_0ᵀ,  location = J_0(β) + trans − h_0, along the world's axes
 
-Then the armature's deformation of bone i is exactly T_i · rest_i⁻¹, linear blend skinning as SMPL means it.
+Then the armature deforms bone i by exactly T_i · rest_i⁻¹, which is SMPL's linear blend skinning.
 """
 
 from __future__ import annotations
 
 import bpy
 import numpy as np
+from numpy.typing import NDArray
 
 from ....solver.body import Body
 from ...kinematics.axes import R_WORLD_MODEL
@@ -22,23 +23,23 @@ from ..animation_data.actions import Channels, bone_path
 from .armature import RestPose, rest_orientations
 
 
-def quaternion_from_rotation_vector(rotation_vectors: np.ndarray) -> np.ndarray:
-    """(..., 3) axis times angle -> (..., 4) unit quaternions w, x, y, z."""
+def quaternion_from_rotation_vector(rotation_vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Convert rotation vectors (..., 3), radians, to unit quaternions (..., 4) in the order w, x, y, z."""
     half = 0.5 * np.linalg.norm(rotation_vectors, axis=-1, keepdims=True)
     # numpy's sinc(x) is sin(πx)/(πx): smooth at zero, where sin(half)/angle would divide by zero.
     return np.concatenate([np.cos(half), 0.5 * np.sinc(half / np.pi) * rotation_vectors], axis=-1)
 
 
-def quaternion_product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """(..., 4) ``a ⊗ b``: the rotation b, then a."""
+def quaternion_product(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return ``a ⊗ b`` (..., 4): the rotation b followed by a."""
     aw, av = a[..., :1], a[..., 1:]
     bw, bv = b[..., :1], b[..., 1:]
     w = aw * bw - (av * bv).sum(axis=-1, keepdims=True)
     return np.concatenate([w, aw * bv + bw * av + np.cross(av, bv)], axis=-1)
 
 
-def quaternion_from_matrix(R: np.ndarray) -> np.ndarray:
-    """(3, 3) rotation -> (4,) unit quaternion w, x, y, z, as the eigenvector of Bar-Itzhack's symmetric matrix."""
+def quaternion_from_matrix(R: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Convert a rotation (3, 3) to a unit quaternion (4,), the eigenvector of Bar-Itzhack's symmetric matrix."""
     K = np.zeros((4, 4))
     K[0, 0] = np.trace(R)
     K[0, 1:] = K[1:, 0] = R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]
@@ -47,10 +48,13 @@ def quaternion_from_matrix(R: np.ndarray) -> np.ndarray:
     return q if q[0] >= 0 else -q
 
 
-def on_one_hemisphere(quaternions: np.ndarray) -> np.ndarray:
-    """(T, ..., 4) with signs chosen so that neighbours in time agree; q and −q are the same rotation.
+def on_one_hemisphere(quaternions: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Choose the signs of quaternions so that consecutive ones are on one hemisphere; q and −q are equal rotations.
 
-    Blender interpolates the four numbers one by one: a change of sign would swing the bone through everything between.
+    Blender interpolates the four components separately: a change of sign would make the bone spin between two keys.
+
+    :param quaternions: (T, ..., 4).
+    :return: (T, ..., 4).
     """
     agrees = (quaternions[1:] * quaternions[:-1]).sum(axis=-1) >= 0
     sign = np.cumprod(np.where(agrees, 1.0, -1.0), axis=0)
@@ -59,8 +63,10 @@ def on_one_hemisphere(quaternions: np.ndarray) -> np.ndarray:
     return out
 
 
-def pose_channels(body: Body, motion: Motion, rest: RestPose, M: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Blender's channels of every frame of a motion.
+def pose_channels(
+    body: Body, motion: Motion, rest: RestPose, M: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Compute Blender's channels for every frame of a motion.
 
     :param M: (K+1, 3, 3) rest orientations.
     :return: rotations (T, K+1, 4), w first, on one hemisphere; root locations (T, 3) metres, world axes.
@@ -82,9 +88,9 @@ def animate_armature(
     body: Body,
     motion: Motion,
     rest: RestPose,
-    frames: np.ndarray,
+    frames: NDArray[np.float64],
 ) -> Channels:
-    """Key every joint's rotation and the root's location at ``frames`` (T,), linear in between."""
+    """Key every joint's rotation and the root's location at scene ``frames`` (T,), with linear interpolation."""
     rotations, locations = pose_channels(body, motion, rest, rest_orientations(armature, body))
     channels = Channels(armature, action)
     root = body.joint_names[0]

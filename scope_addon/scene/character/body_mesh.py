@@ -3,17 +3,20 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import bpy
 import numpy as np
+from numpy.typing import NDArray
 
 from ....solver.body import Body
 from ...kinematics.axes import R_WORLD_MODEL
 
 
 def build_mesh(
-    name: str, body: Body, vertices: np.ndarray, collection: bpy.types.Collection
+    name: str, body: Body, vertices: NDArray[np.float64], collection: bpy.types.Collection
 ) -> bpy.types.Object:
-    """A mesh object of the body with UVs and materials, at the world's origin.
+    """Create a mesh object of the body with UVs and materials, at the world's origin.
 
     :param vertices: (V, 3) metres, world frame, at rest.
     """
@@ -39,13 +42,21 @@ def build_mesh(
     return obj
 
 
-def rest_vertices_world(body: Body, lift: np.ndarray, betas: np.ndarray | None = None) -> np.ndarray:
-    """(V, 3) the rest mesh in the world frame, z up; ``lift`` (3,) as in ``RestPose``."""
-    return body.rest_vertices(betas) @ R_WORLD_MODEL.T + lift
+def rest_vertices_world(
+    body: Body, lift: NDArray[np.float64], betas: NDArray[np.floating[Any]] | None = None
+) -> NDArray[np.float64]:
+    """Return the vertices of the rest mesh in the world frame.
+
+    :param lift: (3,) metres, as in ``RestPose``.
+    :param betas: (P,) shape coefficients; None for the mean shape.
+    :return: (V, 3) metres, z up.
+    """
+    vertices: NDArray[np.float64] = body.rest_vertices(betas) @ R_WORLD_MODEL.T + lift
+    return vertices
 
 
 def skin_to_armature(mesh: bpy.types.Object, armature: bpy.types.Object, body: Body) -> None:
-    """Vertex groups with the body's skin weights, an Armature modifier (linear) and the armature as parent."""
+    """Add vertex groups with the body's skin weights and a linear Armature modifier, and set the armature as parent."""
     joints, weights = body.skin_joints, body.skin_weights
     for k, joint_name in enumerate(body.joint_names):
         group = mesh.vertex_groups.new(name=joint_name)
@@ -58,20 +69,20 @@ def skin_to_armature(mesh: bpy.types.Object, armature: bpy.types.Object, body: B
     mesh.parent = armature
 
 
-def _materials(body: Body) -> list[tuple[str, np.ndarray]]:
+def _materials(body: Body) -> list[tuple[str, NDArray[np.float64]]]:
     plain = np.array([0.6, 0.6, 0.6, 1.0])
     names = body.material_names or ("body",)
     colors = body.material_colors if body.material_colors is not None else np.tile(plain, (len(names), 1))
     return list(zip(names, colors, strict=True))
 
 
-def _material(name: str, color: np.ndarray) -> bpy.types.Material:
-    """A matte Principled material of a linear RGBA colour, in the viewport and the render."""
+def _material(name: str, color: NDArray[np.float64]) -> bpy.types.Material:
+    """Create a matte Principled material of a linear RGBA colour (4,), for viewport and render."""
     material = bpy.data.materials.new(name)
     rgba = tuple(float(c) for c in color)
     material.diffuse_color = rgba
     material.roughness = 0.6
-    if material.node_tree is None:  # before 5.0 materials start without nodes
+    if material.node_tree is None:  # before 5.0, new materials have no nodes
         material.use_nodes = True
     for node in material.node_tree.nodes:
         if node.type == "BSDF_PRINCIPLED":

@@ -1,42 +1,43 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How bones look: rings about the body, left in one colour, right in another, and a bone collection for each side.
+"""The display of bones: rings around the body in a colour for each side, and a bone collection for each side.
 
-A ring is a custom shape, so an animator grasps a limb from outside the body; exporters never see it, because the ring's
-object belongs to no scene.
+A ring is a custom shape, so an animator can select a bone outside the body. Exporters ignore it, because the ring's
+object is in no scene.
 """
 
 from __future__ import annotations
 
 import bpy
 import numpy as np
+from numpy.typing import NDArray
 
 from ....solver.body import Body
 from .armature import RestPose, rest_orientations
 
 RING = "scope_bone_ring"
-# Left blue, right red, as studios have it; brighter than Blender's own palettes, which drown on the dark suit.
+# Left blue, right red, as is conventional; brighter than Blender's palettes, which are hard to see on the dark suit.
 SIDES = {"Left": (0.12, 0.56, 1.0), "Right": (1.0, 0.22, 0.16), "Middle": (1.0, 0.76, 0.1)}
 _SELECTED, _ACTIVE = 0.5, 0.8  # shares of white in the colours of selected and active bones
 _RING_POINTS = 32
-_CLEARANCE = 1.12  # ring radius over that of the flesh
-_THINNEST = 0.008  # metres
+_CLEARANCE = 1.12  # ratio of the ring's radius to that of the body's surface
+_MIN_RADIUS = 0.008  # metres
 _WIRE_WIDTH = 2.0  # pixels
 
 
 def side_of(joint_name: str) -> str:
-    """``Left``, ``Right`` or ``Middle``."""
+    """Return ``Left``, ``Right`` or ``Middle``."""
     head = joint_name.split("_", 1)[0].title()
     return head if head in SIDES else "Middle"
 
 
-def show_bones(armature: bpy.types.Object, body: Body, rest: RestPose, vertices: np.ndarray) -> None:
-    """Give every bone its side's colour and collection, and a ring about the flesh it moves.
+def show_bones(armature: bpy.types.Object, body: Body, rest: RestPose, vertices: NDArray[np.float64]) -> None:
+    """Give every bone the colour and collection of its side, and a ring around the surface that it moves.
 
     :param vertices: (V, 3) metres, the rest mesh of the fitted shape, world frame.
     """
     ring = _ring()
     collections = {side: armature.data.collections.new(side) for side in SIDES}
-    radii = flesh_radii(body, rest, rest_orientations(armature, body), vertices)
+    radii = surface_radii(body, rest, rest_orientations(armature, body), vertices)
     for i, name in enumerate(body.joint_names):
         side, bone, posed = side_of(name), armature.data.bones[name], armature.pose.bones[name]
         collections[side].assign(bone)
@@ -50,12 +51,16 @@ def show_bones(armature: bpy.types.Object, body: Body, rest: RestPose, vertices:
         bone.show_wire = True
 
 
-def flesh_radii(body: Body, rest: RestPose, M: np.ndarray, vertices: np.ndarray) -> np.ndarray:
-    """(K+1,) metres: how far the flesh reaches from each bone's axis, half way along the bone.
+def surface_radii(
+    body: Body, rest: RestPose, M: NDArray[np.float64], vertices: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Measure the distance of the body's surface from each bone's axis, in the middle of the bone.
 
-    Of the vertices that a bone moves most, those in the middle half of its length count, the ninth tenth of them.
+    It is the 90 % quantile over the vertices that the bone moves most, in the middle half of its length.
 
     :param M: (K+1, 3, 3) rest orientations, y along the bone.
+    :param vertices: (V, 3) metres, the rest mesh of the fitted shape, world frame.
+    :return: (K+1,) metres.
     """
     owner = np.take_along_axis(body.skin_joints, body.skin_weights.argmax(axis=1)[:, None], axis=1)[:, 0]
     lengths = np.linalg.norm(rest.tails - rest.joints, axis=1)
@@ -64,12 +69,12 @@ def flesh_radii(body: Body, rest: RestPose, M: np.ndarray, vertices: np.ndarray)
         local = (vertices[owner == i] - rest.joints[i]) @ M[i]
         middle = local[np.abs(local[:, 1] - 0.5 * length) <= 0.25 * length] if len(local) else local
         reach = np.linalg.norm((middle if len(middle) else local)[:, [0, 2]], axis=1)
-        radii[i] = max(float(np.quantile(reach, 0.9)) if len(reach) else 0.3 * length, _THINNEST)
+        radii[i] = max(float(np.quantile(reach, 0.9)) if len(reach) else 0.3 * length, _MIN_RADIUS)
     return radii
 
 
 def remove_if_unused() -> None:
-    """Take the ring out of the file once no bone shows it."""
+    """Remove the ring from the file if no bone uses it."""
     ring = bpy.data.objects.get(RING)
     if ring is not None and ring.users == 0:
         mesh = ring.data
@@ -85,7 +90,7 @@ def _color(bone: bpy.types.Bone, color: tuple[float, float, float]) -> None:
 
 
 def _ring() -> bpy.types.Object:
-    """A circle of radius 1 in the plane across the bone's y axis; one for all captures of the file."""
+    """Return a circle of radius 1 normal to the bone's y axis, shared by all captures in the file."""
     ring = bpy.data.objects.get(RING)
     if ring is not None and ring.type == "MESH" and ring.library is None:
         return ring

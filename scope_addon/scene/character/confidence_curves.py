@@ -1,38 +1,40 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the capture knows beside the pose, keyed: confidence on every bone, contact on the feet's, markers at doubts.
+"""Keys of confidence and contact on the bones, and timeline markers at review spans.
 
-``confidence`` (0..1) says how far keypoints, not priors, fix the bone. ``contact`` (0..1) is the probability that the
-heel (on the ankle's bone) or the toes (on the foot's) stand still on the floor; drivers and constraints can use it.
+``confidence`` (0..1) says how far keypoints, rather than priors, determine the bone. ``contact`` (0..1) is the
+probability that the heel (on the ankle's bone) or the toes (on the foot's) are at rest on the floor; drivers and
+constraints can use it.
 """
 
 from __future__ import annotations
 
 import bpy
 import numpy as np
+from numpy.typing import NDArray
 
 from ....solver.body import Body
 from ...motion import Motion
-from ...review_spans import REASONS, low_confidence_spans
+from ...review_spans import REASONS, find_review_spans
 from ..animation_data.actions import Channels, bone_property_path
 
 CONFIDENCE, CONTACT = "confidence", "contact"
 # The bones that carry the columns of ``Motion.foot_contact``.
 CONTACT_BONES = ("left_ankle", "left_foot", "right_ankle", "right_foot")
 _DESCRIPTIONS = {
-    CONFIDENCE: "How far the footage, not experience, fixes this bone",
-    CONTACT: "Probability that this end of the foot stands on the floor",
+    CONFIDENCE: "How far the footage, rather than prior knowledge, determines this bone",
+    CONTACT: "Probability that this end of the foot rests on the floor",
 }
 MARKER_NAMES = {"unseen": "not seen", "far": "check", "unsure": "unsure"}
-_MOST_MARKERS = 40  # more would only hide the timeline
-_GAP_S = 0.5  # spans nearer than this share a marker
+_MAX_MARKERS = 40  # more would clutter the timeline
+_GAP_S = 0.5  # spans closer than this share a marker
 
 
 def key_measurements(
-    armature: bpy.types.Object, channels: Channels, body: Body, motion: Motion, frames: np.ndarray
+    armature: bpy.types.Object, channels: Channels, body: Body, motion: Motion, frames: NDArray[np.float64]
 ) -> None:
     """Key confidence and contact as custom properties of the bones, at scene frames (T,).
 
-    The curves are hidden in the graph editor, where they would only be in the way of the rotations'.
+    The curves are hidden in the graph editor, where they would obscure those of the rotations.
     """
     columns = {(name, CONFIDENCE): motion.joint_confidence[:, i] for i, name in enumerate(body.joint_names)}
     columns |= {
@@ -48,19 +50,20 @@ def key_measurements(
             curve.hide = True
 
 
-def mark_low_confidence(scene: bpy.types.Scene, whose: str, motion: Motion, frames: np.ndarray) -> int:
-    """Put a marker on the timeline where each span that deserves a look begins; returns how many.
+def add_review_markers(scene: bpy.types.Scene, prefix: str, motion: Motion, frames: NDArray[np.float64]) -> int:
+    """Add a timeline marker at the start of each review span; return how many.
 
-    Of very many the longest get one. What a marker means stands in its name: "not seen 12-18".
+    If there are too many spans, the longest get a marker. Its name states the reason: "not seen 12-18".
 
-    :param whose: put before the name, for several people.
+    :param prefix: of the marker's name, to distinguish several people.
+    :param frames: (T,) scene frame of each pose.
     """
-    spans = sorted(low_confidence_spans(motion, _GAP_S), key=lambda span: span.first - span.last)[:_MOST_MARKERS]
+    spans = sorted(find_review_spans(motion, _GAP_S), key=lambda span: span.first - span.last)[:_MAX_MARKERS]
     there = {(marker.name, marker.frame) for marker in scene.timeline_markers}
     for span in sorted(spans, key=lambda span: span.first):
         first, last = round(float(frames[span.first])), round(float(frames[span.last]))
         at = f"{first}" if first == last else f"{first}-{last}"
-        name = f"{whose}{MARKER_NAMES[span.reason]} {at}"
+        name = f"{prefix}{MARKER_NAMES[span.reason]} {at}"
         if (name, first) not in there:
             scene.timeline_markers.new(name, frame=first)
     return len(spans)

@@ -1,23 +1,25 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A captured armature's keys as a clip in numpy, and back: what the operators after a capture work on.
+"""Converting a captured armature's keys to a clip in numpy and back, for editing.
 
 The inverse of ``animation.py``: Ω_i = C_iᵀ B_i C_i, R_0 = R_world_model C_0ᵀ B_0 C_0, pelvis = location + h_0, in the
-armature's space. The keys are the truth; so undo, and what an animator has changed by hand, count.
+armature's space. The keys are the only source, so undo and manual changes are respected.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import bpy
 import numpy as np
+from numpy.typing import NDArray
 
 from ....solver.body import Body
 from ....solver.rotations import matrix_from_quaternion
 from ....solver.rotations import quaternion_from_matrix as quaternions
 from ...edit.clip import Clip, band_limited, sample
-from ...edit.reduce import angles_between, keep_of_positions, keep_of_quaternions
+from ...edit.reduce import angles_between, select_position_keys, select_quaternion_keys
 from ...errors import UsageError
 from ...kinematics.axes import R_WORLD_MODEL
 from ..animation_data.actions import bone_path, fcurves, read_keys, rewrite_keys
@@ -27,21 +29,26 @@ from .armature import rest_orientations
 ROTATION, LOCATION = "rotation_quaternion", "location"
 
 
-def read_clip(armature: bpy.types.Object, body: Body, rate: float) -> tuple[Clip, np.ndarray]:
-    """The motion that the keys hold, and the scene frames (T,) of its keys.
+def read_clip(armature: bpy.types.Object, body: Body, rate: float) -> tuple[Clip, NDArray[np.float64]]:
+    """Read the motion from the keys.
 
-    Where curves have keys at different frames, every frame that has a key on any of them counts.
+    If curves have keys at different frames, every frame with a key on any curve is included.
 
-    :param rate: scene frames a second.
-    :raises UsageError: a bone or its keys are missing.
+    :param rate: scene frames per second.
+    :return: the motion, and the scene frames (T,) of its keys.
+    :raises UsageError: when a bone or its keys are missing.
     """
     curves = _curves(armature, body)
     frames = np.unique(np.concatenate([read_keys(curve)[:, 0] for bone in curves.values() for curve in bone]))
-    return read_at(armature, body, rate, frames), frames
+    return read_clip_at(armature, body, rate, frames), frames
 
 
-def read_at(armature: bpy.types.Object, body: Body, rate: float, frames: np.ndarray) -> Clip:
-    """The motion at scene frames (T,), as Blender interpolates it."""
+def read_clip_at(armature: bpy.types.Object, body: Body, rate: float, frames: NDArray[np.float64]) -> Clip:
+    """Read the motion at scene frames (T,), as interpolated by Blender.
+
+    :param rate: scene frames per second.
+    :raises UsageError: when a bone or its keys are missing.
+    """
     curves = _curves(armature, body)
     values = {path: np.stack([_values(curve, frames) for curve in bone], axis=1) for path, bone in curves.items()}
     q = np.stack([values[bone_path(name, ROTATION)] for name in body.joint_names], axis=1)
@@ -53,8 +60,14 @@ def read_at(armature: bpy.types.Object, body: Body, rate: float, frames: np.ndar
     return Clip(frames / rate, rotations, pelvis)
 
 
-def channels(armature: bpy.types.Object, body: Body, clip: Clip) -> tuple[np.ndarray, np.ndarray]:
-    """Blender's values of a clip: quaternions (T, K+1, 4) on one hemisphere, root locations (T, 3)."""
+def channel_values(
+    armature: bpy.types.Object, body: Body, clip: Clip
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Compute Blender's channels of a clip.
+
+    :return: quaternions (T, K+1, 4) on one hemisphere; root locations (T, 3) in the armature's space.
+    :raises UsageError: when a bone is missing.
+    """
     C = _axes(armature, body)
     rotations = clip.rotations.copy()
     rotations[:, 0] = R_WORLD_MODEL.T @ rotations[:, 0]
@@ -62,18 +75,23 @@ def channels(armature: bpy.types.Object, body: Body, clip: Clip) -> tuple[np.nda
     return on_one_hemisphere(quaternions(B)), clip.root - _root_head(armature, body)
 
 
-def write_clip(armature: bpy.types.Object, body: Body, clip: Clip, frames: np.ndarray) -> None:
-    """Replace the keys of all bones by the clip's, at scene frames (T,); curves, groups and action stay."""
-    values = _values_by_path(body, *channels(armature, body, clip))
+def write_clip(armature: bpy.types.Object, body: Body, clip: Clip, frames: NDArray[np.float64]) -> None:
+    """Replace the keys of all bones by the clip's, at scene frames (T,); curves, groups and action are kept.
+
+    :raises UsageError: when a bone or its keys are missing.
+    """
+    values = _values_by_path(body, *channel_values(armature, body, clip))
     for path, bone in _curves(armature, body).items():
         for index, curve in enumerate(bone):
             rewrite_keys(curve, frames, values[path][:, index])
 
 
 def bake_whole_frames(armature: bpy.types.Object, body: Body, rate: float) -> tuple[int, int]:
-    """A key on every whole frame of the scene between the first key and the last; returns keys a curve before, after.
+    """Replace the keys by one on every whole frame of the scene, with a low-pass filter against aliasing.
 
-    :param rate: scene frames a second. Detail faster than that is smoothed away first.
+    :param rate: scene frames per second.
+    :return: the number of keys per curve before and after.
+    :raises UsageError: when a bone or its keys are missing.
     """
     clip, frames = read_clip(armature, body, rate)
     whole = np.arange(math.ceil(frames[0] - 1e-4), math.floor(frames[-1] + 1e-4) + 1, dtype=float)
@@ -85,58 +103,64 @@ def bake_whole_frames(armature: bpy.types.Object, body: Body, rate: float) -> tu
 
 @dataclass(frozen=True)
 class Reduction:
-    """What ``reduce_keys`` did: numbers of keys, and the largest errors at the frames that had keys."""
+    """The result of ``reduce_keys``: numbers of keys, and the largest errors at the frames of the former keys."""
 
     before: int
     after: int
-    angle: float  # radians, of any bone against its parent
-    joint_m: float  # of any joint in the armature's space
+    angle: float  # radians, of any bone relative to its parent
+    joint_m: float  # metres, of any joint in the armature's space
 
 
 def reduce_keys(
-    armature: bpy.types.Object, body: Body, betas: np.ndarray, rate: float, angle: float, distance: float
+    armature: bpy.types.Object, body: Body, betas: NDArray[np.floating[Any]], rate: float, angle: float, distance: float
 ) -> Reduction:
-    """Remove the keys that linear interpolation does not need, each bone by itself.
+    """Remove the keys that linear interpolation does not need, separately for each bone.
 
-    :param angle: radians that any bone's rotation may be off by; distance: metres that the pelvis may.
+    :param betas: (P,) shape coefficients, for measuring the error of joints.
+    :param rate: scene frames per second.
+    :param angle: maximum error of any bone's rotation, radians.
+    :param distance: maximum error of the pelvis's position, metres.
+    :raises UsageError: when a bound is not positive, or a bone or its keys are missing.
     """
     clip, frames = read_clip(armature, body, rate)
-    q, location = channels(armature, body, clip)
+    q, location = channel_values(armature, body, clip)
     values = _values_by_path(body, q, location)
     before = after = 0
     for path, bone in _curves(armature, body).items():
         before += sum(len(curve.keyframe_points) for curve in bone)
         if path == location_path(body):
-            keep = keep_of_positions(clip.times, location, distance)
+            keep = select_position_keys(clip.times, location, distance)
         else:
-            keep = keep_of_quaternions(clip.times, values[path], angle)
+            keep = select_quaternion_keys(clip.times, values[path], angle)
         for index, curve in enumerate(bone):
             rewrite_keys(curve, frames[keep], values[path][keep, index])
         after += len(keep) * len(bone)
-    reduced = read_at(armature, body, rate, frames)
-    off = angles_between(channels(armature, body, reduced)[0], q)
+    reduced = read_clip_at(armature, body, rate, frames)
+    off = angles_between(channel_values(armature, body, reduced)[0], q)
     moved = np.linalg.norm(reduced.joints(body, betas) - clip.joints(body, betas), axis=-1)
     return Reduction(before, after, float(off.max()), float(moved.max()))
 
 
 def location_path(body: Body) -> str:
-    """Data path of the root's location."""
+    """Return the data path of the root's location."""
     return bone_path(body.joint_names[0], LOCATION)
 
 
-def _values_by_path(body: Body, q: np.ndarray, location: np.ndarray) -> dict[str, np.ndarray]:
-    """What ``channels`` gives, (T, 4) or (T, 3) by data path."""
+def _values_by_path(
+    body: Body, q: NDArray[np.float64], location: NDArray[np.float64]
+) -> dict[str, NDArray[np.float64]]:
+    """Return the values of ``channel_values`` by data path, (T, 4) or (T, 3)."""
     rotations = {bone_path(name, ROTATION): q[:, k] for k, name in enumerate(body.joint_names)}
     return rotations | {location_path(body): location}
 
 
-def _root_head(armature: bpy.types.Object, body: Body) -> np.ndarray:
-    """(3,) h_0."""
+def _root_head(armature: bpy.types.Object, body: Body) -> NDArray[np.float64]:
+    """Return h_0 (3,)."""
     return np.array(armature.data.bones[body.joint_names[0]].head_local)
 
 
 def _curves(armature: bpy.types.Object, body: Body) -> dict[str, list[bpy.types.FCurve]]:
-    """Curves by data path, in order of their index: every bone's rotation, and the root's location."""
+    """Return the curves of every bone's rotation and the root's location by data path, in the order of their index."""
     wanted = {bone_path(name, ROTATION): 4 for name in body.joint_names} | {location_path(body): 3}
     found: dict[str, dict[int, bpy.types.FCurve]] = {path: {} for path in wanted}
     for curve in fcurves(armature):
@@ -146,27 +170,26 @@ def _curves(armature: bpy.types.Object, body: Body) -> dict[str, list[bpy.types.
     animation = armature.animation_data
     if missing and animation is not None and animation.action is None and len(animation.nla_tracks):
         raise UsageError(
-            f"'{armature.name}' moves by the NLA track '{animation.nla_tracks[0].name}', not by an action of its own: "
-            "enter Tweak Mode on the track's strip (Tab), or choose the action in the Action Editor again"
+            f"'{armature.name}' is animated by the NLA track '{animation.nla_tracks[0].name}', not by an action of its "
+            "own: enter Tweak Mode on the track's strip (Tab), or choose the action in the Action Editor again"
         )
     if missing:
-        raise UsageError(
-            f"'{armature.name}' has lost the keys of {missing[0]}; undo what removed them, or capture again"
-        )
+        raise UsageError(f"'{armature.name}' has lost the keys of {missing[0]}; undo their removal, or capture again")
     return {path: [by_index[i] for i in sorted(by_index)] for path, by_index in found.items()}
 
 
-def _values(curve: bpy.types.FCurve, frames: np.ndarray) -> np.ndarray:
-    """(T,) the curve at frames; read off where its keys are there, which is much faster."""
+def _values(curve: bpy.types.FCurve, frames: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Evaluate the curve at frames (T,); if these are its keys, read them, which is much faster."""
     keys = read_keys(curve)
     if len(keys) == len(frames) and (keys[:, 0] == frames).all():
         return keys[:, 1].astype(float)
     return np.array([curve.evaluate(frame) for frame in frames])
 
 
-def _axes(armature: bpy.types.Object, body: Body) -> np.ndarray:
-    """(K+1, 3, 3) C_i = M_iᵀ R_world_model."""
+def _axes(armature: bpy.types.Object, body: Body) -> NDArray[np.float64]:
+    """Return C_i = M_iᵀ R_world_model (K+1, 3, 3)."""
     missing = [name for name in body.joint_names if name not in armature.data.bones]
     if missing:
-        raise UsageError(f"'{armature.name}' has no bone '{missing[0]}'; choose an armature that Scope has captured")
-    return np.swapaxes(rest_orientations(armature, body), 1, 2) @ R_WORLD_MODEL
+        raise UsageError(f"'{armature.name}' has no bone '{missing[0]}'; choose an armature that Scope captured")
+    axes: NDArray[np.float64] = np.swapaxes(rest_orientations(armature, body), 1, 2) @ R_WORLD_MODEL
+    return axes

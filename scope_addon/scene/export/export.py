@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Captures to files: .glb .fbx .blend .bvh .usdc by what the scene holds, .npz by what was captured.
+"""Exporting captures: .glb, .fbx, .blend, .bvh and .usdc from the scene, .npz from the captured motion.
 
-Captures are linked into a scene of their own for the time of the export, so that nothing else of the user's file goes
-along and nothing depends on selection or visibility. Files are written beside their place and renamed into it.
+Captures are linked to a temporary scene, so that nothing else of the user's file is exported and the result does not
+depend on selection or visibility. Files are written atomically.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -16,7 +16,7 @@ from pathlib import Path
 import bpy
 
 from ....solver.body import Body
-from ...atomic_write import reason, written_beside
+from ...atomic_write import atomic_path, reason
 from ...errors import OutputError, UsageError
 from ...motion import Motion
 from ..animation_data import actions
@@ -24,14 +24,14 @@ from ..build import CAPTURE_TAG, NEW_SCENE, BuildOptions, BuildResult, Progress,
 from ..character.bone_display import remove_if_unused
 from . import formats
 from .export_states import (
-    actions_as_long_as,
+    actions_over_scene_range,
     all_evaluated,
-    alone,
     baked_meshes,
+    external_parents_replaced,
+    one_person,
     out_of_edit_mode,
     scene_of,
     temporary_scene,
-    with_carriers,
 )
 from .output_paths import check_output, person_paths
 
@@ -40,26 +40,29 @@ SHAPES = ("auto", "keys", "baked")
 
 @dataclass(frozen=True)
 class ExportOptions:
-    """What goes into the files."""
+    """Options of ``export``."""
 
-    camera: bool = False  # the footage's camera, in .glb, .fbx and .usdc; .blend always has it
-    # "keys": morph targets whose value is the coefficient. "baked": a plain mesh of the fitted shape, for engines that
-    # clamp morphs to 0..1. "auto": keys, but baked in .usdc, because USD importers (Blender's among them) clamp.
+    camera: bool = False  # include the footage's camera in .glb, .fbx and .usdc; .blend always includes it
+    # "keys": morph targets whose value is the coefficient. "baked": a mesh of the fitted shape without morph targets,
+    # for engines that clamp them to 0..1. "auto": keys, but baked in .usdc, as USD importers clamp, also Blender's.
     shape: str = "auto"
-    separate: bool = False  # a file for each person, also in the formats that hold several
+    separate: bool = False  # one file per person, also in formats that can hold several
 
     def __post_init__(self) -> None:
-        """Refuse values that are not offered."""
+        """Check the values.
+
+        :raises UsageError: when ``shape`` is unknown.
+        """
         if self.shape not in SHAPES:
             raise UsageError(f"shape must be one of {', '.join(SHAPES)}, but is '{self.shape}'")
 
     def bakes(self, suffix: str) -> bool:
-        """Whether a file of this format gets the shape baked into its mesh."""
+        """Return whether the shape is baked into the mesh in files with this suffix."""
         return self.shape == "baked" or (self.shape == "auto" and suffix == ".usdc")
 
 
 def captures(scene: bpy.types.Scene) -> list[bpy.types.Collection]:
-    """The collections of a scene that hold captures."""
+    """Return the collections of a scene that contain captures."""
     return [c for c in scene.collection.children_recursive if CAPTURE_TAG in c]
 
 
@@ -69,12 +72,13 @@ def export(
     motions: Sequence[Motion] = (),
     options: ExportOptions | None = None,
 ) -> list[Path]:
-    """Write captures to one file (.bvh and .npz, or where it is wanted: one per person) in the format of its suffix.
+    """Write captures in the format of the suffix, to one file, or one per person for .bvh, .npz and on request.
 
-    :param collections: the captures; those of the active scene when not given.
-    :param motions: needed for .npz, which holds what was captured rather than what the scene has become.
+    :param collections: the captures; by default those of the active scene.
+    :param motions: required for .npz, which holds the captured motion without changes made in the scene.
     :return: the files written.
-    :raises UsageError: unknown suffix, or nothing to export. :raises OutputError: cannot be written.
+    :raises UsageError: when the suffix is unknown, or there is nothing to export.
+    :raises OutputError: when a file cannot be written.
     """
     path = check_output(path)
     suffix = path.suffix.lower()
@@ -91,13 +95,13 @@ def export(
     if not rigs:
         raise UsageError(f"cannot write {path.name}: the capture's armature was removed; undo that or capture again")
     if suffix == ".npz":
-        raise UsageError(f"cannot write {path.name}: a motion file holds what was captured, so pass the motions")
+        raise UsageError(f"cannot write {path.name}: a motion file holds the captured motion; pass the motions")
     targets = person_paths(path, len(rigs), options.separate)
     if len(targets) == 1:
         _write_one(path, chosen, rigs, options)
         return [path]
     for number, (target, rig) in enumerate(zip(targets, rigs, strict=True), 1):
-        with alone(rig, rigs, chosen, f"person{number}") as parts:
+        with one_person(rig, rigs, chosen, f"person{number}") as parts:
             _write_one(target, parts, rigs, options)
     return targets
 
@@ -108,16 +112,18 @@ def _write_one(
     rigs: Sequence[bpy.types.Object],
     options: ExportOptions,
 ) -> None:
-    """Write these collections, as long as all of ``rigs`` move: files of several people begin at the same time."""
+    """Write these collections over the frame range of all ``rigs``, so that separate files start at the same time."""
     suffix = path.suffix.lower()
     with (
         out_of_edit_mode(collections),
-        nullcontext() if suffix == ".blend" else all_evaluated(collections),  # a scene keeps what is hidden in it
+        nullcontext() if suffix == ".blend" else all_evaluated(collections),  # keeps hidden objects as they are
         scene_of(collections, rigs, options.camera) as scene,
-        with_carriers(scene) if suffix == ".glb" else nullcontext(),  # that exporter leaves out what hangs on others
+        external_parents_replaced(scene)
+        if suffix == ".glb"
+        else nullcontext(),  # its exporter omits children of objects outside the scene
         baked_meshes(scene) if options.bakes(suffix) else nullcontext(),
-        actions.nla_as_actions(scene) if suffix == ".glb" else nullcontext(),  # that exporter reads actions alone
-        actions_as_long_as(scene),
+        actions.nla_as_actions(scene) if suffix == ".glb" else nullcontext(),  # its exporter only reads actions
+        actions_over_scene_range(scene),
     ):
         rig = next((obj for obj in scene.objects if obj.type == "ARMATURE"), None)
         writers = {
@@ -139,11 +145,15 @@ def export_motions(
     export_options: ExportOptions | None = None,
     progress: Progress | None = None,
 ) -> tuple[list[Path], list[str]]:
-    """Build the motions in a scene of their own, write one file or several, and leave the session as it was.
+    """Build the motions in a temporary scene, write one or more files, and leave the session as it was.
 
-    The scene takes the motion's frame rate and the footage's resolution.
+    The scene has the motion's frame rate and the footage's resolution.
 
     :return: the files written, and the warnings of the build.
+    :raises UsageError: when a suffix is unknown.
+    :raises MotionFileError: when a motion does not belong to the body.
+    :raises VideoError: when the footage is missing.
+    :raises OutputError: when a file cannot be written.
     """
     paths = [path] if isinstance(path, str | Path) else list(path)
     for each in paths:
@@ -167,7 +177,7 @@ def export_motions(
 
 
 def _remove(result: BuildResult) -> None:
-    """Take what a build made out of the file again."""
+    """Remove the datablocks of a build from the file."""
     objects = list(result.collection.objects)
     data = {obj.data for obj in objects}
     owners = [*objects, *(obj.data.shape_keys for obj in objects if obj.type == "MESH")]
@@ -181,24 +191,27 @@ def _remove(result: BuildResult) -> None:
     remove_if_unused()
 
 
-def _write(path: Path, writer) -> None:
-    """Run ``writer(temporary path)`` and move its file into place; on failure nothing is left."""
+def _write(path: Path, writer: Callable[[Path], None]) -> None:
+    """Run ``writer(temporary path)`` and rename its file to ``path``; remove it on failure.
+
+    :raises OutputError: when the file cannot be written.
+    """
     try:
-        with written_beside(path) as temporary:
+        with atomic_path(path) as temporary:
             temporary.unlink()  # Blender's writers differ in what they do with an existing file
             with formats.quiet():
                 writer(temporary)
             if not temporary.is_file():
-                raise OutputError(f"cannot write {path}: Blender wrote nothing")
+                raise OutputError(f"cannot write {path}: Blender wrote no file; try another format")
     except (RuntimeError, OSError) as error:
         raise OutputError(f"cannot write {path}: {_reason(error)}") from error
 
 
 def _reason(error: RuntimeError | OSError) -> str:
-    """One sentence, and what to do. Of an exporter that fails Blender hands on the whole traceback, and its place."""
+    """Return the cause in one sentence, and what to do; Blender reports the whole traceback of a failed exporter."""
     if isinstance(error, OSError) and error.strerror:
         return reason(error)
     lines = [line for line in str(error).splitlines() if line and not line[0].isspace() and "Location: " not in line]
     last = lines[-1] if lines else type(error).__name__
-    said = re.sub(r"^(?:\w*Error: )*(?:\[Errno \d+\] )?", "", last)
-    return f"{said}; {'free some space or choose another folder' if '[Errno ' in last else 'try another format'}"
+    cause = re.sub(r"^(?:\w*Error: )*(?:\[Errno \d+\] )?", "", last)
+    return f"{cause}; {'free some space or choose another folder' if '[Errno ' in last else 'try another format'}"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How captures stand while an exporter reads them, and stand again as before when it has: a context manager each."""
+"""Context managers that prepare captures for an exporter and restore them afterwards."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ from ..character.shape_keys import mixed_vertices
 
 @contextmanager
 def temporary_scene(name: str) -> Iterator[bpy.types.Scene]:
-    """An empty scene that is the window's while the block runs, and gone afterwards."""
-    # Edit mode and the exporters work on a window's scene; timers have no window of their own, so they borrow one.
+    """Provide an empty scene that is the window's active scene inside the block, and remove it afterwards."""
+    # Edit Mode and the exporters work on a window's scene. Timers have no window, so the first one is used.
     window = bpy.context.window or bpy.context.window_manager.windows[0]
     with bpy.context.temp_override(window=window):
         before = window.scene
@@ -38,12 +38,12 @@ def temporary_scene(name: str) -> Iterator[bpy.types.Scene]:
 def scene_of(
     collections: Sequence[bpy.types.Collection], rigs: Sequence[bpy.types.Object], with_camera: bool
 ) -> Iterator[bpy.types.Scene]:
-    """A scene that holds these collections alone, with the rate and picture of the scene they come from.
+    """Provide a scene that contains only these collections, with the frame rate and resolution of the active scene.
 
-    It begins and ends with the motion of ``rigs``.
+    Its frame range is that of the motion of ``rigs``.
 
-    :param with_camera: the picture is the footage's, by which exporters tell the camera's vertical field of view.
-    :raises UsageError: the motion begins before frame 0.
+    :param with_camera: use the footage's resolution, from which exporters compute the camera's vertical field of view.
+    :raises UsageError: when the motion begins before frame 0.
     """
     source = bpy.context.scene
     with temporary_scene("Capture") as scene:
@@ -58,10 +58,10 @@ def scene_of(
         if with_camera and scene.camera is not None:
             set_resolution(scene, next(c for c in collections if scene.camera in c.all_objects.values()))
         span = actions.frame_range(list(rigs)) or (source.frame_start, source.frame_end)
-        if math.floor(span[0]) < 0:  # a scene begins at 0 or later, and what lies before would be lost
+        if math.floor(span[0]) < 0:  # a scene starts at 0 or later, so earlier keys would be lost
             raise UsageError(
-                f"the motion begins at frame {math.floor(span[0])}, but exports at 0: move its keys later, or capture "
-                "again with a First Frame of 0 or more"
+                f"the motion begins at frame {math.floor(span[0])}, but an export at 0: move its keys later, or "
+                "capture again with a First Frame of 0 or more"
             )
         scene.frame_end = math.ceil(span[1])
         scene.frame_start = math.floor(span[0])
@@ -73,29 +73,29 @@ def scene_of(
 
 
 @contextmanager
-def with_carriers(scene: bpy.types.Scene) -> Iterator[None]:
-    """Let what hangs on something outside the scene hang for a while on an empty that goes the same way.
+def external_parents_replaced(scene: bpy.types.Scene) -> Iterator[None]:
+    """Replace parents outside the scene by empties with the same motion.
 
-    The carriers themselves would bring along all that hangs on them.
+    Exporting the parents themselves would include all their other children.
     """
-    hanging = [obj for obj in scene.objects if obj.parent is not None and obj.parent not in scene.objects.values()]
-    kept = [(o, o.parent, o.parent_type, o.parent_bone, o.matrix_parent_inverse.copy()) for o in hanging]
+    children = [obj for obj in scene.objects if obj.parent is not None and obj.parent not in scene.objects.values()]
+    kept = [(o, o.parent, o.parent_type, o.parent_bone, o.matrix_parent_inverse.copy()) for o in children]
     frames = np.arange(scene.frame_start, scene.frame_end + 1)
-    ways: list[list[Matrix]] = [[] for _ in hanging]
-    for frame in frames if hanging else ():
+    trajectories: list[list[Matrix]] = [[] for _ in children]
+    for frame in frames if children else ():
         scene.frame_set(int(frame))
         evaluated = bpy.context.evaluated_depsgraph_get()
-        for obj, way in zip(hanging, ways, strict=True):
+        for obj, trajectory in zip(children, trajectories, strict=True):
             seen = obj.evaluated_get(evaluated)
-            way.append(seen.matrix_world @ seen.matrix_basis.inverted_safe())
-    made: list[bpy.types.ID] = []
+            trajectory.append(seen.matrix_world @ seen.matrix_basis.inverted_safe())
+    created: list[bpy.types.ID] = []
     try:
-        for obj, way in zip(hanging, ways, strict=True):
+        for obj, trajectory in zip(children, trajectories, strict=True):
             empty = bpy.data.objects.new(f"{obj.parent.name}_carrier", None)
             channels = actions.Channels(empty, bpy.data.actions.new(empty.name))
-            made += [empty, channels.action]
+            created += [empty, channels.action]
             empty.rotation_mode = "QUATERNION"
-            place, turn, size = (np.array(each) for each in zip(*(m.decompose() for m in way), strict=True))
+            place, turn, size = (np.array(each) for each in zip(*(m.decompose() for m in trajectory), strict=True))
             channels.write("location", frames, place)
             channels.write("rotation_quaternion", frames, on_one_hemisphere(turn))
             channels.write("scale", frames, size)
@@ -107,12 +107,12 @@ def with_carriers(scene: bpy.types.Scene) -> Iterator[None]:
     finally:
         for obj, parent, kind, bone, inverse in kept:
             obj.parent, obj.parent_type, obj.parent_bone, obj.matrix_parent_inverse = parent, kind, bone, inverse
-        bpy.data.batch_remove(made)
+        bpy.data.batch_remove(created)
 
 
 @contextmanager
 def out_of_edit_mode(collections: Sequence[bpy.types.Collection]) -> Iterator[None]:
-    """Leave Edit Mode for a while if something in these collections is edited: it would be written as it was before."""
+    """Leave Edit Mode inside the block if an object in these collections is edited; the edits would not be written."""
     edited = any(obj.mode == "EDIT" for collection in collections for obj in collection.all_objects)
     try:
         if edited:
@@ -125,9 +125,9 @@ def out_of_edit_mode(collections: Sequence[bpy.types.Collection]) -> Iterator[No
 
 @contextmanager
 def all_evaluated(collections: Sequence[bpy.types.Collection]) -> Iterator[None]:
-    """Hide nothing in these collections for a while, and let their armatures move.
+    """Show all objects in these collections and leave Rest Position inside the block.
 
-    Viewports, renders and Rest Position each keep some exporter from what moves.
+    Some exporters ignore the animation of objects hidden in viewports or renders, or in Rest Position.
     """
     groups = {group for collection in collections for group in (collection, *collection.children_recursive)}
     objects = {obj for collection in collections for obj in collection.all_objects}
@@ -147,26 +147,26 @@ def all_evaluated(collections: Sequence[bpy.types.Collection]) -> Iterator[None]
 
 
 @contextmanager
-def actions_as_long_as(scene: bpy.types.Scene) -> Iterator[None]:
-    """Let the actions of armatures last as long as the scene.
+def actions_over_scene_range(scene: bpy.types.Scene) -> Iterator[None]:
+    """Set the frame range of armatures' actions to that of the scene.
 
-    One who comes late is late in a file of their own too, and exporters do not stop before keys between whole frames.
+    A person who appears late then does so in a separate file too, and exporters include keys between whole frames.
     """
     moving = [obj.animation_data for obj in scene.objects if obj.type == "ARMATURE" and obj.animation_data]
-    stretched = [a for a in {data.action for data in moving} if a is not None and not a.use_frame_range]
+    extended = [a for a in {data.action for data in moving} if a is not None and not a.use_frame_range]
     try:
-        for action in stretched:
+        for action in extended:
             action.use_frame_range = True
             action.frame_start, action.frame_end = scene.frame_start, scene.frame_end
         yield
     finally:
-        for action in stretched:
+        for action in extended:
             action.use_frame_range = False
 
 
 @contextmanager
 def baked_meshes(scene: bpy.types.Scene) -> Iterator[None]:
-    """Give the scene's objects with shape keys plain meshes for a while, the current mix in their vertices."""
+    """Replace meshes with shape keys by meshes of their current shape inside the block."""
     shaped = [(obj, obj.data, obj.data.name) for obj in scene.objects if obj.type == "MESH" and obj.data.shape_keys]
     baked = []
     try:
@@ -174,7 +174,7 @@ def baked_meshes(scene: bpy.types.Scene) -> Iterator[None]:
             vertices = mixed_vertices(obj)
             plain = bpy.data.meshes.new_from_object(obj)
             baked.append(plain)
-            if mesh.library is None:  # else the name is another file's, and free in this one
+            if mesh.library is None:  # a linked mesh's name does not conflict with one in this file
                 mesh.name = f"{name} shaped"
             plain.name = name
             plain.vertices.foreach_set("co", vertices.ravel())
@@ -192,13 +192,13 @@ def baked_meshes(scene: bpy.types.Scene) -> Iterator[None]:
 
 
 @contextmanager
-def alone(
+def one_person(
     rig: bpy.types.Object,
     rigs: Sequence[bpy.types.Object],
     collections: Sequence[bpy.types.Collection],
     name: str,
 ) -> Iterator[list[bpy.types.Collection]]:
-    """Collections, for a while, of what those hold but for the other people."""
+    """Provide collections with the objects of one person inside the block: those of ``collections`` without others'."""
     others = {obj for other in rigs if other != rig for obj in (other, *other.children_recursive)}
     parts = []
     try:

@@ -1,16 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Turns an FBX file of metres into one of centimetres, the format's own unit.
+"""Converting an FBX file from metres to centimetres, the format's own unit.
 
-Unreal takes lengths for centimetres whatever the file says, and Blender either writes metres or scales every object by
-100, which becomes the scale of a skeleton's root. So all lengths in the file are multiplied, and no object is scaled:
-vertices and shapes, translations and their curves, the translations in bind matrices, and what a camera measures.
+Unreal interprets lengths as centimetres whatever unit the file states. Blender either writes metres or scales every
+object by 100, which becomes the scale of a skeleton's root. Therefore all lengths in the file are multiplied and no
+object is scaled: vertices and shapes, translations and their curves, the translations in bind matrices, and the lengths
+of cameras.
 
-The file is read and written by the parser and the encoder of Blender's own FBX add-on, which need not be enabled.
+The file is read and written with the parser and the encoder of Blender's FBX add-on, which need not be enabled.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -18,9 +19,9 @@ import numpy as np
 
 from ...errors import OutputError
 
-_Node = Any  # the parser's: id, props, props_type (a letter's code for each) and elems, the nodes below
+_Node = Any  # the parser's: id, props, props_type (a letter code for each), and elems, the child nodes
 
-# The encoder's methods by the letter of a property's type.
+# The encoder's methods by the letter code of a property's type.
 _ADD = {
     "Z": "add_int8",
     "Y": "add_int16",
@@ -40,6 +41,7 @@ _ADD = {
     "c": "add_byte_array",
 }
 _MATRICES = (b"Matrix", b"Transform", b"TransformLink", b"TransformAssociateModel")
+_TRANSLATION = slice(12, 15)  # of a matrix's 16 elements
 _LENGTHS = (
     *(b"Lcl Translation", b"Size"),
     *(b"Position", b"InterestPosition", b"NearPlane", b"FarPlane", b"BackPlaneDistance", b"FocusDistance"),
@@ -47,14 +49,15 @@ _LENGTHS = (
 
 
 def metres_to_centimetres(path: Path) -> None:
-    """Rewrite the file in centimetres; one that is in centimetres already stays as it is.
+    """Rewrite the file in centimetres, unless it already is.
 
-    :raises OSError: it is no binary FBX file, or cannot be written. :raises OutputError: Blender's add-on lacks a part.
+    :raises OSError: when the file is not a binary FBX file, or cannot be written.
+    :raises OutputError: when Blender's add-on lacks the parser or the encoder.
     """
     try:
-        from io_scene_fbx import encode_bin, parse_fbx  # found once bpy is imported
+        from io_scene_fbx import encode_bin, parse_fbx  # importable after bpy
     except ImportError as error:
-        raise OutputError("this Blender's FBX add-on cannot give centimetres; choose .glb") from error
+        raise OutputError("this Blender's FBX add-on cannot write centimetres; export .glb instead") from error
     root, version = parse_fbx.parse(str(path))
     settings = {p.props[0]: p for node in _below(root, b"GlobalSettings") for p in _properties(node)}
     factor = settings[b"UnitScaleFactor"].props[-1]  # in centimetres
@@ -67,30 +70,32 @@ def metres_to_centimetres(path: Path) -> None:
 
 
 def _multiply_lengths(root: _Node, factor: float) -> None:
-    moved = _curves_of_translations(root)
-    translation = slice(12, 15)
+    """Multiply all lengths in the file, in place."""
+    translations = _translation_curves(root)
     for node in (child for objects in _below(root, b"Objects") for child in objects.elems):
-        if node.id == b"Geometry":
-            for vertices in _below(node, b"Vertices"):
-                _multiply(vertices, factor)
-        elif node.id in (b"Model", b"NodeAttribute"):
-            for p in _properties(node):
-                if p.props[0] in _LENGTHS:
-                    _multiply(p, factor)
-        elif node.id in (b"Pose", b"Deformer"):
+        for holder in _length_holders(node, translations):
+            _multiply(holder, factor)
+        if node.id in (b"Pose", b"Deformer"):
             for holder in (node, *_below(node, b"PoseNode")):
                 for matrix in _below(holder, *_MATRICES):
-                    _multiply(matrix, factor, translation)
-        elif node.id == b"AnimationCurveNode" and node.props[0] in moved:
-            for p in _properties(node):
-                _multiply(p, factor)
-        elif node.id == b"AnimationCurve" and node.props[0] in moved:
-            for values in _below(node, b"KeyValueFloat"):
-                _multiply(values, factor)
+                    _multiply(matrix, factor, _TRANSLATION)
+
+
+def _length_holders(node: _Node, translations: set[int]) -> Iterable[_Node]:
+    """Return the nodes below an object node all of whose numbers are lengths."""
+    if node.id == b"Geometry":
+        return _below(node, b"Vertices")
+    if node.id in (b"Model", b"NodeAttribute"):
+        return (p for p in _properties(node) if p.props[0] in _LENGTHS)
+    if node.id == b"AnimationCurveNode" and node.props[0] in translations:
+        return _properties(node)
+    if node.id == b"AnimationCurve" and node.props[0] in translations:
+        return _below(node, b"KeyValueFloat")
+    return ()
 
 
 def _multiply(node: _Node, factor: float, only: slice = slice(None)) -> None:
-    """Its doubles, and those elements of its arrays of floats and doubles."""
+    """Multiply a node's doubles, and the selected elements of its arrays of floats and doubles, in place."""
     for index, kind in enumerate(node.props_type.decode()):
         if kind == "D":
             node.props[index] *= factor
@@ -98,8 +103,8 @@ def _multiply(node: _Node, factor: float, only: slice = slice(None)) -> None:
             np.frombuffer(node.props[index], kind)[only] *= factor
 
 
-def _curves_of_translations(root: _Node) -> set[int]:
-    """Numbers of the curve nodes that move a model, and of their curves."""
+def _translation_curves(root: _Node) -> set[int]:
+    """Return the ids of the curve nodes that animate a model's translation, and of their curves."""
     links = [c.props for node in _below(root, b"Connections") for c in _below(node, b"C") if c.props[0] == b"OP"]
     nodes = {link[1] for link in links if link[3] == b"Lcl Translation"}
     return nodes | {link[1] for link in links if link[2] in nodes}
@@ -114,7 +119,7 @@ def _below(node: _Node, *names: bytes) -> Iterator[_Node]:
 
 
 def _encoded(node: _Node, element: Any) -> Any:
-    """The node as the encoder's ``element`` takes it, and all below."""
+    """Convert a node and its children to the encoder's class ``element``."""
     out = element(node.id)
     for kind, value in zip(node.props_type.decode(), node.props, strict=True):
         getattr(out, _ADD[kind])(value)

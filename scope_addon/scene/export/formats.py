@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One writer per file format, each for the active scene, with the settings other tools need."""
+"""One writer per file format, with the settings that other tools need."""
 
 from __future__ import annotations
 
@@ -12,24 +12,26 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stdout
 from pathlib import Path
+from typing import Any
 
 import addon_utils
 import bpy
 import numpy as np
+from numpy.typing import NDArray
 
 from ...errors import OutputError
 from ..animation_data import timing
 from . import bvh
 from .fbx_units import metres_to_centimetres
-from .glb_times import true_times
+from .glb_times import corrected_key_times
 
 
 def write_glb(path: Path, camera: bool = False) -> None:
-    """glTF binary: y up, metres, four influences a vertex, shape keys as morph targets, all motion in one animation."""
-    need_addon("io_scene_gltf2")
+    """Write the active scene as binary glTF: y up, metres, shape keys as morph targets, all motion in one animation."""
+    enable_addon("io_scene_gltf2")
     scene = bpy.context.scene
     moving = [obj for obj in scene.objects if obj.animation_data]
-    with true_times(path, scene):
+    with corrected_key_times(path, scene):
         call_operator(
             bpy.ops.export_scene.gltf,
             filepath=str(path),
@@ -50,19 +52,19 @@ def write_glb(path: Path, camera: bool = False) -> None:
             export_leaf_bone=False,
             export_animations=True,
             export_animation_mode="ACTIVE_ACTIONS",
-            export_anim_single_armature=False,  # else Blender 4.2 mixes in the other actions of the file
+            export_anim_single_armature=False,  # otherwise Blender 4.2 includes other actions of the file
             export_force_sampling=True,
             export_frame_range=True,
-            export_anim_slide_to_zero=True,  # players begin at zero, and would wait for the first frame each time
+            export_anim_slide_to_zero=True,  # players start at zero and would wait for the first frame
             export_optimize_animation_size=False,
-            # Faster, but it hides all that moves except for the first one, and then the others rest.
+            # Faster, but it hides all animated objects except the first, which then do not move.
             export_optimize_disable_viewport=len(moving) < 2,
         )
 
 
 def write_fbx(path: Path, camera: bool = False) -> None:
-    """FBX: y up, centimetres, objects at scale 1, no leaf bones, every frame keyed."""
-    need_addon("io_scene_fbx")
+    """Write the active scene as FBX: y up, centimetres, objects at scale 1, no leaf bones, every frame keyed."""
+    enable_addon("io_scene_fbx")
     call_operator(
         bpy.ops.export_scene.fbx,
         filepath=str(path),
@@ -92,7 +94,10 @@ def write_fbx(path: Path, camera: bool = False) -> None:
 
 
 def write_usd(path: Path, camera: bool = False) -> None:
-    """USD crate: z up, metres, skeleton, blend shapes, preview materials."""
+    """Write the active scene as a USD crate: z up, metres, skeleton, blend shapes, preview materials.
+
+    :raises OSError: when the file is incomplete.
+    """
     call_operator(
         bpy.ops.wm.usd_export,
         filepath=str(path),
@@ -112,13 +117,13 @@ def write_usd(path: Path, camera: bool = False) -> None:
         convert_world_material=False,
         root_prim_path="/root",
     )
-    # The exporter says nothing about what it could not write.
+    # The exporter does not report write errors.
     if path.suffix == ".usdc" and path.is_file() and not _is_whole_crate(path):
-        raise OSError(errno.ENOSPC, "the file could not be written to its end", str(path))
+        raise OSError(errno.ENOSPC, "the file could not be written completely", str(path))
 
 
 def _is_whole_crate(path: Path) -> bool:
-    """Whether a USD crate file has its table of contents, whose place the head tells, and which is written last.
+    """Return whether a USD crate file has its table of contents, which is written last and located by the header.
 
     Source: OpenUSD, pxr/usd/usd/crateFile.h: identifier (8 bytes), version (8), offset of the table (8); the table is a
     count (8) of sections of 32 bytes each.
@@ -133,28 +138,28 @@ def _is_whole_crate(path: Path) -> bool:
             return False
         file.seek(table)
         (count,) = struct.unpack("<q", file.read(8))
-    return 0 < count <= (size - table - 8) // 32
+    return bool(0 < count <= (size - table - 8) // 32)
 
 
 def write_blend(path: Path, scene: bpy.types.Scene) -> None:
-    """A .blend of one scene and what it uses; paths of footage relative to the file."""
+    """Write a .blend of one scene and its dependencies; paths of footage are relative to the file."""
     bpy.data.libraries.write(str(path), {scene}, path_remap="RELATIVE_ALL", compress=True)
 
 
 def write_bvh(path: Path, scene: bpy.types.Scene, rig: bpy.types.Object) -> None:
-    """One armature as BVH, sampled at the scene's whole frames."""
+    """Write one armature as BVH, sampled at the scene's whole frames."""
     path.write_text(bvh.bvh_text(sample_armature(scene, rig)), encoding="ascii", errors="replace")
 
 
 def sample_armature(scene: bpy.types.Scene, rig: bpy.types.Object) -> bvh.SampledPose:
-    """The pose of an armature at every frame of the scene's range, in the world frame."""
+    """Sample the pose of an armature at every frame of the scene's range, in the world frame."""
     bones = [bone for bone in rig.data.bones]
     names = [bone.name for bone in bones]
     rest = np.array([np.array(bone.matrix_local) for bone in bones])
     frames = range(scene.frame_start, scene.frame_end + 1)
     posed = np.empty((len(frames), len(bones), 4, 4))
     before = scene.frame_current, scene.frame_subframe
-    with _meshes_asleep(scene):
+    with _without_deformation(scene):
         for row, frame in enumerate(frames):
             scene.frame_set(frame)
             evaluated = rig.evaluated_get(bpy.context.evaluated_depsgraph_get())
@@ -176,13 +181,14 @@ def sample_armature(scene: bpy.types.Scene, rig: bpy.types.Object) -> bvh.Sample
     )
 
 
-def _unscaled(R: np.ndarray) -> np.ndarray:
-    return R / np.linalg.norm(R, axis=-2, keepdims=True)
+def _unscaled(R: NDArray[np.float64]) -> NDArray[np.float64]:
+    rotations: NDArray[np.float64] = R / np.linalg.norm(R, axis=-2, keepdims=True)
+    return rotations
 
 
 @contextmanager
-def _meshes_asleep(scene: bpy.types.Scene) -> Iterator[None]:
-    """Do not deform meshes while only bones are read: most of a frame's time would go there."""
+def _without_deformation(scene: bpy.types.Scene) -> Iterator[None]:
+    """Disable mesh deformation while only bones are read; it would take most of the time."""
     modifiers = [m for obj in scene.objects for m in obj.modifiers if m.type == "ARMATURE" and m.show_viewport]
     for modifier in modifiers:
         modifier.show_viewport = False
@@ -193,49 +199,51 @@ def _meshes_asleep(scene: bpy.types.Scene) -> Iterator[None]:
             modifier.show_viewport = True
 
 
-class _Nowhere(io.TextIOBase):
-    """A stream that is never closed: exporters keep log handlers that outlive the call."""
+class _NullStream(io.TextIOBase):
+    """A null stream that is never closed, because exporters keep log handlers that outlive the call."""
 
     def write(self, text: str) -> int:
-        """Drop the text."""
+        """Discard the text."""
         return len(text)
 
 
 @contextmanager
 def quiet() -> Iterator[None]:
-    """Keep Blender's writers from printing: standard output may be carrying a report for a program."""
+    """Suppress the output of Blender's exporters, because standard output may carry a machine-readable report."""
     sys.stdout.flush()
     keep = os.dup(1)
-    nowhere = os.open(os.devnull, os.O_WRONLY)
+    devnull = os.open(os.devnull, os.O_WRONLY)
     try:
-        os.dup2(nowhere, 1)  # what Blender's own code prints
-        with redirect_stdout(_Nowhere()):  # what exporters in Python print
+        os.dup2(devnull, 1)  # output of Blender's C++ code
+        with redirect_stdout(_NullStream()):  # output of exporters in Python
             yield
     finally:
         sys.stdout.flush()
         os.dup2(keep, 1)
         os.close(keep)
-        os.close(nowhere)
+        os.close(devnull)
 
 
-def need_addon(module: str) -> None:
-    """Enable an exporter or importer that comes with Blender, for this session only, where a user has turned it off."""
+def enable_addon(module: str) -> None:
+    """Enable an exporter or importer that is part of Blender, for this session only, if the user has disabled it."""
     if not addon_utils.check(module)[1]:
         addon_utils.enable(module, default_set=False)
 
 
-def call_operator(operator, **settings) -> None:
-    """Call an exporter or importer with those of our settings that this Blender's version of it has.
+def call_operator(operator: Any, **settings: Any) -> None:
+    """Call an exporter or importer with those of the settings that this Blender version supports.
 
-    :raises RuntimeError: it failed. :raises KeyboardInterrupt: somebody pressed Ctrl-C.
+    :raises OutputError: when this Blender lacks the operator.
+    :raises RuntimeError: when the operator fails.
+    :raises KeyboardInterrupt: when the user presses Ctrl-C.
     """
     try:
         known = operator.get_rna_type().properties.keys()
     except KeyError as error:
-        raise OutputError("this Blender was built without the format; use one from blender.org") from error
+        raise OutputError("this Blender was built without the format; use a build from blender.org") from error
     try:
         operator(**{name: value for name, value in settings.items() if name in known})
     except RuntimeError as error:
-        if re.search(r"^KeyboardInterrupt\b", str(error), re.MULTILINE):  # Blender makes one error of all
+        if re.search(r"^KeyboardInterrupt\b", str(error), re.MULTILINE):  # Blender converts all exceptions to this one
             raise KeyboardInterrupt from None
         raise

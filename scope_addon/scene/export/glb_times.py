@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Keeps the time of a binary glTF true at frame rates such as 29.97.
+"""Correcting the key times of a binary glTF at frame rates such as 29.97.
 
-Blender's exporter takes the scene's ``fps`` times ``fps_base`` for its rate, which is fps / fps_base: 29.97 becomes
-30.03, and a capture runs away from its footage's sound. So a scene is written at its whole ``fps``, and the seconds in
-the file are stretched afterwards. (Blender's importer counts as its exporter does.)
+Blender's exporter computes the rate as ``fps`` times ``fps_base`` instead of fps / fps_base: 29.97 becomes 30.03, and
+the motion drifts from the footage's sound. Therefore a scene is written at its integer ``fps``, and the times in the
+file are scaled afterwards. (Blender's importer has the same error as its exporter.)
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-_HEADER, _CHUNK_HEADER = 12, 8  # bytes; of the file: magic, version, length; of a chunk: length, type
+_HEADER, _CHUNK_HEADER = 12, 8  # bytes: magic, version, length of the file; length, type of a chunk
 
 
 @contextmanager
-def true_times(path: Path, scene: bpy.types.Scene) -> Iterator[None]:
-    """Have a .glb of the scene that is written here tell the seconds that the scene means."""
+def corrected_key_times(path: Path, scene: bpy.types.Scene) -> Iterator[None]:
+    """Correct the key times of the .glb that the block writes to ``path``."""
     base = scene.render.fps_base
     scene.render.fps_base = 1.0
     try:
@@ -30,10 +30,10 @@ def true_times(path: Path, scene: bpy.types.Scene) -> Iterator[None]:
     finally:
         scene.render.fps_base = base
     if base != 1.0 and path.is_file():
-        _stretch_times(path, base)
+        _scale_times(path, base)
 
 
-def _stretch_times(path: Path, factor: float) -> None:
+def _scale_times(path: Path, factor: float) -> None:
     """Multiply the times of all keys in the file."""
     data = path.read_bytes()
     (length,) = struct.unpack_from("<I", data, _HEADER)

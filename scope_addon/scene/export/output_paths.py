@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which files an export may write. Free of bpy, so that the command line can check its arguments first."""
+"""Checking and naming the files of an export. Free of bpy, so that the command line can check its arguments first."""
 
 from __future__ import annotations
 
@@ -7,25 +7,25 @@ import errno
 import os
 from pathlib import Path
 
-from ...atomic_write import file_behind, reason
+from ...atomic_write import reason, resolve_link
 from ...errors import OutputError, UsageError
 
 SUFFIXES = (".glb", ".fbx", ".blend", ".bvh", ".usdc", ".npz")
-PER_PERSON = (".bvh", ".npz")  # formats that hold one person a file
+PER_PERSON = (".bvh", ".npz")  # formats with one person per file
 
 
 def check_output(path: str | Path, suffixes: tuple[str, ...] = SUFFIXES) -> Path:
-    """The path, when a file of a known format can be written there.
+    """Check that a file of a known format can be written to the path, and return it.
 
-    :raises UsageError: unknown suffix, or a folder.
-    :raises OutputError: the folder is missing or cannot be written to, the name is too long, or what is there is no
-        ordinary file.
+    :raises UsageError: when the suffix is unknown, or the path is a folder.
+    :raises OutputError: when the folder is missing or not writable, the name is too long, or the path is a folder or a
+        link into a missing folder.
     """
     path = Path(path)
     if path.suffix.lower() not in suffixes:
         if path.is_dir():
             known = ", ".join(suffixes)
-            raise UsageError(f"cannot write {path}: it is a folder; name a file in it, whose suffix is one of {known}")
+            raise UsageError(f"cannot write {path}: it is a folder; name a file in it with one of the suffixes {known}")
         raise UsageError(f"cannot write '{path.name}': its suffix must be one of {', '.join(suffixes)}")
     folder = path.parent
     if not folder.is_dir():
@@ -36,19 +36,19 @@ def check_output(path: str | Path, suffixes: tuple[str, ...] = SUFFIXES) -> Path
         if error.errno == errno.ENAMETOOLONG:
             raise OutputError(f"cannot write {path}: {reason(error)}") from error
     if path.is_dir():
-        raise OutputError(f"cannot write {path}: a folder of that name is there; choose another place")
-    folder = file_behind(path).parent
+        raise OutputError(f"cannot write {path}: a folder of that name exists; choose another name")
+    folder = resolve_link(path).parent
     if not folder.is_dir():
         raise OutputError(f"cannot write {path}: it is a link into {folder}, which does not exist; choose another name")
     if not os.access(folder, os.W_OK):
-        raise OutputError(f"cannot write {path}: the folder {folder} is not writable; choose another place")
+        raise OutputError(f"cannot write {path}: the folder {folder} is not writable; choose another folder")
     return path
 
 
 def person_paths(path: str | Path, people: int, separate: bool = False) -> list[Path]:
-    """One path per person for the formats that hold one: OUT.bvh, or OUT.person1.bvh, OUT.person2.bvh, …
+    """Return one path per person for formats with one person per file: OUT.bvh, or OUT.person1.bvh, OUT.person2.bvh, …
 
-    :param separate: for the others too.
+    :param separate: also for the other formats.
     """
     path = Path(path)
     if people == 1 or not (separate or path.suffix.lower() in PER_PERSON):

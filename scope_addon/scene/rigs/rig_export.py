@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The user's own rig to files: one out of a file in the captured body's place, or one that moves in the scene."""
+"""Exporting the user's own rig: from a rig file, in place of the captured body, or from the scene."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import bpy
@@ -12,10 +13,20 @@ from ....solver.body import Body
 from ...motion import Motion
 from ...retarget.rig_source import RigSource
 from ..build import BuildOptions, build_scene
-from ..export.export import ExportOptions, export, temporary_scene
+from ..export.export import ExportOptions, export
+from ..export.export_states import temporary_scene
 from ..export.output_paths import check_output
-from .rig_file import bones_of, forgotten, load_rig, with_meshes
+from .rig_file import load_rig, rig_bone_map, temporary_datablocks, with_meshes
 from .rig_retarget import RetargetOptions, retarget
+
+
+@dataclass(frozen=True)
+class RigExportOptions:
+    """Options of ``export_on_rig``."""
+
+    build: BuildOptions
+    root: str = "bone"  # where the root motion goes, see ``RetargetOptions``
+    export: ExportOptions | None = None
 
 
 def export_on_rig(
@@ -23,48 +34,49 @@ def export_on_rig(
     body: Body,
     paths: Sequence[Path],
     source: RigSource,
-    build_options: BuildOptions,
-    root: str = "bone",
+    options: RigExportOptions,
     footage: Path | None = None,
-    export_options: ExportOptions | None = None,
 ) -> tuple[list[Path], list[str]]:
-    """Put every person's motion on a rig of its own, write one file or several, and leave the session as it was.
+    """Retarget every person's motion to a copy of the rig, write one or more files, and leave the session as it was.
 
-    :param root: where the way over the floor is kept, see ``RetargetOptions``.
     :return: the files written, and the warnings.
-    :raises InputError, UsageError: the rig cannot be used; see ``load_rig``. :raises OutputError: cannot be written.
+    :raises InputError: when the rig cannot be used; see ``load_rig``.
+    :raises UsageError: when the choice of armature is ambiguous, or a suffix unknown.
+    :raises OutputError: when a file cannot be written.
     """
     for path in paths:
         check_output(path)
     written: list[Path] = []
-    with forgotten(), temporary_scene("Retargeting"):
-        result = build_scene(motions, body, footage, build_options)
+    with temporary_datablocks(), temporary_scene("Retargeting"):
+        result = build_scene(motions, body, footage, options.build)
         warnings = list(result.warnings)
         for number, person in enumerate(result.people, 1):
             rig = load_rig(source, result.collection)
-            bones = bones_of(source, rig)
+            bones = rig_bone_map(source, rig)
             if number == 1 and any(c <= 0.5 for c in bones.confidence.values()):
-                warnings.append(f"the bones of '{rig.name}' were guessed by its rest pose alone; look at the result")
+                warnings.append(f"the bones of '{rig.name}' were guessed from its rest pose alone; check the result")
             if len(motions) > 1:
                 rig.name = f"{rig.name}_person{number}"
-            betas, options = person.motion.betas, RetargetOptions(root=root)
-            warnings += retarget(person.armature, body, betas, rig, bones, result.frame_rate, options).warnings
+            betas, rate = person.motion.betas, result.frame_rate
+            retargeting = RetargetOptions(root=options.root)
+            warnings += retarget(person.armature, body, betas, rig, bones, rate, retargeting).warnings
         bpy.data.batch_remove([obj for person in result.people for obj in (person.armature, person.mesh)])
         for path in paths:
-            written += export(path, [result.collection], options=export_options)
+            written += export(path, [result.collection], options=options.export)
     return written, warnings
 
 
 def export_rig(path: Path, rig: bpy.types.Object, options: ExportOptions) -> list[Path]:
-    """Write a rig of the scene as it moves there, with the meshes that it moves; returns the files written.
+    """Write an animated rig of the scene with the meshes that it deforms; return the files written.
 
-    :raises UsageError: unknown suffix. :raises OutputError: cannot be written.
+    :raises UsageError: when the suffix is unknown.
+    :raises OutputError: when a file cannot be written.
     """
     collection, parts = bpy.data.collections.new(rig.name), with_meshes(rig, bpy.context.scene.objects)
     try:
         for obj in parts:
             below = obj.children_recursive
-            if rig not in below or set(below) <= set(parts):  # what carries other things too would take them along
+            if rig not in below or set(below) <= set(parts):  # a parent of other objects would export them as well
                 collection.objects.link(obj)
         return export(path, [collection], options=options)
     finally:

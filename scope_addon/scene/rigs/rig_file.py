@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The user's rig out of a .blend, .fbx or glTF file: one armature and the meshes that it moves."""
+"""Loading the user's rig from a .blend, .fbx or glTF file: one armature and the meshes that it deforms."""
 
 from __future__ import annotations
 
@@ -15,9 +15,10 @@ from ...retarget.bone_map import PHALANGES, BoneMap
 from ...retarget.rig_source import RigSource
 from ..export import formats
 from ..export.export_states import temporary_scene
-from .rig_retarget import check_turning, guess_bone_map
+from .rig_probe import check_bones_move
+from .rig_retarget import guess_bone_map
 
-# What a file may bring along, users before what they use.
+# Kinds of datablock that a file may contain, users before the datablocks that they use.
 _KINDS = (
     "scenes", "collections", "objects", "meshes", "armatures", "curves", "cameras", "lights", "metaballs", "lattices",
     "actions", "materials", "node_groups", "textures", "images", "texts", "worlds", "libraries",
@@ -25,9 +26,10 @@ _KINDS = (
 
 
 def load_rig(source: RigSource, collection: bpy.types.Collection) -> bpy.types.Object:
-    """Read the rig into ``collection`` of the active scene, without any animation; returns its armature.
+    """Load the rig into ``collection`` of the active scene, without animation; return its armature.
 
-    :raises InputError: the file cannot be read or has no armature. :raises UsageError: which armature is not clear.
+    :raises InputError: when the file cannot be read or has no armature.
+    :raises UsageError: when the choice of armature is ambiguous, or none has the given name.
     """
     path = source.path
     loaded = _append(path) if path.suffix.lower() == ".blend" else _import(path)
@@ -40,13 +42,13 @@ def load_rig(source: RigSource, collection: bpy.types.Collection) -> bpy.types.O
     for obj in keep:
         collection.objects.link(obj)
         obj.hide_viewport = obj.hide_render = False
-        _still(obj)
+        _remove_animation(obj)
     bpy.context.view_layer.update()
     return rig
 
 
 def with_meshes(rig: bpy.types.Object, objects: Iterable[bpy.types.Object]) -> list[bpy.types.Object]:
-    """The rig, the meshes among some objects that it moves, and what these hang on."""
+    """Return the rig, those of the objects that are meshes deformed by it, and the parents of these."""
     keep = [rig]
     keep += [obj for obj in objects if obj.type == "MESH" and obj not in _widgets(rig) and _moved_by(obj, rig)]
     for obj in keep:
@@ -57,44 +59,45 @@ def with_meshes(rig: bpy.types.Object, objects: Iterable[bpy.types.Object]) -> l
 
 
 def check_rig(source: RigSource, *, fingers: bool = True) -> None:
-    """Whether a motion can be put on the rig, before one is captured.
+    """Check, before a capture, that a motion can be retargeted to the rig.
 
-    :param fingers: whether that motion will have any: those of the rig stay as they are otherwise.
-    :raises InputError, UsageError: as ``load_rig``, and when its bones cannot be mapped or turned.
+    :param fingers: whether the motion will include fingers; otherwise, those of the rig are not checked.
+    :raises InputError: when the rig cannot be loaded, or its bones cannot be mapped or rotated.
+    :raises UsageError: when the choice of armature is ambiguous, or none has the given name.
     """
-    with forgotten(), temporary_scene("Looking at a rig") as scene:
+    with temporary_datablocks(), temporary_scene("Checking a rig") as scene:
         rig = load_rig(source, scene.collection)
-        bones = bones_of(source, rig)
+        bones = rig_bone_map(source, rig)
         moved = {b: part for b, part in bones.parts.items() if fingers or part.partition("_")[2] not in PHALANGES}
-        check_turning(rig, BoneMap(moved))
+        check_bones_move(rig, BoneMap(moved))
 
 
-def bones_of(source: RigSource, rig: bpy.types.Object) -> BoneMap:
-    """The given bone map, or the guessed one.
+def rig_bone_map(source: RigSource, rig: bpy.types.Object) -> BoneMap:
+    """Return the given bone map, or else guess one.
 
-    :raises InputError: it does not fit the rig, or nothing could be guessed.
+    :raises InputError: when it does not match the rig, or a required part could not be guessed.
     """
     found = source.bone_map or guess_bone_map(rig)
     missing = [name for name in found.parts if name not in rig.data.bones]
     if missing:
-        raise InputError(f"{source.path}: the bone map's '{missing[0]}' is no bone of '{rig.name}'; correct the map")
+        raise InputError(f"{source.path}: the bone map's '{missing[0]}' is not a bone of '{rig.name}'; correct the map")
     try:
         found.check()
     except InputError as error:
         raise InputError(
-            f"{source.path}: which bone of '{rig.name}' is which could not be guessed ({error}); give a --bone-map"
+            f"{source.path}: the bone map of '{rig.name}' could not be guessed ({error}); give one with --bone-map"
         ) from error
     return found
 
 
 @contextmanager
-def forgotten() -> Iterator[None]:
-    """Remove everything again that the block has brought into the file."""
+def temporary_datablocks() -> Iterator[None]:
+    """Remove all datablocks that the block has added to the file."""
     before = {kind: {block.session_uid for block in getattr(bpy.data, kind)} for kind in _KINDS}
     try:
         yield
     finally:
-        # A scene that is left over is the window's business.
+        # Scenes are removed by ``temporary_scene``.
         kinds = [kind for kind in _KINDS if kind != "scenes"]
         bpy.data.batch_remove([b for k in kinds for b in getattr(bpy.data, k) if b.session_uid not in before[k]])
 
@@ -113,20 +116,25 @@ def _import(path: Path) -> list[bpy.types.Object]:
     try:
         with formats.quiet():
             if path.suffix.lower() == ".fbx":
-                formats.need_addon("io_scene_fbx")
+                formats.enable_addon("io_scene_fbx")
                 formats.call_operator(
                     bpy.ops.import_scene.fbx, filepath=str(path), use_anim=False, ignore_leaf_bones=False
                 )
             else:
-                formats.need_addon("io_scene_gltf2")
+                formats.enable_addon("io_scene_gltf2")
                 formats.call_operator(bpy.ops.import_scene.gltf, filepath=str(path), disable_bone_shape=True)
-    except Exception as error:  # importers written in Python fail in every way on a damaged file
+    except Exception as error:  # importers written in Python raise any exception on a damaged file
         raise InputError(f"{path}: Blender cannot import this file; export it again or choose another") from error
     return [obj for obj in bpy.data.objects if obj.session_uid not in before]
 
 
 def _choose(path: Path, rigs: list[bpy.types.Object], name: str) -> bpy.types.Object:
-    """:raises InputError: none. :raises UsageError: several, or none of that name."""
+    """Choose the armature of a file.
+
+    :param name: may be empty if there is only one.
+    :raises InputError: when there is none.
+    :raises UsageError: when there are several, or none has that name.
+    """
     if not rigs:
         raise InputError(f"{path}: there is no armature in this file; choose the file that holds your rig")
     rigs = sorted(rigs, key=lambda rig: rig.name)
@@ -156,8 +164,8 @@ def _moved_by(obj: bpy.types.Object, rig: bpy.types.Object) -> bool:
     return False
 
 
-def _still(obj: bpy.types.Object) -> None:
-    """Without action and NLA: drivers stay."""
+def _remove_animation(obj: bpy.types.Object) -> None:
+    """Remove action and NLA; drivers are kept."""
     if obj.animation_data is None:
         return
     obj.animation_data.action = None

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One capture, from the button to the built scene. ``step`` advances it and never waits for the worker.
+"""A capture, from the button to the finished scene. ``step`` advances it and never waits for the worker.
 
 The modal operator calls ``step`` on a timer; scripts and tests call it in a loop.
 """
@@ -10,6 +10,7 @@ import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import bpy
 
@@ -34,8 +35,8 @@ class CaptureJob:
     def __init__(self, scene: bpy.types.Scene, python: Sequence[str] = ()) -> None:
         """Start the worker, or find the finished capture in the cache.
 
-        :param python: interpreter of the worker and its arguments; Blender's own if empty.
-        :raises ScopeError: a setting cannot be used.
+        :param python: interpreter of the worker and its arguments; if empty, Blender's own.
+        :raises ScopeError: a setting is invalid, or the worker cannot be started.
         """
         self._cache: Cache = cache()
         self.progress = JobProgress(first_use=not self._cache.has_kernels)
@@ -55,13 +56,13 @@ class CaptureJob:
 
     @property
     def worker(self) -> WorkerProcess | None:
-        """None if the result was cached."""
+        """Worker process; None if the result was cached."""
         return self._worker
 
     def step(self) -> bool:
         """Continue as far as possible without waiting; return False once the scene is built.
 
-        :raises ScopeError: the capture failed; the scene is as it was and nothing is left on disk.
+        :raises ScopeError: the capture failed; the scene is unchanged and no file is left on disk.
         """
         try:
             return self._step()
@@ -78,7 +79,7 @@ class CaptureJob:
         if self._captured is None:
             self._listen()
             return True
-        if not self._building:  # one step later, so that the panel can show this stage first
+        if not self._building:  # built in the next step, so that the panel can show this stage first
             self._building = True
             self.progress.update("building the scene", 0, 0)
             return True
@@ -104,7 +105,7 @@ class CaptureJob:
                 self._cache.prune((limit.cache_limit_gb if limit else 2) * 10**9)
                 self._worker.close()
 
-    def _show_preview(self, message: dict) -> None:
+    def _show_preview(self, message: dict[str, Any]) -> None:
         assert self._worker is not None
         try:
             pixels = (self._worker.job_folder / Path(message["file"]).name).read_bytes()
@@ -122,7 +123,7 @@ class CaptureJob:
             footage = None
         with _window_shows(scene):
             result = build_scene(motions, body, footage, self._options)
-        remember_motions(result, captured.motions, self._request.values["body"])
+        store_motion_paths(result, captured.motions, self._request.values["body"])
         report = dict(captured.report, warnings=warnings + result.warnings)
         show_result(scene.scope.result, self._request.footage, report, result)
 
@@ -130,11 +131,12 @@ class CaptureJob:
 def capture_request(scene: bpy.types.Scene) -> JobRequest:
     """Make the request to the worker from the scene's settings and the preferences.
 
-    :raises VideoError, UsageError: no footage or body is chosen, or it is not there.
+    :raises UsageError: no footage, calibration or body file is chosen, or the captured part is empty.
+    :raises VideoError: the footage does not exist.
     """
     settings, chosen = scene.scope, preferences()
     if not settings.footage:
-        raise UsageError("choose a video or picture first")
+        raise UsageError("no footage is chosen; choose a video or picture first")
     footage = Path(bpy.path.abspath(settings.footage))
     if not footage.is_file():
         what = "is not a file" if footage.exists() else "does not exist"
@@ -142,12 +144,12 @@ def capture_request(scene: bpy.types.Scene) -> JobRequest:
     if settings.use_range and settings.range_end <= settings.range_start:
         raise UsageError("the part of the video ends before it starts; change From or To")
     if settings.lens == "FILE" and not settings.calibration_file:
-        raise UsageError("choose a calibration file, or another lens")
+        raise UsageError("no calibration file is chosen; choose one, or another kind of lens")
     values = option_values(settings, Place.PANEL) | option_values(chosen, Place.PREFERENCES)
     if values["body"] == "file":
         path = settings.body_file or (chosen.body_file if chosen else "")
         if not path:
-            raise UsageError("choose a body file, here or in the preferences, or use the built-in body")
+            raise UsageError("no body file is chosen; choose one here or in the preferences, or use the built-in body")
         values["body"] = bpy.path.abspath(path)
     if values["hands"]:
         values["body"] = body_with_hands(values["body"])
@@ -170,8 +172,8 @@ def build_options(scene: bpy.types.Scene) -> BuildOptions:
     )
 
 
-def remember_motions(result: BuildResult, paths: Sequence[Path], body: str) -> None:
-    """Store the paths of the motion files with the capture, and each person's own with its body at the armature."""
+def store_motion_paths(result: BuildResult, paths: Sequence[Path], body: str) -> None:
+    """Store the paths of the motion files with the capture, and with each armature its motion file and body."""
     result.collection["scope_motions"] = [str(path) for path in paths]
     for person, path in zip(result.people, paths, strict=True):
         person.armature["scope_motion"] = str(path)
@@ -179,7 +181,7 @@ def remember_motions(result: BuildResult, paths: Sequence[Path], body: str) -> N
 
 
 def _is_animated(scene: bpy.types.Scene) -> bool:
-    """Whether another frame rate would change the speed of any animation in the scene."""
+    """Return whether another frame rate would change the speed of an animation in the scene."""
     owners = [scene, *scene.objects, *(obj.data for obj in scene.objects if obj.data)]
     data = [owner.animation_data for owner in owners if owner.animation_data]
     return any(animation.action or animation.nla_tracks for animation in data)
@@ -193,10 +195,9 @@ def _window_shows(scene: bpy.types.Scene) -> Iterator[None]:
         return
     window = bpy.context.window or bpy.context.window_manager.windows[0]
     with bpy.context.temp_override(window=window):
-        before = window.scene
+        previous = window.scene
         window.scene = scene
         try:
             yield
         finally:
-            window.scene = before
-
+            window.scene = previous

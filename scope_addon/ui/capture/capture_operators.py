@@ -33,7 +33,7 @@ class _State:
 state = _State()
 
 
-def stop_everything() -> None:
+def end_capture() -> None:
     """End a running capture: the extension is being disabled, or a test begins."""
     stop_job()
     clear_status_bar()
@@ -51,7 +51,7 @@ class SCOPE_OT_choose_footage(bpy.types.Operator):
     filter_glob: StringProperty(default=";".join(f"*{s}" for s in FOOTAGE_SUFFIXES), options={"HIDDEN"})
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        """Take a dropped file, or ask for one."""
+        """Use a dropped file, or ask for one."""
         if self.filepath:
             return self.execute(context)
         context.window_manager.fileselect_add(self)
@@ -68,7 +68,7 @@ class SCOPE_OT_choose_footage(bpy.types.Operator):
 
 
 class SCOPE_OT_use_sample(bpy.types.Operator):
-    """Use the short clip that comes with Scope, to try a capture"""
+    """Use the short clip that is included with Scope"""
 
     bl_idname = "scope.use_sample"
     bl_label = "Try the Sample Clip"
@@ -81,7 +81,7 @@ class SCOPE_OT_use_sample(bpy.types.Operator):
 
 
 class SCOPE_OT_capture(bpy.types.Operator):
-    """Find the person in the footage and build the animated body. Blender stays usable meanwhile"""
+    """Capture the person in the footage as an animated body, while Blender stays usable"""
 
     bl_idname = "scope.capture"
     bl_label = "Capture"
@@ -110,10 +110,10 @@ class SCOPE_OT_capture(bpy.types.Operator):
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         """Step on timer events, cancel on Escape, pass the others to Blender."""
         job = state.job
-        if job is None:  # stopped from outside
+        if job is None:  # stopped by something else
             return self._end(context, {"CANCELLED"})
         if job.cancel_requested or (event.type == "ESC" and event.value == "PRESS"):
-            self.report({"INFO"}, "Capture cancelled; nothing was changed")
+            self.report({"INFO"}, "Capture cancelled; the scene is unchanged")
             return self._end(context, {"CANCELLED"})
         if event.type != "TIMER":
             return {"PASS_THROUGH"}
@@ -123,7 +123,7 @@ class SCOPE_OT_capture(bpy.types.Operator):
         return self._end(context, outcome) if outcome else {"PASS_THROUGH"}
 
     def cancel(self, context: bpy.types.Context) -> None:
-        """Stop when Blender opens another file or closes."""
+        """Stop when Blender opens another file or quits."""
         self._end(context, {"CANCELLED"})
 
     def execute(self, context: bpy.types.Context) -> set[str]:
@@ -143,7 +143,7 @@ class SCOPE_OT_capture(bpy.types.Operator):
         try:
             from .capture_job import CaptureJob
         except ImportError as error:
-            return self._fail(f"a part of Scope cannot be loaded ({error}); install the extension again")
+            return self._fail(f"a part of Scope cannot be loaded ({error}); reinstall the extension")
         from ....solver.errors import ScopeError
 
         try:
@@ -153,7 +153,7 @@ class SCOPE_OT_capture(bpy.types.Operator):
         return True
 
     def _step(self) -> set[str] | None:
-        """Advance the job; None if it has not ended."""
+        """Advance the job; return None while it is running, and then the operator's outcome."""
         from ....solver.errors import ScopeError
 
         assert state.job is not None
@@ -163,12 +163,12 @@ class SCOPE_OT_capture(bpy.types.Operator):
         except (ScopeError, OSError, MemoryError) as error:
             self._fail(error)
             return {"CANCELLED"}
-        self.report({"INFO"}, "Captured")
+        self.report({"INFO"}, "Capture finished")
         return {"FINISHED"}
 
     def _fail(self, error: Exception | str) -> bool:
         state.message = sentence(error)
-        stop_job()  # before the report, which raises when a script called us
+        stop_job()  # before the report, which raises in a script
         redraw_twice(bpy.context)
         self.report({"ERROR"}, state.message)
         return False
@@ -187,7 +187,7 @@ class SCOPE_OT_capture(bpy.types.Operator):
 
 
 class SCOPE_OT_cancel(bpy.types.Operator):
-    """Stop the capture; nothing is changed"""
+    """Cancel the capture; the scene stays unchanged"""
 
     bl_idname = "scope.cancel"
     bl_label = "Cancel Capture"
@@ -214,21 +214,21 @@ def stop_job() -> None:
 
 
 def clear_status_bar() -> None:
-    """Clear the status bar in every workspace: each keeps its own text, and the user may have switched."""
+    """Clear the status bar in every workspace, because each has its own text and the user may have switched."""
     for workspace in bpy.data.workspaces:
-        with bpy.context.temp_override(workspace=workspace):  # Blender sets the context's text alone
+        with bpy.context.temp_override(workspace=workspace):  # Blender sets only the context's text
             workspace.status_text_set(None)
 
 
 def redraw(context: bpy.types.Context) -> None:
-    """Redraw the sidebars, but not the viewports: redrawing a heavy scene repeatedly would be slow."""
+    """Redraw the sidebars, but not the viewports, because redrawing a large scene repeatedly is slow."""
     areas = [a for window in context.window_manager.windows for a in window.screen.areas if a.type == "VIEW_3D"]
     for region in (r for area in areas for r in area.regions if r.type == "UI"):
         region.tag_redraw()
 
 
 def redraw_twice(context: bpy.types.Context) -> None:
-    """Redraw now and once more shortly: panels below one whose height changed move at the second redraw."""
+    """Redraw now and again shortly: panels below one whose height changed move only at the second redraw."""
     redraw(context)
     if not bpy.app.background:
         bpy.app.timers.register(lambda: redraw(bpy.context), first_interval=0.3)

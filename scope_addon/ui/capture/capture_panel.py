@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The panels in the sidebar of the 3D viewport, tab Scope."""
+"""The capture panels in the sidebar of the 3D viewport, tab Scope."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from ..view.view_operators import camera_of, is_looking_through
 from . import preview_picture
 from .capture_operators import state
 
-_PIXELS_PER_LETTER = 7.0
+_PIXELS_PER_CHARACTER = 7.0
 
 
 class Tab:
-    """Location of all of Scope's panels."""
+    """Location of Scope's panels."""
 
     bl_space_type = "VIEW_3D"
     bl_region_type = "UI"
@@ -102,7 +102,7 @@ class SCOPE_PT_person(Tab, bpy.types.Panel):
 
 
 class SCOPE_PT_scene(Tab, bpy.types.Panel):
-    """Changes of the scene that a capture may make."""
+    """Settings of the scene that a capture may change."""
 
     bl_idname = "SCOPE_PT_scene"
     bl_parent_id = "SCOPE_PT_capture"
@@ -121,14 +121,14 @@ class SCOPE_PT_scene(Tab, bpy.types.Panel):
 
 
 class SCOPE_PT_result(Tab, bpy.types.Panel):
-    """Result of the last capture, and its export."""
+    """The result of the last capture, and its export."""
 
     bl_idname = "SCOPE_PT_result"
     bl_label = "Result"
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Show the panel if the captured collection is in this scene: copied settings may refer to another one."""
+        """Require the captured collection in this scene: copied settings may refer to another scene's."""
         return context.scene.scope.result.collection in context.scene.collection.children_recursive
 
     def draw(self, context: bpy.types.Context) -> None:
@@ -137,9 +137,9 @@ class SCOPE_PT_result(Tab, bpy.types.Panel):
         column = layout.column(align=True)
         column.label(text=Path(result.footage).name, icon="FILE_MOVIE")
         column.label(text="1 person" if result.people == 1 else f"{result.people} people", icon="OUTLINER_OB_ARMATURE")
-        took = duration(result.frames / result.frames_per_second) if result.frames_per_second else "no time"
+        seconds = result.frames / result.frames_per_second if result.frames_per_second else 0.0
         frames = "1 frame" if result.frames == 1 else f"{result.frames} frames"
-        column.label(text=f"{frames}, captured in {took}", icon="TIME")
+        column.label(text=f"{frames}, captured in {duration(seconds)}", icon="TIME")
         column.label(text=f"Reprojection error {result.reprojection_px:.1f} px", icon="CON_CAMERASOLVER")
         column.label(text=f"Lens: {result.camera}", icon="CAMERA_DATA")
         if result.execution:
@@ -158,12 +158,12 @@ class SCOPE_PT_result(Tab, bpy.types.Panel):
         grid = layout.grid_flow(columns=2, row_major=True, even_columns=True, align=True)
         for key, label, _, _ in FORMATS:
             cell = grid.column()
-            cell.enabled = key != "USDC" or "usd_export" in dir(bpy.ops.wm)  # some systems build Blender without USD
+            cell.enabled = key != "USDC" or "usd_export" in dir(bpy.ops.wm)  # some builds of Blender lack USD
             cell.operator("scope.export", text=label).format = key
 
 
 def _draw_warning(context: bpy.types.Context, box: bpy.types.UILayout, warning: bpy.types.PropertyGroup) -> None:
-    """Draw a warning, and a button for each span of frames that goes to its first one."""
+    """Draw a warning, and for each of its spans a button that goes to the first frame."""
     _draw_text(context, box, warning.text, "ERROR")
     if warning.spans:
         grid = box.grid_flow(columns=4, even_columns=True, align=True, row_major=True)
@@ -177,6 +177,7 @@ def first_frame(span: str) -> int:
 
 
 def _split(layout: bpy.types.UILayout) -> bpy.types.UILayout:
+    """Set the layout to labels on the left and values on the right, and return it."""
     layout.use_property_split = True
     layout.use_property_decorate = False
     return layout
@@ -185,7 +186,7 @@ def _split(layout: bpy.types.UILayout) -> bpy.types.UILayout:
 def _draw_text(context: bpy.types.Context, layout: bpy.types.UILayout, text: str, icon: str = "NONE") -> None:
     """Draw a sentence, wrapped to the width of the sidebar."""
     scale = context.preferences.system.ui_scale
-    width = max(20, int((context.region.width / scale - 60) / _PIXELS_PER_LETTER)) if context.region else 40
+    width = max(20, int((context.region.width / scale - 60) / _PIXELS_PER_CHARACTER)) if context.region else 40
     column = layout.column(align=True)
     for index, line in enumerate(textwrap.wrap(text, width)):
         column.label(text=line, icon=icon if index == 0 or icon == "NONE" else "BLANK1")

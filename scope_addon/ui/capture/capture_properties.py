@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The settings and the result that the panel shows, kept with each scene and saved in the .blend."""
+"""The settings and the result that the panel shows, stored with each scene in the .blend file."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ from ..declared_properties import PATH_OPTIONS, with_options
 from .capture_operators import state
 
 
-def _forget_failure(_settings: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
-    """Clear the message about other footage."""
+def _clear_message(_settings: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
+    """Clear the error message, which was about other footage."""
     state.message = ""
 
 
 class SCOPE_PG_warning(bpy.types.PropertyGroup):
-    """One line of the result."""
+    """A warning about the result."""
 
     text: StringProperty()
-    spans: StringProperty()  # the scene frames concerned: "12-18,40"
+    spans: StringProperty()  # scene frames, such as "12-18,40"
 
 
 class SCOPE_PG_result(bpy.types.PropertyGroup):
@@ -56,7 +56,7 @@ class SCOPE_PG_settings(bpy.types.PropertyGroup):
         name="Footage",
         subtype="FILE_PATH",
         options=PATH_OPTIONS,
-        update=_forget_failure,
+        update=_clear_message,
         description="Video or picture of a person to capture",
     )
     result: PointerProperty(type=SCOPE_PG_result)
@@ -66,10 +66,10 @@ CLASSES = (SCOPE_PG_warning, SCOPE_PG_result, SCOPE_PG_settings)
 
 
 def attach() -> None:
-    """Give every scene its settings."""
+    """Add the settings to every scene."""
     bpy.types.Scene.scope = PointerProperty(type=SCOPE_PG_settings)
 
 
 def detach() -> None:
-    """Remove the settings; their values stay in the .blend until it is saved without the extension."""
+    """Remove the settings; their values stay in a .blend file until it is saved without the extension."""
     del bpy.types.Scene.scope

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The worker's picture of the current frame as an icon for the panel. It is no datablock, so no .blend holds it."""
+"""The preview of the current frame as an icon for the panel; it is not a datablock, so no .blend file contains it."""
 
 from __future__ import annotations
 
@@ -10,8 +10,11 @@ _collection: bpy.utils.previews.ImagePreviewCollection | None = None
 
 
 def show(pixels: bytes, width: int, height: int) -> None:
-    """Take a new picture: RGBA bytes, the lowest row first. A picture that is not whole is passed over."""
-    import numpy as np  # here: Blender does not need it to start
+    """Replace the picture; incomplete pictures are ignored.
+
+    :param pixels: RGBA bytes, bottom row first.
+    """
+    import numpy as np  # imported here, so that Blender starts without it
 
     if len(pixels) != 4 * width * height or not pixels:
         return
@@ -24,12 +27,12 @@ def show(pixels: bytes, width: int, height: int) -> None:
 
 
 def icon_id() -> int:
-    """For ``template_icon``; 0 when there is nothing to show."""
+    """Return the icon for ``template_icon``; 0 if there is no picture."""
     return _collection["frame"].icon_id if _collection is not None and "frame" in _collection else 0
 
 
 def clear() -> None:
-    """Forget the picture."""
+    """Remove the picture."""
     global _collection
     if _collection is not None:
         bpy.utils.previews.remove(_collection)

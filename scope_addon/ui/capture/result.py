@@ -1,24 +1,28 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a capture found, as the panel shows it: figures, and warnings with the scene frames to look at."""
+"""The result of a capture as the panel shows it: figures, and warnings with the scene frames to review."""
 
 from __future__ import annotations
 
+from typing import Any
+
 import bpy
 import numpy as np
+from numpy.typing import NDArray
 
 from ...motion import Motion
-from ...review_spans import REASONS, Span, low_confidence_spans
+from ...review_spans import REASONS, Span, find_review_spans
 from ...scene.build import BuildResult
 from ...scene.camera import pixel_aspect
 from ..reporting import sentence
 
-_MOST_SPANS = 12  # buttons
+_MAX_SPANS = 12  # number of buttons
 
 
-def show_result(shown: bpy.types.PropertyGroup, footage: str, report: dict, result: BuildResult) -> None:
-    """Fill the result section.
+def show_result(shown: bpy.types.PropertyGroup, footage: str, report: dict[str, Any], result: BuildResult) -> None:
+    """Fill the properties that the result panel shows.
 
-    :param report: of the capture pipeline.
+    :param shown: the properties, which are overwritten.
+    :param report: report of the capture pipeline.
     """
     shown.footage = footage
     shown.collection = result.collection
@@ -35,27 +39,27 @@ def show_result(shown: bpy.types.PropertyGroup, footage: str, report: dict, resu
     shown.pixel_aspect = pixel_aspect(first)
     shown.warnings.clear()
     for line in report.get("warnings", ()):
-        _warn(shown, str(line))
+        _add_warning(shown, str(line))
     for index, person in enumerate(result.people):
         whose = "" if len(result.people) == 1 else f"person {index + 1}: "
         for reason, spans in frame_warnings(person.motion, person.frames).items():
-            _warn(shown, whose + REASONS[reason], spans)
+            _add_warning(shown, whose + REASONS[reason], spans)
 
 
-def frame_warnings(motion: Motion, frames: np.ndarray) -> dict[str, str]:
-    """The spans of scene frames that deserve a look, by reason; of very many the longest.
+def frame_warnings(motion: Motion, frames: NDArray[np.float64]) -> dict[str, str]:
+    """Return the review spans of a motion in scene frames, by reason; at most the longest ``_MAX_SPANS`` of each.
 
     :param frames: (T,) scene frame of each pose.
-    :return: reason, a key of ``REASONS``, to spans as in ``12-18,40``.
+    :return: reason, a key of ``REASONS``, to spans such as ``12-18,40``.
     """
     by_reason: dict[str, list[Span]] = {}
-    for span in low_confidence_spans(motion):
+    for span in find_review_spans(motion):
         by_reason.setdefault(span.reason, []).append(span)
     return {reason: _text(spans, frames) for reason, spans in by_reason.items()}
 
 
-def _text(spans: list[Span], frames: np.ndarray) -> str:
-    longest = sorted(spans, key=lambda span: span.first - span.last)[:_MOST_SPANS]
+def _text(spans: list[Span], frames: NDArray[np.float64]) -> str:
+    longest = sorted(spans, key=lambda span: span.first - span.last)[:_MAX_SPANS]
     texts = []
     for span in sorted(longest, key=lambda span: span.first):
         a, b = round(float(frames[span.first])), round(float(frames[span.last]))
@@ -63,6 +67,6 @@ def _text(spans: list[Span], frames: np.ndarray) -> str:
     return ",".join(texts)
 
 
-def _warn(shown: bpy.types.PropertyGroup, text: str, spans: str = "") -> None:
+def _add_warning(shown: bpy.types.PropertyGroup, text: str, spans: str = "") -> None:
     warning = shown.warnings.add()
     warning.text, warning.spans = sentence(text), spans

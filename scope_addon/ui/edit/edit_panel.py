@@ -1,32 +1,32 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The buttons for work on a captured motion."""
+"""The panel for editing a captured motion."""
 
 from __future__ import annotations
 
 import bpy
 
 from ..capture.capture_panel import Tab
-from ..captured_person import anybody_captured, draw_meant
+from ..captured_person import draw_active_person, has_captured_person
 
 
 class SCOPE_PT_edit(Tab, bpy.types.Panel):
-    """Smoothing, mending, floor, root motion, loops and keys of the selected person."""
+    """Smoothing, repairs, floor, root motion, loops and keys of the selected person."""
 
     bl_idname = "SCOPE_PT_edit"
     bl_label = "Refine"
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """There is a captured person."""
-        return anybody_captured(context)
+        """Require a captured person."""
+        return has_captured_person(context)
 
     def draw(self, context: bpy.types.Context) -> None:
         """Draw the panel."""
         layout = self.layout
-        if draw_meant(layout, context) is None:
+        if draw_active_person(layout, context) is None:
             return
         row = layout.row(align=True)
-        for text, strength in (("Raw", 0.0), ("Normal", 1.0), ("Calm", 2.5)):
+        for text, strength in (("Raw", 0.0), ("Normal", 1.0), ("Strong", 2.5)):
             row.operator("scope.smooth", text=text).strength = strength
         column = layout.column(align=True)
         column.operator("scope.interpolate_span", icon="IPO_EASE_IN_OUT")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Put a captured motion on the user's own rig: guess the bones, edit and keep the list, retarget."""
+"""Operators that retarget a captured motion to the user's rig, and that guess, edit, save and load the bone map."""
 
 from __future__ import annotations
 
@@ -9,36 +9,36 @@ import bpy
 from bpy.props import EnumProperty, StringProperty
 
 from ..captured_person import PERSON, betas_of, body_of, captured_armature, captured_people
-from ..reporting import TellingOperator, sentence
+from ..reporting import ReportingOperator, sentence
 
 if TYPE_CHECKING:
     from ...retarget.bone_map import BoneMap
 
 
-_ASIDE = (1.5, 0.0, 0.0)  # metres: to the left of a person who faces the front view
+_SIDE_OFFSET_M = (1.5, 0.0, 0.0)  # to the left of a person who faces the front view
 
 
-class _OnRig(TellingOperator):
-    """What the operators share: a rig is chosen."""
+class _RigOperator(ReportingOperator):
+    """An operator on the chosen rig. Not registered."""
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """A rig is chosen."""
+        """Require a rig in the view layer."""
         rig = context.scene.scope_retarget.rig
         if rig is None:
             cls.poll_message_set("Choose your rig first")
             return False
         if rig.name not in context.view_layer.objects:
             cls.poll_message_set(
-                f"'{rig.name}' is not in the scene's view layer: put it into the scene, or tick its collection in the "
+                f"'{rig.name}' is not in the scene's view layer: add it to the scene, or enable its collection in the "
                 "Outliner"
             )
             return False
         return True
 
 
-class SCOPE_OT_guess_bones(_OnRig):
-    """Find out which bone of the rig is which body part, by names and rest pose"""
+class SCOPE_OT_guess_bones(_RigOperator):
+    """Assign the rig's bones to body parts by their names and rest pose"""
 
     bl_idname = "scope.guess_bones"
     bl_label = "Guess Bones"
@@ -48,74 +48,75 @@ class SCOPE_OT_guess_bones(_OnRig):
         from ...scene.rigs.rig_retarget import guess_bone_map
 
         found = guess_bone_map(context.scene.scope_retarget.rig)
-        _show(context, found)
-        return f"{len(found.parts)} bones found; check the list"
+        _fill_list(context, found)
+        return f"Found {len(found.parts)} bones; check the list"
 
 
-class SCOPE_OT_retarget(_OnRig):
-    """Move your rig as the captured person moves, as a new action. The rig's former action stays in the file, but one
-    that this button has made and nobody has changed"""
+class SCOPE_OT_retarget(_RigOperator):
+    """Transfer the captured motion to your rig, as a new action. An action of this button is replaced if unchanged"""
 
     bl_idname = "scope.retarget"
     bl_label = "Retarget"
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """A rig is chosen that this file can animate, and whose motion it takes."""
+        """Require a rig that can be animated in this file, and a captured person."""
         if not super().poll(context):
             return False
         rig = context.scene.scope_retarget.rig
         if rig.library is not None:
             cls.poll_message_set(
-                f"'{rig.name}' is linked from {rig.library.filepath}, and its motion would be lost when this file is "
-                "saved: make an override of it (Object > Library Override > Make)"
+                f"'{rig.name}' is linked from {rig.library.filepath}, so its motion would not be saved in this file: "
+                "make an override of it (Object > Library Override > Make)"
             )
             return False
         if captured_armature(context) is None:
             cls.poll_message_set(
-                "Several people are captured: select the armature of the one whose motion the rig takes"
+                "Several people are captured: select the armature of the one whose motion to retarget"
                 if captured_people(context)
-                else "The scene holds no capture yet"
+                else "The scene contains no capture yet"
             )
             return False
         return True
 
     def work(self, context: bpy.types.Context) -> str:
-        """Key the rig."""
+        """Write the rig's keys."""
         from ...scene.animation_data.timing import scene_rate
         from ...scene.rigs.rig_retarget import RetargetOptions, guess_bone_map, retarget
         from ...scene.visibility import hide, show
 
         settings, source = context.scene.scope_retarget, captured_armature(context)
-        assert source is not None  # poll has asked
+        assert source is not None  # checked by poll
         if not len(settings.pairs):
-            _show(context, guess_bone_map(settings.rig))
+            _fill_list(context, guess_bone_map(settings.rig))
         body = body_of(source)
-        done = retarget(
+        result = retarget(
             source,
             body,
             betas_of(source, body),
             settings.rig,
-            _map_of(context),
+            _bone_map(context),
             scene_rate(context.scene),
             RetargetOptions(
-                feet=settings.feet, root=settings.root, offset=_ASIDE if settings.captured == "beside" else (0, 0, 0)
+                feet=settings.feet,
+                root=settings.root,
+                offset=_SIDE_OFFSET_M if settings.captured == "beside" else (0, 0, 0),
             ),
         )
         settings.rig[PERSON] = source.name
         if settings.captured == "hide":
-            _choose(context, settings.rig)
+            _select_only(context, settings.rig)
             hide(source, context.view_layer)
         else:
             show(source, context.view_layer)
-        if done.warnings:
-            self.report({"WARNING"}, sentence(done.warnings[0]))
+        if result.warnings:
+            self.report({"WARNING"}, sentence(result.warnings[0]))
             return ""
-        return f"'{settings.rig.name}' moves by the action '{done.action.name}'"
+        return f"Animated '{settings.rig.name}' by the action '{result.action.name}'"
 
 
-class _BoneMapFile(_OnRig):
-    """What saving and loading the list share: the file is asked for."""
+class _BoneMapFileOperator(_RigOperator):
+    """An operator on a bone map file, which the file browser asks for. Not registered."""
 
     filter_glob: StringProperty(default="*.json", options={"HIDDEN"})
 
@@ -125,8 +126,8 @@ class _BoneMapFile(_OnRig):
         return {"RUNNING_MODAL"}
 
 
-class SCOPE_OT_save_bone_map(_BoneMapFile):
-    """Save the list of bones as a JSON file for rigs of the same kind"""
+class SCOPE_OT_save_bone_map(_BoneMapFileOperator):
+    """Save the bone map as a JSON file for similar rigs"""
 
     bl_idname = "scope.save_bone_map"
     bl_label = "Save Bone Map"
@@ -134,15 +135,15 @@ class SCOPE_OT_save_bone_map(_BoneMapFile):
     filepath: StringProperty(subtype="FILE_PATH", default="bones.json")
 
     def work(self, context: bpy.types.Context) -> str:
-        """Write."""
+        """Write the file."""
         from ...retarget.bone_map import save_bone_map
 
-        save_bone_map(_map_of(context), bpy.path.abspath(self.filepath))
+        save_bone_map(_bone_map(context), bpy.path.abspath(self.filepath))
         return f"Saved {self.filepath}"
 
 
-class SCOPE_OT_load_bone_map(_BoneMapFile):
-    """Read a list of bones that was saved as JSON"""
+class SCOPE_OT_load_bone_map(_BoneMapFileOperator):
+    """Load a bone map from a JSON file"""
 
     bl_idname = "scope.load_bone_map"
     bl_label = "Load Bone Map"
@@ -153,17 +154,17 @@ class SCOPE_OT_load_bone_map(_BoneMapFile):
         """Fill the list."""
         from ...retarget.bone_map import load_bone_map
 
-        _show(context, load_bone_map(bpy.path.abspath(self.filepath)))
-        return f"Read {self.filepath}"
+        _fill_list(context, load_bone_map(bpy.path.abspath(self.filepath)))
+        return f"Loaded {self.filepath}"
 
 
-class SCOPE_OT_edit_bone_pair(_OnRig):
-    """Add a line to the list of bones, or take the chosen one out"""
+class SCOPE_OT_edit_bone_pair(_RigOperator):
+    """Add an entry to the bone map, or remove the selected one"""
 
     bl_idname = "scope.edit_bone_pair"
-    bl_label = "Edit Bone List"
+    bl_label = "Edit Bone Map"
 
-    action: EnumProperty(items=(("ADD", "Add", "Add a line"), ("REMOVE", "Remove", "Remove the chosen line")))
+    action: EnumProperty(items=(("ADD", "Add", "Add an entry"), ("REMOVE", "Remove", "Remove the selected entry")))
 
     def work(self, context: bpy.types.Context) -> str:
         """Change the list."""
@@ -177,8 +178,8 @@ class SCOPE_OT_edit_bone_pair(_OnRig):
         return f"{len(settings.pairs)} bones"
 
 
-def _choose(context: bpy.types.Context, rig: bpy.types.Object) -> None:
-    """Make the rig active and the only one selected: what is hidden cannot be."""
+def _select_only(context: bpy.types.Context, rig: bpy.types.Object) -> None:
+    """Make the rig the active and the only selected object, because a hidden object cannot be selected."""
     active = context.view_layer.objects.active
     if active is not None and active.mode != "OBJECT":
         bpy.ops.object.mode_set(mode="OBJECT")
@@ -187,8 +188,8 @@ def _choose(context: bpy.types.Context, rig: bpy.types.Object) -> None:
     context.view_layer.objects.active = rig
 
 
-def _show(context: bpy.types.Context, bone_map: BoneMap) -> None:
-    """Put a map into the list, in the order of the body's parts."""
+def _fill_list(context: bpy.types.Context, bone_map: BoneMap) -> None:
+    """Fill the list with a map, in the order of the body's parts."""
     from ...retarget.bone_map import PARTS
 
     settings = context.scene.scope_retarget
@@ -199,8 +200,8 @@ def _show(context: bpy.types.Context, bone_map: BoneMap) -> None:
     settings.active = 0
 
 
-def _map_of(context: bpy.types.Context) -> BoneMap:
-    """The list as a map; lines without a bone or a part do not count."""
+def _bone_map(context: bpy.types.Context) -> BoneMap:
+    """Return the list as a map; entries without a bone or a part are left out."""
     from ...retarget.bone_map import BoneMap
 
     pairs = [pair for pair in context.scene.scope_retarget.pairs if pair.bone and pair.part]

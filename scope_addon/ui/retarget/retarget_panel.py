@@ -1,37 +1,49 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The retarget section of the sidebar."""
+"""The panel for retargeting a captured motion."""
 
 from __future__ import annotations
 
 import bpy
 
 from ..capture.capture_panel import Tab
-from ..captured_person import anybody_captured, draw_meant
+from ..captured_person import draw_active_person, has_captured_person
 
 
 class SCOPE_UL_bone_pairs(bpy.types.UIList):
     """Bones of the rig and the body parts that they follow."""
 
-    def draw_item(self, context, layout, data, item, icon, active_data, active_property, index) -> None:  # type: ignore[no-untyped-def]
-        """One line: part, bone, and a question mark where the guess is not sure."""
-        rig = data.rig
-        chosen = index == getattr(active_data, active_property)
+    def draw_item(
+        self,
+        _context: bpy.types.Context,
+        layout: bpy.types.UILayout,
+        settings: bpy.types.PropertyGroup,
+        item: bpy.types.PropertyGroup,
+        _icon: int,
+        _settings_with_active: bpy.types.PropertyGroup,
+        _active_property: str,
+    ) -> None:
+        """Draw one entry: part, bone, and a question mark if the guess is uncertain.
+
+        Blender's further arguments, ``index`` and ``flt_flag``, are optional and left out.
+        """
+        rig = settings.rig
+        chosen = item in settings.pairs[settings.active : settings.active + 1]
         row = layout.split(factor=0.5 if chosen else 0.42, align=True)
         if chosen or not item.part:
             row.prop(item, "part", text="", placeholder="Body Part")
-        else:  # without the field's frame and button the longest names fit
+        else:  # a label leaves enough room for the longest names
             row.label(text=item.part)
         row = row.row(align=True)
         known = rig is not None and item.bone in rig.data.bones
         row.alert = not known
         if rig is not None:
             row.prop_search(item, "bone", rig.data, "bones", text="")
-        if not known or item.confidence <= 0.6:  # no room is wasted on what is sure
+        if not known or item.confidence <= 0.6:  # certain guesses need no icon
             row.label(text="", icon="QUESTION" if known else "ERROR")
 
 
 class SCOPE_PT_retarget(Tab, bpy.types.Panel):
-    """Put the captured motion on a rig of your own."""
+    """Retargeting of the captured motion to the user's rig."""
 
     bl_idname = "SCOPE_PT_retarget"
     bl_label = "Retarget"
@@ -39,13 +51,13 @@ class SCOPE_PT_retarget(Tab, bpy.types.Panel):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """There is a captured person."""
-        return anybody_captured(context)
+        """Require a captured person."""
+        return has_captured_person(context)
 
     def draw(self, context: bpy.types.Context) -> None:
         """Draw the panel."""
         layout, settings = self.layout, context.scene.scope_retarget
-        draw_meant(layout, context)
+        draw_active_person(layout, context)
         layout.prop(settings, "rig")
         if settings.rig is None:
             return

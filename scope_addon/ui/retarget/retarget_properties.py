@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The retarget section's settings: the rig, and which bone is which body part. Kept with the scene."""
+"""The settings of retargeting: the rig and the bone map. Stored with the scene."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from bpy.props import (
 
 
 def offered_parts(_pair: bpy.types.PropertyGroup | None, _context: bpy.types.Context, typed: str) -> list[str]:
-    """The body parts that a name may be of, for Blender to offer while it is typed."""
+    """Return the body parts whose names contain what was typed so far, for Blender to suggest."""
     from ...retarget.bone_map import PARTS
 
     return [part for part in PARTS if typed.lower() in part]
@@ -29,7 +29,7 @@ class SCOPE_PG_bone_pair(bpy.types.PropertyGroup):
     part: StringProperty(
         name="Body Part", search=offered_parts, description="Part of the captured body that this bone follows"
     )
-    confidence: FloatProperty(name="Confidence", min=0.0, max=1.0, description="How sure the guess is")
+    confidence: FloatProperty(name="Confidence", min=0.0, max=1.0, description="Confidence of the guess")
 
 
 def _is_armature(_settings: bpy.types.PropertyGroup, obj: bpy.types.Object) -> bool:
@@ -37,17 +37,17 @@ def _is_armature(_settings: bpy.types.PropertyGroup, obj: bpy.types.Object) -> b
 
 
 class SCOPE_PG_retarget(bpy.types.PropertyGroup):
-    """What the user chose."""
+    """The settings of retargeting."""
 
     rig: PointerProperty(
-        name="Rig", type=bpy.types.Object, poll=_is_armature, description="Your own armature that shall move"
+        name="Rig", type=bpy.types.Object, poll=_is_armature, description="Armature to animate with the captured motion"
     )
     pairs: CollectionProperty(type=SCOPE_PG_bone_pair)
     active: IntProperty()
     feet: BoolProperty(
         name="Feet on the Floor",
         default=True,
-        description="Hold heel or ball where the captured ones stand, scaled to the rig, and never below the floor",
+        description="Lock feet that are in contact, scaled to the rig, and keep them above the floor",
     )
     root: EnumProperty(
         name="Root Motion",
@@ -62,12 +62,12 @@ class SCOPE_PG_retarget(bpy.types.PropertyGroup):
     captured: EnumProperty(
         name="Captured Body",
         items=(
-            ("hide", "Hide", "Hide the captured person, but when comparing with the footage", 0),
-            ("beside", "Beside", "Show both, the rig to the left of the captured person", 1),
-            ("keep", "Leave", "Show both in the same place", 2),
+            ("hide", "Hide", "Hide the captured person, except when comparing with the footage", 0),
+            ("beside", "Side by Side", "Show both, the rig to the left of the captured person", 1),
+            ("keep", "Overlap", "Show both in the same place", 2),
         ),
         default="hide",
-        description="What becomes of the captured person when the rig moves instead",
+        description="How the captured person is shown after retargeting",
     )
 
 
@@ -75,10 +75,10 @@ CLASSES = (SCOPE_PG_bone_pair, SCOPE_PG_retarget)
 
 
 def attach() -> None:
-    """Give every scene its settings."""
+    """Add the settings to every scene."""
     bpy.types.Scene.scope_retarget = PointerProperty(type=SCOPE_PG_retarget)
 
 
 def detach() -> None:
-    """Take the settings away."""
+    """Remove the settings."""
     del bpy.types.Scene.scope_retarget

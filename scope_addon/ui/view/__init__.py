@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Looking at results: through the solved camera, at warnings, after undo."""
+"""Viewing results: through the estimated camera, at warnings, after undo."""

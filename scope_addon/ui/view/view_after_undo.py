@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Undoing "Compare with Footage" takes the viewport back too: Blender undoes the file, and views are no part of it."""
+"""Restore the viewport when "Compare with Footage" is undone; views are not part of what Blender undoes."""
 
 from __future__ import annotations
 
@@ -8,17 +8,17 @@ from bpy.app.handlers import persistent
 
 from .view_operators import looks_through
 
-_looked_through: set[int] = set()  # viewports that did, before Blender undid something
+_looked_through: set[int] = set()  # areas that showed a capture through its camera before the undo
 
 
 def attach() -> None:
-    """Be told when something is undone."""
+    """Add the undo handlers."""
     bpy.app.handlers.undo_pre.append(_before)
     bpy.app.handlers.undo_post.append(_after)
 
 
 def detach() -> None:
-    """No longer."""
+    """Remove the undo handlers."""
     bpy.app.handlers.undo_pre.remove(_before)
     bpy.app.handlers.undo_post.remove(_after)
 
@@ -34,11 +34,11 @@ def _before(*_: object) -> None:
 @persistent
 def _after(*_: object) -> None:
     if _looked_through:
-        bpy.app.timers.register(_leave)  # no operator runs well in the midst of undoing
+        bpy.app.timers.register(_leave)  # operators must not run during an undo
 
 
 def _leave() -> None:
-    """Let the viewports that looked through a capture's camera, and no longer do, show the scene again."""
+    """Leave local view and camera view in the viewports that no longer show a capture through its camera."""
     for window, area in _viewports():
         space = area.spaces.active
         if area.as_pointer() not in _looked_through or looks_through(window.scene, space):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Looking at the result."""
+"""Operators for viewing the result: through the camera, at a frame, in the sequencer."""
 
 from __future__ import annotations
 
@@ -7,21 +7,21 @@ import bpy
 from bpy.props import IntProperty
 from mathutils import Matrix
 
-from ..reporting import TellingOperator
+from ..reporting import ReportingOperator
 
 
 def hide_startup_cube(context: bpy.types.Context) -> None:
-    """The cube of a file that was never saved, if nobody has touched it: it stands where the person does."""
+    """Hide the unmodified default cube of an unsaved file, which is where the person stands."""
     cube = context.scene.objects.get("Cube")
     if bpy.data.filepath or cube is None or cube.type != "MESH" or len(cube.data.vertices) != 8:
         return
-    touched = cube.animation_data or cube.modifiers or cube.constraints or cube.children
-    if not touched and cube.matrix_world == Matrix.Identity(4) and cube.name in context.view_layer.objects:
+    modified = cube.animation_data or cube.modifiers or cube.constraints or cube.children
+    if not modified and cube.matrix_world == Matrix.Identity(4) and cube.name in context.view_layer.objects:
         cube.hide_set(True)
 
 
 def frame_selected(context: bpy.types.Context) -> None:
-    """Turn to what is selected in the viewport that shows the panel; a camera's view stays as it is."""
+    """Frame the selected objects in the viewport of the context, unless it shows a camera's view."""
     area = context.area
     if context.window is None or area is None or area.type != "VIEW_3D":
         return
@@ -35,7 +35,7 @@ def frame_selected(context: bpy.types.Context) -> None:
 
 
 class SCOPE_OT_look_through(bpy.types.Operator):
-    """See the body over the footage, through the capture's camera, and back. Sets the scene's camera and resolution"""
+    """Toggle the view of the body over the footage. Sets the scene's camera and resolution"""
 
     bl_idname = "scope.look_through"
     bl_label = "Compare with Footage"
@@ -43,9 +43,9 @@ class SCOPE_OT_look_through(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """The last capture has a camera, and can be seen."""
+        """Require that the last capture has a camera and is not hidden."""
         if camera_of(context.scene) is None:
-            cls.poll_message_set("Capture something first, with its camera: the scene has none of a capture")
+            cls.poll_message_set("The scene has no camera of a capture: capture with the option Camera with Footage")
             return False
         collection = context.scene.scope.result.collection
         if not is_looking_through(context) and not _is_shown(collection, context.view_layer.layer_collection):
@@ -60,13 +60,13 @@ class SCOPE_OT_look_through(bpy.types.Operator):
         scene, camera = context.scene, camera_of(context.scene)
         if is_looking_through(context):
             bpy.ops.view3d.localview(frame_selected=False)
-            bpy.ops.view3d.view_camera()  # Blender's own toggle: it knows the view there was before
+            bpy.ops.view3d.view_camera()  # Blender's own toggle restores the previous view
             for obj in [obj for obj in scene.scope.result.collection.all_objects if "scope_source" in obj]:
                 hide_again(obj, context.view_layer)
             return {"FINISHED"}
-        assert camera is not None  # poll has asked
+        assert camera is not None  # checked by poll
         scene.camera = camera
-        camera.hide_viewport = False  # a hidden one shows no footage
+        camera.hide_viewport = False  # a hidden camera shows no footage
         camera.hide_set(False, view_layer=context.view_layer)
         render, result = scene.render, scene.scope.result
         render.resolution_x, render.resolution_y = result.resolution
@@ -77,7 +77,7 @@ class SCOPE_OT_look_through(bpy.types.Operator):
         return {"FINISHED"}
 
     def _show_alone(self, context: bpy.types.Context, collection: bpy.types.Collection) -> None:
-        """Local view: what else is in the scene would hide the footage or the body."""
+        """Show only the capture in local view, because other objects could hide the footage or the body."""
         from ...scene.visibility import show
 
         space, selected, active = context.space_data, context.selected_objects, context.view_layer.objects.active
@@ -86,9 +86,9 @@ class SCOPE_OT_look_through(bpy.types.Operator):
         if space.local_view:
             bpy.ops.view3d.localview(frame_selected=False)
         bpy.ops.object.select_all(action="DESELECT")
-        for obj in list(collection.all_objects):  # which hiding and showing invalidates
-            if "scope_source" in obj:  # perhaps hidden while a rig moves instead
-                show(obj, context.view_layer, for_now=True)
+        for obj in list(collection.all_objects):  # copied, because hiding and showing invalidates the iterator
+            if "scope_source" in obj:  # it may be hidden because of a retargeted rig
+                show(obj, context.view_layer, temporarily=True)
             obj.select_set(True)
         bpy.ops.view3d.localview(frame_selected=False)
         bpy.ops.object.select_all(action="DESELECT")
@@ -99,38 +99,38 @@ class SCOPE_OT_look_through(bpy.types.Operator):
 
 
 def _is_shown(collection: bpy.types.Collection, layer: bpy.types.LayerCollection) -> bool:
-    """Whether a collection is shown, in this layer collection or below it."""
+    """Return whether a collection is visible in this layer collection or in one below it."""
     here = layer.collection == collection and layer.is_visible
     return here or any(_is_shown(collection, child) for child in layer.children)
 
 
 def is_looking_through(context: bpy.types.Context) -> bool:
-    """Whether the viewport shows a capture alone through its camera."""
+    """Return whether the context's viewport shows only a capture, through its camera."""
     space = context.space_data
     return space is not None and space.type == "VIEW_3D" and looks_through(context.scene, space)
 
 
 def looks_through(scene: bpy.types.Scene, space: bpy.types.SpaceView3D) -> bool:
-    """The same of a viewport that need not be the context's."""
+    """Return whether a viewport shows only a capture, through its camera."""
     if not space.local_view or space.region_3d.view_perspective != "CAMERA":
         return False
     return scene.camera is not None and scene.camera == camera_of(scene)
 
 
 def camera_of(scene: bpy.types.Scene) -> bpy.types.Object | None:
-    """The camera of the scene's last capture."""
+    """Return the camera of the scene's last capture; None if there is none."""
     collection = scene.scope.result.collection
     return next((o for o in collection.all_objects if o.type == "CAMERA"), None) if collection else None
 
 
 class SCOPE_OT_go_to_frame(bpy.types.Operator):
-    """Go to the frame, to see what the warning is about"""
+    """Go to the frame that the warning is about"""
 
     bl_idname = "scope.go_to_frame"
     bl_label = "Go to Frame"
     bl_options = {"INTERNAL"}
 
-    frame: IntProperty(name="Frame", description="Scene frame to show")
+    frame: IntProperty(name="Frame", description="Scene frame")
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Set the current frame."""
@@ -138,8 +138,8 @@ class SCOPE_OT_go_to_frame(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class SCOPE_OT_footage_to_sequencer(TellingOperator):
-    """Put the footage, picture and sound, into the video sequencer, in time with the motion"""
+class SCOPE_OT_footage_to_sequencer(ReportingOperator):
+    """Add the footage with its sound to the video sequencer, synchronized with the motion"""
 
     bl_idname = "scope.footage_to_sequencer"
     bl_label = "Footage to Sequencer"
@@ -147,7 +147,7 @@ class SCOPE_OT_footage_to_sequencer(TellingOperator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Something was captured."""
+        """Require a capture."""
         return context.scene.scope.result.collection is not None
 
     def work(self, context: bpy.types.Context) -> str:
@@ -163,8 +163,8 @@ class SCOPE_OT_footage_to_sequencer(TellingOperator):
         if rate and abs(rate - scene_rate(scene)) > 0.01:
             self.report(
                 {"WARNING"},
-                f"The scene plays at {scene_rate(scene):.5g} frames/s and the footage at {rate:.5g}: the strip drifts "
-                "from the motion",
+                f"The scene has {scene_rate(scene):.5g} frames/s and the footage {rate:.5g}: the strip will not stay "
+                "synchronized with the motion",
             )
         return ""
 

@@ -62,13 +62,13 @@ def test_the_lifting_network_runs_once_for_both_fits(monkeypatch):
     track = _standing_track(body, camera)
     lifts = []
 
-    lift_both_ways = Lifter.lift_both_ways
+    lift_mixture = Lifter.lift_mixture
 
     def counted(self, *arguments):
         lifts.append(1)
-        return lift_both_ways(self, *arguments)
+        return lift_mixture(self, *arguments)
 
-    monkeypatch.setattr(Lifter, "lift_both_ways", counted)
+    monkeypatch.setattr(Lifter, "lift_mixture", counted)
     prepared = prepare_track(body, track, camera)
     first = track_fit.fit_track(prepared, lambda *_: None)
     second = track_fit.refit_track(prepared, first, _stance(first), lambda *_: None)

@@ -8,7 +8,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from scope.scope_addon.capture.media.exposure import Exposure
+from scope.scope_addon.capture.media.exposure import AutoExposure
 from scope.scope_addon.capture.options import CaptureOptions
 from scope.scope_addon.capture.pipeline import capture
 from scope.solver import Body
@@ -23,7 +23,7 @@ def picture(level: float) -> np.ndarray:
 def test_brightest_places_become_bright(level: int, becomes: int) -> None:
     """Some 200 of 255, but no more than 16 times as bright, and everything else in proportion."""
     before = picture(level)
-    found = Exposure().brightened(before).astype(float)
+    found = AutoExposure().brighten(before).astype(float)
     assert np.percentile(found, 98) == pytest.approx(becomes, rel=0.05)
     np.testing.assert_allclose(found, before * (becomes / level), atol=0.08 * becomes)
 
@@ -31,15 +31,15 @@ def test_brightest_places_become_bright(level: int, becomes: int) -> None:
 @pytest.mark.parametrize("level", [0, 3, 130, 255])
 def test_black_and_bright_ones_stay(level: int) -> None:
     frame = picture(level)
-    assert Exposure().brightened(frame) is frame
+    assert AutoExposure().brighten(frame) is frame
 
 
 def test_brightness_does_not_flicker() -> None:
-    exposure = Exposure()
+    exposure = AutoExposure()
     levels = [40 + 8 * (k % 2) for k in range(40)]
-    gains = [float(exposure.brightened(picture(level))[:, -1].mean()) / level for level in levels]
+    gains = [float(exposure.brighten(picture(level))[:, -1].mean()) / level for level in levels]
     assert np.abs(np.diff(np.log(gains[20:]))).max() < 0.05
-    assert exposure.brightened(picture(200)).max() <= 201  # the light is switched on
+    assert exposure.brighten(picture(200)).max() <= 201  # the light is switched on
 
 
 @pytest.mark.usefixtures("networks")

@@ -63,8 +63,8 @@ def test_without_a_rate(folder: Path) -> None:
         ([0, 10, 20, 30], [0, 1, 2, 3], None),
         ([0, 1, 4, 5, 6], [0, 1, 4, 5, 6], "2 numbers between 0 and 6"),
         ([0, 10, 30, 40], [0, 1, 3, 4], "1 numbers between 0 and 40"),
-        ([0, 1, 9], [0, 1, 2], "one after the other"),
-        ([1690000000033, 1690000000067, 1690000000100], [0, 1, 2], "one after the other"),
+        ([0, 1, 9], [0, 1, 2], "consecutive frames"),
+        ([1690000000033, 1690000000067, 1690000000100], [0, 1, 2], "consecutive frames"),
     ],
 )
 def test_missing_pictures_leave_their_time_and_are_told(
@@ -137,5 +137,5 @@ def test_capture_and_batch_agree_on_what_a_sequence_is(tmp_path: Path, names: li
         with open_video(clips / "folder", VideoRange(fps=Fraction(10))) as video:
             assert len(list(video)) == len(names)
     else:
-        with pytest.raises(VideoError, match="no numbered sequence"):
+        with pytest.raises(VideoError, match="not a numbered sequence"):
             open_video(clips / "folder")

@@ -16,8 +16,9 @@ import av
 import cv2
 import numpy as np
 import pytest
+from scope.scope_addon.capture.media.frame_rate import exact_fps
 from scope.scope_addon.capture.media.frame_readers import OpencvReader, PyavReader
-from scope.scope_addon.capture.media.video import exact_fps, open_video
+from scope.scope_addon.capture.media.video import open_video
 from scope.scope_addon.capture.media.video_range import VideoRange
 from scope.scope_addon.errors import VideoError
 

@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 import pytest
 from scope.scope_addon.capture.media.video import Frame, open_video
-from scope.scope_addon.capture.media.video_range import FrameChooser, VideoRange, parse_range, parse_rate
+from scope.scope_addon.capture.media.video_range import FrameSampler, VideoRange, parse_range, parse_rate
 from scope.scope_addon.errors import UsageError, VideoError
 
 FPS = 25
@@ -65,10 +65,10 @@ def test_a_start_after_the_end_of_the_video(long_video: Path) -> None:
 
 def test_nearest_frames_of_a_variable_rate() -> None:
     times = [0.0, 0.09, 0.11, 0.3, 0.39, 0.52, 0.6, 0.61]
-    chooser = FrameChooser(Fraction(10))
+    sampler = FrameSampler(Fraction(10))
     image = np.zeros((1, 1, 3), np.uint8)
-    chosen = [f.timestamp_s for k, t in enumerate(times) for f in chooser.choose(Frame(k, t, image))]
-    chosen += [f.timestamp_s for f in chooser.rest()]
+    chosen = [f.timestamp_s for k, t in enumerate(times) for f in sampler.add(Frame(k, t, image))]
+    chosen += [f.timestamp_s for f in sampler.flush()]
     assert chosen == [0.0, 0.11, 0.3, 0.39, 0.52, 0.6]  # for 0.0, 0.1, (0.2: nothing near), 0.3, 0.4, 0.5, 0.6
 
 

@@ -9,7 +9,7 @@ from types import SimpleNamespace
 
 import pytest
 from scope.scope_addon.capture.perception import sessions
-from scope.scope_addon.capture.perception.execution import CHOICES, CPU, PROVIDERS, Execution, OneAtATime
+from scope.scope_addon.capture.perception.execution import CHOICES, CPU, PROVIDERS, Execution, SerializedSession
 from scope.scope_addon.capture.perception.sessions import network_path, open_session
 from scope.scope_addon.errors import UsageError
 from scope.scope_addon.options import option
@@ -77,7 +77,7 @@ def test_what_is_not_there_is_said_once(runtime) -> None:
     open_session(Path("m.onnx"), 1, execution)
     assert fake.asked == [[CPU_NAME]] * 2
     (warning,) = execution.warnings
-    assert "CUDA was asked for, but this onnxruntime has only CoreML, CPU" in warning
+    assert "CUDA was requested, but this onnxruntime has only CoreML, CPU" in warning
 
 
 @pytest.mark.parametrize("how", ["broken", "silent"])
@@ -95,7 +95,7 @@ def test_a_provider_that_fails_gives_way_once_and_for_all(runtime, how: str) -> 
 def test_directml_runs_one_at_a_time(runtime) -> None:
     runtime("directml")
     session = open_session(Path("m.onnx"), 1, Execution("auto"))
-    assert isinstance(session, OneAtATime)
+    assert isinstance(session, SerializedSession)
     assert session.options.enable_mem_pattern is False
     inside = threading.Semaphore()
 
@@ -136,4 +136,4 @@ def test_the_real_processor() -> None:
         pytest.skip("this machine has TensorRT")
     assert session.get_session_options().intra_op_num_threads == 2
     assert execution.used == [CPU]
-    assert "TensorRT was asked for" in execution.warnings[0]
+    assert "TensorRT was requested" in execution.warnings[0]

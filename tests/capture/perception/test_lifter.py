@@ -118,9 +118,9 @@ def test_long_clips_are_lifted_in_blocks_that_know_their_neighbours(lifter, walk
     points, rays, times = walkers
     ones = np.ones(points.shape[:2])
     windows = windows_around(times, np.ones(len(times), bool))
-    whole = lifter.lift_both_ways(rays, ones, relative(points), windows)
+    whole = lifter.lift_mixture(rays, ones, relative(points), windows)
     monkeypatch.setattr("scope.scope_addon.kinematics.frame_blocks.BLOCK_FRAMES", 17)
-    blocks = lifter.lift_both_ways(rays, ones, relative(points), windows)
+    blocks = lifter.lift_mixture(rays, ones, relative(points), windows)
     assert np.allclose(blocks.points, whole.points, atol=1e-5)
     assert np.allclose(blocks.sigma_along, whole.sigma_along, atol=1e-5)
 
@@ -164,7 +164,7 @@ def real_people(shared, frames):
 
 def test_real_people_are_lifted_better_than_by_their_world_landmarks(lifter, real_people):
     (rays, confidence, world, truth), limbs = real_people
-    lifted = lifter.lift_both_ways(rays, confidence, world)
+    lifted = lifter.lift_mixture(rays, confidence, world)
     ours, theirs = (np.nanmean(np.linalg.norm(p[:, limbs] - truth, axis=-1)) for p in (lifted.points, world))
     assert len(truth) >= 15
     assert ours < 0.115
@@ -174,7 +174,7 @@ def test_real_people_are_lifted_better_than_by_their_world_landmarks(lifter, rea
 def test_errors_on_real_people_are_as_large_as_foretold(lifter, real_people):
     """Root mean square of residual over deviation, one for honest deviations, all four cameras together."""
     (rays, confidence, world, truth), limbs = real_people
-    lifted = lifter.lift_both_ways(rays, confidence, world)
+    lifted = lifter.lift_mixture(rays, confidence, world)
     error = (lifted.points[:, limbs] - truth) @ np.swapaxes(virtual_camera(rays), 1, 2)
     across = error[..., :2] / lifted.sigma_across[:, limbs, None]
     along = error[..., 2] / lifted.sigma_along[:, limbs]

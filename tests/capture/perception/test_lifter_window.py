@@ -7,7 +7,7 @@ from scope.scope_addon.capture.perception.lifter_window import (
     MIDDLE,
     OFFSETS_S,
     WINDOW,
-    standing_still,
+    single_frame_windows,
     windows_around,
 )
 
@@ -18,7 +18,7 @@ def moments(times, seen, values=None):
     rows = np.arange(len(times))
     first, end = windows.span(rows)
     x = (times if values is None else values).astype(float)[first:end, None]
-    return windows.of(x, rows, first)[..., 0]
+    return windows.gather(x, rows, first)[..., 0]
 
 
 def test_moments_are_evenly_spaced_in_time_at_any_frame_rate():
@@ -67,9 +67,9 @@ def test_sparse_frames_and_single_pictures_stand_still():
     assert np.allclose(moments(times, np.ones(5, bool)), times[:, None])
     assert np.allclose(moments(np.zeros(1), np.ones(1, bool)), 0)
     assert np.allclose(moments(times, np.zeros(5, bool))[:, MIDDLE], times)  # nobody was seen: nothing fails
-    still = standing_still(3)
+    still = single_frame_windows(3)
     x = np.arange(3.0)[:, None]
-    assert np.array_equal(still.of(x, np.arange(3), 0)[..., 0], np.repeat(x, WINDOW, axis=1))
+    assert np.array_equal(still.gather(x, np.arange(3), 0)[..., 0], np.repeat(x, WINDOW, axis=1))
 
 
 def test_a_block_of_frames_needs_only_the_rows_around_it():
@@ -79,5 +79,5 @@ def test_a_block_of_frames_needs_only_the_rows_around_it():
     first, end = windows.span(rows)
     assert 24 <= 4096 - first <= 25
     assert 24 <= end - 8192 <= 25
-    whole = windows.of(times[:, None], rows, 0)
-    assert np.array_equal(windows.of(times[first:end, None], rows, first), whole)
+    whole = windows.gather(times[:, None], rows, 0)
+    assert np.array_equal(windows.gather(times[first:end, None], rows, first), whole)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What failed work leaves: nothing of its own, and all else as it was."""
+"""A failure in a transaction leaves no new datablocks and restores the others."""
 
 import bpy
 import numpy as np
@@ -15,7 +15,7 @@ def person(body, make_motion):
 
 
 def everything(person):
-    """What must not change, by value."""
+    """Return the values that must not change."""
     scene, rig, keys = bpy.context.scene, person.armature, person.mesh.data.shape_keys
     curves = [(c.data_path, c.array_index, read_keys(c).tobytes()) for c in (*fcurves(rig), *fcurves(keys))]
     action = rig.animation_data.action
@@ -33,13 +33,13 @@ def everything(person):
 
 
 def shuffle(person):
-    """Change what edits and retargeting change, and more."""
+    """Make the changes of edits and retargeting, and others."""
     scene, rig = bpy.context.scene, person.armature
     for curve in fcurves(rig)[:7]:
         rewrite_keys(curve, np.array([1.0, 2.0]), np.array([0.3, 0.4]))
     empty = bpy.data.objects.new("Root", None)
     scene.collection.objects.link(empty)
-    Channels(empty, bpy.data.actions.new("Way")).write("location", np.array([1.0]), np.array([[1.0, 2.0, 3.0]]))
+    Channels(empty, bpy.data.actions.new("Trajectory")).write("location", np.array([1.0]), np.array([[1.0, 2.0, 3.0]]))
     rig.parent, rig.location = empty, (1, 2, 3)
     rig["new"], rig["scope_start"], rig.pose.bones[3]["IK_FK"] = 1.0, 99.0, 0.5
     scene.frame_start, scene.frame_end, scene.render.fps = 5, 6, 99
@@ -50,7 +50,7 @@ def shuffle(person):
 
 
 def fail_after(work, *objects):
-    """Do the work, then run out of memory."""
+    """Make the changes, then run out of memory."""
     with all_or_nothing(bpy.context.scene, *objects):
         work()
         raise MemoryError
@@ -60,7 +60,7 @@ def another_action(datablock):
     Channels(datablock, bpy.data.actions.new("Other"))
 
 
-def test_what_fails_changes_nothing(person):
+def test_a_failure_changes_nothing(person):
     person.armature.pose.bones[3]["IK_FK"] = 0.25
     before = everything(person)
     with pytest.raises(MemoryError):
@@ -68,7 +68,7 @@ def test_what_fails_changes_nothing(person):
     assert everything(person) == before
 
 
-def test_another_action_is_taken_away_again(person):
+def test_a_new_action_is_removed_by_a_rollback(person):
     before, action = everything(person), person.armature.animation_data.action
     with pytest.raises(MemoryError):
         fail_after(lambda: another_action(person.armature), person.armature)
@@ -76,17 +76,17 @@ def test_another_action_is_taken_away_again(person):
     assert person.armature.animation_data.action == action  # the very same, which others may hold
 
 
-def test_what_was_not_animated_is_not_animated_afterwards(person):
+def test_an_object_without_animation_has_none_after_a_rollback(person):
     empty = bpy.data.objects.new("Empty", None)
     with pytest.raises(MemoryError):
         fail_after(lambda: another_action(empty), empty, empty)
     assert empty.animation_data is None
 
 
-def test_what_is_done_stays_and_leaves_no_copies(person):
+def test_success_keeps_the_changes_and_leaves_no_copies(person):
     actions = {action.name for action in bpy.data.actions}
     with all_or_nothing(bpy.context.scene, person.armature):
         shuffle(person)
-    assert {action.name for action in bpy.data.actions} == actions | {"Way"}
+    assert {action.name for action in bpy.data.actions} == actions | {"Trajectory"}
     assert person.armature["scope_start"] == 99.0
     assert bpy.context.scene.frame_end == 6

@@ -24,7 +24,7 @@ def sides(body) -> dict[str, list[str]]:
 
 
 def test_rings_lie_around_the_limbs(body, make_motion):
-    """Half way along the thigh the ring clears the flesh, and not by much: as the mesh itself is cut there."""
+    """The ring is just outside the surface of the mesh in the middle of the thigh."""
     person = build_scene([make_motion(body, 2)], body).people[0]
     rest = np.array([v.co for v in person.mesh.data.shape_keys.reference_key.data])
     for key in person.mesh.data.shape_keys.key_blocks[1:]:

@@ -9,7 +9,7 @@ from scope.scope_addon.scene.build import NEW_SCENE, BuildOptions, build_scene
 
 @pytest.fixture
 def doubtful(body, make_motion):
-    """Sixty frames; 20-22 not seen, 40-44 far from the footage, and a confidence and contact of each joint's own."""
+    """Sixty frames; 20-22 not seen, 40-44 far from the footage, with different confidences and contacts per joint."""
     motion = make_motion(body, 60)
     rng = np.random.default_rng(3)
     motion.joint_confidence[:] = rng.uniform(0.5, 1.0, motion.joint_confidence.shape)
@@ -33,13 +33,13 @@ def test_confidence_and_contact_follow_the_timeline(body, doubtful, blender):
     assert (ui["min"], ui["max"]) == (0.0, 1.0)
 
 
-def test_their_curves_stay_out_of_the_graph_editor(body, doubtful):
+def test_their_curves_are_hidden_in_the_graph_editor(body, doubtful):
     rig = build_scene([doubtful], body).people[0].armature
     hidden = {curve.data_path.rsplit("[", 1)[1] for curve in actions.fcurves(rig) if curve.hide}
     assert hidden == {'"confidence"]', '"contact"]'}
 
 
-def test_markers_where_the_motion_deserves_a_look(body, doubtful):
+def test_markers_at_review_spans(body, doubtful):
     scene = bpy.context.scene
     options = BuildOptions(frame_rate="set", start_frame=101)
     build_scene([doubtful], body, options=options)
@@ -50,7 +50,7 @@ def test_markers_where_the_motion_deserves_a_look(body, doubtful):
     assert "person 2 check 141-145" in scene.timeline_markers
 
 
-def test_no_markers_unless_wanted_and_none_after_a_cancel(body, doubtful):
+def test_no_markers_unless_requested_and_none_after_a_cancel(body, doubtful):
     scene = bpy.context.scene
     scene.timeline_markers.new("mine", frame=7)
     build_scene([doubtful], body, options=BuildOptions(with_markers=False))

@@ -132,7 +132,7 @@ def test_fbx_objects_have_unit_scale_and_no_leaf_bones(body, make_motion, tmp_pa
 
 
 def test_fbx_is_in_centimetres_without_any_scaling(body, make_motion, tmp_path):
-    """As read by Blender's own parser. Unreal takes the numbers for centimetres, whatever unit the file names."""
+    """Read with Blender's parser. Unreal interprets lengths as centimetres, whatever unit the file states."""
     parser = pytest.importorskip("io_scene_fbx.parse_fbx")
     path, motion = tmp_path / "walk.fbx", make_motion(body, 4)
     export_motions([motion], body, path, export_options=ExportOptions(camera=True))
@@ -191,8 +191,8 @@ def test_glb_holds_one_animation_one_skin_and_named_morphs(body, make_motion, tm
 
 
 @pytest.mark.parametrize("rate", [12.5, 24000 / 1001, 30000 / 1001, 24.449])
-def test_glb_tells_the_seconds_of_the_footage(body, make_motion, tmp_path, rate):
-    """As they stand in the file: Blender's importer would take back what its exporter does to them."""
+def test_glb_key_times_are_those_of_the_footage(body, make_motion, tmp_path, rate):
+    """Read from the file itself, because Blender's importer has the same error as its exporter."""
     motion, path = make_motion(body, 7, rate=rate), tmp_path / "walk.glb"
     export_motions([motion], body, path, export_options=ExportOptions(camera=True))
     gltf, data = glb_json(path), path.read_bytes()
@@ -230,7 +230,7 @@ def test_glb_is_upright_in_its_y_up_frame(body, make_motion, tmp_path):
     assert 1.4 < high[1] - low[1] < 2.2
 
 
-def test_the_footages_camera_comes_along_on_request(body, make_motion, tmp_path, blender):
+def test_the_footages_camera_is_exported_on_request(body, make_motion, tmp_path, blender):
     path = tmp_path / "walk.glb"
     motion = make_motion(body, 2)
     export_motions([motion], body, path, export_options=ExportOptions(camera=True))
@@ -280,7 +280,7 @@ def test_blend_opens_with_camera_rate_and_shape_keys(body, make_motion, tmp_path
 
 @pytest.mark.parametrize("separate", [False, True])
 @pytest.mark.parametrize("suffix", [".glb", ".fbx", ".bvh"])
-def test_a_capture_without_its_armature_is_told(body, make_motion, tmp_path, suffix, separate):
+def test_a_capture_without_its_armature_is_reported(body, make_motion, tmp_path, suffix, separate):
     person = build_scene([make_motion(body, 2)], body).people[0]
     bpy.data.objects.remove(person.armature)
     with pytest.raises(UsageError, match="armature was removed"):
@@ -290,7 +290,7 @@ def test_a_capture_without_its_armature_is_told(body, make_motion, tmp_path, suf
 
 @pytest.mark.parametrize("suffix", [".glb", ".fbx", ".usdc", ".blend"])
 def test_a_file_for_each_of_several_people(body, make_motion, tmp_path, blender, truth, suffix):
-    """Each with one armature and mesh, moving as the person does, and all of them beginning at the same time."""
+    """Each file has one armature and mesh with that person's motion; all start at the same time."""
     late = make_motion(body, timestamps=np.arange(2, 6) / 30, seed=1)
     motions = [make_motion(body, 6), late]
     before = sorted(c.name for c in bpy.data.collections)
@@ -367,7 +367,7 @@ def test_a_caller_without_a_window_can_export(body, make_motion, tmp_path):
     assert all(path.is_file() for path in written)
 
 
-def test_a_folder_is_told_from_a_name_without_suffix(body, make_motion, tmp_path):
+def test_a_folder_is_distinguished_from_a_name_without_suffix(body, make_motion, tmp_path):
     with pytest.raises(UsageError, match="it is a folder; name a file in it"):
         export_motions([make_motion(body, 1)], body, tmp_path)
 
@@ -405,14 +405,14 @@ def test_an_unwritable_folder_is_named(body, make_motion, tmp_path):
 
 @pytest.mark.skipif(not Path("/proc/self").is_dir(), reason="needs a folder in which even root cannot make files")
 @pytest.mark.parametrize("suffix", SCENE_SUFFIXES)
-def test_a_folder_that_takes_no_files_is_named(body, make_motion, suffix):
+def test_a_folder_that_accepts_no_files_is_named(body, make_motion, suffix):
     with pytest.raises(OutputError, match="cannot write /proc/walk"):
         export_motions([make_motion(body, 1)], body, f"/proc/walk{suffix}")
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no limit on a file's size that a process could set")
 @pytest.mark.parametrize("suffix", SCENE_SUFFIXES)
-def test_no_room_for_the_file_is_told_in_a_sentence_and_leaves_nothing(body, make_motion, tmp_path, suffix):
+def test_a_full_disk_is_reported_in_one_sentence_and_leaves_nothing(body, make_motion, tmp_path, suffix):
     import resource
 
     path, motion = tmp_path / f"walk{suffix}", make_motion(body, 200)
@@ -446,7 +446,7 @@ def test_a_failing_writer_leaves_the_old_file_and_no_other(body, make_motion, tm
 
 
 class StoppedExporter(bpy.types.Operator):
-    """An exporter in Python, in which somebody presses Ctrl-C."""
+    """An exporter in Python that is interrupted with Ctrl-C."""
 
     bl_idname, bl_label = "scope_test.stopped", "Stopped"
 
@@ -454,7 +454,7 @@ class StoppedExporter(bpy.types.Operator):
         raise KeyboardInterrupt
 
 
-def test_ctrl_c_in_an_exporter_stops_and_is_no_failure(body, make_motion, tmp_path, monkeypatch):
+def test_ctrl_c_in_an_exporter_is_not_reported_as_a_failure(body, make_motion, tmp_path, monkeypatch):
     monkeypatch.setattr(formats, "write_glb", lambda *rest: formats.call_operator(bpy.ops.scope_test.stopped))
     bpy.utils.register_class(StoppedExporter)
     try:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Captures in whatever state users leave them, exported: hidden, at rest, edited, linked, in the NLA, beside others."""
+"""Exporting captures in various states: hidden, at rest, edited, linked, in the NLA, among other objects."""
 
 import bpy
 import numpy as np
@@ -80,9 +80,7 @@ def _out_of_renders(person, collection):
 
 @pytest.mark.parametrize("suffix", [".glb", ".fbx", ".usdc", ".bvh"])
 @pytest.mark.parametrize("hide", [_in_rest_position, _in_edit_mode, _out_of_viewports, _out_of_renders])
-def test_what_does_not_move_in_the_viewport_moves_in_the_file(
-    body, make_motion, tmp_path, blender, truth, suffix, hide
-):
+def test_motion_disabled_in_the_viewport_is_exported(body, make_motion, tmp_path, blender, truth, suffix, hide):
     motion = make_motion(body, 4)
     result = build_scene([motion], body, options=BuildOptions(frame_rate="set"))
     person, collection = result.people[0], result.collection
@@ -102,7 +100,7 @@ def test_what_does_not_move_in_the_viewport_moves_in_the_file(
 
 
 def _to_nla(datablock, *starts):
-    """Let a datablock play its action by the NLA alone, once from each of these frames on."""
+    """Move a datablock's action to NLA strips that start at these frames."""
     animation = datablock.animation_data
     action, slot = animation.action, getattr(animation, "action_slot", None)
     animation.action = None
@@ -114,7 +112,7 @@ def _to_nla(datablock, *starts):
 
 
 @pytest.mark.parametrize("suffix", [".glb", ".fbx", ".usdc", ".bvh"])
-def test_what_hangs_on_something_of_the_users_goes_where_that_takes_it(body, make_motion, tmp_path, blender, suffix):
+def test_a_capture_with_a_parent_moves_with_it_in_the_file(body, make_motion, tmp_path, blender, suffix):
     person = build_scene([make_motion(body, 4)], body, options=BuildOptions(frame_rate="set")).people[0]
     stage = bpy.data.objects.new("Stage", None)
     bpy.context.scene.collection.objects.link(stage)
@@ -137,7 +135,7 @@ def test_what_hangs_on_something_of_the_users_goes_where_that_takes_it(body, mak
 
 
 @pytest.mark.parametrize("suffix", [".glb", ".fbx", ".bvh"])
-def test_a_motion_in_the_nla_is_exported_as_it_is_seen(body, make_motion, tmp_path, blender, truth, suffix):
+def test_a_motion_in_the_nla_is_exported_as_displayed(body, make_motion, tmp_path, blender, truth, suffix):
     motion = make_motion(body, 5)
     person = build_scene([motion], body, options=BuildOptions(frame_rate="set")).people[0]
     animation = _to_nla(person.armature, 40)
@@ -153,7 +151,7 @@ def test_a_motion_in_the_nla_is_exported_as_it_is_seen(body, make_motion, tmp_pa
     np.testing.assert_allclose(joints, truth(body, motion).joints[3], atol=JOINT_TOLERANCE)
 
 
-def test_what_has_no_bones_may_be_in_the_nla_too(body, make_motion, tmp_path, blender, truth):
+def test_objects_without_bones_may_be_in_the_nla_too(body, make_motion, tmp_path, blender, truth):
     motion = make_motion(body, 5)
     person = build_scene([motion], body, options=BuildOptions(frame_rate="set")).people[0]
     _to_nla(person.armature, 1)
@@ -169,7 +167,7 @@ def test_what_has_no_bones_may_be_in_the_nla_too(body, make_motion, tmp_path, bl
     np.testing.assert_allclose(joints, truth(body, motion).joints[3], atol=JOINT_TOLERANCE)
 
 
-def test_a_track_that_plays_solo_lasts_as_long_as_it_does(body, make_motion):
+def test_a_solo_track_determines_the_frame_range(body, make_motion):
     person = build_scene([make_motion(body, 5)], body, options=BuildOptions(frame_rate="set")).people[0]
     animation = _to_nla(person.armature, 1, 1000)
     assert actions.frame_range([person.armature])[1] > 1000
@@ -177,7 +175,7 @@ def test_a_track_that_plays_solo_lasts_as_long_as_it_does(body, make_motion):
     assert actions.frame_range([person.armature])[1] < 10
 
 
-def test_a_scene_keeps_what_is_hidden_in_it(body, make_motion, tmp_path):
+def test_hidden_objects_stay_hidden_in_a_blend(body, make_motion, tmp_path):
     result = build_scene([make_motion(body, 4)], body, options=BuildOptions(frame_rate="set"))
     person = result.people[0]
     person.armature.data.pose_position = "REST"
@@ -190,7 +188,7 @@ def test_a_scene_keeps_what_is_hidden_in_it(body, make_motion, tmp_path):
     assert mesh.parent.data.pose_position == "REST"
 
 
-def test_a_users_edit_is_exported(body, make_motion, tmp_path, blender):
+def test_an_edit_in_progress_is_exported(body, make_motion, tmp_path, blender):
     motion = make_motion(body, 4)
     person = build_scene([motion], body, options=BuildOptions(frame_rate="set")).people[0]
     person.armature.location = (5.0, 0.0, 0.0)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Motions on the user's own rig, from file to file."""
+"""Retargeting from a rig file to exported files."""
 
 import json
 import subprocess
@@ -15,7 +15,7 @@ from scope.scope_addon.retarget.bone_map import BoneMap, save_bone_map
 from scope.scope_addon.retarget.rig_source import rig_source
 from scope.scope_addon.scene.build import NEW_SCENE
 from scope.scope_addon.scene.export import formats
-from scope.scope_addon.scene.rigs.rig_export import export_on_rig
+from scope.scope_addon.scene.rigs.rig_export import RigExportOptions, export_on_rig
 from scope.scope_addon.scene.rigs.rig_file import check_rig
 from scope.solver.errors import InputError
 
@@ -24,7 +24,7 @@ from ..made_rigs import ARMS, FRAMES, build_rig, names_of, seen, truth
 
 
 def save_rig(path, scheme="mixamo", armatures=1, animated=False):
-    """A file of rigs, each with its mesh, and a stone that belongs to nobody; the session is empty then."""
+    """Write a file of rigs, each with its mesh, and an unrelated object; the session is empty afterwards."""
     for k in range(armatures):
         rig, bone_of = build_rig(scheme, seed=k)
         rig.name = f"Rig{k}"
@@ -57,7 +57,7 @@ def save_rig(path, scheme="mixamo", armatures=1, animated=False):
 
 
 def read(path):
-    """The armatures of a file, which the active scene holds then."""
+    """Load a file into the active scene and return its armatures."""
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     bpy.context.scene.render.fps = 30
     with formats.quiet():
@@ -74,7 +74,7 @@ def read(path):
 
 
 def worst_arm(rig, bone_of, offset):
-    """Degrees between the rig's arms and the body's; the motion begins at frame ``offset``."""
+    """Return the angles between the rig's arms and the body's, degrees; the motion begins at frame ``offset``."""
     joints, worst = truth()[[f - 1 for f in FRAMES]], 0.0
     frames = [f - 1 + offset for f in FRAMES]
     for a, b in ARMS:
@@ -93,7 +93,7 @@ def test_a_rig_from_a_file_goes_into_every_format(tmp_path, kind):
     source = rig_source(save_rig(tmp_path / f"rig{kind}", animated=kind == ".blend"))
     targets = [tmp_path / name for name in ("out.blend", "out.fbx", "out.glb", "out.bvh", "out.usdc")]
     before = {k: len(getattr(bpy.data, k)) for k in ("objects", "meshes", "armatures", "actions", "collections")}
-    written, _ = export_on_rig([motion_of(walk(2.0))], BODY, targets, source, OPTIONS)
+    written, _ = export_on_rig([motion_of(walk(2.0))], BODY, targets, source, RigExportOptions(OPTIONS))
     assert written == targets
     assert {k: len(getattr(bpy.data, k)) for k in before} == before
     for path in targets[:3]:
@@ -110,7 +110,7 @@ def test_two_people_have_a_rig_each(tmp_path):
     other = walk(2.0)
     other.root[:, 0] += 2.0
     motions = [motion_of(walk(2.0)), motion_of(other)]
-    export_on_rig(motions, BODY, [tmp_path / "out.glb"], source, OPTIONS)
+    export_on_rig(motions, BODY, [tmp_path / "out.glb"], source, RigExportOptions(OPTIONS))
     rigs = read(tmp_path / "out.glb")
     places = [seen(rig, [names_of("mixamo")["pelvis"]], [30])[0, 0, 0] for rig in rigs]
     assert len(rigs) == 2
@@ -133,7 +133,7 @@ def test_a_file_without_an_armature_is_refused(tmp_path):
         check_rig(rig_source(tmp_path / "rig.blend"))
 
 
-def test_a_rig_whose_bones_are_held_is_refused_before_the_work(tmp_path):
+def test_a_rig_with_blocked_bones_is_refused_before_the_capture(tmp_path):
     rig, bone_of = build_rig("mixamo")
     limit = rig.pose.bones[bone_of["left_knee"]].constraints.new("LIMIT_ROTATION")
     limit.owner_space = "LOCAL"
@@ -155,9 +155,9 @@ def test_fingers_that_follow_one_another_matter_only_where_fingers_are_captured(
         bone.head, bone.tail, bone.parent = parent.tail, parent.tail + along, parent
         parent = bone
     bpy.ops.object.mode_set(mode="OBJECT")
-    held = rig.pose.bones["mixamorig:LeftHandIndex2"].constraints.new("COPY_ROTATION")
-    held.target, held.subtarget = rig, "mixamorig:LeftHandIndex1"
-    held.target_space = held.owner_space = "LOCAL"
+    constraint = rig.pose.bones["mixamorig:LeftHandIndex2"].constraints.new("COPY_ROTATION")
+    constraint.target, constraint.subtarget = rig, "mixamorig:LeftHandIndex1"
+    constraint.target_space = constraint.owner_space = "LOCAL"
     formats.write_blend(tmp_path / "rig.blend", bpy.context.scene)
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     parts = {bone: part for part, bone in names_of("mixamo").items()}
@@ -172,7 +172,7 @@ def test_fingers_that_follow_one_another_matter_only_where_fingers_are_captured(
 def test_a_map_of_another_rig_is_refused(tmp_path):
     path = save_rig(tmp_path / "rig.glb")
     save_bone_map(BoneMap({bone: part for part, bone in names_of("unreal").items()}), tmp_path / "map.json")
-    with pytest.raises(InputError, match="'pelvis' is no bone of 'Rig0'"):
+    with pytest.raises(InputError, match="'pelvis' is not a bone of 'Rig0'"):
         check_rig(rig_source(path, bone_map=tmp_path / "map.json"))
 
 
@@ -194,12 +194,12 @@ def test_damaged_files_are_refused_in_one_sentence(tmp_path, suffix, damage):
 
 
 @pytest.mark.parametrize("kind", [".blend", ".fbx", ".glb"])
-def test_the_way_on_an_object_is_the_same_in_every_format(tmp_path, kind):
+def test_root_motion_on_an_object_is_the_same_in_every_format(tmp_path, kind):
     source = rig_source(save_rig(tmp_path / "rig.glb"))
     paths = {}
     for root in ("bone", "object"):
         out = tmp_path / f"{root}{kind}"
-        export_on_rig([motion_of(walk(2.0))], BODY, [out], source, OPTIONS, root)
+        export_on_rig([motion_of(walk(2.0))], BODY, [out], source, RigExportOptions(OPTIONS, root))
         rigs = read(out)
         bone = names_of("mixamo")["pelvis"]
         paths[root] = seen(rigs[0], [bone], range(2, 60, 8))[:, 0], np.array(rigs[0].pose.bones[bone].head)
@@ -213,7 +213,7 @@ def shell(*arguments):
     return subprocess.run(argv, capture_output=True, text=True, check=False)
 
 
-def test_the_shell_retargets_a_capture(tmp_path):
+def test_the_command_line_retargets_a_capture(tmp_path):
     rig = save_rig(tmp_path / "rig.glb")
     argv = ["capture", SAMPLE, "--quality", "fast", "--end", "0.2", "--json", "--retarget", rig]
     argv += ["--retarget-root", "object"]
@@ -225,7 +225,7 @@ def test_the_shell_retargets_a_capture(tmp_path):
     assert set(names_of("mixamo").values()) <= set(rigs[0].data.bones.keys())
 
 
-def test_the_shell_refuses_before_it_captures(tmp_path):
+def test_the_command_line_checks_the_rig_before_the_capture(tmp_path):
     done = shell("capture", SAMPLE, "--retarget-root", "object", "-o", tmp_path / "out.glb")
     assert done.returncode == 2
     assert "--retarget-root applies to a rig" in done.stderr

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Retargeting, judged by what Blender's depsgraph shows of the rig and by forward kinematics of our own."""
+"""Retargeting: the rig as evaluated by Blender against forward kinematics of the motion."""
 
 import json
 
@@ -21,7 +21,7 @@ def source():
 
 
 def direction_error(rig, bone_of, pairs):
-    """Largest angle in degrees between a limb of the rig and the body's."""
+    """Return the largest angle between a limb of the rig and the body's, degrees."""
     joints, worst = truth()[[f - 1 for f in FRAMES]], 0.0
     for a, b in pairs:
         ours = seen(rig, [bone_of[a], bone_of[b]])
@@ -70,7 +70,7 @@ def _disabled_in_viewports(rig):
 
 
 @pytest.mark.parametrize("hide", [_in_rest_position, _in_edit_mode, _disabled_in_viewports, _in_a_hidden_collection])
-def test_a_rig_that_does_not_react_moves_all_the_same(source, hide):
+def test_a_hidden_or_edited_rig_moves(source, hide):
     rig, bone_of = build_rig("mixamo")
     hide(rig)
     collections, hidden = rig.users_collection, rig.hide_viewport
@@ -81,7 +81,7 @@ def test_a_rig_that_does_not_react_moves_all_the_same(source, hide):
     assert direction_error(rig, bone_of, ARMS + LEGS) < 1.0
 
 
-def test_a_bone_that_is_held_is_named_and_nothing_changes(source):
+def test_a_blocked_bone_is_named_and_nothing_changes(source):
     rig, bone_of = build_rig("mixamo")
     target = bpy.data.objects.new("target", None)
     bpy.context.scene.collection.objects.link(target)
@@ -186,8 +186,11 @@ def test_a_rig_whose_nla_plays_moves_as_captured(source, prepare):
     assert [strip.action for strip in track.strips] == [own]
 
 
-@pytest.mark.parametrize("step", ["transfer", "_probe", "_channel", "drop_root"])
-def test_what_fails_leaves_the_rig_as_it_was(source, monkeypatch, step):
+@pytest.mark.parametrize(
+    "step",
+    ["rig_retarget.transfer", "rig_retarget.probe", "rig_action._rotation_channel", "rig_retarget.remove_root_object"],
+)
+def test_a_failure_leaves_the_rig_unchanged(source, monkeypatch, step):
     rig, _ = build_rig("unreal")
     bone = rig.pose.bones[3]
     bone["IK_FK"] = 0.25
@@ -197,7 +200,7 @@ def test_what_fails_leaves_the_rig_as_it_was(source, monkeypatch, step):
     def fail(*args, **keywords):
         raise MemoryError
 
-    monkeypatch.setattr(f"scope.scope_addon.scene.rigs.rig_retarget.{step}", fail)
+    monkeypatch.setattr(f"scope.scope_addon.scene.rigs.{step}", fail)
     with pytest.raises(MemoryError):
         run(source, rig)
     assert bone["IK_FK"] == 0.25
@@ -220,7 +223,7 @@ def test_a_map_is_read_as_it_was_saved(tmp_path):
 
 
 def _legs_and(pelvis):
-    """A map with all that is needed."""
+    """A map of all required parts."""
     bones = {"a": "left_hip", "b": "left_knee", "c": "right_hip", "d": "right_knee", "PELVIS": "pelvis"}
     text = json.dumps({"format": "scope bone map", "version": 1, "bones": bones})
     return text.replace("PELVIS", pelvis)
@@ -245,7 +248,7 @@ def test_hostile_maps_are_refused(tmp_path, text):
         load_bone_map(path)
 
 
-def test_what_cannot_be_retargeted_is_said(source):
+def test_an_unusable_rig_or_map_is_reported(source):
     rig, _ = build_rig("unreal")
     with pytest.raises(UsageError, match="another armature"):
         run(source, source, guess_bone_map(rig))
@@ -253,7 +256,7 @@ def test_what_cannot_be_retargeted_is_said(source):
         run(source, rig, BoneMap({"head": "head"}))
 
 
-def test_a_pelvis_that_cannot_be_moved_is_told(source):
+def test_a_pelvis_that_cannot_be_moved_is_reported(source):
     rig, bone_of = build_rig("unreal")
     bpy.context.view_layer.objects.active = rig
     bpy.ops.object.mode_set(mode="EDIT")
@@ -268,23 +271,23 @@ def test_a_pelvis_that_cannot_be_moved_is_told(source):
     bpy.ops.object.mode_set(mode="OBJECT")
     run(source, rig)
     assert np.ptp(seen(rig, ["pelvis"])[:, 0, 1]) > 1.0
-    held = rig.pose.bones["pelvis"].constraints.new("COPY_LOCATION")
-    held.target, held.subtarget = rig, "root"
+    constraint = rig.pose.bones["pelvis"].constraints.new("COPY_LOCATION")
+    constraint.target, constraint.subtarget = rig, "root"
     with pytest.raises(InputError, match="'pelvis' of 'unreal' does not move"):
         run(source, rig)
 
 
-def test_bones_that_a_constraint_holds_are_told(source):
+def test_bones_blocked_by_a_constraint_are_reported(source):
     rig, bone_of = build_rig("unreal")
     assert run(source, rig).warnings == []
     target = bpy.data.objects.new("target", None)
     bpy.context.scene.collection.objects.link(target)
     target.location = (0.2, 0.0, 0.2)
-    held = rig.pose.bones[bone_of["left_knee"]].constraints.new("IK")
-    held.target, held.chain_count = target, 2
+    constraint = rig.pose.bones[bone_of["left_knee"]].constraints.new("IK")
+    constraint.target, constraint.chain_count = target, 2
     (warning,) = run(source, rig).warnings
     assert "'thigh_l'" in warning
-    assert "cannot follow: mute the constraints" in warning
-    held.mute = True
+    assert "cannot follow the motion: mute the constraints" in warning
+    constraint.mute = True
     assert run(source, rig).warnings == []
     assert direction_error(rig, bone_of, ARMS) < 1.0

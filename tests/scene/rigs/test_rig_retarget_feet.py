@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Feet that stand on the body stand on the rig: heel and ball, contact by contact, as the depsgraph shows them."""
+"""Heel and ball of the rig, as evaluated by Blender, are at rest in every contact of the body."""
 
 import bpy
 import numpy as np
@@ -20,13 +20,13 @@ def source():
 
 
 def contacts(stands):
-    """Spans of frames in which a point stands."""
+    """Return the spans of frames in which a point is in contact."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], stands.astype(int), [0]])))
     return [slice(a, b) for a, b in zip(edges[::2], edges[1::2], strict=True) if b - a > 2]
 
 
 def points(rig, foot, ball):
-    """(T, 2, 3) heel and ball in the world, and where they are at rest."""
+    """Return heel and ball (T, 2, 3) in the world, and their positions at rest."""
     _, stands = rolling_walk()
     ankle = np.array(rig.matrix_world @ rig.data.bones[foot].head_local)
     back = ankle - np.array(rig.matrix_world @ rig.data.bones[ball].head_local)
@@ -49,7 +49,7 @@ def leg_length(rig, spell):
 
 
 def check_contacts(rig, spell):
-    """Every contact: the point slides less than 1 cm, and its height is its resting one within 1 cm; steps scale."""
+    """Check that in every contact a point slides and rises by less than 1 cm, and that steps scale."""
     _, stands = rolling_walk()
     scale = leg_length(rig, spell) / sum(
         np.linalg.norm(joint(f"left_{a}") - joint(f"left_{b}")) for a, b in (("hip", "knee"), ("knee", "ankle"))
@@ -70,7 +70,7 @@ def check_contacts(rig, spell):
 
 
 @pytest.mark.parametrize(("scheme", "size"), [("mixamo", 1.3), ("mixamo", 0.7), ("unreal", 1.0)])
-def test_feet_stand(source, scheme, size):
+def test_feet_in_contact_stay_in_place(source, scheme, size):
     rig, bone_of = build_rig(scheme, size=size, matrix=FBX if scheme == "mixamo" else None)
     run(source, rig)
     check_contacts(rig, lambda side, part: bone_of[f"{side}_{PART[part]}"])
@@ -101,7 +101,7 @@ def test_feet_of_a_capture_below_the_floor_stay_on_it():
         assert np.abs(seen[stands[side][:, 1], 1, 2] - rest[1, 2]).max() < 0.01
 
 
-def test_toes_that_were_not_seen_to_bend_stay_flat():
+def test_toes_without_captured_bending_stay_flat():
     rig, bone_of = build_rig("mixamo")
     run(captured(motion_of(rolling_walk(stiff_toes=True)[0])), rig)
     _, stands = rolling_walk()

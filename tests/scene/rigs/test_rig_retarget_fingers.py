@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Fingers on other rigs: found by their names and by the hand's shape, pointing where the body's fingers point."""
+"""Fingers of rigs are found by name and by geometry, and point in the direction of the body's."""
 
 import bpy
 import numpy as np
@@ -44,7 +44,7 @@ PALM = {
 
 
 def build_hands(scheme, twist=0.6, **options):
-    """A rig with fingers, its palms turned about the forearm, and the bones of the phalanges by part."""
+    """Build a rig with fingers and rotated palms; return it with the bones of the phalanges by part."""
     rig, bone_of = build_rig(scheme, **options)
     to_armature = rig.matrix_world.inverted()
     size, rng = options.get("size", 1.3), np.random.default_rng(5)
@@ -81,7 +81,7 @@ def build_hands(scheme, twist=0.6, **options):
 
 
 def gesture():
-    """A walk whose hands open and close; every finger, and the wrists, in their own way."""
+    """Return a walk whose hands open and close; every finger and wrist moves differently."""
     plain = walk(2.0)
     rotations = np.tile(np.eye(3), (len(plain), HANDS.K + 1, 1, 1))
     phase = 2 * np.pi * plain.times
@@ -109,13 +109,13 @@ def run(source, rig, body=HANDS):
 
 
 def angles(a, b):
-    """Degrees between directions (..., 3)."""
+    """Return the angles between directions (..., 3), degrees."""
     cosine = (a * b).sum(-1) / np.linalg.norm(a, axis=-1) / np.linalg.norm(b, axis=-1)
     return np.degrees(np.arccos(np.clip(cosine, -1, 1)))
 
 
 def check_hands(rig, bone_of):
-    """Phalanges point where the body's do, and palms face where the body's face; at the frames that are looked at."""
+    """Check that phalanges and palms have the directions of the body's at the checked frames."""
     joints = truth(motion_of(gesture(), body=HANDS), HANDS)[[f - 1 for f in FRAMES]]
     parts = list(bone_of)
     heads = seen(rig, [bone_of[part] for part in parts])
@@ -177,8 +177,8 @@ def test_a_capture_without_fingers_leaves_them_as_they_are():
     assert rig.animation_data.action == done.action
 
 
-def test_a_rig_of_the_same_shape_gets_the_same_flesh(source, blender):
-    """The captured body's own skeleton under other names: its mesh has to lie where the captured one lies."""
+def test_a_rig_of_the_same_shape_deforms_the_same_mesh(source, blender):
+    """The captured body's skeleton with other names: its mesh must coincide with the captured one."""
     person = build_scene([motion_of(gesture(), body=HANDS)], HANDS, None, BuildOptions(start_frame=1.0)).people[0]
     rig, mesh = person.armature, person.mesh
     rig.animation_data_clear()

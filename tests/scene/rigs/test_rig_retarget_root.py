@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A retargeted rig's way over the floor: in its bones, on an object of its own or left out, the capture's likewise."""
+"""Root motion of rig and capture: in the bones, on a root object, or in place."""
 
 import math
 
@@ -7,9 +7,13 @@ import bpy
 import numpy as np
 import pytest
 from mathutils import Matrix
-from scope.scope_addon.edit.root_motion import with_path
+from scope.scope_addon.edit.root_motion import with_trajectory
 from scope.scope_addon.errors import UsageError
-from scope.scope_addon.scene.character.root_object import root_object, to_bones, to_root_object
+from scope.scope_addon.scene.character.root_object import (
+    move_root_motion_to_bones,
+    move_root_motion_to_object,
+    root_object,
+)
 from scope.scope_addon.scene.rigs.rig_retarget import RetargetOptions, guess_bone_map, retarget
 
 from ...edit.walking import BODY, RATE, motion_of, walk
@@ -20,9 +24,9 @@ TURNED = Matrix.LocRotScale((2.0, 1.0, 0.0), Matrix.Rotation(math.pi, 3, "Z").to
 
 @pytest.fixture
 def source():
-    """A walk that begins somewhere and takes a bend."""
+    """A walk along a curve that does not begin at the origin."""
     clip = walk(2.0)
-    bent = with_path(clip, np.tile([0.7, -0.4, 0.0], (len(clip), 1)), 0.3 + 0.8 * clip.times)
+    bent = with_trajectory(clip, np.tile([0.7, -0.4, 0.0], (len(clip), 1)), 0.3 + 0.8 * clip.times)
     return captured(motion_of(bent))
 
 
@@ -46,7 +50,7 @@ def test_on_an_object_the_rig_looks_the_same(source, matrix):
     run(source, rig)
     before = seen(rig, bones)
     assert root_object(rig) is None
-    for _ in range(2):  # and once more, from a rig that hangs on such an object
+    for _ in range(2):  # and again, from a rig with a root object
         run(source, rig, root="object")
         np.testing.assert_allclose(seen(rig, bones), before, atol=1e-3)
         roots = [obj for obj in bpy.data.objects if "scope_root" in obj]
@@ -67,22 +71,22 @@ def test_on_an_object_the_rig_looks_the_same(source, matrix):
     assert not [obj for obj in bpy.data.objects if "scope_root" in obj]
 
 
-def test_a_capture_whose_way_is_on_an_object_or_left_out(source):
+def test_a_capture_with_root_motion_on_an_object_or_in_place(source):
     rig, bone_of = build_rig("unreal")
     bones = list(bone_of.values())
     run(source, rig)
     before = seen(rig, bones)
-    to_root_object(source, BODY, RATE, in_place=False, heading=True)
+    move_root_motion_to_object(source, BODY, RATE, in_place=False, heading=True)
     for root in ("bone", "object"):
         run(source, rig, root=root)
         np.testing.assert_allclose(seen(rig, bones), before, atol=2e-3)
-    to_root_object(source, BODY, RATE, in_place=True, heading=False)
+    move_root_motion_to_object(source, BODY, RATE, in_place=True, heading=False)
     run(source, rig)
     there = seen(rig, bones)
     pelvis = bones.index(bone_of["pelvis"])
     assert np.ptp(there[:, pelvis, :2], axis=0).max() < 0.02  # the hips' middle stays, and the body turns about it
     np.testing.assert_allclose(there[0], before[0], atol=2e-3)
-    to_bones(source, BODY, RATE)
+    move_root_motion_to_bones(source, BODY, RATE)
     run(source, rig)
     np.testing.assert_allclose(seen(rig, bones), before, atol=2e-3)
 
@@ -100,7 +104,7 @@ def test_the_rig_follows_where_the_user_puts_the_captured_armature(source, root)
     np.testing.assert_allclose(seen(rig, bones), wanted, atol=2e-3)
 
 
-def test_what_is_re_run_replaces_its_own_action_but_not_a_changed_one(source):
+def test_retargeting_again_replaces_its_own_action_unless_it_was_edited(source):
     rig, _ = build_rig("unreal")
     name, actions = run(source, rig).action.name, len(bpy.data.actions)
     for root in ("object", "object", "in-place", "bone"):
@@ -113,7 +117,7 @@ def test_what_is_re_run_replaces_its_own_action_but_not_a_changed_one(source):
     assert len(bpy.data.actions) == actions + 1
 
 
-def test_a_rig_that_hangs_on_something_takes_it_along(source):
+def test_the_parent_of_a_rig_moves_along(source):
     rig, bone_of = build_rig("unreal")
     bones = list(bone_of.values())
     holder = bpy.data.objects.new("Holder", None)
@@ -131,19 +135,19 @@ def test_a_rig_that_hangs_on_something_takes_it_along(source):
     other, _ = build_rig("mixamo")
     other.parent = holder
     action = rig.animation_data.action
-    with pytest.raises(UsageError, match="take 'mixamo' along"):
+    with pytest.raises(UsageError, match="'mixamo' would move along"):
         run(source, rig, root="object")
     assert rig.animation_data.action == action
     np.testing.assert_allclose(seen(rig, bones), before, atol=1e-3)
 
 
 @pytest.mark.parametrize("hung", ["capture", "rig"])
-def test_a_root_object_stays_hung_where_the_user_hangs_it(source, hung):
+def test_a_root_object_keeps_the_parent_that_the_user_gives_it(source, hung):
     rig, bone_of = build_rig("unreal")
     bones = list(bone_of.values())
     run(source, rig, root="object")
     before = seen(rig, bones)
-    to_root_object(source, BODY, RATE, in_place=False, heading=True)
+    move_root_motion_to_object(source, BODY, RATE, in_place=False, heading=True)
     stage = bpy.data.objects.new("Stage", None)
     bpy.context.scene.collection.objects.link(stage)
     turn = Matrix.Rotation(1.1, 3, "Z").to_quaternion()
@@ -159,6 +163,6 @@ def test_a_root_object_stays_hung_where_the_user_hangs_it(source, hung):
             assert (root_object(rig) or rig).parent == stage
 
 
-def test_a_choice_that_is_not_offered_is_refused():
+def test_an_unknown_choice_is_refused():
     with pytest.raises(UsageError, match="bone, object, in-place"):
         RetargetOptions(root="pelvis")

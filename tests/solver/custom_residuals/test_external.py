@@ -9,10 +9,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scope.solver import (
+    Floor,
+    FootContacts,
     InvalidValueError,
     Keypoints3D,
     Measurements,
     Options,
+    PosePriors,
     Priors,
     ShapeError,
     Stage,
@@ -67,9 +70,7 @@ register_residual("slow_pose", function=slow_pose, floats=14)
 
 
 def fitted(name, rows, weight=1.0):
-    own_field = name in ("floor", "foot_contact")
-    weights = Weights(**{name: weight}) if own_field else Weights(tables={name: weight})
-    return solved(replace(SEEN, tables={name: rows}), weights)
+    return solved(replace(SEEN, tables={name: rows}), Weights(tables={name: weight}))
 
 
 def assert_same(a, b, atol):
@@ -81,47 +82,39 @@ def assert_same(a, b, atol):
 
 UP = np.array([0.0, -1.0, 0.0])
 POINT_ROWS = {
-    "floor": floor.pack(np.arange(M), UP, -0.1, np.ones(M), np.full(M, 0.5)),
-    "foot_contact": foot_contact.pack(np.arange(4), POINTS[:4] + 0.1, np.ones(4)),
+    "own_floor": floor.pack(np.arange(M), UP, -0.1, np.ones(M), np.full(M, 0.5)),
+    "own_contact": foot_contact.pack(np.arange(4), POINTS[:4] + 0.1, np.ones(4)),
+}
+SAME = {
+    "floor": replace(SEEN, floor=Floor(np.arange(M), UP, -0.1, contact=np.full(M, 0.5))),
+    "foot_contact": replace(SEEN, foot_contacts=FootContacts(np.arange(4), POINTS[:4] + 0.1, np.ones(4))),
 }
 
 
 @pytest.mark.parametrize(("own", "built_in"), [("own_floor", "floor"), ("own_contact", "foot_contact")])
 def test_a_registered_kernel_fits_as_the_same_kernel_within_the_solver(own, built_in):
     """One that numba has compiled already, and one as plain Python."""
-    rows = POINT_ROWS[built_in]
-    a, b, none = fitted(own, rows, 4e4), fitted(built_in, rows, 4e4), solved(SEEN)
+    b = solved(SAME[built_in], Weights(**{built_in: 4e4}))
+    a, none = fitted(own, POINT_ROWS[own], 4e4), solved(SEEN)
     assert_same(a, b, 1e-9)
     assert np.abs(a.t_camera_part - none.t_camera_part).max() > 1e-3
     np.testing.assert_allclose(a.cost_by_term[own], b.cost_by_term[built_in], rtol=1e-9)
 
 
-@pytest.mark.parametrize(
-    ("slow", "built_in", "rows"),
-    [
-        (
-            "slow_joint",
-            "joint_prior",
-            joint_prior.pack(np.array([2, 5]), rotations.exp(0.3 * np.eye(3)[:2]), [90.0, 70]),
-        ),
-        (
-            "slow_pose",
-            "pose_prior",
-            pose_prior.pack(np.array([0, 3]), rotations.exp(np.eye(3)[:2]), POINTS[:2], [40.0, 9.0], [10.0, 300.0]),
-        ),
-    ],
-)
-def test_a_python_residual_fits_as_the_solvers_own_kernel(slow, built_in, rows):
-    a = fitted(slow, rows, 3.0)
+def test_a_python_residual_of_a_joint_fits_as_the_solvers_own_kernel():
+    rows = joint_prior.pack(np.array([2, 5]), rotations.exp(0.3 * np.eye(3)[:2]), [90.0, 70.0])
+    a = fitted("slow_joint", rows, 3.0)
     floats = rows[1].copy()
-    floats[:, -1] *= 3.0
-    if built_in == "pose_prior":
-        floats[:, -2] *= 3.0
-    else:
-        floats[:, -1] /= Weights().joint_prior  # its own weight is 50
-    b = solved(replace(SEEN, tables={built_in: (rows[0], floats)}))
-    assert_same(a, b, 1e-6)
-    assert a.cost_by_term[slow] > 1.0
+    floats[:, -1] *= 3.0 / Weights().joint_prior
+    assert_same(a, solved(replace(SEEN, tables={"joint_prior": (rows[0], floats)})), 1e-6)
+    assert a.cost_by_term["slow_joint"] > 1.0
+
+
+def test_a_python_residual_of_a_part_fits_as_the_solvers_own_kernel():
+    parts, R, t = np.array([0, 3]), rotations.exp(np.eye(3)[:2]), POINTS[:2]
+    a = fitted("slow_pose", pose_prior.pack(parts, R, t, [40.0, 9.0], [10.0, 300.0]), 3.0)
+    assert_same(a, solved(replace(SEEN, pose_priors=PosePriors(parts, R, t, [120.0, 27.0], [30.0, 900.0]))), 1e-6)
+    assert a.cost_by_term["slow_pose"] > 1.0
 
 
 def test_the_python_residual_of_the_example_fits_as_its_kernel():
@@ -217,6 +210,9 @@ def test_rows_that_do_not_fit_are_refused_as_the_solvers_own():
     for part in (-1, K + 1):
         with pytest.raises(ShapeError, match=rf"Parts of 'height' must lie in 0..{K}, but go from {part}"):
             fitted("height", (np.array([[part]]), np.ones((1, 2))))
+    for point in (-1, M + K + 1):
+        with pytest.raises(ShapeError, match=rf"Points of 'own_floor' must lie in 0..{M + K}, but go from {point}"):
+            fitted("own_floor", (np.array([[point]]), np.ones((1, 6))))
     with pytest.raises(ShapeError, match=r"\(n, 1\) and \(n, 2\), but got \(1, 1\) and \(1, 3\)"):
         fitted("height", (np.array([[1]]), np.ones((1, 3))))
 

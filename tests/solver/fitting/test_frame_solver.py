@@ -371,12 +371,9 @@ def test_wrong_shapes_are_refused_with_what_was_expected(measurements, message):
 
 
 INDICES = {
-    "pose_prior": ([-1, K + 1], f"Parts of 'pose_prior' must lie in 0..{K}"),
     "joint_prior": ([0, K + 1], f"Joints of 'joint_prior' must lie in 1..{K}"),
     "joint_limits": ([0, K + 1], f"Joints of 'joint_limits' must lie in 1..{K}"),
     "joint_flow": ([-1, K + 1], f"Parts of 'joint_flow' must lie in 0..{K}"),
-    "foot_contact": ([-1, M + K + 1], f"Points of 'foot_contact' must lie in 0..{M + K}"),
-    "floor": ([-1, M + K + 1], f"Points of 'floor' must lie in 0..{M + K}"),
 }
 
 

@@ -54,7 +54,7 @@ def test_a_result_is_built_shown_and_cached(fake_worker, footage):
     assert (result.people, result.frames, result.valid_frames) == (1, 10, 7)
     assert result.reprojection_px == pytest.approx(2.0)
     shown = [(w.text, w.spans) for w in result.warnings]
-    assert shown == [("A warning", ""), ("Filled in without being seen", "4-5,8")]
+    assert shown == [("A warning", ""), ("Not visible, the pose is filled in", "4-5,8")]
     assert result.collection == captures()[0]
     assert (scene.render.fps, scene.frame_start, scene.frame_end) == (25, 1, 10)
     assert job_files() == []
@@ -63,7 +63,7 @@ def test_a_result_is_built_shown_and_cached(fake_worker, footage):
     assert len(captures()) == 2
 
 
-def test_several_people_are_built_and_told_apart(fake_worker, footage):
+def test_several_people_are_built_and_distinguished(fake_worker, footage):
     fake_worker("assert request['people'] == 3\nfinish(2)")
     scene = bpy.context.scene
     scene.scope.footage, scene.scope.people, scene.scope.people_count = str(footage), "COUNT", 3
@@ -73,14 +73,14 @@ def test_several_people_are_built_and_told_apart(fake_worker, footage):
     assert len([o for o in captures()[0].objects if o.type == "ARMATURE"]) == 2
 
 
-def test_hands_ask_for_the_body_with_fingers(fake_worker, footage):
+def test_hands_request_the_body_with_fingers(fake_worker, footage):
     fake_worker("assert request['hands'] and request['body'] == 'scope_h'\nsend('error', message='so it was')")
     bpy.context.scene.scope.footage, bpy.context.scene.scope.hands = str(footage), True
     with pytest.raises(RuntimeError, match="So it was"):
         bpy.ops.scope.capture()
 
 
-def test_other_options_are_another_capture(fake_worker, footage):
+def test_changed_options_need_another_capture(fake_worker, footage):
     fake_worker(FINISH)
     scene = bpy.context.scene
     scene.scope.footage = str(footage)
@@ -123,7 +123,7 @@ def test_the_operator_builds_what_the_interface_builds(fake_worker, footage, sta
         ("open(folder + '/person1.npz', 'w').write('x'); send('result', motions=['person1.npz'], report={})", "npz"),
     ],
 )
-def test_a_failure_is_told_and_changes_nothing(fake_worker, footage, contents, script, says):
+def test_a_failure_is_reported_and_changes_nothing(fake_worker, footage, contents, script, says):
     fake_worker(script)
     bpy.context.scene.scope.footage = str(footage)
     before = contents()
@@ -136,7 +136,7 @@ def test_a_failure_is_told_and_changes_nothing(fake_worker, footage, contents, s
 
 
 @pytest.mark.parametrize("end", [lambda job: job.close(), lambda job: os.kill(job.worker.pid, signal.SIGKILL)])
-def test_cancelled_or_killed_in_the_middle_nothing_is_left(fake_worker, footage, contents, end):
+def test_a_cancelled_or_killed_capture_leaves_nothing_behind(fake_worker, footage, contents, end):
     fake_worker("send('progress', stage='solving', done=3, total=10)\nopen(folder + '/half', 'w')\ntime.sleep(600)")
     bpy.context.scene.scope.footage = str(footage)
     before = contents()
@@ -150,7 +150,7 @@ def test_cancelled_or_killed_in_the_middle_nothing_is_left(fake_worker, footage,
     assert job_files() == []
 
 
-def test_cancel_operator_ends_the_worker_at_once(fake_worker, footage):
+def test_the_cancel_operator_ends_the_worker_immediately(fake_worker, footage):
     fake_worker("time.sleep(600)")
     bpy.context.scene.scope.footage = str(footage)
     assert not bpy.ops.scope.cancel.poll()
@@ -159,20 +159,20 @@ def test_cancel_operator_ends_the_worker_at_once(fake_worker, footage):
     bpy.ops.scope.cancel()
     assert state.job.cancel_requested
     assert not state.job.worker.alive
-    capture_operators.stop_everything()
+    capture_operators.end_capture()
     assert bpy.ops.scope.capture.poll()
 
 
-def test_no_workspace_goes_on_telling_of_a_capture_that_has_ended(monkeypatch):
-    told = {}
+def test_the_status_bar_is_cleared_in_every_workspace(monkeypatch):
+    texts = {}
 
-    def tell(_, text):  # as Blender does it: the workspace is the context's
-        told[bpy.context.workspace.name] = text
+    def tell(_, text):  # like Blender, for the context's workspace
+        texts[bpy.context.workspace.name] = text
 
     monkeypatch.setattr(bpy.types.WorkSpace, "status_text_set", tell)
-    capture_operators.stop_everything()
-    assert len(told) > 1
-    assert told == dict.fromkeys((workspace.name for workspace in bpy.data.workspaces), None)
+    capture_operators.end_capture()
+    assert len(texts) > 1
+    assert texts == dict.fromkeys((workspace.name for workspace in bpy.data.workspaces), None)
 
 
 def test_disabling_the_extension_ends_the_worker(fake_worker, footage):
@@ -193,21 +193,21 @@ def test_step_never_waits_for_the_worker(fake_worker, footage):
     fake_worker("time.sleep(600)")
     bpy.context.scene.scope.footage = str(footage)
     job = CaptureJob(bpy.context.scene)
-    for _ in range(1000):  # each would take minutes if one of them waited
+    for _ in range(1000):  # takes minutes if a step waits
         assert job.step()
     job.close()
 
 
-def test_a_full_disk_is_told(footage, monkeypatch, tmp_path, contents):
+def test_an_unwritable_cache_is_an_error(footage, monkeypatch, tmp_path, contents):
     (tmp_path / "user").write_text("a file where the folder should be")
     bpy.context.scene.scope.footage = str(footage)
     before = contents()
-    with pytest.raises(RuntimeError, match="(?i)cannot write in the cache folder"):
+    with pytest.raises(RuntimeError, match="(?i)cannot write to the cache folder"):
         bpy.ops.scope.capture()
     assert contents() == before
 
 
-def test_footage_that_went_while_capturing_is_missed_not_fatal(fake_worker, footage):
+def test_footage_that_is_removed_during_a_capture_gives_a_warning(fake_worker, footage):
     fake_worker(f"os.remove({str(footage)!r})\nfinish()")
     scene = bpy.context.scene
     scene.scope.footage = str(footage)
@@ -226,7 +226,7 @@ def test_footage_that_went_while_capturing_is_missed_not_fatal(fake_worker, foot
         ({"lens": "FILE", "calibration_file": "/nowhere/lens.json"}, "lens.json"),
     ],
 )
-def test_wrong_settings_are_told(footage, settings, says, contents):
+def test_invalid_settings_are_errors(footage, settings, says, contents):
     scene = bpy.context.scene
     scene.scope.footage = str(footage)
     for name, value in settings.items():
@@ -237,7 +237,7 @@ def test_wrong_settings_are_told(footage, settings, says, contents):
     assert contents() == before
 
 
-def test_the_result_goes_to_the_scene_it_was_started_in(fake_worker, footage):
+def test_the_result_is_built_in_the_scene_of_the_capture(fake_worker, footage):
     fake_worker(FINISH)
     first = bpy.context.scene
     first.scope.footage = str(footage)
@@ -251,7 +251,7 @@ def test_the_result_goes_to_the_scene_it_was_started_in(fake_worker, footage):
     assert not second.collection.children
 
 
-def test_a_removed_scene_is_told(fake_worker, footage):
+def test_a_removed_scene_is_an_error(fake_worker, footage):
     fake_worker(FINISH)
     scene = bpy.data.scenes.new("gone soon")
     scene.scope.footage = str(footage)
@@ -276,7 +276,7 @@ def test_the_automatic_frame_rate_respects_other_animation(fake_worker, footage,
 
 
 def test_real_worker_on_a_picture(footage):
-    """Blender's own Python, isolated, with nothing but the folders it was given."""
+    """It runs in Blender's Python, isolated, with only the folders that it is given."""
     scene = bpy.context.scene
     scene.scope.footage, scene.scope.quality = str(footage), "FAST"
     assert bpy.ops.scope.capture() == {"FINISHED"}
@@ -290,7 +290,7 @@ def test_real_worker_on_a_picture(footage):
     assert np.allclose(got.trans, expected.trans, atol=1e-4)
 
 
-def test_real_worker_knows_a_calibrated_lens(footage, tmp_path):
+def test_real_worker_uses_a_calibration(footage, tmp_path):
     import cv2
 
     height, width = cv2.imread(str(footage)).shape[:2]
@@ -299,7 +299,7 @@ def test_real_worker_knows_a_calibrated_lens(footage, tmp_path):
     scene.scope.footage, scene.scope.quality = str(footage), "FAST"
     scene.scope.lens, scene.scope.calibration_file = "FILE", str(lens)
     found = []
-    for k1 in (dist[0], -0.1):  # what changed in the file is another capture
+    for k1 in (dist[0], -0.1):  # a changed file needs another capture
         lens.write_text(json.dumps({"intrinsics": K, "dist": [k1, *dist[1:]]}))
         assert bpy.ops.scope.capture() == {"FINISHED"}
         found.append(Motion.load(scene.scope.result.collection["scope_motions"][0]))
@@ -311,7 +311,7 @@ def test_real_worker_knows_a_calibrated_lens(footage, tmp_path):
     assert camera.data.background_images[0].clip_user.use_render_undistorted
 
 
-def test_real_worker_says_that_nobody_is_there(tmp_path):
+def test_real_worker_reports_that_no_person_was_found(tmp_path):
     import cv2
 
     cv2.imwrite(str(tmp_path / "wall.png"), np.full((240, 320, 3), 128, np.uint8))
@@ -321,7 +321,7 @@ def test_real_worker_says_that_nobody_is_there(tmp_path):
         bpy.ops.scope.capture()
 
 
-def test_real_worker_touches_no_network(footage, tmp_path):
+def test_real_worker_uses_no_internet_connection(footage, tmp_path):
     guard = tmp_path / "guard.py"
     guard.write_text(
         "import runpy, sys\n"
@@ -340,7 +340,7 @@ def test_real_worker_touches_no_network(footage, tmp_path):
     assert scene.scope.result.people == 1
 
 
-def test_the_sample_is_there():
+def test_the_sample_exists():
     bpy.ops.scope.use_sample()
     assert bpy.context.scene.scope.footage == str(SAMPLE)
     assert SAMPLE.is_file()

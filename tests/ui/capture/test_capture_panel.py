@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Settings in the .blend, dropped files, export buttons, the camera button, texts."""
+"""Settings in .blend files, dropped files, export buttons, the camera button, progress."""
 
 import time
 from types import SimpleNamespace
@@ -12,7 +12,7 @@ from scope.scope_addon.motion import Motion
 from scope.scope_addon.scene.footage_strip import strips_of
 from scope.scope_addon.ui import drop
 from scope.scope_addon.ui.capture import capture_job
-from scope.scope_addon.ui.capture.capture_operators import state, stop_everything
+from scope.scope_addon.ui.capture.capture_operators import end_capture, state
 from scope.scope_addon.ui.preferences import cache
 
 FINISH = "finish()"
@@ -24,7 +24,7 @@ def captured(fake_worker, footage):
     bpy.ops.scope.capture()
 
 
-def test_settings_and_result_survive_the_file(fake_worker, footage, tmp_path):
+def test_settings_and_result_are_saved_in_the_blend_file(fake_worker, footage, tmp_path):
     captured(fake_worker, footage)
     settings = bpy.context.scene.scope
     wanted = {"quality": "FAST", "body": "FILE", "body_file": "//smpl.npz", "lens": "FOCAL", "focal_mm": 35.0}
@@ -44,7 +44,7 @@ def test_settings_and_result_survive_the_file(fake_worker, footage, tmp_path):
     assert len(settings.result.warnings) == 2
 
 
-def test_a_height_is_asked_for_in_centimetres_and_none_is_none(footage):
+def test_the_height_is_in_centimetres_and_optional(footage):
     scene = bpy.context.scene
     scene.scope.footage = str(footage)
     assert capture_job.capture_request(scene).values["heights_m"] == ()
@@ -59,7 +59,7 @@ def test_each_scene_has_its_own_settings():
     assert second.scope.quality == "BEST"
 
 
-def test_a_scene_that_took_over_the_settings_alone_shows_no_result(fake_worker, footage):
+def test_a_scene_with_copied_settings_shows_no_result(fake_worker, footage):
     captured(fake_worker, footage)
     panel = bpy.types.SCOPE_PT_result
     assert panel.poll(bpy.context)
@@ -81,7 +81,7 @@ def test_dropped_files_become_the_footage(footage):
     assert bpy.context.scene.scope.footage == str(footage)
 
 
-def test_buttons_wait_for_what_they_need(fake_worker, footage):
+def test_buttons_are_disabled_until_their_input_exists(fake_worker, footage):
     assert not bpy.ops.scope.capture.poll()
     assert not bpy.ops.scope.export.poll()
     assert not bpy.ops.scope.look_through.poll()
@@ -92,7 +92,7 @@ def test_buttons_wait_for_what_they_need(fake_worker, footage):
 
 
 @pytest.mark.parametrize(("kind", "suffix"), [(k, f".{k.lower()}") for k in ("FBX", "GLB", "BVH", "USDC", "NPZ")])
-def test_export_buttons_write_and_leave_the_file_alone(fake_worker, footage, tmp_path, contents, kind, suffix):
+def test_export_buttons_write_files_and_do_not_change_the_scene(fake_worker, footage, tmp_path, contents, kind, suffix):
     if kind == "USDC" and "usd_export" not in dir(bpy.ops.wm):
         pytest.skip("this Blender was built without USD")
     captured(fake_worker, footage)
@@ -102,7 +102,7 @@ def test_export_buttons_write_and_leave_the_file_alone(fake_worker, footage, tmp
     assert contents() == before
 
 
-def test_a_motion_file_holds_what_was_captured(fake_worker, footage, tmp_path):
+def test_a_motion_file_contains_the_captured_motion(fake_worker, footage, tmp_path):
     captured(fake_worker, footage)
     armature = next(o for o in bpy.data.objects if "scope_motion" in o)
     bpy.context.view_layer.objects.active = armature
@@ -115,7 +115,7 @@ def test_a_motion_file_holds_what_was_captured(fake_worker, footage, tmp_path):
         bpy.ops.scope.export(filepath=str(tmp_path / "again.npz"), format="NPZ")
 
 
-def test_export_of_the_active_capture_alone(fake_worker, footage, tmp_path):
+def test_only_the_active_capture_is_exported(fake_worker, footage, tmp_path):
     captured(fake_worker, footage)
     bpy.ops.scope.capture()
     bpy.ops.scope.export(filepath=str(tmp_path / "both.bvh"), format="BVH", which="ALL")
@@ -127,23 +127,23 @@ def test_export_of_the_active_capture_alone(fake_worker, footage, tmp_path):
         bpy.ops.scope.export(filepath=str(tmp_path / "none.bvh"), format="BVH", which="ACTIVE")
 
 
-def test_an_export_that_cannot_be_written_is_told(fake_worker, footage, tmp_path):
+def test_an_unwritable_export_is_an_error(fake_worker, footage, tmp_path):
     captured(fake_worker, footage)
     with pytest.raises(RuntimeError, match="does not exist"):
         bpy.ops.scope.export(filepath=str(tmp_path / "none" / "walk.glb"), format="GLB")
 
 
 @pytest.mark.parametrize("name", ["", ".glb"])
-def test_an_export_without_a_name_asks_for_one(fake_worker, footage, tmp_path, name):
+def test_an_export_without_a_name_is_an_error(fake_worker, footage, tmp_path, name):
     captured(fake_worker, footage)
-    with pytest.raises(RuntimeError, match="Give the file to write a name"):
+    with pytest.raises(RuntimeError, match="The file has no name; enter one"):
         bpy.ops.scope.export(filepath=f"{tmp_path}/{name}", format="GLB")
-    with pytest.raises(RuntimeError, match="Give the file to write a name"):
+    with pytest.raises(RuntimeError, match="The file has no name; enter one"):
         bpy.ops.scope.export(format="GLB")
 
 
 @pytest.mark.parametrize("way", ["sample", "chosen", "typed"])
-def test_other_footage_leaves_an_earlier_failure_behind(footage, tmp_path, way):
+def test_choosing_other_footage_clears_the_error_message(footage, tmp_path, way):
     settings = bpy.context.scene.scope
     settings.footage = str(tmp_path / "gone.mp4")
     with pytest.raises(RuntimeError, match="does not exist"):
@@ -158,7 +158,7 @@ def test_other_footage_leaves_an_earlier_failure_behind(footage, tmp_path, way):
     assert not state.message
 
 
-def test_looking_through_the_camera_sets_camera_and_resolution(fake_worker, footage):
+def test_comparing_with_footage_sets_camera_and_resolution(fake_worker, footage):
     captured(fake_worker, footage)
     scene = bpy.context.scene
     assert scene.camera is None
@@ -167,7 +167,7 @@ def test_looking_through_the_camera_sets_camera_and_resolution(fake_worker, foot
     assert (scene.render.resolution_x, scene.render.resolution_y) == (640, 480)
 
 
-def test_a_hidden_camera_is_shown_since_it_shows_the_footage(fake_worker, footage):
+def test_a_hidden_camera_is_shown_because_it_shows_the_footage(fake_worker, footage):
     captured(fake_worker, footage)
     camera = next(obj for obj in bpy.context.scene.scope.result.collection.objects if obj.type == "CAMERA")
     camera.hide_viewport = True
@@ -177,7 +177,7 @@ def test_a_hidden_camera_is_shown_since_it_shows_the_footage(fake_worker, footag
 
 
 @pytest.mark.parametrize("way", ["exclude", "hide_viewport"])
-def test_a_hidden_capture_is_not_compared_with_its_footage(fake_worker, footage, way):
+def test_comparing_a_hidden_capture_is_an_error(fake_worker, footage, way):
     captured(fake_worker, footage)
     shown = bpy.context.scene.scope.result.collection
     layer = next(c for c in bpy.context.view_layer.layer_collection.children if c.collection == shown)
@@ -190,7 +190,7 @@ def test_a_hidden_capture_is_not_compared_with_its_footage(fake_worker, footage,
     assert bpy.ops.scope.look_through() == {"FINISHED"}
 
 
-def test_warnings_lead_to_their_frames(fake_worker, footage):
+def test_warnings_name_their_frames(fake_worker, footage):
     from scope.scope_addon.ui.capture.capture_panel import first_frame
 
     captured(fake_worker, footage)
@@ -200,17 +200,17 @@ def test_warnings_lead_to_their_frames(fake_worker, footage):
     bpy.ops.scope.go_to_frame(frame=8)
     assert scene.frame_current == 8
     assert [first_frame(span) for span in ("-12--4", "-3-4", "7")] == [-12, -3, 7]
-    assert [m.frame for m in scene.timeline_markers] == [4]  # both spans: they lie near each other
+    assert [m.frame for m in scene.timeline_markers] == [4]  # one marker for both spans, which are close together
 
 
-def test_the_footage_begins_at_frame_0_at_the_earliest():
-    """Where scenes do, and exports with them."""
+def test_the_first_frame_is_not_negative():
+    """Scenes and exports start there, too."""
     settings = bpy.context.scene.scope
     settings.start_frame = -50
     assert settings.start_frame == 0
 
 
-def test_the_footage_goes_to_the_sequencer(fake_worker, footage):
+def test_the_footage_is_added_to_the_sequencer(fake_worker, footage):
     assert not bpy.ops.scope.footage_to_sequencer.poll()
     bpy.context.scene.scope.start_frame = 11
     captured(fake_worker, footage)
@@ -221,7 +221,7 @@ def test_the_footage_goes_to_the_sequencer(fake_worker, footage):
         bpy.ops.scope.footage_to_sequencer()
 
 
-def test_a_part_of_the_video_is_asked_for(fake_worker, footage):
+def test_the_part_of_the_video_is_sent_to_the_worker(fake_worker, footage):
     fake_worker("assert (float(request['start']), float(request['end'])) == (1.5, 3.0)\nfinish()")
     settings = bpy.context.scene.scope
     settings.footage = str(footage)
@@ -232,7 +232,7 @@ def test_a_part_of_the_video_is_asked_for(fake_worker, footage):
         bpy.ops.scope.capture()
 
 
-def test_the_preferences_reach_the_worker(fake_worker, footage, monkeypatch):
+def test_the_preferences_are_sent_to_the_worker(fake_worker, footage, monkeypatch):
     chosen = SimpleNamespace(
         threads=3, provider="DIRECTML", detector_file="/a/d.onnx", keypoints_file="/a/k.onnx", body_file="",
         cache_folder="", cache_limit_gb=2,
@@ -255,7 +255,7 @@ def test_clearing_the_cache_leaves_the_scene(fake_worker, footage):
     assert bpy.context.scene.scope.result.collection is not None
 
 
-def test_the_current_frame_is_shown_while_capturing(fake_worker, footage):
+def test_the_preview_is_shown_during_a_capture(fake_worker, footage):
     from scope.scope_addon.ui.capture import preview_picture
     from scope.scope_addon.ui.capture.capture_job import CaptureJob
 
@@ -271,13 +271,13 @@ def test_the_current_frame_is_shown_while_capturing(fake_worker, footage):
     icon = preview_picture._collection["frame"]
     assert tuple(icon.image_size) == (3, 2)
     assert icon.image_pixels[0] == int.from_bytes(bytes(range(4)), "little")
-    stop_everything()
+    end_capture()
     assert preview_picture.icon_id() == 0
     preview_picture.show(b"half", 3, 2)
     assert preview_picture.icon_id() == 0
 
 
-def test_progress_says_stage_speed_and_time_left():
+def test_progress_shows_stage_speed_and_remaining_time():
     now = [0.0]
     progress = JobProgress(clock=lambda: now[0])
     assert progress.lines() == ["Starting"]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The operators on a captured motion, by what Blender's depsgraph shows afterwards."""
+"""The operators that edit a captured motion, checked in Blender's evaluated scene."""
 
 import bpy
 import numpy as np
@@ -21,7 +21,7 @@ SECONDS = 3.0
 
 @pytest.fixture
 def rig(tmp_path):
-    """A captured walk, its armature active, with the motion file that the cache would keep."""
+    """A captured walk whose armature is active, with its motion file."""
     motion = motion_of(walk(SECONDS), noise=0.05)
     armature = captured(motion)
     path = tmp_path / "person1.npz"
@@ -53,7 +53,7 @@ def test_the_keys_are_read_as_they_were_written(rig):
 
 
 def test_a_scene_of_the_users_own_body_knows_its_file(tmp_path, monkeypatch):
-    """As the command line makes it, which knows of no cache."""
+    """The command line, which has no cache, makes such a scene."""
     monkeypatch.chdir(tmp_path)
     with np.load(BUILT_IN["scope"]) as arrays:
         np.savez("hero.npz", **dict(arrays, name="hero"))
@@ -77,7 +77,7 @@ def test_smoothing_from_raw_and_back(rig):
     calm = seen(rig)
     shaking = [np.linalg.norm(np.diff(joints, 2, axis=0), axis=-1).mean() for joints in (calm, raw)]
     assert shaking[0] < shaking[1]
-    bpy.ops.scope.smooth(strength=1.0)  # what the capture did
+    bpy.ops.scope.smooth(strength=1.0)  # as after the capture
     np.testing.assert_allclose(seen(rig), before, atol=2e-4)
     assert rig.animation_data.action == action
 
@@ -95,7 +95,7 @@ def test_smoothing_a_resampled_motion_keeps_its_keys_on_whole_frames(tmp_path):
     np.testing.assert_array_equal(read_clip(rig, BODY, 24.0)[1], before)
 
 
-def test_smoothing_without_the_cached_motion_is_told(rig):
+def test_smoothing_without_the_cached_motion_is_an_error(rig):
     before = seen(rig)
     rig["scope_motion"] = "/nowhere/person1.npz"
     with pytest.raises(RuntimeError, match="no longer in the cache"):
@@ -103,7 +103,7 @@ def test_smoothing_without_the_cached_motion_is_told(rig):
     np.testing.assert_array_equal(seen(rig), before)
 
 
-def test_bridging_and_swapping_a_span(rig):
+def test_interpolating_and_swapping_a_span(rig):
     before = keys(rig)[0]
     bpy.ops.scope.swap_sides(start=20, end=30, limbs="legs")
     swapped = keys(rig)[0]
@@ -125,7 +125,7 @@ def test_feet_to_floor(rig):
     write_clip(rig, BODY, clip, 1 + np.arange(len(clip)))
     bpy.ops.scope.refloor()
     lowest = keys(rig)[0].soles(BODY, np.zeros(BODY.P))[..., 2].min(axis=1)
-    assert np.abs(lowest).max() < 0.06  # this walk's feet are not exactly on a floor themselves
+    assert np.abs(lowest).max() < 0.06  # the feet of this walk are not exactly on one plane
     assert lowest.min() > -1e-4
 
 
@@ -137,7 +137,7 @@ def test_the_floor_is_where_the_armature_was_put(rig):
 
 
 @pytest.mark.parametrize("mode", ["OBJECT", "IN_PLACE"])
-def test_feet_of_one_whose_way_is_not_in_the_bones_come_to_the_same_floor(rig, mode):
+def test_the_floor_is_the_same_with_root_motion_on_an_object_or_removed(rig, mode):
     from scope.scope_addon.scene.character.keys import write_clip
 
     clip, frames = keys(rig)
@@ -190,7 +190,7 @@ def test_root_motion_of_an_armature_that_was_moved_looks_the_same(rig, tilt):
 
 
 @pytest.mark.parametrize("mode", ["OBJECT", "IN_PLACE"])
-def test_an_armature_stands_where_it_was_put_again_when_its_way_goes_back(rig, mode):
+def test_a_moved_armature_is_in_place_again_when_root_motion_returns_to_the_bones(rig, mode):
     rig.rotation_mode, rig.location, rig.rotation_euler, rig.scale = "XYZ", (1.0, 2.0, 0.5), (0.3, 0, 0.8), (1.2,) * 3
     bpy.ops.scope.smooth()
     before, place, clip = seen(rig), np.array(rig.matrix_world), keys(rig)[0]
@@ -206,7 +206,7 @@ def test_an_armature_stands_where_it_was_put_again_when_its_way_goes_back(rig, m
 
 @pytest.fixture
 def stage():
-    """An object of the user's own, moved, turned, tilted and scaled, that goes somewhere."""
+    """An animated object that is also moved, rotated, tilted and scaled."""
     obj = bpy.data.objects.new("Stage", None)
     bpy.context.scene.collection.objects.link(obj)
     obj.rotation_euler, obj.scale = (0.2, -0.1, 0.7), (1.5,) * 3
@@ -216,7 +216,7 @@ def stage():
     return obj
 
 
-def test_root_motion_keeps_what_the_user_has_hung_the_armature_on(rig, stage):
+def test_root_motion_keeps_the_armatures_parent(rig, stage):
     rig.parent, rig.location, rig.rotation_euler, rig.rotation_mode = stage, (0.4, 0, 0), (0, 0, 0.5), "XYZ"
     rig.matrix_parent_inverse = Matrix.Translation((0, 0.2, 0)) @ Matrix.Scale(0.8, 4)
     before = seen(rig)
@@ -233,7 +233,7 @@ def test_root_motion_keeps_what_the_user_has_hung_the_armature_on(rig, stage):
     assert not [o for o in bpy.data.objects if "scope_root" in o]
 
 
-def test_root_motion_below_a_bone_of_the_users(rig, stage):
+def test_root_motion_of_an_armature_parented_to_a_bone(rig, stage):
     crane = bpy.data.objects.new("Crane", bpy.data.armatures.new("Crane"))
     bpy.context.scene.collection.objects.link(crane)
     bpy.context.view_layer.objects.active = crane
@@ -249,7 +249,7 @@ def test_root_motion_below_a_bone_of_the_users(rig, stage):
     assert (rig.parent, rig.parent_type, rig.parent_bone) == (crane, "BONE", "hook")
 
 
-def test_what_fails_halfway_leaves_keys_and_root_as_they_were(rig, monkeypatch):
+def test_a_failed_edit_restores_keys_and_root(rig, monkeypatch):
     bpy.ops.scope.root_motion(mode="OBJECT")
     before, empty, action = seen(rig), root_object(rig), rig.animation_data.action.name
     blocks = (len(bpy.data.objects), len(bpy.data.actions))
@@ -259,7 +259,7 @@ def test_what_fails_halfway_leaves_keys_and_root_as_they_were(rig, monkeypatch):
 
     monkeypatch.setattr("scope.scope_addon.scene.character.root_object.Channels", fail)
     with pytest.raises(RuntimeError, match="No room"):
-        bpy.ops.scope.root_motion(mode="OBJECT", heading=False)  # the bones are written by then
+        bpy.ops.scope.root_motion(mode="OBJECT", heading=False)  # fails after the bones are written
     assert root_object(rig) == empty
     assert (len(bpy.data.objects), len(bpy.data.actions)) == blocks
     np.testing.assert_array_equal(seen(rig), before)
@@ -270,7 +270,7 @@ def test_what_fails_halfway_leaves_keys_and_root_as_they_were(rig, monkeypatch):
     assert rig.animation_data.action.name == action
 
 
-def test_a_loop_goes_on_for_ever_where_it_ended(rig):
+def test_each_cycle_of_a_loop_continues_from_the_previous_one(rig):
     bpy.ops.scope.loop(start=5, end=85, shortest=0.8)
     scene = bpy.context.scene
     length = scene.frame_end + 1 - scene.frame_start
@@ -282,7 +282,7 @@ def test_a_loop_goes_on_for_ever_where_it_ended(rig):
     np.testing.assert_allclose(next_time - next_time[:, :1], once - once[:, :1], atol=2e-3)
 
 
-def test_a_loop_that_is_smoothed_again_is_the_whole_motion_once_more(rig):
+def test_smoothing_a_loop_restores_the_whole_motion(rig):
     last = 1 + round(SECONDS * RATE)
     bpy.ops.scope.smooth()
     before = seen(rig, [1, last, last + 20])
@@ -291,23 +291,23 @@ def test_a_loop_that_is_smoothed_again_is_the_whole_motion_once_more(rig):
     np.testing.assert_allclose(seen(rig, [1, last, last + 20]), before, atol=1e-5)
 
 
-def test_a_loop_that_is_smoothed_again_is_played_as_a_whole(rig):
+def test_smoothing_a_loop_restores_the_frame_range(rig):
     scene = bpy.context.scene
     scene.frame_start, scene.frame_end = 2, 120
     bpy.ops.scope.loop(start=5, end=85, shortest=0.8)
     cycle = scene.frame_start, scene.frame_end
-    bpy.ops.scope.loop(start=cycle[0], end=cycle[1] + 1, shortest=0.5)  # once more, within the first one
+    bpy.ops.scope.loop(start=cycle[0], end=cycle[1] + 1, shortest=0.5)  # again, within the first one
     bpy.ops.scope.smooth()
     assert (scene.frame_start, scene.frame_end) == (2, 120)
     bpy.ops.scope.loop(start=5, end=85, shortest=0.8)
-    scene.frame_start = 1  # the user's own choice stays
+    scene.frame_start = 1  # a manual setting is kept
     bpy.ops.scope.smooth()
     assert (scene.frame_start, scene.frame_end) == (1, cycle[1])
 
 
 @pytest.mark.parametrize("suffix", ["glb", "fbx", "bvh"])
-def test_a_loop_is_exported_alone(rig, tmp_path, suffix):
-    """Curves that loop for ever, and the confidence of the frames that were cut off, do not make the file longer."""
+def test_only_the_loop_is_exported(rig, tmp_path, suffix):
+    """Neither cyclic curves nor confidence keys outside the cycle make the file longer."""
     bpy.ops.scope.loop(start=5, end=85, shortest=0.8)
     length = bpy.context.scene.frame_end + 1 - bpy.context.scene.frame_start
     path = str(tmp_path / f"loop.{suffix}")
@@ -322,7 +322,7 @@ def test_a_loop_is_exported_alone(rig, tmp_path, suffix):
         assert suffix != "glb" or action.frame_range[0] == 0  # players begin there
 
 
-def test_a_motion_file_of_a_capture_without_its_armature_is_not_promised(rig, tmp_path):
+def test_a_motion_file_without_the_armature_is_an_error(rig, tmp_path):
     bpy.data.objects.remove(rig)
     with pytest.raises(RuntimeError, match="armature was removed; undo that or capture again"):
         bpy.ops.scope.export(filepath=str(tmp_path / "walk.npz"), format="NPZ")
@@ -330,7 +330,7 @@ def test_a_motion_file_of_a_capture_without_its_armature_is_not_promised(rig, tm
 
 
 @pytest.mark.parametrize("degrees", [0.3, 2.0])
-def test_reduced_keys_stay_within_what_was_asked(rig, degrees):
+def test_reduced_keys_stay_within_the_chosen_error(rig, degrees):
     before, dense = seen(rig, range(1, 91)), keys(rig)[0]
     count = sum(len(c.keyframe_points) for c in _curves(rig))
     bpy.ops.scope.reduce_keys(degrees=degrees, millimetres=3.0)
@@ -385,7 +385,7 @@ def test_a_linked_capture_is_not_edited_until_it_is_local(rig, tmp_path, overrid
     np.testing.assert_allclose(seen(local), before, atol=2e-4)
 
 
-def test_lost_keys_are_told_and_change_nothing(rig):
+def test_missing_keys_are_an_error_and_change_nothing(rig):
     from scope.scope_addon.scene.animation_data.actions import fcurves
 
     name = NAMES[5]
@@ -396,7 +396,7 @@ def test_lost_keys_are_told_and_change_nothing(rig):
         bpy.ops.scope.refloor()
 
 
-def test_a_motion_in_the_nla_is_not_taken_for_lost(rig):
+def test_a_motion_in_the_nla_is_an_error_of_its_own(rig):
     animation = rig.animation_data
     action, slot = animation.action, getattr(animation, "action_slot", None)
     animation.action = None
@@ -411,8 +411,8 @@ def test_a_motion_in_the_nla_is_not_taken_for_lost(rig):
     assert bpy.ops.scope.refloor() == {"FINISHED"}
 
 
-def test_an_edit_can_be_undone_by_hand_made_changes_too(rig):
-    """The keys are the truth: a pose changed by hand survives another edit."""
+def test_an_edit_keeps_manual_changes(rig):
+    """A pose changed by hand survives another edit."""
     clip, _ = keys(rig)
     from scope.scope_addon.scene.character.keys import write_clip
 

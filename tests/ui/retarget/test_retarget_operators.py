@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The retarget section as a user works it."""
+"""The retarget operators as a user runs them."""
 
 import bpy
 import numpy as np
@@ -39,7 +39,7 @@ def test_guess_keep_and_retarget(rig, tmp_path):
     assert np.ptp(seen(rig, ["pelvis"])[:, 0, 1]) > 1.0  # it walks
 
 
-def test_the_captured_body_is_hidden_beside_or_left(rig):
+def test_the_captured_body_is_hidden_side_by_side_or_overlapping(rig):
     settings, scene = bpy.context.scene.scope_retarget, bpy.context.scene
     source = next(obj for obj in scene.objects if "scope_source" in obj)
     body = next(obj for obj in source.children if obj.type == "MESH")
@@ -53,7 +53,7 @@ def test_the_captured_body_is_hidden_beside_or_left(rig):
     bpy.ops.scope.retarget()
     assert not any(obj.hide_get() or obj.hide_render for obj in (source, body))
     np.testing.assert_allclose(seen(rig, ["pelvis"]) - there, np.broadcast_to([1.5, 0, 0], there.shape), atol=1e-4)
-    body.hide_render = True  # the user's own choice
+    body.hide_render = True  # a manual setting
     settings.captured = "keep"
     bpy.ops.scope.retarget()
     np.testing.assert_allclose(seen(rig, ["pelvis"]), there, atol=1e-4)
@@ -61,7 +61,7 @@ def test_the_captured_body_is_hidden_beside_or_left(rig):
 
 
 @pytest.mark.parametrize("captured", ["hide", "beside"])
-def test_the_captured_persons_collection_may_be_left_out_of_the_view_layer(rig, captured):
+def test_the_captured_persons_collection_may_be_excluded_from_the_view_layer(rig, captured):
     source = next(obj for obj in bpy.context.scene.objects if "scope_source" in obj)
     layers = bpy.context.view_layer.layer_collection.children
     next(c for c in layers if c.collection in source.users_collection).exclude = True
@@ -71,11 +71,11 @@ def test_the_captured_persons_collection_may_be_left_out_of_the_view_layer(rig, 
     assert np.ptp(seen(rig, ["pelvis"])[:, 0, 1]) > 1.0
 
 
-def test_what_is_hidden_is_shown_for_now_and_hidden_again(rig):
+def test_a_hidden_body_is_shown_temporarily_for_comparison(rig):
     layer = bpy.context.view_layer
     source = next(obj for obj in bpy.context.scene.objects if "scope_source" in obj)
     bpy.ops.scope.retarget()
-    show(source, layer, for_now=True)
+    show(source, layer, temporarily=True)
     assert not source.hide_get()
     hide_again(source, layer)
     assert source.hide_get()
@@ -84,7 +84,7 @@ def test_what_is_hidden_is_shown_for_now_and_hidden_again(rig):
     assert not source.hide_get()
 
 
-def test_an_edit_and_the_same_button_again_update_the_rig(rig, tmp_path):
+def test_retargeting_again_after_an_edit_updates_the_rig(rig, tmp_path):
     source = next(obj for obj in bpy.context.scene.objects if "scope_source" in obj)
     motion_of(walk(2.0), noise=0.1).save(tmp_path / "person1.npz")
     source["scope_motion"] = str(tmp_path / "person1.npz")
@@ -103,7 +103,7 @@ def test_an_edit_and_the_same_button_again_update_the_rig(rig, tmp_path):
 
 
 @pytest.mark.parametrize("suffix", ["glb", "fbx"])
-def test_what_else_hangs_where_the_rig_does_stays_out_of_its_file(rig, tmp_path, suffix):
+def test_siblings_of_the_rig_are_not_exported_with_it(rig, tmp_path, suffix):
     scene, layer = bpy.context.scene, bpy.context.view_layer
     active = layer.objects.active
     bpy.ops.mesh.primitive_plane_add(location=(1.0, 2.0, 0.5))
@@ -128,7 +128,7 @@ def test_what_else_hangs_where_the_rig_does_stays_out_of_its_file(rig, tmp_path,
     np.testing.assert_allclose(seen(rig, ["pelvis", "hand_l"], [9 if suffix == "glb" else 10]), wanted, atol=1e-3)
 
 
-def test_with_several_people_the_panels_stay_and_ask_for_one(rig):
+def test_with_several_people_the_panels_ask_for_a_selection(rig):
     people = [next(obj for obj in bpy.context.scene.objects if "scope_source" in obj), captured(motion_of(walk(2.0)))]
     people[1]["scope_body_file"] = "scope"
     panels, layer = (bpy.types.SCOPE_PT_retarget, bpy.types.SCOPE_PT_edit), bpy.context.view_layer
@@ -146,12 +146,12 @@ def test_with_several_people_the_panels_stay_and_ask_for_one(rig):
     assert not any(panel.poll(bpy.context) for panel in panels)
 
 
-def test_body_parts_are_offered_while_they_are_typed():
+def test_body_parts_are_suggested_while_typing():
     assert offered_parts(None, bpy.context, "LEFT_h") == ["left_hip"]
     assert offered_parts(None, bpy.context, "") == list(PARTS)
 
 
-def test_a_list_without_legs_is_refused(rig):
+def test_a_bone_map_without_legs_is_an_error(rig):
     bpy.ops.scope.guess_bones()
     for pair in bpy.context.scene.scope_retarget.pairs:
         if pair.part == "left_knee":
@@ -161,7 +161,7 @@ def test_a_list_without_legs_is_refused(rig):
     assert rig.animation_data is None or rig.animation_data.action is None
 
 
-def test_undo_takes_the_motion_away(rig):
+def test_undo_removes_the_motion(rig):
     name = rig.name
     bpy.ops.scope.guess_bones()
     bpy.ops.ed.undo_push(message="before")
@@ -177,8 +177,8 @@ def test_undo_takes_the_motion_away(rig):
 
 
 @pytest.mark.parametrize("kind", ["fbx", "glb", "bvh"])
-def test_the_rig_is_exported_as_it_moves_with_its_mesh_alone(rig, tmp_path, kind):
-    """The captured body stays behind; in the scene nothing changes."""
+def test_the_rig_is_exported_with_its_animation_and_only_its_mesh(rig, tmp_path, kind):
+    """The captured body is not exported, and the scene does not change."""
     mesh = bpy.data.meshes.new("skin")
     mesh.from_pydata([(0, 0, 1), (0.1, 0, 1), (0, 0.1, 1)], [], [(0, 1, 2)])
     skin = bpy.data.objects.new("skin", mesh)
@@ -199,15 +199,15 @@ def test_the_rig_is_exported_as_it_moves_with_its_mesh_alone(rig, tmp_path, kind
     assert np.ptp(way, axis=0).max() == pytest.approx(np.ptp(there, axis=0).max(), rel=0.05)
 
 
-def test_a_bone_map_that_cannot_be_saved_names_its_place(rig, tmp_path):
+def test_an_unwritable_bone_map_is_an_error_that_names_the_file(rig, tmp_path):
     bpy.ops.scope.guess_bones()
     with pytest.raises(RuntimeError, match=r"Cannot write .*nowhere/bones\.json: its folder does not exist"):
         bpy.ops.scope.save_bone_map(filepath=str(tmp_path / "nowhere" / "bones.json"))
 
 
-def test_without_a_rig_its_export_says_what_to_do(rig, tmp_path):
+def test_exporting_without_a_rig_is_an_error_that_says_what_to_do(rig, tmp_path):
     bpy.context.scene.scope_retarget.rig = None
-    with pytest.raises(RuntimeError, match="choose yours"):
+    with pytest.raises(RuntimeError, match="choose a rig there"):
         bpy.ops.scope.export(filepath=str(tmp_path / "hero.fbx"), format="FBX", which="RIG")
 
 
@@ -227,14 +227,14 @@ def _linked_character(folder):
     return here.collections[0]
 
 
-def test_on_a_linked_rig_the_button_says_what_to_do(tmp_path):
+def test_retargeting_to_a_linked_rig_is_an_error_that_says_what_to_do(tmp_path):
     bpy.context.scene.scope_retarget.rig = _linked_character(tmp_path).objects["unreal"]
     with pytest.raises(RuntimeError, match=r"linked from .*hero\.blend.*make an override"):
         bpy.ops.scope.retarget()
 
 
 @pytest.mark.parametrize("root", ["bone", "object"])
-def test_a_library_override_moves_and_is_saved(tmp_path, root):
+def test_a_library_override_is_animated_and_saved(tmp_path, root):
     _linked_character(tmp_path).override_hierarchy_create(bpy.context.scene, bpy.context.view_layer)
     settings = bpy.context.scene.scope_retarget
     settings.rig = next(obj for obj in bpy.context.scene.objects if obj.override_library)
@@ -247,7 +247,7 @@ def test_a_library_override_moves_and_is_saved(tmp_path, root):
     np.testing.assert_allclose(seen(bpy.context.scene.scope_retarget.rig, ["pelvis", "hand_l"]), moving, atol=1e-4)
 
 
-def test_a_rig_that_is_out_of_the_view_layer_is_said_to_be(rig):
+def test_a_rig_outside_the_view_layer_is_an_error(rig):
     aside = bpy.data.collections.new("Aside")
     bpy.context.scene.collection.children.link(aside)
     aside.objects.link(rig)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is done to the view when a result is there."""
+"""Changes of the view after a capture."""
 
 import bpy
 import pytest
@@ -17,7 +17,7 @@ def empty():
     bpy.ops.wm.read_factory_settings(use_empty=True)
 
 
-def test_the_startup_cube_steps_aside(empty):
+def test_the_default_cube_is_hidden(empty):
     startup, own = cube(), cube("Box")
     hide_startup_cube(bpy.context)
     assert startup.hide_get()
@@ -30,7 +30,7 @@ def test_the_startup_cube_steps_aside(empty):
     lambda o: o.keyframe_insert("location"),
     lambda o: setattr(o, "name", "Die"),
 ])  # fmt: skip
-def test_a_cube_that_somebody_has_touched_stays(empty, touch):
+def test_a_modified_cube_stays(empty, touch):
     startup = cube()
     touch(startup)
     bpy.context.view_layer.update()

@@ -4,21 +4,24 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 
-def perineum(mirror: np.ndarray, vertices: np.ndarray) -> np.ndarray:
-    """(3,) the lowest point of the mesh on the midline."""
+def perineum(mirror: NDArray[np.intp], vertices: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the lowest point of the mesh on the midline, (3,) metres."""
     midline = np.flatnonzero(mirror == np.arange(len(vertices)))
     return vertices[midline[vertices[midline, 1].argmin()]]
 
 
-def bump(vertices: np.ndarray, centre: np.ndarray, radius: float) -> np.ndarray:
-    """(V,) one at the centre, smoothly zero from ``radius`` on."""
+def bump(vertices: NDArray[np.float64], centre: NDArray[np.float64], radius: float) -> NDArray[np.float64]:
+    """Return (V,) factors: one at the centre, falling smoothly to zero at ``radius``."""
     distance = np.linalg.norm(vertices - centre, axis=1) / radius
     return np.clip(1.0 - distance**2, 0.0, None) ** 2
 
 
-def diffuse(links: np.ndarray, values: np.ndarray, strength: np.ndarray, rounds: int) -> np.ndarray:
+def diffuse(
+    links: NDArray[np.intp], values: NDArray[np.float64], strength: NDArray[np.float64], rounds: int
+) -> NDArray[np.float64]:
     """Move each vertex's row towards the mean of its neighbours by ``strength`` (V,) in [0, 1], ``rounds`` times."""
     active = np.flatnonzero(strength > 0.0)
     near = links[np.isin(links, active).any(axis=1)]

@@ -1,19 +1,20 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Closed edge loops of the quad mesh, as the clean borders between materials."""
+"""Closed edge loops of the quad mesh, the borders between materials."""
 
 from __future__ import annotations
 
 from collections import defaultdict
 
 import numpy as np
+from numpy.typing import NDArray
 
 MAX_LENGTH = 400
 
 
 class QuadLoops:
-    """Walks edge loops: at a vertex with four quads a loop goes on along the opposite edge."""
+    """Finds edge loops: at a vertex with four quads, a loop continues along the opposite edge."""
 
-    def __init__(self, faces: np.ndarray) -> None:
+    def __init__(self, faces: NDArray[np.intp]) -> None:
         """Index the mesh: ``faces`` (F, 4)."""
         self.faces = faces
         self.faces_at: dict[int, list[int]] = defaultdict(list)
@@ -23,7 +24,7 @@ class QuadLoops:
         self.face_sets = [frozenset(quad) for quad in faces.tolist()]
 
     def neighbours(self, v: int) -> list[int]:
-        """Vertices that share an edge with ``v``, in ascending order."""
+        """Return the vertices that share an edge with ``v``, in ascending order."""
         found = set()
         for f in self.faces_at[v]:
             quad = self.faces[f].tolist()
@@ -32,7 +33,7 @@ class QuadLoops:
         return sorted(found)
 
     def walk(self, start: int, second: int) -> list[int] | None:
-        """The loop through an edge as a list of vertices, or None if it meets a pole or a border."""
+        """Return the edge loop through an edge as a list of vertices, or None if it meets a pole or a border."""
         loop = [start, second]
         while len(loop) <= MAX_LENGTH:
             previous, here = loop[-2:]
@@ -48,8 +49,10 @@ class QuadLoops:
             loop.append(ahead[0])
         return None
 
-    def nearest(self, vertices: np.ndarray, point: np.ndarray, normal: np.ndarray, radius: float) -> list[int]:
-        """The closed loop around a limb that stays nearest to a plane.
+    def nearest(
+        self, vertices: NDArray[np.float64], point: NDArray[np.float64], normal: NDArray[np.float64], radius: float
+    ) -> list[int]:
+        """Return the closed loop around a limb that stays nearest to a plane.
 
         :param vertices: (V, 3) metres; ``point``, ``normal``: the plane, across the limb at its axis.
         :param radius: metres; only loops within this distance of ``point`` count.
@@ -78,8 +81,8 @@ class QuadLoops:
             raise ValueError(f"no closed edge loop within {radius} m of {np.round(point, 3)}")
         return best
 
-    def beyond(self, loop: list[int], seed: int) -> np.ndarray:
-        """(F,) bool: faces reached from face ``seed`` without crossing ``loop``."""
+    def beyond(self, loop: list[int], seed: int) -> NDArray[np.bool_]:
+        """Return (F,) bool: the faces reached from face ``seed`` without crossing ``loop``."""
         border = {frozenset(edge) for edge in zip(loop, loop[1:] + loop[:1], strict=True)}
         reached, queue = np.zeros(len(self.faces), bool), [seed]
         reached[seed] = True
@@ -96,8 +99,8 @@ class QuadLoops:
         return reached
 
 
-def _plane_axes(normal: np.ndarray) -> np.ndarray:
-    """(3, 2) two axes that span the plane."""
+def _plane_axes(normal: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return two axes (3, 2) that span the plane."""
     first = np.cross(normal, np.eye(3)[np.abs(normal).argmin()])
     first /= np.linalg.norm(first)
     return np.stack([first, np.cross(normal, first)], axis=1)

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The look: a two-tone suit that leaves only head and hands bare, so that the body can be shown anywhere."""
+"""Materials: a two-tone suit that leaves only head and hands bare."""
 
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..joints import Skeleton
 from .loops import QuadLoops
@@ -26,8 +27,10 @@ HAIRLINE = (  # metres relative to the eyes: z from the back of the head to the 
 X, Y = np.eye(3)[:2]
 
 
-def face_materials(mesh: Mesh, skeleton: Skeleton, vertices: np.ndarray, J: np.ndarray) -> np.ndarray:
-    """(F,) index into ``MATERIALS``, symmetric. The borders are closed edge loops around limbs and trunk.
+def face_materials(
+    mesh: Mesh, skeleton: Skeleton, vertices: NDArray[np.float64], J: NDArray[np.float64]
+) -> NDArray[np.uint8]:
+    """Return (F,) indices into ``MATERIALS``, symmetric, with closed edge loops around limbs and trunk as borders.
 
     :param vertices: (V, 3) the mean shape in T-pose; ``J`` (K+1, 3) its joints.
     """
@@ -36,17 +39,17 @@ def face_materials(mesh: Mesh, skeleton: Skeleton, vertices: np.ndarray, J: np.n
     centre = vertices[mesh.faces].mean(axis=1)
     mirrored = mirror_faces(mesh)
 
-    def between(start: str, end: str, fraction: float) -> np.ndarray:
+    def between(start: str, end: str, fraction: float) -> NDArray[np.float64]:
         a, b = J[skeleton.index(start)], J[skeleton.index(end)]
         return a + fraction * (b - a)
 
-    def beyond(point: np.ndarray, normal: np.ndarray, radius: float) -> np.ndarray:
-        """Faces past the loop nearest to the plane, on the side that the normal points to."""
+    def beyond(point: NDArray[np.float64], normal: NDArray[np.float64], radius: float) -> NDArray[np.bool_]:
+        """Return the faces beyond the loop nearest to the plane, on the side to which the normal points."""
         distance = np.linalg.norm(centre - point - 0.5 * radius * normal, axis=1)
         seed = int(np.where(mesh.is_eye, np.inf, distance).argmin())
         return loops.beyond(loops.nearest(vertices, point, normal, radius), seed)
 
-    def both_sides(mask: np.ndarray) -> np.ndarray:
+    def both_sides(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
         return mask | mask[mirrored]
 
     material = np.full(len(centre), names.index("suit"))
@@ -70,14 +73,14 @@ def face_materials(mesh: Mesh, skeleton: Skeleton, vertices: np.ndarray, J: np.n
     return material
 
 
-def mirror_faces(mesh: Mesh) -> np.ndarray:
-    """(F,) index of the face on the other side."""
+def mirror_faces(mesh: Mesh) -> NDArray[np.intp]:
+    """Return (F,) the index of the face on the other side."""
     place = {frozenset(quad): f for f, quad in enumerate(mesh.faces.tolist())}
     return np.array([place[frozenset(quad)] for quad in mesh.mirror[mesh.faces].tolist()])
 
 
-def _front_of_eyes(mesh: Mesh, vertices: np.ndarray, rings: int) -> np.ndarray:
-    """(F,) bool: eyeball faces inside the first ``rings`` rings around the line of sight."""
+def _front_of_eyes(mesh: Mesh, vertices: NDArray[np.float64], rings: int) -> NDArray[np.bool_]:
+    """Return (F,) bool: the eyeball faces inside the first ``rings`` rings around the line of sight."""
     inside = np.zeros(len(vertices), bool)
     eyeballs = np.unique(mesh.faces[mesh.is_eye])
     for side in (1.0, -1.0):

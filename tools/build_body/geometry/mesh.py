@@ -6,6 +6,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..source import SourceMesh
 from .diffusion import bump, diffuse, perineum
@@ -19,21 +20,21 @@ PERINEUM_RADIUS, PERINEUM_ROUNDS = 0.08, 6  # metres, times
 class Mesh:
     """The kept part of the source mesh. V vertices, F quads counter-clockwise from outside."""
 
-    kept: np.ndarray  # (V,) source vertex of each vertex
-    faces: np.ndarray  # (F, 4)
-    uv: np.ndarray  # (U, 2)
-    uv_faces: np.ndarray  # (F, 4)
-    is_eye: np.ndarray  # (F,) bool
-    mirror: np.ndarray  # (V,) vertex on the other side
+    kept: NDArray[np.intp]  # (V,) source vertex of each vertex
+    faces: NDArray[np.intp]  # (F, 4)
+    uv: NDArray[np.float64]  # (U, 2)
+    uv_faces: NDArray[np.intp]  # (F, 4)
+    is_eye: NDArray[np.bool_]  # (F,) bool
+    mirror: NDArray[np.intp]  # (V,) vertex on the other side
 
 
-def body_and_eyes(source: SourceMesh) -> tuple[np.ndarray, np.ndarray]:
-    """(F,) masks over the source faces: the skin, and the eyeballs."""
+def body_and_eyes(source: SourceMesh) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Return (F,) masks over the source faces: the skin, and the eyeballs."""
     return source.face_group == "body", np.isin(source.face_group, ("helper-l-eye", "helper-r-eye"))
 
 
-def keep_visible(source: SourceMesh, vertices: np.ndarray) -> Mesh:
-    """Drop helpers and the inside of the head (mouth, eye sockets, nostrils), renumber what is left.
+def keep_visible(source: SourceMesh, vertices: NDArray[np.float64]) -> Mesh:
+    """Remove helpers and the inside of the head (mouth, eye sockets, nostrils) and renumber the rest.
 
     :param vertices: (N, 3) the mean shape.
     """
@@ -42,7 +43,7 @@ def keep_visible(source: SourceMesh, vertices: np.ndarray) -> Mesh:
     in_head = skin & (vertices[source.faces][:, :, 1].min(axis=1) > neck)
     head, hidden_by = source.faces[in_head], source.faces[eyes]
     seen = seen_from_outside(vertices, split_quads(head), split_quads(hidden_by)).reshape(2, -1).any(axis=0)
-    # One ring more than is seen, so that no rim shows an edge when the shape changes; and the same on both sides.
+    # One ring more than is visible, so that no border shows when the shape changes; the same on both sides.
     touched = np.zeros(len(vertices), bool)
     touched[head[seen]] = True
     touched |= touched[source.mirror]
@@ -56,25 +57,25 @@ def keep_visible(source: SourceMesh, vertices: np.ndarray) -> Mesh:
     return Mesh(kept, faces.reshape(-1, 4), source.uv[used_uv], uv_faces.reshape(-1, 4), eyes[keep], mirror)
 
 
-def split_quads(quads: np.ndarray) -> np.ndarray:
-    """(2F, 3) triangles: first halves of all quads, then second halves."""
+def split_quads(quads: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Return (2F, 3) triangles: first halves of all quads, then second halves."""
     return np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
 
 
-def vertex_areas(vertices: np.ndarray, quads: np.ndarray) -> np.ndarray:
-    """(N,) a third of the area of the triangles around each vertex."""
+def vertex_areas(vertices: NDArray[np.float64], quads: NDArray[np.intp]) -> NDArray[np.float64]:
+    """Return (N,) a third of the area of the triangles around each vertex."""
     a, b, c = vertices[split_quads(quads)].transpose(1, 0, 2)
     area = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 6.0
-    return np.bincount(split_quads(quads).ravel(), np.repeat(area, 3), len(vertices))
+    return np.bincount(split_quads(quads).ravel(), np.repeat(area, 3), len(vertices)).astype(float, copy=False)
 
 
-def edges(quads: np.ndarray) -> np.ndarray:
-    """(E, 2) undirected edges, each once."""
+def edges(quads: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Return (E, 2) undirected edges, each once."""
     sides = np.concatenate([quads[:, [k, (k + 1) % 4]] for k in range(4)])
     return np.unique(np.sort(sides, axis=1), axis=0)
 
 
-def smooth_nipples(source: SourceMesh, basis: np.ndarray) -> np.ndarray:
+def smooth_nipples(source: SourceMesh, basis: NDArray[np.float64]) -> NDArray[np.float64]:
     """Refill the inside of the two rings as a thin plate, in the mean and in every component (linear in both).
 
     :param basis: (1 + P, N, 3).
@@ -88,8 +89,8 @@ def smooth_nipples(source: SourceMesh, basis: np.ndarray) -> np.ndarray:
     return out
 
 
-def smooth_perineum(mesh: Mesh, basis: np.ndarray) -> np.ndarray:
-    """As a suit drapes: average the mesh between the legs, in the mean and in every component (linear in both).
+def smooth_perineum(mesh: Mesh, basis: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Smooth the mesh between the legs like a suit, in the mean and in every component (linear in both).
 
     :param basis: (1 + P, N, 3).
     """
@@ -102,8 +103,8 @@ def smooth_perineum(mesh: Mesh, basis: np.ndarray) -> np.ndarray:
     return out
 
 
-def thin_plate(links: np.ndarray, unknown: np.ndarray, basis: np.ndarray) -> np.ndarray:
-    """(1 + P, n, 3): positions of ``unknown`` (ascending indices) on a thin plate through their surroundings.
+def thin_plate(links: NDArray[np.intp], unknown: NDArray[np.intp], basis: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return positions (1 + P, n, 3) of ``unknown`` (ascending indices) on a thin plate through their surroundings.
 
     They minimize the squared umbrella Laplacian, summed over them and their rim.
     """
@@ -126,8 +127,8 @@ def thin_plate(links: np.ndarray, unknown: np.ndarray, basis: np.ndarray) -> np.
     return solution.reshape(-1, len(basis), 3).transpose(1, 0, 2)
 
 
-def _enclosed(links: np.ndarray, ring: np.ndarray, count: int) -> np.ndarray:
-    """Vertices cut off from the rest of the mesh by a closed loop of vertices."""
+def _enclosed(links: NDArray[np.intp], ring: NDArray[np.intp], count: int) -> NDArray[np.intp]:
+    """Return the vertices cut off from the rest of the mesh by a closed loop of vertices."""
     open_links = links[~np.isin(links, ring).any(axis=1)]
     label = np.arange(count)
     while True:  # the lowest index reachable labels a component

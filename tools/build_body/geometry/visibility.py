@@ -5,17 +5,20 @@ from __future__ import annotations
 
 import numba
 import numpy as np
+from numpy.typing import NDArray
 
 DIRECTIONS = 96
 PIXEL = 0.0007  # metres
 
 
-def seen_from_outside(vertices: np.ndarray, triangles: np.ndarray, occluders: np.ndarray) -> np.ndarray:
-    """(T,) bool: the triangle shows its front in at least one pixel of one direction.
+def seen_from_outside(
+    vertices: NDArray[np.float64], triangles: NDArray[np.intp], occluders: NDArray[np.intp]
+) -> NDArray[np.bool_]:
+    """Return (T,) bool: whether the triangle's front is visible in at least one pixel from one direction.
 
     :param vertices: (N, 3) metres.
     :param triangles: (T, 3), counter-clockwise from outside.
-    :param occluders: (O, 3) further triangles that hide but are not asked about.
+    :param occluders: (O, 3) further triangles that only occlude.
     """
     corners = vertices[np.concatenate([triangles, occluders])]
     seen = np.zeros(len(corners), bool)
@@ -29,8 +32,8 @@ def seen_from_outside(vertices: np.ndarray, triangles: np.ndarray, occluders: np
     return seen[: len(triangles)]
 
 
-def _sphere(count: int) -> np.ndarray:
-    """Directions spread evenly over the sphere (the golden spiral)."""
+def _sphere(count: int) -> NDArray[np.float64]:
+    """Return directions spread evenly over the sphere (the golden spiral)."""
     i = np.arange(count) + 0.5
     height, turn = 1.0 - 2.0 * i / count, i * np.pi * (3.0 - np.sqrt(5.0))
     ring = np.sqrt(1.0 - height**2)

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Skin weights: MakeHuman's bones merged onto the joints, mirrored, diffused where they crease, four a vertex."""
+"""Skin weights: MakeHuman's bones merged onto the joints, mirrored, diffused where they crease, four per vertex."""
 
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..joints import FINGERS, Skeleton
 from ..source import SourceMesh
@@ -25,8 +26,10 @@ SIDE_BONES = {  # bone without .L / .R -> joint without left_ / right_
 }  # fmt: skip
 
 
-def skin_weights(source: SourceMesh, mesh: Mesh, skeleton: Skeleton, mean_shape: np.ndarray) -> np.ndarray:
-    """(V, K+1) weights, rows summing to one, at most four of them above zero, symmetric.
+def skin_weights(
+    source: SourceMesh, mesh: Mesh, skeleton: Skeleton, mean_shape: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return (V, K+1) weights, rows summing to one, at most four of them above zero, symmetric.
 
     :param mean_shape: (N, 3) all source vertices of the mean shape, in the source pose.
     """
@@ -45,16 +48,16 @@ def skin_weights(source: SourceMesh, mesh: Mesh, skeleton: Skeleton, mean_shape:
     return keep_strongest(W)
 
 
-def keep_strongest(W: np.ndarray) -> np.ndarray:
-    """Only the four largest weights of a row, normalized; those that tie with the fifth go too, for symmetry."""
+def keep_strongest(W: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Keep the four largest weights of each row, normalized, without those equal to the fifth, for symmetry."""
     fifth = np.sort(W, axis=1)[:, -INFLUENCES - 1][:, None]
     W = np.where(W > fifth + 1e-9, W, 0.0)
     W[W < 1e-3] = 0.0
     return W / W.sum(axis=1, keepdims=True)
 
 
-def pack(W: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(V, 4) joint indices and (V, 4) weights, the strongest first; unused slots are joint 0 with weight 0."""
+def pack(W: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+    """Return (V, 4) joint indices and (V, 4) weights, the strongest first; unused slots are joint 0 with weight 0."""
     joints = np.argsort(-W, axis=1, kind="stable")[:, :INFLUENCES]
     weights = np.take_along_axis(W, joints, axis=1)
     return np.where(weights > 0.0, joints, 0), weights

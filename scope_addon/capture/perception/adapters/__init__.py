@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Networks of the user's own: each kind of graph has a file that recognises it and reads its outputs."""
+"""Adapters of the user's own networks: each kind of graph has a module that detects it and reads its outputs."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The small JSON beside a model (``NAME.json`` beside ``NAME.onnx``) that says what its graph does not."""
+"""The JSON file next to a model (``NAME.json`` for ``NAME.onnx``), with what its graph does not specify."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from .keypoint_sets import KEYPOINT_SETS
 
 @dataclass(frozen=True)
 class Description:
-    """What the JSON says; None: not said, so the graph or the kind's usual value decides.
+    """The contents of the JSON; None: not specified, so that the graph or the usual value of its type applies.
 
     ``type``: see `DETECTOR_TYPES` and `KEYPOINT_TYPES`.  ``input_size``: [width, height].  ``mean``, ``std``: one or
     three numbers on the scale 0..255, in the order of the channels; input = (pixel − mean) / std.
-    ``channel_order``: rgb or bgr.  ``score_threshold``: of a person or of a keypoint that counts as seen.
-    Detectors: ``decoded`` (yolox: boxes are in pixels already), ``person_class`` (number of the class).
-    Keypoints: ``keypoints`` (a set's name), ``decode`` (dark or quarter), ``udp`` (heatmaps whose corner cells lie on
-    the corner pixels).
+    ``channel_order``: rgb or bgr.  ``score_threshold``: least score of a person or of a visible keypoint.
+    Detectors: ``decoded`` (yolox: boxes are in pixels already), ``person_class`` (index of the class).
+    Keypoints: ``keypoints`` (a set's name), ``decode`` (dark or quarter), ``udp`` (the corner cells of a heatmap
+    are centred on the corner pixels).
     """
 
     type: str | None = None
@@ -39,15 +39,15 @@ class Description:
 
 
 def description_path(model: Path) -> Path:
-    """Where a model's JSON lies."""
+    """Derive the path of a model's JSON."""
     return model.with_suffix(".json")
 
 
 def read_description(model: Path, types: tuple[str, ...]) -> Description:
-    """The JSON beside a model; an empty one where there is none.
+    """Read the JSON next to a model; a missing file is like an empty one.
 
-    :param types: what ``type`` may be.
-    :raises ModelFileError: not JSON, a key that does not exist, or a value that cannot be.
+    :param types: the valid values of ``type``.
+    :raises ModelFileError: it is not JSON, or has an unknown key or an invalid value.
     """
     path = description_path(model)
     if not path.is_file():
@@ -61,18 +61,17 @@ def read_description(model: Path, types: tuple[str, ...]) -> Description:
     known = {field.name for field in fields(Description)}
     for key, value in values.items():
         if key not in known:
-            raise ModelFileError(f"{path}: {key!r} is not known; write some of {', '.join(sorted(known))}")
-        if wrong := _wrong(key, value, types):
-            raise ModelFileError(f"{path}: {key} must be {wrong}, but is {json.dumps(value)[:80]}")
+            raise ModelFileError(f"{path}: {key!r} is not known; use some of {', '.join(sorted(known))}")
+        if expected := _violated(key, value, types):
+            raise ModelFileError(f"{path}: {key} must be {expected}, but is {json.dumps(value)[:80]}")
     for key in ("mean", "std", "input_size"):
         if key in values:
-            given = values[key] if isinstance(values[key], list) else [values[key]]
-            values[key] = tuple(given)
+            values[key] = tuple(values[key] if isinstance(values[key], list) else [values[key]])
     return Description(**values)
 
 
-def _wrong(key: str, value: Any, types: tuple[str, ...]) -> str | None:
-    """What a value must be, in words, where it is not."""
+def _violated(key: str, value: Any, types: tuple[str, ...]) -> str | None:
+    """Describe what a value must be; None if it is valid."""
     choices = {
         "type": types,
         "channel_order": ("rgb", "bgr"),
@@ -86,15 +85,15 @@ def _wrong(key: str, value: Any, types: tuple[str, ...]) -> str | None:
     if key == "score_threshold":
         return None if _is_number(value) and 0 < value < 1 else "a number between 0 and 1"
     if key == "person_class":
-        return None if type(value) is int and value >= 0 else "a number from 0 on"
+        return None if type(value) is int and value >= 0 else "a whole number of at least 0"
     if key == "input_size":
-        sound = isinstance(value, list) and len(value) == 2 and all(type(v) is int and 16 <= v <= 4096 for v in value)
-        return None if sound else "[width, height] in pixels, 16 to 4096"
-    several = value if isinstance(value, list) else [value]
-    sound = len(several) in (1, 3) and all(_is_number(v) for v in several)
+        valid = isinstance(value, list) and len(value) == 2 and all(type(v) is int and 16 <= v <= 4096 for v in value)
+        return None if valid else "[width, height] in pixels, 16 to 4096"
+    numbers = value if isinstance(value, list) else [value]
+    valid = len(numbers) in (1, 3) and all(_is_number(v) for v in numbers)
     if key == "std":
-        sound = sound and all(v > 0 for v in several)
-    return None if sound else "one number or three" + (" above 0" if key == "std" else "")
+        valid = valid and all(v > 0 for v in numbers)
+    return None if valid else "one number or three" + (" above 0" if key == "std" else "")
 
 
 def _is_number(value: Any) -> bool:

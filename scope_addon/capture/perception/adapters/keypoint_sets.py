@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Keypoint orders of other networks, and how each becomes the 33 keypoints that the lifter and the solver know.
+"""Keypoint sets of other networks, and their conversion to the 33 keypoints of the lifter and the solver.
 
-What a set does not have gets confidence 0: the solver then leaves it out, and the lifter sees it where it roughly is
-and knows that this is a guess.
+A keypoint that a set lacks gets a rough position and confidence 0: the solver ignores it, and the lifter gets the
+position together with the confidence.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..landmark_network import KEYPOINT_NAMES
 
@@ -22,9 +23,9 @@ COCO_17 = (
     ),
 )
 _SIDES = ("left", "right")
-_TOES = {"big_toe": 0.85, "small_toe": 0.15}  # where BlazePose sees the tip of a foot; see solver/loaders/keypoints.py
+_TOES = {"big_toe": 0.85, "small_toe": 0.15}  # weights of BlazePose's foot tip; see solver/loaders/keypoints.py
 
-# Our name: {number in the set: weight}.
+# Our name: {index in the set: weight}.
 Mixture = dict[str, dict[int, float]]
 
 
@@ -32,10 +33,10 @@ def _coco() -> Mixture:
     return {name: {k: 1.0} for k, name in enumerate(COCO_17)}
 
 
-def _feet(numbers: dict[str, int]) -> Mixture:
-    feet: Mixture = {f"{side}_heel": {numbers[f"{side}_heel"]: 1.0} for side in _SIDES}
+def _feet(indices: dict[str, int]) -> Mixture:
+    feet: Mixture = {f"{side}_heel": {indices[f"{side}_heel"]: 1.0} for side in _SIDES}
     for side in _SIDES:
-        feet[f"{side}_foot_index"] = {numbers[f"{side}_{toe}"]: share for toe, share in _TOES.items()}
+        feet[f"{side}_foot_index"] = {indices[f"{side}_{toe}"]: weight for toe, weight in _TOES.items()}
     return feet
 
 
@@ -47,10 +48,10 @@ def _halpe() -> Mixture:
 
 def _wholebody() -> Mixture:
     feet = _feet({f"{s}_{p}": 17 + 3 * i + k for i, s in enumerate(_SIDES) for k, p in enumerate((*_TOES, "heel"))})
-    # 23 + the 68 points of the face, which begin at the person's right ear; eyes from 36 on, mouth from 48 on
+    # 23 + the 68 points of the face, which begin at the person's right ear; eyes from 36, mouth from 48
     face = {"right_eye_outer": 36, "right_eye_inner": 39, "left_eye_inner": 42, "left_eye_outer": 45}
     face |= {"mouth_right": 48, "mouth_left": 54}
-    # hands of 21: wrist, then thumb, index, middle, ring, pinky from the root to the tip
+    # hands of 21: wrist, then thumb, index, middle, ring, pinky, each from the base to the tip
     hand = {"thumb": 3, "index": 5, "pinky": 17}
     fingers = {f"{s}_{f}": {91 + 21 * i + n: 1.0} for i, s in enumerate(_SIDES) for f, n in hand.items()}
     return _coco() | feet | {name: {23 + n: 1.0} for name, n in face.items()} | fingers
@@ -58,39 +59,50 @@ def _wholebody() -> Mixture:
 
 @dataclass(frozen=True)
 class KeypointSet:
-    """``count`` keypoints of a network, and which of ours they give."""
+    """A set of ``count`` keypoints, and ``mixture``, the weights from which ours are calculated."""
 
     name: str
     count: int
     mixture: Mixture
 
-    def to_ours(self, points: np.ndarray, scores: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """(count, 2) pixels and (count,) scores -> (33, 2) and (33,); see the module for what the set lacks."""
+    def to_blazepose(
+        self, points: NDArray[np.float64], scores: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Convert to our keypoints; see the module for those that the set lacks.
+
+        :param points: (count, 2) pixels.
+        :param scores: (count,) 0..1.
+        :return: (33, 2) pixels and (33,) confidence.
+        """
         ours, confidence = np.zeros((len(KEYPOINT_NAMES), 2)), np.zeros(len(KEYPOINT_NAMES))
         for k, name in enumerate(KEYPOINT_NAMES):
             if name in self.mixture:
-                numbers, weights = list(self.mixture[name]), np.array(list(self.mixture[name].values()))
-                ours[k], confidence[k] = weights @ points[numbers], scores[numbers].min()
+                indices, weights = list(self.mixture[name]), np.array(list(self.mixture[name].values()))
+                ours[k], confidence[k] = weights @ points[indices], scores[indices].min()
         at = {name: ours[k] for k, name in enumerate(KEYPOINT_NAMES)}
         for k, name in enumerate(KEYPOINT_NAMES):
             if name not in self.mixture:
-                ours[k] = _guess(name, at)
+                ours[k] = _approximate(name, at)
         return ours, confidence
 
 
-def _guess(name: str, at: dict[str, np.ndarray]) -> np.ndarray:
-    """Roughly where a keypoint lies, from those that every set has."""
+def _approximate(name: str, at: dict[str, NDArray[np.float64]]) -> NDArray[np.float64]:
+    """Estimate the rough position (2,) of a keypoint from those that every set has."""
     side = "left" if "left" in name else "right"
     if "eye" in name:
         return at[f"{side}_eye"]
     if "mouth" in name:
         neck = (at["left_shoulder"] + at["right_shoulder"]) / 2
-        return at["nose"] + 0.2 * (neck - at["nose"]) + 0.3 * (at[f"{side}_eye"] - at["nose"]) * [1.0, 0.0]
+        to_eye = (at[f"{side}_eye"] - at["nose"]) * np.array([1.0, 0.0])
+        mouth: NDArray[np.float64] = at["nose"] + 0.2 * (neck - at["nose"]) + 0.3 * to_eye
+        return mouth
     if "heel" in name or "foot" in name:
         lower_leg = at[f"{side}_ankle"] - at[f"{side}_knee"]
-        return at[f"{side}_ankle"] + (0.12 if "heel" in name else 0.2) * lower_leg
+        foot: NDArray[np.float64] = at[f"{side}_ankle"] + (0.12 if "heel" in name else 0.2) * lower_leg
+        return foot
     forearm = at[f"{side}_wrist"] - at[f"{side}_elbow"]
-    return at[f"{side}_wrist"] + 0.3 * forearm
+    finger: NDArray[np.float64] = at[f"{side}_wrist"] + 0.3 * forearm
+    return finger
 
 
 KEYPOINT_SETS = {
@@ -101,5 +113,5 @@ KEYPOINT_SETS = {
 
 
 def keypoint_set_of_count(count: int) -> KeypointSet | None:
-    """The set with so many keypoints."""
+    """Find the set by its number of keypoints; None if there is none."""
     return next((s for s in KEYPOINT_SETS.values() if s.count == count), None)

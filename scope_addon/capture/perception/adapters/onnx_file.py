@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Looks into an ONNX file before onnxruntime does: weights in other files must lie in the model's own folder.
+"""Checks an ONNX file before onnxruntime opens it: external weights must be in the model's own folder.
 
 An ONNX file is a protocol buffer; only the few fields that lead to tensors are followed (onnx.proto3 of the ONNX
 project). https://protobuf.dev/programming-guides/encoding/ describes the wire format.
@@ -12,7 +12,7 @@ from pathlib import Path
 
 from .....solver.errors import ModelFileError
 
-# Message: {number of a field: what it holds}.
+# Message: {field number: message in the field}.
 _FIELDS = {
     "model": {7: "graph", 25: "function"},
     "graph": {1: "node", 5: "tensor", 15: "sparse"},
@@ -28,15 +28,17 @@ _LARGEST_BYTES = 2 << 30  # of a protocol buffer
 
 
 def check_onnx_file(path: Path) -> None:
-    """Refuse what is not an ONNX file, and one whose weights lie outside its folder.
+    """Check that a file is an ONNX model and has no weights outside its folder.
 
-    :raises ModelFileError: with the reason and what to do.
+    :raises ModelFileError: it is not, it has, or the file cannot be read.
     """
     try:
         if path.exists() and not (path.is_file() or path.is_dir()):  # reading a device or a pipe may never end
-            raise ModelFileError(f"{path} is no ordinary file; choose an ONNX file")
+            raise ModelFileError(f"{path} is not a regular file; choose an ONNX file")
         if path.stat().st_size > _LARGEST_BYTES:
-            raise ModelFileError(f"{path} is larger than the 2 GiB of an ONNX file; export its weights beside it")
+            raise ModelFileError(
+                f"{path} is larger than the 2 GiB of an ONNX file; export its weights to a separate file"
+            )
         data = memoryview(path.read_bytes())
     except OSError as error:
         raise ModelFileError(f"{path} cannot be read ({error.strerror}); choose an ONNX file") from error
@@ -52,14 +54,14 @@ def check_onnx_file(path: Path) -> None:
         if not target.is_relative_to(folder):
             raise ModelFileError(
                 f"{path} wants to read its weights from {location!r}, outside its own folder; "
-                "export it as one file, or with its data beside it"
+                "export it as one file, or with its data in the same folder"
             )
         if not target.is_file():
-            raise ModelFileError(f"{path} needs its weights in {target}, which is missing; put that file beside it")
+            raise ModelFileError(f"{path} needs its weights in {target}, which is missing; put that file there")
 
 
 def _locations(data: memoryview, kind: str, depth: int) -> Iterator[str]:
-    """Where the tensors of a message say that their data lies."""
+    """Iterate over the locations of external data in the tensors of a message."""
     if depth > _DEEPEST:
         raise ValueError("it is nested too deeply")
     for number, value in _fields(data):
@@ -77,7 +79,7 @@ def _locations(data: memoryview, kind: str, depth: int) -> Iterator[str]:
 
 
 def _fields(data: memoryview) -> Iterator[tuple[int, memoryview | int]]:
-    """(number, value) of every field of a message: bytes as they are, numbers as 0 where nobody asks for them."""
+    """Iterate over the fields of a message; yield number and value. Fixed-size numbers, which are unused, become 0."""
     at = 0
     while at < len(data):
         tag, at = _varint(data, at)
@@ -103,7 +105,7 @@ def _fields(data: memoryview) -> Iterator[tuple[int, memoryview | int]]:
 
 
 def _varint(data: memoryview, at: int) -> tuple[int, int]:
-    """The number at ``at``, seven bits a byte, least first; and where it ends."""
+    """Decode the varint at ``at`` (seven bits per byte, least significant first); return it and the offset after it."""
     value = 0
     for shift in range(0, 70, 7):
         if at >= len(data):

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Heatmaps (HRNet, ViTPose, AlphaPose): (1, J, rows, columns), coarser than the picture, hottest at the keypoint.
+"""Heatmaps (HRNet, ViTPose, AlphaPose): (1, J, rows, columns), coarser than the input, with a maximum at each keypoint.
 
-The hottest cell is refined by a quarter of a cell towards its hotter neighbours, or as DARK does: with h the logarithm
-of the heatmap after a Gaussian blur, the maximum of its second-order Taylor expansion about the hottest cell is at
+The maximum is refined by a quarter of a cell towards its greater neighbours, or by DARK: with h the logarithm of the
+heatmap after a Gaussian blur, the maximum of its second-order Taylor expansion about the greatest cell is at
 
     cell − (∇²h)⁻¹ ∇h
 
@@ -12,19 +12,22 @@ c · width / columns, or with ``udp`` c · (width − 1) / (columns − 1).
 
 from __future__ import annotations
 
+from typing import Any
+
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
-from ..graph import IMAGENET, Graph, sound
+from ..graph import IMAGENET, Graph, finite
 
 TYPE = "heatmap"
 NORMALIZATION = IMAGENET
 _BLUR = 11  # cells; suits the Gaussians of 2 to 3 cells that these networks are trained with
-_COLDEST = 1e-10
+_LEAST_HEAT = 1e-10
 
 
-def recognises(graph: Graph) -> bool:
-    """One output, a coarser picture for each keypoint."""
+def matches(graph: Graph) -> bool:
+    """Check for one output, with a map per keypoint that is not finer than the input."""
     if len(graph.shapes) != 1 or len(graph.shapes[0]) != 4:
         return False
     _, _, rows, columns = graph.shapes[0]
@@ -32,27 +35,36 @@ def recognises(graph: Graph) -> bool:
 
 
 def keypoint_count(graph: Graph) -> int:
-    """How many keypoints the graph gives."""
+    """Count the keypoints of the graph."""
     return graph.shapes[0][1]
 
 
 def decode(
-    outputs: list[np.ndarray], graph: Graph, *, how: str = "dark", udp: bool = False
-) -> tuple[np.ndarray, np.ndarray]:
-    """(J, 2) pixels of the network's picture, the top left pixel's centre at 0, and (J,) scores: the greatest heat."""
-    heatmaps = sound(outputs[0])[0]
+    outputs: list[NDArray[Any]], graph: Graph, *, refinement: str = "dark", udp: bool = False
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Locate the keypoints.
+
+    :param outputs: see the module.
+    :param refinement: dark or quarter.
+    :param udp: the corner cells are centred on the corner pixels.
+    :return: (J, 2) pixels of the network's input, the top left pixel's centre at 0, and (J,) scores, the maxima.
+    """
+    heatmaps = finite(outputs[0])[0]
     count, rows, columns = heatmaps.shape
-    hottest = heatmaps.reshape(count, -1).argmax(axis=1)
-    cells = np.stack([hottest % columns, hottest // columns], axis=1)
-    scores = heatmaps.reshape(count, -1).max(axis=1)
-    refine = _by_taylor if how == "dark" else _by_quarter
-    refined = np.array([refine(h, x, y) for h, (x, y) in zip(heatmaps, cells.tolist(), strict=True)])
+    greatest = heatmaps.reshape(count, -1).argmax(axis=1)
+    cells = np.stack([greatest % columns, greatest // columns], axis=1)
+    scores: NDArray[np.float64] = heatmaps.reshape(count, -1).max(axis=1)
+    refine = _by_taylor if refinement == "dark" else _by_quarter
+    refined: NDArray[np.float64] = np.array(
+        [refine(h, x, y) for h, (x, y) in zip(heatmaps, cells.tolist(), strict=True)]
+    )
     size, grid = np.array([graph.width, graph.height]), np.array([columns, rows])
-    return refined * ((size - 1) / (grid - 1) if udp else size / grid), scores
+    pixels_per_cell: NDArray[np.float64] = (size - 1) / (grid - 1) if udp else size / grid
+    return refined * pixels_per_cell, scores
 
 
-def _by_quarter(heat: np.ndarray, x: int, y: int) -> tuple[float, float]:
-    """A quarter of a cell towards the hotter neighbour, in x and in y."""
+def _by_quarter(heat: NDArray[np.float64], x: int, y: int) -> tuple[float, float]:
+    """Move a quarter of a cell towards the greater neighbour, in x and in y."""
     rows, columns = heat.shape
     if not (0 < x < columns - 1 and 0 < y < rows - 1):
         return x, y
@@ -60,17 +72,17 @@ def _by_quarter(heat: np.ndarray, x: int, y: int) -> tuple[float, float]:
     return x + 0.25 * float(np.sign(right)), y + 0.25 * float(np.sign(down))
 
 
-def _by_taylor(heat: np.ndarray, x: int, y: int) -> tuple[float, float]:
-    """DARK; the hottest cell itself at the edge and where the heatmap is not a hill."""
+def _by_taylor(heat: NDArray[np.float64], x: int, y: int) -> tuple[float, float]:
+    """Refine by DARK; keep the cell itself at the edge and where the expansion has no maximum."""
     rows, columns = heat.shape
     if not (1 < x < columns - 2 and 1 < y < rows - 2) or heat[y, x] <= 0:
         return x, y
-    reach = _BLUR // 2 + 2  # only what the blur carries into the 5 x 5 cells that count
+    reach = _BLUR // 2 + 2  # the support of the blur in the 5 x 5 cells that are used
     left, top = max(0, x - reach), max(0, y - reach)
     part = heat[top : y + reach + 1, left : x + reach + 1]
-    # beyond the heatmap there is no heat
+    # zero padding: there is no heat beyond the heatmap
     blurred = cv2.GaussianBlur(part, (_BLUR, _BLUR), 0, borderType=cv2.BORDER_CONSTANT)
-    h = np.log(np.maximum(blurred, _COLDEST))
+    h = np.log(np.maximum(blurred, _LEAST_HEAT))
     x0, y0 = x - left, y - top
     gradient = np.array([h[y0, x0 + 1] - h[y0, x0 - 1], h[y0 + 1, x0] - h[y0 - 1, x0]]) / 2
     xx = (h[y0, x0 + 2] - 2 * h[y0, x0] + h[y0, x0 - 2]) / 4

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A user's top-down keypoint network in the place of BlazePose's landmark network: the same interface for the tracker.
+"""A user's top-down keypoint network, with the interface of BlazePose's landmark network for the tracker.
 
-It looks at a box about the person, turned so that the trunk is upright, and tells nothing about depth.
+Its input is a box around the person, rotated so that the trunk is upright. It does not estimate depth.
 """
 
 from __future__ import annotations
@@ -11,8 +11,10 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ......solver.errors import ModelFileError
 from ...execution import Execution
@@ -26,52 +28,53 @@ from . import heatmap, simcc
 _ADAPTERS: tuple[ModuleType, ...] = (simcc, heatmap)
 KEYPOINT_TYPES = tuple(adapter.TYPE for adapter in _ADAPTERS)
 SCORE_THRESHOLD = 0.3  # from which a keypoint counts as seen
-UNSURE = 0.25  # of this threshold: enough to widen the next region
-MARGIN = 1.4  # the box round the keypoints lacks crown, feet and the border that these networks are trained with
-STATURE = 1.6  # the least, in lengths of trunk and leg: a person who crouches will stand up
-SHRINKS = 0.97  # the most from one frame to the next: legs that were hidden for a moment must stay inside
-FEWEST = 4  # keypoints that say where to look next
+UNSURE = 0.25  # share of this threshold from which a keypoint widens the next region
+MARGIN = 1.4  # the keypoints' box lacks crown, feet and the border that these networks are trained with
+MIN_STATURE = 1.6  # least side in lengths of trunk and leg: a person who crouches will stand up
+MAX_SHRINK = 0.97  # from one frame to the next: legs that are briefly occluded must stay inside
+MIN_KEYPOINTS = 4  # to predict the next region
 _BODY = np.array([KEYPOINT_NAMES.index(name) for name in COCO_17])
 _SHOULDERS = np.array([KEYPOINT_NAMES.index(f"{side}_shoulder") for side in ("left", "right")])
 _HIPS = np.array([KEYPOINT_NAMES.index(f"{side}_hip") for side in ("left", "right")])
-_LEGS = [
-    [KEYPOINT_NAMES.index(f"{side}_{joint}") for joint in ("hip", "knee", "ankle")] for side in ("left", "right")
-]
+_LEGS = [[KEYPOINT_NAMES.index(f"{side}_{joint}") for joint in ("hip", "knee", "ankle")] for side in ("left", "right")]
 
-Decode = Callable[[list[np.ndarray], Graph], tuple[np.ndarray, np.ndarray]]
+Decode = Callable[[list[NDArray[Any]], Graph], tuple[NDArray[np.float64], NDArray[np.float64]]]
 
 
 class KeypointNetwork:
-    """See `Description` for the JSON beside the model.
+    """The user's network; see `Description` for its JSON.
 
-    :raises ModelFileError: the file or its JSON cannot be used, or does not tell what it is.
+    :raises ModelFileError: the file or its JSON cannot be used, or the type of the network is unknown.
     """
 
     def __init__(self, path: Path, threads: int, execution: Execution | None = None) -> None:
-        said = read_description(path, KEYPOINT_TYPES)
-        self._graph = Graph(path, said, threads, execution)
-        self._adapter = _adapter_for(self._graph, said)
+        description = read_description(path, KEYPOINT_TYPES)
+        self._graph = Graph(path, description, threads, execution)
+        self._adapter = _adapter_for(self._graph, description)
         self.type: str = self._adapter.TYPE
-        self.keypoint_set = _set_for(self._graph, self._adapter, said)
-        self._normalization = self._adapter.NORMALIZATION.given(said)
-        self._threshold = said.score_threshold or SCORE_THRESHOLD
+        self.keypoint_set = _set_for(self._graph, self._adapter, description)
+        self._normalization = self._adapter.NORMALIZATION.with_description(description)
+        self._threshold = description.score_threshold or SCORE_THRESHOLD
         self._decode: Decode = self._adapter.decode
         if self._adapter is heatmap:
-            self._decode = partial(heatmap.decode, how=said.decode, udp=said.udp)
+            self._decode = partial(heatmap.decode, refinement=description.decode, udp=description.udp)
         self._side = max(self._graph.width, self._graph.height)
         self._corner = np.array([(self._side - self._graph.width) // 2, (self._side - self._graph.height) // 2])
 
-    def estimate(self, image_rgb: np.ndarray, regions: Sequence[Region]) -> list[PoseEstimate]:
-        """One estimate per region of an (H, W, 3) uint8 image; the world landmarks are all 0, which is: not known."""
+    def estimate(self, image_rgb: NDArray[np.uint8], regions: Sequence[Region]) -> list[PoseEstimate]:
+        """Estimate one pose per region of an (H, W, 3) uint8 RGB image; world landmarks are all 0, that is, unknown.
+
+        :raises ModelFileError: the network fails.
+        """
         return [self._estimate(image_rgb, region) for region in regions]
 
-    def _estimate(self, image_rgb: np.ndarray, region: Region) -> PoseEstimate:
+    def _estimate(self, image_rgb: NDArray[np.uint8], region: Region) -> PoseEstimate:
         left, top = self._corner
         square = region.cut(image_rgb, self._side)
         picture = square[top : top + self._graph.height, left : left + self._graph.width]
         points, scores = self._decode(self._graph.run(picture, self._normalization), self._graph)
         pixels = region.image_from_crop((points + self._corner + 0.5) / self._side)
-        ours, confidence = self.keypoint_set.to_ours(pixels, np.clip(scores, 0.0, 1.0))
+        ours, confidence = self.keypoint_set.to_blazepose(pixels, np.clip(scores, 0.0, 1.0))
         height, width = image_rgb.shape[:2]
         in_frame = ((ours >= -0.5) & (ours <= [width - 0.5, height - 0.5])).all(axis=1)
         return PoseEstimate(
@@ -84,26 +87,26 @@ class KeypointNetwork:
             next_region=self._next_region(ours, confidence, region),
         )
 
-    def _next_region(self, points: np.ndarray, confidence: np.ndarray, region: Region) -> Region:
-        """The box round the keypoints that are seen, upright along the trunk, in the network's proportions."""
+    def _next_region(self, points: NDArray[np.float64], confidence: NDArray[np.float64], region: Region) -> Region:
+        """Calculate the box around the seen keypoints, upright along the trunk, in the network's aspect ratio."""
         seen = confidence >= UNSURE * self._threshold
-        if seen.sum() < FEWEST:
+        if seen.sum() < MIN_KEYPOINTS:
             return region
         trunk = points[_SHOULDERS].mean(axis=0) - points[_HIPS].mean(axis=0)
         upright = math.atan2(float(trunk[0]), float(-trunk[1]))
         rotation = upright if seen[[*_SHOULDERS, *_HIPS]].all() else region.rotation
-        turned = Region((0.0, 0.0), 1.0, rotation)
-        along = points[seen] @ turned.R_image_crop  # in the axes of the box
+        axes = Region((0.0, 0.0), 1.0, rotation)
+        along = points[seen] @ axes.R_image_crop  # in the axes of the box
         low, high = along.min(axis=0), along.max(axis=0)
         shape = np.array([self._graph.width, self._graph.height]) / self._side
         around = MARGIN * float(((high - low) / shape).max())
-        side = max(around, SHRINKS * region.side_px, STATURE * _stature(points, seen))
-        x, y = turned.R_image_crop @ ((low + high) / 2)
+        side = max(around, MAX_SHRINK * region.side_px, MIN_STATURE * _stature(points, seen))
+        x, y = axes.R_image_crop @ ((low + high) / 2)
         return Region((float(x), float(y)), side, rotation)
 
 
-def _stature(points: np.ndarray, seen: np.ndarray) -> float:
-    """Length in pixels of trunk, thigh and lower leg, whichever way they are bent; 0 for what is not seen."""
+def _stature(points: NDArray[np.float64], seen: NDArray[np.bool_]) -> float:
+    """Add the lengths in pixels of trunk, thigh and lower leg, regardless of the pose; 0 for those not seen."""
     ends = [points[pair].mean(axis=0) for pair in (_SHOULDERS, _HIPS)]
     trunk = math.dist(*ends) if seen[[*_SHOULDERS, *_HIPS]].all() else 0.0
     legs = [
@@ -113,21 +116,21 @@ def _stature(points: np.ndarray, seen: np.ndarray) -> float:
     return trunk + max(legs)
 
 
-def _adapter_for(graph: Graph, said: Description) -> ModuleType:
-    adapter = next((a for a in _ADAPTERS if a.recognises(graph) and said.type in (None, a.TYPE)), None)
+def _adapter_for(graph: Graph, description: Description) -> ModuleType:
+    adapter = next((a for a in _ADAPTERS if a.matches(graph) and description.type in (None, a.TYPE)), None)
     if adapter is None:
-        why = f"it is not {said.type}" if said.type else "its outputs do not tell what it is"
-        raise graph.unrecognised("a keypoint network", KEYPOINT_TYPES, why)
+        why = f"it is not {description.type}" if description.type else "its outputs match no known type"
+        raise graph.unrecognized("a keypoint network", KEYPOINT_TYPES, why)
     return adapter
 
 
-def _set_for(graph: Graph, adapter: ModuleType, said: Description) -> KeypointSet:
+def _set_for(graph: Graph, adapter: ModuleType, description: Description) -> KeypointSet:
     count = adapter.keypoint_count(graph)
-    found = KEYPOINT_SETS[said.keypoints] if said.keypoints else keypoint_set_of_count(count)
+    found = KEYPOINT_SETS[description.keypoints] if description.keypoints else keypoint_set_of_count(count)
     if found is None or found.count > count:
         sets = ", ".join(f"{s.name} ({s.count})" for s in KEYPOINT_SETS.values())
         raise ModelFileError(
-            f"{graph.path} gives {count} keypoints, which is none of {sets}; if it begins with those of one of these, "
-            f'say so in {description_path(graph.path)}: {{"keypoints": "coco17"}}'
+            f"{graph.path} has {count} keypoints, which is none of {sets}; if it begins with those of one of these, "
+            f'name it in {description_path(graph.path)}: {{"keypoints": "coco17"}}'
         )
     return found

@@ -85,7 +85,7 @@ def test_heatmap_peaks_between_cells(tmp_path: Path, how: str, udp: bool) -> Non
     path = fixed(tmp_path / "m.onnx", 192, 256, {"heatmaps": np.stack(maps)[None].astype(np.float32)})
     path.with_suffix(".json").write_text(json.dumps({"decode": how, "udp": udp}))
     network = KeypointNetwork(path, threads=1)
-    points, scores = network._decode(network._graph.trial, network._graph)
+    points, scores = network._decode(network._graph.trial_outputs, network._graph)
     pixels = middle * ([191 / 47, 255 / 63] if udp else 4.0)
     assert np.abs(points - pixels).max() < (0.05 if how == "dark" else 1.1)
     assert scores.min() > 0.9
@@ -98,7 +98,7 @@ def numbered(count: int) -> tuple[np.ndarray, np.ndarray]:
 @pytest.mark.parametrize("name", KEYPOINT_SETS)
 def test_keypoint_orders(name: str) -> None:
     points, scores = numbered(KEYPOINT_SETS[name].count)
-    ours, confidence = KEYPOINT_SETS[name].to_ours(points, scores)
+    ours, confidence = KEYPOINT_SETS[name].to_blazepose(points, scores)
     at = dict(zip(KEYPOINT_NAMES, ours[:, 0], strict=True))
     known = dict(zip(KEYPOINT_NAMES, confidence, strict=True))
     assert at["nose"] == 0
@@ -174,9 +174,7 @@ def test_the_next_region_holds_the_keypoints(tmp_path: Path) -> None:
     assert network._next_region(upright(), confidence * 0.05, region) is region
     # legs hidden: shrink slowly
     legs = np.array(["knee" in n or "ankle" in n or "hip" in n for n in KEYPOINT_NAMES])
-    assert network._next_region(upright(), confidence * ~legs, region).side_px == pytest.approx(
-        0.97 * region.side_px
-    )
+    assert network._next_region(upright(), confidence * ~legs, region).side_px == pytest.approx(0.97 * region.side_px)
     # crouching: the box stays as large as the person will be
     low = upright()
     ankles = [KEYPOINT_NAMES.index(f"{side}_ankle") for side in ("left", "right")]

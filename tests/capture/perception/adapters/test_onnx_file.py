@@ -54,7 +54,7 @@ def test_what_would_be_read_forever(tmp_path: Path, opens: Open) -> None:
     keeps_open = os.open(pipe, os.O_RDWR | os.O_NONBLOCK)
     os.write(keeps_open, b"text")
     try:
-        refused(opens, pipe, "m.onnx is no ordinary file")
+        refused(opens, pipe, "m.onnx is not a regular file")
     finally:
         os.close(keeps_open)
 
@@ -127,7 +127,7 @@ def test_weights_outside_of_the_folder(tmp_path: Path, opens: Open, location: st
 
 def test_weights_beside_it_are_welcome(tmp_path: Path) -> None:
     path = with_external_data(tmp_path / "m.onnx", "m.onnx.data")
-    refused(KeypointNetwork, path, "missing; put that file beside it")
+    refused(KeypointNetwork, path, "missing; put that file there")
     (tmp_path / "m.onnx.data").write_bytes(bytes(4352))
     check_onnx_file(path)
 
@@ -178,7 +178,7 @@ def test_a_graph_that_fails_when_it_runs(tmp_path: Path, opens: Open) -> None:
     shape = {"wanted": np.array([7, 11], np.int64)}
     path = save(tmp_path / "m.onnx", nodes, [picture_input("w", "h")], [out], shape)
     path.with_suffix(".json").write_text('{"input_size": [32, 32]}')
-    refused(opens, path, "cannot be run on a picture of 32 x 32")
+    refused(opens, path, "cannot be run on an image of 32 x 32")
 
 
 @pytest.mark.parametrize(

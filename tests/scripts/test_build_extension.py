@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The built extension: Blender's own tool accepts it, and every Blender takes the wheels of its Python."""
+"""The built extension: Blender's own tool accepts it, and every Blender chooses the wheels of its Python."""
 
 import importlib.util
 import shutil
@@ -10,13 +10,14 @@ from pathlib import Path
 import bpy
 import pytest
 
+ROOT = Path(__file__).resolve().parent.parent.parent
 CP311 = "numba-0.68.1-cp311-cp311-manylinux_2_27_x86_64.manylinux_2_28_x86_64.whl"
 CP313 = CP311.replace("311", "313")
 STABLE = "opencv_contrib_python_headless-4.11.0.86-cp37-abi3-manylinux_2_17_x86_64.manylinux2014_x86_64.whl"
 
 
 @pytest.fixture
-def small_root(root, tmp_path):
+def small_root(tmp_path):
     """A copy of the repository whose largest files, which take long to compress, are empty."""
 
     def copy(source, target):
@@ -27,15 +28,15 @@ def small_root(root, tmp_path):
 
     target = tmp_path / "repository"
     for name in ("solver", "scope_addon", "assets", "scripts"):
-        shutil.copytree(root / name, target / name, copy_function=copy, ignore=shutil.ignore_patterns("__pycache__"))
+        shutil.copytree(ROOT / name, target / name, copy_function=copy, ignore=shutil.ignore_patterns("__pycache__"))
     for name in ("__init__.py", "LICENSE", "THIRD_PARTY.md", "blender_manifest.toml"):
-        shutil.copy2(root / name, target / name)
+        shutil.copy2(ROOT / name, target / name)
     return target
 
 
 @pytest.fixture
-def builder(root, tmp_path, monkeypatch):
-    spec = importlib.util.spec_from_file_location("build_extension", root / "scripts" / "build_extension.py")
+def builder(tmp_path, monkeypatch):
+    spec = importlib.util.spec_from_file_location("build_extension", ROOT / "scripts" / "build_extension.py")
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     for name in ("WHEELS", "STAGING", "DIST"):
@@ -51,10 +52,10 @@ def blenders_tool():
     return module
 
 
-def test_names_under_which_every_blender_takes_the_right_wheel(builder):
+def test_wheel_names_make_every_blender_choose_the_right_wheel(builder):
     names = [builder.shipped_name(name) for name in (CP311, CP313, STABLE)]
     assert names[0] == CP311
-    # 4.2's first releases compare nothing but the names of wheels of one version, and run Python 3.11.
+    # The first releases of 4.2 compare only the names of wheels of one version, and run Python 3.11.
     assert max(names[:2]) == CP311
     tool = blenders_tool()
     if not hasattr(tool, "python_versions_from_wheel_python_tag"):
@@ -65,7 +66,7 @@ def test_names_under_which_every_blender_takes_the_right_wheel(builder):
         assert not tool.blender_platform_compatible_with_wheel_platform_from_filepath("windows-x64", name)
 
 
-def test_the_locks_name_every_wheel_with_hashes(builder):
+def test_the_lock_files_list_every_wheel_with_hashes(builder):
     for python in builder.PYTHONS:
         entries = builder.locked(python)
         assert [line.split("==")[0] for line in entries.splitlines() if "==" in line] == list(builder.PACKAGES)
@@ -90,7 +91,7 @@ def without(target, archive, name):
 
 
 @pytest.mark.usefixtures("networks")
-def test_a_build_with_empty_wheels(builder, root, small_root, tmp_path, monkeypatch):
+def test_a_build_with_empty_wheels(builder, small_root, tmp_path, monkeypatch):
     monkeypatch.setattr(builder, "ROOT", small_root)
 
     def wheels(platform):
@@ -108,7 +109,7 @@ def test_a_build_with_empty_wheels(builder, root, small_root, tmp_path, monkeypa
     with zipfile.ZipFile(builder.DIST / archives[0]) as file:
         names = file.namelist()
     assert not any("numpy" in n or "/tests/" in n or n.startswith(("tests/", "tools/", ".")) for n in names)
-    manifest = tomllib.loads((root / "blender_manifest.toml").read_text())
+    manifest = tomllib.loads((ROOT / "blender_manifest.toml").read_text())
     for folder in (p.strip("/") for p in manifest["build"]["paths_exclude_pattern"] if p.endswith("/")):
         assert not any(n.startswith(f"{folder}/") or f"/{folder}/" in n for n in names), folder
     for name in ("assets/lifter/lifter.onnx", "assets/prior/joint_prior.npz", "THIRD_PARTY.md"):
@@ -120,7 +121,7 @@ def test_a_build_with_empty_wheels(builder, root, small_root, tmp_path, monkeypa
         builder.check(builder.DIST / archives[0])
 
 
-def test_an_unknown_platform_is_told(builder, monkeypatch, capsys):
+def test_an_unknown_platform_is_an_error(builder, monkeypatch, capsys):
     monkeypatch.setattr("sys.argv", ["build", "amiga"])
     assert builder.main() == 2
     assert "amiga" in capsys.readouterr().err

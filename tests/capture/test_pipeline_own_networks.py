@@ -18,8 +18,8 @@ from scope.scope_addon.cli import SAMPLE
 from scope.scope_addon.errors import NoPersonError
 from scope.solver.loaders.body_file import load_body
 
-from ...small_graphs import fixed
-from ...wrapped_networks import box_rows, coco_simcc
+from .small_graphs import fixed
+from .wrapped_networks import box_rows, coco_simcc
 
 Frames = Callable[..., Iterator[np.ndarray]]
 

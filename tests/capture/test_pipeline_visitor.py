@@ -14,7 +14,7 @@ from scope.scope_addon.capture.options import CaptureOptions
 from scope.scope_addon.capture.pipeline import Capture, capture
 from scope.solver.body import Body
 
-from ..composites import visit
+from .composites import visit
 
 EVERY = 2  # of the frames, for 30 per second
 EDGE = 1200.0

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Enabling and disabling, under both of the package's names, and what it costs."""
+"""Enabling and disabling under both of the package's names, and the libraries that this loads."""
 
 import subprocess
 import sys
@@ -22,7 +22,7 @@ def ours():
     return sorted(name for name in dir(bpy.types) if name.startswith("SCOPE_"))
 
 
-def test_twice_in_a_shell(unregistered):
+def test_registering_twice_in_a_shell(unregistered):
     assert ours() == []
     for _ in range(2):
         scope.register()
@@ -33,7 +33,7 @@ def test_twice_in_a_shell(unregistered):
         assert not hasattr(bpy.types.Scene, "scope")
 
 
-def test_twice_as_an_extension_with_preferences(unregistered, tmp_path, root):
+def test_enabling_twice_as_an_extension_with_preferences(unregistered, tmp_path, root):
     (tmp_path / "scope").symlink_to(root)
     repository = bpy.context.preferences.extensions.repos.new(
         name="test", module="scope_test", custom_directory=str(tmp_path), remote_url=""
@@ -94,7 +94,7 @@ def test_every_operator_and_setting_has_a_tooltip():
                     assert all(item.description for item in prop.enum_items), prop.identifier
 
 
-def test_the_command_reaches_the_shells_command_line(capsys):
+def test_the_command_runs_the_command_line(capsys):
     from scope.scope_addon.ui import command
 
     assert command.run(["capture", "/nowhere/at/all.mp4", "-o", "/nowhere/a.npz"]) != 0

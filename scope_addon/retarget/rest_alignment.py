@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The rotations that align a rig's rest pose with the body's T-pose: F for the heading, A_b for each bone.
+
+See ``transfer.py`` for their use.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...solver.rotations import exp, shortest_turn
+from .bone_map import FINGERS
+from .skeleton import Skeleton
+
+_UP = np.array([0.0, 0.0, 1.0])
+_NEXT = {"hip": "knee", "knee": "ankle", "shoulder": "elbow", "elbow": "wrist", "wrist": "hand"}
+# The fourth does not exist in any body: the last phalanx has no end joint.
+_NEXT |= {f"{finger}{k}": f"{finger}{k + 1}" for finger in FINGERS for k in (1, 2, 3)}
+_MAX_PALM_TURN = np.radians(100)  # between two palms at rest; a larger angle means that fingers were confused
+
+
+def heading_alignment(rig: Skeleton, row: dict[str, int]) -> NDArray[np.float64]:
+    """Return F (3, 3), the rotation about the vertical that turns the rig's left to the body's, +x.
+
+    :param row: the rig's bone of each body part.
+    """
+    left = rig.heads[row["left_hip"]] - rig.heads[row["right_hip"]]
+    return exp(np.array([0.0, 0.0, -np.arctan2(left[1], left[0])]))
+
+
+def rest_alignment(
+    rig: Skeleton,
+    part_of: list[str],
+    row: dict[str, int],
+    rest: NDArray[np.float64],
+    index: dict[str, int],
+    F: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Return A_b of every bone.
+
+    :param part_of: the body part of each bone.
+    :param row: the rig's bone of each body part.
+    :param rest: (K+1, 3) the body's rest joints, metres, world axes.
+    :param index: the joint of each body part.
+    :param F: (3, 3) the heading alignment.
+    :return: (B, 3, 3) rotations.
+    """
+    A = np.tile(np.eye(3), (len(part_of), 1, 1))
+    for b, part in enumerate(part_of):
+        side, _, kind = part.partition("_")
+        parent = int(rig.carriers[b])
+        if kind in ("ankle", "foot"):
+            end = row.get(f"{side}_foot") if kind == "ankle" else None
+            along = F @ ((rig.heads[end] if end is not None else rig.tails[b]) - rig.heads[b])
+            ankle, foot = rest[index[f"{side}_ankle"]], rest[index[f"{side}_foot"]]
+            flat, wanted = along * [1, 1, 0], (foot - ankle) * [1, 1, 0]
+            if np.linalg.norm(flat) > 0.3 * np.linalg.norm(along):
+                angle = np.arctan2(wanted[1], wanted[0]) - np.arctan2(flat[1], flat[0])
+                A[b] = exp(_UP * ((angle + np.pi) % (2 * np.pi) - np.pi))
+        elif kind in _NEXT:
+            A[b] = before = A[parent] if parent >= 0 and part_of[parent].partition("_")[2] in _NEXT else np.eye(3)
+            end = row.get(f"{side}_{_NEXT[kind]}")
+            along = (rig.heads[end] if end is not None else rig.tails[b]) - rig.heads[b]
+            # Zero for the last phalanges, which have no end joint: they keep the rig's angle to the one before.
+            wanted = rest[index.get(f"{side}_{_NEXT[kind]}", index[part])] - rest[index[part]]
+            if np.linalg.norm(along) > 1e-9 and np.linalg.norm(wanted) > 1e-9:
+                A[b] = shortest_turn(before @ F @ along, wanted) @ before
+            if kind == "wrist":
+                palm = _palm_alignment(rig.heads @ F.T, row, rest, index, side)
+                if palm is not None and (np.trace(palm @ A[b].T) - 1) / 2 > np.cos(_MAX_PALM_TURN):
+                    A[b] = palm
+    return A
+
+
+def _palm_alignment(
+    heads: NDArray[np.float64], row: dict[str, int], rest: NDArray[np.float64], index: dict[str, int], side: str
+) -> NDArray[np.float64] | None:
+    """Return the rotation (3, 3) of the rig's palm to the body's, from wrist and knuckles; None without fingers."""
+    parts = [f"{side}_{part}" for part in ("wrist", "index1", "pinky1")]
+    if not all(part in row and part in index for part in parts):
+        return None
+    palms = []
+    for points, rows in ((heads, row), (rest, index)):
+        wrist, first, last = (points[rows[part]] for part in parts)
+        across, along = first - last, (first + last) / 2 - wrist
+        normal = np.cross(along, across)
+        if np.linalg.norm(normal) < 1e-9:
+            return None
+        axes = np.stack([along, np.cross(normal, along), normal], axis=1)
+        palms.append(axes / np.linalg.norm(axes, axis=0))
+    alignment: NDArray[np.float64] = palms[1] @ palms[0].T
+    return alignment

@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A rig's mapped bones at rest, their motion, and the conversion between world rotations and bone channels."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True)
+class Skeleton:
+    """The B mapped bones of a rig in its rest pose, in the world frame (z up, metres), parents before children.
+
+    ``parents`` are the mapped bones whose rotation each bone inherits, -1 for none. ``carriers`` are those that its
+    head moves with; they differ where a bone does not inherit rotation.
+    """
+
+    names: list[str]
+    parents: NDArray[np.intp]  # (B,)
+    carriers: NDArray[np.intp]  # (B,)
+    heads: NDArray[np.float64]  # (B, 3) metres
+    tails: NDArray[np.float64]  # (B, 3) metres
+    rotations: NDArray[np.float64]  # (B, 3, 3) bone to world
+    floor: float = 0.0  # height of the floor under the rig at rest, metres
+
+
+@dataclass(frozen=True)
+class Pose:
+    """A skeleton's motion in the world frame."""
+
+    rotations: NDArray[np.float64]  # (T, B, 3, 3) bone to world
+    heads: NDArray[np.float64]  # (T, B, 3) metres
+    facing: float  # rotation about the vertical from the heading of the rig at rest to that of the body, radians
+
+
+def basis(rig: Skeleton, world: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Convert world rotations to the bones' channels: ``B = (R_parent R_parent0ᵀ R_b0)ᵀ R_b``.
+
+    :param world: (T, B, 3, 3) bone to world.
+    :return: (T, B, 3, 3) rotations relative to parent and rest pose.
+    """
+    out = np.empty_like(world)
+    for b, parent in enumerate(rig.parents):
+        if parent < 0:
+            out[:, b] = rig.rotations[b].T @ world[:, b]
+        else:
+            local = rig.rotations[parent].T @ rig.rotations[b]
+            out[:, b] = np.swapaxes(world[:, parent] @ local, 1, 2) @ world[:, b]
+    return out
+
+
+def head_positions(rig: Skeleton, world: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the bones' heads without any translation of the root bone.
+
+    :param world: (T, B, 3, 3) bone to world.
+    :return: (T, B, 3) metres.
+    """
+    heads = np.empty((*world.shape[:2], 3))
+    for b, carrier in enumerate(rig.carriers):
+        if carrier < 0:
+            heads[:, b] = rig.heads[b]
+        else:
+            offset = rig.rotations[carrier].T @ (rig.heads[b] - rig.heads[carrier])
+            heads[:, b] = heads[:, carrier] + world[:, carrier] @ offset
+    return heads

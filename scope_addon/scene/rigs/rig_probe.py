@@ -1,0 +1,256 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Measuring how the bones of a rig move together, by posing the rig itself.
+
+Each mapped bone is rotated once, and the other bones are observed. Constraints, such as those of Rigify's controls,
+therefore need no special treatment, and no frame of an animation has to be evaluated.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import bpy
+import numpy as np
+from mathutils import Matrix, Quaternion
+from numpy.typing import NDArray
+
+from ....solver.errors import InputError
+from ...retarget.bone_map import PHALANGES, BoneMap
+from ...retarget.skeleton import Skeleton
+from ..character.root_object import root_object, topmost
+
+# Rigify's properties: limbs by FK, neck and head with the chest.
+_SWITCHES = ("IK_FK", "neck_follow", "head_follow")
+_CARRIER_TOLERANCE = 0.02  # of a head's position relative to its carrier, as a share of their distance
+_MIN_RESPONSE = 0.1  # change of a rotation matrix's entries; the probe changes them by more than 0.3
+_CHECKED_FRAMES, _MAX_DEVIATION = 5, np.radians(20)
+
+
+def check_bones_move(rig: bpy.types.Object, bone_map: BoneMap) -> None:
+    """Check that the mapped bones can be rotated, and the pelvis moved.
+
+    :raises InputError: when one of them cannot.
+    """
+    with at_rest(rig):
+        probe(rig, bone_map.parts)
+
+
+def probe(rig: bpy.types.Object, parts: dict[str, str]) -> Skeleton:
+    """Measure the mapped bones at rest and their dependencies; the rig must be ``at_rest``.
+
+    :param parts: bone name -> body part.
+    :raises InputError: when a bone does not rotate, the pelvis does not move, or the rig's scale is 0.
+    """
+    names = list(parts)
+    rest = _matrices(rig, names)
+    if min(map(abs, rig.matrix_world.to_scale())) < 1e-9:
+        raise InputError(f"'{rig.name}' is scaled to 0; give it a size (S, or Scale in the sidebar)")
+    follows, carried = _dependencies(rig, parts, rest)
+    _check_root_moves(rig, next((bone for bone, part in parts.items() if part == "pelvis"), names[0]))
+    order: list[int] = []
+    while rows := [b for b in range(len(names)) if b not in order]:
+        above = {b: sum(a not in order for a in np.flatnonzero(follows[b] | carried[b])) for b in rows}
+        order.append(min(rows, key=above.__getitem__))
+    parents, carriers = (_nearest(above[np.ix_(order, order)]) for above in (follows, carried))
+    carriers = np.where(carriers < 0, parents, carriers)
+    matrices = rest[order]
+    ends = matrices[:, :3, 3] + matrices[:, :3, 1] * [[rig.pose.bones[names[b]].length] for b in order]
+    ordered = [names[b] for b in order]
+    return Skeleton(ordered, parents, carriers, matrices[:, :3, 3], ends, _rotations(matrices), _floor(rig))
+
+
+def _dependencies(
+    rig: bpy.types.Object, parts: dict[str, str], rest: NDArray[np.float64]
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Rotate each bone and observe the others.
+
+    :param rest: (B, 4, 4) bones to world at rest.
+    :return: (B, B) whether the row's bone rotates with the column's, and whether its head moves with it.
+    """
+    names = list(parts)
+    follows = np.zeros((len(names), len(names)), bool)
+    carried = follows.copy()
+    heads = rest[:, :3, 3]
+    for group in _independent(parts):
+        for k, a in enumerate(group):  # with different angles, to distinguish which bone another one follows
+            turn = Quaternion((0.6, 0.48, 0.64), 0.5 + 0.15 * k)
+            rig.pose.bones[names[a]].matrix_basis = turn.to_matrix().to_4x4()
+        posed = _matrices(rig, names)
+        turned = _rotations(posed) @ np.swapaxes(_rotations(rest), 1, 2)
+        _check_rotated(rig, [names[a] for a in group], turned[group])
+        for a in group:
+            rig.pose.bones[names[a]].matrix_basis = Matrix()
+            follows[:, a] = np.abs(turned - turned[a]).max(axis=(1, 2)) < 0.02
+            away = heads - heads[a]
+            expected = away @ turned[a].T
+            off, moved = (np.linalg.norm(expected - now, axis=1) for now in (posed[:, :3, 3] - heads[a], away))
+            carried[:, a] = (off < _CARRIER_TOLERANCE * np.linalg.norm(away, axis=1)) & (off < moved)
+            follows[a, a] = carried[a, a] = False
+    return follows, carried
+
+
+def _independent(parts: dict[str, str]) -> list[list[int]]:
+    """Group bones that do not move each other, such as those of both sides, to save evaluations."""
+    groups: dict[str, list[int]] = {}
+    for row, (bone, part) in enumerate(parts.items()):
+        side, _, kind = part.partition("_")
+        key = "phalanx" + kind[-1] if kind in PHALANGES else kind
+        groups.setdefault(key or bone, []).append(row)
+    return list(groups.values())
+
+
+def _nearest(above: NDArray[np.bool_]) -> NDArray[np.intp]:
+    """Return the last preceding bone that each bone depends on (B,), -1 for none.
+
+    :param above: (B, B) whether the row's bone depends on the column's.
+    """
+    return np.array([max(np.flatnonzero(row[:b]), default=-1) for b, row in enumerate(above)], int)
+
+
+def _floor(rig: bpy.types.Object) -> float:
+    """Return the height of the floor: the rig's origin if the rig rests near it, otherwise its lowest bone."""
+    deforming = [bone for bone in rig.data.bones if bone.use_deform] or rig.data.bones
+    lowest = min((rig.matrix_world @ end).z for bone in deforming for end in (bone.head_local, bone.tail_local))
+    origin = rig.matrix_world.translation.z
+    return float(origin if abs(lowest - origin) < 0.3 else lowest)
+
+
+def _check_rotated(rig: bpy.types.Object, names: list[str], turned: NDArray[np.float64]) -> None:
+    """Check that the probe rotated these bones; other bones at rest would seem to follow one that did not.
+
+    :param turned: (B, 3, 3) the rotation of each of these bones.
+    :raises InputError: when one did not rotate.
+    """
+    blocked = [name for name, R in zip(names, turned, strict=True) if np.abs(R - np.eye(3)).max() < _MIN_RESPONSE]
+    if blocked:
+        raise InputError(
+            f"'{blocked[0]}' of '{rig.name}' does not move when it is rotated: show the rig in the viewport, mute the "
+            "constraint or driver that controls the bone, or remove it from the list"
+        )
+
+
+def _check_root_moves(rig: bpy.types.Object, name: str) -> None:
+    """Check that the pelvis, whose location is the root motion, can be moved. Leaves it at rest.
+
+    :raises InputError: when it cannot.
+    """
+    bone, rest = rig.pose.bones[name], _matrices(rig, [name])
+    bone.matrix_basis = Matrix.Translation((bone.length,) * 3)
+    moved = np.linalg.norm(np.linalg.solve(np.array(rig.matrix_world), _matrices(rig, [name]) - rest)[0, :3, 3])
+    bone.matrix_basis = Matrix()
+    if moved > 0.1 * bone.length:
+        return
+    if bone.bone.use_connect:
+        raise InputError(
+            f"'{name}' of '{rig.name}' is connected to '{bone.parent.name}' and cannot move away from it: in Edit "
+            "Mode, disconnect the bone (Alt P)"
+        )
+    raise InputError(
+        f"'{name}' of '{rig.name}' does not move when its location changes: mute the constraint or driver that "
+        "controls the bone, or choose another one for the pelvis in the list"
+    )
+
+
+def blocked_bones(
+    rig: bpy.types.Object, names: list[str], turns: NDArray[np.float64], wanted: NDArray[np.float64]
+) -> list[str]:
+    """Return warnings about bones that deviate from the motion although they can be rotated, such as a leg with IK.
+
+    :param names: of the B bones.
+    :param turns: (T, B, 3, 3) rotations of the channels.
+    :param wanted: (T, B, 3, 3) bone to world.
+    """
+    off = np.zeros(len(names))
+    for t in np.unique(np.linspace(0, len(turns) - 1, _CHECKED_FRAMES).astype(int)):
+        for name, turn in zip(names, turns[t], strict=True):
+            rig.pose.bones[name].matrix_basis = Matrix(turn.tolist()).to_4x4()
+        seen = _rotations(_matrices(rig, names))
+        cosine = (np.einsum("bij,bij->b", seen, wanted[t]) - 1) / 2
+        off = np.maximum(off, np.arccos(np.clip(cosine, -1, 1)))
+    blocked = [name for name, angle in zip(names, off, strict=True) if angle > _MAX_DEVIATION]
+    if not blocked:
+        return []
+    others = {1: "", 2: f" and '{blocked[-1]}'"}.get(len(blocked), f" and {len(blocked) - 1} other bones")
+    return [
+        f"'{blocked[0]}'{others} of '{rig.name}' cannot follow the motion: mute the constraints or drivers that "
+        "control them, such as IK, or put the bones that control them into the list"
+    ]
+
+
+def _matrices(rig: bpy.types.Object, names: list[str]) -> NDArray[np.float64]:
+    """Return the evaluated bones to world (B, 4, 4)."""
+    bpy.context.view_layer.update()
+    posed = rig.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    return np.array([posed.matrix_world @ posed.pose.bones[name].matrix for name in names], float)
+
+
+def _rotations(matrices: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the rotations (B, 3, 3) of matrices (B, 4, 4), without scale."""
+    U, _, Vt = np.linalg.svd(matrices[:, :3, :3])
+    rotations: NDArray[np.float64] = U @ Vt
+    return rotations
+
+
+@contextmanager
+def at_rest(rig: bpy.types.Object) -> Iterator[None]:
+    """Evaluate the rig without animation, pose and root object, with limbs switched to FK, inside the block.
+
+    Everything is restored except the switches and Edit Mode.
+    """
+    if rig.mode == "EDIT":
+        bpy.ops.object.mode_set(mode="OBJECT")
+    state = _RigState(rig)
+    try:
+        state.clear()
+        yield
+    finally:
+        state.restore()
+
+
+class _RigState:
+    """A rig's visibility, animation, pose and root object."""
+
+    def __init__(self, rig: bpy.types.Object) -> None:
+        self._rig = rig
+        self._shown = bpy.context.scene.collection.objects  # this collection cannot be hidden or excluded
+        self._hidden, self._linked = rig.hide_viewport, rig in self._shown.values()
+        self._position = rig.data.pose_position
+        self._animation = rig.animation_data
+        self._action = self._animation.action if self._animation else None
+        self._slot = getattr(self._animation, "action_slot", None)
+        self._nla = self._animation.use_nla if self._animation else False
+        self._bases = [(bone, bone.matrix_basis.copy()) for bone in rig.pose.bones]
+        self._top, self._empty = topmost(rig), root_object(rig)
+
+    def clear(self) -> None:
+        """Show the rig without animation, pose and root object, and switch limbs to FK."""
+        rig = self._rig
+        if not self._linked:
+            self._shown.link(rig)
+        rig.hide_viewport, rig.data.pose_position = False, "POSE"
+        self._top.parent = None
+        if self._animation:
+            self._animation.action, self._animation.use_nla = None, False
+        for bone, _ in self._bases:
+            bone.matrix_basis = Matrix()
+            for switch in _SWITCHES:
+                if switch in bone:
+                    bone[switch] = 1.0
+        rig.update_tag()
+
+    def restore(self) -> None:
+        """Restore everything except the switches."""
+        rig = self._rig
+        for bone, matrix in self._bases:
+            bone.matrix_basis = matrix
+        self._top.parent = self._empty
+        rig.hide_viewport, rig.data.pose_position = self._hidden, self._position
+        if not self._linked:
+            self._shown.unlink(rig)
+        if self._animation:
+            self._animation.use_nla = self._nla
+            if self._action is not None:
+                self._animation.action = self._action
+                if self._slot is not None:
+                    self._animation.action_slot = self._slot

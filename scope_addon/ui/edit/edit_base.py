@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Base classes of the operators that edit a captured motion."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import bpy
+from bpy.props import IntProperty
+
+from ..captured_person import body_of, captured_armature, library_of
+from ..reporting import ReportingOperator
+
+if TYPE_CHECKING:
+    from ....solver.body import Body
+
+
+class EditOperator(ReportingOperator):
+    """An operator that edits the keys of the active capture; if it fails, the keys are unchanged. Not registered."""
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Require a captured armature whose keys are stored in this file."""
+        armature = captured_armature(context)
+        if armature is None:
+            cls.poll_message_set("Select the armature of a capture first")
+            return False
+        library = library_of(armature)
+        if library is not None:
+            cls.poll_message_set(
+                f"'{armature.name}' or its motion is linked from {library.filepath}, so changes would be lost: make "
+                "both local (Object > Relations > Make Local > All) or edit them in that file"
+            )
+            return False
+        return True
+
+    if TYPE_CHECKING:  # implemented by each operator
+
+        def edit(self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float) -> str:
+            """Change the keys and return a message for the user, which may be empty."""
+
+    def work(self, context: bpy.types.Context) -> str:
+        """Edit the keys; if that fails, restore them."""
+        from ...scene.animation_data.timing import scene_rate
+        from ...scene.animation_data.transaction import all_or_nothing
+
+        armature = captured_armature(context)
+        assert armature is not None  # checked by poll
+        with all_or_nothing(context.scene, armature):
+            return self.edit(context, armature, body_of(armature), scene_rate(context.scene))
+
+
+class SpanOperator(EditOperator):
+    """An operator on a span of frames, which a dialog asks for. Not registered."""
+
+    start: IntProperty(name="First Frame", description="First frame of the span")
+    end: IntProperty(name="Last Frame", description="Last frame of the span, inclusive")
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        """Ask for the span; suggest the preview range, if there is one."""
+        scene = context.scene
+        if scene.use_preview_range:
+            self.start, self.end = scene.frame_preview_start, scene.frame_preview_end
+        else:
+            self.start, self.end = self.default_span(scene)
+        outcome: set[str] = context.window_manager.invoke_props_dialog(self)
+        return outcome
+
+    def default_span(self, scene: bpy.types.Scene) -> tuple[int, int]:
+        """Return the span to suggest without a preview range: around the current frame."""
+        return scene.frame_current - 2, scene.frame_current + 2

@@ -1,0 +1,137 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Operators that change which keys a captured motion has: loop, key reduction, baking to a frame rate."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import bpy
+from bpy.props import BoolProperty, FloatProperty
+
+from ..captured_person import betas_of
+from .edit_base import EditOperator, SpanOperator
+
+if TYPE_CHECKING:
+    from ....solver.body import Body
+
+
+class SCOPE_OT_loop(SpanOperator):
+    """Find the best cycle within a span of frames, close it, and repeat it"""
+
+    bl_idname = "scope.loop"
+    bl_label = "Make Loop"
+
+    shortest: FloatProperty(
+        name="Shortest",
+        default=0.5,
+        min=0.1,
+        soft_max=5.0,
+        subtype="TIME_ABSOLUTE",
+        description="Minimum duration of the cycle in seconds",
+    )
+    blend: FloatProperty(
+        name="Blend",
+        default=0.2,
+        min=0.0,
+        soft_max=1.0,
+        subtype="TIME_ABSOLUTE",
+        description="Duration in seconds, at the end of the cycle, over which it is closed",
+    )
+    repeat: BoolProperty(
+        name="Repeat", default=True, description="Repeat the curves; each cycle starts where the previous one ended"
+    )
+
+    def default_span(self, scene: bpy.types.Scene) -> tuple[int, int]:
+        """Return the span to suggest without a preview range: the scene's frame range."""
+        return scene.frame_start, scene.frame_end
+
+    def edit(self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float) -> str:
+        """Replace the keys by those of the closed cycle."""
+        from ...edit.clip import Clip
+        from ...edit.loop import best_cycle, close_cycle
+        from ...scene.animation_data.actions import add_cycles
+        from ...scene.animation_data.timing import play_cycle
+        from ...scene.character.keys import location_path, read_clip, write_clip
+        from ...scene.character.root_object import clip_with_root_motion, remove_root_object
+
+        clip, frames = read_clip(armature, body, rate)
+        clip = clip_with_root_motion(armature, clip, frames)
+        betas = betas_of(armature, body)
+        cycle = best_cycle(clip, body, betas, self.start / rate, self.end / rate, self.shortest)
+        closed: Clip = close_cycle(clip, cycle, self.blend)
+        first, last = float(frames[cycle.first]), float(frames[cycle.last])
+        write_clip(armature, body, closed, frames[cycle.first : cycle.last + 1])
+        if self.repeat:
+            add_cycles(armature, offset_curves={(location_path(body), 0), (location_path(body), 1)})
+        play_cycle(context.scene, armature, math.ceil(first), math.floor(last) - 1)
+        remove_root_object(armature)
+        return f"Cycle of {closed.times[-1]:.2f} s; before closing, its ends were {100 * cycle.error_m:.1f} cm apart"
+
+
+class SCOPE_OT_reduce_keys(EditOperator):
+    """Remove keys within a maximum error"""
+
+    bl_idname = "scope.reduce_keys"
+    bl_label = "Reduce Keys"
+
+    degrees: FloatProperty(
+        name="Rotation",
+        default=0.5,
+        min=0.01,
+        soft_max=5.0,
+        max=45.0,
+        description="Maximum rotation error of a bone in degrees",
+    )
+    millimetres: FloatProperty(
+        name="Position",
+        default=2.0,
+        min=0.01,
+        soft_max=50.0,
+        max=1000.0,
+        description="Maximum position error of the pelvis in millimetres",
+    )
+
+    def edit(self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float) -> str:
+        """Remove keys bone by bone."""
+        from ...scene.character.keys import reduce_keys
+
+        betas = betas_of(armature, body)
+        found = reduce_keys(armature, body, betas, rate, math.radians(self.degrees), self.millimetres / 1000.0)
+        return (
+            f"Reduced {found.before} keys to {found.after}; maximum error {math.degrees(found.angle):.2f} degrees for "
+            f"bones, {1000 * found.joint_m:.1f} mm for joints"
+        )
+
+
+class SCOPE_OT_bake_rate(EditOperator):
+    """Replace the keys by keys at a constant frame rate"""
+
+    bl_idname = "scope.bake_rate"
+    bl_label = "Bake to Frame Rate"
+
+    rate: FloatProperty(
+        name="Keys per Second",
+        default=0.0,
+        min=0.0,
+        soft_max=120.0,
+        max=1000.0,
+        description="Frame rate of the keys; 0: one key on each frame of the scene",
+    )
+
+    def edit(self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float) -> str:
+        """Replace all keys; at the scene's frame rate, they are on whole frames."""
+        from ...edit.clip import resample
+        from ...scene.character.keys import bake_whole_frames, read_clip, write_clip
+
+        if self.rate > 0:
+            clip, frames = read_clip(armature, body, rate)
+            baked = resample(clip, self.rate)
+            write_clip(armature, body, baked, baked.times * rate)
+            before, after = len(frames), len(baked)
+        else:
+            before, after = bake_whole_frames(armature, body, rate)
+        return f"Replaced {before} keys by {after}"
+
+
+CLASSES = (SCOPE_OT_loop, SCOPE_OT_reduce_keys, SCOPE_OT_bake_rate)

@@ -1,0 +1,38 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Find the cycle of a walk and close it."""
+
+import numpy as np
+import pytest
+from scope.scope_addon.edit import loop
+from scope.scope_addon.edit.clip import Clip
+from scope.scope_addon.errors import UsageError
+from scope.solver.rotations import exp
+
+from .walking import BETAS, BODY, NAMES, walk
+
+
+def test_the_cycle_of_a_walk_is_found_and_closed():
+    clip = walk(5.0, period=1.1)
+    rng = np.random.default_rng(2)
+    noisy = Clip(clip.times, clip.rotations @ exp(0.02 * rng.standard_normal((len(clip), len(NAMES), 3))), clip.root)
+    found = loop.best_cycle(noisy, BODY, BETAS, 0.3, 4.7)
+    length = clip.times[found.last] - clip.times[found.first]
+    assert abs(length / 1.1 - round(length / 1.1)) < 0.05
+    assert found.error_m < 0.03
+    closed = loop.close_cycle(noisy, found)
+    np.testing.assert_allclose(closed.rotations[-1], closed.rotations[0], atol=1e-9)
+    assert closed.root[-1, 2] == pytest.approx(closed.root[0, 2])
+    travelled = closed.root[-1, 1] - closed.root[0, 1]
+    assert travelled == pytest.approx(-1.2 * length, abs=0.02)  # the way is kept
+    assert closed.times[0] == 0.0
+    with pytest.raises(UsageError, match="does not fit"):
+        loop.best_cycle(clip, BODY, BETAS, 0.0, 0.2)
+
+
+def test_a_cycle_that_turns_a_corner_closes_up_to_its_heading():
+    clip = walk(3.0)
+    turn = 0.5 * clip.times
+    clip.rotations[:, 0] = exp(turn[:, None] * [0, 0, 1.0]) @ clip.rotations[:, 0]
+    closed = loop.close_cycle(clip, loop.Cycle(10, 70, 0.0))
+    relative = closed.rotations[-1, 0] @ closed.rotations[0, 0].T
+    np.testing.assert_allclose(relative, exp([0, 0, 0.5 * 2.0]), atol=0.02)
