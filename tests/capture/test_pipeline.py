@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The main job on real footage with 3D truth and on our own clip with exact truth."""
+"""The main job on real footage with ground truth in 3D, and on our own clip with exact ground truth."""
 
 import json
 import os
@@ -87,7 +87,7 @@ def test_the_motion_is_complete_and_its_values_are_sane(sample):
     assert not np.array_equal(m.poses, m.poses_raw)
 
 
-def test_the_motion_says_which_gender_its_body_is_of(body):
+def test_the_motion_states_the_gender_of_its_body(body):
     options = CaptureOptions(quality="fast", wanted=VideoRange(end_s=0.05))
     assert capture(SAMPLE, replace(body, gender="female"), options).motions[0].gender == "female"
 
@@ -109,8 +109,8 @@ def evaluated(shared, body, camera, quality, folder):
 
 
 @pytest.mark.parametrize("quality", ["fast", "balanced"])
-def test_the_smaller_networks_do_not_flip_somebody_whose_face_is_blurred(shared, body, tmp_path, quality):
-    """BlazePose-full takes front for back, or left for right, in 29 % of this camera's frames."""
+def test_the_smaller_networks_do_not_flip_a_person_with_a_blurred_face(shared, body, tmp_path, quality):
+    """BlazePose-full confuses front and back, or left and right, in 29 % of this camera's frames."""
     figures = evaluated(shared, body, "cam2", quality, tmp_path)
     assert figures["coverage"] == 1.0
     assert figures["lr_swap"] + figures["mirror"] + figures["mirror_swap"] <= 0.01
@@ -148,13 +148,13 @@ def test_frames_without_the_person_are_filled_and_marked(body, tmp_path):
     assert any("8 of 30" in w or "9 of 30" in w or "10 of 30" in w for w in result.report["warnings"])
 
 
-def test_nobody_is_said_so(body, tmp_path):
+def test_footage_without_people_is_an_error(body, tmp_path):
     cv2.imwrite(str(tmp_path / "grey.png"), np.full((300, 400, 3), 100, np.uint8))
     with pytest.raises(NoPersonError, match="grey.png"):
         capture(tmp_path / "grey.png", body, CaptureOptions(quality="fast"))
 
 
-def test_threads_are_no_more_than_the_cores(body, tmp_path):
+def test_there_are_no_more_threads_than_cores(body, tmp_path):
     ok, frame = cv2.VideoCapture(str(SAMPLE)).read()
     assert ok
     cv2.imwrite(str(tmp_path / "person.png"), frame)
@@ -164,7 +164,7 @@ def test_threads_are_no_more_than_the_cores(body, tmp_path):
     assert [w for w in report["warnings"] if f"1000 threads were requested, but there are only {cores} cores" in w]
 
 
-def test_a_cancel_comes_through_and_leaves_no_thread(body):
+def test_a_cancel_is_raised_and_leaves_no_thread(body):
     def cancel(stage, done, total):
         if done >= 3:
             raise CancelledError("stopped")
@@ -179,13 +179,13 @@ def test_a_cancel_comes_through_and_leaves_no_thread(body):
     assert not left
 
 
-def test_a_motion_survives_its_file(sample, tmp_path):
+def test_a_motion_is_the_same_after_saving_and_loading(sample, tmp_path):
     sample.motions[0].save(tmp_path / "m.npz")
     assert np.array_equal(Motion.load(tmp_path / "m.npz").poses, sample.motions[0].poses)
 
 
-def test_feet_beside_the_picture_hold_nobody(shared, body, tmp_path):
-    """Squats, cut off at the hips: what is seen of her moves up and down, as in the picture."""
+def test_feet_outside_the_image_are_not_locked(shared, body, tmp_path):
+    """Squats, cut off at the hips: the visible part of the body moves up and down, as in the image."""
     clip = tmp_path / "hips.mp4"
     video = cv2.VideoCapture(str(shared / "data" / "clips" / "squats_5fps.mp4"))
     writer = cv2.VideoWriter(str(clip), cv2.VideoWriter.fourcc(*"mp4v"), 5, (720, 600))
@@ -201,7 +201,7 @@ def test_feet_beside_the_picture_hold_nobody(shared, body, tmp_path):
     assert motion.residual_px[motion.valid].max() < 10
 
 
-def test_whose_hands_were_not_found_is_told(shared):
+def test_a_warning_names_the_person_without_hands(shared):
     clip, body = shared / "data" / "clips" / "two_people_portrait.mp4", load_body("scope_h")
     options = CaptureOptions(quality="fast", people=2, hands=True, wanted=VideoRange(0.0, 0.5, None))
     report = capture(clip, body, options).report

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A real clip of a camera on a stand, filmed again by a virtual camera that pans: the world must stay the same."""
+"""A real clip of a static camera, filmed again by a virtual camera that pans: the world must stay the same."""
 
 import cv2
 import numpy as np
@@ -13,7 +13,7 @@ START, FRAMES, WIDTH, HEIGHT, FOV = 130, 50, 960, 540, 60.0
 
 
 def film(source, path, turn):
-    """Write a clip: each frame as a camera sees it that has turned by turn(k) (rotation vector) from the stand's."""
+    """Write a clip with each frame as seen by a camera rotated by turn(k) (rotation vector)."""
     reader = cv2.VideoCapture(str(source))
     reader.set(cv2.CAP_PROP_POS_FRAMES, START)
     out = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*"mp4v"), 30, (WIDTH, HEIGHT))
@@ -27,7 +27,7 @@ def film(source, path, turn):
     out.release()
 
 
-def test_the_world_of_a_panning_camera_stands_still(shared, tmp_path):
+def test_the_world_of_a_panning_camera_does_not_move(shared, tmp_path):
     clip = shared / "data" / "clips" / "walk_side_static.mp4"
     pan = np.array([0.02, 0.10, 0.01])
     film(clip, tmp_path / "stand.mp4", lambda k: 0 * pan)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Axis conventions against facts that can be said in words."""
+"""Axis conventions against facts stated in words."""
 
 import numpy as np
 import pytest

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a long clip keeps of every frame is small, and as good as what was computed."""
+"""Per-frame results of long clips take little memory and lose no relevant accuracy."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Record:
     name: str
 
 
-def test_only_what_is_large_is_rounded() -> None:
+def test_only_large_arrays_are_rounded() -> None:
     rng = np.random.default_rng(0)
     record = Record(
         rng.normal(0, 5, (50, 33, 3)), rng.normal(0, 5, (50, 3)), np.arange(50) / 30, np.arange(400).reshape(50, 8), "a"
@@ -49,7 +49,7 @@ def walk(frames: int) -> tuple[Track, FittedTrack]:
     return track, FittedTrack(exp(pose), root, np.zeros(body.P), valid, np.ones((frames, body.K + 1)), 1.0)
 
 
-def test_a_compact_fit_is_placed_within_a_hundredth_of_a_millimetre() -> None:
+def test_a_fit_in_single_precision_is_placed_within_a_hundredth_of_a_millimetre() -> None:
     body, (track, fitted) = load_body("scope"), walk(120)
     exact, small = place_track(body, track, fitted, True), place_track(body, track, to_single_precision(fitted), True)
     np.testing.assert_allclose(small.joints, exact.joints, atol=1e-5)
@@ -59,7 +59,7 @@ def test_a_compact_fit_is_placed_within_a_hundredth_of_a_millimetre() -> None:
     np.testing.assert_allclose(small.joints, joints, atol=1e-5)
 
 
-def test_placing_a_long_clip_takes_few_kilobytes_a_frame() -> None:
+def test_placing_a_long_clip_takes_few_kilobytes_per_frame() -> None:
     body, count = load_body("scope"), 30_000
     track, fitted = walk(count)
     fitted = to_single_precision(fitted)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Smoothing against the frequency response it promises, and gaps against known in-betweens."""
+"""Smoothing against its documented frequency response, and gaps against known values."""
 
 import numpy as np
 import pytest
@@ -36,7 +36,7 @@ def test_constants_and_slow_motion_pass():
     assert np.abs(gaussian_smooth(slow[:, None], times, 6)[20:-20, 0] - slow[20:-20]).max() < 0.01
 
 
-def test_uneven_times_count_as_they_are():
+def test_uneven_times_need_no_resampling():
     rng = np.random.default_rng(0)
     times = np.cumsum(rng.uniform(0.002, 0.015, 2000))
     wave = np.sin(2 * np.pi * 3 * times)
@@ -45,8 +45,8 @@ def test_uneven_times_count_as_they_are():
     assert abs((smooth @ wave[200:-200]) / (wave[200:-200] @ wave[200:-200]) - expected) < 0.03
 
 
-def test_a_stretch_of_many_frames_a_second_is_smoothed_as_if_all_of_it_were_such():
-    """As telephones film: most of a clip at 24 frames a second, a part of it at 120."""
+def test_a_part_with_a_higher_frame_rate_is_smoothed_like_a_clip_of_that_rate():
+    """As recorded by phones: most of a clip at 24 frames per second, a part of it at 120."""
     dense = np.arange(10, 12, 1 / 120)
     noise = np.random.default_rng(3).normal(size=len(dense))
     times = np.concatenate([np.arange(0, 10, 1 / 24), dense])
@@ -65,7 +65,7 @@ def test_rotations_stay_rotations_and_cross_pi_without_a_jump():
     assert steps.max() < 2.0 * (4 * np.pi / 239)
 
 
-def test_the_root_keeps_its_place_in_the_picture_while_depth_is_smoothed():
+def test_the_root_keeps_its_image_position_while_depth_is_smoothed():
     times = np.arange(120) / 30
     depth = 4 + 0.3 * np.random.default_rng(2).normal(size=120)
     root = np.stack([0.2 * depth, -0.1 * depth, depth], 1)
@@ -75,7 +75,7 @@ def test_the_root_keeps_its_place_in_the_picture_while_depth_is_smoothed():
     assert smooth[20:-20, 2].std() < 0.35 * depth.std()
 
 
-def test_gaps_are_filled_by_time_and_held_at_the_ends():
+def test_gaps_are_interpolated_in_time_and_extended_at_the_ends():
     times = np.array([0, 1, 2, 4, 5.0])
     valid = np.array([False, True, False, True, False])
     got = fill_gaps(np.array([[9.0], [1], [9], [4], [9]]), valid, times)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The cheapest path against all there are."""
+"""The path with the least cost, against all possible paths."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ def test_no_other_path_costs_less(count: int, states: int, barred: float) -> Non
         assert tuple(least_cost_path(costs, switching)) == expected
 
 
-def test_of_equals_the_lower_states() -> None:
+def test_ties_are_resolved_to_lower_states() -> None:
     assert least_cost_path(np.zeros((4, 3)), np.zeros((3, 3, 3))).tolist() == [0, 0, 0, 0]
 
 
-def test_nothing() -> None:
+def test_no_frames() -> None:
     assert least_cost_path(np.zeros((0, 3)), np.zeros((0, 3, 3))).shape == (0,)

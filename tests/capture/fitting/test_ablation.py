@@ -11,16 +11,16 @@ from scope.solver import Weights
 WEIGHTS = Weights(keypoints2d=1e5, keypoints3d=100.0, orientation_field=400.0, joint_prior=3.0)
 
 
-def test_all_parts_change_no_weight() -> None:
+def test_no_ablation_changes_no_weight() -> None:
     assert NO_ABLATION.weights(WEIGHTS) == WEIGHTS
 
 
 @pytest.mark.parametrize("name", ["keypoints3d", "orientation_field", "joint_prior"])
-def test_what_is_left_out_weighs_nothing_and_the_rest_stays(name: str) -> None:
+def test_a_term_left_out_has_weight_zero_and_the_others_keep_theirs(name: str) -> None:
     found = Ablation(**{name: False}).weights(WEIGHTS)
     assert found == dataclasses.replace(WEIGHTS, **{name: 0.0})
 
 
-def test_some_source_of_depth_has_to_stay() -> None:
+def test_a_source_of_depth_is_required() -> None:
     with pytest.raises(UsageError, match="without either, depth is unknown"):
         Ablation(lifter=False, world_landmarks=False)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The focal length by fits: the body itself before cameras that are known, and our own clip with exact truth."""
+"""The focal length from fits: the body itself in front of known cameras, and our own clip with exact ground truth."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ POSES = [  # axis-angle of joints; arms and legs reach towards the camera and aw
 
 
 def observe(body, pose, ratio: float, distance_m: float, pitch: float = 0.35) -> Observation:
-    """The body by a camera of ``ratio`` times the assumed focal length, that looks down on it."""
+    """The body seen by a camera with ``ratio`` times the assumed focal length that looks down on it."""
     rotations = np.tile(np.eye(3), (body.K + 1, 1, 1))
     rotations[0] = exp([pitch, 0, 0]) @ np.diag([1.0, -1.0, -1.0])
     for joint, vector in pose.items():
@@ -50,8 +50,8 @@ def found(body, ratio: float, distance_m: float):
     return camera_by_fits(ASSUMED, ASSUMED, costs, float(HEIGHT))
 
 
-def test_who_is_near_tells_the_focal_length(body):
-    """1.3 m from the camera at half the focal length fills as much of the picture as 2.6 m at the whole one."""
+def test_a_nearby_person_determines_the_focal_length(body):
+    """At 1.3 m and half the focal length, a person is as large in the image as at 2.6 m and the full one."""
     ratios = [0.6, 1.0, 1.6]
     log_f = [np.log(found(body, ratio, 2.2 * ratio).intrinsics[0, 0] / ASSUMED.intrinsics[0, 0]) for ratio in ratios]
     assert log_f[0] < log_f[1] - 0.1 < log_f[2] - 0.2
@@ -59,13 +59,13 @@ def test_who_is_near_tells_the_focal_length(body):
     assert np.square(after).mean() < 0.7 * np.square(before).mean()
 
 
-def test_who_is_far_tells_nothing(body):
+def test_a_distant_person_does_not_change_the_focal_length(body):
     camera = found(body, 8.0, 60.0)
     assert abs(np.log(camera.intrinsics[0, 0] / ASSUMED.intrinsics[0, 0])) < 0.15
     assert 0.2 < camera.focal_deviation <= 0.25
 
 
-def test_edges_that_tell_more_are_believed_more(body):
+def test_a_more_certain_estimate_from_edges_weighs_more(body):
     costs = [FocalFits(body).costs(observe(body, POSES[0], 0.6, 1.3), ASSUMED)]
     sure = camera_by_fits(ASSUMED, ASSUMED, costs, float(HEIGHT))
     by_edges = type(ASSUMED)(ASSUMED.intrinsics, ASSUMED.dist, "estimated", 0.03)
@@ -78,20 +78,20 @@ def test_edges_that_tell_more_are_believed_more(body):
 
 
 @pytest.mark.parametrize(("seconds", "least", "most"), [(0.01, 1, 1), (1.5, 3, 5), (60.0, 7, 10), (3600.0, 13, 16)])
-def test_an_hour_takes_little_more_than_a_minute(body, seconds, least, most):
+def test_an_hour_takes_few_more_fits_than_a_minute(body, seconds, least, most):
     fits = FocalFits(body)
     due = [k for k in range(int(30 * seconds) + 1) if fits.is_due(7.0 + k / 30)]
     assert due[0] == 0
     assert least <= len(due) <= most
 
 
-def test_what_is_not_finite_tells_nothing(body):
+def test_an_observation_that_is_not_finite_has_no_costs(body):
     observation = observe(body, POSES[0], 1.0, 3.0)
     observation.keypoints_px[3] = np.nan
     assert FocalFits(body).costs(observation, ASSUMED) is None
 
 
-def test_a_given_focal_length_is_not_looked_for(body, monkeypatch):
+def test_a_given_focal_length_is_not_estimated(body, monkeypatch):
     def never(*_):
         raise AssertionError("a fit of a camera that is known")
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The focal length by edges: drawn boxes seen by a known camera, and real pictures whose calibration is known."""
+"""The focal length from edges: drawn boxes seen by a known camera, and real images with known calibration."""
 
 import json
 
@@ -17,7 +17,7 @@ ASSUMED = choose_camera(WIDTH, HEIGHT).intrinsics[0, 0]
 
 
 def room(focal_px, R_camera_room, clutter=20, seed=0):
-    """A picture of edges along three directions at right angles, with clutter in any direction."""
+    """An image of edges along three orthogonal directions, with clutter in any direction."""
     rng = np.random.default_rng(seed)
     K = pinhole(WIDTH, HEIGHT, focal_px)
     picture = np.full((HEIGHT, WIDTH, 3), 120, np.uint8)
@@ -47,14 +47,14 @@ def found(picture):
 
 @pytest.mark.parametrize("ratio", [0.7, 1.0, 1.4])
 @pytest.mark.parametrize("turn", [[0.1, 0.6, 0.0], [-0.15, -0.5, 0.1]])
-def test_a_room_seen_across_its_corner_tells_the_focal_length(ratio, turn):
+def test_a_room_seen_across_its_corner_determines_the_focal_length(ratio, turn):
     R = exp([turn[0], 0, 0]) @ exp([0, 0, turn[2]]) @ exp([0, turn[1], 0])
     estimate = found(room(ratio * ASSUMED, R))
     assert estimate.focal_px == pytest.approx(ratio * ASSUMED, rel=0.05)
     assert abs(np.log(estimate.focal_px / (ratio * ASSUMED))) < 3 * estimate.deviation + 0.01
 
 
-def test_a_wall_seen_straight_on_tells_nothing():
+def test_a_wall_seen_frontally_gives_no_estimate():
     wall = np.full((HEIGHT, WIDTH, 3), 120, np.uint8)
     for k in range(12):
         cv2.line(wall, (60 + 100 * k, 80), (60 + 100 * k, 640), (30, 30, 30), 3)
@@ -63,8 +63,8 @@ def test_a_wall_seen_straight_on_tells_nothing():
 
 
 @pytest.mark.parametrize("ratio", [0.5, 1.0, 2.0])
-def test_level_edges_count_at_every_focal_length_where_none_is_upright(ratio):
-    """Else a focal length at which two edges happen to meet straight above would have nothing to compare with."""
+def test_horizontal_edges_count_at_every_focal_length_without_vertical_ones(ratio):
+    """Otherwise, a focal length at which two edges happen to meet vertically above would have no competitor."""
     floor = np.full((HEIGHT, WIDTH, 3), 120, np.uint8)
     for y in (380, 400, 470, 690):
         cv2.line(floor, (40, y), (1240, y), (30, 30, 30), 3)
@@ -76,13 +76,13 @@ def test_level_edges_count_at_every_focal_length_where_none_is_upright(ratio):
     assert edges.support(ratio * ASSUMED) > 0.95 * edges.weight[level].sum()
 
 
-def test_nothing_tells_nothing():
+def test_no_edges_give_no_estimate():
     assert focal_from_edges(Segments.none(), WIDTH, HEIGHT, ASSUMED) is None
     assert found(np.full((HEIGHT, WIDTH, 3), 90, np.uint8)) is None
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_rubbish_tells_nothing(seed):
+def test_random_edges_give_no_estimate(seed):
     rng = np.random.default_rng(seed)
     scribble = np.full((HEIGHT, WIDTH, 3), 120, np.uint8)
     for _ in range(80):
@@ -94,7 +94,7 @@ def test_rubbish_tells_nothing(seed):
 
 @pytest.mark.parametrize("number", [1, 2, 3, 4])
 def test_real_cameras(shared, number):
-    """Four pictures of a laboratory; one of them shows too few edges across, which must not be taken for knowledge."""
+    """Four images of a laboratory; one of them has too few edges in depth and must not give an estimate."""
     folder = shared / "data" / "pose2sim"
     ok, picture = cv2.VideoCapture(str(folder / f"cam{number}.mp4")).read()
     assert ok

@@ -1,18 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where lifted points lie in the camera, against the least squares that the module promises."""
+"""The position of lifted points in the camera, against the module's least-squares problem."""
 
 import numpy as np
 from scope.scope_addon.capture.fitting.frame_measurements import place
 
 
-def test_points_come_to_where_they_were_seen():
+def test_points_move_onto_their_lines_of_sight():
     rng = np.random.default_rng(0)
     points, t = rng.normal(scale=0.5, size=(33, 3)), np.array([0.4, -0.2, 4.0])
     seen = points + t
     np.testing.assert_allclose(place(points, seen[:, :2] / seen[:, 2:], rng.uniform(size=33)), t, atol=1e-9)
 
 
-def test_points_that_contradict_each_other_count_by_their_confidence():
+def test_contradicting_points_are_weighted_by_confidence():
     rng = np.random.default_rng(1)
     points, rays, confidence = rng.normal(size=(33, 3)), rng.normal(scale=0.2, size=(33, 2)), rng.uniform(size=33)
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hands in the solver: from the keypoints of a known pose the fingers come back; without any they keep calm."""
+"""Hands in the solver: the fingers of a known pose are recovered; unseen fingers move smoothly."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def points_of(body, state):
 
 
 def line_of_sight(points):
-    """(3, 3) rotation from the camera's axes to those that look at the middle of the points, without roll."""
+    """(3, 3) rotation from camera axes to axes that look at the centre of the points, without roll."""
     z = points.mean(axis=0) / points[:, 2].mean()
     z = z / np.linalg.norm(z)
     x = np.cross([0.0, 1.0, 0.0], z)
@@ -71,7 +71,7 @@ def line_of_sight(points):
 
 
 def hands_of(body, points):
-    """(2, 21, 6) what a perfect network would say of both hands: world landmarks as seen along its line of sight."""
+    """(2, 21, 6) the output of a perfect network for both hands: world landmarks in the axes of the line of sight."""
     hands = np.zeros((2, HAND_POINTS, 6))
     for side, name in enumerate(SIDES):
         at = [body.keypoint_names.index(n) for n in HAND_KEYPOINT_NAMES if n.startswith(f"hand/{name}")]
@@ -100,12 +100,12 @@ def fitted(body, measured):
 
 
 def bends(body, Omega, side):
-    """(12,) bend of each finger joint in radians: the part of its rotation vector about the body's z axis."""
+    """(12,) flexion of each finger joint in radians: its rotation vector's component about the body's z axis."""
     sign = -1.0 if side == "left" else 1.0
     return sign * log(Omega[np.array(finger_joints(body, side)[:12]) - 1])[:, 2]
 
 
-def test_the_fingers_of_a_known_pose_come_back(body):
+def test_the_fingers_of_a_known_pose_are_recovered(body):
     truth = somebody(body, grips=(0.8, 0.3))
     points = points_of(body, truth)
     found = fitted(body, measure(body, points, hands_of(body, points)))
@@ -119,7 +119,7 @@ def test_the_fingers_of_a_known_pose_come_back(body):
         assert np.linalg.norm(ours - (t[joints] - t[wrist]), axis=1).mean() < 0.008  # metres
 
 
-def test_a_hand_that_is_not_seen_says_nothing(body):
+def test_a_hand_that_is_not_seen_adds_no_measurements(body):
     points = points_of(body, somebody(body, grips=(0.8, 0.8)))
     hands = hands_of(body, points)
     hands[1] = 0.0
@@ -133,7 +133,7 @@ def test_a_hand_that_is_not_seen_says_nothing(body):
     assert bends(body, found.state.Omega, "left").mean() > 0.6
 
 
-def test_the_palm_turns_the_wrist(body):
+def test_the_palm_determines_the_wrists_rotation(body):
     truth = somebody(body, grips=(0.2, 0.2))
     wrist = body.joint_names.index("left_wrist")
     truth.Omega[wrist - 1] = exp([0.7, 0.0, 0.3])
@@ -145,7 +145,7 @@ def test_the_palm_turns_the_wrist(body):
     assert np.linalg.norm(log(R.T @ found.R_camera_part[wrist])) < 0.2
 
 
-def test_directions_are_turned_from_the_line_of_sight_to_the_cameras_axes(body):
+def test_directions_are_rotated_from_the_line_of_sight_to_camera_axes(body):
     points = points_of(body, somebody(body, grips=(0.5, 0.5)))
     hands = hands_of(body, points)
     measurer = HandMeasurer(body, K)
@@ -180,7 +180,7 @@ def _bent(Omega, P) -> Part:
     return Part(np.eye(3), np.zeros(3), np.zeros((3, P)), Omega, np.eye(3), np.zeros(3), np.zeros(P))
 
 
-def test_unseen_fingers_are_carried_over_short_gaps_and_rest_in_long_ones(body):
+def test_unseen_fingers_are_interpolated_over_short_gaps_and_rest_in_long_ones(body):
     T = 240
     times = np.arange(T) / 30.0
     rotations = np.tile(np.eye(3), (T, body.K + 1, 1, 1))
@@ -213,7 +213,7 @@ def test_fingers_of_a_long_clip_take_no_more_memory_than_the_clip(body):
     assert most < 4 * rotations.nbytes
 
 
-def test_confidence_of_fingers_is_that_of_the_hand_and_nothing_elsewhere(body):
+def test_fingers_have_the_confidence_of_the_hand_and_other_joints_none(body):
     hands = np.zeros((3, 2, HAND_POINTS, 6))
     hands[1, 0, :, 2] = 0.8
     confidence = HandMeasurer(body, K).joint_confidence(hands)
@@ -229,7 +229,7 @@ def test_a_body_without_fingers_is_refused():
         require_fingers(load_body("scope"))
 
 
-def test_tracks_keep_hands_in_their_rows_and_exchange_them_with_left_and_right():
+def test_tracks_keep_hands_in_their_rows_and_swap_them_with_left_and_right():
     tracklet = Tracklet()
     for row in (1, 2):
         hands = np.zeros((2, HAND_POINTS, 6))

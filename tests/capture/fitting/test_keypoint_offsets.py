@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where the landmark network sees keypoints: on both sides alike, and nearer to it on people whom nobody asked."""
+"""Keypoint offsets: symmetric, recovered if known, and an improvement on people they were not estimated from."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def test_left_and_right_are_mirror_images(body):
             np.testing.assert_allclose(left, right * [-1, 1, 1], atol=2e-5, err_msg=name)
 
 
-def test_only_what_networks_see_moves(body):
+def test_only_the_networks_keypoints_move(body):
     seen, at = with_keypoint_offsets(body), body.keypoint_set("blazepose")
     moved = np.flatnonzero((seen.keypoint_template != body.keypoint_template).any(axis=1))
     np.testing.assert_array_equal(moved, sorted(at.values()))
@@ -64,8 +64,8 @@ def left_over_px(body: Body, motion: Motion) -> float:
     return float(np.median(np.concatenate(found)))
 
 
-def test_what_a_network_without_depth_sees_is_not_displaced(body):
-    """Nobody knows where another network sees hips."""
+def test_keypoints_of_a_network_without_depth_get_no_offsets(body):
+    """The offsets of other networks are unknown."""
     camera = choose_camera(1280, 720)
     pixels, world = someone_walking(3, 30.0, 0.4)
     track = track_without_depth(pixels, 30.0, {})
@@ -74,8 +74,8 @@ def test_what_a_network_without_depth_sees_is_not_displaced(body):
         np.testing.assert_array_equal(prepared.body.keypoint_template, which.keypoint_template)
 
 
-def test_a_hip_is_as_sure_as_the_knee_that_shows_it(body):
-    """Keypoints at joints, wherever they are seen, do not tell how these turn; what lies further down does."""
+def test_a_hip_is_as_confident_as_the_knee_that_determines_its_rotation(body):
+    """Keypoints at joints do not determine the rotation of these joints; keypoints further down the chain do."""
     measurer = Measurer(with_keypoint_offsets(body), choose_camera(1280, 720).intrinsics)
     hidden = np.array([any(part in name for part in ("knee", "ankle", "heel", "foot")) for name in BLAZEPOSE])
     confidence = np.ones((1, len(BLAZEPOSE)))
@@ -86,14 +86,14 @@ def test_a_hip_is_as_sure_as_the_knee_that_shows_it(body):
 
 
 class Recorded(SimpleNamespace):
-    """What of a motion tells where keypoints were seen."""
+    """The part of a motion from which keypoint offsets are estimated."""
 
     def __len__(self) -> int:
         return len(self.poses)
 
 
-def test_displaced_keypoints_are_found_where_they_were_put(body):
-    """On a body that turns before the camera, its keypoints seen some centimetres off, on both sides alike."""
+def test_known_offsets_are_recovered(body):
+    """On a body that turns in front of the camera, with keypoints displaced symmetrically by some centimetres."""
     rng = np.random.default_rng(2)
     displaced = {name: rng.normal(0, 0.012, 3) for name in BLAZEPOSE if "right" not in name}
     displaced["nose"][0] = 0.0
@@ -126,7 +126,7 @@ def test_displaced_keypoints_are_found_where_they_were_put(body):
 
 
 @pytest.mark.parametrize("camera", ["cam1", "cam3"])
-def test_a_body_covers_a_man_better_of_whom_the_offsets_know_nothing(shared, body, camera):
+def test_offsets_lower_the_reprojection_error_of_a_man_they_were_not_estimated_from(shared, body, camera):
     video, wanted = shared / "data" / "pose2sim" / f"{camera}.mp4", VideoRange(end_s=0.6)
     left_over = []
     for which, ablation in ((body, Ablation(keypoint_offsets=False)), (with_keypoint_offsets(body), Ablation())):

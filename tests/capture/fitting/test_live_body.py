@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The body in single frames, on our own clip with exact truth."""
+"""The body in single frames, on our own clip with exact ground truth."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def silhouette(image, vertices, body, camera) -> np.ndarray:
     return drawn.max(axis=2) > 60
 
 
-def test_the_body_lies_where_the_truth_has_it(watched, body):
+def test_the_body_covers_the_true_joints(watched, body):
     truth = np.load(SAMPLE.with_name("sample_truth.npz"))
     _, seen = watched
     assert len(seen) >= 5
@@ -59,7 +59,7 @@ def test_watching_changes_nothing(watched, body):
         np.testing.assert_array_equal(getattr(alone, name), getattr(watched[0].motions[0], name))
 
 
-def test_the_result_does_not_depend_on_how_fast_the_threads_are(watched, body, monkeypatch):
+def test_the_result_does_not_depend_on_the_speed_of_the_threads(watched, body, monkeypatch):
     class Slow(LiveBody):
         def load(self):
             time.sleep(0.5)
@@ -78,7 +78,7 @@ def test_the_result_does_not_depend_on_how_fast_the_threads_are(watched, body, m
         np.testing.assert_array_equal(getattr(slowly, name), getattr(watched[0].motions[0], name))
 
 
-def test_a_failure_beside_is_not_lost(body, monkeypatch):
+def test_an_error_in_a_parallel_thread_is_raised(body, monkeypatch):
     def broken(*_):
         raise ValueError("no edges today")
 

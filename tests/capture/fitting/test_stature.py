@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Heights that are known: the mesh's own extent, and the size and distance of captured people."""
+"""Known heights: the extent of the mesh, and the size and distance of captured people."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ SAMPLE = ASSETS / "sample" / "sample.mp4"
 
 
 @pytest.mark.parametrize("height_m", [1.3, 1.55, 1.7, 1.95, 2.1])
-def test_of_all_shapes_of_a_height_the_most_common_one_is_expected(height_m):
+def test_the_mean_is_the_most_probable_shape_of_a_height(height_m):
     body = load_body("scope")
     priors = with_stature(default_priors(body), body, height_m)
     betas = np.asarray(priors.shape_mean)
@@ -32,13 +32,13 @@ def test_of_all_shapes_of_a_height_the_most_common_one_is_expected(height_m):
     ("height_m", "says"),
     [(0.3, "nobody is 30 cm"), (np.nan, "nan"), (1.0, "can be 127 to 213 cm"), (2.5, "not 250"), (-1.8, "-180")],
 )
-def test_heights_of_nobody_are_refused(height_m, says):
+def test_impossible_heights_are_refused(height_m, says):
     with pytest.raises(UsageError, match=says):
         check_options(load_body("scope"), CaptureOptions(heights_m=(1.8, height_m)))
 
 
 def test_a_known_height_sets_size_and_distance():
-    """The same pixels of somebody a quarter taller come from somebody a quarter farther away."""
+    """If a person is a quarter taller, the same pixels mean a quarter more distance."""
     body = load_body("scope")
     found = {}
     for height_m in (1.5, 1.9):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Both fits of a track work from one preparation."""
+"""Both fits of a track, from one preparation."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from dataclasses import replace
 import numpy as np
 from scope.scope_addon.capture.camera.intrinsics import choose_camera
 from scope.scope_addon.capture.fitting import track_fit
-from scope.scope_addon.capture.fitting.frame_sequence import FittedTrack, with_same_rotations
+from scope.scope_addon.capture.fitting.frame_sequence import FittedTrack
 from scope.scope_addon.capture.fitting.keypoint_offsets import with_keypoint_offsets
 from scope.scope_addon.capture.fitting.prepared_track import Stance, prepare_track
 from scope.scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES
 from scope.scope_addon.capture.perception.lifter import Lifted, Lifter
 from scope.scope_addon.capture.tracking.track import Track
 from scope.scope_addon.capture.world.placement import place_track
-from scope.solver import State, load_body
+from scope.solver import load_body
 from scope.solver.rotations import exp
 
 FRAMES = 4
@@ -23,7 +23,7 @@ FEET = np.array([1.0, 1.0, 1.0, 1.0, 0.0, 0.0])  # stand, and hands do not
 
 
 def _standing_track(body, camera, bent=()) -> Track:
-    """A person in the rest pose, but for ``bent`` (joint, radians about x), upright, 4 m in front of the camera."""
+    """A person upright, 4 m in front of the camera, in the rest pose except for ``bent`` (joint, radians about x)."""
     flip = np.diag([1.0, -1.0, -1.0])  # body y up, OpenCV y down
     rotations = np.tile(np.eye(3), (1, body.K + 1, 1, 1))
     rotations[:, 0] = flip
@@ -47,7 +47,7 @@ def _standing_track(body, camera, bent=()) -> Track:
 
 
 def _stance(fit: FittedTrack, contact: float = 0.0, floor_m: float = 0.0) -> Stance:
-    """The pelvis where it was fitted; feet that stand so surely on a level floor so far below the camera."""
+    """The fitted pelvis, and a floor ``floor_m`` below the camera with this contact probability of the feet."""
     return Stance(
         root_cam=fit.t_camera_root,
         turn=np.tile(np.eye(3), (FRAMES, 1, 1)),
@@ -79,8 +79,8 @@ def test_the_lifting_network_runs_once_for_both_fits(monkeypatch):
     assert abs(placed.joints[:, 0, 2].mean() - 4.0) < 0.6  # metres; one view tells the distance by the body's size
 
 
-def test_who_is_nearer_than_it_seemed_is_smaller():
-    """A floor that others stand on tells the distance, and with it the size: the picture stays the same."""
+def test_a_person_nearer_than_first_estimated_is_smaller():
+    """The floor that others stand on determines the distance, and so the size; the image stays the same."""
     body, camera = load_body("scope"), choose_camera(1080, 1920)
     prepared = prepare_track(body, _standing_track(body, camera), camera)
     first = track_fit.fit_track(prepared, lambda *_: None)
@@ -97,8 +97,8 @@ def test_who_is_nearer_than_it_seemed_is_smaller():
         assert abs(leg(second) / leg(first) / moved - 1) < 0.03
 
 
-def test_a_limb_goes_where_it_is_seen_to_go_for_sure_and_was_there_before():
-    """A leg before the body looks as one behind it, and the first frames are believed to show the wrong one."""
+def test_a_confident_direction_corrects_a_limb_in_earlier_frames_as_well():
+    """A leg in front of the body looks like one behind it, and the first frames are lifted to the wrong one."""
     body, camera = load_body("scope"), choose_camera(1080, 1920)
     track = _standing_track(body, camera, (("right_hip", 0.3), ("right_knee", 0.9)))
     prepared = prepare_track(body, track, camera)
@@ -120,29 +120,8 @@ def test_a_limb_goes_where_it_is_seen_to_go_for_sure_and_was_there_before():
             np.testing.assert_allclose(joints[:, k, 2] - joints[:, at_hip, 2], there, atol=0.2)
 
 
-def test_a_frame_is_turned_as_the_one_before_was():
-    rng = np.random.default_rng(0)
-    body = load_body("scope")
-
-    def state() -> State:
-        return State(
-            exp(rng.standard_normal(3)), rng.standard_normal(3), exp(rng.standard_normal((body.K, 3))), np.zeros(body.P)
-        )
-
-    before, now, after = state(), state(), state()
-    same = with_same_rotations(now, before, before)
-    np.testing.assert_allclose(same.Omega, now.Omega, atol=1e-12)
-    there = with_same_rotations(before, before, after)
-    np.testing.assert_allclose(there.Omega, after.Omega, atol=1e-12)
-    np.testing.assert_allclose(there.R_camera_root, after.R_camera_root, atol=1e-12)
-    np.testing.assert_array_equal(there.t_camera_root, before.t_camera_root)
-    turned = with_same_rotations(now, before, after)  # by the same rotation, in the parent's axes
-    by = turned.Omega @ np.swapaxes(now.Omega, 1, 2)
-    np.testing.assert_allclose(by, after.Omega @ np.swapaxes(before.Omega, 1, 2), atol=1e-12)
-
-
-def test_of_two_ways_to_bend_a_leg_frames_go_on_with_that_of_the_frame_before():
-    """All first fits have it on the wrong side; the first frame is then told better, the others nothing of depth."""
+def test_with_an_ambiguous_leg_frames_keep_the_pose_of_the_previous_frame():
+    """At first, all frames have the leg on the wrong side; then one is lifted correctly, the others without depth."""
     body, camera = load_body("scope"), choose_camera(1080, 1920)
     track = _standing_track(body, camera, (("right_hip", 0.3), ("right_knee", 0.9)))
     prepared = prepare_track(body, track, camera)
@@ -169,8 +148,8 @@ def test_of_two_ways_to_bend_a_leg_frames_go_on_with_that_of_the_frame_before():
     np.testing.assert_allclose(ahead(second), there, atol=0.2)
 
 
-def test_a_leg_at_a_wrong_depth_is_drawn_to_the_floor_where_it_stands_and_only_there():
-    """Seen from above, a foot that was lifted too near hangs in the air; the picture alone does not tell."""
+def test_a_leg_at_a_wrong_depth_moves_to_the_floor_only_while_in_contact():
+    """Seen from above, a foot lifted too near is in the air; the image alone does not show this."""
     body, camera = load_body("scope"), choose_camera(1080, 1920)
     down = exp(np.array([0.35, 0.0, 0.0]))  # the camera looks down on the person
     level = _standing_track(body, camera)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Weight over feet: bodies that lean away from the camera, and some that may."""
+"""Balance: bodies that lean away from the camera, some of which may."""
 
 import numpy as np
 import pytest
@@ -16,7 +16,7 @@ FEET = np.tile([1.0, 1.0, 1.0, 1.0, 0.0, 0.0], (T, 1))  # stand, and hands do no
 
 
 def standing(lean_deg=0.0, axis=(1.0, 0.0, 0.0), speed_m_s=0.0, arms=(0.0, 0.0, 60.0), bends=()):
-    """A person who stands 4 m away with arms down, leaning as a whole about the feet; gliding along if so asked.
+    """A person standing 4 m away with arms down, leaning as a whole about the feet, and moving at ``speed_m_s``.
 
     ``arms``: the right shoulder's axis-angle, degrees; the left one mirrors it. ``bends``: of both hips, knees and so
     on, degrees about the joint's x axis.
@@ -63,7 +63,7 @@ def test_the_center_of_mass_is_that_of_the_volume():
 
 
 @pytest.mark.parametrize("lean", [-20.0, 20.0])
-def test_who_would_fall_is_turned_back_over_the_feet(lean):
+def test_a_body_out_of_balance_is_rotated_back_over_the_feet(lean):
     placed = standing(lean)
     turn, pivot = balancing_rotations(placed, FEET, UP)
     angle = turned_deg(turn)[T // 2]
@@ -75,16 +75,16 @@ def test_who_would_fall_is_turned_back_over_the_feet(lean):
     assert abs(after) < 0.75 * abs(before)
 
 
-def test_who_stands_upright_is_left_alone():
+def test_an_upright_body_is_not_rotated():
     assert np.abs(turned_deg(balancing_rotations(standing(), FEET, UP)[0])).max() < 1.0
 
 
-def test_a_lean_across_the_line_of_sight_is_seen_and_left_alone():
+def test_a_lean_across_the_line_of_sight_is_not_corrected():
     turn, _ = balancing_rotations(standing(20.0, axis=(0.0, 0.0, 1.0)), FEET, UP)
     assert np.abs(rotations.log(turn)).max() < np.radians(1.0)
 
 
-def test_who_moves_or_flies_is_left_alone():
+def test_a_body_that_moves_or_is_in_the_air_is_not_rotated():
     turn, _ = balancing_rotations(standing(20.0, speed_m_s=1.5), FEET, UP)
     assert np.abs(turned_deg(turn)[10:-10]).max() < 0.5  # the speed at the ends is not known well
     turn, _ = balancing_rotations(standing(20.0), np.zeros((T, 6)), UP)
@@ -97,18 +97,18 @@ SITS, KNEELS, BENDS = (("hip", -85), ("knee", 85)), (("knee", 90), ("ankle", 50)
 
 @pytest.mark.parametrize("bends", [SITS, KNEELS], ids=["sits", "kneels"])
 @pytest.mark.parametrize("lean", [-10.0, 0.0, 10.0])
-def test_who_rests_on_a_chair_or_the_shins_is_left_alone(bends, lean):
+def test_a_body_on_a_chair_or_on_its_shins_is_not_rotated(bends, lean):
     turn, _ = balancing_rotations(standing(lean, bends=bends), FEET, UP)
     assert np.abs(turned_deg(turn)).max() < 0.1
 
 
-def test_who_goes_down_a_little_has_to_keep_balance():
+def test_a_body_with_slightly_bent_knees_must_be_balanced():
     turn, _ = balancing_rotations(standing(20.0, bends=BENDS), FEET, UP)
     assert turned_deg(turn)[T // 2] < -3.0
 
 
-def test_who_is_on_hands_and_feet_is_left_alone():
-    """A plank towards the camera: the weight is between toes and palms, far from the feet."""
+def test_a_body_on_hands_and_feet_is_not_rotated():
+    """A plank towards the camera: the zero moment point is between toes and palms, far from the feet."""
     planks = standing(80.0, arms=(0.0, 90.0, 0.0))
     assert turned_deg(balancing_rotations(planks, FEET, UP)[0])[T // 2] < -3.0
     turn, pivot = balancing_rotations(planks, np.ones((T, 6)), UP)
@@ -116,7 +116,7 @@ def test_who_is_on_hands_and_feet_is_left_alone():
     np.testing.assert_allclose(pivot, planks.contact_points.mean(axis=1), atol=1e-6)
 
 
-def test_a_still_is_judged_as_it_stands():
+def test_a_still_image_is_balanced_without_accelerations():
     placed = standing(20.0)
     one = PlacedTrack(*(getattr(placed, n) if n in ("body", "betas") else getattr(placed, n)[:1]
                         for n in placed.__dataclass_fields__))  # fmt: skip
@@ -124,8 +124,8 @@ def test_a_still_is_judged_as_it_stands():
     assert turned_deg(turn)[0] < -3.0
 
 
-def test_a_frame_in_which_nothing_stands_is_turned_about_its_own_feet_too():
-    """As the first one after a cut: those beside it say by how much, and far away is not where it is turned about."""
+def test_a_frame_without_contact_is_rotated_about_its_own_feet():
+    """As after a cut: the angle follows from neighbouring frames, but the centre of rotation must not be far away."""
     placed, contact = standing(20.0), FEET.copy()
     contact[T // 2] = 0.0
     _, pivot = balancing_rotations(placed, contact, UP)

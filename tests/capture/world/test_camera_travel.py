@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How far a camera travels beside somebody who walks, from feet whose steps are known."""
+"""The travel of a camera that follows a walking person, from feet with known steps."""
 
 import numpy as np
 import pytest
@@ -19,7 +19,7 @@ TIMES = np.arange(T) / FPS
 
 
 def steps(speed, period=1.0, duty=0.6):
-    """(T, 4, 3) soles of a walk along +x at z = 4 m, 1 m below the camera: each foot stands, then swings."""
+    """(T, 4, 3) soles of a walk along +x at z = 4 m, 1 m below the camera: each foot is in contact, then swings."""
     soles = np.zeros((T, 4, 3))
     for foot, shift in ((0, 0.0), (1, 0.0), (2, 0.5), (3, 0.5)):
         phase = TIMES / period + shift
@@ -36,7 +36,7 @@ def seen_from(soles, center, noise=0.0):
 
 
 @pytest.mark.parametrize("speed", [0.8, 1.4, 3.0])
-def test_a_camera_that_keeps_up_with_a_walker(speed):
+def test_a_camera_that_follows_a_walker(speed):
     center = np.stack([speed * TIMES, 0 * TIMES, 0.1 * TIMES], axis=1)
     found = camera_travel(seen_from(steps(speed), center, 0.004), np.ones(T, bool), UP, TIMES)
     assert np.linalg.norm(found[-1] - center[-1]) < 0.1 * np.linalg.norm(center[-1])
@@ -58,19 +58,19 @@ def test_a_camera_does_not_travel_from_one_scene_into_the_next():
     assert abs(found[-1, 0] - center[-1, 0]) < 0.1 * center[-1, 0]
 
 
-def test_feet_that_stand_still_are_a_camera_that_stands_still():
+def test_feet_at_rest_imply_a_static_camera():
     found = camera_travel(seen_from(steps(1.4), np.zeros((T, 3)), 0.004), np.ones(T, bool), UP, TIMES)
     np.testing.assert_array_equal(found, 0.0)
 
 
-def test_feet_that_slide_every_which_way_tell_nothing():
+def test_feet_that_slide_in_all_directions_give_no_travel():
     rng = np.random.default_rng(1)
     soles = np.cumsum(0.05 * rng.standard_normal((T, 4, 3)), axis=0) + [0, 1.0, 4.0]
     np.testing.assert_array_equal(camera_travel(soles, np.ones(T, bool), UP, TIMES), 0.0)
     np.testing.assert_array_equal(camera_travel(soles[:5], np.ones(5, bool), UP, TIMES[:5]), 0.0)
 
 
-def test_there_and_back_along_a_path():
+def test_transforming_along_a_path_and_back():
     rng = np.random.default_rng(2)
     path = CameraPath(exp(0.3 * rng.standard_normal((5, 3))), rng.standard_normal((5, 3)))
     fit = FittedTrack(
@@ -98,7 +98,7 @@ def test_there_and_back_along_a_path():
 
 
 def test_a_stance_is_the_same_in_every_camera():
-    """Heights over the floor, the pelvis and what turns do to directions, whichever axes they are told in."""
+    """Heights above the floor, the pelvis and rotated directions are the same in all axes."""
     rng = np.random.default_rng(3)
     path = CameraPath(exp(0.3 * rng.standard_normal((5, 3))), rng.standard_normal((5, 3)))
     up = exp([0.1, 0.2, 0.3]) @ [0.0, -1.0, 0.0]
@@ -123,7 +123,7 @@ def test_a_stance_is_the_same_in_every_camera():
 
 
 def test_without_smoothing_the_camera_travels_as_far(shared):
-    """What is left out is smoothing over time and held feet, not what else tells where somebody is."""
+    """Without smoothing and foot locking, positions are still estimated in the same way."""
     body, clip = load_body("scope"), shared / "data/clips/run_moving_camera.mp4"
     wanted = VideoRange(end_s=1.5)
     smooth, raw = (

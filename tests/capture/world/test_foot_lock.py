@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Contact, depth and held feet on motions whose truth is known."""
+"""Contact, depth and foot locking on motions with known ground truth."""
 
 import numpy as np
 import pytest
@@ -26,7 +26,7 @@ def placed(supported, omega, root, times, center):
 
 
 def locked(supported, omega, root, contact, T_world_camera, times):
-    """Rotations and root of the motion with its feet locked, for a camera on a stand."""
+    """Rotations and root of the motion with its feet locked, for a static camera."""
     found = lock_feet(placed(supported, omega, root, times, np.zeros((len(root), 3))), contact, T_world_camera)
     return found.rotations, found.root
 
@@ -60,7 +60,7 @@ def step():
     return supported, omega, root, place, T_world_camera, times
 
 
-def test_the_raised_foot_is_known_from_the_standing_one(step):
+def test_a_raised_foot_is_told_from_one_in_contact(step):
     _, omega, root, place, T_world_camera, times = step
     p = standing.resting_probability(place(omega, root)[2], T_world_camera[2, :3], times, CAMERA)
     assert (p[:, 2:4] > 0.8).all()  # right
@@ -70,8 +70,8 @@ def test_the_raised_foot_is_known_from_the_standing_one(step):
     assert (p[75:, :2] > 0.8).all()
 
 
-def test_a_still_foot_at_a_wrong_distance_stands_and_a_raised_one_does_not(step):
-    """A foot that is seen too near, or too far, along its line of sight seems to be below the floor, or above it."""
+def test_a_foot_at_rest_at_a_wrong_depth_is_in_contact_and_a_raised_one_is_not(step):
+    """A foot estimated too near or too far along its line of sight seems to be above or below the floor."""
     _, omega, root, place, T_world_camera, times = step
     up = T_world_camera[2, :3]
     soles = place(omega[:1], root[:1])[2][:, :4].repeat(len(times), axis=0)
@@ -96,7 +96,7 @@ def test_a_still_foot_at_a_wrong_distance_stands_and_a_raised_one_does_not(step)
         np.testing.assert_allclose(elsewhere, standing.standing_probability(far, up, times, CAMERA), atol=1e-9)
 
 
-def test_wrong_depth_is_found_again_by_the_floor(step):
+def test_a_wrong_depth_is_corrected_by_the_floor(step):
     _, omega, root, place, T_world_camera, times = step
     unit = root / np.linalg.norm(root, axis=1, keepdims=True)
     wrong = 0.15 * np.sin(2 * np.pi * 0.4 * times)
@@ -108,7 +108,7 @@ def test_wrong_depth_is_found_again_by_the_floor(step):
     assert np.abs(left).max() < 0.1 * np.abs(np.diff(wrong)).max()  # and what is left hardly slides
 
 
-def test_right_depth_is_left_alone(step):
+def test_a_right_depth_is_not_changed(step):
     _, omega, root, place, T_world_camera, times = step
     soles = place(omega, root)[2]
     contact = standing.resting_probability(soles, T_world_camera[2, :3], times, CAMERA)
@@ -124,7 +124,7 @@ def test_the_depth_system_is_solved_as_a_dense_one():
     assert np.allclose(ground_plane._solve_tridiagonal(diagonal, off, right), np.linalg.solve(dense, right))
 
 
-def test_a_trembling_motion_stands_still_where_it_stands(step):
+def test_the_feet_of_a_trembling_motion_are_at_rest_in_contact(step):
     supported, omega, root, place, T_world_camera, times = step
     rng = np.random.default_rng(1)
     noise = gaussian_smooth(rng.normal(size=(len(times), supported.K + 1, 3)), times, 4.5)
@@ -144,8 +144,8 @@ def test_a_trembling_motion_stands_still_where_it_stands(step):
 
 
 @pytest.mark.parametrize("turned", [0.0, 0.6, 2.5])
-def test_the_picture_stays_where_feet_are_held_elsewhere(step, turned):
-    """Whatever way the camera looks, and wherever it is: legs and distance give way, not what was seen."""
+def test_projections_stay_when_feet_are_locked_elsewhere(step, turned):
+    """For any direction and position of the camera: legs and distance change, the projections do not."""
     supported, omega, root, place, T_world_camera, _ = step
     R, center = rotations.exp(np.array([0.0, turned, 0.0])), np.array([1.0, -0.2, 0.5])
     omega, root = omega[:3].copy(), root[:3] @ R.T + center
@@ -166,8 +166,8 @@ def test_the_picture_stays_where_feet_are_held_elsewhere(step, turned):
 
 
 @pytest.mark.parametrize("level", [-1.8, -0.5, 0.6])
-def test_feet_on_another_level_are_not_drawn_to_the_floor(step, level):
-    """Half of the time the person stands on the floor, then on a wall or in a pit."""
+def test_feet_on_another_level_are_not_moved_to_the_floor(step, level):
+    """The person stands on the floor, then, for the second half, on a wall or in a pit."""
     supported, omega, root, place, T_world_camera, times = step
     up = T_world_camera[2, :3]
     other = root + np.where(times > 1.5, level, 0.0)[:, None] * up
@@ -190,7 +190,7 @@ def test_a_still_and_a_single_frame_pass(step):
 
 @pytest.fixture(scope="module")
 def plank():
-    """On toes and palms for two seconds, headed aside, 4 m from a camera 1.5 m high; palms and toes level."""
+    """A person on toes and palms for two seconds, seen from the side, 4 m from a camera 1.5 m high."""
     body = load_body("scope")
     supported, times = with_contact_points(body, np.zeros(body.P)), np.arange(60) / FPS
     T_world_camera = world_from_level_camera(np.array([0.0, -1.0, -0.2]), height=1.5)
@@ -220,7 +220,7 @@ def plank():
     return supported, omega, root, place, T_world_camera, times
 
 
-def test_palms_rest_where_they_keep_still_on_the_floor(plank):
+def test_palms_at_rest_on_the_floor_are_in_contact(plank):
     _, omega, root, place, T_world_camera, times = plank
     up, contact_points = T_world_camera[2, :3], place(omega, root)[2]
     p = standing.resting_probability(contact_points, up, times, CAMERA)
@@ -234,7 +234,7 @@ def test_palms_rest_where_they_keep_still_on_the_floor(plank):
         assert p[:, 5].min() > 0.8
 
 
-def test_feet_that_keep_still_above_the_hands_do_not_stand(plank):
+def test_feet_at_rest_above_the_hands_are_not_in_contact(plank):
     _, omega, root, place, T_world_camera, times = plank
     up, contact_points = T_world_camera[2, :3], place(omega, root)[2]
     contact_points[:, :4] += 1.5 * up
@@ -243,7 +243,7 @@ def test_feet_that_keep_still_above_the_hands_do_not_stand(plank):
     assert p[:, 4:].min() > 0.8
 
 
-def test_trembling_palms_keep_still_on_the_floor(plank):
+def test_trembling_palms_are_locked_on_the_floor(plank):
     supported, omega, root, place, T_world_camera, times = plank
     rng = np.random.default_rng(2)
     noise = gaussian_smooth(rng.normal(size=(len(times), supported.K + 1, 3)), times, 4.5)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whose feet stand, on a body that does."""
+"""Contacts of a standing body."""
 
 import numpy as np
 import pytest
@@ -12,7 +12,7 @@ UP = np.array([0.0, -1.0, 0.0])  # OpenCV's axes, a level camera
 
 
 def stands(times):
-    """The body at rest, 4 m before a camera on a stand."""
+    """The body in rest pose, 4 m in front of a static camera."""
     body, T = load_body("scope"), len(times)
     supported = with_contact_points(body, np.zeros(body.P))
     rotations = np.tile(np.eye(3), (T, body.K + 1, 1, 1))
@@ -26,14 +26,14 @@ def stands(times):
 
 
 @pytest.mark.parametrize("step_s", [1 / 240, 1 / 30, 1.0, 30.03 / 30, 5.0])
-def test_who_stands_does_so_at_any_frame_rate(step_s):
+def test_a_standing_body_is_in_contact_at_any_frame_rate(step_s):
     contact = stands(np.arange(8) * step_s).contact(UP)
     assert contact[:, :4].min() > 0.9
     assert contact[:, 4:].max() < 0.01  # hands
 
 
 @pytest.mark.parametrize("frames", [1, 4])
-def test_nothing_stands_from_one_scene_into_the_next(frames):
+def test_contacts_end_at_scene_cuts(frames):
     times = np.arange(2 * frames) / 30 + np.repeat([0.0, 10.0], frames)
     contact = stands(times).contact(UP)
     assert contact[frames].max() == 0.0

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Up and floor on bodies placed in a known world."""
+"""Up direction and floor from bodies placed in a known world."""
 
 from dataclasses import fields, replace
 
@@ -32,7 +32,7 @@ def walk(body, T=60, lean_deg=0.0):
 
 
 def seen_by(body, R, t, camera_from_world):
-    """The motion of part poses in the world before a camera, 30 frames a second, everything seen."""
+    """The motion of part poses in the world as seen by a camera, 30 frames per second, everything visible."""
     soled, T = with_contact_points(body, np.zeros(body.P)), len(t)
     joints, R_camera = transform_points(camera_from_world, t), camera_from_world[:3, :3] @ R
     contact_points = contact_point_positions(soled, R_camera, joints)
@@ -62,8 +62,8 @@ def test_up_and_floor_are_recovered_from_a_walk(pitch_deg, roll_deg):
     assert np.allclose(transform_points(got, placed.joints[:1, 0])[0, :2], 0)
 
 
-def test_who_leaps_for_most_of_a_clip_stands_on_the_floor_between():
-    """Leaps of half a second, 0.3 m high, and a fifth of a second on the floor after each."""
+def test_a_person_who_jumps_for_most_of_a_clip_stands_on_the_floor_in_between():
+    """Jumps of half a second, 0.3 m high, and a fifth of a second on the floor after each."""
     body = load_body("scope")
     R, t = (np.repeat(each[:1], 84, axis=0) for each in walk(body))
     since = np.arange(84) % 21 / 30
@@ -76,7 +76,7 @@ def test_who_leaps_for_most_of_a_clip_stands_on_the_floor_between():
 
 
 def test_people_share_a_world_and_each_has_a_floor():
-    """One who is seen from the tenth frame on, one who walks 1 m higher, one who seems to be 4 % farther away."""
+    """One person seen from the tenth frame on, one who walks 1 m higher, one who seems to be 4 % farther away."""
     body = load_body("scope")
     R, t = walk(body)
     up = rotations.exp(np.radians([-12.0, 0, 5.0])) @ [0, -1.0, 0]
@@ -97,15 +97,15 @@ def test_people_share_a_world_and_each_has_a_floor():
 
 
 def centroid(vertices, faces):
-    """Of the volume within a closed surface: tetrahedra from the origin."""
+    """Centroid of the volume within a closed surface, by tetrahedra from the origin."""
     a, b, c = (vertices[faces[:, k]] for k in range(3))
     volume = np.einsum("ij,ij->i", a, np.cross(b, c))
     return (volume[:, None] * (a + b + c)).sum(0) / (4 * volume.sum())
 
 
 @pytest.mark.parametrize("pitch_deg", [-25.0, 0.0, 20.0])
-def test_who_bends_over_is_upright_by_the_weight(pitch_deg):
-    """Knees and hips bent, so that no axis of the body is upright, the mesh's centre of volume over the soles."""
+def test_up_of_a_person_who_bends_follows_from_the_centre_of_mass(pitch_deg):
+    """Knees and hips bent, no axis of the body upright, and the mesh's centre of volume above the soles."""
     body = load_body("scope")
     omega = np.tile(np.eye(3), (body.K + 1, 1, 1))
     omega[0] = R_WORLD_MODEL
@@ -128,8 +128,8 @@ def test_who_bends_over_is_upright_by_the_weight(pitch_deg):
 
 @pytest.mark.parametrize("bends", [{"hip": -85.0, "knee": 85.0}, {"knee": 90.0, "ankle": 50.0}], ids=["sits", "kneels"])
 @pytest.mark.parametrize("turned_deg", [0.0, 90.0, 180.0])
-def test_who_sits_or_kneels_does_not_tilt_the_world(bends, turned_deg):
-    """Their feet keep still as well, but the weight is on a chair or the shins: a trunk that is upright tells up."""
+def test_people_who_sit_or_kneel_do_not_tilt_the_world(bends, turned_deg):
+    """Their feet are at rest as well, but the weight is on a chair or the shins; up follows from the upright trunk."""
     body = load_body("scope")
     omega = np.tile(np.eye(3), (body.K + 1, 1, 1))
     omega[0] = rotations.exp(np.radians([0, 0, turned_deg])) @ R_WORLD_MODEL
@@ -142,8 +142,8 @@ def test_who_sits_or_kneels_does_not_tilt_the_world(bends, turned_deg):
     assert np.degrees(np.arccos(find_world([placed]).T_world_camera[2, :3] @ up)) < 2.0
 
 
-def test_a_moment_tells_nothing_by_the_weight():
-    """Who runs is not over the feet in a picture; over a clip, forces average out."""
+def test_a_single_moment_does_not_use_the_centre_of_mass():
+    """A runner's centre of mass is not above the feet in one frame; over a clip, inertial forces average out."""
     body = load_body("scope")
     R, t = walk(body, T=60, lean_deg=12.0)
     camera_from_world = np.linalg.inv(world_from_level_camera(np.array([0, -1.0, 0]), height=1.6))
@@ -155,8 +155,8 @@ def test_a_moment_tells_nothing_by_the_weight():
 
 
 @pytest.mark.parametrize("standing", [0, 20])
-def test_who_lies_on_the_floor_does_not_tilt_the_world(standing):
-    """Lies for 60 frames, straight, and then stands, or does not: a camera 10 degrees from level."""
+def test_people_lying_on_the_floor_do_not_tilt_the_world(standing):
+    """A person lies straight for 60 frames and then stands, or not; the camera is 10 degrees from level."""
     body = load_body("scope")
     R, t = walk(body, T=60 + standing)
     up = rotations.exp(np.radians([10.0, 0, 0])) @ [0, -1.0, 0]
