@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""HEIC files as phones write them: pictures coded in one piece or in tiles, turned, with EXIF beside them."""
+"""HEIC files like those of phones: pictures coded in one piece or in tiles, rotated, with EXIF."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def coded(picture_rgb: np.ndarray) -> tuple[bytes, bytes]:
     av = pytest.importorskip("av")
     try:
         encoder = av.CodecContext.create("libx265", "w")
-    except ValueError as error:  # its codecs are the builder's choice
+    except ValueError as error:  # a build may lack the codec
         pytest.skip(f"this PyAV does not write HEVC: {error}")
     encoder.width, encoder.height, encoder.pix_fmt = picture_rgb.shape[1], picture_rgb.shape[0], "yuv444p"
     encoder.time_base, encoder.options = Fraction(1), {"crf": "8", "x265-params": "log-level=none:repeat-headers=1"}
@@ -52,9 +52,9 @@ def heic(
     grid: bytes | None = None,
     is_inside: bool = False,
 ) -> bytes:
-    """A file. ``tile``: side of the tiles; a thumbnail comes first.
+    """Build a file. ``tile``: side of the tiles; a thumbnail comes first.
 
-    ``grid``: what is said of the grid instead; ``is_inside``: in the idat box.
+    ``grid``: the content of the grid item instead; ``is_inside``: in the idat box.
     """
     height, width = picture_rgb.shape[:2]
     if tile is None:

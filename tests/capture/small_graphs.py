@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Small ONNX graphs with the inputs and outputs of real networks, and answers that are known.
+"""Small ONNX graphs with the inputs and outputs of real networks, and known results.
 
-Detectors answer with fixed numbers. Keypoint networks answer with what they see: keypoint k is the brightest place of
+Detectors return constants. Keypoint networks detect colours: keypoint k is the brightest place of
 the picture's colour k mod 3 (red, green, blue), so that the picture and the way back from it are tested with them.
 """
 
@@ -30,7 +30,7 @@ def picture_input(width: int | str, height: int | str, kind: int = TensorProto.F
 
 
 def fixed(path: Path, width: int | str, height: int | str, outputs: dict[str, np.ndarray]) -> Path:
-    """A graph that gives these arrays whatever it sees."""
+    """Write a graph that returns these arrays for any input."""
     nodes, constants = [], {}
     for name, value in outputs.items():
         constants[f"{name}_value"] = value
@@ -43,13 +43,13 @@ def fixed(path: Path, width: int | str, height: int | str, outputs: dict[str, np
 
 
 def _colours(count: int) -> tuple[list, dict[str, np.ndarray]]:
-    """``seen`` (1, count, H, W): of each keypoint the channel it looks at."""
+    """Create the node that selects each keypoint's channel, ``seen`` (1, count, H, W)."""
     node = helper.make_node("Gather", ["images", "channel"], ["seen"], axis=1)
     return [node], {"channel": np.arange(count, dtype=np.int64) % 3}
 
 
 def simcc(path: Path, count: int, width: int, height: int, ratio: float = 2.0) -> Path:
-    """RTMPose: bin b of an axis is the greatest value of the column or row b / ratio, between them by interpolation."""
+    """Write an RTMPose graph: bin b of an axis is the maximum of column or row b / ratio, linearly interpolated."""
     nodes, constants = _colours(count)
     constants["scales"] = np.array([1.0, 1.0, ratio], np.float32)
     for name, axis in (("simcc_x", 2), ("simcc_y", 3)):
@@ -71,7 +71,7 @@ def simcc(path: Path, count: int, width: int, height: int, ratio: float = 2.0) -
 
 
 def heatmaps(path: Path, count: int, width: int, height: int, stride: int = 4) -> Path:
-    """HRNet: cell c is the picture about pixel c · stride."""
+    """Write an HRNet graph: cell c is the mean of the image around pixel c · stride."""
     nodes, constants = _colours(count)
     nodes.append(
         helper.make_node(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A whole capture with plugged-in networks, which are ours behind the outputs of others."""
+"""Captures with a user's networks, which are ours with the outputs of others."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ Frames = Callable[..., Iterator[np.ndarray]]
 
 @pytest.fixture(scope="module")
 def own_networks(networks: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
-    """A detector and a keypoint network as a user brings them."""
+    """Write a user's detector and keypoint network."""
     folder = tmp_path_factory.mktemp("networks")
     return box_rows(folder / "detector.onnx"), coco_simcc(folder / "keypoints.onnx")
 
@@ -53,13 +53,13 @@ def test_a_capture_with_both_is_as_good_as_ours(own_networks: tuple[Path, Path])
     assert not motion.keypoints2d[:, [1, 9, 17, 31], 2].any()  # what COCO lacks: eye corner, mouth, finger, toe
 
 
-def test_a_network_that_sees_nobody_is_named(tmp_path: Path) -> None:
+def test_a_network_that_finds_nobody_is_named(tmp_path: Path) -> None:
     blind = fixed(tmp_path / "blind.onnx", 640, 640, {"output0": np.zeros((1, 84, 8400), np.float32)})
     with pytest.raises(NoPersonError, match=r"crop it; if .* without blind\.onnx, write into blind\.json"):
         captured(detector=blind)
 
 
-def test_lost_and_found_again(own_networks: tuple[Path, Path]) -> None:
+def test_a_lost_person_is_found_again(own_networks: tuple[Path, Path]) -> None:
     video = cv2.VideoCapture(str(SAMPLE))
     images = [np.ascontiguousarray(video.read()[1][:, :, ::-1]) for _ in range(6)]
     tracker = PeopleTracker("fast", 2, detector=own_networks[0], keypoints=own_networks[1])
@@ -71,8 +71,8 @@ def test_lost_and_found_again(own_networks: tuple[Path, Path]) -> None:
     assert after[0][0][1].region.resembles(before[-1][0][1].region, 0.15)
 
 
-def test_left_and_right_of_a_plugged_in_network_are_repaired(shared: Path, tmp_path: Path) -> None:
-    """BlazePose-full exchanges them in 29 of 100 frames of this clip, in which the man's face hardly shows."""
+def test_left_right_swaps_of_a_users_network_are_repaired(shared: Path, tmp_path: Path) -> None:
+    """BlazePose-full swaps them in 29 of 100 frames of this clip, in which the man's face is hardly visible."""
     spec = importlib.util.spec_from_file_location("evaluate", shared / "tools/evaluate.py")
     tool = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(tool)
@@ -86,7 +86,7 @@ def test_left_and_right_of_a_plugged_in_network_are_repaired(shared: Path, tmp_p
     assert figures["mpjpe_root"] < 90
 
 
-def test_two_people_stay_themselves(own_networks: tuple[Path, Path], frames: Frames) -> None:
+def test_two_people_keep_their_identities(own_networks: tuple[Path, Path], frames: Frames) -> None:
     tracker = PeopleTracker("fast", 2, people=4, detector=own_networks[0], keypoints=own_networks[1])
     for image in frames("clips/two_people_portrait", stop=24):
         seen = dict(tracker.step(image))
@@ -94,8 +94,8 @@ def test_two_people_stay_themselves(own_networks: tuple[Path, Path], frames: Fra
     assert abs(seen[0].region.center_px[0] - seen[1].region.center_px[0]) > 200
 
 
-def test_a_runner_is_followed_at_a_low_rate(own_networks: tuple[Path, Path], frames: Frames) -> None:
-    """Without auxiliary points to go by: at 7.5 frames a second, every limb stays in the region that was foretold."""
+def test_a_runner_is_tracked_at_a_low_frame_rate(own_networks: tuple[Path, Path], frames: Frames) -> None:
+    """Without auxiliary points, at 7.5 frames per second, every limb stays in the predicted region."""
     tracker, numbers = PeopleTracker("fast", 2, detector=own_networks[0], keypoints=own_networks[1]), set()
     for image in frames("clips/run_moving_camera", every=4):
         ((number, seen),) = tracker.step(image)
@@ -105,7 +105,7 @@ def test_a_runner_is_followed_at_a_low_rate(own_networks: tuple[Path, Path], fra
     assert numbers == {0}
 
 
-def test_who_walks_out_of_the_picture_is_let_go(own_networks: tuple[Path, Path], frames: Frames) -> None:
+def test_the_track_of_a_person_who_leaves_the_image_ends(own_networks: tuple[Path, Path], frames: Frames) -> None:
     """The woman on the grass leaves at the left edge between frames 195 and 207."""
     tracker, woman = PeopleTracker("fast", 2, people=2, keypoints=own_networks[1]), []
     for index, image in enumerate(frames("clips/walk_side_static", start=185, stop=215), 185):

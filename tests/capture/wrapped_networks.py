@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Our own networks behind the outputs of other kinds: a user's RTMPose and YOLO, in effect.
+"""Our own networks with the outputs of other types, such as a user's RTMPose and YOLO.
 
-The nodes after ours turn BlazePose's landmarks into SimCC rows of COCO-17, and its detections into rows of boxes.
+Appended nodes convert BlazePose's landmarks to SimCC rows of COCO-17, and its detections to rows of boxes.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ def _extend(source: str, path: Path, nodes: list, constants: dict[str, np.ndarra
 
 
 def coco_simcc(path: Path, source: str = "pose_landmark_lite") -> Path:
-    """A score falls from the keypoint's visibility, if a person is there at all, by a quarter per bin."""
+    """Write a SimCC network: the score is visibility times presence, and falls by a quarter per bin."""
     constants = {
         "table": np.array([39, 5], np.int64),
         "coco": np.array([KEYPOINT_NAMES.index(name) for name in COCO_17], np.int64),
@@ -72,7 +72,7 @@ def coco_simcc(path: Path, source: str = "pose_landmark_lite") -> Path:
 
 
 def box_rows(path: Path) -> Path:
-    """The square about each body circle, its score, and class 0."""
+    """Write a box detector: the square around each body circle, its score, and class 0."""
     constants = {
         "anchors": make_anchors().astype(np.float32)[None],
         "hips": np.array([4, 5], np.int64),

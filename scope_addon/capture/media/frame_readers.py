@@ -13,8 +13,8 @@ from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol, cast
 
-# OpenCV reads these when it first opens a video. -8 silences ffmpeg's own messages, which repeat ours. A playlist named
-# .mp4 must not access the network: footage is read from files only.
+# OpenCV reads these when it first opens a video. -8 silences ffmpeg's messages, because Scope reports errors itself. A
+# playlist named .mp4 must not access the network: footage is read from files only.
 os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
 os.environ.setdefault("OPENCV_FFMPEG_CAPTURE_OPTIONS", "protocol_whitelist;file")
 
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from av.container import InputContainer
 
 _PROTOCOLS = {"protocol_whitelist": "file"}
-_MIN_SEEK_S = 20.0  # below this, decoding every frame is as fast as seeking
+_MIN_SEEK_S = 20.0  # start from which seeking is tried
 _AV1 = ("av01", "AV01")
 # Degrees clockwise by which an image has to be rotated to be upright.
 _ROTATIONS = {90: cv2.ROTATE_90_CLOCKWISE, 180: cv2.ROTATE_180, 270: cv2.ROTATE_90_COUNTERCLOCKWISE}

@@ -132,7 +132,7 @@ def parse_range(start: str | None, end: str | None, fps: str | None) -> FootageR
 
 
 def parse_rate(text: str) -> Fraction:
-    """Parse frames per second: "25", "30000/1001", or "29.97", which stands for 30000/1001, and likewise 23.976 etc.
+    """Parse frames per second: "25", "30000/1001", or "29.97", which stands for 30000/1001 (likewise 23.976 etc.).
 
     :raises UsageError: the text is not a positive number of at most 1000.
     """

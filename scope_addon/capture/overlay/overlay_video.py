@@ -107,10 +107,9 @@ def draw_overlay(
         colors = [tint(i) for i in range(len(people))]
     elif isinstance(colors, np.ndarray) and len(people) == 1 and colors.ndim <= 2:
         colors = [colors]
-    per_person = list(cast("Sequence[ArrayLike]", colors))
     opacities = np.broadcast_to(np.asarray(opacity, float), (len(people),)).tolist()
     canvas = Canvas.blank(image_rgb.shape[1], image_rgb.shape[0])
-    draw_bodies(canvas, people, faces, intrinsics, dist, per_person, opacities)
+    draw_bodies(canvas, people, faces, intrinsics, dist, list(cast("Sequence[ArrayLike]", colors)), opacities)
     return blended(image_rgb, canvas)
 
 
@@ -240,6 +239,7 @@ class _Painter:
     def _draw_keypoints(
         self, image: NDArray[np.uint8], keypoints: NDArray[np.floating[Any]], color: NDArray[np.float64]
     ) -> None:
+        """Draw the confident keypoints (n, 3) of one person into the image, in place."""
         radius = max(1, round(max(image.shape[:2]) / 500))
         for k, (u, v, confidence) in enumerate(keypoints):
             if confidence > 0.3 and np.isfinite((u, v)).all() and max(abs(u), abs(v)) < 1e5:
@@ -292,7 +292,7 @@ def _open_writer(temporary: Path, fps: float, width: int, height: int, path: Pat
 
 
 def _is_readable(video: Path) -> bool:
-    """Check if a video can be read: its index is written last."""
+    """Check if a video can be read, that is, has its index, which is written last."""
     reader = cv2.VideoCapture(str(video))
     try:
         return reader.isOpened() and reader.grab()

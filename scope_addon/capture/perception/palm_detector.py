@@ -18,7 +18,7 @@ from .sessions import network_path, open_session
 
 INPUT_SIZE = 192
 SCORE_THRESHOLD = 0.5
-_LAYERS = ((8, 2), (16, 6))  # stride, anchors per cell; the three stride-16 layers are merged
+_LAYERS = ((8, 2), (16, 6))  # stride, anchors per cell; the three stride-16 layers are combined
 
 
 @dataclass(frozen=True)

@@ -20,9 +20,9 @@ from .sessions import network_path, open_session
 INPUT_SIZE = 224
 SCORE_THRESHOLD = 0.5
 OVERLAP_THRESHOLD = 0.3
-_LAYERS = ((8, 2), (16, 2), (32, 6))  # stride, anchors per cell; the three stride-32 layers are merged
+_LAYERS = ((8, 2), (16, 2), (32, 6))  # stride, anchors per cell; the three stride-32 layers are combined
 _SCORE_LIMIT = 100.0
-_SURE_SCORE = 0.8  # from which no closer search is needed: the person fills a good part of the image
+_SURE_SCORE = 0.8  # from which the squares are not searched: such a person fills a good part of the image
 _SQUARES_FROM = 1.2  # aspect ratio from which squares show people larger
 
 

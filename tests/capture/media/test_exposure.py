@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Dark frames are brightened, without flicker, and others left alone; a man in the dark is captured."""
+"""Dark frames are brightened without flicker, others are unchanged; a person in the dark is captured."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from scope.solver import Body
 
 
 def picture(level: float) -> np.ndarray:
-    """Grey slopes up to ``level``."""
+    """Create a grey gradient up to ``level``."""
     return np.repeat(np.linspace(0, level, 320)[None, :, None], 180, axis=0).repeat(3, axis=2).round().astype(np.uint8)
 
 
 @pytest.mark.parametrize(("level", "becomes"), [(6, 96), (10, 160), (25, 200), (60, 200), (100, 200)])
-def test_brightest_places_become_bright(level: int, becomes: int) -> None:
-    """Some 200 of 255, but no more than 16 times as bright, and everything else in proportion."""
+def test_highlights_are_raised(level: int, becomes: int) -> None:
+    """Highlights become about 200 of 255, with at most 16-fold gain, and everything else in proportion."""
     before = picture(level)
     found = AutoExposure().brighten(before).astype(float)
     assert np.percentile(found, 98) == pytest.approx(becomes, rel=0.05)
@@ -29,7 +29,7 @@ def test_brightest_places_become_bright(level: int, becomes: int) -> None:
 
 
 @pytest.mark.parametrize("level", [0, 3, 130, 255])
-def test_black_and_bright_ones_stay(level: int) -> None:
+def test_black_and_bright_frames_are_unchanged(level: int) -> None:
     frame = picture(level)
     assert AutoExposure().brighten(frame) is frame
 
@@ -43,8 +43,8 @@ def test_brightness_does_not_flicker() -> None:
 
 
 @pytest.mark.usefixtures("networks")
-def test_a_man_in_the_dark_is_captured(shared: Path, body: Body, tmp_path: Path) -> None:
-    """At 6 % of the light, of which nothing was seen before."""
+def test_a_person_in_the_dark_is_captured(shared: Path, body: Body, tmp_path: Path) -> None:
+    """At 6 % of the light, at which the networks find nobody without the gain."""
     clip = tmp_path / "dark.mp4"
     writer = cv2.VideoWriter(str(clip), cv2.VideoWriter.fourcc(*"mp4v"), 15, (540, 960))
     video = cv2.VideoCapture(str(shared / "data" / "pose2sim" / "cam2.mp4"))

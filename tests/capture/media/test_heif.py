@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Pictures of phones: in one piece and in tiles, turned as they say, with their focal length, damaged, and hostile."""
+"""Phone pictures: in one piece or in tiles, rotated, with a focal length, damaged, and malicious."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ W, H = 150, 100
 
 
 def slopes(width: int = W, height: int = H) -> np.ndarray:
-    """A picture that looks different whichever way it is turned."""
+    """Create a picture without any symmetry."""
     y, x = np.mgrid[:height, :width]
     return np.stack([255 * x / width, 255 * y / height, 90 + 0 * x], axis=-1).astype(np.uint8)
 
@@ -38,7 +38,7 @@ def read(path: Path, data: bytes) -> np.ndarray:
 
 @pytest.mark.parametrize("tile", [None, 64])
 @pytest.mark.parametrize("name", ["IMG_0001.HEIC", "a.jpg"])
-def test_pieces_become_the_picture(tmp_path: Path, tile: int | None, name: str) -> None:
+def test_tiles_are_assembled(tmp_path: Path, tile: int | None, name: str) -> None:
     found = read(tmp_path / name, heic(slopes(), tile))
     assert found.shape == (H, W, 3)
     assert np.abs(found - slopes()).mean() < 3
@@ -48,7 +48,7 @@ def test_pieces_become_the_picture(tmp_path: Path, tile: int | None, name: str) 
 @pytest.mark.parametrize(
     ("turns", "expected"),
     [
-        ([("irot", 1)], lambda a: a.transpose(1, 0, 2)[::-1]),  # a quarter turn anticlockwise: right becomes top
+        ([("irot", 1)], lambda a: a.transpose(1, 0, 2)[::-1]),  # 90° anticlockwise: right becomes top
         ([("irot", 2)], lambda a: a[::-1, ::-1]),
         ([("irot", 3)], lambda a: a[::-1].transpose(1, 0, 2)),
         ([("imir", 0)], lambda a: a[::-1]),
@@ -57,7 +57,7 @@ def test_pieces_become_the_picture(tmp_path: Path, tile: int | None, name: str) 
     ],
     ids=["left turn", "half turn", "right turn", "upside down", "mirrored", "mirrored, left turn"],
 )
-def test_turned_as_the_file_says(tmp_path: Path, turns: list, expected, tile: int | None) -> None:
+def test_rotations_and_mirroring_are_applied(tmp_path: Path, turns: list, expected, tile: int | None) -> None:
     found = read(tmp_path / "a.heic", heic(slopes(), tile, turns))
     wanted = expected(slopes().astype(int))
     assert found.shape == wanted.shape
@@ -70,7 +70,7 @@ def test_the_focal_length_is_read(tmp_path: Path) -> None:
         assert video.focal_35mm == 26
 
 
-def test_numbered_ones_are_a_sequence(tmp_path: Path) -> None:
+def test_numbered_pictures_are_a_sequence(tmp_path: Path) -> None:
     for k in (1, 2):
         (tmp_path / f"IMG_{k}.HEIC").write_bytes(heic(np.full((64, 64, 3), 60 * k, np.uint8)))
     with open_video(tmp_path, VideoRange(fps=Fraction(10))) as video:
@@ -88,13 +88,13 @@ def test_numbered_ones_are_a_sequence(tmp_path: Path) -> None:
         b"\0",
     ],
 )
-def test_a_grid_that_cannot_be_is_refused(tmp_path: Path, grid: bytes) -> None:
+def test_an_impossible_grid_is_refused(tmp_path: Path, grid: bytes) -> None:
     (tmp_path / "a.heic").write_bytes(heic(slopes(), 64, grid=grid))
     with pytest.raises(VideoError, match=r"a\.heic is a picture that cannot be decoded"):
         open_video(tmp_path / "a.heic")
 
 
-def test_pieces_of_other_sizes_are_refused() -> None:
+def test_tiles_of_different_sizes_are_refused() -> None:
     layout = read_layout(heic(slopes(), 64))
     assert layout is not None
     pieces = {n: np.zeros((64, 64, 3), np.uint8) for n in layout.tiles.ravel().tolist()}
@@ -104,7 +104,7 @@ def test_pieces_of_other_sizes_are_refused() -> None:
     assert assemble(layout, pieces) is None
 
 
-def test_damage_is_told_and_never_anything_else(tmp_path: Path) -> None:
+def test_damaged_files_raise_only_video_errors(tmp_path: Path) -> None:
     whole, path = heic(slopes(64, 48), 32), tmp_path / "a.heic"
     for size in (30, 100, 300, len(whole) // 2, len(whole) - 40):
         path.write_bytes(whole[:size])
@@ -125,13 +125,13 @@ def test_damage_is_told_and_never_anything_else(tmp_path: Path) -> None:
 
 
 def patched(data: bytes, name: bytes, content: bytes) -> bytes:
-    """A file whose first box of this name has another content of the same length, or less."""
+    """Replace the content of the first box of this name by one of at most the same length."""
     at = data.index(name) + 4
     return data[:at] + content + data[at + len(content) :]
 
 
-def test_a_small_file_cannot_ask_for_much() -> None:
-    """Places without a length, repeated; one place that is the whole file, many times."""
+def test_a_small_file_cannot_request_much_memory() -> None:
+    """Repeated extents without a length; one extent of the whole file, many times."""
     whole = heic(slopes(64, 48), 32, focal_mm=26)
     at = whole.index(b"iloc")
     for sizes, parts in ((0x0000, 5 * struct.pack(">HHH", 1, 0, 65535)), (0x4400, b"")):
@@ -141,26 +141,26 @@ def test_a_small_file_cannot_ask_for_much() -> None:
         assert read_layout(patched(whole, b"iloc", content)) is None
 
 
-def test_no_more_pixels_are_decoded_than_are_allowed(tmp_path: Path) -> None:
+def test_decoding_stops_at_the_maximum_number_of_pixels(tmp_path: Path) -> None:
     path = tmp_path / "a.heic"
     path.write_bytes(heic(slopes(), 64))
     assert len(decode_items(path, {2, 3, 4}, 3 * 64 * 64)) == 3
     assert decode_items(path, {2, 3, 4}, 3 * 64 * 64 - 1) == {}
 
 
-def test_tiles_that_a_grid_has_no_use_for_are_refused() -> None:
+def test_surplus_tiles_are_refused() -> None:
     layout = replace(read_layout(heic(slopes(), 64)), size=(64, 64))
     assert assemble(layout, {n: np.zeros((64, 64, 3), np.uint8) for n in range(2, 8)}) is None
 
 
-def test_a_grid_within_the_boxes_is_found(tmp_path: Path) -> None:
-    """As phones write it: the grid in the idat box."""
+def test_a_grid_in_the_idat_box_is_found(tmp_path: Path) -> None:
+    """Phones store the grid there."""
     (tmp_path / "a.heic").write_bytes(heic(slopes(), 64, is_inside=True))
     with open_video(tmp_path / "a.heic") as video:
         assert (video.width, video.height) == (W, H)
 
 
-def test_a_box_in_itself_ends() -> None:
+def test_a_box_that_contains_itself_terminates() -> None:
     whole = heic(slopes(64, 48), 32)
     at = whole.index(b"dimg") + 4
     # the grid's first tile is the grid itself

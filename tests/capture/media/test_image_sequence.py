@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Numbered pictures are footage too."""
+"""Image sequences: order, rate, missing and damaged pictures."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ NUMBERS = [*range(7, 12), 100]
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """Frames 7 to 11 and 100, not zero-padded, as bright as their number; and what does not belong to them."""
+    """Write frames 7 to 11 and 100, not zero-padded, with their number as brightness, and unrelated files."""
     for number in NUMBERS:
         cv2.imwrite(str(tmp_path / f"walk_{number}.png"), np.full((20, 30, 3), number, np.uint8))
     (tmp_path / "notes.txt").write_text("no picture")
@@ -32,7 +32,7 @@ def brightness(path: Path, wanted: VideoRange | None = None) -> list[int]:
 
 
 @pytest.mark.parametrize("name", ["", "walk_####.png", "walk_%04d.png", "walk_%d.png", "walk_7.png"])
-def test_in_the_order_of_their_numbers(folder: Path, name: str) -> None:
+def test_pictures_are_in_numerical_order(folder: Path, name: str) -> None:
     wanted = VideoRange(fps=Fraction(12))
     assert brightness(folder / name, wanted) == NUMBERS
     with open_video(folder / name, wanted) as video:
@@ -43,12 +43,12 @@ def test_in_the_order_of_their_numbers(folder: Path, name: str) -> None:
         assert "88 numbers between 7 and 100 have no picture" in warning
 
 
-def test_a_part_of_them(folder: Path) -> None:
+def test_a_range_of_the_sequence(folder: Path) -> None:
     assert brightness(folder, VideoRange(0.1, 0.3, Fraction(10))) == [8, 9, 10]
     assert brightness(folder / "walk_9.png", VideoRange(fps=Fraction(10))) == [9, 10, 11, 100]
 
 
-def test_without_a_rate(folder: Path) -> None:
+def test_without_a_rate_30_is_assumed(folder: Path) -> None:
     with open_video(folder / "walk_9.png") as video:
         assert video.frame_count == 1
     with open_video(folder) as video:
@@ -67,7 +67,7 @@ def test_without_a_rate(folder: Path) -> None:
         ([1690000000033, 1690000000067, 1690000000100], [0, 1, 2], "consecutive frames"),
     ],
 )
-def test_missing_pictures_leave_their_time_and_are_told(
+def test_missing_pictures_leave_gaps_and_give_a_warning(
     tmp_path: Path, numbers: list[int], times: list[int], says: str | None
 ) -> None:
     for number in numbers:
@@ -83,7 +83,7 @@ def test_missing_pictures_leave_their_time_and_are_told(
         assert video.expected_frames == len(wanted)
 
 
-def test_pictures_of_a_sequence_look_as_they_do_alone(tmp_path: Path) -> None:
+def test_pictures_are_decoded_alike_alone_and_in_a_sequence(tmp_path: Path) -> None:
     clear = np.zeros((20, 30, 4), np.uint8)
     deep = np.full((20, 30, 3), 70 * 257, np.uint16)
     for number, image in enumerate((clear, deep)):
@@ -92,21 +92,21 @@ def test_pictures_of_a_sequence_look_as_they_do_alone(tmp_path: Path) -> None:
     assert [brightness(tmp_path / f"a_{k}.png") for k in (0, 1)] == [[255], [70]]
 
 
-def test_a_damaged_picture_ends_it_with_a_warning(folder: Path) -> None:
+def test_a_damaged_picture_ends_the_sequence_with_a_warning(folder: Path) -> None:
     (folder / "walk_9.png").write_bytes(b"no picture any more")
     with open_video(folder, VideoRange(fps=Fraction(10))) as video:
         assert [int(f.image_rgb[0, 0, 0]) for f in video] == [7, 8]
         assert any("stopped after 2" in warning for warning in video.warnings)
 
 
-def test_nothing_to_see(tmp_path: Path) -> None:
+def test_missing_pictures_are_errors(tmp_path: Path) -> None:
     (tmp_path / "empty").mkdir()
     for path, words in ((tmp_path / "empty", "folder without a picture"), (tmp_path / "x_##.png", "does not exist")):
         with pytest.raises(VideoError, match=words):
             open_video(path)
 
 
-def test_a_folder_of_unrelated_pictures_is_no_clip(folder: Path) -> None:
+def test_a_folder_of_unrelated_pictures_is_refused(folder: Path) -> None:
     (folder / "holiday.png").write_bytes((folder / "walk_9.png").read_bytes())
     with pytest.raises(VideoError, match=r"holiday\.png.*pattern"):
         open_video(folder)

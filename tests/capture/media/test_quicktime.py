@@ -21,7 +21,7 @@ def box(name: bytes, *payload: bytes) -> bytes:
 
 
 def meta(kind: int, value: bytes, key: bytes = KEY, version: bytes = b"") -> bytes:
-    """A meta box with the make of the telephone and, second, the key."""
+    """Build a meta box with the phone's make and, second, the key."""
     names = box(b"mdta", b"com.apple.quicktime.make") + box(b"mdta", key)
     make = box(struct.pack(">I", 1), box(b"data", struct.pack(">II", 1, 0), b"Telephone"))
     item = box(struct.pack(">I", 2), box(b"data", struct.pack(">II", kind, 0), value))
@@ -41,7 +41,7 @@ def meta(kind: int, value: bytes, key: bytes = KEY, version: bytes = b"") -> byt
         (1, b"26.00mm"),
     ],
 )
-def test_values_of_each_type_in_film_and_track(tmp_path, kind, value):
+def test_values_of_each_type_in_movie_and_track(tmp_path, kind, value):
     path = tmp_path / "a.mov"
     head = box(b"ftyp", b"qt  ") + box(b"wide") + box(b"mdat", bytes(5000))
     for index in (box(b"mvhd", bytes(100)) + meta(kind, value), box(b"trak", meta(kind, value, version=bytes(4)))):
@@ -62,7 +62,7 @@ def test_absent_or_damaged_is_none(tmp_path):
     assert focal_35mm(tmp_path / "missing.mov") is None
 
 
-def test_a_video_says_it(tmp_path: Path):
+def test_a_video_has_its_focal_length(tmp_path: Path):
     path = tmp_path / "a.mp4"
     writer = cv2.VideoWriter(str(path), cv2.CAP_FFMPEG, cv2.VideoWriter_fourcc(*"mp4v"), 30, (64, 48))
     for _ in range(3):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Pictures that cameras and browsers write besides JPEG and PNG, and what is said of those that cannot be read."""
+"""Picture formats besides JPEG and PNG, and the messages for pictures that cannot be read."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def avif(path: Path, image_rgb: np.ndarray) -> Path:
     return path
 
 
-def test_avif_is_a_picture_whatever_it_is_called(tmp_path: Path) -> None:
+def test_avif_is_recognized_by_its_content(tmp_path: Path) -> None:
     image = np.full((H, W, 3), 255, np.uint8)
     image[: H // 2] = (255, 0, 0)
     for name in ("a.avif", "a.jpg"):
@@ -69,14 +69,14 @@ def test_damaged_avif(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         open_video(tmp_path / "a.avif")
 
 
-def test_openexr_says_what_to_do(tmp_path: Path) -> None:
+def test_openexr_is_refused_with_advice(tmp_path: Path) -> None:
     (tmp_path / "render.exr").write_bytes(b"v/1\x01" + bytes(99))
     with pytest.raises(VideoError, match=r"render\.exr is an OpenEXR picture.*PNG"):
         open_video(tmp_path / "render.exr")
 
 
 @pytest.mark.parametrize("asked", [("5", None, None), ("00:00:01:00", None, None), (None, None, "9")])
-def test_a_range_of_a_picture_is_told_to_change_nothing(tmp_path: Path, asked: tuple[str | None, ...]) -> None:
+def test_a_range_of_a_single_picture_gives_a_warning(tmp_path: Path, asked: tuple[str | None, ...]) -> None:
     (tmp_path / "a.png").write_bytes(png(GREY))
     with open_video(tmp_path / "a.png", parse_range(*asked)) as video:
         assert len(list(video)) == 1
@@ -86,7 +86,7 @@ def test_a_range_of_a_picture_is_told_to_change_nothing(tmp_path: Path, asked: t
 
 
 @pytest.mark.parametrize("name", ["a.webp", "a.png"])
-def test_an_animation_is_told_to_be_one(tmp_path: Path, name: str) -> None:
+def test_an_animation_gives_a_warning(tmp_path: Path, name: str) -> None:
     animation = cv2.Animation()
     animation.frames, animation.durations = [GREY, GREY + 30, GREY + 60], [100, 100, 100]
     assert cv2.imwriteanimation(str(tmp_path / name), animation)

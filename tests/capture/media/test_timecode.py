@@ -26,7 +26,7 @@ NO_TIMES = ["", ".", "1:.5", "-1", "1:60", "1:60:00", "one", "1:2:3:4", "nan", "
 
 
 @pytest.mark.parametrize("text", [*NO_TIMES, "9" * 9999, "9" * 9999 + ":00:00:00"])
-def test_what_is_no_time(text: str) -> None:
+def test_invalid_times_are_refused(text: str) -> None:
     with pytest.raises(UsageError):
         parse_time(text)
 
@@ -38,7 +38,7 @@ def timecode(text: str) -> Timecode:
 
 
 def labels(rate: int, dropped: int) -> Iterator[str]:
-    """Every timecode of 21 minutes in order, without the first ``dropped`` of each minute but of every tenth."""
+    """Iterate over the timecodes of 21 minutes, without the first ``dropped`` of each minute except every tenth."""
     for minute in range(21):
         for second in range(60):
             for frame in range(rate):
@@ -58,13 +58,13 @@ def labels(rate: int, dropped: int) -> Iterator[str]:
         (Fraction(2999, 100), 30, 0),
     ],
 )
-def test_every_timecode_is_the_next_frame(fps: Fraction, rate: int, dropped: int) -> None:
+def test_consecutive_timecodes_are_consecutive_frames(fps: Fraction, rate: int, dropped: int) -> None:
     for number, text in enumerate(labels(rate, dropped)):
         if number % 7 == 0 or ":00" in text[-6:]:
             assert timecode(text).frame(fps) == number, text
 
 
-def test_an_hour_of_drop_frame_keeps_up_with_the_clock() -> None:
+def test_an_hour_of_drop_frame_timecode_is_an_hour() -> None:
     assert timecode("01:00:00;00").frame(Fraction(30000, 1001)) == 107892
     assert timecode("01;00;00;00").frame(Fraction(60000, 1001)) == 215784
     assert timecode("01:00:00:00").frame(Fraction(30000, 1001)) == 108000
@@ -82,7 +82,7 @@ def test_an_hour_of_drop_frame_keeps_up_with_the_clock() -> None:
         ("00:00:01:00", Fraction(1, 4), "in seconds"),
     ],
 )
-def test_timecodes_that_do_not_exist(text: str, fps: Fraction, says: str) -> None:
+def test_nonexistent_timecodes_are_refused(text: str, fps: Fraction, says: str) -> None:
     with pytest.raises(UsageError, match=says) as caught:
         timecode(text).frame(fps)
     assert text in str(caught.value)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Videos and pictures: files made here with known content, files broken here, and real clips."""
+"""Videos and pictures: synthetic files with known content, damaged files, and real clips."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ W, H = 64, 48
 
 
 def corner_image(width: int = W, height: int = H) -> np.ndarray:
-    """RGB: red top left, green top right, blue bottom left, white bottom right."""
+    """Create an RGB image: red top left, green top right, blue bottom left, white bottom right."""
     image = np.full((height, width, 3), 255, np.uint8)
     image[: height // 2, : width // 2] = (255, 0, 0)
     image[: height // 2, width // 2 :] = (0, 255, 0)
@@ -35,7 +35,7 @@ def corner_image(width: int = W, height: int = H) -> np.ndarray:
 
 
 def corners(image: np.ndarray) -> str:
-    """The image's corners (top left, top right, bottom left, bottom right) as letters of ``corner_image``."""
+    """Name the colours of the corners (top left, top right, bottom left, bottom right) by their first letters."""
     names = {(1, 0, 0): "r", (0, 1, 0): "g", (0, 0, 1): "b", (1, 1, 1): "w"}
     points = [image[6, 6], image[6, -7], image[-7, 6], image[-7, -7]]
     return "".join(names.get(tuple(int(c > 128) for c in p), "?") for p in points)
@@ -56,7 +56,7 @@ def ramp(count: int) -> list[np.ndarray]:
 
 
 def replace_mp4_box(data: bytes, path: tuple[bytes, ...], payload: bytes) -> bytes:
-    """``data`` with the payload of the box at ``path`` replaced; sizes of the boxes around it are corrected.
+    """Replace the payload of the box at ``path`` and correct the sizes of the boxes around it.
 
     Only for files whose sample data lies before the index, as OpenCV writes them: offsets then stay true.
     """
@@ -80,7 +80,7 @@ TABLE = (*TRACK, b"mdia", b"minf", b"stbl")
 
 
 def with_time_table(path: Path, timescale: int, steps: list[tuple[int, int]]) -> None:
-    """Give an .mp4 a clock of ``timescale`` ticks a second and (count, ticks) frame durations."""
+    """Give an .mp4 a clock of ``timescale`` ticks per second and (count, ticks) frame durations."""
     data = path.read_bytes()
     duration = sum(n * d for n, d in steps)
     header = struct.pack(">IIIIIHH", 0, 0, 0, timescale, duration, 0x55C4, 0)
@@ -106,7 +106,7 @@ HALF_TURN = (-65536, 0, 0, 0, -65536, 0, 0, 0, 1 << 30)
 COUNTERCLOCKWISE = (0, -65536, 0, 65536, 0, 0, 0, 0, 1 << 30)
 
 
-def test_frames_come_in_order_as_rgb_with_their_times(tmp_path):
+def test_frames_are_in_order_as_rgb_with_their_times(tmp_path):
     images = [np.full((H, W, 3), 20 * i, np.uint8) for i in range(12)]
     path = write_video(tmp_path / "a.mp4", images, fps=25)
     with open_video(path) as video:
@@ -133,7 +133,7 @@ def test_every_iteration_starts_at_the_first_frame(tmp_path):
 
 
 @pytest.mark.parametrize("rate", [Fraction(30000, 1001), Fraction(24000, 1001), Fraction(60000, 1001), Fraction(25)])
-def test_the_rate_of_the_container_is_exact(tmp_path, rate):
+def test_the_container_rate_is_exact(tmp_path, rate):
     path = write_video(tmp_path / "a.mp4", ramp(10))
     with_time_table(path, rate.numerator, [(10, rate.denominator)])
     video = open_video(path)
@@ -196,7 +196,7 @@ def test_pixels_become_square(tmp_path, display_width, matrix, size):
 
 @pytest.mark.parametrize("matrix", [None, CLOCKWISE, HALF_TURN, COUNTERCLOCKWISE])
 @pytest.mark.parametrize("display_width", [W, 2 * W, W // 2])
-def test_both_readers_see_the_same(tmp_path, matrix, display_width):
+def test_both_readers_agree(tmp_path, matrix, display_width):
     path = write_video(tmp_path / "a.mp4", [corner_image(), 255 - corner_image()] * 10, fps=25)
     patch_track_header(path, matrix, display_width)
     readers = [OpencvReader(path), PyavReader(path)]
@@ -224,7 +224,7 @@ def test_odd_sizes(tmp_path):
     assert (np.diff([f.timestamp_s for f in frames]) > 0).all()
 
 
-def test_leaving_early_ends_the_decoding_thread(tmp_path):
+def test_ending_an_iteration_early_ends_the_decoding_thread(tmp_path):
     path = write_video(tmp_path / "a.mp4", ramp(50))
 
     def decoding() -> bool:
@@ -242,7 +242,7 @@ def test_leaving_early_ends_the_decoding_thread(tmp_path):
         next(unfinished)
 
 
-def test_decoding_runs_ahead_by_a_few_frames_only(tmp_path):
+def test_decoding_runs_ahead_by_at_most_a_few_frames(tmp_path):
     video = open_video(write_video(tmp_path / "a.mp4", ramp(50)))
     frames = iter(video)
     next(frames)
@@ -255,7 +255,7 @@ def test_decoding_runs_ahead_by_a_few_frames_only(tmp_path):
 
 
 def exif_block(orientation: int, focal_35mm: int | None = None, endian: str = "<") -> bytes:
-    """A TIFF directory with an orientation and, one directory further, a focal length."""
+    """Build a TIFF directory with an orientation and, in its EXIF directory, a focal length."""
     entry = struct.Struct(endian + "HHIHH")
     main = [entry.pack(0x0112, 3, 1, orientation, 0)]
     inner = b""
@@ -328,7 +328,7 @@ def test_orientation_of_png_webp_and_tiff(tmp_path):
         assert corners(next(iter(open_video(tmp_path / name))).image_rgb) == "brwg", name
 
 
-def test_damaged_exif_counts_as_none(tmp_path):
+def test_damaged_exif_counts_as_absent(tmp_path):
     for i, block in enumerate((b"II*\0", b"II*\0\xff\xff\xff\xff", b"", exif_block(6)[:12], exif_block(99), b"XX" * 9)):
         path = tmp_path / f"{i}.jpg"
         path.write_bytes(jpeg_with_exif(corner_image(), block))
@@ -370,7 +370,7 @@ def silence(path: Path) -> None:
         ("cut.mp4", lambda p: p.write_bytes(write_video(p, ramp(9)).read_bytes()[:700]), "not a video or picture"),
     ],
 )
-def test_what_cannot_be_used_gives_one_clear_sentence(tmp_path, capfd, name, make, words):
+def test_unusable_files_give_a_message_of_one_line(tmp_path, capfd, name, make, words):
     make(tmp_path / name)
     with pytest.raises(VideoError, match=words) as caught:
         open_video(tmp_path / name)
@@ -379,11 +379,11 @@ def test_what_cannot_be_used_gives_one_clear_sentence(tmp_path, capfd, name, mak
     assert capfd.readouterr().err == ""
 
 
-@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="Windows keeps its pipes in no folder")
-def test_a_pipe_is_refused_and_not_waited_for(tmp_path):
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="Windows has no named pipes in folders")
+def test_a_pipe_is_refused_without_waiting(tmp_path):
     path = tmp_path / "pipe.mp4"
     os.mkfifo(path)
-    both_ends = os.open(path, os.O_RDWR)  # so that nothing waits here whatever is done with it
+    both_ends = os.open(path, os.O_RDWR)  # so that opening it never blocks
     try:
         with pytest.raises(VideoError, match="pipe.mp4 is a pipe or a device"):
             open_video(path)
@@ -402,7 +402,7 @@ def test_no_decodable_frame_is_an_error(tmp_path):
         open_video(path)
 
 
-def test_decoding_that_stops_early_gives_what_there_is_and_a_warning(tmp_path, capfd):
+def test_a_truncated_video_gives_its_frames_and_a_warning(tmp_path, capfd):
     rng = np.random.default_rng(1)
     images = [rng.integers(0, 255, (H, W, 3), dtype=np.uint8) for _ in range(40)]
     path = write_video(tmp_path / "a.mkv", images)
@@ -417,8 +417,8 @@ def test_decoding_that_stops_early_gives_what_there_is_and_a_warning(tmp_path, c
 
 
 @pytest.mark.parametrize(("suffix", "shift_s"), [(".mp4", -0.8), (".mkv", 20.0)])
-def test_a_clip_cut_without_coding_it_anew_is_whole(tmp_path, suffix, shift_s):
-    """An edit list leaves its beginning out, or its times begin late: both are no damage."""
+def test_a_clip_cut_without_re_encoding_gives_no_warning(tmp_path, suffix, shift_s):
+    """An edit list omits the beginning, or timestamps start late: neither is damage."""
     cut = tmp_path / f"cut{suffix}"
     with av.open(str(write_video(tmp_path / "a.mp4", ramp(60)))) as source, av.open(str(cut), "w") as out:
         stream = source.streams.video[0]
@@ -440,8 +440,8 @@ def test_a_clip_cut_without_coding_it_anew_is_whole(tmp_path, suffix, shift_s):
     ("name", "codec", "start_s", "options"),
     [("late.flv", "flv1", 100.0, {}), ("pieces.mp4", "mpeg4", 0.0, {"movflags": "frag_keyframe"})],
 )
-def test_a_container_that_counts_oddly_can_be_entered_in_its_middle(tmp_path, name, codec, start_s, options):
-    """Times that begin late in a file whose length leaves that out; pieces of which the first alone is counted."""
+def test_seeking_in_containers_with_unreliable_frame_counts(tmp_path, name, codec, start_s, options):
+    """Timestamps that start late, which the duration does not include; fragments of which only the first is counted."""
     path = tmp_path / name
     with av.open(str(path), "w", options=options) as out:
         stream = out.add_stream(codec, rate=25)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What phones, cameras and editors write: Blender's own encoder makes the files, one process for all of them."""
+"""Codecs of phones, cameras and editors: files encoded by Blender, in one process."""
 
 import os
 import struct
@@ -68,7 +68,7 @@ def encoded():
 
 
 def colours(path):
-    """Times, and the middle pixel of every frame."""
+    """Read the time and the middle pixel of every frame."""
     with open_video(path) as video:
         assert (video.width, video.height) == (WIDTH, HEIGHT)
         frames = list(video)
@@ -77,7 +77,7 @@ def colours(path):
 
 
 @pytest.mark.parametrize("name", CODECS)
-def test_every_frame_arrives_with_its_colour_and_its_time(encoded, name):
+def test_every_frame_has_its_colour_and_time(encoded, name):
     folder, errors = encoded
     path = folder / f"{name}.{CODECS[name][2]}"
     if not path.is_file() or not path.stat().st_size:
@@ -90,8 +90,8 @@ def test_every_frame_arrives_with_its_colour_and_its_time(encoded, name):
     assert np.ptp(seen[:, 1]) < 35
 
 
-def test_av1_starts_and_ends_where_it_is_asked_to(encoded):
-    """OpenCV's wheels know AV1's container and carry no decoder for it, so another reader goes through the file."""
+def test_av1_range(encoded):
+    """OpenCV's wheels open AV1's container but have no decoder for it, so that PyAV reads the file."""
     path = encoded[0] / "av1.mp4"
     if not path.is_file() or not path.stat().st_size:
         pytest.skip(f"this Blender does not encode AV1: {encoded[1][-200:]}")
@@ -105,7 +105,7 @@ def test_av1_starts_and_ends_where_it_is_asked_to(encoded):
         list(video)
 
 
-def test_av1_without_its_decoder_says_what_to_do(encoded, monkeypatch):
+def test_av1_without_its_decoder_is_refused_with_advice(encoded, monkeypatch):
     path = encoded[0] / "av1.mp4"
     if not path.is_file() or not path.stat().st_size:
         pytest.skip(f"this Blender does not encode AV1: {encoded[1][-200:]}")
@@ -119,7 +119,7 @@ def test_h264_is_never_skipped(encoded):
 
 
 def gif(frames, delays):
-    """A GIF of (T, H, W) pictures of up to 128 colours of grey; delays in hundredths of a second. Not compressed: the
+    """Build a GIF of (T, H, W) images with up to 128 grey levels; delays in hundredths of a second. Not compressed: the
     table of codes is cleared before it could grow.
     """
     height, width = frames.shape[1:]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Parts of videos: start, end and frame rate; every frame of the test video shows its own number."""
+"""Ranges of videos: start, end and frame rate; every frame of the test video shows its own index."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ FPS = 25
 
 @pytest.fixture(scope="module")
 def long_video(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """60 s at 25 fps with a key frame now and then; the number of the frame in 12 black or white squares."""
+    """Write 60 s at 25 fps with few key frames; 12 black or white squares encode the index of the frame."""
     path = tmp_path_factory.mktemp("range") / "long.mp4"
     return write_numbers(path, FPS, 60 * FPS, "mp4v")
 
@@ -38,7 +38,7 @@ def shown(frame: Frame) -> int:
 
 
 @pytest.mark.parametrize(("start", "end"), [(0, 0.5), (3.2, 4.0), (19.0, 19.4), (41.36, 42.0), (59.0, 1e9)])
-def test_frames_of_a_part_are_those_of_the_whole(long_video: Path, start: float, end: float) -> None:
+def test_frames_of_a_range_are_those_of_the_whole(long_video: Path, start: float, end: float) -> None:
     with open_video(long_video, VideoRange(start, end)) as video:
         frames = list(video)
         assert video.expected_frames == pytest.approx(len(frames), abs=1)
@@ -91,12 +91,12 @@ def test_an_impossible_range() -> None:
 
 @pytest.fixture(scope="module")
 def rounded_video(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """12 s of the same at 29.97 frames a second, from a container that rounds times to milliseconds."""
+    """Write 12 s of the same at 29.97 fps, in a container that rounds times to milliseconds."""
     return write_numbers(tmp_path_factory.mktemp("range") / "rounded.mkv", 30000 / 1001, 360, "MJPG")
 
 
 @pytest.mark.parametrize(("name", "nominal"), [("long_video", 25), ("rounded_video", 30)])
-def test_timecodes_mean_frames(name: str, nominal: int, request: pytest.FixtureRequest) -> None:
+def test_timecodes_select_frames(name: str, nominal: int, request: pytest.FixtureRequest) -> None:
     """From 3 s and 12 frames to 4 s and 7 frames, both included."""
     path, first, last = request.getfixturevalue(name), 3 * nominal + 12, 4 * nominal + 7
     with open_video(path, parse_range("00:00:03:12", "00:00:04:07", None)) as video:

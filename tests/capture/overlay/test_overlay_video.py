@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The overlay: where the body is drawn, what stays as it was, and how files come to be."""
+"""The overlay: where bodies are drawn, which pixels do not change, and how files are written."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ GREY = 90
 
 
 def standing(body: Body, frames: list[int], x: float = 0.0, y: float = 3.0, size=(W, H), intrinsics=K) -> Motion:
-    """A person in T-pose ``y`` metres ahead of a level camera at 1 m, seen in every frame."""
+    """Create a person in T-pose ``y`` metres in front of a level camera at 1 m, seen in every frame."""
     T, K1 = len(frames), body.K + 1
     poses = np.zeros((T, K1, 3), np.float32)
     poses[:, 0] = cv2.Rodrigues(R_WORLD_MODEL)[0].ravel()
@@ -49,7 +49,7 @@ def standing(body: Body, frames: list[int], x: float = 0.0, y: float = 3.0, size
 
 @pytest.fixture
 def footage(tmp_path) -> Path:
-    """Ten grey frames at 25 per second."""
+    """Write ten grey frames at 25 per second."""
     path = tmp_path / "footage.mp4"
     writer = cv2.VideoWriter(str(path), cv2.CAP_FFMPEG, cv2.VideoWriter_fourcc(*"mp4v"), 25, (W, H))
     for _ in range(10):
@@ -59,12 +59,12 @@ def footage(tmp_path) -> Path:
 
 
 def changed(image: np.ndarray) -> np.ndarray:
-    """(H, W) bool: clearly not the grey of the footage."""
+    """Find the pixels (H, W) that clearly differ from the grey of the footage."""
     return np.abs(image.astype(int) - GREY).max(-1) > 12
 
 
 def silhouette(body: Body, x: float = 0.0, y: float = 3.0) -> np.ndarray:
-    """(H, W) bool by OpenCV's filled polygons, posed by hand: x stays, model y is up, facing the camera."""
+    """Draw the silhouette (H, W) with OpenCV's polygons, posed by hand: x stays, model y is up, facing the camera."""
     offset = body.v_template - body.J_template[0]
     points = np.stack([x + offset[:, 0], 1.0 - (0.95 + offset[:, 1]), y - offset[:, 2]], -1)
     pixels = np.round((points[:, :2] / points[:, 2:] @ K[:2, :2].T + K[:2, 2]) * 256).astype(np.int32)
@@ -74,11 +74,11 @@ def silhouette(body: Body, x: float = 0.0, y: float = 3.0) -> np.ndarray:
     return mask > 0
 
 
-def overlap(a: np.ndarray, b: np.ndarray) -> float:
+def intersection_over_union(a: np.ndarray, b: np.ndarray) -> float:
     return (a & b).sum() / (a | b).sum()
 
 
-def test_vertices_come_into_the_camera_of_their_row(body):
+def test_vertices_are_in_the_camera_of_their_row(body):
     motion = standing(body, [0, 1])
     rng = np.random.default_rng(2)
     rotation = cv2.Rodrigues(rng.normal(size=3))[0]
@@ -106,13 +106,13 @@ def test_the_video_shows_the_body_where_it_is_and_nothing_elsewhere(tmp_path, fo
         assert changed(images[i]).mean() < 0.01
     expected = silhouette(body, x=0.3)
     for i in (2, 3, 5, 6):
-        assert overlap(changed(images[i]), expected) > 0.65  # at this size the codec blurs the outline
+        assert intersection_over_union(changed(images[i]), expected) > 0.65  # at this size the codec blurs the outline
     strength = [np.abs(image[expected].astype(float) - GREY).mean() for image in images]
     assert 0.1 * strength[3] < strength[4] < 0.6 * strength[3]  # filled in: drawn fainter
     assert sorted(p.name for p in tmp_path.iterdir()) == ["footage.mp4", "overlay.mp4"]
 
 
-def test_two_people_have_their_own_colours_and_the_nearer_hides_the_other(body):
+def test_two_people_have_different_colours_and_the_nearer_occludes_the_other(body):
     image = np.full((H, W, 3), GREY, np.uint8)
     near, far = (camera_vertices(standing(body, [0], x, y), body, 0) for x, y in ((0.0, 2.5), (0.2, 4.0)))
     out = draw_overlay(image, [far, near], body.faces, K, opacity=1.0)
@@ -125,7 +125,7 @@ def test_two_people_have_their_own_colours_and_the_nearer_hides_the_other(body):
     assert blue[only_far].mean() < 0.02  # the first is orange
 
 
-def test_opacity_blends_and_the_picture_given_stays_as_it_was(body):
+def test_opacity_blends_and_the_input_image_is_not_changed(body):
     image = np.full((H, W, 3), GREY, np.uint8)
     vertices = camera_vertices(standing(body, [0]), body, 0)
     colors = body_colors(body, 0)
@@ -136,16 +136,16 @@ def test_opacity_blends_and_the_picture_given_stays_as_it_was(body):
     assert (image == GREY).all()
 
 
-def test_a_picture_suffix_gives_the_first_frame_with_somebody(tmp_path, footage, body):
+def test_a_picture_suffix_gives_the_first_frame_with_a_person(tmp_path, footage, body):
     motion = standing(body, [0, 1, 2])
     motion.valid[:] = (False, False, True)
     for name in ("still.png", "still.JPG", "still.webp"):
         write_overlay(tmp_path / name, footage, motion, body)
         image = cv2.cvtColor(cv2.imread(str(tmp_path / name)), cv2.COLOR_BGR2RGB)
-        assert overlap(changed(image), silhouette(body)) > 0.8
+        assert intersection_over_union(changed(image), silhouette(body)) > 0.8
 
 
-def test_keypoints_are_dots_where_they_are_sure(tmp_path, footage, body):
+def test_confident_keypoints_are_drawn_as_dots(tmp_path, footage, body):
     motion = standing(body, [0])
     motion.keypoints2d = np.array([[[20, 30, 0.9], [20, 90, 0.1], [np.nan, 5, 0.9], [1e9, 5, 0.9]]], np.float32)
     motion.keypoints2d_names = np.array(list("abcd"))
@@ -155,7 +155,7 @@ def test_keypoints_are_dots_where_they_are_sure(tmp_path, footage, body):
     assert not marks[85:95, 15:25].any()
 
 
-def test_odd_sizes_lose_a_row_and_large_ones_are_bounded(tmp_path, body):
+def test_odd_sizes_are_cropped_and_large_ones_are_limited(tmp_path, body):
     picture = cv2.imencode(".jpg", np.full((61, 2401, 3), GREY, np.uint8))[1].tobytes()
     (tmp_path / "wide.mjpeg").write_bytes(picture * 3)
     camera = np.array([[60.0, 0, 1200], [0, 60.0, 30.0], [0, 0, 1]])
@@ -169,7 +169,7 @@ def test_odd_sizes_lose_a_row_and_large_ones_are_bounded(tmp_path, body):
 
 
 @pytest.mark.parametrize("name", ["overlay.gif", "overlay", "no/such/folder/overlay.mp4"])
-def test_what_cannot_be_written_is_said(tmp_path, footage, body, name):
+def test_unwritable_outputs_are_errors(tmp_path, footage, body, name):
     with pytest.raises(OutputError, match="cannot write"):
         write_overlay(tmp_path / name, footage, standing(body, [0]), body)
     assert [p.name for p in tmp_path.iterdir()] == ["footage.mp4"]
@@ -177,7 +177,7 @@ def test_what_cannot_be_written_is_said(tmp_path, footage, body, name):
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no limit on a file's size that a process could set")
 @pytest.mark.parametrize("name", ["overlay.mp4", "overlay.png"])
-def test_no_room_is_said_and_nothing_is_left(tmp_path, footage, body, name):
+def test_a_full_disk_is_an_error_and_leaves_no_file(tmp_path, footage, body, name):
     import resource
 
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
@@ -190,7 +190,7 @@ def test_no_room_is_said_and_nothing_is_left(tmp_path, footage, body, name):
     assert [p.name for p in tmp_path.iterdir()] == ["footage.mp4"]
 
 
-def test_cancelling_leaves_nothing_and_keeps_what_was_there(tmp_path, footage, body):
+def test_cancelling_leaves_no_file_and_keeps_an_existing_one(tmp_path, footage, body):
     (tmp_path / "overlay.mp4").write_bytes(b"the last one")
 
     def cancel(done: int, total: int) -> None:
@@ -203,7 +203,7 @@ def test_cancelling_leaves_nothing_and_keeps_what_was_there(tmp_path, footage, b
     assert (tmp_path / "overlay.mp4").read_bytes() == b"the last one"
 
 
-def test_footage_that_is_gone_and_a_body_that_does_not_fit(tmp_path, footage, body):
+def test_missing_footage_and_a_wrong_body_are_errors(tmp_path, footage, body):
     with pytest.raises(VideoError):
         write_overlay(tmp_path / "a.mp4", tmp_path / "gone.mp4", standing(body, [0]), body)
     motion = standing(body, [0])

@@ -14,7 +14,7 @@ RED, BLUE = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
 
 
 def sphere(center, radius: float, rows: int = 48) -> tuple[np.ndarray, np.ndarray]:
-    """Vertices and outward counter-clockwise triangles."""
+    """Create vertices and triangles, counter-clockwise seen from outside."""
     theta, phi = np.linspace(0, np.pi, rows), np.linspace(0, 2 * np.pi, 2 * rows, endpoint=False)
     t, p = np.meshgrid(theta, phi, indexing="ij")
     points = np.stack([np.sin(t) * np.cos(p), np.sin(t) * np.sin(p), np.cos(t)], -1).reshape(-1, 3)
@@ -26,13 +26,13 @@ def sphere(center, radius: float, rows: int = 48) -> tuple[np.ndarray, np.ndarra
 
 
 def rays() -> np.ndarray:
-    """(H, W, 3) viewing ray of each pixel centre with z = 1."""
+    """Calculate the viewing ray (H, W, 3) of each pixel centre with z = 1."""
     v, u = np.mgrid[:HEIGHT, :WIDTH].astype(float)
     return np.stack([(u - K[0, 2]) / K[0, 0], (v - K[1, 2]) / K[1, 1], np.ones_like(u)], -1)
 
 
 def sphere_depth(center, radius: float) -> np.ndarray:
-    """(H, W) z of the nearer intersection of each pixel's ray with a sphere, inf where there is none."""
+    """Calculate z (H, W) of the nearer intersection of each pixel's ray with a sphere, inf where there is none."""
     d, c = rays(), np.asarray(center)
     a, b = (d * d).sum(-1), d @ c
     inside = b * b - a * (c @ c - radius**2)
@@ -105,7 +105,7 @@ def test_back_faces_are_left_out():
     assert canvas.depth[canvas.coverage].min() > outline - 0.03
 
 
-def test_a_floor_that_passes_under_the_camera_is_cut_at_the_near_plane():
+def test_a_floor_that_passes_under_the_camera_is_clipped_at_the_near_plane():
     y = 1.5
     floor = np.array([[-50, y, -20], [50, y, -20], [50, y, 60], [-50, y, 60.0]])
     canvas = Canvas.blank(WIDTH, HEIGHT)
@@ -119,7 +119,7 @@ def test_a_floor_that_passes_under_the_camera_is_cut_at_the_near_plane():
     np.testing.assert_allclose(canvas.depth[both], z[both], rtol=1e-4)
 
 
-def test_nothing_behind_the_camera_or_not_a_number_is_drawn():
+def test_vertices_behind_the_camera_or_nan_are_not_drawn():
     points, triangles = sphere((0, 0, -3.0), 0.5)
     canvas = Canvas.blank(WIDTH, HEIGHT)
     rasterize(canvas, points, triangles, RED, K)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which provider a session gets: what is there, what was asked for, and the processor when that fails."""
+"""The provider of a session: availability, the request, and the CPU as fallback."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ CPU_NAME = "CPUExecutionProvider"
 
 
 class FakeRuntime:
-    """onnxruntime with these providers; those in ``broken`` raise, those in ``silent`` are left out."""
+    """Fake of onnxruntime with these providers; those in ``broken`` raise, those in ``silent`` are left out."""
 
     def __init__(self, available: list[str], broken: tuple[str, ...] = (), silent: tuple[str, ...] = ()) -> None:
         self.available, self.broken, self.silent = available, broken, silent
@@ -62,7 +62,7 @@ def runtime(monkeypatch: pytest.MonkeyPatch):
         (("cuda",), "cpu", "cpu"),
     ],
 )
-def test_the_best_there_is(runtime, available: tuple[str, ...], asked: str, used: str) -> None:
+def test_the_best_available_provider_is_used(runtime, available: tuple[str, ...], asked: str, used: str) -> None:
     fake, execution = runtime(*available), Execution(asked)
     open_session(Path("m.onnx"), 3, execution)
     assert execution.used == [used]
@@ -71,7 +71,7 @@ def test_the_best_there_is(runtime, available: tuple[str, ...], asked: str, used
     assert fake.threads == [3]
 
 
-def test_what_is_not_there_is_said_once(runtime) -> None:
+def test_an_unavailable_provider_gives_one_warning(runtime) -> None:
     fake, execution = runtime("coreml"), Execution("cuda")
     open_session(Path("m.onnx"), 1, execution)
     open_session(Path("m.onnx"), 1, execution)
@@ -81,7 +81,7 @@ def test_what_is_not_there_is_said_once(runtime) -> None:
 
 
 @pytest.mark.parametrize("how", ["broken", "silent"])
-def test_a_provider_that_fails_gives_way_once_and_for_all(runtime, how: str) -> None:
+def test_a_failing_provider_is_not_tried_again(runtime, how: str) -> None:
     fake, execution = runtime("cuda", **{how: (PROVIDERS["cuda"][0],)}), Execution("auto")
     for _ in range(3):
         open_session(Path("m.onnx"), 1, execution)
@@ -92,7 +92,7 @@ def test_a_provider_that_fails_gives_way_once_and_for_all(runtime, how: str) -> 
     assert "\n" not in warning
 
 
-def test_directml_runs_one_at_a_time(runtime) -> None:
+def test_directml_sessions_run_in_one_thread_at_a_time(runtime) -> None:
     runtime("directml")
     session = open_session(Path("m.onnx"), 1, Execution("auto"))
     assert isinstance(session, SerializedSession)
@@ -115,7 +115,7 @@ def test_directml_runs_one_at_a_time(runtime) -> None:
     assert results == [1] * 6
 
 
-def test_the_line_that_says_it() -> None:
+def test_description_of_the_providers() -> None:
     assert Execution("auto", used=["cuda"]).describe(2) == "CUDA"
     assert Execution("auto", used=["cpu"]).describe(2) == "CPU, 2 threads"
     assert Execution("auto", used=["cpu"]).describe(1) == "CPU, 1 thread"
@@ -123,12 +123,12 @@ def test_the_line_that_says_it() -> None:
         Execution("gpu")
 
 
-def test_the_command_line_offers_the_same() -> None:
+def test_the_command_line_offers_the_same_choices() -> None:
     assert sorted(option("provider").values) == sorted(CHOICES)
 
 
 @pytest.mark.usefixtures("networks")
-def test_the_real_processor() -> None:
+def test_the_real_cpu() -> None:
     path = network_path("pose_detection")
     execution = Execution("tensorrt")
     session = open_session(path, 2, execution)

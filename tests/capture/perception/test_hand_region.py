@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where hands are looked for, from geometry that is known."""
+"""Regions of hands, from known geometry."""
 
 import math
 
@@ -19,13 +19,13 @@ from scope.scope_addon.capture.perception.region import Region
 
 
 def turned(points, angle, center=(0.0, 0.0), size=1.0):
-    """Points (n, 2) turned clockwise on screen, enlarged and moved."""
+    """Rotate points (n, 2) clockwise on screen, scale and shift them."""
     c, s = math.cos(angle), math.sin(angle)
     return size * np.asarray(points, float) @ np.array([[c, s], [-s, c]]) + center
 
 
 def flat_hand():
-    """(21, 2) an upright open hand of length 1, the wrist at 0, y down."""
+    """Create an upright open hand (21, 2) of length 1, the wrist at 0, y down."""
     hand = np.zeros((len(HAND_NAMES), 2))
     for finger, x in enumerate((-0.3, -0.15, 0.0, 0.12, 0.24)):
         for k, y in enumerate((-0.5, -0.7, -0.85, -1.0)):
@@ -41,7 +41,7 @@ def arm(elbow, wrist, index, pinky):
 
 
 @pytest.mark.parametrize("angle", [0.0, 0.7, -2.0, math.pi])
-def test_the_body_foretells_the_hand_beyond_the_wrist_whatever_the_arms_direction(angle):
+def test_the_body_predicts_the_hand_beyond_the_wrist_in_any_direction_of_the_arm(angle):
     scale = 500.0
     length = HAND_LENGTH_M * scale
     along = turned([[0.0, 3 * length], [0, 0], [-10, -length / 2], [10, -length / 2]], angle, (400, 300))
@@ -54,24 +54,24 @@ def test_the_body_foretells_the_hand_beyond_the_wrist_whatever_the_arms_directio
     assert ((inside > 0) & (inside < 1)).all()
 
 
-def test_a_hand_that_points_at_the_camera_is_looked_for_at_the_wrist_turned_like_the_forearm():
+def test_a_hand_that_points_at_the_camera_is_predicted_at_the_wrist_along_the_forearm():
     region = region_from_body(arm((100, 100), (200, 100), (200, 100), (200, 100)), 500.0, 0)
     assert region.center_px == pytest.approx((200, 100))
     assert region.rotation == pytest.approx(math.pi / 2)
 
 
-def test_keypoints_that_lie_absurdly_far_from_the_wrist_do_not_carry_the_region_away():
+def test_outlying_finger_keypoints_move_the_region_only_a_little():
     region = region_from_body(arm((0, 400), (0, 0), (0, -5000), (0, -5000)), 500.0, 0)
     assert math.hypot(*region.center_px) <= HAND_LENGTH_M * 500.0
 
 
-def test_the_scale_of_a_person_is_that_of_an_orthographic_view():
+def test_the_scale_of_a_person_is_that_of_an_orthographic_projection():
     world = np.random.default_rng(1).standard_normal((33, 3))
     assert pixels_per_metre(world[:, :2] * 240.0 + [700, 50], world) == pytest.approx(240.0)
 
 
 @pytest.mark.parametrize("angle", [0.0, 1.1, -2.5])
-def test_keypoints_tell_the_next_region(angle):
+def test_keypoints_predict_the_next_region(angle):
     upright = region_from_landmarks(flat_hand() * 100)
     hand = turned(flat_hand(), angle, (320, 240), 100)
     region = region_from_landmarks(hand)
@@ -84,7 +84,7 @@ def test_keypoints_tell_the_next_region(angle):
     assert seen[12, 1] < 0.35 < 0.65 < seen[0, 1]  # the middle finger's tip above, the wrist below
 
 
-def test_bent_fingers_leave_the_region_where_it_is():
+def test_bending_fingers_does_not_move_the_region():
     open_hand, fist = flat_hand() * 100, flat_hand() * 100
     fist[[8, 12, 16, 20]] = fist[[5, 9, 13, 17]]
     assert region_from_landmarks(fist) == region_from_landmarks(open_hand)
@@ -93,7 +93,7 @@ def test_bent_fingers_leave_the_region_where_it_is():
     assert region_from_landmarks(askew).rotation == region_from_landmarks(open_hand).rotation
 
 
-def test_a_palm_tells_the_region_also_when_it_was_looked_for_in_a_turned_square():
+def test_a_palm_gives_the_region_also_in_a_rotated_square():
     points = np.zeros((7, 2))
     points[0], points[2] = (96, 120), (96, 72)
     upright = region_from_palm(np.array([72.0, 72, 120, 120]), points)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The landmark network: decoding against hand-made outputs, and real pictures against measured truth."""
+"""The landmark network: decoding of hand-made outputs, and real images against measured ground truth."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def network(networks: Path) -> LandmarkNetwork:
 
 
 def raw_outputs() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Landmarks in the middle of the crop, cold heatmaps, world landmarks at the origin."""
+    """Create outputs: landmarks in the middle of the crop, empty heatmaps, world landmarks at the origin."""
     landmarks = np.zeros((39, 5), np.float32)
     landmarks[:, :2] = 128
     return landmarks, np.full((39, 64, 64), -20, np.float32), np.zeros((39, 3), np.float32)
@@ -71,10 +71,10 @@ def test_refine_at_the_edge_sees_only_its_own_cells() -> None:
 
 
 @pytest.mark.parametrize("camera", [1, 2, 3, 4])
-def test_agrees_with_measured_truth(
+def test_agrees_with_measured_ground_truth(
     network: LandmarkNetwork, first_frame: Callable[..., np.ndarray], shared: Path, camera: int
 ) -> None:
-    """x right, y down, z away from the camera, left is the person's left: any other reading is far off."""
+    """x right, y down, z away from the camera, left is the person's left: any other convention has large errors."""
     truth = np.load(shared / "data" / "pose2sim" / f"truth_cam{camera}.npz")
     row = 10
     image = first_frame(f"pose2sim/cam{camera}", skip=int(truth["frame_index"][row]))

@@ -28,7 +28,7 @@ def lifter():
 
 
 def before_camera(body, R, heading):
-    """(2, 33, 3) keypoints of a pose (24, 3, 3) 5 m away, camera frame: the body's own, and where they are seen."""
+    """Place a pose (24, 3, 3) 5 m away: its keypoints (2, 33, 3) in camera axes, exact and with keypoint offsets."""
     R[0] = np.diag([1.0, -1.0, -1.0]) @ exp(np.array([0, heading, 0])) @ R[0]
     pose, at = body.forward_kinematics(R, np.array([0.3, 0.1, 5.0])), list(body.keypoint_set("blazepose").values())
     return np.array([which.keypoints(*pose)[at] for which in (body, with_keypoint_offsets(body))])
@@ -41,7 +41,7 @@ def truth_and_rays(moments):
 
 @pytest.fixture(scope="module")
 def people(body):
-    """Keypoints of the body in the camera frame (T, 33, 3) and where they are seen, (T, 33, 2) with z = 1: walking-like
+    """Create keypoints of the body in camera axes (T, 33, 3) and their image (T, 33, 2) at z = 1: walking-like
     poses, every heading, a camera 5 m away."""
     rng, out = np.random.default_rng(0), []
     for k in range(48):
@@ -58,7 +58,7 @@ def people(body):
 
 @pytest.fixture(scope="module")
 def walkers(body):
-    """As ``people``, of a walk on the spot that turns once, 4 s, 30 frames a second; and times."""
+    """Create the same for a walk on the spot that turns once, 4 s at 30 fps, and the times."""
     times, out = np.arange(120) / 30, []
     for t in times:
         pose = np.zeros((body.K + 1, 3))
@@ -78,7 +78,7 @@ def relative(points):
     return points - points[:, HIPS].mean(axis=1, keepdims=True)
 
 
-def test_depth_of_unseen_people_is_found_from_their_image_alone(lifter, people):
+def test_depth_of_people_outside_the_training_data_is_estimated_from_their_image_alone(lifter, people):
     people, rays = people
     lifted = lifter.lift(rays, np.ones(rays.shape[:2]), None)
     limbs = [*range(11, 17), *range(25, 29)]
@@ -88,7 +88,7 @@ def test_depth_of_unseen_people_is_found_from_their_image_alone(lifter, people):
     assert error < 0.7 * flat
 
 
-def test_true_world_landmarks_make_it_better(lifter, people):
+def test_true_world_landmarks_improve_the_estimate(lifter, people):
     people, rays = people
     ones = np.ones(people.shape[:2])
     R = virtual_camera(rays)
@@ -98,8 +98,8 @@ def test_true_world_landmarks_make_it_better(lifter, people):
     assert error[1] < error[0]
 
 
-def test_what_lies_around_a_frame_makes_it_better(lifter, walkers):
-    """With errors of the image that change from frame to frame, three seeds: nearer to the truth, and calmer."""
+def test_neighbouring_frames_improve_the_estimate(lifter, walkers):
+    """With independent image errors per frame and three seeds: smaller errors and less jitter."""
     points, seen, times = walkers
     truth, ones = relative(points), np.ones(points.shape[:2])
     windows = windows_around(times, np.ones(len(times), bool))
@@ -114,7 +114,7 @@ def test_what_lies_around_a_frame_makes_it_better(lifter, walkers):
         assert unrest[1] < 0.8 * unrest[0]
 
 
-def test_long_clips_are_lifted_in_blocks_that_know_their_neighbours(lifter, walkers, monkeypatch):
+def test_long_clips_are_lifted_in_blocks_with_their_neighbours(lifter, walkers, monkeypatch):
     points, rays, times = walkers
     ones = np.ones(points.shape[:2])
     windows = windows_around(times, np.ones(len(times), bool))
@@ -125,7 +125,7 @@ def test_long_clips_are_lifted_in_blocks_that_know_their_neighbours(lifter, walk
     assert np.allclose(blocks.sigma_along, whole.sigma_along, atol=1e-5)
 
 
-def test_errors_are_as_large_as_foretold(lifter, people):
+def test_errors_match_their_standard_deviations(lifter, people):
     people, rays = people
     lifted = lifter.lift(rays, np.ones(rays.shape[:2]), None)
     z = (lifted.points - relative(people))[..., 2] / lifted.sigma_along
@@ -136,7 +136,7 @@ def test_errors_are_as_large_as_foretold(lifter, people):
 
 @pytest.fixture(scope="module")
 def real_people(shared, frames):
-    """What the landmark network sees of a man, filmed by four cameras, and where he truly was, hips' middle at 0.
+    """Read the landmark network's estimates of a man filmed by four cameras, and his true position, hip centre at 0.
 
     rays (n, 33, 2), confidence (n, 33), world landmarks (n, 33, 3), true limbs (n, 10, 3), NaN where not
     measured, and their keypoints' numbers.
@@ -162,7 +162,7 @@ def real_people(shared, frames):
     return [np.array(part) for part in zip(*found, strict=True)], [KEYPOINT_NAMES.index(n) for n in limbs]
 
 
-def test_real_people_are_lifted_better_than_by_their_world_landmarks(lifter, real_people):
+def test_lifting_real_people_is_more_accurate_than_their_world_landmarks(lifter, real_people):
     (rays, confidence, world, truth), limbs = real_people
     lifted = lifter.lift_mixture(rays, confidence, world)
     ours, theirs = (np.nanmean(np.linalg.norm(p[:, limbs] - truth, axis=-1)) for p in (lifted.points, world))
@@ -171,8 +171,8 @@ def test_real_people_are_lifted_better_than_by_their_world_landmarks(lifter, rea
     assert ours < 0.85 * theirs
 
 
-def test_errors_on_real_people_are_as_large_as_foretold(lifter, real_people):
-    """Root mean square of residual over deviation, one for honest deviations, all four cameras together."""
+def test_errors_on_real_people_match_their_standard_deviations(lifter, real_people):
+    """Root mean square of residual over standard deviation, 1 if calibrated, over all four cameras."""
     (rays, confidence, world, truth), limbs = real_people
     lifted = lifter.lift_mixture(rays, confidence, world)
     error = (lifted.points[:, limbs] - truth) @ np.swapaxes(virtual_camera(rays), 1, 2)
@@ -197,7 +197,7 @@ def test_disagreement_widens_the_deviation_along_its_own_axis(people):
     assert np.allclose(uneven.sigma_along, np.sqrt(sigma[1] ** 2 + 0.75 * 0.1**2 + 0.25 * 0.3**2))
 
 
-def test_the_mirror_image_is_lifted_to_the_mirror_image(lifter, people):
+def test_a_mirrored_image_is_lifted_to_the_mirrored_body(lifter, people):
     people, rays = people
     ones = np.ones(people.shape[:2])
     plain = lifter.lift(rays, ones, None).points
@@ -205,7 +205,7 @@ def test_the_mirror_image_is_lifted_to_the_mirror_image(lifter, people):
     assert np.linalg.norm(mirrored - plain[:, MIRROR_PARTNER] * [-1, 1, 1], axis=-1).mean() < 0.05
 
 
-def test_the_virtual_camera_looks_at_the_person_and_stands_upright():
+def test_the_virtual_camera_looks_at_the_person_and_is_upright():
     rays = np.random.default_rng(0).uniform(-0.5, 0.5, (20, 33, 2))
     R = virtual_camera(rays)
     assert np.allclose(R @ np.swapaxes(R, 1, 2), np.eye(3), atol=1e-12)
@@ -216,8 +216,8 @@ def test_the_virtual_camera_looks_at_the_person_and_stands_upright():
     assert np.allclose(R[:, 0, 1], 0)  # its x axis stays level
 
 
-def test_turning_the_camera_changes_neither_input_nor_shape(lifter, people):
-    """A pan about the camera's own centre moves the person in the picture; what is lifted turns with it."""
+def test_panning_the_camera_changes_neither_input_nor_shape(lifter, people):
+    """A pan around the camera's centre moves the person in the image; the lifted keypoints rotate with it."""
     turn, (_, rays) = exp(np.array([0.0, 0.35, 0.0])), people
     turned = np.concatenate([rays, np.ones((*rays.shape[:2], 1))], axis=-1) @ turn.T
     other = turned[..., :2] / turned[..., 2:]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Windows around frames, against moments worked out by hand."""
+"""Windows around frames, against samples calculated by hand."""
 
 import numpy as np
 from scope.scope_addon.capture.perception.lifter_window import (
@@ -12,8 +12,8 @@ from scope.scope_addon.capture.perception.lifter_window import (
 )
 
 
-def moments(times, seen, values=None):
-    """What a window of times (or other values of each frame) holds, for every frame."""
+def samples(times, seen, values=None):
+    """Sample the windows of all frames, of their times or other values."""
     windows = windows_around(times, seen)
     rows = np.arange(len(times))
     first, end = windows.span(rows)
@@ -21,52 +21,52 @@ def moments(times, seen, values=None):
     return windows.gather(x, rows, first)[..., 0]
 
 
-def test_moments_are_evenly_spaced_in_time_at_any_frame_rate():
+def test_samples_are_evenly_spaced_in_time_at_any_frame_rate():
     for rate in (10, 24, 25, 29.97, 30, 60, 240):
         times = np.arange(int(4 * rate)) / rate
-        found = moments(times, np.ones(len(times), bool))
+        found = samples(times, np.ones(len(times), bool))
         inside = (times > 0.41) & (times < times[-1] - 0.41)
         assert np.allclose(found[inside], times[inside, None] + OFFSETS_S, atol=1e-6)
 
 
-def test_frames_of_variable_rate_are_mixed_in_proportion_to_time():
+def test_frames_of_variable_rate_are_interpolated_in_time():
     times = np.cumsum(np.random.default_rng(0).uniform(0.01, 0.2, 100))
-    found = moments(times, np.ones(100, bool))
+    found = samples(times, np.ones(100, bool))
     expected = np.clip(times[:, None] + OFFSETS_S, times[0], times[-1])
     assert np.allclose(found, expected, atol=1e-6)
 
 
 def test_the_ends_of_a_clip_are_repeated():
     times = np.arange(90) / 30
-    found = moments(times, np.ones(90, bool))
+    found = samples(times, np.ones(90, bool))
     assert np.allclose(found[0, : MIDDLE + 1], 0)
     assert np.allclose(found[-1, MIDDLE:], times[-1])
 
 
-def test_a_short_gap_is_bridged_and_a_long_one_is_not_looked_across():
+def test_a_short_gap_is_interpolated_and_a_long_one_ends_the_window():
     times = np.arange(90) / 30
     seen = np.ones(90, bool)
     seen[40:44] = False
-    assert np.allclose(moments(times, seen)[39], times[39] + OFFSETS_S, atol=1e-6)
+    assert np.allclose(samples(times, seen)[39], times[39] + OFFSETS_S, atol=1e-6)
     seen[40:60] = False
-    assert moments(times, seen)[39].max() <= times[39] + 1e-9
-    assert moments(times, seen)[60].min() >= times[60] - 1e-9
+    assert samples(times, seen)[39].max() <= times[39] + 1e-9
+    assert samples(times, seen)[60].min() >= times[60] - 1e-9
 
 
-def test_frames_that_were_not_seen_lend_nothing_to_others():
+def test_unseen_frames_do_not_contribute():
     times = np.arange(90) / 30
     seen = np.ones(90, bool)
     seen[[10, 33, 34, 70]] = False
     values = np.where(seen, 1.0, np.nan)
-    assert np.isfinite(moments(times, seen, np.where(seen, values, 1e6))[seen]).all()
-    assert np.allclose(moments(times, seen, np.where(seen, 1.0, 1e6))[seen], 1.0)
+    assert np.isfinite(samples(times, seen, np.where(seen, values, 1e6))[seen]).all()
+    assert np.allclose(samples(times, seen, np.where(seen, 1.0, 1e6))[seen], 1.0)
 
 
-def test_sparse_frames_and_single_pictures_stand_still():
+def test_windows_of_sparse_frames_and_stills_repeat_one_frame():
     times = np.arange(5) * 2 * LONGEST_GAP_S
-    assert np.allclose(moments(times, np.ones(5, bool)), times[:, None])
-    assert np.allclose(moments(np.zeros(1), np.ones(1, bool)), 0)
-    assert np.allclose(moments(times, np.zeros(5, bool))[:, MIDDLE], times)  # nobody was seen: nothing fails
+    assert np.allclose(samples(times, np.ones(5, bool)), times[:, None])
+    assert np.allclose(samples(np.zeros(1), np.ones(1, bool)), 0)
+    assert np.allclose(samples(times, np.zeros(5, bool))[:, MIDDLE], times)  # no frame was seen: all are used
     still = single_frame_windows(3)
     x = np.arange(3.0)[:, None]
     assert np.array_equal(still.gather(x, np.arange(3), 0)[..., 0], np.repeat(x, WINDOW, axis=1))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The person detector: its pieces against hand-made answers, the whole on real pictures."""
+"""The person detector: its parts against results by hand, the whole on real images."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def test_overlapping_boxes_become_their_weighted_mean() -> None:
 
 
 @pytest.mark.parametrize(("height", "width"), [(1080, 1920), (640, 360), (31, 29), (1, 500)])
-def test_letterbox_keeps_the_picture_whole_and_centred(height: int, width: int) -> None:
+def test_letterbox_shows_the_whole_image_centred(height: int, width: int) -> None:
     square, scale, offset = letterbox(np.full((height, width, 3), 255, np.uint8))
     rows, columns = np.flatnonzero(square.any(axis=(1, 2))), np.flatnonzero(square.any(axis=(0, 2)))
     np.testing.assert_allclose([columns[0], rows[0]], offset)
@@ -76,7 +76,7 @@ def test_finds_the_squatting_person(detector: PersonDetector, first_frame: Calla
     assert abs(person.region.rotation) < 0.3
 
 
-def test_result_follows_the_picture(detector: PersonDetector, first_frame: Callable[[str], np.ndarray]) -> None:
+def test_detections_follow_the_image(detector: PersonDetector, first_frame: Callable[[str], np.ndarray]) -> None:
     image = first_frame("clips/gesture_square")
     (person,) = detector.detect(image)
     bordered = np.zeros((800, 900, 3), np.uint8)
@@ -93,7 +93,7 @@ def test_finds_both_people(detector: PersonDetector, last_frame: Callable[[str],
     assert not found[0].region.resembles(found[1].region, 0.2)
 
 
-def test_nobody_in_a_blank_picture(detector: PersonDetector) -> None:
+def test_no_detections_in_a_blank_image(detector: PersonDetector) -> None:
     assert detector.detect(np.full((90, 160, 3), 128, np.uint8)) == []
 
 

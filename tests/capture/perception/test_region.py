@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The rotated square: analytic positions and rotations, and pixels that land where the maps say."""
+"""The rotated square: analytic positions and rotations, and pixels against the coordinate maps."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ TILTED = Region((320.0, 200.0), 180.0, math.radians(35))
     ("top", "rotation_deg"),
     [((50, 20), 0), ((80, 50), 90), ((50, 80), 180), ((20, 50), -90), ((50 + 30, 50 - 30), 45)],
 )
-def test_region_turns_the_top_point_upright(top: tuple[float, float], rotation_deg: float) -> None:
+def test_region_rotates_the_top_point_upright(top: tuple[float, float], rotation_deg: float) -> None:
     region = region_from_points(np.array([50.0, 50.0]), np.array(top, float))
     distance = math.dist((50, 50), top)
     assert math.degrees(region.rotation) == pytest.approx(rotation_deg)
@@ -39,8 +39,8 @@ def test_maps_are_inverse() -> None:
 
 @pytest.mark.parametrize("side", [90.0, 256.0, 700.0, 1500.0])
 @pytest.mark.parametrize("rotation_deg", [0, 20, -130])
-def test_cut_shows_a_blob_where_the_map_says(side: float, rotation_deg: float) -> None:
-    """Also for large squares, where pixels are averaged first."""
+def test_cut_agrees_with_the_coordinate_map(side: float, rotation_deg: float) -> None:
+    """Large squares included, in which pixels are averaged first."""
     size = 256
     blob = np.array([637.0, 411.0])
     y, x = np.mgrid[:800, :1200]
@@ -54,13 +54,13 @@ def test_cut_shows_a_blob_where_the_map_says(side: float, rotation_deg: float) -
     np.testing.assert_allclose(found * size, region.crop_from_image(blob) * size, atol=0.1)
 
 
-def test_cut_beyond_the_edge_continues_the_outermost_pixels() -> None:
+def test_cut_repeats_the_border_pixels_outside_the_image() -> None:
     image = np.full((40, 40, 3), 77, np.uint8)
     for region in (Region((0.0, 0.0), 60.0, 0.3), Region((-100.0, 20.0), 30.0, 0.0), Region((20.0, 20.0), 4000.0, 1.0)):
         assert (region.cut(image, 64) == 77).all()
 
 
-def test_world_vectors_turn_with_the_region() -> None:
+def test_world_vectors_rotate_with_the_region() -> None:
     quarter = Region((0.0, 0.0), 1.0, math.pi / 2)
     vectors = np.array([[1.0, 0, 0], [0, 1, 0], [0, 0, 1]])
     np.testing.assert_allclose(quarter.rotate_to_camera(vectors), [[0, 1, 0], [-1, 0, 0], [0, 0, 1]], atol=1e-12)

@@ -112,7 +112,7 @@ class Graph:
             for fixed, new in ((width, new_width), (height, new_height)):
                 if isinstance(fixed, int) and fixed != new:
                     raise ModelFileError(
-                        f"{description_path(self.path)} says input_size {list(description.input_size)}, but "
+                        f"{description_path(self.path)} specifies input_size {list(description.input_size)}, but "
                         f"{self.path.name} takes images of {width} x {height}; correct it"
                     )
             width, height = new_width, new_height

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Files that are no network, or networks that want what they must not have: a sentence for each."""
+"""Damaged and malicious network files: each gives one message."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def refused(opens: Open, path: Path, says: str | None = None) -> None:
 
 @OPENERS
 @pytest.mark.parametrize("content", [b"", b"PK\x03\x04 torch", b"\x80\x04 pickle", b"text\n" * 99, b"\xff" * 99])
-def test_no_onnx(tmp_path: Path, opens: Open, content: bytes) -> None:
+def test_files_that_are_not_onnx(tmp_path: Path, opens: Open, content: bytes) -> None:
     (tmp_path / "m.onnx").write_bytes(content)
     refused(opens, tmp_path / "m.onnx", "not an ONNX model")
 
@@ -47,8 +47,8 @@ def test_missing_and_folder(tmp_path: Path, opens: Open) -> None:
 
 
 @OPENERS
-@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="Windows keeps its pipes in no folder")
-def test_what_would_be_read_forever(tmp_path: Path, opens: Open) -> None:
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="Windows has no named pipes in folders")
+def test_a_pipe_is_refused_without_waiting(tmp_path: Path, opens: Open) -> None:
     pipe = tmp_path / "m.onnx"
     os.mkfifo(pipe)
     keeps_open = os.open(pipe, os.O_RDWR | os.O_NONBLOCK)
@@ -60,7 +60,7 @@ def test_what_would_be_read_forever(tmp_path: Path, opens: Open) -> None:
 
 
 @OPENERS
-def test_more_than_a_protocol_buffer_can_hold(tmp_path: Path, opens: Open) -> None:
+def test_a_file_larger_than_a_protocol_buffer_is_refused(tmp_path: Path, opens: Open) -> None:
     path = tmp_path / "m.onnx"
     with path.open("wb") as file:
         file.truncate((2 << 30) + 1)
@@ -68,7 +68,7 @@ def test_more_than_a_protocol_buffer_can_hold(tmp_path: Path, opens: Open) -> No
 
 
 def boxes_and_scores(path: Path) -> Path:
-    """The outputs of a detector that MMDeploy exported, for one person."""
+    """Write a detector with MMDeploy's outputs, with one person."""
     path.with_suffix(".json").write_text('{"type": "detections", "mean": 0, "std": 1, "channel_order": "bgr"}')
     boxes, label = np.array([[[4, 4, 28, 28, 0.9]]], np.float32), np.zeros((1, 1), np.int64)
     return fixed(path, 32, 32, {"dets": boxes, "labels": label})
@@ -125,7 +125,7 @@ def test_weights_outside_of_the_folder(tmp_path: Path, opens: Open, location: st
     refused(opens, path, "outside its own folder")
 
 
-def test_weights_beside_it_are_welcome(tmp_path: Path) -> None:
+def test_weights_in_the_same_folder_are_read(tmp_path: Path) -> None:
     path = with_external_data(tmp_path / "m.onnx", "m.onnx.data")
     refused(KeypointNetwork, path, "missing; put that file there")
     (tmp_path / "m.onnx.data").write_bytes(bytes(4352))
@@ -133,7 +133,7 @@ def test_weights_beside_it_are_welcome(tmp_path: Path) -> None:
 
 
 @OPENERS
-def test_operators_of_its_own(tmp_path: Path, opens: Open) -> None:
+def test_unknown_operators_are_refused(tmp_path: Path, opens: Open) -> None:
     node = helper.make_node("Magic", ["images"], ["out"], domain="com.example")
     info = helper.make_tensor_value_info("out", TensorProto.FLOAT, [1, 17, 64])
     graph = helper.make_graph([node], "ours", [picture_input(32, 32)], [info])
@@ -144,7 +144,7 @@ def test_operators_of_its_own(tmp_path: Path, opens: Open) -> None:
 
 
 @OPENERS
-def test_an_opset_that_is_too_new(tmp_path: Path, opens: Open) -> None:
+def test_a_too_new_opset_is_refused(tmp_path: Path, opens: Open) -> None:
     path = fixed(tmp_path / "m.onnx", 32, 32, {"out": np.zeros((1, 17, 8, 8), np.float32)})
     model = onnx.load(path)
     model.opset_import[0].version = 99
@@ -164,7 +164,9 @@ def test_an_opset_that_is_too_new(tmp_path: Path, opens: Open) -> None:
         ([1, 3, "h", "w"], TensorProto.FLOAT, "input_size"),
     ],
 )
-def test_inputs_that_are_no_picture(tmp_path: Path, opens: Open, shape: list, kind: int, says: str) -> None:
+def test_inputs_that_are_not_an_image_are_refused(
+    tmp_path: Path, opens: Open, shape: list, kind: int, says: str
+) -> None:
     info = helper.make_tensor_value_info("images", kind, shape)
     out = helper.make_tensor_value_info("out", kind, shape)
     path = save(tmp_path / "m.onnx", [helper.make_node("Identity", ["images"], ["out"])], [info], [out])
@@ -172,7 +174,7 @@ def test_inputs_that_are_no_picture(tmp_path: Path, opens: Open, shape: list, ki
 
 
 @OPENERS
-def test_a_graph_that_fails_when_it_runs(tmp_path: Path, opens: Open) -> None:
+def test_a_graph_that_fails_at_run_time_is_refused(tmp_path: Path, opens: Open) -> None:
     nodes = [helper.make_node("Reshape", ["images", "wanted"], ["out"])]
     out = helper.make_tensor_value_info("out", TensorProto.FLOAT, [7, 11])
     shape = {"wanted": np.array([7, 11], np.int64)}
@@ -194,21 +196,21 @@ def test_a_graph_that_fails_when_it_runs(tmp_path: Path, opens: Open) -> None:
         ('{"mean": NaN}', "mean must be"),
         ('{"input_size": [640, 0]}', "input_size must be"),
         ('{"input_size": 640}', "input_size must be"),
-        ('{"input_size": [640, 640]}', "says input_size"),
+        ('{"input_size": [640, 640]}', "specifies input_size"),
         ('{"score_threshold": 3}', "between 0 and 1"),
         ('{"type": ["simcc"]}', "type must be"),
         ('{"keypoints": "mpii16"}', "coco17, halpe26, wholebody133"),
         ('{"type": "heatmap"}', "not heatmap"),
     ],
 )
-def test_a_json_that_is_wrong(tmp_path: Path, text: str, says: str) -> None:
+def test_an_invalid_json_is_refused(tmp_path: Path, text: str, says: str) -> None:
     path = simcc(tmp_path / "m.onnx", 17, 32, 32)
     path.with_suffix(".json").write_text(text)
     refused(KeypointNetwork, path, says)
 
 
 @pytest.mark.parametrize("option", ["--detector", "--keypoints"])
-def test_the_command_line_says_it_in_one_sentence(tmp_path: Path, capsys: pytest.CaptureFixture, option: str) -> None:
+def test_the_command_line_prints_one_line(tmp_path: Path, capsys: pytest.CaptureFixture, option: str) -> None:
     path = fixed(tmp_path / "m.onnx", 32, 32, {"what": np.zeros((1, 7), np.float32)})
     assert main(["capture", str(SAMPLE), option, str(path), "-o", str(tmp_path / "out.npz")]) == 1
     said = capsys.readouterr().err

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Every detector adapter on a graph of ours with known boxes, in pictures of odd sizes."""
+"""Every detector adapter on a small graph with known boxes, with images of odd sizes."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ CELLS = len(cells(WIDTH, HEIGHT))
 
 
 def in_picture(box: np.ndarray, left: float = 0.0) -> np.ndarray:
-    """A box of the image in the letterboxed picture of the network."""
+    """Convert a box from the image to the network's letterboxed input."""
     x = COLUMNS / 333
     return box * [x, SCALE, x, SCALE] + [left, 0, left, 0]
 
@@ -47,7 +47,7 @@ def assert_finds_the_person(path: Path, kind: str, score: float = 0.9) -> None:
 
 
 def yolox_rows(classes: int) -> tuple[np.ndarray, int]:
-    """Decoded rows; the person, twice, and something that is none in cells of their own."""
+    """Create decoded rows with the person, twice, and something else in cells of their own."""
     rows = np.zeros((CELLS, 5 + classes), np.float32)
     grid = cells(WIDTH, HEIGHT)
     rows[:, :2] = (grid[:, :2] + 0.5) * grid[:, 2:]
@@ -101,7 +101,7 @@ def test_yolov4(tmp_path: Path, order: tuple[str, str]) -> None:
     assert_finds_the_person(path, "yolov4")
 
 
-def test_as_many_boxes_as_scores(tmp_path: Path) -> None:
+def test_different_numbers_of_boxes_and_scores_are_refused(tmp_path: Path) -> None:
     outputs = {"boxes": np.zeros((1, 40, 1, 4), np.float32), "confs": np.zeros((1, 39, 80), np.float32)}
     path = fixed(tmp_path / "m.onnx", WIDTH, HEIGHT, outputs)
     (tmp_path / "m.json").write_text('{"type": "yolov4"}')
@@ -116,7 +116,7 @@ def test_end_to_end(tmp_path: Path) -> None:
     assert_finds_the_person(fixed(tmp_path / "m.onnx", WIDTH, HEIGHT, {"output0": rows}), "end_to_end")
 
 
-def test_detections_need_their_colours(tmp_path: Path) -> None:
+def test_detections_need_their_normalization(tmp_path: Path) -> None:
     rows = np.array([[[*in_picture(PERSON), 0.9], [1, 1, 9, 9, 0.95]]], np.float32)
     path = fixed(tmp_path / "m.onnx", WIDTH, HEIGHT, {"dets": rows, "labels": np.array([[0, 3]])})
     with pytest.raises(ModelFileError, match=r"m\.json.*\"mean\""):
@@ -126,7 +126,7 @@ def test_detections_need_their_colours(tmp_path: Path) -> None:
     assert_finds_the_person(path, "detections")
 
 
-def test_the_letterbox_leads_where_the_image_lies() -> None:
+def test_the_letterbox_maps_back_to_the_image() -> None:
     image = np.zeros((251, 333, 3), np.uint8)
     image[100:111, 200:211] = 255  # its middle: pixel 105, 205
     for settings in ({"centered": True}, {"centered": False}, {"centered": False, "stretched": True}):
@@ -138,7 +138,7 @@ def test_the_letterbox_leads_where_the_image_lies() -> None:
         np.testing.assert_allclose(look.to_image(np.array([x, y])), [205, 105], atol=0.5)
 
 
-def test_the_json_overrules(tmp_path: Path) -> None:
+def test_the_json_takes_precedence(tmp_path: Path) -> None:
     columns = np.zeros((84, CELLS), np.float32)
     columns[[0, 1, 2, 3, 7], 3] = [50, 50, 40, 40, 0.35]
     path = fixed(tmp_path / "m.onnx", "width", "height", {"output0": columns[None]})
@@ -149,7 +149,7 @@ def test_the_json_overrules(tmp_path: Path) -> None:
     assert len(BoxDetector(path, threads=1).detect(IMAGE)) == 1
 
 
-def test_a_graph_that_does_not_tell(tmp_path: Path) -> None:
+def test_a_graph_of_unknown_type_is_refused(tmp_path: Path) -> None:
     path = fixed(tmp_path / "m.onnx", WIDTH, HEIGHT, {"what": np.zeros((1, 7), np.float32)})
     with pytest.raises(ModelFileError, match=r"what \[1, 7\].*yolox, yolov8.*m\.json"):
         BoxDetector(path, threads=1)
@@ -159,7 +159,7 @@ def test_a_graph_that_does_not_tell(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, 1e38])
-def test_numbers_that_are_none_do_no_harm(tmp_path: Path, value: float) -> None:
+def test_nan_and_infinity_are_ignored(tmp_path: Path, value: float) -> None:
     rows, person = yolox_rows(80)
     rows[50:60] = value
     detector = BoxDetector(fixed(tmp_path / "m.onnx", WIDTH, HEIGHT, {"output": rows[None]}), threads=1)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Keypoint adapters on graphs of ours that see coloured spots: known pixels come back, whatever the region and size."""
+"""Keypoint adapters on small graphs that detect coloured spots at known pixels, in various regions and sizes."""
 
 from __future__ import annotations
 
@@ -35,14 +35,14 @@ def spots(sigma: float = 5.0) -> np.ndarray:
 
 
 def unit_colours(path: Path, **more: object) -> None:
-    """The spots are to be seen as 0..1, which real networks are not trained for."""
+    """Write a JSON that scales pixels to 0..1, as the small graphs need."""
     path.with_suffix(".json").write_text(json.dumps({"mean": 0, "std": 255, **more}))
 
 
 @pytest.mark.parametrize("region", REGIONS.values(), ids=REGIONS)
 @pytest.mark.parametrize("graph", [simcc, heatmaps], ids=["simcc", "heatmap"])
 @pytest.mark.parametrize("size", [(192, 256), (288, 384)], ids=str)
-def test_known_pixels_come_back(tmp_path: Path, graph: object, region: Region, size: tuple[int, int]) -> None:
+def test_known_pixels_are_found(tmp_path: Path, graph: object, region: Region, size: tuple[int, int]) -> None:
     path = graph(tmp_path / "m.onnx", 17, *size)  # type: ignore[operator]
     unit_colours(path)
     network = KeypointNetwork(path, threads=1)
@@ -57,15 +57,15 @@ def test_known_pixels_come_back(tmp_path: Path, graph: object, region: Region, s
     assert seen.disagreement == 0.0
 
 
-def test_channel_order_and_square_pictures(tmp_path: Path) -> None:
+def test_channel_order_and_square_inputs(tmp_path: Path) -> None:
     path = simcc(tmp_path / "m.onnx", 17, 256, 256)
     unit_colours(path, channel_order="bgr")
     (seen,) = KeypointNetwork(path, threads=1).estimate(spots(), [REGIONS["larger"]])
     np.testing.assert_allclose(seen.keypoints_px[KEYPOINT_NAMES.index("nose")], SPOTS[2], atol=1.0)
 
 
-def test_normalisation_is_imagenets(tmp_path: Path) -> None:
-    """Grey of ImageNet's mean is 0; the score of a picture one deviation above it is 1."""
+def test_normalization_is_that_of_imagenet(tmp_path: Path) -> None:
+    """ImageNet's mean becomes 0, and the score of an image one standard deviation above it is 1."""
     path = simcc(tmp_path / "m.onnx", 17, 192, 256)
     above = np.array([123.675 + 58.395, 116.28 + 57.12, 103.53 + 57.375])
     image = np.full((100, 100, 3), np.round(above), np.uint8)
@@ -77,7 +77,7 @@ def test_normalisation_is_imagenets(tmp_path: Path) -> None:
 @pytest.mark.parametrize("how", ["dark", "quarter"])
 @pytest.mark.parametrize("udp", [False, True])
 def test_heatmap_peaks_between_cells(tmp_path: Path, how: str, udp: bool) -> None:
-    """Gaussians whose middle is known to a fraction of a cell: DARK finds it exactly, the quarter offset roughly."""
+    """Gaussians with known sub-cell centres: DARK finds them exactly, the quarter offset roughly."""
     rng = np.random.default_rng(3)
     middle = rng.uniform([6, 6], [41, 57], (17, 2))
     y, x = np.mgrid[:64, :48]
@@ -132,14 +132,14 @@ def test_an_unknown_count_asks_for_the_json(tmp_path: Path) -> None:
     assert KeypointNetwork(path, threads=1).keypoint_set.name == "coco17"
 
 
-def test_a_detector_is_no_keypoint_network(tmp_path: Path) -> None:
+def test_a_detector_is_refused_as_a_keypoint_network(tmp_path: Path) -> None:
     path = fixed(tmp_path / "m.onnx", 640, 640, {"output0": np.zeros((1, 84, 8400), np.float32)})
     with pytest.raises(ModelFileError, match=r"as a keypoint network.*output0 \[1, 84, 8400\].*simcc, heatmap"):
         KeypointNetwork(path, threads=1)
 
 
 def upright(count: int = 17) -> np.ndarray:
-    """(33, 2) a standing person, 200 pixels from nose to ankles."""
+    """Create a standing person (33, 2), 200 pixels from nose to ankles."""
     height = {"nose": 0, "eye": -5, "ear": 0, "shoulder": 35, "elbow": 70, "wrist": 100, "hip": 100, "knee": 150}
     height |= {"ankle": 200}
     points = np.zeros((33, 2))
@@ -149,7 +149,7 @@ def upright(count: int = 17) -> np.ndarray:
     return points + [400, 300]
 
 
-def test_the_next_region_holds_the_keypoints(tmp_path: Path) -> None:
+def test_the_next_region_contains_the_keypoints(tmp_path: Path) -> None:
     network = KeypointNetwork(simcc(tmp_path / "m.onnx", 17, 192, 256), threads=1)
     confidence = np.array([0.9 if name in COCO_17 else 0.0 for name in KEYPOINT_NAMES])
     seen = confidence > 0
