@@ -50,6 +50,15 @@ def inlined_kernel(function: Callable[..., Any]) -> Any:
     return njit(**options)(function)
 
 
+def expanded_kernel(function: Callable[..., Any]) -> Any:
+    """Compile a kernel that only others call, expanded into their code before LLVM sees it.
+
+    For pieces of a hot loop that pass many numbers to each other: a call might pass them through memory.
+    """
+    options = dict(_OPTIONS, _nrt=False, inline="always")
+    return njit(**options)(function)
+
+
 def _compiled(function: Callable[..., Any], **options: Any) -> Any:
     try:
         compiled = njit(cache=True, **_OPTIONS, **options)(function)
