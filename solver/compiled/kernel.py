@@ -86,7 +86,7 @@ _announced: set[Any] = set()
 
 
 def announce_compilation(dispatcher: Any) -> None:
-    """Tell the log, which goes to stderr unless somebody arranged otherwise, why the coming call takes long.
+    """Log why the coming call takes long; warnings go to stderr unless logging is configured.
 
     Once in a process: further threads that come meanwhile wait for the same machine code.
     """
