@@ -94,7 +94,7 @@ class Body:
         return out
 
     def keypoint_set(self, prefix: str) -> dict[str, int]:
-        """Keypoints of one set, e.g. ``blazepose``: name without the prefix -> index, in file order.
+        """Return the keypoints of one set, e.g. ``blazepose``: name without the prefix -> index, in file order.
 
         :raises ModelFileError: the body has no keypoints of that name.
         """
@@ -121,7 +121,7 @@ class Body:
         return self.v_template if betas is None else self.v_template + self.shapedirs @ self._betas(betas)
 
     def stature(self, betas: Array | None = None) -> float:
-        """Height of who stands: from the lowest to the highest vertex of v̄(β), metres.
+        """Return the height of a person standing upright: from the lowest to the highest vertex of v̄(β), metres.
 
         :param betas: (P,); zeros if None.
         :raises ShapeError: betas have another shape.
@@ -132,7 +132,7 @@ class Body:
         return as_array(betas, (self.P,), f"betas of body '{self.name}'")
 
     def forward_kinematics(self, rotations: Array, trans: Array, betas: Array | None = None) -> tuple[Array, Array]:
-        """Pose of every part.
+        """Return the pose of every part.
 
         :param rotations: (..., K+1, 3, 3); row 0 the root's rotation into the target frame, the others Ω_i.
         :param trans: (..., 3) metres, target frame; the root joint comes to lie at J_0(β) + trans.
@@ -155,7 +155,7 @@ class Body:
         return R, t
 
     def skin(self, R: Array, t: Array, betas: Array | None = None) -> Array:
-        """Linear blend skinning of one frame.
+        """Return the mesh of one frame by linear blend skinning.
 
         :param R, t: (K+1, 3, 3), (K+1, 3) part poses from ``forward_kinematics``.
         :param betas: (P,); zeros if None.
@@ -171,7 +171,7 @@ class Body:
     def keypoints(
         self, R: Array, t: Array, betas: Array | None = None, which: Sequence[int] | slice = slice(None)
     ) -> Array:
-        """Keypoints, metres.
+        """Return keypoints in metres.
 
         :param R, t: (..., K+1, 3, 3), (..., K+1, 3) part poses from ``forward_kinematics``.
         :param betas: (P,); zeros if None.

@@ -52,7 +52,7 @@ class JointPrior:
     ) -> tuple[Array, Array]:
         """Return the tables of residuals/joint_flow.py for the joints of a body (K+1,) that have a prior.
 
-        :param weights: w by joint name, one where nothing is said.
+        :param weights: w by joint name, 1 for joints that are missing.
         :param log_det: h, one for the density's maximum, zero for the paper's 1/2 |z|^2.
         :return: (n, INTS) int64 and (n, FLOATS) float64.
         :raises InvalidValueError: a weight or `log_det` is negative or no number.

@@ -97,7 +97,7 @@ class OrientationField:
 class PosePriors:
     """Known estimates of part poses in the camera frame: parts (n,), R (n, 3, 3), t (n, 3), weights (n,) each.
 
-    A row of which neither weight is positive is left out.
+    A row without a positive weight is left out.
     """
 
     parts: ArrayLike

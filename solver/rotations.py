@@ -184,7 +184,7 @@ def left_jacobian_inverse(phi: ArrayLike) -> Array:
 def quaternion_from_matrix(rotation: ArrayLike) -> Array:
     """Return unit quaternions (..., 4), w >= 0, of rotation matrices (..., 3, 3).
 
-    Of the four ways to divide, each matrix takes the one by its largest component, which is never below 1/2.
+    Each matrix is divided by the largest component of its quaternion, which is never below 1/2.
 
     :raises ShapeError: the matrices have another shape.
     """
@@ -267,7 +267,7 @@ def shortest_turn(a: Array, b: Array) -> Array:
     b = b / np.maximum(np.linalg.norm(b, axis=-1, keepdims=True), 1e-12)
     axis, cosine = np.cross(a, b), (a * b).sum(axis=-1)
     sine = np.linalg.norm(axis, axis=-1)
-    aside = np.cross(a, np.eye(3)[np.abs(a).argmin(axis=-1)])  # any way across is the smallest for opposite ones
+    aside = np.cross(a, np.eye(3)[np.abs(a).argmin(axis=-1)])  # for opposite directions any perpendicular axis
     axis = np.where(((sine < 1e-9) & (cosine < 0))[..., None], aside, axis)
     length = np.maximum(np.linalg.norm(axis, axis=-1), 1e-12)
     return exp(axis * (np.arctan2(sine, cosine) / length)[..., None])

@@ -191,7 +191,7 @@ def warn_of_units(points: Array, name: str) -> None:
     """Warn of points (n, 3) of one person that lie too far apart to be in metres, with `UnitsWarning`."""
     if _far_apart(points, LARGEST_STEP):
         warnings.warn(
-            f"{name} lie more than {LARGEST_STEP:g} m apart, one after the other, which no person is; {_UNITS}.",
+            f"{name} lie more than {LARGEST_STEP:g} m apart from one to the next, too far for a person; {_UNITS}.",
             UnitsWarning,
             stacklevel=3,
         )

@@ -50,6 +50,15 @@ def inlined_kernel(function: Callable[..., Any]) -> Any:
     return njit(**options)(function)
 
 
+def expanded_kernel(function: Callable[..., Any]) -> Any:
+    """Compile a kernel that only others call, expanded into their code before LLVM sees it.
+
+    For pieces of a hot loop that pass many numbers to each other: a call might pass them through memory.
+    """
+    options = dict(_OPTIONS, _nrt=False, inline="always")
+    return njit(**options)(function)
+
+
 def _compiled(function: Callable[..., Any], **options: Any) -> Any:
     try:
         compiled = njit(cache=True, **_OPTIONS, **options)(function)
@@ -77,7 +86,7 @@ _announced: set[Any] = set()
 
 
 def announce_compilation(dispatcher: Any) -> None:
-    """Tell the log, which goes to stderr unless somebody arranged otherwise, why the coming call takes long.
+    """Log why the coming call takes long; warnings go to stderr unless logging is configured.
 
     Once in a process: further threads that come meanwhile wait for the same machine code.
     """

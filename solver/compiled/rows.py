@@ -28,7 +28,7 @@ def padded(n: int) -> int:
 
 
 def splat_of(builder: Any, scalar: Any) -> Any:
-    """Return a vector of which every lane is `scalar`."""
+    """Return a vector whose lanes are all `scalar`."""
     undefined = ir.Constant(VECTOR, ir.Undefined)
     one = builder.insert_element(undefined, scalar, ir.Constant(_INT32, 0))
     return builder.shuffle_vector(one, undefined, ir.Constant(ir.VectorType(_INT32, WIDTH), [0] * WIDTH))

@@ -45,8 +45,8 @@ def differentiate(function: Callable[[Part], Any], part: Part) -> Linearization:
         beta[k] += h
         return replace(part, beta=beta, t=part.t + h * part.D[:, k])
 
-    ways = [(twisted, 6), (turned, 3), (shaped, len(part.beta))]
-    columns = [[slope(lambda h, m=move, k=k: m(k, h)) for k in range(n)] for move, n in ways]  # type: ignore[misc]
+    moves = [(twisted, 6), (turned, 3), (shaped, len(part.beta))]
+    columns = [[slope(lambda h, m=move, k=k: m(k, h)) for k in range(n)] for move, n in moves]  # type: ignore[misc]
     return Linearization(r, *(np.array(some).reshape(-1, len(r)).T for some in columns))
 
 

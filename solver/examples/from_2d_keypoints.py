@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from .. import Keypoints2D, Measurements, fit_clip, load_body, rotations
-from . import somebody
+from . import person
 
 FRAMES = 12
 
@@ -17,21 +17,21 @@ def main() -> float:
     rng = np.random.default_rng(2)
     names = body.keypoint_set("coco")  # what most detectors give
     index = np.array(list(names.values()))
-    first, last = somebody.pose(body, seed=3, bend=0.15), somebody.pose(body, seed=4, bend=0.15)
+    first, last = person.pose(body, seed=3, bend=0.15), person.pose(body, seed=4, bend=0.15)
     clip, seen = [], []
     turn = rotations.log(np.swapaxes(first.Omega, -1, -2) @ last.Omega)
     for k in range(FRAMES):
         now = replace(first, Omega=first.Omega @ rotations.exp(turn * k / FRAMES))
-        R, t = somebody.place(body, now)
-        pixels = somebody.project(body.keypoints(R, t, now.beta)[index])
+        R, t = person.place(body, now)
+        pixels = person.project(body.keypoints(R, t, now.beta)[index])
         noisy = Keypoints2D(index, pixels + 2.0 * rng.standard_normal(pixels.shape), np.full(len(index), 0.9))
-        clip.append(Measurements(somebody.INTRINSICS, keypoints2d=noisy))
+        clip.append(Measurements(person.INTRINSICS, keypoints2d=noisy))
         seen.append(pixels)
 
     found = fit_clip(body, clip)
 
     fitted = [body.keypoints(f.R_camera_part, f.t_camera_part, found.beta)[index] for f in found.frames]
-    drawn = [somebody.project(points) for points in fitted]
+    drawn = [person.project(points) for points in fitted]
     error = float(np.linalg.norm(np.array(drawn) - np.array(seen), axis=-1).mean())
     print(f"{found.status.name}: {FRAMES} frames, one shape, {error:.2f} pixels from where the keypoints really are")
     return error

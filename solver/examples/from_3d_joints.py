@@ -4,7 +4,7 @@
 import numpy as np
 
 from .. import Keypoints3D, Measurements, Options, Stage, Weights, fit, load_body, rotations
-from . import somebody
+from . import person
 
 NOISE_M = 0.005
 
@@ -12,8 +12,8 @@ NOISE_M = 0.005
 def main() -> float:
     """Fit, print, and return the mean error of the joints in millimetres."""
     body = load_body("scope")
-    truth = somebody.pose(body)
-    joints = somebody.place(body, truth)[1]
+    truth = person.pose(body)
+    joints = person.place(body, truth)[1]
     joints = joints + NOISE_M * np.random.default_rng(1).standard_normal(joints.shape)
 
     M = len(body.keypoint_names)  # points are numbered: keypoints first, then joints
@@ -22,7 +22,7 @@ def main() -> float:
     weights = Weights(keypoints3d=1.0 / NOISE_M**2, shape=1.0, joint_limits=100.0)
     found = fit(body, Measurements(keypoints3d=measured), options=Options(stages=[Stage(weights)]))
 
-    error = somebody.joint_error_mm(body, found.t_camera_part, truth)
+    error = person.joint_error_mm(body, found.t_camera_part, truth)
     poses = np.concatenate([rotations.log(found.state.R_camera_root)[None], rotations.log(found.state.Omega)])
     print(f"{found.status.name} after {found.iterations} iterations; joints off by {error:.1f} mm on average")
     print(f"poses (72,) begin {poses.ravel()[:6].round(3)}, betas begin {found.state.beta[:3].round(2)}")

@@ -1,21 +1,21 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""An SMPL+H hand: 21 keypoints of one hand in space, 51 joints in the tree, the rest of the body told by its joints."""
+"""An SMPL+H hand: 21 keypoints of one hand in space, 51 joints in the tree, the rest known by its joints."""
 
 import numpy as np
 
 from .. import Keypoints3D, Measurements, fit, load_body, rotations
-from . import somebody
+from . import person
 
 
 def main() -> float:
     """Fit, print, and return the mean error of the left hand's joints in millimetres."""
     body = load_body("scope_h")
-    truth = somebody.pose(body, seed=7)
+    truth = person.pose(body, seed=7)
     fingers = [i for i, name in enumerate(body.joint_names) if name.startswith("left_") and name[-1] in "123"]
     grip = rotations.exp([0.0, 0.0, -0.6])  # about the finger's own axis: the palm of the left hand faces down
     for i in fingers:
         truth.Omega[i - 1] = truth.Omega[i - 1] @ grip
-    R, t = somebody.place(body, truth)
+    R, t = person.place(body, truth)
 
     M = len(body.keypoint_names)
     hand = [k for k, name in enumerate(body.keypoint_names) if name.startswith("hand/left_")]

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import Body, Keypoints3D, Measurements, Options, Stage, Weights, fit, load_body
-from . import somebody
+from . import person
 
 OFFSET_M = 0.0095  # of the marker's centre from the skin
 
@@ -38,8 +38,8 @@ def main() -> float:
     rigid = np.flatnonzero(body.skin_weights.max(axis=1) > 0.95)
     chosen = _spread(body.v_template, rigid, 41)
     marked = with_markers(body, chosen)
-    truth = somebody.pose(body, seed=6)
-    R, t = somebody.place(body, truth)
+    truth = person.pose(body, seed=6)
+    R, t = person.place(body, truth)
     markers = marked.keypoints(R, t, truth.beta) + 0.001 * rng.standard_normal((41, 3))
     markers[7] = np.nan  # lost: a value that is not finite is left out
 
@@ -47,7 +47,7 @@ def main() -> float:
     weights = Weights(keypoints3d=1.0 / 0.005**2, shape=1.0, joint_limits=100.0)  # one over a variance
     found = fit(marked, seen, options=Options(stages=[Stage(weights)]))
 
-    error = somebody.joint_error_mm(body, found.t_camera_part, truth)
+    error = person.joint_error_mm(body, found.t_camera_part, truth)
     print(f"{found.status.name}: {found.measurements} of 41 markers, joints off by {error:.1f} mm on average")
     return error
 

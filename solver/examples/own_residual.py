@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from .. import Keypoints3D, Measurements, Options, Stage, Weights, fit, load_body, register_residual
 from ..compiled.part import Part
 from ..residuals.accumulation import add_to_point
-from . import somebody
+from . import person
 
 
 def accumulate(tree, ints, floats, weight, inv_sigma, triggs, pose, blocks):  # type: ignore[no-untyped-def]
@@ -44,8 +44,8 @@ def main() -> tuple[float, float]:
     """Fit without the heights and with them, print, and return the error of the hands' heights in millimetres."""
     register()
     body = load_body("scope")
-    truth = somebody.pose(body)
-    joints = somebody.place(body, truth)[1]
+    truth = person.pose(body)
+    joints = person.place(body, truth)[1]
     hands = np.array([body.joint_names.index(name) for name in ("left_hand", "right_hand")])
     seen = np.setdiff1d(np.arange(body.K + 1), [*hands, *(hands - 2)])  # neither hands nor wrists
     points = Keypoints3D(len(body.keypoint_names) + seen, joints[seen], np.ones(len(seen)))

@@ -71,8 +71,8 @@ def fit_clip(
 
     First every frame is fitted in order, from the frame before and with the shape's information carried along (not if
     `init` is given); then all poses and the shape are optimized together. `temporal` adds the pull towards the frame
-    before, as it came out of the first pass. A frame in which nothing was measured holds the pose of the last one
-    before it in which something was, or of the first one after it; its status says so. With `temporal` the pull is a
+    before, as it came out of the first pass. A frame without measurements gets the pose of the last frame before it
+    that has some, or of the first after it; its status is `NO_MEASUREMENTS`. With `temporal` the pull is a
     measurement of its own: see `Fit.measurements`.
     `focal_weight` is a prior on the squared logarithm of the focal scale.
     At most `shape_frames` frames, evenly spaced, decide the shape; the others are then fitted with it fixed.

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""C += XᵀZ for tall X and Z: tiles of C, four rows by one to three vectors, stay in registers over all rows of X and Z.
+"""Gram products C += XᵀZ of tall X and Z.
+
+Tiles of C, four rows by one to three vectors, stay in registers over all rows of X and Z.
 
 Only tiles on and above the diagonal are touched. Rows are as in rows.py.
 """

@@ -6,23 +6,27 @@ its part's origin, W = GᵀG of the position terms, W_d of the direction, f and 
     M += [[ [e]x (W + W_d) [e]xᵀ, [e]x W ], [., W]],   N += [ e x (W + W_d) V' ; W V' ],   C += V'ᵀ (W + W_d) V'
 with V' = R_i V. The derivative D of the part's origin by shape is added once per part, and the part's sums, taken
 about its own origin, are then shifted to the pelvis, the origin of all twists. Products that go into C are gathered as
-pairs of rows and multiplied many at a time.
+pairs of rows and multiplied many at a time. The arithmetic of one point is in point_terms.py, of one part in
+part_sums.py; both are expanded here before LLVM sees them.
 """
 
 from typing import Any
 
 import numpy as np
 
-from ..compiled.kernel import kernel
+from ..compiled.kernel import expanded_kernel, kernel
 from ..compiled.part import GRADIENT, SHAPE, Array, Blocks, Pose
-from ..compiled.rows import add3, clear
+from ..compiled.rows import add3 as add_rows
+from ..compiled.rows import clear
 from ..compiled.tree import Tree
 from ..custom_residuals.external import accumulate_external
-from ..residuals import keypoint2d, keypoint3d, orientation_field, shape_prior
+from ..residuals import shape_prior
 from ..residuals.registry import KEYPOINT2D, KEYPOINT3D, ORIENTATION_FIELD, SHAPE_PRIOR, accumulate_tables
 from .gram import add_gram
+from .part_sums import add3, add6, add9, add_cross, cross_both, rotate, shift_angular, shift_corner, write_part
+from .point_terms import point_at_rest, point_terms
 from .row_pass import row_pass
-from .terms import HAS_2D, HAS_3D, HAS_DIRECTION, HAS_SHAPE, Terms
+from .terms import HAS_2D, HAS_SHAPE, Terms
 
 QUEUE = 48  # pairs of rows (X, Z) of C += XᵀZ that are gathered before they are multiplied
 
@@ -128,6 +132,85 @@ def clear_blocks(blocks: Blocks) -> None:
     clear(blocks.c, 0, W)
 
 
+@expanded_kernel
+def _make_room(C, W, scratch, waiting, more):  # type: ignore[no-untyped-def]
+    """Multiply the queue out if it cannot take `more` pairs; return how many are waiting."""
+    if waiting + more > QUEUE:
+        add_gram(C, W, scratch, 0, 2 * W, scratch, W, 2 * W, waiting)
+        waiting = 0
+    return waiting
+
+
+@expanded_kernel
+def _add_points(tree, terms, i, t, settings, pose, blocks, scratch, waiting, cost):  # type: ignore[no-untyped-def]
+    """Add the terms of part i's points to the cost, N, C and c.
+
+    settings: weight and 1/sigma of each kind of term, focal scale, share of the second-order terms.
+    Return the cost, how many pairs are waiting, and sums over the points about the part's origin: W (6), [e]x W (9),
+    [e]x W_all [e]xᵀ (6), the force (3) and its moment (3), and those of the focal length's column.
+    """
+    A, C, c, V = blocks.A, blocks.C, blocks.c, terms.V
+    W, P = C.shape[0], tree.shape
+    row = SHAPE + W
+    fit_focal = tree.globals > P
+    R = pose.R[i]
+    r = (R[0, 0], R[0, 1], R[0, 2], R[1, 0], R[1, 1], R[1, 2], R[2, 0], R[2, 1], R[2, 2])
+    a00, a01, a02, a11, a12, a22 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    x00, x01, x02, x10, x11, x12, x20, x21, x22 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    y00, y01, y02, y11, y12, y22 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    fx, fy, fz, mx, my, mz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    hx, hy, hz, nx, ny, nz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0  # scalars, as in point_terms.py
+    for j in range(terms.starts[i], terms.starts[i + 1]):
+        flags = terms.flags[j]
+        if flags <= HAS_SHAPE:
+            continue
+        e = rotate(r, point_at_rest(terms, pose.beta, j, P))
+        cost, w, b, f, w_all, b_all, g, h, ff, fr = point_terms(terms, j, e, t, settings, cost)
+        if fit_focal and flags & HAS_2D:
+            C[P, P] += ff
+            c[P] += fr
+            hx, hy, hz = add3((hx, hy, hz), h)
+            nx, ny, nz = add_cross((nx, ny, nz), e, h)
+        a00, a01, a02, a11, a12, a22 = add6((a00, a01, a02, a11, a12, a22), w)
+        x00, x01, x02, x10, x11, x12, x20, x21, x22 = add9((x00, x01, x02, x10, x11, x12, x20, x21, x22), b)
+        fx, fy, fz = add3((fx, fy, fz), f)
+        y00, y01, y02, y11, y12, y22 = add6((y00, y01, y02, y11, y12, y22), cross_both(e, b_all))
+        mx, my, mz = add_cross((mx, my, mz), e, g)
+        if flags & HAS_SHAPE:
+            waiting = _make_room(C, W, scratch, waiting, 3)
+            at = 2 * waiting * W
+            _point(r + b_all + w + w_all, W, A, 6 * i * row + SHAPE, row, V, 3 * j * W, W, scratch, at, W)
+            add_rows(c, 0, g[0], g[1], g[2], scratch, at, at + 2 * W, at + 4 * W, W)
+            if fit_focal and flags & HAS_2D:
+                k = 2 * waiting
+                for n in range(P):
+                    C[n, P] += scratch[k, n] * h[0] + scratch[k + 2, n] * h[1] + scratch[k + 4, n] * h[2]
+            waiting += 3
+    a, x = (a00, a01, a02, a11, a12, a22), (x00, x01, x02, x10, x11, x12, x20, x21, x22)
+    y, f, m = (y00, y01, y02, y11, y12, y22), (fx, fy, fz), (mx, my, mz)
+    return cost, waiting, (a, x, y, f, m, (hx, hy, hz), (nx, ny, nz))
+
+
+@expanded_kernel
+def _add_part(tree, i, s, sums, pose, blocks, scratch, waiting):  # type: ignore[no-untyped-def]
+    """Shift part i's sums from its origin to the pelvis and write its block; return how many pairs are waiting."""
+    a, x, y, f, m, h, n = sums
+    A, C, c, D = blocks.A, blocks.C, blocks.c, pose.D
+    W, P = C.shape[0], tree.shape
+    B, row, at = A[i], SHAPE + W, 3 * i * W
+    if tree.globals > P:
+        B[0, SHAPE + P], B[1, SHAPE + P], B[2, SHAPE + P] = n
+        B[3, SHAPE + P], B[4, SHAPE + P], B[5, SHAPE + P] = h
+    z = shift_corner(s, x, a)
+    if i > 0 and W > 0:
+        waiting = _make_room(C, W, scratch, waiting, 6)
+        _part(a + z + s + (0.5,), W, A, 6 * i * row + SHAPE, row, D, at, W, scratch, 2 * waiting * W, W)
+        waiting += 6
+        add_rows(c, 0, f[0], f[1], f[2], D, at, at + W, at + 2 * W, W)
+    write_part(B, shift_angular(s, y, x, z), z, a, s, f, m)
+    return waiting
+
+
 @kernel
 def linearize(
     tree: Tree, terms: Terms, stage: Array, triggs: float, pose: Pose, blocks: Blocks, scratch: Array
@@ -138,148 +221,22 @@ def linearize(
     """
     place_parts(tree, pose)
     weights, inv_sigma = stage[0], stage[1]
-    w2, w3, wd = weights[KEYPOINT2D], weights[KEYPOINT3D], weights[ORIENTATION_FIELD]
-    k2, k3, kd = inv_sigma[KEYPOINT2D], inv_sigma[KEYPOINT3D], inv_sigma[ORIENTATION_FIELD]
-    A, C, c, D, V, rest = blocks.A, blocks.C, blocks.c, pose.D, terms.V, terms.rest
-    W, P = C.shape[0], tree.shape
-    row = SHAPE + W
-    fit_focal = tree.globals > P
-    focal = np.exp(pose.log_focal[0])
+    settings = (
+        weights[KEYPOINT2D], inv_sigma[KEYPOINT2D], weights[KEYPOINT3D], inv_sigma[KEYPOINT3D],
+        weights[ORIENTATION_FIELD], inv_sigma[ORIENTATION_FIELD], np.exp(pose.log_focal[0]), triggs,
+    )  # fmt: skip
+    A, C, W = blocks.A, blocks.C, blocks.C.shape[0]
     clear_blocks(blocks)
     waiting = 0  # pairs in the queue
     ox, oy, oz = pose.t[0, 0], pose.t[0, 1], pose.t[0, 2]
     cost: float = 0.0
     for i in range(tree.parents.shape[0]):
-        base = 6 * i * row
-        clear(A, base, 6 * row)
+        clear(A, 6 * i * (SHAPE + W), 6 * (SHAPE + W))
         if terms.starts[i] == terms.starts[i + 1]:
             continue
-        R = pose.R[i]
-        r00, r01, r02, r10, r11, r12 = R[0, 0], R[0, 1], R[0, 2], R[1, 0], R[1, 1], R[1, 2]
-        r20, r21, r22 = R[2, 0], R[2, 1], R[2, 2]
         tx, ty, tz = pose.t[i, 0], pose.t[i, 1], pose.t[i, 2]
-        # sums over the part's points, about its origin: W, [e]x W, [e]x W_all [e]xT, and forces with their moments
-        a00, a01, a02, a11, a12, a22 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-        x00, x01, x02, x10, x11, x12, x20, x21, x22 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-        y00, y01, y02, y11, y12, y22 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-        fx, fy, fz, mx, my, mz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-        hx, hy, hz, nx, ny, nz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-        for j in range(terms.starts[i], terms.starts[i + 1]):
-            flags = terms.flags[j]
-            if flags <= HAS_SHAPE:
-                continue
-            vx, vy, vz = rest[j, 0], rest[j, 1], rest[j, 2]
-            if flags & HAS_SHAPE:
-                for a in range(P):
-                    b = pose.beta[a]
-                    vx += V[j, 0, a] * b
-                    vy += V[j, 1, a] * b
-                    vz += V[j, 2, a] * b
-            ex = r00 * vx + r01 * vy + r02 * vz
-            ey = r10 * vx + r11 * vy + r12 * vz
-            ez = r20 * vx + r21 * vy + r22 * vz
-            w00, w01, w02, w11, w12, w22, gx, gy, gz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-            px, py, pz = 0.0, 0.0, 0.0
-            if flags & HAS_2D:
-                q = terms.image[j]
-                e, w00, w01, w02, w11, w12, w22, gx, gy, gz, px, py, pz, ff, fr = keypoint2d.term(
-                    ex + tx, ey + ty, ez + tz, q[0], q[1], focal, w2 * q[2], k2, triggs
-                )
-                cost += e
-                if fit_focal:
-                    C[P, P] += ff
-                    c[P] += fr
-                    hx, hy, hz = hx + px, hy + py, hz + pz
-                    nx, ny, nz = nx + ey * pz - ez * py, ny + ez * px - ex * pz, nz + ex * py - ey * px
-            if flags & HAS_3D:
-                q = terms.point[j]
-                e, w3d, k, ux, uy, uz = keypoint3d.term(
-                    ex + tx, ey + ty, ez + tz, q[0], q[1], q[2], w3 * q[3], k3, triggs
-                )
-                cost += e
-                gx, gy, gz = gx + ux, gy + uy, gz + uz
-                w00, w01, w02 = w00 + w3d - k * ux * ux, w01 - k * ux * uy, w02 - k * ux * uz
-                w11, w12, w22 = w11 + w3d - k * uy * uy, w12 - k * uy * uz, w22 + w3d - k * uz * uz
-            # position terms: [e]x W, and the force
-            b00, b01, b02 = ey * w02 - ez * w01, ey * w12 - ez * w11, ey * w22 - ez * w12
-            b10, b11, b12 = ez * w00 - ex * w02, ez * w01 - ex * w12, ez * w02 - ex * w22
-            b20, b21, b22 = ex * w01 - ey * w00, ex * w11 - ey * w01, ex * w12 - ey * w02
-            a00, a01, a02, a11, a12, a22 = a00 + w00, a01 + w01, a02 + w02, a11 + w11, a12 + w12, a22 + w22
-            x00, x01, x02 = x00 + b00, x01 + b01, x02 + b02
-            x10, x11, x12 = x10 + b10, x11 + b11, x12 + b12
-            x20, x21, x22 = x20 + b20, x21 + b21, x22 + b22
-            fx, fy, fz = fx + gx, fy + gy, fz + gz
-            p00, p01, p02, p11, p12, p22 = w00, w01, w02, w11, w12, w22
-            if flags & HAS_DIRECTION:
-                q = terms.direction[j]
-                e, d00, d01, d02, d11, d12, d22, ux, uy, uz = orientation_field.term(
-                    ex, ey, ez, q[0], q[1], q[2], wd * q[3], kd, triggs
-                )
-                cost += e
-                gx, gy, gz = gx + ux, gy + uy, gz + uz
-                w00, w01, w02, w11, w12, w22 = w00 + d00, w01 + d01, w02 + d02, w11 + d11, w12 + d12, w22 + d22
-                b00, b01, b02 = ey * w02 - ez * w01, ey * w12 - ez * w11, ey * w22 - ez * w12
-                b10, b11, b12 = ez * w00 - ex * w02, ez * w01 - ex * w12, ez * w02 - ex * w22
-                b20, b21, b22 = ex * w01 - ey * w00, ex * w11 - ey * w01, ex * w12 - ey * w02
-            y00 += ey * b02 - ez * b01
-            y01 += ez * b00 - ex * b02
-            y02 += ex * b01 - ey * b00
-            y11 += ez * b10 - ex * b12
-            y12 += ex * b11 - ey * b10
-            y22 += ex * b21 - ey * b20
-            mx, my, mz = mx + ey * gz - ez * gy, my + ez * gx - ex * gz, mz + ex * gy - ey * gx
-            if flags & HAS_SHAPE:
-                if waiting + 3 > QUEUE:
-                    add_gram(C, W, scratch, 0, 2 * W, scratch, W, 2 * W, waiting)
-                    waiting = 0
-                at = 2 * waiting * W
-                waiting += 3
-                entries = (
-                    r00, r01, r02, r10, r11, r12, r20, r21, r22, b00, b01, b02, b10, b11, b12, b20, b21, b22,
-                    p00, p01, p02, p11, p12, p22, w00, w01, w02, w11, w12, w22,
-                )  # fmt: skip
-                _point(entries, W, A, base + SHAPE, row, V, 3 * j * W, W, scratch, at, W)
-                add3(c, 0, gx, gy, gz, scratch, at, at + 2 * W, at + 4 * W, W)
-                if fit_focal and flags & HAS_2D:
-                    k = 2 * (waiting - 3)
-                    for a in range(P):
-                        C[a, P] += scratch[k, a] * px + scratch[k + 2, a] * py + scratch[k + 4, a] * pz
-        B = A[i]
-        if fit_focal:
-            B[0, SHAPE + P], B[1, SHAPE + P], B[2, SHAPE + P] = nx, ny, nz
-            B[3, SHAPE + P], B[4, SHAPE + P], B[5, SHAPE + P] = hx, hy, hz
-        # shift to the pelvis: moments gain s x force, with s the part's origin from there
-        sx, sy, sz = tx - ox, ty - oy, tz - oz
-        # Z = X + [s]x A is the corner of M; M_aa = Y + X [s]xT + [s]x ZT
-        z00, z01, z02 = x00 + sy * a02 - sz * a01, x01 + sy * a12 - sz * a11, x02 + sy * a22 - sz * a12
-        z10, z11, z12 = x10 + sz * a00 - sx * a02, x11 + sz * a01 - sx * a12, x12 + sz * a02 - sx * a22
-        z20, z21, z22 = x20 + sx * a01 - sy * a00, x21 + sx * a11 - sy * a01, x22 + sx * a12 - sy * a02
-        if i > 0 and W > 0:
-            if waiting + 6 > QUEUE:
-                add_gram(C, W, scratch, 0, 2 * W, scratch, W, 2 * W, waiting)
-                waiting = 0
-            origin = (
-                a00, a01, a02, a11, a12, a22, z00, z01, z02, z10, z11, z12, z20, z21, z22, sx, sy, sz, 0.5
-            )  # fmt: skip
-            _part(origin, W, A, base + SHAPE, row, D, 3 * i * W, W, scratch, 2 * waiting * W, W)
-            waiting += 6
-            add3(c, 0, fx, fy, fz, D, 3 * i * W, 3 * i * W + W, 3 * i * W + 2 * W, W)
-        y00 += sy * x02 - sz * x01 + sy * z02 - sz * z01
-        y01 += sz * x00 - sx * x02 + sy * z12 - sz * z11
-        y02 += sx * x01 - sy * x00 + sy * z22 - sz * z21
-        y11 += sz * x10 - sx * x12 + sz * z10 - sx * z12
-        y12 += sx * x11 - sy * x10 + sz * z20 - sx * z22
-        y22 += sx * x21 - sy * x20 + sx * z21 - sy * z20
-        B[0, 0], B[0, 1], B[0, 2], B[0, 3], B[0, 4], B[0, 5] = y00, y01, y02, z00, z01, z02
-        B[1, 0], B[1, 1], B[1, 2], B[1, 3], B[1, 4], B[1, 5] = y01, y11, y12, z10, z11, z12
-        B[2, 0], B[2, 1], B[2, 2], B[2, 3], B[2, 4], B[2, 5] = y02, y12, y22, z20, z21, z22
-        B[3, 0], B[3, 1], B[3, 2], B[3, 3], B[3, 4], B[3, 5] = z00, z10, z20, a00, a01, a02
-        B[4, 0], B[4, 1], B[4, 2], B[4, 3], B[4, 4], B[4, 5] = z01, z11, z21, a01, a11, a12
-        B[5, 0], B[5, 1], B[5, 2], B[5, 3], B[5, 4], B[5, 5] = z02, z12, z22, a02, a12, a22
-        B[0, GRADIENT] = mx + sy * fz - sz * fy
-        B[1, GRADIENT] = my + sz * fx - sx * fz
-        B[2, GRADIENT] = mz + sx * fy - sy * fx
-        B[3, GRADIENT], B[4, GRADIENT], B[5, GRADIENT] = fx, fy, fz
+        cost, waiting, sums = _add_points(tree, terms, i, (tx, ty, tz), settings, pose, blocks, scratch, waiting, cost)
+        waiting = _add_part(tree, i, (tx - ox, ty - oy, tz - oz), sums, pose, blocks, scratch, waiting)
     add_gram(C, W, scratch, 0, 2 * W, scratch, W, 2 * W, waiting)
     cost += accumulate_tables(tree, terms.ints, terms.floats, weights, inv_sigma, triggs, pose, blocks)
     cost += accumulate_external(tree, terms.external, weights, inv_sigma, triggs, pose, blocks)

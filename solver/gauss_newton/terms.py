@@ -60,7 +60,8 @@ def _common_part(tree: Tree, a: int, b: int) -> tuple[int, int, int]:
 def _lay_out(tree: Tree, i2, i3, i_start, i_end) -> tuple[Any, ...]:  # type: ignore[no-untyped-def]
     """Return (starts, shaped, rest, V, slots of 2D, of 3D, of directions, first direction without a common part or -1).
 
-    Points measured in several ways share one slot, unless one way repeats. `shaped` is HAS_SHAPE where V is not zero.
+    Points with several kinds of measurement share one slot, unless one kind repeats. `shaped` is HAS_SHAPE where V is
+    not zero.
     """
     n_points, W = tree.V.shape[0], tree.S.shape[2]
     n_parts = tree.parents.shape[0]
@@ -71,11 +72,11 @@ def _lay_out(tree: Tree, i2, i3, i_start, i_end) -> tuple[Any, ...]:  # type: ig
     point, minus = np.empty(most, np.int64), np.full(most, -1, np.int64)  # numbered as of_point
     slots = np.empty(most, np.int64)
     n, term = 0, 0
-    for way in range(3):
-        for k in range(counts[way]):
+    for kind in range(3):
+        for k in range(counts[kind]):
             first, last = -1, -1
-            if way < 2:
-                end = i2[k] if way == 0 else i3[k]
+            if kind < 2:
+                end = i2[k] if kind == 0 else i3[k]
                 i = tree.point_part[end]
             else:
                 end = i_end[k]
@@ -84,9 +85,9 @@ def _lay_out(tree: Tree, i2, i3, i_start, i_end) -> tuple[Any, ...]:  # type: ig
                     empty = np.zeros(0, np.int64)
                     return empty, empty, np.zeros((0, 3)), np.zeros((0, 3, W)), empty, empty, empty, k
             key = end if last < 0 else n_points + last
-            from_origin = way < 2 or (first < 0 and i_start[k] == tree.keypoints + i)
+            from_origin = kind < 2 or (first < 0 and i_start[k] == tree.keypoints + i)
             slot = of_point[key] if from_origin else -1
-            bit = HAS_2D if way == 0 else (HAS_3D if way == 1 else HAS_DIRECTION)
+            bit = HAS_2D if kind == 0 else (HAS_3D if kind == 1 else HAS_DIRECTION)
             if slot < 0 or listed[slot] & bit:
                 slot = n
                 n += 1

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The wanted arrays of a .npz body file, one by one: official SMPL-X files also carry pickled tables nobody needs here.
+"""The wanted arrays of a .npz body file, one by one.
 
+Official SMPL-X files also carry pickled tables, which are not needed.
 Each array's size is checked against its own header before anything is allocated.
 """
 

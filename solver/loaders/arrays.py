@@ -92,6 +92,16 @@ def check_body(body: Body, path: Path) -> None:
         raise ModelFileError(f"{path}: {len(body.joint_names)} joint names for {n} joints")
     if n == 0 or body.parents[0] != -1 or (body.parents[1:] < 0).any() or (body.parents[1:] >= np.arange(1, n)).any():
         raise ModelFileError(f"{path}: kintree_table must list each joint after its parent, the root first")
+    _check_indices(body, path)
+    for key in (key for key, (kind, _) in (REQUIRED | OPTIONAL).items() if kind == "numbers"):
+        array = getattr(body, key)
+        if array is not None and not np.isfinite(array).all():
+            raise ModelFileError(f"{path}: {key} contains NaN or infinity")
+
+
+def _check_indices(body: Body, path: Path) -> None:
+    """Refuse indices of joints, vertices and materials that point outside."""
+    n, v, materials = len(body.parents), len(body.v_template), max(1, len(body.material_names))
     tops = {"skin_joints": n, "faces": v, "keypoint_part": n, "face_material": materials}
     if body.uv is not None:
         tops["uv_faces"] = len(body.uv)
@@ -99,7 +109,3 @@ def check_body(body: Body, path: Path) -> None:
         index = getattr(body, key)
         if index is not None and index.size and (index.min() < 0 or index.max() >= top):
             raise ModelFileError(f"{path}: {key} points outside 0..{top - 1}")
-    for key in (key for key, (kind, _) in (REQUIRED | OPTIONAL).items() if kind == "numbers"):
-        array = getattr(body, key)
-        if array is not None and not np.isfinite(array).all():
-            raise ModelFileError(f"{path}: {key} contains NaN or infinity")

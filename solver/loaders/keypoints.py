@@ -17,7 +17,7 @@ from ..body import Body
 from ..names import BLAZEPOSE, BODY_JOINTS, COCO
 from .landmarks import FINGERS, RestPoints
 
-# MediaPipe's joints of a finger, and where they lie on the way from wrist to tip when the skeleton has no fingers.
+# MediaPipe's joints of a finger, and their positions between wrist and tip when the skeleton has no fingers.
 _FINGER_JOINTS = {
     "thumb": (("cmc", 0.37), ("mcp", 0.56), ("ip", 0.80), ("tip", 1.0)),
     "index": (("mcp", 0.60), ("pip", 0.75), ("dip", 0.87), ("tip", 1.0)),

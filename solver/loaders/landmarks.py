@@ -109,10 +109,10 @@ class RestPoints:
             ear_at = rim_at + 0.15 * (nose_at - rim_at)  # from the rim of the ear to its opening
             width, depth = ear_at[0] - middle, nose_at[2] - ear_at[2]
             eye_at = np.array([middle + 0.42 * width, nose_at[1] + 0.5 * abs(width), nose_at[2] - 0.25 * depth])
-            beside = head[(v[:, 0] >= middle) if side == "left" else (v[:, 0] <= middle)]
-            beside = beside if beside.size else head
-            found[f"{side}_ear"] = self._nearest(beside, ear_at)
-            found[f"{side}_eye"] = self._nearest(beside, eye_at)
+            same_side = head[(v[:, 0] >= middle) if side == "left" else (v[:, 0] <= middle)]
+            same_side = same_side if same_side.size else head
+            found[f"{side}_ear"] = self._nearest(same_side, ear_at)
+            found[f"{side}_eye"] = self._nearest(same_side, eye_at)
         return found
 
     def _search_foot(self, side: str) -> dict[str, int]:

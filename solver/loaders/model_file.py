@@ -6,7 +6,7 @@
 
 Only the linear-blend-skinning part is used. The pose correctives (``posedirs``: from rotation matrices in SMPL, from
 quaternions and the second shape coefficient in STAR) are left out: they move the surface near bent joints, never
-the joints, so that a fitted motion is a motion of the full model. ``Body.license`` says so too.
+the joints, so that a fitted motion is a motion of the full model. ``Body.license`` states this.
 """
 
 from __future__ import annotations

@@ -40,7 +40,7 @@ class Global:
 
 
 class Discarded:
-    """A set: nobody looks into it, and its content is dropped."""
+    """A set; its content is not needed and is dropped."""
 
     __slots__ = ()
 

@@ -3,7 +3,8 @@
 
 Globals become the inert stand-ins of ``pickled_values``; a name that is not listed there is refused. The unpickler is
 the standard library's in pure Python: the one in C allocates memory for any memo index that a file asks for, and hashes
-tuples that a file uses as keys, which can take for ever. Python 2 strings stay bytes, so that array data stays as is.
+tuples that a file uses as keys, which can take arbitrarily long. Python 2 strings stay bytes, so that array data is
+unchanged.
 
 Bounds: the file's size, the number of opcodes, and recoded text, which may not exceed the file's size; every array is
 a view of bytes in the file. So memory stays within a small multiple of the file. Nothing here recurses.

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Every residual the optimizer knows. This is the one place to add another; `register_residual` adds one from outside.
 
-A residual r_i(T_i, Omega_i, beta) beside the measurements is a module with
+A residual r_i(T_i, Omega_i, beta) in addition to the measurements is a module with
     INTS, FLOATS                             columns of its two tables, one row for each term
     INDEXES                                  what all its whole numbers count: "points" as in the measurements, "parts"
                                              0..K or "joints" 1..K. Rows outside are refused; without it, negative ones

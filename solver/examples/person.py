@@ -9,7 +9,7 @@ from .. import Body, State, rotations
 INTRINSICS = np.array([[1400.0, 0.0, 960.0], [0.0, 1400.0, 540.0], [0.0, 0.0, 1.0]])
 
 
-# Axis-angle vectors in radians of somebody in mid-stride; joints that are not named are near their rest pose.
+# Axis-angle vectors in radians of a person in mid-stride; joints that are not named are near their rest pose.
 STRIDE = {
     "left_hip": (-0.5, 0.0, 0.05), "right_hip": (0.25, 0.0, -0.05), "left_knee": (0.4, 0.0, 0.0),
     "right_knee": (0.6, 0.0, 0.0), "left_shoulder": (0.1, -0.3, -1.1), "right_shoulder": (0.1, 0.4, 1.1),
