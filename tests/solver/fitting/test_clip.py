@@ -25,7 +25,7 @@ from scope.solver import (
     rotations,
     with_previous,
 )
-from scope.solver.examples import somebody
+from scope.solver.examples import person
 from scope.solver.fitting.clip import _Frame, _Joint
 from scope.solver.gauss_newton.terms import make_terms
 
@@ -217,13 +217,13 @@ def test_a_gap_and_a_clip_without_measurements_end_well():
 def from_behind():
     """The default body with its back to the camera, where a start from the rest pose ends a metre beside the truth."""
     body = load_body("scope")
-    state = somebody.pose(body, seed=3, bend=0.1)
+    state = person.pose(body, seed=3, bend=0.1)
     turn = np.diag([1.0, -1.0, -1.0]) @ rotations.exp([0.0, np.pi - 0.3, 0.0])
-    R, t = somebody.place(body, replace(state, R_camera_root=turn))
+    R, t = person.place(body, replace(state, R_camera_root=turn))
     index = np.array(list(body.keypoint_set("blazepose").values()))
     points, ones = body.keypoints(R, t, state.beta)[index], np.ones(len(index))
-    image, space = Keypoints2D(index, somebody.project(points), ones), Keypoints3D(index, points, ones)
-    return body, t, Measurements(somebody.INTRINSICS, image, space)
+    image, space = Keypoints2D(index, person.project(points), ones), Keypoints3D(index, points, ones)
+    return body, t, Measurements(person.INTRINSICS, image, space)
 
 
 @pytest.mark.parametrize("temporal", [None, Temporal()])
