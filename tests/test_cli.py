@@ -71,7 +71,7 @@ def test_unreadable_footage_gives_one_sentence_status_1_and_no_file(tmp_path, ca
         (["capture", "--fov", "60", "--focal-mm", "26", "-o", "{tmp}/a.npz"], 2, "contradict"),
         (["capture", "--fov", "wide"], 2, "wide"),
         (["capture", "--height", "1,82", "-o", "{tmp}/a.npz"], 2, "a height of 1 cm is not plausible"),
-        (["capture", "--height", "tall", "-o", "{tmp}/a.npz"], 2, "centimetres such as 175"),
+        (["capture", "--height", "tall", "-o", "{tmp}/a.npz"], 2, "centimetres, such as 175"),
         (["capture", "--body", "nobody", "-o", "{tmp}/a.npz"], 1, "nobody"),
         (["capture", "--retarget", "{tmp}/rig.glb", "-o", "{tmp}/a.glb"], 1, "rig.glb"),
         (["capture", "--retarget", "{tmp}/rig.obj", "-o", "{tmp}/a.glb"], 2, ".obj"),
