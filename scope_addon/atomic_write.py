@@ -47,7 +47,7 @@ def atomic_path(path: Path) -> Iterator[Path]:
 def resolve_link(path: Path) -> Path:
     """Return the file that writing to ``path`` changes: the target of a link, otherwise ``path``. It may not exist yet.
 
-    :raises OutputError: the file exists and is not a regular one, which renaming would replace; or links form a circle.
+    :raises OutputError: the file exists and is not a regular one, which renaming would replace; or links form a loop.
     """
     target = Path(os.path.realpath(path)) if path.is_symlink() else path
     link = f"it is a link to {target}, and that" if target != path else "it"
@@ -55,7 +55,7 @@ def resolve_link(path: Path) -> Path:
         mode = target.stat().st_mode
     except OSError as error:
         if error.errno == errno.ELOOP:
-            raise OutputError(f"cannot write {path}: its links form a circle; choose another name") from error
+            raise OutputError(f"cannot write {path}: its symbolic links form a loop; choose another name") from error
         return target  # it does not exist; any other problem is reported when it is written
     if not stat.S_ISREG(mode):
         what = "a folder" if stat.S_ISDIR(mode) else "a device, a pipe or a socket"

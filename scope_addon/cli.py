@@ -39,11 +39,11 @@ def build_parser() -> argparse.ArgumentParser:
     """Build the whole argparse tree."""
     parser = _Parser(prog="scope", description="Markerless motion capture: video in, animated body out.")
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND", parser_class=_Parser)
-    capture = commands.add_parser("capture", help="capture the people in a video or picture")
+    capture = commands.add_parser("capture", help="capture the people in a video or image")
     capture.set_defaults(run=run_capture)
     _add_capture_files(capture)
     add_options(capture)
-    batch = commands.add_parser("batch", help="capture every video and picture of a folder")
+    batch = commands.add_parser("batch", help="capture every video and image in a folder")
     batch.set_defaults(run=run_batch)
     _add_batch_files(batch)
     add_options(batch)
@@ -56,7 +56,7 @@ def _add_capture_files(capture: argparse.ArgumentParser) -> None:
         nargs="?",
         type=path_argument,
         metavar="VIDEO",
-        help="video, picture, or numbered pictures as a folder or walk_####.png (default: a sample)",
+        help="video, image, or numbered images as a folder or walk_####.png (default: a sample)",
     )
     capture.add_argument(
         "-o",
@@ -77,7 +77,7 @@ def _add_capture_files(capture: argparse.ArgumentParser) -> None:
 
 def _add_batch_files(batch: argparse.ArgumentParser) -> None:
     batch.add_argument(
-        "folder", type=path_argument, metavar="FOLDER", help="folder of videos, pictures and picture sequences"
+        "folder", type=path_argument, metavar="FOLDER", help="folder of videos, images and image sequences"
     )
     batch.add_argument("--out", type=path_argument, required=True, metavar="FOLDER", help="output folder")
     batch.add_argument(
@@ -130,9 +130,7 @@ def run_capture(args: argparse.Namespace) -> dict[str, Any]:
     check_installed(CAPTURE)
     video = args.video or SAMPLE
     if not args.video and not SAMPLE.is_file():
-        raise UsageError(
-            "the sample clip is only part of the repository, not of this installation; give the VIDEO to capture"
-        )
+        raise UsageError("the sample clip is only in the repository, not in this installation; give a VIDEO to capture")
     outputs = distinct_paths(args.output) or [video.with_suffix(".npz"), video.with_suffix(".glb")]
     check_outputs(outputs, args.overlay, video)
     check_blender(outputs)

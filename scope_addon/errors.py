@@ -4,7 +4,7 @@
     ScopeError                  (solver)                                          exit 1
     ├── InputError              (solver) the user's file or value cannot be used
     │   ├── ModelFileError      (solver) a body or network file is missing or malformed
-    │   ├── VideoError          a video or picture cannot be opened or decoded
+    │   ├── VideoError          a video or image cannot be opened or decoded
     │   └── MotionFileError     a motion file is missing or malformed
     ├── ShapeError              (solver) an array of the wrong shape or type
     ├── UsageError              invalid or contradictory arguments                exit 2
@@ -24,7 +24,7 @@ FAILED, BAD_ARGUMENTS, NO_PERSON = 1, 2, 3  # exit statuses
 
 
 class VideoError(InputError):
-    """A video or picture cannot be opened or decoded."""
+    """A video or image cannot be opened or decoded."""
 
 
 class MotionFileError(InputError):

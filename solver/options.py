@@ -93,10 +93,10 @@ class Stage:
         """
         check_type(self.weights, Weights, "Stage.weights")
         if not as_number(self.tolerance, "Stage.tolerance") >= 0.0:
-            raise InvalidValueError(f"Stage.tolerance must be a number from 0 on, but is {self.tolerance}.")
+            raise InvalidValueError(f"Stage.tolerance must be a number of at least 0, but is {self.tolerance}.")
         if not isinstance(self.max_iterations, Integral) or self.max_iterations < 0:
             raise InvalidValueError(
-                f"Stage.max_iterations must be a whole number from 0 on, but is {self.max_iterations!r}."
+                f"Stage.max_iterations must be a whole number of at least 0, but is {self.max_iterations!r}."
             )
 
 

@@ -67,7 +67,7 @@ def test_circular_links_are_an_error(tmp_path):
     path = tmp_path / "walk.npz"
     path.symlink_to(path)
     for refused in (check_output, write):
-        with pytest.raises(OutputError, match="form a circle"):
+        with pytest.raises(OutputError, match="form a loop"):
             refused(path)
 
 

@@ -42,7 +42,7 @@ def select_position_keys(times: NDArray[np.float64], p: NDArray[np.float64], bou
 
 def _check(bound: float) -> None:
     if not np.isfinite(bound) or bound <= 0:
-        raise UsageError(f"keys are reduced within an error bound above zero, not {bound}")
+        raise UsageError(f"the error bound must be above zero, not {bound}")
 
 
 def _keep(

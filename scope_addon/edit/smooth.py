@@ -31,7 +31,7 @@ def smoothed(body: Body, motion: Motion, strength: float) -> Clip:
     :raises UsageError: when the strength is negative or not a number.
     """
     if not np.isfinite(strength) or strength < 0:
-        raise UsageError(f"smoothing takes a strength from 0 on, not {strength}")
+        raise UsageError(f"the smoothing strength must be 0 or more, not {strength}")
     raw = clip_from_motion(body, motion, raw=True)
     if strength == 0 or len(raw) < 3:
         return raw

@@ -32,7 +32,7 @@ BODIES = (
 LENSES = (
     Choice("auto", "Automatic", "Read from the file's metadata if present, estimated otherwise", 0),
     Choice("focal", "Focal Length", "Enter the 35 mm equivalent focal length", 1),
-    Choice("fov", "Field of View", "Enter the field of view along the longer side of the picture", 2),
+    Choice("fov", "Field of View", "Enter the field of view along the longer side of the image", 2),
     Choice("file", "Calibration", "Read focal lengths, principal point and distortion from a calibration file", 3),
 )
 
@@ -41,7 +41,7 @@ def _parse_people(text: str) -> int | str:
     if text in (LARGEST, ALL):
         return text
     if not re.fullmatch("[0-9]{1,6}", text) or int(text) < 1:
-        raise ValueError("must be a number of at least 1, all or largest")
+        raise ValueError("must be all, largest or a number from 1")
     return int(text)
 
 
@@ -50,7 +50,7 @@ def _parse_heights(text: str) -> tuple[float, ...]:
     try:
         return tuple(float(number) / 100 for number in text.split(","))
     except ValueError as error:
-        raise ValueError("must be in centimetres such as 175, or 175,162 for two people") from error
+        raise ValueError("must be in centimetres, such as 175, or 175,162 for two people") from error
 
 
 def _range_limit(settings: Any, name: str) -> str | None:
@@ -215,7 +215,7 @@ CAPTURE_OPTIONS = (
         float,
         None,
         _EVERYWHERE,
-        "field of view along the longer side of the picture",
+        "field of view along the longer side of the image",
         unit="degrees",
         minimum=1.0,
         maximum=175.0,

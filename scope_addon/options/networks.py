@@ -55,13 +55,14 @@ NETWORK_OPTIONS = (
         str,
         "auto",
         _NETWORKS,
-        "execution provider of the networks",
+        "execution provider for the networks",
         choices=PROVIDERS,
         decides_result=False,
         argument=Argument(default_text="auto, the fastest available"),
         blender=Property(
             label="Execution Provider",
-            description="What the networks run on; if unavailable, the CPU is used and the result shows a warning",
+            description="Execution provider for the networks; if unavailable, the CPU is used and the result shows a"
+            " warning",
         ),
     ),
     Option(

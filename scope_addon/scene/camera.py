@@ -124,7 +124,7 @@ def show_footage(
     """
     path = Path(footage).resolve()
     if not path.is_file():
-        raise VideoError(f"the footage {path} does not exist; give the video or picture the motion was captured from")
+        raise VideoError(f"the footage {path} does not exist; give the video or image the motion was captured from")
     warnings: list[str] = []
     background = camera.data.background_images.new()
     background.alpha = 1.0
@@ -155,7 +155,7 @@ def show_footage(
             _set_lens_distortion(clip, background, motion)
             if drift > 1.0:
                 warnings.append(
-                    f"the background picture drifts from the motion by up to {drift:.0f} frames, because the scene "
+                    f"the background image drifts from the motion by up to {drift:.0f} frames, because the scene "
                     "does not have the footage's constant frame rate and the lens distorts; the motion keeps its "
                     "speed"
                 )
@@ -164,7 +164,7 @@ def show_footage(
     elif tuple(motion.image_size) != size:
         warnings.append(
             f"Blender shows {path.name} at {size[0]} x {size[1]}, but it was captured at {motion.image_size[0]} x "
-            f"{motion.image_size[1]}: turn or scale the camera's background picture"
+            f"{motion.image_size[1]}: turn or scale the camera's background image"
         )
     return warnings
 
@@ -204,8 +204,8 @@ def _show_picture_sequence(
         return []
     if len(numbers) <= motion.frames.max() or numbers[-1] >= _MAX_DURATION:
         return [
-            f"Blender cannot show the picture sequence from {first.name} on, because pictures are missing or their "
-            "numbers are too large, so the camera shows that picture only; renumber the files consecutively to show all"
+            f"Blender cannot show the image sequence from {first.name} on, because images are missing or their "
+            "numbers are too large, so the camera shows that image only; renumber the files consecutively to show all"
         ]
     background.image.source = "SEQUENCE"
     scene_frames = np.arange(np.floor(frames[0]), np.ceil(frames[-1]) + 1)

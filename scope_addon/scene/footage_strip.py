@@ -22,7 +22,7 @@ def add_footage_strips(scene: bpy.types.Scene, footage: str | Path, start_frame:
     """
     path = Path(footage)
     if not path.is_file():
-        raise VideoError(f"the footage {path} does not exist; choose the video or picture again and repeat the capture")
+        raise VideoError(f"the footage {path} does not exist; choose the video or image again and repeat the capture")
     editor = scene.sequence_editor or scene.sequence_editor_create()
     strips = strips_of(editor)
     if not len(strips):
@@ -42,7 +42,7 @@ def add_footage_strips(scene: bpy.types.Scene, footage: str | Path, start_frame:
     except RuntimeError as error:
         for strip in added:
             strips.remove(strip)
-        raise VideoError(f"Blender cannot read {path}; convert a video to MP4 (H.264), a picture to JPEG") from error
+        raise VideoError(f"Blender cannot read {path}; convert a video to MP4 (H.264), an image to JPEG") from error
     return added
 
 

@@ -87,7 +87,7 @@ def betas_of(armature: bpy.types.Object, body: Body) -> NDArray[np.float64]:
 
     betas = np.array(list(armature.get("scope_betas", ())), float)
     if betas.shape != (body.P,):
-        raise UsageError(f"'{armature.name}' lacks its body's shape coefficients; capture again")
+        raise UsageError(f"'{armature.name}' has no stored body shape; capture again")
     return betas
 
 

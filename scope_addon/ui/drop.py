@@ -9,7 +9,7 @@ from ..footage import FOOTAGE_SUFFIXES
 
 
 class SCOPE_FH_footage(bpy.types.FileHandler):
-    """Make a dropped video or picture the scene's footage."""
+    """Make a dropped video or image the scene's footage."""
 
     bl_idname = "SCOPE_FH_footage"
     bl_label = "Capture with Scope"

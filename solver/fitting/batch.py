@@ -96,7 +96,7 @@ def _spread(work: Callable[[_T], _R], jobs: Iterable[_T], threads: int) -> list[
     """Results in the jobs' order. The first job runs alone, so that kernels are compiled once, not by every thread."""
     queue = list(jobs)
     if not isinstance(threads, Integral) or threads < 0:
-        raise InvalidValueError(f"threads must be a whole number from 0 on, but is {threads!r}.")
+        raise InvalidValueError(f"threads must be a whole number of at least 0, but is {threads!r}.")
     threads = min(threads if threads > 0 else os.cpu_count() or 1, max(1, len(queue)))
     if threads == 1:
         return [work(job) for job in queue]

@@ -40,7 +40,7 @@ def load_body(which: str | Path = "scope") -> Body:
     if is_user_model(path):
         return load_model(path)
     if is_motion(path):
-        raise ModelFileError(f"{path} is a motion file, which holds how a body moves and not the body: {choice}")
+        raise ModelFileError(f"{path} is a motion file, which holds how a body moves, not the body itself: {choice}")
     data = read_npz(path, ModelFileError, "body file")
     missing = [k for k in REQUIRED if k not in data]
     if missing:

@@ -109,7 +109,9 @@ def _check_tables(arrays: dict[str, NDArray[Any]], path: Path) -> None:
     check_arrays(arrays, {"kintree_table": ("whole numbers", (2, None)), "v_template": ("numbers", (None, 3))}, path)
     vertices, n = len(arrays["v_template"]), arrays["kintree_table"].shape[1]
     if 0 in (vertices, n):
-        raise ModelFileError(f"{path}: {vertices} vertices and {n} joints are no body; choose another")
+        raise ModelFileError(
+            f"{path}: {vertices} vertices and {n} joints do not match any supported body; choose another file"
+        )
     if vertices > MOST_VERTICES or n > MOST_JOINTS or vertices * n > MOST_WEIGHTS:
         raise ModelFileError(f"{path}: {vertices} vertices and {n} joints are too many for a body; choose another")
     forms: dict[str, Form] = {

@@ -50,7 +50,7 @@ def read_pickle(path: Path) -> dict[str, Any]:
     except _UNREADABLE as cause:
         raise ModelFileError(f"{path} is not a readable pickle ({cause}); download it again") from cause
     if not isinstance(result, dict):
-        raise ModelFileError(f"{path} holds a {type(result).__name__} and not a table of arrays; choose a body file")
+        raise ModelFileError(f"{path} contains a {type(result).__name__}, not a table of arrays; choose a body file")
     return result
 
 

@@ -110,21 +110,21 @@ def register_residual(
         describes it: a plain function, which is compiled here, or one that `numba.njit` has compiled. Its speed is that
         of Scope's own.
     :param function: ``function(part, ints, floats) -> r (n,)`` of one row (ints,), (floats,) in plain Python, with
-        R (3, 3), t (3,) of `residuals.part.Part` the pose of part i in the camera frame, metres, Omega (3, 3) the state
+        R (3, 3), t (3,) of `compiled.part.Part` the pose of part i in the camera frame, metres, Omega (3, 3) the state
         of its joint and beta (P,). Derivatives are central differences: slow, to try an idea.
     :raises InvalidValueError: the name is one of Scope's own, not exactly one of `kernel` and `function` is given, a
-        count is no whole number from 1 (`floats`: 0) on, `indexes` is unknown or "points" with a `function`, or too
-        many are registered.
+        count is not a whole number of at least 1 (`floats`: 0), `indexes` is unknown or "points" with a `function`, or
+        too many are registered.
     """
     external = external_residuals()
     own = [*RESIDUALS, "keypoints2d", "keypoints3d", "orientation_field", "shape_prior", "focal_prior"]
     if not isinstance(name, str) or not name or name in own:
         raise InvalidValueError(f"A residual of your own needs a name other than {', '.join(own)}, but got {name!r}.")
     if (kernel is None) == (function is None) or not callable(kernel or function):
-        raise InvalidValueError(f"Residual {name!r} needs either a kernel or a function, something to call.")
+        raise InvalidValueError(f"Residual {name!r} needs exactly one callable, kernel or function.")
     for what, count, least in (("ints", ints, 1), ("floats", floats, 0)):
         if not isinstance(count, Integral) or count < least:
-            raise InvalidValueError(f"{what} of {name!r} must be a whole number from {least} on, but is {count!r}.")
+            raise InvalidValueError(f"{what} of {name!r} must be a whole number of at least {least}, but is {count!r}.")
     allowed = INDEXES if function is None else INDEXES[1:]
     if indexes not in allowed:
         raise InvalidValueError(f"indexes of {name!r} must be one of {', '.join(allowed)}, but is {indexes!r}.")

@@ -55,7 +55,7 @@ def test_a_capture_with_both_is_as_good_as_ours(own_networks: tuple[Path, Path])
 
 def test_a_network_that_finds_nobody_is_named(tmp_path: Path) -> None:
     blind = fixed(tmp_path / "blind.onnx", 640, 640, {"output0": np.zeros((1, 84, 8400), np.float32)})
-    with pytest.raises(NoPersonError, match=r"crop it; if .* without blind\.onnx, write into blind\.json"):
+    with pytest.raises(NoPersonError, match=r"crop footage of .*; if .* without blind\.onnx, state in blind\.json"):
         captured(detector=blind)
 
 

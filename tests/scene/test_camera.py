@@ -285,7 +285,7 @@ def test_pictures_numbered_beyond_blenders_frames_are_warned_about(body, make_mo
     result = build_scene([motion], body, footage=tmp_path / "20261122101500.png", options=NEW_SCENE)
     assert result.people[0].camera.data.background_images[0].image.source == "FILE"
     assert len(result.warnings) == 1
-    assert "the camera shows that picture only" in result.warnings[0]
+    assert "the camera shows that image only" in result.warnings[0]
 
 
 def test_a_picture_of_another_size_is_warned_about(body, make_motion, tmp_path):

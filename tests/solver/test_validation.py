@@ -201,7 +201,7 @@ MEASURED_REFUSED = {
         lambda: fit_batch(BODY, [SEEN], init=[np.eye(3)]),
         r"init\[0\] must be State or None, but is an array",
     ),
-    "threads": (lambda: fit_batch(BODY, [SEEN], threads=-2), "threads must be a whole number from 0 on, but is -2"),
+    "threads": (lambda: fit_batch(BODY, [SEEN], threads=-2), "threads must be a whole number of at least 0, but is -2"),
     "threads of clips": (lambda: fit_clips(BODY, [[SEEN]], threads=1.5), "threads must be a whole number"),
 }
 
@@ -241,10 +241,10 @@ SETTINGS_REFUSED = {
     "weight None": (lambda: Weights(floor=None), "Weights.floor must be a number, but is None"),
     "weight of a table": (lambda: Weights(tables={"floor": -1.0}), r"Weights.tables\['floor'\] must be finite"),
     "weights' tables": (lambda: Weights(tables=5.0), "Weights.tables must be Mapping, but is a float"),
-    "tolerance": (lambda: Stage(tolerance=-1e-6), "Stage.tolerance must be a number from 0 on, but is -1e-06"),
-    "tolerance NaN": (lambda: Stage(tolerance=NAN), "Stage.tolerance must be a number from 0 on, but is nan"),
+    "tolerance": (lambda: Stage(tolerance=-1e-6), "Stage.tolerance must be a number of at least 0, but is -1e-06"),
+    "tolerance NaN": (lambda: Stage(tolerance=NAN), "Stage.tolerance must be a number of at least 0, but is nan"),
     "tolerance text": (lambda: Stage(tolerance="1e-6"), "Stage.tolerance must be a number"),
-    "iterations": (lambda: Stage(max_iterations=-1), "Stage.max_iterations must be a whole number from 0 on"),
+    "iterations": (lambda: Stage(max_iterations=-1), "Stage.max_iterations must be a whole number of at least 0"),
     "iterations float": (lambda: Stage(max_iterations=2.5), "Stage.max_iterations must be a whole number"),
     "stage's weights": (lambda: Stage({"shape": 1.0}), "Stage.weights must be Weights, but is a dict"),
     "robust": (lambda: Options(robust_keypoints2d=0.0), "Options.robust_keypoints2d must be positive"),

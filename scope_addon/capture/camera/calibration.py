@@ -64,21 +64,21 @@ class Calibration:
             if not (0 <= K[0, 2] <= width and 0 <= K[1, 2] <= height):
                 raise InputError(
                     f"{self.path}: the principal point ({K[0, 2]:g}, {K[1, 2]:g}) lies outside of the footage, which "
-                    f'has {width} x {height} pixels; add "size": [width, height] of the pictures it was calibrated with'
+                    f'has {width} x {height} pixels; add "size": [width, height] of the images it was calibrated with'
                 )
             known_width, known_height = float(width), float(height)
         else:
             known_width, known_height = self.size
         if not _same_proportions((known_width, known_height), (width, height)):
             raise InputError(
-                f"{self.path} is for pictures of {known_width:g} x {known_height:g}, the footage has {width} x {height}"
-                f" pixels, which are other proportions; {_advice(known_width, known_height, width, height)}"
+                f"{self.path} is for images of {known_width:g} x {known_height:g}, the footage has {width} x {height}"
+                f" pixels, which is a different aspect ratio; {_advice(known_width, known_height, width, height)}"
             )
         longer = max(known_width, known_height)
         if not all(_FOCAL_RANGE[0] * longer <= K[i, i] <= _FOCAL_RANGE[1] * longer for i in (0, 1)):
             raise InputError(
-                f"{self.path}: no lens has focal lengths of {K[0, 0]:g} and {K[1, 1]:g} pixels in pictures of "
-                f"{known_width:g} x {known_height:g}; give them in pixels, with the size of the calibration pictures"
+                f"{self.path}: no lens has focal lengths of {K[0, 0]:g} and {K[1, 1]:g} pixels in images of "
+                f"{known_width:g} x {known_height:g}; give them in pixels, with the size of the calibration images"
             )
         if not 1 / _LARGEST_PIXEL_ASPECT <= K[0, 0] / K[1, 1] <= _LARGEST_PIXEL_ASPECT:
             raise InputError(
@@ -87,12 +87,12 @@ class Calibration:
         off_axis = (np.array([known_width, known_height]) / 2 - K[:2, 2]) / K[[0, 1], [0, 1]]
         if np.abs(off_axis).max() > _LARGEST_OFFSET:
             raise InputError(
-                f"{self.path}: the principal point ({K[0, 2]:g}, {K[1, 2]:g}) is too far from pictures of "
+                f"{self.path}: the principal point ({K[0, 2]:g}, {K[1, 2]:g}) is too far from images of "
                 f"{known_width:g} x {known_height:g}; give it in pixels from their top left corner"
             )
         if not _can_be_undistorted(self.dist, min(known_width, known_height) / (K[0, 0] + K[1, 1])):
             raise InputError(
-                f"{self.path}: dist {self.dist.tolist()} folds or tears the picture; give OpenCV's k1, k2, p1, p2, k3, "
+                f"{self.path}: dist {self.dist.tolist()} folds or tears the image; give OpenCV's k1, k2, p1, p2, k3, "
                 "in this order, from the same calibration as the intrinsics"
             )
         scaled: NDArray[np.float64] = np.diag([width / known_width, height / known_height, 1.0]) @ K
@@ -223,5 +223,5 @@ def _same_proportions(a: tuple[float, float], b: tuple[float, float]) -> bool:
 
 def _advice(known_width: float, known_height: float, width: int, height: int) -> str:
     if _same_proportions((known_height, known_width), (width, height)):
-        return "the clip is rotated relative to them: calibrate with pictures in the orientation of the clip"
-    return "calibrate with pictures from the same camera mode, because another one crops them"
+        return "the clip is rotated relative to them: calibrate with images in the orientation of the clip"
+    return "calibrate with images from the same camera mode, because another one crops them"

@@ -99,7 +99,9 @@ def choose_camera(
         return Camera(pinhole(width, height, focal_mm / FILM_WIDTH_MM * longer), np.zeros(5), f"given, {focal_mm:g} mm")
     if fov_deg is not None:
         if not 1.0 <= fov_deg <= 175.0:
-            raise UsageError(f"--fov {fov_deg:g} is not a field of view: give degrees along the longer side, say 60")
+            raise UsageError(
+                f"--fov {fov_deg:g} is not a field of view: give degrees along the longer side, such as 60"
+            )
         focal_px = _focal_from_fov(longer, fov_deg)
         return Camera(pinhole(width, height, focal_px), np.zeros(5), f"given, {fov_deg:g} degrees")
     if metadata_focal_mm:

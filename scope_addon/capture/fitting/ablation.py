@@ -32,7 +32,7 @@ class Ablation:
     def __post_init__(self) -> None:
         """Require a source of depth."""
         if not (self.lifter or self.world_landmarks):
-            raise UsageError("lifter and world_landmarks cannot both be left out: without either, depth is unknown")
+            raise UsageError("lifter and world_landmarks cannot both be left out: nothing else provides depth")
 
     def weights(self, weights: Weights) -> Weights:
         """Return the solver's weights with zeros for the terms that are left out."""

@@ -37,15 +37,15 @@ def require_stature(body: Body, height_m: float) -> None:
     """
     if not SHORTEST_M <= height_m <= TALLEST_M:
         most = f"{100 * SHORTEST_M:.0f} to {100 * TALLEST_M:.0f} cm"
-        raise UsageError(f"nobody is {100 * height_m:g} cm tall: give a height from {most}")
+        raise UsageError(f"a height of {100 * height_m:g} cm is not plausible: give one from {most}")
     if body.P == 0:
-        raise UsageError(f"the body '{body.name}' has a single shape, whose height cannot be set: leave the height out")
+        raise UsageError(f"the body '{body.name}' has a single shape, whose height cannot be set: omit the height")
     betas, *_ = _shape_of(body, height_m)
     if np.linalg.norm(betas) > MAX_DEVIATIONS:
         unit = betas / np.linalg.norm(betas)
         low, high = sorted(100 * body.stature(side * MAX_DEVIATIONS * unit) for side in (-1, 1))
         what = f"can be {low:.0f} to {high:.0f} cm tall, not {100 * height_m:g}"
-        raise UsageError(f"the body '{body.name}' {what}: leave the height out")
+        raise UsageError(f"the body '{body.name}' {what}: omit the height")
 
 
 def _shape_of(body: Body, height_m: float) -> tuple[NDArray[np.float64], float, NDArray[np.float64]]:

@@ -90,7 +90,7 @@ class OpencvReader:
         self._capture = cv2.VideoCapture(str(path.absolute()), cv2.CAP_FFMPEG)
         if not self._capture.isOpened():
             raise VideoError(
-                f"{path} is not a video or picture that can be decoded; copy it again if it may be incomplete, or "
+                f"{path} is not a video or image that can be decoded; copy it again if it may be incomplete, or "
                 "convert it to an H.264 .mp4"
             )
         self._capture.set(cv2.CAP_PROP_ORIENTATION_AUTO, 0)
@@ -162,7 +162,7 @@ def _open_with_pyav(path: Path) -> tuple[type[Exception], InputContainer | None]
     except ImportError as error:
         raise VideoError(
             f"{path} is AV1 or HEIC, which needs the package 'av' that is not installed; install it, or convert a "
-            "video to H.264 .mp4, a picture to JPEG"
+            "video to H.264 .mp4, an image to JPEG"
         ) from error
     try:
         container = av.open(str(path.absolute()), options=_PROTOCOLS, container_options=_PROTOCOLS)

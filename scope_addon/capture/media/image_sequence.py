@@ -45,9 +45,9 @@ class PictureSequence:
         missing = slots[-1] + 1 - len(paths)
         if missing <= 0:
             return cls(paths, slots, [])
-        between = f"{name}: {missing} numbers between {numbers[0]} and {numbers[-1]} have no picture"
+        between = f"{name}: {missing} numbers between {numbers[0]} and {numbers[-1]} have no image"
         if 2 * missing > slots[-1] + 1:
-            return cls(paths, list(range(len(paths))), [f"{between}, so the pictures were read as consecutive frames"])
+            return cls(paths, list(range(len(paths))), [f"{between}, so the images were read as consecutive frames"])
         return cls(paths, slots, [f"{between}; the time of these frames was kept free"])
 
     def time(self, index: int, fps: Fraction) -> float:
@@ -69,8 +69,9 @@ def find_sequence(path: Path, rate_given: bool) -> PictureSequence | None:
         if len(found) > 1 and not is_sequence(found):
             kinds = {sequence_pattern(p): p.name for p in reversed(found)}
             raise VideoError(
-                f"{path} holds pictures that are not a numbered sequence ({', '.join(sorted(kinds.values())[:3])}, …); "
-                "give the pattern of one sequence, such as walk_####.png, or a single picture"
+                f"{path} contains images that do not form one numbered sequence "
+                f"({', '.join(sorted(kinds.values())[:3])}, …); "
+                "give the pattern you mean, such as walk_####.png, or a single image"
             )
     elif (sign := _NUMBER_SIGN.search(path.name)) and not path.exists() and path.parent.is_dir():
         found = numbered(path.parent, path.name[: sign.start()], path.name[sign.end() :])

@@ -43,7 +43,7 @@ def is_picture(path: Path) -> bool:
     if _brands(head) & _HEIF_BRANDS:
         return True
     if head.startswith(_OPENEXR):
-        raise VideoError(f"{path} is an OpenEXR picture, which cannot be read here; export it as PNG or TIFF")
+        raise VideoError(f"{path} is an OpenEXR image, which cannot be read here; export it as PNG or TIFF")
     if head.startswith(_GIF) or path.suffix.lower() in _JPEG_STREAMS:
         return False
     return bool(cv2.haveImageReader(str(path)))

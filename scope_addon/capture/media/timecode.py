@@ -83,7 +83,8 @@ def parse_time(text: str) -> float | Timecode:
     match = _CLOCK.fullmatch(text.strip())
     if match is None:
         raise UsageError(
-            f"{text!r} is not a time; give seconds (12.5), MM:SS, HH:MM:SS.mmm or a timecode (HH:MM:SS:FF, HH:MM:SS;FF)"
+            f"{text!r} is not a valid time; give seconds (12.5), MM:SS, HH:MM:SS.mmm or a timecode "
+            "(HH:MM:SS:FF, HH:MM:SS;FF)"
         )
     hours, minutes, seconds = match.groups()
     value = float(seconds.replace(",", "."))
@@ -93,4 +94,4 @@ def parse_time(text: str) -> float | Timecode:
 
 def _check_sixty(text: str, minutes: float, seconds: float) -> None:
     if minutes >= 60 or seconds >= 60:
-        raise UsageError(f"{text!r} is not a time: minutes and seconds go up to 59")
+        raise UsageError(f"{text!r} is not a valid time: minutes and seconds go up to 59")

@@ -115,7 +115,7 @@ def open_video(path: str | Path, wanted: FootageRange | None = None) -> Video:
         return _open_sequence(path, sequence, wanted)
     if path.is_dir():
         raise VideoError(
-            f"{path} is a folder without a picture; give a video, a picture or a folder of pictures,"
+            f"{path} is a folder that contains no images; give a video, an image or a folder of images,"
             " or capture a folder of videos with scope batch"
         )
     try:
@@ -148,7 +148,7 @@ def _open_sequence(path: Path, sequence: PictureSequence, requested: FootageRang
     video.warnings += sequence.warnings
     if requested.fps is None and count > 1:
         video.warnings.append(
-            f"{path.name}: pictures have no frame rate, so 30 frames per second were assumed; give another rate with "
+            f"{path.name}: images have no frame rate, so 30 frames per second were assumed; set another with "
             "--fps on the command line"
         )
     return video
@@ -161,17 +161,17 @@ def _open_still(path: Path, requested: FootageRange) -> Video:
     height, width = picture.rgb.shape[:2]
     video = Video(path, width, height, DEFAULT_FPS, 1, picture.focal_35mm, _still=picture.rgb)
     if requested != VideoRange():
-        video.warnings.append(f"{path.name} is a single picture: a start, an end or a frame rate changes nothing")
+        video.warnings.append(f"{path.name} is a single image: a start, an end or a frame rate has no effect")
     if picture.length > 1:
         video.warnings.append(
-            f"{path.name} is an animation of {picture.length} pictures, of which only the first was captured; "
+            f"{path.name} is an animation of {picture.length} images, and only the first was captured; "
             "convert it to an .mp4 or a .gif to capture all of them"
         )
     return video
 
 
 def _damaged(picture: Path) -> VideoError:
-    return VideoError(f"{picture} is a picture that cannot be decoded; it may be damaged, so export it again as JPEG")
+    return VideoError(f"{picture} is an image that cannot be decoded; it may be damaged, so export it again as JPEG")
 
 
 def _open_moving(path: Path, requested: FootageRange) -> Video:

@@ -27,7 +27,7 @@ class VideoRange:
 
     def __post_init__(self) -> None:
         if not 0 <= self.start_s < float("inf"):
-            raise UsageError(f"the start must be a time of at least 0 s, but is {self.start_s} s")
+            raise UsageError(f"the start must be 0 s or later, but is {self.start_s} s")
         if not self.end_s > self.start_s:
             raise UsageError(f"the end ({self.end_s:g} s) must come after the start ({self.start_s:g} s)")
         if self.fps is not None and not 0 < self.fps <= 1000:

@@ -260,7 +260,7 @@ def _write_still(path: Path, painter: _Painter, video: Video, index: int) -> Non
             break
     ok, data = cv2.imencode(path.suffix, cv2.cvtColor(painter.paint(frame), cv2.COLOR_RGB2BGR))
     if not ok:
-        raise OutputError(f"cannot encode a {path.suffix} picture; choose .png")
+        raise OutputError(f"cannot encode a {path.suffix} image; choose .png")
     path.write_bytes(data.tobytes())
 
 
@@ -278,7 +278,7 @@ def _write_video(temporary: Path, painter: _Painter, video: Video, path: Path, p
         if writer is not None:
             writer.release()
     if not _is_readable(temporary):  # the encoder does not report what it could not write
-        raise OutputError(f"cannot write {path} completely; free some space or choose another folder")
+        raise OutputError(f"could not finish writing {path}; free some space or choose another folder")
 
 
 def _open_writer(temporary: Path, fps: float, width: int, height: int, path: Path) -> cv2.VideoWriter:

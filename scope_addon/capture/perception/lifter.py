@@ -150,7 +150,7 @@ class Lifter:
         self.path = path or LIFTER_FILE
         if not self.path.is_file():
             raise SetupError(
-                f"{self.path} is missing; install the extension again, or restore the file in the repository."
+                f"{self.path} is missing; install the extension again, or restore the file from the repository."
             )
         self._session = open_session(self.path, threads)
         shapes = [s.shape[1:] for s in (*self._session.get_inputs(), *self._session.get_outputs())]

@@ -101,7 +101,7 @@ def observe(
         )
         tracks = frames.people.build(most_people(options.people))
     if not len(footage.timestamps):
-        raise VideoError(f"{video.path} has no frame in the requested range; change the start or the end")
+        raise VideoError(f"{video.path} has no frames between the given start and end; change one of them")
     if not tracks:
         own_networks = [network for network in (options.detector, options.keypoints) if network]
         raise _no_person_error(Path(video.path), len(footage.timestamps), own_networks)
@@ -195,6 +195,6 @@ def _no_person_error(path: Path, frames: int, own_networks: list[Path]) -> NoPer
         for own in own_networks
     )
     return NoPersonError(
-        f"no person was found {where}: at least one person must be mostly in the picture and at least "
+        f"no person was found {where}: at least one person must be mostly in the image and at least "
         f"a fifth as tall as its shorter side; crop footage of smaller people{networks}"
     )

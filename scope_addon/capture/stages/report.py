@@ -58,7 +58,9 @@ def capture_warnings(name: str, options: CaptureOptions, cuts_s: list[float], mo
     warnings = []
     if cuts_s:
         times = _at(cuts_s)
-        warnings.append(f"{name} cuts to another scene {times}: capture each scene separately, with its start and end")
+        warnings.append(
+            f"{name} cuts to another scene {times}: capture each scene separately, with a start and end time"
+        )
     if len(options.heights_m) > len(motions):
         found = f"{len(motions)} people were found" if len(motions) > 1 else "one person was found"
         warnings.append(f"{name}: {len(options.heights_m)} heights were given, but {found}")

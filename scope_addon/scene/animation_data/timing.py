@@ -31,7 +31,7 @@ def blender_rate(frames_per_second: float) -> tuple[int, float]:
     :raises UsageError: when Blender cannot store the rate.
     """
     if not math.isfinite(frames_per_second) or not 0.01 <= frames_per_second <= 32767:
-        raise UsageError(f"the frame rate must lie between 0.01 and 32767 frames a second, but is {frames_per_second}")
+        raise UsageError(f"the frame rate must be between 0.01 and 32767 frames per second, not {frames_per_second}")
     for rate in BROADCAST:
         if abs(frames_per_second - float(rate)) < TOLERANCE:
             return rate.numerator // 1000, 1.001

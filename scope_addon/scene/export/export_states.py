@@ -60,8 +60,8 @@ def scene_of(
         span = actions.frame_range(list(rigs)) or (source.frame_start, source.frame_end)
         if math.floor(span[0]) < 0:  # a scene starts at 0 or later, so earlier keys would be lost
             raise UsageError(
-                f"the motion begins at frame {math.floor(span[0])}, but an export at 0: move its keys later, or "
-                "capture again with a First Frame of 0 or more"
+                f"the motion begins at frame {math.floor(span[0])}, but exports start at frame 0: move its keys later, "
+                "or capture again with a First Frame of 0 or more"
             )
         scene.frame_end = math.ceil(span[1])
         scene.frame_start = math.floor(span[0])

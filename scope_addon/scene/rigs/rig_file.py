@@ -143,7 +143,7 @@ def _choose(path: Path, rigs: list[bpy.types.Object], name: str) -> bpy.types.Ob
         for rig in rigs:
             if rig.name == name:
                 return rig
-        raise UsageError(f"{path} has no armature '{name}', but {names}; give one of them with --rig-object")
+        raise UsageError(f"{path} has no armature '{name}', only {names}; give one of them with --rig-object")
     if len(rigs) > 1:
         raise UsageError(f"{path} has {len(rigs)} armatures, {names}; choose one with --rig-object NAME")
     return rigs[0]

@@ -136,11 +136,11 @@ def capture_request(scene: bpy.types.Scene) -> JobRequest:
     """
     settings, chosen = scene.scope, preferences()
     if not settings.footage:
-        raise UsageError("no footage is chosen; choose a video or picture first")
+        raise UsageError("no footage is chosen; choose a video or image first")
     footage = Path(bpy.path.abspath(settings.footage))
     if not footage.is_file():
         what = "is not a file" if footage.exists() else "does not exist"
-        raise VideoError(f"{footage} {what}; choose the video or picture again")
+        raise VideoError(f"{footage} {what}; choose the video or image again")
     if settings.use_range and settings.range_end <= settings.range_start:
         raise UsageError("the part of the video ends before it starts; change From or To")
     if settings.lens == "FILE" and not settings.calibration_file:

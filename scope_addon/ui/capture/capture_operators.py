@@ -41,7 +41,7 @@ def end_capture() -> None:
 
 
 class SCOPE_OT_choose_footage(bpy.types.Operator):
-    """Choose a video or picture of a person"""
+    """Choose a video or image of a person"""
 
     bl_idname = "scope.choose_footage"
     bl_label = "Choose Video or Picture"
@@ -61,7 +61,7 @@ class SCOPE_OT_choose_footage(bpy.types.Operator):
         """Set the footage to the file."""
         path = Path(bpy.path.abspath(self.filepath))
         if not path.is_file():
-            self.report({"ERROR"}, f"{path} is not a file; choose a video or picture")
+            self.report({"ERROR"}, f"{path} is not a file; choose a video or image")
             return {"CANCELLED"}
         context.scene.scope.footage = str(path)
         return {"FINISHED"}
@@ -94,7 +94,7 @@ class SCOPE_OT_capture(bpy.types.Operator):
             cls.poll_message_set("A capture is running; wait for it or cancel it")
             return False
         if not context.scene.scope.footage:
-            cls.poll_message_set("Choose a video or picture first")
+            cls.poll_message_set("Choose a video or image first")
             return False
         return True
 

@@ -57,7 +57,7 @@ class SCOPE_PG_settings(bpy.types.PropertyGroup):
         subtype="FILE_PATH",
         options=PATH_OPTIONS,
         update=_clear_message,
-        description="Video or picture of a person to capture",
+        description="Video or image of a person to capture",
     )
     result: PointerProperty(type=SCOPE_PG_result)
 

@@ -112,7 +112,7 @@ class SCOPE_OT_retarget(_RigOperator):
         if result.warnings:
             self.report({"WARNING"}, sentence(result.warnings[0]))
             return ""
-        return f"Animated '{settings.rig.name}' by the action '{result.action.name}'"
+        return f"'{settings.rig.name}' is now animated by the action '{result.action.name}'"
 
 
 class _BoneMapFileOperator(_RigOperator):

@@ -22,5 +22,5 @@ def test_a_term_left_out_has_weight_zero_and_the_others_keep_theirs(name: str) -
 
 
 def test_a_source_of_depth_is_required() -> None:
-    with pytest.raises(UsageError, match="without either, depth is unknown"):
+    with pytest.raises(UsageError, match="nothing else provides depth"):
         Ablation(lifter=False, world_landmarks=False)

@@ -90,7 +90,7 @@ def test_numbered_pictures_are_a_sequence(tmp_path: Path) -> None:
 )
 def test_an_impossible_grid_is_refused(tmp_path: Path, grid: bytes) -> None:
     (tmp_path / "a.heic").write_bytes(heic(slopes(), 64, grid=grid))
-    with pytest.raises(VideoError, match=r"a\.heic is a picture that cannot be decoded"):
+    with pytest.raises(VideoError, match=r"a\.heic is an image that cannot be decoded"):
         open_video(tmp_path / "a.heic")
 
 

@@ -40,7 +40,7 @@ def test_pictures_are_in_numerical_order(folder: Path, name: str) -> None:
         assert (video.fps, video.frame_count, video.width, video.height) == (12, 6, 30, 20)
         assert [f.timestamp_s for f in frames] == pytest.approx([k / 12 for k in range(6)])
         (warning,) = video.warnings
-        assert "88 numbers between 7 and 100 have no picture" in warning
+        assert "88 numbers between 7 and 100 have no image" in warning
 
 
 def test_a_range_of_the_sequence(folder: Path) -> None:
@@ -101,7 +101,10 @@ def test_a_damaged_picture_ends_the_sequence_with_a_warning(folder: Path) -> Non
 
 def test_missing_pictures_are_errors(tmp_path: Path) -> None:
     (tmp_path / "empty").mkdir()
-    for path, words in ((tmp_path / "empty", "folder without a picture"), (tmp_path / "x_##.png", "does not exist")):
+    for path, words in (
+        (tmp_path / "empty", "folder that contains no images"),
+        (tmp_path / "x_##.png", "does not exist"),
+    ):
         with pytest.raises(VideoError, match=words):
             open_video(path)
 
@@ -137,5 +140,5 @@ def test_capture_and_batch_agree_on_what_a_sequence_is(tmp_path: Path, names: li
         with open_video(clips / "folder", VideoRange(fps=Fraction(10))) as video:
             assert len(list(video)) == len(names)
     else:
-        with pytest.raises(VideoError, match="not a numbered sequence"):
+        with pytest.raises(VideoError, match="do not form one numbered sequence"):
             open_video(clips / "folder")

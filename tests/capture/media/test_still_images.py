@@ -62,7 +62,7 @@ def test_damaged_avif(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     whole = avif(tmp_path / "a.avif", GREY).read_bytes()
     for size in (40, 200, len(whole) - 20):
         (tmp_path / "cut.avif").write_bytes(whole[:size])
-        with pytest.raises(VideoError, match=r"cut\.avif is a picture that cannot be decoded"):
+        with pytest.raises(VideoError, match=r"cut\.avif is an image that cannot be decoded"):
             open_video(tmp_path / "cut.avif")
     monkeypatch.setitem(sys.modules, "av", None)
     with pytest.raises(VideoError, match=r"a\.avif is AV1 or HEIC, which needs the package 'av'.*JPEG"):
@@ -71,7 +71,7 @@ def test_damaged_avif(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_openexr_is_refused_with_advice(tmp_path: Path) -> None:
     (tmp_path / "render.exr").write_bytes(b"v/1\x01" + bytes(99))
-    with pytest.raises(VideoError, match=r"render\.exr is an OpenEXR picture.*PNG"):
+    with pytest.raises(VideoError, match=r"render\.exr is an OpenEXR image.*PNG"):
         open_video(tmp_path / "render.exr")
 
 
@@ -80,7 +80,7 @@ def test_a_range_of_a_single_picture_gives_a_warning(tmp_path: Path, asked: tupl
     (tmp_path / "a.png").write_bytes(png(GREY))
     with open_video(tmp_path / "a.png", parse_range(*asked)) as video:
         assert len(list(video)) == 1
-        assert "a.png is a single picture: a start, an end or a frame rate changes nothing" in video.warnings
+        assert "a.png is a single image: a start, an end or a frame rate has no effect" in video.warnings
     with open_video(tmp_path / "a.png") as video:
         assert not video.warnings
 
@@ -93,4 +93,4 @@ def test_an_animation_gives_a_warning(tmp_path: Path, name: str) -> None:
     with open_video(tmp_path / name) as video:
         (frame,) = video
         assert abs(int(frame.image_rgb.mean()) - 90) < 4
-        assert f"{name} is an animation of 3 pictures" in video.warnings[0]
+        assert f"{name} is an animation of 3 images" in video.warnings[0]

@@ -363,11 +363,11 @@ def silence(path: Path) -> None:
         ("missing.mp4", lambda p: None, "does not exist"),
         ("empty.mp4", lambda p: p.write_bytes(b""), "is empty"),
         ("folder.mp4", lambda p: p.mkdir(), "is a folder"),
-        ("text.mp4", lambda p: p.write_text("not a film at all\n" * 50), "not a video or picture"),
-        ("sound.wav", silence, "not a video or picture"),
-        ("noise.mp4", lambda p: p.write_bytes(np.random.default_rng(0).bytes(20000)), "not a video or picture"),
+        ("text.mp4", lambda p: p.write_text("not a film at all\n" * 50), "not a video or image"),
+        ("sound.wav", silence, "not a video or image"),
+        ("noise.mp4", lambda p: p.write_bytes(np.random.default_rng(0).bytes(20000)), "not a video or image"),
         ("half.png", lambda p: p.write_bytes(encode(".png", corner_image())[:40]), "cannot be decoded"),
-        ("cut.mp4", lambda p: p.write_bytes(write_video(p, ramp(9)).read_bytes()[:700]), "not a video or picture"),
+        ("cut.mp4", lambda p: p.write_bytes(write_video(p, ramp(9)).read_bytes()[:700]), "not a video or image"),
     ],
 )
 def test_unusable_files_give_a_message_of_one_line(tmp_path, capfd, name, make, words):

@@ -160,8 +160,11 @@ BROKEN = {
     "a scalar": (put("v_template", np.float64(3)), "v_template must have shape"),
     "no tree": (put("kintree_table", np.int64(3)), r"kintree_table must have shape \(2, any\), but has \(\)"),
     "flat tree": (put("kintree_table", np.arange(24)), r"kintree_table must have shape \(2, any\), but has \(24,\)"),
-    "empty": (put("v_template", np.zeros((0, 3))), "0 vertices and 24 joints are no body"),
-    "no joints": (put("kintree_table", np.zeros((2, 0), int)), "300 vertices and 0 joints are no body"),
+    "empty": (put("v_template", np.zeros((0, 3))), "0 vertices and 24 joints do not match any supported body"),
+    "no joints": (
+        put("kintree_table", np.zeros((2, 0), int)),
+        "300 vertices and 0 joints do not match any supported body",
+    ),
     "flat shapedirs": (put("shapedirs", np.zeros((900, 10))), "shapedirs must have shape"),
     "text": (put("v_template", np.full((300, 3), "x")), "v_template must hold numbers"),
     "complex": (put("weights", lambda a: a.astype(complex)), "weights must hold numbers"),

@@ -61,7 +61,7 @@ def read_description(model: Path, types: tuple[str, ...]) -> Description:
     known = {field.name for field in fields(Description)}
     for key, value in values.items():
         if key not in known:
-            raise ModelFileError(f"{path}: {key!r} is not known; use some of {', '.join(sorted(known))}")
+            raise ModelFileError(f"{path}: unknown entry {key!r}; use any of {', '.join(sorted(known))}")
         if expected := _violated(key, value, types):
             raise ModelFileError(f"{path}: {key} must be {expected}, but is {json.dumps(value)[:80]}")
     for key in ("mean", "std", "input_size"):

@@ -95,7 +95,7 @@ class Graph:
                 f"({' '.join(str(error).split())}); export it again, or correct {description_path(self.path).name}"
             ) from error
         if not all(isinstance(output, np.ndarray) for output in outputs):
-            raise ModelFileError(f"{self.path} has outputs that are not arrays; export it without them")
+            raise ModelFileError(f"{self.path} has outputs that are not arrays; export it without these")
         return [o.astype(np.float32) if o.dtype.kind == "f" else o for o in outputs]
 
     def _input_layout(self, shape: list[Any], description: Description) -> tuple[bool, int, int]:
@@ -118,7 +118,7 @@ class Graph:
             width, height = new_width, new_height
         if not (isinstance(width, int) and isinstance(height, int)):
             raise ModelFileError(
-                f"{self.path} takes images of any size; write the size that it was trained for into "
+                f"{self.path} takes images of any size; put its training size in "
                 f'{description_path(self.path)}, such as {{"input_size": [640, 640]}}'
             )
         if not (16 <= width <= _LARGEST_SIDE and 16 <= height <= _LARGEST_SIDE):
@@ -133,7 +133,7 @@ class Graph:
         return ModelFileError(
             f"{self.path} cannot be used as {what}: {why}. Its outputs are {outputs}. If it is one of "
             f"{', '.join(types)}, "
-            f'write {description_path(self.path)} with {{"type": "{types[0]}"}}, or with its own type'
+            f'create {description_path(self.path)} with {{"type": "{types[0]}"}}, or the correct type'
         )
 
 

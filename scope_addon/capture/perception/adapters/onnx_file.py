@@ -53,7 +53,7 @@ def check_onnx_file(path: Path) -> None:
         target = (folder / location).resolve()
         if not target.is_relative_to(folder):
             raise ModelFileError(
-                f"{path} wants to read its weights from {location!r}, outside its own folder; "
+                f"{path} refers to weights in {location!r}, outside its own folder; "
                 "export it as one file, or with its data in the same folder"
             )
         if not target.is_file():

@@ -189,7 +189,7 @@ def test_a_graph_that_fails_at_run_time_is_refused(tmp_path: Path, opens: Open) 
         ("{", "as JSON"),
         ("[]", "one JSON object"),
         ("[" * 100_000, "as JSON"),
-        ('{"colour": "rgb"}', "'colour' is not known"),
+        ('{"colour": "rgb"}', "unknown entry 'colour'"),
         ('{"type": "yolov99"}', "type must be one of simcc, heatmap"),
         ('{"mean": [1, 2]}', "mean must be one number or three"),
         ('{"std": 0}', "above 0"),

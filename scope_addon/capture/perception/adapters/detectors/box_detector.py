@@ -73,8 +73,8 @@ class BoxDetector:
             return boxes
         except (IndexError, ValueError) as error:
             raise ModelFileError(
-                f"{self._graph.path} does not have the outputs of a {self.type} detector with class "
-                f"{self._description.person_class}, but arrays of {[o.shape for o in outputs]}; "
+                f"{self._graph.path} outputs arrays of {[o.shape for o in outputs]}, which do not "
+                f"match a {self.type} detector with class {self._description.person_class}; "
                 f"correct {description_path(self._graph.path)}"
             ) from error
 
@@ -93,7 +93,7 @@ def _adapter_for(graph: Graph, description: Description) -> ModuleType:
         raise graph.unrecognized("a detector", DETECTOR_TYPES)
     if adapter is detections and (description.mean is None or description.channel_order is None):
         raise ModelFileError(
-            f"{graph.path} has MMDeploy's outputs, but its colour normalization is unknown; write "
+            f"{graph.path} is an MMDeploy model, but its colour normalization is unknown; create "
             f"{description_path(graph.path)} "
             'with {"type": "detections", "mean": 0, "std": 1, "channel_order": "bgr"} for YOLOX, with '
             '"mean": [103.53, 116.28, 123.675], "std": [57.375, 57.12, 58.395] for RTMDet'

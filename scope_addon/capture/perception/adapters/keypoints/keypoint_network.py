@@ -130,7 +130,7 @@ def _set_for(graph: Graph, adapter: ModuleType, description: Description) -> Key
     if found is None or found.count > count:
         sets = ", ".join(f"{s.name} ({s.count})" for s in KEYPOINT_SETS.values())
         raise ModelFileError(
-            f"{graph.path} has {count} keypoints, which is none of {sets}; if it begins with those of one of these, "
-            f'name it in {description_path(graph.path)}: {{"keypoints": "coco17"}}'
+            f"{graph.path} outputs {count} keypoints, which matches none of {sets}; if it begins with those of "
+            f'one of these, name it in {description_path(graph.path)}: {{"keypoints": "coco17"}}'
         )
     return found
