@@ -74,6 +74,8 @@ def test_lost_and_found_again(own_networks: tuple[Path, Path]) -> None:
 def test_left_and_right_of_a_plugged_in_network_are_repaired(shared: Path, tmp_path: Path) -> None:
     """BlazePose-full exchanges them in 29 of 100 frames of this clip, in which the man's face hardly shows."""
     spec = importlib.util.spec_from_file_location("evaluate", shared / "tools/evaluate.py")
+    assert spec is not None
+    assert spec.loader is not None
     tool = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(tool)
     options = CaptureOptions(keypoints=coco_simcc(tmp_path / "full.onnx", "pose_landmark_full"), threads=2)

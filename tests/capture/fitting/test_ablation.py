@@ -2,6 +2,7 @@
 """Leaving parts of the pipeline out."""
 
 import dataclasses
+from typing import Any
 
 import pytest
 from scope.scope_addon.capture.fitting.ablation import NO_ABLATION, Ablation
@@ -18,7 +19,8 @@ def test_all_parts_change_no_weight() -> None:
 @pytest.mark.parametrize("name", ["keypoints3d", "orientation_field", "joint_prior"])
 def test_what_is_left_out_weighs_nothing_and_the_rest_stays(name: str) -> None:
     found = Ablation(**{name: False}).weights(WEIGHTS)
-    assert found == dataclasses.replace(WEIGHTS, **{name: 0.0})
+    left_out: dict[str, Any] = {name: 0.0}
+    assert found == dataclasses.replace(WEIGHTS, **left_out)
 
 
 def test_some_source_of_depth_has_to_stay() -> None:

@@ -149,8 +149,9 @@ def test_no_more_pixels_are_decoded_than_are_allowed(tmp_path: Path) -> None:
 
 
 def test_tiles_that_a_grid_has_no_use_for_are_refused() -> None:
-    layout = replace(read_layout(heic(slopes(), 64)), size=(64, 64))
-    assert assemble(layout, {n: np.zeros((64, 64, 3), np.uint8) for n in range(2, 8)}) is None
+    layout = read_layout(heic(slopes(), 64))
+    assert layout is not None
+    assert assemble(replace(layout, size=(64, 64)), {n: np.zeros((64, 64, 3), np.uint8) for n in range(2, 8)}) is None
 
 
 def test_a_grid_within_the_boxes_is_found(tmp_path: Path) -> None:

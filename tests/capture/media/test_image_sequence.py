@@ -86,7 +86,8 @@ def test_missing_pictures_leave_their_time_and_are_told(
 def test_pictures_of_a_sequence_look_as_they_do_alone(tmp_path: Path) -> None:
     clear = np.zeros((20, 30, 4), np.uint8)
     deep = np.full((20, 30, 3), 70 * 257, np.uint16)
-    for number, image in enumerate((clear, deep)):
+    images: tuple[np.ndarray, ...] = (clear, deep)
+    for number, image in enumerate(images):
         cv2.imwrite(str(tmp_path / f"a_{number}.png"), image)
     assert brightness(tmp_path, VideoRange(fps=Fraction(10))) == [255, 70]
     assert [brightness(tmp_path / f"a_{k}.png") for k in (0, 1)] == [[255], [70]]
