@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from scope.scope_addon.motion import Motion
 from scope.solver.body import Body
@@ -15,7 +17,7 @@ def made_motion(body: Body, poses: np.ndarray, trans: np.ndarray, rate: float = 
     """
     T, K1 = len(poses), body.K + 1
     poses = poses.reshape(T, 3 * K1)
-    fields = {
+    fields: dict[str, Any] = {
         "poses": poses,
         "trans": trans,
         "poses_raw": poses,

@@ -14,7 +14,7 @@ PRODUCT = ("solver", "scope_addon")
 
 # Each room and the rooms that its files may import directly; what these may import in turn, it may reach as well.
 # A name stands for a file, or for a folder and everything below it, unless a longer name fits better.
-SOLVER = {"solver": set()}
+SOLVER: dict[str, set[str]] = {"solver": set()}
 CAPTURE = {
     "scope_addon/capture/media": {"scope_addon/files"},
     "scope_addon/capture/perception": {"scope_addon/kinematics"},
@@ -99,7 +99,8 @@ def reachable(name: str) -> set[str]:
 @pytest.mark.parametrize("module", modules())
 def test_a_module_reaches_only_rooms_of_its_row(module: str) -> None:
     """Follow its imports to the end, so that nothing leaks in through another room."""
-    allowed, seen, todo = reachable(room(module)), set(), [(module, (module,))]
+    allowed, seen = reachable(room(module)), set()
+    todo: list[tuple[str, tuple[str, ...]]] = [(module, (module,))]
     while todo:
         here, chain = todo.pop()
         for target in imported(here):

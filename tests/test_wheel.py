@@ -74,7 +74,10 @@ def installed(wheel, tmp_path_factory) -> Path:
     venv.create(place, with_pip=False, symlinks=os.name != "nt")
     packages = next(iter(place.rglob("site-packages")))
     for name in ("numpy", "numba", "llvmlite"):
-        package = Path(find_spec(name).origin).parent
+        spec = find_spec(name)
+        assert spec is not None
+        assert spec.origin is not None
+        package = Path(spec.origin).parent
         for folder in (package, package.with_name(f"{name}.libs")):  # where wheels keep their shared libraries
             if folder.is_dir():
                 (packages / folder.name).symlink_to(folder, target_is_directory=True)

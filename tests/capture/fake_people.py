@@ -89,7 +89,8 @@ class FakeDetector:
 
 class FakeLandmarks:
     def __init__(self, people: list[Person], is_reliable: bool = False) -> None:
-        self.people, self.is_reliable, self.batches = people, is_reliable, []
+        self.people, self.is_reliable = people, is_reliable
+        self.batches: list[int] = []
         self.begun = 0
 
     def estimate(self, image: np.ndarray, regions: list[Region]) -> list[PoseEstimate]:
@@ -110,6 +111,7 @@ class FakeLandmarks:
         person = min(self.people, key=distance)
         seen = distance(person) < 0.4 and (self.is_reliable or t not in person.lost)
         place = person.place(t) if seen else np.asarray(region.center_px)
+        assert place is not None  # a person who is seen is at a finite distance
         body = person.body(t)
         if t in person.swapped and not self.is_reliable:
             body = body[MIRROR_PARTNER]

@@ -132,7 +132,7 @@ def test_real_footage_with_truth_beats_the_raw_landmarks(shared, body, tmp_path)
 def test_frames_without_the_person_are_filled_and_marked(body, tmp_path):
     footage, blanked = cv2.VideoCapture(str(SAMPLE)), tmp_path / "blanked.avi"
     size = int(footage.get(cv2.CAP_PROP_FRAME_WIDTH)), int(footage.get(cv2.CAP_PROP_FRAME_HEIGHT))
-    writer = cv2.VideoWriter(str(blanked), cv2.VideoWriter_fourcc(*"MJPG"), 30, size)
+    writer = cv2.VideoWriter(str(blanked), cv2.VideoWriter.fourcc(*"MJPG"), 30, size)
     for k in range(30):
         _, image = footage.read()
         writer.write(np.full_like(image, 90) if 10 <= k < 18 else image)

@@ -16,7 +16,7 @@ def film(source, path, turn):
     """Write a clip with each frame as seen by a camera rotated by turn(k) (rotation vector)."""
     reader = cv2.VideoCapture(str(source))
     reader.set(cv2.CAP_PROP_POS_FRAMES, START)
-    out = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*"mp4v"), 30, (WIDTH, HEIGHT))
+    out = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"mp4v"), 30, (WIDTH, HEIGHT))
     K = pinhole(WIDTH, HEIGHT, WIDTH / (2 * np.tan(np.radians(FOV) / 2)))
     for k in range(FRAMES):
         ok, frame = reader.read()

@@ -74,6 +74,8 @@ def test_a_lost_person_is_found_again(own_networks: tuple[Path, Path]) -> None:
 def test_left_right_swaps_of_a_users_network_are_repaired(shared: Path, tmp_path: Path) -> None:
     """BlazePose-full swaps them in 29 of 100 frames of this clip, in which the man's face is hardly visible."""
     spec = importlib.util.spec_from_file_location("evaluate", shared / "tools/evaluate.py")
+    assert spec is not None
+    assert spec.loader is not None
     tool = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(tool)
     options = CaptureOptions(keypoints=coco_simcc(tmp_path / "full.onnx", "pose_landmark_full"), threads=2)

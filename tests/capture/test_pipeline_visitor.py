@@ -26,7 +26,7 @@ def footage(shared: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Pat
     path, places, writer = tmp_path_factory.mktemp("visit") / "visit.avi", [], None
     for t, (image, at) in enumerate(visit(shared)):
         if t % EVERY == 0:
-            writer = writer or cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*"MJPG"), 30, image.shape[1::-1])
+            writer = writer or cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), 30, image.shape[1::-1])
             writer.write(np.ascontiguousarray(image[:, :, ::-1]))
             places.append(at)
     assert writer is not None

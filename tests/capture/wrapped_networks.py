@@ -32,13 +32,13 @@ def _extend(source: str, path: Path, nodes: list, constants: dict[str, np.ndarra
 
 def coco_simcc(path: Path, source: str = "pose_landmark_lite") -> Path:
     """Write a SimCC network: the score is visibility times presence, and falls by a quarter per bin."""
-    constants = {
+    constants: dict[str, np.ndarray] = {
         "table": np.array([39, 5], np.int64),
         "coco": np.array([KEYPOINT_NAMES.index(name) for name in COCO_17], np.int64),
         "bins": np.arange(_SIDE * _RATIO, dtype=np.float32)[None],
-        "ratio": np.float32(_RATIO),
-        "slope": np.float32(0.25),
-        "one": np.float32(1),
+        "ratio": np.array(_RATIO, np.float32),
+        "slope": np.array(0.25, np.float32),
+        "one": np.array(1, np.float32),
         "visible": np.array([3], np.int64),
         "column_x": np.array([0], np.int64),
         "column_y": np.array([1], np.int64),
@@ -73,11 +73,11 @@ def coco_simcc(path: Path, source: str = "pose_landmark_lite") -> Path:
 
 def box_rows(path: Path) -> Path:
     """Write a box detector: the square around each body circle, its score, and class 0."""
-    constants = {
+    constants: dict[str, np.ndarray] = {
         "anchors": make_anchors().astype(np.float32)[None],
         "hips": np.array([4, 5], np.int64),
         "circle": np.array([6, 7], np.int64),
-        "shrink": np.float32(0.8),
+        "shrink": np.array(0.8, np.float32),
     }
     make = helper.make_node
     nodes = [

@@ -3,6 +3,7 @@
 
 import warnings
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -45,13 +46,19 @@ SHORT = Options(stages=[Stage(max_iterations=2)])
 NAN, INF = np.nan, np.inf
 
 
+def untyped(value: object) -> Any:
+    """Return the value as it is, for calls that a type checker would refuse before the solver can."""
+    return value
+
+
 def body(**fields):
     return replace(random_body(np.random.default_rng(1), K, P, M), **fields)
 
 
 BODY = body()
 POINTS = forward(BODY, *random_state(np.random.default_rng(2), K, P))[2]
-SEEN = Measurements(keypoints3d=Keypoints3D(np.arange(M), POINTS, np.ones(M)))
+KEYPOINTS = Keypoints3D(np.arange(M), POINTS, np.ones(M))
+SEEN = Measurements(keypoints3d=KEYPOINTS)
 
 
 def state(**fields):
@@ -155,8 +162,11 @@ MEASURED_REFUSED = {
     ),
     "floor's contact": (seen(floor=Floor([0], UP, 1.0, [-1.0])), "Contact with the floor must not be negative"),
     "floor's normal": (seen(floor=Floor([0], 2.0 * UP, 1.0, [1.0])), "normal of length 2"),
-    "floor's offset": (seen(floor=Floor([0], UP, "one", [1.0])), "Offset of the floor must be a number"),
-    "floor's offset None": (seen(floor=Floor([0], UP, None, [1.0])), "Offset of the floor must be a number, .* None"),
+    "floor's offset": (seen(floor=Floor([0], UP, untyped("one"), [1.0])), "Offset of the floor must be a number"),
+    "floor's offset None": (
+        seen(floor=Floor([0], UP, untyped(None), [1.0])),
+        "Offset of the floor must be a number, .* None",
+    ),
     "a text of pixels": (seen_2d(INTRINSICS, "pixels"), "Pixels of 2D keypoints must be numbers .* the text 'pixels'"),
     "texts of pixels": (seen_2d(INTRINSICS, [["1", "2"]]), "Pixels of 2D keypoints must be numbers"),
     "pixels None": (seen_2d(INTRINSICS, None), r"Pixels of 2D keypoints must be numbers of shape \(1, 2\), .* None"),
@@ -167,18 +177,24 @@ MEASURED_REFUSED = {
         "Points of 3D keypoints must be numbers .* a ragged list",
     ),
     "ragged indices": (seen(keypoints3d=Keypoints3D([[0], [1, 2]], POINTS, np.ones(M))), "Indices of 3D keypoints"),
-    "indices None": (seen(keypoints3d=Keypoints3D(None, POINTS, np.ones(M))), "Indices of 3D keypoints .* None"),
+    "indices None": (
+        seen(keypoints3d=Keypoints3D(untyped(None), POINTS, np.ones(M))),
+        "Indices of 3D keypoints .* None",
+    ),
     "indices of text": (seen(keypoints3d=Keypoints3D(["nose"], POINTS[:1], [1.0])), "Indices of 3D keypoints"),
     "directions": (
         seen(orientation_field=OrientationField([M], [M + 1], "up", [1.0])),
         "Directions of the orientation field must be numbers",
     ),
     "keypoints in a tuple": (
-        lambda: Measurements(INTRINSICS, ([0], [[1.0, 2.0]], [1.0])),
+        lambda: Measurements(INTRINSICS, untyped(([0], [[1.0, 2.0]], [1.0]))),
         "Measurements.keypoints2d must be Keypoints2D or None, but is a tuple",
     ),
-    "3D for 2D": (lambda: Measurements(keypoints2d=SEEN.keypoints3d), "Measurements.keypoints2d must be Keypoints2D"),
-    "tables": (lambda: Measurements(tables=[1]), "Measurements.tables must be Mapping or None, but is a list"),
+    "3D for 2D": (
+        lambda: Measurements(keypoints2d=untyped(KEYPOINTS)),
+        "Measurements.keypoints2d must be Keypoints2D",
+    ),
+    "tables": (lambda: Measurements(tables=untyped([1])), "Measurements.tables must be Mapping or None, but is a list"),
     "a table of text": (seen(tables={"joint_limits": "rows"}), "Tables of 'joint_limits' must be a pair of arrays"),
     "a table's indices": (
         seen(tables={"joint_limits": ([[0.7]], np.ones((1, 6)))}),
@@ -189,20 +205,23 @@ MEASURED_REFUSED = {
         "Numbers of 'joint_limits' must be numbers",
     ),
     "a table of a field": (
-        lambda: Measurements(tables={"floor": ([[0]], np.ones((1, 6)))}),
+        lambda: Measurements(tables={"floor": untyped(([[0]], np.ones((1, 6))))}),
         "tables must not hold 'floor', which has a field of its own; give it as Measurements.floor",
     ),
     "a table of a field, joints": (
-        lambda: Measurements(tables={"pose_prior": ([], [])}),
+        lambda: Measurements(tables={"pose_prior": untyped(([], []))}),
         "give it as Measurements.pose_priors",
     ),
-    "a batch's frame": (lambda: fit_batch(BODY, [SEEN, None]), r"measurements\[1\] must be Measurements, but is None"),
+    "a batch's frame": (
+        lambda: fit_batch(BODY, [SEEN, untyped(None)]),
+        r"measurements\[1\] must be Measurements, but is None",
+    ),
     "a batch's state": (
-        lambda: fit_batch(BODY, [SEEN], init=[np.eye(3)]),
+        lambda: fit_batch(BODY, [SEEN], init=[untyped(np.eye(3))]),
         r"init\[0\] must be State or None, but is an array",
     ),
     "threads": (lambda: fit_batch(BODY, [SEEN], threads=-2), "threads must be a whole number of at least 0, but is -2"),
-    "threads of clips": (lambda: fit_clips(BODY, [[SEEN]], threads=1.5), "threads must be a whole number"),
+    "threads of clips": (lambda: fit_clips(BODY, [[SEEN]], threads=untyped(1.5)), "threads must be a whole number"),
 }
 
 
@@ -231,29 +250,32 @@ SETTINGS_REFUSED = {
     "Temporal.joints": (lambda: Temporal(joints=-1.0), "Temporal.joints must be finite and not negative, but is -1"),
     "Temporal.root_rotation": (lambda: Temporal(root_rotation=NAN), "Temporal.root_rotation must be finite"),
     "Temporal.root_position": (lambda: Temporal(root_position=INF), "Temporal.root_position must be finite"),
-    "Temporal text": (lambda: Temporal(joints="strong"), "Temporal.joints must be a number, but is the text 'strong'"),
+    "Temporal text": (
+        lambda: Temporal(joints=untyped("strong")),
+        "Temporal.joints must be a number, but is the text 'strong'",
+    ),
     "previous": (
         lambda: with_previous(SEEN, state(Omega=np.zeros((K, 3, 3))), Temporal()),
         "Omega of the previous state must be rotation matrices",
     ),
     "weight": (lambda: Weights(keypoints3d=-1.0), "Weights.keypoints3d must be finite and not negative, but is -1"),
     "weight NaN": (lambda: Weights(shape=NAN), "Weights.shape must be finite"),
-    "weight None": (lambda: Weights(floor=None), "Weights.floor must be a number, but is None"),
+    "weight None": (lambda: Weights(floor=untyped(None)), "Weights.floor must be a number, but is None"),
     "weight of a table": (lambda: Weights(tables={"floor": -1.0}), r"Weights.tables\['floor'\] must be finite"),
-    "weights' tables": (lambda: Weights(tables=5.0), "Weights.tables must be Mapping, but is a float"),
+    "weights' tables": (lambda: Weights(tables=untyped(5.0)), "Weights.tables must be Mapping, but is a float"),
     "tolerance": (lambda: Stage(tolerance=-1e-6), "Stage.tolerance must be a number of at least 0, but is -1e-06"),
     "tolerance NaN": (lambda: Stage(tolerance=NAN), "Stage.tolerance must be a number of at least 0, but is nan"),
-    "tolerance text": (lambda: Stage(tolerance="1e-6"), "Stage.tolerance must be a number"),
+    "tolerance text": (lambda: Stage(tolerance=untyped("1e-6")), "Stage.tolerance must be a number"),
     "iterations": (lambda: Stage(max_iterations=-1), "Stage.max_iterations must be a whole number of at least 0"),
-    "iterations float": (lambda: Stage(max_iterations=2.5), "Stage.max_iterations must be a whole number"),
-    "stage's weights": (lambda: Stage({"shape": 1.0}), "Stage.weights must be Weights, but is a dict"),
+    "iterations float": (lambda: Stage(max_iterations=untyped(2.5)), "Stage.max_iterations must be a whole number"),
+    "stage's weights": (lambda: Stage(untyped({"shape": 1.0})), "Stage.weights must be Weights, but is a dict"),
     "robust": (lambda: Options(robust_keypoints2d=0.0), "Options.robust_keypoints2d must be positive"),
     "robust NaN": (lambda: Options(robust_orientation_field=NAN), "Options.robust_orientation_field must be positive"),
-    "damping text": (lambda: Options(damping="high"), "Options.damping must be a number"),
-    "triggs": (lambda: Options(triggs=None), "Options.triggs must be a number"),
-    "stages": (lambda: Options(stages=Stage()), "Options.stages must be Sequence or None, but is a Stage"),
+    "damping text": (lambda: Options(damping=untyped("high")), "Options.damping must be a number"),
+    "triggs": (lambda: Options(triggs=untyped(None)), "Options.triggs must be a number"),
+    "stages": (lambda: Options(stages=untyped(Stage())), "Options.stages must be Sequence or None, but is a Stage"),
     "a stage": (
-        lambda: fit(BODY, SEEN, options=Options(stages=[Weights()])),
+        lambda: fit(BODY, SEEN, options=Options(stages=[untyped(Weights())])),
         r"Options.stages\[0\] must be Stage, but is a Weights",
     ),
     "a joint of the prior": (lambda: load_joint_prior().of("tail"), "no joint 'tail'; it has .*left_knee"),
@@ -303,8 +325,8 @@ def test_lengths_in_millimetres_bring_a_warning_and_a_fit():
 
 
 NOT_REFUSED = {
-    "far away": seen(keypoints3d=replace(SEEN.keypoints3d, points=POINTS + [0.0, 0.0, 2000.0])),
-    "one stray point": seen(keypoints3d=replace(SEEN.keypoints3d, points=np.vstack([POINTS[:-1], [[0, 0, 9000.0]]]))),
+    "far away": seen(keypoints3d=replace(KEYPOINTS, points=POINTS + [0.0, 0.0, 2000.0])),
+    "one stray point": seen(keypoints3d=replace(KEYPOINTS, points=np.vstack([POINTS[:-1], [[0, 0, 9000.0]]]))),
     "a skewed camera": seen_2d(moved([[0, 2.0, 0], [0, 0, 0], [0, 0, 0]])),
     "lists": seen_2d(INTRINSICS.tolist(), [[1, 2]], [True]),
     "single precision": seen_2d(INTRINSICS.astype(np.float32), np.ones((1, 2), np.float32)),
@@ -321,7 +343,9 @@ NOT_REFUSED = {
     "rounded": known(shape_information=np.diag([1e8, 1.0, -1e-8])),
     "no robust kernel": lambda: fit(BODY, SEEN, options=replace(SHORT, robust_keypoints3d=INF)),
     "no iterations": lambda: fit(BODY, SEEN, options=Options(stages=[Stage(max_iterations=0, tolerance=0.0)])),
-    "whole numbers of numpy's": lambda: fit(BODY, SEEN, options=Options(stages=[Stage(max_iterations=np.int64(1))])),
+    "whole numbers of numpy's": lambda: fit(
+        BODY, SEEN, options=Options(stages=[Stage(max_iterations=untyped(np.int64(1)))])
+    ),
     "no pull": lambda: fit_clip(BODY, [SEEN, SEEN], options=SHORT, temporal=Temporal(0.0, 0.0, 0.0)),
 }
 

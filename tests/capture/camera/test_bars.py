@@ -47,11 +47,13 @@ def test_bars_of_other_kinds_are_found(kind: str, upright: bool) -> None:
     clip = cv2.resize(scene(30, 54), (300, 540), interpolation=cv2.INTER_CUBIC)
     picture = np.full((540, 960, 3), 235, np.uint8)
     if kind == "blurred":
-        picture = cv2.resize(cv2.GaussianBlur(cv2.resize(clip, (96, 172)), (0, 0), 5)[60:114], (960, 540))
+        blurred = cv2.GaussianBlur(cv2.resize(clip, (96, 172)), (0, 0), 5)[60:114]
+        picture = np.asarray(cv2.resize(blurred, (960, 540)), np.uint8)
     picture[:, 330:630] = clip
     if upright:
         picture = picture.transpose(1, 0, 2).copy()
-    bars = find_bars(cv2.imdecode(cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, 80])[1], cv2.IMREAD_COLOR))
+    data = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, 80])[1]
+    bars = find_bars(np.asarray(cv2.imdecode(data, cv2.IMREAD_COLOR), np.uint8))
     sizes = [bar[[3, 2]] if upright else bar[[2, 3]] for bar in bars]
     assert sizes[0][0] == pytest.approx(330, abs=2)
     assert longer_content_side(bars, *picture.shape[1::-1]) == pytest.approx(540)

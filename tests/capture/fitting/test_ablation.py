@@ -2,6 +2,7 @@
 """Leaving parts of the pipeline out."""
 
 import dataclasses
+from typing import Any
 
 import pytest
 from scope.scope_addon.capture.fitting.ablation import NO_ABLATION, Ablation
@@ -18,7 +19,8 @@ def test_no_ablation_changes_no_weight() -> None:
 @pytest.mark.parametrize("name", ["keypoints3d", "orientation_field", "joint_prior"])
 def test_a_term_left_out_has_weight_zero_and_the_others_keep_theirs(name: str) -> None:
     found = Ablation(**{name: False}).weights(WEIGHTS)
-    assert found == dataclasses.replace(WEIGHTS, **{name: 0.0})
+    left_out: dict[str, Any] = {name: 0.0}
+    assert found == dataclasses.replace(WEIGHTS, **left_out)
 
 
 def test_a_source_of_depth_is_required() -> None:

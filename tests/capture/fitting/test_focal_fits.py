@@ -46,7 +46,11 @@ def observe(body, pose, ratio: float, distance_m: float, pitch: float = 0.35) ->
 
 def found(body, ratio: float, distance_m: float):
     fits = FocalFits(body)
-    costs = [fits.costs(observe(body, pose, ratio, distance_m), ASSUMED) for pose in POSES]
+    costs = []
+    for pose in POSES:
+        cost = fits.costs(observe(body, pose, ratio, distance_m), ASSUMED)
+        assert cost is not None
+        costs.append(cost)
     return camera_by_fits(ASSUMED, ASSUMED, costs, float(HEIGHT))
 
 

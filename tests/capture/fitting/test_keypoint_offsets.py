@@ -58,7 +58,8 @@ def left_over_px(body: Body, motion: Motion) -> float:
         root = motion.joints_cam[t, 0] - body.rest_joints(motion.betas)[0]
         points = body.keypoints(*body.forward_kinematics(R, root, motion.betas), motion.betas)
         points = points[[at[name] for name in BLAZEPOSE]].astype(float)
-        pixels = cv2.projectPoints(points, np.zeros(3), np.zeros(3), motion.intrinsics.astype(float), None)[0][:, 0]
+        intrinsics = motion.intrinsics.astype(float)
+        pixels = cv2.projectPoints(points, np.zeros(3), np.zeros(3), intrinsics, np.zeros(5))[0][:, 0]
         seen = motion.keypoints2d[t, [names.index(name) for name in BLAZEPOSE]]
         found.append(np.linalg.norm(seen[:, :2] - pixels, axis=1)[seen[:, 2] > 0.5])
     return float(np.median(np.concatenate(found)))

@@ -149,8 +149,9 @@ def test_decoding_stops_at_the_maximum_number_of_pixels(tmp_path: Path) -> None:
 
 
 def test_surplus_tiles_are_refused() -> None:
-    layout = replace(read_layout(heic(slopes(), 64)), size=(64, 64))
-    assert assemble(layout, {n: np.zeros((64, 64, 3), np.uint8) for n in range(2, 8)}) is None
+    layout = read_layout(heic(slopes(), 64))
+    assert layout is not None
+    assert assemble(replace(layout, size=(64, 64)), {n: np.zeros((64, 64, 3), np.uint8) for n in range(2, 8)}) is None
 
 
 def test_a_grid_in_the_idat_box_is_found(tmp_path: Path) -> None:

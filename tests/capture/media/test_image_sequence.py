@@ -86,7 +86,8 @@ def test_missing_pictures_leave_gaps_and_give_a_warning(
 def test_pictures_are_decoded_alike_alone_and_in_a_sequence(tmp_path: Path) -> None:
     clear = np.zeros((20, 30, 4), np.uint8)
     deep = np.full((20, 30, 3), 70 * 257, np.uint16)
-    for number, image in enumerate((clear, deep)):
+    images: tuple[np.ndarray, ...] = (clear, deep)
+    for number, image in enumerate(images):
         cv2.imwrite(str(tmp_path / f"a_{number}.png"), image)
     assert brightness(tmp_path, VideoRange(fps=Fraction(10))) == [255, 70]
     assert [brightness(tmp_path / f"a_{k}.png") for k in (0, 1)] == [[255], [70]]

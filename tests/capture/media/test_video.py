@@ -36,14 +36,14 @@ def corner_image(width: int = W, height: int = H) -> np.ndarray:
 
 def corners(image: np.ndarray) -> str:
     """Name the colours of the corners (top left, top right, bottom left, bottom right) by their first letters."""
-    names = {(1, 0, 0): "r", (0, 1, 0): "g", (0, 0, 1): "b", (1, 1, 1): "w"}
+    names: dict[tuple[int, ...], str] = {(1, 0, 0): "r", (0, 1, 0): "g", (0, 0, 1): "b", (1, 1, 1): "w"}
     points = [image[6, 6], image[6, -7], image[-7, 6], image[-7, -7]]
     return "".join(names.get(tuple(int(c > 128) for c in p), "?") for p in points)
 
 
 def write_video(path: Path, images: list[np.ndarray], fps: float = 30.0, codec: str = "mp4v") -> Path:
     height, width = images[0].shape[:2]
-    writer = cv2.VideoWriter(str(path), cv2.CAP_FFMPEG, cv2.VideoWriter_fourcc(*codec), fps, (width, height))
+    writer = cv2.VideoWriter(str(path), cv2.CAP_FFMPEG, cv2.VideoWriter.fourcc(*codec), fps, (width, height))
     assert writer.isOpened()
     for image in images:
         writer.write(cv2.cvtColor(image, cv2.COLOR_RGB2BGR))

@@ -24,7 +24,7 @@ def long_video(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def write_numbers(path: Path, fps: float, count: int, codec: str) -> Path:
-    writer = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*codec), fps, (192, 32))
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*codec), fps, (192, 32))
     for number in range(count):
         bits = [(number >> b & 1) * 255 for b in range(12)]
         row = np.repeat(np.array(bits, np.uint8), 16)

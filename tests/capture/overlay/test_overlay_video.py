@@ -51,7 +51,7 @@ def standing(body: Body, frames: list[int], x: float = 0.0, y: float = 3.0, size
 def footage(tmp_path) -> Path:
     """Write ten grey frames at 25 per second."""
     path = tmp_path / "footage.mp4"
-    writer = cv2.VideoWriter(str(path), cv2.CAP_FFMPEG, cv2.VideoWriter_fourcc(*"mp4v"), 25, (W, H))
+    writer = cv2.VideoWriter(str(path), cv2.CAP_FFMPEG, cv2.VideoWriter.fourcc(*"mp4v"), 25, (W, H))
     for _ in range(10):
         writer.write(np.full((H, W, 3), GREY, np.uint8))
     writer.release()
@@ -70,7 +70,7 @@ def silhouette(body: Body, x: float = 0.0, y: float = 3.0) -> np.ndarray:
     pixels = np.round((points[:, :2] / points[:, 2:] @ K[:2, :2].T + K[:2, 2]) * 256).astype(np.int32)
     mask = np.zeros((H, W), np.uint8)
     for quad in body.faces:
-        cv2.fillConvexPoly(mask, pixels[quad], 1, shift=8)
+        cv2.fillConvexPoly(mask, pixels[quad], (1,), shift=8)
     return mask > 0
 
 

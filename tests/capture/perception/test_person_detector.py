@@ -35,16 +35,17 @@ def test_anchors_are_cell_centres_in_layer_order() -> None:
 
 
 def test_decode_adds_the_anchor_and_sorts_by_score() -> None:
-    boxes = np.zeros((3, 12))
+    boxes = np.zeros((3, 12), np.float32)
     boxes[1] = [1, 2, 10, 20, 5, 6, 0, 0, 0, 0, -3, 4]
-    score, values = decode(boxes, np.array([0.0, 500.0, -1.0]), np.array([[10, 10], [100, 50], [0, 0]]), 0.5)
+    logits = np.array([0.0, 500.0, -1.0], np.float32)
+    score, values = decode(boxes, logits, np.array([[10, 10], [100, 50], [0, 0]]), 0.5)
     np.testing.assert_allclose(score, [1.0, 0.5])
     np.testing.assert_allclose(values[0], [96, 42, 106, 62, 105, 56, 100, 50, 100, 50, 97, 54])
     np.testing.assert_allclose(values[1], [10] * 12)
 
 
 def test_overlapping_boxes_become_their_weighted_mean() -> None:
-    far = [100, 100, 110, 110, 1, 1]
+    far: list[float] = [100, 100, 110, 110, 1, 1]
     values = np.array([[0, 0, 10, 10, 4, 4], far, [0, 2, 10, 12, 4, 8]], float)
     score, merged = merge_overlapping(np.array([0.9, 0.8, 0.3]), values)
     np.testing.assert_allclose(score, [0.9, 0.8])

@@ -41,14 +41,20 @@ def follow(monkeypatch: pytest.MonkeyPatch) -> Callable[..., list[Track]]:
     return run
 
 
+def standing(x_px: float, count: float = np.inf) -> Callable[[int], tuple[float, float] | None]:
+    """A person who stands at x_px and leaves after ``count`` frames."""
+    return lambda t: (x_px, 200) if t < count else None
+
+
 def identities(track: Track, people: list[Person]) -> set[int]:
     """The indices of the people at whose hips the track's hips are in any frame."""
     out = set()
     for t in np.flatnonzero(track.seen):
         hips = track.keypoints_px[t, [23, 24]].mean(axis=0)
-        places = [np.inf if p.place(t) is None else np.linalg.norm(p.place(t) - hips) for p in people]
-        assert min(places) < 60
-        out.add(int(np.argmin(places)))
+        places = [person.place(t) for person in people]
+        distances = [np.inf if place is None else float(np.linalg.norm(place - hips)) for place in places]
+        assert min(distances) < 60
+        out.add(int(np.argmin(distances)))
     return out
 
 
@@ -146,7 +152,7 @@ def test_searches_are_less_frequent_once_all_wanted_people_are_tracked(monkeypat
 
 
 def test_searches_stay_frequent_while_fewer_than_wanted_are_tracked(monkeypatch: pytest.MonkeyPatch) -> None:
-    people = [Person(lambda t, k=k: (90 * k + 60, 200), BLUE, size_px=30) for k in range(11)]
+    people = [Person(standing(90 * k + 60), BLUE, size_px=30) for k in range(11)]
     detector = FakeDetector(people)
     monkeypatch.setattr(tracking_networks, "LandmarkNetwork", lambda name, *_: FakeLandmarks(people))
     monkeypatch.setattr(tracking_networks, "PersonDetector", lambda *_: detector)
@@ -160,7 +166,7 @@ def test_every_search_for_a_person_who_was_just_lost_is_close(monkeypatch: pytes
     """At 30 frames per second all other searches are close too; at a low rate some of them are not."""
     stays = Person(lambda t: (300, 200), BLUE)
     for fps, close_alone in ((30, True), (6, False)):
-        leaves = Person(lambda t, fps=fps: (900, 200) if t < fps else None, RED)
+        leaves = Person(standing(900, fps), RED)
         detector = FakeDetector([stays, leaves])
         monkeypatch.setattr(tracking_networks, "LandmarkNetwork", lambda *_, d=detector: FakeLandmarks(d.people))
         monkeypatch.setattr(tracking_networks, "PersonDetector", lambda *_, d=detector: d)

@@ -65,9 +65,12 @@ def test_lost_and_found_again(tracker: PeopleTracker, frames: Frames) -> None:
     assert [tracker.step(blank) for _ in range(3)] == [[]] * 3
     after = [largest(tracker, image) for image in images[3:]]
     assert None not in before + after
-    assert after[0][1].acquired
-    assert after[0][0] != before[-1][0]
-    assert after[0][1].region.resembles(before[-1][1].region, 0.1)
+    last, first = before[-1], after[0]
+    assert last is not None
+    assert first is not None
+    assert first[1].acquired
+    assert first[0] != last[0]
+    assert first[1].region.resembles(last[1].region, 0.1)
 
 
 def test_reset_forgets(tracker: PeopleTracker, frames: Frames) -> None:
@@ -91,7 +94,8 @@ def test_odd_images(tracker: PeopleTracker) -> None:
 
 def test_a_somersault_is_tracked_all_the_way_round(frames: Frames) -> None:
     """The man turns over once in the air, against the sun, between frames 165 and 183."""
-    tracker, seen = PeopleTracker("best", threads=2), {}
+    tracker = PeopleTracker("best", threads=2)
+    seen: dict[int, dict[int, Observation]] = {}
     for index, image in enumerate(frames("clips/walk_side_static", start=100, stop=187), 100):
         for tracklet, observation in tracker.step(image):
             if observation.keypoints_px[:, 1].mean() < 600:  # the man in the air, not the woman on the grass
@@ -109,7 +113,8 @@ def test_a_person_who_walks_out_of_the_picture_is_lost(frames: Frames) -> None:
 
     The man runs behind a tree between frames 223 and 229, and no person is found in its bark.
     """
-    tracker, seen = PeopleTracker("best", 2, 2), {}
+    tracker = PeopleTracker("best", 2, 2)
+    seen: dict[int, list[int]] = {}
     for index, image in enumerate(frames("clips/walk_side_static", start=185), 185):
         for tracklet, _ in tracker.step(image):
             seen.setdefault(tracklet, []).append(index)

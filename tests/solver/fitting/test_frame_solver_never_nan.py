@@ -77,7 +77,7 @@ SPOILED = {
 }
 
 
-@pytest.fixture(scope="module", params=BODIES.values(), ids=BODIES)
+@pytest.fixture(scope="module", params=BODIES.values(), ids=list(BODIES))
 def scene(request):
     K, P = request.param
     rng = np.random.default_rng(K + P)

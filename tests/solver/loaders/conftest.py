@@ -10,6 +10,7 @@ import struct
 import sys
 import types
 from collections.abc import Callable
+from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -29,7 +30,8 @@ BODY_PARENTS = [-1, 0, 0, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 9, 9, 12, 13, 14, 16, 17
 
 def _fingers(first: int) -> tuple[list[tuple[float, float, float]], list[int]]:
     """15 finger joints a side, left then right, index first and thumb last."""
-    joints, parents = [], []
+    joints: list[tuple[float, float, float]] = []
+    parents: list[int] = []
     for sign, wrist in ((1, 20), (-1, 21)):
         for z in (0.03, 0.01, -0.03, -0.01, 0.05):
             for i in range(3):
@@ -93,7 +95,7 @@ def smpl_formula(
     chain: list[np.ndarray] = []
     for i, R in enumerate(rotations):
         local = np.eye(4)
-        parent = int(tables["kintree_table"][0, i]) if i else None
+        parent = int(tables["kintree_table"][0, i]) if i else 0  # the root has none, and its entry is not used
         local[:3, :3], local[:3, 3] = R, J[i] - (J[parent] if i else 0)
         chain.append(chain[parent] @ local if i else local)
     from_rest = []
@@ -111,7 +113,9 @@ def smpl_formula(
 class Python2Pickler(pickle._Pickler):
     """Writes str and bytes as Python 2 wrote its one kind of string."""
 
-    dispatch = dict(pickle._Pickler.dispatch)
+    dispatch: ClassVar[dict[type, Callable[..., None]]] = dict(pickle._Pickler.dispatch)
+    write: Callable[[bytes], object]  # these two are undocumented, and unknown to the type checker
+    memoize: Callable[[object], None]
 
     def _string(self, value: str | bytes) -> None:
         raw = value.encode("latin1") if isinstance(value, str) else value

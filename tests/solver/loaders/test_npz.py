@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.typing import ArrayLike
 from scope.solver.errors import ModelFileError
 from scope.solver.loaders import archive, is_user_model, load_model
 from scope.solver.loaders.model_file import read_gender
@@ -21,8 +22,9 @@ def random_rotations(count: int, seed: int = 1) -> np.ndarray:
     return q
 
 
-def save(path: Path, tables: dict[str, np.ndarray], **more: object) -> Path:
-    np.savez(path, **{**tables, **more})
+def save(path: Path, tables: dict[str, np.ndarray], **more: ArrayLike) -> Path:
+    arrays: dict[str, ArrayLike] = {**tables, **more}
+    np.savez(path, **arrays)
     return path
 
 

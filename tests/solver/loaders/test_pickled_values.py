@@ -16,7 +16,7 @@ PROTOCOLS = range(pickle.HIGHEST_PROTOCOL + 1)
 
 
 def with_state(cls: type, **state: object) -> object:
-    made = cls.__new__(cls)
+    made: object = object.__new__(cls)
     made.__dict__.update(state)
     return made
 
