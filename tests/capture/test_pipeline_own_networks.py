@@ -12,7 +12,8 @@ import cv2
 import numpy as np
 import pytest
 from scope.scope_addon.capture.media.video_range import VideoRange
-from scope.scope_addon.capture.pipeline import Capture, CaptureOptions, capture
+from scope.scope_addon.capture.options import CaptureOptions
+from scope.scope_addon.capture.pipeline import Capture, capture
 from scope.scope_addon.capture.tracking.tracker import PeopleTracker
 from scope.scope_addon.cli import SAMPLE
 from scope.scope_addon.errors import NoPersonError

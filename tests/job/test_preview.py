@@ -4,13 +4,13 @@
 import threading
 
 import numpy as np
-from scope.scope_addon.capture.media.video import Frame
+from scope.scope_addon.capture.media.frame import Frame
 from scope.scope_addon.capture.media.video_range import VideoRange
 from scope.scope_addon.capture.options import CaptureOptions
 from scope.scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES
+from scope.scope_addon.capture.perception.observation import Observation
 from scope.scope_addon.capture.perception.region import Region
 from scope.scope_addon.capture.pipeline import capture
-from scope.scope_addon.capture.tracking.tracker import Observation
 from scope.scope_addon.cli import SAMPLE
 from scope.scope_addon.job import preview
 from scope.scope_addon.job.preview import FILE, LONGER_SIDE, PreviewWriter, draw

@@ -37,7 +37,8 @@ def test_pictures_are_in_numerical_order(folder: Path, name: str) -> None:
     assert brightness(folder / name, wanted) == NUMBERS
     with open_video(folder / name, wanted) as video:
         frames = list(video)
-        assert (video.fps, video.frame_count, video.width, video.height) == (12, 6, 30, 20)
+        assert video.fps == 12
+        assert (video.frame_count, video.width, video.height) == (6, 30, 20)
         assert [f.timestamp_s for f in frames] == pytest.approx([k / 12 for k in range(6)])
         (warning,) = video.warnings
         assert "88 numbers between 7 and 100 have no image" in warning
