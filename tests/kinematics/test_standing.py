@@ -1,0 +1,79 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The probability of contact, on motions with known ground truth."""
+
+import numpy as np
+import pytest
+from scope.scope_addon.kinematics import standing
+
+from ..posed_people import plank_person, stepping_person
+
+CAMERA = np.zeros(3)
+
+
+@pytest.fixture(scope="module")
+def step():
+    return stepping_person()
+
+
+@pytest.fixture(scope="module")
+def plank():
+    return plank_person()
+
+
+def test_a_raised_foot_is_told_from_one_in_contact(step):
+    _, omega, root, place, T_world_camera, times = step
+    p = standing.resting_probability(place(omega, root)[2], T_world_camera[2, :3], times, CAMERA)
+    assert (p[:, 2:4] > 0.8).all()  # right
+    assert (p[:, 4:] < 0.01).all()  # hands
+    assert (p[:20, :2] > 0.8).all()
+    assert (p[36:54, :2] < 0.3).all()
+    assert (p[75:, :2] > 0.8).all()
+
+
+def test_a_foot_at_rest_at_a_wrong_depth_is_in_contact_and_a_raised_one_is_not(step):
+    """A foot estimated too near or too far along its line of sight seems to be above or below the floor."""
+    _, omega, root, place, T_world_camera, times = step
+    up = T_world_camera[2, :3]
+    soles = place(omega[:1], root[:1])[2][:, :4].repeat(len(times), axis=0)
+    sight = soles[:, :2] / np.linalg.norm(soles[:, :2], axis=-1, keepdims=True)
+    far = soles.copy()
+    far[:, :2] -= 0.35 * sight  # the left one: nearer to the camera, so higher
+    higher = ((far[:, :2] - soles[:, :2]) @ up).mean()
+    assert higher > 0.1
+    assert (standing.standing_probability(far, up, times, CAMERA)[:, :2] > 0.5).all()
+    assert (standing.standing_probability(far, up, times)[:, :2] < 0.1).all()  # nobody knows where the sight is
+
+    raised = soles.copy()
+    raised[:, :2] += 0.35 * up
+    assert (standing.standing_probability(raised, up, times, CAMERA)[:, :2] < 0.1).all()
+
+    moving = far.copy()
+    moving[:, :2, 0] += 0.06 * np.sin(2 * np.pi * times)[:, None]  # up to 0.38 m/s, and slow where it turns round
+    assert (standing.standing_probability(moving, up, times, CAMERA)[:, :2] < 0.3).all()
+    at = np.array([2.0, -1.0, 3.0])
+    for center in (at, np.tile(at, (len(times), 1))):
+        elsewhere = standing.standing_probability(far + at, up, times, center)
+        np.testing.assert_allclose(elsewhere, standing.standing_probability(far, up, times, CAMERA), atol=1e-9)
+
+
+def test_palms_at_rest_on_the_floor_are_in_contact(plank):
+    _, omega, root, place, T_world_camera, times = plank
+    up, contact_points = T_world_camera[2, :3], place(omega, root)[2]
+    p = standing.resting_probability(contact_points, up, times, CAMERA)
+    assert p[:, [1, 3, 4, 5]].min() > 0.8  # toes and palms
+    raised, moved = contact_points.copy(), contact_points.copy()
+    raised[:, 4] += 0.4 * up
+    moved[:, 4, 1] += 0.3 * np.sin(2 * np.pi * times)
+    for other in (raised, moved):
+        p = standing.resting_probability(other, up, times, CAMERA)
+        assert np.median(p[:, 4]) < 0.1
+        assert p[:, 5].min() > 0.8
+
+
+def test_feet_at_rest_above_the_hands_are_not_in_contact(plank):
+    _, omega, root, place, T_world_camera, times = plank
+    up, contact_points = T_world_camera[2, :3], place(omega, root)[2]
+    contact_points[:, :4] += 1.5 * up
+    p = standing.resting_probability(contact_points, up, times, CAMERA)
+    assert p[:, :4].max() < 0.05
+    assert p[:, 4:].min() > 0.8
