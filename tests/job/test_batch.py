@@ -361,7 +361,7 @@ def test_bad_arguments(tmp_path, capsys, argv, says):
     ("argv", "status", "says"),
     [
         (["--people", "40"], 2, "1 to 12"),
-        (["--people", "9" * 9999], 2, "--people must be a number"),
+        (["--people", "9" * 9999], 2, "--people must be all, largest or a number"),
         (["--calibration", "{tmp}/lens.json"], 1, "lens.json is not a calibration"),
         (["--detector", "{tmp}/net.onnx"], 1, "net.onnx is not an ONNX model"),
         (["--keypoints", "{tmp}/net.onnx"], 1, "net.onnx is not an ONNX model"),

@@ -247,7 +247,7 @@ def test_memory_stays_within_a_small_multiple_of_the_file(tmp_path):
     path.write_bytes(b"\x80\x02" + block + b"(" + arrays + b"l.")
     tracemalloc.start()
     try:
-        with pytest.raises(ModelFileError, match="holds a list"):
+        with pytest.raises(ModelFileError, match="contains a list"):
             load_model(path)
         assert tracemalloc.get_traced_memory()[1] < 5 * path.stat().st_size
     finally:
