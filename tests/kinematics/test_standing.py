@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scope.scope_addon.kinematics import standing
 
-from ..posed_people import plank_person, stepping_person
+from .posed_people import plank_person, stepping_person
 
 CAMERA = np.zeros(3)
 

@@ -11,7 +11,7 @@ from scope.scope_addon.kinematics.contact_points import contact_point_positions
 from scope.scope_addon.kinematics.smoothing import gaussian_smooth
 from scope.solver import rotations
 
-from ...posed_people import FPS, plank_person, stepping_person
+from ...kinematics.posed_people import FPS, plank_person, stepping_person
 
 CAMERA = np.zeros(3)
 

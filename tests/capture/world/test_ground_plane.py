@@ -6,7 +6,7 @@ import pytest
 from scope.scope_addon.capture.world import ground_plane
 from scope.scope_addon.kinematics import standing
 
-from ...posed_people import stepping_person
+from ...kinematics.posed_people import stepping_person
 
 CAMERA = np.zeros(3)
 
