@@ -49,23 +49,25 @@ def _nothing(tree, ints, floats, weights, inv_sigma, triggs, pose, blocks):  # t
     return 0.0
 
 
-def _followed_by(before: Any, index: int, accumulate: Any) -> Any:
-    """Return the kernel that runs `before`, then the residual with that index."""
+def _followed_by(before: Any, index: int, name: str, accumulate: Any) -> Any:
+    """Return the kernel that runs `before`, then the residual with that index and name."""
     column = FIRST_TABLE + index
 
-    @inlined_kernel
     def run(tree, ints, floats, weights, inv_sigma, triggs, pose, blocks):  # type: ignore[no-untyped-def]
         cost = before(tree, ints, floats, weights, inv_sigma, triggs, pose, blocks)
         w, s = weights[column], inv_sigma[column]
         return cost + accumulate(tree, ints[index], floats[index], w, s, triggs, pose, blocks)
 
-    return run
+    # Numba names machine code by this and a number that counts up within a process. Code that several processes have
+    # put on disk is linked by name: under one name for all, a kernel of one file could run in place of another's.
+    run.__qualname__ = run.__name__ = f"run_to_{name}"
+    return inlined_kernel(run)
 
 
 # Adds the residuals of all tables to the blocks and returns their cost; ints, floats and weights in RESIDUALS' order.
 accumulate_tables = _nothing
-for _index, _module in enumerate(RESIDUALS.values()):
-    accumulate_tables = _followed_by(accumulate_tables, _index, _module.accumulate)
+for _index, (_name, _module) in enumerate(RESIDUALS.items()):
+    accumulate_tables = _followed_by(accumulate_tables, _index, _name, _module.accumulate)
 
 
 def registered(name: str) -> Any:

@@ -80,3 +80,17 @@ def test_one_file_its_import_and_one_line_add_a_residual(tmp_path):
         "Parts of 'toy' must lie in 0..2, but go from -1 to -1.",
         "Indices of 'toy' must not be negative, but go from -1 to -1.",
     ]
+
+
+def test_kernels_made_in_a_loop_have_names_of_their_own():
+    """Machine code from several processes is linked by these names."""
+    from scope.solver.residuals import registry
+
+    names, chain = [], [registry.accumulate_tables]
+    while chain:
+        function = chain.pop().py_func
+        names.append(function.__qualname__)
+        inner = dict(zip(function.__code__.co_freevars, function.__closure__ or (), strict=True))
+        chain += [inner["before"].cell_contents] if "before" in inner else []
+    assert len(names) == len(registry.RESIDUALS) + 1
+    assert len(set(names)) == len(names)
