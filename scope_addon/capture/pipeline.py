@@ -11,8 +11,8 @@ from ...solver.body import Body
 from ..motion import Motion
 from .media.video import Video, open_video
 from .options import CaptureOptions, check_options
-from .stages.clock import StageClock
-from .stages.observe import Footage, Listeners, Progress, Watch, observe
+from .stages.clock import Progress, StageClock
+from .stages.observe import Footage, Listeners, Watch, observe
 from .stages.repair import repair
 from .stages.report import make_report
 from .stages.solve import solve

@@ -4,8 +4,11 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+
+# Called with the stage's name, the steps done and the total (0: unknown). May raise CancelledError.
+Progress = Callable[[str, int, int], None]
 
 
 class StageClock:

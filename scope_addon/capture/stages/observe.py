@@ -34,10 +34,8 @@ from ..tracking.people import PeopleBuilder
 from ..tracking.scene_cuts import SceneCuts
 from ..tracking.track import Track
 from ..tracking.tracker import PeopleTracker
-from .clock import StageClock
+from .clock import Progress, StageClock
 
-# Called with the stage's name, the steps done and the total (0: unknown). May raise CancelledError.
-Progress = Callable[[str, int, int], None]
 # Called with each decoded frame, its largest person, and the object that fits the body to such an observation.
 Watch = Callable[[Frame, Observation | None, LiveBody], None]
 

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from ...kinematics.single_precision import to_single_precision
@@ -20,8 +20,7 @@ from ..world.placement import PlacedTrack, place_track
 from ..world.shot import FittedPerson, Shot
 from ..world.stance import stance_on_floor
 from ..world.world_frame import SharedWorld, find_world
-
-Progress = Callable[[str, int, int], None]
+from .clock import Progress
 
 
 @dataclass(frozen=True)
