@@ -112,7 +112,7 @@ def write_outputs(
         sequence = find_sequence(video, args.fps is not None)
         footage = sequence.paths[0] if sequence else video
         options = replace(NEW_SCENE, name=video.stem, shape=args.shape_keys)
-        separate = ExportOptions(separate=args.file_per_person)
+        separate = ExportOptions(separate=args.file_per_person, bvh_unit=args.bvh_unit)
         if rig is not None:
             from ..scene.rigs.rig_export import RigExportOptions, export_on_rig
 

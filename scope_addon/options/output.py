@@ -24,6 +24,10 @@ ROOTS = (
     ),
     Choice("in-place", "In Place", "No root motion: the character stays in place", 2),
 )
+BVH_UNITS = (
+    Choice("cm", "Centimetres", "One unit is a centimetre, as most tools expect", 0),
+    Choice("m", "Metres", "One unit is a metre", 1),
+)
 FRAME_RATES = (
     Choice(
         "auto", "Automatic", "Set the scene's frame rate to the footage's unless something in the scene is animated", 0
@@ -45,6 +49,22 @@ OUTPUT_OPTIONS = (
             "--shape-keys",
             help="shape keys keyed once, keyed per_frame, or baked into the mesh for engines that clamp morph targets",
         ),
+    ),
+    Option(
+        "take",
+        str,
+        "",
+        Place.PANEL,
+        "name of the next capture, its actions and the exported animation; if empty, the footage's name",
+    ),
+    Option(
+        "bvh_unit",
+        str,
+        "cm",
+        Place.COMMAND_LINE | Place.EXPORT,
+        "unit of length in .bvh files",
+        choices=BVH_UNITS,
+        blender=Property(label="Unit"),
     ),
     Option(
         "file_per_person", bool, False, Place.COMMAND_LINE, "write a separate file for each person, in every format"

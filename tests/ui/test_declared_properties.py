@@ -46,6 +46,7 @@ LABELS = {
     "start_frame": "First Frame",
     "set_frame_range": "Set Frame Range",
     "shape": "Shape",
+    "take": "Take",
     "with_markers": "Markers",
     "with_camera": "Camera with Footage",
 }

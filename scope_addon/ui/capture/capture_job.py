@@ -165,6 +165,7 @@ def build_options(scene: bpy.types.Scene) -> BuildOptions:
     if frame_rate == "auto":
         frame_rate = "keep" if _is_animated(scene) else "set"
     return BuildOptions(
+        name=settings.take.strip(),
         frame_rate=frame_rate,
         set_frame_range=settings.set_frame_range,
         start_frame=float(settings.start_frame),

@@ -9,7 +9,7 @@ from pathlib import Path
 import bpy
 
 from ...job.progress import JobProgress, duration
-from ..export_operators import FORMATS
+from ..export_operators import FORMATS, is_available
 from ..view.view_operators import camera_of, is_looking_through
 from . import preview_picture
 from .capture_operators import state
@@ -158,7 +158,7 @@ class SCOPE_PT_result(Tab, bpy.types.Panel):
         grid = layout.grid_flow(columns=2, row_major=True, even_columns=True, align=True)
         for key, label, _, _ in FORMATS:
             cell = grid.column()
-            cell.enabled = key != "USDC" or "usd_export" in dir(bpy.ops.wm)  # some builds of Blender lack USD
+            cell.enabled = is_available(key)
             cell.operator("scope.export", text=label).format = key
 
 

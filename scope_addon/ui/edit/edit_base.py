@@ -12,7 +12,27 @@ from ..captured_person import body_of, captured_armature, library_of
 from ..reporting import ReportingOperator
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    import numpy as np
+    from numpy.typing import NDArray
+
     from ....solver.body import Body
+    from ...edit.clip import Clip
+
+
+def edit_clip(
+    armature: bpy.types.Object, body: Body, rate: float, change: Callable[[Clip, NDArray[np.float64]], Clip]
+) -> None:
+    """Replace the keys of a captured armature on the same frames.
+
+    :param rate: of the scene, frames per second.
+    :param change: returns the new poses, given the present ones and the scene frame of each, (T,).
+    """
+    from ...scene.character.keys import read_clip, write_clip
+
+    clip, frames = read_clip(armature, body, rate)
+    write_clip(armature, body, change(clip, frames), frames)
 
 
 class EditOperator(ReportingOperator):

@@ -13,10 +13,14 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty
 
 from ..captured_person import betas_of, captured_motion
-from .edit_base import EditOperator, SpanOperator
+from .edit_base import EditOperator, SpanOperator, edit_clip
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from ....solver.body import Body
+    from ...edit.clip import Clip
 
 
 class SCOPE_OT_smooth(EditOperator):
@@ -62,10 +66,8 @@ class SCOPE_OT_interpolate_span(SpanOperator):
     def edit(self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float) -> str:
         """Replace the keys inside the span."""
         from ...edit.spans import interpolate
-        from ...scene.character.keys import read_clip, write_clip
 
-        clip, frames = read_clip(armature, body, rate)
-        write_clip(armature, body, interpolate(clip, self.start / rate, self.end / rate), frames)
+        edit_clip(armature, body, rate, lambda clip, _: interpolate(clip, self.start / rate, self.end / rate))
         return ""
 
 
@@ -89,10 +91,9 @@ class SCOPE_OT_swap_sides(SpanOperator):
     def edit(self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float) -> str:
         """Change the keys inside the span."""
         from ...edit.spans import swap_sides
-        from ...scene.character.keys import read_clip, write_clip
 
-        clip, frames = read_clip(armature, body, rate)
-        write_clip(armature, body, swap_sides(clip, body, self.start / rate, self.end / rate, self.limbs), frames)
+        span = self.start / rate, self.end / rate
+        edit_clip(armature, body, rate, lambda clip, _: swap_sides(clip, body, *span, self.limbs))
         return ""
 
 
@@ -115,16 +116,17 @@ class SCOPE_OT_refloor(EditOperator):
         """Change all keys."""
         from ...edit.floor import refloor
         from ...edit.root_motion import relative_to_trajectory, with_trajectory
-        from ...scene.character.keys import read_clip, write_clip
         from ...scene.character.root_object import removed_root_motion
 
-        clip, frames = read_clip(armature, body, rate)
-        positions, angles = removed_root_motion(armature, frames)
-        path = positions * [1.0, 1.0, 0.0], angles  # feet in contact are at rest only with root motion
-        floored = refloor(
-            with_trajectory(clip, *path), body, betas_of(armature, body), level=self.level, lift=self.lift
-        )
-        write_clip(armature, body, relative_to_trajectory(floored, *path), frames)
+        betas = betas_of(armature, body)
+
+        def floored(clip: Clip, frames: NDArray[np.float64]) -> Clip:
+            positions, angles = removed_root_motion(armature, frames)
+            path = positions * [1.0, 1.0, 0.0], angles  # feet in contact are at rest only with root motion
+            placed = refloor(with_trajectory(clip, *path), body, betas, level=self.level, lift=self.lift)
+            return relative_to_trajectory(placed, *path)
+
+        edit_clip(armature, body, rate, floored)
         return ""
 
 

@@ -153,11 +153,12 @@ class SCOPE_OT_footage_to_sequencer(ReportingOperator):
     def work(self, context: bpy.types.Context) -> str:
         """Add the strips."""
         from ...scene.animation_data.timing import scene_rate
-        from ...scene.footage_strip import add_footage_strips
+        from ...scene.footage_strip import add_footage_strips, strips_of
 
         scene, result = context.scene, context.scene.scope.result
         armatures = (o for o in result.collection.all_objects if "scope_start" in o)
         start = next((float(o["scope_start"]) for o in armatures), 0.0)
+        known = set(strips_of(scene.sequence_editor)) if scene.sequence_editor else set()
         strips = add_footage_strips(scene, bpy.path.abspath(result.footage), start)
         rate = getattr(strips[-1], "fps", 0.0)
         if rate and abs(rate - scene_rate(scene)) > 0.01:
@@ -166,7 +167,8 @@ class SCOPE_OT_footage_to_sequencer(ReportingOperator):
                 f"The scene has {scene_rate(scene):.5g} frames/s and the footage {rate:.5g}: the strip will not stay "
                 "synchronized with the motion",
             )
-        return ""
+            return ""
+        return "The footage is already in the sequencer" if strips[-1] in known else ""
 
 
 CLASSES = (SCOPE_OT_look_through, SCOPE_OT_go_to_frame, SCOPE_OT_footage_to_sequencer)

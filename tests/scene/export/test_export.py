@@ -5,6 +5,7 @@ import json
 import os
 import re
 import struct
+from dataclasses import replace
 from pathlib import Path
 
 import bpy
@@ -322,9 +323,11 @@ def test_several_people_in_one_file_all_move(body, make_motion, tmp_path, blende
             np.testing.assert_allclose(joints, truth(body, motion).joints[t], atol=2e-3, err_msg=armature.name)
 
 
-def test_bvh_is_y_up_in_metres_and_one_file_a_person(body, make_motion, tmp_path, truth):
+@pytest.mark.parametrize(("unit", "per_metre"), [(None, 100.0), ("cm", 100.0), ("m", 1.0)])
+def test_bvh_is_y_up_in_centimetres_and_one_file_a_person(body, make_motion, tmp_path, truth, unit, per_metre):
     motions = [make_motion(body, 3), make_motion(body, 3, seed=1)]
-    written, _ = export_motions(motions, body, tmp_path / "pair.bvh")
+    options = ExportOptions(bvh_unit=unit) if unit else None
+    written, _ = export_motions(motions, body, tmp_path / "pair.bvh", export_options=options)
     assert [p.name for p in written] == ["pair.person1.bvh", "pair.person2.bvh"]
     for path, motion in zip(written, motions, strict=True):
         lines = path.read_text().splitlines()
@@ -332,7 +335,47 @@ def test_bvh_is_y_up_in_metres_and_one_file_a_person(body, make_motion, tmp_path
         assert lines[start + 1] == "Frames: 3"
         rows = np.array([[float(v) for v in line.split()] for line in lines[start + 3 :]])
         pelvis = truth(body, motion).joints[:, 0]
-        np.testing.assert_allclose(rows[:, :3], pelvis[:, [0, 2, 1]] * [1, 1, -1], atol=1e-5)
+        np.testing.assert_allclose(rows[:, :3] / per_metre, pelvis[:, [0, 2, 1]] * [1, 1, -1], atol=1e-5)
+        offsets = [[float(v) for v in line.split()[1:]] for line in lines[:start] if line.strip().startswith("OFFSET")]
+        joints = body.rest_joints(motion.betas)
+        knee, hip = (body.joint_names.index(f"left_{part}") for part in ("knee", "hip"))
+        thigh = np.linalg.norm(joints[knee] - joints[hip])
+        assert np.abs(np.linalg.norm(offsets, axis=1) / per_metre - thigh).min() < 1e-4
+
+
+def test_an_unknown_unit_of_bvh_is_an_error():
+    with pytest.raises(UsageError, match="bvh_unit must be one of cm, m"):
+        ExportOptions(bvh_unit="inch")
+
+
+@pytest.mark.parametrize("first_frame", [0.0, 1.0, 7.0])
+def test_fbx_and_glb_begin_at_zero_and_are_named_after_the_clip(body, make_motion, tmp_path, first_frame):
+    """Read from the files themselves, because importers move and rename animation."""
+    parser = pytest.importorskip("io_scene_fbx.parse_fbx")
+    built = build_scene(
+        [make_motion(body, 5, rate=20.0)], body, None, replace(NEW_SCENE, name="A walk", start_frame=first_frame)
+    )
+    export(tmp_path / "out.glb", [built.collection])
+    export(tmp_path / "out.fbx", [built.collection])
+    gltf = glb_json(tmp_path / "out.glb")
+    assert [animation["name"] for animation in gltf["animations"]] == ["A walk"]
+    inputs = [gltf["accessors"][s["input"]] for s in gltf["animations"][0]["samplers"]]
+    assert min(a["min"][0] for a in inputs) == 0.0
+    assert max(a["max"][0] for a in inputs) == pytest.approx(0.2)
+    root, _ = parser.parse(str(tmp_path / "out.fbx"))
+    objects, takes = ([e for e in root.elems if e.id == name][0] for name in (b"Objects", b"Takes"))
+    second = 46186158000
+    times = [
+        t for e in objects.elems if e.id == b"AnimationCurve" for k in e.elems if k.id == b"KeyTime" for t in k.props[0]
+    ]
+    assert min(times) == 0
+    assert max(times) / second == pytest.approx(0.2)
+    (stack,) = (e for e in objects.elems if e.id == b"AnimationStack")
+    assert stack.props[1] == b"A walk\0\x01AnimStack"
+    (take,) = (e for e in takes.elems if e.id == b"Take")
+    assert take.props == [b"A walk"]
+    span = next(e.props for e in take.elems if e.id == b"LocalTime")
+    assert span == [0, pytest.approx(0.2 * second)]
 
 
 def test_npz_is_the_motion_itself(body, make_motion, tmp_path):

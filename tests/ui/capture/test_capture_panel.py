@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scope.scope_addon.job.progress import JobProgress, duration
 from scope.scope_addon.motion import Motion
-from scope.scope_addon.scene.footage_strip import strips_of
+from scope.scope_addon.scene.footage_strip import start_of, strips_of
 from scope.scope_addon.ui import drop
 from scope.scope_addon.ui.capture import capture_job
 from scope.scope_addon.ui.capture.capture_operators import end_capture, state
@@ -240,7 +240,9 @@ def test_the_footage_is_added_to_the_sequencer(fake_worker, footage):
     bpy.context.scene.scope.start_frame = 11
     captured(fake_worker, footage)
     assert bpy.ops.scope.footage_to_sequencer() == {"FINISHED"}
-    assert [strip.frame_final_start for strip in strips_of(bpy.context.scene.sequence_editor)] == [11]
+    assert [start_of(strip) for strip in strips_of(bpy.context.scene.sequence_editor)] == [11]
+    assert bpy.ops.scope.footage_to_sequencer() == {"FINISHED"}
+    assert len(strips_of(bpy.context.scene.sequence_editor)) == 1
     footage.unlink()
     with pytest.raises(RuntimeError, match="does not exist"):
         bpy.ops.scope.footage_to_sequencer()
