@@ -106,7 +106,10 @@ class SCOPE_OT_export(ReportingOperator):
                 layout.prop(self, "separate")
 
     def work(self, context: bpy.types.Context) -> str:
-        """Write the files."""
+        """Write the files.
+
+        :raises UsageError: the file has no name, or there is nothing of what is to be written.
+        """
         from ..errors import UsageError
         from ..scene.export.export import ExportOptions, captures, export
         from ..scene.rigs.rig_export import export_rig
