@@ -17,6 +17,7 @@ from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from ....solver.body import Body
+from ....solver.compiled.kernel import cached
 from ....solver.errors import ShapeError
 from ....solver.rotations import exp
 from ...atomic_write import atomic_path, reason
@@ -180,7 +181,8 @@ def _triangles(faces: NDArray[np.integer[Any]]) -> NDArray[np.integer[Any]]:
     return np.concatenate([faces[:, [0, 1, 2]], faces[:, [0, 2, 3]]])
 
 
-@njit(cache=True, nogil=True)
+@cached
+@njit(nogil=True)
 def _blend(image: NDArray[np.uint8], rgba: NDArray[np.uint8]) -> None:
     """Blend ``rgba`` over ``image`` in place; at outlines, opacity is scaled by the covered share of the neighbours."""
     height, width = image.shape[:2]
