@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from ..motion import Motion
 
 
+_CORRECTED = "-corrected-"  # in the name of a motion file, followed by a number
 PERSON = "scope_person"  # custom property of a rig: the name of the captured armature that it was retargeted from
 
 
@@ -91,8 +92,8 @@ def betas_of(armature: bpy.types.Object, body: Body) -> NDArray[np.float64]:
     return betas
 
 
-def cached_motion(armature: bpy.types.Object) -> Motion:
-    """Return the captured motion, before any editing.
+def motion_of(armature: bpy.types.Object) -> Motion:
+    """Return the captured motion, before any editing but with its corrections.
 
     :raises UsageError: it is no longer in the cache.
     :raises MotionFileError: its file is damaged.
@@ -104,3 +105,25 @@ def cached_motion(armature: bpy.types.Object) -> Motion:
     if not path or not Path(path).is_file():
         raise UsageError("the captured motion is no longer in the cache; capture the footage again")
     return Motion.load(path)
+
+
+def set_motion_of(armature: bpy.types.Object, motion: Motion) -> None:
+    """Store a motion as the armature's captured one. Undo restores the former one, whose file is kept.
+
+    :raises OutputError: the file cannot be written.
+    """
+    former = Path(armature["scope_motion"])
+    number = 1 + max((int(found) for found in _numbers_of(former)), default=0)
+    path = former.with_name(f"{_plain_stem(former)}{_CORRECTED}{number}.npz")
+    motion.save(path)
+    armature["scope_motion"] = str(path)
+
+
+def _plain_stem(path: Path) -> str:
+    return path.stem.partition(_CORRECTED)[0]
+
+
+def _numbers_of(path: Path) -> list[str]:
+    """Return the numbers of the corrected motions beside a motion file."""
+    ends = [other.stem.partition(_CORRECTED)[2] for other in path.parent.glob(f"{_plain_stem(path)}{_CORRECTED}*.npz")]
+    return [end for end in ends if end.isdecimal()]

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty
 
-from ..captured_person import betas_of, cached_motion
+from ..captured_person import betas_of, motion_of
 from .edit_base import EditOperator, SpanOperator
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 class SCOPE_OT_smooth(EditOperator):
-    """Smooth the captured motion again, more or less strongly. Discards manual changes"""
+    """Smooth the captured motion again, more or less strongly. Keeps corrections, discards other changes"""
 
     bl_idname = "scope.smooth"
     bl_label = "Smooth Motion"
@@ -42,9 +42,10 @@ class SCOPE_OT_smooth(EditOperator):
         from ...scene.character.keys import bake_whole_frames, write_clip
         from ...scene.character.root_object import remove_root_object
 
-        motion = cached_motion(armature)
+        motion = motion_of(armature)
         clip = smoothed(body, motion, self.strength)
         write_clip(armature, body, clip, key_frames(motion.timestamps, rate, float(armature.get("scope_start", 0.0))))
+        armature["scope_smoothing"] = self.strength
         remove_cycles(armature)  # a loop becomes the whole motion again
         if armature.get("scope_resampled"):
             bake_whole_frames(armature, body, rate)
