@@ -91,7 +91,7 @@ def betas_of(armature: bpy.types.Object, body: Body) -> NDArray[np.float64]:
 
 
 def captured_motion(armature: bpy.types.Object) -> Motion:
-    """Return the captured motion, before any editing.
+    """Return the captured motion, before any editing but with its corrections.
 
     :raises UsageError: the armature does not store it.
     :raises MotionFileError: what it stores is damaged.
@@ -99,3 +99,10 @@ def captured_motion(armature: bpy.types.Object) -> Motion:
     from ..scene.packed_motion import stored_motion
 
     return stored_motion(armature)
+
+
+def set_captured_motion(armature: bpy.types.Object, motion: Motion) -> None:
+    """Store a motion as the armature's captured one. Undo restores the former one."""
+    from ..scene.packed_motion import pack_motion
+
+    pack_motion(armature, motion.to_bytes())

@@ -35,24 +35,29 @@ def edit_clip(
     write_clip(armature, body, change(clip, frames), frames)
 
 
+def may_edit(cls: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
+    """Return whether there is a captured armature whose keys are stored in this file; if not, say why."""
+    armature = captured_armature(context)
+    if armature is None:
+        cls.poll_message_set("Select the armature of a capture first")
+        return False
+    library = library_of(armature)
+    if library is not None:
+        cls.poll_message_set(
+            f"'{armature.name}' or its motion is linked from {library.filepath}, so changes would be lost: make "
+            "both local (Object > Relations > Make Local > All) or edit them in that file"
+        )
+        return False
+    return True
+
+
 class EditOperator(ReportingOperator):
     """An operator that edits the keys of the active capture; if it fails, the keys are unchanged. Not registered."""
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Require a captured armature whose keys are stored in this file."""
-        armature = captured_armature(context)
-        if armature is None:
-            cls.poll_message_set("Select the armature of a capture first")
-            return False
-        library = library_of(armature)
-        if library is not None:
-            cls.poll_message_set(
-                f"'{armature.name}' or its motion is linked from {library.filepath}, so changes would be lost: make "
-                "both local (Object > Relations > Make Local > All) or edit them in that file"
-            )
-            return False
-        return True
+        return may_edit(cls, context)
 
     if TYPE_CHECKING:  # implemented by each operator
 

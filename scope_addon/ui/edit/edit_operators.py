@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 class SCOPE_OT_smooth(EditOperator):
-    """Smooth the captured motion again, more or less strongly. Discards manual changes"""
+    """Smooth the captured motion again, more or less strongly. Keeps corrections, discards other changes"""
 
     bl_idname = "scope.smooth"
     bl_label = "Smooth Motion"
@@ -49,6 +49,7 @@ class SCOPE_OT_smooth(EditOperator):
         motion = captured_motion(armature)
         clip = smoothed(body, motion, self.strength)
         write_clip(armature, body, clip, key_frames(motion.timestamps, rate, float(armature.get("scope_start", 0.0))))
+        armature["scope_smoothing"] = self.strength
         remove_cycles(armature)  # a loop becomes the whole motion again
         if armature.get("scope_resampled"):
             bake_whole_frames(armature, body, rate)
