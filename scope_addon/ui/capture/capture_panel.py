@@ -10,7 +10,7 @@ import bpy
 
 from ...job.progress import JobProgress, duration
 from ..export_operators import FORMATS, is_available
-from ..view.view_operators import camera_of, is_looking_through
+from ..view.comparison import camera_of, is_looking_through, side_area
 from . import preview_picture
 from .capture_operators import state
 
@@ -150,7 +150,11 @@ class SCOPE_PT_result(Tab, bpy.types.Panel):
         if camera is not None:
             back = is_looking_through(context)
             text = "Back to the Scene" if back else "Compare with Footage"
-            layout.operator("scope.look_through", text=text, icon="VIEW_CAMERA", depress=back)
+            row = layout.row(align=True)
+            row.operator("scope.look_through", text=text, icon="VIEW_CAMERA", depress=back)
+            if back:
+                shown = side_area(context.window.screen) is not None
+                row.operator("scope.side_view", text="", icon="SPLIT_VERTICAL", depress=shown)
             for background in camera.data.background_images[:1]:
                 layout.prop(background, "alpha", text="Footage Opacity", slider=True)
             layout.operator("scope.footage_to_sequencer", icon="SEQUENCE")
