@@ -216,9 +216,9 @@ class SCOPE_OT_cancel(bpy.types.Operator):
         outcome: set[str] = context.window_manager.invoke_confirm(
             self,
             event,
-            title="Cancel the Capture?",
+            title="Stop the Capture?",
             message=f"It has run for {duration(seconds)}. The scene stays unchanged",
-            confirm_text="Cancel Capture",
+            confirm_text="Stop Capture",
         )
         return outcome
 
