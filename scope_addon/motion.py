@@ -8,9 +8,10 @@ world frame and the others relative to their parents; ``trans`` is SMPL's: pelvi
 
 from __future__ import annotations
 
+import io
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -92,21 +93,30 @@ class Motion:
         :raises OutputError: the file cannot be written.
         """
         path = Path(path)
-        arrays = {f.name: np.asarray(getattr(self, f.name)) for f in fields(self)}
         try:
             with atomic_path(path) as temporary, temporary.open("wb") as file:
-                np.savez_compressed(file, **arrays)
+                self._write(file)
         except OSError as error:
             raise OutputError(f"cannot write {path}: {reason(error)}") from error
 
+    def to_bytes(self) -> bytes:
+        """Return the content of the motion file."""
+        file = io.BytesIO()
+        self._write(file)
+        return file.getvalue()
+
+    def _write(self, file: BinaryIO) -> None:
+        np.savez_compressed(file, **{f.name: np.asarray(getattr(self, f.name)) for f in fields(self)})
+
     @classmethod
-    def load(cls, path: str | Path) -> Motion:
+    def load(cls, path: str | Path, content: bytes | None = None) -> Motion:
         """Read and check a motion file. Nothing is unpickled.
 
+        :param content: the file's bytes if they are not on disk; ``path`` then only names them in messages.
         :raises MotionFileError: the file is missing or damaged, or is not a motion file of this version.
         """
         path = Path(path)
-        data = read_npz(path, MotionFileError, "motion file")
+        data = read_npz(path, MotionFileError, "motion file", content)
         known = {f.name for f in fields(cls)}
         missing = sorted(known - set(data) - {"source"})
         if missing:

@@ -18,8 +18,8 @@ OTHERS = ("solver", "tools", "benchmarks", "scripts")
 # Tests that belong to no single module, by path below tests/, and what they test.
 CROSS_CUTTING = {
     "test_code_size.py": "lines and parameters of functions, lines of files",
-    "solver/test_docstrings.py": "docstrings of all public functions",
     "test_docs.py": "the documentation against the program",
+    "test_docstrings.py": "docstrings of all public functions",
     "test_imports.py": "packages that a module may not import",
     "test_layout.py": "names and places of test files",
     "test_required.py": "a helper of the tests",

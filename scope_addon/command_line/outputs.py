@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ...solver.body import Body
+from ...solver.loaders.body_file import ASSETS
 from ..errors import UsageError
 from ..installed import check_installed
 from ..motion import Motion
@@ -22,6 +23,26 @@ if TYPE_CHECKING:
 
 MOTION_SUFFIXES = (".npz",)
 OVERLAY_SUFFIXES = (".mp4", ".png", ".jpg")
+
+
+def default_outputs(video: Path) -> list[Path]:
+    """Return the outputs of a capture without ``-o``: a motion file and a character next to the video.
+
+    For footage that comes with Scope they lie in the current folder. Nothing is written into Scope's own folder, which
+    the next version replaces, and which may not be writable.
+
+    :raises UsageError: the current folder is a part of Scope's own.
+    """
+    folder = video.parent
+    if _is_shipped(folder):
+        folder = Path()
+        if _is_shipped(folder):
+            raise UsageError(f"{folder.resolve()} belongs to Scope and is replaced with it; choose an output with -o")
+    return [folder / f"{video.stem}{suffix}" for suffix in (".npz", ".glb")]
+
+
+def _is_shipped(folder: Path) -> bool:
+    return folder.resolve().is_relative_to(ASSETS.resolve())
 
 
 def check_outputs(outputs: list[Path], overlay: Path | None, video: Path) -> None:

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import bpy
@@ -91,16 +90,12 @@ def betas_of(armature: bpy.types.Object, body: Body) -> NDArray[np.float64]:
     return betas
 
 
-def cached_motion(armature: bpy.types.Object) -> Motion:
+def captured_motion(armature: bpy.types.Object) -> Motion:
     """Return the captured motion, before any editing.
 
-    :raises UsageError: it is no longer in the cache.
-    :raises MotionFileError: its file is damaged.
+    :raises UsageError: the armature does not store it.
+    :raises MotionFileError: what it stores is damaged.
     """
-    from ..errors import UsageError
-    from ..motion import Motion
+    from ..scene.packed_motion import stored_motion
 
-    path = armature.get("scope_motion", "")
-    if not path or not Path(path).is_file():
-        raise UsageError("the captured motion is no longer in the cache; capture the footage again")
-    return Motion.load(path)
+    return stored_motion(armature)

@@ -17,6 +17,7 @@ from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from ....solver.body import Body
+from ....solver.compiled.kernel import cached
 from ....solver.errors import ShapeError
 from ....solver.rotations import exp
 from ...atomic_write import atomic_path, reason
@@ -124,7 +125,14 @@ def draw_bodies(
 ) -> None:
     """Draw the bodies of several people into a canvas.
 
-    For the parameters see `draw_overlay`; here they are lists with one element per person.
+    As `draw_overlay`, but with a list element per person.
+
+    :param vertices_cam: (V, 3) each: metres, camera axes (OpenCV's).
+    :param faces: (F, 3) or (F, 4), counter-clockwise seen from outside.
+    :param intrinsics: (3, 3) K in pixels of the canvas.
+    :param dist: up to (5,) distortion coefficients; None for none.
+    :param colors: (3,) or (F, 3) each, sRGB in 0..1.
+    :param opacities: 0..1 each.
     """
     triangles = _triangles(faces)
     for vertices, color, opacity in zip(vertices_cam, colors, opacities, strict=True):
@@ -173,7 +181,8 @@ def _triangles(faces: NDArray[np.integer[Any]]) -> NDArray[np.integer[Any]]:
     return np.concatenate([faces[:, [0, 1, 2]], faces[:, [0, 2, 3]]])
 
 
-@njit(cache=True, nogil=True)
+@cached
+@njit(nogil=True)
 def _blend(image: NDArray[np.uint8], rgba: NDArray[np.uint8]) -> None:
     """Blend ``rgba`` over ``image`` in place; at outlines, opacity is scaled by the covered share of the neighbours."""
     height, width = image.shape[:2]

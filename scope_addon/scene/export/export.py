@@ -22,6 +22,7 @@ from ...motion import Motion
 from ..animation_data import actions
 from ..build import CAPTURE_TAG, NEW_SCENE, BuildOptions, BuildResult, Progress, build_scene
 from ..character.bone_display import remove_if_unused
+from ..packed_motion import motion_texts, pack_motion
 from . import formats
 from .bvh import UNITS_PER_METRE
 from .export_states import (
@@ -175,6 +176,9 @@ def export_motions(
     with temporary_scene("Capturing"):
         result = build_scene(motions, body, footage, build_options, progress)
         try:
+            if any(Path(path).suffix.lower() == ".blend" for path in scene_paths):
+                for person in result.people:
+                    pack_motion(person.armature, person.motion.to_bytes())
             for each in scene_paths:
                 written += export(each, [result.collection], motions, export_options)
         finally:
@@ -192,7 +196,8 @@ def _remove(result: BuildResult) -> None:
     materials = {m for block in data for m in getattr(block, "materials", ())}
     shown = {footage for block in data for picture in getattr(block, "background_images", ())
              for footage in (picture.clip, picture.image) if footage}  # fmt: skip
-    bpy.data.batch_remove([result.collection, *objects, *data, *used, *materials])
+    texts = motion_texts(objects)
+    bpy.data.batch_remove([result.collection, *objects, *data, *used, *materials, *texts])
     bpy.data.batch_remove([footage for footage in shown if footage.users == 0])
     remove_if_unused()
 

@@ -2,7 +2,7 @@
 """Operators that edit the motion of a capture: smoothing, interpolation, left and right, floor, root motion.
 
 All of them read and rewrite the keys of the active capture's armature; only smoothing starts from the captured motion,
-which the cache stores. None of them uses the footage.
+which the .blend file stores. None of them uses the footage.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty
 
-from ..captured_person import betas_of, cached_motion
+from ..captured_person import betas_of, captured_motion
 from .edit_base import EditOperator, SpanOperator, edit_clip
 
 if TYPE_CHECKING:
@@ -39,14 +39,14 @@ class SCOPE_OT_smooth(EditOperator):
     )
 
     def edit(self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float) -> str:
-        """Replace the keys by those of the cached motion, smoothed."""
+        """Replace the keys by those of the captured motion, smoothed."""
         from ...edit.smooth import smoothed
         from ...scene.animation_data.actions import remove_cycles
         from ...scene.animation_data.timing import key_frames, restore_scene_range
         from ...scene.character.keys import bake_whole_frames, write_clip
         from ...scene.character.root_object import remove_root_object
 
-        motion = cached_motion(armature)
+        motion = captured_motion(armature)
         clip = smoothed(body, motion, self.strength)
         write_clip(armature, body, clip, key_frames(motion.timestamps, rate, float(armature.get("scope_start", 0.0))))
         remove_cycles(armature)  # a loop becomes the whole motion again

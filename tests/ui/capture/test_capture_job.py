@@ -11,9 +11,9 @@ import bpy
 import numpy as np
 import pytest
 from scope.scope_addon.job.process import WorkerFailedError
-from scope.scope_addon.motion import Motion
 from scope.scope_addon.scene.animation_data.actions import fcurves, read_keys
 from scope.scope_addon.scene.build import BuildOptions, build_scene
+from scope.scope_addon.scene.packed_motion import stored_motion
 from scope.scope_addon.ui.capture import capture_operators
 from scope.scope_addon.ui.capture.capture_job import CaptureJob
 from scope.scope_addon.ui.capture.capture_operators import (
@@ -292,7 +292,7 @@ def test_real_worker_on_a_picture(footage):
     from scope.scope_addon.capture.pipeline import capture
 
     expected = capture(footage, load_body("scope"), CaptureOptions(quality="fast")).motions[0]
-    got = Motion.load(scene.scope.result.collection["scope_motions"][0])
+    got = stored_motion(next(o for o in captures()[-1].objects if "scope_source" in o))
     assert np.allclose(got.poses, expected.poses, atol=1e-4)
     assert np.allclose(got.trans, expected.trans, atol=1e-4)
 
@@ -309,7 +309,7 @@ def test_real_worker_uses_a_calibration(footage, tmp_path):
     for k1 in (dist[0], -0.1):  # a changed file needs another capture
         lens.write_text(json.dumps({"intrinsics": K, "dist": [k1, *dist[1:]]}))
         assert bpy.ops.scope.capture() == {"FINISHED"}
-        found.append(Motion.load(scene.scope.result.collection["scope_motions"][0]))
+        found.append(stored_motion(next(o for o in captures()[-1].objects if "scope_source" in o)))
     assert np.allclose(found[0].intrinsics, K)
     assert np.allclose(found[0].dist, dist)
     assert found[1].dist[0] == -0.1
