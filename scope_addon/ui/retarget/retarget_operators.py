@@ -98,7 +98,7 @@ class SCOPE_OT_retarget(_RigOperator):
                 offset=_SIDE_OFFSET_M if settings.captured == "beside" else (0, 0, 0),
             ),
         )
-        settings.rig[PERSON] = source.name
+        settings.rig[PERSON] = source
         if settings.captured == "hide":
             _select_only(context, settings.rig)
             hide(source, context.view_layer)

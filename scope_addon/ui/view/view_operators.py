@@ -60,6 +60,7 @@ class SCOPE_OT_look_through(bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Set the scene's camera and resolution, and the viewport's view."""
+        from ...scene.camera import set_resolution
         from ...scene.visibility import hide_again
 
         scene, camera = context.scene, camera_of(context.scene)
@@ -74,10 +75,7 @@ class SCOPE_OT_look_through(bpy.types.Operator):
         scene.camera = camera
         camera.hide_viewport = False  # a hidden camera shows no footage
         camera.hide_set(False, view_layer=context.view_layer)
-        render, result = scene.render, scene.scope.result
-        render.resolution_x, render.resolution_y = result.resolution
-        render.pixel_aspect_x, render.pixel_aspect_y = result.pixel_aspect
-        render.resolution_percentage = 100
+        set_resolution(scene, scene.scope.result.collection)
         if not bpy.app.background and context.area and context.area.type == "VIEW_3D":
             comparison.begin(context, context.area, scene.scope.result.collection)
         return {"FINISHED"}
@@ -138,7 +136,10 @@ class SCOPE_OT_footage_to_sequencer(ReportingOperator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Require a capture."""
-        return context.scene.scope.result.collection is not None
+        if not context.scene.scope.result.footage:
+            cls.poll_message_set("The capture does not say where its footage is")
+            return False
+        return True
 
     def work(self, context: bpy.types.Context) -> str:
         """Add the strips."""

@@ -95,7 +95,7 @@ def test_the_captured_persons_collection_may_be_excluded_from_the_view_layer(rig
     source = next(obj for obj in bpy.context.scene.objects if "scope_source" in obj)
     layers = bpy.context.view_layer.layer_collection.children
     next(c for c in layers if c.collection in source.users_collection).exclude = True
-    bpy.context.scene.scope.result.collection = source.users_collection[0]
+    bpy.context.scene.scope.capture = source.users_collection[0]
     bpy.context.scene.scope_retarget.captured = captured
     assert bpy.ops.scope.retarget() == {"FINISHED"}
     assert np.ptp(seen(rig, ["pelvis"])[:, 0, 1]) > 1.0
