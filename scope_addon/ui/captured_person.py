@@ -15,26 +15,37 @@ if TYPE_CHECKING:
     from ..motion import Motion
 
 
-PERSON = "scope_person"  # custom property of a rig: the name of the captured armature that it was retargeted from
+# Custom property of a rig: the captured armature that it was retargeted from; its name in older .blend files.
+PERSON = "scope_person"
 
 
 def captured_armature(context: bpy.types.Context) -> bpy.types.Object | None:
-    """Return the captured armature of the active object, or else the only one of the last capture or of the scene."""
+    """Return the captured armature of the active object, or else the only one of the selected capture or scene."""
     obj = context.view_layer.objects.active if context.view_layer else None
     while obj is not None:
         if "scope_source" in obj:
             return obj
-        person = context.scene.objects.get(obj.get(PERSON, ""))
-        if person is not None and "scope_source" in person:
+        person = _retargeted_from(context.scene, obj)
+        if person is not None:
             return person
         found = [child for child in obj.children if "scope_source" in child]
         if len(found) == 1:
             return found[0]
         obj = obj.parent
-    collection = context.scene.scope.result.collection
+    collection = context.scene.scope.capture
     found = captured_people(context)
     last = [o for o in found if o.name in collection.all_objects] if collection else []
     return last[0] if len(last) == 1 else found[0] if len(found) == 1 else None
+
+
+def _retargeted_from(scene: bpy.types.Scene, rig: bpy.types.Object) -> bpy.types.Object | None:
+    """Return the captured armature in the scene that a rig was retargeted from."""
+    person = rig.get(PERSON)
+    if isinstance(person, str):
+        person = scene.objects.get(person)
+    if not isinstance(person, bpy.types.Object) or "scope_source" not in person:
+        return None
+    return person if scene.objects.get(person.name) == person else None
 
 
 def captured_people(context: bpy.types.Context) -> list[bpy.types.Object]:

@@ -127,7 +127,8 @@ class CaptureJob:
             result = build_scene(motions, body, footage, self._options)
         store_motions(result, [content for _, content in contents], self._request.values["body"])
         report = dict(captured.report, warnings=warnings + result.warnings)
-        show_result(scene.scope.result, self._request.footage, report, result)
+        show_result(result.collection.scope_result, self._request.footage, report, result)
+        scene.scope.capture = result.collection
 
 
 def capture_request(scene: bpy.types.Scene) -> JobRequest:

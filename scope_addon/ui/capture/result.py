@@ -25,7 +25,6 @@ def show_result(shown: bpy.types.PropertyGroup, footage: str, report: dict[str, 
     :param report: report of the capture pipeline.
     """
     shown.footage = footage
-    shown.collection = result.collection
     shown.people = len(result.people)
     shown.frames = max(len(p.motion) for p in result.people)
     shown.valid_frames = int(sum(p.motion.valid.sum() for p in result.people))
