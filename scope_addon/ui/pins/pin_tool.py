@@ -15,7 +15,7 @@ from mathutils import Vector
 
 from ..captured_person import captured_armature
 from ..edit.edit_base import may_edit
-from ..view.view_operators import camera_of
+from ..view.comparison import camera_of
 from .corrected_person import listed_corrections
 
 _SIDED = ("shoulder", "elbow", "wrist", "hip", "knee", "ankle", "foot")
