@@ -66,6 +66,21 @@ def test_a_clip_shorter_than_the_kernel_is_averaged_with_the_weights_of_the_gaus
     assert np.allclose(gaussian_smooth(values, times, 2.0), expected, atol=1e-12)
 
 
+def test_a_clip_in_reverse_is_smoothed_to_the_reverse():
+    """Which is what no phase shift means."""
+    values = np.random.default_rng(7).normal(size=(60, 3))
+    times = np.arange(60) / 30
+    assert np.allclose(gaussian_smooth(values[::-1], times, 4.0), gaussian_smooth(values, times, 4.0)[::-1], atol=1e-12)
+
+
+@pytest.mark.parametrize(("count", "cutoff"), [(1, 2.0), (2, 2.0), (9, 0.0), (9, -1.0)])
+def test_two_samples_or_no_cutoff_give_a_copy(count, cutoff):
+    values = np.random.default_rng(6).normal(size=(count, 3))
+    copy = gaussian_smooth(values, np.arange(count) / 30, cutoff)
+    assert np.array_equal(copy, values)
+    assert not np.shares_memory(copy, values)
+
+
 def test_quaternions_are_of_unit_length_and_have_no_jumps():
     R = turn(np.stack([np.linspace(0, 6 * np.pi, 50), np.linspace(3, -9, 50)], axis=1))
     q = continuous_quaternions(R)
