@@ -86,7 +86,7 @@ def under_floor(motion: Motion, body: Body) -> NDArray[np.bool_]:
 def lower_floors(
     heights: NDArray[np.floating[Any]], contact: NDArray[np.floating[Any]], times: NDArray[np.float64]
 ) -> list[tuple[int, int]]:
-    """Find the spans under the floor in which the feet walk or stand on another, lower one.
+    """Find the spans in which the feet walk or stand on another, lower floor, with the ways down and up.
 
     A foot rests in them more than `LEVEL_M` under the floor, or is farther below it than depth errors reach.
 
@@ -96,11 +96,15 @@ def lower_floors(
     :return: the first row and the row after the last one of each span.
     """
     lowest, rests = heights.min(axis=1), ((contact > 0.5) & (heights < -LEVEL_M)).any(axis=1)
-    return [
-        (first, end)
-        for first, end in runs(lowest < 0)
-        if lowest[first:end].min() < -DEPTH_ERROR_M or _duration(rests[first:end], times[first:end]) >= MIN_REST_S
-    ]
+    found = []
+    for first, end in runs(lowest < -LEVEL_M):
+        if lowest[first:end].min() < -DEPTH_ERROR_M or _duration(rests[first:end], times[first:end]) >= MIN_REST_S:
+            while first > 0 and lowest[first] < lowest[first - 1] < 0:
+                first -= 1
+            while end < len(lowest) and lowest[end - 1] < lowest[end] < 0:
+                end += 1
+            found.append((first, end))
+    return found
 
 
 def upper_floors(

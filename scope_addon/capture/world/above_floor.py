@@ -10,7 +10,8 @@ which is what it was at h = 0, with the same slope, so that a foot slows down at
 foot at rest a few millimetres below it hardly moves. Where h stays within `UNDER_FLOOR_M`, nothing changes at all.
 
 Body and legs share the lift. The root rises by what the deeper foot needs, except as far as the other foot or a palm
-rests on the floor and would leave it; the legs bend by the rest. Where a foot rests on something clearly below the
+rests on the floor and would leave it; the legs bend by the rest. Feet that are not in the image are a guess, and do not
+move the body. Where a foot rests on something clearly below the
 floor, as after a leap from a wall, the floor is another one and the motion stays.
 """
 
@@ -50,7 +51,8 @@ def raise_feet(
     up = T_floor_camera[2, :3]
     supports = np.stack([contact[:, :2].max(1), contact[:, 2:4].max(1), contact[:, len(SOLES) :].max(1)], axis=1)
     supports = np.minimum(supports / RESTING, 1.0)
-    rise = _root_rise(lifts, supports, placed.times)
+    seen = placed.contact_points_visible[:, : len(SOLES)].reshape(-1, 2, 2).max(axis=2)
+    rise = _root_rise(lifts, seen, supports, placed.times)
     # A foot in the air goes up with the body, one that rests stays where it is.
     wanted = lifts + (1 - supports[:, :2]) * np.maximum(rise[:, None] - lifts, 0.0)
     shift = wanted - rise[:, None]
@@ -102,13 +104,18 @@ def _foot_lifts(
 
 
 def _root_rise(
-    lifts: NDArray[np.float64], supports: NDArray[np.floating[Any]], times: NDArray[np.float64]
+    lifts: NDArray[np.float64],
+    seen: NDArray[np.floating[Any]],
+    supports: NDArray[np.floating[Any]],
+    times: NDArray[np.float64],
 ) -> NDArray[np.float64]:
     """Return by how much the whole body rises, (T,): what the deeper foot needs, unless something else rests.
 
     :param lifts: (T, 2) of the feet.
+    :param seen: (T, 2) 0..1, whether each foot was seen.
     :param supports: (T, 3) probability that left foot, right foot and palms rest on something.
     """
     needs = np.concatenate([lifts, np.zeros((len(lifts), 1))], axis=1)
-    deepest = needs.max(axis=1, keepdims=True)
-    return gaussian_smooth((needs + (deepest - needs) * (1 - supports)).min(axis=1), times, ROOT_CUTOFF_HZ)
+    deepest = (lifts * seen).max(axis=1, keepdims=True)
+    allowed = needs + np.maximum(deepest - needs, 0.0) * (1 - supports)
+    return gaussian_smooth(np.minimum(allowed, deepest).min(axis=1), times, ROOT_CUTOFF_HZ)

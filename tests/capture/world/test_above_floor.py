@@ -18,14 +18,14 @@ def step():
     return stepping_person()
 
 
-def raised(person, omega, root):
+def raised(person, omega, root, visible=1.0):
     """The given motion as a track, and the result."""
     supported, _, _, _, T_world_camera, times = person
     R, t = supported.forward_kinematics(omega, root - supported.rest_joints()[0])
-    points, seen = contact_point_positions(supported, R, t), np.ones((len(root), 6))
+    points, seen = contact_point_positions(supported, R, t), np.full((len(root), 6), visible)
     betas, valid = np.zeros(supported.P), np.ones(len(root), bool)
     placed = PlacedTrack(supported, betas, times, valid, omega, root, t, points, seen, np.zeros((len(root), 3)))
-    contact = standing.resting_probability(points, T_world_camera[2, :3], times, np.zeros(3))
+    contact = standing.resting_probability(points, T_world_camera[2, :3], times, np.zeros(3)) * visible
     return placed, raise_feet(placed, contact, T_world_camera)
 
 
@@ -112,6 +112,14 @@ def test_a_foot_alone_is_raised_by_its_leg_and_the_other_stays(step):
     assert np.abs(after[:, 2:4] - before[:, 2:4]).max() < 0.02
     assert np.abs(after[:, 2:4, 2] - before[:, 2:4, 2]).max() < 0.015
     assert skin_heights(step, found.rotations, found.root).min() > -0.02
+
+
+def test_feet_outside_the_image_are_raised_without_the_body(step):
+    omega, root = on_the_floor(step)
+    sunk = root - 0.15 * bump(step[5], 0.7, 2.3)[:, None] * step[4][2, :3]
+    _, found = raised(step, omega, sunk, visible=0.0)
+    np.testing.assert_allclose(found.root, sunk, atol=1e-12)
+    assert skin_heights(step, found.rotations, found.root).min() > -0.01
 
 
 def test_a_fall_to_another_floor_is_left_alone(step):
