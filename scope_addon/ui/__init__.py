@@ -12,13 +12,14 @@ import bpy
 from . import command, drop, export_operators, preferences
 from .capture import capture_operators, capture_panel, capture_properties, captures
 from .edit import edit_operators, edit_panel, key_operators
-from .pins import correction_operators, correction_panel, pin_tool
+from .pins import correction_operators, correction_panel, pin_tool, upright_operators
 from .retarget import retarget_operators, retarget_panel, retarget_properties
 from .view import view_after_undo, view_operators
 
 _MODULES = (
     *(capture_properties, preferences, capture_operators, export_operators, view_operators, drop),
-    *(edit_operators, key_operators, correction_operators, pin_tool, retarget_properties, retarget_operators),
+    *(edit_operators, key_operators, correction_operators, pin_tool, upright_operators),
+    *(retarget_properties, retarget_operators),
     *(captures, capture_panel, edit_panel, correction_panel, retarget_panel),
 )
 

@@ -34,6 +34,7 @@ class SCOPE_PT_corrections(Tab, bpy.types.Panel):
         for text, foot in (("Left Foot Stands", "left"), ("Right Foot Stands", "right")):
             row.operator("scope.foot_stands", text=text).foot = foot
         layout.operator("scope.exchange_sides", icon="MOD_MIRROR")
+        layout.operator("scope.upright_line", icon="EMPTY_SINGLE_ARROW")
         listed = listed_corrections(armature)
         if not listed:
             return

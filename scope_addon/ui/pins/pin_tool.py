@@ -10,13 +10,13 @@ import blf
 import bpy
 import gpu
 from bpy_extras.view3d_utils import location_3d_to_region_2d, region_2d_to_location_3d
-from gpu_extras.batch import batch_for_shader
 from mathutils import Vector
 
 from ..captured_person import captured_armature
 from ..edit.edit_base import may_edit
 from ..view.comparison import camera_of
 from .corrected_person import listed_corrections
+from .drawing import draw_disc, draw_line
 
 _SIDED = ("shoulder", "elbow", "wrist", "hip", "knee", "ankle", "foot")
 HANDLES = ("head", "pelvis", *(f"{side}_{name}" for side in ("left", "right") for name in _SIDED))
@@ -154,10 +154,10 @@ def _draw(session: _Session) -> None:
             continue
         if name == session.dragged:
             target = (at[0] + session.mouse[0] - session.start[0], at[1] + session.mouse[1] - session.start[1])
-            _line([tuple(at), target], _LINE)
-            _circle(target, 1.4 * _RADIUS * scale, _HOVERED)
+            draw_line([tuple(at), target], _LINE)
+            draw_disc(target, 1.4 * _RADIUS * scale, _HOVERED)
         color = _HOVERED if name == session.hovered else _PINNED if name in pinned else _FREE
-        _circle(tuple(at), (1.3 if name == session.hovered else 1.0) * _RADIUS * scale, color)
+        draw_disc(tuple(at), (1.3 if name == session.hovered else 1.0) * _RADIUS * scale, color)
         if name in (session.hovered, session.dragged):
             blf.size(0, 13 * scale)
             blf.color(0, 1.0, 1.0, 1.0, 1.0)
@@ -166,23 +166,4 @@ def _draw(session: _Session) -> None:
     gpu.state.blend_set("NONE")
 
 
-def _circle(center: tuple[float, float], radius: float, color: tuple[float, ...]) -> None:
-    """Draw a disc with a dark rim."""
-    for size, fill in ((radius + 1.5, (0.0, 0.0, 0.0, 0.6)), (radius, color)):
-        rim = [(center[0] + size * math.cos(a), center[1] + size * math.sin(a)) for a in _ANGLES]
-        triangles = [(0, k + 1, (k + 1) % len(rim) + 1) for k in range(len(rim))]
-        shader = gpu.shader.from_builtin("UNIFORM_COLOR")
-        batch = batch_for_shader(shader, "TRIS", {"pos": [center, *rim]}, indices=triangles)
-        shader.uniform_float("color", fill)
-        batch.draw(shader)
-
-
-def _line(points: list[tuple[float, ...]], color: tuple[float, ...]) -> None:
-    shader = gpu.shader.from_builtin("UNIFORM_COLOR")
-    batch = batch_for_shader(shader, "LINES", {"pos": points})
-    shader.uniform_float("color", color)
-    batch.draw(shader)
-
-
-_ANGLES = [2 * math.pi * k / 20 for k in range(20)]
 CLASSES = (SCOPE_OT_pin_limb,)
