@@ -11,7 +11,7 @@ from bpy_extras.view3d_utils import region_2d_to_origin_3d, region_2d_to_vector_
 
 from ..captured_person import body_of, captured_armature, captured_motion, set_captured_motion
 from ..edit.edit_base import EditOperator, may_edit
-from ..view.view_operators import camera_of
+from ..view.comparison import camera_of
 from .drawing import draw_line
 
 if TYPE_CHECKING:
