@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).resolve().parent.parent
+ROOT = Path(__file__).resolve().parents[2]
 PRODUCT = ("solver", "scope_addon")
 
 # Each room and the rooms that its files may import directly; what these may import in turn, it may reach as well.

@@ -29,9 +29,9 @@ from scope.scope_addon.scene.export.output_paths import check_output
 from scope.solver.loaders.body_file import BUILT_IN
 from scope.tools import solver_reference
 
-from .made_motion import made_motion
+from ..made_motion import made_motion
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
 PAGES = [ROOT / "README.md", *sorted(DOCS.glob("*.md"))]
 _NOT_OURS = {".venv", "build", "node_modules", "__pycache__"}
