@@ -16,6 +16,7 @@ from typing import Any, NoReturn
 
 from ..solver.errors import ScopeError
 from ..solver.loaders.body_file import ASSETS
+from .capture.media.file_names import shown
 from .command_line.arguments import add_options, body_and_options, non_default_arguments, path_argument
 from .command_line.outputs import check_blender, check_outputs, checked_rig, distinct_paths, summary, write_outputs
 from .command_line.signals import interrupted, stopped_by_signals
@@ -109,7 +110,7 @@ def main(argv: Sequence[str] | None = None, program: Sequence[str] = PROGRAM) ->
                 stop_with_parent()
             report = args.run(args)
             if args.json:
-                print(json.dumps(report), file=stdout, flush=True)
+                print(shown(json.dumps(report, ensure_ascii=False)), file=stdout, flush=True)
         return int(report.get("exit_status", 0))
     except ScopeError as error:
         print(f"scope: {error}", file=sys.stderr)

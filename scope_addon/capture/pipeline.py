@@ -9,6 +9,7 @@ from typing import Any
 
 from ...solver.body import Body
 from ..motion import Motion
+from .media.file_names import shown
 from .media.video import Video, open_video
 from .options import CaptureOptions, check_options
 from .stages.clock import Progress, StageClock
@@ -65,7 +66,7 @@ def _shot(video: Video, body: Body, options: CaptureOptions, footage: Footage) -
         footage.lines,
         video.fps,
         (video.width, video.height),
-        Path(video.path).name,
+        shown(Path(video.path).name),
         options.smoothing and frames > 1,
         options.ablation,
     )

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ...solver.body import Body
+from ..capture.media.file_names import shown
 from ..errors import UsageError
 from ..installed import check_installed
 from ..motion import Motion
@@ -111,7 +112,7 @@ def write_outputs(
 
         sequence = find_sequence(video, args.fps is not None)
         footage = sequence.paths[0] if sequence else video
-        options = replace(NEW_SCENE, name=video.stem, shape=args.shape_keys)
+        options = replace(NEW_SCENE, name=shown(video.stem), shape=args.shape_keys)
         separate = ExportOptions(separate=args.file_per_person)
         if rig is not None:
             from ..scene.rigs.rig_export import RigExportOptions, export_on_rig
