@@ -17,6 +17,9 @@ import tomllib
 import zipfile
 from pathlib import Path
 
+sys.path.insert(0, str(Path(__file__).parent))
+from shipped_kernels import add_kernels
+
 ROOT = Path(__file__).resolve().parent.parent
 BUILD = ROOT / "build"
 WHEELS, STAGING, DIST = BUILD / "wheels", BUILD / "staging", BUILD / "dist"
@@ -46,6 +49,9 @@ def main() -> int:
         return 2
     wheels = {platform: download_wheels(platform) for platform in platforms}
     stage(wheels)
+    for platform in platforms:
+        for python in PYTHONS:
+            add_kernels(STAGING, platform, python, wheels[platform])
     shutil.rmtree(DIST, ignore_errors=True)
     DIST.mkdir(parents=True)
     blender_extension("build", "--source-dir", str(STAGING), "--output-dir", str(DIST), "--split-platforms")

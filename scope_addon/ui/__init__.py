@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import bpy
 
-from . import command, drop, export_operators, preferences
+from . import command, drop, export_operators, preferences, warm_up
 from .capture import capture_operators, capture_panel, capture_properties
 from .edit import edit_operators, edit_panel, key_operators
 from .retarget import retarget_operators, retarget_panel, retarget_properties
@@ -34,6 +34,7 @@ def register() -> None:
         retarget_properties.attach()
         command.register()
         view_after_undo.attach()
+        warm_up.attach()
     except Exception:
         for cls in reversed(registered):
             bpy.utils.unregister_class(cls)
@@ -43,6 +44,7 @@ def register() -> None:
 def unregister() -> None:
     """Stop a running capture, and unregister everything."""
     capture_operators.end_capture()
+    warm_up.detach()
     view_after_undo.detach()
     command.unregister()
     retarget_properties.detach()

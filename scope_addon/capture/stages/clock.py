@@ -7,6 +7,9 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
+COMPILING = (
+    "compiling the solver"  # a stage of the first capture on a computer, where no machine code is shipped for it
+)
 # Called with the stage's name, the steps done and the total (0: unknown). May raise CancelledError.
 Progress = Callable[[str, int, int], None]
 
