@@ -16,12 +16,12 @@ from typing import Any, NoReturn
 
 from ..solver.errors import ScopeError
 from ..solver.loaders.body_file import ASSETS
-from .capture.media.file_names import shown
 from .command_line.arguments import add_options, body_and_options, non_default_arguments, path_argument
 from .command_line.outputs import check_blender, check_outputs, checked_rig, distinct_paths, summary, write_outputs
 from .command_line.signals import interrupted, stopped_by_signals
 from .command_line.terminal import ProgressBar, say, stdout_for_report
 from .errors import UsageError, exit_status, system_error_message
+from .footage import shown
 from .installed import CAPTURE, check_installed
 from .job.parent import stop_with_parent
 from .scene.export.output_paths import SUFFIXES

@@ -9,8 +9,8 @@ import sys
 import numpy as np
 import pytest
 from scope.scope_addon import cli
-from scope.scope_addon.capture.media.file_names import shown
 from scope.scope_addon.cli import SAMPLE, main
+from scope.scope_addon.footage import shown
 from scope.scope_addon.motion import Motion
 
 

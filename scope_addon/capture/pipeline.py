@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from ...solver.body import Body
+from ..footage import shown
 from ..motion import Motion
-from .media.file_names import shown
 from .media.video import Video, open_video
 from .options import CaptureOptions, check_options
 from .stages.clock import Progress, StageClock

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ...solver.body import Body
-from ..capture.media.file_names import shown
 from ..errors import UsageError
+from ..footage import shown
 from ..installed import check_installed
 from ..motion import Motion
 from ..options import option

@@ -21,9 +21,8 @@ from typing import IO, Any
 
 from ...solver.errors import InputError
 from ..atomic_write import atomic_path
-from ..capture.media.file_names import shown
 from ..errors import NO_PERSON, OutputError, UsageError, system_error_message
-from ..footage import FOOTAGE_SUFFIXES, PICTURE_SUFFIXES
+from ..footage import FOOTAGE_SUFFIXES, PICTURE_SUFFIXES, shown
 from .clips import OVERLAY, find_clips
 from .parent import GRACE_S
 from .request import code_version

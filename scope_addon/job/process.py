@@ -15,8 +15,8 @@ from pathlib import Path
 from typing import Any
 
 from ...solver.errors import ScopeError
-from ..capture.media.file_names import shown
 from ..errors import SetupError
+from ..footage import shown
 from .request import WARM_UP, JobRequest
 from .start_worker import worker_command
 

@@ -1,33 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""File names that are not UTF-8, as old discs and archives hold them on Linux.
-
-Python keeps such bytes as lone surrogates. Text with them can name a file, but cannot be printed, be part of JSON or of
-Blender's names; and OpenCV's functions end the process with a segmentation fault.
-"""
+"""Opening files whose names are not UTF-8, at which OpenCV's functions end the process with a segmentation fault."""
 
 from __future__ import annotations
 
-import os
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from ...errors import VideoError
-
-
-def shown(path: str | Path) -> str:
-    """Return a path as text for people and other programs: bytes that are not UTF-8 become U+FFFD."""
-    return os.fsencode(path).decode("utf-8", "replace") if not is_utf8(path) else str(path)
-
-
-def is_utf8(path: str | Path) -> bool:
-    """Return whether a path's characters are all of Unicode."""
-    try:
-        str(path).encode()
-    except UnicodeEncodeError:
-        return False
-    return True
+from ...footage import is_utf8, shown
 
 
 @contextmanager

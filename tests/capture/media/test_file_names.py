@@ -7,8 +7,9 @@ import subprocess
 import sys
 
 import pytest
-from scope.scope_addon.capture.media.file_names import is_utf8, shown, utf8_name
+from scope.scope_addon.capture.media.file_names import utf8_name
 from scope.scope_addon.cli import SAMPLE
+from scope.scope_addon.footage import is_utf8, shown
 
 NAME = os.fsdecode(b"caf\xe9.png")
 
