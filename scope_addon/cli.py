@@ -29,6 +29,7 @@ from .command_line.outputs import (
 from .command_line.signals import interrupted, stopped_by_signals
 from .command_line.terminal import ProgressBar, say, stdout_for_report
 from .errors import UsageError, exit_status, system_error_message
+from .footage import shown
 from .installed import CAPTURE, check_installed
 from .job.parent import stop_with_parent
 from .scene.export.output_paths import SUFFIXES
@@ -117,7 +118,7 @@ def main(argv: Sequence[str] | None = None, program: Sequence[str] = PROGRAM) ->
                 stop_with_parent()
             report = args.run(args)
             if args.json:
-                print(json.dumps(report), file=stdout, flush=True)
+                print(shown(json.dumps(report, ensure_ascii=False)), file=stdout, flush=True)
         return int(report.get("exit_status", 0))
     except ScopeError as error:
         print(f"scope: {error}", file=sys.stderr)

@@ -21,6 +21,9 @@ import zipfile
 from dataclasses import dataclass
 from pathlib import Path
 
+sys.path.insert(0, str(Path(__file__).parent))
+from shipped_kernels import add_kernels
+
 ROOT = Path(__file__).resolve().parent.parent
 BUILD = ROOT / "build"
 WHEELS, STAGING, DIST, OTHER_DIST = BUILD / "wheels", BUILD / "staging", BUILD / "dist", BUILD / "dist_any_blender"
@@ -97,7 +100,9 @@ def main() -> int:
 
 def build(target: Target, folder: Path, website: str = "") -> Path:
     """Stage, zip, validate and check one target; return its zip."""
-    stage(target, download_wheels(target), website)
+    wheels = download_wheels(target)
+    stage(target, wheels, website)
+    add_kernels(STAGING, target.platform, target.python, wheels)
     version = tomllib.loads((STAGING / "blender_manifest.toml").read_text())["version"]
     archive = folder / target.file_name(version)
     blender_extension("build", "--source-dir", str(STAGING), "--output-filepath", str(archive))

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from ...solver.body import Body
 from ...solver.loaders.body_file import ASSETS
 from ..errors import UsageError
+from ..footage import shown
 from ..installed import check_installed
 from ..motion import Motion
 from ..options import option
@@ -132,7 +133,7 @@ def write_outputs(
 
         sequence = find_sequence(video, args.fps is not None)
         footage = sequence.paths[0] if sequence else video
-        options = replace(NEW_SCENE, name=video.stem, shape=args.shape_keys)
+        options = replace(NEW_SCENE, name=shown(video.stem), shape=args.shape_keys)
         separate = ExportOptions(separate=args.file_per_person, bvh_unit=args.bvh_unit)
         if rig is not None:
             from ..scene.rigs.rig_export import RigExportOptions, export_on_rig

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ...solver.body import Body
 from ..errors import MotionFileError, UsageError
+from ..footage import shown
 from ..kinematics.foot_skin import under_floor
 from ..motion import Motion
 from . import camera
@@ -116,7 +117,7 @@ def _build(
     options: BuildOptions,
     report: Progress,
 ) -> BuildResult:
-    name = options.name or Path(str(footage or motions[0].source or "capture")).stem
+    name = options.name or shown(Path(str(footage or motions[0].source or "capture")).stem)
     warnings: list[str] = []
     if options.frame_rate == "set":
         timing.set_scene_rate(scene, motions[0].mocap_framerate)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import bpy
 
-from . import command, drop, export_operators, preferences
+from . import command, drop, export_operators, preferences, warm_up
 from .capture import capture_operators, capture_panel, capture_properties, captures
 from .edit import edit_operators, edit_panel, key_operators
 from .pins import correction_operators, correction_panel, pin_tool, upright_operators
@@ -37,6 +37,7 @@ def register() -> None:
         command.register()
         correction_panel.attach()
         view_after_undo.attach()
+        warm_up.attach()
     except Exception:
         for cls in reversed(registered):
             bpy.utils.unregister_class(cls)
@@ -46,6 +47,7 @@ def register() -> None:
 def unregister() -> None:
     """Stop a running capture, and unregister everything."""
     capture_operators.end_capture()
+    warm_up.detach()
     view_after_undo.detach()
     correction_panel.detach()
     command.unregister()

@@ -28,11 +28,17 @@ _LOG = logging.getLogger(__name__)
 _ANNOTATION = 6  # index in what numba reduces a result to: the annotated source, of no use and with the machine's paths
 
 
-class Compilation:
-    """How many kernels this process had to compile so far, and whether their code could not be kept."""
+_compiling: list[Path] = []  # of each kernel that this process had to compile so far: the folder of its source
+_refused: list[OSError] = []  # why code could not be kept
+_announced: list[Path] = []  # the folder of which that has been said, once in a process
 
-    kernels = 0
-    is_refused = False
+
+def compiled_kernels(sources: Path = SOLVER) -> int:
+    """Return how many kernels this process had to compile so far, those in progress included.
+
+    :param sources: only those in this folder count.
+    """
+    return sum(sources == folder or sources in folder.parents for folder in list(_compiling))
 
 
 class CodeCache(_Cache):
@@ -41,7 +47,8 @@ class CodeCache(_Cache):
     def __init__(self, function: Callable[..., Any]) -> None:
         code = function.__code__
         self._function = function.__module__, function.__qualname__, code.co_firstlineno
-        self._area = _area_of(function.__module__, Path(inspect.getfile(function)).parent)
+        self._source = Path(inspect.getfile(function)).parent
+        self._area = _area_of(function.__module__, self._source)
         name = f"{function.__module__.rpartition('.')[2]}.{function.__qualname__}"
         self._name = name.replace("<", "").replace(">", "")
         # What a closure refers to is not in the sources.
@@ -74,7 +81,7 @@ class CodeCache(_Cache):
             if not trusted:
                 _used(self._area, folder)
             return result
-        Compilation.kernels += 1
+        _compiling.append(self._source)
         return None
 
     def save_overload(self, sig: Any, data: Any) -> None:
@@ -86,13 +93,13 @@ class CodeCache(_Cache):
             try:
                 write_code(folder / self._file_name(sig), self._key(sig), payload)
             except OSError as error:
-                refusal = error
+                _refused.append(error)
                 continue
             _used(self._area, folder)
             return
-        if not Compilation.is_refused:
-            Compilation.is_refused = True
-            reason = refusal.strerror or refusal
+        if not _announced:
+            _announced.append(folder)
+            reason = _refused[-1].strerror or _refused[-1]
             _LOG.warning("The compiled solver cannot be kept in %s (%s): it works, but starts slowly.", folder, reason)
 
     def enable(self) -> None:

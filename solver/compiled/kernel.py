@@ -81,4 +81,4 @@ def announce_compilation(dispatcher: Any) -> None:
     """
     if not is_compiled(dispatcher) and dispatcher not in _announced:
         _announced.add(dispatcher)
-        _LOG.warning("Compiling the solver for this machine, once: 10 to 20 seconds.")
+        _LOG.warning("Compiling the solver for this machine, once: a minute or two.")

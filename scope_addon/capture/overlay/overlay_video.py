@@ -24,6 +24,7 @@ from ...atomic_write import atomic_path, reason
 from ...errors import OutputError
 from ...motion import Motion
 from ..camera.intrinsics import scaled_intrinsics
+from ..media.file_names import utf8_name
 from ..media.frame import Frame
 from ..media.video import Video, open_video
 from ..media.video_range import FootageRange
@@ -293,7 +294,8 @@ def _write_video(temporary: Path, painter: _Painter, video: Video, path: Path, p
 def _open_writer(temporary: Path, fps: float, width: int, height: int, path: Path) -> cv2.VideoWriter:
     for codec, backend in _CODECS:
         fourcc = cv2.VideoWriter.fourcc(*codec)
-        writer = cv2.VideoWriter(str(temporary), backend, fourcc, fps, (width, height))
+        with utf8_name(temporary) as name:
+            writer = cv2.VideoWriter(name, backend, fourcc, fps, (width, height))
         if writer.isOpened():
             return writer
         writer.release()
@@ -302,7 +304,8 @@ def _open_writer(temporary: Path, fps: float, width: int, height: int, path: Pat
 
 def _is_readable(video: Path) -> bool:
     """Check if a video can be read, that is, has its index, which is written last."""
-    reader = cv2.VideoCapture(str(video))
+    with utf8_name(video) as name:
+        reader = cv2.VideoCapture(name)
     try:
         return reader.isOpened() and reader.grab()
     finally:

@@ -40,7 +40,7 @@ class CaptureJob:
         :raises ScopeError: a setting is invalid, or the worker cannot be started.
         """
         self._cache: Cache = cache()
-        self.progress = JobProgress(first_use=not self._cache.has_kernels)
+        self.progress = JobProgress()
         self.cancel_requested = False
         self._scene_uid = scene.session_uid
         self._options = build_options(scene)

@@ -12,6 +12,7 @@ from bpy.props import StringProperty
 
 from ...footage import FOOTAGE_SUFFIXES
 from ...job.progress import duration
+from .. import warm_up
 from ..reporting import sentence
 from ..view.view_operators import frame_selected, hide_startup_cube
 from . import preview_picture
@@ -157,6 +158,7 @@ class SCOPE_OT_capture(bpy.types.Operator):
             return self._fail(f"a part of Scope cannot be loaded ({error}); reinstall the extension")
         from ....solver.errors import ScopeError
 
+        warm_up.stop()  # its processor time is the capture's; what it has compiled is kept
         try:
             state.job = CaptureJob(context.scene)
         except (ScopeError, OSError) as error:

@@ -9,6 +9,7 @@ from pathlib import Path
 import bpy
 
 from ...job.progress import JobProgress, duration
+from .. import warm_up
 from ..export_operators import FORMATS, is_available
 from ..view.comparison import camera_of, is_looking_through, side_area
 from . import preview_picture
@@ -51,6 +52,7 @@ class SCOPE_PT_capture(Tab, bpy.types.Panel):
             row = layout.row()
             row.scale_y = 1.6
             row.operator("scope.capture", icon="ARMATURE_DATA")
+            warm_up.draw(layout)
         if state.message and state.scene_uid == context.scene.session_uid:
             _draw_text(context, layout.box(), state.message, "ERROR")
 

@@ -319,7 +319,22 @@ def test_progress_shows_stage_speed_and_remaining_time():
     progress.update("finding the shape", 0, 0)
     assert progress.fraction > before
     assert progress.seconds_left is None
-    assert len(JobProgress(first_use=True).lines()) == 1
+
+
+def test_compiling_has_its_own_progress_and_no_remaining_time():
+    now = [0.0]
+    progress = JobProgress(clock=lambda: now[0])
+    for second in range(10, 51, 10):
+        now[0] = float(second)
+        progress.update("finding the person", 2 * second, 100)
+    before, left = progress.fraction, progress.seconds_left
+    for second in range(50, 150):
+        now[0] = float(second)
+        progress.update("compiling the solver", second - 50, 100)
+        assert progress.lines() == [f"Compiling the solver (first capture only), {second - 50} of 100"]
+    progress.update("finding the shape", 1, 100)
+    assert progress.fraction == pytest.approx(before, abs=0.01)
+    assert progress.seconds_left == pytest.approx(left, rel=0.1)
 
 
 @pytest.mark.parametrize(
