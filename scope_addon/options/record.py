@@ -18,6 +18,7 @@ class Place(enum.Flag):
     CAPTURE = enum.auto()  # a field of CaptureOptions, which experiments set as well
     PANEL = enum.auto()  # a property of the scene
     PREFERENCES = enum.auto()  # a property of the extension's preferences
+    IMPORT = enum.auto()  # an argument of the command that imports motion files
 
 
 @dataclass(frozen=True)

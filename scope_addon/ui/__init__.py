@@ -9,14 +9,14 @@ from __future__ import annotations
 
 import bpy
 
-from . import command, drop, export_operators, preferences
+from . import command, drop, export_operators, import_operators, preferences
 from .capture import capture_operators, capture_panel, capture_properties, captures
 from .edit import edit_operators, edit_panel, key_operators
 from .retarget import retarget_operators, retarget_panel, retarget_properties
 from .view import view_after_undo, view_operators
 
 _MODULES = (
-    *(capture_properties, preferences, capture_operators, export_operators, view_operators, drop),
+    *(capture_properties, preferences, capture_operators, export_operators, import_operators, view_operators, drop),
     *(edit_operators, key_operators, retarget_properties, retarget_operators),
     *(captures, capture_panel, edit_panel, retarget_panel),
 )
@@ -34,6 +34,7 @@ def register() -> None:
         retarget_properties.attach()
         command.register()
         view_after_undo.attach()
+        import_operators.attach()
     except Exception:
         for cls in reversed(registered):
             bpy.utils.unregister_class(cls)
@@ -43,6 +44,7 @@ def register() -> None:
 def unregister() -> None:
     """Stop a running capture, and unregister everything."""
     capture_operators.end_capture()
+    import_operators.detach()
     view_after_undo.detach()
     command.unregister()
     retarget_properties.detach()
