@@ -17,6 +17,7 @@ from typing import Any, NoReturn
 from ..solver.errors import ScopeError
 from ..solver.loaders.body_file import ASSETS
 from .command_line.arguments import add_options, body_and_options, non_default_arguments, path_argument
+from .command_line.import_command import add_import
 from .command_line.outputs import (
     check_blender,
     check_outputs,
@@ -56,6 +57,7 @@ def build_parser() -> argparse.ArgumentParser:
     batch.set_defaults(run=run_batch)
     _add_batch_files(batch)
     add_options(batch)
+    add_import(commands.add_parser("import", help="convert a motion file, of Scope or of another SMPL-based tool"))
     return parser
 
 

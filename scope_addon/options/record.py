@@ -19,6 +19,7 @@ class Place(enum.Flag):
     PANEL = enum.auto()  # a property of the scene
     PREFERENCES = enum.auto()  # a property of the extension's preferences
     EXPORT = enum.auto()  # a property of the export operator
+    IMPORT = enum.auto()  # an argument of the command that imports motion files
 
 
 @dataclass(frozen=True)

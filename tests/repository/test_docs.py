@@ -202,7 +202,7 @@ def folder(tmp_path, monkeypatch):
 
 
 def parsed(words: list[str]) -> argparse.Namespace:
-    """A capture or batch, its footage and body replaced by the sample clip and the default body."""
+    """A capture, batch or import, its footage and body replaced by the sample clip and the default body."""
     start = words.index("scope") + 1 if words[0] == "blender" else 0
     argv = [Path(words[start]).name, *words[start + 1 :]]
     args = build_parser().parse_args(argv)
@@ -217,9 +217,10 @@ def test_every_command_would_be_accepted(words, folder):
     if Path(words[-1]).name == "--help":
         with pytest.raises(SystemExit, match="0"):
             parsed(words)
-    elif words[0] in ("./scripts/capture", "./scripts/batch", "blender"):
+    elif words[0] in ("./scripts/capture", "./scripts/batch", "./scripts/import", "blender"):
         args = parsed(words)
-        body_and_options(args)
+        if args.command != "import":
+            body_and_options(args)
         for path in getattr(args, "output", []):
             check_output(path)
     elif words[0].startswith("./"):

@@ -43,8 +43,11 @@ class SCOPE_PT_capture(Tab, bpy.types.Panel):
             row.scale_y = 1.6
             row.operator("scope.choose_footage", icon="FILE_MOVIE")
             column.operator("scope.use_sample", icon="PLAY")
+            column.operator("scope.import_motion", icon="IMPORT")
             return
-        column.prop(settings, "footage", text="", icon="FILE_MOVIE")
+        row = column.row(align=True)
+        row.prop(settings, "footage", text="", icon="FILE_MOVIE")
+        row.operator("scope.import_motion", text="", icon="IMPORT")
         column.row(align=True).prop(settings, "quality", expand=True)
         if state.job is not None:
             _draw_progress(context, layout, state.job.progress)
