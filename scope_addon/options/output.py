@@ -61,7 +61,7 @@ OUTPUT_OPTIONS = (
         "bvh_unit",
         str,
         "cm",
-        Place.COMMAND_LINE | Place.EXPORT,
+        Place.COMMAND_LINE | Place.IMPORT | Place.EXPORT,
         "unit of length in .bvh files",
         choices=BVH_UNITS,
         blender=Property(label="Unit"),
