@@ -139,7 +139,10 @@ class SCOPE_OT_remove_correction(EditOperator):
     index: IntProperty(name="Number", default=-1, min=-1, description="Counted from 0; -1 removes all")
 
     def edit(self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float) -> str:
-        """Remove it and change the keys back."""
+        """Remove it and change the keys back.
+
+        :raises UsageError: there is no correction of this number.
+        """
         from ...errors import UsageError
 
         count = len(listed_corrections(armature))
