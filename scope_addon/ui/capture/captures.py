@@ -63,14 +63,13 @@ class SCOPE_UL_captures(bpy.types.UIList):
         _settings: bpy.types.PropertyGroup,
         _active_property: str,
     ) -> None:
-        """Draw one capture: its name, people, frames, and whether it has warnings; grey without an armature."""
+        """Draw one capture: its name, its people, and whether it has warnings; grey without an armature."""
         people, result = people_of(item), item.scope_result
-        row = layout.split(factor=0.5, align=True)
+        row = layout.split(factor=0.6, align=True)
         row.active = bool(people)
         row.prop(item, "name", text="", emboss=False, icon="OUTLINER_COLLECTION" if people else "GHOST_DISABLED")
         details = row.row(align=True)
-        text = counted(len(people), "person", "people") if people else "removed"
-        details.label(text=f"{text}, {result.frames} fr." if people and result.frames else text)
+        details.label(text=counted(len(people), "person", "people") if people else "removed")
         details.label(text="", icon="ERROR" if people and len(result.warnings) else "BLANK1")
 
     def filter_items(
