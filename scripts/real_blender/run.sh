@@ -5,6 +5,21 @@ set -euo pipefail
 cd /scope
 log=out/$1.log
 
+# A part's home is a copy of the installed one, mounted over it: compiled code is bound to the path of its source. It
+# begins with the code that other parts have compiled by then.
+separate_home() {
+    local own=homes/$1 compiled
+    mkdir -p homes
+    rm -rf "$own"
+    cp -al home "$own"
+    find "$own" -name userpref.blend -exec cp {} {}.own \; -exec mv {}.own {} \;
+    while read -r compiled; do
+        mkdir -p "$own/${compiled#homes/*/}"
+        cp -rn "$compiled/." "$own/${compiled#homes/*/}" || true # what is being written is compiled once more
+    done < <(find homes -path "homes/$1" -prune -o -path '*/.user/*' -name kernels -print -prune)
+    mount --bind "$own" home
+}
+
 on_screen() { # a command, with a separate virtual screen
     local status=0
     Xvfb :7 -screen 0 1600x1000x24 >/dev/null 2>&1 &
@@ -22,6 +37,7 @@ in_window() { # a script of this folder in a Blender
     on_screen blender --python-exit-code 1 --python "parts/$script" -- "$@"
 }
 
+case $1 in install | startup) ;; *) separate_home "$1" ;; esac
 case $1 in
     install)
         blender --background --command extension install-file --repo user_default --enable scope.zip >"$log" 2>&1 ||
