@@ -30,7 +30,9 @@ def atomic_path(path: Path) -> Iterator[Path]:
     :raises OutputError: ``path`` exists and is not a regular file.
     """
     target = resolve_link(path)
-    start = path.stem[:40]  # short enough for the limit on file names, even where a letter takes several bytes
+    # Short enough for the limit on file names, even where a letter takes several bytes, and without bytes that are not
+    # UTF-8, at which exporters fail.
+    start = path.stem[:40].encode("utf-8", "ignore").decode()
     handle, name = tempfile.mkstemp(prefix=f".{start}.", suffix=path.suffix.lower(), dir=target.parent)
     temporary = Path(name)
     _temporary_files.add(temporary)

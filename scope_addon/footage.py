@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Recognize footage by file names. Standard library only, so that menus and command lines load quickly."""
+"""Recognize footage by file names, and show these. Standard library only: menus and command lines load it quickly."""
 
+import os
 import re
 from pathlib import Path
 
@@ -45,6 +46,24 @@ def numbered_from(first: Path) -> list[Path]:
         return []
     before, after = first.stem[: number.start()], first.stem[number.end() :] + first.suffix
     return numbered(first.parent, before, after, int(number.group()))
+
+
+def shown(path: str | Path) -> str:
+    """Return a path as text for people and other programs: bytes that are not UTF-8 become U+FFFD.
+
+    Old discs and archives hold such names, and Python keeps the bytes as lone surrogates. Text with them can name a
+    file, but cannot be printed, or be part of JSON or of Blender's names.
+    """
+    return os.fsencode(path).decode("utf-8", "replace") if not is_utf8(path) else str(path)
+
+
+def is_utf8(path: str | Path) -> bool:
+    """Return whether a path's characters are all of Unicode."""
+    try:
+        str(path).encode()
+    except UnicodeEncodeError:
+        return False
+    return True
 
 
 def _natural_order(path: Path) -> list[tuple[int, int, str]]:

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from scope.scope_addon import cli
 from scope.scope_addon.cli import SAMPLE, main
+from scope.scope_addon.footage import shown
 from scope.scope_addon.motion import Motion
 
 
@@ -153,15 +154,41 @@ def test_an_interrupt_during_the_overlay_leaves_complete_files(tmp_path, capsys,
     assert files_below(tmp_path) == ["a.npz"]
 
 
-def test_a_picture_gives_a_motion_of_one_frame_and_only_json_on_stdout(tmp_path):
+def test_no_command_writes_into_scopes_own_folders(tmp_path, capfd, monkeypatch):
+    def state():
+        files = [p for name in ("assets", "scope_addon", "solver") for p in (SAMPLE.parents[2] / name).rglob("*")]
+        kept = [p for p in files if p.is_file() and "__pycache__" not in p.parts]  # Python's own
+        return {str(p): (p.stat().st_size, p.stat().st_mtime_ns) for p in kept}
+
+    monkeypatch.chdir(tmp_path)
+    before = state()
+    brief = ["--quality", "fast", "--end", "0.1"]
+    for argv in (
+        ["capture", *brief],
+        ["capture", SAMPLE, *brief, "--overlay", "check.mp4"],
+        ["batch", SAMPLE.parent, "--out", "motions", "--formats", "npz", *brief],
+    ):
+        status, _, err = run(capfd, *argv)
+        assert status == 0, err
+        assert state() == before
+    made = ["check.mp4", "motions", "motions/sample.npz", "motions/scope-batch.json", "sample.glb", "sample.npz"]
+    assert files_below(tmp_path) == made
+
+
+NOT_UTF8 = os.fsdecode(b"person \xe9")
+ON_LINUX = pytest.mark.skipif(sys.platform != "linux", reason="file names are Unicode on this system")
+
+
+@pytest.mark.parametrize("name", ["person", pytest.param(NOT_UTF8, marks=ON_LINUX)])
+def test_a_picture_gives_a_motion_of_one_frame_and_only_json_on_stdout(tmp_path, name):
     import cv2
 
-    picture = tmp_path / "person.png"
+    picture = tmp_path / f"{name}.png"
     capture = cv2.VideoCapture(str(SAMPLE))
     ok, frame = capture.read()
     assert ok
-    cv2.imwrite(str(picture), frame)
-    outputs = [tmp_path / "out.npz", tmp_path / "out.glb"]
+    picture.write_bytes(cv2.imencode(".png", frame)[1].tobytes())
+    outputs = [tmp_path / f"{name}.npz", tmp_path / f"{name}.glb"]
     argv = [
         sys.executable,
         "-m",
@@ -170,21 +197,23 @@ def test_a_picture_gives_a_motion_of_one_frame_and_only_json_on_stdout(tmp_path)
         picture,
         "--json",
         "--overlay",
-        tmp_path / "o.png",
+        tmp_path / f"{name}.o.png",
     ]
     for path in outputs:
         argv += ["-o", path]
-    done = subprocess.run(list(map(str, argv)), capture_output=True, text=True, env=dict(os.environ), check=False)
+    done = subprocess.run(list(map(os.fsencode, argv)), capture_output=True, env=dict(os.environ), check=False)
     assert done.returncode == 0, done.stderr
-    report = json.loads(done.stdout)
+    report = json.loads(done.stdout.decode())
+    json.dumps(report, ensure_ascii=False).encode()  # no half characters
     assert report["frames"] == 1
     assert report["people"] == 1
-    assert set(report["outputs"]) == {str(p) for p in [*outputs, tmp_path / "o.png"]}
+    assert set(report["outputs"]) == {shown(p) for p in [*outputs, tmp_path / f"{name}.o.png"]}
     assert {"fps", "reprojection_px", "warnings"} <= set(report)
-    motion = Motion.load(tmp_path / "out.npz")
+    motion = Motion.load(outputs[0])
     assert len(motion) == 1
     assert motion.valid.all()
-    assert cv2.imread(str(tmp_path / "o.png")).shape == frame.shape
+    overlay = np.frombuffer((tmp_path / f"{name}.o.png").read_bytes(), np.uint8)
+    assert cv2.imdecode(overlay, cv2.IMREAD_COLOR).shape == frame.shape
 
 
 def test_help_lists_every_option(capsys):

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from ...solver.body import Body
+from ..footage import shown
 from ..motion import Motion
 from .media.video import Video, open_video
 from .options import CaptureOptions, check_options
@@ -65,7 +66,7 @@ def _shot(video: Video, body: Body, options: CaptureOptions, footage: Footage) -
         footage.lines,
         video.fps,
         (video.width, video.height),
-        Path(video.path).name,
+        shown(Path(video.path).name),
         options.smoothing and frames > 1,
         options.ablation,
     )

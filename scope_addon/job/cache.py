@@ -3,13 +3,14 @@
 
 - ``captures/<key>/report.json``, ``person1.npz``, …: a finished capture
 - ``jobs/<name>/``: a capture that is being written; it is moved to ``captures`` when it is complete
-- ``kernels/``: the machine code that numba compiled
+- ``kernels/``: the machine code that was compiled here. Clearing keeps it, except for that of replaced versions
 """
 
 from __future__ import annotations
 
 import json
 import os
+import re
 import shutil
 import tempfile
 import time
@@ -20,6 +21,9 @@ from pathlib import Path
 from typing import Any
 
 REPORT = "report.json"
+_VERSION = re.compile(
+    r"(\w+-[0-9a-f]{8})-[0-9a-f]{12}"
+)  # a folder of solver/compiled/code_folders.py, less its program
 _ABANDONED_S = 24 * 3600.0  # age above which a job folder belongs to no running process
 
 
@@ -41,11 +45,6 @@ class Cache:
     def kernels(self) -> Path:
         """Folder where the worker's numba stores compiled code."""
         return self.root / "kernels"
-
-    @property
-    def has_kernels(self) -> bool:
-        """Whether an earlier capture has compiled the solver."""
-        return any(file.suffix == ".nbi" for file in _files(self.kernels))
 
     def find(self, key: str) -> CachedCapture | None:
         """Return the finished capture with this key; None if there is none."""
@@ -96,11 +95,14 @@ class Cache:
         return CachedCapture([target / name for name in motions], report)
 
     def size(self) -> int:
-        """Return the size of finished captures and compiled code in bytes."""
+        """Return in bytes what clearing frees: finished captures, and code compiled by replaced versions."""
         return sum(_size(folder) for folder in self._owned())
 
     def clear(self) -> int:
-        """Remove finished captures and compiled code, but not running jobs; return the number of bytes freed."""
+        """Remove finished captures and replaced versions' code; return the number of bytes freed.
+
+        Running jobs and the compiled code in use are kept.
+        """
         before = self.size()
         for folder in self._owned():
             shutil.rmtree(folder, ignore_errors=True)
@@ -124,7 +126,19 @@ class Cache:
         )
 
     def _owned(self) -> list[Path]:
-        return [self.root / "captures", self.kernels]
+        return [self.root / "captures", *self._replaced_kernels()]
+
+    def _replaced_kernels(self) -> list[Path]:
+        """Return the folders of code that another version has replaced, or that numba's own cache had made."""
+        newest: set[str] = set()
+        replaced = []
+        for path, _ in _by_time(self.kernels):
+            version = _VERSION.fullmatch(path.name)
+            if version is None or version[1] in newest:
+                replaced.append(path)
+            else:
+                newest.add(version[1])
+        return [path for path in replaced if path.is_dir()]
 
 
 def _by_time(folder: Path) -> list[tuple[Path, float]]:

@@ -55,7 +55,7 @@ class PreviewWriter:
         self._path, self._send = folder / FILE, send
         self._last = -np.inf
         self._pool = ThreadPoolExecutor(2, "scope-preview")
-        self._rasterizer = self._pool.submit(_load_rasterizer)
+        self._rasterizer = self._pool.submit(load_rasterizer)
         self._drawing: Future[None] | None = None
         self._open, self._writing = True, threading.Lock()
 
@@ -93,7 +93,7 @@ class PreviewWriter:
             self._send("preview", file=FILE, width=width, height=height, frame=frame.index)
 
 
-def _load_rasterizer() -> None:
+def load_rasterizer() -> None:
     """Compile the rasterizer by drawing a triangle."""
     corners = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]])
     draw_overlay(np.zeros((8, 8, 3), np.uint8), corners, np.array([[0, 1, 2]]), np.diag([4.0, 4.0, 1.0]), np.zeros(5))

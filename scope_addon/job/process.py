@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import contextlib
 import json
-import os
 import queue
 import shutil
 import subprocess
@@ -17,7 +16,9 @@ from typing import Any
 
 from ...solver.errors import ScopeError
 from ..errors import SetupError
-from .request import JobRequest
+from ..footage import shown
+from .request import WARM_UP, JobRequest
+from .start_worker import worker_command
 
 ROOT = Path(__file__).resolve().parents[2]
 START_SCRIPT = Path(__file__).with_name("start_worker.py")
@@ -34,7 +35,7 @@ class WorkerProcess:
 
     def __init__(
         self,
-        request: JobRequest,
+        request: JobRequest | None,
         job_folder: Path,
         kernels: Path | None,
         python: Sequence[str] = (sys.executable,),
@@ -42,6 +43,7 @@ class WorkerProcess:
     ) -> None:
         """Start the worker.
 
+        :param request: the capture; None to compile what captures need.
         :param job_folder: folder for the worker's files.
         :param kernels: folder for the code that numba compiles; if None, next to the sources.
         :param python: interpreter and its arguments; inside Blender ``[sys.executable, *bpy.app.python_args]``.
@@ -50,10 +52,7 @@ class WorkerProcess:
         """
         self.job_folder = job_folder
         self.finished = False
-        # An empty entry means the current folder, which isolated Python omits on purpose.
-        search_path = [p for p in sys.path if p and os.path.exists(p)]
-        command = [*python, str(script), str(ROOT), str(job_folder), *search_path]
-        environment = dict(os.environ, **({"NUMBA_CACHE_DIR": str(kernels)} if kernels else {}))
+        command, environment = worker_command(python, ROOT, job_folder, kernels, script)
         try:
             with (job_folder / LOG).open("wb") as log:
                 self._process = subprocess.Popen(
@@ -71,7 +70,7 @@ class WorkerProcess:
         threading.Thread(target=self._read, name="scope-worker-lines", daemon=True).start()
         with contextlib.suppress(OSError):  # the worker has ended already; poll() reports that
             assert self._process.stdin is not None
-            self._process.stdin.write(request.to_json().encode() + b"\n")
+            self._process.stdin.write((request.to_json() if request else WARM_UP).encode() + b"\n")
             self._process.stdin.flush()
 
     @property
@@ -103,7 +102,7 @@ class WorkerProcess:
             if message is None:
                 continue
             if message["event"] == "error":
-                raise WorkerFailedError(str(message.get("message", "the capture failed")))
+                raise WorkerFailedError(shown(str(message.get("message", "the capture failed"))))
             self.finished = self.finished or message["event"] == "result"
             messages.append(message)
 

@@ -6,6 +6,8 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
+from ..capture.stages.clock import COMPILING
+
 # Share of the total time that each stage of a capture takes, in order; measured on clips of 10 to 40 seconds.
 STAGES = {
     "starting": 0.02,
@@ -17,16 +19,19 @@ STAGES = {
 }
 
 
+# Stages that only the first capture after installation has; they take none of the others' shares.
+FIRST_ONLY = (COMPILING,)
+
+
 class JobProgress:
     """Convert the worker's progress messages to what the panel shows."""
 
-    def __init__(self, first_use: bool = False, clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         """Begin at 0.
 
-        :param first_use: whether the cache contains no compiled solver yet.
         :param clock: returns the time in seconds.
         """
-        self._clock, self._first_use = clock, first_use
+        self._clock = clock
         self._start = self._stage_start = clock()
         self._stage_first = 0  # frames done when the stage began
         self.stage, self.done, self.total = "starting", 0, 0
@@ -35,14 +40,11 @@ class JobProgress:
     def update(self, stage: str, done: int, total: int) -> None:
         """Take one progress message of the worker: ``done`` of ``total``, which is 0 if unknown."""
         if stage != self.stage:
+            if self.stage in FIRST_ONLY:  # the time left follows from the other stages' speed
+                self._start += self._clock() - self._stage_start
             self.stage, self._stage_start, self._stage_first = stage, self._clock(), done
         self.done, self.total = done, total
         self.fraction = max(self.fraction, self._fraction_at_stage())
-
-    @property
-    def compiling(self) -> bool:
-        """Whether the solver is being compiled, as in the first capture after installation."""
-        return self._first_use and self.stage == "finding the shape"
 
     def _fraction_at_stage(self) -> float:
         """Return the completed fraction of the job. A stage without a total counts as not begun."""
@@ -57,24 +59,25 @@ class JobProgress:
     def frames_per_second(self) -> float | None:
         """Speed of the current stage; None until it can be measured."""
         elapsed, frames = self._clock() - self._stage_start, self.done - self._stage_first
-        return frames / elapsed if self.total > 1 and frames > 0 and elapsed > 0.5 else None
+        is_measured = self.total > 1 and frames > 0 and elapsed > 0.5 and self.stage not in FIRST_ONLY
+        return frames / elapsed if is_measured else None
 
     @property
     def seconds_left(self) -> float | None:
         """Estimated remaining time of the job; None until it can be estimated."""
         elapsed, fraction = self._clock() - self._start, self.fraction
-        if elapsed < 2 or fraction < 0.05 or self.total == 0:
+        if elapsed < 2 or fraction < 0.05 or self.total == 0 or self.stage in FIRST_ONLY:
             return None
         return elapsed * (1 - fraction) / fraction
 
     def lines(self) -> list[str]:
         """Return the lines to show: the stage, and speed and remaining time if they are known."""
         stage = self.stage.capitalize()
+        if self.stage in FIRST_ONLY:
+            stage += " (first capture only)"
         if self.total > 0:
             stage += f", {self.done} of {self.total}"
         lines = [stage]
-        if self.compiling:
-            lines.append("First use: compiling the solver takes a minute")
         speed = [f"{self.frames_per_second:.1f} frames/s"] if self.frames_per_second else []
         left = [f"{duration(self.seconds_left)} left"] if self.seconds_left is not None else []
         if speed or left:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,7 @@ from typing import Any
 from ..errors import UsageError
 from ..options import Place, options_at
 
+WARM_UP = json.dumps({"warm_up": True})  # the request to compile what a capture needs, without capturing anything
 _SAMPLE_BYTES = 1 << 20  # hashed at the beginning and end of the footage; reading gigabytes would block the window
 
 
@@ -80,7 +82,7 @@ def _checked(values: Mapping[str, Any]) -> dict[str, Any]:
 def _add_file(digest: hashlib._Hash, path: Path) -> None:
     """Add name, size, modification time, first and last megabyte."""
     status = path.stat()
-    digest.update(f"{path.name} {status.st_size} {status.st_mtime_ns}".encode())
+    digest.update(os.fsencode(path.name) + f" {status.st_size} {status.st_mtime_ns}".encode())
     with path.open("rb") as file:
         digest.update(file.read(_SAMPLE_BYTES))
         file.seek(max(0, status.st_size - _SAMPLE_BYTES))

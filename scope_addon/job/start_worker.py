@@ -9,8 +9,23 @@ numpy and of the extension's wheels are passed as arguments.
 """
 
 import importlib.util
+import os
 import sys
+from collections.abc import Sequence
 from pathlib import Path
+
+
+def worker_command(
+    python: Sequence[str], root: Path, job_folder: Path, kernels: Path | None, script: Path = Path(__file__)
+) -> tuple[list[str], dict[str, str]]:
+    """Return the parent's command line for a worker, and the environment variables.
+
+    :param kernels: folder for the code that the solver compiles; if None, next to the sources.
+    """
+    # An empty entry means the current folder, which isolated Python omits on purpose.
+    search_path = [p for p in sys.path if p and os.path.exists(p)]
+    environment = dict(os.environ, **({"NUMBA_CACHE_DIR": str(kernels)} if kernels else {}))
+    return [*python, str(script), str(root), str(job_folder), *search_path], environment
 
 
 def load_package(root: Path) -> None:

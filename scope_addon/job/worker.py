@@ -16,9 +16,10 @@ from typing import IO, NoReturn
 from ...solver.errors import ScopeError
 from ..errors import exit_status, system_error_message
 from .parent import when_parent_ends
-from .request import JobRequest
+from .request import WARM_UP, JobRequest
 
 _REMOVAL_ATTEMPTS = 20  # an attempt fails if a file is created during it
+_NICENESS = 5  # of a capture, behind Blender's window; compiling ahead of it has the lowest priority
 _MIN_INTERVAL_S = 0.05  # between two progress messages of one stage
 
 
@@ -46,24 +47,19 @@ class Reporter:
         self.send("progress", stage=stage, done=done, total=total)
 
 
-def run(request: JobRequest, job_folder: Path, reporter: Reporter) -> int:
-    """Capture, write the results and return the exit status. Every failure is reported as an ``error`` message."""
+def run(request: JobRequest | None, job_folder: Path, reporter: Reporter) -> int:
+    """Do what is requested and return the exit status. Every failure is reported as an ``error`` message.
+
+    :param request: the capture; None to compile what captures need.
+    """
     try:
         reporter.progress("starting", 0, 0)
-        # Imported here, so that a missing package is reported in the panel.
-        from ...solver.loaders.body_file import load_body
-        from ..capture.options import capture_options
-        from ..capture.pipeline import capture
-        from .preview import PreviewWriter
+        if request is None:
+            from .warm_up import warm_up
 
-        with PreviewWriter(job_folder, reporter.send) as watch:
-            body, options = load_body(request.values["body"]), capture_options(request.values)
-            result = capture(request.footage, body, options, reporter.progress, watch)
-        names = [f"person{i + 1}.npz" for i in range(len(result.motions))]
-        reporter.progress("writing", 0, 0)
-        for name, motion in zip(names, result.motions, strict=True):
-            motion.save(job_folder / name)
-        reporter.send("result", motions=names, report=result.report)
+            reporter.send("result", compiled=warm_up(reporter.progress))
+        else:
+            _capture(request, job_folder, reporter)
         return 0
     except ScopeError as error:
         reporter.send("error", message=str(error))
@@ -80,6 +76,24 @@ def run(request: JobRequest, job_folder: Path, reporter: Reporter) -> int:
     return 1
 
 
+def _capture(request: JobRequest, job_folder: Path, reporter: Reporter) -> None:
+    """Capture and write the results."""
+    # Imported here, so that a missing package is reported in the panel.
+    from ...solver.loaders.body_file import load_body
+    from ..capture.options import capture_options
+    from ..capture.pipeline import capture
+    from .preview import PreviewWriter
+
+    with PreviewWriter(job_folder, reporter.send) as watch:
+        body, options = load_body(request.values["body"]), capture_options(request.values)
+        result = capture(request.footage, body, options, reporter.progress, watch)
+    names = [f"person{i + 1}.npz" for i in range(len(result.motions))]
+    reporter.progress("writing", 0, 0)
+    for name, motion in zip(names, result.motions, strict=True):
+        motion.save(job_folder / name)
+    reporter.send("result", motions=names, report=result.report)
+
+
 def main(job_folder: Path) -> NoReturn:
     """Run the worker process: the request on stdin, messages on stdout, everything else on stderr."""
     # Everything that libraries print to stdout, including from C, goes to stderr; the messages get the real stdout.
@@ -90,12 +104,13 @@ def main(job_folder: Path) -> NoReturn:
         _remove(job_folder)
         _exit(1)
     _exit_with_parent(job_folder)
-    _lower_priority()
     status = 1
     reporter = Reporter(stream)
     with contextlib.suppress(BrokenPipeError):
         try:
-            status = run(JobRequest.from_json(line), job_folder, reporter)
+            request = None if line.strip() == WARM_UP else JobRequest.from_json(line)
+            _lower_priority(_NICENESS if request else 19)
+            status = run(request, job_folder, reporter)
         except ScopeError as error:
             reporter.send("error", message=str(error))
     _exit(status)
@@ -130,8 +145,8 @@ def _remove(job_folder: Path) -> None:
             return
 
 
-def _lower_priority() -> None:
+def _lower_priority(niceness: int) -> None:
     """Lower the priority, so that Blender stays responsive; on Windows the parent starts the process with it."""
     if hasattr(os, "nice"):
         with contextlib.suppress(OSError):
-            os.nice(5)
+            os.nice(niceness)

@@ -4,8 +4,13 @@
 from __future__ import annotations
 
 import os
+import sys
+from importlib import import_module
+from pathlib import Path
 
 import bpy
+
+from ..job.start_worker import load_package
 
 _handle: object | None = None
 
@@ -14,12 +19,14 @@ def run(argv: list[str]) -> int:
     """Run the command line with the arguments after ``scope``; return the exit status. Blender calls this."""
     from .preferences import cache
 
-    # Not the worker's folder: compiled code contains the package's name, which differs.
-    os.environ.setdefault("NUMBA_CACHE_DIR", str(cache().root / "kernels" / "command"))
-    from ..cli import main
+    os.environ.setdefault("NUMBA_CACHE_DIR", str(cache().kernels))
+    # Compiled code contains the package's name: with the worker's, its code serves here too.
+    if "scope" not in sys.modules:
+        load_package(Path(__file__).resolve().parents[2])
+    main = import_module("scope.scope_addon.cli").main
 
     # A batch starts one Blender process per clip, because exports need Blender.
-    return main(argv, program=(bpy.app.binary_path, "--background", "--command", "scope"))
+    return int(main(argv, program=(bpy.app.binary_path, "--background", "--command", "scope")))
 
 
 def register() -> None:

@@ -59,12 +59,12 @@ class SCOPE_AP_preferences(bpy.types.AddonPreferences):
         layout.prop(self, "cache_limit_gb", text="Keep at Most (GB)")
         row = layout.row()
         row.alignment = "RIGHT"
-        row.label(text=f"{_size_text(_cache_size(cache().root))} in {cache().root}")
+        row.label(text=f"{_size_text(_cache_size(cache().root))} of captures in {cache().root}")
         row.operator("scope.clear_cache")
 
 
 class SCOPE_OT_clear_cache(bpy.types.Operator):
-    """Remove captured motion from the cache. Existing scenes are not affected"""
+    """Remove captured motion from the cache. Existing scenes and the compiled solver are not affected"""
 
     bl_idname = "scope.clear_cache"
     bl_label = "Clear Cache"

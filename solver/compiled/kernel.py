@@ -1,25 +1,19 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How every kernel of the solver is compiled, and when its cached machine code is still good."""
+"""How every kernel of the solver is compiled, and how its machine code is kept."""
 
 import logging
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 from numba import njit
+
+from .code_cache import CodeCache
 
 # Reordering sums and fusing multiplications is allowed; assuming that no NaN or infinity occurs is not, because the
 # optimizer must recognise them. The GIL is released, so that frames can be solved in threads.
 _OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": {"reassoc", "contract", "arcp", "nsz"}}
 
 
-def source_stamp() -> tuple[tuple[str, float, int], ...]:
-    """Return name, modification time and size of every source file that kernels may come from."""
-    files = sorted(Path(__file__).parent.parent.rglob("*.py"))
-    return tuple((f.name, s.st_mtime, s.st_size) for f in files for s in [f.stat()])
-
-
-_STAMP = source_stamp()
 _LOG = logging.getLogger(__name__)
 
 
@@ -29,9 +23,8 @@ def kernel(function: Callable[..., Any]) -> Any:
     It may not create arrays; views of those it is given are fine. So no references need to be counted, which would be
     two atomic operations for every array at every call.
 
-    Numba throws a cached kernel away when its own file has changed, but kernels are inlined into their callers in
-    other files, which would go on using the old code; so the stamp that numba compares covers all of them.
-    Where no folder can be written to, nothing is kept.
+    Kernels are inlined into their callers in other files, so that a change of any file of the solver makes all of their
+    code stale. Where no folder can be written to, nothing is kept.
     """
     return _compiled(function, _nrt=False)
 
@@ -59,27 +52,23 @@ def expanded_kernel(function: Callable[..., Any]) -> Any:
     return njit(**options)(function)
 
 
-def _compiled(function: Callable[..., Any], **options: Any) -> Any:
-    try:
-        compiled = njit(cache=True, **_OPTIONS, **options)(function)
-    except RuntimeError:  # numba found no place for its cache
-        return njit(**_OPTIONS, **options)(function)
-    cache_file = getattr(getattr(compiled, "_cache", None), "_cache_file", None)
-    # Not part of numba's interface: without it, numba's own rule stands.
-    if cache_file is not None and hasattr(cache_file, "_source_stamp"):
-        cache_file._source_stamp = _STAMP
+def cached(compiled: Any) -> Any:
+    """Keep the machine code of a function that `numba.njit` compiles, as that of a kernel.
+
+    A change of any source in its folder, or of the solver, makes it stale.
+    """
+    if hasattr(compiled, "_cache"):  # not where numba is told not to compile at all
+        compiled._cache = CodeCache(compiled.py_func)
     return compiled
 
 
+def _compiled(function: Callable[..., Any], **options: Any) -> Any:
+    return cached(njit(**_OPTIONS, **options)(function))
+
+
 def is_compiled(dispatcher: Any) -> bool:
-    """Whether a kernel's machine code is in memory or, still good, on disk."""
-    if dispatcher.signatures:
-        return True
-    cache_file = getattr(getattr(dispatcher, "_cache", None), "_cache_file", None)
-    try:
-        return cache_file is not None and bool(cache_file._load_index())
-    except Exception:  # not part of numba's interface: without it, or with a damaged index, say that it takes time
-        return False
+    """Whether a kernel's machine code is in memory or, as it seems, on disk."""
+    return bool(dispatcher.signatures) or dispatcher._cache.has_code()
 
 
 _announced: set[Any] = set()
@@ -92,4 +81,4 @@ def announce_compilation(dispatcher: Any) -> None:
     """
     if not is_compiled(dispatcher) and dispatcher not in _announced:
         _announced.add(dispatcher)
-        _LOG.warning("Compiling the solver for this machine, once: 10 to 20 seconds.")
+        _LOG.warning("Compiling the solver for this machine, once: a minute or two.")

@@ -100,3 +100,24 @@ def test_an_unwritable_folder_is_an_error(tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(OutputError, match="choose another folder"):
         Cache(tmp_path / "file" / "cache").new_job_folder()
+
+
+def test_clearing_keeps_compiled_code_except_that_of_replaced_versions(cache):
+    add(cache, "a", size=1000)
+    of_numba = cache.kernels / "gauss_newton_" / "optimizer.optimize-134.py311.nbi"
+    replaced, used, other = (
+        cache.kernels / name / "optimizer.optimize-0123456789ab.code"
+        for name in ("solver-01234567-000000000000", "solver-01234567-ffffffffffff", "solver-89abcdef-000000000000")
+    )
+    for path in (of_numba, replaced, used, other):
+        path.parent.mkdir(parents=True)
+        path.write_bytes(b"x" * 100)
+    marker = cache.kernels / "0123456789abcdef.ready"
+    marker.touch()
+    os.utime(replaced.parent, (1, 1))
+    freed = cache.size()
+    assert 1200 <= freed < 1300
+    assert cache.clear() == freed
+    assert cache.find("a") is None
+    assert [path.exists() for path in (of_numba, replaced, used, other, marker)] == [False, False, True, True, True]
+    assert cache.size() == 0

@@ -115,7 +115,7 @@ def test_previews_do_not_wait_for_the_rasterizer_to_compile(tmp_path, monkeypatc
 
     sent, compiled = [], threading.Event()
     monkeypatch.setattr(preview, "INTERVAL_S", 0.0)
-    monkeypatch.setattr(preview, "_load_rasterizer", compiled.wait)
+    monkeypatch.setattr(preview, "load_rasterizer", compiled.wait)
     with PreviewWriter(tmp_path, lambda event, **values: sent.append(event)) as writer:
         for k, expected in ((0, ["preview"]), (1, ["preview", "fitted", "preview"])):
             writer(Frame(k, 0.0, np.zeros((50, 50, 3), np.uint8)), observation(np.full((33, 2), 20.0)), Ready())

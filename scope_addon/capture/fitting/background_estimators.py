@@ -9,12 +9,15 @@ of the threads.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import wait as wait_for
 from types import TracebackType
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ....solver.compiled.code_cache import compiled_kernels
 from ..camera.bars import longer_content_side
 from ..camera.camera_rotation import BackgroundTracker
 from ..camera.intrinsics import Camera, assumed_camera
@@ -24,6 +27,7 @@ from .focal_fits import FocalFits
 from .focal_length import camera_by_edges, camera_by_fits
 from .live_body import LiveBody
 
+_POLLING_INTERVAL_S = 0.2
 _THREADS = 2  # background and edges; the solver has its own thread, because compiling it must not delay either
 
 
@@ -40,7 +44,7 @@ class BackgroundEstimators:
         self._longer_px = float(max(width, height))
         self._by_edges: Future[Camera] | None = None
         self._costs: list[Future[NDArray[np.float64] | None]] = []
-        self._solver.submit(live.load)
+        self._loading = self._solver.submit(live.load)
 
     def __enter__(self) -> BackgroundEstimators:
         return self
@@ -74,6 +78,15 @@ class BackgroundEstimators:
         if self._largest is not None and self._fits.is_due(self._largest[0]):
             self._costs.append(self._solver.submit(self._fits.costs, self._largest[1], self._assumed()))
         self._largest = None
+
+    def wait_for_solver(self, progress: Callable[[int], None]) -> None:
+        """Wait until the solver is loaded.
+
+        :param progress: called several times a second with the number of kernels compiled so far, unless there is none.
+        """
+        while wait_for([self._loading], timeout=_POLLING_INTERVAL_S).not_done:
+            if compiled := compiled_kernels():
+                progress(compiled)
 
     def camera(self) -> Camera:
         """Return the camera; an assumed focal length is replaced by the estimate from edges and fits."""

@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import VideoError
+from .file_names import utf8_name
 
 if TYPE_CHECKING:
     import av
@@ -87,7 +88,8 @@ class OpencvReader:
     """
 
     def __init__(self, path: Path) -> None:
-        self._capture = cv2.VideoCapture(str(path.absolute()), cv2.CAP_FFMPEG)
+        with utf8_name(path) as name:
+            self._capture = cv2.VideoCapture(name, cv2.CAP_FFMPEG)
         if not self._capture.isOpened():
             raise VideoError(
                 f"{path} is not a video or image that can be decoded; copy it again if it may be incomplete, or "
@@ -165,7 +167,8 @@ def _open_with_pyav(path: Path) -> tuple[type[Exception], InputContainer | None]
             "video to H.264 .mp4, an image to JPEG"
         ) from error
     try:
-        container = av.open(str(path.absolute()), options=_PROTOCOLS, container_options=_PROTOCOLS)
+        with utf8_name(path) as name:
+            container = av.open(name, options=_PROTOCOLS, container_options=_PROTOCOLS)
     except (av.error.FFmpegError, OSError, ValueError):
         return av.error.FFmpegError, None
     return av.error.FFmpegError, container

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from ...errors import VideoError
 from .exif import animation_length, read_exif
+from .file_names import utf8_name
 from .frame_readers import decode_items
 from .heif import MAX_PIXELS, assemble, read_layout
 
@@ -46,7 +47,8 @@ def is_picture(path: Path) -> bool:
         raise VideoError(f"{path} is an OpenEXR image, which cannot be read here; export it as PNG or TIFF")
     if head.startswith(_GIF) or path.suffix.lower() in _JPEG_STREAMS:
         return False
-    return bool(cv2.haveImageReader(str(path)))
+    with utf8_name(path) as name:
+        return bool(cv2.haveImageReader(name))
 
 
 def read_picture(path: Path) -> Picture | None:

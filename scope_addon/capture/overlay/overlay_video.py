@@ -17,12 +17,14 @@ from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from ....solver.body import Body
+from ....solver.compiled.kernel import cached
 from ....solver.errors import ShapeError
 from ....solver.rotations import exp
 from ...atomic_write import atomic_path, reason
 from ...errors import OutputError
 from ...motion import Motion
 from ..camera.intrinsics import scaled_intrinsics
+from ..media.file_names import utf8_name
 from ..media.frame import Frame
 from ..media.video import Video, open_video
 from ..media.video_range import FootageRange
@@ -180,7 +182,8 @@ def _triangles(faces: NDArray[np.integer[Any]]) -> NDArray[np.integer[Any]]:
     return np.concatenate([faces[:, [0, 1, 2]], faces[:, [0, 2, 3]]])
 
 
-@njit(cache=True, nogil=True)
+@cached
+@njit(nogil=True)
 def _blend(image: NDArray[np.uint8], rgba: NDArray[np.uint8]) -> None:
     """Blend ``rgba`` over ``image`` in place; at outlines, opacity is scaled by the covered share of the neighbours."""
     height, width = image.shape[:2]
@@ -291,7 +294,8 @@ def _write_video(temporary: Path, painter: _Painter, video: Video, path: Path, p
 def _open_writer(temporary: Path, fps: float, width: int, height: int, path: Path) -> cv2.VideoWriter:
     for codec, backend in _CODECS:
         fourcc = cv2.VideoWriter.fourcc(*codec)
-        writer = cv2.VideoWriter(str(temporary), backend, fourcc, fps, (width, height))
+        with utf8_name(temporary) as name:
+            writer = cv2.VideoWriter(name, backend, fourcc, fps, (width, height))
         if writer.isOpened():
             return writer
         writer.release()
@@ -300,7 +304,8 @@ def _open_writer(temporary: Path, fps: float, width: int, height: int, path: Pat
 
 def _is_readable(video: Path) -> bool:
     """Check if a video can be read, that is, has its index, which is written last."""
-    reader = cv2.VideoCapture(str(video))
+    with utf8_name(video) as name:
+        reader = cv2.VideoCapture(name)
     try:
         return reader.isOpened() and reader.grab()
     finally:

@@ -20,6 +20,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from ....solver.compiled.kernel import cached
+
 NEAR = 0.05  # metres; the near plane, at which triangles are clipped
 _TO_LIGHT = np.array([-0.40, -0.66, -0.63]) / np.linalg.norm([-0.40, -0.66, -0.63])
 _AMBIENT, _DIFFUSE, _RIM = 0.42, 0.58, 0.30
@@ -82,7 +84,8 @@ def rasterize(
     _draw(canvas.rgba, canvas.depth, vertices, screen, where, shading, corners, colors, K, lens, alpha)
 
 
-@njit(cache=True, nogil=True)
+@cached
+@njit(nogil=True)
 def vertex_normals(vertices: NDArray[np.float64], triangles: NDArray[np.int32]) -> NDArray[np.float64]:
     """Calculate unit normals (V, 3), area-weighted means of the triangles around each vertex (zero without triangles).
 
@@ -106,7 +109,8 @@ def vertex_normals(vertices: NDArray[np.float64], triangles: NDArray[np.int32]) 
     return normals
 
 
-@njit(cache=True, nogil=True)
+@cached
+@njit(nogil=True)
 def shade(vertices: NDArray[np.float64], normals: NDArray[np.float64]) -> NDArray[np.float64]:
     """Calculate the shading (V, 2): factor on the surface's colour (ambient + Lambert), and white to add (rim).
 
@@ -132,7 +136,8 @@ def _largest_radius2(lens: NDArray[np.float64]) -> float:
     return float(real.min()) if len(real) else np.inf
 
 
-@njit(cache=True, nogil=True)
+@cached
+@njit(nogil=True)
 def _pixel(x: float, y: float, K: NDArray[np.float64], lens: NDArray[np.float64]) -> tuple[float, float]:
     """Project the normalized image point (x, y) to a pixel."""
     r2 = x * x + y * y
@@ -142,7 +147,8 @@ def _pixel(x: float, y: float, K: NDArray[np.float64], lens: NDArray[np.float64]
     return K[0, 0] * u + K[0, 1] * v + K[0, 2], K[1, 1] * v + K[1, 2]
 
 
-@njit(cache=True, nogil=True)
+@cached
+@njit(nogil=True)
 def _project(
     vertices: NDArray[np.float64], K: NDArray[np.float64], lens: NDArray[np.float64], largest: float
 ) -> tuple[NDArray[np.float64], NDArray[np.uint8]]:
@@ -161,7 +167,8 @@ def _project(
     return screen, where
 
 
-@njit(cache=True, nogil=True)
+@cached
+@njit(nogil=True)
 def _draw(
     rgba: NDArray[np.uint8],
     depth: NDArray[np.float32],
@@ -190,7 +197,8 @@ def _draw(
             _fill(rgba, depth, p[:3], q[:3], r[:3], p[3:], q[3:], r[3:], colors[f], alpha)
 
 
-@njit(cache=True, nogil=True)
+@cached
+@njit(nogil=True)
 def _clip_at_near(
     cut: NDArray[np.float64],
     vertices: NDArray[np.float64],
@@ -220,7 +228,8 @@ def _clip_at_near(
     return n
 
 
-@njit(cache=True, nogil=True)
+@cached
+@njit(nogil=True)
 def _fill(
     rgba: NDArray[np.uint8],
     depth: NDArray[np.float32],

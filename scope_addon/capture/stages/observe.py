@@ -34,7 +34,9 @@ from ..tracking.people import PeopleBuilder
 from ..tracking.scene_cuts import SceneCuts
 from ..tracking.track import Track
 from ..tracking.tracker import PeopleTracker
-from .clock import Progress, StageClock
+from .clock import COMPILING, Progress, StageClock
+
+_KERNELS = 65  # that fitting a frame compiles
 
 # Called with each decoded frame, its largest person, and the object that fits the body to such an observation.
 Watch = Callable[[Frame, Observation | None, LiveBody], None]
@@ -129,6 +131,7 @@ class _Frames:
             listeners.watch(frame, largest, live)
             listeners.progress("finding the person", len(self.people), max(expected, len(self.people)))
         self._background.wait()
+        self._background.wait_for_solver(lambda done: listeners.progress(COMPILING, min(done, _KERNELS), _KERNELS))
 
     def _process(
         self, frame: Frame, lit: NDArray[np.uint8], upcoming: tuple[Frame, NDArray[np.uint8]] | None

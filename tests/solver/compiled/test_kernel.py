@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Cached machine code is dropped when any file of the solver changes, not only the kernel's own."""
 
-import shutil
 import subprocess
 import sys
+
+from .small_package import make_package
 
 SOURCE = {
     "__init__.py": "",
@@ -15,12 +16,7 @@ SOURCE = {
 
 
 def test_a_changed_callee_reaches_its_cached_caller(tmp_path):
-    from scope.solver.compiled import kernel
-
-    package = tmp_path / "package"
-    (package / "compiled").mkdir(parents=True)
-    (package / "compiled" / "__init__.py").touch()
-    shutil.copy(kernel.__file__, package / "compiled")
+    package = make_package(tmp_path)
     found = []
     for value in (1, 22):
         for name, text in SOURCE.items():
@@ -35,12 +31,7 @@ def test_a_changed_callee_reaches_its_cached_caller(tmp_path):
 
 def test_compiling_is_announced_once(tmp_path):
     """The first session says why it waits; the next one finds the machine code and says nothing."""
-    from scope.solver.compiled import kernel
-
-    package = tmp_path / "package"
-    (package / "compiled").mkdir(parents=True)
-    (package / "compiled" / "__init__.py").touch()
-    shutil.copy(kernel.__file__, package / "compiled")
+    package = make_package(tmp_path)
     for name, text in SOURCE.items():
         (package / name).write_text(text.format(value=1))
     code = """

@@ -1,0 +1,30 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Compile what a capture needs, before the first one.
+
+Most computers need this only while an extension is built: its machine code comes with it. Where none does (another
+processor or Python), it runs once in the background, after the extension has been enabled.
+"""
+
+from __future__ import annotations
+
+from ...solver.compiled.code_cache import compiled_kernels
+from ...solver.loaders.body_file import ASSETS, load_body
+from ..capture.media.video_range import VideoRange
+from ..capture.options import CaptureOptions
+from ..capture.pipeline import capture
+from ..capture.stages.clock import Progress
+from .preview import load_rasterizer
+
+ROOT = ASSETS.parent
+_SECONDS = 0.3  # of the sample clip: a few frames, so that every stage has its work
+
+
+def warm_up(progress: Progress) -> int:
+    """Capture the beginning of the sample clip; return how many kernels had to be compiled.
+
+    :raises ScopeError: the sample cannot be captured.
+    """
+    load_rasterizer()
+    options = CaptureOptions(quality="fast", wanted=VideoRange(end_s=_SECONDS), threads=1)
+    capture(ASSETS / "sample" / "sample.mp4", load_body("scope"), options, progress)
+    return compiled_kernels(ROOT)

@@ -1,0 +1,118 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Compiling the solver in the background after the extension was enabled, so that the first capture need not wait.
+
+Where machine code for this computer comes with the extension, that takes a few seconds and compiles nothing. It happens
+once for each installed version, at the lowest priority, never in Blenders without a window, and ends with Blender, or
+when a capture begins. Only the standard library is loaded: the solver's libraries would stop the window for a second.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import bpy
+
+from ..job.start_worker import worker_command
+from .preferences import PACKAGE, cache, preferences
+
+ROOT = Path(__file__).resolve().parents[2]
+KERNELS = 73  # that a capture and its preview compile
+_DELAY_S, _INTERVAL_S = 3.0, 1.0
+_REQUEST = b'{"warm_up": true}\n'
+_WINDOWS_FLAGS = getattr(subprocess, "CREATE_NO_WINDOW", 0) | getattr(subprocess, "IDLE_PRIORITY_CLASS", 0)
+
+
+class WarmUp:
+    """The process that compiles; ``process`` is None while there is none."""
+
+    process: subprocess.Popen[bytes] | None = None
+    folder: tempfile.TemporaryDirectory[str] | None = None
+
+
+def attach() -> None:
+    """Begin in a few seconds, in a Blender with a window where Scope is enabled as an extension."""
+    if not bpy.app.background and preferences() is not None:
+        bpy.app.timers.register(step, first_interval=_DELAY_S)
+
+
+def detach() -> None:
+    """Stop."""
+    if bpy.app.timers.is_registered(step):
+        bpy.app.timers.unregister(step)
+    stop()
+
+
+def step() -> float | None:
+    """Start the process, or see whether it has ended; return in how many seconds to call again. A timer calls this."""
+    if WarmUp.process is None:
+        if _marker().exists() or not start():
+            return None
+    elif WarmUp.process.poll() is not None:
+        if WarmUp.process.returncode == 0:
+            with contextlib.suppress(OSError):
+                _marker().touch()
+        stop()
+    _redraw()
+    return _INTERVAL_S if WarmUp.process else None
+
+
+def start() -> bool:
+    """Start the process; return whether that worked. If not, the first capture compiles the solver."""
+    python = [sys.executable, *getattr(bpy.app, "python_args", ("-I",))]
+    kernels = cache().kernels
+    try:
+        kernels.mkdir(parents=True, exist_ok=True)
+        WarmUp.folder = tempfile.TemporaryDirectory(prefix="scope-warm-up-", ignore_cleanup_errors=True)
+        command, environment = worker_command(python, ROOT, Path(WarmUp.folder.name), kernels)
+        quiet = subprocess.DEVNULL
+        WarmUp.process = subprocess.Popen(
+            command, stdin=subprocess.PIPE, stdout=quiet, stderr=quiet, env=environment, creationflags=_WINDOWS_FLAGS
+        )
+        assert WarmUp.process.stdin is not None
+        WarmUp.process.stdin.write(_REQUEST)  # it stays open: the process ends when Blender does
+        WarmUp.process.stdin.flush()
+    except OSError:
+        stop()
+        return False
+    return True
+
+
+def stop() -> None:
+    """End the process. What it has compiled is kept."""
+    process, folder = WarmUp.process, WarmUp.folder
+    WarmUp.process = WarmUp.folder = None
+    if process is not None:
+        if process.poll() is None:
+            process.kill()
+        process.wait()
+        if process.stdin is not None:
+            with contextlib.suppress(OSError):
+                process.stdin.close()
+    if folder is not None:
+        folder.cleanup()
+
+
+def draw(layout: bpy.types.UILayout) -> None:
+    """Show the progress while the solver is being compiled."""
+    if WarmUp.process is not None and (done := len(list(cache().kernels.glob("*/*.code")))):
+        share = min(1.0, done / KERNELS)
+        layout.progress(text=f"Compiling the solver in the background, {100 * share:.0f} %", factor=share)
+
+
+def _marker() -> Path:
+    """Return the file that says that everything is compiled for this installation and this Blender's Python."""
+    installed = (ROOT / "__init__.py").stat().st_mtime_ns
+    digest = hashlib.sha256(f"{PACKAGE} {ROOT} {installed} {sys.version}".encode(errors="replace"))
+    return cache().kernels / f"{digest.hexdigest()[:16]}.ready"
+
+
+def _redraw() -> None:
+    for window in bpy.context.window_manager.windows:
+        for area in window.screen.areas:
+            if area.type in {"VIEW_3D", "PREFERENCES"}:
+                area.tag_redraw()

@@ -1,0 +1,144 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The machine code of one kernel on disk, in place of numba's own cache.
+
+Numba's cache fails on damaged files, for ever; throws a kernel's code away when its own file has changed, but not when
+one of those has that are inlined into it; and depends on the sources' times and the exact processor.
+"""
+
+from __future__ import annotations
+
+import inspect
+import logging
+import pickle
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from numba.core import serialize
+from numba.core.caching import _Cache
+from numba.core.compiler import CompileResult
+
+from .code_files import SUFFIX, read_code, remove_code, write_code
+from .code_folders import PACKAGE, SOLVER, Area, digest_of, mark_used
+
+_rebuild: Any = CompileResult._rebuild  # these declare no types
+_dumps: Callable[[Any], bytes] = serialize.dumps
+_LOG = logging.getLogger(__name__)
+_ANNOTATION = 6  # index in what numba reduces a result to: the annotated source, of no use and with the machine's paths
+
+
+_compiling: list[Path] = []  # of each kernel that this process had to compile so far: the folder of its source
+_refused: list[OSError] = []  # why code could not be kept
+_announced: list[Path] = []  # the folder of which that has been said, once in a process
+
+
+def compiled_kernels(sources: Path = SOLVER) -> int:
+    """Return how many kernels this process had to compile so far, those in progress included.
+
+    :param sources: only those in this folder count.
+    """
+    return sum(sources == folder or sources in folder.parents for folder in list(_compiling))
+
+
+class CodeCache(_Cache):
+    """The code of a kernel's signatures, one file for each. What cannot be read or kept is compiled again."""
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        code = function.__code__
+        self._function = function.__module__, function.__qualname__, code.co_firstlineno
+        self._source = Path(inspect.getfile(function)).parent
+        self._area = _area_of(function.__module__, self._source)
+        name = f"{function.__module__.rpartition('.')[2]}.{function.__qualname__}"
+        self._name = name.replace("<", "").replace(">", "")
+        # What a closure refers to is not in the sources.
+        self._enabled = function.__closure__ is None
+
+    @property
+    def cache_path(self) -> str:
+        """The folder that code is written to."""
+        return str(self._area.own_folders()[0])
+
+    def has_code(self) -> bool:
+        """Whether there is code of any signature."""
+        return self._enabled and any(
+            any(folder.glob(f"{self._name}-*{SUFFIX}")) for folder, _ in self._area.folders() if folder.is_dir()
+        )
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """Return the code for a signature; None if it must be compiled."""
+        target_context.refresh()
+        for folder, trusted in self._area.folders() if self._enabled else ():
+            path, key = folder / self._file_name(sig), self._key(sig)
+            payload = read_code(path, key, trusted=trusted)
+            if payload is None:
+                continue
+            try:
+                result = _rebuild(target_context, *pickle.loads(payload))
+            except Exception:  # whatever an unusable file leads to, compiling it again mends it
+                remove_code(path)
+                continue
+            if not trusted:
+                _used(self._area, folder)
+            return result
+        _compiling.append(self._source)
+        return None
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Keep the code of a signature, if there is a place for it."""
+        if not self._enabled or data.library.has_dynamic_globals or any(not x.can_cache for x in data.lifted):
+            return
+        payload = _payload(data)
+        for folder in self._area.own_folders():
+            try:
+                write_code(folder / self._file_name(sig), self._key(sig), payload)
+            except OSError as error:
+                _refused.append(error)
+                continue
+            _used(self._area, folder)
+            return
+        if not _announced:
+            _announced.append(folder)
+            reason = _refused[-1].strerror or _refused[-1]
+            _LOG.warning("The compiled solver cannot be kept in %s (%s): it works, but starts slowly.", folder, reason)
+
+    def enable(self) -> None:
+        """Use the files."""
+        self._enabled = True
+
+    def disable(self) -> None:
+        """Ignore the files."""
+        self._enabled = False
+
+    def flush(self) -> None:
+        """Remove the code of all signatures that this processor's own folder has."""
+        for folder in self._area.own_folders():
+            for path in folder.glob(f"{self._name}-*{SUFFIX}"):
+                remove_code(path)
+
+    def _key(self, sig: Any) -> str:
+        return repr((self._function, str(sig)))
+
+    def _file_name(self, sig: Any) -> str:
+        return f"{self._name}-{digest_of(self._key(sig))[:12]}{SUFFIX}"
+
+
+def _payload(result: Any) -> bytes:
+    reduced = list(result._reduce())
+    reduced[_ANNOTATION] = ""
+    return _dumps(tuple(reduced))
+
+
+@cache
+def _area_of(module: str, sources: Path) -> Area:
+    """Return the area of a module: the whole solver, or the package that contains the module."""
+    if sources == SOLVER or SOLVER in sources.parents:
+        return Area(f"{PACKAGE}.{SOLVER.name}" if PACKAGE else SOLVER.name, SOLVER)
+    return Area(module.rpartition(".")[0], sources)
+
+
+@cache
+def _used(area: Area, folder: Path) -> None:
+    """Note, once in a process, that a folder is in use, and remove what it replaces."""
+    mark_used(folder)
+    area.remove_stale(folder)

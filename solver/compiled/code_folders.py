@@ -1,0 +1,145 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The folders in which machine code lies, named after everything that it depends on.
+
+Some code comes with the program (`SHIPPED`), compiled for a processor that nearly every computer's includes (`LEVELS`).
+What is missing there is compiled on first use, for the computer's own processor, and kept in a folder of the user.
+
+Each version has a folder of its own, ``<area>-<environment>-<program>``: the area is the package whose sources count,
+the environment Python, system and processor, the program the sources' content and the versions of numba and numpy.
+Sources count by content alone, since an installer gives files new times.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import shutil
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import suppress
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import llvmlite
+import llvmlite.binding
+import numba
+import numba.core.config
+import numpy as np
+from numba.misc import appdirs
+
+config: Any = numba.core.config  # these declare no types
+llvm: Any = llvmlite.binding
+user_folder: Any = appdirs.AppDirs
+
+SOLVER = Path(__file__).parent.parent
+PACKAGE = __name__.rpartition(".compiled.")[0].rpartition(".")[0]  # the package that contains the solver
+SHIPPED = SOLVER.parent / "assets" / "kernels"
+# By machine: LLVM's name of the processor that shipped code is compiled for, and the features that it needs of another.
+LEVELS = {
+    "x86_64": ("x86-64-v3", ("avx2", "bmi", "bmi2", "cx16", "f16c", "fma", "lzcnt", "movbe", "popcnt", "sse4.2")),
+    "arm64": ("apple-m1", ()),  # macOS, whose every ARM processor is this one or a later one
+}
+NOT_SHIPPED = "examples"  # a folder that an installation may lack; no kernel is in it
+_STALE_S = 14 * 24 * 3600.0  # unused for so long, another version's code is removed
+
+
+def digest_of(*parts: object) -> str:
+    """Return a hexadecimal digest."""
+    return hashlib.sha256(repr(parts).encode()).hexdigest()
+
+
+def sources_digest(folder: Path) -> str:
+    """Return a digest of the names and contents of all sources below a folder, whatever their line ends."""
+    files = sorted(f for f in folder.rglob("*.py") if NOT_SHIPPED not in f.relative_to(folder).parts)
+    texts = [(f.relative_to(folder).as_posix(), f.read_bytes().replace(b"\r\n", b"\n")) for f in files]
+    return digest_of(*texts)
+
+
+_SOLVER_DIGEST = sources_digest(SOLVER)  # while importing: what is changed later is not what runs
+
+
+class Area:
+    """The kernels of one package: the folders that may have their code."""
+
+    def __init__(self, package: str, sources: Path) -> None:
+        """Make the names of the folders.
+
+        :param package: of the kernels; part of the code, which imports its types from there.
+        :param sources: folder of the package's sources. All of the solver's count as well.
+        """
+        self._name = package.rpartition(".")[2]
+        own = "" if sources == SOLVER else sources_digest(sources)
+        # Kernels see arrays through numba alone, so that only the rules of numpy's major version matter.
+        versions = numba.__version__, llvmlite.__version__, np.__version__.partition(".")[0]
+        self._program = digest_of(package, _SOLVER_DIGEST, own, versions)[:12]
+
+    def folders(self) -> Iterator[tuple[Path, bool]]:
+        """Yield every folder to look in, and whether it came with the program."""
+        if can_run_shipped():
+            yield SHIPPED / self._folder_name(shipped_processor()), True
+        for place in places():
+            yield place / self._folder_name(_processor()), False
+
+    def own_folders(self) -> list[Path]:
+        """Return the folders to write to, the first that can be written to, for the processor to compile for."""
+        return [place / self._folder_name(_processor()) for place in places()]
+
+    def remove_stale(self, folder: Path) -> None:
+        """Remove what lies beside the folder of an area, is of another program, and has not been used for long."""
+        prefix = folder.name[: -len(self._program)]
+        with suppress(OSError):
+            for other in folder.parent.glob(f"{prefix}*"):
+                if other != folder and time.time() - other.stat().st_mtime > _STALE_S:
+                    shutil.rmtree(other, ignore_errors=True)
+
+    def _folder_name(self, processor: str) -> str:
+        environment = sys.implementation.cache_tag, sys.platform, _machine(), processor
+        return f"{self._name}-{digest_of(environment)[:8]}-{self._program}"
+
+
+def places() -> list[Path]:
+    """Return the folders in which code may be kept: only NUMBA_CACHE_DIR if set, else numba's own choices."""
+    if config.CACHE_DIR:
+        return [Path(config.CACHE_DIR)]
+    return [Path(__file__).parent / "__pycache__", Path(user_folder(appname="numba", appauthor=False).user_cache_dir)]
+
+
+@cache
+def _machine() -> str:
+    machine = str(llvm.get_process_triple()).partition("-")[0]
+    return {"amd64": "x86_64", "aarch64": "arm64"}.get(machine, machine)
+
+
+def shipped_processor() -> str:
+    """Return LLVM's name of the processor that code is shipped for; empty where none is."""
+    return "" if _machine() == "arm64" and sys.platform != "darwin" else LEVELS.get(_machine(), ("", ()))[0]
+
+
+@cache
+def can_run_shipped() -> bool:
+    """Whether this computer's processor has everything that shipped code needs."""
+    return bool(shipped_processor()) and all(_host_features().get(feature) for feature in LEVELS[_machine()][1])
+
+
+@cache
+def _host_features() -> dict[str, bool]:
+    try:
+        return dict(llvm.get_host_cpu_features())
+    except RuntimeError:  # LLVM does not know this processor
+        return {}
+
+
+def _processor() -> str:
+    """Describe the processor that numba compiles for: the one to ship for, or this computer's."""
+    if config.CPU_NAME and config.CPU_NAME == shipped_processor():
+        return shipped_processor()
+    features = config.CPU_FEATURES or sorted(name for name, has in _host_features().items() if has)
+    return digest_of(config.CPU_NAME or llvm.get_host_cpu_name(), features, config.ENABLE_AVX)
+
+
+def mark_used(folder: Path) -> None:
+    """Note that a folder's code is in use."""
+    with suppress(OSError):
+        os.utime(folder)

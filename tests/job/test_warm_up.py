@@ -1,0 +1,36 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""After a warm-up, a capture has nothing left to compile."""
+
+import json
+import subprocess
+import sys
+
+from scope.scope_addon.job.process import WorkerProcess
+
+from .processes import wait_for
+
+CAPTURE = """
+import json, sys, tempfile, time
+from pathlib import Path
+from scope.scope_addon.cli import SAMPLE
+from scope.scope_addon.job.request import JobRequest
+from scope.scope_addon.job.worker import Reporter, run
+from scope.scope_addon.job.warm_up import ROOT
+from scope.solver.compiled.code_cache import compiled_kernels
+with tempfile.TemporaryDirectory() as folder:
+    status = run(JobRequest(str(SAMPLE), quality="fast", end="0.5"), Path(folder), Reporter(sys.stderr))
+print(json.dumps([status, compiled_kernels(ROOT)]))
+"""
+
+
+def test_a_capture_after_a_warm_up_compiles_nothing(tmp_path):
+    folder = tmp_path / "job"
+    folder.mkdir()
+    worker = WorkerProcess(None, folder, None, [sys.executable, "-I"])
+    messages = []
+    wait_for(lambda: messages.extend(worker.poll()) or worker.finished, 500)
+    worker.wait()
+    worker.close()
+    assert messages[-1]["compiled"] >= 0
+    done = subprocess.run([sys.executable, "-c", CAPTURE], capture_output=True, text=True, check=True)
+    assert json.loads(done.stdout) == [0, 0], done.stderr[-2000:]

@@ -1,0 +1,144 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Kernels work whatever has become of their code on disk, and code that cannot be used is compiled and kept again."""
+
+import os
+import pickle
+import shutil
+import subprocess
+import sys
+
+import pytest
+from scope.solver.compiled.code_files import read_code, write_code
+from scope.solver.compiled.code_folders import can_run_shipped, shipped_processor
+
+from .small_package import make_package
+
+COUNT = 7
+ONE = """
+@kernel
+def add{n}(x):
+    return x + {n}.0
+"""
+# Prints the kernels' results, and which of them came from disk.
+RUN = f"""
+from package import kernels
+found = [getattr(kernels, f"add{{n}}") for n in range({COUNT})]
+print([kernel(1.0) for kernel in found])
+print([sum(kernel.stats.cache_hits.values()) for kernel in found])
+"""
+RESULTS = [1.0 + n for n in range(COUNT)]
+
+
+def run(folder, cache, before="", **environment):
+    """Return which kernels came from disk, and what was written to stderr."""
+    environment = dict(os.environ, **{"NUMBA_CACHE_DIR": str(cache), **environment})
+    command = [sys.executable, "-c", before + RUN]
+    done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=True, timeout=100)
+    results, hits = map(eval, done.stdout.splitlines())
+    assert results == RESULTS
+    return hits, done.stderr
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """A folder with the package and, in ``cache``, its compiled code."""
+    folder = tmp_path_factory.mktemp("made")
+    text = "from .compiled.kernel import kernel\n" + "".join(ONE.format(n=n) for n in range(COUNT))
+    (make_package(folder) / "kernels.py").write_text(text)
+    assert run(folder, folder / "cache")[0] == [0] * COUNT
+    return folder
+
+
+@pytest.fixture
+def folder(made, tmp_path):
+    """A copy with new modification times, as after unpacking an archive."""
+    return shutil.copytree(made, tmp_path / "copy", copy_function=shutil.copyfile)
+
+
+def code_files(cache):
+    """Return the file of each kernel, in order."""
+    files = sorted(cache.rglob("*.code"))
+    assert [path.name.partition("-")[0] for path in files] == [f"kernels.add{n}" for n in range(COUNT)]
+    return files
+
+
+def test_code_is_kept_whatever_the_times_of_the_sources(folder):
+    assert run(folder, folder / "cache") == ([1] * COUNT, "")
+
+
+def test_damaged_code_is_replaced(folder):
+    empty, cut, first, middle, last, exchanged, sound = code_files(folder / "cache")
+    exchanged.write_bytes(sound.read_bytes())
+    empty.write_bytes(b"")
+    cut.write_bytes(cut.read_bytes()[:500])
+    for path, share in ((first, 0.0), (middle, 0.5), (last, 1.0)):
+        content = bytearray(path.read_bytes())
+        content[round(share * (len(content) - 1))] ^= 0x10
+        path.write_bytes(content)
+    assert run(folder, folder / "cache") == ([0] * (COUNT - 1) + [1], "")
+    assert run(folder, folder / "cache") == ([1] * COUNT, "")
+
+
+def test_content_that_numba_cannot_use_is_replaced(folder):
+    """Its checksum is right."""
+    contents = [b"", b"no pickle", *(pickle.dumps(value) for value in (None, (), (1, 2), ("",) * 9, ({},) * 9))]
+    for n, (path, content) in enumerate(zip(code_files(folder / "cache"), contents, strict=True)):
+        key = repr((("package.kernels", f"add{n}", 3 + 4 * n), "(float64,)"))
+        assert read_code(path, key, trusted=False)
+        write_code(path, key, content)
+    assert run(folder, folder / "cache") == ([0] * COUNT, "")
+    assert run(folder, folder / "cache") == ([1] * COUNT, "")
+
+
+def test_without_a_place_for_code_kernels_work(folder):
+    (folder / "file").write_text("")
+    hits, said = run(folder, folder / "file" / "cache")
+    assert hits == [0] * COUNT
+    assert said.count("\n") == 1
+    assert "cannot be kept" in said
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows cannot limit a process's files")
+def test_a_full_disk_leaves_no_part_of_a_file(folder):
+    limit = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))\n"
+    hits, said = run(folder, folder / "full", limit, PYTHONDONTWRITEBYTECODE="1")
+    assert hits == [0] * COUNT
+    assert said.count("\n") == 1
+    assert [path for path in (folder / "full").rglob("*") if path.is_file()] == []
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows reports no owner")
+def test_code_that_others_could_have_written_is_not_run(folder):
+    groups, everyones, pipe, theirs, *sound = code_files(folder / "cache")
+    groups.chmod(0o664)
+    everyones.chmod(0o646)
+    pipe.unlink()
+    os.mkfifo(pipe)
+    expected = [0, 0, 0, 1] + [1] * len(sound)
+    if os.geteuid() == 0:
+        os.chown(theirs, 12345, -1)
+        expected[3] = 0
+    assert run(folder, folder / "cache")[0] == expected
+    assert run(folder, folder / "cache")[0] == [1] * COUNT
+
+
+@pytest.mark.skipif(not can_run_shipped(), reason="no code is shipped for this processor")
+def test_shipped_code_is_used_and_nothing_written(folder):
+    shipped = folder / "assets" / "kernels"
+    assert run(folder, shipped, NUMBA_CPU_NAME=shipped_processor(), NUMBA_CPU_FEATURES="")[0] == [0] * COUNT
+    assert run(folder, folder / "other") == ([1] * COUNT, "")
+    assert not (folder / "other").exists()
+    code_files(shipped)[0].write_bytes(b"damaged")
+    assert run(folder, folder / "other")[0] == [0] + [1] * (COUNT - 1)
+    assert run(folder, folder / "other")[0] == [1] * COUNT
+
+
+def test_a_changed_source_makes_code_stale(folder):
+    with (folder / "package" / "__init__.py").open("a") as source:
+        source.write("# changed\n")
+    assert run(folder, folder / "cache")[0] == [0] * COUNT
+    assert len(list((folder / "cache").iterdir())) == 2
+    for version in (folder / "cache").iterdir():
+        os.utime(version, (1, 1))
+    assert run(folder, folder / "cache")[0] == [1] * COUNT
+    assert len(list((folder / "cache").iterdir())) == 1

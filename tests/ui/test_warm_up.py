@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The background process after enabling: once for an installation, ended with the extension or by a capture."""
+
+import sys
+import time
+
+import pytest
+from scope.scope_addon.ui import warm_up
+from scope.scope_addon.ui.preferences import cache
+
+
+@pytest.fixture
+def process(tmp_path, monkeypatch):
+    """Replace what the process runs."""
+
+    def use(code):
+        monkeypatch.setattr(warm_up, "worker_command", lambda *_: ([sys.executable, "-c", code], None))
+
+    monkeypatch.setattr(warm_up, "_INTERVAL_S", 0.01)
+    yield use
+    warm_up.stop()
+
+
+def wait_for_end():
+    end = time.monotonic() + 60
+    while interval := warm_up.step():
+        assert time.monotonic() < end
+        time.sleep(interval)
+
+
+def test_it_runs_once_for_an_installation(process, tmp_path):
+    process(f"import sys; open({str(tmp_path / 'said')!r}, 'a').write(sys.stdin.readline())")
+    for _ in range(3):
+        wait_for_end()
+    assert (tmp_path / "said").read_text() == '{"warm_up": true}\n'
+    assert cache().clear() == 0
+    wait_for_end()
+    assert (tmp_path / "said").read_text().count("\n") == 1
+
+
+def test_after_a_failure_it_runs_again(process, tmp_path):
+    process(f"import sys; open({str(tmp_path / 'said')!r}, 'a').write(sys.stdin.readline()); sys.exit(1)")
+    for _ in range(2):
+        wait_for_end()
+    assert (tmp_path / "said").read_text().count("\n") == 2
+
+
+def test_it_ends_with_the_extension(process):
+    process("import time; time.sleep(100)")
+    assert warm_up.step() is not None
+    running = warm_up.WarmUp.process
+    assert running.poll() is None
+    warm_up.detach()
+    assert running.poll() is not None
+
+
+def test_a_capture_ends_it(process, fake_worker, footage):
+    import bpy
+
+    process("import time; time.sleep(100)")
+    fake_worker("finish()")
+    assert warm_up.step() is not None
+    running = warm_up.WarmUp.process
+    bpy.context.scene.scope.footage = str(footage)
+    assert bpy.ops.scope.capture() == {"FINISHED"}
+    assert running.poll() is not None
+
+
+def test_without_a_window_it_does_not_begin():
+    import bpy
+
+    assert not bpy.app.timers.is_registered(warm_up.step)
