@@ -43,7 +43,10 @@ def add_kernels(staging: Path, target: str, python: str, wheels: Iterable[Path])
     if not stated.is_file() or stated.read_text() != wanted:
         is_here = _THIS.get((platform.system(), platform.machine())) == target
         if not is_here or not (find_python(python) or _has_debian(python)):
-            print(f"build: no compiled code for {target}, Python {python}: it takes both to make it", file=sys.stderr)
+            print(
+                f"build: no compiled code for {target}, Python {python}: build on such a computer to have it",
+                file=sys.stderr,
+            )
             return False
         _compile(staging, target, python, wheels, kept)
         stated.write_text(wanted)
