@@ -15,6 +15,7 @@ from typing import IO, NoReturn
 
 from ...solver.errors import ScopeError
 from ..errors import exit_status, system_error_message
+from ..footage import shown
 from .parent import when_parent_ends
 from .request import WARM_UP, JobRequest
 
@@ -33,7 +34,7 @@ class Reporter:
 
     def send(self, event: str, **values: object) -> None:
         """Send a message immediately; thread-safe."""
-        line = json.dumps({"event": event, **values}) + "\n"
+        line = shown(json.dumps({"event": event, **values}, ensure_ascii=False)) + "\n"
         with self._lock:
             self._stream.write(line)
             self._stream.flush()

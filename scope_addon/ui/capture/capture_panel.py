@@ -8,6 +8,7 @@ from pathlib import Path
 
 import bpy
 
+from ...footage import shown
 from ...job.progress import JobProgress, duration
 from .. import warm_up
 from ..export_operators import FORMATS
@@ -137,7 +138,7 @@ class SCOPE_PT_result(Tab, bpy.types.Panel):
         """Draw the panel."""
         layout, result = self.layout, context.scene.scope.result
         column = layout.column(align=True)
-        column.label(text=Path(result.footage).name, icon="FILE_MOVIE")
+        column.label(text=shown(Path(result.footage).name), icon="FILE_MOVIE")
         column.label(text="1 person" if result.people == 1 else f"{result.people} people", icon="OUTLINER_OB_ARMATURE")
         seconds = result.frames / result.frames_per_second if result.frames_per_second else 0.0
         frames = "1 frame" if result.frames == 1 else f"{result.frames} frames"

@@ -34,7 +34,7 @@ class SCOPE_PG_warning(bpy.types.PropertyGroup):
 class SCOPE_PG_result(bpy.types.PropertyGroup):
     """Result of the last capture of this scene."""
 
-    footage: StringProperty()
+    footage: StringProperty(subtype="FILE_PATH")
     collection: PointerProperty(type=bpy.types.Collection)
     people: IntProperty()
     frames: IntProperty()
