@@ -16,7 +16,16 @@ from typing import Any, NoReturn
 from ..solver.errors import ScopeError
 from ..solver.loaders.body_file import ASSETS
 from .command_line.arguments import add_options, body_and_options, non_default_arguments, path_argument
-from .command_line.outputs import check_blender, check_outputs, checked_rig, distinct_paths, summary, write_outputs
+from .command_line.import_command import add_import
+from .command_line.outputs import (
+    check_blender,
+    check_outputs,
+    checked_rig,
+    default_outputs,
+    distinct_paths,
+    summary,
+    write_outputs,
+)
 from .command_line.signals import interrupted, stopped_by_signals
 from .command_line.terminal import ProgressBar, say, stdout_for_report
 from .errors import UsageError, exit_status, system_error_message
@@ -47,6 +56,7 @@ def build_parser() -> argparse.ArgumentParser:
     batch.set_defaults(run=run_batch)
     _add_batch_files(batch)
     add_options(batch)
+    add_import(commands.add_parser("import", help="convert a motion file, of Scope or of another SMPL-based tool"))
     return parser
 
 
@@ -66,7 +76,7 @@ def _add_capture_files(capture: argparse.ArgumentParser) -> None:
         default=[],
         metavar="OUT",
         help=f"result file, may be repeated; its suffix selects the format: {', '.join(SUFFIXES)}"
-        " (default: .npz and .glb next to the video)",
+        " (default: .npz and .glb next to the video; in the current folder for the sample)",
     )
     capture.add_argument(
         "--overlay", type=path_argument, metavar="FILE", help="draw the body over the footage: .mp4, .png, .jpg"
@@ -131,7 +141,7 @@ def run_capture(args: argparse.Namespace) -> dict[str, Any]:
     video = args.video or SAMPLE
     if not args.video and not SAMPLE.is_file():
         raise UsageError("the sample clip is only in the repository, not in this installation; give a VIDEO to capture")
-    outputs = distinct_paths(args.output) or [video.with_suffix(".npz"), video.with_suffix(".glb")]
+    outputs = distinct_paths(args.output) or default_outputs(video)
     check_outputs(outputs, args.overlay, video)
     check_blender(outputs)
     rig = checked_rig(args, outputs)

@@ -8,9 +8,10 @@ world frame and the others relative to their parents; ``trans`` is SMPL's: pelvi
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+import io
+from dataclasses import dataclass, field, fields
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,6 +52,8 @@ class Motion:
     residual_px: NDArray[np.floating[Any]]  # (T,)
     image_size: NDArray[np.int64]  # (2,) width, height of the decoded, upright frame
     source: str = ""  # file name of the footage
+    # What the user corrected, which `poses` and `joints_cam` contain: the arrays named CORRECTION_KEYS, or none.
+    corrections: dict[str, NDArray[Any]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for name, (_, dtype) in _SCHEMA.items():
@@ -92,29 +95,46 @@ class Motion:
         :raises OutputError: the file cannot be written.
         """
         path = Path(path)
-        arrays = {f.name: np.asarray(getattr(self, f.name)) for f in fields(self)}
         try:
             with atomic_path(path) as temporary, temporary.open("wb") as file:
-                np.savez_compressed(file, **arrays)
+                self._write(file)
         except OSError as error:
             raise OutputError(f"cannot write {path}: {reason(error)}") from error
 
+    def to_bytes(self) -> bytes:
+        """Return the content of the motion file."""
+        file = io.BytesIO()
+        self._write(file)
+        return file.getvalue()
+
+    def _write(self, file: BinaryIO) -> None:
+        arrays = {f.name: np.asarray(getattr(self, f.name)) for f in fields(self) if f.name != "corrections"}
+        np.savez_compressed(file, **arrays, **self.corrections)
+
     @classmethod
-    def load(cls, path: str | Path) -> Motion:
+    def load(cls, path: str | Path, content: bytes | None = None) -> Motion:
         """Read and check a motion file. Nothing is unpickled.
 
+        :param content: the file's bytes if they are not on disk; ``path`` then only names them in messages.
         :raises MotionFileError: the file is missing or damaged, or is not a motion file of this version.
         """
         path = Path(path)
-        data = read_npz(path, MotionFileError, "motion file")
-        known = {f.name for f in fields(cls)}
+        data = read_npz(path, MotionFileError, "motion file", content)
+        known = {f.name for f in fields(cls)} - {"corrections"}
         missing = sorted(known - set(data) - {"source"})
         if missing:
             raise MotionFileError(f"{path} lacks {', '.join(missing)}: it is not a motion file of this version")
         values: dict[str, Any] = {k: v.item() if v.ndim == 0 else v for k, v in data.items() if k in known}
-        return cls(**values)
+        return cls(**values, corrections={key: data[key] for key in CORRECTION_KEYS if key in data})
 
 
+# Only in files with corrections. The first rows say what was corrected, the others how the changed frames were before.
+CORRECTION_KEYS = (
+    *("pin_frames", "pin_joints", "pin_uv", "pin_xyz", "pin_reach"),
+    *("contact_spans", "contact_feet", "exchange_spans", "exchange_limbs"),
+    *("uncorrected_rows", "uncorrected_poses", "uncorrected_trans", "uncorrected_poses_raw", "uncorrected_trans_raw"),
+    "uncorrected_joints_cam",
+)
 _SCHEMA: dict[str, tuple[tuple[str | int, ...], type]] = {
     "poses": (("T", "3K1"), np.float32),
     "trans": (("T", 3), np.float32),

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Spans of frames that should be reviewed: filled in, far from the footage, or with low confidence. Numpy only."""
+"""Spans of frames that should be reviewed: filled in, far from the footage, unsure, or under the floor. Numpy only."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ REASONS = {
     "unseen": "not visible, the pose is filled in",
     "far": "large reprojection error, should be checked",
     "unsure": "low confidence, should be checked",
+    "floor": "a foot is under the floor",
 }
 
 
@@ -29,16 +30,20 @@ class Span:
     last: int
 
 
-def find_review_spans(motion: Motion, gap_s: float = 0.0) -> list[Span]:
+def find_review_spans(motion: Motion, gap_s: float = 0.0, under_floor: NDArray[np.bool_] | None = None) -> list[Span]:
     """Find the spans of a motion that should be reviewed.
 
     :param gap_s: spans of the same reason that are less than this many seconds apart are merged.
-    :return: the spans of each reason in turn, in chronological order; a frame has at most one reason.
+    :param under_floor: (T,) frames in which a foot is under the floor; None: not known.
+    :return: the spans of each reason in turn, in chronological order; apart from the floor, a frame has at most one
+        reason.
     """
     unseen = ~motion.valid
     far = ~unseen & (motion.residual_px > FAR_SHARE * motion.image_size.max())
     unsure = ~unseen & ~far & (body_confidence(motion) < LOW_CONFIDENCE)
     masks = {"unseen": unseen, "far": far, "unsure": unsure}
+    if under_floor is not None:
+        masks["floor"] = under_floor
     return [Span(why, *pair) for why, mask in masks.items() for pair in _spans(mask, motion.timestamps, gap_s)]
 
 

@@ -1,13 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Build the extension: a staging copy with the wheels of every platform, zipped and validated by Blender's own tool.
+"""Build the extension: one zip for each platform and Python, validated and listed by Blender's own tool.
 
-Blender's ``extension build`` is one Python file that needs no running Blender; PyPI's bpy carries it.
+Blender's ``extension`` command is one Python file that needs no running Blender; PyPI's bpy carries it. What the
+Extensions Platform asks of a zip, and where the code answers, is in docs/publishing.md.
 """
 
 from __future__ import annotations
 
 import argparse
+import hashlib
 import importlib.util
+import json
 import os
 import re
 import shutil
@@ -15,6 +18,7 @@ import subprocess
 import sys
 import tomllib
 import zipfile
+from dataclasses import dataclass
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
@@ -22,7 +26,7 @@ from shipped_kernels import add_kernels
 
 ROOT = Path(__file__).resolve().parent.parent
 BUILD = ROOT / "build"
-WHEELS, STAGING, DIST = BUILD / "wheels", BUILD / "staging", BUILD / "dist"
+WHEELS, STAGING, DIST, OTHER_DIST = BUILD / "wheels", BUILD / "staging", BUILD / "dist", BUILD / "dist_any_blender"
 
 # pip's platform tags, newest first, down to the oldest systems that onnxruntime and llvmlite support.
 PLATFORMS = {
@@ -30,61 +34,102 @@ PLATFORMS = {
     "macos-arm64": ["macosx_14_0_arm64"],
     "linux-x64": ["manylinux_2_28_x86_64", "manylinux_2_27_x86_64", "manylinux_2_17_x86_64", "manylinux2014_x86_64"],
 }
-PYTHONS = ("3.13", "3.11")  # Blender 5.1 and later; 4.2 to 5.0
+# The Python of Blender's own builds: the first Blender with it, and the first after it. Distributions use others.
+BLENDERS = {"3.11": ("4.2.0", "5.1.0"), "3.13": ("5.1.0", None)}
 # All imported packages. onnxruntime's metadata also requires flatbuffers, packaging and protobuf, but running a network
 # imports none of them. numpy is always Blender's own.
 PACKAGES = ("numba", "llvmlite", "onnxruntime", "opencv-contrib-python-headless", "av")
 CONTENT = ("__init__.py", "LICENSE", "THIRD_PARTY.md", "solver", "scope_addon", "assets")
-LEFT_OUT = ("__pycache__", "*.pyc", ".*", "sample_truth.npz", "pictures", "guide", "examples")
+GUIDE = ("docs/guide.md",)  # with its pictures in assets/guide
+LEFT_OUT = ("__pycache__", "*.pyc", ".*", "sample_truth.npz", "pictures", "examples")
+GOAL_MB, LIMIT_MB = 200, 240
+
+
+@dataclass(frozen=True)
+class Target:
+    """What a zip is made for: a platform, a Python, and Blender's own builds with that Python or any Blender."""
+
+    platform: str
+    python: str
+    any_blender: bool = False
+
+    @property
+    def blenders(self) -> tuple[str, str | None]:
+        """The first Blender that may install it, and the first that may not; None where there is no such."""
+        return (BLENDERS["3.11"][0], None) if self.any_blender else BLENDERS[self.python]
+
+    def file_name(self, version: str) -> str:
+        """Return the name of its zip, which says what it is for."""
+        first, end = (text and text.removesuffix(".0") for text in self.blenders)
+        blender = (
+            f"python_{self.python}" if self.any_blender else f"blender_{first}" + (f"_before_{end}" if end else "")
+        )
+        return f"scope-{version}-{blender}-{self.platform.replace('-', '_')}.zip"
 
 
 def main() -> int:
     """Build the extension; return the exit status."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("platforms", nargs="*", metavar="PLATFORM", help=f"of {', '.join(PLATFORMS)} (default: all)")
-    platforms = parser.parse_args().platforms or list(PLATFORMS)
-    unknown = sorted(set(platforms) - set(PLATFORMS))
+    parser.add_argument("--python", choices=sorted(BLENDERS), help="build for this Python alone (default: each)")
+    parser.add_argument(
+        "--any-blender",
+        action="store_true",
+        help="for a distribution's Blender, whose Python is not that of Blender's own build; any version from 4.2 on"
+        f" may install the zip, which is written to build/{OTHER_DIST.name}",
+    )
+    parser.add_argument("--website", metavar="URL", default="", help="page for users, written into the manifest")
+    args = parser.parse_args()
+    unknown = sorted(set(args.platforms) - set(PLATFORMS))
     if unknown:
         print(f"build: unknown platform {', '.join(unknown)}; choose of {', '.join(PLATFORMS)}", file=sys.stderr)
         return 2
-    wheels = {platform: download_wheels(platform) for platform in platforms}
-    stage(wheels)
-    for platform in platforms:
-        for python in PYTHONS:
-            add_kernels(STAGING, platform, python, wheels[platform])
-    shutil.rmtree(DIST, ignore_errors=True)
-    DIST.mkdir(parents=True)
-    blender_extension("build", "--source-dir", str(STAGING), "--output-dir", str(DIST), "--split-platforms")
-    archives = sorted(DIST.glob("*.zip"))
-    assert len(archives) == len(platforms), archives
-    for archive in archives:
-        blender_extension("validate", str(archive))
-        check(archive)
-        print(f"{archive}  {archive.stat().st_size / 1e6:.0f} MB")
+    pythons = [args.python] if args.python else sorted(BLENDERS)
+    targets = [Target(p, python, args.any_blender) for p in args.platforms or PLATFORMS for python in pythons]
+    folder = OTHER_DIST if args.any_blender else DIST
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True)
+    for target in targets:
+        archive = build(target, folder, args.website)
+        size = archive.stat().st_size / 1e6
+        print(f"{archive}  {size:.0f} MB{f', above the goal of {GOAL_MB} MB' if size > GOAL_MB else ''}", flush=True)
+    if not args.any_blender:
+        check_listing(folder, targets)
     return 0
 
 
-def download_wheels(platform: str) -> list[Path]:
-    """Return the platform's wheels for every Python, as locked; download only those that are missing."""
-    paths: list[Path] = []
-    for python in PYTHONS:
-        folder = WHEELS / platform / python
-        folder.mkdir(parents=True, exist_ok=True)
-        pins = folder / "requirements.txt"
-        wanted = locked(python)
-        if not pins.is_file() or pins.read_text() != wanted or len(list(folder.glob("*.whl"))) != len(PACKAGES):
-            for old in folder.iterdir():
-                old.unlink()
-            request = folder / "request.txt"
-            request.write_text(wanted)
-            command = [sys.executable, "-m", "pip", "download", "--quiet", "--disable-pip-version-check", "--no-deps"]
-            command += ["--only-binary=:all:", "--require-hashes", "--implementation", "cp", "--python-version", python]
-            for tag in PLATFORMS[platform]:
-                command += ["--platform", tag]
-            subprocess.run([*command, "--dest", str(folder), "--requirement", str(request)], check=True)
-            request.rename(pins)
-        paths += sorted(folder.glob("*.whl"))
-    return paths
+def build(target: Target, folder: Path, website: str = "") -> Path:
+    """Stage, zip, validate and check one target; return its zip."""
+    wheels = download_wheels(target)
+    stage(target, wheels, website)
+    add_kernels(STAGING, target.platform, target.python, wheels)
+    version = tomllib.loads((STAGING / "blender_manifest.toml").read_text())["version"]
+    archive = folder / target.file_name(version)
+    blender_extension("build", "--source-dir", str(STAGING), "--output-filepath", str(archive))
+    blender_extension("validate", str(archive))
+    check(archive, target)
+    return archive
+
+
+def download_wheels(target: Target) -> list[Path]:
+    """Return a target's wheels, as locked and as on PyPI; download them if they are missing."""
+    folder = WHEELS / target.platform / target.python
+    folder.mkdir(parents=True, exist_ok=True)
+    pins = folder / "requirements.txt"
+    wanted = locked(target.python)
+    if not pins.is_file() or pins.read_text() != wanted or len(list(folder.glob("*.whl"))) != len(PACKAGES):
+        for old in folder.iterdir():
+            old.unlink()
+        request = folder / "request.txt"
+        request.write_text(wanted)
+        command = [sys.executable, "-m", "pip", "download", "--quiet", "--disable-pip-version-check", "--no-deps"]
+        command += ["--only-binary=:all:", "--require-hashes", "--implementation", "cp"]
+        command += ["--python-version", target.python]
+        for tag in PLATFORMS[target.platform]:
+            command += ["--platform", tag]
+        subprocess.run([*command, "--dest", str(folder), "--requirement", str(request)], check=True)
+        request.rename(pins)
+    return sorted(folder.glob("*.whl"))
 
 
 def locked(python: str) -> str:
@@ -99,50 +144,57 @@ def locked(python: str) -> str:
     return "\n".join(found[name] for name in PACKAGES) + "\n"
 
 
-def shipped_name(wheel: str) -> str:
-    """Return the file name with which every Blender since 4.2.0 chooses the right wheel; the content is unchanged.
+def shipped_name(wheel: str, python: str) -> str:
+    """Return a wheel's file name in the zip: PyPI's, except where a Blender would then leave the wheel out.
 
-    - Until 4.4 Blender compares a wheel's Python tag with its own Python, also for the stable ABI, and would skip a
-      ``cp37-abi3`` wheel; such a wheel also gets the tags of the supported Pythons.
-    - 4.2's first releases ignore the tag and, of two wheels of one version, take the one whose name sorts last.
-      Their Python is 3.11, so the others get a build number, which sorts before it.
+    Blender 4.3, and the first updates of 4.2, compare a wheel's Python tag with their own Python also where the wheel
+    is for the stable ABI, and skip ``cp37-abi3``. In the zip for their Python, such a wheel's name also has the tag of
+    that Python. The wheel itself is unchanged.
     """
-    name, version, *build, python, abi, platform = wheel.removesuffix(".whl").split("-")
-    tags = ["cp" + p.replace(".", "") for p in sorted(PYTHONS)]
-    if abi == "abi3":
-        python = ".".join([python, *tags])
-    elif python != "cp311":
-        build = ["1"]
-    return "-".join([name, version, *build, python, abi, platform]) + ".whl"
+    *head, tag, abi, platform = wheel.removesuffix(".whl").split("-")
+    own = "cp" + python.replace(".", "")
+    if python == "3.11" and abi == "abi3" and tag != own:
+        tag = f"{tag}.{own}"
+    return "-".join([*head, tag, abi, platform]) + ".whl"
 
 
-def stage(wheels: dict[str, list[Path]]) -> None:
-    """Copy the shipped files and wheels into the staging folder, with a manifest that lists the wheels."""
+def stage(target: Target, wheels: list[Path], website: str = "") -> None:
+    """Copy the shipped files and a target's wheels into the staging folder, with its manifest."""
     shutil.rmtree(STAGING, ignore_errors=True)
     (STAGING / "wheels").mkdir(parents=True)
-    for name in CONTENT:
-        source, target = ROOT / name, STAGING / name
+    for name in (*CONTENT, *GUIDE):
+        source, goal = ROOT / name, STAGING / name
         if source.is_dir():
-            shutil.copytree(source, target, ignore=shutil.ignore_patterns(*LEFT_OUT))
+            shutil.copytree(source, goal, ignore=shutil.ignore_patterns(*LEFT_OUT))
         else:
-            shutil.copy2(source, target)
+            goal.parent.mkdir(exist_ok=True)
+            shutil.copy2(source, goal)
     names = []
-    for path in (p for paths in wheels.values() for p in paths):
-        target = STAGING / "wheels" / shipped_name(path.name)
-        if not target.exists():  # a wheel for the stable ABI serves both Pythons
-            os.link(path, target)
-            names.append(f"./wheels/{target.name}")
-    manifest = (ROOT / "blender_manifest.toml").read_text()
-    top, tables = manifest.split("\n[", 1)
-    lists = {"platforms": list(wheels), "wheels": names}
-    for key, values in lists.items():
+    for path in wheels:
+        name = shipped_name(path.name, target.python)
+        os.link(path, STAGING / "wheels" / name)
+        names.append(f"./wheels/{name}")
+    (STAGING / "blender_manifest.toml").write_text(manifest(target, names, website))
+
+
+def manifest(target: Target, wheels: list[str], website: str = "") -> str:
+    """Return the manifest of a target: that of the repository, with its Blenders, platform, wheels and website."""
+    top, tables = (ROOT / "blender_manifest.toml").read_text().split("\n[", 1)
+    first, end = target.blenders
+    limits = f'blender_version_min = "{first}"' + (f'\nblender_version_max = "{end}"' if end else "")
+    top, count = re.subn(r'^blender_version_min = ".*"$', limits, top, flags=re.M)
+    if count != 1:
+        raise SystemExit("build: blender_manifest.toml must have one line blender_version_min")
+    if website:
+        top += f"\nwebsite = {json.dumps(website)}\n"
+    for key, values in {"platforms": [target.platform], "wheels": wheels}.items():
         top += f"\n{key} = [\n" + "".join(f'    "{value}",\n' for value in values) + "]\n"
     tables = tables.split("\n[build]")[0]  # the staging folder holds only what is shipped
-    (STAGING / "blender_manifest.toml").write_text(f"{top}\n[{tables}\n")
+    return f"{top}\n[{tables}\n"
 
 
-def blender_extension(*arguments: str) -> None:
-    """Run Blender's extension tool."""
+def blender_extension(*arguments: str) -> str:
+    """Run Blender's extension tool; return what it says."""
     spec = importlib.util.find_spec("bpy")
     package = Path(spec.origin).parent if spec and spec.origin else ROOT / "no bpy"
     found = sorted(package.glob("*/scripts/**/blender_ext.py"))
@@ -151,24 +203,25 @@ def blender_extension(*arguments: str) -> None:
     done = subprocess.run([sys.executable, str(found[0]), *arguments], capture_output=True, text=True, check=False)
     if done.returncode:
         raise SystemExit(f"build: Blender's extension tool refused:\n{done.stdout}{done.stderr}")
+    return done.stdout + done.stderr
 
 
-def check(archive: Path) -> None:
-    """Check what Blender's tool cannot: the archive contains everything that a capture needs, and not numpy."""
+def check(archive: Path, target: Target) -> None:
+    """Check what Blender's tool cannot: the size, and that all that a capture needs is there, and not numpy."""
     with zipfile.ZipFile(archive) as file:
         names = file.namelist()
-        manifest = tomllib.loads(file.read(next(n for n in names if n.endswith("blender_manifest.toml"))).decode())
-    generated = manifest["build"]["generated"]  # the part of the lists that Blender's tool kept for this platform
-    wheels = [Path(w).name for w in generated["wheels"]]
-    problems = [f"{w} is listed but not there" for w in wheels if not any(n.endswith(f"wheels/{w}") for n in names)]
-    for python in PYTHONS:
-        tag = "cp" + python.replace(".", "")
-        for package in PACKAGES:
-            prefix = package.replace("-", "_") + "-"
-            fitting = [w for w in wheels if w.startswith(prefix) and tag in re.split(r"[-.]", w)]
-            if len(fitting) != 1:
-                problems.append(f"{len(fitting)} wheels of {package} for Python {python}")
-    if any(w.lower().startswith("numpy") for w in wheels):
+        wheels = {Path(n).name: hashlib.sha256(file.read(n)).hexdigest() for n in names if n.endswith(".whl")}
+        stated = tomllib.loads(file.read("blender_manifest.toml").decode())
+    listed = [Path(w).name for w in stated["wheels"]]
+    problems = [f"{w} is listed but not there" for w in listed if w not in wheels]
+    problems += [f"{w} is there but not listed" for w in wheels if w not in listed]
+    lock = locked(target.python)
+    problems += [f"{w} is not the locked file" for w, found in wheels.items() if f"sha256:{found}" not in lock]
+    for package in PACKAGES:
+        count = sum(w.startswith(package.replace("-", "_") + "-") for w in listed)
+        if count != 1:
+            problems.append(f"{count} wheels of {package}")
+    if any(w.lower().startswith("numpy") for w in listed):
         problems.append("numpy is shipped")
     networks = ("pose_detection", "pose_landmark_lite", "pose_landmark_full", "pose_landmark_heavy")
     networks += ("palm_detection", "hand_landmark")
@@ -176,13 +229,30 @@ def check(archive: Path) -> None:
     wanted += ["assets/networks/LICENSE-mediapipe.txt", "assets/body/scope.npz", "assets/body/scope_h.npz"]
     wanted += ["assets/lifter/lifter.onnx", "assets/prior/joint_prior.npz", "assets/sample/sample.mp4"]
     wanted += [f"assets/{folder}/LICENSE.md" for folder in ("body", "lifter", "sample")]
-    wanted += ["LICENSE", "THIRD_PARTY.md", "scope_addon/ui/__init__.py"]
-    problems += [f"{w} is missing" for w in wanted if not any(n.endswith(w) for n in names)]
-    if len(generated["platforms"]) != 1:
-        problems.append(f"made for {', '.join(generated['platforms'])}, not for one platform")
+    wanted += ["LICENSE", "THIRD_PARTY.md", "scope_addon/ui/__init__.py", *GUIDE]
+    problems += [f"{w} is missing" for w in wanted if w not in names]
+    if stated["platforms"] != [target.platform]:
+        problems.append(f"made for {', '.join(stated['platforms'])}, not for {target.platform}")
+    if (stated["blender_version_min"], stated.get("blender_version_max")) != target.blenders:
+        problems.append(f"not made for Blender {' to '.join(str(b) for b in target.blenders)}")
     problems += [f"{n} does not belong in" for n in names if "__pycache__" in n or n.endswith((".pyc", ".nbi", ".nbc"))]
+    size = archive.stat().st_size / 1e6
+    if size > LIMIT_MB:
+        problems.append(f"it has {size:.0f} MB, more than the limit of {LIMIT_MB} MB")
     if problems:
         raise SystemExit(f"build: {archive.name}: {'; '.join(problems)}")
+
+
+def check_listing(folder: Path, targets: list[Target]) -> None:
+    """List the zips as an extension repository does: every one must be listed, and no Blender may fit two."""
+    said = blender_extension("server-generate", "--repo-dir", str(folder))
+    listing = folder / "index.json"
+    entries = json.loads(listing.read_text())["data"]
+    found = sorted((e["platforms"], e["blender_version_min"], e.get("blender_version_max")) for e in entries)
+    wanted = sorted(([target.platform], *target.blenders) for target in targets)
+    if found != wanted or "duplicate" in said.lower() or "error" in said.lower():
+        raise SystemExit(f"build: Blender's tool listed {found}, not {wanted}, and said:\n{said}")
+    print(f"{listing}  {len(entries)} zips listed for an extension repository")
 
 
 if __name__ == "__main__":

@@ -154,6 +154,27 @@ def test_an_interrupt_during_the_overlay_leaves_complete_files(tmp_path, capsys,
     assert files_below(tmp_path) == ["a.npz"]
 
 
+def test_no_command_writes_into_scopes_own_folders(tmp_path, capfd, monkeypatch):
+    def state():
+        files = [p for name in ("assets", "scope_addon", "solver") for p in (SAMPLE.parents[2] / name).rglob("*")]
+        kept = [p for p in files if p.is_file() and "__pycache__" not in p.parts]  # Python's own
+        return {str(p): (p.stat().st_size, p.stat().st_mtime_ns) for p in kept}
+
+    monkeypatch.chdir(tmp_path)
+    before = state()
+    brief = ["--quality", "fast", "--end", "0.1"]
+    for argv in (
+        ["capture", *brief],
+        ["capture", SAMPLE, *brief, "--overlay", "check.mp4"],
+        ["batch", SAMPLE.parent, "--out", "motions", "--formats", "npz", *brief],
+    ):
+        status, _, err = run(capfd, *argv)
+        assert status == 0, err
+        assert state() == before
+    made = ["check.mp4", "motions", "motions/sample.npz", "motions/scope-batch.json", "sample.glb", "sample.npz"]
+    assert files_below(tmp_path) == made
+
+
 NOT_UTF8 = os.fsdecode(b"person \xe9")
 ON_LINUX = pytest.mark.skipif(sys.platform != "linux", reason="file names are Unicode on this system")
 

@@ -31,6 +31,13 @@ def test_each_frame_has_one_reason():
     assert find_review_spans(m) == expected
 
 
+def test_feet_under_the_floor_are_a_reason_of_their_own():
+    m, under = motion(), np.zeros(30, bool)
+    m.valid[:3] = False
+    under[2:6] = True
+    assert find_review_spans(m, under_floor=under) == [Span("unseen", 0, 2), Span("floor", 2, 5)]
+
+
 def test_close_spans_are_merged():
     m = motion()
     m.valid[[3, 6, 20]] = False

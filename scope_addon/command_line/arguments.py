@@ -27,9 +27,9 @@ def path_argument(text: str) -> Path:
     return Path(text)
 
 
-def add_options(parser: argparse.ArgumentParser) -> None:
-    """Add an argument for each option of the command line."""
-    for option in options_at(Place.COMMAND_LINE):
+def add_options(parser: argparse.ArgumentParser, place: Place = Place.COMMAND_LINE) -> None:
+    """Add an argument for each option of the command line, or of one of its commands."""
+    for option in options_at(place):
         if option.value_type is bool:
             parser.add_argument(option.flag, action="store_true", help=option.argument.help or option.help)
         else:
@@ -71,12 +71,12 @@ def body_and_options(args: argparse.Namespace) -> tuple[Body, CaptureOptions]:
     return body, options
 
 
-def option_values(args: argparse.Namespace) -> dict[str, Any]:
-    """Return the value of each option of the command line by the option's name.
+def option_values(args: argparse.Namespace, place: Place = Place.COMMAND_LINE) -> dict[str, Any]:
+    """Return the value of each option of the command line, or of one of its commands, by the option's name.
 
     :raises UsageError: an argument cannot be parsed.
     """
-    return {option.name: _value(option, _argument(option, args)) for option in options_at(Place.COMMAND_LINE)}
+    return {option.name: _value(option, _argument(option, args)) for option in options_at(place)}
 
 
 def non_default_arguments(args: argparse.Namespace) -> dict[str, str | None]:

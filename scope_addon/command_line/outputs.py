@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ...solver.body import Body
+from ...solver.loaders.body_file import ASSETS
 from ..errors import UsageError
 from ..footage import shown
 from ..installed import check_installed
@@ -25,6 +26,26 @@ MOTION_SUFFIXES = (".npz",)
 OVERLAY_SUFFIXES = (".mp4", ".png", ".jpg")
 
 
+def default_outputs(video: Path) -> list[Path]:
+    """Return the outputs of a capture without ``-o``: a motion file and a character next to the video.
+
+    For footage that comes with Scope they lie in the current folder. Nothing is written into Scope's own folder, which
+    the next version replaces, and which may not be writable.
+
+    :raises UsageError: the current folder is a part of Scope's own.
+    """
+    folder = video.parent
+    if _is_shipped(folder):
+        folder = Path()
+        if _is_shipped(folder):
+            raise UsageError(f"{folder.resolve()} belongs to Scope and is replaced with it; choose an output with -o")
+    return [folder / f"{video.stem}{suffix}" for suffix in (".npz", ".glb")]
+
+
+def _is_shipped(folder: Path) -> bool:
+    return folder.resolve().is_relative_to(ASSETS.resolve())
+
+
 def check_outputs(outputs: list[Path], overlay: Path | None, video: Path) -> None:
     """Check, before the capture starts, that the outputs can be written after it.
 
@@ -38,7 +59,7 @@ def check_outputs(outputs: list[Path], overlay: Path | None, video: Path) -> Non
     paths = [*outputs, overlay] if overlay else outputs
     for path in paths:
         if path.exists() and video.exists() and path.samefile(video):
-            raise UsageError(f"{path} is the footage itself; choose another name")
+            raise UsageError(f"{path} is the input itself; choose another name")
 
 
 def check_blender(outputs: list[Path]) -> None:
@@ -106,14 +127,14 @@ def write_outputs(
             motion.save(target)
         written += targets
     if scene_files:
-        from ..capture.media.image_sequence import find_sequence
         from ..scene.build import NEW_SCENE
         from ..scene.export.export import ExportOptions, export_motions
 
-        sequence = find_sequence(video, args.fps is not None)
-        footage = sequence.paths[0] if sequence else video
+        footage = _footage(video, args)
         options = replace(NEW_SCENE, name=shown(video.stem), shape=args.shape_keys)
-        separate = ExportOptions(separate=args.file_per_person)
+        if not motions[0].image_size.any():  # imported, and never seen by a camera
+            options = replace(options, resolution="keep", active_camera=False, with_camera=False)
+        separate = ExportOptions(separate=args.file_per_person, bvh_unit=args.bvh_unit)
         if rig is not None:
             from ..scene.rigs.rig_export import RigExportOptions, export_on_rig
 
@@ -125,6 +146,16 @@ def write_outputs(
         for warning in warnings:
             say(f"warning: {warning}")
     return written
+
+
+def _footage(video: Path, args: argparse.Namespace) -> Path | None:
+    """Return the footage to show; None for an imported motion."""
+    if args.command == "import":
+        return None
+    from ..capture.media.image_sequence import find_sequence
+
+    sequence = find_sequence(video, args.fps is not None)
+    return sequence.paths[0] if sequence else video
 
 
 def summary(report: dict[str, Any]) -> str:

@@ -14,6 +14,7 @@ from ...solver.rotations import exp, log
 from ..errors import UsageError
 from ..kinematics.contact_points import SOLES, contact_point_positions, with_contact_points
 from ..kinematics.smoothing import smooth_rotations
+from ..motion import Motion
 
 
 @dataclass
@@ -44,6 +45,13 @@ class Clip:
         :return: (T, K+1, 3) metres, world frame.
         """
         return body.forward_kinematics(self.rotations, self.root - body.rest_joints(betas)[0], betas)[1]
+
+
+def clip_from_motion(body: Body, motion: Motion, raw: bool) -> Clip:
+    """Convert a motion to keys: the finished one, or the one before smoothing (``raw``)."""
+    poses, trans = (motion.poses_raw, motion.trans_raw) if raw else (motion.poses, motion.trans)
+    rotations = exp(poses.reshape(len(motion), -1, 3).astype(float))
+    return Clip(motion.timestamps, rotations, body.rest_joints(motion.betas)[0] + trans)
 
 
 def keys_within(clip: Clip, start: float, end: float) -> NDArray[np.intp]:

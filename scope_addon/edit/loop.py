@@ -30,9 +30,15 @@ class Cycle:
 
 
 def best_cycle(
-    clip: Clip, body: Body, betas: NDArray[np.floating[Any]], start: float, end: float, shortest: float = 0.4
+    clip: Clip,
+    body: Body,
+    betas: NDArray[np.floating[Any]],
+    start: float,
+    end: float,
+    shortest: float = 0.4,
+    least_movement_m: float = 0.05,
 ) -> Cycle:
-    """Find the two keys within a span whose poses and velocities differ least.
+    """Find the two keys within a span whose poses and velocities differ least, with movement between them.
 
     Poses are compared by joint positions relative to the pelvis's projection on the floor, rotated to the same heading.
 
@@ -40,7 +46,9 @@ def best_cycle(
     :param start: start of the span, seconds.
     :param end: end of the span, seconds.
     :param shortest: minimum duration of the cycle, seconds.
-    :raises UsageError: when the span is too short.
+    :param least_movement_m: root mean square distance of the joints, metres, by which a pose between the two must
+        differ from the first; 0 also accepts a person who does not move.
+    :raises UsageError: when the span is too short, or no movement in it is repeated.
     """
     span = keys_within(clip, start, end)
     if clip.times[span[-1]] - clip.times[span[0]] < shortest or len(span) < 4:
@@ -54,11 +62,32 @@ def best_cycle(
     apart = np.maximum(squares[:, None] + squares[None] - 2 * features @ features.T, 0.0)
     duration = part.times[None] - part.times[:, None]
     apart[duration < shortest] = np.inf
+    if least_movement_m > 0:
+        apart[~_moves(joints, least_movement_m)] = np.inf
+    if not np.isfinite(apart).any():
+        raise UsageError(
+            "no cycle was found: no movement is repeated within the chosen frames; choose frames in which the person "
+            "does the same thing twice, such as two steps of a walk"
+        )
     # Prefer the longest of nearly equal cycles: a negligible difference must not select the shortest part of a walk.
     score = np.sqrt(apart / joints.shape[1]) - 0.002 * duration
     a, b = np.unravel_index(int(np.argmin(score)), score.shape)
     distance = np.sqrt(((joints[a] - joints[b]) ** 2).sum(-1).mean())
     return Cycle(int(span[a]), int(span[b]), float(distance))
+
+
+def _moves(joints: NDArray[np.float64], least: float) -> NDArray[np.bool_]:
+    """Return (N, N): whether the body leaves pose a by ``least`` and comes back at least halfway by pose b.
+
+    :param joints: (N, J, 3) metres.
+    :param least: root mean square distance over the joints, metres.
+    """
+    flat = joints.reshape(len(joints), -1)
+    squares = (flat**2).sum(1)
+    apart = np.sqrt(np.maximum(squares[:, None] + squares[None] - 2 * flat @ flat.T, 0.0) / joints.shape[1])
+    farthest = np.maximum.accumulate(np.triu(apart), axis=1)  # from pose a on, up to pose b
+    moves: NDArray[np.bool_] = (farthest >= least) & (apart <= 0.5 * farthest)
+    return moves
 
 
 def close_cycle(clip: Clip, cycle: Cycle, blend: float = 0.2) -> Clip:

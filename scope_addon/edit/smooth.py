@@ -6,22 +6,15 @@ from __future__ import annotations
 import numpy as np
 
 from ...solver.body import Body
-from ...solver.rotations import exp
 from ..errors import UsageError
 from ..kinematics.smoothing import ROTATION_CUTOFF_HZ, smooth_root, smooth_rotations
 from ..motion import Motion
-from .clip import Clip, interpolate_rotations
-
-
-def clip_from_motion(body: Body, motion: Motion, raw: bool) -> Clip:
-    """Convert a motion to keys: the finished one, or the one before smoothing (``raw``)."""
-    poses, trans = (motion.poses_raw, motion.trans_raw) if raw else (motion.poses, motion.trans)
-    rotations = exp(poses.reshape(len(motion), -1, 3).astype(float))
-    return Clip(motion.timestamps, rotations, body.rest_joints(motion.betas)[0] + trans)
+from .clip import Clip, clip_from_motion, interpolate_rotations
+from .pins.corrected_motion import before_smoothing, corrected
 
 
 def smoothed(body: Body, motion: Motion, strength: float) -> Clip:
-    """Smooth the raw motion without phase shift.
+    """Smooth the raw motion without phase shift, and correct it where the user did.
 
     The cut-off frequency is 4.5 Hz / strength: 0 leaves the raw motion, 1 is what a capture does, 3 is very smooth. The
     capture also locks feet in contact. That correction is the difference between the finished motion and plain
@@ -38,6 +31,15 @@ def smoothed(body: Body, motion: Motion, strength: float) -> Clip:
     finished = clip_from_motion(body, motion, raw=False)
     if strength == 1:
         return finished
+    if not motion.corrections:
+        return _smoothed(motion, raw, finished, strength)
+    captured = before_smoothing(motion, body)
+    clips = clip_from_motion(body, captured, raw=True), clip_from_motion(body, captured, raw=False)
+    return corrected(_smoothed(captured, *clips, strength), motion, body)
+
+
+def _smoothed(motion: Motion, raw: Clip, finished: Clip, strength: float) -> Clip:
+    """Smooth a motion without corrections; see `smoothed`."""
     plain, wanted = _plain(raw, motion, 1.0), _plain(raw, motion, strength)
     share = min(strength, 1.0)
     correction = np.swapaxes(plain.rotations, -1, -2) @ finished.rotations

@@ -100,5 +100,5 @@ def _speed(
 
 
 def logistic(x: NDArray[np.floating[Any]] | float) -> NDArray[np.floating[Any]]:
-    """Return the logistic function 1 / (1 + exp(−x)) of an array of any shape, clipped at |x| = 30."""
+    """Return the logistic function 1 / (1 + exp(−x)) of an array (...), clipped at |x| = 30."""
     return np.asarray(1 / (1 + np.exp(-np.clip(x, -30, 30))))

@@ -145,7 +145,7 @@ CAPTURE_OPTIONS = (
         "body",
         str,
         "scope",
-        Place.COMMAND_LINE | Place.WORKER | Place.PANEL,
+        Place.COMMAND_LINE | Place.WORKER | Place.PANEL | Place.IMPORT,
         "the body that is fitted to the person",
         argument=Argument(help="body model: scope, scope_h, or your own .npz or .pkl file"),
         blender=Property(choices=BODIES),

@@ -24,6 +24,10 @@ ROOTS = (
     ),
     Choice("in-place", "In Place", "No root motion: the character stays in place", 2),
 )
+BVH_UNITS = (
+    Choice("cm", "Centimetres", "One unit is a centimetre, as most tools expect", 0),
+    Choice("m", "Metres", "One unit is a metre", 1),
+)
 FRAME_RATES = (
     Choice(
         "auto", "Automatic", "Set the scene's frame rate to the footage's unless something in the scene is animated", 0
@@ -38,7 +42,7 @@ OUTPUT_OPTIONS = (
         "shape",
         str,
         "keyed",
-        Place.COMMAND_LINE | Place.PANEL,
+        Place.COMMAND_LINE | Place.IMPORT | Place.PANEL,
         "how the person's body shape is stored",
         choices=SHAPES,
         argument=Argument(
@@ -47,13 +51,29 @@ OUTPUT_OPTIONS = (
         ),
     ),
     Option(
+        "take",
+        str,
+        "",
+        Place.PANEL,
+        "name of the next capture, its actions and the exported animation; if empty, the footage's name",
+    ),
+    Option(
+        "bvh_unit",
+        str,
+        "cm",
+        Place.COMMAND_LINE | Place.IMPORT | Place.EXPORT,
+        "unit of length in .bvh files",
+        choices=BVH_UNITS,
+        blender=Property(label="Unit"),
+    ),
+    Option(
         "file_per_person", bool, False, Place.COMMAND_LINE, "write a separate file for each person, in every format"
     ),
     Option(
         "retarget",
         Path,
         None,
-        Place.COMMAND_LINE,
+        Place.COMMAND_LINE | Place.IMPORT,
         "retarget the motion to the rig in this .blend, .fbx or .glb file",
         argument=Argument(metavar="RIG"),
     ),
@@ -61,7 +81,7 @@ OUTPUT_OPTIONS = (
         "rig_object",
         str,
         "",
-        Place.COMMAND_LINE,
+        Place.COMMAND_LINE | Place.IMPORT,
         "name of the armature, if RIG contains several",
         argument=Argument(metavar="NAME"),
     ),
@@ -69,7 +89,7 @@ OUTPUT_OPTIONS = (
         "bone_map",
         Path,
         None,
-        Place.COMMAND_LINE,
+        Place.COMMAND_LINE | Place.IMPORT,
         "bone assignments, a JSON file saved in the panel",
         argument=Argument(metavar="FILE"),
     ),
@@ -77,7 +97,7 @@ OUTPUT_OPTIONS = (
         "retarget_root",
         str,
         "bone",
-        Place.COMMAND_LINE,
+        Place.COMMAND_LINE | Place.IMPORT,
         "root motion of the rig: in its pelvis bone, on its object, or none (in-place)",
         choices=ROOTS,
     ),
@@ -115,9 +135,11 @@ REPORT_OPTIONS = (
         "json",
         bool,
         False,
-        Place.COMMAND_LINE,
+        Place.COMMAND_LINE | Place.IMPORT,
         "print a machine-readable report on stdout",
         argument=Argument(inherited=False),
     ),
-    Option("quiet", bool, False, Place.COMMAND_LINE, "no progress bar", argument=Argument(inherited=False)),
+    Option(
+        "quiet", bool, False, Place.COMMAND_LINE | Place.IMPORT, "no progress bar", argument=Argument(inherited=False)
+    ),
 )

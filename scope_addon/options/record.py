@@ -18,6 +18,8 @@ class Place(enum.Flag):
     CAPTURE = enum.auto()  # a field of CaptureOptions, which experiments set as well
     PANEL = enum.auto()  # a property of the scene
     PREFERENCES = enum.auto()  # a property of the extension's preferences
+    EXPORT = enum.auto()  # a property of the export operator
+    IMPORT = enum.auto()  # an argument of the command that imports motion files
 
 
 @dataclass(frozen=True)

@@ -1,16 +1,21 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Goals for feet of another shape than the body's: whichever of heel and ball is in contact keeps its position.
+"""Goals for a rig's ankles, where its feet differ in shape from the body's.
 
-A foot that rolls from the heel onto the ball rotates about whichever of them is on the floor. Each of the two gives a
-position of the ankle,
+A foot that rolls from the heel onto the ball rotates about the one that is on the floor, and that point must not move.
+The ankle follows from either point i, heel or ball:
 
-    a_i = G(p_i) + Y c_i − D q_i,      q_i: from the rig's ankle to its heel or ball,   s_i: the body's,
-    G(p) = s p, with heights measured from the floor of each,      c_i = (q_i − s s_i) without its height,
+    a_i = G(p_i) + Y c_i − D q_i,      c_i = q_i − s s_i, with its height set to 0,
 
-with D the rotation of the foot and Y its heading alone. On a flat foot both agree with the body's ankle, so that a
-longer foot extends at both ends and nothing jumps; a point at rest on the body is at rest on the rig. The two positions
-are blended by a logistic function of the difference in height, in favour of the lower one. Neither point penetrates the
-floor, even where the captured foot does.
+    p_i   the point on the body, metres, world frame
+    s_i   from the body's ankle to the point, at rest;  q_i: the same on the rig
+    s     the rig's leg length divided by the body's
+    G(p)  s p, but the height is that of the rig's point at rest plus s times the rise of p above its height at rest
+    D, Y  rotation of the foot from rest, and its rotation about the vertical alone (heading)
+
+So a point that is at rest on the body is at rest on the rig. On a flat foot both goals are the same: s times the body's
+ankle, at the height of the rig's ankle; so a longer foot extends at both ends, and nothing jumps. The two goals are
+blended by a logistic function of the difference in height of the points, in favour of the lower one. Neither point
+penetrates the floor, even where the captured foot does.
 """
 
 from __future__ import annotations

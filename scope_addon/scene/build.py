@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from ...solver.body import Body
 from ..errors import MotionFileError, UsageError
 from ..footage import shown
+from ..kinematics.foot_skin import under_floor
 from ..motion import Motion
 from . import camera
 from .animation_data import timing
@@ -64,6 +65,7 @@ class Person:
     camera: bpy.types.Object | None
     motion: Motion = field(repr=False)
     frames: NDArray[np.float64] = field(repr=False)  # (T,) scene frame of each pose
+    under_floor: NDArray[np.bool_] = field(repr=False)  # (T,) poses with a foot under the floor
 
 
 @dataclass
@@ -132,7 +134,7 @@ def _build(
     if options.with_markers:
         for index, person in enumerate(people):
             prefix = "" if len(people) == 1 else f"person {index + 1} "
-            confidence_curves.add_review_markers(scene, prefix, person.motion, person.frames)
+            confidence_curves.add_review_markers(scene, prefix, person.motion, person.frames, person.under_floor)
     if options.with_camera:
         warnings += _build_cameras(name, people, collection, footage, options)
     unit = scene.unit_settings.scale_length
@@ -182,7 +184,7 @@ def _build_person(
     rig["scope_body_file"] = body.file
     rig["scope_start"] = options.start_frame
     rig["scope_betas"] = [float(b) for b in motion.betas]
-    return Person(rig, mesh, None, motion, frames)
+    return Person(rig, mesh, None, motion, frames, under_floor(motion, body))
 
 
 def _build_cameras(

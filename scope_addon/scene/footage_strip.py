@@ -11,11 +11,14 @@ import bpy
 from ..errors import VideoError
 from ..footage import PICTURE_SUFFIXES
 
+_OURS = "scope_footage"  # custom property of the strips that are added here
+
 
 def add_footage_strips(scene: bpy.types.Scene, footage: str | Path, start_frame: float) -> list[bpy.types.Strip]:
-    """Add the footage on free channels above existing strips; return the new strips.
+    """Add the footage on free channels above existing strips, and return its strips, the picture last.
 
-    A scene without strips continues to render its camera; otherwise, the render would show the footage alone.
+    Strips that were added before are moved instead. A scene without strips continues to render its camera; otherwise,
+    the render would show the footage alone.
 
     :param start_frame: scene frame of timestamp 0.
     :raises VideoError: when the file is missing, or Blender cannot read it.
@@ -25,6 +28,10 @@ def add_footage_strips(scene: bpy.types.Scene, footage: str | Path, start_frame:
         raise VideoError(f"the footage {path} does not exist; choose the video or image again and repeat the capture")
     editor = scene.sequence_editor or scene.sequence_editor_create()
     strips = strips_of(editor)
+    if present := _added_before(strips, path):
+        for strip in present:
+            move_to(strip, round(start_frame))
+        return present
     if not len(strips):
         scene.render.use_sequencer = False
     channel = max((strip.channel for strip in strips), default=0) + 1
@@ -43,6 +50,8 @@ def add_footage_strips(scene: bpy.types.Scene, footage: str | Path, start_frame:
         for strip in added:
             strips.remove(strip)
         raise VideoError(f"Blender cannot read {path}; convert a video to MP4 (H.264), an image to JPEG") from error
+    for strip in added:
+        strip[_OURS] = True
     return added
 
 
@@ -51,13 +60,48 @@ def strips_of(editor: bpy.types.SequenceEditor) -> Any:
     return editor.strips if hasattr(editor, "strips") else editor.sequences
 
 
+def _added_before(strips: Any, path: Path) -> list[bpy.types.Strip]:
+    """Return the strips that ``add_footage_strips`` has made of a file: its sound first, then its picture."""
+    found = [strip for strip in strips if _OURS in strip and _file_of(strip) == path.resolve()]
+    return sorted(found, key=lambda strip: strip.type != "SOUND")
+
+
+def _file_of(strip: bpy.types.Strip) -> Path | None:
+    """Return the file of a movie, sound or image strip, which may be stored relative to the .blend file."""
+    if strip.type == "SOUND":
+        path = strip.sound.filepath if strip.sound else ""
+    elif strip.type == "IMAGE":
+        path = f"{strip.directory}/{strip.elements[0].filename}"
+    else:
+        path = strip.filepath if strip.type == "MOVIE" else ""
+    return Path(bpy.path.abspath(path)).resolve() if path else None
+
+
+# Blender 5.1 renamed these properties of strips, and 6.0 removes the old names.
+
+
+def start_of(strip: bpy.types.Strip) -> int:
+    """Return the scene frame of the strip's first visible frame."""
+    return int(strip.left_handle if hasattr(strip, "left_handle") else strip.frame_final_start)
+
+
+def length_of(strip: bpy.types.Strip) -> int:
+    """Return the number of frames of the strip's source."""
+    return int(strip.content_duration if hasattr(strip, "content_duration") else strip.frame_duration)
+
+
+def move_to(strip: bpy.types.Strip, frame: int) -> None:
+    """Move a strip so that its source starts at a scene frame."""
+    setattr(strip, "content_start" if hasattr(strip, "content_start") else "frame_start", frame)
+
+
 def _sound(strips: Any, path: Path, channel: int, start: int) -> bpy.types.Strip | None:
     """Add the sound; return None for silent footage, for which Blender fails or adds a strip without length."""
     try:
         strip = strips.new_sound(path.stem, str(path), channel, start)
     except RuntimeError:
         return None
-    if strip.frame_duration > 1:
+    if length_of(strip) > 1:
         return strip
     sound = strip.sound
     strips.remove(strip)

@@ -9,16 +9,18 @@ from __future__ import annotations
 
 import bpy
 
-from . import command, drop, export_operators, preferences, warm_up
-from .capture import capture_operators, capture_panel, capture_properties
+from . import command, drop, export_operators, import_operators, preferences, warm_up
+from .capture import capture_operators, capture_panel, capture_properties, captures
 from .edit import edit_operators, edit_panel, key_operators
+from .pins import correction_operators, correction_panel, pin_tool, upright_operators
 from .retarget import retarget_operators, retarget_panel, retarget_properties
 from .view import view_after_undo, view_operators
 
 _MODULES = (
-    *(capture_properties, preferences, capture_operators, export_operators, view_operators, drop),
-    *(edit_operators, key_operators, retarget_properties, retarget_operators),
-    *(capture_panel, edit_panel, retarget_panel),
+    *(capture_properties, preferences, capture_operators, export_operators, import_operators, view_operators, drop),
+    *(edit_operators, key_operators, correction_operators, pin_tool, upright_operators),
+    *(retarget_properties, retarget_operators),
+    *(captures, capture_panel, edit_panel, correction_panel, retarget_panel),
 )
 
 
@@ -33,7 +35,9 @@ def register() -> None:
         capture_properties.attach()
         retarget_properties.attach()
         command.register()
+        correction_panel.attach()
         view_after_undo.attach()
+        import_operators.attach()
         warm_up.attach()
     except Exception:
         for cls in reversed(registered):
@@ -45,7 +49,9 @@ def unregister() -> None:
     """Stop a running capture, and unregister everything."""
     capture_operators.end_capture()
     warm_up.detach()
+    import_operators.detach()
     view_after_undo.detach()
+    correction_panel.detach()
     command.unregister()
     retarget_properties.detach()
     capture_properties.detach()

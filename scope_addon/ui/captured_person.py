@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import bpy
@@ -16,26 +15,37 @@ if TYPE_CHECKING:
     from ..motion import Motion
 
 
-PERSON = "scope_person"  # custom property of a rig: the name of the captured armature that it was retargeted from
+# Custom property of a rig: the captured armature that it was retargeted from; its name in older .blend files.
+PERSON = "scope_person"
 
 
 def captured_armature(context: bpy.types.Context) -> bpy.types.Object | None:
-    """Return the captured armature of the active object, or else the only one of the last capture or of the scene."""
+    """Return the captured armature of the active object, or else the only one of the selected capture or scene."""
     obj = context.view_layer.objects.active if context.view_layer else None
     while obj is not None:
         if "scope_source" in obj:
             return obj
-        person = context.scene.objects.get(obj.get(PERSON, ""))
-        if person is not None and "scope_source" in person:
+        person = _retargeted_from(context.scene, obj)
+        if person is not None:
             return person
         found = [child for child in obj.children if "scope_source" in child]
         if len(found) == 1:
             return found[0]
         obj = obj.parent
-    collection = context.scene.scope.result.collection
+    collection = context.scene.scope.capture
     found = captured_people(context)
     last = [o for o in found if o.name in collection.all_objects] if collection else []
     return last[0] if len(last) == 1 else found[0] if len(found) == 1 else None
+
+
+def _retargeted_from(scene: bpy.types.Scene, rig: bpy.types.Object) -> bpy.types.Object | None:
+    """Return the captured armature in the scene that a rig was retargeted from."""
+    person = rig.get(PERSON)
+    if isinstance(person, str):
+        person = scene.objects.get(person)
+    if not isinstance(person, bpy.types.Object) or "scope_source" not in person:
+        return None
+    return person if scene.objects.get(person.name) == person else None
 
 
 def captured_people(context: bpy.types.Context) -> list[bpy.types.Object]:
@@ -91,16 +101,19 @@ def betas_of(armature: bpy.types.Object, body: Body) -> NDArray[np.float64]:
     return betas
 
 
-def cached_motion(armature: bpy.types.Object) -> Motion:
-    """Return the captured motion, before any editing.
+def captured_motion(armature: bpy.types.Object) -> Motion:
+    """Return the captured motion, before any editing but with its corrections.
 
-    :raises UsageError: it is no longer in the cache.
-    :raises MotionFileError: its file is damaged.
+    :raises UsageError: the armature does not store it.
+    :raises MotionFileError: what it stores is damaged.
     """
-    from ..errors import UsageError
-    from ..motion import Motion
+    from ..scene.packed_motion import stored_motion
 
-    path = armature.get("scope_motion", "")
-    if not path or not Path(path).is_file():
-        raise UsageError("the captured motion is no longer in the cache; capture the footage again")
-    return Motion.load(path)
+    return stored_motion(armature)
+
+
+def set_captured_motion(armature: bpy.types.Object, motion: Motion) -> None:
+    """Store a motion as the armature's captured one. Undo restores the former one."""
+    from ..scene.packed_motion import pack_motion
+
+    pack_motion(armature, motion.to_bytes())

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Footage dropped from the system's file browser into the 3D viewport."""
+"""Footage and motion files dropped from the system's file browser into the 3D viewport."""
 
 from __future__ import annotations
 
@@ -22,4 +22,18 @@ class SCOPE_FH_footage(bpy.types.FileHandler):
         return bool(context.area) and context.area.type == "VIEW_3D"
 
 
-CLASSES = (SCOPE_FH_footage,)
+class SCOPE_FH_motion(bpy.types.FileHandler):
+    """Import dropped motion files."""
+
+    bl_idname = "SCOPE_FH_motion"
+    bl_label = "Import Motion with Scope"
+    bl_import_operator = "scope.import_motion"
+    bl_file_extensions = ".npz"
+
+    @classmethod
+    def poll_drop(cls, context: bpy.types.Context) -> bool:
+        """Accept files over a 3D viewport."""
+        return bool(context.area) and context.area.type == "VIEW_3D"
+
+
+CLASSES = (SCOPE_FH_footage, SCOPE_FH_motion)

@@ -3,12 +3,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import bpy
 from bpy.props import BoolProperty, EnumProperty, StringProperty
 
-from .captured_person import cached_motion
+from ..options import Place
+from .captured_person import PERSON, captured_motion
+from .declared_properties import with_options
 from .reporting import ReportingOperator
 
 FORMATS = (
@@ -18,15 +21,17 @@ FORMATS = (
     ("USDC", "USD", "For Omniverse, Houdini and other studio tools", 3),
     ("NPZ", "NPZ", "For research: SMPL-style arrays of the captured motion before any editing, one file per person", 4),
 )
+_NO_USD = "This Blender was built without USD; use a build from blender.org, or another format"
 _SUFFIX = {"FBX": ".fbx", "GLB": ".glb", "BVH": ".bvh", "USDC": ".usdc", "NPZ": ".npz"}
 
 
+@with_options(Place.EXPORT)
 class SCOPE_OT_export(ReportingOperator):
     """Write captures to a file"""
 
     bl_idname = "scope.export"
     bl_label = "Export Capture"
-    bl_options = {"REGISTER"}
+    bl_options = {"REGISTER", "PRESET"}
 
     filepath: StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"})
     filter_glob: StringProperty(default="*.fbx", options={"HIDDEN", "SKIP_SAVE"})
@@ -59,8 +64,9 @@ class SCOPE_OT_export(ReportingOperator):
 
     @classmethod
     def description(cls, context: bpy.types.Context, properties: bpy.types.OperatorProperties) -> str:
-        """Return the tooltip of the button for the format."""
-        return next(text for key, _, text, _ in FORMATS if key == properties.format)
+        """Return the tooltip of the button for the format, and why the format is not available."""
+        text = next(text for key, _, text, _ in FORMATS if key == properties.format)
+        return text if is_available(properties.format) else f"{text}. {_NO_USD}"
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -91,14 +97,19 @@ class SCOPE_OT_export(ReportingOperator):
         layout.use_property_split = True
         layout.use_property_decorate = False
         layout.prop(self, "which")
-        if self.format not in ("BVH", "NPZ"):
+        if self.format == "BVH":
+            layout.prop(self, "bvh_unit")
+        elif self.format != "NPZ":
             layout.prop(self, "shape")
             if self.which != "RIG":
                 layout.prop(self, "camera")
                 layout.prop(self, "separate")
 
     def work(self, context: bpy.types.Context) -> str:
-        """Write the files."""
+        """Write the files.
+
+        :raises UsageError: the file has no name, or there is nothing of what is to be written.
+        """
         from ..errors import UsageError
         from ..scene.export.export import ExportOptions, captures, export
         from ..scene.rigs.rig_export import export_rig
@@ -106,7 +117,11 @@ class SCOPE_OT_export(ReportingOperator):
         if not bpy.path.basename(self.filepath).removesuffix(_SUFFIX[self.format]):
             raise UsageError("the file has no name; enter one")
         path = Path(bpy.path.ensure_ext(bpy.path.abspath(self.filepath), _SUFFIX[self.format]))
-        options = ExportOptions(camera=self.camera, shape=self.shape.lower(), separate=self.separate)
+        if not is_available(self.format):
+            raise UsageError(_NO_USD[0].lower() + _NO_USD[1:])
+        options = ExportOptions(
+            camera=self.camera, shape=self.shape.lower(), separate=self.separate, bvh_unit=self.bvh_unit.lower()
+        )
         collections, rig = captures(context.scene), context.scene.scope_retarget.rig
         if self.which == "RIG" and self.format == "NPZ":
             raise UsageError("a motion file contains the captured motion, not a rig; choose another format")
@@ -119,12 +134,22 @@ class SCOPE_OT_export(ReportingOperator):
                 raise UsageError("the active object belongs to no capture; select one of a capture's objects")
         if self.format == "NPZ":
             people = [obj for c in collections for obj in c.all_objects if "scope_source" in obj]
-            written = export(path, collections, [cached_motion(obj) for obj in people])
+            written = export(path, collections, [captured_motion(obj) for obj in people])
         elif self.which == "RIG":
-            written = export_rig(path, rig, options)
+            written = export_rig(path, rig, replace(options, take=_take_of(rig, collections)))
         else:
             written = export(path, collections, options=options)
         return f"Wrote {', '.join(p.name for p in written)} in {written[0].parent}"
+
+
+def is_available(kind: str) -> bool:
+    """Return whether this build of Blender can write a format, a key of ``FORMATS``."""
+    return kind != "USDC" or "usd_export" in dir(bpy.ops.wm)
+
+
+def _take_of(rig: bpy.types.Object, collections: list[bpy.types.Collection]) -> str:
+    """Return the name of the capture whose motion a rig has; empty if it is unknown."""
+    return next((c.name for c in collections if rig.get(PERSON, "") in c.all_objects), "")
 
 
 CLASSES = (SCOPE_OT_export,)

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import json
 import os
-import shutil
 import sys
 import time
 from collections.abc import Iterator
@@ -93,7 +92,8 @@ def steps() -> Iterator[float]:
     report["reprojection_px"] = round(result.reprojection_px, 2)
     report["warnings"] = [w.text for w in result.warnings]
     report["scene_rate"] = [scene.render.fps, round(scene.render.fps_base, 4)]
-    shutil.copy(result.collection["scope_motions"][0], OUT / "motion.npz")
+    armature = next(o for o in result.collection.objects if o.type == "ARMATURE")
+    (OUT / "motion.npz").write_bytes(armature["scope_motion"]["motion"])
 
     invoke(bpy.ops.scope.look_through)
     scene.frame_set(result.frames // 2)

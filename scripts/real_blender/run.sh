@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: GPL-3.0-or-later
-# run.sh install|first|panel|undo|trouble|headless|startup [VIDEO]    one part of ./scripts/blender, inside the Debian, in /scope.
+# run.sh install|first|panel|undo|trouble|headless|startup|walk [VIDEO [SEED]]
+# One part of ./scripts/blender, inside the Debian, in /scope.
 set -euo pipefail
 cd /scope
 log=out/$1.log
@@ -12,7 +13,7 @@ on_screen() { # a command, with a separate virtual screen
     sleep 2
     DISPLAY=:7 timeout -k 10 1500 "$@" >"$log" 2>&1 || status=$?
     kill $screen
-    [ $status = 0 ] || tail -n 40 "$log" >&2
+    [ $status = 0 ] || tail -n 150 "$log" >&2
     return $status
 }
 
@@ -36,6 +37,7 @@ case $1 in
         [ $status = 0 ] || tail -n 40 "$log" >&2
         exit $status
         ;;
+    walk) on_screen python3 parts/walk.py "$3" ;;
     headless) python3 parts/headless.py 2>&1 | tee "$log" >&2 ;;
-    *) echo "run.sh: no part '$1'; there are first, panel, undo, trouble, headless and startup" >&2; exit 2 ;;
+    *) echo "run.sh: no part '$1'; there are first, panel, undo, trouble, headless, startup and walk" >&2; exit 2 ;;
 esac

@@ -67,7 +67,7 @@ def press(place: tuple[int, int], happened: Callable[[], bool]) -> Iterator[floa
 def addon():
     """Return the extension's module of operators, to inspect the job."""
     module = ".scope_addon.ui.capture.capture_operators"
-    name = next(n for n in sys.modules if n.startswith("bl_ext.") and n.endswith(module))
+    name = next(n for n in sys.modules if n.endswith(module))
     return sys.modules[name]
 
 
@@ -78,8 +78,8 @@ def invoke(operator, *arguments, **settings) -> set[str]:
 
 
 def use(operator, *arguments, **settings) -> set[str]:
-    """Call an operator as a button does, with a step to undo."""
-    return invoke(operator, *(arguments or ("EXEC_DEFAULT",)), True, **settings)
+    """Call an operator as a button does, with a step to undo, which Blender has only with a window."""
+    return invoke(operator, *(arguments or ("EXEC_DEFAULT",)), not bpy.app.background, **settings)
 
 
 def until(happened: Callable[[], bool], seconds: float, what: str) -> Iterator[float]:

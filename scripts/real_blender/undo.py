@@ -43,7 +43,17 @@ def state() -> State:
             about["pose"] = [round(x, 4) for bone in obj.pose.bones for x in (*bone.head, *bone.tail)]
             about["mode"] = obj.mode
         found |= {f"object {obj.name} {key}": value for key, value in about.items()}
-    for kind in ("meshes", "armatures", "cameras", "actions", "collections", "images", "movieclips", "materials"):
+    for kind in (
+        "meshes",
+        "armatures",
+        "cameras",
+        "actions",
+        "collections",
+        "images",
+        "movieclips",
+        "materials",
+        "texts",
+    ):
         found[kind] = sorted(block.name for block in getattr(bpy.data, kind) if block.users)
     for action in bpy.data.actions:
         found[f"action {action.name}"] = _digest(sorted(_keys(curve) for curve in _curves(action)))
@@ -59,6 +69,8 @@ def state() -> State:
     strips = (editor.strips if hasattr(editor, "strips") else editor.sequences) if editor else ()
     found["strips"] = sorted(strip.name for strip in strips)
     found |= _group("settings", scene.scope) | _group("retarget", scene.scope_retarget)
+    for collection in bpy.data.collections:
+        found |= _group(f"result of {collection.name}", collection.scope_result)
     return found
 
 

@@ -184,6 +184,18 @@ def test_a_motion_is_the_same_after_saving_and_loading(sample, tmp_path):
     assert np.array_equal(Motion.load(tmp_path / "m.npz").poses, sample.motions[0].poses)
 
 
+def test_no_foot_is_under_the_floor(shared, body):
+    """A man walks out of the image, close to the camera: every vertex of his feet counts."""
+    options = CaptureOptions(quality="fast", wanted=VideoRange(7.0, 9.4))
+    found = capture(shared / "data" / "clips" / "sit_stand_close.mp4", body, options)
+    m = found.motions[0]
+    parts = [body.joint_names.index(f"{side}_{part}") for side in ("left", "right") for part in ("ankle", "foot")]
+    of_feet = np.isin(body.skin_joints[np.arange(len(body.skin_joints)), body.skin_weights.argmax(axis=1)], parts)
+    vertices = [smpl_by_hand(body, *row, m.betas.astype(float))[1] for row in zip(m.poses, m.trans, strict=True)]
+    assert np.min(np.array(vertices)[:, of_feet, 2]) > -0.01
+    assert not any("floor" in warning for warning in found.report["warnings"])
+
+
 def test_feet_outside_the_image_are_not_locked(shared, body, tmp_path):
     """Squats, cut off at the hips: the visible part of the body moves up and down, as in the image."""
     clip = tmp_path / "hips.mp4"

@@ -29,3 +29,15 @@ def test_the_given_up_becomes_world_z(up):
     assert np.allclose(T[:3, :3] @ (np.array(up) / np.linalg.norm(up)), [0, 0, 1])
     assert np.allclose(T[:3, :3] @ T[:3, :3].T, np.eye(3))
     assert np.isclose(np.linalg.det(T[:3, :3]), 1)
+
+
+@pytest.mark.parametrize("up", [[0, -1, 0.3], [0.2, -1, -0.4], [0.7, -1, 0.6], [1, 0, 0], [-0.5, 0.8, 0.1]])
+def test_the_optical_axis_points_along_world_y_however_the_camera_is_rolled(up):
+    axis = axes.world_from_level_camera(np.array(up, float))[:3, :3] @ [0, 0, 1]
+    assert np.isclose(axis[0], 0)
+    assert axis[1] > 0.5
+
+
+@pytest.mark.parametrize("up", [[0, 0, 1.0], [0, 0, -1.0]])
+def test_a_camera_that_looks_straight_up_or_down_has_its_images_vertical_along_world_y(up):
+    assert np.allclose(axes.world_from_level_camera(np.array(up))[:3, :3] @ [0, 1, 0], [0, 1, 0])

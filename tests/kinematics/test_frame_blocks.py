@@ -23,3 +23,9 @@ def test_blocks_give_the_result_of_one_call(frames, monkeypatch):
     assert double.dtype == np.float32
     assert max(sizes) <= 5
     assert sum(sizes) == frames
+
+
+def test_one_array_is_enough(monkeypatch):
+    monkeypatch.setattr(frame_blocks, "BLOCK_FRAMES", 5)
+    (squares,) = frame_blocks.by_blocks(lambda x: (x**2,), np.arange(12))
+    np.testing.assert_array_equal(squares, np.arange(12) ** 2)

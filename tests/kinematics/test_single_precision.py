@@ -18,6 +18,7 @@ from scope.solver.rotations import exp
 @dataclass(frozen=True)
 class Record:
     large: np.ndarray
+    quaternion: np.ndarray
     point: np.ndarray
     times: np.ndarray
     frames: np.ndarray
@@ -26,12 +27,12 @@ class Record:
 
 def test_only_large_arrays_are_rounded() -> None:
     rng = np.random.default_rng(0)
-    record = Record(
-        rng.normal(0, 5, (50, 33, 3)), rng.normal(0, 5, (50, 3)), np.arange(50) / 30, np.arange(400).reshape(50, 8), "a"
-    )
+    large, quaternion, point = (rng.normal(0, 5, (50, *shape)) for shape in ((33, 3), (4,), (3,)))
+    record = Record(large, quaternion, point, np.arange(50) / 30, np.arange(400).reshape(50, 8), "a")
     small = to_single_precision(record)
     assert small.large.dtype == np.float32
     np.testing.assert_allclose(small.large, record.large, atol=1e-6)
+    assert small.quaternion.dtype == np.float32
     assert small.point is record.point
     assert small.times is record.times
     assert small.frames is record.frames

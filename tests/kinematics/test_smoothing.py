@@ -4,12 +4,14 @@
 import numpy as np
 import pytest
 from scope.scope_addon.kinematics.smoothing import (
+    continuous_quaternions,
     fill_gaps,
     fill_rotation_gaps,
     gaussian_smooth,
     smooth_root,
     smooth_rotations,
 )
+from scope.solver.rotations import matrix_from_quaternion
 
 
 def turn(angle):
@@ -54,6 +56,39 @@ def test_a_part_with_a_higher_frame_rate_is_smoothed_like_a_clip_of_that_rate():
     assert np.allclose(smooth[-120:], gaussian_smooth(noise, dense, 2.0)[-120:], atol=1e-3)
 
 
+@pytest.mark.parametrize("count", [3, 6])
+def test_a_clip_shorter_than_the_kernel_is_averaged_with_the_weights_of_the_gaussian(count):
+    times = np.array([0, 0.02, 0.05, 0.06, 0.1, 0.13])[:count]
+    values = np.random.default_rng(5).normal(size=(count, 2, 2))
+    sigma = np.sqrt(np.log(2)) / (2 * np.pi * 2.0)  # 66 ms
+    w = np.exp(-0.5 * ((times[:, None] - times) / sigma) ** 2)
+    expected = np.einsum("st,tij->sij", w, values) / w.sum(axis=1)[:, None, None]
+    assert np.allclose(gaussian_smooth(values, times, 2.0), expected, atol=1e-12)
+
+
+def test_a_clip_in_reverse_is_smoothed_to_the_reverse():
+    """Which is what no phase shift means."""
+    values = np.random.default_rng(7).normal(size=(60, 3))
+    times = np.arange(60) / 30
+    assert np.allclose(gaussian_smooth(values[::-1], times, 4.0), gaussian_smooth(values, times, 4.0)[::-1], atol=1e-12)
+
+
+@pytest.mark.parametrize(("count", "cutoff"), [(1, 2.0), (2, 2.0), (9, 0.0), (9, -1.0)])
+def test_two_samples_or_no_cutoff_give_a_copy(count, cutoff):
+    values = np.random.default_rng(6).normal(size=(count, 3))
+    copy = gaussian_smooth(values, np.arange(count) / 30, cutoff)
+    assert np.array_equal(copy, values)
+    assert not np.shares_memory(copy, values)
+
+
+def test_quaternions_are_of_unit_length_and_have_no_jumps():
+    R = turn(np.stack([np.linspace(0, 6 * np.pi, 50), np.linspace(3, -9, 50)], axis=1))
+    q = continuous_quaternions(R)
+    assert np.allclose(np.linalg.norm(q, axis=-1), 1)
+    assert (np.sum(q[1:] * q[:-1], axis=-1) > 0.9).all()
+    assert np.allclose(matrix_from_quaternion(q), R)
+
+
 def test_rotations_stay_rotations_and_cross_pi_without_a_jump():
     times = np.arange(240) / 60
     R = turn(np.linspace(0, 4 * np.pi, 240) + 0.05 * np.random.default_rng(1).normal(size=240))[:, None]
@@ -73,6 +108,14 @@ def test_the_root_keeps_its_image_position_while_depth_is_smoothed():
     assert np.allclose(smooth[:, 0] / smooth[:, 2], 0.2)
     assert np.allclose(smooth[:, 1] / smooth[:, 2], -0.1)
     assert smooth[20:-20, 2].std() < 0.35 * depth.std()
+
+
+@pytest.mark.parametrize("distance", [0.5, 4.0])
+def test_slow_motion_of_the_root_passes_near_the_camera_and_far_from_it(distance):
+    times = np.arange(120) / 30
+    slow = np.sin(2 * np.pi * 0.1 * times)
+    root = distance * np.stack([0.2 * slow, -0.3 + 0 * slow, 1 + 0.2 * slow], axis=1)
+    assert np.abs(smooth_root(root, times) - root)[20:-20].max() < 0.005 * distance
 
 
 def test_gaps_are_interpolated_in_time_and_extended_at_the_ends():

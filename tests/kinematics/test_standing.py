@@ -77,3 +77,67 @@ def test_feet_at_rest_above_the_hands_are_not_in_contact(plank):
     p = standing.resting_probability(contact_points, up, times, CAMERA)
     assert p[:, :4].max() < 0.05
     assert p[:, 4:].min() > 0.8
+
+
+def s(x):
+    return 1 / (1 + np.exp(-x))
+
+
+UP, TIMES = np.array([0.0, 0.0, 1.0]), np.arange(60) / 30
+
+
+def sliding(heights, speeds, away=(0.0, 5.0)):
+    """Return points (T, n, 3) at constant heights that move along x at constant speeds, through `away` in frame 30."""
+    points = np.zeros((len(TIMES), len(heights), 3))
+    points[..., 0] = (TIMES - TIMES[30])[:, None] * speeds
+    points[..., :2] += away
+    points[..., 2] = heights
+    return points
+
+
+def test_without_a_camera_the_probability_is_the_documented_function_of_speed_and_height():
+    heights, speeds = np.array([0.0, 0.02, 0.05, 0.08]), np.array([0.1, 0.35, 0.5, 0.0])
+    p = standing.standing_probability(sliding(heights, speeds), UP, TIMES)[30]
+    np.testing.assert_allclose(p, s(4 * (1 - speeds / 0.35)) * s(4 * (1 - heights / 0.05)), rtol=1e-6)
+
+
+def test_a_still_point_may_be_higher_by_what_an_error_in_depth_explains():
+    heights, speeds = np.array([0.0, 0.1, 0.2, 0.1]), np.array([0.0, 0.0, 0.0, 0.15])
+    points = sliding(heights, speeds)
+    center = np.array([0.0, 0.0, 3.0])
+    sight = (points[30] - center) / np.linalg.norm(points[30] - center, axis=1, keepdims=True)
+    allowed = 0.05 + 0.4 * np.abs(sight[:, 2]) * s(4 * (1 - speeds / 0.12))
+    p = standing.standing_probability(points, UP, TIMES, center)[30]
+    np.testing.assert_allclose(p, s(4 * (1 - speeds / 0.35)) * s(4 * (1 - heights / allowed)), rtol=0.002)
+
+
+def test_motion_along_the_line_of_sight_is_left_out_of_the_speed():
+    near = sliding(np.zeros(2), np.array([0.0, 0.8]))  # the second moves along the x axis, away from the camera
+    center = np.array([-4.0, 5.0, 0.0])
+    assert standing.standing_probability(near, UP, TIMES, center)[30].min() > 0.9
+    assert standing.standing_probability(near, UP, TIMES)[30, 1] < 0.1
+
+
+def test_two_frames_tell_nothing_of_speed_or_stillness():
+    points = sliding(np.array([0.0, 0.1]), np.zeros(2))[:2]
+    seen = standing.standing_probability(points, UP, TIMES[:2], np.array([0.0, 0.0, 3.0]))
+    np.testing.assert_allclose(seen, standing.standing_probability(points, UP, TIMES[:2]))
+
+
+def test_palms_and_the_soles_above_them_have_the_documented_probabilities():
+    speeds = np.array([0, 0, 0, 0, 0.2, 0.4])
+    for d in (0.0, 0.25, 0.4):  # height of the soles above the lower palm
+        points = sliding(np.array([d, d, d, d, 0.0, 0.06]), speeds)
+        center = np.array([0.0, 0.0, 1e6])  # far above, so that the speed is that across the line of sight
+        stands = standing.standing_probability(points[:, :4], UP, TIMES, center)[30]
+        p = standing.resting_probability(points, UP, TIMES, center)[30]
+        np.testing.assert_allclose(p[:4], stands * s(8 * (1 - d / 0.5)) / s(8), rtol=1e-6)
+        above = np.array([0.0, 0.06]) - d
+        np.testing.assert_allclose(p[4:], s(4 * (1 - speeds[4:] / 0.35)) * s(4 * (1 - above / 0.12)), rtol=1e-6)
+
+
+def test_lines_of_sight_have_unit_length_and_none_leads_to_the_camera_itself():
+    direction = np.array([0.36, -0.48, 0.8])
+    for distance in (0.2, 1.0, 30.0):
+        np.testing.assert_allclose(standing.line_of_sight(distance * direction), direction)
+    np.testing.assert_array_equal(standing.line_of_sight(np.zeros(3)), np.zeros(3))

@@ -79,7 +79,7 @@ def dance(
         upright = Quaternion((1, 0, 0), np.pi / 2)
         axis, angle = (heading @ upright).to_axis_angle()
         w[t, 0] = np.array(axis) * angle
-    trans = np.array(offset) + np.stack([0.3 * timestamps, -0.8 * timestamps, 1.0 + 0.05 * timestamps], axis=1)
+    trans = np.array(offset) + np.stack([0.3 * timestamps, -0.8 * timestamps, 1.1 + 0.05 * timestamps], axis=1)
     world_from_camera = np.tile(np.eye(4), (count, 1, 1))
     world_from_camera[:, :3, :3] = [[1, 0, 0], [0, 0, 1], [0, -1, 0]]
     world_from_camera[:, :3, 3] = [0.1, -4.0, 1.4]

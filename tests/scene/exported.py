@@ -43,7 +43,7 @@ def read_back(path: Path, rate: float = 30.0) -> float:
         for key in (k for block in bpy.data.shape_keys for k in block.key_blocks):
             key.slider_min, key.slider_max = -10.0, 10.0  # the importer leaves 0..1, which clamps
     elif path.suffix == ".bvh":
-        bpy.ops.import_anim.bvh(filepath=str(path), frame_start=1, update_scene_fps=True)
+        bpy.ops.import_anim.bvh(filepath=str(path), global_scale=0.01, frame_start=1, update_scene_fps=True)
         keyed = actions.frame_range([next(o for o in bpy.data.objects if o.type == "ARMATURE")])
         assert keyed is not None
         return keyed[0]

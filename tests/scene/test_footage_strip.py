@@ -5,7 +5,7 @@ import bpy
 import pytest
 import scope
 from scope.scope_addon.errors import VideoError
-from scope.scope_addon.scene.footage_strip import add_footage_strips, strips_of
+from scope.scope_addon.scene.footage_strip import add_footage_strips, start_of, strips_of
 
 SAMPLE = Path(scope.__file__).resolve().parent / "assets" / "sample" / "sample.mp4"
 
@@ -13,7 +13,7 @@ SAMPLE = Path(scope.__file__).resolve().parent / "assets" / "sample" / "sample.m
 def test_the_footage_begins_where_the_motion_does():
     scene = bpy.context.scene
     added = add_footage_strips(scene, SAMPLE, 101.0)
-    assert [(s.type, s.frame_final_start) for s in added] == [("MOVIE", 101)]
+    assert [(s.type, start_of(s)) for s in added] == [("MOVIE", 101)]
     assert not scene.render.use_sequencer  # else a render would give the footage alone
 
 
@@ -25,6 +25,22 @@ def test_existing_strips_are_kept_and_rendered():
     assert added[0].channel == 3
     assert scene.render.use_sequencer
     assert "mine" in strips
+
+
+def test_the_same_footage_is_not_added_twice_but_moved():
+    scene = bpy.context.scene
+    first = add_footage_strips(scene, SAMPLE, 1.0)
+    again = add_footage_strips(scene, SAMPLE.parent / ".." / SAMPLE.parent.name / SAMPLE.name, 21.0)
+    assert [s.name for s in strips_of(scene.sequence_editor)] == [s.name for s in first]
+    assert [start_of(s) for s in again] == [21]
+
+
+def test_a_strip_of_the_users_own_is_left_alone():
+    strips = strips_of(bpy.context.scene.sequence_editor_create())
+    own = strips.new_movie("mine", str(SAMPLE), 1, 100)
+    add_footage_strips(bpy.context.scene, SAMPLE, 1.0)
+    assert start_of(own) == 100
+    assert len(strips) == 2
 
 
 def effect_end(frame: int) -> dict:

@@ -1,8 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The built extension: Blender's own tool accepts it, and every Blender chooses the wheels of its Python."""
+"""The built extension: one zip for each platform and Python, which Blender's own tool accepts and lists."""
 
+import ast
+import hashlib
 import importlib.util
 import shutil
+import sys
 import tomllib
 import zipfile
 from pathlib import Path
@@ -14,6 +17,7 @@ ROOT = Path(__file__).resolve().parent.parent.parent
 CP311 = "numba-0.68.1-cp311-cp311-manylinux_2_27_x86_64.manylinux_2_28_x86_64.whl"
 CP313 = CP311.replace("311", "313")
 STABLE = "opencv_contrib_python_headless-4.11.0.86-cp37-abi3-manylinux_2_17_x86_64.manylinux2014_x86_64.whl"
+NEWER_STABLE = "av-18.1.0-cp311-abi3-manylinux_2_28_x86_64.whl"
 
 
 @pytest.fixture
@@ -27,7 +31,7 @@ def small_root(tmp_path):
             shutil.copy2(source, target)
 
     target = tmp_path / "repository"
-    for name in ("solver", "scope_addon", "assets", "scripts"):
+    for name in ("solver", "scope_addon", "assets", "scripts", "docs"):
         shutil.copytree(ROOT / name, target / name, copy_function=copy, ignore=shutil.ignore_patterns("__pycache__"))
     for name in ("__init__.py", "LICENSE", "THIRD_PARTY.md", "blender_manifest.toml"):
         shutil.copy2(ROOT / name, target / name)
@@ -38,11 +42,35 @@ def small_root(tmp_path):
 def builder(tmp_path, monkeypatch):
     spec = importlib.util.spec_from_file_location("build_extension", ROOT / "scripts" / "build_extension.py")
     module = importlib.util.module_from_spec(spec)
+    monkeypatch.setitem(sys.modules, "build_extension", module)  # as its dataclass needs
     spec.loader.exec_module(module)
-    for name in ("WHEELS", "STAGING", "DIST"):
+    for name in ("WHEELS", "STAGING", "DIST", "OTHER_DIST"):
         monkeypatch.setattr(module, name, tmp_path / name.lower())
     monkeypatch.setattr(module, "add_kernels", lambda *_: False)  # see test_shipped_kernels.py
     return module
+
+
+@pytest.fixture
+def with_empty_wheels(builder, small_root, tmp_path, monkeypatch):
+    """The builder of the small repository, with wheels that contain nothing."""
+    lock = {python: "" for python in builder.BLENDERS}
+
+    def wheels(target):
+        tag, cp = builder.PLATFORMS[target.platform][0], "cp" + target.python.replace(".", "")
+        names = [f"opencv_contrib_python_headless-4.11.0.86-cp37-abi3-{tag}.whl"]
+        names += [f"{name}-1.0-{cp}-{cp}-{tag}.whl" for name in builder.PACKAGES if not name.startswith("opencv")]
+        folder = tmp_path / target.platform / target.python
+        folder.mkdir(parents=True, exist_ok=True)
+        for name in names:
+            with zipfile.ZipFile(folder / name, "w") as file:
+                file.writestr("module.py", name)
+            lock[target.python] += f"--hash=sha256:{hashlib.sha256((folder / name).read_bytes()).hexdigest()}\n"
+        return [folder / name for name in names]
+
+    monkeypatch.setattr(builder, "ROOT", small_root)
+    monkeypatch.setattr(builder, "download_wheels", wheels)
+    monkeypatch.setattr(builder, "locked", lock.__getitem__)
+    return builder
 
 
 def blenders_tool():
@@ -53,76 +81,161 @@ def blenders_tool():
     return module
 
 
-def test_wheel_names_make_every_blender_choose_the_right_wheel(builder):
-    names = [builder.shipped_name(name) for name in (CP311, CP313, STABLE)]
-    assert names[0] == CP311
-    # The first releases of 4.2 compare only the names of wheels of one version, and run Python 3.11.
-    assert max(names[:2]) == CP311
+def manifest_of(archive):
+    with zipfile.ZipFile(archive) as file:
+        return tomllib.loads(file.read("blender_manifest.toml").decode())
+
+
+def run(builder, monkeypatch, *arguments):
+    monkeypatch.setattr("sys.argv", ["build", *arguments])
+    return builder.main()
+
+
+def test_wheels_keep_their_names_except_where_a_blender_would_skip_them(builder):
+    for wheel in (CP313, STABLE, NEWER_STABLE):
+        assert builder.shipped_name(wheel, "3.13") == wheel
+    for wheel in (CP311, NEWER_STABLE):
+        assert builder.shipped_name(wheel, "3.11") == wheel
+    renamed = builder.shipped_name(STABLE, "3.11")
+    assert renamed == STABLE.replace("cp37", "cp37.cp311")
     tool = blenders_tool()
     if not hasattr(tool, "python_versions_from_wheel_python_tag"):
-        pytest.skip(f"Blender {bpy.app.version_string} looks at nothing but the names' order")
-    for name, wanted in zip(names, [{(3, 11)}, {(3, 13)}, {(3, 11), (3, 13)}], strict=True):
-        assert wanted <= tool.python_versions_from_wheel_python_tag(name.split("-")[-3])
-        assert tool.blender_platform_compatible_with_wheel_platform_from_filepath("linux-x64", name)
-        assert not tool.blender_platform_compatible_with_wheel_platform_from_filepath("windows-x64", name)
+        pytest.skip(f"Blender {bpy.app.version_string} does not look at a wheel's Python")
+    # Blender 4.3 installs a wheel only where one of these is its own Python, 3.11.
+    for wheel, fits in ((STABLE, False), (renamed, True), (CP311, True), (NEWER_STABLE, True)):
+        versions = tool.python_versions_from_wheel_python_tag(wheel.removesuffix(".whl").split("-")[-3])
+        assert ((3, 11) in versions) == fits, wheel
+    for wheel in (renamed, CP311, CP313):
+        assert tool.blender_platform_compatible_with_wheel_platform_from_filepath("linux-x64", wheel)
+        assert not tool.blender_platform_compatible_with_wheel_platform_from_filepath("windows-x64", wheel)
 
 
 def test_the_lock_files_list_every_wheel_with_hashes(builder):
-    for python in builder.PYTHONS:
+    for python in builder.BLENDERS:
         entries = builder.locked(python)
         assert [line.split("==")[0] for line in entries.splitlines() if "==" in line] == list(builder.PACKAGES)
         assert entries.count("--hash=sha256:") >= 3 * len(builder.PACKAGES)
 
 
-def fake_wheels(folder, names):
-    folder.mkdir(parents=True, exist_ok=True)
-    for name in names:
-        with zipfile.ZipFile(folder / name, "w") as file:
-            file.writestr("module.py", "")
-    return [folder / name for name in names]
+def test_every_blender_since_4_2_fits_one_zip_of_a_platform(builder):
+    ranges = [builder.Target("linux-x64", python).blenders for python in sorted(builder.BLENDERS)]
+    assert ranges == [("4.2.0", "5.1.0"), ("5.1.0", None)]
+    manifests = [tomllib.loads(builder.manifest(builder.Target("linux-x64", p), [])) for p in ("3.11", "3.13")]
+    found = [(m["blender_version_min"], m.get("blender_version_max")) for m in manifests]
+    assert found == ranges
+    other = builder.Target("linux-x64", "3.13", any_blender=True)
+    assert "blender_version_max" not in tomllib.loads(builder.manifest(other, []))
+    assert tomllib.loads(builder.manifest(other, []))["blender_version_min"] == "4.2.0"
 
 
-def without(target, archive, name):
-    """A copy of an archive that lacks a file."""
+def test_the_manifest_names_licences_and_holders_of_all_that_the_zip_contains(builder):
+    manifest = tomllib.loads((ROOT / "blender_manifest.toml").read_text())
+    assert manifest["license"][0] == "SPDX:GPL-3.0-or-later"
+    third_party = (ROOT / "THIRD_PARTY.md").read_text()
+    for licence in ("Apache-2.0", "BSD-2-Clause", "BSD-3-Clause", "MIT", "LGPL-2.1-or-later", "GPL-2.0-or-later"):
+        assert f"SPDX:{licence}" in manifest["license"]
+        assert licence in third_party
+    assert "SPDX:CC0-1.0" in manifest["license"]
+    for package in builder.PACKAGES:
+        assert f"| `{package}` |" in third_party
+        assert package == "av" or package in " ".join(manifest["copyright"])
+    validate = getattr(blenders_tool(), "pkg_manifest_validate_field_copyright", None)
+    assert validate is None or validate(manifest["copyright"], True) is None
+
+
+@pytest.mark.usefixtures("networks")
+def test_six_zips_with_empty_wheels(with_empty_wheels, monkeypatch, capsys, tmp_path):
+    builder = with_empty_wheels
+    assert run(builder, monkeypatch, "--website", "https://example.com/scope") == 0
+    archives = sorted(p.name for p in builder.DIST.glob("*.zip"))
+    blenders, platforms = ("blender_4.2_before_5.1", "blender_5.1"), ("linux_x64", "macos_arm64", "windows_x64")
+    assert archives == sorted(f"scope-0.1.0-{b}-{p}.zip" for b in blenders for p in platforms)
+    assert "6 zips listed" in capsys.readouterr().out
+    archive, target = builder.DIST / archives[0], builder.Target("linux-x64", "3.11")
+    assert manifest_of(archive)["website"] == "https://example.com/scope"
+    with zipfile.ZipFile(archive) as file:
+        names = file.namelist()
+    assert not any("numpy" in n or "/tests/" in n or n.startswith(("tests/", "tools/", ".")) for n in names)
+    assert "docs/guide.md" in names
+    manifest = tomllib.loads((ROOT / "blender_manifest.toml").read_text())
+    for folder in (p.strip("/") for p in manifest["build"]["paths_exclude_pattern"] if p.endswith("/")):
+        assert not any(n.startswith(f"{folder}/") or f"/{folder}/" in n for n in names), folder
+
+    def refused(file, match, **made_for):
+        with pytest.raises(SystemExit, match=match):
+            builder.check(file, builder.Target(**{"platform": "linux-x64", "python": "3.11", **made_for}))
+
+    for name in ("assets/lifter/lifter.onnx", "assets/prior/joint_prior.npz", "THIRD_PARTY.md", "docs/guide.md"):
+        refused(changed(tmp_path / "other.zip", archive, {name: None}), f"{name} is missing")
+    wheel = next(n for n in names if n.startswith("wheels/av-"))
+    refused(changed(tmp_path / "other.zip", archive, {wheel: b"other"}), "av-.* is not the locked file")
+    refused(changed(tmp_path / "other.zip", archive, {wheel: None}), "is listed but not there")
+    refused(archive, "made for linux-x64, not for windows-x64", platform="windows-x64")
+    refused(archive, "not made for Blender 5.1.0", python="3.13")
+    monkeypatch.setattr(builder, "LIMIT_MB", 0.1)
+    refused(archive, "more than the limit of 0.1 MB")
+    monkeypatch.setattr(builder, "LIMIT_MB", 240)
+    builder.check(archive, target)
+    monkeypatch.setattr(builder, "PACKAGES", (*builder.PACKAGES, "forgotten"))
+    refused(archive, "0 wheels of forgotten")
+
+
+def changed(target, archive, contents):
+    """A copy of an archive with other content in some files, or without those whose content is None."""
     with zipfile.ZipFile(archive) as source, zipfile.ZipFile(target, "w") as file:
         for entry in source.infolist():
-            if not entry.filename.endswith(name):
-                file.writestr(entry, source.read(entry))
+            content = contents.get(entry.filename, source.read(entry))
+            if content is not None:
+                file.writestr(entry, content)
     return target
 
 
 @pytest.mark.usefixtures("networks")
-def test_a_build_with_empty_wheels(builder, small_root, tmp_path, monkeypatch):
-    monkeypatch.setattr(builder, "ROOT", small_root)
-
-    def wheels(platform):
-        tag = builder.PLATFORMS[platform][0]
-        names = [f"opencv_contrib_python_headless-4.11.0.86-cp37-abi3-{tag}.whl"]
-        others = [name for name in builder.PACKAGES if not name.startswith("opencv")]
-        names += [f"{name}-1.0-{cp}-{cp}-{tag}.whl" for cp in ("cp313", "cp311") for name in others]
-        return fake_wheels(tmp_path / platform, names)
-
-    monkeypatch.setattr(builder, "download_wheels", wheels)
-    monkeypatch.setattr("sys.argv", ["build"])
-    assert builder.main() == 0
-    archives = sorted(p.name for p in builder.DIST.glob("*.zip"))
-    assert [a.split("-")[-1] for a in archives] == ["linux_x64.zip", "macos_arm64.zip", "windows_x64.zip"]
-    with zipfile.ZipFile(builder.DIST / archives[0]) as file:
-        names = file.namelist()
-    assert not any("numpy" in n or "/tests/" in n or n.startswith(("tests/", "tools/", ".")) for n in names)
-    manifest = tomllib.loads((ROOT / "blender_manifest.toml").read_text())
-    for folder in (p.strip("/") for p in manifest["build"]["paths_exclude_pattern"] if p.endswith("/")):
-        assert not any(n.startswith(f"{folder}/") or f"/{folder}/" in n for n in names), folder
-    for name in ("assets/lifter/lifter.onnx", "assets/prior/joint_prior.npz", "THIRD_PARTY.md"):
-        short = without(tmp_path / "short.zip", builder.DIST / archives[0], name)
-        with pytest.raises(SystemExit, match=f"{name} is missing"):
-            builder.check(short)
-    monkeypatch.setattr(builder, "PACKAGES", (*builder.PACKAGES, "forgotten"))
-    with pytest.raises(SystemExit, match="0 wheels of forgotten for Python 3.13"):
-        builder.check(builder.DIST / archives[0])
+def test_a_zip_for_a_distributions_blender_leaves_the_others_alone(with_empty_wheels, monkeypatch):
+    builder = with_empty_wheels
+    builder.DIST.mkdir()
+    (builder.DIST / "kept.zip").touch()
+    assert run(builder, monkeypatch, "linux-x64", "--python", "3.13", "--any-blender") == 0
+    assert [p.name for p in builder.OTHER_DIST.iterdir()] == ["scope-0.1.0-python_3.13-linux_x64.zip"]
+    assert [p.name for p in builder.DIST.iterdir()] == ["kept.zip"]
 
 
-def test_an_unknown_platform_is_an_error(builder, monkeypatch, capsys):
-    monkeypatch.setattr("sys.argv", ["build", "amiga"])
-    assert builder.main() == 2
-    assert "amiga" in capsys.readouterr().err
+@pytest.mark.usefixtures("networks")
+def test_two_zips_for_one_blender_are_refused(with_empty_wheels, monkeypatch):
+    if not hasattr(blenders_tool(), "pkg_manifest_detect_duplicates"):
+        pytest.skip(f"the tool of Blender {bpy.app.version_string} does not look for them")
+    builder = with_empty_wheels
+    builder.DIST.mkdir()
+    target = builder.Target("linux-x64", "3.13")
+    archive = builder.build(target, builder.DIST)
+    builder.check_listing(builder.DIST, [target])
+    shutil.copy(archive, builder.DIST / "twice.zip")
+    with pytest.raises(SystemExit, match="listed"):
+        builder.check_listing(builder.DIST, [target, target])
+
+
+def test_no_shipped_module_uses_the_network_or_has_the_metadata_of_an_old_add_on():
+    network = {"socket", "ssl", "urllib", "http", "ftplib", "smtplib", "xmlrpc", "requests", "webbrowser", "pip"}
+    modules = [
+        p for name in ("solver", "scope_addon") for p in (ROOT / name).rglob("*.py") if "examples" not in p.parts
+    ]
+    assert len(modules) > 100
+    for module in modules:
+        for node in ast.walk(ast.parse(module.read_text("utf-8"))):
+            names = [a.name for a in node.names] if isinstance(node, ast.Import) else []
+            names += [node.module or ""] if isinstance(node, ast.ImportFrom) and not node.level else []
+            assert not network & {name.split(".")[0] for name in names}, module
+            if isinstance(node, ast.Name) and node.id == "bl_info":
+                raise AssertionError(f"{module} has the metadata of an old add-on")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"), [(["amiga"], "amiga"), (["linux-x64", "--python", "2.7"], "invalid choice: '2.7'")]
+)
+def test_bad_arguments(builder, monkeypatch, capsys, arguments, says):
+    try:
+        status = run(builder, monkeypatch, *arguments)
+    except SystemExit as stop:
+        status = stop.code
+    assert status == 2
+    assert says in capsys.readouterr().err

@@ -98,11 +98,12 @@ def fake_worker(tmp_path, monkeypatch, standing):
                 folder, request = sys.argv[2], json.loads(sys.stdin.readline())
                 def send(event, **values):
                     print(json.dumps(dict(values, event=event)), flush=True)
-                def finish(people=1):
+                def finish(people=1, warnings=("a warning",)):
                     names = [f"person{{i + 1}}.npz" for i in range(people)]
                     for name in names:
                         shutil.copy({str(tmp_path / "standing.npz")!r}, os.path.join(folder, name))
-                    report = {{"people": 1, "reprojection_px": 2.5, "fps": {{"total": 5.0}}, "warnings": ["a warning"]}}
+                    report = {{"people": 1, "reprojection_px": 2.5, "fps": {{"total": 5.0}}}}
+                    report["warnings"] = list(warnings)
                     send("result", motions=names, report=report)
             """)
             + textwrap.dedent(body)

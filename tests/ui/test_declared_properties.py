@@ -25,6 +25,7 @@ STORED = {
     "shape": {"KEYED": 0, "PER_FRAME": 1, "BAKED": 2},
     "provider": {"AUTO": 0, "CPU": 1, "CUDA": 2, "TENSORRT": 3, "DIRECTML": 4, "COREML": 5},
 }
+_NOT_OPTIONS = ("rna_type", "name", "capture", "capture_index", "no_result")
 LABELS = {
     "footage": "Footage",
     "quality": "Quality",
@@ -46,6 +47,7 @@ LABELS = {
     "start_frame": "First Frame",
     "set_frame_range": "Set Frame Range",
     "shape": "Shape",
+    "take": "Take",
     "with_markers": "Markers",
     "with_camera": "Camera with Footage",
 }
@@ -61,7 +63,7 @@ def properties(place):
 
 
 def test_the_panel_keeps_its_names_and_labels():
-    own = {p.identifier: p.name for p in properties(Place.PANEL) if p.identifier not in ("rna_type", "name", "result")}
+    own = {p.identifier: p.name for p in properties(Place.PANEL) if p.identifier not in _NOT_OPTIONS}
     assert own == LABELS
 
 

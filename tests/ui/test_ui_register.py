@@ -88,7 +88,7 @@ def test_every_operator_and_setting_has_a_tooltip():
     shown = [bpy.context.scene.scope.bl_rna, ui.preferences.SCOPE_AP_preferences.bl_rna]
     for rna in shown:
         for prop in rna.properties:
-            if prop.identifier not in ("rna_type", "name", "bl_idname", "result"):
+            if prop.identifier not in ("rna_type", "name", "bl_idname", "no_result"):
                 assert prop.description.strip(), prop.identifier
                 if prop.type == "ENUM":
                     assert all(item.description for item in prop.enum_items), prop.identifier

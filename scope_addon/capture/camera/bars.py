@@ -47,7 +47,7 @@ def find_bars(image_rgb: NDArray[np.uint8]) -> list[NDArray[np.float64]]:
 def longer_content_side(bars: Sequence[NDArray[np.float64]], width: int, height: int) -> float:
     """Return the longer side, in pixels, of the content between the bars.
 
-    :param bars: as `find_bars` returns them.
+    :param bars: (4,) each, as `find_bars` returns them.
     :param width: of the whole picture in pixels.
     :param height: likewise.
     """

@@ -78,7 +78,7 @@ def find_segments(
     :param image_rgb: (H, W, 3).
     :param people: (n, 2) points of each person in pixels; edges inside their bounding boxes are left out.
     :param working_side_px: the longer side to which the picture is reduced; the time grows with its square.
-    :param bars: see `bars`; their edges are left out.
+    :param bars: (4,) each, see `bars`; their edges are left out.
     """
     height, width = image_rgb.shape[:2]
     scale = min(1.0, working_side_px / max(width, height))

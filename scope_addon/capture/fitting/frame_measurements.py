@@ -32,7 +32,10 @@ NEAREST_M = 0.3  # the least plausible distance of a person from the camera
 
 
 class Measurer:
-    """Converts landmarks to measurements of one body; the mapping between the two is computed once."""
+    """Converts landmarks to measurements of one body; the mapping between the two is computed once.
+
+    :param intrinsics: (3, 3) K in pixels.
+    """
 
     def __init__(self, body: Body, intrinsics: NDArray[np.float64]) -> None:
         self.body, self.intrinsics = body, intrinsics

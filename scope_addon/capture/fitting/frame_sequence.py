@@ -37,7 +37,10 @@ class FittedTrack:
 
 
 class FrameSequence:
-    """Fits frames one after another; a frame without a fit repeats the last one."""
+    """Fits frames one after another; a frame without a fit repeats the last one.
+
+    :param betas: (P,) shape of the person, the same in all frames.
+    """
 
     def __init__(self, prepared: PreparedTrack, betas: NDArray[np.floating[Any]]) -> None:
         T, body = len(prepared.track), prepared.body

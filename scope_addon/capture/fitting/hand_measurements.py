@@ -61,6 +61,7 @@ def require_fingers(body: Body) -> None:
 class HandMeasurer:
     """Converts hand landmarks to measurements of one body.
 
+    :param intrinsics: (3, 3) K in pixels.
     :raises UsageError: the body has no finger joints.
     """
 

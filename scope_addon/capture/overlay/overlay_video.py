@@ -126,7 +126,14 @@ def draw_bodies(
 ) -> None:
     """Draw the bodies of several people into a canvas.
 
-    For the parameters see `draw_overlay`; here they are lists with one element per person.
+    As `draw_overlay`, but with a list element per person.
+
+    :param vertices_cam: (V, 3) each: metres, camera axes (OpenCV's).
+    :param faces: (F, 3) or (F, 4), counter-clockwise seen from outside.
+    :param intrinsics: (3, 3) K in pixels of the canvas.
+    :param dist: up to (5,) distortion coefficients; None for none.
+    :param colors: (3,) or (F, 3) each, sRGB in 0..1.
+    :param opacities: 0..1 each.
     """
     triangles = _triangles(faces)
     for vertices, color, opacity in zip(vertices_cam, colors, opacities, strict=True):

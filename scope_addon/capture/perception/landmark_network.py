@@ -129,7 +129,10 @@ class LandmarkNetwork:
         return [pending.result() for pending in [self.begin(image_rgb, region) for region in regions]]
 
     def begin(self, image_rgb: NDArray[np.uint8], region: Region) -> Future[PoseEstimate]:
-        """Start the estimate of one region in another thread; the image must not change until it is done."""
+        """Start the estimate of one region in another thread; the image must not change until it is done.
+
+        :param image_rgb: (H, W, 3) uint8.
+        """
         return self._pool.submit(self._estimate, self._shared, image_rgb, region)
 
     @staticmethod

@@ -189,8 +189,10 @@ class Lifter:
     ) -> Lifted:
         """Mix the estimates with and without world landmarks, which is more accurate on real clips than either.
 
-        For the parameters see `lift`.
-
+        :param rays: (T, 33, 2), see `lift`.
+        :param confidence: (T, 33) 0..1.
+        :param world: (T, 33, 3) world landmarks in metres, hip-centred.
+        :param windows: of the frames around each; None if every frame is a still.
         :raises ShapeError: an array has the wrong shape.
         """
         around = _windows(rays, confidence, windows)

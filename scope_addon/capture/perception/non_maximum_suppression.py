@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 def overlap_clusters(corners: NDArray[np.float64], threshold: float) -> list[NDArray[np.intp]]:
     """Cluster boxes: the best remaining box and all whose intersection over union with it exceeds the threshold.
 
-    :param corners: (N, 4+) left, top, right, bottom; best box first.
+    :param corners: (N, 4 + M) left, top, right, bottom and M more columns; best box first.
     :return: indices of the boxes of each cluster, the best first.
     """
     low, high = corners[:, :2], corners[:, 2:4]

@@ -13,11 +13,12 @@ from ....solver.names import BODY_JOINTS
 from ...motion import Motion
 from ..media.video import Video
 from ..options import CaptureOptions
+from .clock import at_times
+from .floor_warnings import floor_warnings
 from .observe import Footage
 from .solve import Solved
 
 MIN_LEG_CONFIDENCE = 0.05  # of the shanks; below it, legs count as not seen
-MAX_TIMES = 4  # cuts whose times are listed
 
 
 def make_report(
@@ -49,7 +50,9 @@ def make_report(
         "reprojection_px": float(motions[0].residual_px[motions[0].valid].mean()),
         "iterations": solved.iterations,
         "cuts_s": [round(t, 3) for t in footage.cuts_s],
-        "warnings": footage.warnings + capture_warnings(Path(video.path).name, options, footage.cuts_s, motions),
+        "warnings": footage.warnings
+        + capture_warnings(Path(video.path).name, options, footage.cuts_s, motions)
+        + floor_warnings(Path(video.path).name, body, motions),
     }
 
 
@@ -57,7 +60,7 @@ def capture_warnings(name: str, options: CaptureOptions, cuts_s: list[float], mo
     """List what a user should know about the result, in sentences; ``name`` is the footage's."""
     warnings = []
     if cuts_s:
-        times = _at(cuts_s)
+        times = at_times(cuts_s)
         warnings.append(
             f"{name} cuts to another scene {times}: capture each scene separately, with a start and end time"
         )
@@ -101,11 +104,3 @@ def _legs_confidence(motion: Motion) -> float:
     """Return the mean confidence of the more visible leg over the frames in which the person was seen."""
     shanks = [BODY_JOINTS.index(f"{side}_knee") for side in ("left", "right")]
     return float(motion.joint_confidence[motion.valid][:, shanks].mean(axis=0).max())
-
-
-def _at(times_s: list[float]) -> str:
-    """Write times as "at 2.0 s and at 4.1 s"; if there are many, only the first few."""
-    listed = [f"at {t:.1f} s" for t in times_s[:MAX_TIMES]]
-    more = len(times_s) - len(listed)
-    listed += [f"{more} more times"] if more else []
-    return listed[0] if len(listed) == 1 else f"{', '.join(listed[:-1])} and {listed[-1]}"

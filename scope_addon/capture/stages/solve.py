@@ -12,6 +12,7 @@ from ..fitting.frame_sequence import FittedTrack
 from ..fitting.prepared_track import PreparedTrack, prepare_track
 from ..fitting.track_fit import fit_track, refit_track
 from ..tracking.track import Track
+from ..world.above_floor import raise_feet
 from ..world.assemble import assemble_motion
 from ..world.camera_path import CameraPath
 from ..world.camera_travel import camera_travel
@@ -95,8 +96,10 @@ def refit(
 
 
 def finish(shot: Shot, person: FittedPerson, placed: PlacedTrack, world: SharedWorld, number: int) -> Motion:
-    """Lock the feet of one person, the ``number``-th of the world, and assemble the motion."""
+    """Lock the feet of one person, the ``number``-th of the world, above the floor, and assemble the motion."""
     contact = placed.contact(world.up)
     if shot.smoothing and shot.ablation.contact:
         placed = lock_feet(placed, contact, world.floor_from_camera(number))
+    if shot.ablation.contact and (shot.smoothing or shot.is_still):
+        placed = raise_feet(placed, contact, world.floor_from_camera(number))
     return assemble_motion(shot, person, placed, contact, world.T_world_camera)

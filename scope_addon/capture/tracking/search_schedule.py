@@ -48,8 +48,11 @@ class SearchSchedule:
         return self._clock.has_passed(self._interval_s(image_rgb, live, lost), self._clock.time_s - self._search_s)
 
     def begin(self, image_rgb: NDArray[np.uint8], live: Sequence[TrackedTarget], lost: Sequence[TrackedTarget]) -> bool:
-        """Note a search in this frame, with the parameters of `is_due`.
+        """Note a search in this frame.
 
+        :param image_rgb: (H, W, 3).
+        :param live: the people who are tracked.
+        :param lost: the people who are remembered.
         :return: whether to search closely: where somebody small may be, and less often at a low frame rate, because
             it costs more.
         """

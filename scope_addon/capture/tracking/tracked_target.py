@@ -118,5 +118,5 @@ def _confidence(estimate: PoseEstimate) -> float:
 
 
 def mean_distance(a: NDArray[np.floating[Any]], b: NDArray[np.floating[Any]]) -> float:
-    """Return the mean distance of corresponding points (..., n)."""
+    """Return the mean distance between the points a (..., n) and b (..., n)."""
     return float(np.linalg.norm(a - b, axis=-1).mean())

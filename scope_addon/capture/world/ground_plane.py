@@ -93,5 +93,5 @@ def _solve_tridiagonal(
 
 
 def floor_probability(height: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
-    """Return the probability that feet in contact at these heights, metres, stand on the floor."""
+    """Return the probability (...) that feet in contact at the heights (...), metres, stand on the floor."""
     return logistic(4 * (1 - np.abs(height) / LEVEL_M))

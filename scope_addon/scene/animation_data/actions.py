@@ -157,6 +157,24 @@ def rewrite_keys(
     curve.update()
 
 
+def change_keys(curve: bpy.types.FCurve, frames: NDArray[np.float64], values: NDArray[np.float64]) -> None:
+    """Change the values of a curve's keys at some frames, and add those that are missing; other keys stay as they are.
+
+    :param frames: (T,) scene frames.
+    :param values: (T,) in the unit of the property.
+    """
+    keys = curve.keyframe_points
+    coordinates = read_keys(curve)
+    wanted = frames.astype(np.float32)
+    at = np.clip(np.searchsorted(coordinates[:, 0], wanted - 1e-3), 0, len(coordinates) - 1)
+    present = np.abs(coordinates[at, 0] - wanted) < 2e-3
+    coordinates[at[present], 1] = values[present]
+    keys.foreach_set("co", coordinates.ravel())
+    for frame, value in zip(wanted[~present], values[~present], strict=True):
+        keys.insert(float(frame), float(value), options={"FAST"}).interpolation = "LINEAR"
+    curve.update()
+
+
 def add_cycles(datablock: bpy.types.ID, offset_curves: set[tuple[str, int]] | None = None) -> None:
     """Make every curve of a datablock cyclic.
 

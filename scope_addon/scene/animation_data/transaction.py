@@ -15,7 +15,10 @@ import numpy as np
 from .actions import fcurves_of, read_keys
 
 # Kinds of datablock that the work may create; shape keys go with their mesh.
-_KINDS = ("collections", "objects", "meshes", "armatures", "cameras", "actions", "materials", "movieclips", "images")
+_KINDS = (
+    *("collections", "objects", "meshes", "armatures", "cameras", "actions", "materials", "movieclips", "images"),
+    "texts",  # packed motions
+)
 _SCENE = ("frame_start", "frame_end", "frame_preview_start", "frame_preview_end", "camera")
 _RENDER = ("fps", "fps_base", "resolution_x", "resolution_y", "pixel_aspect_x", "pixel_aspect_y")
 

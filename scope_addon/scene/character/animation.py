@@ -31,7 +31,7 @@ def quaternion_from_rotation_vector(rotation_vectors: NDArray[np.float64]) -> ND
 
 
 def quaternion_product(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return ``a ⊗ b`` (..., 4): the rotation b followed by a."""
+    """Return ``a ⊗ b`` (..., 4) of quaternions (w, x, y, z), a and b (..., 4): the rotation b followed by a."""
     aw, av = a[..., :1], a[..., 1:]
     bw, bv = b[..., :1], b[..., 1:]
     w = aw * bw - (av * bv).sum(axis=-1, keepdims=True)

@@ -24,7 +24,7 @@ _DESCRIPTIONS = {
     CONFIDENCE: "How far the footage, rather than prior knowledge, determines this bone",
     CONTACT: "Probability that this end of the foot rests on the floor",
 }
-MARKER_NAMES = {"unseen": "not seen", "far": "check", "unsure": "unsure"}
+MARKER_NAMES = {"unseen": "not seen", "far": "check", "unsure": "unsure", "floor": "under floor"}
 _MAX_MARKERS = 40  # more would clutter the timeline
 _GAP_S = 0.5  # spans closer than this share a marker
 
@@ -50,15 +50,24 @@ def key_measurements(
             curve.hide = True
 
 
-def add_review_markers(scene: bpy.types.Scene, prefix: str, motion: Motion, frames: NDArray[np.float64]) -> int:
+def add_review_markers(
+    scene: bpy.types.Scene,
+    prefix: str,
+    motion: Motion,
+    frames: NDArray[np.float64],
+    under_floor: NDArray[np.bool_] | None = None,
+) -> int:
     """Add a timeline marker at the start of each review span; return how many.
 
     If there are too many spans, the longest get a marker. Its name states the reason: "not seen 12-18".
 
     :param prefix: of the marker's name, to distinguish several people.
     :param frames: (T,) scene frame of each pose.
+    :param under_floor: (T,) poses with a foot under the floor.
     """
-    spans = sorted(find_review_spans(motion, _GAP_S), key=lambda span: span.first - span.last)[:_MAX_MARKERS]
+    spans = sorted(find_review_spans(motion, _GAP_S, under_floor), key=lambda span: span.first - span.last)[
+        :_MAX_MARKERS
+    ]
     there = {(marker.name, marker.frame) for marker in scene.timeline_markers}
     for span in sorted(spans, key=lambda span: span.first):
         first, last = round(float(frames[span.first])), round(float(frames[span.last]))

@@ -22,7 +22,7 @@ from ...edit.clip import Clip, band_limited, sample
 from ...edit.reduce import angles_between, select_position_keys, select_quaternion_keys
 from ...errors import UsageError
 from ...kinematics.axes import R_WORLD_MODEL
-from ..animation_data.actions import bone_path, fcurves, read_keys, rewrite_keys
+from ..animation_data.actions import bone_path, change_keys, fcurves, read_keys, rewrite_keys
 from .animation import on_one_hemisphere
 from .armature import rest_orientations
 
@@ -84,6 +84,25 @@ def write_clip(armature: bpy.types.Object, body: Body, clip: Clip, frames: NDArr
     for path, bone in _curves(armature, body).items():
         for index, curve in enumerate(bone):
             rewrite_keys(curve, frames, values[path][:, index])
+
+
+def write_keys(
+    armature: bpy.types.Object, body: Body, clip: Clip, frames: NDArray[np.float64], which: NDArray[np.bool_]
+) -> None:
+    """Replace only some keys by the clip's; a curve that has no key at one of these frames gets one.
+
+    :param frames: (T,) scene frames of the clip's keys.
+    :param which: (T,) the keys to write.
+    :raises UsageError: when a bone or its keys are missing.
+    """
+    values = _values_by_path(body, *channel_values(armature, body, clip))
+    for path, bone in _curves(armature, body).items():
+        new = values[path]
+        if len(bone) == 4:  # the sign of the quaternion that is there, since the keys around it stay
+            old = np.stack([_values(curve, frames) for curve in bone], axis=1)
+            new = new * np.where((new * old).sum(axis=1, keepdims=True) < 0, -1.0, 1.0)
+        for index, curve in enumerate(bone):
+            change_keys(curve, frames[which], new[which, index])
 
 
 def bake_whole_frames(armature: bpy.types.Object, body: Body, rate: float) -> tuple[int, int]:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Biovision hierarchy files (.bvh): y up, metres, the T-pose at zero rotation facing +z.
+"""Biovision hierarchy files (.bvh): y up, centimetres or metres, the T-pose at zero rotation facing +z.
 
 Every joint's axes are those of the model at rest, so offsets are differences of rest joints and rotations are SMPL's.
 The root's channels are its position and rotation in the y-up world; its OFFSET is zero because readers disagree
@@ -8,12 +8,14 @@ on whether position channels are added to it. Blender's own exporter writes z up
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..axes import R_GLTF_WORLD
+
+UNITS_PER_METRE = {"cm": 100.0, "m": 1.0}  # the format states no unit; most tools expect centimetres
 
 
 @dataclass(frozen=True)
@@ -29,8 +31,13 @@ class SampledPose:
     rate: float  # frames per second
 
 
-def bvh_text(pose: SampledPose) -> str:
-    """Return the content of the file."""
+def bvh_text(pose: SampledPose, unit: str = "cm") -> str:
+    """Return the content of the file.
+
+    :param unit: of its lengths, a key of ``UNITS_PER_METRE``.
+    """
+    scale = UNITS_PER_METRE[unit]
+    pose = replace(pose, heads=scale * pose.heads, tails=scale * pose.tails, joints=scale * pose.joints)
     children: list[list[int]] = [[] for _ in pose.names]
     for i, parent in enumerate(pose.parents):
         if parent >= 0:
@@ -71,7 +78,7 @@ def _triple(v: NDArray[np.float64]) -> str:
 
 
 def _channel_values(pose: SampledPose, order: list[int]) -> NDArray[np.float64]:
-    """Return (T, channels) in the order of the hierarchy, metres and degrees."""
+    """Return (T, channels) in the order of the hierarchy, lengths in the unit of ``pose``, angles in degrees."""
     turned = R_GLTF_WORLD @ pose.rotations @ R_GLTF_WORLD.T
     columns = []
     for i in order:

@@ -22,7 +22,9 @@ from ...motion import Motion
 from ..animation_data import actions
 from ..build import CAPTURE_TAG, NEW_SCENE, BuildOptions, BuildResult, Progress, build_scene
 from ..character.bone_display import remove_if_unused
+from ..packed_motion import motion_texts, pack_motion
 from . import formats
+from .bvh import UNITS_PER_METRE
 from .export_states import (
     actions_over_scene_range,
     all_evaluated,
@@ -47,12 +49,16 @@ class ExportOptions:
     # for engines that clamp them to 0..1. "auto": keys, but baked in .usdc, as USD importers clamp, also Blender's.
     shape: str = "auto"
     separate: bool = False  # one file per person, also in formats that can hold several
+    bvh_unit: str = "cm"  # of the lengths in .bvh: "cm" or "m"
+    take: str = ""  # name of the animation; empty: the capture's
 
     def __post_init__(self) -> None:
         """Check the values.
 
-        :raises UsageError: when ``shape`` is unknown.
+        :raises UsageError: when ``shape`` or ``bvh_unit`` is unknown.
         """
+        if self.bvh_unit not in UNITS_PER_METRE:
+            raise UsageError(f"bvh_unit must be one of {', '.join(UNITS_PER_METRE)}, but is '{self.bvh_unit}'")
         if self.shape not in SHAPES:
             raise UsageError(f"shape must be one of {', '.join(SHAPES)}, but is '{self.shape}'")
 
@@ -114,6 +120,7 @@ def _write_one(
 ) -> None:
     """Write these collections over the frame range of all ``rigs``, so that separate files start at the same time."""
     suffix = path.suffix.lower()
+    take = options.take or (collections[0].name if len(collections) == 1 else path.stem)
     with (
         out_of_edit_mode(collections),
         nullcontext() if suffix == ".blend" else all_evaluated(collections),  # keeps hidden objects as they are
@@ -127,9 +134,9 @@ def _write_one(
     ):
         rig = next((obj for obj in scene.objects if obj.type == "ARMATURE"), None)
         writers = {
-            ".bvh": lambda temporary: formats.write_bvh(temporary, scene, rig),
-            ".glb": lambda temporary: formats.write_glb(temporary, options.camera),
-            ".fbx": lambda temporary: formats.write_fbx(temporary, options.camera),
+            ".bvh": lambda temporary: formats.write_bvh(temporary, scene, rig, options.bvh_unit),
+            ".glb": lambda temporary: formats.write_glb(temporary, options.camera, take),
+            ".fbx": lambda temporary: formats.write_fbx(temporary, options.camera, take),
             ".usdc": lambda temporary: formats.write_usd(temporary, options.camera),
             ".blend": lambda temporary: formats.write_blend(temporary, scene),
         }
@@ -169,6 +176,9 @@ def export_motions(
     with temporary_scene("Capturing"):
         result = build_scene(motions, body, footage, build_options, progress)
         try:
+            if any(Path(path).suffix.lower() == ".blend" for path in scene_paths):
+                for person in result.people:
+                    pack_motion(person.armature, person.motion.to_bytes())
             for each in scene_paths:
                 written += export(each, [result.collection], motions, export_options)
         finally:
@@ -186,7 +196,8 @@ def _remove(result: BuildResult) -> None:
     materials = {m for block in data for m in getattr(block, "materials", ())}
     shown = {footage for block in data for picture in getattr(block, "background_images", ())
              for footage in (picture.clip, picture.image) if footage}  # fmt: skip
-    bpy.data.batch_remove([result.collection, *objects, *data, *used, *materials])
+    texts = motion_texts(objects)
+    bpy.data.batch_remove([result.collection, *objects, *data, *used, *materials, *texts])
     bpy.data.batch_remove([footage for footage in shown if footage.users == 0])
     remove_if_unused()
 

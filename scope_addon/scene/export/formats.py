@@ -22,12 +22,15 @@ from numpy.typing import NDArray
 from ...errors import OutputError
 from ..animation_data import timing
 from . import bvh
-from .fbx_units import metres_to_centimetres
+from .fbx_file import correct_fbx
 from .glb_times import corrected_key_times
 
 
-def write_glb(path: Path, camera: bool = False) -> None:
-    """Write the active scene as binary glTF: y up, metres, shape keys as morph targets, all motion in one animation."""
+def write_glb(path: Path, camera: bool = False, take: str = "Animation") -> None:
+    """Write the active scene as binary glTF: y up, metres, shape keys as morph targets, all motion in one animation.
+
+    :param take: name of the animation.
+    """
     enable_addon("io_scene_gltf2")
     scene = bpy.context.scene
     moving = [obj for obj in scene.objects if obj.animation_data]
@@ -52,6 +55,7 @@ def write_glb(path: Path, camera: bool = False) -> None:
             export_leaf_bone=False,
             export_animations=True,
             export_animation_mode="ACTIVE_ACTIONS",
+            export_nla_strips_merged_animation_name=take,
             export_anim_single_armature=False,  # otherwise Blender 4.2 includes other actions of the file
             export_force_sampling=True,
             export_frame_range=True,
@@ -62,8 +66,11 @@ def write_glb(path: Path, camera: bool = False) -> None:
         )
 
 
-def write_fbx(path: Path, camera: bool = False) -> None:
-    """Write the active scene as FBX: y up, centimetres, objects at scale 1, no leaf bones, every frame keyed."""
+def write_fbx(path: Path, camera: bool = False, take: str = "Take") -> None:
+    """Write the active scene as FBX: y up, centimetres, objects at scale 1, no leaf bones, every frame keyed from 0 s.
+
+    :param take: name of the animation.
+    """
     enable_addon("io_scene_fbx")
     call_operator(
         bpy.ops.export_scene.fbx,
@@ -90,7 +97,7 @@ def write_fbx(path: Path, camera: bool = False) -> None:
         bake_anim_simplify_factor=0.0,
         path_mode="AUTO",
     )
-    metres_to_centimetres(path)
+    correct_fbx(path, take)
 
 
 def write_usd(path: Path, camera: bool = False) -> None:
@@ -146,9 +153,12 @@ def write_blend(path: Path, scene: bpy.types.Scene) -> None:
     bpy.data.libraries.write(str(path), {scene}, path_remap="RELATIVE_ALL", compress=True)
 
 
-def write_bvh(path: Path, scene: bpy.types.Scene, rig: bpy.types.Object) -> None:
-    """Write one armature as BVH, sampled at the scene's whole frames."""
-    path.write_text(bvh.bvh_text(sample_armature(scene, rig)), encoding="ascii", errors="replace")
+def write_bvh(path: Path, scene: bpy.types.Scene, rig: bpy.types.Object, unit: str = "cm") -> None:
+    """Write one armature as BVH, sampled at the scene's whole frames.
+
+    :param unit: of the file's lengths, ``cm`` or ``m``.
+    """
+    path.write_text(bvh.bvh_text(sample_armature(scene, rig), unit), encoding="ascii", errors="replace")
 
 
 def sample_armature(scene: bpy.types.Scene, rig: bpy.types.Object) -> bvh.SampledPose:

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import bpy
@@ -69,9 +69,12 @@ def export_on_rig(
 def export_rig(path: Path, rig: bpy.types.Object, options: ExportOptions) -> list[Path]:
     """Write an animated rig of the scene with the meshes that it deforms; return the files written.
 
+    :param options: without a ``take``, the animation is named after the rig's action.
     :raises UsageError: when the suffix is unknown.
     :raises OutputError: when a file cannot be written.
     """
+    action = rig.animation_data.action if rig.animation_data else None
+    options = replace(options, take=options.take or (action.name if action else rig.name))
     collection, parts = bpy.data.collections.new(rig.name), with_meshes(rig, bpy.context.scene.objects)
     try:
         for obj in parts:

@@ -24,6 +24,7 @@ from ...job.request import JobRequest, code_version
 from ...motion import Motion
 from ...options import Place
 from ...scene.build import BuildOptions, BuildResult, build_scene
+from ...scene.packed_motion import pack_motion
 from ..declared_properties import option_values
 from ..preferences import cache, preferences
 from . import preview_picture
@@ -115,7 +116,8 @@ class CaptureJob:
         preview_picture.show(pixels, message["width"], message["height"])
 
     def _build(self, scene: bpy.types.Scene, captured: CachedCapture) -> None:
-        motions = [Motion.load(path) for path in captured.motions]
+        contents = [(path, path.read_bytes()) for path in captured.motions]
+        motions = [Motion.load(path, content) for path, content in contents]
         body = load_body(self._request.values["body"])
         warnings = list(captured.report.get("warnings", ()))
         footage: str | None = self._request.footage
@@ -124,9 +126,10 @@ class CaptureJob:
             footage = None
         with _window_shows(scene):
             result = build_scene(motions, body, footage, self._options)
-        store_motion_paths(result, captured.motions, self._request.values["body"])
+        store_motions(result, [content for _, content in contents], self._request.values["body"])
         report = dict(captured.report, warnings=[shown(warning) for warning in warnings + result.warnings])
-        show_result(scene.scope.result, self._request.footage, report, result)
+        show_result(result.collection.scope_result, self._request.footage, report, result)
+        scene.scope.capture = result.collection
 
 
 def capture_request(scene: bpy.types.Scene) -> JobRequest:
@@ -164,6 +167,7 @@ def build_options(scene: bpy.types.Scene) -> BuildOptions:
     if frame_rate == "auto":
         frame_rate = "keep" if _is_animated(scene) else "set"
     return BuildOptions(
+        name=settings.take.strip(),
         frame_rate=frame_rate,
         set_frame_range=settings.set_frame_range,
         start_frame=float(settings.start_frame),
@@ -173,11 +177,10 @@ def build_options(scene: bpy.types.Scene) -> BuildOptions:
     )
 
 
-def store_motion_paths(result: BuildResult, paths: Sequence[Path], body: str) -> None:
-    """Store the paths of the motion files with the capture, and with each armature its motion file and body."""
-    result.collection["scope_motions"] = [str(path) for path in paths]
-    for person, path in zip(result.people, paths, strict=True):
-        person.armature["scope_motion"] = str(path)
+def store_motions(result: BuildResult, contents: Sequence[bytes], body: str) -> None:
+    """Store with each armature the bytes of its motion file, and the body."""
+    for person, content in zip(result.people, contents, strict=True):
+        pack_motion(person.armature, content)
         person.armature["scope_body_file"] = body
 
 

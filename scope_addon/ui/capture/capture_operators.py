@@ -11,6 +11,7 @@ import bpy
 from bpy.props import StringProperty
 
 from ...footage import FOOTAGE_SUFFIXES
+from ...job.progress import duration
 from .. import warm_up
 from ..reporting import sentence
 from ..view.view_operators import frame_selected, hide_startup_cube
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 
 SAMPLE = Path(__file__).resolve().parents[3] / "assets" / "sample" / "sample.mp4"
 TIMER_S = 0.1
+ASK_AFTER_S = 10.0  # a capture that has run longer is cancelled only after a question
 
 
 class _State:
@@ -29,6 +31,7 @@ class _State:
     job: CaptureJob | None = None
     scene_uid = 0  # of the scene that the job or the message belongs to
     message = ""  # why the last capture failed
+    started = 0.0  # when the job was started, in seconds of the monotonic clock
 
 
 state = _State()
@@ -109,17 +112,25 @@ class SCOPE_OT_capture(bpy.types.Operator):
         return {"RUNNING_MODAL"}
 
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        """Step on timer events, cancel on Escape, pass the others to Blender."""
+        """Step on timer events, cancel on Escape over the panel, pass the others to Blender.
+
+        Elsewhere, Escape belongs to what is under the mouse, such as the playback of the timeline.
+        """
         job = state.job
         if job is None:  # stopped by something else
             return self._end(context, {"CANCELLED"})
-        if job.cancel_requested or (event.type == "ESC" and event.value == "PRESS"):
+        if event.type == "ESC" and event.value == "PRESS" and is_over_panel(context.window, event):
+            bpy.ops.scope.cancel("INVOKE_DEFAULT")
+            return {"RUNNING_MODAL"}
+        if job.cancel_requested:
             self.report({"INFO"}, "Capture cancelled; the scene is unchanged")
             return self._end(context, {"CANCELLED"})
         if event.type != "TIMER":
             return {"PASS_THROUGH"}
         outcome = self._step()
-        context.workspace.status_text_set(f"Scope: {', '.join(job.progress.lines())}   (Esc to cancel)")
+        context.workspace.status_text_set(
+            f"Scope: {', '.join(job.progress.lines())}   (Esc over the Scope panel to cancel)"
+        )
         redraw(context)
         return self._end(context, outcome) if outcome else {"PASS_THROUGH"}
 
@@ -139,7 +150,7 @@ class SCOPE_OT_capture(bpy.types.Operator):
             stop_job()
 
     def _start(self, context: bpy.types.Context) -> bool:
-        state.message, state.scene_uid = "", context.scene.session_uid
+        state.message, state.scene_uid, state.started = "", context.scene.session_uid, time.monotonic()
         # Imported here: it loads numba and numpy, which would slow down the start of Blender.
         try:
             from .capture_job import CaptureJob
@@ -199,6 +210,20 @@ class SCOPE_OT_cancel(bpy.types.Operator):
         """Require that a capture is running."""
         return state.job is not None
 
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        """Ask first if the capture has run for a while."""
+        seconds = time.monotonic() - state.started
+        if seconds <= ASK_AFTER_S or bpy.app.background:
+            return self.execute(context)
+        outcome: set[str] = context.window_manager.invoke_confirm(
+            self,
+            event,
+            title="Stop the Capture?",
+            message=f"It has run for {duration(seconds)}. The scene stays unchanged",
+            confirm_text="Stop Capture",
+        )
+        return outcome
+
     def execute(self, context: bpy.types.Context) -> set[str]:
         """End the worker, and ask the modal operator to end."""
         assert state.job is not None
@@ -213,6 +238,18 @@ def stop_job() -> None:
         state.job.close()
     state.job = None
     preview_picture.clear()
+
+
+def is_over_panel(window: bpy.types.Window, event: bpy.types.Event) -> bool:
+    """Return whether the mouse is over a sidebar of a 3D viewport that shows the tab Scope."""
+    sidebars = [r for area in window.screen.areas if area.type == "VIEW_3D" for r in area.regions if r.type == "UI"]
+    return any(
+        0 <= event.mouse_x - sidebar.x < sidebar.width
+        and 0 <= event.mouse_y - sidebar.y < sidebar.height
+        and getattr(sidebar, "active_panel_category", "Scope") == "Scope"
+        for sidebar in sidebars
+        if sidebar.width > 1  # a hidden one is 1 pixel wide
+    )
 
 
 def clear_status_bar() -> None:

@@ -11,10 +11,11 @@ import bpy
 from ...footage import shown
 from ...job.progress import JobProgress, duration
 from .. import warm_up
-from ..export_operators import FORMATS
-from ..view.view_operators import camera_of, is_looking_through
+from ..export_operators import FORMATS, is_available
+from ..view.comparison import camera_of, is_looking_through, side_area
 from . import preview_picture
 from .capture_operators import state
+from .captures import counted, draw_captures, people_of, shown_capture
 
 _PIXELS_PER_CHARACTER = 7.0
 
@@ -43,8 +44,11 @@ class SCOPE_PT_capture(Tab, bpy.types.Panel):
             row.scale_y = 1.6
             row.operator("scope.choose_footage", icon="FILE_MOVIE")
             column.operator("scope.use_sample", icon="PLAY")
+            column.operator("scope.import_motion", icon="IMPORT")
             return
-        column.prop(settings, "footage", text="", icon="FILE_MOVIE")
+        row = column.row(align=True)
+        row.prop(settings, "footage", text="", icon="FILE_MOVIE")
+        row.operator("scope.import_motion", text="", icon="IMPORT")
         column.row(align=True).prop(settings, "quality", expand=True)
         if state.job is not None:
             _draw_progress(context, layout, state.job.progress)
@@ -124,36 +128,32 @@ class SCOPE_PT_scene(Tab, bpy.types.Panel):
 
 
 class SCOPE_PT_result(Tab, bpy.types.Panel):
-    """The result of the last capture, and its export."""
+    """The captures of the scene, the result of the selected one, and its export."""
 
     bl_idname = "SCOPE_PT_result"
     bl_label = "Result"
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Require the captured collection in this scene: copied settings may refer to another scene's."""
-        return context.scene.scope.result.collection in context.scene.collection.children_recursive
+        """Require a capture in this scene: copied settings may refer to another scene's."""
+        return shown_capture(context.scene) is not None
 
     def draw(self, context: bpy.types.Context) -> None:
         """Draw the panel."""
         layout, result = self.layout, context.scene.scope.result
-        column = layout.column(align=True)
-        column.label(text=shown(Path(result.footage).name), icon="FILE_MOVIE")
-        column.label(text="1 person" if result.people == 1 else f"{result.people} people", icon="OUTLINER_OB_ARMATURE")
-        seconds = result.frames / result.frames_per_second if result.frames_per_second else 0.0
-        frames = "1 frame" if result.frames == 1 else f"{result.frames} frames"
-        column.label(text=f"{frames}, captured in {duration(seconds)}", icon="TIME")
-        column.label(text=f"Reprojection error {result.reprojection_px:.1f} px", icon="CON_CAMERASOLVER")
-        column.label(text=f"Lens: {result.camera}", icon="CAMERA_DATA")
-        if result.execution:
-            column.label(text=f"Networks on {result.execution}", icon="MEMORY")
+        draw_captures(layout, context)
+        _draw_figures(layout, result)
         for warning in result.warnings:
             _draw_warning(context, layout.box(), warning)
         camera = camera_of(context.scene)
         if camera is not None:
             back = is_looking_through(context)
             text = "Back to the Scene" if back else "Compare with Footage"
-            layout.operator("scope.look_through", text=text, icon="VIEW_CAMERA", depress=back)
+            row = layout.row(align=True)
+            row.operator("scope.look_through", text=text, icon="VIEW_CAMERA", depress=back)
+            if back:
+                shown = side_area(context.window.screen) is not None
+                row.operator("scope.side_view", text="", icon="SPLIT_VERTICAL", depress=shown)
             for background in camera.data.background_images[:1]:
                 layout.prop(background, "alpha", text="Footage Opacity", slider=True)
             layout.operator("scope.footage_to_sequencer", icon="SEQUENCE")
@@ -161,8 +161,29 @@ class SCOPE_PT_result(Tab, bpy.types.Panel):
         grid = layout.grid_flow(columns=2, row_major=True, even_columns=True, align=True)
         for key, label, _, _ in FORMATS:
             cell = grid.column()
-            cell.enabled = key != "USDC" or "usd_export" in dir(bpy.ops.wm)  # some builds of Blender lack USD
+            cell.enabled = is_available(key)
             cell.operator("scope.export", text=label).format = key
+
+
+def _draw_figures(layout: bpy.types.UILayout, result: bpy.types.PropertyGroup) -> None:
+    """Draw footage, people, frames and error. A .blend file written by the command line has no figures."""
+    column = layout.column(align=True)
+    column.label(text=shown(Path(result.footage).name) or result.collection.name, icon="FILE_MOVIE")
+    people = people_of(result.collection)
+    column.label(
+        text=counted(len(people), "person", "people") if people else "The captured person was deleted",
+        icon="OUTLINER_OB_ARMATURE" if people else "GHOST_DISABLED",
+    )
+    if not result.frames:
+        return
+    seconds = result.frames / result.frames_per_second if result.frames_per_second else 0.0
+    captured = f", captured in {duration(seconds)}" if seconds else ""
+    column.label(text=counted(result.frames, "frame", "frames") + captured, icon="TIME")
+    if result.camera:
+        column.label(text=f"Reprojection error {result.reprojection_px:.1f} px", icon="CON_CAMERASOLVER")
+        column.label(text=f"Lens: {result.camera}", icon="CAMERA_DATA")
+    if result.execution:
+        column.label(text=f"Networks on {result.execution}", icon="MEMORY")
 
 
 def _draw_warning(context: bpy.types.Context, box: bpy.types.UILayout, warning: bpy.types.PropertyGroup) -> None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The settings and the result that the panel shows, stored with each scene in the .blend file."""
+"""The settings that the panel shows, stored with each scene, and results, stored with each capture's collection."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ from bpy.props import (
 from ...options import Place
 from ..declared_properties import PATH_OPTIONS, with_options
 from .capture_operators import state
+from .captures import show_index, shown_capture, shown_index
 
 
 def _clear_message(_settings: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
@@ -32,10 +33,9 @@ class SCOPE_PG_warning(bpy.types.PropertyGroup):
 
 
 class SCOPE_PG_result(bpy.types.PropertyGroup):
-    """Result of the last capture of this scene."""
+    """Result of a capture, stored with its collection."""
 
     footage: StringProperty(subtype="FILE_PATH")
-    collection: PointerProperty(type=bpy.types.Collection)
     people: IntProperty()
     frames: IntProperty()
     valid_frames: IntProperty()
@@ -47,10 +47,15 @@ class SCOPE_PG_result(bpy.types.PropertyGroup):
     pixel_aspect: FloatVectorProperty(size=2)
     warnings: CollectionProperty(type=SCOPE_PG_warning)
 
+    @property
+    def collection(self) -> bpy.types.Collection | None:
+        """The capture; None if this is the empty result of a scene without captures."""
+        return self.id_data if isinstance(self.id_data, bpy.types.Collection) else None
+
 
 @with_options(Place.PANEL)
 class SCOPE_PG_settings(bpy.types.PropertyGroup):
-    """The settings of a capture: the footage, the declared options of the panel, and the last result."""
+    """The settings of a capture: the footage, the declared options of the panel, and the capture that is shown."""
 
     footage: StringProperty(
         name="Footage",
@@ -59,17 +64,32 @@ class SCOPE_PG_settings(bpy.types.PropertyGroup):
         update=_clear_message,
         description="Video or image of a person to capture",
     )
-    result: PointerProperty(type=SCOPE_PG_result)
+    capture: PointerProperty(
+        name="Capture", type=bpy.types.Collection, description="Capture whose result the panel shows"
+    )
+    capture_index: IntProperty(
+        name="Capture", get=shown_index, set=show_index, description="Capture whose result the panel shows"
+    )
+    no_result: PointerProperty(type=SCOPE_PG_result)  # stays empty
+
+    @property
+    def result(self) -> SCOPE_PG_result:
+        """Result of the capture that is selected in the list; empty in a scene without captures."""
+        capture = shown_capture(self.id_data)
+        result: SCOPE_PG_result = capture.scope_result if capture else self.no_result
+        return result
 
 
 CLASSES = (SCOPE_PG_warning, SCOPE_PG_result, SCOPE_PG_settings)
 
 
 def attach() -> None:
-    """Add the settings to every scene."""
+    """Add the settings to every scene, and a result to every collection."""
+    bpy.types.Collection.scope_result = PointerProperty(type=SCOPE_PG_result)
     bpy.types.Scene.scope = PointerProperty(type=SCOPE_PG_settings)
 
 
 def detach() -> None:
-    """Remove the settings; their values stay in a .blend file until it is saved without the extension."""
+    """Remove the settings and results; their values stay in a .blend file until it is saved without the extension."""
     del bpy.types.Scene.scope
+    del bpy.types.Collection.scope_result

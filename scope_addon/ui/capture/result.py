@@ -25,7 +25,6 @@ def show_result(shown: bpy.types.PropertyGroup, footage: str, report: dict[str, 
     :param report: report of the capture pipeline.
     """
     shown.footage = footage
-    shown.collection = result.collection
     shown.people = len(result.people)
     shown.frames = max(len(p.motion) for p in result.people)
     shown.valid_frames = int(sum(p.motion.valid.sum() for p in result.people))
@@ -42,18 +41,19 @@ def show_result(shown: bpy.types.PropertyGroup, footage: str, report: dict[str, 
         _add_warning(shown, str(line))
     for index, person in enumerate(result.people):
         whose = "" if len(result.people) == 1 else f"person {index + 1}: "
-        for reason, spans in frame_warnings(person.motion, person.frames).items():
+        for reason, spans in frame_warnings(person.motion, person.frames, person.under_floor).items():
             _add_warning(shown, whose + REASONS[reason], spans)
 
 
-def frame_warnings(motion: Motion, frames: NDArray[np.float64]) -> dict[str, str]:
+def frame_warnings(motion: Motion, frames: NDArray[np.float64], under_floor: NDArray[np.bool_]) -> dict[str, str]:
     """Return the review spans of a motion in scene frames, by reason; at most the longest ``_MAX_SPANS`` of each.
 
     :param frames: (T,) scene frame of each pose.
+    :param under_floor: (T,) poses with a foot under the floor.
     :return: reason, a key of ``REASONS``, to spans such as ``12-18,40``.
     """
     by_reason: dict[str, list[Span]] = {}
-    for span in find_review_spans(motion):
+    for span in find_review_spans(motion, under_floor=under_floor):
         by_reason.setdefault(span.reason, []).append(span)
     return {reason: _text(spans, frames) for reason, spans in by_reason.items()}
 

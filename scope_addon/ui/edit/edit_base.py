@@ -12,7 +12,43 @@ from ..captured_person import body_of, captured_armature, library_of
 from ..reporting import ReportingOperator
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    import numpy as np
+    from numpy.typing import NDArray
+
     from ....solver.body import Body
+    from ...edit.clip import Clip
+
+
+def edit_clip(
+    armature: bpy.types.Object, body: Body, rate: float, change: Callable[[Clip, NDArray[np.float64]], Clip]
+) -> None:
+    """Replace the keys of a captured armature on the same frames.
+
+    :param rate: of the scene, frames per second.
+    :param change: returns the new poses, given the present ones and the scene frame of each, (T,).
+    """
+    from ...scene.character.keys import read_clip, write_clip
+
+    clip, frames = read_clip(armature, body, rate)
+    write_clip(armature, body, change(clip, frames), frames)
+
+
+def may_edit(cls: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
+    """Return whether there is a captured armature whose keys are stored in this file; if not, say why."""
+    armature = captured_armature(context)
+    if armature is None:
+        cls.poll_message_set("Select the armature of a capture first")
+        return False
+    library = library_of(armature)
+    if library is not None:
+        cls.poll_message_set(
+            f"'{armature.name}' or its motion is linked from {library.filepath}, so changes would be lost: make "
+            "both local (Object > Relations > Make Local > All) or edit them in that file"
+        )
+        return False
+    return True
 
 
 class EditOperator(ReportingOperator):
@@ -21,18 +57,7 @@ class EditOperator(ReportingOperator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Require a captured armature whose keys are stored in this file."""
-        armature = captured_armature(context)
-        if armature is None:
-            cls.poll_message_set("Select the armature of a capture first")
-            return False
-        library = library_of(armature)
-        if library is not None:
-            cls.poll_message_set(
-                f"'{armature.name}' or its motion is linked from {library.filepath}, so changes would be lost: make "
-                "both local (Object > Relations > Make Local > All) or edit them in that file"
-            )
-            return False
-        return True
+        return may_edit(cls, context)
 
     if TYPE_CHECKING:  # implemented by each operator
 

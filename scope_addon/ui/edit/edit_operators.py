@@ -2,7 +2,7 @@
 """Operators that edit the motion of a capture: smoothing, interpolation, left and right, floor, root motion.
 
 All of them read and rewrite the keys of the active capture's armature; only smoothing starts from the captured motion,
-which the cache stores. None of them uses the footage.
+which the .blend file stores. None of them uses the footage.
 """
 
 from __future__ import annotations
@@ -12,15 +12,19 @@ from typing import TYPE_CHECKING
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty
 
-from ..captured_person import betas_of, cached_motion
-from .edit_base import EditOperator, SpanOperator
+from ..captured_person import betas_of, captured_motion
+from .edit_base import EditOperator, SpanOperator, edit_clip
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from ....solver.body import Body
+    from ...edit.clip import Clip
 
 
 class SCOPE_OT_smooth(EditOperator):
-    """Smooth the captured motion again, more or less strongly. Discards manual changes"""
+    """Smooth the captured motion again, more or less strongly. Keeps corrections, discards other changes"""
 
     bl_idname = "scope.smooth"
     bl_label = "Smooth Motion"
@@ -35,16 +39,17 @@ class SCOPE_OT_smooth(EditOperator):
     )
 
     def edit(self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float) -> str:
-        """Replace the keys by those of the cached motion, smoothed."""
+        """Replace the keys by those of the captured motion, smoothed."""
         from ...edit.smooth import smoothed
         from ...scene.animation_data.actions import remove_cycles
         from ...scene.animation_data.timing import key_frames, restore_scene_range
         from ...scene.character.keys import bake_whole_frames, write_clip
         from ...scene.character.root_object import remove_root_object
 
-        motion = cached_motion(armature)
+        motion = captured_motion(armature)
         clip = smoothed(body, motion, self.strength)
         write_clip(armature, body, clip, key_frames(motion.timestamps, rate, float(armature.get("scope_start", 0.0))))
+        armature["scope_smoothing"] = self.strength
         remove_cycles(armature)  # a loop becomes the whole motion again
         if armature.get("scope_resampled"):
             bake_whole_frames(armature, body, rate)
@@ -62,10 +67,8 @@ class SCOPE_OT_interpolate_span(SpanOperator):
     def edit(self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float) -> str:
         """Replace the keys inside the span."""
         from ...edit.spans import interpolate
-        from ...scene.character.keys import read_clip, write_clip
 
-        clip, frames = read_clip(armature, body, rate)
-        write_clip(armature, body, interpolate(clip, self.start / rate, self.end / rate), frames)
+        edit_clip(armature, body, rate, lambda clip, _: interpolate(clip, self.start / rate, self.end / rate))
         return ""
 
 
@@ -89,10 +92,9 @@ class SCOPE_OT_swap_sides(SpanOperator):
     def edit(self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float) -> str:
         """Change the keys inside the span."""
         from ...edit.spans import swap_sides
-        from ...scene.character.keys import read_clip, write_clip
 
-        clip, frames = read_clip(armature, body, rate)
-        write_clip(armature, body, swap_sides(clip, body, self.start / rate, self.end / rate, self.limbs), frames)
+        span = self.start / rate, self.end / rate
+        edit_clip(armature, body, rate, lambda clip, _: swap_sides(clip, body, *span, self.limbs))
         return ""
 
 
@@ -115,16 +117,17 @@ class SCOPE_OT_refloor(EditOperator):
         """Change all keys."""
         from ...edit.floor import refloor
         from ...edit.root_motion import relative_to_trajectory, with_trajectory
-        from ...scene.character.keys import read_clip, write_clip
         from ...scene.character.root_object import removed_root_motion
 
-        clip, frames = read_clip(armature, body, rate)
-        positions, angles = removed_root_motion(armature, frames)
-        path = positions * [1.0, 1.0, 0.0], angles  # feet in contact are at rest only with root motion
-        floored = refloor(
-            with_trajectory(clip, *path), body, betas_of(armature, body), level=self.level, lift=self.lift
-        )
-        write_clip(armature, body, relative_to_trajectory(floored, *path), frames)
+        betas = betas_of(armature, body)
+
+        def floored(clip: Clip, frames: NDArray[np.float64]) -> Clip:
+            positions, angles = removed_root_motion(armature, frames)
+            path = positions * [1.0, 1.0, 0.0], angles  # feet in contact are at rest only with root motion
+            placed = refloor(with_trajectory(clip, *path), body, betas, level=self.level, lift=self.lift)
+            return relative_to_trajectory(placed, *path)
+
+        edit_clip(armature, body, rate, floored)
         return ""
 
 

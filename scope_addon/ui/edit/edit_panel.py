@@ -30,7 +30,6 @@ class SCOPE_PT_edit(Tab, bpy.types.Panel):
             row.operator("scope.smooth", text=text).strength = strength
         column = layout.column(align=True)
         column.operator("scope.interpolate_span", icon="IPO_EASE_IN_OUT")
-        column.operator("scope.swap_sides", icon="MOD_MIRROR")
         column.operator("scope.refloor", icon="TRIA_DOWN_BAR")
         layout.label(text="Root Motion")
         row = layout.row(align=True)

@@ -38,6 +38,14 @@ class SCOPE_OT_loop(SpanOperator):
         subtype="TIME_ABSOLUTE",
         description="Duration in seconds, at the end of the cycle, over which it is closed",
     )
+    movement: FloatProperty(
+        name="Least Movement",
+        default=0.05,
+        min=0.0,
+        soft_max=0.5,
+        description="Mean distance in metres by which the joints must move within the cycle; 0 also loops a person who "
+        "stays still",
+    )
     repeat: BoolProperty(
         name="Repeat", default=True, description="Repeat the curves; each cycle starts where the previous one ended"
     )
@@ -58,7 +66,7 @@ class SCOPE_OT_loop(SpanOperator):
         clip, frames = read_clip(armature, body, rate)
         clip = clip_with_root_motion(armature, clip, frames)
         betas = betas_of(armature, body)
-        cycle = best_cycle(clip, body, betas, self.start / rate, self.end / rate, self.shortest)
+        cycle = best_cycle(clip, body, betas, self.start / rate, self.end / rate, self.shortest, self.movement)
         closed: Clip = close_cycle(clip, cycle, self.blend)
         first, last = float(frames[cycle.first]), float(frames[cycle.last])
         write_clip(armature, body, closed, frames[cycle.first : cycle.last + 1])

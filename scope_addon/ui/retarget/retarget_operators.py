@@ -3,17 +3,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import bpy
 from bpy.props import EnumProperty, StringProperty
 
 from ..captured_person import PERSON, betas_of, body_of, captured_armature, captured_people
 from ..reporting import ReportingOperator, sentence
-
-if TYPE_CHECKING:
-    from ...retarget.bone_map import BoneMap
-
+from .bone_list import fill_list, listed_map
 
 _SIDE_OFFSET_M = (1.5, 0.0, 0.0)  # to the left of a person who faces the front view
 
@@ -48,7 +43,7 @@ class SCOPE_OT_guess_bones(_RigOperator):
         from ...scene.rigs.rig_retarget import guess_bone_map
 
         found = guess_bone_map(context.scene.scope_retarget.rig)
-        _fill_list(context, found)
+        fill_list(context.scene.scope_retarget, found)
         return f"Found {len(found.parts)} bones; check the list"
 
 
@@ -88,14 +83,14 @@ class SCOPE_OT_retarget(_RigOperator):
         settings, source = context.scene.scope_retarget, captured_armature(context)
         assert source is not None  # checked by poll
         if not len(settings.pairs):
-            _fill_list(context, guess_bone_map(settings.rig))
+            fill_list(settings, guess_bone_map(settings.rig))
         body = body_of(source)
         result = retarget(
             source,
             body,
             betas_of(source, body),
             settings.rig,
-            _bone_map(context),
+            listed_map(settings),
             scene_rate(context.scene),
             RetargetOptions(
                 feet=settings.feet,
@@ -103,7 +98,7 @@ class SCOPE_OT_retarget(_RigOperator):
                 offset=_SIDE_OFFSET_M if settings.captured == "beside" else (0, 0, 0),
             ),
         )
-        settings.rig[PERSON] = source.name
+        settings.rig[PERSON] = source
         if settings.captured == "hide":
             _select_only(context, settings.rig)
             hide(source, context.view_layer)
@@ -138,7 +133,7 @@ class SCOPE_OT_save_bone_map(_BoneMapFileOperator):
         """Write the file."""
         from ...retarget.bone_map import save_bone_map
 
-        save_bone_map(_bone_map(context), bpy.path.abspath(self.filepath))
+        save_bone_map(listed_map(context.scene.scope_retarget), bpy.path.abspath(self.filepath))
         return f"Saved {self.filepath}"
 
 
@@ -154,7 +149,7 @@ class SCOPE_OT_load_bone_map(_BoneMapFileOperator):
         """Fill the list."""
         from ...retarget.bone_map import load_bone_map
 
-        _fill_list(context, load_bone_map(bpy.path.abspath(self.filepath)))
+        fill_list(context.scene.scope_retarget, load_bone_map(bpy.path.abspath(self.filepath)))
         return f"Loaded {self.filepath}"
 
 
@@ -186,26 +181,6 @@ def _select_only(context: bpy.types.Context, rig: bpy.types.Object) -> None:
     for obj in context.view_layer.objects:
         obj.select_set(obj == rig, view_layer=context.view_layer)
     context.view_layer.objects.active = rig
-
-
-def _fill_list(context: bpy.types.Context, bone_map: BoneMap) -> None:
-    """Fill the list with a map, in the order of the body's parts."""
-    from ...retarget.bone_map import PARTS
-
-    settings = context.scene.scope_retarget
-    settings.pairs.clear()
-    for bone, part in sorted(bone_map.parts.items(), key=lambda pair: PARTS.index(pair[1])):
-        pair = settings.pairs.add()
-        pair.bone, pair.part, pair.confidence = bone, part, bone_map.confidence.get(bone, 1.0)
-    settings.active = 0
-
-
-def _bone_map(context: bpy.types.Context) -> BoneMap:
-    """Return the list as a map; entries without a bone or a part are left out."""
-    from ...retarget.bone_map import BoneMap
-
-    pairs = [pair for pair in context.scene.scope_retarget.pairs if pair.bone and pair.part]
-    return BoneMap({pair.bone: pair.part for pair in pairs}, {pair.bone: pair.confidence for pair in pairs})
 
 
 CLASSES = (

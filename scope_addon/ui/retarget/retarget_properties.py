@@ -36,12 +36,33 @@ def _is_armature(_settings: bpy.types.PropertyGroup, obj: bpy.types.Object) -> b
     return obj.type == "ARMATURE" and "scope_source" not in obj
 
 
+def _list_bones_of_new_rig(settings: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
+    """Replace the bone list of another rig by a guess; keep that of the same rig, or of one with the same bones."""
+    rig = settings.rig
+    if rig is None:
+        return
+    bones = "\n".join(sorted(bone.name for bone in rig.data.bones))
+    if settings.listed_bones == bones:
+        return
+    settings.listed_bones = bones
+    if len(settings.pairs) == 0:
+        return  # nothing to replace: guessed when it is needed
+    from .bone_list import guess_into_list
+
+    guess_into_list(settings)
+
+
 class SCOPE_PG_retarget(bpy.types.PropertyGroup):
     """The settings of retargeting."""
 
     rig: PointerProperty(
-        name="Rig", type=bpy.types.Object, poll=_is_armature, description="Armature to animate with the captured motion"
+        name="Rig",
+        type=bpy.types.Object,
+        poll=_is_armature,
+        update=_list_bones_of_new_rig,
+        description="Armature to animate with the captured motion",
     )
+    listed_bones: StringProperty(options={"HIDDEN"})  # names of all bones of the rig that the list is for
     pairs: CollectionProperty(type=SCOPE_PG_bone_pair)
     active: IntProperty()
     feet: BoolProperty(

@@ -6,9 +6,10 @@ from __future__ import annotations
 import bpy
 from bpy.app.handlers import persistent
 
-from .view_operators import looks_through
+from .comparison import close_side_view, end, looks_through, side_area
 
 _looked_through: set[int] = set()  # areas that showed a capture through its camera before the undo
+_sides: set[int] = set()  # areas that showed a capture from its side
 
 
 def attach() -> None:
@@ -26,7 +27,10 @@ def detach() -> None:
 @persistent
 def _before(*_: object) -> None:
     _looked_through.clear()
+    _sides.clear()
     for window, area in _viewports():
+        if area == side_area(window.screen):
+            _sides.add(area.as_pointer())
         if looks_through(window.scene, area.spaces.active):
             _looked_through.add(area.as_pointer())
 
@@ -39,16 +43,13 @@ def _after(*_: object) -> None:
 
 def _leave() -> None:
     """Leave local view and camera view in the viewports that no longer show a capture through its camera."""
+    left = False
     for window, area in _viewports():
-        space = area.spaces.active
-        if area.as_pointer() not in _looked_through or looks_through(window.scene, space):
-            continue
-        region = next(region for region in area.regions if region.type == "WINDOW")
-        with bpy.context.temp_override(window=window, area=area, region=region):
-            if space.local_view:
-                bpy.ops.view3d.localview(frame_selected=False)
-            if space.region_3d.view_perspective == "CAMERA":
-                bpy.ops.view3d.view_camera()
+        if area.as_pointer() in _looked_through and not looks_through(window.scene, area.spaces.active):
+            end(window, area)
+            left = True
+    for window, side in [pair for pair in _viewports() if left and pair[1].as_pointer() in _sides]:
+        close_side_view(window, side)
     _looked_through.clear()
 
 

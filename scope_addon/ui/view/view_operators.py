@@ -8,6 +8,8 @@ from bpy.props import IntProperty
 from mathutils import Matrix
 
 from ..reporting import ReportingOperator
+from . import comparison
+from .comparison import camera_of, is_looking_through, is_side_view
 
 
 def hide_startup_cube(context: bpy.types.Context) -> None:
@@ -44,6 +46,9 @@ class SCOPE_OT_look_through(bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Require that the last capture has a camera and is not hidden."""
+        if is_side_view(context):
+            cls.poll_message_set("Use this in the viewport with the footage")
+            return False
         if camera_of(context.scene) is None:
             cls.poll_message_set("The scene has no camera of a capture: capture with the option Camera with Footage")
             return False
@@ -55,12 +60,14 @@ class SCOPE_OT_look_through(bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Set the scene's camera and resolution, and the viewport's view."""
+        from ...scene.camera import set_resolution
         from ...scene.visibility import hide_again
 
         scene, camera = context.scene, camera_of(context.scene)
         if is_looking_through(context):
-            bpy.ops.view3d.localview(frame_selected=False)
-            bpy.ops.view3d.view_camera()  # Blender's own toggle restores the previous view
+            comparison.end(context.window, context.area)
+            if side := comparison.side_area(context.window.screen):
+                comparison.close_side_view(context.window, side)
             for obj in [obj for obj in scene.scope.result.collection.all_objects if "scope_source" in obj]:
                 hide_again(obj, context.view_layer)
             return {"FINISHED"}
@@ -68,34 +75,10 @@ class SCOPE_OT_look_through(bpy.types.Operator):
         scene.camera = camera
         camera.hide_viewport = False  # a hidden camera shows no footage
         camera.hide_set(False, view_layer=context.view_layer)
-        render, result = scene.render, scene.scope.result
-        render.resolution_x, render.resolution_y = result.resolution
-        render.pixel_aspect_x, render.pixel_aspect_y = result.pixel_aspect
-        render.resolution_percentage = 100
+        set_resolution(scene, scene.scope.result.collection)
         if not bpy.app.background and context.area and context.area.type == "VIEW_3D":
-            self._show_alone(context, scene.scope.result.collection)
+            comparison.begin(context, context.area, scene.scope.result.collection)
         return {"FINISHED"}
-
-    def _show_alone(self, context: bpy.types.Context, collection: bpy.types.Collection) -> None:
-        """Show only the capture in local view, because other objects could hide the footage or the body."""
-        from ...scene.visibility import show
-
-        space, selected, active = context.space_data, context.selected_objects, context.view_layer.objects.active
-        if active and active.mode != "OBJECT":
-            bpy.ops.object.mode_set(mode="OBJECT")
-        if space.local_view:
-            bpy.ops.view3d.localview(frame_selected=False)
-        bpy.ops.object.select_all(action="DESELECT")
-        for obj in list(collection.all_objects):  # copied, because hiding and showing invalidates the iterator
-            if "scope_source" in obj:  # it may be hidden because of a retargeted rig
-                show(obj, context.view_layer, temporarily=True)
-            obj.select_set(True)
-        bpy.ops.view3d.localview(frame_selected=False)
-        bpy.ops.object.select_all(action="DESELECT")
-        for obj in selected:
-            obj.select_set(True)
-        if space.region_3d.view_perspective != "CAMERA":
-            bpy.ops.view3d.view_camera()
 
 
 def _is_shown(collection: bpy.types.Collection, layer: bpy.types.LayerCollection) -> bool:
@@ -104,23 +87,28 @@ def _is_shown(collection: bpy.types.Collection, layer: bpy.types.LayerCollection
     return here or any(_is_shown(collection, child) for child in layer.children)
 
 
-def is_looking_through(context: bpy.types.Context) -> bool:
-    """Return whether the context's viewport shows only a capture, through its camera."""
-    space = context.space_data
-    return space is not None and space.type == "VIEW_3D" and looks_through(context.scene, space)
+class SCOPE_OT_side_view(bpy.types.Operator):
+    """Show the captured body from its side in a second viewport, beside the one with the footage"""
 
+    bl_idname = "scope.side_view"
+    bl_label = "Side View"
 
-def looks_through(scene: bpy.types.Scene, space: bpy.types.SpaceView3D) -> bool:
-    """Return whether a viewport shows only a capture, through its camera."""
-    if not space.local_view or space.region_3d.view_perspective != "CAMERA":
-        return False
-    return scene.camera is not None and scene.camera == camera_of(scene)
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Require a viewport that compares a capture with its footage."""
+        if not is_looking_through(context):
+            cls.poll_message_set("Compare with Footage first")
+            return False
+        return True
 
-
-def camera_of(scene: bpy.types.Scene) -> bpy.types.Object | None:
-    """Return the camera of the scene's last capture; None if there is none."""
-    collection = scene.scope.result.collection
-    return next((o for o in collection.all_objects if o.type == "CAMERA"), None) if collection else None
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Open the second viewport, or close it."""
+        side = comparison.side_area(context.window.screen)
+        if side is None:
+            comparison.open_side_view(context, context.area)
+        else:
+            comparison.close_side_view(context.window, side)
+        return {"FINISHED"}
 
 
 class SCOPE_OT_go_to_frame(bpy.types.Operator):
@@ -148,16 +136,20 @@ class SCOPE_OT_footage_to_sequencer(ReportingOperator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Require a capture."""
-        return context.scene.scope.result.collection is not None
+        if not context.scene.scope.result.footage:
+            cls.poll_message_set("The capture does not say where its footage is")
+            return False
+        return True
 
     def work(self, context: bpy.types.Context) -> str:
         """Add the strips."""
         from ...scene.animation_data.timing import scene_rate
-        from ...scene.footage_strip import add_footage_strips
+        from ...scene.footage_strip import add_footage_strips, strips_of
 
         scene, result = context.scene, context.scene.scope.result
         armatures = (o for o in result.collection.all_objects if "scope_start" in o)
         start = next((float(o["scope_start"]) for o in armatures), 0.0)
+        known = set(strips_of(scene.sequence_editor)) if scene.sequence_editor else set()
         strips = add_footage_strips(scene, bpy.path.abspath(result.footage), start)
         rate = getattr(strips[-1], "fps", 0.0)
         if rate and abs(rate - scene_rate(scene)) > 0.01:
@@ -166,7 +158,8 @@ class SCOPE_OT_footage_to_sequencer(ReportingOperator):
                 f"The scene has {scene_rate(scene):.5g} frames/s and the footage {rate:.5g}: the strip will not stay "
                 "synchronized with the motion",
             )
-        return ""
+            return ""
+        return "The footage is already in the sequencer" if strips[-1] in known else ""
 
 
-CLASSES = (SCOPE_OT_look_through, SCOPE_OT_go_to_frame, SCOPE_OT_footage_to_sequencer)
+CLASSES = (SCOPE_OT_look_through, SCOPE_OT_side_view, SCOPE_OT_go_to_frame, SCOPE_OT_footage_to_sequencer)

@@ -42,12 +42,12 @@ def follow(monkeypatch: pytest.MonkeyPatch) -> Callable[..., list[Track]]:
 
 
 def standing(x_px: float, count: float = np.inf) -> Callable[[int], tuple[float, float] | None]:
-    """A person who stands at x_px and leaves after ``count`` frames."""
+    """Return the position, by frame, of a person who stands still at x_px; None after ``count`` frames."""
     return lambda t: (x_px, 200) if t < count else None
 
 
 def identities(track: Track, people: list[Person]) -> set[int]:
-    """The indices of the people at whose hips the track's hips are in any frame."""
+    """Return the indices of the people whom the track follows: in each frame, the person with the nearest hips."""
     out = set()
     for t in np.flatnonzero(track.seen):
         hips = track.keypoints_px[t, [23, 24]].mean(axis=0)

@@ -5,6 +5,7 @@ import pytest
 from scope.scope_addon.errors import CancelledError
 from scope.scope_addon.scene.animation_data import actions
 from scope.scope_addon.scene.build import NEW_SCENE, BuildOptions, build_scene
+from scope.solver.rotations import exp
 
 
 @pytest.fixture
@@ -48,6 +49,23 @@ def test_markers_at_review_spans(body, doubtful):
     assert len(scene.timeline_markers) == 2
     build_scene([doubtful, doubtful], body, options=options)
     assert "person 2 check 141-145" in scene.timeline_markers
+
+
+def test_a_marker_where_a_foot_is_under_the_floor(body, make_motion):
+    motion = make_motion(body, 30)
+    lowest = under_floor_depth(body, motion)
+    motion.trans[:, 2] -= lowest  # the lowest vertex of each pose on the floor
+    motion.trans[10:15, 2] -= 0.03
+    build_scene([motion], body, options=BuildOptions(frame_rate="set"))
+    assert [(m.name, m.frame) for m in bpy.context.scene.timeline_markers] == [("under floor 10-14", 10)]
+
+
+def under_floor_depth(body, motion):
+    """(T,) the height of each pose's lowest vertex."""
+    betas = motion.betas.astype(float)
+    turns = exp(motion.poses.reshape(len(motion), -1, 3).astype(float))
+    poses = [body.forward_kinematics(R, t, betas) for R, t in zip(turns, motion.trans.astype(float), strict=True)]
+    return np.array([body.skin(*pose, betas)[:, 2].min() for pose in poses])
 
 
 def test_no_markers_unless_requested_and_none_after_a_cancel(body, doubtful):

@@ -2,21 +2,21 @@
 """Each format is written, read back by Blender's importer, and compared with the solver's own joints and skin."""
 
 import json
-import os
 import re
 import struct
+from dataclasses import replace
 from pathlib import Path
 
 import bpy
 import numpy as np
 import pytest
 import scope
-from scope.scope_addon.errors import OutputError, UsageError
+from scope.scope_addon.errors import UsageError
 from scope.scope_addon.motion import Motion
 from scope.scope_addon.scene.build import NEW_SCENE, build_scene
 from scope.scope_addon.scene.export import formats
 from scope.scope_addon.scene.export.export import ExportOptions, captures, export, export_motions
-from scope.scope_addon.scene.export.output_paths import SUFFIXES, person_paths
+from scope.scope_addon.scene.export.output_paths import SUFFIXES
 
 from ..exported import JOINT_TOLERANCE, SKIN_TOLERANCE, corresponding, read_back
 
@@ -322,9 +322,11 @@ def test_several_people_in_one_file_all_move(body, make_motion, tmp_path, blende
             np.testing.assert_allclose(joints, truth(body, motion).joints[t], atol=2e-3, err_msg=armature.name)
 
 
-def test_bvh_is_y_up_in_metres_and_one_file_a_person(body, make_motion, tmp_path, truth):
+@pytest.mark.parametrize(("unit", "per_metre"), [(None, 100.0), ("cm", 100.0), ("m", 1.0)])
+def test_bvh_is_y_up_in_centimetres_and_one_file_a_person(body, make_motion, tmp_path, truth, unit, per_metre):
     motions = [make_motion(body, 3), make_motion(body, 3, seed=1)]
-    written, _ = export_motions(motions, body, tmp_path / "pair.bvh")
+    options = ExportOptions(bvh_unit=unit) if unit else None
+    written, _ = export_motions(motions, body, tmp_path / "pair.bvh", export_options=options)
     assert [p.name for p in written] == ["pair.person1.bvh", "pair.person2.bvh"]
     for path, motion in zip(written, motions, strict=True):
         lines = path.read_text().splitlines()
@@ -332,7 +334,47 @@ def test_bvh_is_y_up_in_metres_and_one_file_a_person(body, make_motion, tmp_path
         assert lines[start + 1] == "Frames: 3"
         rows = np.array([[float(v) for v in line.split()] for line in lines[start + 3 :]])
         pelvis = truth(body, motion).joints[:, 0]
-        np.testing.assert_allclose(rows[:, :3], pelvis[:, [0, 2, 1]] * [1, 1, -1], atol=1e-5)
+        np.testing.assert_allclose(rows[:, :3] / per_metre, pelvis[:, [0, 2, 1]] * [1, 1, -1], atol=1e-5)
+        offsets = [[float(v) for v in line.split()[1:]] for line in lines[:start] if line.strip().startswith("OFFSET")]
+        joints = body.rest_joints(motion.betas)
+        knee, hip = (body.joint_names.index(f"left_{part}") for part in ("knee", "hip"))
+        thigh = np.linalg.norm(joints[knee] - joints[hip])
+        assert np.abs(np.linalg.norm(offsets, axis=1) / per_metre - thigh).min() < 1e-4
+
+
+def test_an_unknown_unit_of_bvh_is_an_error():
+    with pytest.raises(UsageError, match="bvh_unit must be one of cm, m"):
+        ExportOptions(bvh_unit="inch")
+
+
+@pytest.mark.parametrize("first_frame", [0.0, 1.0, 7.0])
+def test_fbx_and_glb_begin_at_zero_and_are_named_after_the_clip(body, make_motion, tmp_path, first_frame):
+    """Read from the files themselves, because importers move and rename animation."""
+    parser = pytest.importorskip("io_scene_fbx.parse_fbx")
+    built = build_scene(
+        [make_motion(body, 5, rate=20.0)], body, None, replace(NEW_SCENE, name="A walk", start_frame=first_frame)
+    )
+    export(tmp_path / "out.glb", [built.collection])
+    export(tmp_path / "out.fbx", [built.collection])
+    gltf = glb_json(tmp_path / "out.glb")
+    assert [animation["name"] for animation in gltf["animations"]] == ["A walk"]
+    inputs = [gltf["accessors"][s["input"]] for s in gltf["animations"][0]["samplers"]]
+    assert min(a["min"][0] for a in inputs) == 0.0
+    assert max(a["max"][0] for a in inputs) == pytest.approx(0.2)
+    root, _ = parser.parse(str(tmp_path / "out.fbx"))
+    objects, takes = ([e for e in root.elems if e.id == name][0] for name in (b"Objects", b"Takes"))
+    second = 46186158000
+    times = [
+        t for e in objects.elems if e.id == b"AnimationCurve" for k in e.elems if k.id == b"KeyTime" for t in k.props[0]
+    ]
+    assert min(times) == 0
+    assert max(times) / second == pytest.approx(0.2)
+    (stack,) = (e for e in objects.elems if e.id == b"AnimationStack")
+    assert stack.props[1] == b"A walk\0\x01AnimStack"
+    (take,) = (e for e in takes.elems if e.id == b"Take")
+    assert take.props == [b"A walk"]
+    span = next(e.props for e in take.elems if e.id == b"LocalTime")
+    assert span == [0, pytest.approx(0.2 * second)]
 
 
 def test_npz_is_the_motion_itself(body, make_motion, tmp_path):
@@ -365,127 +407,3 @@ def test_a_caller_without_a_window_can_export(body, make_motion, tmp_path):
         assert bpy.context.window is None
         written, _ = export_motions([make_motion(body, 2)], body, [tmp_path / "a.bvh", tmp_path / "b.glb"])
     assert all(path.is_file() for path in written)
-
-
-def test_a_folder_is_distinguished_from_a_name_without_suffix(body, make_motion, tmp_path):
-    with pytest.raises(UsageError, match="it is a folder; name a file in it"):
-        export_motions([make_motion(body, 1)], body, tmp_path)
-
-
-def test_an_unknown_suffix_lists_the_valid_ones(body, make_motion, tmp_path):
-    with pytest.raises(UsageError, match=r"\.glb, \.fbx, \.blend, \.bvh, \.usdc, \.npz"):
-        export_motions([make_motion(body, 1)], body, tmp_path / "walk.obj")
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_a_missing_folder_is_named(body, make_motion, tmp_path):
-    with pytest.raises(OutputError, match="nowhere"):
-        export_motions([make_motion(body, 1)], body, tmp_path / "nowhere" / "walk.glb")
-
-
-@pytest.mark.skipif(os.name == "nt", reason="Windows counts letters, and those of the whole path")
-@pytest.mark.parametrize("suffix", [".bvh", ".npz"])
-def test_names_may_be_as_long_as_the_system_lets_them(body, make_motion, tmp_path, suffix):
-    longest = tmp_path / ("ä" * 125 + suffix)  # 254 bytes
-    export_motions([make_motion(body, 1)], body, longest)
-    assert list(tmp_path.iterdir()) == [longest]
-    for people in (1, 2):
-        too_long = tmp_path / ("x" * (252 if people == 1 else 245) + suffix)
-        with pytest.raises(OutputError, match=f"cannot write .*x(.person1)?{suffix}: .*; choose a shorter name"):
-            export_motions([make_motion(body, 1)] * people, body, too_long)
-    assert list(tmp_path.iterdir()) == [longest]
-
-
-@pytest.mark.skipif(os.name == "nt" or os.geteuid() == 0, reason="root and Windows write where the mode bits forbid it")
-def test_an_unwritable_folder_is_named(body, make_motion, tmp_path):
-    tmp_path.chmod(0o500)
-    with pytest.raises(OutputError, match="not writable"):
-        export_motions([make_motion(body, 1)], body, tmp_path / "walk.glb")
-
-
-@pytest.mark.skipif(not Path("/proc/self").is_dir(), reason="needs a folder in which even root cannot make files")
-@pytest.mark.parametrize("suffix", SCENE_SUFFIXES)
-def test_a_folder_that_accepts_no_files_is_named(body, make_motion, suffix):
-    with pytest.raises(OutputError, match="cannot write /proc/walk"):
-        export_motions([make_motion(body, 1)], body, f"/proc/walk{suffix}")
-
-
-@pytest.mark.skipif(os.name == "nt", reason="Windows has no limit on a file's size that a process could set")
-@pytest.mark.parametrize("suffix", SCENE_SUFFIXES)
-def test_a_full_disk_is_reported_in_one_sentence_and_leaves_nothing(body, make_motion, tmp_path, suffix):
-    import resource
-
-    path, motion = tmp_path / f"walk{suffix}", make_motion(body, 200)
-    before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, before[1]))
-    try:
-        with pytest.raises(OutputError, match="cannot write .*walk") as raised:
-            export_motions([motion], body, path)
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, before)
-    assert "\n" not in str(raised.value)
-    assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.parametrize("suffix", SCENE_SUFFIXES)
-def test_a_failing_writer_leaves_the_old_file_and_no_other(body, make_motion, tmp_path, monkeypatch, suffix):
-    path = tmp_path / f"walk{suffix}"
-    path.write_text("before")
-
-    def fail(temporary, *rest):
-        temporary.write_text("half")
-        raise RuntimeError("disk full")
-
-    name = {".usdc": "usd"}.get(suffix, suffix[1:])
-    monkeypatch.setattr(formats, f"write_{name}", fail)
-    with pytest.raises(OutputError, match="disk full"):
-        export_motions([make_motion(body, 1)], body, path)
-    assert [p.name for p in tmp_path.iterdir()] == [path.name]
-    assert path.read_text() == "before"
-    assert [s.name for s in bpy.data.scenes] == ["Scene"]
-
-
-class StoppedExporter(bpy.types.Operator):
-    """An exporter in Python that is interrupted with Ctrl-C."""
-
-    bl_idname, bl_label = "scope_test.stopped", "Stopped"
-
-    def execute(self, context):
-        raise KeyboardInterrupt
-
-
-def test_ctrl_c_in_an_exporter_is_not_reported_as_a_failure(body, make_motion, tmp_path, monkeypatch):
-    monkeypatch.setattr(formats, "write_glb", lambda *rest: formats.call_operator(bpy.ops.scope_test.stopped))
-    bpy.utils.register_class(StoppedExporter)
-    try:
-        with pytest.raises(KeyboardInterrupt):
-            export_motions([make_motion(body, 1)], body, tmp_path / "walk.glb")
-    finally:
-        bpy.utils.unregister_class(StoppedExporter)
-    assert list(tmp_path.iterdir()) == []
-    assert [s.name for s in bpy.data.scenes] == ["Scene"]
-
-
-def test_a_scene_without_captures_cannot_be_exported(tmp_path):
-    with pytest.raises(UsageError, match="no capture"):
-        export(tmp_path / "walk.glb")
-
-
-def test_writers_keep_standard_output_clean(body, make_motion, tmp_path, capfd):
-    paths = [tmp_path / f"walk{suffix}" for suffix in SUFFIXES]
-    capfd.readouterr()
-    export_motions([make_motion(body, 2)], body, paths)
-    assert capfd.readouterr().out == ""
-
-
-@pytest.mark.parametrize(
-    ("path", "people", "expected"),
-    [
-        ("a/walk.npz", 1, ["a/walk.npz"]),
-        ("a/walk.npz", 2, ["a/walk.person1.npz", "a/walk.person2.npz"]),
-        ("walk.v2.bvh", 2, ["walk.v2.person1.bvh", "walk.v2.person2.bvh"]),
-        ("walk.glb", 3, ["walk.glb"]),
-    ],
-)
-def test_one_path_per_person(path, people, expected):
-    assert [p.as_posix() for p in person_paths(path, people)] == expected

@@ -6,17 +6,24 @@ import os
 import signal
 import sys
 import time
+from types import SimpleNamespace
 
 import bpy
 import numpy as np
 import pytest
 from scope.scope_addon.job.process import WorkerFailedError
-from scope.scope_addon.motion import Motion
 from scope.scope_addon.scene.animation_data.actions import fcurves, read_keys
 from scope.scope_addon.scene.build import BuildOptions, build_scene
+from scope.scope_addon.scene.packed_motion import stored_motion
 from scope.scope_addon.ui.capture import capture_operators
 from scope.scope_addon.ui.capture.capture_job import CaptureJob
-from scope.scope_addon.ui.capture.capture_operators import SAMPLE, state
+from scope.scope_addon.ui.capture.capture_operators import (
+    SAMPLE,
+    SCOPE_OT_cancel,
+    SCOPE_OT_capture,
+    end_capture,
+    state,
+)
 from scope.scope_addon.ui.preferences import cache
 from scope.solver.errors import ScopeError
 from scope.solver.loaders.body_file import load_body
@@ -286,7 +293,7 @@ def test_real_worker_on_a_picture(footage):
     from scope.scope_addon.capture.pipeline import capture
 
     expected = capture(footage, load_body("scope"), CaptureOptions(quality="fast")).motions[0]
-    got = Motion.load(scene.scope.result.collection["scope_motions"][0])
+    got = stored_motion(next(o for o in captures()[-1].objects if "scope_source" in o))
     assert np.allclose(got.poses, expected.poses, atol=1e-4)
     assert np.allclose(got.trans, expected.trans, atol=1e-4)
 
@@ -303,7 +310,7 @@ def test_real_worker_uses_a_calibration(footage, tmp_path):
     for k1 in (dist[0], -0.1):  # a changed file needs another capture
         lens.write_text(json.dumps({"intrinsics": K, "dist": [k1, *dist[1:]]}))
         assert bpy.ops.scope.capture() == {"FINISHED"}
-        found.append(Motion.load(scene.scope.result.collection["scope_motions"][0]))
+        found.append(stored_motion(next(o for o in captures()[-1].objects if "scope_source" in o)))
     assert np.allclose(found[0].intrinsics, K)
     assert np.allclose(found[0].dist, dist)
     assert found[1].dist[0] == -0.1
@@ -361,3 +368,51 @@ def test_footage_whose_name_is_not_utf8(fake_worker, footage, tmp_path):
         bpy.ops.scope.capture()
     assert "does not exist" in state.message
     state.message.encode()
+
+
+def window_with_sidebar(category="Scope", width=200):
+    """Return what the operator reads of a window whose 3D viewport has its sidebar at x 800 to 1000."""
+    sidebar = SimpleNamespace(type="UI", x=800, y=100, width=width, height=500, active_panel_category=category)
+    viewport = SimpleNamespace(type="VIEW_3D", regions=[SimpleNamespace(type="WINDOW"), sidebar])
+    timeline = SimpleNamespace(type="DOPESHEET_EDITOR", regions=[])
+    return SimpleNamespace(screen=SimpleNamespace(areas=[timeline, viewport]))
+
+
+@pytest.mark.parametrize(
+    ("x", "y", "window", "cancels"),
+    [
+        (900, 300, window_with_sidebar(), True),
+        (400, 300, window_with_sidebar(), False),  # over the viewport
+        (900, 50, window_with_sidebar(), False),  # over the timeline below
+        (900, 300, window_with_sidebar("Item"), False),
+        (800, 300, window_with_sidebar(width=1), False),  # the sidebar is hidden
+    ],
+)
+def test_escape_cancels_only_over_the_panel(fake_worker, footage, x, y, window, cancels):
+    fake_worker("time.sleep(600)")
+    bpy.context.scene.scope.footage = str(footage)
+    state.job, state.started = CaptureJob(bpy.context.scene), time.monotonic()
+    operator = SimpleNamespace(report=lambda *_: None, _end=lambda _, outcome: outcome)
+    context = SimpleNamespace(window=window)
+    escape = SimpleNamespace(type="ESC", value="PRESS", mouse_x=x, mouse_y=y)
+    outcome = SCOPE_OT_capture.modal(operator, context, escape)
+    assert outcome == ({"RUNNING_MODAL"} if cancels else {"PASS_THROUGH"})
+    assert state.job.cancel_requested is cancels
+    end_capture()
+
+
+@pytest.mark.parametrize(("seconds", "asks"), [(3.0, False), (30.0, True)])
+def test_cancelling_asks_when_more_than_ten_seconds_are_done(monkeypatch, seconds, asks):
+    state.job, state.started = SimpleNamespace(cancel_requested=False, close=lambda: None), time.monotonic() - seconds
+    questions = []
+    manager = SimpleNamespace(invoke_confirm=lambda *_, **texts: questions.append(texts) or {"RUNNING_MODAL"})
+    monkeypatch.setattr(capture_operators.bpy, "app", SimpleNamespace(background=False))
+    operator = SimpleNamespace(execute=lambda _: setattr(state.job, "cancel_requested", True) or {"FINISHED"})
+    try:
+        SCOPE_OT_cancel.invoke(operator, SimpleNamespace(window_manager=manager), None)
+        assert bool(questions) is asks
+        assert state.job.cancel_requested is not asks
+        assert not asks or "30 s" in questions[0]["message"]
+    finally:
+        monkeypatch.undo()
+        state.job = None

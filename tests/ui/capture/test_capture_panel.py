@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scope.scope_addon.job.progress import JobProgress, duration
 from scope.scope_addon.motion import Motion
-from scope.scope_addon.scene.footage_strip import strips_of
+from scope.scope_addon.scene.footage_strip import start_of, strips_of
 from scope.scope_addon.ui import drop
 from scope.scope_addon.ui.capture import capture_job
 from scope.scope_addon.ui.capture.capture_operators import end_capture, state
@@ -104,15 +104,40 @@ def test_export_buttons_write_files_and_do_not_change_the_scene(fake_worker, foo
 
 def test_a_motion_file_contains_the_captured_motion(fake_worker, footage, tmp_path):
     captured(fake_worker, footage)
-    armature = next(o for o in bpy.data.objects if "scope_motion" in o)
+    armature, cached = bpy.data.objects["person"], next((cache().root / "captures").rglob("person1.npz"))
+    kept = Motion.load(cached)
     bpy.context.view_layer.objects.active = armature
     bpy.ops.scope.refloor()
     bpy.ops.scope.export(filepath=str(tmp_path / "walk.npz"), format="NPZ")
-    got, kept = Motion.load(tmp_path / "walk.npz"), Motion.load(armature["scope_motion"])
+    got = Motion.load(tmp_path / "walk.npz")
     assert np.array_equal(got.poses, kept.poses)
     bpy.ops.scope.clear_cache()
-    with pytest.raises(RuntimeError, match="no longer in the cache"):
-        bpy.ops.scope.export(filepath=str(tmp_path / "again.npz"), format="NPZ")
+    assert not cached.exists()
+    bpy.ops.scope.export(filepath=str(tmp_path / "again.npz"), format="NPZ")
+    assert np.array_equal(Motion.load(tmp_path / "again.npz").poses, kept.poses)
+
+
+def test_a_reopened_file_needs_no_cache(fake_worker, footage, tmp_path):
+    captured(fake_worker, footage)
+    bpy.ops.scope.clear_cache()
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "saved.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "saved.blend"))
+    for strength in (0.0, 1.0, 2.5):
+        assert bpy.ops.scope.smooth(strength=strength) == {"FINISHED"}
+    assert bpy.ops.scope.export(filepath=str(tmp_path / "again.npz"), format="NPZ") == {"FINISHED"}
+
+
+def test_the_motion_is_undone_and_redone_with_the_capture(fake_worker, footage):
+    bpy.context.scene.scope.footage = str(footage)
+    bpy.ops.ed.undo_push(message="Footage")
+    captured(fake_worker, footage)
+    bpy.ops.ed.undo_push(message="Capture")
+    content = bpy.data.objects["person"]["scope_motion"]["motion"]
+    bpy.ops.ed.undo()
+    assert (len(bpy.data.texts), len(bpy.data.objects)) == (0, 0)
+    bpy.ops.ed.redo()
+    assert bpy.data.objects["person"]["scope_motion"]["motion"] == content
+    assert bpy.ops.scope.smooth(strength=2.5) == {"FINISHED"}
 
 
 def test_only_the_active_capture_is_exported(fake_worker, footage, tmp_path):
@@ -215,7 +240,9 @@ def test_the_footage_is_added_to_the_sequencer(fake_worker, footage):
     bpy.context.scene.scope.start_frame = 11
     captured(fake_worker, footage)
     assert bpy.ops.scope.footage_to_sequencer() == {"FINISHED"}
-    assert [strip.frame_final_start for strip in strips_of(bpy.context.scene.sequence_editor)] == [11]
+    assert [start_of(strip) for strip in strips_of(bpy.context.scene.sequence_editor)] == [11]
+    assert bpy.ops.scope.footage_to_sequencer() == {"FINISHED"}
+    assert len(strips_of(bpy.context.scene.sequence_editor)) == 1
     footage.unlink()
     with pytest.raises(RuntimeError, match="does not exist"):
         bpy.ops.scope.footage_to_sequencer()

@@ -95,10 +95,10 @@ def test_smoothing_a_resampled_motion_keeps_its_keys_on_whole_frames(tmp_path):
     np.testing.assert_array_equal(read_clip(rig, BODY, 24.0)[1], before)
 
 
-def test_smoothing_without_the_cached_motion_is_an_error(rig):
+def test_smoothing_without_the_captured_motion_is_an_error(rig):
     before = seen(rig)
     rig["scope_motion"] = "/nowhere/person1.npz"
-    with pytest.raises(RuntimeError, match="no longer in the cache"):
+    with pytest.raises(RuntimeError, match="neither in this .blend file nor in the cache"):
         bpy.ops.scope.smooth(strength=2.0)
     np.testing.assert_array_equal(seen(rig), before)
 

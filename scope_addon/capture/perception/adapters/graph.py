@@ -78,7 +78,7 @@ class Graph:
     def run(self, picture_rgb: NDArray[np.uint8], normalization: Normalization) -> list[NDArray[Any]]:
         """Run the graph.
 
-        :param picture_rgb: (height, width, 3) uint8.
+        :param picture_rgb: (H, W, 3) uint8, of the input's size.
         :return: the outputs, float16 and float64 converted to float32.
         :raises ModelFileError: the graph fails.
         """
@@ -138,5 +138,5 @@ class Graph:
 
 
 def finite(values: NDArray[Any]) -> NDArray[np.float64]:
-    """Convert to float64, with 0 in place of NaN and infinity: as a score, 0 means that nothing was found."""
+    """Convert an array (...) to float64, with 0 in place of NaN and infinity: as a score, 0 means nothing was found."""
     return np.nan_to_num(values.astype(np.float64), nan=0.0, posinf=0.0, neginf=0.0)

@@ -52,14 +52,14 @@ def share_within(a: PoseEstimate, b: PoseEstimate) -> float:
 
 
 def is_center_in_image(estimate: PoseEstimate, image_rgb: NDArray[np.uint8]) -> bool:
-    """Return whether the mean of the keypoints is inside the image; a network may also imagine a body outside."""
+    """Return whether the mean of the keypoints is inside the image (H, W, 3); a network may imagine a body outside."""
     height, width = image_rgb.shape[:2]
     x, y = estimate.keypoints_px.mean(axis=0)
     return bool(0 <= x < width and 0 <= y < height)
 
 
 def share_in_image(estimate: PoseEstimate, image_rgb: NDArray[np.uint8]) -> float:
-    """Return the share of the keypoints that are inside the image."""
+    """Return the share of the keypoints that are inside the image (H, W, 3)."""
     height, width = image_rgb.shape[:2]
     return float(((estimate.keypoints_px >= 0) & (estimate.keypoints_px < [width, height])).all(axis=1).mean())
 
@@ -75,7 +75,7 @@ def is_same_region(a: Region, b: Region) -> bool:
 
 
 def is_in_image(region: Region, image_rgb: NDArray[np.uint8]) -> bool:
-    """Return whether a region overlaps the image and has a usable size."""
+    """Return whether a region overlaps the image (H, W, 3) and has a usable size."""
     height, width = image_rgb.shape[:2]
     x, y = region.center_px
     reach = region.side_px / 2

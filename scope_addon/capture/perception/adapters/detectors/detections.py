@@ -31,7 +31,7 @@ def matches(graph: Graph) -> bool:
 def decode(outputs: list[NDArray[Any]], graph: Graph, description: Description) -> Boxes:
     """Read the boxes of people, in pixels of the network's input.
 
-    :param outputs: see the module.
+    :param outputs: ``dets`` (1, N, 5) and ``labels`` (1, N); see the module.
     """
     people = outputs[1][0] == description.person_class
     rows = finite(outputs[0])[0][people]

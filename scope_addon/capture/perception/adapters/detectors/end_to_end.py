@@ -28,7 +28,7 @@ def matches(graph: Graph) -> bool:
 def decode(outputs: list[NDArray[Any]], graph: Graph, description: Description) -> Boxes:
     """Read the boxes of people, in pixels of the network's input.
 
-    :param outputs: see the module.
+    :param outputs: one, (1, N, 6); see the module.
     """
     rows = finite(outputs[0])[0]
     rows = rows[np.round(rows[:, 5]) == description.person_class]

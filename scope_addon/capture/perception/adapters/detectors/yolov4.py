@@ -33,7 +33,7 @@ def matches(graph: Graph) -> bool:
 def decode(outputs: list[NDArray[Any]], graph: Graph, description: Description) -> Boxes:
     """Read the boxes of people, in pixels of the network's input.
 
-    :param outputs: see the module.
+    :param outputs: ``boxes`` (1, N, 1, 4) and ``confs`` (1, N, C) for C classes, in either order; see the module.
     """
     boxes, scores = outputs if _boxes_first([o.shape for o in outputs]) else outputs[::-1]
     size = np.array([graph.width, graph.height] * 2, float)

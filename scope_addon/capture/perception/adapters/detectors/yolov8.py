@@ -31,7 +31,7 @@ def matches(graph: Graph) -> bool:
 def decode(outputs: list[NDArray[Any]], graph: Graph, description: Description) -> Boxes:
     """Read the boxes of people, in pixels of the network's input.
 
-    :param outputs: see the module.
+    :param outputs: one, (1, 4 + C, N) for C classes; see the module.
     """
     columns = finite(outputs[0])[0]
     return Boxes(corners_of(columns[:4].T), columns[4 + description.person_class])

@@ -41,7 +41,7 @@ def is_decoded(graph: Graph) -> bool:
 def decode(outputs: list[NDArray[Any]], graph: Graph, description: Description, *, decoded: bool) -> Boxes:
     """Read the boxes of people, in pixels of the network's input.
 
-    :param outputs: see the module.
+    :param outputs: one, (1, N, 5 + C) for N cells and C classes; see the module.
     :param decoded: whether boxes are in pixels already.
     """
     rows = finite(outputs[0])[0]

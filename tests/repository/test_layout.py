@@ -10,21 +10,21 @@ from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).resolve().parent.parent
+ROOT = Path(__file__).resolve().parents[2]
 TESTS = ROOT / "tests"
 PRODUCT = "scope_addon"  # left out of the path: tests/job/ holds the tests of scope_addon/job/
 OTHERS = ("solver", "tools", "benchmarks", "scripts")
 
 # Tests that belong to no single module, by path below tests/, and what they test.
 CROSS_CUTTING = {
-    "test_code_size.py": "lines and parameters of functions, lines of files",
-    "solver/test_docstrings.py": "docstrings of all public functions",
-    "test_docs.py": "the documentation against the program",
-    "test_imports.py": "packages that a module may not import",
-    "test_layout.py": "names and places of test files",
+    "repository/test_code_size.py": "lines and parameters of functions, lines of files",
+    "repository/test_docs.py": "the documentation against the program",
+    "repository/test_docstrings.py": "docstrings of all public functions",
+    "repository/test_imports.py": "packages that a module may not import",
+    "repository/test_layout.py": "names and places of test files",
+    "repository/test_rooms.py": "which folder may import which",
+    "repository/test_wheel.py": "the wheel, installed",
     "test_required.py": "a helper of the tests",
-    "test_rooms.py": "which folder may import which",
-    "test_wheel.py": "the wheel, installed",
 }
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).resolve().parent.parent
+ROOT = Path(__file__).resolve().parents[2]
 LINES, PARAMETERS, FILE_LINES = 60, 7, 500
 
 # Modules of compiled kernels: they take their arrays one by one, and a call between kernels may cost speed.

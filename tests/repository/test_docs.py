@@ -22,14 +22,16 @@ from scope.scope_addon.capture.perception.adapters.detectors.box_detector import
 from scope.scope_addon.capture.perception.adapters.keypoints.keypoint_network import KEYPOINT_TYPES
 from scope.scope_addon.cli import SAMPLE, build_parser, main
 from scope.scope_addon.command_line.arguments import body_and_options
-from scope.scope_addon.motion import Motion
+from scope.scope_addon.edit.pins.corrected_motion import with_corrections
+from scope.scope_addon.edit.pins.corrections import Contact, Exchange, Pin
+from scope.scope_addon.motion import CORRECTION_KEYS, Motion
 from scope.scope_addon.scene.export.output_paths import check_output
 from scope.solver.loaders.body_file import BUILT_IN
 from scope.tools import solver_reference
 
-from .made_motion import made_motion
+from ..made_motion import made_motion
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
 PAGES = [ROOT / "README.md", *sorted(DOCS.glob("*.md"))]
 _NOT_OURS = {".venv", "build", "node_modules", "__pycache__"}
@@ -119,15 +121,18 @@ def test_every_option_is_defined_once_in_the_command_line_page():
 
 
 def test_every_key_of_the_motion_file_is_defined_once():
-    keys = [field.name for field in fields(Motion)]
+    keys = [field.name for field in fields(Motion) if field.name != "corrections"] + list(CORRECTION_KEYS)
     assert defined({"key"}) == Counter({("motion_file.md", key): 1 for key in keys})
 
 
 def test_shapes_and_types_of_the_motion_file_are_as_documented(body, tmp_path):
     motion = made_motion(body, np.zeros((7, 3 * (body.K + 1))), np.zeros((7, 3)))
+    changes = (Pin(2, "head", (320.0, 200.0)), Contact(1, 3, "left"), Exchange(1, 2), Exchange(4, 5))
+    motion = with_corrections(motion, body, changes)
     motion.save(tmp_path / "a.npz")
-    sizes = {"T": 7, "K": body.K, "P": body.P, "J": motion.keypoints2d.shape[1]}
-    rows = next(rows for first, rows in tables(DOCS / "motion_file.md") if first == "key")
+    sizes = {"T": 7, "K": body.K, "P": body.P, "J": motion.keypoints2d.shape[1], "N": 1, "C": 1, "E": 2}
+    sizes["U"] = len(motion.corrections["uncorrected_rows"])
+    rows = [row for first, rows in tables(DOCS / "motion_file.md") if first == "key" for row in rows]
     with np.load(tmp_path / "a.npz") as file:
         for key, shape, kind, _ in rows:
             array = file[key.strip("`")]
@@ -197,7 +202,7 @@ def folder(tmp_path, monkeypatch):
 
 
 def parsed(words: list[str]) -> argparse.Namespace:
-    """A capture or batch, its footage and body replaced by the sample clip and the default body."""
+    """A capture, batch or import, its footage and body replaced by the sample clip and the default body."""
     start = words.index("scope") + 1 if words[0] == "blender" else 0
     argv = [Path(words[start]).name, *words[start + 1 :]]
     args = build_parser().parse_args(argv)
@@ -212,9 +217,10 @@ def test_every_command_would_be_accepted(words, folder):
     if Path(words[-1]).name == "--help":
         with pytest.raises(SystemExit, match="0"):
             parsed(words)
-    elif words[0] in ("./scripts/capture", "./scripts/batch", "blender"):
+    elif words[0] in ("./scripts/capture", "./scripts/batch", "./scripts/import", "blender"):
         args = parsed(words)
-        body_and_options(args)
+        if args.command != "import":
+            body_and_options(args)
         for path in getattr(args, "output", []):
             check_output(path)
     elif words[0].startswith("./"):

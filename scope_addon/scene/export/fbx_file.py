@@ -1,10 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Converting an FBX file from metres to centimetres, the format's own unit.
+"""Correcting an FBX file: lengths in centimetres, the format's own unit, time from zero, and the take's name.
 
 Unreal interprets lengths as centimetres whatever unit the file states. Blender either writes metres or scales every
 object by 100, which becomes the scale of a skeleton's root. Therefore all lengths in the file are multiplied and no
 object is scaled: vertices and shapes, translations and their curves, the translations in bind matrices, and the lengths
 of cameras.
+
+Blender's exporter starts at the time of the scene's first frame, which is 1/20 s at frame 1 and 20 frames per second,
+and names the take after the scene.
 
 The file is read and written with the parser and the encoder of Blender's FBX add-on, which need not be enabled.
 """
@@ -42,14 +45,16 @@ _ADD = {
 }
 _MATRICES = (b"Matrix", b"Transform", b"TransformLink", b"TransformAssociateModel")
 _TRANSLATION = slice(12, 15)  # of a matrix's 16 elements
+_SEPARATOR = b"\0\x01"  # between an object's name and its class
+_LIMITS = (b"LocalStart", b"LocalStop", b"ReferenceStart", b"ReferenceStop")
 _LENGTHS = (
     *(b"Lcl Translation", b"Size"),
     *(b"Position", b"InterestPosition", b"NearPlane", b"FarPlane", b"BackPlaneDistance", b"FocusDistance"),
 )
 
 
-def metres_to_centimetres(path: Path) -> None:
-    """Rewrite the file in centimetres, unless it already is.
+def correct_fbx(path: Path, take: str) -> None:
+    """Rewrite the file in centimetres, with its take starting at 0 s and named ``take``.
 
     :raises OSError: when the file is not a binary FBX file, or cannot be written.
     :raises OutputError: when Blender's add-on lacks the parser or the encoder.
@@ -61,12 +66,40 @@ def metres_to_centimetres(path: Path) -> None:
     root, version = parse_fbx.parse(str(path))
     settings = {p.props[0]: p for node in _below(root, b"GlobalSettings") for p in _properties(node)}
     factor = settings[b"UnitScaleFactor"].props[-1]  # in centimetres
-    if factor == 1.0:
-        return
-    for name in (b"UnitScaleFactor", b"OriginalUnitScaleFactor"):
-        settings[name].props[-1] = 1.0
-    _multiply_lengths(root, factor)
+    if factor != 1.0:
+        for name in (b"UnitScaleFactor", b"OriginalUnitScaleFactor"):
+            settings[name].props[-1] = 1.0
+        _multiply_lengths(root, factor)
+    _start_at_zero(root)
+    _name_take(root, take.encode())
     encode_bin.write(str(path), _encoded(root, encode_bin.FBXElem), version)
+
+
+def _start_at_zero(root: _Node) -> None:
+    """Subtract the start of the take from the times of all keys and from the take's limits, in place."""
+    stacks = [node for objects in _below(root, b"Objects") for node in _below(objects, b"AnimationStack")]
+    limits = [p for stack in stacks for p in _properties(stack) if p.props[0] in _LIMITS]
+    # The format's own ticks, as the exporter has rounded them; it omits a start at 0.
+    ticks = next((limit.props[-1] for limit in limits if limit.props[0] == b"LocalStart"), 0)
+    for node in (child for objects in _below(root, b"Objects") for child in objects.elems):
+        for times in _below(node, b"KeyTime") if node.id == b"AnimationCurve" else ():
+            np.frombuffer(times.props[0], np.int64)[:] -= ticks
+    for limit in limits:
+        limit.props[-1] -= ticks
+    for take in (child for takes in _below(root, b"Takes") for child in _below(takes, b"Take")):
+        for span in _below(take, b"LocalTime", b"ReferenceTime"):
+            span.props[:] = [time - ticks for time in span.props]
+
+
+def _name_take(root: _Node, name: bytes) -> None:
+    """Give the only take and its animation stack a name, in place."""
+    for stack in (node for objects in _below(root, b"Objects") for node in _below(objects, b"AnimationStack")):
+        stack.props[1] = name + stack.props[1][stack.props[1].index(_SEPARATOR) :]
+    for takes in _below(root, b"Takes"):
+        for current in _below(takes, b"Current"):
+            current.props[0] = name if current.props[0] else b""
+        for take in _below(takes, b"Take"):
+            take.props[0] = name
 
 
 def _multiply_lengths(root: _Node, factor: float) -> None:

@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The command that imports a motion file and writes it in other formats."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from typing import Any
+
+from ...solver.loaders.skeletons import SKELETONS
+from ..errors import UsageError
+from ..options import Place, options_at
+from ..scene.export.output_paths import SUFFIXES
+from .arguments import add_options, option_values, path_argument
+from .outputs import check_blender, check_outputs, checked_rig, distinct_paths, write_outputs
+from .terminal import say
+
+
+def add_import(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of ``scope import``."""
+    parser.add_argument(
+        "motion",
+        type=path_argument,
+        metavar="MOTION",
+        help=".npz motion of Scope, AMASS or another SMPL-based tool",
+    )
+    parser.add_argument(
+        "-o",
+        "--output",
+        action="append",
+        type=path_argument,
+        default=[],
+        metavar="OUT",
+        help=f"result file, may be repeated; its suffix selects the format: {', '.join(SUFFIXES)}"
+        " (default: .glb next to the motion)",
+    )
+    add_options(parser, Place.IMPORT)
+    parser.set_defaults(run=run_import, file_per_person=False, hands=False)
+
+
+def run_import(args: argparse.Namespace) -> dict[str, Any]:
+    """Run ``scope import``: read the motion, write every output; return the report.
+
+    :raises ScopeError: an argument is invalid, the motion cannot be used, or an output failed.
+    """
+    outputs = distinct_paths(args.output) or [args.motion.with_suffix(".glb")]
+    check_outputs(outputs, None, args.motion)
+    check_blender(outputs)
+    values = option_values(args, Place.IMPORT)
+    for option in options_at(Place.IMPORT):
+        if problem := option.range_error(values[option.name]):
+            raise UsageError(f"{option.flag} {problem}")
+    # Imported here, so that errors in the arguments are printed immediately.
+    from ..smpl_import.convert import import_motion
+
+    imported = import_motion(args.motion, values["body"], values["up_axis"], values["motion_rate"])
+    args.hands = imported.motion.joint_count > len(SKELETONS[24].joint_names)
+    rig = checked_rig(args, outputs)
+    written = write_outputs(outputs, [imported.motion], imported.body, args.motion, args, rig)
+    for note in imported.notes:
+        say(f"warning: {note}")
+    frames, rate = len(imported.motion), imported.motion.mocap_framerate
+    if not args.json and not args.quiet:
+        print(f"{frames} frames at {rate:g} frames/s; wrote {', '.join(map(str, written))}", file=sys.stderr)
+    return {
+        "source": str(args.motion),
+        "body": imported.body.name,
+        "frames": frames,
+        "frame_rate": rate,
+        "warnings": imported.notes,
+        "outputs": [str(path) for path in written],
+    }

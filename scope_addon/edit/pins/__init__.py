@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Corrections of single frames: pins, feet that stand, exchanged sides."""

@@ -1,0 +1,134 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A motion with corrections: which can be changed and removed again, and outlive another smoothing.
+
+The motion keeps what was corrected, and of the frames that this changed how they were before.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ....solver.body import Body
+from ....solver.rotations import exp, log
+from ...errors import MotionFileError
+from ...kinematics.smoothing import smooth_rotations
+from ...motion import Motion
+from ..clip import Clip, clip_from_motion
+from ..spans import swap_sides
+from .corrections import Correction, Exchange, from_arrays, to_arrays
+from .solve_pins import Shot, resolve
+
+_KEPT = ("poses", "trans", "poses_raw", "trans_raw", "joints_cam")
+_MIXED_S = 0.12  # on both sides of a span's end, smoothing has mixed left and right
+
+
+def corrections_of(motion: Motion) -> tuple[Correction, ...]:
+    """Return what was corrected.
+
+    :raises MotionFileError: the motion's arrays are damaged.
+    """
+    return from_arrays(motion.corrections)
+
+
+def shot_of(motion: Motion, start: float = 0.0) -> Shot:
+    """Return when and from where the motion's frames were taken.
+
+    :param start: seconds of the clip's clock at the footage's time 0.
+    """
+    return Shot(motion.frames, motion.timestamps + start, motion.world_from_camera, motion.intrinsics)
+
+
+def uncorrected(motion: Motion) -> Motion:
+    """Return the motion as it was before any correction.
+
+    :raises MotionFileError: the motion's arrays are damaged.
+    """
+    if "uncorrected_rows" not in motion.corrections:
+        return motion
+    rows = motion.corrections["uncorrected_rows"]
+    before: dict[str, Any] = {}
+    try:
+        for name in _KEPT:
+            before[name] = getattr(motion, name).copy()
+            before[name][rows] = motion.corrections[f"uncorrected_{name}"]
+    except (KeyError, IndexError, ValueError) as error:
+        raise MotionFileError(f"the motion's corrections are damaged: {error}; capture the footage again") from error
+    return replace(motion, **before, corrections={})
+
+
+def with_corrections(motion: Motion, body: Body, corrections: tuple[Correction, ...]) -> Motion:
+    """Return the motion with these corrections in place of those that it has.
+
+    :raises UsageError: a pin names a joint that the body does not have.
+    """
+    base = uncorrected(motion)
+    if not corrections:
+        return base
+    wanted = replace(base, corrections=to_arrays(corrections))
+    captured = before_smoothing(wanted, body)
+    values: dict[str, Any] = {}
+    changed = np.zeros(len(base), bool)
+    for raw in (False, True):
+        before = clip_from_motion(body, base, raw)
+        after = corrected(clip_from_motion(body, captured, raw), wanted, body)
+        new = (after.rotations != before.rotations).any((1, 2, 3)) | (after.root != before.root).any(1)
+        changed |= new
+        poses, trans = ("poses_raw", "trans_raw") if raw else ("poses", "trans")
+        values[poses], values[trans] = getattr(base, poses).copy(), getattr(base, trans).copy()
+        values[poses][new] = log(after.rotations[new]).reshape(int(new.sum()), -1)
+        values[trans][new] = after.root[new] - body.rest_joints(base.betas)[0]
+        if not raw:
+            values["joints_cam"] = base.joints_cam.copy()
+            T = base.world_from_camera[new]
+            joints = Clip(after.times[new], after.rotations[new], after.root[new]).joints(body, base.betas)
+            values["joints_cam"][new] = (joints - T[:, None, :3, 3]) @ T[:, :3, :3]
+    rows = np.flatnonzero(changed)
+    kept = {f"uncorrected_{name}": getattr(base, name)[rows] for name in _KEPT}
+    return replace(wanted, **values, corrections={**wanted.corrections, "uncorrected_rows": rows, **kept})
+
+
+def corrected(clip: Clip, motion: Motion, body: Body) -> Clip:
+    """Apply the motion's pins and contacts to another smoothing of it, which has its sides exchanged already."""
+    wanted = [c for c in corrections_of(motion) if not isinstance(c, Exchange)]
+    return resolve(clip, body, motion.betas, wanted, shot_of(motion)) if wanted else clip
+
+
+def before_smoothing(motion: Motion, body: Body) -> Motion:
+    """Return the motion as it would have been captured with left and right as they are in the user's eyes.
+
+    At the ends of an exchanged span, smoothing has mixed both sides: there, the raw motion is smoothed again.
+    """
+    base = uncorrected(motion)
+    exchanges = [c for c in corrections_of(motion) if isinstance(c, Exchange)]
+    if not exchanges:
+        return base
+    raw, finished = clip_from_motion(body, base, raw=True), clip_from_motion(body, base, raw=False)
+    mixed = np.zeros(len(base), bool)
+    for exchange in exchanges:
+        span = np.flatnonzero((base.frames >= exchange.first) & (base.frames <= exchange.last))
+        if len(span):
+            first, last = base.timestamps[span[[0, -1]]]
+            raw = swap_sides(raw, body, first, last, exchange.limbs)
+            finished = swap_sides(finished, body, first, last, exchange.limbs)
+            for k, neighbour in ((span[0], span[0] - 1), (span[-1], span[-1] + 1)):
+                if 0 <= neighbour < len(base):
+                    mixed |= np.abs(base.timestamps - base.timestamps[k]) < _MIXED_S
+    smooth = smooth_rotations(raw.rotations, raw.times)
+    sided = np.flatnonzero([name.startswith(("left_", "right_")) for name in body.joint_names])
+    again = np.ix_(np.flatnonzero(mixed), sided)
+    finished.rotations[again] = smooth[again]
+    new_raw, new = (_poses(clip, getattr(base, poses)) for clip, poses in ((raw, "poses_raw"), (finished, "poses")))
+    return replace(base, poses_raw=new_raw, poses=new)
+
+
+def _poses(clip: Clip, before: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
+    """Return axis-angle vectors (T, 3(K+1)), unchanged in the frames that the clip has not changed."""
+    rotations = exp(before.reshape(len(before), -1, 3).astype(float))
+    new = (clip.rotations != rotations).any((1, 2, 3))
+    poses = before.copy()
+    poses[new] = log(clip.rotations[new]).reshape(int(new.sum()), -1)
+    return poses

@@ -1,0 +1,156 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a user corrects in a motion, as values and as the plain arrays of a motion file.
+
+Frames are those of the footage (``Motion.frames``), so that corrections stay valid whatever smoothing or frame rate the
+keys have.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import MotionFileError, UsageError
+
+REACH_S = 0.4  # over which a correction fades out on both sides
+FEET = ("left", "right")
+
+
+@dataclass(frozen=True)
+class Pin:
+    """A joint's position in one frame: in the image, or in the world if ``position`` is given."""
+
+    frame: int
+    joint: str
+    pixel: tuple[float, float] | None = None  # of the upright frame, without lens distortion
+    position: tuple[float, float, float] | None = None  # metres, world
+    reach: float = REACH_S  # seconds
+
+    def __post_init__(self) -> None:
+        """Check the values.
+
+        :raises UsageError: neither or both of pixel and position are given, or a number is not finite.
+        """
+        if (self.pixel is None) == (self.position is None):
+            raise UsageError(f"a pin of {self.joint} needs either a pixel or a position in the world")
+        numbers = [*(self.pixel or ()), *(self.position or ()), self.reach]
+        if not np.isfinite(numbers).all() or self.reach <= 0:
+            raise UsageError(
+                f"the pin of {self.joint} in frame {self.frame} has the values {numbers}, which no fit can use"
+            )
+
+
+@dataclass(frozen=True)
+class Contact:
+    """A foot that stands still on the floor from one frame to another, both inclusive."""
+
+    first: int
+    last: int
+    foot: str  # "left" or "right"
+
+    def __post_init__(self) -> None:
+        """Check the values.
+
+        :raises UsageError: the foot is neither left nor right, or the span is empty.
+        """
+        if self.foot not in FEET:
+            raise UsageError(f"the foot must be left or right, not {self.foot!r}")
+        _check_span(self.first, self.last)
+
+
+@dataclass(frozen=True)
+class Exchange:
+    """Left and right limbs are exchanged from one frame to another, both inclusive."""
+
+    first: int
+    last: int
+    limbs: str = "both"  # "arms", "legs" or "both"
+
+    def __post_init__(self) -> None:
+        """Check the values.
+
+        :raises UsageError: the limbs are unknown, or the span is empty.
+        """
+        if self.limbs not in ("arms", "legs", "both"):
+            raise UsageError(f"limbs must be arms, legs or both, not {self.limbs!r}")
+        _check_span(self.first, self.last)
+
+
+Correction = Pin | Contact | Exchange
+
+
+def _check_span(first: int, last: int) -> None:
+    if last < first:
+        raise UsageError(f"the span ends in frame {last}, before it begins in frame {first}; swap them")
+
+
+def added(corrections: tuple[Correction, ...], new: Correction) -> tuple[Correction, ...]:
+    """Return the corrections with a new one; a pin replaces the same joint's pin in the same frame.
+
+    The same exchange a second time undoes the first, so that neither remains.
+    """
+    if isinstance(new, Exchange) and new in corrections:
+        return tuple(c for c in corrections if c != new)
+    if isinstance(new, Pin):
+        corrections = tuple(
+            c for c in corrections if not (isinstance(c, Pin) and (c.frame, c.joint) == (new.frame, new.joint))
+        )
+    return corrections if new in corrections else (*corrections, new)
+
+
+def to_arrays(corrections: tuple[Correction, ...]) -> dict[str, NDArray[Any]]:
+    """Return the arrays of a motion file; see docs/motion_file.md. Coordinates that a pin does not have are NaN."""
+    pins = [c for c in corrections if isinstance(c, Pin)]
+    contacts = [c for c in corrections if isinstance(c, Contact)]
+    exchanges = [c for c in corrections if isinstance(c, Exchange)]
+    nan = float("nan")
+    return {
+        "pin_frames": np.array([p.frame for p in pins], np.int64),
+        "pin_joints": np.array([p.joint for p in pins], np.str_),
+        "pin_uv": np.array([p.pixel or (nan,) * 2 for p in pins], np.float64).reshape(-1, 2),
+        "pin_xyz": np.array([p.position or (nan,) * 3 for p in pins], np.float64).reshape(-1, 3),
+        "pin_reach": np.array([p.reach for p in pins], np.float64),
+        "contact_spans": np.array([(c.first, c.last) for c in contacts], np.int64).reshape(-1, 2),
+        "contact_feet": np.array([c.foot for c in contacts], np.str_),
+        "exchange_spans": np.array([(e.first, e.last) for e in exchanges], np.int64).reshape(-1, 2),
+        "exchange_limbs": np.array([e.limbs for e in exchanges], np.str_),
+    }
+
+
+def from_arrays(arrays: Mapping[str, NDArray[Any]]) -> tuple[Correction, ...]:
+    """Read the corrections from the arrays of a motion file; keys may be missing.
+
+    :param arrays: named and shaped as `docs/motion_file.md` says, for example ``pin_uv`` (N, 2).
+    :raises MotionFileError: an array has the wrong shape, or a value is impossible.
+    """
+
+    def column(name: str, *shape: int) -> NDArray[Any]:
+        array = np.asarray(arrays.get(name, np.zeros((0, *shape))))
+        if array.shape[1:] != shape or array.ndim != 1 + len(shape):
+            raise MotionFileError(f"{name} must have shape {('N', *shape)}, but has {array.shape}")
+        return array
+
+    spans = column("contact_spans", 2), column("exchange_spans", 2)
+    try:
+        pins = zip(
+            *(column("pin_frames"), column("pin_joints"), column("pin_uv", 2), column("pin_xyz", 3)),
+            column("pin_reach"),
+            strict=True,
+        )
+        contacts = zip(*spans[0].T, column("contact_feet"), strict=True) if len(spans[0]) else ()
+        exchanges = zip(*spans[1].T, column("exchange_limbs"), strict=True) if len(spans[1]) else ()
+        return (
+            *(Pin(int(f), str(j), _numbers(uv), _numbers(xyz), float(r)) for f, j, uv, xyz, r in pins),
+            *(Contact(int(a), int(b), str(foot)) for a, b, foot in contacts),
+            *(Exchange(int(a), int(b), str(limbs)) for a, b, limbs in exchanges),
+        )
+    except (ValueError, UsageError) as error:
+        raise MotionFileError(f"the motion's corrections are damaged: {error}") from error
+
+
+def _numbers(row: NDArray[np.float64]) -> Any:
+    return None if np.isnan(row).any() else tuple(float(x) for x in row)

@@ -1,0 +1,161 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The lowest points of the feet's skin: how far a posed body's feet are above the floor, or below it.
+
+Contact points (`contact_points`) are where a flat foot touches the floor. A foot that rolls over its heel or its toes
+is lower at its end, by two centimetres and more, so the skin itself decides whether a foot is under the floor.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...solver.body import Body
+from ...solver.rotations import exp
+from ..motion import Motion
+from .contact_points import FOOT_PARTS
+from .frame_blocks import by_blocks
+from .standing import LEVEL_M
+
+UNDER_FLOOR_M = 0.01  # depth from which on a foot counts as under the floor
+MIN_REST_S = 0.3  # feet that rest more briefly may be at the turning point of a jump
+STEP_M = 0.1  # rests farther from the floor are no errors of a few centimetres, but may be on a step
+DEPTH_ERROR_M = 0.5  # no foot is taken for lower than it is by more
+_DIRECTIONS = 400  # in which the skin's outermost points are kept
+
+
+class FootSkin:
+    """The skin of the feet, for one shape of a body; the four parts are those of `FOOT_PARTS`."""
+
+    def __init__(self, body: Body, betas: NDArray[np.floating[Any]]) -> None:
+        """Collect the vertices that move with each part, of which only the outermost matter.
+
+        :param betas: (P,) shape coefficients.
+        """
+        v, J = body.rest_vertices(betas), body.rest_joints(betas)
+        strongest = body.skin_joints[np.arange(len(v)), body.skin_weights.argmax(1)]
+        self.parts = [body.joint_names.index(name) for name in FOOT_PARTS]
+        self._points = []  # of each part, (n, 3) from its joint
+        for part in self.parts:
+            own = v[strongest == part] - J[part] if (strongest == part).any() else np.zeros((1, 3))
+            self._points.append(own[np.unique((own @ _directions().T).argmax(axis=0))])
+
+    def heights(
+        self, R: NDArray[np.floating[Any]], t: NDArray[np.floating[Any]], up: NDArray[np.floating[Any]]
+    ) -> NDArray[np.float64]:
+        """Return the (T, 4) heights of each part's lowest point, relative to the origin.
+
+        :param R, t: (T, K+1, 3, 3) and (T, K+1, 3) part poses in any frame.
+        :param up: (3,) unit vector, in the same frame.
+        """
+        lowest = [
+            (np.einsum("tji,j->ti", R[:, k], up) @ points.T).min(axis=1) + t[:, k] @ up
+            for k, points in zip(self.parts, self._points, strict=True)
+        ]
+        return np.stack(lowest, axis=1)
+
+
+def foot_heights(motion: Motion, body: Body, raw: bool = False) -> NDArray[np.float64]:
+    """Return the (T, 4) heights of the lowest skin of left heel, left toes, right heel and right toes; z = 0 the floor.
+
+    :param body: that of the motion.
+    :param raw: of the motion before smoothing and contact.
+    """
+    betas = np.asarray(motion.betas, float)
+    skin, up = FootSkin(body, betas), np.array([0.0, 0.0, 1.0])
+
+    def heights(poses: NDArray[np.floating[Any]], trans: NDArray[np.floating[Any]]) -> tuple[NDArray[np.float64]]:
+        rotations = exp(poses.reshape(len(poses), -1, 3).astype(float))
+        return (skin.heights(*body.forward_kinematics(rotations, trans.astype(float), betas), up),)
+
+    chosen = (motion.poses_raw, motion.trans_raw) if raw else (motion.poses, motion.trans)
+    return by_blocks(heights, *chosen)[0]
+
+
+def under_floor(motion: Motion, body: Body) -> NDArray[np.bool_]:
+    """Return the (T,) frames of a motion in which a foot is more than `UNDER_FLOOR_M` under the floor.
+
+    :param body: that of the motion.
+    """
+    under: NDArray[np.bool_] = foot_heights(motion, body).min(axis=1) < -UNDER_FLOOR_M
+    return under
+
+
+def lower_floors(
+    heights: NDArray[np.floating[Any]], contact: NDArray[np.floating[Any]], times: NDArray[np.float64]
+) -> list[tuple[int, int]]:
+    """Find the spans in which the feet walk or stand on another, lower floor, with the ways down and up.
+
+    A foot rests in them more than `LEVEL_M` under the floor, or is farther below it than depth errors reach.
+
+    :param heights: (T, F) of the feet's points above the floor, metres.
+    :param contact: (T, F) probability that each of them rests on something.
+    :param times: (T,) seconds.
+    :return: the first row and the row after the last one of each span.
+    """
+    lowest, rests = heights.min(axis=1), ((contact > 0.5) & (heights < -LEVEL_M)).any(axis=1)
+    found = []
+    for first, end in runs(lowest < -LEVEL_M):
+        if lowest[first:end].min() < -DEPTH_ERROR_M or _duration(rests[first:end], times[first:end]) >= MIN_REST_S:
+            while first > 0 and lowest[first] < lowest[first - 1] < 0:
+                first -= 1
+            while end < len(lowest) and lowest[end - 1] < lowest[end] < 0:
+                end += 1
+            found.append((first, end))
+    return found
+
+
+def upper_floors(
+    heights: NDArray[np.floating[Any]], contact: NDArray[np.floating[Any]], times: NDArray[np.float64]
+) -> list[tuple[int, int]]:
+    """Find the spans in which the lower foot rests clearly above the floor.
+
+    :param heights: (T, F) of the feet's points above the floor, metres.
+    :param contact: (T, F) probability that each of them rests on something.
+    :param times: (T,) seconds.
+    :return: the first row and the row after the last one of each span.
+    """
+    rests = (contact > 0.5).any(axis=1) & (heights.min(axis=1) > LEVEL_M)
+    return [(first, end) for first, end in runs(rests) if times[end - 1] - times[first] >= MIN_REST_S]
+
+
+def steps(
+    heights: NDArray[np.floating[Any]], contact: NDArray[np.floating[Any]], times: NDArray[np.float64]
+) -> list[tuple[int, float]]:
+    """Find where feet rest some centimetres above or below the floor, as on a step.
+
+    Such a step cannot be distinguished from an error of the depth, so a capture puts these feet on the floor.
+
+    :param heights: (T, F) of the feet's points above the floor, metres.
+    :param contact: (T, F) probability that each of them rests on something.
+    :param times: (T,) seconds.
+    :return: the first row and the median height of each rest, in chronological order.
+    """
+    found = [
+        (first, float(np.median(heights[first:end, point])))
+        for point in range(contact.shape[1])
+        for first, end in runs(contact[:, point] > 0.5)
+        if times[end - 1] - times[first] >= MIN_REST_S
+    ]
+    return sorted((first, height) for first, height in found if STEP_M < abs(height) <= LEVEL_M)
+
+
+def _duration(mask: NDArray[np.bool_], times: NDArray[np.float64]) -> float:
+    """Return the seconds for which ``mask`` (T,) is True, of frames at ``times`` (T,)."""
+    return float(mask.sum() * np.median(np.diff(times))) if len(times) > 1 else 0.0
+
+
+def runs(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """Return the first row and the row after the last one of each run of True in ``mask``, (T,)."""
+    edges = np.flatnonzero(np.diff(np.r_[False, mask, False]))
+    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
+
+
+def _directions() -> NDArray[np.float64]:
+    """Return unit vectors (n, 3) that are spread evenly over the sphere, by a Fibonacci spiral."""
+    k = np.arange(_DIRECTIONS) + 0.5
+    z, turn = 1 - 2 * k / _DIRECTIONS, np.pi * (1 + np.sqrt(5)) * k
+    flat = np.sqrt(1 - z * z)
+    return np.stack([flat * np.cos(turn), flat * np.sin(turn), z], axis=1)

@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Moving the feet of a body by bending or stretching its legs, while the rest of it and the feet's rotations stay.
+
+The knee turns by θ about n, then the whole leg turns so that the ankle lies in the direction of its goal. With thigh u,
+shin s and the wanted distance d from hip to ankle, θ follows from
+
+    2 u·exp(nθ)s = d² − u² − s²,   u·exp(nθ)s = (u·n)(s·n) + cos θ (u·s − (u·n)(s·n)) + sin θ u·(n×s).
+
+A nearly straight knee hardly determines its plane, so n is the sum of the knee's present axis u×s/(|u||s|) and of the
+thigh's sideways axis times `HINGE`: straight knees bend forwards, bent ones in their plane.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...solver.body import Body
+from ...solver.rotations import exp, shortest_turn
+
+HINGE = 0.3  # the sine of the angle from which on a knee bends mainly in its own plane
+LONGEST = 0.995  # of the stretched leg's length; a knee snaps beyond, unless the leg is longer already
+SHORTEST = 0.35  # of the stretched leg's length, a knee bent by 140 degrees
+
+
+def move_feet(
+    body: Body,
+    rotations: NDArray[np.floating[Any]],
+    poses: tuple[NDArray[np.floating[Any]], NDArray[np.floating[Any]]],
+    shift: NDArray[np.floating[Any]],
+) -> NDArray[np.float64]:
+    """Return the rotations (T, K+1, 3, 3) that move both ankles as far as the legs reach.
+
+    :param rotations: (T, K+1, 3, 3) the root's, and the others relative to their parents.
+    :param poses: (T, K+1, 3, 3) and (T, K+1, 3) part poses of this motion, in any frame.
+    :param shift: (T, 2, 3) of the left and the right ankle, in that frame, metres.
+    """
+    R, t = poses
+    out = np.array(rotations, float)
+    for side, name in enumerate(("left", "right")):
+        hip, knee, ankle = (body.joint_names.index(f"{name}_{part}") for part in ("hip", "knee", "ankle"))
+        moved = np.flatnonzero(np.linalg.norm(shift[:, side], axis=1) > 1e-6)
+        if not len(moved):
+            continue
+        upper, lower = t[moved, knee] - t[moved, hip], t[moved, ankle] - t[moved, knee]
+        bend = _knee_turn(upper, lower, R[moved, hip, :, 0], upper + lower + shift[moved, side])
+        reached = upper + np.einsum("tij,tj->ti", bend, lower)
+        swing = shortest_turn(reached, upper + lower + shift[moved, side])
+        thigh, shin = swing @ R[moved, hip], swing @ bend @ R[moved, knee]
+        parent = R[moved, body.parents[hip]]
+        out[moved, hip] = np.swapaxes(parent, 1, 2) @ thigh
+        out[moved, knee] = np.swapaxes(thigh, 1, 2) @ shin
+        out[moved, ankle] = np.swapaxes(shin, 1, 2) @ R[moved, ankle]
+    return out
+
+
+def _knee_turn(
+    upper: NDArray[np.floating[Any]],
+    lower: NDArray[np.floating[Any]],
+    sideways: NDArray[np.floating[Any]],
+    goal: NDArray[np.floating[Any]],
+) -> NDArray[np.float64]:
+    """Return the rotations (n, 3, 3) of the shin about the knee that bring the ankle to the goal's distance.
+
+    :param upper, lower: (n, 3) from hip to knee, and from knee to ankle, metres.
+    :param sideways: (n, 3) the thigh's unit axis about which a knee bends.
+    :param goal: (n, 3) of the ankle, from the hip, metres.
+    """
+    a, b = np.linalg.norm(upper, axis=1), np.linalg.norm(lower, axis=1)
+    now = np.linalg.norm(upper + lower, axis=1)
+    wanted = np.linalg.norm(goal, axis=1)
+    wanted = np.clip(wanted, np.minimum(now, SHORTEST * (a + b)), np.maximum(now, LONGEST * (a + b)))
+    axis = np.cross(upper, lower) / (a * b)[:, None] + HINGE * sideways
+    axis /= np.maximum(np.linalg.norm(axis, axis=1, keepdims=True), 1e-9)
+    along_u, along_l = (upper * axis).sum(1), (lower * axis).sum(1)
+    fixed = along_u * along_l
+    cosine, sine = (upper * lower).sum(1) - fixed, (upper * np.cross(axis, lower)).sum(1)
+    size = np.maximum(np.hypot(cosine, sine), 1e-12)
+    target = np.clip((0.5 * (wanted**2 - a**2 - b**2) - fixed) / size, -1.0, 1.0)
+    angle = np.arctan2(sine, cosine) + np.arccos(target)
+    return exp(axis * angle[:, None])

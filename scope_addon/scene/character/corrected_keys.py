@@ -1,0 +1,104 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Changing a captured armature's keys by what was corrected in its motion.
+
+The keys may have been edited since: smoothed, put on the floor, their root motion moved to an object. So it is the
+change of the motion that is applied to them, in each joint's own axes and the pelvis's: Ω' = Ω (Ω_beforeᵀ Ω_after),
+t' = t + R_0 R_0,beforeᵀ (t_after − t_before). Keys that the correction does not reach are not written.
+"""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ....solver.body import Body
+from ...edit.clip import Clip, sample
+from ...edit.pins.corrected_motion import shot_of
+from ...edit.pins.corrections import Pin
+from ...edit.pins.solve_pins import missed, resolve
+from ...edit.smooth import smoothed
+from ...errors import UsageError
+from ...motion import Motion
+from .keys import read_clip, write_keys
+from .root_object import clip_with_root_motion
+
+_SAME_S = 1e-4  # keys' frames are single precision
+_MISSED_PX, _MISSED_M = 1.0, 0.005
+
+
+def rewrite_changed_keys(armature: bpy.types.Object, body: Body, rate: float, before: Motion, after: Motion) -> None:
+    """Change the keys from one motion to another, which differs from it in its corrections.
+
+    :param rate: scene frames per second.
+    :raises UsageError: when a bone or its keys are missing.
+    """
+    clip, frames = read_clip(armature, body, rate)
+    strength = float(armature.get("scope_smoothing", 1.0))
+    old, new = (_at(smoothed(body, m, strength), clip.times, _start(armature, rate)) for m in (before, after))
+    _write_change(armature, body, clip, frames, (old, new))
+
+
+def meet_pin(armature: bpy.types.Object, body: Body, rate: float, motion: Motion, pin: Pin) -> None:
+    """Correct the keys by one more pin, if edited keys do not meet it although the motion does.
+
+    :param rate: scene frames per second.
+    """
+    clip, frames = read_clip(armature, body, rate)
+    whole = clip_with_root_motion(armature, clip, frames)
+    shot = shot_of(motion, _start(armature, rate))
+    if missed(whole, body, motion.betas, pin, shot) > (_MISSED_M if pin.pixel is None else _MISSED_PX):
+        _write_change(armature, body, clip, frames, (whole, resolve(whole, body, motion.betas, [pin], shot)))
+
+
+def captured_points(armature: bpy.types.Object, frame: float, points_world: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Convert points of the scene (N, 3) at the current frame to the world of the capture, (N, 3) metres."""
+    inverse = np.array(armature.matrix_world.inverted_safe())
+    points = points_world @ inverse[:3, :3].T + inverse[:3, 3]
+    n = len(points)
+    still = Clip(np.zeros(n), np.tile(np.eye(3), (n, 1, 1, 1)), points)
+    return clip_with_root_motion(armature, still, np.full(n, frame)).root
+
+
+def source_frame(armature: bpy.types.Object, motion: Motion, frame: float, rate: float) -> int:
+    """Return the footage's frame that is shown at a scene frame.
+
+    :raises UsageError: the motion has none there.
+    """
+    time = frame / rate - _start(armature, rate)
+    row = int(np.abs(motion.timestamps - time).argmin())
+    spacing = float(np.median(np.diff(motion.timestamps))) if len(motion) > 1 else 1.0 / rate
+    if abs(motion.timestamps[row] - time) > max(spacing, 1.0 / rate):
+        raise UsageError(f"frame {frame:g} is outside of the captured motion; go to a frame within it")
+    return int(motion.frames[row])
+
+
+def scene_frame(armature: bpy.types.Object, motion: Motion, frame: int, rate: float) -> float:
+    """Return the scene frame at which a frame of the footage is shown."""
+    return float(np.interp(frame, motion.frames, motion.timestamps) * rate + armature.get("scope_start", 0.0))
+
+
+def _start(armature: bpy.types.Object, rate: float) -> float:
+    """Return the scene's time in seconds at the footage's time 0."""
+    return float(armature.get("scope_start", 0.0)) / rate
+
+
+def _at(clip: Clip, times: NDArray[np.float64], start: float) -> Clip:
+    """Sample a captured clip at the keys' times; keys at its own frames must not mix in a little of the next frame."""
+    own = clip.times + start
+    nearest = own[np.clip(np.searchsorted(own, times - _SAME_S), 0, len(own) - 1)]
+    return sample(Clip(own, clip.rotations, clip.root), np.where(np.abs(nearest - times) < _SAME_S, nearest, times))
+
+
+def _write_change(
+    armature: bpy.types.Object, body: Body, clip: Clip, frames: NDArray[np.float64], change: tuple[Clip, Clip]
+) -> None:
+    """Apply the change between two clips to the keys at which they differ."""
+    old, new = change
+    which = (old.rotations != new.rotations).any((1, 2, 3)) | (old.root != new.root).any(1)
+    rotations, root = clip.rotations.copy(), clip.root.copy()
+    inverse = np.swapaxes(old.rotations[which], -1, -2)
+    shift = (inverse[:, 0] @ (new.root - old.root)[which, :, None])[..., 0]
+    root[which] += (clip.rotations[which, 0] @ shift[..., None])[..., 0]
+    rotations[which] = clip.rotations[which] @ inverse @ new.rotations[which]
+    write_keys(armature, body, Clip(clip.times, rotations, root), frames, which)

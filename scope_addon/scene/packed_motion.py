@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The captured motion inside the .blend file.
+
+The motion file's bytes are a custom property of a text datablock, to which a custom property of the armature points.
+Blender therefore saves, appends and links the text together with the armature, duplicates of the armature share it,
+and it is removed with the last of them. Bytes on the armature itself would be copied with each duplicate and each
+evaluation of the object; nothing evaluates or copies a text, and undo stores it again only if it changes.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import bpy
+
+from ..errors import MotionFileError, UsageError
+from ..motion import Motion
+
+MOTION = "scope_motion"  # property of the armature: the text, or the path of a motion file in older .blend files
+_CONTENT = "motion"  # property of the text: bytes of the motion file
+_LARGEST_BYTES = 1 << 30  # packed; an hour at 60 frames per second takes a tenth
+_NOTE = """\
+The captured motion of '{name}', which Scope stores in the custom property '{content}' of this text.
+Smoothing and the export of motion files start from it. It is deleted with the armature.
+"""
+
+
+def pack_motion(armature: bpy.types.Object, content: bytes) -> None:
+    """Store a motion file's bytes with the armature. Duplicates of the armature keep the motion that they have."""
+    previous = armature.get(MOTION)
+    text = bpy.data.texts.new(f"{armature.name} motion")
+    text.from_string(_NOTE.format(name=armature.name, content=_CONTENT))
+    text[_CONTENT] = content
+    armature[MOTION] = text
+    text.use_fake_user = False  # texts have one when they are new, and would stay in the file for ever
+    if isinstance(previous, bpy.types.Text) and previous.users == 0:
+        bpy.data.texts.remove(previous)
+
+
+def stored_motion(armature: bpy.types.Object) -> Motion:
+    """Return the motion that is stored with the armature. A .blend file may be hostile: nothing is unpickled.
+
+    :raises UsageError: the armature stores none.
+    :raises MotionFileError: what it stores is damaged or not a motion.
+    """
+    stored = armature.get(MOTION)
+    if isinstance(stored, bpy.types.Text):
+        content = stored.get(_CONTENT)
+        name = f"the motion in the text '{stored.name}'"
+        if not isinstance(content, bytes):
+            raise MotionFileError(f"{name} was removed or changed; undo that, or capture the footage again")
+        if len(content) > _LARGEST_BYTES:
+            raise MotionFileError(f"{name} has {len(content) >> 20} MiB, too much for a motion; capture again")
+        return Motion.load(name, content)
+    if isinstance(stored, str) and stored and Path(stored).is_file():
+        return Motion.load(stored)
+    raise UsageError(
+        f"the captured motion of '{armature.name}' is stored neither in this .blend file nor in the cache; capture the "
+        "footage again, or import its .npz file"
+    )
+
+
+def motion_texts(armatures: list[bpy.types.Object]) -> list[bpy.types.Text]:
+    """Return the texts that hold the armatures' motions."""
+    found = [armature.get(MOTION) for armature in armatures]
+    return list(dict.fromkeys(text for text in found if isinstance(text, bpy.types.Text)))

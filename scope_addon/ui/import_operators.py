@@ -1,0 +1,143 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The operator that imports motion files, and its entry in File > Import."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import bpy
+from bpy.props import BoolProperty, CollectionProperty, StringProperty
+
+from ..footage import FOOTAGE_SUFFIXES
+from ..options import option
+from .declared_properties import blender_property
+from .preferences import preferences
+from .reporting import ReportingOperator, sentence
+from .view.view_operators import frame_selected, hide_startup_cube
+
+if TYPE_CHECKING:
+    from ..scene.build import BuildOptions
+    from ..smpl_import.convert import Imported
+
+
+class SCOPE_OT_import_motion(ReportingOperator):
+    """Import captured motions of Scope, AMASS or other tools that use SMPL's joints, as animated bodies"""
+
+    bl_idname = "scope.import_motion"
+    bl_label = "Import Motion"
+
+    filepath: StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"})
+    directory: StringProperty(subtype="DIR_PATH", options={"SKIP_SAVE", "HIDDEN"})
+    files: CollectionProperty(type=bpy.types.OperatorFileListElement, options={"SKIP_SAVE", "HIDDEN"})
+    filter_glob: StringProperty(default="*.npz", options={"HIDDEN"})
+    up_axis: blender_property(option("up_axis"), {})
+    motion_rate: blender_property(option("motion_rate"), {})
+    body: blender_property(option("body"), {})
+    set_rate: BoolProperty(
+        name="Set Scene Frame Rate",
+        default=False,
+        description="Set the scene's frame rate to the motion's; otherwise keys may be between frames",
+    )
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        """Use dropped files, or ask for some."""
+        if self.filepath or self.directory:
+            return self.execute(context)
+        context.window_manager.fileselect_add(self)
+        return {"RUNNING_MODAL"}
+
+    def work(self, context: bpy.types.Context) -> str:
+        """Read all files, then build them."""
+        from ..scene.animation_data.transaction import all_or_nothing
+        from ..smpl_import.convert import import_motion
+
+        body = self._body(context)
+        paths = self._paths()
+        found = [import_motion(path, body, self.up_axis.lower(), self.motion_rate) for path in paths]
+        with all_or_nothing(context.scene):
+            for path, imported in zip(paths, found, strict=True):
+                _build(context.scene, path, imported, self._build_options(context.scene))
+        hide_startup_cube(context)
+        frame_selected(context)
+        notes = list(dict.fromkeys(note for imported in found for note in imported.notes))
+        if notes:
+            self.report({"WARNING"}, sentence("; ".join(notes)))
+            return ""
+        return f"Imported {', '.join(path.name for path in paths)}"
+
+    def _paths(self) -> list[Path]:
+        """Return the chosen files.
+
+        :raises UsageError: there are none.
+        """
+        from ..errors import UsageError
+
+        folder = Path(bpy.path.abspath(self.directory)) if self.directory else None
+        names = [each.name for each in self.files if each.name]
+        if folder and names:
+            return [folder / name for name in names]
+        path = Path(bpy.path.abspath(self.filepath))
+        if not self.filepath or path.is_dir():
+            raise UsageError("no motion file is chosen; choose an .npz file")
+        return [path]
+
+    def _body(self, context: bpy.types.Context) -> str:
+        """Return the name or file of the body.
+
+        :raises UsageError: no file is chosen for the body.
+        """
+        from ..errors import UsageError
+
+        if self.body != "FILE":
+            return str(self.body).lower()
+        chosen = preferences()
+        path = context.scene.scope.body_file or (chosen.body_file if chosen else "")
+        if not path:
+            raise UsageError("no body file is chosen; choose one under Options or in the preferences")
+        return str(bpy.path.abspath(path))
+
+    def _build_options(self, scene: bpy.types.Scene) -> BuildOptions:
+        """Return the scene's options, but change the frame rate only on request."""
+        from .capture.capture_job import build_options
+
+        options = build_options(scene)
+        rate = "resample" if scene.scope.frame_rate == "RESAMPLE" else "keep"
+        return replace(options, frame_rate="set" if self.set_rate else rate)
+
+
+def _build(scene: bpy.types.Scene, path: Path, imported: Imported, options: BuildOptions) -> None:
+    """Build one motion and store it and its result with the scene."""
+    from ..scene.build import build_scene
+    from ..scene.packed_motion import pack_motion
+    from .capture.result import show_result
+
+    motion, footage = imported.motion, None
+    seen = bool(motion.image_size.all())  # by a camera, as motions of other tools are not
+    beside = path.parent / Path(motion.source).name
+    if seen and beside.suffix.lower() in FOOTAGE_SUFFIXES and beside.is_file():
+        footage = beside
+    options = replace(options, name=path.stem, with_camera=options.with_camera and seen)
+    result = build_scene([motion], imported.body, footage, options)
+    pack_motion(result.people[0].armature, motion.to_bytes())
+    report = {"warnings": [*imported.notes, *result.warnings]}
+    show_result(result.collection.scope_result, str(footage or ""), report, result)
+    scene.scope.capture = result.collection
+
+
+def _draw_menu(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
+    menu.layout.operator(SCOPE_OT_import_motion.bl_idname, text="SMPL Motion (.npz)")
+
+
+def attach() -> None:
+    """Add the operator to File > Import."""
+    bpy.types.TOPBAR_MT_file_import.append(_draw_menu)
+
+
+def detach() -> None:
+    """Remove the operator from File > Import."""
+    bpy.types.TOPBAR_MT_file_import.remove(_draw_menu)
+
+
+CLASSES = (SCOPE_OT_import_motion,)

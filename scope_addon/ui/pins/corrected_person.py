@@ -1,0 +1,100 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The corrections of a captured armature: in its motion, in its keys, and as a list for the panel."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING, Any
+
+import bpy
+
+from ..captured_person import captured_motion, set_captured_motion
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from ....solver.body import Body
+    from ...edit.pins.corrections import Correction, Pin
+    from ...motion import Motion
+
+_LIST = "scope_corrections"  # custom property: what the panel lists, so that drawing reads no motion
+
+
+def listed_corrections(armature: bpy.types.Object) -> list[dict[str, Any]]:
+    """Return the corrections in their order: ``kind``, ``text``, and the scene frames ``first`` and ``last``."""
+    listed: list[dict[str, Any]] = json.loads(armature.get(_LIST, "[]"))
+    return listed
+
+
+def change_corrections(
+    armature: bpy.types.Object,
+    body: Body,
+    rate: float,
+    change: Callable[[tuple[Correction, ...]], tuple[Correction, ...]],
+) -> Motion:
+    """Change the corrections of a captured person: of the motion, the keys and the list.
+
+    :param rate: scene frames per second.
+    :param change: returns the new corrections for the present ones.
+    :return: the corrected motion.
+    :raises UsageError: the motion is no longer there, or keys are missing.
+    """
+    from ...edit.pins.corrected_motion import corrections_of, with_corrections
+    from ...scene.character.corrected_keys import rewrite_changed_keys
+
+    before = captured_motion(armature)
+    after = with_corrections(before, body, change(corrections_of(before)))
+    rewrite_changed_keys(armature, body, rate, before, after)
+    set_captured_motion(armature, after)
+    armature[_LIST] = json.dumps([_entry(armature, after, correction, rate) for correction in corrections_of(after)])
+    return after
+
+
+def pin_at(
+    context: bpy.types.Context, armature: bpy.types.Object, motion: Motion, joint: str, place: tuple[Any, bool, float]
+) -> Pin:
+    """Return a pin at the scene's current frame.
+
+    :param place: the joint's position in the scene (3,); whether it was placed in the view of the capture's camera; and
+        the seconds over which the correction fades out. A pin in the image needs the camera where it was captured.
+    :raises UsageError: the current frame is outside of the motion.
+    """
+    import numpy as np
+
+    from ...edit.pins.corrected_motion import shot_of
+    from ...edit.pins.corrections import Pin
+    from ...scene.animation_data.timing import scene_rate
+    from ...scene.character.corrected_keys import captured_points, source_frame
+
+    scene, (location, in_image, reach) = context.scene, place
+    context.view_layer.update()
+    current = scene.frame_current + scene.frame_subframe
+    frame = source_frame(armature, motion, current, scene_rate(scene))
+    points = [np.array(location, float)]
+    if in_image and scene.camera is not None:
+        points.append(np.array(scene.camera.matrix_world.translation))
+    at = captured_points(armature, current, np.array(points))
+    row = int(np.abs(motion.frames - frame).argmin())
+    centre = motion.world_from_camera[row, :3, 3]
+    if len(at) == 2 and np.linalg.norm(at[1] - centre) < 0.02:
+        u, v = shot_of(motion).project(frame, at[0])
+        return Pin(frame, joint, pixel=(float(u), float(v)), reach=reach)
+    x, y, z = at[0]
+    return Pin(frame, joint, position=(float(x), float(y), float(z)), reach=reach)
+
+
+def _entry(armature: bpy.types.Object, motion: Motion, correction: Correction, rate: float) -> dict[str, Any]:
+    """Describe a correction for the panel."""
+    from ...edit.pins.corrections import Contact, Pin
+    from ...scene.character.corrected_keys import scene_frame
+
+    if isinstance(correction, Pin):
+        kind, text, span = "PIN", correction.joint.replace("_", " ").title(), (correction.frame,) * 2
+    elif isinstance(correction, Contact):
+        kind, text, span = "CONTACT", f"{correction.foot.title()} Foot Stands", (correction.first, correction.last)
+    else:
+        what = {"both": "Left and Right", "arms": "Arms", "legs": "Legs"}[correction.limbs]
+        kind, text, span = "EXCHANGE", f"{what} Exchanged", (correction.first, correction.last)
+    first, last = (round(scene_frame(armature, motion, frame, rate)) for frame in span)
+    joint = correction.joint if isinstance(correction, Pin) else ""
+    return {"kind": kind, "text": text, "first": first, "last": last, "joint": joint}

@@ -1,0 +1,161 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Operators that add and remove corrections; the tool with the mouse is in ``pin_tool.py``."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import bpy
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProperty, IntProperty, StringProperty
+
+from ..captured_person import captured_motion
+from ..edit.edit_base import EditOperator, SpanOperator
+from .corrected_person import change_corrections, listed_corrections, pin_at
+
+if TYPE_CHECKING:
+    from ....solver.body import Body
+    from ...edit.pins.corrections import Correction
+
+_NOW = -1_048_574  # the first frame that Blender allows; stands for the current one
+
+
+class SCOPE_OT_add_pin(EditOperator):
+    """Pin a joint to a place in one frame, and solve the motion around it again"""
+
+    bl_idname = "scope.add_pin"
+    bl_label = "Add Pin"
+
+    joint: StringProperty(name="Joint", default="left_wrist", description="Name of the joint's bone")
+    location: FloatVectorProperty(
+        name="Location", subtype="TRANSLATION", unit="LENGTH", description="Where the joint is in that frame"
+    )
+    frame: IntProperty(
+        name="Frame", default=_NOW, min=_NOW, description="Scene frame; the current one if left out", options={"HIDDEN"}
+    )
+    in_image: BoolProperty(
+        name="In the Image",
+        default=False,
+        description="Pin the joint only in the camera's image; its distance from the camera is free",
+    )
+    reach: FloatProperty(
+        name="Reach",
+        default=0.4,
+        min=0.02,
+        soft_max=2.0,
+        subtype="TIME_ABSOLUTE",
+        description="Seconds before and after the frame over which the correction fades out",
+    )
+
+    def edit(self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float) -> str:
+        """Add the pin and change the keys around it."""
+        from ...edit.pins.corrections import added
+        from ...scene.character.corrected_keys import meet_pin
+
+        scene = context.scene
+        current = scene.frame_current, scene.frame_subframe
+        if self.frame != _NOW:
+            scene.frame_set(self.frame)
+        try:
+            place = tuple(self.location), self.in_image, self.reach
+            pin = pin_at(context, armature, captured_motion(armature), self.joint, place)
+            motion = change_corrections(armature, body, rate, lambda present: added(present, pin))
+            meet_pin(armature, body, rate, motion, pin)
+        finally:
+            scene.frame_set(current[0], subframe=current[1])
+        return ""
+
+
+class CorrectSpanOperator(SpanOperator):
+    """A correction of a span of frames. Not registered."""
+
+    if TYPE_CHECKING:  # implemented by each operator
+
+        def correction(self, first: int, last: int) -> Correction:
+            """Return the correction of these frames of the footage."""
+
+    def edit(self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float) -> str:
+        """Add the correction and change the keys."""
+        from ...edit.pins.corrections import added
+        from ...scene.character.corrected_keys import source_frame
+
+        motion = captured_motion(armature)
+        first, last = (source_frame(armature, motion, frame, rate) for frame in (self.start, self.end))
+        new = self.correction(first, last)
+        change_corrections(armature, body, rate, lambda present: added(present, new))
+        context.scene.frame_set(context.scene.frame_current, subframe=context.scene.frame_subframe)
+        return ""
+
+
+class SCOPE_OT_foot_stands(CorrectSpanOperator):
+    """Keep a foot in place on the floor from the first to the last frame"""
+
+    bl_idname = "scope.foot_stands"
+    bl_label = "Foot Stands"
+
+    foot: EnumProperty(
+        name="Foot",
+        items=(("left", "Left", "The left foot", 0), ("right", "Right", "The right foot", 1)),
+        default="left",
+        description="Which foot stands",
+    )
+
+    def correction(self, first: int, last: int) -> Correction:
+        """Return the contact."""
+        from ...edit.pins.corrections import Contact
+
+        return Contact(first, last, self.foot)
+
+
+class SCOPE_OT_exchange_sides(CorrectSpanOperator):
+    """Exchange left and right from the first to the last frame; the same once more undoes it"""
+
+    bl_idname = "scope.exchange_sides"
+    bl_label = "Exchange Left and Right"
+
+    limbs: EnumProperty(
+        name="Limbs",
+        items=(
+            ("both", "Arms and Legs", "All four limbs", 0),
+            ("legs", "Legs", "Only the legs", 1),
+            ("arms", "Arms", "Only the arms", 2),
+        ),
+        default="both",
+        description="Which limbs are exchanged",
+    )
+
+    def correction(self, first: int, last: int) -> Correction:
+        """Return the exchange."""
+        from ...edit.pins.corrections import Exchange
+
+        return Exchange(first, last, self.limbs)
+
+
+class SCOPE_OT_remove_correction(EditOperator):
+    """Remove the correction; the motion around it is again what it was without it"""
+
+    bl_idname = "scope.remove_correction"
+    bl_label = "Remove Correction"
+
+    index: IntProperty(name="Number", default=-1, min=-1, description="Counted from 0; -1 removes all")
+
+    def edit(self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float) -> str:
+        """Remove it and change the keys back.
+
+        :raises UsageError: there is no correction of this number.
+        """
+        from ...errors import UsageError
+
+        count = len(listed_corrections(armature))
+        if self.index >= count:
+            raise UsageError(f"there is no correction {self.index}; '{armature.name}' has {count}, counted from 0")
+        change_corrections(
+            armature,
+            body,
+            rate,
+            lambda present: tuple(c for k, c in enumerate(present) if self.index >= 0 and k != self.index),
+        )
+        context.scene.frame_set(context.scene.frame_current, subframe=context.scene.frame_subframe)
+        return ""
+
+
+CLASSES = (SCOPE_OT_add_pin, SCOPE_OT_foot_stands, SCOPE_OT_exchange_sides, SCOPE_OT_remove_correction)

@@ -1,0 +1,32 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Drawing over the viewport, in pixels of its region."""
+
+from __future__ import annotations
+
+import math
+
+import gpu
+from gpu_extras.batch import batch_for_shader
+
+_ANGLES = [2 * math.pi * k / 20 for k in range(20)]
+
+
+def draw_disc(center: tuple[float, float], radius: float, color: tuple[float, ...]) -> None:
+    """Draw a disc with a dark rim."""
+    for size, fill in ((radius + 1.5, (0.0, 0.0, 0.0, 0.6)), (radius, color)):
+        rim = [(center[0] + size * math.cos(a), center[1] + size * math.sin(a)) for a in _ANGLES]
+        triangles = [(0, k + 1, (k + 1) % len(rim) + 1) for k in range(len(rim))]
+        shader = gpu.shader.from_builtin("UNIFORM_COLOR")
+        batch = batch_for_shader(shader, "TRIS", {"pos": [center, *rim]}, indices=triangles)
+        shader.uniform_float("color", fill)
+        batch.draw(shader)
+
+
+def draw_line(points: list[tuple[float, float]], color: tuple[float, ...]) -> None:
+    """Draw a line between two points."""
+    gpu.state.line_width_set(2.0)
+    shader = gpu.shader.from_builtin("UNIFORM_COLOR")
+    batch = batch_for_shader(shader, "LINES", {"pos": points})
+    shader.uniform_float("color", color)
+    batch.draw(shader)
+    gpu.state.line_width_set(1.0)

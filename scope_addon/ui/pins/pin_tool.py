@@ -1,0 +1,169 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The tool that pins limbs with the mouse: drag a handle to where the joint is in the picture, or in space."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import blf
+import bpy
+import gpu
+from bpy_extras.view3d_utils import location_3d_to_region_2d, region_2d_to_location_3d
+from mathutils import Vector
+
+from ..captured_person import captured_armature
+from ..edit.edit_base import may_edit
+from ..view.comparison import camera_of
+from .corrected_person import listed_corrections
+from .drawing import draw_disc, draw_line
+
+_SIDED = ("shoulder", "elbow", "wrist", "hip", "knee", "ankle", "foot")
+HANDLES = ("head", "pelvis", *(f"{side}_{name}" for side in ("left", "right") for name in _SIDED))
+_RADIUS, _NEAR, _MOVED = 6.0, 16.0, 3.0  # pixels
+_FREE, _HOVERED, _PINNED, _LINE = (1.0, 1.0, 1.0, 0.8), (1.0, 0.8, 0.2, 1.0), (0.9, 0.2, 0.2, 1.0), (1.0, 0.8, 0.2, 0.9)
+_HELP = "Drag a handle to where the joint is.  Scrub or play to go to other frames.  Esc or Enter: done"
+
+
+@dataclass
+class _Session:
+    """What the tool draws; Blender's objects are looked up by name, because undo replaces them."""
+
+    armature: str
+    area: int  # as_pointer
+    hovered: str = ""
+    dragged: str = ""
+    start: tuple[float, float] = (0.0, 0.0)
+    mouse: tuple[float, float] = (0.0, 0.0)
+
+
+class SCOPE_OT_pin_limb(bpy.types.Operator):
+    """Drag handles on the body to where the joints are in this frame; the motion around is solved again"""
+
+    bl_idname = "scope.pin_limb"
+    bl_label = "Pin Limbs"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Require a captured armature in a 3D viewport."""
+        if context.area is None or context.area.type != "VIEW_3D":
+            return False
+        return may_edit(cls, context)
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        """Show the handles."""
+        armature = captured_armature(context)
+        assert armature is not None  # checked by poll
+        self._session = _Session(armature.name, context.area.as_pointer())
+        self._area = context.area
+        draw = bpy.types.SpaceView3D.draw_handler_add
+        self._handler = draw(_draw, (self._session,), "WINDOW", "POST_PIXEL")
+        context.workspace.status_text_set(_HELP)
+        context.window_manager.modal_handler_add(self)
+        context.area.tag_redraw()
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        """Follow the mouse."""
+        session, region = self._session, _main_region(self._area)
+        if region is None or session.armature not in bpy.data.objects:
+            self.cancel(context)
+            return {"CANCELLED"}
+        session.mouse = (event.mouse_x - region.x, event.mouse_y - region.y)
+        inside = 0 <= session.mouse[0] < region.width and 0 <= session.mouse[1] < region.height
+        if event.type == "MOUSEMOVE":
+            if not session.dragged:
+                session.hovered = _nearest(session, self._area, region) if inside else ""
+            self._area.tag_redraw()
+            return {"RUNNING_MODAL"} if session.dragged else {"PASS_THROUGH"}
+        busy = bool(session.dragged)
+        if event.type == "LEFTMOUSE" and event.value == "PRESS" and inside:
+            session.hovered = _nearest(session, self._area, region)
+            session.dragged, session.start = session.hovered, session.mouse
+            busy = bool(session.dragged)
+        elif event.type == "LEFTMOUSE" and event.value == "RELEASE" and busy:
+            self._drop(context, region)
+        elif event.type in ("ESC", "RIGHTMOUSE", "RET", "NUMPAD_ENTER") and event.value == "PRESS":
+            if not busy:
+                self.cancel(context)
+                return {"FINISHED"}
+            session.dragged = ""
+            self._area.tag_redraw()
+        return {"RUNNING_MODAL"} if busy else {"PASS_THROUGH"}
+
+    def cancel(self, context: bpy.types.Context) -> None:
+        """Remove the handles."""
+        bpy.types.SpaceView3D.draw_handler_remove(self._handler, "WINDOW")
+        context.workspace.status_text_set(None)
+        self._area.tag_redraw()
+
+    def _drop(self, context: bpy.types.Context, region: bpy.types.Region) -> None:
+        """Pin the dragged joint under the mouse, which is a step to undo of its own."""
+        session = self._session
+        joint, session.dragged, session.hovered = session.dragged, "", ""
+        self._area.tag_redraw()
+        if math.dist(session.mouse, session.start) < _MOVED:
+            return
+        view = self._area.spaces.active.region_3d
+        was = _joint_positions(session)[joint]
+        offset = Vector(session.mouse) - Vector(session.start)
+        screen = location_3d_to_region_2d(region, view, was) + offset
+        location = region_2d_to_location_3d(region, view, screen, was)
+        in_image = view.view_perspective == "CAMERA" and context.scene.camera == camera_of(context.scene)
+        try:
+            bpy.ops.scope.add_pin("EXEC_DEFAULT", True, joint=joint, location=location, in_image=in_image)
+        except RuntimeError as error:
+            self.report({"ERROR"}, str(error).removeprefix("Error: ").strip())
+
+
+def _main_region(area: bpy.types.Area) -> bpy.types.Region | None:
+    return next((region for region in area.regions if region.type == "WINDOW"), None)
+
+
+def _joint_positions(session: _Session) -> dict[str, Vector]:
+    """Return the handles' positions in the scene."""
+    armature = bpy.data.objects.get(session.armature)
+    bones = armature.pose.bones if armature is not None and armature.pose is not None else {}
+    return {name: armature.matrix_world @ bones[name].head for name in HANDLES if name in bones}
+
+
+def _nearest(session: _Session, area: bpy.types.Area, region: bpy.types.Region) -> str:
+    """Return the handle under the mouse, or an empty name."""
+    best, found = _NEAR * bpy.context.preferences.system.ui_scale, ""
+    for name, place in _joint_positions(session).items():
+        at = location_3d_to_region_2d(region, area.spaces.active.region_3d, place)
+        if at is not None and math.dist(at, session.mouse) < best:
+            best, found = math.dist(at, session.mouse), name
+    return found
+
+
+def _draw(session: _Session) -> None:
+    """Draw the handles and this frame's pins."""
+    context = bpy.context
+    if context.area is None or context.area.as_pointer() != session.area or context.region_data is None:
+        return
+    armature = bpy.data.objects.get(session.armature)
+    if armature is None:
+        return
+    frame, scale = context.scene.frame_current, context.preferences.system.ui_scale
+    pinned = {e["joint"] for e in listed_corrections(armature) if e["kind"] == "PIN" and e["first"] == frame}
+    gpu.state.blend_set("ALPHA")
+    for name, place in _joint_positions(session).items():
+        at = location_3d_to_region_2d(context.region, context.region_data, place)
+        if at is None:
+            continue
+        if name == session.dragged:
+            target = (at[0] + session.mouse[0] - session.start[0], at[1] + session.mouse[1] - session.start[1])
+            draw_line([tuple(at), target], _LINE)
+            draw_disc(target, 1.4 * _RADIUS * scale, _HOVERED)
+        color = _HOVERED if name == session.hovered else _PINNED if name in pinned else _FREE
+        draw_disc(tuple(at), (1.3 if name == session.hovered else 1.0) * _RADIUS * scale, color)
+        if name in (session.hovered, session.dragged):
+            blf.size(0, 13 * scale)
+            blf.color(0, 1.0, 1.0, 1.0, 1.0)
+            blf.position(0, at[0] + 14 * scale, at[1] + 8 * scale, 0)
+            blf.draw(0, name.replace("_", " ").title())
+    gpu.state.blend_set("NONE")
+
+
+CLASSES = (SCOPE_OT_pin_limb,)

@@ -1,0 +1,146 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Operators that correct what is upright in the world, by a line in the footage."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import bpy
+from bpy.props import FloatVectorProperty
+from bpy_extras.view3d_utils import region_2d_to_origin_3d, region_2d_to_vector_3d
+
+from ..captured_person import body_of, captured_armature, captured_motion, set_captured_motion
+from ..edit.edit_base import EditOperator, may_edit
+from ..view.comparison import camera_of
+from .drawing import draw_line
+
+if TYPE_CHECKING:
+    from ....solver.body import Body
+
+_HELP = "Draw a line along something that is upright: a door, a wall's edge, a post.  Esc: cancel"
+
+
+class SCOPE_OT_set_upright(EditOperator):
+    """Turn the capture and its camera so that a line in the footage is upright"""
+
+    bl_idname = "scope.set_upright"
+    bl_label = "Set Upright"
+
+    start: FloatVectorProperty(name="Start", size=2, description="Pixel of the footage, from its top left")
+    end: FloatVectorProperty(name="End", size=2, description="Pixel of the footage, from its top left")
+
+    def edit(self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float) -> str:
+        """Move everybody of the capture, and the camera."""
+        from ...edit.pins.upright import moved_motion, upright_transform
+        from ...scene.animation_data.transaction import all_or_nothing
+        from ...scene.camera import same_camera
+        from ...scene.character.corrected_keys import source_frame
+        from ...scene.character.upright_scene import move_camera, move_person
+
+        scene, motion = context.scene, captured_motion(armature)
+        frame = source_frame(armature, motion, scene.frame_current + scene.frame_subframe, rate)
+        transform = upright_transform(motion, body, frame, (tuple(self.start), tuple(self.end)))
+        near = [obj for c in armature.users_collection for obj in c.all_objects]
+        people = [obj for obj in near if obj != armature and "scope_source" in obj]
+        together = [armature, *(obj for obj in people if same_camera(captured_motion(obj), motion))]
+        cameras = [obj for obj in near if obj.type == "CAMERA"][:1]
+        with all_or_nothing(scene, *together[1:], *cameras):
+            for person in together:
+                own = body_of(person)
+                moved = moved_motion(captured_motion(person), own, transform)
+                move_person(person, own, rate, transform)
+                set_captured_motion(person, moved)
+            for camera in cameras:
+                move_camera(camera, armature, transform)
+        scene.frame_set(scene.frame_current, subframe=scene.frame_subframe)
+        return ""
+
+
+class SCOPE_OT_upright_line(bpy.types.Operator):
+    """Draw a line in the footage along something that is upright; the capture and its camera turn with it"""
+
+    bl_idname = "scope.upright_line"
+    bl_label = "Upright Line"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Require the view through the capture's camera."""
+        space = context.space_data
+        if space is None or space.type != "VIEW_3D" or space.region_3d.view_perspective != "CAMERA":
+            cls.poll_message_set("Press Compare with Footage first: the line is drawn in the footage")
+            return False
+        return may_edit(cls, context) and context.scene.camera == camera_of(context.scene)
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        """Wait for the line."""
+        self._area = context.area
+        self._line: list[tuple[float, float]] = []
+        draw = bpy.types.SpaceView3D.draw_handler_add
+        self._handler = draw(_draw, (self._line, context.area.as_pointer()), "WINDOW", "POST_PIXEL")
+        context.workspace.status_text_set(_HELP)
+        context.window.cursor_modal_set("CROSSHAIR")
+        context.window_manager.modal_handler_add(self)
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        """Follow the mouse."""
+        region = next(region for region in self._area.regions if region.type == "WINDOW")
+        mouse = (event.mouse_x - region.x, event.mouse_y - region.y)
+        if event.type in ("ESC", "RIGHTMOUSE") and event.value == "PRESS":
+            self.cancel(context)
+            return {"CANCELLED"}
+        if event.type == "LEFTMOUSE" and event.value == "PRESS":
+            self._line[:] = [mouse, mouse]
+        elif event.type == "MOUSEMOVE" and self._line:
+            self._line[1] = mouse
+            self._area.tag_redraw()
+        elif event.type == "LEFTMOUSE" and event.value == "RELEASE" and self._line:
+            self.cancel(context)
+            self._finish(context, region)
+            return {"FINISHED"}
+        return {"RUNNING_MODAL"}
+
+    def cancel(self, context: bpy.types.Context) -> None:
+        """Remove the line."""
+        bpy.types.SpaceView3D.draw_handler_remove(self._handler, "WINDOW")
+        context.workspace.status_text_set(None)
+        context.window.cursor_modal_restore()
+        self._area.tag_redraw()
+
+    def _finish(self, context: bpy.types.Context, region: bpy.types.Region) -> None:
+        """Set what is upright, which is a step to undo of its own."""
+        view = self._area.spaces.active.region_3d
+        rays = [
+            region_2d_to_origin_3d(region, view, at) + 3.0 * region_2d_to_vector_3d(region, view, at)
+            for at in self._line
+        ]
+        start, end = _pixels(context, rays)
+        try:
+            bpy.ops.scope.set_upright("EXEC_DEFAULT", True, start=start, end=end)
+        except RuntimeError as error:
+            self.report({"ERROR"}, str(error).removeprefix("Error: ").strip())
+
+
+def _pixels(context: bpy.types.Context, points: list[object]) -> list[tuple[float, float]]:
+    """Return the pixels of the footage at which points of the scene are."""
+    import numpy as np
+
+    from ...edit.pins.corrected_motion import shot_of
+    from ...scene.animation_data.timing import scene_rate
+    from ...scene.character.corrected_keys import captured_points, source_frame
+
+    armature, scene = captured_armature(context), context.scene
+    assert armature is not None  # checked by poll
+    motion, current = captured_motion(armature), scene.frame_current + scene.frame_subframe
+    frame = source_frame(armature, motion, current, scene_rate(scene))
+    at = captured_points(armature, current, np.array(points, float))
+    u, v = (shot_of(motion).project(frame, point) for point in at)
+    return [(float(u[0]), float(u[1])), (float(v[0]), float(v[1]))]
+
+
+def _draw(line: list[tuple[float, float]], area: int) -> None:
+    if line and bpy.context.area is not None and bpy.context.area.as_pointer() == area:
+        draw_line(line, (1.0, 0.8, 0.2, 0.9))
+
+
+CLASSES = (SCOPE_OT_set_upright, SCOPE_OT_upright_line)

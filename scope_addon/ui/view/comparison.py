@@ -1,0 +1,145 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A viewport that shows a capture over its footage, and a second one beside it that shows the capture from its side.
+
+Views are not part of what Blender undoes and saves with a scene, so this state is read from the viewports themselves.
+"""
+
+from __future__ import annotations
+
+import bpy
+from mathutils import Matrix, Vector
+
+from ..captured_person import captured_armature
+
+_SIDE_HEIGHT_M = 2.6  # vertical extent of the side view
+_SENSOR_MM = 72.0  # a viewport shows the distance times this over its focal length, across its longer side
+_had_bones: dict[int, bool] = {}  # by viewport: whether it showed bones before the comparison
+
+
+def camera_of(scene: bpy.types.Scene) -> bpy.types.Object | None:
+    """Return the camera of the scene's last capture; None if there is none."""
+    collection = scene.scope.result.collection
+    return next((o for o in collection.all_objects if o.type == "CAMERA"), None) if collection else None
+
+
+def is_looking_through(context: bpy.types.Context) -> bool:
+    """Return whether the context's viewport shows only a capture, through its camera."""
+    space = context.space_data
+    return space is not None and space.type == "VIEW_3D" and looks_through(context.scene, space)
+
+
+def looks_through(scene: bpy.types.Scene, space: bpy.types.SpaceView3D) -> bool:
+    """Return whether a viewport shows only a capture, through its camera."""
+    if not space.local_view or space.region_3d.view_perspective != "CAMERA":
+        return False
+    return scene.camera is not None and scene.camera == camera_of(scene)
+
+
+def begin(context: bpy.types.Context, area: bpy.types.Area, collection: bpy.types.Collection) -> None:
+    """Show a capture over its footage in a viewport, without bones, which would cover the body."""
+    space = area.spaces.active
+    _show_alone(context, area, collection)
+    _had_bones[space.as_pointer()] = space.overlay.show_bones
+    space.overlay.show_bones = False
+    if space.region_3d.view_perspective != "CAMERA":
+        with _in(context.window, area):
+            bpy.ops.view3d.view_camera()
+
+
+def end(window: bpy.types.Window, area: bpy.types.Area) -> None:
+    """Show the scene in a viewport again as before the comparison."""
+    space = area.spaces.active
+    space.overlay.show_bones = _had_bones.pop(space.as_pointer(), True)  # unknown after the file was opened again
+    with _in(window, area):
+        if space.local_view:
+            bpy.ops.view3d.localview(frame_selected=False)
+        if space.region_3d.view_perspective == "CAMERA":
+            bpy.ops.view3d.view_camera()  # Blender's own toggle restores the previous view
+
+
+def side_area(screen: bpy.types.Screen) -> bpy.types.Area | None:
+    """Return the viewport with the side view; None if there is none."""
+    return next((area for area in screen.areas if area.type == "VIEW_3D" and _is_side(area.spaces.active)), None)
+
+
+def is_side_view(context: bpy.types.Context) -> bool:
+    """Return whether the context's viewport is the side view."""
+    space = context.space_data
+    return space is not None and space.type == "VIEW_3D" and _is_side(space)
+
+
+def _is_side(space: bpy.types.SpaceView3D) -> bool:
+    followed = space.lock_object
+    return bool(space.local_view and followed is not None and "scope_source" in followed)
+
+
+def open_side_view(context: bpy.types.Context, area: bpy.types.Area) -> None:
+    """Split a viewport, and show the capture from its side in the new one."""
+    window, screen = context.window, context.window.screen
+    before = {each.as_pointer() for each in screen.areas}
+    with _in(window, area):
+        bpy.ops.screen.area_split(direction="VERTICAL", factor=0.5)
+    side = next(each for each in screen.areas if each.as_pointer() not in before)
+    collection, camera = context.scene.scope.result.collection, camera_of(context.scene)
+    people = [o for o in collection.all_objects if "scope_source" in o]
+    active = captured_armature(context)
+    if camera is None or not people:
+        return
+    _show_alone(context, side, collection)
+    space = side.spaces.active
+    space.show_region_ui = space.show_region_toolbar = False
+    space.overlay.show_bones = space.overlay.show_extras = False
+    space.lock_object = active if active in people else people[0]
+    space.lock_bone = space.lock_object.data.bones[0].name
+    view = space.region_3d
+    view.view_perspective = "ORTHO"
+    view.view_rotation = _side_rotation(camera.matrix_world).to_quaternion()
+    span = _SIDE_HEIGHT_M * max(1.0, area.width / 2 / max(1, area.height))
+    view.view_distance = span * space.lens / _SENSOR_MM
+
+
+def close_side_view(window: bpy.types.Window, side: bpy.types.Area) -> None:
+    """Give the place of the side view back to the viewport that it was split from."""
+    with _in(window, side):
+        bpy.ops.screen.area_close()
+
+
+def _side_rotation(camera: Matrix) -> Matrix:
+    """Return the rotation (3, 3) of a view that is level and looks to the right of where a camera looks.
+
+    :param camera: (4, 4) world from camera, whose z points backwards.
+    """
+    back = -(camera.to_3x3() @ Vector((1.0, 0.0, 0.0)))
+    back.z = 0.0
+    if back.length < 1e-6:  # the camera lies on its side
+        back = Vector((-1.0, 0.0, 0.0))
+    back.normalize()
+    up = Vector((0.0, 0.0, 1.0))
+    return Matrix((up.cross(back), up, back)).transposed()
+
+
+def _show_alone(context: bpy.types.Context, area: bpy.types.Area, collection: bpy.types.Collection) -> None:
+    """Show only the capture in local view, because other objects could hide the footage or the body."""
+    from ...scene.visibility import show
+
+    selected, active = context.selected_objects, context.view_layer.objects.active
+    if active and active.mode != "OBJECT":
+        bpy.ops.object.mode_set(mode="OBJECT")
+    with _in(context.window, area):
+        if area.spaces.active.local_view:
+            bpy.ops.view3d.localview(frame_selected=False)
+        bpy.ops.object.select_all(action="DESELECT")
+        for obj in list(collection.all_objects):  # copied, because hiding and showing invalidates the iterator
+            if "scope_source" in obj:  # it may be hidden because of a retargeted rig
+                show(obj, context.view_layer, temporarily=True)
+            obj.select_set(True)
+        bpy.ops.view3d.localview(frame_selected=False)
+        bpy.ops.object.select_all(action="DESELECT")
+    for obj in selected:
+        obj.select_set(True)
+
+
+def _in(window: bpy.types.Window, area: bpy.types.Area) -> bpy.types.ContextTempOverride:
+    """Return the context of a viewport's main region."""
+    region = next(region for region in area.regions if region.type == "WINDOW")
+    return bpy.context.temp_override(window=window, area=area, region=region)

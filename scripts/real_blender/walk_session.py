@@ -1,0 +1,117 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The random walk inside Blender: one step per timer, so that the window is redrawn and other timers run in between.
+
+Usage: ``blender --python walk_session.py -- VIDEO FOLDER SEED STEPS``; ``walk.py`` starts it. A traceback that is
+printed or raised between two steps is a failure of the step before; an operator that reports an error is not. PyPI's
+bpy, which has no window and cannot undo, takes the same steps: ``python walk_session.py -- VIDEO FOLDER SEED STEPS``.
+"""
+
+from __future__ import annotations
+
+import faulthandler
+import json
+import os
+import random
+import sys
+import time
+import traceback
+from pathlib import Path
+
+import bpy
+
+sys.path.insert(0, str(Path(__file__).parent))
+import walk_steps
+from session import ARGUMENTS, OUT, show_tab
+
+SEED, COUNT = int(ARGUMENTS[2]), int(ARGUMENTS[3])
+PAUSE_S = 0.02
+OPENED_PAUSE_S = 0.5  # Blender crashes when a script chooses a tab before the new file's window is drawn
+MOST_OBJECTS = 60  # above which a step begins a new file
+
+
+class Walk:
+    """The state of the walk."""
+
+    def __init__(self) -> None:
+        self.random = random.Random(SEED)
+        self.steps = walk_steps.Steps(self.random, OUT, ARGUMENTS[0])
+        self.taken = 0
+        self.failures: list[str] = []
+        self.outcomes: dict[str, int] = {}
+        self.last = "start"
+        self.log = (OUT / "steps.log").open("w")
+        (OUT / "printed.log").touch()
+        self.printed = (OUT / "printed.log").open(errors="replace")
+        self.began = time.monotonic()
+
+    def advance(self) -> float | None:
+        """Take one step; Blender's timers call this."""
+        self.check_printed()
+        if not bpy.app.background:
+            show_tab()
+        if self.taken == COUNT:
+            self.end()
+        if self.taken == 0:
+            self.steps.prepare()
+        self.taken += 1
+        crowded = len(bpy.data.objects) > MOST_OBJECTS
+        step = self.steps.new_file() if crowded else self.steps.choose()
+        self.last = f"{self.taken} {step.text}"
+        self.log.write(f"{time.monotonic() - self.began:.1f} s: {self.last}")
+        self.log.flush()
+        try:
+            outcome = str(step.take())
+        except RuntimeError as error:  # reported by an operator
+            outcome = f"refused: {str(error).strip()}"
+            if "Traceback (most recent call last)" in outcome:
+                self.fail(outcome)
+        except Exception:
+            outcome = traceback.format_exc()
+            self.fail(outcome)
+        self.log.write(f" -> {outcome.replace(chr(10), ' | ')[:300]}\n")
+        self.log.flush()
+        key = step.text.split("(")[0] + (" refused" if outcome.startswith("refused") else "")
+        self.outcomes[key] = self.outcomes.get(key, 0) + 1
+        opened = step.text.startswith(("open(", "new file("))
+        return OPENED_PAUSE_S if opened else PAUSE_S
+
+    def check_printed(self) -> None:
+        """Read what Blender has printed since the last step: handlers, timers and panels print their tracebacks."""
+        sys.stdout.flush()
+        sys.stderr.flush()
+        text = self.printed.read()
+        if "Traceback (most recent call last)" in text:
+            self.fail(text[text.index("Traceback (most recent call last)") :])
+
+    def fail(self, text: str) -> None:
+        """Note a failure of the last step, once."""
+        if not any(failure.endswith(text[-300:]) for failure in self.failures):
+            self.failures.append(f"step {self.last}: {text}")
+
+    def end(self) -> None:
+        """Write the results and end Blender."""
+        seconds = round(time.monotonic() - self.began, 1)
+        results = {"seed": SEED, "steps": self.taken, "seconds": seconds, "failures": self.failures}
+        results["outcomes"] = dict(sorted(self.outcomes.items()))
+        (OUT / "results.json").write_text(json.dumps(results, indent=1))
+        self.log.close()
+        os._exit(1 if self.failures else 0)  # Blender's own exit can hang
+
+
+def in_module() -> None:
+    """Walk in PyPI's bpy, with the extension registered under its name in the shell."""
+    from scope.scope_addon import ui
+
+    ui.register()
+    walk = Walk()
+    while True:
+        walk.advance()
+
+
+faulthandler.enable()
+if bpy.app.background:
+    in_module()
+bpy.context.preferences.view.show_splash = False
+bpy.context.preferences.filepaths.use_auto_save_temporary_files = False
+walk = Walk()
+bpy.app.timers.register(walk.advance, first_interval=3.0, persistent=True)

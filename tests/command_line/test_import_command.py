@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""``scope import``: formats, report, warnings, and one sentence where a file cannot be used."""
+
+import json
+
+import numpy as np
+import pytest
+from scope.scope_addon.cli import main
+from scope.scope_addon.motion import Motion
+
+from ..edit.walking import motion_of, walk
+
+MOTION = motion_of(walk(0.5))
+
+
+@pytest.fixture
+def amass(tmp_path):
+    path = tmp_path / "walk.npz"
+    np.savez(path, poses=MOTION.poses, trans=MOTION.trans, mocap_frame_rate=np.array(60.0))
+    return path
+
+
+def test_the_outputs_and_the_report(amass, capfd):
+    outputs = [amass.with_name(name) for name in ("out.glb", "out.bvh", "out.blend", "out.npz")]
+    assert main(["import", str(amass), *(word for path in outputs for word in ("-o", str(path))), "--json"]) == 0
+    out, err = capfd.readouterr()
+    report = json.loads(out)
+    assert set(report["outputs"]) == {str(path) for path in outputs}
+    assert (report["body"], report["frames"], report["frame_rate"]) == ("scope", len(MOTION), 60.0)
+    assert all(path.stat().st_size > 1000 for path in outputs)
+    assert all(f"scope: warning: {note}" in err for note in report["warnings"])
+    np.testing.assert_allclose(Motion.load(outputs[-1]).poses, MOTION.poses, atol=1e-5)
+
+
+def test_without_an_output_a_glb_lies_beside_the_motion(amass):
+    assert main(["import", str(amass), "--quiet"]) == 0
+    assert amass.with_suffix(".glb").stat().st_size > 1000
+
+
+@pytest.mark.parametrize(
+    ("arguments", "status", "says"),
+    [
+        (["missing.npz"], 1, "does not exist"),
+        (["text.npz"], 1, "not a readable motion file"),
+        (["other.npz"], 1, "no SMPL-style motion"),
+        (["walk.npz", "-o", "out.xyz"], 2, ".xyz"),
+        (["walk.npz", "-o", "walk.npz"], 2, "is the input itself"),
+        (["walk.npz", "--up", "x"], 2, "--up"),
+        (["walk.npz", "--rate", "-1"], 2, "--rate must be from 0"),
+        (["walk.npz", "--rate", "nan"], 2, "--rate"),
+        (["walk.npz", "--body", "none.npz"], 1, "none.npz"),
+        (["walk.npz", "--bone-map", "bones.json"], 2, "--retarget"),
+        (["walk.npz", "--retarget", "rig.glb"], 1, "rig.glb"),
+        ([""], 2, "MOTION: the path is empty"),
+    ],
+)
+def test_errors_are_one_sentence_and_write_nothing(amass, monkeypatch, capfd, arguments, status, says):
+    monkeypatch.chdir(amass.parent)
+    (amass.parent / "text.npz").write_text("no motion")
+    np.savez(amass.parent / "other.npz", x=np.zeros(3))
+    before = sorted(amass.parent.iterdir())
+    assert main(["import", *arguments]) == status
+    err = capfd.readouterr().err
+    assert says in err
+    assert err.count("\n") == 1
+    assert sorted(amass.parent.iterdir()) == before

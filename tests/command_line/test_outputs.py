@@ -1,0 +1,35 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Where results lie that were given no place."""
+
+from pathlib import Path
+
+import pytest
+from scope.scope_addon.cli import SAMPLE
+from scope.scope_addon.command_line.outputs import default_outputs
+from scope.scope_addon.errors import UsageError
+
+
+def test_results_lie_next_to_the_footage(tmp_path):
+    assert default_outputs(tmp_path / "walk.mov") == [tmp_path / "walk.npz", tmp_path / "walk.glb"]
+    assert default_outputs(Path("take.1.mp4")) == [Path("take.1.npz"), Path("take.1.glb")]
+    link = tmp_path / "linked.mp4"
+    link.symlink_to(SAMPLE)
+    assert default_outputs(link) == [tmp_path / "linked.npz", tmp_path / "linked.glb"]
+
+
+@pytest.mark.parametrize("way", ["itself", "through a link", "with a detour"])
+def test_results_of_the_shipped_sample_lie_in_the_current_folder(tmp_path, monkeypatch, way):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "link").symlink_to(SAMPLE.parent)
+    sample = {
+        "itself": SAMPLE,
+        "through a link": tmp_path / "link" / SAMPLE.name,
+        "with a detour": SAMPLE.parent / ".." / "sample" / SAMPLE.name,
+    }[way]
+    assert [p.resolve() for p in default_outputs(sample)] == [tmp_path / "sample.npz", tmp_path / "sample.glb"]
+
+
+def test_a_current_folder_within_scopes_own_is_refused(monkeypatch):
+    monkeypatch.chdir(SAMPLE.parent)
+    with pytest.raises(UsageError, match="belongs to Scope .* choose an output with -o"):
+        default_outputs(Path(SAMPLE.name))

@@ -1,0 +1,157 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Solving a motion again around corrected frames, against a truth that was corrupted."""
+
+import numpy as np
+import pytest
+from scope.scope_addon.edit.clip import Clip
+from scope.scope_addon.edit.pins.corrections import Contact, Exchange, Pin
+from scope.scope_addon.edit.pins.solve_pins import Shot, missed, resolve
+from scope.scope_addon.edit.spans import swap_sides
+from scope.scope_addon.errors import UsageError
+from scope.solver.rotations import exp
+
+from ...made_motion import level_camera
+from ..walking import BETAS, BODY, NAMES, RATE, walk
+
+TRUTH = walk(3.0)
+T = len(TRUTH)
+SHOT = Shot(np.arange(T), TRUTH.times, level_camera(T), np.array([[900.0, 0, 320], [0, 900.0, 240], [0, 0, 1]]))
+JOINTS = TRUTH.joints(BODY, BETAS)
+FIRST, LAST = 30, 60  # the corrupted span
+ARM = [NAMES.index(f"left_{name}") for name in ("elbow", "wrist")]
+
+
+def corrupted(joints=("left_shoulder", "left_elbow")):
+    """The walk with an arm that turns away by 40 degrees and comes back."""
+    share = np.clip(1.6 * np.sin(np.pi * np.clip((np.arange(T) - FIRST) / (LAST - FIRST), 0, 1)), 0, 1)
+    rotations = TRUTH.rotations.copy()
+    for name, axis in zip(joints, ([0.4, 0.3, 0.5], [0.2, -0.5, 0.4]), strict=False):
+        rotations[:, NAMES.index(name)] = rotations[:, NAMES.index(name)] @ exp(share[:, None] * np.array(axis))
+    return Clip(TRUTH.times, rotations, TRUTH.root.copy())
+
+
+def pins(frames, names=("left_wrist",), image=True):
+    found = []
+    for frame in frames:
+        for name in names:
+            where = JOINTS[frame, NAMES.index(name)]
+            pixel = tuple(SHOT.project(frame, where)) if image else None
+            found.append(Pin(frame, name, pixel, None if image else tuple(where)))
+    return found
+
+
+def error(clip, joints=ARM):
+    """Mean distance from the truth over the corrupted span, metres."""
+    off = np.linalg.norm(clip.joints(BODY, BETAS) - JOINTS, axis=-1)
+    return off[FIRST : LAST + 1][:, joints].mean()
+
+
+def pixels(clip, joint):
+    """Mean distance from the truth in the image over the corrupted span, pixels."""
+    at = clip.joints(BODY, BETAS)[:, joint]
+    return np.mean(
+        [np.linalg.norm(SHOT.project(f, at[f]) - SHOT.project(f, JOINTS[f, joint])) for f in range(FIRST, LAST + 1)]
+    )
+
+
+@pytest.mark.parametrize(
+    ("frames", "left"), [((45,), 0.6), ((40, 50), 0.35), ((37, 45, 53), 0.25)], ids=["one", "two", "three"]
+)
+@pytest.mark.parametrize("image", [True, False], ids=["image", "space"])
+def test_pins_at_the_truth_correct_the_span_around_them(frames, left, image):
+    bad = corrupted()
+    wanted = pins(frames, ("left_elbow", "left_wrist"), image)
+    good = resolve(bad, BODY, BETAS, wanted, SHOT)
+    assert max(missed(good, BODY, BETAS, pin, SHOT) for pin in wanted) < (0.5 if image else 0.002)
+    if image:
+        assert pixels(good, ARM[1]) < left * pixels(bad, ARM[1])
+    else:
+        assert error(good) < left * error(bad)
+
+
+def test_other_limbs_and_other_frames_stay():
+    bad, pin = corrupted(), pins((45,))[0]
+    good = resolve(bad, BODY, BETAS, [pin], SHOT)
+    changed = np.flatnonzero((good.rotations != bad.rotations).any((1, 2, 3)) | (good.root != bad.root).any(1))
+    near = np.flatnonzero(np.abs(TRUTH.times - TRUTH.times[45]) < pin.reach)
+    assert set(changed) <= set(near)
+    assert len(changed) > 0.5 * len(near)
+    others = [k for k, name in enumerate(NAMES) if not name.startswith("left_") or "hip" in name or "knee" in name]
+    moved = np.linalg.norm(good.joints(BODY, BETAS) - bad.joints(BODY, BETAS), axis=-1)
+    assert moved[:, ARM[1]].max() > 0.1
+    assert moved[:, others].max() < 0.005
+
+
+def test_the_correction_begins_and_ends_without_a_jump_of_velocity():
+    bad = corrupted()
+    good = resolve(bad, BODY, BETAS, pins((45,)), SHOT)
+    change = (good.joints(BODY, BETAS) - bad.joints(BODY, BETAS))[:, ARM[1]]
+    speed = np.linalg.norm(np.diff(change, axis=0), axis=1) * RATE
+    moving = np.flatnonzero(speed > 0)
+    assert max(speed[moving[0]], speed[moving[-1]]) < 0.25 * speed.max()
+    assert np.linalg.norm(np.diff(change, 2, axis=0), axis=1).max() * RATE < speed.max()  # nor one in between
+
+
+def test_a_pin_at_the_joint_itself_changes_nothing():
+    still = resolve(TRUTH, BODY, BETAS, pins((45,), ("left_wrist", "right_knee", "head")), SHOT)
+    np.testing.assert_allclose(still.joints(BODY, BETAS), JOINTS, atol=2e-4)
+
+
+def test_a_dragged_pelvis_leaves_a_standing_foot_where_it_is():
+    still = Clip(TRUTH.times, np.repeat(TRUTH.rotations[:1], T, axis=0), np.repeat(TRUTH.root[:1], T, axis=0))
+    knees = [NAMES.index(name) for name in ("left_knee", "right_knee", "left_hip", "right_hip")]
+    for joint, angle in zip(knees, (0.8, 0.8, -0.4, -0.4), strict=True):
+        still.rotations[:, joint] = exp(np.array([angle, 0, 0]))
+    at = still.joints(BODY, BETAS)
+    pin = Pin(45, "pelvis", position=tuple(at[45, 0] + [0.03, 0.0, -0.06]))
+    moved = resolve(still, BODY, BETAS, [pin], SHOT)
+    assert missed(moved, BODY, BETAS, pin, SHOT) < 0.002
+    assert np.linalg.norm(moved.soles(BODY, BETAS) - still.soles(BODY, BETAS), axis=-1).max() < 0.01
+
+
+def test_several_limbs_at_once_all_meet_their_pins():
+    bad = corrupted()
+    at = bad.joints(BODY, BETAS)
+    wanted = [
+        Pin(frame, name, position=tuple(at[frame, NAMES.index(name)] + shift))
+        for frame, name, shift in (
+            (40, "left_wrist", [0.0, 0.1, 0.1]),
+            (46, "left_elbow", [0.0, 0.05, 0.0]),
+            (44, "right_wrist", [0.0, -0.1, 0.1]),
+            (44, "right_ankle", [0.0, 0.05, 0.05]),
+            (47, "head", [0.03, 0.0, 0.0]),
+        )
+    ]
+    good = resolve(bad, BODY, BETAS, wanted, SHOT)
+    assert max(missed(good, BODY, BETAS, pin, SHOT) for pin in wanted) < 0.005
+
+
+def test_a_foot_that_stands_stays_on_the_floor():
+    height = np.median(TRUTH.soles(BODY, BETAS)[50:63, :2, 2], axis=0).min() - 0.03  # 3 cm above the floor
+    clip = Clip(TRUTH.times, TRUTH.rotations.copy(), TRUTH.root - [0.0, 0.0, height])
+    fixed = resolve(clip, BODY, BETAS, [Contact(50, 62, "left")], SHOT)
+    soles = fixed.soles(BODY, BETAS)[50:63, :2]
+    assert np.linalg.norm(soles - soles[0], axis=-1).max() < 0.003
+    assert abs(soles[..., 2].min()) < 0.003
+    changed = np.flatnonzero((fixed.rotations != clip.rotations).any((1, 2, 3)))
+    assert changed[0] > 50 - 0.25 * RATE
+    assert changed[-1] < 62 + 0.25 * RATE
+
+
+def test_exchanged_sides_are_exchanged_before_pins():
+    swapped = swap_sides(TRUTH, BODY, TRUTH.times[30], TRUTH.times[50])
+    fixed = resolve(swapped, BODY, BETAS, [Exchange(30, 50)], SHOT)
+    np.testing.assert_allclose(fixed.rotations, TRUTH.rotations, atol=1e-12)
+    again = resolve(swapped, BODY, BETAS, [*pins((40,)), Exchange(30, 50)], SHOT)
+    np.testing.assert_allclose(again.joints(BODY, BETAS), JOINTS, atol=2e-4)
+
+
+def test_corrections_at_frames_without_keys_are_left_out():
+    half = Clip(TRUTH.times[:40], TRUTH.rotations[:40], TRUTH.root[:40])
+    same = resolve(half, BODY, BETAS, [*pins((80,)), Contact(80, 85, "right"), Exchange(80, 85)], SHOT)
+    np.testing.assert_array_equal(same.rotations, half.rotations)
+
+
+def test_an_unknown_joint_is_an_error_that_lists_the_joints():
+    with pytest.raises(UsageError, match=r"no joint 'left_paw'.*left_wrist"):
+        resolve(TRUTH, BODY, BETAS, [Pin(40, "left_paw", (1.0, 2.0))], SHOT)

@@ -1,0 +1,59 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A line that is upright corrects a tilted world."""
+
+import numpy as np
+import pytest
+from scope.scope_addon.edit.clip import clip_from_motion
+from scope.scope_addon.edit.pins.corrected_motion import shot_of, with_corrections
+from scope.scope_addon.edit.pins.corrections import Pin
+from scope.scope_addon.edit.pins.upright import moved_clip, moved_motion, upright_transform
+from scope.scope_addon.errors import UsageError
+from scope.solver.rotations import exp
+
+from ..walking import BODY, angle, motion_of, walk
+
+TRUTH = motion_of(walk(2.0), noise=0.02)
+POST = np.array([[0.4, 1.0, 0.2], [0.4, 1.0, 1.9]])  # two points of an upright post
+
+
+def rolled(degrees=8.0):
+    """The truth in a world that is tilted about the camera's line of sight, and the post's two pixels."""
+    tilt = np.eye(4)
+    tilt[:3, :3] = exp(np.radians([0.0, degrees, 0.0]))
+    line = tuple(tuple(shot_of(TRUTH).project(20, point)) for point in POST)
+    return moved_motion(TRUTH, BODY, tilt), line
+
+
+def test_an_upright_line_brings_the_true_up_back():
+    motion, line = rolled()
+    fixed = moved_motion(motion, BODY, upright_transform(motion, BODY, 20, line))
+    up = fixed.world_from_camera[0, :3, :3] @ TRUTH.world_from_camera[0, :3, :3].T
+    assert np.degrees(np.arccos(up[2, 2])) < 1  # one line leaves the tilt along it open
+    wrong = motion.world_from_camera[0, :3, :3] @ TRUTH.world_from_camera[0, :3, :3].T
+    assert np.degrees(np.arccos(wrong[2, 2])) > 7
+
+
+def test_the_body_stays_where_it_is_in_the_image_and_pins_move_along():
+    motion, line = rolled()
+    pin = Pin(30, "head", position=tuple(clip_from_motion(BODY, motion, raw=False).joints(BODY, motion.betas)[30, 15]))
+    motion = with_corrections(motion, BODY, (pin,))
+    transform = upright_transform(motion, BODY, 20, line)
+    fixed = moved_motion(motion, BODY, transform)
+    np.testing.assert_array_equal(fixed.joints_cam, motion.joints_cam)
+    clips = [clip_from_motion(BODY, m, raw=False) for m in (motion, fixed)]
+    for frame in (0, 30, 60):
+        at = [
+            shot_of(m).project(frame, c.joints(BODY, m.betas)[frame, 20])
+            for m, c in zip((motion, fixed), clips, strict=True)
+        ]
+        np.testing.assert_allclose(at[0], at[1], atol=0.1)
+    np.testing.assert_allclose(moved_clip(clips[0], transform).root, clips[1].root, atol=1e-5)
+    assert angle(moved_clip(clips[0], transform).rotations, clips[1].rotations).max() < 1e-5
+    restored = with_corrections(fixed, BODY, ())
+    np.testing.assert_allclose(restored.poses, moved_motion(with_corrections(motion, BODY, ()), BODY, transform).poses)
+
+
+@pytest.mark.parametrize(("line", "says"), [(((10, 10), (12, 11)), "shorter"), (((10, 10), (200, 12)), "from upright")])
+def test_a_line_that_cannot_be_upright_is_refused(line, says):
+    with pytest.raises(UsageError, match=says):
+        upright_transform(TRUTH, BODY, 20, line)

@@ -1,0 +1,77 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Moving feet by the legs: ankles arrive, feet keep their rotation, knees bend forwards."""
+
+import numpy as np
+import pytest
+from scope.scope_addon.kinematics.leg_reach import move_feet
+from scope.solver import rotations
+from scope.solver.loaders.body_file import load_body
+
+
+@pytest.fixture(scope="module")
+def body():
+    return load_body("scope")
+
+
+def moved(body, omega, shift):
+    """Part poses before and after."""
+    poses = body.forward_kinematics(omega, np.zeros((len(omega), 3)))
+    return poses, body.forward_kinematics(move_feet(body, omega, poses, shift), np.zeros((len(omega), 3)))
+
+
+def random_legs(body, count, seed):
+    rng = np.random.default_rng(seed)
+    vectors = 0.2 * rng.normal(size=(count, body.K + 1, 3))
+    for side in ("left", "right"):
+        vectors[:, body.joint_names.index(f"{side}_knee")] = 0.05 * rng.normal(size=(count, 3))
+        vectors[:, body.joint_names.index(f"{side}_knee"), 0] = rng.uniform(0.2, 1.5, count)
+    return rotations.exp(vectors)
+
+
+def test_ankles_arrive_and_everything_else_stays(body):
+    omega = random_legs(body, 40, 1)
+    shift = 0.02 * np.random.default_rng(2).normal(size=(40, 2, 3)) + [0, 0.06, 0]
+    (R, t), (R_new, t_new) = moved(body, omega, shift)
+    for side, name in enumerate(("left", "right")):
+        hip, knee, ankle, foot = (body.joint_names.index(f"{name}_{part}") for part in ("hip", "knee", "ankle", "foot"))
+        np.testing.assert_allclose(t_new[:, ankle], t[:, ankle] + shift[:, side], atol=2e-3)
+        np.testing.assert_allclose(R_new[:, [ankle, foot]], R[:, [ankle, foot]], atol=1e-9)
+        others = [k for k in range(body.K + 1) if k not in (knee, ankle, foot)]
+        legs = [body.joint_names.index(f"{s}_{p}") for s in ("left", "right") for p in ("knee", "ankle", "foot")]
+        np.testing.assert_allclose(
+            t_new[:, [k for k in others if k not in legs]], t[:, [k for k in others if k not in legs]]
+        )
+        np.testing.assert_allclose(
+            np.linalg.norm(t_new[:, knee] - t_new[:, hip], axis=1), np.linalg.norm(t[:, knee] - t[:, hip], axis=1)
+        )
+
+
+def test_straight_legs_bend_forwards(body):
+    omega = np.tile(np.eye(3), (1, body.K + 1, 1, 1))
+    for angle in (-0.05, 0.0, 0.05):  # knees that the noise of a fit turns sideways
+        for side in ("left", "right"):
+            omega[:, body.joint_names.index(f"{side}_knee")] = rotations.exp(np.array([0.02, 0.0, angle]))
+        (_, t), (_, t_new) = moved(body, omega, np.tile([0.0, 0.12, 0.0], (1, 2, 1)))
+        for side in ("left", "right"):
+            knee, ankle = (body.joint_names.index(f"{side}_{part}") for part in ("knee", "ankle"))
+            assert abs(t_new[0, ankle, 1] - t[0, ankle, 1] - 0.12) < 1e-3
+            forwards, sideways = (t_new - t)[0, knee, [2, 0]]
+            assert forwards > 0.15
+            assert abs(sideways) < 0.25 * forwards
+
+
+def test_a_goal_out_of_reach_stretches_the_leg_without_a_snap(body):
+    omega = random_legs(body, 30, 3)
+    (_, t), (_, t_new) = moved(body, omega, np.tile([0.0, -0.6, 0.0], (30, 2, 1)))
+    for side in ("left", "right"):
+        hip, knee, ankle = (body.joint_names.index(f"{side}_{part}") for part in ("hip", "knee", "ankle"))
+        bones = np.linalg.norm(t[:, knee] - t[:, hip], axis=1) + np.linalg.norm(t[:, ankle] - t[:, knee], axis=1)
+        reach = np.linalg.norm(t_new[:, ankle] - t_new[:, hip], axis=1) / bones
+        assert np.all(reach < 0.9951)
+        assert np.all(reach > 0.99)
+
+
+def test_no_shift_changes_nothing(body):
+    omega = random_legs(body, 5, 4)
+    poses = body.forward_kinematics(omega, np.zeros((5, 3)))
+    np.testing.assert_array_equal(move_feet(body, omega, poses, np.zeros((5, 2, 3))), omega)

@@ -1,0 +1,166 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Docstrings of public functions say what a caller cannot see: shapes of arrays, and errors.
+
+The source is parsed, not imported. A function's errors are those that it raises itself; in the solver, also those of
+the functions of its module, of private methods and of the checks in validation.py that it calls. What a constructor
+takes and raises may be said by the docstring of its class.
+"""
+
+import ast
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+SOLVER = ROOT / "solver"
+CHECKS = SOLVER / "validation.py"
+PACKAGES = (SOLVER, ROOT / "scope_addon")
+# (n,), (..., 3), (K+1, 3, P), (M', 3), (), ...: extents are numbers, n, m, capitals and what is added to them.
+EXTENT = r"(?:\.\.\.|\d*\s?(?:[A-Z][A-Z_]*'?|[nmT]|count|None)(?:\s?[+-]\s?\w)*|\d+(?:\s?\+\s?[A-Z])*)"
+SHAPE = re.compile(rf"\((?:|\.\.\.|{EXTENT},|{EXTENT}(?:, {EXTENT})+)\)")
+ARRAY = re.compile(r"\b(NDArray|ArrayLike|Array)\b")
+CONSTRUCTORS = ("__init__", "__post_init__")
+INTERNAL = {"AssertionError", "NotImplementedError"}  # mistakes in the program, which no caller handles
+KERNELS = {"kernel", "allocating_kernel", "inlined_kernel", "expanded_kernel", "intrinsic", "compiled"}
+
+
+@dataclass(frozen=True)
+class Function:
+    """A function or method: where it is, what it says and what it does."""
+
+    name: str
+    node: ast.FunctionDef
+    module: Path
+    owner: ast.ClassDef | None = None
+
+    @property
+    def doc(self) -> str:
+        own = ast.get_docstring(self.node) or ""
+        of_class = self.owner is not None and self.node.name in CONSTRUCTORS and ast.get_docstring(self.owner)
+        return f"{own}\n{of_class or ''}"
+
+    @property
+    def array_parameters(self) -> list[str]:
+        arguments = self.node.args
+        everything = [*arguments.posonlyargs, *arguments.args, *arguments.kwonlyargs]
+        return [a.arg for a in everything if a.annotation and ARRAY.search(ast.unparse(a.annotation))]
+
+    @property
+    def is_compiled(self) -> bool:
+        return any(isinstance(d, ast.Name) and d.id in KERNELS for d in self.node.decorator_list)
+
+
+def parse(path: Path) -> list[Function]:
+    """The module's functions and the methods of its classes, private ones included; no nested functions."""
+    found = []
+    for node in ast.parse(path.read_text(encoding="utf-8")).body:
+        if isinstance(node, ast.FunctionDef):
+            found.append(Function(node.name, node, path))
+        elif isinstance(node, ast.ClassDef):
+            methods = [n for n in node.body if isinstance(n, ast.FunctionDef)]
+            found += [Function(f"{node.name}.{n.name}", n, path, node) for n in methods]
+    return found
+
+
+def is_public(name: str) -> bool:
+    return all(not part.startswith("_") or part in CONSTRUCTORS for part in name.split("."))
+
+
+MODULES = {path: parse(path) for package in PACKAGES for path in sorted(package.rglob("*.py"))}
+PUBLIC = {
+    f"{path.relative_to(ROOT).with_suffix('')}:{f.name}": f
+    for path, functions in MODULES.items()
+    for f in functions
+    if is_public(f.name) and not f.is_compiled
+}
+
+
+def base_classes() -> dict[str, set[str]]:
+    """The direct base classes of every error of ours, by name."""
+    classes = [
+        node
+        for path in MODULES
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.ClassDef) and node.name.endswith("Error")
+    ]
+    return {node.name: {ast.unparse(base) for base in node.bases} for node in classes}
+
+
+BASES = base_classes()
+
+
+def with_bases(error: str) -> set[str]:
+    """An error's name and those of all its base classes that are ours, with Python's directly above them."""
+    return {error}.union(*(with_bases(base) for base in BASES.get(error, ())))
+
+
+def last_name(node: ast.expr) -> str:
+    """The name of a class or function, without the module or object before it."""
+    return node.id if isinstance(node, ast.Name) else node.attr if isinstance(node, ast.Attribute) else ""
+
+
+def caught_by(handler: ast.ExceptHandler) -> set[str]:
+    kinds = handler.type.elts if isinstance(handler.type, ast.Tuple) else [handler.type] if handler.type else []
+    return {last_name(kind) for kind in kinds}
+
+
+def raised_directly(node: ast.AST, caught: frozenset[str] = frozenset()) -> set[str]:
+    """The names of the errors that statements below a node raise and do not catch."""
+    errors = set()
+    if isinstance(node, ast.Raise) and isinstance(node.exc, ast.Call):
+        name = last_name(node.exc.func)
+        errors = {name} if name[:1].isupper() and name not in INTERNAL and not with_bases(name) & caught else set()
+    if isinstance(node, ast.Try):
+        inside = caught.union(*map(caught_by, node.handlers))
+        rest = [*node.handlers, *node.orelse, *node.finalbody]
+        return set().union(
+            *(raised_directly(n, inside) for n in node.body), *(raised_directly(n, caught) for n in rest)
+        )
+    return errors.union(*(raised_directly(child, caught) for child in ast.iter_child_nodes(node)))
+
+
+def raised(function: Function, seen: frozenset[str] = frozenset()) -> set[str]:
+    """The names of the errors that a function raises, as described above."""
+    errors = raised_directly(function.node)
+    if not function.module.is_relative_to(SOLVER):
+        return errors
+    for node in ast.walk(function.node):
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name | ast.Attribute):
+            called = last_name(node.func)
+            if called in seen:
+                continue
+            if isinstance(node.func, ast.Name):
+                others = [f for f in MODULES[function.module] + MODULES[CHECKS] if f.name == called]
+            else:
+                others = [f for f in MODULES[function.module] if called[0] == "_" and f.name.endswith(f".{called}")]
+            for other in others:
+                errors |= raised(other, seen | {called})
+    return errors
+
+
+def test_the_parser_finds_shapes_and_errors() -> None:
+    for text in ("(n,)", "(..., 3, 3)", "(K+1, 3, P)", "(M', 3)", "(...)", "(n, 8 + W)", "(count, 3, 3)", "(None, 3)"):
+        assert SHAPE.search(text), text
+    for text in ("exp(phi)", "(see below)", "(x, y, z)", "f(a, b)"):
+        assert not SHAPE.search(text), text
+    assert raised(PUBLIC["solver/rotations:exp"]) == {"ShapeError"}
+    assert raised(PUBLIC["solver/validation:check_weight"]) == {"InvalidValueError"}
+    assert raised(PUBLIC["scope_addon/job/batch:Batch.__init__"]) == {"InputError", "OutputError"}
+    assert raised(PUBLIC["scope_addon/cli:main"]) == set()  # it prints what it catches
+    assert sum(name.startswith("solver/") for name in PUBLIC) > 100
+    assert len(PUBLIC) > 800
+
+
+@pytest.mark.parametrize("name", [name for name, f in PUBLIC.items() if f.array_parameters])
+def test_docstrings_give_the_shapes_of_arrays(name: str) -> None:
+    function = PUBLIC[name]
+    shapes = len(SHAPE.findall(function.doc))
+    assert shapes >= len(function.array_parameters), (function.array_parameters, function.doc)
+
+
+@pytest.mark.parametrize("name", [name for name, f in PUBLIC.items() if raised(f)])
+def test_docstrings_name_the_errors(name: str) -> None:
+    documented = set(re.findall(r":raises (\w+):", PUBLIC[name].doc))
+    assert [error for error in raised(PUBLIC[name]) if not with_bases(error) & documented] == []

@@ -1,0 +1,159 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A .blend file that carries its motions: saved, appended, linked, duplicated, renamed, deleted, undone, hostile."""
+
+import io
+import zipfile
+
+import bpy
+import numpy as np
+import pytest
+from scope.scope_addon.errors import MotionFileError, UsageError
+from scope.scope_addon.motion import Motion
+from scope.scope_addon.scene.build import build_scene
+from scope.scope_addon.scene.export.export import export_motions
+from scope.scope_addon.scene.packed_motion import MOTION, pack_motion, stored_motion
+
+from .conftest import dance
+
+
+@pytest.fixture
+def people(body):
+    """Two captured people, each with a motion."""
+    motions = [dance(body), dance(body, count=7)]
+    result = build_scene(motions, body)
+    for person in result.people:
+        pack_motion(person.armature, person.motion.to_bytes())
+    return [(person.armature, person.motion) for person in result.people]
+
+
+def assert_same(got: Motion, expected: Motion) -> None:
+    for name, value in vars(expected).items():
+        np.testing.assert_array_equal(getattr(got, name), value, err_msg=name)
+
+
+def saved(tmp_path) -> str:
+    path = str(tmp_path / "saved.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    return path
+
+
+def load(path, names, *, link):
+    with bpy.data.libraries.load(path, link=link) as (_, wanted):
+        wanted.objects = list(names)
+    return wanted.objects
+
+
+def test_everyone_has_their_own_motion_after_saving_and_opening(people, tmp_path):
+    expected = {armature.name: motion for armature, motion in people}
+    bpy.ops.wm.open_mainfile(filepath=saved(tmp_path))
+    assert len(bpy.data.texts) == len(expected) == 2
+    for name, motion in expected.items():
+        assert_same(stored_motion(bpy.data.objects[name]), motion)
+
+
+@pytest.mark.parametrize("link", [False, True])
+def test_append_and_link_bring_the_motion_along(people, tmp_path, link):
+    (armature, motion), name = people[0], people[0][0].name
+    del armature
+    (got,) = load(saved(tmp_path), [name], link=link)
+    assert (got.library is not None) == link
+    assert_same(stored_motion(got), motion)
+
+
+def test_a_library_override_reads_the_motion_of_its_library(people, tmp_path):
+    name, motion = people[0][0].name, people[0][1]
+    (linked,) = load(saved(tmp_path), [name], link=True)
+    override = linked.override_create()
+    assert override.override_library is not None
+    assert_same(stored_motion(override), motion)
+
+
+def test_duplicates_share_the_motion_and_keep_it(people, tmp_path):
+    armature, motion = people[0]
+    copy = armature.copy()
+    bpy.context.scene.collection.objects.link(copy)
+    assert len(bpy.data.texts) == 2
+    armature.name, copy.name = "renamed", "copied"
+    assert_same(stored_motion(copy), motion)
+    pack_motion(armature, people[1][1].to_bytes())
+    assert_same(stored_motion(copy), motion)
+    assert_same(stored_motion(armature), people[1][1])
+    bpy.data.objects.remove(armature)
+    bpy.ops.wm.open_mainfile(filepath=saved(tmp_path))
+    assert_same(stored_motion(bpy.data.objects["copied"]), motion)
+
+
+def test_the_motion_is_deleted_with_the_last_armature(people, tmp_path):
+    for armature, _ in people:
+        bpy.data.objects.remove(armature)
+    bpy.ops.wm.open_mainfile(filepath=saved(tmp_path))
+    assert len(bpy.data.texts) == 0
+
+
+def test_storing_another_motion_leaves_no_text_behind(people):
+    armature = people[0][0]
+    pack_motion(armature, people[1][1].to_bytes())
+    assert len(bpy.data.texts) == 2
+    assert_same(stored_motion(armature), people[1][1])
+
+
+def test_a_blend_file_from_the_shell_carries_its_motion(body, tmp_path):
+    motion = dance(body)
+    export_motions([motion], body, [tmp_path / "walk.blend", tmp_path / "walk.glb"])
+    assert len(bpy.data.texts) == 0
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "walk.blend"))
+    armature = next(obj for obj in bpy.data.objects if "scope_source" in obj)
+    assert_same(stored_motion(armature), motion)
+
+
+def test_a_file_that_only_has_a_path_still_works(people, tmp_path):
+    armature, motion = people[0]
+    motion.save(tmp_path / "person1.npz")
+    armature[MOTION] = str(tmp_path / "person1.npz")
+    assert_same(stored_motion(armature), motion)
+    (tmp_path / "person1.npz").unlink()
+    with pytest.raises(UsageError, match="neither in this .blend file nor in the cache"):
+        stored_motion(armature)
+
+
+def bomb() -> bytes:
+    """An archive that claims to unpack to more than memory holds."""
+    file = io.BytesIO()
+    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
+        header = b"\x93NUMPY\x01\x00\x76\x00" + b"{'descr': '<f8', 'fortran_order': False, 'shape': (1000000000000,), }"
+        archive.writestr("poses.npy", header.ljust(127) + b"\n")
+    return file.getvalue()
+
+
+def pickled() -> bytes:
+    file = io.BytesIO()
+    np.savez(file, poses=np.array([{}], object))
+    return file.getvalue()
+
+
+@pytest.mark.parametrize(
+    "content", [b"", b"PK\x03\x04 no zip", bomb(), pickled(), "text", 7, [1, 2], {"a": 1}], ids=range(8)
+)
+def test_hostile_content_is_an_error(people, content):
+    armature = people[0][0]
+    armature[MOTION]["motion"] = content
+    with pytest.raises(MotionFileError, match=f"text '{armature.name} motion'"):
+        stored_motion(armature)
+
+
+def test_a_removed_text_is_an_error(people):
+    armature = people[0][0]
+    bpy.data.texts.remove(armature[MOTION])
+    with pytest.raises(UsageError, match="import its .npz file"):
+        stored_motion(armature)
+
+
+@pytest.mark.parametrize("value", [None, 5, "/etc", [1.0, 2.0]])
+def test_an_armature_without_a_motion_is_an_error(people, value):
+    armature = people[0][0]
+    del armature[MOTION]
+    if value is not None:
+        armature[MOTION] = value
+    with pytest.raises(UsageError, match="capture the footage again"):
+        stored_motion(armature)

@@ -1,0 +1,158 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The list of captures: one result each, which survives whatever is done to the collection and its armatures."""
+
+import bpy
+import pytest
+from scope.scope_addon.ui.capture.captures import captures_of, people_of, shown_capture
+from scope.scope_addon.ui.captured_person import PERSON, captured_armature
+
+
+def capture(fake_worker, footage, people=1, warnings=("a warning",)):
+    fake_worker(f"finish(people={people}, warnings={list(warnings)})")
+    bpy.context.scene.scope.footage = str(footage)
+    assert bpy.ops.scope.capture() == {"FINISHED"}
+    return shown_capture(bpy.context.scene)
+
+
+@pytest.fixture
+def two(fake_worker, footage):
+    """Two captures, of one person and of two, by name."""
+    first = capture(fake_worker, footage, 1, ["first"])
+    other = footage.with_name("other.png")
+    footage.rename(other)
+    second = capture(fake_worker, other, 2, ["second"])
+    return first.name, second.name
+
+
+def shown() -> tuple[str, int, str]:
+    result = bpy.context.scene.scope.result
+    return result.collection.name, result.people, result.warnings[0].text
+
+
+def select(name: str) -> None:
+    settings = bpy.context.scene.scope
+    settings.capture_index = bpy.data.collections.find(name)
+
+
+def listed() -> list[str]:
+    """Names of the captures that the list would draw."""
+    fake = type("List", (), {"filter_name": "", "bitflag_filter_item": 1})()
+    flags, _ = bpy.types.SCOPE_UL_captures.filter_items(fake, bpy.context, bpy.data, "collections")
+    return [each.name for each, flag in zip(bpy.data.collections, flags, strict=True) if flag]
+
+
+def test_each_capture_keeps_its_result(two):
+    assert shown() == ("other", 2, "Second")
+    select("person")
+    assert shown() == ("person", 1, "First")
+    assert bpy.context.scene.scope.result.footage.endswith("person.png")
+    assert listed() == ["other", "person"]
+
+
+def test_comparison_and_active_person_follow_the_selection(two):
+    bpy.context.view_layer.objects.active = None
+    select("person")
+    assert captured_armature(bpy.context).name == "person"
+    bpy.ops.scope.look_through()
+    assert bpy.context.scene.camera.name == "person_camera"
+    select("other")
+    bpy.ops.scope.look_through()
+    assert bpy.context.scene.camera.name == "other_camera"
+
+
+def test_selection_and_results_survive_saving_and_opening(two, tmp_path):
+    select("person")
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "saved.blend"))
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "saved.blend"))
+    assert shown() == ("person", 1, "First")
+    select("other")
+    assert shown() == ("other", 2, "Second")
+
+
+def test_undoing_a_capture_shows_the_previous_result(fake_worker, footage):
+    capture(fake_worker, footage, 1, ["first"])
+    bpy.ops.ed.undo_push(message="first")
+    other = footage.with_name("other.png")
+    footage.rename(other)
+    capture(fake_worker, other, 2, ["second"])
+    bpy.ops.ed.undo_push(message="second")
+    bpy.ops.ed.undo()
+    assert shown() == ("person", 1, "First")
+    assert listed() == ["person"]
+    bpy.ops.ed.redo()
+    assert shown() == ("other", 2, "Second")
+    assert listed() == ["other", "person"]
+
+
+def test_renaming_breaks_nothing(two):
+    select("person")
+    collection = bpy.data.collections["person"]
+    collection.name, bpy.data.objects["person"].name = "zzz", "hero"  # the collections are sorted by name
+    bpy.data.collections["other"].name = "person"
+    assert shown() == ("zzz", 1, "First")
+    assert [obj.name for obj in people_of(collection)] == ["hero"]
+    assert bpy.ops.scope.smooth(strength=2.0) == {"FINISHED"}
+
+
+def test_duplicating_an_armature_breaks_nothing(two):
+    select("person")
+    copy = bpy.data.objects["person"].copy()
+    bpy.data.collections["person"].objects.link(copy)
+    assert shown() == ("person", 1, "First")
+    bpy.context.view_layer.objects.active = copy
+    assert captured_armature(bpy.context) == copy
+    assert bpy.ops.scope.smooth(strength=0.0) == {"FINISHED"}
+
+
+def test_deleting_armature_and_collection(two):
+    select("person")
+    bpy.data.objects.remove(bpy.data.objects["person"])
+    assert people_of(bpy.data.collections["person"]) == []
+    assert shown() == ("person", 1, "First")
+    bpy.data.collections.remove(bpy.data.collections["person"])
+    assert shown() == ("other", 2, "Second")
+    bpy.data.collections.remove(bpy.data.collections["other"])
+    assert not bpy.types.SCOPE_PT_result.poll(bpy.context)
+    assert bpy.context.scene.scope.result.collection is None
+    assert listed() == []
+
+
+def test_a_capture_from_the_command_line_is_listed_without_figures(body, standing, tmp_path):
+    from scope.scope_addon.scene.export.export import export_motions
+
+    export_motions([standing], body, [tmp_path / "walk.blend"])
+    with bpy.data.libraries.load(str(tmp_path / "walk.blend")) as (source, wanted):
+        wanted.collections = source.collections
+    for each in wanted.collections:
+        bpy.context.scene.collection.children.link(each)
+    assert bpy.types.SCOPE_PT_result.poll(bpy.context)
+    assert bpy.context.scene.scope.result.frames == 0
+    assert bpy.ops.scope.look_through() == {"FINISHED"}
+    assert bpy.context.scene.render.resolution_x == 640
+
+
+def test_an_appended_capture_brings_its_result(two, tmp_path):
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "saved.blend"))
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    with bpy.data.libraries.load(str(tmp_path / "saved.blend")) as (_, wanted):
+        wanted.collections = ["person"]
+    bpy.context.scene.collection.children.link(wanted.collections[0])
+    assert shown() == ("person", 1, "First")
+    assert len(captures_of(bpy.context.scene)) == 1
+
+
+def test_a_rig_finds_its_person_after_renaming(two):
+    rig = bpy.data.objects.new("rig", bpy.data.armatures.new("rig"))
+    bpy.context.scene.collection.objects.link(rig)
+    person = bpy.data.objects["person"]
+    rig[PERSON] = person
+    person.name = "hero"
+    bpy.context.view_layer.objects.active = rig
+    assert captured_armature(bpy.context) == person
+    rig[PERSON] = "hero"  # as older files store it
+    assert captured_armature(bpy.context) == person
+    rig[PERSON] = person
+    bpy.context.scene.scope.capture = bpy.data.collections["person"]
+    bpy.data.collections["person"].objects.unlink(person)
+    assert captured_armature(bpy.context) != person

@@ -1,0 +1,159 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Corrections through Blender's operators, checked in the evaluated scene."""
+
+import bpy
+import numpy as np
+import pytest
+from bpy_extras.object_utils import world_to_camera_view
+from mathutils import Vector
+from scope.scope_addon.scene.animation_data.actions import fcurves, read_keys
+from scope.scope_addon.ui.captured_person import captured_motion
+from scope.scope_addon.ui.pins.corrected_person import listed_corrections
+
+from ...edit.walking import NAMES, motion_of, walk
+from ...scene import made_rigs
+from ...scene.made_rigs import captured
+
+FRAME = 46  # of the scene; the footage's frame 45, as the capture starts at frame 1
+WRIST, ANKLE = NAMES.index("left_wrist"), NAMES.index("right_ankle")
+
+
+@pytest.fixture
+def rig(tmp_path):
+    """A captured walk, with its motion file."""
+    armature = captured(motion := motion_of(walk(3.0), noise=0.05))
+    motion.save(tmp_path / "person1.npz")
+    armature["scope_motion"], armature["scope_body_file"] = str(tmp_path / "person1.npz"), "scope"
+    scene = bpy.context.scene
+    scene.camera = next(o for o in scene.objects if o.type == "CAMERA")
+    scene.render.resolution_x, scene.render.resolution_y = 640, 480
+    scene.frame_set(FRAME)
+    return armature
+
+
+def seen(rig, frames=(FRAME,)):
+    return made_rigs.seen(rig, NAMES, frames)
+
+
+def keys(rig):
+    return {(c.data_path, c.array_index): read_keys(c) for c in fcurves(rig)}
+
+
+def in_image(place):
+    x, y, _ = world_to_camera_view(bpy.context.scene, bpy.context.scene.camera, Vector(place))
+    return np.array([x * 640, y * 480])
+
+
+def test_a_pin_in_space_is_met_and_other_keys_stay(rig):
+    before, old = seen(rig)[0], keys(rig)
+    target = before[WRIST] + [0.1, 0.05, 0.15]
+    bpy.ops.scope.add_pin(joint="left_wrist", location=target)
+    assert np.linalg.norm(seen(rig)[0, WRIST] - target) < 0.01
+    assert np.linalg.norm(seen(rig)[0, ANKLE] - before[ANKLE]) < 0.01
+    for curve, new in keys(rig).items():
+        far = np.abs(new[:, 0] - FRAME) > 0.4 * 30
+        np.testing.assert_array_equal(new[far], old[curve][far])
+    assert bpy.context.scene.frame_current == FRAME
+
+
+def test_a_pin_in_the_image_is_met_whatever_the_smoothing(rig):
+    target = seen(rig)[0, WRIST] + [0.12, 0.0, 0.1]
+    bpy.ops.scope.add_pin(joint="left_wrist", location=target, in_image=True)
+    pixel = in_image(target)
+    for strength in (None, 0.0, 2.5, 1.0):
+        if strength is not None:
+            bpy.ops.scope.smooth(strength=strength)
+        assert np.linalg.norm(in_image(seen(rig)[0, WRIST]) - pixel) < 2.0
+    motion = captured_motion(rig)
+    assert motion.corrections["pin_joints"].tolist() == ["left_wrist"]
+    assert np.isfinite(motion.corrections["pin_uv"]).all()
+
+
+def test_removing_pins_restores_the_motion_in_any_order(rig):
+    frames = range(20, 75, 3)
+    before = seen(rig, frames)
+    bpy.ops.scope.add_pin(joint="left_wrist", frame=FRAME, location=before[9, WRIST] + [0.1, 0.05, 0.15])
+    bpy.ops.scope.add_pin(joint="right_ankle", frame=FRAME + 6, location=seen(rig, [FRAME + 6])[0, ANKLE] + [0, 0.1, 0])
+    assert [(e["text"], e["first"]) for e in listed_corrections(rig)] == [
+        ("Left Wrist", FRAME),
+        ("Right Ankle", FRAME + 6),
+    ]
+    bpy.ops.scope.smooth(strength=2.5)
+    bpy.ops.scope.remove_correction(index=0)
+    bpy.ops.scope.remove_correction(index=0)
+    assert listed_corrections(rig) == []
+    bpy.ops.scope.smooth(strength=1.0)
+    np.testing.assert_allclose(seen(rig, frames), before, atol=1e-5)
+
+
+def test_the_list_is_in_the_order_that_numbers_refer_to(rig):
+    target = seen(rig)[0, WRIST] + [0.1, 0.05, 0.15]
+    bpy.ops.scope.foot_stands(start=60, end=63, foot="right")
+    bpy.ops.scope.add_pin(joint="left_wrist", location=target)
+    assert [e["kind"] for e in listed_corrections(rig)] == ["PIN", "CONTACT"]
+    bpy.ops.scope.remove_correction(index=1)
+    assert [e["text"] for e in listed_corrections(rig)] == ["Left Wrist"]
+    assert np.linalg.norm(seen(rig)[0, WRIST] - target) < 0.01
+    bpy.ops.scope.remove_correction()
+    assert listed_corrections(rig) == []
+
+
+@pytest.mark.parametrize("mode", ["OBJECT", "IN_PLACE"])
+def test_a_pin_is_met_with_the_root_motion_on_an_object_and_stays_when_it_moves_back(rig, mode):
+    bpy.ops.scope.root_motion(mode=mode)
+    before = seen(rig)[0]
+    target = before[WRIST] + [0.1, 0.05, 0.15]
+    bpy.ops.scope.add_pin(joint="left_wrist", location=target)
+    assert np.linalg.norm(seen(rig)[0, WRIST] - target) < 0.01
+    assert np.linalg.norm(seen(rig)[0, ANKLE] - before[ANKLE]) < 0.01
+
+
+def test_a_pin_on_edited_keys_is_met_where_it_was_placed(rig):
+    bpy.ops.scope.refloor()
+    bpy.ops.scope.interpolate_span(start=40, end=52)
+    target = seen(rig)[0, WRIST] + [0.1, 0.05, 0.1]
+    bpy.ops.scope.add_pin(joint="left_wrist", location=target)
+    assert np.linalg.norm(seen(rig)[0, WRIST] - target) < 0.01
+
+
+def test_an_exchange_swaps_the_sides_and_once_more_swaps_them_back(rig):
+    left, right = NAMES.index("left_knee"), NAMES.index("right_knee")
+    before = seen(rig, [40, 46, 70])
+    bpy.ops.scope.exchange_sides(start=40, end=52)
+    after = seen(rig, [40, 46, 70])
+    np.testing.assert_allclose(after[2], before[2], atol=1e-6)
+    assert abs((after[1, left] - after[1, right])[1] + (before[1, left] - before[1, right])[1]) < 0.02
+    bpy.ops.scope.exchange_sides(start=40, end=52)
+    np.testing.assert_allclose(seen(rig, [40, 46, 70]), before, atol=1e-5)
+    assert listed_corrections(rig) == []
+
+
+def test_a_foot_that_stands_is_at_rest(rig):
+    left = NAMES.index("left_ankle")
+    moved = np.ptp(seen(rig, range(46, 54))[:, left], axis=0).max()
+    bpy.ops.scope.foot_stands(start=46, end=53, foot="left")
+    assert np.ptp(seen(rig, range(46, 54))[:, left], axis=0).max() < 0.2 * moved
+
+
+def test_a_failure_changes_nothing(rig, monkeypatch):
+    before, path = keys(rig), rig["scope_motion"]
+    for arguments, message in (
+        ({"joint": "left_paw"}, "no joint 'left_paw'"),
+        ({"joint": "head", "frame": 500}, "outside of the captured motion"),
+    ):
+        with pytest.raises(RuntimeError, match=message):
+            bpy.ops.scope.add_pin(location=(0, 0, 1), **arguments)
+
+    def fail(*_):
+        raise OSError("no room")
+
+    monkeypatch.setattr("scope.scope_addon.motion.Motion.to_bytes", fail)
+    with pytest.raises(RuntimeError, match="No room"):
+        bpy.ops.scope.add_pin(joint="head", location=(0, 0, 2))
+    with pytest.raises(RuntimeError, match="no correction 3"):
+        bpy.ops.scope.remove_correction(index=3)
+    assert rig["scope_motion"] == path
+    assert listed_corrections(rig) == []
+    assert bpy.context.scene.frame_current == FRAME
+    for curve, now in keys(rig).items():
+        np.testing.assert_array_equal(now, before[curve])

@@ -1,0 +1,48 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The view over the footage and the one from the side, as far as a Blender without a window has them."""
+
+import bpy
+import numpy as np
+import pytest
+from mathutils import Euler, Matrix
+from scope.scope_addon.ui.view import comparison
+
+
+@pytest.mark.parametrize("heading", [0.0, 0.7, 3.0])
+@pytest.mark.parametrize("tilt", [0.0, -0.5, 0.4])
+def test_the_side_view_is_level_and_looks_across_the_cameras_view(heading, tilt):
+    camera = Euler((np.pi / 2 + tilt, 0.0, heading)).to_matrix().to_4x4()
+    side = np.array(comparison._side_rotation(camera))
+    np.testing.assert_allclose(side @ side.T, np.eye(3), atol=1e-6)
+    assert np.linalg.det(side) == pytest.approx(1.0)
+    looks, up = -side[:, 2], side[:, 1]
+    np.testing.assert_allclose(up, [0, 0, 1], atol=1e-6)
+    forward = -np.array(camera.col[2])[:3]
+    assert abs(looks @ forward) < 1e-6
+    np.testing.assert_allclose(looks, np.array(camera.col[0])[:3], atol=1e-6)  # to the right of the camera's view
+
+
+def test_a_camera_that_looks_along_its_side_still_gives_a_view():
+    on_its_side = Matrix.Rotation(np.pi / 2, 4, "Y")  # its x points down
+    side = np.array(comparison._side_rotation(on_its_side))
+    np.testing.assert_allclose(side @ side.T, np.eye(3), atol=1e-6)
+
+
+def test_the_side_view_needs_the_view_over_the_footage():
+    with pytest.raises(RuntimeError, match="Compare with Footage first"):
+        bpy.ops.scope.side_view()
+
+
+def test_bones_are_hidden_in_the_view_and_shown_again_after_it():
+    bpy.ops.wm.read_homefile(use_factory_startup=True)
+    window = bpy.context.window_manager.windows[0]
+    area = next(each for each in window.screen.areas if each.type == "VIEW_3D")
+    overlay, collection = area.spaces.active.overlay, bpy.data.collections.new("capture")
+    bpy.context.scene.collection.children.link(collection)
+    for shown in (True, False):
+        overlay.show_bones = shown
+        with bpy.context.temp_override(window=window, area=area):
+            comparison.begin(bpy.context, area, collection)
+            assert not overlay.show_bones
+            comparison.end(window, area)
+        assert overlay.show_bones is shown
