@@ -7,10 +7,12 @@ from typing import TYPE_CHECKING
 
 import bpy
 
+from ..footage import shown
+
 
 def sentence(error: Exception | str) -> str:
     """Return an error's message with a capital first letter, as the panel shows it."""
-    text = str(error).strip() or type(error).__name__
+    text = shown(str(error).strip()) or type(error).__name__
     return text[:1].upper() + text[1:]
 
 

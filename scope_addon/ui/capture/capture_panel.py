@@ -8,6 +8,7 @@ from pathlib import Path
 
 import bpy
 
+from ...footage import shown
 from ...job.progress import JobProgress, duration
 from .. import warm_up
 from ..export_operators import FORMATS, is_available
@@ -167,7 +168,7 @@ class SCOPE_PT_result(Tab, bpy.types.Panel):
 def _draw_figures(layout: bpy.types.UILayout, result: bpy.types.PropertyGroup) -> None:
     """Draw footage, people, frames and error. A .blend file written by the command line has no figures."""
     column = layout.column(align=True)
-    column.label(text=Path(result.footage).name or result.collection.name, icon="FILE_MOVIE")
+    column.label(text=shown(Path(result.footage).name) or result.collection.name, icon="FILE_MOVIE")
     people = people_of(result.collection)
     column.label(
         text=counted(len(people), "person", "people") if people else "The captured person was deleted",

@@ -4,6 +4,7 @@
 import json
 import os
 import signal
+import sys
 import time
 from types import SimpleNamespace
 
@@ -351,6 +352,22 @@ def test_the_sample_exists():
     bpy.ops.scope.use_sample()
     assert bpy.context.scene.scope.footage == str(SAMPLE)
     assert SAMPLE.is_file()
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="file names are Unicode on this system")
+def test_footage_whose_name_is_not_utf8(fake_worker, footage, tmp_path):
+    fake_worker("send('progress', stage=request['footage'], done=0, total=0)\nfinish()")
+    renamed = footage.rename(tmp_path / os.fsdecode(b"caf\xe9.png"))
+    settings = bpy.context.scene.scope
+    settings.footage = str(renamed)
+    assert bpy.ops.scope.capture() == {"FINISHED"}
+    assert settings.result.footage == str(renamed)
+    assert "caf\N{REPLACEMENT CHARACTER}" in captures()[0].name
+    settings.footage = str(tmp_path / os.fsdecode(b"\xe9.mp4"))
+    with pytest.raises(RuntimeError, match="does not exist"):
+        bpy.ops.scope.capture()
+    assert "does not exist" in state.message
+    state.message.encode()
 
 
 def window_with_sidebar(category="Scope", width=200):
