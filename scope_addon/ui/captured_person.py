@@ -101,7 +101,7 @@ def betas_of(armature: bpy.types.Object, body: Body) -> NDArray[np.float64]:
     return betas
 
 
-def captured_motion(armature: bpy.types.Object) -> Motion:
+def motion_of(armature: bpy.types.Object) -> Motion:
     """Return the captured motion, before any editing.
 
     :raises UsageError: the armature does not store it.
@@ -110,3 +110,10 @@ def captured_motion(armature: bpy.types.Object) -> Motion:
     from ..scene.packed_motion import stored_motion
 
     return stored_motion(armature)
+
+
+def set_motion_of(armature: bpy.types.Object, motion: Motion) -> None:
+    """Store a motion as the armature's captured one. Undo restores the former one, and its duplicates keep it."""
+    from ..scene.packed_motion import pack_motion
+
+    pack_motion(armature, motion.to_bytes())

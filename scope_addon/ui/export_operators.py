@@ -8,7 +8,7 @@ from pathlib import Path
 import bpy
 from bpy.props import BoolProperty, EnumProperty, StringProperty
 
-from .captured_person import captured_motion
+from .captured_person import motion_of
 from .reporting import ReportingOperator
 
 FORMATS = (
@@ -119,7 +119,7 @@ class SCOPE_OT_export(ReportingOperator):
                 raise UsageError("the active object belongs to no capture; select one of a capture's objects")
         if self.format == "NPZ":
             people = [obj for c in collections for obj in c.all_objects if "scope_source" in obj]
-            written = export(path, collections, [captured_motion(obj) for obj in people])
+            written = export(path, collections, [motion_of(obj) for obj in people])
         elif self.which == "RIG":
             written = export_rig(path, rig, options)
         else:
