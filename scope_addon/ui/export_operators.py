@@ -10,7 +10,7 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, StringProperty
 
 from ..options import Place
-from .captured_person import PERSON, captured_motion
+from .captured_person import PERSON, motion_of
 from .declared_properties import with_options
 from .reporting import ReportingOperator
 
@@ -134,7 +134,7 @@ class SCOPE_OT_export(ReportingOperator):
                 raise UsageError("the active object belongs to no capture; select one of a capture's objects")
         if self.format == "NPZ":
             people = [obj for c in collections for obj in c.all_objects if "scope_source" in obj]
-            written = export(path, collections, [captured_motion(obj) for obj in people])
+            written = export(path, collections, [motion_of(obj) for obj in people])
         elif self.which == "RIG":
             written = export_rig(path, rig, replace(options, take=_take_of(rig, collections)))
         else:
