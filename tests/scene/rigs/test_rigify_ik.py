@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scope.scope_addon.scene.rigs.rig_retarget import RetargetOptions, guess_bone_map, retarget
 
-from ...edit.walking import BODY, RATE, motion_of, walk
+from ...edit.walking import BODY, NAMES, RATE, motion_of, walk
 from ..made_rigs import captured
 
 LIMBS = [(f"{name}.{side}", kind) for side in "LR" for name, kind in (("thigh", "leg"), ("upper_arm", "arm"))]
@@ -36,7 +36,11 @@ def posed(rig, frames):
 
 @pytest.mark.parametrize("root", ["bone", "object"])
 def test_ik_shows_the_pose_of_fk(rigify_rigs, root):
-    source = captured(motion_of(walk(1.0)))
+    motion = motion_of(walk(1.0))
+    elbows = motion.poses.reshape(len(motion), -1, 3)[:, [NAMES.index("left_elbow"), NAMES.index("right_elbow")]]
+    elbows += [[0.4, -1.2, 0.3], [0.5, 0.7, 0.6]]  # not about the axis about which the rig's IK bends the elbow
+    motion.poses.reshape(len(motion), -1, 3)[:, [NAMES.index("left_elbow"), NAMES.index("right_elbow")]] = elbows
+    source = captured(motion)
     rig = rigify_rigs[1][0]
     rig.pose.bones["foot_heel_ik.L"].rotation_euler = (0.4, 0.2, 0.1)  # left by the user
     retarget(source, BODY, np.zeros(BODY.P), rig, guess_bone_map(rig), RATE, RetargetOptions(root=root))
