@@ -135,10 +135,16 @@ class CaptureJob:
 def capture_request(scene: bpy.types.Scene) -> JobRequest:
     """Make the request to the worker from the scene's settings and the preferences.
 
-    :raises UsageError: no footage, calibration or body file is chosen, or the captured part is empty.
+    :raises UsageError: the scene is linked, no footage, calibration or body file is chosen, or the captured part is
+        empty.
     :raises VideoError: the footage does not exist.
     """
     settings, chosen = scene.scope, preferences()
+    if scene.library is not None:
+        raise UsageError(
+            f"the scene is linked from {scene.library.filepath}, so nothing can be added to it; capture in a scene of "
+            "this file"
+        )
     if not settings.footage:
         raise UsageError("no footage is chosen; choose a video or image first")
     footage = Path(bpy.path.abspath(settings.footage))
