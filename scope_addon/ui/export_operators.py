@@ -149,7 +149,9 @@ def is_available(kind: str) -> bool:
 
 def _take_of(rig: bpy.types.Object, collections: list[bpy.types.Collection]) -> str:
     """Return the name of the capture whose motion a rig has; empty if it is unknown."""
-    return next((c.name for c in collections if rig.get(PERSON, "") in c.all_objects), "")
+    person = rig.get(PERSON, "")  # an object, or its name in older .blend files
+    name = person if isinstance(person, str) else person.name
+    return next((c.name for c in collections if name in c.all_objects), "")
 
 
 CLASSES = (SCOPE_OT_export,)

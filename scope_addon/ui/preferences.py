@@ -13,6 +13,7 @@ from bpy.props import IntProperty, StringProperty
 
 from ..job.cache import Cache
 from ..options import Place
+from . import keymap
 from .declared_properties import with_options
 
 PACKAGE = __package__.rpartition(".scope_addon")[0]  # "bl_ext.<repository>.scope" in Blender, "scope" outside
@@ -57,6 +58,7 @@ class SCOPE_AP_preferences(bpy.types.AddonPreferences):
         layout.prop(self, "body_file")
         layout.prop(self, "cache_folder")
         layout.prop(self, "cache_limit_gb", text="Keep at Most (GB)")
+        keymap.draw(layout, context)
         row = layout.row()
         row.alignment = "RIGHT"
         row.label(text=f"{_size_text(_cache_size(cache().root))} of captures in {cache().root}")

@@ -12,6 +12,7 @@ from ...footage import shown
 from ...job.progress import JobProgress, duration
 from .. import warm_up
 from ..export_operators import FORMATS, is_available
+from ..presets import SCOPE_PT_capture_presets
 from ..view.comparison import camera_of, is_looking_through, side_area
 from . import preview_picture
 from .capture_operators import state
@@ -33,6 +34,10 @@ class SCOPE_PT_capture(Tab, bpy.types.Panel):
 
     bl_idname = "SCOPE_PT_capture"
     bl_label = "Capture"
+
+    def draw_header_preset(self, _context: bpy.types.Context) -> None:
+        """Draw the button of the presets in the header."""
+        SCOPE_PT_capture_presets.draw_panel_header(self.layout)
 
     def draw(self, context: bpy.types.Context) -> None:
         """Draw the panel."""
@@ -84,6 +89,7 @@ class SCOPE_PT_person(Tab, bpy.types.Panel):
         """Draw the panel."""
         layout, settings = _split(self.layout), context.scene.scope
         layout.enabled = state.job is None
+        layout.prop(settings, "take")
         layout.prop(settings, "people")
         if settings.people == "COUNT":
             layout.prop(settings, "people_count", text="Number")
