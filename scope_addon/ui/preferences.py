@@ -14,6 +14,7 @@ from bpy.props import IntProperty, StringProperty
 from ..job.cache import Cache
 from ..options import Place
 from .declared_properties import with_options
+from .reporting import iface_, rpt_
 
 PACKAGE = __package__.rpartition(".scope_addon")[0]  # "bl_ext.<repository>.scope" in Blender, "scope" outside
 DEFAULT_CACHE_GB = 2
@@ -59,7 +60,8 @@ class SCOPE_AP_preferences(bpy.types.AddonPreferences):
         layout.prop(self, "cache_limit_gb", text="Keep at Most (GB)")
         row = layout.row()
         row.alignment = "RIGHT"
-        row.label(text=f"{_size_text(_cache_size(cache().root))} of captures in {cache().root}")
+        size, folder = _size_text(_cache_size(cache().root)), cache().root
+        row.label(text=iface_("{size} of captures in {folder}", size=size, folder=folder))
         row.operator("scope.clear_cache")
 
 
@@ -73,7 +75,7 @@ class SCOPE_OT_clear_cache(bpy.types.Operator):
         """Remove the files."""
         freed = cache().clear()
         _measured.clear()
-        self.report({"INFO"}, f"Freed {_size_text(freed)}")
+        self.report({"INFO"}, rpt_("Freed {size}", size=_size_text(freed)))
         return {"FINISHED"}
 
 
