@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import bpy
 
-from . import command, drop, export_operators, import_operators, preferences, warm_up
+from . import command, drop, export_operators, import_operators, preferences, translations, warm_up
 from .capture import capture_operators, capture_panel, capture_properties, captures
 from .edit import edit_operators, edit_panel, key_operators
 from .pins import correction_operators, correction_panel, pin_tool, upright_operators
@@ -39,6 +39,7 @@ def register() -> None:
         view_after_undo.attach()
         import_operators.attach()
         warm_up.attach()
+        translations.register()
     except Exception:
         for cls in reversed(registered):
             bpy.utils.unregister_class(cls)
@@ -48,6 +49,7 @@ def register() -> None:
 def unregister() -> None:
     """Stop a running capture, and unregister everything."""
     capture_operators.end_capture()
+    translations.unregister()
     warm_up.detach()
     import_operators.detach()
     view_after_undo.detach()

@@ -7,22 +7,24 @@ from typing import TYPE_CHECKING
 
 import bpy
 
+from .translations import CONTEXT
+
 
 def iface_(text: str, **values: object) -> str:
     """Return a label in the user's language, with values for its placeholders."""
-    translated: str = bpy.app.translations.pgettext_iface(text)
+    translated: str = bpy.app.translations.pgettext_iface(text, CONTEXT)
     return translated.format(**values) if values else translated
 
 
 def rpt_(text: str, **values: object) -> str:
     """Return a message to report in the user's language, with values for its placeholders."""
-    translated: str = bpy.app.translations.pgettext_rpt(text)
+    translated: str = bpy.app.translations.pgettext_rpt(text, CONTEXT)
     return translated.format(**values) if values else translated
 
 
 def tip_(text: str, **values: object) -> str:
     """Return a tooltip in the user's language, with values for its placeholders."""
-    translated: str = bpy.app.translations.pgettext_tip(text)
+    translated: str = bpy.app.translations.pgettext_tip(text, CONTEXT)
     return translated.format(**values) if values else translated
 
 
