@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import bpy
 
-from . import de, fr
+from . import de, es, fr
 
 # Blender's own translations come first. In this context it has none, so ours hold where the same English word means
 # something else in Blender.
 CONTEXT = "Scope"
-LANGUAGES = {"de_DE": de, "fr_FR": fr}
+LANGUAGES = {"de_DE": de, "fr_FR": fr, "es": es}
 
 
 def register() -> None:
