@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import bpy
 
-from . import de, es, fr, ja
+from . import de, es, fr, ja, zh
 
 # Blender's own translations come first. In this context it has none, so ours hold where the same English word means
 # something else in Blender.
 CONTEXT = "Scope"
-LANGUAGES = {"de_DE": de, "fr_FR": fr, "es": es, "ja_JP": ja}
+LANGUAGES = {"de_DE": de, "fr_FR": fr, "es": es, "ja_JP": ja, "zh_HANS": zh}
 
 
 def register() -> None:
