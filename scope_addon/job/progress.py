@@ -70,16 +70,22 @@ class JobProgress:
             return None
         return elapsed * (1 - fraction) / fraction
 
-    def lines(self) -> list[str]:
-        """Return the lines to show: the stage, and speed and remaining time if they are known."""
-        stage = self.stage.capitalize()
+    def lines(self, translate: Callable[[str], str] = str) -> list[str]:
+        """Return the lines to show: the stage, and speed and remaining time if they are known.
+
+        :param translate: returns a text in the user's language, with the same placeholders.
+        """
+        stage = translate(self.stage.capitalize())
         if self.stage in FIRST_ONLY:
-            stage += " (first capture only)"
+            stage = translate("{stage} (first capture only)").format(stage=stage)
         if self.total > 0:
-            stage += f", {self.done} of {self.total}"
+            stage = translate("{stage}, {done} of {total}").format(stage=stage, done=self.done, total=self.total)
         lines = [stage]
-        speed = [f"{self.frames_per_second:.1f} frames/s"] if self.frames_per_second else []
-        left = [f"{duration(self.seconds_left)} left"] if self.seconds_left is not None else []
+        speed, left = [], []
+        if rate := self.frames_per_second:
+            speed = [translate("{rate:.1f} frames/s").format(rate=rate)]
+        if self.seconds_left is not None:
+            left = [translate("{time} left").format(time=duration(self.seconds_left))]
         if speed or left:
             lines.append(", ".join(speed + left))
         return lines

@@ -9,7 +9,18 @@ from __future__ import annotations
 
 import bpy
 
-from . import command, drop, export_operators, import_operators, keymap, menus, preferences, presets, warm_up
+from . import (
+    command,
+    drop,
+    export_operators,
+    import_operators,
+    keymap,
+    menus,
+    preferences,
+    presets,
+    translations,
+    warm_up,
+)
 from .capture import capture_operators, capture_panel, capture_properties, captures, video_import
 from .edit import action_operators, edit_operators, edit_panel, key_operators
 from .pins import correction_operators, correction_panel, pin_tool, upright_operators
@@ -42,6 +53,7 @@ def register() -> None:
         menus.attach()
         keymap.attach()
         warm_up.attach()
+        translations.register()
     except Exception:
         for cls in reversed(registered):
             bpy.utils.unregister_class(cls)
@@ -51,6 +63,7 @@ def register() -> None:
 def unregister() -> None:
     """Stop a running capture, and unregister everything."""
     capture_operators.end_capture()
+    translations.unregister()
     warm_up.detach()
     keymap.detach()
     menus.detach()

@@ -11,6 +11,7 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
 from ..options import Choice, Option, Place, options_at
+from .translations import CONTEXT
 
 _NOT_ANIMATABLE: set[str] = set()  # the options of a property without ANIMATABLE
 # Since 4.5, properties declare whether their path may begin with "//", the folder of the .blend file.
@@ -43,6 +44,7 @@ def blender_property(option: Option, place_keywords: dict[str, Any]) -> Any:
     keywords: dict[str, Any] = {
         "name": declared.label or property_name(option).replace("_", " ").title(),
         "description": declared.description or option.help[0].upper() + option.help[1:],
+        "translation_context": CONTEXT,
     }
     if option.value_type is Path:
         options = {"options": PATH_OPTIONS} if place_keywords else {}

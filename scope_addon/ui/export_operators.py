@@ -12,7 +12,7 @@ from bpy.props import BoolProperty, EnumProperty, StringProperty
 from ..options import Place
 from .captured_person import PERSON, motion_of
 from .declared_properties import with_options
-from .reporting import ReportingOperator
+from .reporting import ReportingOperator, rpt_, tip_
 
 FORMATS = (
     ("FBX", "FBX", "For Unreal Engine, Unity, Maya and MotionBuilder: armature, mesh and animation", 0),
@@ -66,13 +66,13 @@ class SCOPE_OT_export(ReportingOperator):
     def description(cls, context: bpy.types.Context, properties: bpy.types.OperatorProperties) -> str:
         """Return the tooltip of the button for the format, and why the format is not available."""
         text = next(text for key, _, text, _ in FORMATS if key == properties.format)
-        return text if is_available(properties.format) else f"{text}. {_NO_USD}"
+        return tip_(text) if is_available(properties.format) else f"{tip_(text)}. {tip_(_NO_USD)}"
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Require a capture in the scene."""
         if not any("scope_capture" in c for c in context.scene.collection.children_recursive):
-            cls.poll_message_set("The scene contains no capture yet")
+            cls.poll_message_set(tip_("The scene contains no capture yet"))
             return False
         return True
 
@@ -139,7 +139,7 @@ class SCOPE_OT_export(ReportingOperator):
             written = export_rig(path, rig, replace(options, take=_take_of(rig, collections)))
         else:
             written = export(path, collections, options=options)
-        return f"Wrote {', '.join(p.name for p in written)} in {written[0].parent}"
+        return rpt_("Wrote {files} in {folder}", files=", ".join(p.name for p in written), folder=written[0].parent)
 
 
 def is_available(kind: str) -> bool:

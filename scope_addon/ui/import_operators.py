@@ -14,7 +14,7 @@ from ..footage import FOOTAGE_SUFFIXES
 from ..options import option
 from .declared_properties import blender_property
 from .preferences import preferences
-from .reporting import ReportingOperator, sentence
+from .reporting import ReportingOperator, rpt_, sentence
 from .view.view_operators import frame_selected, hide_startup_cube
 
 if TYPE_CHECKING:
@@ -65,7 +65,7 @@ class SCOPE_OT_import_motion(ReportingOperator):
         if notes:
             self.report({"WARNING"}, sentence("; ".join(notes)))
             return ""
-        return f"Imported {', '.join(path.name for path in paths)}"
+        return rpt_("Imported {files}", files=", ".join(path.name for path in paths))
 
     def _paths(self) -> list[Path]:
         """Return the chosen files.

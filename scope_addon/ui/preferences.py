@@ -15,6 +15,7 @@ from ..job.cache import Cache
 from ..options import Place
 from . import keymap
 from .declared_properties import with_options
+from .reporting import iface_, rpt_
 
 PACKAGE = __package__.rpartition(".scope_addon")[0]  # "bl_ext.<repository>.scope" in Blender, "scope" outside
 DEFAULT_CACHE_GB = 2
@@ -61,7 +62,8 @@ class SCOPE_AP_preferences(bpy.types.AddonPreferences):
         keymap.draw(layout, context)
         row = layout.row()
         row.alignment = "RIGHT"
-        row.label(text=f"{_size_text(_cache_size(cache().root))} of captures in {cache().root}")
+        size, folder = _size_text(_cache_size(cache().root)), cache().root
+        row.label(text=iface_("{size} of captures in {folder}", size=size, folder=folder))
         row.operator("scope.clear_cache")
 
 
@@ -75,7 +77,7 @@ class SCOPE_OT_clear_cache(bpy.types.Operator):
         """Remove the files."""
         freed = cache().clear()
         _measured.clear()
-        self.report({"INFO"}, f"Freed {_size_text(freed)}")
+        self.report({"INFO"}, rpt_("Freed {size}", size=_size_text(freed)))
         return {"FINISHED"}
 
 

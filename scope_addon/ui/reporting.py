@@ -1,13 +1,33 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Operators that report their result or error as a message."""
+"""Texts in the user's language, and operators that report their result or error as a message."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
 import bpy
+from bpy.app.translations import pgettext_iface, pgettext_rpt, pgettext_tip
 
 from ..footage import shown
+from .translations import CONTEXT
+
+
+def iface_(text: str, **values: object) -> str:
+    """Return a label in the user's language, with values for its placeholders."""
+    translated: str = pgettext_iface(text, CONTEXT)
+    return translated.format(**values) if values else translated
+
+
+def rpt_(text: str, **values: object) -> str:
+    """Return a message to report in the user's language, with values for its placeholders."""
+    translated: str = pgettext_rpt(text, CONTEXT)
+    return translated.format(**values) if values else translated
+
+
+def tip_(text: str, **values: object) -> str:
+    """Return a tooltip in the user's language, with values for its placeholders."""
+    translated: str = pgettext_tip(text, CONTEXT)
+    return translated.format(**values) if values else translated
 
 
 def sentence(error: Exception | str) -> str:

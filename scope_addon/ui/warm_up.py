@@ -19,6 +19,7 @@ import bpy
 
 from ..job.start_worker import worker_command
 from .preferences import PACKAGE, cache, preferences
+from .reporting import iface_
 
 ROOT = Path(__file__).resolve().parents[2]
 KERNELS = 77  # that a capture and its preview compile
@@ -103,7 +104,8 @@ def draw(layout: bpy.types.UILayout) -> None:
     """Show the progress while the solver is being compiled."""
     if WarmUp.process is not None and (compiled := _files() - WarmUp.files_before) > 0:
         share = min(1.0, compiled / KERNELS)
-        layout.progress(text=f"Compiling the solver in the background, {100 * share:.0f} %", factor=share)
+        text = iface_("Compiling the solver in the background, {percent:.0f} %", percent=100 * share)
+        layout.progress(text=text, factor=share)
 
 
 def _files() -> int:

@@ -13,7 +13,7 @@ from bpy.props import StringProperty
 from ...footage import FOOTAGE_SUFFIXES
 from ...job.progress import duration
 from .. import warm_up
-from ..reporting import sentence
+from ..reporting import iface_, rpt_, sentence, tip_
 from ..view.view_operators import frame_selected, hide_startup_cube
 from . import preview_picture
 
@@ -65,7 +65,7 @@ class SCOPE_OT_choose_footage(bpy.types.Operator):
         """Set the footage to the file."""
         path = Path(bpy.path.abspath(self.filepath))
         if not path.is_file():
-            self.report({"ERROR"}, f"{path} is not a file; choose a video or image")
+            self.report({"ERROR"}, rpt_("{path} is not a file; choose a video or image", path=path))
             return {"CANCELLED"}
         context.scene.scope.footage = str(path)
         return {"FINISHED"}
@@ -95,10 +95,10 @@ class SCOPE_OT_capture(bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         """Require that footage is chosen and nothing is running."""
         if state.job is not None:
-            cls.poll_message_set("A capture is running; wait for it or cancel it")
+            cls.poll_message_set(tip_("A capture is running; wait for it or cancel it"))
             return False
         if not context.scene.scope.footage:
-            cls.poll_message_set("Choose a video or image first")
+            cls.poll_message_set(tip_("Choose a video or image first"))
             return False
         return True
 
@@ -133,7 +133,10 @@ class SCOPE_OT_capture(bpy.types.Operator):
             self._end(context, {"CANCELLED"})
             raise
         context.workspace.status_text_set(
-            f"Scope: {', '.join(job.progress.lines())}   (Esc over the Scope panel to cancel)"
+            iface_(
+                "Scope: {progress}   (Esc over the Scope panel to cancel)",
+                progress=", ".join(job.progress.lines(iface_)),
+            )
         )
         redraw(context)
         return self._end(context, outcome) if outcome else {"PASS_THROUGH"}
@@ -223,7 +226,7 @@ class SCOPE_OT_cancel(bpy.types.Operator):
             self,
             event,
             title="Stop the Capture?",
-            message=f"It has run for {duration(seconds)}. The scene stays unchanged",
+            message=iface_("It has run for {time}. The scene stays unchanged", time=duration(seconds)),
             confirm_text="Stop Capture",
         )
         return outcome

@@ -13,10 +13,11 @@ from ...job.progress import JobProgress, duration
 from .. import warm_up
 from ..export_operators import FORMATS, is_available
 from ..presets import SCOPE_PT_capture_presets
+from ..reporting import iface_
 from ..view.comparison import camera_of, is_looking_through, side_area
 from . import preview_picture
 from .capture_operators import state
-from .captures import counted, draw_captures, people_of, shown_capture
+from .captures import draw_captures, people_of, people_text, shown_capture
 
 _PIXELS_PER_CHARACTER = 7.0
 
@@ -70,7 +71,7 @@ def _draw_progress(context: bpy.types.Context, layout: bpy.types.UILayout, progr
     layout.progress(text=f"{100 * progress.fraction:.0f} %", factor=progress.fraction)
     if icon := preview_picture.icon_id():
         layout.template_icon(icon_value=icon, scale=10.0)
-    for part in progress.lines():
+    for part in progress.lines(iface_):
         _draw_text(context, layout, part)
     row = layout.row()
     row.scale_y = 1.6
@@ -177,19 +178,22 @@ def _draw_figures(layout: bpy.types.UILayout, result: bpy.types.PropertyGroup) -
     column.label(text=shown(Path(result.footage).name) or result.collection.name, icon="FILE_MOVIE")
     people = people_of(result.collection)
     column.label(
-        text=counted(len(people), "person", "people") if people else "The captured person was deleted",
+        text=people_text(len(people)) if people else "The captured person was deleted",
         icon="OUTLINER_OB_ARMATURE" if people else "GHOST_DISABLED",
     )
     if not result.frames:
         return
     seconds = result.frames / result.frames_per_second if result.frames_per_second else 0.0
-    captured = f", captured in {duration(seconds)}" if seconds else ""
-    column.label(text=counted(result.frames, "frame", "frames") + captured, icon="TIME")
+    frames = iface_("{count} frame" if result.frames == 1 else "{count} frames", count=result.frames)
+    if seconds:
+        frames = iface_("{frames}, captured in {time}", frames=frames, time=duration(seconds))
+    column.label(text=frames, icon="TIME")
     if result.camera:
-        column.label(text=f"Reprojection error {result.reprojection_px:.1f} px", icon="CON_CAMERASOLVER")
-        column.label(text=f"Lens: {result.camera}", icon="CAMERA_DATA")
+        error = iface_("Reprojection error {pixels:.1f} px", pixels=result.reprojection_px)
+        column.label(text=error, icon="CON_CAMERASOLVER")
+        column.label(text=iface_("Lens: {lens}", lens=result.camera), icon="CAMERA_DATA")
     if result.execution:
-        column.label(text=f"Networks on {result.execution}", icon="MEMORY")
+        column.label(text=iface_("Networks on {processor}", processor=result.execution), icon="MEMORY")
 
 
 def _draw_warning(context: bpy.types.Context, box: bpy.types.UILayout, warning: bpy.types.PropertyGroup) -> None:

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import bpy
 
+from ..reporting import iface_
+
 CAPTURE = "scope_capture"  # custom property that ``scene.build`` gives to a capture's collection
 
 
@@ -30,9 +32,9 @@ def people_of(capture: bpy.types.Collection) -> list[bpy.types.Object]:
     return [obj for obj in capture.all_objects if obj.type == "ARMATURE" and "scope_source" in obj]
 
 
-def counted(number: int, singular: str, plural: str) -> str:
-    """Return a number with its noun."""
-    return f"{number} {singular if number == 1 else plural}"
+def people_text(count: int) -> str:
+    """Return a number of people with its noun."""
+    return iface_("{count} person" if count == 1 else "{count} people", count=count)
 
 
 def shown_index(settings: bpy.types.PropertyGroup) -> int:
@@ -69,7 +71,7 @@ class SCOPE_UL_captures(bpy.types.UIList):
         row.active = bool(people)
         row.prop(item, "name", text="", emboss=False, icon="OUTLINER_COLLECTION" if people else "GHOST_DISABLED")
         details = row.row(align=True)
-        details.label(text=counted(len(people), "person", "people") if people else "removed")
+        details.label(text=people_text(len(people)) if people else iface_("removed"))
         details.label(text="", icon="ERROR" if people and len(result.warnings) else "BLANK1")
 
     def filter_items(

@@ -9,7 +9,7 @@ import bpy
 from bpy.props import IntProperty
 
 from ..captured_person import body_of, captured_armature, library_of
-from ..reporting import ReportingOperator
+from ..reporting import ReportingOperator, tip_
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -39,13 +39,17 @@ def may_edit(cls: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
     """Return whether there is a captured armature whose keys are stored in this file; if not, say why."""
     armature = captured_armature(context)
     if armature is None:
-        cls.poll_message_set("Select the armature of a capture first")
+        cls.poll_message_set(tip_("Select the armature of a capture first"))
         return False
     library = library_of(armature)
     if library is not None:
         cls.poll_message_set(
-            f"'{armature.name}' or its motion is linked from {library.filepath}, so changes would be lost: make "
-            "both local (Object > Relations > Make Local > All) or edit them in that file"
+            tip_(
+                "'{name}' or its motion is linked from {file}, so changes would be lost: make both local (Object > "
+                "Relations > Make Local > All) or edit them in that file",
+                name=armature.name,
+                file=library.filepath,
+            )
         )
         return False
     return True

@@ -10,6 +10,7 @@ import bpy
 from bpy.props import BoolProperty, FloatProperty
 
 from ..captured_person import betas_of
+from ..reporting import rpt_
 from .edit_base import EditOperator, SpanOperator
 
 if TYPE_CHECKING:
@@ -74,7 +75,11 @@ class SCOPE_OT_loop(SpanOperator):
             add_cycles(armature, offset_curves={(location_path(body), 0), (location_path(body), 1)})
         play_cycle(context.scene, armature, math.ceil(first), math.floor(last) - 1)
         remove_root_object(armature)
-        return f"Cycle of {closed.times[-1]:.2f} s; before closing, its ends were {100 * cycle.error_m:.1f} cm apart"
+        return rpt_(
+            "Cycle of {seconds:.2f} s; before closing, its ends were {distance:.1f} cm apart",
+            seconds=closed.times[-1],
+            distance=100 * cycle.error_m,
+        )
 
 
 class SCOPE_OT_reduce_keys(EditOperator):
@@ -106,9 +111,13 @@ class SCOPE_OT_reduce_keys(EditOperator):
 
         betas = betas_of(armature, body)
         found = reduce_keys(armature, body, betas, rate, math.radians(self.degrees), self.millimetres / 1000.0)
-        return (
-            f"Reduced {found.before} keys to {found.after}; maximum error {math.degrees(found.angle):.2f} degrees for "
-            f"bones, {1000 * found.joint_m:.1f} mm for joints"
+        return rpt_(
+            "Reduced {before} keys to {after}; maximum error {angle:.2f} degrees for bones, "
+            "{distance:.1f} mm for joints",
+            before=found.before,
+            after=found.after,
+            angle=math.degrees(found.angle),
+            distance=1000 * found.joint_m,
         )
 
 
@@ -139,7 +148,7 @@ class SCOPE_OT_bake_rate(EditOperator):
             before, after = len(frames), len(baked)
         else:
             before, after = bake_whole_frames(armature, body, rate)
-        return f"Replaced {before} keys by {after}"
+        return rpt_("Replaced {before} keys by {after}", before=before, after=after)
 
 
 CLASSES = (SCOPE_OT_loop, SCOPE_OT_reduce_keys, SCOPE_OT_bake_rate)

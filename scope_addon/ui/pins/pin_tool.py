@@ -14,6 +14,7 @@ from mathutils import Vector
 
 from ..captured_person import captured_armature
 from ..edit.edit_base import may_edit
+from ..reporting import iface_
 from ..view.comparison import camera_of
 from .corrected_person import listed_corrections
 from .drawing import draw_disc, draw_line
@@ -58,7 +59,7 @@ class SCOPE_OT_pin_limb(bpy.types.Operator):
         self._area = context.area
         draw = bpy.types.SpaceView3D.draw_handler_add
         self._handler = draw(_draw, (self._session,), "WINDOW", "POST_PIXEL")
-        context.workspace.status_text_set(_HELP)
+        context.workspace.status_text_set(iface_(_HELP))
         context.window_manager.modal_handler_add(self)
         context.area.tag_redraw()
         return {"RUNNING_MODAL"}
@@ -162,7 +163,7 @@ def _draw(session: _Session) -> None:
             blf.size(0, 13 * scale)
             blf.color(0, 1.0, 1.0, 1.0, 1.0)
             blf.position(0, at[0] + 14 * scale, at[1] + 8 * scale, 0)
-            blf.draw(0, name.replace("_", " ").title())
+            blf.draw(0, iface_(name.replace("_", " ").title()))
     gpu.state.blend_set("NONE")
 
 

@@ -11,6 +11,7 @@ from bpy_extras.view3d_utils import region_2d_to_origin_3d, region_2d_to_vector_
 
 from ..captured_person import body_of, captured_armature, motion_of, set_motion_of
 from ..edit.edit_base import EditOperator, may_edit
+from ..reporting import iface_, tip_
 from ..view.comparison import camera_of
 from .drawing import draw_line
 
@@ -67,7 +68,7 @@ class SCOPE_OT_upright_line(bpy.types.Operator):
         """Require the view through the capture's camera."""
         space = context.space_data
         if space is None or space.type != "VIEW_3D" or space.region_3d.view_perspective != "CAMERA":
-            cls.poll_message_set("Press Compare with Footage first: the line is drawn in the footage")
+            cls.poll_message_set(tip_("Press Compare with Footage first: the line is drawn in the footage"))
             return False
         return may_edit(cls, context) and context.scene.camera == camera_of(context.scene)
 
@@ -77,7 +78,7 @@ class SCOPE_OT_upright_line(bpy.types.Operator):
         self._line: list[tuple[float, float]] = []
         draw = bpy.types.SpaceView3D.draw_handler_add
         self._handler = draw(_draw, (self._line, context.area.as_pointer()), "WINDOW", "POST_PIXEL")
-        context.workspace.status_text_set(_HELP)
+        context.workspace.status_text_set(iface_(_HELP))
         context.window.cursor_modal_set("CROSSHAIR")
         context.window_manager.modal_handler_add(self)
         return {"RUNNING_MODAL"}

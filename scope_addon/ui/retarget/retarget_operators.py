@@ -7,7 +7,7 @@ import bpy
 from bpy.props import EnumProperty, StringProperty
 
 from ..captured_person import PERSON, betas_of, body_of, captured_armature, captured_people
-from ..reporting import ReportingOperator, sentence
+from ..reporting import ReportingOperator, rpt_, sentence, tip_
 from .bone_list import fill_list, listed_map
 
 _SIDE_OFFSET_M = (1.5, 0.0, 0.0)  # to the left of a person who faces the front view
@@ -21,12 +21,15 @@ class _RigOperator(ReportingOperator):
         """Require a rig in the view layer."""
         rig = context.scene.scope_retarget.rig
         if rig is None:
-            cls.poll_message_set("Choose your rig first")
+            cls.poll_message_set(tip_("Choose your rig first"))
             return False
         if rig.name not in context.view_layer.objects:
             cls.poll_message_set(
-                f"'{rig.name}' is not in the scene's view layer: add it to the scene, or enable its collection in the "
-                "Outliner"
+                tip_(
+                    "'{rig}' is not in the scene's view layer: add it to the scene, or enable its collection in the "
+                    "Outliner",
+                    rig=rig.name,
+                )
             )
             return False
         return True
@@ -44,7 +47,7 @@ class SCOPE_OT_guess_bones(_RigOperator):
 
         found = guess_bone_map(context.scene.scope_retarget.rig)
         fill_list(context.scene.scope_retarget, found)
-        return f"Found {len(found.parts)} bones; check the list"
+        return rpt_("Found {count} bones; check the list", count=len(found.parts))
 
 
 class SCOPE_OT_retarget(_RigOperator):
@@ -61,15 +64,19 @@ class SCOPE_OT_retarget(_RigOperator):
         rig = context.scene.scope_retarget.rig
         if rig.library is not None:
             cls.poll_message_set(
-                f"'{rig.name}' is linked from {rig.library.filepath}, so its motion would not be saved in this file: "
-                "make an override of it (Object > Library Override > Make)"
+                tip_(
+                    "'{rig}' is linked from {file}, so its motion would not be saved in this file: make an override of "
+                    "it (Object > Library Override > Make)",
+                    rig=rig.name,
+                    file=rig.library.filepath,
+                )
             )
             return False
         if captured_armature(context) is None:
             cls.poll_message_set(
-                "Several people are captured: select the armature of the one whose motion to retarget"
+                tip_("Several people are captured: select the armature of the one whose motion to retarget")
                 if captured_people(context)
-                else "The scene contains no capture yet"
+                else tip_("The scene contains no capture yet")
             )
             return False
         return True
@@ -107,7 +114,8 @@ class SCOPE_OT_retarget(_RigOperator):
         if result.warnings:
             self.report({"WARNING"}, sentence(result.warnings[0]))
             return ""
-        return f"'{settings.rig.name}' is now animated by the action '{result.action.name}'"
+        name, action = settings.rig.name, result.action.name
+        return rpt_("'{rig}' is now animated by the action '{action}'", rig=name, action=action)
 
 
 class _BoneMapFileOperator(_RigOperator):
@@ -134,7 +142,7 @@ class SCOPE_OT_save_bone_map(_BoneMapFileOperator):
         from ...retarget.bone_map import save_bone_map
 
         save_bone_map(listed_map(context.scene.scope_retarget), bpy.path.abspath(self.filepath))
-        return f"Saved {self.filepath}"
+        return rpt_("Saved {file}", file=self.filepath)
 
 
 class SCOPE_OT_load_bone_map(_BoneMapFileOperator):
@@ -150,7 +158,7 @@ class SCOPE_OT_load_bone_map(_BoneMapFileOperator):
         from ...retarget.bone_map import load_bone_map
 
         fill_list(context.scene.scope_retarget, load_bone_map(bpy.path.abspath(self.filepath)))
-        return f"Loaded {self.filepath}"
+        return rpt_("Loaded {file}", file=self.filepath)
 
 
 class SCOPE_OT_edit_bone_pair(_RigOperator):
@@ -170,7 +178,7 @@ class SCOPE_OT_edit_bone_pair(_RigOperator):
         elif len(settings.pairs):
             settings.pairs.remove(settings.active)
             settings.active = max(0, min(settings.active, len(settings.pairs) - 1))
-        return f"{len(settings.pairs)} bones"
+        return rpt_("{count} bones", count=len(settings.pairs))
 
 
 def _select_only(context: bpy.types.Context, rig: bpy.types.Object) -> None:

@@ -7,7 +7,7 @@ import bpy
 from bpy.props import IntProperty
 from mathutils import Matrix
 
-from ..reporting import ReportingOperator
+from ..reporting import ReportingOperator, rpt_, tip_
 from . import comparison
 from .comparison import camera_of, is_looking_through, is_side_view
 
@@ -47,14 +47,17 @@ class SCOPE_OT_look_through(bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         """Require that the last capture has a camera and is not hidden."""
         if is_side_view(context):
-            cls.poll_message_set("Use this in the viewport with the footage")
+            cls.poll_message_set(tip_("Use this in the viewport with the footage"))
             return False
         if camera_of(context.scene) is None:
-            cls.poll_message_set("The scene has no camera of a capture: capture with the option Camera with Footage")
+            cls.poll_message_set(
+                tip_("The scene has no camera of a capture: capture with the option Camera with Footage")
+            )
             return False
         collection = context.scene.scope.result.collection
         if not is_looking_through(context) and not _is_shown(collection, context.view_layer.layer_collection):
-            cls.poll_message_set(f"The collection '{collection.name}' is hidden; show it in the Outliner")
+            name = collection.name
+            cls.poll_message_set(tip_("The collection '{name}' is hidden; show it in the Outliner", name=name))
             return False
         return True
 
@@ -97,7 +100,7 @@ class SCOPE_OT_side_view(bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         """Require a viewport that compares a capture with its footage."""
         if not is_looking_through(context):
-            cls.poll_message_set("Compare with Footage first")
+            cls.poll_message_set(tip_("Compare with Footage first"))
             return False
         return True
 
@@ -137,7 +140,7 @@ class SCOPE_OT_footage_to_sequencer(ReportingOperator):
     def poll(cls, context: bpy.types.Context) -> bool:
         """Require a capture."""
         if not context.scene.scope.result.footage:
-            cls.poll_message_set("The capture does not say where its footage is")
+            cls.poll_message_set(tip_("The capture does not say where its footage is"))
             return False
         return True
 
@@ -155,11 +158,15 @@ class SCOPE_OT_footage_to_sequencer(ReportingOperator):
         if rate and abs(rate - scene_rate(scene)) > 0.01:
             self.report(
                 {"WARNING"},
-                f"The scene has {scene_rate(scene):.5g} frames/s and the footage {rate:.5g}: the strip will not stay "
-                "synchronized with the motion",
+                rpt_(
+                    "The scene has {scene:.5g} frames/s and the footage {footage:.5g}: the strip will not stay "
+                    "synchronized with the motion",
+                    scene=scene_rate(scene),
+                    footage=rate,
+                ),
             )
             return ""
-        return "The footage is already in the sequencer" if strips[-1] in known else ""
+        return rpt_("The footage is already in the sequencer") if strips[-1] in known else ""
 
 
 CLASSES = (SCOPE_OT_look_through, SCOPE_OT_side_view, SCOPE_OT_go_to_frame, SCOPE_OT_footage_to_sequencer)
