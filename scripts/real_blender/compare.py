@@ -76,7 +76,7 @@ def main(video: Path, work: Path, parts: list[str]) -> int:
         problems += panel(video, work / "out", shell_out, report)
     if "headless" in parts:
         problems += headless((work / "clips").resolve(), work / "out", shell_out, report)
-    for part in ("undo", "trouble", "startup"):
+    for part in ("undo", "trouble", "pins", "startup"):
         if part in parts:
             report[part] = json.loads((work / "out" / f"{part}.json").read_text())
     print(json.dumps(report, indent=1))

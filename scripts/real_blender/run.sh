@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: GPL-3.0-or-later
-# run.sh install|panel|undo|trouble|headless|startup [VIDEO]    one part of ./scripts/blender, inside the Debian, in /scope.
+# run.sh install|panel|undo|trouble|pins|headless|startup [VIDEO]    one part of ./scripts/blender, inside the Debian, in /scope.
 set -euo pipefail
 cd /scope
 log=out/$1.log
@@ -28,8 +28,8 @@ case $1 in
             { cat "$log" >&2; exit 1; }
         ;;
     panel) in_window panel.py "/scope/$2" /scope/out ;;
-    undo | trouble) in_window "$1.py" /scope/clips/walk.mp4 /scope/out ;;
+    undo | trouble | pins) in_window "$1.py" /scope/clips/walk.mp4 /scope/out ;;
     startup) on_screen python3 parts/startup.py 15 ;;
     headless) python3 parts/headless.py 2>&1 | tee "$log" >&2 ;;
-    *) echo "run.sh: no part '$1'; there are panel, undo, trouble, headless and startup" >&2; exit 2 ;;
+    *) echo "run.sh: no part '$1'; there are panel, undo, trouble, pins, headless and startup" >&2; exit 2 ;;
 esac
