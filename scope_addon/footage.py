@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Recognize footage by file names, and show these. Standard library only: menus and command lines load it quickly."""
 
+import json
 import os
 import re
 from pathlib import Path
@@ -55,6 +56,11 @@ def shown(path: str | Path) -> str:
     file, but cannot be printed, or be part of JSON or of Blender's names.
     """
     return os.fsencode(path).decode("utf-8", "replace") if not is_utf8(path) else str(path)
+
+
+def json_text(value: object, indent: int | None = None) -> str:
+    """Return JSON in ASCII, in which file names are as `shown`."""
+    return json.dumps(json.loads(shown(json.dumps(value, ensure_ascii=False))), indent=indent)
 
 
 def is_utf8(path: str | Path) -> bool:

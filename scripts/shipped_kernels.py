@@ -24,6 +24,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 KEPT = ROOT / "build" / "kernels"
+DEBIAN_READY = ROOT / "build" / "blender" / "ready"
 MADE_FROM = "made_from"  # the file that says what the machine code was made from
 PROCESSORS = {"windows-x64": "x86-64-v3", "linux-x64": "x86-64-v3", "macos-arm64": "apple-m1"}
 _THIS = {("Windows", "AMD64"): "windows-x64", ("Linux", "x86_64"): "linux-x64", ("Darwin", "arm64"): "macos-arm64"}
@@ -40,11 +41,14 @@ def add_kernels(staging: Path, target: str, python: str, wheels: Iterable[Path])
     kept, wanted = KEPT / target / python, _digest(staging, wheels)
     stated = kept / MADE_FROM
     if not stated.is_file() or stated.read_text() != wanted:
-        interpreter = find_python(python) if _THIS.get((platform.system(), platform.machine())) == target else None
-        if interpreter is None:
-            print(f"build: without compiled code for {target}, Python {python}: make it there", file=sys.stderr)
+        is_here = _THIS.get((platform.system(), platform.machine())) == target
+        if not is_here or not (find_python(python) or _has_debian(python)):
+            print(
+                f"build: no compiled code for {target}, Python {python}: build on such a computer to have it",
+                file=sys.stderr,
+            )
             return False
-        _compile(staging, interpreter, target, python, wheels, kept)
+        _compile(staging, target, python, wheels, kept)
         stated.write_text(wanted)
     for folder in kept.iterdir():
         if folder.is_dir():
@@ -67,7 +71,21 @@ def find_python(version: str) -> str | None:
     return None
 
 
-def _compile(staging: Path, interpreter: str, target: str, python: str, wheels: list[Path], kept: Path) -> None:
+def _has_debian(python: str) -> bool:
+    """Return whether ./scripts/debian has been set up, whose Python is 3.13."""
+    return python == "3.13" and DEBIAN_READY.is_file() and os.geteuid() == 0
+
+
+def _command(python: str, folders: list[Path], variables: dict[str, str]) -> list[str]:
+    """Return the start of the command line that runs a Python, with some folders, and environment variables."""
+    if own := find_python(python):
+        return [own]
+    binds = [part for folder in folders for part in ("--bind", str(folder))]
+    given = [f"{name}={value}" for name, value in variables.items()]  # it has an environment of its own
+    return [str(ROOT / "scripts" / "debian"), *binds, "env", *given, f"python{python}"]
+
+
+def _compile(staging: Path, target: str, python: str, wheels: list[Path], kept: Path) -> None:
     print(f"build: compiling the solver for {target}, Python {python}: one or two minutes", file=sys.stderr, flush=True)
     with tempfile.TemporaryDirectory(prefix="scope-kernels-") as name:
         packages, job = Path(name) / "packages", Path(name) / "job"
@@ -76,16 +94,16 @@ def _compile(staging: Path, interpreter: str, target: str, python: str, wheels: 
             with zipfile.ZipFile(wheel) as file:
                 file.extractall(packages)
         start = staging / "scope_addon" / "job" / "start_worker.py"
-        command = [interpreter, "-I", "-B", str(start), str(staging), str(job), str(packages)]
         kernels = Path(name) / "kernels"  # with what has been made before, of which some may still be good
         if kept.is_dir():
             shutil.copytree(kept, kernels)
         for folder in kernels.glob("*"):
             os.utime(folder, (0, 0))
         variables = {"NUMBA_CPU_NAME": PROCESSORS[target], "NUMBA_CPU_FEATURES": "", "NUMBA_CACHE_DIR": str(kernels)}
-        with subprocess.Popen(
-            command, env=os.environ | variables, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
-        ) as process:
+        command = _command(python, [staging, Path(name)], variables)
+        command += ["-I", "-B", str(start), str(staging), str(job), str(packages)]
+        environment, pipe = os.environ | variables, subprocess.PIPE
+        with subprocess.Popen(command, env=environment, stdin=pipe, stdout=pipe, text=True) as process:
             assert process.stdin is not None
             assert process.stdout is not None
             process.stdin.write(json.dumps({"warm_up": True}) + "\n")

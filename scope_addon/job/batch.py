@@ -22,7 +22,7 @@ from typing import IO, Any
 from ...solver.errors import InputError
 from ..atomic_write import atomic_path
 from ..errors import NO_PERSON, OutputError, UsageError, system_error_message
-from ..footage import FOOTAGE_SUFFIXES, PICTURE_SUFFIXES, shown
+from ..footage import FOOTAGE_SUFFIXES, PICTURE_SUFFIXES, json_text
 from .clips import OVERLAY, find_clips
 from .parent import GRACE_S
 from .request import code_version
@@ -262,7 +262,7 @@ class Batch:
         }
         try:
             with atomic_path(self.report_file) as temporary:
-                temporary.write_text(shown(json.dumps(report, indent=1, ensure_ascii=False)), encoding="utf-8")
+                temporary.write_text(json_text(report, indent=1), encoding="utf-8")
         except OSError as error:
             raise OutputError(f"cannot write {self.report_file}: {error.strerror}; free some space") from error
         return report

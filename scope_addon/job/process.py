@@ -16,7 +16,6 @@ from typing import Any
 
 from ...solver.errors import ScopeError
 from ..errors import SetupError
-from ..footage import shown
 from .request import WARM_UP, JobRequest
 from .start_worker import worker_command
 
@@ -102,7 +101,7 @@ class WorkerProcess:
             if message is None:
                 continue
             if message["event"] == "error":
-                raise WorkerFailedError(shown(str(message.get("message", "the capture failed"))))
+                raise WorkerFailedError(str(message.get("message", "the capture failed")))
             self.finished = self.finished or message["event"] == "result"
             messages.append(message)
 

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import contextlib
-import json
 import os
 import shutil
 import sys
@@ -15,6 +14,7 @@ from typing import IO, NoReturn
 
 from ...solver.errors import ScopeError
 from ..errors import exit_status, system_error_message
+from ..footage import json_text
 from .parent import when_parent_ends
 from .request import WARM_UP, JobRequest
 
@@ -33,7 +33,7 @@ class Reporter:
 
     def send(self, event: str, **values: object) -> None:
         """Send a message immediately; thread-safe."""
-        line = json.dumps({"event": event, **values}) + "\n"
+        line = json_text({"event": event, **values}) + "\n"
         with self._lock:
             self._stream.write(line)
             self._stream.flush()

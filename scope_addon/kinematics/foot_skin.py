@@ -110,7 +110,13 @@ def lower_floors(
 def upper_floors(
     heights: NDArray[np.floating[Any]], contact: NDArray[np.floating[Any]], times: NDArray[np.float64]
 ) -> list[tuple[int, int]]:
-    """Find the spans in which the lower foot rests clearly above the floor; arguments and result as `lower_floors`."""
+    """Find the spans in which the lower foot rests clearly above the floor.
+
+    :param heights: (T, F) of the feet's points above the floor, metres.
+    :param contact: (T, F) probability that each of them rests on something.
+    :param times: (T,) seconds.
+    :return: the first row and the row after the last one of each span.
+    """
     rests = (contact > 0.5).any(axis=1) & (heights.min(axis=1) > LEVEL_M)
     return [(first, end) for first, end in runs(rests) if times[end - 1] - times[first] >= MIN_REST_S]
 
@@ -118,10 +124,13 @@ def upper_floors(
 def steps(
     heights: NDArray[np.floating[Any]], contact: NDArray[np.floating[Any]], times: NDArray[np.float64]
 ) -> list[tuple[int, float]]:
-    """Find where feet rest some centimetres above or below the floor, as on a step; arguments as `lower_floors`.
+    """Find where feet rest some centimetres above or below the floor, as on a step.
 
-    Such a step cannot be told from an error of the depth, so a capture puts these feet on the floor.
+    Such a step cannot be distinguished from an error of the depth, so a capture puts these feet on the floor.
 
+    :param heights: (T, F) of the feet's points above the floor, metres.
+    :param contact: (T, F) probability that each of them rests on something.
+    :param times: (T,) seconds.
     :return: the first row and the median height of each rest, in chronological order.
     """
     found = [

@@ -26,15 +26,15 @@ Smoothing and the export of motion files start from it. It is deleted with the a
 
 
 def pack_motion(armature: bpy.types.Object, content: bytes) -> None:
-    """Store a motion file's bytes with the armature. Duplicates of the armature keep the motion that they have."""
-    previous = armature.get(MOTION)
+    """Store a motion file's bytes with the armature. Duplicates of the armature keep the motion that they have.
+
+    A former text that nothing else uses is not saved with the file; until then, undo and a failed operator restore it.
+    """
     text = bpy.data.texts.new(f"{armature.name} motion")
     text.from_string(_NOTE.format(name=armature.name, content=_CONTENT))
     text[_CONTENT] = content
     armature[MOTION] = text
     text.use_fake_user = False  # texts have one when they are new, and would stay in the file for ever
-    if isinstance(previous, bpy.types.Text) and previous.users == 0:
-        bpy.data.texts.remove(previous)
 
 
 def stored_motion(armature: bpy.types.Object) -> Motion:

@@ -102,8 +102,8 @@ def convert(source: SmplMotion, body: Body, path: Path, up: str = "auto", rate: 
             notes.append(f"the motion is of a {source.gender} body, but '{body.name}' is {body.gender}")
     else:
         notes.append(
-            "the poses were applied to Scope's own body, whose rest pose and proportions differ from SMPL's, and the "
-            "shape coefficients were left out; choose your SMPL, SMPL+H or SMPL-X file as the body for the exact motion"
+            "the poses were applied as they are to Scope's own body, whose rest pose and proportions differ from "
+            "SMPL's; with your SMPL, SMPL+H or SMPL-X file as the body, the motion is exact"
         )
     poses, missing = _for_body(source, body)
     if missing:
@@ -125,6 +125,7 @@ def convert(source: SmplMotion, body: Body, path: Path, up: str = "auto", rate: 
     contact, floor = _standing(body, betas, poses, root, times)
     if not exact or axis != "z":
         root[:, 2] -= floor
+    if axis != "z":
         notes.append(f"{_AXIS_TEXT[axis]} points up in the file; the motion was placed on the floor by its feet")
     motion = _motion(body, betas, poses, root - J0, contact, frames_per_second)
     motion.gender, motion.source = source.gender, path.name

@@ -86,6 +86,7 @@ def read_smpl_motion(path: Path) -> SmplMotion:
 def smpl_motion(arrays: Mapping[str, NDArray[Any]], path: Path) -> SmplMotion:
     """Interpret the arrays of a file.
 
+    :param arrays: poses (T, 72) or in another layout that `docs/motion_file.md` lists, and what goes with them.
     :raises MotionFileError: there are no poses among them, or one of them cannot be used.
     """
     names, poses, usual_up = _poses(arrays, path)

@@ -9,15 +9,27 @@ from __future__ import annotations
 
 import bpy
 
-from . import command, drop, export_operators, import_operators, preferences, translations, warm_up
-from .capture import capture_operators, capture_panel, capture_properties, captures
-from .edit import edit_operators, edit_panel, key_operators
+from . import (
+    command,
+    drop,
+    export_operators,
+    import_operators,
+    keymap,
+    menus,
+    preferences,
+    presets,
+    translations,
+    warm_up,
+)
+from .capture import capture_operators, capture_panel, capture_properties, captures, video_import
+from .edit import action_operators, edit_operators, edit_panel, key_operators
 from .pins import correction_operators, correction_panel, pin_tool, upright_operators
 from .retarget import retarget_operators, retarget_panel, retarget_properties
 from .view import view_after_undo, view_operators
 
 _MODULES = (
     *(capture_properties, preferences, capture_operators, export_operators, import_operators, view_operators, drop),
+    *(video_import, presets, menus, action_operators),
     *(edit_operators, key_operators, correction_operators, pin_tool, upright_operators),
     *(retarget_properties, retarget_operators),
     *(captures, capture_panel, edit_panel, correction_panel, retarget_panel),
@@ -38,6 +50,8 @@ def register() -> None:
         correction_panel.attach()
         view_after_undo.attach()
         import_operators.attach()
+        menus.attach()
+        keymap.attach()
         warm_up.attach()
         translations.register()
     except Exception:
@@ -51,6 +65,8 @@ def unregister() -> None:
     capture_operators.end_capture()
     translations.unregister()
     warm_up.detach()
+    keymap.detach()
+    menus.detach()
     import_operators.detach()
     view_after_undo.detach()
     correction_panel.detach()

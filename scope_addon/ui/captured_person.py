@@ -101,7 +101,7 @@ def betas_of(armature: bpy.types.Object, body: Body) -> NDArray[np.float64]:
     return betas
 
 
-def captured_motion(armature: bpy.types.Object) -> Motion:
+def motion_of(armature: bpy.types.Object) -> Motion:
     """Return the captured motion, before any editing but with its corrections.
 
     :raises UsageError: the armature does not store it.
@@ -112,8 +112,8 @@ def captured_motion(armature: bpy.types.Object) -> Motion:
     return stored_motion(armature)
 
 
-def set_captured_motion(armature: bpy.types.Object, motion: Motion) -> None:
-    """Store a motion as the armature's captured one. Undo restores the former one."""
+def set_motion_of(armature: bpy.types.Object, motion: Motion) -> None:
+    """Store a motion as the armature's captured one. Undo restores the former one, and its duplicates keep it."""
     from ..scene.packed_motion import pack_motion
 
     pack_motion(armature, motion.to_bytes())

@@ -10,7 +10,7 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, StringProperty
 
 from ..options import Place
-from .captured_person import PERSON, captured_motion
+from .captured_person import PERSON, motion_of
 from .declared_properties import with_options
 from .reporting import ReportingOperator, rpt_, tip_
 
@@ -134,7 +134,7 @@ class SCOPE_OT_export(ReportingOperator):
                 raise UsageError("the active object belongs to no capture; select one of a capture's objects")
         if self.format == "NPZ":
             people = [obj for c in collections for obj in c.all_objects if "scope_source" in obj]
-            written = export(path, collections, [captured_motion(obj) for obj in people])
+            written = export(path, collections, [motion_of(obj) for obj in people])
         elif self.which == "RIG":
             written = export_rig(path, rig, replace(options, take=_take_of(rig, collections)))
         else:
@@ -149,7 +149,9 @@ def is_available(kind: str) -> bool:
 
 def _take_of(rig: bpy.types.Object, collections: list[bpy.types.Collection]) -> str:
     """Return the name of the capture whose motion a rig has; empty if it is unknown."""
-    return next((c.name for c in collections if rig.get(PERSON, "") in c.all_objects), "")
+    person = rig.get(PERSON, "")  # an object, or its name in older .blend files
+    name = person if isinstance(person, str) else person.name
+    return next((c.name for c in collections if name in c.all_objects), "")
 
 
 CLASSES = (SCOPE_OT_export,)

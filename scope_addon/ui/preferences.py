@@ -13,6 +13,7 @@ from bpy.props import IntProperty, StringProperty
 
 from ..job.cache import Cache
 from ..options import Place
+from . import keymap
 from .declared_properties import with_options
 from .reporting import iface_, rpt_
 
@@ -58,6 +59,7 @@ class SCOPE_AP_preferences(bpy.types.AddonPreferences):
         layout.prop(self, "body_file")
         layout.prop(self, "cache_folder")
         layout.prop(self, "cache_limit_gb", text="Keep at Most (GB)")
+        keymap.draw(layout, context)
         row = layout.row()
         row.alignment = "RIGHT"
         size, folder = _size_text(_cache_size(cache().root)), cache().root

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import bpy
 from bpy.app.translations import pgettext_iface, pgettext_rpt, pgettext_tip
 
+from ..footage import shown
 from .translations import CONTEXT
 
 
@@ -31,7 +32,7 @@ def tip_(text: str, **values: object) -> str:
 
 def sentence(error: Exception | str) -> str:
     """Return an error's message with a capital first letter, as the panel shows it."""
-    text = str(error).strip() or type(error).__name__
+    text = shown(str(error).strip()) or type(error).__name__
     return text[:1].upper() + text[1:]
 
 

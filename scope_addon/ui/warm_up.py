@@ -22,7 +22,7 @@ from .preferences import PACKAGE, cache, preferences
 from .reporting import iface_
 
 ROOT = Path(__file__).resolve().parents[2]
-KERNELS = 73  # that a capture and its preview compile
+KERNELS = 77  # that a capture and its preview compile
 _DELAY_S, _INTERVAL_S = 3.0, 1.0
 _REQUEST = b'{"warm_up": true}\n'
 _WINDOWS_FLAGS = getattr(subprocess, "CREATE_NO_WINDOW", 0) | getattr(subprocess, "IDLE_PRIORITY_CLASS", 0)
@@ -32,6 +32,7 @@ class WarmUp:
     """The process that compiles; ``process`` is None while there is none."""
 
     process: subprocess.Popen[bytes] | None = None
+    files_before = 0  # of compiled code, when it began
     folder: tempfile.TemporaryDirectory[str] | None = None
 
 
@@ -68,6 +69,7 @@ def start() -> bool:
     kernels = cache().kernels
     try:
         kernels.mkdir(parents=True, exist_ok=True)
+        WarmUp.files_before = _files()
         WarmUp.folder = tempfile.TemporaryDirectory(prefix="scope-warm-up-", ignore_cleanup_errors=True)
         command, environment = worker_command(python, ROOT, Path(WarmUp.folder.name), kernels)
         quiet = subprocess.DEVNULL
@@ -100,10 +102,14 @@ def stop() -> None:
 
 def draw(layout: bpy.types.UILayout) -> None:
     """Show the progress while the solver is being compiled."""
-    if WarmUp.process is not None and (done := len(list(cache().kernels.glob("*/*.code")))):
-        share = min(1.0, done / KERNELS)
+    if WarmUp.process is not None and (compiled := _files() - WarmUp.files_before) > 0:
+        share = min(1.0, compiled / KERNELS)
         text = iface_("Compiling the solver in the background, {percent:.0f} %", percent=100 * share)
         layout.progress(text=text, factor=share)
+
+
+def _files() -> int:
+    return sum(1 for _ in cache().kernels.glob("*/*.code"))
 
 
 def _marker() -> Path:

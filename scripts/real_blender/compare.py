@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 import sys
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -24,6 +25,22 @@ def missing(folder: Path, names: list[str]) -> list[str]:
     """Return a message for each file that is missing or empty."""
     sizes = {name: (folder / name).stat().st_size if (folder / name).is_file() else 0 for name in names}
     return [f"{name} was not written" for name, size in sizes.items() if not size]
+
+
+def written_into_the_extension(work: Path) -> list[str]:
+    """Return a message for each file in an installed extension's folder that the zip did not bring.
+
+    The byte code of a module is Python's own; no other file may be there, such as a result or compiled kernel.
+    """
+    with zipfile.ZipFile(work / "scope.zip") as file:
+        shipped = set(file.namelist())
+    problems = []
+    inside_home = ".config/blender/*/extensions/user_default/scope"
+    for folder in [*work.glob(f"home/{inside_home}"), *work.glob(f"homes/*/{inside_home}")]:
+        found = {str(p.relative_to(folder)) for p in folder.rglob("*") if p.is_file() and p.suffix != ".pyc"}
+        problems += [f"{name} was written into {folder}" for name in sorted(found - shipped)]
+        problems += [f"{name} is gone from {folder}" for name in sorted(n for n in shipped - found if n[-1] != "/")]
+    return problems
 
 
 def panel(video: Path, out: Path, shell_out: Path, report: dict) -> list[str]:
@@ -71,12 +88,12 @@ def main(video: Path, work: Path, parts: list[str]) -> int:
     shell_out = work / "shell"
     shell_out.mkdir(exist_ok=True)
     report: dict = {}
-    problems: list[str] = []
+    problems = written_into_the_extension(work)
     if "panel" in parts:
         problems += panel(video, work / "out", shell_out, report)
     if "headless" in parts:
         problems += headless((work / "clips").resolve(), work / "out", shell_out, report)
-    for part in ("undo", "trouble", "startup", "walk"):
+    for part in ("undo", "trouble", "stored", "pins", "first", "startup", "walk"):
         if part in parts:
             report[part] = json.loads((work / "out" / f"{part}.json").read_text())
     print(json.dumps(report, indent=1))

@@ -121,4 +121,4 @@ def run(steps: Iterator[float]) -> None:
         os._exit(status)  # Blender's own exit can hang
 
     bpy.context.preferences.view.show_splash = False
-    bpy.app.timers.register(advance, first_interval=3.0)
+    bpy.app.timers.register(advance, first_interval=3.0, persistent=True)  # also when another file is opened

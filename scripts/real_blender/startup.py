@@ -2,13 +2,15 @@
 """Time how long Blender takes to open with the extension enabled and disabled, alternating: ``startup.py ROUNDS``.
 
 Runs in the Debian with its own Python, in /scope. Both have the extension's files; only one has it enabled. Each start
-opens a window on a separate screen, and Blender's first timer, which runs once the window exists, ends it.
+opens a window on a separate screen, and Blender's first timer, which runs once the window exists, ends it. Besides the
+time that passed, the processor time is measured, which means something on a busy machine too.
 """
 
 from __future__ import annotations
 
 import json
 import os
+import resource
 import shutil
 import statistics
 import subprocess
@@ -30,9 +32,9 @@ bpy.app.timers.register(end, first_interval=0.0)
 """
 
 
-def opened(kind: str) -> float:
-    """Return the seconds from the start of the process to the window's first timer."""
-    began = time.monotonic()
+def opened(kind: str) -> tuple[float, float]:
+    """Return the seconds from the start of the process to the window's first timer, and those of the processor."""
+    began, used = time.monotonic(), processor_s()
     done = subprocess.run(
         ["blender", "--python-expr", END],
         env=dict(os.environ, HOME=str(HOMES[kind])),
@@ -42,7 +44,13 @@ def opened(kind: str) -> float:
     )
     line = next(line for line in done.stdout.splitlines() if line.startswith("opened"))
     assert (line.split()[2] == "True") == (kind == "enabled"), line
-    return float(line.split()[1]) - began
+    return float(line.split()[1]) - began, processor_s() - used
+
+
+def processor_s() -> float:
+    """Return the processor time of all processes that were waited for."""
+    children = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return children.ru_utime + children.ru_stime
 
 
 def main(rounds: int) -> None:
@@ -55,16 +63,19 @@ def main(rounds: int) -> None:
     environment = dict(os.environ, HOME=str(HOMES["without"]))
     command = ["blender", "--background", "--python-exit-code", "1", "--python-expr", DISABLE]
     subprocess.run(command, env=environment, capture_output=True, check=True)
-    times: dict[str, list[float]] = {kind: [] for kind in HOMES}
+    times: dict[str, list[tuple[float, float]]] = {kind: [] for kind in HOMES}
     for kind in HOMES:
         opened(kind)  # read its files once
     for turn in range(rounds):
         for kind in sorted(HOMES, reverse=bool(turn % 2)):
             times[kind].append(opened(kind))
-    figures = {f"{kind}_s": statistics.median(found) for kind, found in times.items()}
-    pairs = [1e3 * (a - b) for a, b in zip(times["enabled"], times["without"], strict=True)]
-    figures |= {"more_ms": 1e3 * (figures["enabled_s"] - figures["without_s"])}
-    figures |= {"median_of_differences_ms": statistics.median(pairs), "rounds": rounds}
+    figures: dict[str, float] = {"rounds": rounds}
+    for index, what in enumerate(("", "processor_")):
+        found = {kind: [run[index] for run in runs] for kind, runs in times.items()}
+        figures |= {f"{what}{kind}_s": statistics.median(seconds) for kind, seconds in found.items()}
+        pairs = [1e3 * (a - b) for a, b in zip(found["enabled"], found["without"], strict=True)]
+        figures[f"{what}more_ms"] = 1e3 * (figures[f"{what}enabled_s"] - figures[f"{what}without_s"])
+        figures[f"{what}median_of_differences_ms"] = statistics.median(pairs)
     Path("out/startup.json").write_text(json.dumps({name: round(value, 4) for name, value in figures.items()}))
 
 

@@ -103,7 +103,8 @@ def removed_footage() -> Iterator[float]:
 def full_disk() -> Iterator[float]:
     """Fill the disk for the worker's files, then for an export."""
     yield from captured()
-    kernels, size = cache().kernels, cache().size()
+    kernels = cache().kernels  # which clearing keeps, so that they are not part of the size
+    size = cache().size() + sum(path.stat().st_size for path in kernels.rglob("*.code"))
     SMALL.mkdir(exist_ok=True)
     subprocess.run(["mount", "-t", "tmpfs", "-o", f"size={2 * size + 2**20}", "tmpfs", str(SMALL)], check=True)
     preferences().cache_folder = str(SMALL)

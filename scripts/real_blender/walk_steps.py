@@ -171,7 +171,7 @@ class Steps:
         if not saved:
             return self.step_save()
         path, link = str(self.random.choice(saved)), self.random.random() < 0.5
-        kind = self.random.choice(("objects", "collections", "actions", "scenes", "meshes"))
+        kind = self.random.choice(("objects", "collections", "actions", "meshes"))
 
         def take() -> object:
             with bpy.data.libraries.load(path, link=link) as (there, here):

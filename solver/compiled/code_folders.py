@@ -41,7 +41,7 @@ LEVELS = {
     "x86_64": ("x86-64-v3", ("avx2", "bmi", "bmi2", "cx16", "f16c", "fma", "lzcnt", "movbe", "popcnt", "sse4.2")),
     "arm64": ("apple-m1", ()),  # macOS, whose every ARM processor is this one or a later one
 }
-NOT_SHIPPED = "examples"  # a folder that an installation may lack; no kernel is in it
+WITHOUT_KERNELS = {"examples", "loaders"}  # folders whose sources do not count; an installation may lack the first
 _STALE_S = 14 * 24 * 3600.0  # unused for so long, another version's code is removed
 
 
@@ -52,7 +52,7 @@ def digest_of(*parts: object) -> str:
 
 def sources_digest(folder: Path) -> str:
     """Return a digest of the names and contents of all sources below a folder, whatever their line ends."""
-    files = sorted(f for f in folder.rglob("*.py") if NOT_SHIPPED not in f.relative_to(folder).parts)
+    files = sorted(f for f in folder.rglob("*.py") if not WITHOUT_KERNELS & set(f.relative_to(folder).parts))
     texts = [(f.relative_to(folder).as_posix(), f.read_bytes().replace(b"\r\n", b"\n")) for f in files]
     return digest_of(*texts)
 
@@ -119,7 +119,9 @@ def shipped_processor() -> str:
 
 @cache
 def can_run_shipped() -> bool:
-    """Whether this computer's processor has everything that shipped code needs."""
+    """Whether this computer's processor has everything that shipped code needs, and numba was not told to use less."""
+    if config.CPU_NAME not in (None, "", shipped_processor()) or not config.ENABLE_AVX:
+        return False
     return bool(shipped_processor()) and all(_host_features().get(feature) for feature in LEVELS[_machine()][1])
 
 

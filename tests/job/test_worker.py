@@ -187,3 +187,17 @@ def test_compiled_code_is_stored_in_the_given_folder(folder, tmp_path):
     assert messages[0]["at"] == str(tmp_path / "kernels")
     assert list(folder.iterdir()) == []
     worker.close()
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="file names are Unicode on this system")
+def test_a_request_for_footage_whose_name_is_not_utf8(folder, tmp_path):
+    path = tmp_path / os.fsdecode(b"caf\xe9.mp4")
+    path.write_text("no video")
+    request = JobRequest(str(path))
+    assert JobRequest.from_json(request.to_json()) == request
+    assert request.key("1") != JobRequest(SAMPLE).key("1")
+    worker = WorkerProcess(request, folder, None, [sys.executable, "-I"])
+    with pytest.raises(WorkerFailedError, match="cannot|is not") as failed:
+        wait_for(lambda: worker.poll() and False)
+    worker.close()
+    str(failed.value).encode()

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from scope.scope_addon.errors import MotionFileError, UsageError
 from scope.scope_addon.motion import Motion
+from scope.scope_addon.scene.animation_data.transaction import all_or_nothing
 from scope.scope_addon.scene.build import build_scene
 from scope.scope_addon.scene.export.export import export_motions
 from scope.scope_addon.scene.packed_motion import MOTION, pack_motion, stored_motion
@@ -91,11 +92,38 @@ def test_the_motion_is_deleted_with_the_last_armature(people, tmp_path):
     assert len(bpy.data.texts) == 0
 
 
-def test_storing_another_motion_leaves_no_text_behind(people):
-    armature = people[0][0]
-    pack_motion(armature, people[1][1].to_bytes())
+def test_the_former_motion_is_not_saved(people, tmp_path):
+    armature, motion = people[0][0], people[1][1]
+    name = armature.name
+    pack_motion(armature, motion.to_bytes())
+    bpy.ops.wm.open_mainfile(filepath=saved(tmp_path))
     assert len(bpy.data.texts) == 2
-    assert_same(stored_motion(armature), people[1][1])
+    assert_same(stored_motion(bpy.data.objects[name]), motion)
+
+
+def test_an_operator_that_fails_restores_the_former_motion(people):
+    armature, motion = people[0]
+
+    def fail() -> None:
+        with all_or_nothing(bpy.context.scene, armature):
+            pack_motion(armature, people[1][1].to_bytes())
+            raise UsageError("no")
+
+    with pytest.raises(UsageError, match="no"):
+        fail()
+    assert_same(stored_motion(armature), motion)
+    assert len(bpy.data.texts) == 2
+
+
+def test_undo_restores_the_former_motion(people):
+    name, motion, other = people[0][0].name, people[0][1], people[1][1]
+    bpy.ops.ed.undo_push(message="before")
+    pack_motion(bpy.data.objects[name], other.to_bytes())
+    bpy.ops.ed.undo_push(message="after")
+    bpy.ops.ed.undo()
+    assert_same(stored_motion(bpy.data.objects[name]), motion)
+    bpy.ops.ed.redo()
+    assert_same(stored_motion(bpy.data.objects[name]), other)
 
 
 def test_a_blend_file_from_the_shell_carries_its_motion(body, tmp_path):

@@ -168,6 +168,10 @@ MEASURED_REFUSED = {
         "Offset of the floor must be a number, .* None",
     ),
     "a text of pixels": (seen_2d(INTRINSICS, "pixels"), "Pixels of 2D keypoints must be numbers .* the text 'pixels'"),
+    "an array of texts": (
+        seen_2d(INTRINSICS, np.array([["1", "2"]])),
+        "Pixels of 2D keypoints must be numbers .* an array",
+    ),
     "texts of pixels": (seen_2d(INTRINSICS, [["1", "2"]]), "Pixels of 2D keypoints must be numbers"),
     "pixels None": (seen_2d(INTRINSICS, None), r"Pixels of 2D keypoints must be numbers of shape \(1, 2\), .* None"),
     "pixels of None": (seen_2d(INTRINSICS, [[None, None]]), "Pixels of 2D keypoints must be numbers"),
@@ -361,6 +365,14 @@ def test_a_state_that_is_not_finite_is_reported_by_the_status():
     """Unlike a rotation, which has no nearest one: a position is a measured value, and those are never refused."""
     found = fit(BODY, SEEN, init=state(t_camera_root=np.full(3, NAN)), options=SHORT)
     assert found.status is Status.NON_FINITE
+
+
+def test_every_rotation_passes_and_every_reflection_is_refused():
+    R = rotations.exp(3.0 * np.random.default_rng(4).standard_normal((200, 3)))
+    validation.check_rotations(R, "R")
+    for k, mirrored in enumerate(R * [1, 1, -1]):
+        with pytest.raises(InvalidValueError, match="number 1 is"):
+            validation.check_rotations(np.stack([R[k], mirrored]), "R")
 
 
 def test_random_information_is_refused_exactly_where_an_eigenvalue_is_negative():

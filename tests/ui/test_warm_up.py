@@ -38,6 +38,35 @@ def test_it_runs_once_for_an_installation(process, tmp_path):
     assert (tmp_path / "said").read_text().count("\n") == 1
 
 
+class Layout:
+    """Takes what is drawn."""
+
+    def __init__(self):
+        self.shown = []
+
+    def progress(self, text, factor):
+        self.shown.append((text, round(factor, 2)))
+
+
+def test_progress_is_shown_only_while_something_is_compiled(process):
+    earlier = cache().kernels / "solver-01234567-0123456789ab" / "optimizer.optimize-0123456789ab.code"
+    earlier.parent.mkdir(parents=True)
+    earlier.touch()
+    layout = Layout()
+    process("import time; time.sleep(100)")
+    warm_up.draw(layout)
+    warm_up.step()
+    warm_up.draw(layout)
+    assert layout.shown == []
+    for n in range(warm_up.KERNELS // 7):
+        earlier.with_name(f"{n}.code").touch()
+    warm_up.draw(layout)
+    assert layout.shown == [("Compiling the solver in the background, 14 %", 0.14)]
+    warm_up.stop()
+    warm_up.draw(layout)
+    assert len(layout.shown) == 1
+
+
 def test_after_a_failure_it_runs_again(process, tmp_path):
     process(f"import sys; open({str(tmp_path / 'said')!r}, 'a').write(sys.stdin.readline()); sys.exit(1)")
     for _ in range(2):

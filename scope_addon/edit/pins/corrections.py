@@ -124,6 +124,7 @@ def to_arrays(corrections: tuple[Correction, ...]) -> dict[str, NDArray[Any]]:
 def from_arrays(arrays: Mapping[str, NDArray[Any]]) -> tuple[Correction, ...]:
     """Read the corrections from the arrays of a motion file; keys may be missing.
 
+    :param arrays: named and shaped as `docs/motion_file.md` says, for example ``pin_uv`` (N, 2).
     :raises MotionFileError: an array has the wrong shape, or a value is impossible.
     """
 

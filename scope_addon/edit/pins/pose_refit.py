@@ -58,7 +58,10 @@ class Points:
     weights: list[float] = field(default_factory=list)
 
     def add(self, number: int, value: NDArray[np.float64], weight: float) -> None:
-        """Add a point."""
+        """Add a point.
+
+        :param value: (3,) metres in the world, or (2,) in the image.
+        """
         self.numbers.append(number)
         self.values.append(np.asarray(value, float))
         self.weights.append(weight)
@@ -112,10 +115,10 @@ class PoseRefit:
     def place(
         self, rotations: NDArray[np.float64], root: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        """Return orientations (…, K+1, 3, 3) and positions (…, K+1, 3) of all parts, and the soles (…, 4, 3).
+        """Return orientations (..., K+1, 3, 3) and positions (..., K+1, 3) of all parts, and the soles (..., 4, 3).
 
-        :param rotations: (…, K+1, 3, 3), the root's in the world.
-        :param root: (…, 3) metres.
+        :param rotations: (..., K+1, 3, 3), the root's in the world.
+        :param root: (..., 3) metres.
         """
         R, t = self.body.forward_kinematics(rotations, root - self.body.rest_joints(self.betas)[0], self.betas)
         first = self.body.keypoint_names.index(SOLES[0])

@@ -108,7 +108,10 @@ def exchanged(clip: Clip, body: Body, exchange: Exchange, shot: Shot) -> Clip:
 
 
 def missed(clip: Clip, body: Body, betas: NDArray[np.floating[Any]], pin: Pin, shot: Shot) -> float:
-    """Return how far the joint is from its pin: pixels of a pin in the image, metres of one in space."""
+    """Return how far the joint is from its pin: pixels of a pin in the image, metres of one in space.
+
+    :param betas: (P,) shape coefficients.
+    """
     at = sample(clip, np.array([shot.time(pin.frame)]))
     where = at.joints(body, betas)[0, PoseRefit(body, betas).joint(pin.joint)]
     if pin.pixel is not None:

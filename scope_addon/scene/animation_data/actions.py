@@ -204,6 +204,24 @@ def nla_strips(datablock: bpy.types.ID) -> list[bpy.types.NlaStrip]:
     return [strip for track in tracks for strip in track.strips if not strip.mute]
 
 
+def push_to_nla(datablock: bpy.types.ID) -> bpy.types.NlaStrip:
+    """Move the action of a datablock to a strip on a new NLA track, at the frames of its keys.
+
+    :param datablock: with an action, and not in the NLA's Tweak Mode.
+    """
+    animation = datablock.animation_data
+    action, slot = animation.action, getattr(animation, "action_slot", None)
+    first, last = action.frame_range
+    track = animation.nla_tracks.new()
+    track.name = action.name
+    strip = track.strips.new(action.name, int(first), action)
+    if slot is not None:
+        strip.action_slot = slot
+    strip.frame_end, strip.frame_start = last, first  # keys may lie between whole frames
+    animation.action = None
+    return strip
+
+
 @contextmanager
 def nla_as_actions(scene: bpy.types.Scene) -> Iterator[None]:
     """Bake the NLA of the scene's objects to actions for the duration of the block, on whole frames."""

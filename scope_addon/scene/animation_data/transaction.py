@@ -96,7 +96,7 @@ class _SavedTransform:
         self._parenting = obj.parent_type, obj.parent_bone
         self._matrices = obj.matrix_parent_inverse.copy(), obj.matrix_basis.copy()
         owners = [obj, *(obj.pose.bones if obj.pose else ())]
-        self._properties = [(owner, _scalars(owner)) for owner in owners]
+        self._properties = [(owner, _restorable(owner)) for owner in owners]
 
     def restore(self) -> None:
         """Restore the object."""
@@ -105,7 +105,7 @@ class _SavedTransform:
         obj.parent_type, obj.parent_bone = self._parenting
         obj.matrix_parent_inverse, obj.matrix_basis = self._matrices
         for owner, properties in self._properties:
-            for name in [name for name in _scalars(owner) if name not in properties]:
+            for name in [name for name in _restorable(owner) if name not in properties]:
                 del owner[name]
             for name, value in properties.items():
                 owner[name] = value
@@ -152,8 +152,10 @@ class _SavedAnimation:
             bpy.data.actions.remove(self._copy)
 
 
-def _scalars(owner: bpy.types.bpy_struct) -> dict[str, bool | int | float | str]:
-    return {name: owner[name] for name in owner.keys() if isinstance(owner[name], bool | int | float | str)}
+def _restorable(owner: bpy.types.bpy_struct) -> dict[str, bool | int | float | str | bpy.types.ID]:
+    """Return the custom properties that are single values or datablocks."""
+    kinds = (bool, int, float, str, bpy.types.ID)
+    return {name: owner[name] for name in owner.keys() if isinstance(owner[name], kinds)}
 
 
 def _same_keys(a: bpy.types.Action, b: bpy.types.Action) -> bool:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import hashlib
+from dataclasses import dataclass
 
 import bpy
 import numpy as np
@@ -18,36 +19,56 @@ from ..character.animation import on_one_hemisphere
 _CHECKSUM = "scope_keys"  # custom property of an action: the checksum of its keys when they were written
 
 
-def write_action(
+@dataclass(frozen=True)
+class BoneKeys:
+    """The channels of one bone, T frames."""
+
+    bone: str
+    rotations: NDArray[np.float64]  # (T, 3, 3) relative to parent and rest pose
+    locations: NDArray[np.float64] | None = None  # (T, 3) in the axes of the location channel; None: not keyed
+
+    def basis(self, t: int) -> Matrix:
+        """Return the bone's ``matrix_basis`` of one frame."""
+        matrix = Matrix(self.rotations[t].tolist()).to_4x4()
+        if self.locations is not None:
+            matrix.translation = self.locations[t].tolist()
+        return matrix
+
+
+def root_locations(
     rig: bpy.types.Object,
     place: NDArray[np.float64],
     skeleton: Skeleton,
-    rotations: NDArray[np.float64],
     root: int,
     heads: NDArray[np.float64],
-    frames: NDArray[np.float64],
-) -> bpy.types.Action:
-    """Create a new action with the keys, in the rotation mode of each bone.
+) -> NDArray[np.float64]:
+    """Return the location channel (T, 3) of the root bone.
 
     :param place: (4, 4) the rig's object to world at rest.
-    :param rotations: (T, B, 3, 3) of the channels.
     :param root: index of the root bone.
     :param heads: (T, 3) positions of the root bone's head, metres, in the world at rest.
+    """
+    world = place[:3, :3]
+    moved: NDArray[np.float64] = (heads - skeleton.heads[root]) @ np.linalg.inv(world).T
+    if rig.pose.bones[skeleton.names[root]].bone.use_local_location:
+        axes = skeleton.rotations[root].T @ (world / np.cbrt(np.linalg.det(world)))
+        moved = moved @ axes.T
+    return moved
+
+
+def write_action(rig: bpy.types.Object, keys: list[BoneKeys], frames: NDArray[np.float64]) -> bpy.types.Action:
+    """Create a new action with the keys, in the rotation mode of each bone.
+
     :param frames: (T,) scene frames.
     """
     action = bpy.data.actions.new(rig.name)
     channels = Channels(rig, action)
-    for b, bone_name in enumerate(skeleton.names):
-        bone = rig.pose.bones[bone_name]
-        path, values = _rotation_channel(bone.rotation_mode, rotations[:, b])
-        channels.write(bone_path(bone_name, path), frames, values, group=bone_name)
-    bone = rig.pose.bones[skeleton.names[root]]
-    world = place[:3, :3]
-    moved = (heads - skeleton.heads[root]) @ np.linalg.inv(world).T
-    if bone.bone.use_local_location:
-        axes = skeleton.rotations[root].T @ (world / np.cbrt(np.linalg.det(world)))
-        moved = moved @ axes.T
-    channels.write(bone_path(bone.name, "location"), frames, moved, group=bone.name)
+    for key in keys:
+        path, values = _rotation_channel(rig.pose.bones[key.bone].rotation_mode, key.rotations)
+        channels.write(bone_path(key.bone, path), frames, values, group=key.bone)
+    for key in keys:
+        if key.locations is not None:
+            channels.write(bone_path(key.bone, "location"), frames, key.locations, group=key.bone)
     action[_CHECKSUM] = _checksum(action)
     return action
 

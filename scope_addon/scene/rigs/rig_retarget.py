@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import bpy
@@ -30,8 +30,9 @@ from ..character.root_object import (
     root_object,
     topmost,
 )
-from .rig_action import override_nla, retire, write_action
+from .rig_action import BoneKeys, override_nla, retire, root_locations, write_action
 from .rig_probe import at_rest, blocked_bones, probe
+from .rigify_ik import ik_keys
 
 
 @dataclass(frozen=True)
@@ -117,8 +118,11 @@ def retarget(
             motion = _placed(source, clip, skeleton, place, pose, root, options)
             turns = basis(skeleton, motion.rotations)
             warnings = blocked_bones(rig, skeleton.names, turns, motion.rotations)
+            keys = [BoneKeys(name, turns[:, b]) for b, name in enumerate(skeleton.names)]
+            keys[root] = replace(keys[root], locations=root_locations(rig, place, skeleton, root, motion.heads))
+            keys += ik_keys(rig, keys)
         former = rig.animation_data.action if rig.animation_data else None
-        action = write_action(rig, place, skeleton, turns, root, motion.heads, frames)
+        action = write_action(rig, keys, frames)
         _set_parent(rig, frames, motion)
         rig.data.pose_position = "POSE"
         override_nla(rig.animation_data)

@@ -16,6 +16,7 @@ import bpy
 
 from ....solver.loaders.body_file import body_with_hands, load_body
 from ...errors import UsageError, VideoError
+from ...footage import shown
 from ...job.cache import Cache, CachedCapture
 from ...job.process import ROOT, START_SCRIPT, WorkerProcess
 from ...job.progress import JobProgress
@@ -126,7 +127,7 @@ class CaptureJob:
         with _window_shows(scene):
             result = build_scene(motions, body, footage, self._options)
         store_motions(result, [content for _, content in contents], self._request.values["body"])
-        report = dict(captured.report, warnings=warnings + result.warnings)
+        report = dict(captured.report, warnings=[shown(warning) for warning in warnings + result.warnings])
         show_result(result.collection.scope_result, self._request.footage, report, result)
         scene.scope.capture = result.collection
 
@@ -134,10 +135,16 @@ class CaptureJob:
 def capture_request(scene: bpy.types.Scene) -> JobRequest:
     """Make the request to the worker from the scene's settings and the preferences.
 
-    :raises UsageError: no footage, calibration or body file is chosen, or the captured part is empty.
+    :raises UsageError: the scene is linked, no footage, calibration or body file is chosen, or the captured part is
+        empty.
     :raises VideoError: the footage does not exist.
     """
     settings, chosen = scene.scope, preferences()
+    if scene.library is not None:
+        raise UsageError(
+            f"the scene is linked from {scene.library.filepath}, so nothing can be added to it; capture in a scene of "
+            "this file"
+        )
     if not settings.footage:
         raise UsageError("no footage is chosen; choose a video or image first")
     footage = Path(bpy.path.abspath(settings.footage))

@@ -127,7 +127,11 @@ class SCOPE_OT_capture(bpy.types.Operator):
             return self._end(context, {"CANCELLED"})
         if event.type != "TIMER":
             return {"PASS_THROUGH"}
-        outcome = self._step()
+        try:
+            outcome = self._step()
+        except Exception:  # Blender drops the operator without calling ``cancel``
+            self._end(context, {"CANCELLED"})
+            raise
         context.workspace.status_text_set(
             iface_(
                 "Scope: {progress}   (Esc over the Scope panel to cancel)",

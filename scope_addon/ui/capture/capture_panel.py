@@ -8,9 +8,11 @@ from pathlib import Path
 
 import bpy
 
+from ...footage import shown
 from ...job.progress import JobProgress, duration
 from .. import warm_up
 from ..export_operators import FORMATS, is_available
+from ..presets import SCOPE_PT_capture_presets
 from ..reporting import iface_
 from ..view.comparison import camera_of, is_looking_through, side_area
 from . import preview_picture
@@ -33,6 +35,10 @@ class SCOPE_PT_capture(Tab, bpy.types.Panel):
 
     bl_idname = "SCOPE_PT_capture"
     bl_label = "Capture"
+
+    def draw_header_preset(self, _context: bpy.types.Context) -> None:
+        """Draw the button of the presets in the header."""
+        SCOPE_PT_capture_presets.draw_panel_header(self.layout)
 
     def draw(self, context: bpy.types.Context) -> None:
         """Draw the panel."""
@@ -84,6 +90,7 @@ class SCOPE_PT_person(Tab, bpy.types.Panel):
         """Draw the panel."""
         layout, settings = _split(self.layout), context.scene.scope
         layout.enabled = state.job is None
+        layout.prop(settings, "take")
         layout.prop(settings, "people")
         if settings.people == "COUNT":
             layout.prop(settings, "people_count", text="Number")
@@ -168,7 +175,7 @@ class SCOPE_PT_result(Tab, bpy.types.Panel):
 def _draw_figures(layout: bpy.types.UILayout, result: bpy.types.PropertyGroup) -> None:
     """Draw footage, people, frames and error. A .blend file written by the command line has no figures."""
     column = layout.column(align=True)
-    column.label(text=Path(result.footage).name or result.collection.name, icon="FILE_MOVIE")
+    column.label(text=shown(Path(result.footage).name) or result.collection.name, icon="FILE_MOVIE")
     people = people_of(result.collection)
     column.label(
         text=people_text(len(people)) if people else "The captured person was deleted",

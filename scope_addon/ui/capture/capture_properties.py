@@ -35,7 +35,7 @@ class SCOPE_PG_warning(bpy.types.PropertyGroup):
 class SCOPE_PG_result(bpy.types.PropertyGroup):
     """Result of a capture, stored with its collection."""
 
-    footage: StringProperty()
+    footage: StringProperty(subtype="FILE_PATH")
     people: IntProperty()
     frames: IntProperty()
     valid_frames: IntProperty()

@@ -65,16 +65,13 @@ class SCOPE_UL_captures(bpy.types.UIList):
         _settings: bpy.types.PropertyGroup,
         _active_property: str,
     ) -> None:
-        """Draw one capture: its name, people, frames, and whether it has warnings; grey without an armature."""
+        """Draw one capture: its name, its people, and whether it has warnings; grey without an armature."""
         people, result = people_of(item), item.scope_result
-        row = layout.split(factor=0.5, align=True)
+        row = layout.split(factor=0.6, align=True)
         row.active = bool(people)
         row.prop(item, "name", text="", emboss=False, icon="OUTLINER_COLLECTION" if people else "GHOST_DISABLED")
         details = row.row(align=True)
-        text = people_text(len(people)) if people else iface_("removed")
-        if people and result.frames:
-            text = iface_("{people}, {frames} fr.", people=text, frames=result.frames)
-        details.label(text=text)
+        details.label(text=people_text(len(people)) if people else iface_("removed"))
         details.label(text="", icon="ERROR" if people and len(result.warnings) else "BLANK1")
 
     def filter_items(

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty
 
-from ..captured_person import betas_of, captured_motion
+from ..captured_person import betas_of, motion_of
 from .edit_base import EditOperator, SpanOperator, edit_clip
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ class SCOPE_OT_smooth(EditOperator):
         from ...scene.character.keys import bake_whole_frames, write_clip
         from ...scene.character.root_object import remove_root_object
 
-        motion = captured_motion(armature)
+        motion = motion_of(armature)
         clip = smoothed(body, motion, self.strength)
         write_clip(armature, body, clip, key_frames(motion.timestamps, rate, float(armature.get("scope_start", 0.0))))
         armature["scope_smoothing"] = self.strength

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import bpy
 
-from ..captured_person import captured_motion, set_captured_motion
+from ..captured_person import motion_of, set_motion_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -42,10 +42,10 @@ def change_corrections(
     from ...edit.pins.corrected_motion import corrections_of, with_corrections
     from ...scene.character.corrected_keys import rewrite_changed_keys
 
-    before = captured_motion(armature)
+    before = motion_of(armature)
     after = with_corrections(before, body, change(corrections_of(before)))
     rewrite_changed_keys(armature, body, rate, before, after)
-    set_captured_motion(armature, after)
+    set_motion_of(armature, after)
     armature[_LIST] = json.dumps([_entry(armature, after, correction, rate) for correction in corrections_of(after)])
     return after
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProperty, IntProperty, StringProperty
 
-from ..captured_person import captured_motion
+from ..captured_person import motion_of
 from ..edit.edit_base import EditOperator, SpanOperator
 from .corrected_person import change_corrections, listed_corrections, pin_at
 
@@ -57,7 +57,7 @@ class SCOPE_OT_add_pin(EditOperator):
             scene.frame_set(self.frame)
         try:
             place = tuple(self.location), self.in_image, self.reach
-            pin = pin_at(context, armature, captured_motion(armature), self.joint, place)
+            pin = pin_at(context, armature, motion_of(armature), self.joint, place)
             motion = change_corrections(armature, body, rate, lambda present: added(present, pin))
             meet_pin(armature, body, rate, motion, pin)
         finally:
@@ -78,7 +78,7 @@ class CorrectSpanOperator(SpanOperator):
         from ...edit.pins.corrections import added
         from ...scene.character.corrected_keys import source_frame
 
-        motion = captured_motion(armature)
+        motion = motion_of(armature)
         first, last = (source_frame(armature, motion, frame, rate) for frame in (self.start, self.end))
         new = self.correction(first, last)
         change_corrections(armature, body, rate, lambda present: added(present, new))
@@ -139,7 +139,10 @@ class SCOPE_OT_remove_correction(EditOperator):
     index: IntProperty(name="Number", default=-1, min=-1, description="Counted from 0; -1 removes all")
 
     def edit(self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float) -> str:
-        """Remove it and change the keys back."""
+        """Remove it and change the keys back.
+
+        :raises UsageError: there is no correction of this number.
+        """
         from ...errors import UsageError
 
         count = len(listed_corrections(armature))

@@ -9,7 +9,7 @@ import bpy
 from bpy.props import FloatVectorProperty
 from bpy_extras.view3d_utils import region_2d_to_origin_3d, region_2d_to_vector_3d
 
-from ..captured_person import body_of, captured_armature, captured_motion, set_captured_motion
+from ..captured_person import body_of, captured_armature, motion_of, set_motion_of
 from ..edit.edit_base import EditOperator, may_edit
 from ..reporting import iface_, tip_
 from ..view.comparison import camera_of
@@ -38,19 +38,19 @@ class SCOPE_OT_set_upright(EditOperator):
         from ...scene.character.corrected_keys import source_frame
         from ...scene.character.upright_scene import move_camera, move_person
 
-        scene, motion = context.scene, captured_motion(armature)
+        scene, motion = context.scene, motion_of(armature)
         frame = source_frame(armature, motion, scene.frame_current + scene.frame_subframe, rate)
         transform = upright_transform(motion, body, frame, (tuple(self.start), tuple(self.end)))
         near = [obj for c in armature.users_collection for obj in c.all_objects]
         people = [obj for obj in near if obj != armature and "scope_source" in obj]
-        together = [armature, *(obj for obj in people if same_camera(captured_motion(obj), motion))]
+        together = [armature, *(obj for obj in people if same_camera(motion_of(obj), motion))]
         cameras = [obj for obj in near if obj.type == "CAMERA"][:1]
         with all_or_nothing(scene, *together[1:], *cameras):
             for person in together:
                 own = body_of(person)
-                moved = moved_motion(captured_motion(person), own, transform)
+                moved = moved_motion(motion_of(person), own, transform)
                 move_person(person, own, rate, transform)
-                set_captured_motion(person, moved)
+                set_motion_of(person, moved)
             for camera in cameras:
                 move_camera(camera, armature, transform)
         scene.frame_set(scene.frame_current, subframe=scene.frame_subframe)
@@ -132,7 +132,7 @@ def _pixels(context: bpy.types.Context, points: list[object]) -> list[tuple[floa
 
     armature, scene = captured_armature(context), context.scene
     assert armature is not None  # checked by poll
-    motion, current = captured_motion(armature), scene.frame_current + scene.frame_subframe
+    motion, current = motion_of(armature), scene.frame_current + scene.frame_subframe
     frame = source_frame(armature, motion, current, scene_rate(scene))
     at = captured_points(armature, current, np.array(points, float))
     u, v = (shot_of(motion).project(frame, point) for point in at)

@@ -9,7 +9,7 @@ import sys
 
 import pytest
 from scope.solver.compiled.code_files import read_code, write_code
-from scope.solver.compiled.code_folders import can_run_shipped, shipped_processor
+from scope.solver.compiled.code_folders import SOLVER, WITHOUT_KERNELS, can_run_shipped, shipped_processor
 
 from .small_package import make_package
 
@@ -142,3 +142,10 @@ def test_a_changed_source_makes_code_stale(folder):
         os.utime(version, (1, 1))
     assert run(folder, folder / "cache")[0] == [1] * COUNT
     assert len(list((folder / "cache").iterdir())) == 1
+
+
+def test_folders_whose_sources_do_not_count_have_no_kernels():
+    for name in WITHOUT_KERNELS:
+        sources = [path.read_text() for path in (SOLVER / name).rglob("*.py")]
+        assert sources
+        assert not any("compiled.kernel" in text or "njit" in text for text in sources)

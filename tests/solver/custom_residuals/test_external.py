@@ -29,7 +29,7 @@ from scope.solver import (
     rotations,
 )
 from scope.solver.compiled.part import Part
-from scope.solver.custom_residuals import numeric
+from scope.solver.custom_residuals import external, numeric
 from scope.solver.examples import own_residual
 from scope.solver.residuals import floor, foot_contact, joint_prior, pose_prior
 
@@ -276,3 +276,13 @@ def test_the_example_brings_the_hands_to_their_height():
     before, after = own_residual.main()
     assert after < 2.0
     assert before > 5.0 * after
+
+
+def test_there_is_room_for_sixteen_and_each_can_be_replaced(monkeypatch):
+    monkeypatch.setattr(external, "_external", {})
+    for k in range(16):
+        register_residual(f"number {k}", function=lambda part, ints, floats: part.t)
+    with pytest.raises(InvalidValueError, match="room for 16 residuals"):
+        register_residual("number 16", function=lambda part, ints, floats: part.t)
+    register_residual("number 3", function=lambda part, ints, floats: part.beta)
+    assert sorted(residual.slot for residual in external.external_residuals().values()) == list(range(16))

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scope.solver import (
+    FrameSolver,
     InputError,
     InvalidValueError,
     Keypoints2D,
@@ -444,3 +445,13 @@ def test_wrong_states_priors_and_trees_are_refused():
     body.parents = np.array([-1, 2, 1, *range(2, 23)])
     with pytest.raises(ShapeError, match="before their children"):
         fit(body, m)
+
+
+def test_one_solver_fits_cold_and_warm_by_turns_as_a_new_one_for_each_does():
+    body, state = scene(3)
+    m, solver = measured(body, state, noise=1.0), FrameSolver(body)
+    start = FrameSolver(body).fit(m).state
+    for init in (None, start, None, start):
+        found, fresh = solver.fit(m, init), FrameSolver(body).fit(m, init)
+        assert (found.cost, found.iterations) == (fresh.cost, fresh.iterations)
+        np.testing.assert_array_equal(found.t_camera_part, fresh.t_camera_part)

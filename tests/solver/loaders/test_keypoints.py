@@ -9,11 +9,20 @@ from scope.solver.body import Body
 from scope.solver.loaders import load_model
 from scope.solver.loaders.body_file import load_body
 
-PUBLISHED = {  # vertex numbers, as found in several public projects
-    ("smpl", 6890): {"nose": 332, "left_ear": 583, "right_eye": 6260, "left_big_toe": 3216, "right_heel": 6787},
-    ("star", 6890): {"nose": 332, "left_eye": 2800, "right_ear": 4071, "right_small_toe": 6624, "left_heel": 3387},
-    ("smplh", 6890): {"nose": 332, "right_big_toe": 6617, "left_small_toe": 3226},
-    ("smplx", 10475): {"nose": 9120, "left_eye": 9448, "right_ear": 616, "left_big_toe": 5770, "right_heel": 8635},
+# Vertex numbers, as found in several public projects.
+OF_SMPL = {
+    "nose": 332, "left_eye": 2800, "right_eye": 6260, "left_ear": 583, "right_ear": 4071, "left_big_toe": 3216,
+    "left_small_toe": 3226, "left_heel": 3387, "right_big_toe": 6617, "right_small_toe": 6624, "right_heel": 6787,
+}  # fmt: skip
+OF_SMPLX = {
+    "nose": 9120, "left_eye": 9448, "right_eye": 9929, "left_ear": 6, "right_ear": 616, "left_big_toe": 5770,
+    "left_small_toe": 5780, "left_heel": 8846, "right_big_toe": 8463, "right_small_toe": 8474, "right_heel": 8635,
+}  # fmt: skip
+PUBLISHED = {
+    ("smpl", 6890): OF_SMPL,
+    ("star", 6890): OF_SMPL,
+    ("smplh", 6890): OF_SMPL,
+    ("smplx", 10475): OF_SMPLX,
 }
 TIPS = {
     ("smpl", 6890): {"left_index_finger_tip": 2319, "right_thumb_tip": 6191},
@@ -68,6 +77,19 @@ def test_an_unknown_mesh_gets_keypoints_near_the_true_ones(pair):
     distance = np.linalg.norm(loaded.keypoint_template - own.keypoint_template, axis=1)
     for name, d in zip(own.keypoint_names, distance, strict=True):
         assert d < (0.025 if "hand/" in name or "index" in name or "pinky" in name else 0.02), name
+
+
+def test_the_heel_is_on_the_sole_even_if_the_ankle_protrudes_further_back(tmp_path):
+    own = load_body("scope")
+    tables = as_smpl_file(own)
+    np.savez(tmp_path / "plain.npz", **tables)
+    v = tables["v_template"].copy()
+    v[v[:, 1] > v[:, 1].min() + 0.06] -= [0.0, 0.0, 0.1]  # everything above the feet, backwards
+    np.savez(tmp_path / "leaning.npz", **{**tables, "v_template": v})
+    plain, leaning = load_model(tmp_path / "plain.npz"), load_model(tmp_path / "leaning.npz")
+    for name in ("coco/left_heel", "coco/right_heel"):
+        i = own.keypoint_names.index(name)
+        np.testing.assert_allclose(leaning.keypoint_template[i], plain.keypoint_template[i], atol=1e-12)
 
 
 def test_keypoints_follow_the_shape_as_the_true_ones_do(pair):

@@ -119,6 +119,20 @@ def test_repeated_sparse_entries_add_up(tmp_path, tables_of, stand_ins):
     assert_same_model(tmp_path / "body.pkl", tables)
 
 
+@pytest.mark.parametrize("outside", [-1, 24])
+def test_a_sparse_entry_outside_the_matrix_is_refused(tmp_path, tables_of, stand_ins, outside):
+    coo = with_state(
+        stand_ins("scipy.sparse.coo.coo_matrix"),
+        _shape=(24, 300),
+        data=np.ones(2),
+        row=np.array([0, outside]),
+        col=np.zeros(2, int),
+    )
+    (tmp_path / "body.pkl").write_bytes(pickle.dumps({**tables_of("smpl"), "J_regressor": coo}, 2))
+    with pytest.raises(ModelFileError, match=r"indices outside 0\.\.23\b"):
+        load_model(tmp_path / "body.pkl")
+
+
 @pytest.mark.parametrize("family", ["smplh", "smplx", "star"])
 def test_other_families_as_pickles(tmp_path, tables_of, family):
     tables = tables_of(family)

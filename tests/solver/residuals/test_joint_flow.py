@@ -80,6 +80,7 @@ def test_vector_kernel_agrees_with_numpy_joint_by_joint_also_at_half_turns():
     means = flows[:, :9].reshape(K, 3, 3)
     R0, t0, Omega, _ = random_state(rng, K, 0)
     Omega[2] = means[2] @ rotations.exp([0.0, np.pi, 0.0])
+    Omega[7] = means[7] @ rotations.exp((np.pi - 2e-5) * np.array([0.36, -0.48, 0.8]))
     Omega[9] = means[9]
     pose = State(R0, t0, Omega, np.zeros(0)).pose(tree)
     weights = rng.uniform(0.5, 2.0, K)

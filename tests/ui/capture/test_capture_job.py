@@ -4,7 +4,9 @@
 import json
 import os
 import signal
+import sys
 import time
+from functools import partial
 from types import SimpleNamespace
 
 import bpy
@@ -168,6 +170,28 @@ def test_the_cancel_operator_ends_the_worker_immediately(fake_worker, footage):
     assert not state.job.worker.alive
     capture_operators.end_capture()
     assert bpy.ops.scope.capture.poll()
+
+
+def test_an_unexpected_error_ends_the_capture():
+    closed = []
+    state.job = SimpleNamespace(close=lambda: closed.append(True), step=lambda: 1 / 0, cancel_requested=False)
+    operator = SimpleNamespace()
+    operator._step = partial(capture_operators.SCOPE_OT_capture._step, operator)
+    operator._end = partial(capture_operators.SCOPE_OT_capture._end, operator)
+    with pytest.raises(ZeroDivisionError):
+        capture_operators.SCOPE_OT_capture.modal(operator, bpy.context, SimpleNamespace(type="TIMER", value="NOTHING"))
+    assert closed
+    assert state.job is None  # otherwise no other capture could be started
+
+
+def test_a_linked_scene_is_refused(footage, tmp_path):
+    bpy.context.scene.scope.footage = str(footage)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "library.blend"))
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    with bpy.data.libraries.load(str(tmp_path / "library.blend"), link=True) as (there, here):
+        here.scenes = there.scenes
+    with pytest.raises(ScopeError, match="linked from .*library.blend"):
+        CaptureJob(here.scenes[0])
 
 
 def test_the_status_bar_is_cleared_in_every_workspace(monkeypatch):
@@ -351,6 +375,22 @@ def test_the_sample_exists():
     bpy.ops.scope.use_sample()
     assert bpy.context.scene.scope.footage == str(SAMPLE)
     assert SAMPLE.is_file()
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="file names are Unicode on this system")
+def test_footage_whose_name_is_not_utf8(fake_worker, footage, tmp_path):
+    fake_worker("send('progress', stage=request['footage'], done=0, total=0)\nfinish()")
+    renamed = footage.rename(tmp_path / os.fsdecode(b"caf\xe9.png"))
+    settings = bpy.context.scene.scope
+    settings.footage = str(renamed)
+    assert bpy.ops.scope.capture() == {"FINISHED"}
+    assert settings.result.footage == str(renamed)
+    assert "caf\N{REPLACEMENT CHARACTER}" in captures()[0].name
+    settings.footage = str(tmp_path / os.fsdecode(b"\xe9.mp4"))
+    with pytest.raises(RuntimeError, match="does not exist"):
+        bpy.ops.scope.capture()
+    assert "does not exist" in state.message
+    state.message.encode()
 
 
 def window_with_sidebar(category="Scope", width=200):

@@ -7,7 +7,7 @@ import pytest
 from bpy_extras.object_utils import world_to_camera_view
 from mathutils import Vector
 from scope.scope_addon.scene.animation_data.actions import fcurves, read_keys
-from scope.scope_addon.ui.captured_person import captured_motion
+from scope.scope_addon.ui.captured_person import motion_of as stored_motion_of
 from scope.scope_addon.ui.pins.corrected_person import listed_corrections
 
 from ...edit.walking import NAMES, motion_of, walk
@@ -64,7 +64,7 @@ def test_a_pin_in_the_image_is_met_whatever_the_smoothing(rig):
         if strength is not None:
             bpy.ops.scope.smooth(strength=strength)
         assert np.linalg.norm(in_image(seen(rig)[0, WRIST]) - pixel) < 2.0
-    motion = captured_motion(rig)
+    motion = stored_motion_of(rig)
     assert motion.corrections["pin_joints"].tolist() == ["left_wrist"]
     assert np.isfinite(motion.corrections["pin_uv"]).all()
 

@@ -1,0 +1,57 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Capturing from the menu File > Import: choosing the footage and capturing it in one step."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import bpy
+from bpy.props import StringProperty
+
+from ...footage import FOOTAGE_SUFFIXES
+from .capture_operators import state
+
+
+class SCOPE_OT_import_video(bpy.types.Operator):
+    """Motion capture: animate a body with the motion of the person in a video or image"""
+
+    bl_idname = "scope.import_video"
+    bl_label = "Motion from Video (Mocap)"
+    bl_options = {"UNDO"}
+
+    filepath: StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"})
+    filter_glob: StringProperty(default=";".join(f"*{s}" for s in FOOTAGE_SUFFIXES), options={"HIDDEN"})
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Require that no capture is running."""
+        if state.job is not None:
+            cls.poll_message_set("A capture is running; wait for it or cancel it")
+            return False
+        return True
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        """Ask for the file."""
+        context.window_manager.fileselect_add(self)
+        return {"RUNNING_MODAL"}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Draw the settings of the capture in the sidebar of the file browser."""
+        layout, settings = self.layout, context.scene.scope
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        for name in ("quality", "people", "hands", "height_cm", "take"):
+            layout.prop(settings, name)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Set the footage to the file, and start the capture."""
+        path = Path(bpy.path.abspath(self.filepath))
+        if not path.is_file():
+            self.report({"ERROR"}, f"{path} is not a file; choose a video or image")
+            return {"CANCELLED"}
+        context.scene.scope.footage = str(path)
+        bpy.ops.scope.capture("INVOKE_DEFAULT")
+        return {"FINISHED"}
+
+
+CLASSES = (SCOPE_OT_import_video,)

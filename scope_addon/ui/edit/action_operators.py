@@ -1,0 +1,106 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Operators on the action of a captured person, or of a rig with their motion: take name, NLA."""
+
+from __future__ import annotations
+
+import bpy
+from bpy.props import StringProperty
+
+from ..captured_person import PERSON, captured_armature
+from ..reporting import ReportingOperator
+
+
+def animated_armature(context: bpy.types.Context) -> bpy.types.Object | None:
+    """Return the active rig with captured motion, or else the active captured armature; None without one."""
+    active = context.view_layer.objects.active if context.view_layer else None
+    return active if active is not None and active.get(PERSON) else captured_armature(context)
+
+
+class _ActionOperator(ReportingOperator):
+    """An operator on the action of an armature with captured motion. Not registered."""
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Require an armature with captured motion, which is stored in this file and has an action."""
+        armature = animated_armature(context)
+        if armature is None:
+            cls.poll_message_set("Select the armature of a capture first")
+            return False
+        if armature.library is not None:
+            cls.poll_message_set(f"'{armature.name}' is linked from {armature.library.filepath}: make it local")
+            return False
+        if armature.animation_data is None or armature.animation_data.action is None:
+            cls.poll_message_set(f"'{armature.name}' has no action; choose one in the Action Editor")
+            return False
+        return True
+
+
+class SCOPE_OT_push_to_nla(_ActionOperator):
+    """Move the motion to a new track of the Nonlinear Animation editor, where takes are mixed and repeated"""
+
+    bl_idname = "scope.push_to_nla"
+    bl_label = "Push to NLA"
+
+    def work(self, context: bpy.types.Context) -> str:
+        """Add the track."""
+        from ...errors import UsageError
+        from ...scene.animation_data.actions import push_to_nla
+
+        armature = animated_armature(context)
+        assert armature is not None  # checked by poll
+        if armature.animation_data.use_tweak_mode:
+            raise UsageError(f"'{armature.name}' is in the NLA's Tweak Mode; leave it (key Tab) first")
+        strip = push_to_nla(armature)
+        return f"'{strip.name}' is now a strip of {armature.name}'s NLA; to edit its keys, enter Tweak Mode (key Tab)"
+
+
+class SCOPE_OT_rename_take(ReportingOperator):
+    """Rename the capture with its objects and actions; exported animation has the same name"""
+
+    bl_idname = "scope.rename_take"
+    bl_label = "Rename Take"
+
+    name: StringProperty(name="Name", description="New name of the take")
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Require a capture that is stored in this file."""
+        collection = context.scene.scope.result.collection
+        if collection is None:
+            cls.poll_message_set("The scene contains no capture yet")
+            return False
+        if collection.library is not None:
+            cls.poll_message_set(f"The capture is linked from {collection.library.filepath}: make it local")
+            return False
+        return True
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        """Ask for the name."""
+        self.name = context.scene.scope.result.collection.name
+        outcome: set[str] = context.window_manager.invoke_props_dialog(self)
+        return outcome
+
+    def work(self, context: bpy.types.Context) -> str:
+        """Rename everything whose name begins with the take's."""
+        from ...errors import UsageError
+
+        if not self.name.strip():
+            raise UsageError("the take has no name; enter one")
+        _rename(context.scene.scope.result.collection, self.name.strip())
+        return ""
+
+
+def _rename(collection: bpy.types.Collection, name: str) -> None:
+    """Rename a capture, and its objects, their data and actions whose names begin with the capture's."""
+    former = collection.name
+    blocks: list[bpy.types.ID] = [collection]
+    for obj in collection.all_objects:
+        data = [obj, obj.data, getattr(obj.data, "shape_keys", None)]
+        blocks += [block for block in data if block is not None]
+        blocks += [block.animation_data.action for block in data if block is not None and block.animation_data]
+    for block in dict.fromkeys(block for block in blocks if block is not None):
+        if block.library is None and block.name.startswith(former):
+            block.name = name + block.name.removeprefix(former)
+
+
+CLASSES = (SCOPE_OT_push_to_nla, SCOPE_OT_rename_take)

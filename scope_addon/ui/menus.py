@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Entries in Blender's own menus; its search (key F3) finds operators by the menus that lead to them."""
+
+from __future__ import annotations
+
+import bpy
+
+from .export_operators import FORMATS, is_available
+
+
+class SCOPE_MT_export(bpy.types.Menu):
+    """Formats of captured motion"""
+
+    bl_idname = "SCOPE_MT_export"
+    bl_label = "Captured Motion (Mocap)"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Draw the menu."""
+        layout = self.layout
+        layout.operator_context = "INVOKE_DEFAULT"
+        for key, label, _, _ in FORMATS:
+            row = layout.row()
+            row.enabled = is_available(key)
+            row.operator("scope.export", text=f"Captured Motion as {label} (.{key.lower()})").format = key
+
+
+class SCOPE_MT_motion_capture(bpy.types.Menu):
+    """Capture motion from video, and view, edit, retarget and export captured motion"""
+
+    bl_idname = "SCOPE_MT_motion_capture"
+    bl_label = "Motion Capture"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Draw the menu."""
+        layout = self.layout
+        layout.operator_context = "INVOKE_DEFAULT"
+        layout.operator("scope.import_video", icon="FILE_MOVIE")
+        layout.operator("scope.look_through", icon="VIEW_CAMERA")
+        layout.operator("scope.footage_to_sequencer", icon="SEQUENCE")
+        layout.separator()
+        for name in ("smooth", "interpolate_span", "refloor", "loop", "reduce_keys", "bake_rate"):
+            layout.operator(f"scope.{name}")
+        layout.operator_menu_enum("scope.root_motion", "mode")
+        layout.separator()
+        layout.operator("scope.retarget", text="Retarget to Rig", icon="ARMATURE_DATA")
+        layout.operator("scope.rename_take", icon="GREASEPENCIL")
+        layout.operator("scope.push_to_nla", icon="NLA_PUSHDOWN")
+        layout.menu(SCOPE_MT_export.bl_idname, icon="EXPORT")
+
+
+def _draw_import(self: bpy.types.Menu, _context: bpy.types.Context) -> None:
+    self.layout.operator("scope.import_video")
+
+
+def _draw_export(self: bpy.types.Menu, _context: bpy.types.Context) -> None:
+    self.layout.menu(SCOPE_MT_export.bl_idname)
+
+
+def _draw_motion_capture(self: bpy.types.Menu, _context: bpy.types.Context) -> None:
+    self.layout.separator()
+    self.layout.menu(SCOPE_MT_motion_capture.bl_idname)
+
+
+_ENTRIES = (
+    ("TOPBAR_MT_file_import", _draw_import),
+    ("TOPBAR_MT_file_export", _draw_export),
+    ("VIEW3D_MT_object", _draw_motion_capture),
+    ("VIEW3D_MT_pose", _draw_motion_capture),
+)
+
+
+def attach() -> None:
+    """Add the entries."""
+    for menu, draw in _ENTRIES:
+        getattr(bpy.types, menu).append(draw)
+
+
+def detach() -> None:
+    """Remove the entries."""
+    for menu, draw in _ENTRIES:
+        getattr(bpy.types, menu).remove(draw)
+
+
+CLASSES = (SCOPE_MT_export, SCOPE_MT_motion_capture)

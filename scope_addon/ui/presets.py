@@ -1,0 +1,39 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Presets of the capture settings: chosen, added and removed in the header of the Capture panel."""
+
+from __future__ import annotations
+
+import bpy
+from bl_operators.presets import AddPresetBase
+from bl_ui.utils import PresetPanel
+
+from ..options import Place, options_at
+from .declared_properties import property_name
+
+# What belongs to one clip, or to one person, is no preset.
+_OF_THE_CLIP = ("take", "use_range", "start", "end", "heights_m")
+
+
+class SCOPE_PT_capture_presets(PresetPanel, bpy.types.Panel):
+    """Presets of the capture settings."""
+
+    bl_label = "Capture Presets"
+    preset_subdir = "scope/capture"
+    preset_operator = "script.execute_preset"
+    preset_add_operator = "scope.add_capture_preset"
+
+
+class SCOPE_OT_add_capture_preset(AddPresetBase, bpy.types.Operator):
+    """Add the capture settings as a preset, or remove a preset"""
+
+    bl_idname = "scope.add_capture_preset"
+    bl_label = "Add Capture Preset"
+    preset_menu = "SCOPE_PT_capture_presets"
+    preset_subdir = "scope/capture"
+    preset_defines = ["settings = bpy.context.scene.scope"]
+    preset_values = [
+        f"settings.{property_name(option)}" for option in options_at(Place.PANEL) if option.name not in _OF_THE_CLIP
+    ]
+
+
+CLASSES = (SCOPE_PT_capture_presets, SCOPE_OT_add_capture_preset)

@@ -1,0 +1,138 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Exports that fail: one sentence, no half-written file, and no earlier result lost."""
+
+import os
+from pathlib import Path
+
+import bpy
+import pytest
+from scope.scope_addon.errors import OutputError, UsageError
+from scope.scope_addon.scene.export import formats
+from scope.scope_addon.scene.export.export import export, export_motions
+from scope.scope_addon.scene.export.output_paths import SUFFIXES, person_paths
+
+SCENE_SUFFIXES = [s for s in SUFFIXES if s != ".npz"]
+
+
+def test_a_folder_is_distinguished_from_a_name_without_suffix(body, make_motion, tmp_path):
+    with pytest.raises(UsageError, match="it is a folder; name a file in it"):
+        export_motions([make_motion(body, 1)], body, tmp_path)
+
+
+def test_an_unknown_suffix_lists_the_valid_ones(body, make_motion, tmp_path):
+    with pytest.raises(UsageError, match=r"\.glb, \.fbx, \.blend, \.bvh, \.usdc, \.npz"):
+        export_motions([make_motion(body, 1)], body, tmp_path / "walk.obj")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_missing_folder_is_named(body, make_motion, tmp_path):
+    with pytest.raises(OutputError, match="nowhere"):
+        export_motions([make_motion(body, 1)], body, tmp_path / "nowhere" / "walk.glb")
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows counts letters, and those of the whole path")
+@pytest.mark.parametrize("suffix", [".bvh", ".npz"])
+def test_names_may_be_as_long_as_the_system_lets_them(body, make_motion, tmp_path, suffix):
+    longest = tmp_path / ("ä" * 125 + suffix)  # 254 bytes
+    export_motions([make_motion(body, 1)], body, longest)
+    assert list(tmp_path.iterdir()) == [longest]
+    for people in (1, 2):
+        too_long = tmp_path / ("x" * (252 if people == 1 else 245) + suffix)
+        with pytest.raises(OutputError, match=f"cannot write .*x(.person1)?{suffix}: .*; choose a shorter name"):
+            export_motions([make_motion(body, 1)] * people, body, too_long)
+    assert list(tmp_path.iterdir()) == [longest]
+
+
+@pytest.mark.skipif(os.name == "nt" or os.geteuid() == 0, reason="root and Windows write where the mode bits forbid it")
+def test_an_unwritable_folder_is_named(body, make_motion, tmp_path):
+    tmp_path.chmod(0o500)
+    with pytest.raises(OutputError, match="not writable"):
+        export_motions([make_motion(body, 1)], body, tmp_path / "walk.glb")
+
+
+@pytest.mark.skipif(not Path("/proc/self").is_dir(), reason="needs a folder in which even root cannot make files")
+@pytest.mark.parametrize("suffix", SCENE_SUFFIXES)
+def test_a_folder_that_accepts_no_files_is_named(body, make_motion, suffix):
+    with pytest.raises(OutputError, match="cannot write /proc/walk"):
+        export_motions([make_motion(body, 1)], body, f"/proc/walk{suffix}")
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no limit on a file's size that a process could set")
+@pytest.mark.parametrize("suffix", SCENE_SUFFIXES)
+def test_a_full_disk_is_reported_in_one_sentence_and_leaves_nothing(body, make_motion, tmp_path, suffix):
+    import resource
+
+    path, motion = tmp_path / f"walk{suffix}", make_motion(body, 200)
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, before[1]))
+    try:
+        with pytest.raises(OutputError, match="cannot write .*walk") as raised:
+            export_motions([motion], body, path)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    assert "\n" not in str(raised.value)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("suffix", SCENE_SUFFIXES)
+def test_a_failing_writer_leaves_the_old_file_and_no_other(body, make_motion, tmp_path, monkeypatch, suffix):
+    path = tmp_path / f"walk{suffix}"
+    path.write_text("before")
+
+    def fail(temporary, *rest):
+        temporary.write_text("half")
+        raise RuntimeError("disk full")
+
+    name = {".usdc": "usd"}.get(suffix, suffix[1:])
+    monkeypatch.setattr(formats, f"write_{name}", fail)
+    with pytest.raises(OutputError, match="disk full"):
+        export_motions([make_motion(body, 1)], body, path)
+    assert [p.name for p in tmp_path.iterdir()] == [path.name]
+    assert path.read_text() == "before"
+    assert [s.name for s in bpy.data.scenes] == ["Scene"]
+
+
+class StoppedExporter(bpy.types.Operator):
+    """An exporter in Python that is interrupted with Ctrl-C."""
+
+    bl_idname, bl_label = "scope_test.stopped", "Stopped"
+
+    def execute(self, context):
+        raise KeyboardInterrupt
+
+
+def test_ctrl_c_in_an_exporter_is_not_reported_as_a_failure(body, make_motion, tmp_path, monkeypatch):
+    monkeypatch.setattr(formats, "write_glb", lambda *rest: formats.call_operator(bpy.ops.scope_test.stopped))
+    bpy.utils.register_class(StoppedExporter)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            export_motions([make_motion(body, 1)], body, tmp_path / "walk.glb")
+    finally:
+        bpy.utils.unregister_class(StoppedExporter)
+    assert list(tmp_path.iterdir()) == []
+    assert [s.name for s in bpy.data.scenes] == ["Scene"]
+
+
+def test_a_scene_without_captures_cannot_be_exported(tmp_path):
+    with pytest.raises(UsageError, match="no capture"):
+        export(tmp_path / "walk.glb")
+
+
+def test_writers_keep_standard_output_clean(body, make_motion, tmp_path, capfd):
+    paths = [tmp_path / f"walk{suffix}" for suffix in SUFFIXES]
+    capfd.readouterr()
+    export_motions([make_motion(body, 2)], body, paths)
+    assert capfd.readouterr().out == ""
+
+
+@pytest.mark.parametrize(
+    ("path", "people", "expected"),
+    [
+        ("a/walk.npz", 1, ["a/walk.npz"]),
+        ("a/walk.npz", 2, ["a/walk.person1.npz", "a/walk.person2.npz"]),
+        ("walk.v2.bvh", 2, ["walk.v2.person1.bvh", "walk.v2.person2.bvh"]),
+        ("walk.glb", 3, ["walk.glb"]),
+    ],
+)
+def test_one_path_per_person(path, people, expected):
+    assert [p.as_posix() for p in person_paths(path, people)] == expected

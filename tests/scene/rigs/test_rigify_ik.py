@@ -1,0 +1,57 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Retargeting to a generated Rigify rig: the limbs show the same pose by IK as by FK, as evaluated by Blender."""
+
+import bpy
+import numpy as np
+import pytest
+from scope.scope_addon.scene.rigs.rig_retarget import RetargetOptions, guess_bone_map, retarget
+
+from ...edit.walking import BODY, NAMES, RATE, motion_of, walk
+from ..made_rigs import captured
+
+LIMBS = [(f"{name}.{side}", kind) for side in "LR" for name, kind in (("thigh", "leg"), ("upper_arm", "arm"))]
+BONES = {"leg": ("thigh", "shin", "foot", "toe"), "arm": ("upper_arm", "forearm", "hand")}
+
+
+def switch(rig, **properties):
+    """Set properties of every limb."""
+    for limb, _ in LIMBS:
+        for name, value in properties.items():
+            rig.pose.bones[limb.replace(".", "_parent.")][name] = value
+    rig.update_tag()
+
+
+def posed(rig, frames):
+    """Return the deforming bones' ends (T, B, 2, 3) of all limbs in the world."""
+    names = [f"ORG-{bone}.{limb[-1]}" for limb, kind in LIMBS for bone in BONES[kind]]
+    out = []
+    for frame in frames:
+        bpy.context.scene.frame_set(frame)
+        bpy.context.view_layer.update()
+        seen = rig.evaluated_get(bpy.context.evaluated_depsgraph_get())
+        ends = [(seen.pose.bones[name].head, seen.pose.bones[name].tail) for name in names]
+        out.append([[np.array(seen.matrix_world @ end) for end in pair] for pair in ends])
+    return np.array(out)
+
+
+@pytest.mark.parametrize("root", ["bone", "object"])
+def test_ik_shows_the_pose_of_fk(rigify_rigs, root):
+    motion = motion_of(walk(1.0))
+    elbows = motion.poses.reshape(len(motion), -1, 3)[:, [NAMES.index("left_elbow"), NAMES.index("right_elbow")]]
+    elbows += [[0.4, -1.2, 0.3], [0.5, 0.7, 0.6]]  # not about the axis about which the rig's IK bends the elbow
+    motion.poses.reshape(len(motion), -1, 3)[:, [NAMES.index("left_elbow"), NAMES.index("right_elbow")]] = elbows
+    source = captured(motion)
+    rig = rigify_rigs[1][0]
+    rig.pose.bones["foot_heel_ik.L"].rotation_euler = (0.4, 0.2, 0.1)  # left by the user
+    retarget(source, BODY, np.zeros(BODY.P), rig, guess_bone_map(rig), RATE, RetargetOptions(root=root))
+    frames = range(1, 31, 3)
+    switch(rig, IK_FK=1.0)
+    by_fk = posed(rig, frames)
+    for pole in (False, True):
+        switch(rig, IK_FK=0.0, pole_vector=pole)
+        by_ik = posed(rig, frames)
+        assert np.linalg.norm(by_ik - by_fk, axis=-1).max() < 0.01
+        lines = [ends[:, :, 1] - ends[:, :, 0] for ends in (by_fk, by_ik)]
+        cosine = (lines[0] * lines[1]).sum(-1) / np.linalg.norm(lines[0], axis=-1) / np.linalg.norm(lines[1], axis=-1)
+        assert np.degrees(np.arccos(np.clip(cosine, -1, 1))).max() < 2.0
+    assert np.linalg.norm(by_fk[0] - by_fk[-1], axis=-1).max() > 0.1  # it moves

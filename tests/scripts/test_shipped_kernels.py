@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Machine code goes into an extension only if it was made from the extension's own sources."""
+
+import importlib.util
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent.parent
+WHEELS = [Path("numba-0.68.1-cp313-cp313-win_amd64.whl"), Path("numba-0.68.1-cp311-cp311-win_amd64.whl")]
+
+
+@pytest.fixture
+def shipped(tmp_path, monkeypatch):
+    spec = importlib.util.spec_from_file_location("shipped_kernels", ROOT / "scripts" / "shipped_kernels.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    monkeypatch.setattr(module, "KEPT", tmp_path / "kept")
+    return module
+
+
+@pytest.fixture
+def staging(tmp_path):
+    for name in ("solver/fit.py", "scope_addon/capture/overlay/draw.py", "scope_addon/ui/panel.py"):
+        path = tmp_path / "staging" / name
+        path.parent.mkdir(parents=True)
+        path.write_text("# a source\n")
+    return tmp_path / "staging"
+
+
+def keep(shipped, staging, wheels):
+    """Put code where building on that platform would have put it."""
+    kept = shipped.KEPT / "windows-x64" / "3.13"
+    code = kept / "solver-01234567-0123456789ab" / "optimizer.optimize-0123456789ab.code"
+    code.parent.mkdir(parents=True)
+    code.write_text("code")
+    (kept / shipped.MADE_FROM).write_text(shipped._digest(staging, wheels))
+    return code.relative_to(kept)
+
+
+def test_code_made_elsewhere_is_shipped(shipped, staging):
+    code = keep(shipped, staging, WHEELS[:1])
+    (staging / "scope_addon/ui/panel.py").write_text("# changed, but it compiles nothing\n")
+    assert shipped.add_kernels(staging, "windows-x64", "3.13", WHEELS)
+    assert (staging / "assets" / "kernels" / code).read_text() == "code"
+
+
+@pytest.mark.parametrize("changed", ["solver/fit.py", "scope_addon/capture/overlay/draw.py"])
+def test_code_of_other_sources_is_not_shipped(shipped, staging, changed, capsys, monkeypatch):
+    monkeypatch.setattr(shipped, "_THIS", {})  # this computer is of no platform
+    keep(shipped, staging, WHEELS[:1])
+    (staging / changed).write_text("# changed\n")
+    assert not shipped.add_kernels(staging, "windows-x64", "3.13", WHEELS)
+    assert not (staging / "assets").exists()
+    assert "no compiled code for windows-x64, Python 3.13" in capsys.readouterr().err
+
+
+def test_code_for_another_python_is_not_shipped(shipped, staging, monkeypatch):
+    monkeypatch.setattr(shipped, "_THIS", {})
+    keep(shipped, staging, WHEELS[:1])
+    assert not shipped.add_kernels(staging, "windows-x64", "3.11", WHEELS)
+
+
+def test_the_processors_are_those_that_the_solver_looks_for(shipped):
+    from scope.solver.compiled.code_folders import LEVELS
+
+    assert shipped.PROCESSORS == {
+        "windows-x64": LEVELS["x86_64"][0],
+        "linux-x64": LEVELS["x86_64"][0],
+        "macos-arm64": LEVELS["arm64"][0],
+    }

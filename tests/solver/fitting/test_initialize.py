@@ -1,0 +1,57 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The first guess: exact where the measurements fix it, and in front of the camera where they do not."""
+
+import numpy as np
+import pytest
+from scope.solver import Keypoints2D, Keypoints3D, Measurements, OrientationField, Priors, make_tree
+from scope.solver.fitting.initialize import initial_state
+from scope.solver.gauss_newton.terms import make_terms
+
+from ..synthetic import INTRINSICS, forward, project, random_body, random_state
+
+K, P, M = 6, 4, 21
+BODY = random_body(np.random.default_rng(1), K, P, M)
+TREE = make_tree(BODY)
+R0, T0, OMEGA, BETA = random_state(np.random.default_rng(2), K, P)
+R_CAMERA_PART, _, POINTS = forward(BODY, R0, T0, OMEGA, BETA)
+CONFIDENCE = np.random.default_rng(3).uniform(0.2, 1.0, M)
+
+
+def guess(measurements):
+    return initial_state(TREE, make_terms(TREE, measurements, Priors()), OMEGA, BETA)
+
+
+def test_points_in_space_give_the_root_where_joints_and_shape_are_known():
+    found = guess(Measurements(keypoints3d=Keypoints3D(np.arange(M), POINTS, CONFIDENCE)))
+    np.testing.assert_allclose(found.R_camera_root, R0, atol=1e-9, rtol=0)
+    np.testing.assert_allclose(found.t_camera_root, T0, atol=1e-9, rtol=0)
+
+
+def test_directions_alone_give_the_roots_rotation():
+    starts = np.array([j for j in range(M - 1) if BODY.keypoint_part[j] == BODY.keypoint_part[j + 1]])
+    lines = POINTS[starts + 1] - POINTS[starts]
+    # Longer lines say more, but a guess from unit vectors is exact too: all levers are turned by the same rotation.
+    field = OrientationField(starts, starts + 1, lines / np.linalg.norm(lines, axis=1)[:, None], CONFIDENCE[starts])
+    found = guess(Measurements(orientation_field=field))
+    assert len(starts) > K
+    np.testing.assert_allclose(found.R_camera_root, R0, atol=1e-9, rtol=0)
+    assert found.t_camera_root[2] > 1
+
+
+def in_the_image(t):
+    """Return pixels of the upright body that faces the camera, at t: what a guess without depths assumes."""
+    return project(forward(BODY, np.diag([1.0, -1.0, -1.0]), np.array(t), OMEGA, BETA)[2])
+
+
+@pytest.mark.parametrize("t", [[0.3, -0.2, 4.0], [-1.0, 0.5, 9.0]])
+def test_pixels_of_an_upright_person_give_the_position(t):
+    found = guess(Measurements(INTRINSICS, Keypoints2D(np.arange(M), in_the_image(t), CONFIDENCE)))
+    np.testing.assert_allclose(found.t_camera_root, t, atol=1e-6, rtol=0)
+
+
+def test_pixels_that_fit_only_behind_the_camera_give_a_position_on_their_mean_ray():
+    pixels = in_the_image([0.6, -0.4, 4.0])
+    inside_out = 2 * pixels.mean(axis=0) - pixels  # each pixel opposite to where it should be
+    found = guess(Measurements(INTRINSICS, Keypoints2D(np.arange(M), inside_out, np.ones(M))))
+    assert found.t_camera_root[2] > 1
+    np.testing.assert_allclose(project(found.t_camera_root[None])[0], pixels.mean(axis=0), atol=1e-6)

@@ -1,0 +1,34 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Renaming a take, and moving its motion to the NLA."""
+
+import bpy
+import numpy as np
+import pytest
+
+from ...edit.walking import NAMES, motion_of, walk
+from ...scene import made_rigs
+from ...scene.made_rigs import captured
+
+
+@pytest.fixture
+def rig():
+    return captured(motion_of(walk(1.0)))
+
+
+def test_pushing_to_the_nla_keeps_the_motion(rig):
+    before = made_rigs.seen(rig, NAMES, [1, 9, 20])
+    assert bpy.ops.scope.push_to_nla() == {"FINISHED"}
+    assert rig.animation_data.action is None
+    (track,) = rig.animation_data.nla_tracks
+    assert len(track.strips) == 1
+    np.testing.assert_allclose(made_rigs.seen(rig, NAMES, [1, 9, 20]), before, atol=1e-4)
+    with pytest.raises(RuntimeError, match="has no action"):
+        bpy.ops.scope.push_to_nla()
+
+
+def test_renaming_a_take_renames_its_objects_and_actions(rig):
+    collection = bpy.context.scene.scope.result.collection
+    bpy.ops.scope.rename_take(name="Scene 3, take 2")
+    assert collection.name == rig.name == rig.animation_data.action.name == "Scene 3, take 2"
+    with pytest.raises(RuntimeError, match="no name"):
+        bpy.ops.scope.rename_take(name=" ")

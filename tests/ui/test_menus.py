@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Where a Blender user looks for motion capture: menus, shortcut, presets."""
+
+import bpy
+import pytest
+import scope
+from scope.scope_addon.ui import keymap, menus
+from scope.scope_addon.ui.presets import SCOPE_OT_add_capture_preset
+
+
+def functions(menu):
+    return getattr(getattr(bpy.types, menu).draw, "_draw_funcs", [])
+
+
+def test_the_menus_have_entries_only_while_enabled():
+    for menu, draw in menus._ENTRIES:
+        assert functions(menu).count(draw) == 1
+    scope.unregister()
+    try:
+        for menu, draw in menus._ENTRIES:
+            assert draw not in functions(menu)
+    finally:
+        scope.register()
+
+
+def test_labels_have_the_words_that_people_search_for():
+    words = " ".join(
+        [
+            bpy.types.SCOPE_OT_import_video.bl_label,
+            menus.SCOPE_MT_motion_capture.bl_label,
+            menus.SCOPE_MT_export.bl_label,
+        ]
+    ).lower()
+    assert all(word in words for word in ("motion capture", "mocap", "video"))
+
+
+def test_the_shortcut_exists_only_while_enabled():
+    keymaps = bpy.context.window_manager.keyconfigs.addon
+    if keymaps is None:
+        pytest.skip("this Blender has no keymaps without a window")
+
+    def own():
+        found = keymaps.keymaps.get("3D View")
+        return [item.type for item in found.keymap_items if item.idname == "scope.look_through"] if found else []
+
+    assert own() == ["V"]
+    scope.unregister()
+    try:
+        assert own() == []
+        assert keymap._added == []
+    finally:
+        scope.register()
+
+
+def test_presets_store_settings_but_nothing_of_one_clip():
+    names = {value.removeprefix("settings.") for value in SCOPE_OT_add_capture_preset.preset_values}
+    assert {"quality", "people", "hands", "frame_rate"} <= names
+    assert not names & {"take", "range_start", "range_end", "height_cm", "footage"}
+    settings = bpy.context.scene.scope
+    assert all(hasattr(settings, name) for name in names)
