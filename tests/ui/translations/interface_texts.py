@@ -42,10 +42,33 @@ def interface_texts() -> set[Message]:
     return {(context, text) for context, text in found if any(map(str.isalpha, text)) and text not in UNTRANSLATED}
 
 
+def texts_without_lookup(path: Path) -> list[str]:
+    """Return the composed texts and messages of a file that are shown to the user without having been looked up."""
+    shown: list[ast.expr] = []
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Call) and getattr(node.func, "attr", "") in ("poll_message_set", "status_text_set"):
+            shown += node.args
+        elif isinstance(node, ast.Call):
+            reported = node.args[1:] if getattr(node.func, "attr", "") == "report" else []
+            texts = [keyword.value for keyword in node.keywords if keyword.arg in _LAYOUT_TEXTS]
+            shown += [text for text in (*reported, *texts) if isinstance(text, ast.JoinedStr)]
+        elif isinstance(node, ast.FunctionDef) and node.name in ("work", "edit"):
+            shown += [each.value for each in ast.walk(node) if isinstance(each, ast.Return) and each.value]
+    parts = [part for text in shown if isinstance(text, ast.Constant | ast.JoinedStr) for part in _literals(text)]
+    return [part for part in parts if any(map(str.isalpha, part))]
+
+
+def _literals(text: ast.Constant | ast.JoinedStr) -> list[str]:
+    values = text.values if isinstance(text, ast.JoinedStr) else [text]
+    return [value.value for value in values if isinstance(value, ast.Constant) and isinstance(value.value, str)]
+
+
 def _of_class(cls: type) -> Iterator[Message]:
     is_operator = issubclass(cls, bpy.types.Operator)
     if label := getattr(cls, "bl_label", ""):
         yield (OPERATOR if is_operator else DEFAULT), label
+    if issubclass(cls, bpy.types.Menu):
+        yield DEFAULT, cls.__doc__ or ""
     if is_operator:
         group, name = cls.bl_idname.split(".")
         rna = getattr(getattr(bpy.ops, group), name).get_rna_type()

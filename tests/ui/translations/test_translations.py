@@ -13,7 +13,7 @@ import pytest
 from scope.scope_addon.ui import reporting
 from scope.scope_addon.ui.translations import CONTEXT, LANGUAGES
 
-from .interface_texts import OPERATOR, interface_texts
+from .interface_texts import OPERATOR, ROOT, interface_texts, texts_without_lookup
 
 MODULES = {module.__name__.rpartition(".")[2]: module for module in LANGUAGES.values()}
 every_language = pytest.mark.parametrize("language", MODULES.values(), ids=MODULES)
@@ -83,3 +83,17 @@ def test_a_text_has_its_values_filled_in():
 
 def test_braces_in_a_value_are_kept():
     assert reporting.rpt_("Saved {file}", file="{a}.json") == "Saved {a}.json"
+
+
+def test_messages_and_composed_texts_are_looked_up():
+    found = {path.name: texts_without_lookup(path) for path in (ROOT / "ui").rglob("*.py")}
+    assert {name: texts for name, texts in found.items() if texts} == {}
+
+
+def test_a_composed_text_that_is_not_looked_up_is_found(tmp_path):
+    path = tmp_path / "panel.py"
+    path.write_text(
+        'cls.poll_message_set("Choose one")\nlayout.label(text=f"{n} frames")\nself.report({"INFO"}, f"Freed {n}")\n'
+        'layout.label(text=iface_("{n} frames", n=n))\nlayout.label(text=f"{n} %")\n'
+    )
+    assert texts_without_lookup(path) == ["Choose one", " frames", "Freed "]
