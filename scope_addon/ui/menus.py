@@ -6,6 +6,7 @@ from __future__ import annotations
 import bpy
 
 from .export_operators import FORMATS, is_available
+from .reporting import iface_
 
 
 class SCOPE_MT_export(bpy.types.Menu):
@@ -21,7 +22,8 @@ class SCOPE_MT_export(bpy.types.Menu):
         for key, label, _, _ in FORMATS:
             row = layout.row()
             row.enabled = is_available(key)
-            row.operator("scope.export", text=f"Captured Motion as {label} (.{key.lower()})").format = key
+            text = iface_("Captured Motion as {format} (.{suffix})", format=label, suffix=key.lower())
+            row.operator("scope.export", text=text).format = key
 
 
 class SCOPE_MT_motion_capture(bpy.types.Menu):

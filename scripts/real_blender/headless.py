@@ -95,6 +95,11 @@ def folder() -> None:
     (OUT / "batch.json").write_text(json.dumps(first))
 
 
+def languages() -> None:
+    """Show texts of the interface in each of its languages."""
+    subprocess.run(["blender", "--background", "--python-exit-code", "1", "--python", "parts/languages.py"], check=True)
+
+
 if __name__ == "__main__":
     subprocess.run(["convert", "-size", "320x240", "xc:gray", "clips/wall.png"], check=True)
     os.environ.pop("DISPLAY", None)
@@ -103,3 +108,4 @@ if __name__ == "__main__":
     stopped("SIGINT")
     stopped("SIGTERM")
     stopped("SIGKILL")
+    languages()

@@ -9,6 +9,7 @@ import bpy
 from bpy.props import StringProperty
 
 from ...footage import FOOTAGE_SUFFIXES
+from ..reporting import rpt_, tip_
 from .capture_operators import state
 
 
@@ -26,7 +27,7 @@ class SCOPE_OT_import_video(bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         """Require that no capture is running."""
         if state.job is not None:
-            cls.poll_message_set("A capture is running; wait for it or cancel it")
+            cls.poll_message_set(tip_("A capture is running; wait for it or cancel it"))
             return False
         return True
 
@@ -47,7 +48,7 @@ class SCOPE_OT_import_video(bpy.types.Operator):
         """Set the footage to the file, and start the capture."""
         path = Path(bpy.path.abspath(self.filepath))
         if not path.is_file():
-            self.report({"ERROR"}, f"{path} is not a file; choose a video or image")
+            self.report({"ERROR"}, rpt_("{path} is not a file; choose a video or image", path=path))
             return {"CANCELLED"}
         context.scene.scope.footage = str(path)
         bpy.ops.scope.capture("INVOKE_DEFAULT")

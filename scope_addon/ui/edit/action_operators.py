@@ -7,7 +7,7 @@ import bpy
 from bpy.props import StringProperty
 
 from ..captured_person import PERSON, captured_armature
-from ..reporting import ReportingOperator
+from ..reporting import ReportingOperator, rpt_, tip_
 
 
 def animated_armature(context: bpy.types.Context) -> bpy.types.Object | None:
@@ -24,13 +24,15 @@ class _ActionOperator(ReportingOperator):
         """Require an armature with captured motion, which is stored in this file and has an action."""
         armature = animated_armature(context)
         if armature is None:
-            cls.poll_message_set("Select the armature of a capture first")
+            cls.poll_message_set(tip_("Select the armature of a capture first"))
             return False
         if armature.library is not None:
-            cls.poll_message_set(f"'{armature.name}' is linked from {armature.library.filepath}: make it local")
+            file = armature.library.filepath
+            cls.poll_message_set(tip_("'{name}' is linked from {file}: make it local", name=armature.name, file=file))
             return False
         if armature.animation_data is None or armature.animation_data.action is None:
-            cls.poll_message_set(f"'{armature.name}' has no action; choose one in the Action Editor")
+            name = armature.name
+            cls.poll_message_set(tip_("'{name}' has no action; choose one in the Action Editor", name=name))
             return False
         return True
 
@@ -54,7 +56,11 @@ class SCOPE_OT_push_to_nla(_ActionOperator):
         if armature.animation_data.use_tweak_mode:
             raise UsageError(f"'{armature.name}' is in the NLA's Tweak Mode; leave it (key Tab) first")
         strip = push_to_nla(armature)
-        return f"'{strip.name}' is now a strip of {armature.name}'s NLA; to edit its keys, enter Tweak Mode (key Tab)"
+        return rpt_(
+            "'{strip}' is now a strip of {armature}'s NLA; to edit its keys, enter Tweak Mode (key Tab)",
+            strip=strip.name,
+            armature=armature.name,
+        )
 
 
 class SCOPE_OT_rename_take(ReportingOperator):
@@ -70,10 +76,11 @@ class SCOPE_OT_rename_take(ReportingOperator):
         """Require a capture that is stored in this file."""
         collection = context.scene.scope.result.collection
         if collection is None:
-            cls.poll_message_set("The scene contains no capture yet")
+            cls.poll_message_set(tip_("The scene contains no capture yet"))
             return False
         if collection.library is not None:
-            cls.poll_message_set(f"The capture is linked from {collection.library.filepath}: make it local")
+            file = collection.library.filepath
+            cls.poll_message_set(tip_("The capture is linked from {file}: make it local", file=file))
             return False
         return True
 

@@ -14,7 +14,9 @@ from . import de, es, fr, ja, zh
 # Blender's own translations come first. In this context it has none, so ours hold where the same English word means
 # something else in Blender.
 CONTEXT = "Scope"
-LANGUAGES = {"de_DE": de, "fr_FR": fr, "es": es, "ja_JP": ja, "zh_HANS": zh}
+# A code without a country holds for all of them: Blender asks for "de_DE" and takes "de". Not so "zh", which could be
+# the traditional script as well; "zh_CN" is its name in other versions.
+LANGUAGES = {"de": de, "fr": fr, "es": es, "ja": ja, "zh_HANS": zh, "zh_CN": zh}
 
 
 def register() -> None:

@@ -1,0 +1,99 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Every text of the interface has a translation in each language, with the same placeholders; none is left over.
+
+The bpy of the Python package index has no languages to switch to: ./scripts/blender --part panel does that.
+"""
+
+from __future__ import annotations
+
+import re
+import string
+
+import pytest
+from scope.scope_addon.ui import reporting
+from scope.scope_addon.ui.translations import CONTEXT, LANGUAGES
+
+from .interface_texts import OPERATOR, ROOT, interface_texts, texts_without_lookup
+
+MODULES = {module.__name__.rpartition(".")[2]: module for module in LANGUAGES.values()}
+every_language = pytest.mark.parametrize("language", MODULES.values(), ids=MODULES)
+
+
+def both_tables(language):
+    return [*language.OPERATORS.items(), *language.TEXTS.items()]
+
+
+def placeholders(text):
+    """Names and formats in braces, and printf's, each as often as it occurs."""
+    fields = [f"{name}:{spec}" for _, name, spec, _ in string.Formatter().parse(text) if name is not None]
+    return sorted(fields + re.findall(r"%(?:\d+\$)?[sdif]", text))
+
+
+@every_language
+def test_every_text_is_translated(language):
+    texts = interface_texts()
+    buttons = {text for context, text in texts if context == OPERATOR}
+    others = {text for context, text in texts if context != OPERATOR}
+    assert buttons - set(language.OPERATORS) == set()
+    assert others - set(language.TEXTS) == set()
+
+
+@every_language
+def test_no_translation_is_left_over(language):
+    texts = interface_texts()
+    assert {text for text in language.OPERATORS if (OPERATOR, text) not in texts} == set()
+    assert set(language.TEXTS) - {text for context, text in texts if context != OPERATOR} == set()
+
+
+@every_language
+def test_placeholders_are_the_same(language):
+    for text, translation in both_tables(language):
+        assert placeholders(translation) == placeholders(text), text
+
+
+@every_language
+def test_translations_end_as_the_english_texts_do(language):
+    """Blender's labels and tooltips have no full stop at their end, and no spaces around."""
+    for text, translation in both_tables(language):
+        assert translation, text
+        assert translation == translation.strip(), text
+        assert not translation.endswith((".", "。")) or text.endswith("."), text
+        assert translation.endswith(("?", "？")) == text.endswith("?"), text
+
+
+def test_the_texts_found_come_from_classes_layouts_reports_and_lists():
+    texts = interface_texts()
+    assert ("Operator", "Capture") in texts  # bl_label
+    assert (CONTEXT, "Balanced") in texts  # enumeration of a declared option
+    assert ("*", "Footage Opacity") in texts  # literal in a layout
+    assert ("Operator", "Left Foot Stands") in texts  # literal that a loop gives to a layout
+    assert (CONTEXT, "{count} people") in texts  # either branch of a lookup's condition
+    assert ("*", "Capture finished") in texts  # report
+
+
+def test_languages_that_share_a_code_are_those_of_blender():
+    assert set(LANGUAGES) == {"de", "fr", "es", "ja", "zh_HANS", "zh_CN"}
+    assert LANGUAGES["zh_HANS"] is LANGUAGES["zh_CN"]
+
+
+def test_a_text_has_its_values_filled_in():
+    assert reporting.iface_("{count} people", count=3) == "3 people"
+    assert reporting.iface_("100 %") == "100 %"
+
+
+def test_braces_in_a_value_are_kept():
+    assert reporting.rpt_("Saved {file}", file="{a}.json") == "Saved {a}.json"
+
+
+def test_messages_and_composed_texts_are_looked_up():
+    found = {path.name: texts_without_lookup(path) for path in (ROOT / "ui").rglob("*.py")}
+    assert {name: texts for name, texts in found.items() if texts} == {}
+
+
+def test_a_composed_text_that_is_not_looked_up_is_found(tmp_path):
+    path = tmp_path / "panel.py"
+    path.write_text(
+        'cls.poll_message_set("Choose one")\nlayout.label(text=f"{n} frames")\nself.report({"INFO"}, f"Freed {n}")\n'
+        'layout.label(text=iface_("{n} frames", n=n))\nlayout.label(text=f"{n} %")\n'
+    )
+    assert texts_without_lookup(path) == ["Choose one", " frames", "Freed "]
