@@ -53,6 +53,8 @@ def panel(video: Path, out: Path, shell_out: Path, report: dict) -> list[str]:
         problems.append("the window's motion is not the shell's")
     if report["mouse_chose"] != "FAST":
         problems.append("the mouse did not reach the panel's buttons")
+    if report["after_escape_elsewhere"] != {"capturing": True, "playing": False}:
+        problems.append(f"Escape over the viewport: {report['after_escape_elsewhere']}")
     if report["left_after_cancel"]:
         problems.append(f"cancelling left {report['left_after_cancel']}")
     if report["timer_gap_ms"]["p99"] > 1000:  # on a quiet machine it is below 100: see the figure above

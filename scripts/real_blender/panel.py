@@ -20,6 +20,7 @@ from session import FOOTAGE, OUT, addon, inventory, invoke, key, picture, press,
 
 # Where the panel's buttons are on a screen of 1600 x 1000, in pixels from its top left.
 FAST_BUTTON, CAPTURE_BUTTON = (1086, 151), (1174, 183)
+OVER_PANEL = (1174, 300)
 report: dict = {"blender": bpy.app.version_string, "python": sys.version.split()[0], "exports": []}
 
 
@@ -27,6 +28,16 @@ def tracked_half() -> bool:
     """Return whether the running capture has processed half of its frames, or has ended."""
     job = addon().state.job
     return job is None or (job.progress.total > 0 and job.progress.done >= 0.5 * job.progress.total)
+
+
+def cancel() -> Iterator[float]:
+    """Press Escape over the panel, and answer the question that follows when more than some seconds are done."""
+    key("Escape", OVER_PANEL)
+    yield 2.0
+    if addon().state.job is not None:
+        picture("4_question")
+        key("Return", OVER_PANEL)
+        yield 2.0
 
 
 def steps() -> Iterator[float]:
@@ -54,8 +65,15 @@ def steps() -> Iterator[float]:
     picture("3_capturing")
     worker = addon().state.job.worker
     folder, pid = worker.job_folder, worker.pid
-    key("Escape")
-    yield 2.0
+    invoke(bpy.ops.screen.animation_play)
+    yield 0.5
+    key("Escape")  # over the viewport: stops the playback
+    yield 1.0
+    report["after_escape_elsewhere"] = {
+        "capturing": addon().state.job is not None,
+        "playing": bpy.context.window_manager.windows[0].screen.is_animation_playing,
+    }
+    yield from cancel()
     picture("4_cancelled")
     left = [] if inventory() == before else ["data in the file"]
     left += [str(folder)] if folder.exists() else []
@@ -149,8 +167,7 @@ def steps() -> Iterator[float]:
     invoke(bpy.ops.scope.capture, "INVOKE_DEFAULT")
     yield from until(tracked_half, 120, "the preview of the body")
     picture("9_body_over_footage")
-    key("Escape")
-    yield 2.0
+    yield from cancel()
     scene.scope.quality = "FAST"
 
     scene.scope.footage = "/scope/gone.mp4"

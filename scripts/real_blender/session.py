@@ -42,9 +42,9 @@ def picture(name: str) -> None:
     subprocess.run(["import", "-window", "root", str(OUT / f"{name}.png")], check=True)
 
 
-def key(name: str) -> None:
-    """Press a key over the viewport."""
-    subprocess.run(["xdotool", "mousemove", "500", "400", "key", name], check=True)
+def key(name: str, place: tuple[int, int] = (500, 400)) -> None:
+    """Press a key with the mouse at a place of the screen: by default, over the viewport."""
+    subprocess.run(["xdotool", "mousemove", *map(str, place), "sleep", "0.2", "key", name], check=True)
 
 
 def click(x: int, y: int) -> None:

@@ -82,8 +82,9 @@ class Steps:
         if name == "capture":
             return self.capture()
         settings = self.arguments(operator)
-        call = self.random.choice((use, invoke))  # with a step to undo, as from a button, or without, as from a script
-        return Step(f"scope.{name}({settings}) {call.__name__}", lambda: call(operator, **settings))
+        # Always with a step to undo, as from a button: after changes without one, which scripts can make, Blender itself
+        # may crash when it undoes earlier steps.
+        return Step(f"scope.{name}({settings})", lambda: use(operator, **settings))
 
     def capture(self) -> Step:
         """Capture from the button or from a script; the cache has the result."""
