@@ -20,6 +20,7 @@ from . import camera
 from .animation_data import timing
 from .animation_data.transaction import all_or_nothing
 from .character import animation, armature, body_mesh, bone_display, confidence_curves, shape_keys
+from .character.correction_list import store_corrections
 from .character.keys import bake_whole_frames
 
 CAPTURE_TAG = "scope_capture"  # custom property that marks a capture's collection, for exporters
@@ -184,6 +185,8 @@ def _build_person(
     rig["scope_body_file"] = body.file
     rig["scope_start"] = options.start_frame
     rig["scope_betas"] = [float(b) for b in motion.betas]
+    if motion.corrections:
+        store_corrections(rig, motion, rate)
     return Person(rig, mesh, None, motion, frames, under_floor(motion, body))
 
 

@@ -24,13 +24,8 @@ def test_the_menus_have_entries_only_while_enabled():
 
 
 def test_labels_have_the_words_that_people_search_for():
-    words = " ".join(
-        [
-            bpy.types.SCOPE_OT_import_video.bl_label,
-            menus.SCOPE_MT_motion_capture.bl_label,
-            menus.SCOPE_MT_export.bl_label,
-        ]
-    ).lower()
+    shown = (bpy.types.SCOPE_OT_import_video, menus.SCOPE_MT_motion_capture, menus.SCOPE_MT_export)
+    words = " ".join(each.bl_label for each in shown).lower()
     assert all(word in words for word in ("motion capture", "mocap", "video"))
 
 

@@ -127,6 +127,12 @@ class CaptureJob:
         with _window_shows(scene):
             result = build_scene(motions, body, footage, self._options)
         store_motions(result, [content for _, content in contents], self._request.values["body"])
+        footage_rate = float(motions[0].mocap_framerate)
+        if self._options.frame_rate == "keep" and abs(footage_rate - result.frame_rate) > 0.01:
+            warnings.append(
+                f"the scene keeps its {result.frame_rate:.5g} frames/s, the footage has {footage_rate:.5g}: keys lie "
+                "between frames; to change the scene's rate, capture with Frame Rate: Set from Footage"
+            )
         report = dict(captured.report, warnings=[shown(warning) for warning in warnings + result.warnings])
         show_result(result.collection.scope_result, self._request.footage, report, result)
         scene.scope.capture = result.collection

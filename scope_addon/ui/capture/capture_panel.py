@@ -147,11 +147,8 @@ class SCOPE_PT_result(Tab, bpy.types.Panel):
 
     def draw(self, context: bpy.types.Context) -> None:
         """Draw the panel."""
-        layout, result = self.layout, context.scene.scope.result
+        layout = self.layout
         draw_captures(layout, context)
-        _draw_figures(layout, result)
-        for warning in result.warnings:
-            _draw_warning(context, layout.box(), warning)
         camera = camera_of(context.scene)
         if camera is not None:
             back = is_looking_through(context)
@@ -161,15 +158,50 @@ class SCOPE_PT_result(Tab, bpy.types.Panel):
             if back:
                 shown = side_area(context.window.screen) is not None
                 row.operator("scope.side_view", text="", icon="SPLIT_VERTICAL", depress=shown)
-            for background in camera.data.background_images[:1]:
+            row.operator("scope.footage_to_sequencer", text="", icon="SEQUENCE")
+            for background in camera.data.background_images[:1] if back else ():
                 layout.prop(background, "alpha", text="Footage Opacity", slider=True)
-            layout.operator("scope.footage_to_sequencer", icon="SEQUENCE")
-        layout.label(text="Export")
-        grid = layout.grid_flow(columns=2, row_major=True, even_columns=True, align=True)
+        row = layout.row(align=True)
         for key, label, _, _ in FORMATS:
-            cell = grid.column()
+            cell = row.column()
             cell.enabled = is_available(key)
             cell.operator("scope.export", text=label).format = key
+
+
+class SCOPE_PT_warnings(Tab, bpy.types.Panel):
+    """Warnings about the shown capture."""
+
+    bl_idname = "SCOPE_PT_warnings"
+    bl_parent_id = "SCOPE_PT_result"
+    bl_label = "Warnings"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Require warnings."""
+        return len(context.scene.scope.result.warnings) > 0
+
+    def draw_header_preset(self, context: bpy.types.Context) -> None:
+        """Draw their number in the header, which is visible while the panel is closed."""
+        self.layout.label(text=str(len(context.scene.scope.result.warnings)), icon="ERROR")
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Draw the panel."""
+        for warning in context.scene.scope.result.warnings:
+            _draw_warning(context, self.layout.box(), warning)
+
+
+class SCOPE_PT_figures(Tab, bpy.types.Panel):
+    """People, frames, error and lens of the shown capture."""
+
+    bl_idname = "SCOPE_PT_figures"
+    bl_parent_id = "SCOPE_PT_result"
+    bl_label = "Details"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Draw the panel."""
+        _draw_figures(self.layout, context.scene.scope.result)
 
 
 def _draw_figures(layout: bpy.types.UILayout, result: bpy.types.PropertyGroup) -> None:
@@ -226,4 +258,4 @@ def _draw_text(context: bpy.types.Context, layout: bpy.types.UILayout, text: str
         column.label(text=line, icon=icon if index == 0 or icon == "NONE" else "BLANK1")
 
 
-CLASSES = (SCOPE_PT_capture, SCOPE_PT_person, SCOPE_PT_scene, SCOPE_PT_result)
+CLASSES = (SCOPE_PT_capture, SCOPE_PT_person, SCOPE_PT_scene, SCOPE_PT_result, SCOPE_PT_warnings, SCOPE_PT_figures)

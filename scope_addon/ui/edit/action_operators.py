@@ -44,7 +44,10 @@ class SCOPE_OT_push_to_nla(_ActionOperator):
     bl_label = "Push to NLA"
 
     def work(self, context: bpy.types.Context) -> str:
-        """Add the track."""
+        """Add the track.
+
+        :raises UsageError: the armature is in Tweak Mode.
+        """
         from ...errors import UsageError
         from ...scene.animation_data.actions import push_to_nla
 
@@ -88,7 +91,10 @@ class SCOPE_OT_rename_take(ReportingOperator):
         return outcome
 
     def work(self, context: bpy.types.Context) -> str:
-        """Rename everything whose name begins with the take's."""
+        """Rename everything whose name begins with the take's.
+
+        :raises UsageError: the name is empty.
+        """
         from ...errors import UsageError
 
         if not self.name.strip():

@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The corrections of a captured armature: in its motion, in its keys, and as a list for the panel."""
+"""Changing the corrections of a captured armature: in its motion, in its keys and in the list for the panel."""
 
 from __future__ import annotations
 
-import json
 from typing import TYPE_CHECKING, Any
 
 import bpy
 
+from ...scene.character.correction_list import store_corrections
 from ..captured_person import motion_of, set_motion_of
 
 if TYPE_CHECKING:
@@ -16,14 +16,6 @@ if TYPE_CHECKING:
     from ....solver.body import Body
     from ...edit.pins.corrections import Correction, Pin
     from ...motion import Motion
-
-_LIST = "scope_corrections"  # custom property: what the panel lists, so that drawing reads no motion
-
-
-def listed_corrections(armature: bpy.types.Object) -> list[dict[str, Any]]:
-    """Return the corrections in their order: ``kind``, ``text``, and the scene frames ``first`` and ``last``."""
-    listed: list[dict[str, Any]] = json.loads(armature.get(_LIST, "[]"))
-    return listed
 
 
 def change_corrections(
@@ -46,7 +38,7 @@ def change_corrections(
     after = with_corrections(before, body, change(corrections_of(before)))
     rewrite_changed_keys(armature, body, rate, before, after)
     set_motion_of(armature, after)
-    armature[_LIST] = json.dumps([_entry(armature, after, correction, rate) for correction in corrections_of(after)])
+    store_corrections(armature, after, rate)
     return after
 
 
@@ -81,20 +73,3 @@ def pin_at(
         return Pin(frame, joint, pixel=(float(u), float(v)), reach=reach)
     x, y, z = at[0]
     return Pin(frame, joint, position=(float(x), float(y), float(z)), reach=reach)
-
-
-def _entry(armature: bpy.types.Object, motion: Motion, correction: Correction, rate: float) -> dict[str, Any]:
-    """Describe a correction for the panel."""
-    from ...edit.pins.corrections import Contact, Pin
-    from ...scene.character.corrected_keys import scene_frame
-
-    if isinstance(correction, Pin):
-        kind, text, span = "PIN", correction.joint.replace("_", " ").title(), (correction.frame,) * 2
-    elif isinstance(correction, Contact):
-        kind, text, span = "CONTACT", f"{correction.foot.title()} Foot Stands", (correction.first, correction.last)
-    else:
-        what = {"both": "Left and Right", "arms": "Arms", "legs": "Legs"}[correction.limbs]
-        kind, text, span = "EXCHANGE", f"{what} Exchanged", (correction.first, correction.last)
-    first, last = (round(scene_frame(armature, motion, frame, rate)) for frame in span)
-    joint = correction.joint if isinstance(correction, Pin) else ""
-    return {"kind": kind, "text": text, "first": first, "last": last, "joint": joint}

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProperty, IntProperty, StringProperty
 
+from ...scene.character.correction_list import listed_corrections
 from ..captured_person import motion_of
 from ..edit.edit_base import EditOperator, SpanOperator
-from .corrected_person import change_corrections, listed_corrections, pin_at
+from .corrected_person import change_corrections, pin_at
 
 if TYPE_CHECKING:
     from ....solver.body import Body

@@ -5,9 +5,9 @@ from __future__ import annotations
 
 import bpy
 
+from ...scene.character.correction_list import listed_corrections
 from ..capture.capture_panel import Tab
 from ..captured_person import captured_armature, has_captured_person
-from .corrected_person import listed_corrections
 
 _ICONS = {"PIN": "PINNED", "CONTACT": "SNAP_FACE", "EXCHANGE": "MOD_MIRROR"}
 

@@ -12,11 +12,11 @@ import gpu
 from bpy_extras.view3d_utils import location_3d_to_region_2d, region_2d_to_location_3d
 from mathutils import Vector
 
+from ...scene.character.correction_list import listed_corrections
 from ..captured_person import captured_armature
 from ..edit.edit_base import may_edit
 from ..reporting import iface_
 from ..view.comparison import camera_of
-from .corrected_person import listed_corrections
 from .drawing import draw_disc, draw_line
 
 _SIDED = ("shoulder", "elbow", "wrist", "hip", "knee", "ankle", "foot")

@@ -439,3 +439,13 @@ def test_cancelling_asks_when_more_than_ten_seconds_are_done(monkeypatch, second
     finally:
         monkeypatch.undo()
         state.job = None
+
+
+@pytest.mark.parametrize(("policy", "warns"), [("KEEP", True), ("SET", False)])
+def test_a_kept_frame_rate_that_differs_is_reported(fake_worker, footage, policy, warns):
+    fake_worker("finish()")
+    scene = bpy.context.scene
+    scene.render.fps, scene.scope.frame_rate, scene.scope.footage = 20, policy, str(footage)
+    bpy.ops.scope.capture()
+    texts = [warning.text for warning in scene.scope.result.warnings]
+    assert any("keeps its 20 frames/s, the footage has 25" in text for text in texts) is warns

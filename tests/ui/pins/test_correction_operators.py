@@ -7,8 +7,8 @@ import pytest
 from bpy_extras.object_utils import world_to_camera_view
 from mathutils import Vector
 from scope.scope_addon.scene.animation_data.actions import fcurves, read_keys
+from scope.scope_addon.scene.character.correction_list import listed_corrections
 from scope.scope_addon.ui.captured_person import motion_of as stored_motion_of
-from scope.scope_addon.ui.pins.corrected_person import listed_corrections
 
 from ...edit.walking import NAMES, motion_of, walk
 from ...scene import made_rigs

@@ -1,0 +1,162 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Correct a captured motion in a Blender with a window: drag handles with the mouse, undo, smooth, remove.
+
+Usage: ``blender --python pins.py -- VIDEO OUT_FOLDER``
+"""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import bpy
+from bpy_extras.view3d_utils import location_3d_to_region_2d
+
+sys.path.insert(0, str(Path(__file__).parent))
+from session import FOOTAGE, OUT, captured, invoke, key, picture, run, show_tab, use, viewport
+
+report: dict[str, object] = {"blender": bpy.app.version_string}
+
+
+def rig() -> bpy.types.Object:
+    """Return the captured armature."""
+    return next(o for o in bpy.data.objects if o.type == "ARMATURE" and "scope_source" in o)
+
+
+def listed() -> list[dict]:
+    """Return the corrections that the panel lists."""
+    return json.loads(rig().get("scope_corrections", "[]"))
+
+
+def on_screen(joint: str) -> tuple[float, float]:
+    """Return where a joint is on the screen, in pixels from the top left."""
+    here, armature = viewport(), rig()
+    here["window"].view_layer.update()
+    place = armature.matrix_world @ armature.pose.bones[joint].head
+    region = here["region"]
+    x, y = location_3d_to_region_2d(region, here["area"].spaces.active.region_3d, place)
+    return region.x + x, here["window"].height - (region.y + y)
+
+
+def xdotool(*steps: object) -> None:
+    """Send steps of the mouse while Blender keeps running."""
+    subprocess.Popen(["xdotool", *map(str, steps)])
+
+
+def move(x: float, y: float) -> list[object]:
+    """Return xdotool's step that moves the mouse."""
+    return ["mousemove", round(x), round(y), "sleep", "0.3"]
+
+
+def drag(joint: str, by: tuple[int, int], name: str = "") -> Iterator[float]:
+    """Drag a handle; take a screenshot before it is dropped."""
+    x, y = on_screen(joint)
+    xdotool(*move(x - 3, y), *move(x, y), "mousedown", 1, "sleep", "0.3", *move(x + by[0] / 2, y + by[1] / 2))
+    yield 2.5
+    xdotool(*move(x + by[0], y + by[1]))
+    yield 1.5
+    if name:
+        picture(name)
+    xdotool("mouseup", 1)
+    yield 2.5
+
+
+def off(joint: str, target: tuple[float, float]) -> float:
+    """Return how far a joint is from a place on the screen, pixels."""
+    x, y = on_screen(joint)
+    return round(((x - target[0]) ** 2 + (y - target[1]) ** 2) ** 0.5, 2)
+
+
+def steps() -> Iterator[float]:
+    """Run the session."""
+    scene = bpy.context.scene
+    show_tab()
+    yield 1.0
+    bpy.ops.scope.choose_footage(filepath=FOOTAGE)
+    scene.scope.quality = "FAST"
+    yield from captured(1300.0)
+    use(bpy.ops.scope.look_through)
+    first = scene.frame_start
+    frame = first + (scene.frame_end - first) // 2
+    scene.frame_set(frame)
+    yield 1.5
+    invoke(bpy.ops.scope.pin_limb, "INVOKE_DEFAULT")
+    yield 1.0
+    picture("pins_1_handles")
+
+    was = on_screen("left_wrist")
+    target = (was[0] + 60, was[1] - 50)
+    yield from dragged(was, target)
+    yield from corrected(first, frame)
+    missed = {k: v for k, v in report.items() if k.endswith("_px") and v > 2.5}
+    (OUT / "pins.json").write_text(json.dumps(report))
+    assert not missed, missed
+
+
+def dragged(was: tuple[float, float], target: tuple[float, float]) -> Iterator[float]:
+    """Drag two handles; undo, redo, cancel and smooth."""
+    yield from drag("left_wrist", (60, -50), "pins_2_dragged")
+    assert len(listed()) == 1, listed()
+    report["missed_px"] = off("left_wrist", target)
+    picture("pins_3_dropped")
+    yield from drag("right_ankle", (-30, -20))
+    assert [e["joint"] for e in listed()] == ["left_wrist", "right_ankle"], listed()
+    report["first_after_second_px"] = off("left_wrist", target)
+
+    invoke(bpy.ops.ed.undo)
+    invoke(bpy.ops.ed.undo)
+    yield 1.0
+    assert listed() == [], listed()
+    report["undone_px"] = off("left_wrist", was)
+    invoke(bpy.ops.ed.redo)
+    yield 1.0
+    assert len(listed()) == 1, listed()
+    report["redone_px"] = off("left_wrist", target)
+    x, y = on_screen("left_wrist")  # Escape during a drag changes nothing
+    xdotool(
+        *move(x, y), "mousedown", 1, "sleep", "0.3", *move(x + 40, y), "key", "Escape", "sleep", "0.3", "mouseup", 1
+    )
+    yield 3.0
+    assert len(listed()) == 1
+    report["escaped_px"] = off("left_wrist", target)
+    for strength in (0.0, 2.5, 1.0):
+        use(bpy.ops.scope.smooth, strength=strength)
+        yield 0.5
+        report[f"smoothed_{strength}_px"] = off("left_wrist", target)
+    key("Escape")
+    yield 1.0
+
+
+def corrected(first: int, frame: int) -> Iterator[float]:
+    """Correct in space and over spans, and remove everything."""
+    use(bpy.ops.scope.look_through)
+    yield 1.5
+    began = time.monotonic()
+    place = rig().matrix_world @ rig().pose.bones["head"].head
+    use(bpy.ops.scope.add_pin, joint="head", location=(place.x, place.y + 0.05, place.z))
+    report["pin_s"] = round(time.monotonic() - began, 2)
+    use(bpy.ops.scope.foot_stands, start=frame + 20, end=frame + 30, foot="left")
+    use(bpy.ops.scope.exchange_sides, start=first + 5, end=first + 12)
+    sidebar = next(r for r in viewport()["area"].regions if r.type == "UI")
+    sidebar.tag_redraw()
+    yield 1.0
+    picture("pins_4_panel")
+    scroll(sidebar)
+    yield 1.5
+    picture("pins_5_list")
+    use(bpy.ops.scope.remove_correction, index=-1)
+    yield 1.0
+    assert listed() == []
+
+
+def scroll(sidebar: bpy.types.Region) -> None:
+    """Scroll the sidebar down with the wheel."""
+    x = sidebar.x + sidebar.width // 2
+    xdotool("mousemove", x, 500, "click", "--repeat", 14, "--delay", 40, 5)
+
+
+run(steps())

@@ -1,0 +1,26 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The corrections of a motion file are listed with the armature that is built from it."""
+
+import bpy
+from scope.scope_addon.edit.pins.corrected_motion import with_corrections
+from scope.scope_addon.edit.pins.corrections import Contact, Exchange, Pin
+from scope.scope_addon.motion import Motion
+from scope.scope_addon.scene.build import BuildOptions, build_scene
+from scope.scope_addon.scene.character.correction_list import listed_corrections
+
+from ...edit.walking import BODY, motion_of, walk
+
+
+def test_a_corrected_file_brings_its_list(tmp_path):
+    plain = motion_of(walk(2.0))
+    changes = (Pin(20, "left_wrist", (300.0, 200.0)), Contact(30, 34, "right"), Exchange(3, 5, "legs"))
+    with_corrections(plain, BODY, changes).save(tmp_path / "a.npz")
+    bpy.context.scene.render.fps = 60  # twice the motion's rate
+    options = BuildOptions(start_frame=11.0)
+    rig = build_scene([Motion.load(tmp_path / "a.npz")], BODY, None, options).people[0].armature
+    assert [(e["text"], e["first"], e["last"]) for e in listed_corrections(rig)] == [
+        ("Left Wrist", 51, 51),
+        ("Right Foot Stands", 71, 79),
+        ("Legs Exchanged", 17, 21),
+    ]
+    assert listed_corrections(build_scene([plain], BODY, None, options).people[0].armature) == []
