@@ -62,7 +62,7 @@ def draw_active_person(layout: bpy.types.UILayout, context: bpy.types.Context) -
     """Draw the name of the active captured armature, or a request to select one; return the armature."""
     armature = captured_armature(context)
     text = armature.name if armature else "Select a Captured Person"
-    layout.label(text=text, icon="OUTLINER_OB_ARMATURE" if armature else "INFO")
+    layout.label(text=text, icon="OUTLINER_OB_ARMATURE" if armature else "INFO", translate=armature is None)
     return armature
 
 

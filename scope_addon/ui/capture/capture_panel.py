@@ -14,6 +14,7 @@ from .. import warm_up
 from ..export_operators import FORMATS, is_available
 from ..presets import SCOPE_PT_capture_presets
 from ..reporting import iface_
+from ..translations import CONTEXT
 from ..view.comparison import camera_of, is_looking_through, side_area
 from . import preview_picture
 from .capture_operators import state
@@ -28,6 +29,7 @@ class Tab:
     bl_space_type = "VIEW_3D"
     bl_region_type = "UI"
     bl_category = "Scope"
+    bl_translation_context = CONTEXT
 
 
 class SCOPE_PT_capture(Tab, bpy.types.Panel):

@@ -63,7 +63,7 @@ def _literals(text: ast.Constant | ast.JoinedStr) -> list[str]:
     return [value.value for value in values if isinstance(value, ast.Constant) and isinstance(value.value, str)]
 
 
-def _of_class(cls: type) -> Iterator[Message]:
+def _of_class(cls: Any) -> Iterator[Message]:
     is_operator = issubclass(cls, bpy.types.Operator)
     if label := getattr(cls, "bl_label", ""):
         yield (OPERATOR if is_operator else DEFAULT), label
