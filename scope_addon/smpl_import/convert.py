@@ -58,7 +58,7 @@ def import_motion(path: Path, body: str = "scope", up: str = "auto", rate: float
         raise UsageError(f"the up axis must be one of auto, {', '.join(R_WORLD_FILE)}, not '{up}'")
     if not (np.isfinite(rate) and rate >= 0):
         raise UsageError(f"the frame rate must be above zero, not {rate}")
-    own_keys = {each.name for each in fields(Motion)} - {"source"}
+    own_keys = {each.name for each in fields(Motion)} - {"source", "corrections"}  # optional keys
     if own_keys <= npz_keys(path):
         own = Motion.load(path)
         chosen = own.body_model if body == "scope" else body
