@@ -82,8 +82,8 @@ class Steps:
         if name == "capture":
             return self.capture()
         settings = self.arguments(operator)
-        # Always with a step to undo, as from a button: after changes without one, which scripts can make, Blender itself
-        # may crash when it undoes earlier steps.
+        # Always with a step to undo, as from a button: after a script's changes without one, Blender itself may crash
+        # when it undoes earlier steps.
         return Step(f"scope.{name}({settings})", lambda: use(operator, **settings))
 
     def capture(self) -> Step:
