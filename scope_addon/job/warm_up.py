@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Compile what a capture needs, before the first one.
+"""Compile what a capture and its corrections need, before the first one.
 
 Most computers need this only while an extension is built: its machine code comes with it. Where none does (another
 processor or Python), it runs once in the background, after the extension has been enabled.
@@ -13,6 +13,8 @@ from ..capture.media.video_range import VideoRange
 from ..capture.options import CaptureOptions
 from ..capture.pipeline import capture
 from ..capture.stages.clock import Progress
+from ..edit.pins.corrected_motion import with_corrections
+from ..edit.pins.corrections import Pin
 from .preview import load_rasterizer
 
 ROOT = ASSETS.parent
@@ -20,11 +22,14 @@ _SECONDS = 0.3  # of the sample clip: a few frames, so that every stage has its 
 
 
 def warm_up(progress: Progress) -> int:
-    """Capture the beginning of the sample clip; return how many kernels had to be compiled.
+    """Capture the beginning of the sample clip and correct it; return how many kernels had to be compiled.
 
     :raises ScopeError: the sample cannot be captured.
     """
     load_rasterizer()
     options = CaptureOptions(quality="fast", wanted=VideoRange(end_s=_SECONDS), threads=1)
-    capture(ASSETS / "sample" / "sample.mp4", load_body("scope"), options, progress)
+    body = load_body("scope")
+    motion = capture(ASSETS / "sample" / "sample.mp4", body, options, progress).motions[0]
+    pins = (Pin(0, "left_wrist", position=(0.5, 0.0, 1.2)), Pin(0, "right_ankle", pixel=(0.0, 0.0)))
+    with_corrections(motion, body, pins)
     return compiled_kernels(ROOT)

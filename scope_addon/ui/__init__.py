@@ -11,6 +11,7 @@ import bpy
 
 from . import (
     command,
+    compiled_solver,
     drop,
     export_operators,
     import_operators,
@@ -63,6 +64,7 @@ def register() -> None:
 def unregister() -> None:
     """Stop a running capture, and unregister everything."""
     capture_operators.end_capture()
+    compiled_solver.detach()
     translations.unregister()
     warm_up.detach()
     keymap.detach()

@@ -83,6 +83,7 @@ def steps() -> Iterator[float]:
     first = scene.frame_start
     frame = first + (scene.frame_end - first) // 2
     scene.frame_set(frame)
+    invoke(bpy.ops.ed.undo_push, message="Frame")  # as scrubbing does
     yield 1.5
     invoke(bpy.ops.scope.pin_limb, "INVOKE_DEFAULT")
     yield 1.0

@@ -42,6 +42,7 @@ LEVELS = {
     "arm64": ("apple-m1", ()),  # macOS, whose every ARM processor is this one or a later one
 }
 WITHOUT_KERNELS = {"examples", "loaders"}  # folders whose sources do not count; an installation may lack the first
+_chosen: list[Path] = []  # at most one
 _STALE_S = 14 * 24 * 3600.0  # unused for so long, another version's code is removed
 
 
@@ -99,8 +100,15 @@ class Area:
         return f"{self._name}-{digest_of(environment)[:8]}-{self._program}"
 
 
+def keep_in(folder: Path) -> None:
+    """Keep what this process compiles from now on in a folder, rather than where numba would."""
+    _chosen[:] = [folder]
+
+
 def places() -> list[Path]:
-    """Return the folders in which code may be kept: only NUMBA_CACHE_DIR if set, else numba's own choices."""
+    """Return the folders in which code may be kept: `keep_in`'s, or NUMBA_CACHE_DIR, or else numba's own choices."""
+    if _chosen:
+        return list(_chosen)
     if config.CACHE_DIR:
         return [Path(config.CACHE_DIR)]
     return [Path(__file__).parent / "__pycache__", Path(user_folder(appname="numba", appauthor=False).user_cache_dir)]

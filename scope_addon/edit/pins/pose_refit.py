@@ -10,27 +10,18 @@ should stay where they were. The joints of the corrected limb are free to turn, 
 from __future__ import annotations
 
 import math
+import sys
 from dataclasses import dataclass, field
+from importlib import import_module
+from types import ModuleType
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ....solver import (
-    Keypoints2D,
-    Keypoints3D,
-    Measurements,
-    Options,
-    PosePriors,
-    Priors,
-    Stage,
-    State,
-    Weights,
-    fit_tree,
-    make_tree,
-)
+from .... import solver as own_solver
+from ....solver import PosePriors, Priors
 from ....solver.body import Body
-from ....solver.compiled.tree import with_fixed_shape
 from ....solver.residuals import joint_limits
 from ...errors import UsageError
 from ...kinematics.contact_points import SOLES, with_contact_points
@@ -40,10 +31,6 @@ FREE, GIRDLE, STIFF = 1.0, 10.0, 100.0
 PELVIS_ROTATION, PELVIS_POSITION = 400.0, 400.0
 PINNED, PINNED_2D = 1e6, 1e7  # 1 mm; 0.3 pixels at a focal length of 1000
 STANDING, HELD = 1e4, 1e3  # 1 cm, 3 cm
-_STAGES = (Stage(Weights(keypoints2d=1.0, keypoints3d=1.0, joint_prior=1.0, joint_limits=500.0, shape=1.0), 1e-9, 60),)
-_OPTIONS = Options(
-    stages=_STAGES, robust_keypoints2d=math.inf, robust_keypoints3d=math.inf, damping=0.1, curvature=False
-)
 _TRUNK = ("pelvis", "spine1", "spine2", "spine3", "neck", "head")
 _LIMBS = {"arm": ("collar", "shoulder", "elbow", "wrist", "hand"), "leg": ("hip", "knee", "ankle", "foot")}
 _ENDS = ("left_wrist", "right_wrist", "left_ankle", "right_ankle", "head")
@@ -76,6 +63,23 @@ def limb_of(joint: str) -> str:
     return "trunk" if joint in _TRUNK else f"{side}_arm"  # fingers
 
 
+def compiled_solver() -> ModuleType:
+    """Return the solver; inside Blender, where it is loaded as ``scope`` as well, that one, which has machine code."""
+    loaded = sys.modules.get("scope.solver")
+    return loaded if loaded is not None and loaded.__file__ == own_solver.__file__ else own_solver
+
+
+def _options(solver: ModuleType) -> Any:
+    weights = solver.Weights(keypoints2d=1.0, keypoints3d=1.0, joint_prior=1.0, joint_limits=500.0, shape=1.0)
+    return solver.Options(
+        stages=(solver.Stage(weights, 1e-9, 60),),
+        robust_keypoints2d=math.inf,
+        robust_keypoints3d=math.inf,
+        damping=0.1,
+        curvature=False,
+    )
+
+
 class PoseRefit:
     """Fits poses of one body of a fixed shape."""
 
@@ -86,7 +90,10 @@ class PoseRefit:
         """
         self.body, self.betas = with_contact_points(body, betas), np.asarray(betas, float)
         self.names = list(body.joint_names)
-        self._tree = with_fixed_shape(make_tree(self.body), self.betas)
+        self._solver = compiled_solver()
+        tree = import_module(".compiled.tree", self._solver.__name__)
+        self._tree = tree.with_fixed_shape(self._solver.make_tree(self.body), self.betas)
+        self._options = _options(self._solver)
         self._points = len(self.body.keypoint_names)
         self._priors: dict[tuple[str, ...], Priors] = {}
         self._limits = joint_limits.hinges_of(self.names)
@@ -144,20 +151,21 @@ class PoseRefit:
         in_space = [k for k, v in enumerate(points.values) if len(v) == 3]
         in_image = [k for k, v in enumerate(points.values) if len(v) == 2]
         numbers, weights = np.array(points.numbers, int), np.array(points.weights)
-        measured = Measurements(
+        measured = self._solver.Measurements(
             pose_priors=self._root_prior(R_camera_world @ rotations[0], R_camera_world @ (root - center), joints)
         )
         if in_space:
             xyz = (np.array([points.values[k] for k in in_space]) - center) @ R_camera_world.T
-            measured.keypoints3d = Keypoints3D(numbers[in_space], xyz, weights[in_space])
+            measured.keypoints3d = self._solver.Keypoints3D(numbers[in_space], xyz, weights[in_space])
         if in_image and camera is not None:
             uv = np.array([points.values[k] for k in in_image])
-            measured.intrinsics, measured.keypoints2d = camera[1], Keypoints2D(numbers[in_image], uv, weights[in_image])
-        state = State(
+            measured.intrinsics = camera[1]
+            measured.keypoints2d = self._solver.Keypoints2D(numbers[in_image], uv, weights[in_image])
+        state = self._solver.State(
             R_camera_world @ rotations[0], R_camera_world @ (root - center), rotations[1:].copy(), np.zeros(0)
         )
-        priors = Priors(rotations[1:].copy(), self._weights(joints), limits=self._limits_of(joints))
-        found = fit_tree(self._tree, measured, state, priors, _OPTIONS).state
+        priors = self._solver.Priors(rotations[1:].copy(), self._weights(joints), limits=self._limits_of(joints))
+        found = self._solver.fit_tree(self._tree, measured, state, priors, self._options).state
         out = np.concatenate([(R_camera_world.T @ found.R_camera_root)[None], found.Omega])
         return out, R_camera_world.T @ found.t_camera_root + center
 
@@ -166,7 +174,8 @@ class PoseRefit:
         trunk = any(limb_of(j) == "trunk" or j.endswith(("hip", "collar")) for j in joints)
         share = 0.01 if "pelvis" in joints or any(j.endswith("hip") for j in joints) else 0.1 if trunk else 1.0
         rotation = PELVIS_ROTATION * (0.1 if trunk else 1.0)
-        return PosePriors([0], R[None], t[None], [rotation], [PELVIS_POSITION * share])
+        posed: PosePriors = self._solver.PosePriors([0], R[None], t[None], [rotation], [PELVIS_POSITION * share])
+        return posed
 
     def _weights(self, joints: tuple[str, ...]) -> NDArray[np.float64]:
         """Return the weights (K,) of the joints' prior."""

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty
 
+from .. import compiled_solver
 from ..captured_person import betas_of, motion_of
 from .edit_base import EditOperator, SpanOperator, edit_clip
 
@@ -47,6 +48,8 @@ class SCOPE_OT_smooth(EditOperator):
         from ...scene.character.root_object import remove_root_object
 
         motion = motion_of(armature)
+        if motion.corrections:  # which are solved again
+            compiled_solver.load()
         clip = smoothed(body, motion, self.strength)
         write_clip(armature, body, clip, key_frames(motion.timestamps, rate, float(armature.get("scope_start", 0.0))))
         armature["scope_smoothing"] = self.strength

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import bpy
 
 from ...scene.character.correction_list import store_corrections
+from .. import compiled_solver
 from ..captured_person import motion_of, set_motion_of
 
 if TYPE_CHECKING:
@@ -34,6 +35,7 @@ def change_corrections(
     from ...edit.pins.corrected_motion import corrections_of, with_corrections
     from ...scene.character.corrected_keys import rewrite_changed_keys
 
+    compiled_solver.load()
     before = motion_of(armature)
     after = with_corrections(before, body, change(corrections_of(before)))
     rewrite_changed_keys(armature, body, rate, before, after)
