@@ -78,6 +78,9 @@ def main() -> int:
         help="for a distribution's Blender, whose Python is not that of Blender's own build; any version from 4.2 on"
         f" may install the zip, which is written to build/{OTHER_DIST.name}",
     )
+    parser.add_argument(
+        "--no-kernels", action="store_true", help="leave the compiled solver out; it is compiled on first use"
+    )
     parser.add_argument("--website", metavar="URL", default="", help="page for users, written into the manifest")
     args = parser.parse_args()
     unknown = sorted(set(args.platforms) - set(PLATFORMS))
@@ -90,7 +93,7 @@ def main() -> int:
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     for target in targets:
-        archive = build(target, folder, args.website)
+        archive = build(target, folder, args.website, kernels=not args.no_kernels)
         size = archive.stat().st_size / 1e6
         print(f"{archive}  {size:.0f} MB{f', above the goal of {GOAL_MB} MB' if size > GOAL_MB else ''}", flush=True)
     if not args.any_blender:
@@ -98,11 +101,12 @@ def main() -> int:
     return 0
 
 
-def build(target: Target, folder: Path, website: str = "") -> Path:
+def build(target: Target, folder: Path, website: str = "", *, kernels: bool = True) -> Path:
     """Stage, zip, validate and check one target; return its zip."""
     wheels = download_wheels(target)
     stage(target, wheels, website)
-    add_kernels(STAGING, target.platform, target.python, wheels)
+    if kernels:
+        add_kernels(STAGING, target.platform, target.python, wheels)
     version = tomllib.loads((STAGING / "blender_manifest.toml").read_text())["version"]
     archive = folder / target.file_name(version)
     blender_extension("build", "--source-dir", str(STAGING), "--output-filepath", str(archive))

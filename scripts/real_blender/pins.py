@@ -74,6 +74,8 @@ def off(joint: str, target: tuple[float, float]) -> float:
 def steps() -> Iterator[float]:
     """Run the session."""
     scene = bpy.context.scene
+    viewport()["area"].spaces.active.show_region_ui = True
+    yield 1.0
     show_tab()
     yield 1.0
     bpy.ops.scope.choose_footage(filepath=FOOTAGE)

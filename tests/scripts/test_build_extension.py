@@ -191,6 +191,15 @@ def changed(target, archive, contents):
 
 
 @pytest.mark.usefixtures("networks")
+def test_the_compiled_solver_can_be_left_out(with_empty_wheels, monkeypatch):
+    builder, added = with_empty_wheels, []
+    monkeypatch.setattr(builder, "add_kernels", lambda *arguments: added.append(arguments[1:3]))
+    assert run(builder, monkeypatch, "linux-x64", "--python", "3.13", "--no-kernels") == 0
+    assert added == []
+    assert run(builder, monkeypatch, "linux-x64", "--python", "3.13") == 0
+    assert added == [("linux-x64", "3.13")]
+
+
 def test_a_zip_for_a_distributions_blender_leaves_the_others_alone(with_empty_wheels, monkeypatch):
     builder = with_empty_wheels
     builder.DIST.mkdir()

@@ -13,12 +13,23 @@ if TYPE_CHECKING:
     from ...motion import Motion
 
 _LIST = "scope_corrections"  # custom property of the armature
+_ENTRY = {"kind": str, "text": str, "joint": str, "first": int, "last": int}
 
 
 def listed_corrections(armature: bpy.types.Object) -> list[dict[str, Any]]:
-    """Return the corrections in their order: ``kind``, ``text``, ``joint``, scene frames ``first`` and ``last``."""
-    listed: list[dict[str, Any]] = json.loads(armature.get(_LIST, "[]"))
-    return listed
+    """Return the corrections in their order: ``kind``, ``text``, ``joint``, scene frames ``first`` and ``last``.
+
+    A .blend file may be hostile: entries that are something else are left out.
+    """
+    try:
+        listed = json.loads(armature.get(_LIST, "[]"))
+    except (TypeError, ValueError, RecursionError):
+        return []
+    return [each for each in listed if _is_entry(each)] if isinstance(listed, list) else []
+
+
+def _is_entry(value: object) -> bool:
+    return isinstance(value, dict) and all(type(value.get(name)) is kind for name, kind in _ENTRY.items())
 
 
 def store_corrections(armature: bpy.types.Object, motion: Motion, rate: float) -> None:

@@ -1,7 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The corrections of a motion file are listed with the armature that is built from it."""
 
+import json
+
 import bpy
+import pytest
 from scope.scope_addon.edit.pins.corrected_motion import with_corrections
 from scope.scope_addon.edit.pins.corrections import Contact, Exchange, Pin
 from scope.scope_addon.motion import Motion
@@ -9,6 +12,8 @@ from scope.scope_addon.scene.build import BuildOptions, build_scene
 from scope.scope_addon.scene.character.correction_list import listed_corrections
 
 from ...edit.walking import BODY, motion_of, walk
+
+ENTRY = {"kind": "PIN", "text": "Left Wrist", "joint": "left_wrist", "first": 4, "last": 4}
 
 
 def test_a_corrected_file_brings_its_list(tmp_path):
@@ -24,3 +29,22 @@ def test_a_corrected_file_brings_its_list(tmp_path):
         ("Legs Exchanged", 17, 21),
     ]
     assert listed_corrections(build_scene([plain], BODY, None, options).people[0].armature) == []
+
+
+@pytest.mark.parametrize(
+    ("stored", "expected"),
+    [
+        (json.dumps([ENTRY]), [ENTRY]),
+        (json.dumps([ENTRY, {"kind": "PIN"}, 7, dict(ENTRY, first="4"), dict(ENTRY, text=None)]), [ENTRY]),
+        (json.dumps({"kind": "PIN"}), []),
+        ("[" * 100_000, []),
+        ("no json", []),
+        (5, []),
+        ([1, 2], []),
+    ],
+)
+def test_what_is_no_correction_is_left_out(stored, expected):
+    armature = bpy.data.objects.new("person", None)
+    assert listed_corrections(armature) == []
+    armature["scope_corrections"] = stored
+    assert listed_corrections(armature) == expected
