@@ -19,6 +19,7 @@ from .preferences import cache
 ROOT = Path(__file__).resolve().parents[2]
 OWN_NAME = __name__.partition(".scope_addon.")[0]
 NAME = "scope"
+_loaded: list[str] = []  # the package, if it was loaded here
 
 
 def load() -> None:
@@ -27,6 +28,7 @@ def load() -> None:
         return
     if NAME not in sys.modules:
         load_package(ROOT)
+        _loaded.append(NAME)
     for name in [OWN_NAME, *([NAME] if is_ours() else [])]:
         import_module(f"{name}.solver.compiled.code_folders").keep_in(cache().kernels)
     if is_ours():
@@ -41,6 +43,7 @@ def is_ours() -> bool:
 
 def detach() -> None:
     """Forget the package, so that another version of the extension is not mixed with it."""
-    if OWN_NAME != NAME and is_ours():
-        for name in [name for name in sys.modules if name == NAME or name.startswith(f"{NAME}.")]:
+    while _loaded:
+        package = _loaded.pop()
+        for name in [name for name in sys.modules if name == package or name.startswith(f"{package}.")]:
             del sys.modules[name]

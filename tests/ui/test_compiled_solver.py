@@ -45,12 +45,12 @@ def test_corrections_use_the_package_that_has_machine_code(tmp_path):
     assert done.returncode == 0, done.stderr[-2000:]
 
 
-def test_a_foreign_package_of_the_same_name_is_left_alone(monkeypatch):
+def test_a_package_of_the_same_name_that_was_there_before_stays(monkeypatch):
     from scope.scope_addon.ui import compiled_solver
 
     assert compiled_solver.is_ours()
-    monkeypatch.setattr(compiled_solver, "NAME", "json")
     monkeypatch.setattr(compiled_solver, "OWN_NAME", "bl_ext.user_default.scope")
-    assert not compiled_solver.is_ours()
     compiled_solver.detach()
-    assert "json" in sys.modules
+    assert "scope" in sys.modules
+    monkeypatch.setattr(compiled_solver, "NAME", "json")
+    assert not compiled_solver.is_ours()
