@@ -30,9 +30,11 @@ class SCOPE_OT_add_capture_preset(AddPresetBase, bpy.types.Operator):
     bl_label = "Add Capture Preset"
     preset_menu = "SCOPE_PT_capture_presets"
     preset_subdir = "scope/capture"
-    preset_defines = ["settings = bpy.context.scene.scope"]
+    # Whole paths: a Blender before 4.4 does not find what ``preset_defines`` defines if its Python is 3.13.
     preset_values = [
-        f"settings.{property_name(option)}" for option in options_at(Place.PANEL) if option.name not in _OF_THE_CLIP
+        f"bpy.context.scene.scope.{property_name(option)}"
+        for option in options_at(Place.PANEL)
+        if option.name not in _OF_THE_CLIP
     ]
 
 

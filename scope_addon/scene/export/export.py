@@ -133,6 +133,8 @@ def _write_one(
         actions_over_scene_range(scene),
     ):
         rig = next((obj for obj in scene.objects if obj.type == "ARMATURE"), None)
+        if rig is None:  # none of them can be in this scene
+            raise UsageError(f"cannot write {path.name}: the capture's armature is not in a scene; capture again")
         writers = {
             ".bvh": lambda temporary: formats.write_bvh(temporary, scene, rig, options.bvh_unit),
             ".glb": lambda temporary: formats.write_glb(temporary, options.camera, take),
