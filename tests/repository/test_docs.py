@@ -35,11 +35,22 @@ ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
 PAGES = [ROOT / "README.md", *sorted(DOCS.glob("*.md"))]
 _NOT_OURS = {".venv", "build", "node_modules", "__pycache__"}
-ALL_PAGES = sorted(
-    p
-    for p in ROOT.rglob("*.md")
-    if not any(part in _NOT_OURS or part.startswith(".") for part in p.relative_to(ROOT).parts)
-)
+
+
+def pages_under(root: Path) -> list[Path]:
+    """Return every Markdown file of the repository, without looking into folders of others.
+
+    A folder that is being built changes, or vanishes, while it is listed, and the processes that run these tests must
+    find the same files.
+    """
+    pages = []
+    for folder, inner, files in os.walk(root):
+        inner[:] = [name for name in inner if name not in _NOT_OURS and not name.startswith(".")]
+        pages += [Path(folder, name) for name in files if name.endswith(".md")]
+    return sorted(pages)
+
+
+ALL_PAGES = pages_under(ROOT)
 _BLOCK = re.compile(r"^```(\w*)\n(.*?)^```$", re.M | re.S)
 _LINK = re.compile(r"\]\(([^()\s]+)\)")
 
@@ -161,6 +172,13 @@ def anchors(page: Path) -> set[str]:
     """As they are made from headings where the pages are shown."""
     headings = re.findall(r"^#+ (.+)$", _BLOCK.sub("", page.read_text("utf-8")), re.M)
     return {re.sub(r"[^\w\- ]", "", re.sub(r"[`*]", "", h).lower()).replace(" ", "-") for h in headings}
+
+
+def test_folders_of_others_are_not_searched_for_pages(tmp_path):
+    for name in ("a.md", "docs/b.md", "build/c.md", "build/root/docs/d.md", ".venv/e.md", "docs/f.txt"):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).touch()
+    assert pages_under(tmp_path) == [tmp_path / "a.md", tmp_path / "docs" / "b.md"]
 
 
 @pytest.mark.parametrize("page", ALL_PAGES, ids=lambda p: str(p.relative_to(ROOT)))
