@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from ...solver.errors import InputError
+from ...solver.loaders.regular_file import check_regular
 from ..atomic_write import atomic_path, reason
 from ..errors import OutputError
 
@@ -73,9 +74,8 @@ def load_bone_map(path: str | Path) -> BoneMap:
     :raises InputError: when the file cannot be read or is not a valid map.
     """
     path = Path(path)
+    check_regular(path, InputError, "bone map that Scope saved", _LARGEST_BYTES)
     try:
-        if path.stat().st_size > _LARGEST_BYTES:
-            raise InputError(f"{path}: too large for a bone map; choose a file that Scope saved")
         content = json.loads(path.read_text(encoding="utf-8-sig"))  # some editors write a byte order mark
     except OSError as error:
         raise InputError(f"{path}: the bone map cannot be read ({error.strerror}); choose another file") from error
