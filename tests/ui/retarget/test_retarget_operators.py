@@ -229,6 +229,14 @@ def test_the_rig_is_exported_with_its_animation_and_only_its_mesh(rig, tmp_path,
     assert np.ptp(way, axis=0).max() == pytest.approx(np.ptp(there, axis=0).max(), rel=0.05)
 
 
+def test_the_rig_is_exported_also_when_the_person_was_deleted(rig, tmp_path):
+    bpy.ops.scope.retarget()
+    bpy.data.objects.remove(rig["scope_person"])
+    path = tmp_path / "hero.bvh"
+    assert bpy.ops.scope.export(filepath=str(path), format="BVH", which="RIG") == {"FINISHED"}
+    assert path.is_file()
+
+
 def test_an_unwritable_bone_map_is_an_error_that_names_the_file(rig, tmp_path):
     bpy.ops.scope.guess_bones()
     with pytest.raises(RuntimeError, match=r"Cannot write .*nowhere/bones\.json: its folder does not exist"):
