@@ -36,7 +36,7 @@ class SCOPE_MT_motion_capture(bpy.types.Menu):
         """Draw the menu."""
         layout = self.layout
         layout.operator_context = "INVOKE_DEFAULT"
-        layout.operator("scope.import_video", icon="FILE_MOVIE")
+        draw_import_video(layout, "FILE_MOVIE")
         layout.operator("scope.look_through", icon="VIEW_CAMERA")
         layout.operator("scope.footage_to_sequencer", icon="SEQUENCE")
         layout.separator()
@@ -50,8 +50,13 @@ class SCOPE_MT_motion_capture(bpy.types.Menu):
         layout.menu(SCOPE_MT_export.bl_idname, icon="EXPORT")
 
 
+def draw_import_video(layout: bpy.types.UILayout, icon: str) -> None:
+    """Draw the entry with the words people search for: its own count more than those of the menus that lead to it."""
+    layout.operator("scope.import_video", text="Motion from Video (Motion Capture)", icon=icon)
+
+
 def _draw_import(self: bpy.types.Menu, _context: bpy.types.Context) -> None:
-    self.layout.operator("scope.import_video")
+    draw_import_video(self.layout, "NONE")
 
 
 def _draw_export(self: bpy.types.Menu, _context: bpy.types.Context) -> None:

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import contextlib
+
 import bpy
 from bl_operators.presets import AddPresetBase
 from bl_ui.utils import PresetPanel
@@ -21,6 +23,13 @@ class SCOPE_PT_capture_presets(PresetPanel, bpy.types.Panel):
     preset_subdir = "scope/capture"
     preset_operator = "script.execute_preset"
     preset_add_operator = "scope.add_capture_preset"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Draw the presets. Without a folder for them, Blender would complain of missing paths before the first one."""
+        if not bpy.utils.preset_paths(self.preset_subdir):
+            with contextlib.suppress(OSError):
+                bpy.utils.user_resource("SCRIPTS", path=f"presets/{self.preset_subdir}", create=True)
+        PresetPanel.draw(self, context)
 
 
 class SCOPE_OT_add_capture_preset(AddPresetBase, bpy.types.Operator):

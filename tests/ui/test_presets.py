@@ -2,12 +2,16 @@
 """Presets of the capture settings are files that Blender runs."""
 
 from pathlib import Path
+from unittest.mock import MagicMock
 
 import bpy
+from scope.scope_addon.ui import presets
 
 
 def test_a_preset_brings_the_settings_back(monkeypatch, tmp_path):
     monkeypatch.setattr(bpy.utils, "user_resource", lambda *_, **__: str(tmp_path))
+    panel = presets.SCOPE_PT_capture_presets
+    monkeypatch.setattr(panel, "bl_label", panel.bl_label)  # Blender names the menu after the preset
     settings = bpy.context.scene.scope
     settings.quality, settings.people = "BEST", "ALL"
     assert bpy.ops.scope.add_capture_preset(name="everybody") == {"FINISHED"}
@@ -15,3 +19,16 @@ def test_a_preset_brings_the_settings_back(monkeypatch, tmp_path):
     settings.quality, settings.people = "FAST", "LARGEST"
     exec(compile(stored.read_text(), stored, "exec"), {})
     assert (settings.quality, settings.people) == ("BEST", "ALL")
+
+
+def test_without_presets_blender_does_not_complain_of_missing_paths(monkeypatch, tmp_path):
+    scripts = tmp_path / "scripts"
+    monkeypatch.setenv("BLENDER_USER_SCRIPTS", str(scripts))
+    panel, labels = presets.SCOPE_PT_capture_presets, []
+    assert not bpy.utils.preset_paths(panel.preset_subdir)
+    stub = MagicMock(preset_subdir=panel.preset_subdir, preset_operator=panel.preset_operator)
+    stub.path_menu = lambda *given, **named: bpy.types.Menu.path_menu(stub, *given, **named)
+    stub.layout.label = lambda **given: labels.append(given["text"])
+    panel.draw(stub, bpy.context)
+    assert labels == []
+    assert bpy.utils.preset_paths(panel.preset_subdir)

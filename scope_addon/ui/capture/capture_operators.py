@@ -14,6 +14,7 @@ from ...footage import FOOTAGE_SUFFIXES
 from ...job.progress import duration
 from .. import warm_up
 from ..reporting import iface_, rpt_, sentence, tip_
+from ..view.sidebar import is_over_tab, show_tab
 from ..view.view_operators import frame_selected, hide_startup_cube
 from . import preview_picture
 
@@ -68,6 +69,7 @@ class SCOPE_OT_choose_footage(bpy.types.Operator):
             self.report({"ERROR"}, rpt_("{path} is not a file; choose a video or image", path=path))
             return {"CANCELLED"}
         context.scene.scope.footage = str(path)
+        show_tab(context)
         return {"FINISHED"}
 
 
@@ -119,7 +121,7 @@ class SCOPE_OT_capture(bpy.types.Operator):
         job = state.job
         if job is None:  # stopped by something else
             return self._end(context, {"CANCELLED"})
-        if event.type == "ESC" and event.value == "PRESS" and is_over_panel(context.window, event):
+        if event.type == "ESC" and event.value == "PRESS" and is_over_tab(context.window, event):
             bpy.ops.scope.cancel("INVOKE_DEFAULT")
             return {"RUNNING_MODAL"}
         if job.cancel_requested:
@@ -245,18 +247,6 @@ def stop_job() -> None:
         state.job.close()
     state.job = None
     preview_picture.clear()
-
-
-def is_over_panel(window: bpy.types.Window, event: bpy.types.Event) -> bool:
-    """Return whether the mouse is over a sidebar of a 3D viewport that shows the tab Scope."""
-    sidebars = [r for area in window.screen.areas if area.type == "VIEW_3D" for r in area.regions if r.type == "UI"]
-    return any(
-        0 <= event.mouse_x - sidebar.x < sidebar.width
-        and 0 <= event.mouse_y - sidebar.y < sidebar.height
-        and getattr(sidebar, "active_panel_category", "Scope") == "Scope"
-        for sidebar in sidebars
-        if sidebar.width > 1  # a hidden one is 1 pixel wide
-    )
 
 
 def clear_status_bar() -> None:

@@ -164,6 +164,7 @@ class SCOPE_PT_result(Tab, bpy.types.Panel):
             for background in camera.data.background_images[:1] if back else ():
                 layout.prop(background, "alpha", text="Footage Opacity", slider=True)
         row = layout.row(align=True)
+        row.label(text="", icon="EXPORT")
         for key, label, _, _ in FORMATS:
             cell = row.column()
             cell.enabled = is_available(key)

@@ -10,6 +10,7 @@ from bpy.props import StringProperty
 
 from ...footage import FOOTAGE_SUFFIXES
 from ..reporting import rpt_, tip_
+from ..view.sidebar import show_tab
 from .capture_operators import state
 
 
@@ -17,7 +18,7 @@ class SCOPE_OT_import_video(bpy.types.Operator):
     """Motion capture: animate a body with the motion of the person in a video or image"""
 
     bl_idname = "scope.import_video"
-    bl_label = "Motion from Video (Mocap)"
+    bl_label = "Motion from Video"  # short: the button of the file browser shows it, too
     bl_options = {"UNDO"}
 
     filepath: StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"})
@@ -51,6 +52,7 @@ class SCOPE_OT_import_video(bpy.types.Operator):
             self.report({"ERROR"}, rpt_("{path} is not a file; choose a video or image", path=path))
             return {"CANCELLED"}
         context.scene.scope.footage = str(path)
+        show_tab(context)
         bpy.ops.scope.capture("INVOKE_DEFAULT")
         return {"FINISHED"}
 

@@ -1,0 +1,62 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The sidebar of the 3D viewport, and its tab Scope."""
+
+from __future__ import annotations
+
+import bpy
+
+TAB = "Scope"
+_DRAWN_AFTER_S = 0.3  # a sidebar knows its tabs only after it has been drawn
+
+
+def show_tab(context: bpy.types.Context) -> None:
+    """Open the tab in the context's viewport, or else in the largest of its window: it shows a capture's progress."""
+    window = context.window
+    if window is None:
+        return
+    area = context.area
+    if area is None or area.type != "VIEW_3D":
+        viewports = [each for each in window.screen.areas if each.type == "VIEW_3D"]
+        area = max(viewports, key=lambda each: each.width * each.height, default=None)
+    if area is None:
+        return
+    area.spaces.active.show_region_ui = True
+    if not _choose_tab(area) and not bpy.app.background:
+        pointer = area.as_pointer()
+        bpy.app.timers.register(lambda: _choose_tab_later(pointer), first_interval=_DRAWN_AFTER_S)
+
+
+def _choose_tab_later(pointer: int) -> None:
+    """Choose the tab in the viewport at an address, if that is still open."""
+    windows = bpy.context.window_manager.windows
+    areas = [area for window in windows for area in window.screen.areas if area.as_pointer() == pointer]
+    for area in areas:
+        if area.type == "VIEW_3D" and _choose_tab(area):
+            area.tag_redraw()
+
+
+def _choose_tab(area: bpy.types.Area) -> bool:
+    """Choose the tab in a viewport; False where Blender does not allow it, such as before the sidebar was drawn."""
+    try:
+        for sidebar in _sidebars(area):
+            sidebar.active_panel_category = TAB
+    except (AttributeError, TypeError):
+        return False
+    return True
+
+
+def _sidebars(area: bpy.types.Area) -> list[bpy.types.Region]:
+    return [region for region in area.regions if region.type == "UI"]
+
+
+def is_over_tab(window: bpy.types.Window, event: bpy.types.Event) -> bool:
+    """Return whether the mouse is over a sidebar of a 3D viewport that shows the tab Scope."""
+    areas = [area for area in window.screen.areas if area.type == "VIEW_3D"]
+    return any(
+        0 <= event.mouse_x - sidebar.x < sidebar.width
+        and 0 <= event.mouse_y - sidebar.y < sidebar.height
+        and getattr(sidebar, "active_panel_category", TAB) == TAB
+        for area in areas
+        for sidebar in _sidebars(area)
+        if sidebar.width > 1  # a hidden one is 1 pixel wide
+    )
