@@ -39,6 +39,7 @@ class SCOPE_MT_motion_capture(bpy.types.Menu):
         layout.operator("scope.import_video", icon="FILE_MOVIE")
         layout.operator("scope.look_through", icon="VIEW_CAMERA")
         layout.operator("scope.footage_to_sequencer", icon="SEQUENCE")
+        layout.operator("scope.match_frame_rate", icon="TIME")
         layout.separator()
         for name in ("smooth", "interpolate_span", "refloor", "loop", "reduce_keys", "bake_rate"):
             layout.operator(f"scope.{name}")

@@ -43,7 +43,7 @@ class SCOPE_OT_smooth(EditOperator):
         """Replace the keys by those of the captured motion, smoothed."""
         from ...edit.smooth import smoothed
         from ...scene.animation_data.actions import remove_cycles
-        from ...scene.animation_data.timing import key_frames, restore_scene_range
+        from ...scene.animation_data.timing import key_frames, restore_scene_range, store_rate
         from ...scene.character.keys import bake_whole_frames, write_clip
         from ...scene.character.root_object import remove_root_object
 
@@ -53,6 +53,7 @@ class SCOPE_OT_smooth(EditOperator):
         clip = smoothed(body, motion, self.strength)
         write_clip(armature, body, clip, key_frames(motion.timestamps, rate, float(armature.get("scope_start", 0.0))))
         armature["scope_smoothing"] = self.strength
+        store_rate(armature, rate)
         remove_cycles(armature)  # a loop becomes the whole motion again
         if armature.get("scope_resampled"):
             bake_whole_frames(armature, body, rate)
