@@ -48,6 +48,7 @@ class SCOPE_MT_motion_capture(bpy.types.Menu):
         layout.operator("scope.retarget", text="Retarget to Rig", icon="ARMATURE_DATA")
         layout.operator("scope.rename_take", icon="GREASEPENCIL")
         layout.operator("scope.push_to_nla", icon="NLA_PUSHDOWN")
+        layout.operator("scope.mark_asset", icon="ASSET_MANAGER")
         layout.menu(SCOPE_MT_export.bl_idname, icon="EXPORT")
 
 

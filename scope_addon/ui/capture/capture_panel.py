@@ -171,6 +171,7 @@ class SCOPE_PT_result(Tab, bpy.types.Panel):
             cell = row.column()
             cell.enabled = is_available(key)
             cell.operator("scope.export", text=label).format = key
+        layout.operator("scope.mark_asset", icon="ASSET_MANAGER")
 
 
 class SCOPE_PT_warnings(Tab, bpy.types.Panel):
