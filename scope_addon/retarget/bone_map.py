@@ -55,11 +55,13 @@ class BoneMap:
 
 
 def save_bone_map(bone_map: BoneMap, path: str | Path) -> None:
-    """Write the map as JSON, atomically.
+    """Write the map as JSON, atomically. Only a bone map is overwritten, or an empty file.
 
-    :raises OutputError: when the file cannot be written.
+    :raises OutputError: when the file cannot be written, or is something else.
     """
     path = Path(path)
+    if path.is_file() and not _is_bone_map_or_empty(path):
+        raise OutputError(f"{path} is not a bone map, so it is not overwritten; choose another name")
     text = json.dumps({"format": _FORMAT, "version": 1, "bones": bone_map.parts}, indent=2, ensure_ascii=False)
     try:
         with atomic_path(path) as temporary:
@@ -92,6 +94,16 @@ def load_bone_map(path: str | Path) -> BoneMap:
     except InputError as error:
         raise InputError(f"{path}: {error}") from error
     return out
+
+
+def _is_bone_map_or_empty(path: Path) -> bool:
+    """Return whether a file has the format of a bone map, whatever its version and bones, or has no content."""
+    try:
+        size = path.stat().st_size
+        content = json.loads(path.read_text(encoding="utf-8-sig")) if 0 < size <= _LARGEST_BYTES else None
+    except (OSError, ValueError, RecursionError):
+        return False
+    return size == 0 or (isinstance(content, dict) and content.get("format") == _FORMAT)
 
 
 def _is_name(text: object) -> bool:

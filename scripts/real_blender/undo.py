@@ -95,8 +95,17 @@ def edits() -> dict[str, Callable[[], object]]:
         "guess bones": lambda: use(scope.guess_bones),
         "retarget": lambda: use(scope.retarget),
         "retarget, root motion on an object, next to the person": retarget_beside,
+        "mark as asset": lambda: use(scope.mark_asset, author="Ada"),
+        "frame rate from footage": set_rate,
         "footage to sequencer": lambda: use(scope.footage_to_sequencer),
     }
+
+
+def set_rate() -> None:
+    """Change the scene's rate by hand, as in the Output properties, and set it from the footage."""
+    bpy.context.scene.render.fps = 20
+    use(bpy.ops.scope.match_frame_rate)
+    assert bpy.context.scene.render.fps != 20
 
 
 def retarget_beside() -> None:
