@@ -47,6 +47,7 @@ def state() -> State:
         found[kind] = sorted(block.name_full for block in getattr(bpy.data, kind) if block.users)
     for action in bpy.data.actions:
         found[f"action {action.name_full}"] = _digest(sorted(_keys(curve) for curve in _curves(action)))
+        found[f"asset {action.name_full}"] = _asset(action)
     for name in ("frame_start", "frame_end", "frame_current"):
         found[name] = getattr(scene, name)
     for name in ("fps", "fps_base", "resolution_x", "resolution_y", "pixel_aspect_x"):
@@ -100,6 +101,15 @@ def _curves(action: bpy.types.Action) -> list[bpy.types.FCurve]:
         return list(action.fcurves)
     bags = (bag for layer in action.layers for strip in layer.strips for bag in strip.channelbags)
     return [curve for bag in bags for curve in bag.fcurves]
+
+
+def _asset(action: bpy.types.Action) -> object:
+    """Return the metadata and picture of an asset; None of other actions."""
+    data, preview = action.asset_data, action.preview
+    if data is None:
+        return None
+    pixels = [round(value, 2) for value in preview.image_pixels_float] if preview else []
+    return sorted(tag.name for tag in data.tags), data.author, data.description, data.catalog_id, _digest(pixels)
 
 
 def _keys(curve: bpy.types.FCurve) -> tuple[str, int, list[float], list[str]]:
