@@ -125,7 +125,7 @@ class RestPoints:
         t = self.body.v_template[toes]
         outward = sign * t[:, 0]
         across = (outward - outward.min()) / max(np.ptp(outward), 1e-9)
-        inner, outer = across <= 0.5, across >= 0.88
+        inner, outer = across <= 0.5, across >= min(0.88, across.max())  # a flat part has no outer side
         return {
             f"{side}_heel": int(foot[sole][np.argmin(v[sole, 2])]),
             f"{side}_big_toe": int(toes[inner][np.argmax(t[inner, 2])]),

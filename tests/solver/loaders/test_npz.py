@@ -197,6 +197,21 @@ def test_contradictory_files_are_refused_with_the_reason(tmp_path, tables_of, na
     assert str(path) in str(caught.value)
 
 
+@pytest.mark.parametrize("factors", [(1, 1, 0), (0, 1, 1), (1e-3, 1e-3, 1e-3), (1000, 1000, 1000), (1, 1e30, 1)])
+def test_flat_tiny_and_huge_bodies_are_refused(tmp_path, tables_of, factors):
+    tables = tables_of("smpl")
+    tables["v_template"] = tables["v_template"] * np.array(factors)
+    with pytest.raises(ModelFileError, match=r"body\.npz: v_template measures .* m, which no body does; .* metre"):
+        load_model(save(tmp_path / "body.npz", tables))
+
+
+@pytest.mark.parametrize("joint", [7, 8, 10, 11, 15])
+def test_a_body_with_a_flat_part_is_read(tmp_path, tables_of, joint):
+    tables = tables_of("smpl")
+    tables["v_template"][tables["weights"].argmax(axis=1) == joint] = (0.1, 0.2, 0.3)
+    assert load_model(save(tmp_path / "body.npz", tables)).K == 23
+
+
 def rewrite(path: Path, key: str, content: bytes, compression: int = zipfile.ZIP_STORED) -> None:
     with zipfile.ZipFile(path) as file:
         members = {name: file.read(name) for name in file.namelist()}
