@@ -1,13 +1,21 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Atomic writes: a file is written under a temporary name and renamed, so that it is complete or absent."""
+"""Atomic writes: a file is written under a temporary name and renamed, so that it is complete or absent.
+
+A process that is killed leaves its temporary file, whose name tells the computer and the process. The next one that
+writes a file of that name there removes it.
+"""
 
 from __future__ import annotations
 
 import contextlib
 import errno
+import glob
 import os
+import platform
 import stat
 import tempfile
+import time
+import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -15,6 +23,7 @@ from pathlib import Path
 from .errors import OutputError
 
 _temporary_files: set[Path] = set()
+_ABANDONED_S = 24 * 3600.0  # age from which a temporary file is removed if its process cannot be asked about
 
 
 @contextmanager
@@ -32,8 +41,10 @@ def atomic_path(path: Path) -> Iterator[Path]:
     target = resolve_link(path)
     # Short enough for the limit on file names, even where a letter takes several bytes, and without bytes that are not
     # UTF-8, at which exporters fail.
-    start = path.stem[:40].encode("utf-8", "ignore").decode()
-    handle, name = tempfile.mkstemp(prefix=f".{start}.", suffix=path.suffix.lower(), dir=target.parent)
+    start = f".{path.stem[:40].encode('utf-8', 'ignore').decode()}.scope-"
+    suffix = path.suffix.lower()
+    _remove_abandoned(target.parent, start, suffix)
+    handle, name = tempfile.mkstemp(prefix=f"{start}{_computer()}-{os.getpid()}-", suffix=suffix, dir=target.parent)
     temporary = Path(name)
     _temporary_files.add(temporary)
     try:
@@ -72,6 +83,34 @@ def reason(error: OSError) -> str:
     if error.errno == errno.ENOENT:
         return "its folder does not exist; create it or choose another"
     return f"{error.strerror or error}; free some space or choose another folder"
+
+
+def _remove_abandoned(folder: Path, start: str, suffix: str) -> None:
+    """Remove temporary files of processes that do not run any more."""
+    with contextlib.suppress(OSError):
+        for path in folder.glob(f"{glob.escape(start)}*-*-*{glob.escape(suffix)}"):
+            computer, process, _ = path.name.removeprefix(start).split("-", 2)
+            old = time.time() - path.stat().st_mtime > _ABANDONED_S
+            if old or (computer == _computer() and process.isdecimal() and not _runs(int(process))):
+                path.unlink(missing_ok=True)
+
+
+def _computer() -> str:
+    """Return a short name of this computer: folders may be shared with others."""
+    return f"{zlib.crc32(platform.node().encode('utf-8', 'replace')):08x}"
+
+
+def _runs(process: int) -> bool:
+    """Return whether a process of this computer runs, or cannot be asked about."""
+    if os.name == "nt":  # where the signal 0 would end it
+        return True
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except (OSError, OverflowError):
+        return True
+    return True
 
 
 def remove_temporary_files() -> None:

@@ -9,9 +9,11 @@ from __future__ import annotations
 
 import argparse
 import os
+import shutil
 import sys
 from collections.abc import Sequence
 from contextlib import suppress
+from pathlib import Path
 from typing import Any, NoReturn, TextIO
 
 from ..solver.errors import ScopeError
@@ -238,8 +240,16 @@ def run() -> NoReturn:
         with suppress(OSError):  # a full disk, or a reader who went away
             stream.flush()
     if "bpy" in sys.modules:
+        remove_blender_folder()
         os._exit(status)
     sys.exit(status)
+
+
+def remove_blender_folder() -> None:
+    """Remove the temporary folder of Blender's module, which it only removes itself at a normal exit."""
+    folder = Path(sys.modules["bpy"].app.tempdir)
+    if folder.name.startswith("blender_"):  # not a folder that the user has chosen
+        shutil.rmtree(folder, ignore_errors=True)
 
 
 if __name__ == "__main__":

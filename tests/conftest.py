@@ -77,6 +77,9 @@ def pytest_unconfigure(config: pytest.Config) -> None:
     if "bpy" in sys.modules:
         sys.stdout.flush()
         sys.stderr.flush()
+        from scope.scope_addon.cli import remove_blender_folder
+
+        remove_blender_folder()
         os._exit(int(config.stash.get(EXIT_STATUS, 1)))
 
 

@@ -250,3 +250,11 @@ def test_output_of_c_libraries_is_not_part_of_the_report():
     buffered = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, env=buffered)
     assert (done.stdout, done.stderr) == ("{}\n", "Blender 9.9\nexporting\n")
+
+
+def test_no_temporary_folder_of_blender_is_left(tmp_path):
+    code = "import bpy\nfrom scope.scope_addon import cli\ncli.main = lambda: print(bpy.app.tempdir) or 0\ncli.run()"
+    environment = dict(os.environ, TMPDIR=str(tmp_path), TEMP=str(tmp_path))
+    done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
+    assert str(tmp_path) in done.stdout
+    assert files_below(tmp_path) == []
