@@ -47,7 +47,7 @@ def _work(rounds: int) -> dict[str, Any]:
     frames.CACHE.mkdir(parents=True, exist_ok=True)
     motion = frames.CACHE / "sample.npz"
     if not motion.is_file():
-        command = ("scope.scope_addon.cli", "capture", "--quality", "fast", "--quiet", "-o", str(motion))
+        command = ("scope.scope_addon", "capture", "--quality", "fast", "--quiet", "-o", str(motion))
         subprocess.run([sys.executable, "-m", *command], check=True)
     work = ("scope.benchmarks.blender_work", str(motion), str(rounds))
     done = subprocess.run([sys.executable, "-m", *work], stdout=subprocess.PIPE, text=True, check=True)

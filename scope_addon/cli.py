@@ -38,7 +38,7 @@ from .job.parent import stop_with_parent
 from .scene.export.output_paths import SUFFIXES
 
 SAMPLE = ASSETS / "sample" / "sample.mp4"
-PROGRAM = (sys.executable, "-m", f"{__package__}.cli")
+PROGRAM = (sys.executable, "-m", str(__package__))
 
 
 class _Parser(argparse.ArgumentParser):
@@ -250,7 +250,3 @@ def remove_blender_folder() -> None:
     folder = Path(sys.modules["bpy"].app.tempdir)
     if folder.name.startswith("blender_"):  # not a folder that the user has chosen
         shutil.rmtree(folder, ignore_errors=True)
-
-
-if __name__ == "__main__":
-    run()

@@ -3,6 +3,7 @@
 
 import json
 import os
+import signal
 import subprocess
 import sys
 
@@ -192,7 +193,7 @@ def test_a_picture_gives_a_motion_of_one_frame_and_only_json_on_stdout(tmp_path,
     argv = [
         sys.executable,
         "-m",
-        "scope.scope_addon.cli",
+        "scope.scope_addon",
         "capture",
         picture,
         "--json",
@@ -258,3 +259,20 @@ def test_no_temporary_folder_of_blender_is_left(tmp_path):
     done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
     assert str(tmp_path) in done.stdout
     assert files_below(tmp_path) == []
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows ends a process at once")
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_while_the_program_is_loaded_has_its_word(number):
+    """Numpy is imported after the handlers are installed; this stand-in sends the signal then."""
+    code = (
+        "import os, runpy, sys\n"
+        "class Finder:\n"
+        "    def find_spec(name, *_):\n"
+        f"        name == 'numba' and os.kill(os.getpid(), {int(number)})\n"
+        "sys.meta_path.insert(0, Finder)\n"
+        "sys.argv = ['scope', 'capture']\n"
+        "runpy.run_module('scope.scope_addon', run_name='__main__')\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "scope: stopped\n")

@@ -135,7 +135,7 @@ def test_the_solver_fits_with_only_numpy_and_numba(installed):
 
 @pytest.mark.parametrize("command", [["capture", "walk.mp4", "-o", "walk.npz"], ["batch", ".", "--out", "."]])
 def test_the_command_line_reports_missing_packages(installed, command):
-    done = run(installed, "-m", "scope.scope_addon.cli", *command)
+    done = run(installed, "-m", "scope.scope_addon", *command)
     assert done.returncode == 1
     assert done.stderr == (
         "scope: cv2, onnxruntime, av must be installed for this: pip install 'scope-mocap[capture]'\n"

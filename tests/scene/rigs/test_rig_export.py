@@ -209,7 +209,7 @@ def test_root_motion_on_an_object_is_the_same_in_every_format(tmp_path, kind):
 
 
 def shell(*arguments):
-    argv = [sys.executable, "-m", "scope.scope_addon.cli", *map(str, arguments)]
+    argv = [sys.executable, "-m", "scope.scope_addon", *map(str, arguments)]
     return subprocess.run(argv, capture_output=True, text=True, check=False)
 
 
