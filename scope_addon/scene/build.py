@@ -22,6 +22,7 @@ from .animation_data.transaction import all_or_nothing
 from .character import animation, armature, body_mesh, bone_display, confidence_curves, shape_keys
 from .character.correction_list import store_corrections
 from .character.keys import bake_whole_frames
+from .local_scene import check_local
 
 CAPTURE_TAG = "scope_capture"  # custom property that marks a capture's collection, for exporters
 Progress = Callable[[float, str], None]
@@ -95,7 +96,7 @@ def build_scene(
     :param body: the body that the motions were fitted with; it must have their joints and shape coefficients.
     :param footage: video or picture to show as the camera's background.
     :param progress: called with a fraction 0..1 and the current step; may raise to stop.
-    :raises UsageError: when there are no motions.
+    :raises UsageError: when there are no motions, or the active scene is linked.
     :raises MotionFileError: when a motion does not belong to the body.
     :raises VideoError: when the footage is missing.
     """
@@ -106,6 +107,7 @@ def build_scene(
     for motion in motions:
         _check(motion, body)
     scene = bpy.context.scene
+    check_local(scene)
     with all_or_nothing(scene):
         return _build(scene, motions, body, footage, options, report)
 

@@ -10,6 +10,7 @@ import bpy
 
 from ..errors import VideoError
 from ..footage import PICTURE_SUFFIXES
+from .local_scene import check_local
 
 _OURS = "scope_footage"  # custom property of the strips that are added here
 
@@ -22,7 +23,9 @@ def add_footage_strips(scene: bpy.types.Scene, footage: str | Path, start_frame:
 
     :param start_frame: scene frame of timestamp 0.
     :raises VideoError: when the file is missing, or Blender cannot read it.
+    :raises UsageError: when the scene is linked.
     """
+    check_local(scene)
     path = Path(footage)
     if not path.is_file():
         raise VideoError(f"the footage {path} does not exist; choose the video or image again and repeat the capture")

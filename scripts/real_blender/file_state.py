@@ -6,6 +6,7 @@ from __future__ import annotations
 import hashlib
 
 import bpy
+from mathutils import Matrix
 
 _NOT_KEPT = {"rna_type", "session_uid"}
 State = dict[str, object]
@@ -31,7 +32,7 @@ def state() -> State:
     for obj in scene.objects:
         about = {
             "parent": obj.parent.name if obj.parent else None,
-            "matrix": [round(x, 5) for row in obj.matrix_world for x in row],
+            "matrix": [round(x, 5) for row in _matrix(obj) for x in row],
             "action": obj.animation_data.action.name if obj.animation_data and obj.animation_data.action else None,
             "collections": sorted(c.name for c in obj.users_collection),
             "selected": obj.select_get(),
@@ -63,6 +64,11 @@ def state() -> State:
     for collection in bpy.data.collections:
         found |= _group(f"result of {collection.name_full}", collection.scope_result)
     return found
+
+
+def _matrix(obj: bpy.types.Object) -> Matrix:
+    """Return where an object is; Blender does not evaluate those that are hidden."""
+    return obj.matrix_world if obj.visible_get() else obj.matrix_basis
 
 
 def _group(name: str, group: bpy.types.PropertyGroup) -> State:

@@ -24,6 +24,7 @@ from ...job.request import JobRequest, code_version
 from ...motion import Motion
 from ...options import Place
 from ...scene.build import BuildOptions, BuildResult, build_scene
+from ...scene.local_scene import check_local
 from ...scene.packed_motion import pack_motion
 from ..declared_properties import option_values
 from ..preferences import cache, preferences
@@ -147,11 +148,7 @@ def capture_request(scene: bpy.types.Scene) -> JobRequest:
     :raises VideoError: the footage does not exist.
     """
     settings, chosen = scene.scope, preferences()
-    if scene.library is not None:
-        raise UsageError(
-            f"the scene is linked from {scene.library.filepath}, so nothing can be added to it; capture in a scene of "
-            "this file"
-        )
+    check_local(scene)
     if not settings.footage:
         raise UsageError("no footage is chosen; choose a video or image first")
     footage = Path(bpy.path.abspath(settings.footage))
