@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`./scripts/bench solver|perception|choices|renders|blender [--quick] [--json FILE]`: measure, print, write."""
+"""`./scripts/bench WHAT [--quick] [--json FILE]`: measure, print, write. `--help` lists what there is."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def _real_frames(quick: bool) -> dict[str, Any]:
 def main() -> int:
     """Run the command line; return the exit status."""
     parser = argparse.ArgumentParser(prog="bench")
-    parser.add_argument("what", choices=["solver", "perception", "choices", "renders", "blender"])
+    parser.add_argument("what", choices=["solver", "perception", "choices", "renders", "outline", "blender"])
     parser.add_argument("--quick", action="store_true", help="fewer repetitions, the default preset alone")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures as JSON")
     args = parser.parse_args()
@@ -90,6 +90,10 @@ def main() -> int:
         from .perception.renders import renders
 
         figures = renders(args.quick)
+    elif args.what == "outline":
+        from .perception.outline import outline
+
+        figures = outline(args.quick)
     else:
         from .perception.perception import perception
 

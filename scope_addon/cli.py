@@ -11,7 +11,8 @@ import argparse
 import os
 import sys
 from collections.abc import Sequence
-from typing import Any, NoReturn
+from contextlib import suppress
+from typing import Any, NoReturn, TextIO
 
 from ..solver.errors import ScopeError
 from ..solver.loaders.body_file import ASSETS
@@ -27,8 +28,8 @@ from .command_line.outputs import (
     write_outputs,
 )
 from .command_line.signals import interrupted, stopped_by_signals
-from .command_line.terminal import ProgressBar, say, stdout_for_report
-from .errors import UsageError, exit_status, system_error_message
+from .command_line.terminal import ProgressBar, open_standard_streams, say, stdout_for_report
+from .errors import FAILED, OutputError, UsageError, exit_status, internal_error_message, system_error_message
 from .footage import json_text
 from .installed import CAPTURE, check_installed
 from .job.parent import stop_with_parent
@@ -103,7 +104,7 @@ def _add_batch_files(batch: argparse.ArgumentParser) -> None:
 
 
 def main(argv: Sequence[str] | None = None, program: Sequence[str] = PROGRAM) -> int:
-    """Run the command line and return the exit status. Errors are printed, not raised.
+    """Run the command line and return the exit status. Errors are printed, not raised, except with SCOPE_TRACEBACK set.
 
     :param argv: arguments; those of the process if None.
     :param program: command that takes these arguments; a batch starts one such process per clip.
@@ -119,7 +120,7 @@ def main(argv: Sequence[str] | None = None, program: Sequence[str] = PROGRAM) ->
                 stop_with_parent()
             report = args.run(args)
             if args.json:
-                print(json_text(report), file=stdout, flush=True)
+                _print_report(report, stdout)
         return int(report.get("exit_status", 0))
     except ScopeError as error:
         print(f"scope: {error}", file=sys.stderr)
@@ -129,7 +130,27 @@ def main(argv: Sequence[str] | None = None, program: Sequence[str] = PROGRAM) ->
         return 130
     except (OSError, MemoryError) as error:
         print(f"scope: {system_error_message(error)}", file=sys.stderr)
-        return 1
+        return FAILED
+    except Exception as error:
+        if os.environ.get("SCOPE_TRACEBACK"):
+            raise
+        print(f"scope: {internal_error_message(error)}", file=sys.stderr)
+        return FAILED
+
+
+def _print_report(report: dict[str, Any], stdout: TextIO) -> None:
+    """Print the report as one line of JSON.
+
+    :raises OutputError: standard output is closed, full, or a pipe that nobody reads.
+    """
+    try:
+        print(json_text(report), file=stdout, flush=True)
+    except OSError as error:
+        with suppress(OSError):
+            stdout.close()  # would try again to write what it holds, when it is destroyed
+        raise OutputError(
+            f"the report cannot be written to standard output ({error.strerror}); all results are complete"
+        ) from error
 
 
 def run_capture(args: argparse.Namespace) -> dict[str, Any]:
@@ -211,9 +232,11 @@ def run() -> NoReturn:
     When bpy is unloaded, it destroys a condition variable on which one of its own threads still waits, which blocks
     forever. All our files are written and closed at this point, so the process exits without running destructors.
     """
+    open_standard_streams()
     status = main()
-    sys.stdout.flush()
-    sys.stderr.flush()
+    for stream in (sys.stdout, sys.stderr):
+        with suppress(OSError):  # a full disk, or a reader who went away
+            stream.flush()
     if "bpy" in sys.modules:
         os._exit(status)
     sys.exit(status)

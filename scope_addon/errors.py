@@ -58,6 +58,12 @@ def exit_status(error: ScopeError) -> int:
     return NO_PERSON if isinstance(error, NoPersonError) else FAILED
 
 
+def internal_error_message(error: Exception) -> str:
+    """Describe an error that Scope should not have, and what to do."""
+    cause = " ".join(f"{type(error).__name__}: {error}".split())
+    return f"an internal error, {cause}; please report it (the environment variable SCOPE_TRACEBACK=1 tells where)"
+
+
 def system_error_message(error: OSError | MemoryError) -> str:
     """Describe an error of the operating system, and what to do."""
     cause = str(error) or "out of memory"

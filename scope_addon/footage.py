@@ -11,6 +11,7 @@ VIDEO_SUFFIXES = (
 )
 PICTURE_SUFFIXES = (".jpg", ".jpeg", ".png", ".webp", ".tif", ".tiff", ".bmp", ".avif", ".heic", ".heif")
 FOOTAGE_SUFFIXES = VIDEO_SUFFIXES + PICTURE_SUFFIXES
+MAX_PIXELS = 1 << 27  # of an image, 134 million: more than footage has; a few bytes of a file can declare any number
 LAST_NUMBER = re.compile(r"(\d+)(?!.*\d)")
 
 

@@ -21,6 +21,22 @@ def say(text: str) -> None:
     print(f"{clear}scope: {text}", file=sys.stderr, flush=True)
 
 
+def open_standard_streams() -> None:
+    """Open those of the three standard streams that the caller has closed.
+
+    Otherwise the next files to be opened would take their numbers, and messages be written into results. What is
+    written to a closed standard output fails; messages are lost.
+    """
+    for number in range(3):
+        try:
+            os.fstat(number)
+        except OSError:
+            os.open(os.devnull, os.O_RDWR if number == 2 else os.O_RDONLY)  # takes the lowest number that is free
+    sys.stdin = sys.stdin or os.fdopen(0, "r", encoding="utf-8", closefd=False)
+    sys.stdout = sys.stdout or os.fdopen(1, "w", encoding="utf-8", closefd=False)
+    sys.stderr = sys.stderr or os.fdopen(2, "w", encoding="utf-8", closefd=False)
+
+
 class ProgressBar:
     """A one-line progress bar on a terminal; silent elsewhere. Stops work that continues after a signal."""
 

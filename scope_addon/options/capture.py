@@ -37,6 +37,9 @@ LENSES = (
 )
 
 
+_MOST_PEOPLE = 100  # whose heights can be given
+
+
 def _parse_people(text: str) -> int | str:
     if text in (LARGEST, ALL):
         return text
@@ -47,8 +50,11 @@ def _parse_people(text: str) -> int | str:
 
 def _parse_heights(text: str) -> tuple[float, ...]:
     """Convert a list in centimetres, one number for each person, to metres."""
+    numbers = text.split(",")
+    if len(numbers) > _MOST_PEOPLE:
+        raise ValueError(f"must give at most {_MOST_PEOPLE} heights, not {len(numbers)}")
     try:
-        return tuple(float(number) / 100 for number in text.split(","))
+        return tuple(float(number) / 100 for number in numbers)
     except ValueError as error:
         raise ValueError("must be in centimetres, such as 175, or 175,162 for two people") from error
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from ...solver.errors import InputError
+from ...solver.loaders.regular_file import check_regular
 from ..atomic_write import atomic_path, reason
 from ..errors import OutputError
 
@@ -54,11 +55,13 @@ class BoneMap:
 
 
 def save_bone_map(bone_map: BoneMap, path: str | Path) -> None:
-    """Write the map as JSON, atomically.
+    """Write the map as JSON, atomically. Only a bone map is overwritten, or an empty file.
 
-    :raises OutputError: when the file cannot be written.
+    :raises OutputError: when the file cannot be written, or is something else.
     """
     path = Path(path)
+    if path.is_file() and not _is_bone_map_or_empty(path):
+        raise OutputError(f"{path} is not a bone map, so it is not overwritten; choose another name")
     text = json.dumps({"format": _FORMAT, "version": 1, "bones": bone_map.parts}, indent=2, ensure_ascii=False)
     try:
         with atomic_path(path) as temporary:
@@ -73,9 +76,8 @@ def load_bone_map(path: str | Path) -> BoneMap:
     :raises InputError: when the file cannot be read or is not a valid map.
     """
     path = Path(path)
+    check_regular(path, InputError, "bone map that Scope saved", _LARGEST_BYTES)
     try:
-        if path.stat().st_size > _LARGEST_BYTES:
-            raise InputError(f"{path}: too large for a bone map; choose a file that Scope saved")
         content = json.loads(path.read_text(encoding="utf-8-sig"))  # some editors write a byte order mark
     except OSError as error:
         raise InputError(f"{path}: the bone map cannot be read ({error.strerror}); choose another file") from error
@@ -92,6 +94,16 @@ def load_bone_map(path: str | Path) -> BoneMap:
     except InputError as error:
         raise InputError(f"{path}: {error}") from error
     return out
+
+
+def _is_bone_map_or_empty(path: Path) -> bool:
+    """Return whether a file has the format of a bone map, whatever its version and bones, or has no content."""
+    try:
+        size = path.stat().st_size
+        content = json.loads(path.read_text(encoding="utf-8-sig")) if 0 < size <= _LARGEST_BYTES else None
+    except (OSError, ValueError, RecursionError):
+        return False
+    return size == 0 or (isinstance(content, dict) and content.get("format") == _FORMAT)
 
 
 def _is_name(text: object) -> bool:

@@ -7,9 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ...solver.errors import InputError
+from ...solver.loaders.regular_file import check_regular
 from ..errors import UsageError
 from .bone_map import BoneMap, load_bone_map
 
+_LARGEST_BYTES = 4 << 30
 ROOTS = ("bone", "object", "in-place")  # where a rig stores the root motion
 RIG_SUFFIXES = (".blend", ".fbx", ".glb", ".gltf")
 _SIGNATURES = {
@@ -39,6 +41,7 @@ def rig_source(path: Path, armature: str = "", bone_map: Path | None = None) -> 
     suffix = path.suffix.lower()
     if suffix not in RIG_SUFFIXES:
         raise UsageError(f"cannot read a rig from '{path.name}': its suffix must be one of {', '.join(RIG_SUFFIXES)}")
+    check_regular(path, InputError, "rig", _LARGEST_BYTES)
     try:
         with path.open("rb") as file:
             header = file.read(32)

@@ -184,6 +184,7 @@ def _build_person(
     rig["scope_body"] = body.name
     rig["scope_body_file"] = body.file
     rig["scope_start"] = options.start_frame
+    timing.store_rate(rig, rate)
     rig["scope_betas"] = [float(b) for b in motion.betas]
     if motion.corrections:
         store_corrections(rig, motion, rate)

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from ..errors import VideoError
 from ..footage import LAST_NUMBER, PICTURE_SUFFIXES, numbered_from
 from ..motion import Motion
-from .animation_data.actions import Channels
+from .animation_data.actions import Channels, fcurves_of
 from .axes import blender_brown_distortion, blender_camera_matrix
 from .character.animation import on_one_hemisphere, quaternion_from_matrix
 
@@ -166,6 +166,37 @@ def show_footage(
             f"Blender shows {path.name} at {size[0]} x {size[1]}, but it was captured at {motion.image_size[0]} x "
             f"{motion.image_size[1]}: turn or scale the camera's background image"
         )
+    return warnings
+
+
+def show_footage_again(camera: bpy.types.Object, motion: Motion, frames: NDArray[np.float64]) -> list[str]:
+    """Show the camera's footage in step with poses that were moved in time; keep how opaque it is.
+
+    :param frames: (T,) scene frame of each pose.
+    :return: warnings as of ``show_footage``; none if the camera shows no footage, or its file is missing.
+    """
+    former = next(iter(camera.data.background_images), None)
+    shown = (former.clip if former.source == "MOVIE_CLIP" else former.image) if former else None
+    if former is None or shown is None or len(camera.data.background_images) > 1:
+        return []
+    path = Path(bpy.path.abspath(shown.filepath))
+    if not path.is_file():
+        return []
+    opacity, visible = former.alpha, former.show_background_image
+    action = camera.data.animation_data.action if camera.data.animation_data else None
+    if action is not None and all(
+        c.data_path.startswith("background_images[0].image_user") for c in fcurves_of(action)
+    ):
+        camera.data.animation_data.action = None
+        if action.users == 0:
+            bpy.data.actions.remove(action)
+    former.clip = former.image = None  # Blender goes on counting what a removed background image shows as used
+    camera.data.background_images.remove(former)
+    if shown.users == 0 and isinstance(shown, bpy.types.MovieClip):
+        bpy.data.movieclips.remove(shown)
+    warnings = show_footage(camera, path, motion, frames)
+    again = camera.data.background_images[0]
+    again.alpha, again.show_background_image = opacity, visible
     return warnings
 
 

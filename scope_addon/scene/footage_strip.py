@@ -26,14 +26,14 @@ def add_footage_strips(scene: bpy.types.Scene, footage: str | Path, start_frame:
     path = Path(footage)
     if not path.is_file():
         raise VideoError(f"the footage {path} does not exist; choose the video or image again and repeat the capture")
+    had_editor, sounds = scene.sequence_editor is not None, set(bpy.data.sounds)
     editor = scene.sequence_editor or scene.sequence_editor_create()
     strips = strips_of(editor)
     if present := _added_before(strips, path):
         for strip in present:
             move_to(strip, round(start_frame))
         return present
-    if not len(strips):
-        scene.render.use_sequencer = False
+    render_strips = scene.render.use_sequencer and len(strips) > 0
     channel = max((strip.channel for strip in strips), default=0) + 1
     start = round(start_frame)
     added = []
@@ -49,9 +49,13 @@ def add_footage_strips(scene: bpy.types.Scene, footage: str | Path, start_frame:
     except RuntimeError as error:
         for strip in added:
             strips.remove(strip)
+        bpy.data.batch_remove(list(set(bpy.data.sounds) - sounds))
+        if not had_editor:
+            scene.sequence_editor_clear()
         raise VideoError(f"Blender cannot read {path}; convert a video to MP4 (H.264), an image to JPEG") from error
     for strip in added:
         strip[_OURS] = True
+    scene.render.use_sequencer = render_strips
     return added
 
 

@@ -18,6 +18,7 @@ from ..motion import Motion
 
 MOTION = "scope_motion"  # property of the armature: the text, or the path of a motion file in older .blend files
 _CONTENT = "motion"  # property of the text: bytes of the motion file
+_KEYS = "uncorrected_keys"  # property of the text: keys from before corrections, see character/uncorrected_keys.py
 _LARGEST_BYTES = 1 << 30  # packed; an hour at 60 frames per second takes a tenth
 _NOTE = """\
 The captured motion of '{name}', which Scope stores in the custom property '{content}' of this text.
@@ -25,14 +26,18 @@ Smoothing and the export of motion files start from it. It is deleted with the a
 """
 
 
-def pack_motion(armature: bpy.types.Object, content: bytes) -> None:
+def pack_motion(armature: bpy.types.Object, content: bytes, keys: bytes = b"") -> None:
     """Store a motion file's bytes with the armature. Duplicates of the armature keep the motion that they have.
+
+    :param keys: bytes of the armature's ``UncorrectedKeys``.
 
     A former text that nothing else uses is not saved with the file; until then, undo and a failed operator restore it.
     """
     text = bpy.data.texts.new(f"{armature.name} motion")
     text.from_string(_NOTE.format(name=armature.name, content=_CONTENT))
     text[_CONTENT] = content
+    if keys:
+        text[_KEYS] = keys
     armature[MOTION] = text
     text.use_fake_user = False  # texts have one when they are new, and would stay in the file for ever
 
@@ -58,6 +63,12 @@ def stored_motion(armature: bpy.types.Object) -> Motion:
         f"the captured motion of '{armature.name}' is stored neither in this .blend file nor in the cache; capture the "
         "footage again, or import its .npz file"
     )
+
+
+def stored_keys(armature: bpy.types.Object) -> object:
+    """Return the bytes of the armature's ``UncorrectedKeys`` as they are stored; None if there are none."""
+    stored = armature.get(MOTION)
+    return stored.get(_KEYS) if isinstance(stored, bpy.types.Text) else None
 
 
 def motion_texts(armatures: list[bpy.types.Object]) -> list[bpy.types.Text]:

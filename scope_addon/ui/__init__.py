@@ -22,15 +22,22 @@ from . import (
     translations,
     warm_up,
 )
-from .capture import capture_operators, capture_panel, capture_properties, captures, video_import
-from .edit import action_operators, edit_operators, edit_panel, key_operators
+from .capture import (
+    capture_operators,
+    capture_panel,
+    capture_properties,
+    captures,
+    frame_rate_operators,
+    video_import,
+)
+from .edit import action_operators, asset_operators, edit_operators, edit_panel, key_operators
 from .pins import correction_operators, correction_panel, pin_tool, upright_operators
 from .retarget import retarget_operators, retarget_panel, retarget_properties
 from .view import view_after_undo, view_operators
 
 _MODULES = (
     *(capture_properties, preferences, capture_operators, export_operators, import_operators, view_operators, drop),
-    *(video_import, presets, menus, action_operators),
+    *(video_import, presets, menus, action_operators, asset_operators, frame_rate_operators),
     *(edit_operators, key_operators, correction_operators, pin_tool, upright_operators),
     *(retarget_properties, retarget_operators),
     *(captures, capture_panel, edit_panel, correction_panel, retarget_panel),

@@ -149,8 +149,8 @@ def is_available(kind: str) -> bool:
 
 def _take_of(rig: bpy.types.Object, collections: list[bpy.types.Collection]) -> str:
     """Return the name of the capture whose motion a rig has; empty if it is unknown."""
-    person = rig.get(PERSON, "")  # an object, or its name in older .blend files
-    name = person if isinstance(person, str) else person.name
+    person = rig.get(PERSON)  # an object, or its name in older .blend files; None if it was deleted
+    name = person if isinstance(person, str) else person.name if person else ""
     return next((c.name for c in collections if name in c.all_objects), "")
 
 

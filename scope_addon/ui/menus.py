@@ -39,6 +39,7 @@ class SCOPE_MT_motion_capture(bpy.types.Menu):
         draw_import_video(layout, "FILE_MOVIE")
         layout.operator("scope.look_through", icon="VIEW_CAMERA")
         layout.operator("scope.footage_to_sequencer", icon="SEQUENCE")
+        layout.operator("scope.match_frame_rate", icon="TIME")
         layout.separator()
         for name in ("smooth", "interpolate_span", "refloor", "loop", "reduce_keys", "bake_rate"):
             layout.operator(f"scope.{name}")
@@ -47,6 +48,7 @@ class SCOPE_MT_motion_capture(bpy.types.Menu):
         layout.operator("scope.retarget", text="Retarget to Rig", icon="ARMATURE_DATA")
         layout.operator("scope.rename_take", icon="GREASEPENCIL")
         layout.operator("scope.push_to_nla", icon="NLA_PUSHDOWN")
+        layout.operator("scope.mark_asset", icon="ASSET_MANAGER")
         layout.menu(SCOPE_MT_export.bl_idname, icon="EXPORT")
 
 

@@ -6,124 +6,20 @@ Usage: ``blender --python undo.py -- VIDEO OUT_FOLDER``
 
 from __future__ import annotations
 
-import hashlib
 import json
 import shutil
 import sys
 from collections.abc import Callable, Iterator
+from importlib import import_module
 from pathlib import Path
 
 import bpy
 
 sys.path.insert(0, str(Path(__file__).parent))
+from file_state import State, identities, same, state
 from session import FOOTAGE, OUT, addon, captured, invoke, picture, run, show_tab, until, use, viewport
 
-_NOT_KEPT = {"rna_type", "session_uid"}
-State = dict[str, object]
 report: dict[str, list[str]] = {"undone_and_redone": []}
-
-
-def state() -> State:
-    """Return everything in the file that an operator may change, and the evaluated pose, as a flat table of values."""
-    scene = bpy.context.window_manager.windows[0].scene
-    bpy.context.window_manager.windows[0].view_layer.update()
-    found: State = {}
-    for obj in scene.objects:
-        about = {
-            "parent": obj.parent.name if obj.parent else None,
-            "matrix": [round(x, 5) for row in obj.matrix_world for x in row],
-            "action": obj.animation_data.action.name if obj.animation_data and obj.animation_data.action else None,
-            "collections": sorted(c.name for c in obj.users_collection),
-            "selected": obj.select_get(),
-            "hidden": (obj.hide_get(), obj.hide_viewport, obj.hide_render),
-            "properties": {key: _plain(obj[key]) for key in obj.keys() if not key.startswith("scope_")},
-            "ours": _digest({key: _plain(obj[key]) for key in obj.keys() if key.startswith("scope_")}),
-        }
-        if obj.type == "ARMATURE":
-            about["pose"] = [round(x, 4) for bone in obj.pose.bones for x in (*bone.head, *bone.tail)]
-            about["mode"] = obj.mode
-        found |= {f"object {obj.name} {key}": value for key, value in about.items()}
-    for kind in (
-        "meshes",
-        "armatures",
-        "cameras",
-        "actions",
-        "collections",
-        "images",
-        "movieclips",
-        "materials",
-        "texts",
-    ):
-        found[kind] = sorted(block.name for block in getattr(bpy.data, kind) if block.users)
-    for action in bpy.data.actions:
-        found[f"action {action.name}"] = _digest(sorted(_keys(curve) for curve in _curves(action)))
-    for name in ("frame_start", "frame_end", "frame_current"):
-        found[name] = getattr(scene, name)
-    for name in ("fps", "fps_base", "resolution_x", "resolution_y", "pixel_aspect_x"):
-        found[name] = round(getattr(scene.render, name), 5)
-    found["camera"] = scene.camera.name if scene.camera else None
-    found["active"] = bpy.context.window_manager.windows[0].view_layer.objects.active
-    found["active"] = found["active"].name if found["active"] else None
-    found["markers"] = sorted((marker.frame, marker.name) for marker in scene.timeline_markers)
-    editor = scene.sequence_editor
-    strips = (editor.strips if hasattr(editor, "strips") else editor.sequences) if editor else ()
-    found["strips"] = sorted(strip.name for strip in strips)
-    found |= _group("settings", scene.scope) | _group("retarget", scene.scope_retarget)
-    for collection in bpy.data.collections:
-        found |= _group(f"result of {collection.name}", collection.scope_result)
-    return found
-
-
-def _group(name: str, group: bpy.types.PropertyGroup) -> State:
-    """Return a property group's values, including those of nested groups."""
-    found: State = {}
-    for prop in group.bl_rna.properties:
-        if prop.identifier in _NOT_KEPT:
-            continue
-        value = getattr(group, prop.identifier)
-        if isinstance(value, bpy.types.PropertyGroup):
-            found |= _group(f"{name}.{prop.identifier}", value)
-        elif prop.type == "COLLECTION":
-            for index, item in enumerate(value):
-                found |= _group(f"{name}.{prop.identifier}[{index}]", item)
-        else:
-            found[f"{name}.{prop.identifier}"] = _plain(value)
-    return found
-
-
-def _plain(value: object) -> object:
-    if isinstance(value, bpy.types.ID):
-        return value.name
-    if hasattr(value, "to_dict"):
-        return value.to_dict()
-    if hasattr(value, "to_list"):
-        return value.to_list()
-    return value if isinstance(value, str | int | float | bool | None) else list(value)
-
-
-def _digest(value: object) -> str:
-    return hashlib.sha256(repr(value).encode()).hexdigest()[:12]
-
-
-def _curves(action: bpy.types.Action) -> list[bpy.types.FCurve]:
-    if hasattr(action, "fcurves"):
-        return list(action.fcurves)
-    bags = (bag for layer in action.layers for strip in layer.strips for bag in strip.channelbags)
-    return [curve for bag in bags for curve in bag.fcurves]
-
-
-def _keys(curve: bpy.types.FCurve) -> tuple[str, int, list[float], list[str]]:
-    values = [0.0] * (2 * len(curve.keyframe_points))
-    curve.keyframe_points.foreach_get("co", values)
-    return curve.data_path, curve.array_index, [round(v, 4) for v in values], [m.type for m in curve.modifiers]
-
-
-def same(found: State, expected: State, when: str) -> None:
-    """Assert that two states are equal; name the differences."""
-    different = [key for key in sorted(found.keys() | expected.keys()) if found.get(key) != expected.get(key)]
-    if different:
-        told = [f"{key}: {found.get(key)!r:.150} is not {expected.get(key)!r:.150}" for key in different[:12]]
-        raise AssertionError(f"{when}, {len(different)} values differ from before:\n" + "\n".join(told))
 
 
 def view() -> tuple[bool, str]:
@@ -199,8 +95,17 @@ def edits() -> dict[str, Callable[[], object]]:
         "guess bones": lambda: use(scope.guess_bones),
         "retarget": lambda: use(scope.retarget),
         "retarget, root motion on an object, next to the person": retarget_beside,
+        "mark as asset": lambda: use(scope.mark_asset, author="Ada"),
+        "frame rate from footage": set_rate,
         "footage to sequencer": lambda: use(scope.footage_to_sequencer),
     }
+
+
+def set_rate() -> None:
+    """Change the scene's rate by hand, as in the Output properties, and set it from the footage."""
+    bpy.context.scene.render.fps = 20
+    use(bpy.ops.scope.match_frame_rate)
+    assert bpy.context.scene.render.fps != 20
 
 
 def retarget_beside() -> None:
@@ -232,6 +137,38 @@ def capturing() -> Iterator[float]:
     yield from settled("capture during which something was undone", before, keep=True)
 
 
+def failing() -> Iterator[float]:
+    """Let a correction fail after it has changed keys, and then undo what came before, which must not crash."""
+    package = addon().__name__.removesuffix(".ui.capture.capture_operators")
+    keys, errors = (import_module(f"{package}.{name}") for name in ("scene.character.corrected_keys", "errors"))
+
+    def fail(*_: object) -> None:
+        raise errors.UsageError("this fails")
+
+    invoke(bpy.ops.ed.undo_push, message="Evaluated")
+    use(bpy.ops.scope.use_sample)  # only the scene changes, so that undoing this does not read the armature again
+    yield 0.2
+    before, there = state(), identities()
+    meet_pin, keys.meet_pin = keys.meet_pin, fail
+    try:
+        use(bpy.ops.scope.add_pin, joint="left_wrist", location=(0.5, 0.0, 1.5), frame=20)
+    except RuntimeError:
+        pass
+    else:
+        raise AssertionError("the correction did not fail")
+    finally:
+        keys.meet_pin = meet_pin
+    yield 0.2
+    same(state() | identities(), before | there, "after a correction that failed")
+    undo()
+    yield 0.2
+    redo()
+    yield 0.2
+    same(state(), before, "after undoing and redoing what came before a correction that failed")
+    undo()
+    yield 0.2
+
+
 def forget_captures() -> None:
     """Empty the cache, except for compiled code, so that the footage is captured again."""
     preferences = sys.modules[addon().__name__.replace("capture.capture_operators", "preferences")]
@@ -248,6 +185,7 @@ def steps() -> Iterator[float]:
     yield 0.5
     for name, action in edits().items():
         yield from tried(name, action)
+    yield from failing()
     yield from tried("root motion on an object", lambda: use(bpy.ops.scope.root_motion, mode="OBJECT"), keep=True)
     yield from tried("root motion in the bones", lambda: use(bpy.ops.scope.root_motion, mode="BONES"))
     undo()

@@ -18,6 +18,7 @@ OUT = Path("/scope/out")
 FOLDER = OUT / "walk"  # the walk's own files: its log, saved .blend files, exports
 LONGEST_S = 1400.0
 SHOWN_STEPS = 20
+_WINDOW = ("1000", "700")  # without a graphics card, most of the time goes into drawing
 
 
 def main(seed: int, steps: int) -> int:
@@ -27,7 +28,8 @@ def main(seed: int, steps: int) -> int:
     log, printed = FOLDER / "steps.log", FOLDER / "printed.log"
     print(f"walk: seed {seed}, {steps} steps", flush=True)
     script = str(Path(__file__).with_name("walk_session.py"))
-    command = ["blender", "--python-exit-code", "1", "--python", script, "--"]
+    command = ["blender", "--enable-event-simulate", "--window-geometry", "0", "0", *_WINDOW]
+    command += ["--python-exit-code", "1", "--python", script, "--"]
     command += ["/scope/clips/walk.mp4", str(FOLDER), str(seed), str(steps)]
     with printed.open("w") as file:
         process = subprocess.Popen(

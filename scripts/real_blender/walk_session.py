@@ -2,8 +2,9 @@
 """The random walk inside Blender: one step per timer, so that the window is redrawn and other timers run in between.
 
 Usage: ``blender --python walk_session.py -- VIDEO FOLDER SEED STEPS``; ``walk.py`` starts it. A traceback that is
-printed or raised between two steps is a failure of the step before; an operator that reports an error is not. PyPI's
-bpy, which has no window and cannot undo, takes the same steps: ``python walk_session.py -- VIDEO FOLDER SEED STEPS``.
+printed or raised between two steps is a failure of the step before. An operator that reports an error is none, unless
+it has changed the file. PyPI's bpy, which has no window and cannot undo, takes the same steps:
+``python walk_session.py -- VIDEO FOLDER SEED STEPS``.
 """
 
 from __future__ import annotations
@@ -21,12 +22,18 @@ import bpy
 
 sys.path.insert(0, str(Path(__file__).parent))
 import walk_steps
+from file_state import State, differences, identities, state
 from session import ARGUMENTS, OUT, show_tab
 
 SEED, COUNT = int(ARGUMENTS[2]), int(ARGUMENTS[3])
 PAUSE_S = 0.02
 OPENED_PAUSE_S = 0.5  # Blender crashes when a script chooses a tab before the new file's window is drawn
 MOST_OBJECTS = 60  # above which a step begins a new file
+
+
+def everything() -> State:
+    """Return everything in the file that may change, and which datablocks there are."""
+    return state() | identities()
 
 
 class Walk:
@@ -59,6 +66,7 @@ class Walk:
         self.last = f"{self.taken} {step.text}"
         self.log.write(f"{time.monotonic() - self.began:.1f} s: {self.last}")
         self.log.flush()
+        before = everything() if step.checked else {}
         try:
             outcome = str(step.take())
         except RuntimeError as error:  # reported by an operator
@@ -68,6 +76,12 @@ class Walk:
         except Exception:
             outcome = traceback.format_exc()
             self.fail(outcome)
+        if step.checked and "FINISHED" not in outcome:
+            self.check_unchanged(before)
+        elif step.text.startswith("scope.export("):
+            self.check_unchanged(before)
+        elif outcome.startswith("refused") and not step.text.startswith("scope."):
+            self.steps.pushed("refused")
         self.log.write(f" -> {outcome.replace(chr(10), ' | ')[:300]}\n")
         self.log.flush()
         key = step.text.split("(")[0] + (" refused" if outcome.startswith("refused") else "")
@@ -82,6 +96,12 @@ class Walk:
         text = self.printed.read()
         if "Traceback (most recent call last)" in text:
             self.fail(text[text.index("Traceback (most recent call last)") :])
+
+    def check_unchanged(self, before: State) -> None:
+        """Fail if the last step has changed the file: undo knows nothing of changes by an operator that failed."""
+        told = differences(everything(), before)
+        if told:
+            self.fail(f"{len(told)} values changed: " + "; ".join(told[:8]))
 
     def fail(self, text: str) -> None:
         """Note a failure of the last step, once."""

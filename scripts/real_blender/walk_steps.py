@@ -1,43 +1,36 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The steps of the random walk: every operator of the extension, and what a user does to the file around them."""
+"""The steps of the random walk: every operator of the extension, its settings and its tools with the mouse."""
 
 from __future__ import annotations
 
 import random
 import shutil
 import sys
-from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 
 import bpy
-from session import addon, invoke, use
+from bpy_extras.view3d_utils import location_3d_to_region_2d
+from session import addon, invoke, use, viewport
+from walk_file_steps import FileSteps, Step
 
-_BLOCKS = ("objects", "meshes", "armatures", "actions", "cameras", "collections", "scenes")
-_DATA = (*_BLOCKS, "materials", "images", "movieclips", "texts")
-
-
-@dataclass
-class Step:
-    """A step: what the log says, and what it does."""
-
-    text: str
-    take: Callable[[], object]
+TOOLS = ("pin_limb", "upright_line")
+# Cancelled or not, these change what is not undone: the view, the frame.
+UNCHECKED = ("cancel", "go_to_frame", "side_view", "look_through", "add_capture_preset", "import_video")
 
 
-class Steps:
+class Steps(FileSteps):
     """Chooses steps at random."""
 
     def __init__(self, chance: random.Random, folder: Path, footage: str) -> None:
         """Choose with ``chance``, write files to ``folder``, and capture ``footage``."""
-        self.random, self.folder = chance, folder
+        super().__init__(chance, folder)
         self.footage = shutil.copy(footage, folder)  # the walk never writes beside the original
         self.kept = folder.parent / "walk_cache"  # of an earlier walk; a capture takes longer than a walk
-        self.next: Step | None = None
-        self.actions = [name[5:] for name in dir(self) if name.startswith("step_")]
+        names = sorted(dir(bpy.ops.scope))
+        self.operators = [*names, *("export",) * 3, *("import_motion",) * 2]  # which have most variants
 
     def prepare(self) -> None:
-        """Show all panels, capture once, and copy the cache, which steps clear."""
+        """Show all panels, capture once, write a motion file, and copy the cache, which steps clear."""
         for panel in list(bpy.types.Panel.__subclasses__()):
             if panel.__name__.startswith("SCOPE_PT_") and "DEFAULT_CLOSED" in getattr(panel, "bl_options", ()):
                 bpy.utils.unregister_class(panel)
@@ -49,6 +42,7 @@ class Steps:
         invoke(bpy.ops.scope.capture)
         shutil.copytree(cache().root, self.kept, dirs_exist_ok=True)
         self.pushed("capture")
+        invoke(bpy.ops.scope.export, filepath=str(self.folder / "kept.npz"), format="NPZ")
 
     def settings(self) -> None:
         """Choose the settings whose capture is in the cache."""
@@ -62,29 +56,25 @@ class Steps:
 
     def choose(self) -> Step:
         """Return the next step: half of them are operators of the extension."""
-        if self.next is not None:
-            step, self.next = self.next, None
-            return step
+        if self.next:
+            return self.next.pop(0)
         captured = any("scope_source" in obj for obj in bpy.context.window_manager.windows[0].scene.objects)
-        if not captured and self.random.random() < 0.2:
+        if not captured and self.random.random() < 0.3:
             return self.capture()
-        if self.random.random() < 0.5:
-            return self.operator()
-        name = self.random.choice(self.actions)
-        return getattr(self, f"step_{name}")()
-
-    # Operators of the extension
+        return self.operator() if self.random.random() < 0.5 else self.any_step()
 
     def operator(self) -> Step:
         """Run any operator of the extension, with random settings."""
-        name = self.random.choice(sorted(dir(bpy.ops.scope)))
+        name = self.random.choice(self.operators)
         operator = getattr(bpy.ops.scope, name)
         if name == "capture":
             return self.capture()
-        settings = self.arguments(operator)
+        if name in TOOLS and not bpy.app.background:
+            return self.tool(name)
+        settings = self.arguments(name)
         # Always with a step to undo, as from a button: after a script's changes without one, Blender itself may crash
         # when it undoes earlier steps.
-        return Step(f"scope.{name}({settings})", lambda: use(operator, **settings))
+        return Step(f"scope.{name}({settings})", lambda: use(operator, **settings), checked=name not in UNCHECKED)
 
     def capture(self) -> Step:
         """Capture from the button or from a script; the cache has the result."""
@@ -97,17 +87,94 @@ class Steps:
 
         return Step(f"scope.capture({'modal' if modal else 'script'})", take)
 
-    def arguments(self, operator: object) -> dict[str, object]:
+    def tool(self, name: str) -> Step:
+        """Start a tool, drag with the mouse, do something else meanwhile, and leave the tool."""
+
+        def take() -> object:
+            outcome = use(getattr(bpy.ops.scope, name), "INVOKE_DEFAULT")
+            if "RUNNING_MODAL" in outcome:
+                self.next = [*self.dragging(), self.mouse("ESC", "", "PRESS")]
+            return outcome
+
+        step = Step(f"scope.{name}(tool)", take)
+        if name == "pin_limb":
+            return step
+        self.next.append(step)  # the line is drawn in the view of the comparison
+        return Step("scope.look_through({})", lambda: use(bpy.ops.scope.look_through))
+
+    def dragging(self) -> list[Step]:
+        """Return steps of the mouse, with other steps in between."""
+        steps: list[Step] = []
+        for _ in range(self.random.randrange(1, 3)):
+            bone = self.random.choice(("left_wrist", "right_ankle", "head"))
+            steps += [self.mouse("MOUSEMOVE", bone), self.mouse("LEFTMOUSE", bone, "PRESS")]
+            if self.random.random() < 0.3:
+                steps.append(self.any_step())
+            steps += [self.mouse("MOUSEMOVE"), self.mouse("LEFTMOUSE", "", "RELEASE")]
+            if self.random.random() < 0.4:
+                steps.append(self.operator() if self.random.random() < 0.5 else self.any_step())
+        return steps
+
+    def mouse(self, kind: str, bone: str = "", value: str = "NOTHING") -> Step:
+        """Move the mouse to a bone's head or anywhere over the viewport, or press and release there."""
+        share = self.random.random(), self.random.random()
+
+        def take() -> object:
+            context = viewport()
+            region, window = context["region"], context["window"]
+            place = [region.x + share[0] * region.width, region.y + share[1] * region.height]
+            active = window.view_layer.objects.active
+            if bone and active is not None and active.pose and bone in active.pose.bones:
+                head = active.matrix_world @ active.pose.bones[bone].head
+                at = location_3d_to_region_2d(region, context["area"].spaces.active.region_3d, head)
+                place = [region.x + at[0], region.y + at[1]] if at else place
+            x = min(max(int(place[0]), region.x), region.x + region.width - 1)
+            y = min(max(int(place[1]), region.y), region.y + region.height - 1)
+            window.event_simulate(type=kind, value=value, x=x, y=y)
+            return f"{x}, {y}"
+
+        return Step(f"mouse({kind} {value} {bone})", take)
+
+    def arguments(self, name: str) -> dict[str, object]:
         """Choose values for some of an operator's properties."""
         found: dict[str, object] = {}
-        for prop in operator.get_rna_type().properties:
+        for prop in getattr(bpy.ops.scope, name).get_rna_type().properties:
             path = getattr(prop, "subtype", "") in ("FILE_PATH", "DIR_PATH", "FILE_NAME") or "path" in prop.identifier
             if prop.identifier == "rna_type" or (self.random.random() < 0.4 and not path):
                 continue
             value = self.value(prop, path)
             if value is not None:
                 found[prop.identifier] = value
+        if self.random.random() < 0.6:  # what has a chance of success
+            found |= self.likely(name)
         return found
+
+    def likely(self, name: str) -> dict[str, object]:
+        """Choose values with which an operator can do its work on the walk's capture."""
+        chance, folder = self.random, self.folder
+        first = chance.randrange(3, 30)
+        span = {"start": first, "end": first + chance.randrange(1, 12)}
+        place = [chance.uniform(-0.5, 0.5), chance.uniform(-0.5, 0.5), chance.uniform(0.2, 1.5)]
+        values: dict[str, dict[str, object]] = {
+            **dict.fromkeys(("interpolate_span", "swap_sides", "exchange_sides", "foot_stands"), span),
+            **dict.fromkeys(("choose_footage", "import_video"), {"filepath": self.footage}),
+            "import_motion": {"filepath": str(folder / "kept.npz"), "directory": "", "body": "SCOPE"},
+            "load_bone_map": {"filepath": str(folder / "bones.json")},
+            "export": {
+                "filepath": str(folder / "made"),
+                "format": chance.choice(("FBX", "GLB", "BVH", "USDC", "NPZ")),
+                "which": chance.choice(("ALL", "ALL", "ALL", "ACTIVE", "RIG")),
+            },
+            "loop": {"start": 1, "end": 60, "shortest": 0.5, "movement": 0.0},
+            "add_pin": {
+                "joint": chance.choice(("left_wrist", "right_ankle", "head")),
+                "location": place,
+                "frame": first,
+            },
+            "set_upright": {"start": (300, 100), "end": (300 + chance.uniform(-30, 30), 400)},
+            "remove_correction": {"index": chance.choice((-1, 0, 0, 1))},
+        }
+        return values.get(name, {})
 
     def value(self, prop: bpy.types.Property, path: bool) -> object:
         """Choose the value of a property; None leaves its default."""
@@ -135,211 +202,6 @@ class Steps:
         found = [str(self.folder / name) for name in names]
         return self.random.choice([*found, str(self.folder), ""])
 
-    # What others do to the file
-
-    def step_undo(self) -> Step:
-        """Undo some steps; redo some of them in the next step."""
-        if bpy.app.background:
-            return self.operator()
-        count = self.random.choice((1, 1, 2, 5))
-        again = self.random.choice((0, 0, 1, count))
-        if again:
-            self.next = Step(f"redo({again})", lambda: [invoke(bpy.ops.ed.redo) for _ in range(again)][-1])
-        return Step(f"undo({count})", lambda: [invoke(bpy.ops.ed.undo) for _ in range(count)][-1])
-
-    step_undo_again = step_undo_often = step_undo
-
-    def step_save(self) -> Step:
-        """Save the file."""
-        path = str(self.folder / f"saved{self.random.randrange(3)}.blend")
-        return Step(f"save({path})", lambda: bpy.ops.wm.save_as_mainfile(filepath=path, check_existing=False))
-
-    def step_reopen(self) -> Step:
-        """Open a saved file."""
-        saved = sorted(self.folder.glob("saved*.blend"))
-        if not saved:
-            return self.step_save()
-        path, load_ui = str(self.random.choice(saved)), self.random.random() < 0.5
-        return Step(f"open({path}, {load_ui})", lambda: bpy.ops.wm.open_mainfile(filepath=path, load_ui=load_ui))
-
-    def new_file(self) -> Step:
-        """Begin a new file and capture in it."""
-        return Step("new file()", lambda: bpy.ops.wm.read_homefile(load_ui=self.random.random() < 0.5))
-
-    def step_import_file(self) -> Step:
-        """Link or append from a saved file, with or without an override. Blender crashes on the file that is open."""
-        saved = sorted(path for path in self.folder.glob("saved*.blend") if str(path) != bpy.data.filepath)
-        if not saved:
-            return self.step_save()
-        path, link = str(self.random.choice(saved)), self.random.random() < 0.5
-        kind = self.random.choice(("objects", "collections", "actions", "meshes"))
-
-        def take() -> object:
-            with bpy.data.libraries.load(path, link=link) as (there, here):
-                names = list(getattr(there, kind))
-                setattr(here, kind, [self.random.choice(names)] if names else [])
-            scene = bpy.context.window_manager.windows[0].scene
-            for block in filter(None, getattr(here, kind)):
-                if kind == "objects" and block.name not in scene.collection.objects:
-                    scene.collection.objects.link(block)
-                elif kind == "collections" and block.name not in scene.collection.children:
-                    scene.collection.children.link(block)
-                if link and kind in ("objects", "collections") and self.random.random() < 0.5:
-                    block.override_hierarchy_create(scene, bpy.context.window_manager.windows[0].view_layer)
-            return self.pushed(f"{kind} {names[:1]}")
-
-        return Step(f"{'link' if link else 'append'}({kind}, {path})", take)
-
-    def step_rename(self) -> Step:
-        """Rename a datablock, also to a name that another one has."""
-        kind = self.random.choice(_BLOCKS)
-        return self.on(kind, "rename", lambda block: setattr(block, "name", self.random.choice(["x", "walk", 'a"b\\'])))
-
-    def step_delete(self) -> Step:
-        """Delete a datablock, as the Outliner does."""
-        kind = self.random.choice(_DATA)
-        return self.on(kind, "delete", lambda block: getattr(bpy.data, kind).remove(block))
-
-    def step_delete_capture(self) -> Step:
-        """Delete a collection with everything in it."""
-        return self.on(
-            "collections", "delete hierarchy", lambda block: bpy.data.batch_remove([*block.all_objects, block])
-        )
-
-    def step_delete_selected(self) -> Step:
-        """Delete the selected objects."""
-        return Step("delete selected()", lambda: use(bpy.ops.object.delete, confirm=False))
-
-    def step_duplicate(self) -> Step:
-        """Duplicate the selected objects, with or without their data."""
-        linked = self.random.random() < 0.5
-        return Step(f"duplicate({linked})", lambda: use(bpy.ops.object.duplicate, linked=linked))
-
-    def step_copy(self) -> Step:
-        """Copy a collection or an action."""
-        return self.on(self.random.choice(("collections", "actions", "scenes")), "copy", lambda block: block.copy())
-
-    def step_purge(self) -> Step:
-        """Remove unused datablocks, and those that nothing but a library holds."""
-        return Step("purge()", lambda: self.pushed(bpy.data.orphans_purge(do_recursive=True)))
-
-    def step_library(self) -> Step:
-        """Reload, remove or make local what is linked."""
-        if not len(bpy.data.libraries):
-            return self.step_import_file()
-        index, what = self.random.randrange(len(bpy.data.libraries)), self.random.choice(("reload", "remove", "local"))
-
-        def take() -> object:
-            library = bpy.data.libraries[index]
-            if what == "reload":
-                library.reload()
-            elif what == "remove":
-                bpy.data.libraries.remove(library)
-            else:
-                return use(bpy.ops.object.make_local, type="ALL")
-            return self.pushed(what)
-
-        return Step(f"library({what})", take)
-
-    def step_frame(self) -> Step:
-        """Go to a frame, or play."""
-        frame = self.random.randint(-20, 150)
-        if frame < 0:
-            return Step("play()", lambda: invoke(bpy.ops.screen.animation_play))
-        return Step(f"frame({frame})", lambda: bpy.context.window_manager.windows[0].scene.frame_set(frame))
-
-    def step_rate(self) -> Step:
-        """Change the frame rate."""
-        fps = self.random.choice((1, 24, 25, 30, 120))
-        return Step(f"rate({fps})", lambda: setattr(bpy.context.window_manager.windows[0].scene.render, "fps", fps))
-
-    def step_select(self) -> Step:
-        """Select one object and make it the active one."""
-
-        def take(obj: bpy.types.Object) -> None:
-            layer = bpy.context.window_manager.windows[0].view_layer
-            if obj.name in layer.objects and layer.objects[obj.name] == obj:
-                if layer.objects.active is not None and layer.objects.active.mode != "OBJECT":
-                    invoke(bpy.ops.object.mode_set, mode="OBJECT")
-                invoke(bpy.ops.object.select_all, action="DESELECT")
-                obj.select_set(True, view_layer=layer)
-                layer.objects.active = obj
-
-        return self.on("objects", "select", take)
-
-    step_select_again = step_select
-
-    def step_mode(self) -> Step:
-        """Change the mode of the active object."""
-        mode = self.random.choice(("OBJECT", "POSE", "EDIT", "WEIGHT_PAINT"))
-
-        def take() -> object:
-            try:
-                return use(bpy.ops.object.mode_set, mode=mode)
-            except TypeError as error:  # the active object does not have it
-                return f"refused: {error}"
-
-        return Step(f"mode({mode})", take)
-
-    def step_nla(self) -> Step:
-        """Push the action down, tweak a strip, or remove the tracks."""
-        what = self.random.choice(("push", "push", "tweak", "leave", "clear", "mute", "solo"))
-
-        def take(obj: bpy.types.Object) -> None:
-            data = obj.animation_data or obj.animation_data_create()
-            if what == "push" and data.action is not None and not data.use_tweak_mode:
-                data.nla_tracks.new().strips.new(data.action.name, int(data.action.frame_range[0]), data.action)
-                data.action = None
-            elif what in ("tweak", "leave"):
-                if what == "tweak" and data.nla_tracks:
-                    data.nla_tracks.active = data.nla_tracks[-1]
-                    for strip in data.nla_tracks[-1].strips:
-                        strip.select = True
-                data.use_tweak_mode = what == "tweak"
-            elif what == "clear":
-                for track in list(data.nla_tracks):
-                    data.nla_tracks.remove(track)
-            elif data.nla_tracks:
-                setattr(data.nla_tracks[-1], "mute" if what == "mute" else "is_solo", True)
-
-        return self.on("objects", f"nla {what}", take)
-
-    def step_assign_action(self) -> Step:
-        """Give an object another action, or none."""
-
-        def take(obj: bpy.types.Object) -> None:
-            data = obj.animation_data or obj.animation_data_create()
-            data.action = self.random.choice([None, *bpy.data.actions])
-
-        return self.on("objects", "assign action", take)
-
-    def step_parent(self) -> Step:
-        """Give an object a parent, or none."""
-        return self.on(
-            "objects", "parent", lambda obj: setattr(obj, "parent", self.random.choice([None, *bpy.data.objects]))
-        )
-
-    def step_hide(self) -> Step:
-        """Hide or show an object."""
-        how = self.random.choice(("hide_viewport", "hide_render", "hide_select"))
-        return self.on("objects", how, lambda obj: setattr(obj, how, not getattr(obj, how)))
-
-    def step_scene(self) -> Step:
-        """Add a scene, show another one, or remove the one that is shown."""
-        what = self.random.choice(("NEW", "FULL_COPY", "LINK_COPY", "show", "show", "remove"))
-
-        def take() -> object:
-            window = bpy.context.window_manager.windows[0]
-            if what == "show":
-                window.scene = self.random.choice(list(bpy.data.scenes))
-            elif what == "remove":
-                return use(bpy.ops.scene.delete)
-            else:
-                return use(bpy.ops.scene.new, type=what)
-            return what
-
-        return Step(f"scene({what})", take)
-
     def step_rig(self) -> Step:
         """Choose a rig to retarget to: a copy of a captured skeleton, or any armature."""
 
@@ -360,6 +222,44 @@ class Steps:
 
         return Step("rig()", take)
 
+    step_rig_again = step_rig
+
+    def step_select_captured(self) -> Step:
+        """Select a captured armature of the scene."""
+
+        def take() -> object:
+            layer = bpy.context.window_manager.windows[0].view_layer
+            people = [obj for obj in layer.objects if "scope_source" in obj]
+            if not people:
+                return "none"
+            if layer.objects.active is not None and layer.objects.active.mode != "OBJECT":
+                use(bpy.ops.object.mode_set, mode="OBJECT")
+            chosen = layer.objects.active = self.random.choice(people)
+            return self.pushed(chosen.name_full)
+
+        return Step("select captured()", take)
+
+    step_select_captured_again = step_select_captured_often = step_select_captured
+
+    def step_show_capture(self) -> Step:
+        """Select a capture in the list."""
+
+        def take() -> object:
+            scene = bpy.context.window_manager.windows[0].scene
+            scene.scope.capture_index = self.random.randrange(-1, len(bpy.data.collections) + 1)
+            return self.pushed(scene.scope.capture_index)
+
+        return Step("show capture()", take)
+
+    def step_preset(self) -> Step:
+        """Apply a preset of the capture settings that an earlier step has added."""
+        folders = bpy.utils.preset_paths("scope/capture")
+        files = sorted(str(path) for folder in folders for path in Path(folder).glob("*.py"))
+        if not files:
+            return Step("scope.add_capture_preset()", lambda: use(bpy.ops.scope.add_capture_preset, name="walk"))
+        settings = {"filepath": self.random.choice(files), "menu_idname": "SCOPE_PT_capture_presets"}
+        return Step(f"preset({settings})", lambda: use(bpy.ops.script.execute_preset, **settings))
+
     def step_property(self) -> Step:
         """Change a setting of the extension that does not change the capture."""
 
@@ -368,7 +268,7 @@ class Steps:
             group, names = self.random.choice(
                 (
                     (scene.scope_retarget, ("feet", "root", "captured", "active")),
-                    (scene.scope, ("frame_rate", "start_frame", "set_frame_range", "with_camera", "shape")),
+                    (scene.scope, ("frame_rate", "start_frame", "set_frame_range", "with_camera", "shape", "take")),
                 )
             )
             prop = group.bl_rna.properties[self.random.choice(names)]
@@ -377,29 +277,6 @@ class Steps:
             return self.pushed(f"{prop.identifier}={value}")
 
         return Step("property()", take)
-
-    def step_bones(self) -> Step:
-        """Rename or remove a bone, or change its rotation mode."""
-        what = self.random.choice(("rename", "remove", "mode"))
-
-        def take(obj: bpy.types.Object) -> object:
-            if obj.type != "ARMATURE" or not obj.data.bones or obj.library or obj.data.library:
-                return "no bones"
-            bone = self.random.choice(list(obj.data.bones)).name
-            if what == "rename":
-                obj.data.bones[bone].name = "renamed"
-            elif what == "mode" and obj.pose and bone in obj.pose.bones:
-                obj.pose.bones[bone].rotation_mode = "XYZ"
-            elif obj.mode == "EDIT" and bone in obj.data.edit_bones:
-                obj.data.edit_bones.remove(obj.data.edit_bones[bone])
-            return bone
-
-        return self.on("objects", f"bone {what}", take)
-
-    def step_view(self) -> Step:
-        """Switch local view, the camera view or a full-screen area."""
-        what = self.random.choice((bpy.ops.view3d.localview, bpy.ops.view3d.view_camera, bpy.ops.view3d.toggle_shading))
-        return Step(f"view({what.idname_py()})", lambda: use(what))
 
     def step_restart_extension(self) -> Step:
         """Disable and enable the extension, as its update does."""
@@ -414,35 +291,6 @@ class Steps:
             return bpy.ops.preferences.addon_enable(module=name)
 
         return Step(f"restart({name})", take)
-
-    # Tools
-
-    def names(self, kind: str) -> list[str]:
-        """Return the names of all datablocks of a kind."""
-        return [block.name for block in getattr(bpy.data, kind)]
-
-    def on(self, kind: str, what: str, change: Callable) -> Step:
-        """Change a random datablock of a kind, with a step to undo."""
-        count = len(getattr(bpy.data, kind))
-        if not count:
-            return self.step_undo()
-        block = getattr(bpy.data, kind)[self.random.randrange(count)]
-        name, library = block.name, block.library.filepath if block.library else None
-
-        def take() -> object:
-            try:
-                change(getattr(bpy.data, kind)[(name, library)])
-            except (AttributeError, TypeError, ValueError, RuntimeError) as error:  # linked, overridden, in use
-                return f"refused: {error}"
-            return self.pushed(what)
-
-        return Step(f"{what}({kind} {name!r} {library})", take)
-
-    def pushed(self, what: object) -> object:
-        """Add a step to undo, as an operator would."""
-        if not bpy.app.background:
-            invoke(bpy.ops.ed.undo_push, message="Walk")
-        return what
 
 
 def cache():

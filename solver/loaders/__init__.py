@@ -3,6 +3,7 @@
 
 body_file.py          load_body(which) -> Body: the built-in ones, our own format, users' models
 arrays.py             what a body file's arrays must hold
+regular_file.py       no pipes, no devices, nothing too large
 npz.py                reading .npz files of any origin
 model_file.py         load_model(path) -> Body: which reader, which family, shapes checked
 skeletons.py          joint names, trees and vertex numbers of the SMPL family

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 import struct
+import tokenize
 import zipfile
 import zlib
 from collections.abc import Collection
@@ -25,6 +26,7 @@ LARGEST_ARRAY = 1 << 28  # bytes unpacked; SMPL-X's 400 shape directions in floa
 # What zipfile and numpy's header reader raise on damaged files.
 _UNREADABLE: tuple[type[Exception], ...] = (OSError, EOFError, LookupError, ValueError, TypeError, ArithmeticError)
 _UNREADABLE += (RuntimeError, MemoryError, zipfile.BadZipFile, zlib.error, struct.error)
+_UNREADABLE += (SyntaxError, tokenize.TokenError)  # a header that is no Python literal
 _HEADER_READERS: dict[tuple[int, int], Any] = {
     (1, 0): np.lib.format.read_array_header_1_0,
     (2, 0): np.lib.format.read_array_header_2_0,
@@ -33,6 +35,8 @@ _HEADER_READERS: dict[tuple[int, int], Any] = {
 
 def npz_keys(path: Path) -> set[str]:
     """Return the names of the arrays in a .npz file; empty when it is not a zip file at all."""
+    if not path.is_file():  # opening a pipe would wait for a writer
+        return set()
     try:
         with zipfile.ZipFile(path) as archive:
             return {name.removesuffix(".npy") for name in archive.namelist()}

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import io
+import tokenize
 import zipfile
 import zlib
 from collections.abc import Collection
@@ -14,11 +15,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from .regular_file import check_regular
 
 LARGEST_BYTES = 4 << 30  # unpacked; an hour of SMPL+H motion at 60 fps takes a quarter of this
 
 # What zipfile, zlib and numpy raise on damaged or hostile files.
-_BROKEN = (OSError, ValueError, KeyError, EOFError, RuntimeError, MemoryError, zipfile.BadZipFile, zlib.error)
+_BROKEN = (
+    *(OSError, ValueError, LookupError, EOFError, RuntimeError, MemoryError, zipfile.BadZipFile, zlib.error),
+    *(TypeError, ArithmeticError, SyntaxError, tokenize.TokenError),  # a header that is no Python literal
+)
 
 
 def read_npz(
@@ -36,6 +41,8 @@ def read_npz(
     :param wanted: the arrays to read, if they are present; the others may hold anything. All if None.
     :raises InputError: as `error`, when the file cannot be read, would be too large or holds pickled objects.
     """
+    if content is None:
+        check_regular(path, error, what, LARGEST_BYTES)
     source = path if content is None else io.BytesIO(content)
     try:
         with zipfile.ZipFile(source) as archive:

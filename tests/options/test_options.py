@@ -13,7 +13,7 @@ from scope.scope_addon import options as declarations
 from scope.scope_addon.capture.options import CaptureOptions, capture_options, check_options
 from scope.scope_addon.capture.perception.execution import CHOICES
 from scope.scope_addon.capture.perception.sessions import LANDMARK_NETWORK_OF_QUALITY
-from scope.scope_addon.cli import build_parser
+from scope.scope_addon.cli import build_parser, main
 from scope.scope_addon.command_line.arguments import body_and_options, non_default_arguments, option_values
 from scope.scope_addon.errors import UsageError
 from scope.scope_addon.job.request import JobRequest
@@ -98,6 +98,11 @@ def test_the_declared_range_is_what_the_capture_accepts(body, name, step):
         check_options(body, CaptureOptions(**{name: limit}))
         with pytest.raises(UsageError):
             check_options(body, CaptureOptions(**{name: limit + outside}))
+
+
+def test_heights_of_more_people_than_can_be_are_refused(capsys):
+    assert main(["capture", "--height", ",".join(["170"] * 101)]) == 2
+    assert "must give at most 100 heights, not 101" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("outside", [0.499, 2.601])

@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 
+from ..conftest import FIRST
+
 ROOT = Path(__file__).resolve().parents[2]
 TESTS = ROOT / "tests"
 PRODUCT = "scope_addon"  # left out of the path: tests/job/ holds the tests of scope_addon/job/
@@ -64,6 +66,10 @@ def test_every_test_file_is_named_after_a_module():
     assert len(files) > 50
     lost = [str(path.relative_to(TESTS)) for path in files if module_of(path) is None]
     assert sorted(set(lost) - set(CROSS_CUTTING)) == [], "rename them after a module, or list them in CROSS_CUTTING"
+
+
+def test_the_files_to_begin_with_exist():
+    assert [name for name in FIRST if not (TESTS / name).is_file()] == []
 
 
 def test_no_listed_exception_is_stale():

@@ -12,6 +12,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
+from scope.solver.compiled.code_folders import places
 
 ROOT = Path(__file__).resolve().parents[2]
 PRODUCT = ("solver", "scope_addon")
@@ -88,6 +89,8 @@ def installed(wheel, tmp_path_factory) -> Path:
 
 def run(python: Path, *arguments: str) -> subprocess.CompletedProcess:
     environment = {k: v for k, v in os.environ.items() if not k.startswith(("PYTHON", "COVERAGE"))}
+    # Machine code belongs to the content of sources, and the wheel's are those that other tests compile.
+    environment["NUMBA_CACHE_DIR"] = str(places()[0])
     command = [str(python), *arguments]
     return subprocess.run(command, capture_output=True, text=True, check=False, cwd=python.parent, env=environment)
 

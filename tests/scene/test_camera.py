@@ -8,6 +8,7 @@ from bpy_extras.object_utils import world_to_camera_view
 from mathutils import Vector
 from scope.scope_addon.scene.build import NEW_SCENE, BuildOptions, build_scene
 from scope.scope_addon.scene.footage_strip import strips_of
+from scope.scope_addon.scene.match_rate import change_rate
 
 
 def projected_by_blender(camera: bpy.types.Object, points_world: np.ndarray) -> np.ndarray:
@@ -235,6 +236,27 @@ def test_footage_is_synchronized_at_a_rate_other_than_the_scenes(body, make_moti
         for f in range(int(np.ceil(frames[0])), int(np.floor(frames[-1])) + 1):
             assert abs(frame_shown(camera, f) - (f - start) / rate * 30) <= 0.5 + 1e-3
     assert not bpy.data.movieclips
+
+
+@pytest.mark.parametrize(("before", "after"), [(20, 30), (30, 24)])
+def test_footage_stays_synchronized_when_the_scenes_rate_changes(body, make_motion, clip, before, after):
+    scene = bpy.context.scene
+    scene.render.fps = before
+    motion = make_motion(body, 20, rate=30.0, image_size=(64, 48), moving_camera=True)
+    person = build_scene([motion], body, footage=clip, options=BuildOptions(start_frame=5.0)).people[0]
+    person.camera.data.background_images[0].alpha = 0.25
+    assert change_rate(scene, after, {person.armature: motion}, []) == []
+    (background,) = person.camera.data.background_images
+    assert background.alpha == 0.25
+    if after == 30:
+        assert (background.source, background.clip.frame_start) == ("MOVIE_CLIP", 5)
+        assert not any("footage" in action.name for action in bpy.data.actions)
+    else:
+        for f in range(5, 5 + 15):
+            assert abs(frame_shown(person.camera, f) - (f - 5) / 24 * 30) <= 0.5 + 1e-3
+        assert not bpy.data.movieclips
+    scene.frame_set(5 + round(0.5 * after))
+    np.testing.assert_allclose(person.camera.location, motion.world_from_camera[15, :3, 3], atol=1e-4)
 
 
 def test_footage_of_a_distorting_lens_at_another_rate_is_warned_about(body, make_motion, clip):

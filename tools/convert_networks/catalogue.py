@@ -3,6 +3,8 @@
 
 from dataclasses import dataclass
 
+from .to_onnx import Outputs
+
 
 @dataclass(frozen=True)
 class Package:
@@ -15,13 +17,17 @@ class Package:
 
 @dataclass(frozen=True)
 class Network:
-    """One TFLite file and the graph outputs to keep, as (position in the TFLite outputs, new name, NHWC shape)."""
+    """One TFLite file and the graph outputs to keep, as (position in the TFLite outputs, new name, NHWC shape).
+
+    Those of ``on_request`` are computed only when asked for, see `convert_model`.
+    """
 
     name: str
     package: Package
     member: str
     input_shape: tuple[int, ...]
-    outputs: tuple[tuple[int, str, tuple[int, ...]], ...]
+    outputs: Outputs
+    on_request: Outputs = ()
 
 
 WHEEL = Package(
@@ -36,13 +42,13 @@ TARBALL = Package(
 )
 LICENSE_MEMBER = "mediapipe-0.10.14.dist-info/LICENSE"
 
-# The segmentation mask (position 2 of the TFLite outputs) is left out: everything that only feeds it is pruned.
 _LANDMARK_OUTPUTS = (
     (0, "landmarks", (1, 195)),
     (1, "presence", (1, 1)),
     (3, "heatmap", (1, 64, 64, 39)),
     (4, "world", (1, 117)),
 )
+_MASK = ((2, "mask", (1, 256, 256, 1)),)  # logits of the region's person; it costs more than the lite network itself
 
 NETWORKS = (
     Network(
@@ -59,6 +65,7 @@ NETWORKS = (
             f"package/pose_landmark_{size}.tflite",
             (1, 256, 256, 3),
             _LANDMARK_OUTPUTS,
+            _MASK,
         )
         for size in ("lite", "full", "heavy")
     ),

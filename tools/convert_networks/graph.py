@@ -39,6 +39,14 @@ class Graph:
     pads: dict[int, SpatialPad] = field(default_factory=dict)
     _shared: dict[tuple[str, bytes, tuple[int, ...]], str] = field(default_factory=dict)
 
+    def known(self) -> tuple[dict[Any, Any], ...]:
+        """Return a copy of what is known of the values so far, for `forget_since`."""
+        return dict(self.names), dict(self.pads), dict(self._shared)
+
+    def forget_since(self, known: tuple[dict[Any, Any], ...]) -> None:
+        """Forget the values added since `known`; nodes and initializers stay."""
+        self.names, self.pads, self._shared = known
+
     def shape(self, tensor: int) -> tuple[int, ...]:
         """Return the TFLite (NHWC) shape of a tensor."""
         return self.model.tensors[tensor].shape

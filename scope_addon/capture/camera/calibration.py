@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....solver.errors import InputError
+from ....solver.loaders.regular_file import check_regular
 
 # The name in our files, and the names that OpenCV's examples and other programs use.
 _NAMES = {
@@ -41,6 +42,7 @@ _LARGEST_TANGENTIAL = 0.5
 _LARGEST_MAGNIFICATION = 3.0  # by distortion, at half the shorter side
 _LARGEST_SKEW = 1e-3  # of the focal length; less than a pixel at the picture's edge
 _LARGEST_SIDE = 1e6
+_LARGEST_BYTES = 1_000_000
 _SIZE_TOLERANCE_PX = 1.0  # for sizes that were rounded
 
 
@@ -104,6 +106,7 @@ def read_calibration(path: Path) -> Calibration:
 
     :raises InputError: the file cannot be read, or holds an unknown key or an impossible value.
     """
+    check_regular(path, InputError, "calibration", _LARGEST_BYTES)
     try:
         data = json.loads(path.read_text("utf-8-sig"))
     except OSError as error:

@@ -13,10 +13,8 @@ from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol, cast
 
-# OpenCV reads these when it first opens a video. -8 silences ffmpeg's messages, because Scope reports errors itself. A
-# playlist named .mp4 must not access the network: footage is read from files only.
+# OpenCV reads this when it first opens a video. -8 silences ffmpeg's messages, because Scope reports errors itself.
 os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
-os.environ.setdefault("OPENCV_FFMPEG_CAPTURE_OPTIONS", "protocol_whitelist;file")
 
 import cv2
 import numpy as np
@@ -24,12 +22,18 @@ from numpy.typing import NDArray
 
 from ...errors import VideoError
 from .file_names import utf8_name
+from .image_size import check_size
 
 if TYPE_CHECKING:
     import av
     from av.container import InputContainer
 
-_PROTOCOLS = {"protocol_whitelist": "file"}
+# Formats that footage comes in. Others may name further files, or devices.
+_FORMATS = (
+    "mov", "matroska", "webm", "avi", "mpegts", "mpeg", "mpegvideo", "flv", "asf", "ogg", "mxf", "gif", "apng", "mjpeg",
+    "h264", "hevc", "m4v", "av1", "obu", "ivf", "yuv4mpegpipe", "dv", "wtv", "nut", "gxf", "rm", "webp_pipe", "nsv",
+)  # fmt: skip
+_ONLY = {"protocol_whitelist": "file", "format_whitelist": ",".join(_FORMATS)}
 _MIN_SEEK_S = 20.0  # start from which seeking is tried
 _AV1 = ("av01", "AV01")
 # Degrees clockwise by which an image has to be rotated to be upright.
@@ -71,11 +75,22 @@ def open_reader(path: Path) -> FrameReader:
     return PyavReader(path)
 
 
-def _upright(image: NDArray[np.uint8], aspect: float, clockwise_deg: int) -> NDArray[np.uint8]:
-    """Stretch the side with the coarser pixels until pixels are square, then rotate the image."""
-    if abs(aspect - 1) > 1e-3:
-        height, width = image.shape[:2]
-        size = (round(width * aspect), height) if aspect > 1 else (width, round(height / aspect))
+def _size(width: float, height: float, aspect: float) -> tuple[int, int]:
+    """Calculate width and height of an image with square pixels, its side with the coarser pixels stretched."""
+    if abs(aspect - 1) <= 1e-3:
+        return round(width), round(height)
+    return (round(width * aspect), round(height)) if aspect > 1 else (round(width), round(height / aspect))
+
+
+def _upright(path: Path, image: NDArray[np.uint8], aspect: float, clockwise_deg: int) -> NDArray[np.uint8]:
+    """Stretch an image of a file until pixels are square, then rotate it.
+
+    :raises VideoError: it is too large or too long (see `image_size`).
+    """
+    height, width = image.shape[:2]
+    size = _size(width, height, aspect)
+    check_size(path, *size)
+    if size != (width, height):
         image = cast(NDArray[np.uint8], cv2.resize(image, size, interpolation=cv2.INTER_LINEAR))
     rotation = _ROTATIONS.get(clockwise_deg % 360)
     return image if rotation is None else cast(NDArray[np.uint8], cv2.rotate(image, rotation))
@@ -84,10 +99,11 @@ def _upright(image: NDArray[np.uint8], aspect: float, clockwise_deg: int) -> NDA
 class OpencvReader:
     """cv2.VideoCapture with rotation and pixel aspect applied here, because OpenCV versions differ in applying them.
 
-    :raises VideoError: OpenCV cannot open the file.
+    :raises VideoError: OpenCV cannot open the file, or its images are too large or too long (see `image_size`).
     """
 
     def __init__(self, path: Path) -> None:
+        self._path = path
         with utf8_name(path) as name:
             self._capture = cv2.VideoCapture(name, cv2.CAP_FFMPEG)
         if not self._capture.isOpened():
@@ -99,6 +115,9 @@ class OpencvReader:
         self._rotation_deg = round(self._get(cv2.CAP_PROP_ORIENTATION_META))
         num, den = self._get(cv2.CAP_PROP_SAR_NUM), self._get(cv2.CAP_PROP_SAR_DEN)
         self._aspect = num / den if num > 0 and den > 0 else 1.0
+        check_size(
+            path, *_size(self._get(cv2.CAP_PROP_FRAME_WIDTH), self._get(cv2.CAP_PROP_FRAME_HEIGHT), self._aspect)
+        )
         self._grabbed = False
         self._bgr: NDArray[np.uint8] | None = None  # reused for every frame: allocating memory takes time
         self.rate, self.frame_count = self._get(cv2.CAP_PROP_FPS), self._get(cv2.CAP_PROP_FRAME_COUNT)
@@ -119,7 +138,7 @@ class OpencvReader:
         if not ok or decoded is None:
             return None
         self._bgr = cast(NDArray[np.uint8], decoded)
-        image = cv2.cvtColor(_upright(self._bgr, self._aspect, self._rotation_deg), cv2.COLOR_BGR2RGB)
+        image = cv2.cvtColor(_upright(self._path, self._bgr, self._aspect, self._rotation_deg), cv2.COLOR_BGR2RGB)
         return self._get(cv2.CAP_PROP_POS_MSEC) / 1000, cast(NDArray[np.uint8], image)
 
     def skip_to(self, seconds: float, fps: Fraction) -> int:
@@ -168,7 +187,7 @@ def _open_with_pyav(path: Path) -> tuple[type[Exception], InputContainer | None]
         ) from error
     try:
         with utf8_name(path) as name:
-            container = av.open(name, options=_PROTOCOLS, container_options=_PROTOCOLS)
+            container = av.open(name, options=_ONLY, container_options=_ONLY)
     except (av.error.FFmpegError, OSError, ValueError):
         return av.error.FFmpegError, None
     return av.error.FFmpegError, container
@@ -237,10 +256,12 @@ def decode_items(path: Path, numbers: Collection[int], max_pixels: int) -> dict[
 class PyavReader:
     """PyAV's decoders, for AV1.
 
-    :raises VideoError: PyAV is not installed or cannot open the file.
+    :raises VideoError: PyAV is not installed or cannot open the file, or its images are too large or too long (see
+        `image_size`).
     """
 
     def __init__(self, path: Path) -> None:
+        self._path = path
         self._failure, container = _open_with_pyav(path)
         if container is None:
             raise VideoError(f"{path} is not a video that can be decoded; convert it to an H.264 .mp4")
@@ -250,6 +271,7 @@ class PyavReader:
         self._frames: Iterator[av.VideoFrame] = self._container.decode(self._stream)
         self._start_s = float((self._stream.start_time or 0) * (self._stream.time_base or 0))
         self._aspect = float(self._stream.sample_aspect_ratio or 1)
+        check_size(path, *_size(self._stream.width, self._stream.height, self._aspect))
         self.rate, self.frame_count = float(self._stream.average_rate or 0), float(self._stream.frames)
 
     def _next(self) -> av.VideoFrame | None:
@@ -266,7 +288,7 @@ class PyavReader:
         frame = self._next()
         if frame is None:
             return None
-        image = _upright(_rgb(frame), self._aspect, -round(frame.rotation))
+        image = _upright(self._path, _rgb(frame), self._aspect, -round(frame.rotation))
         return self._time(frame), image
 
     def skip_to(self, seconds: float, fps: Fraction) -> int:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ...errors import VideoError
 from ...footage import LAST_NUMBER, is_sequence, numbered, numbered_from, pictures_in, sequence_pattern
-from .still_images import read_picture
+from .stills.still_images import read_picture
 
 _NUMBER_SIGN = re.compile(r"#+|%0?\d*d")
 

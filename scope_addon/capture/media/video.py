@@ -33,11 +33,13 @@ from .frame_rate import DEFAULT_FPS, estimate_fps, exact_fps
 from .frame_readers import FrameReader, open_reader, presented_duration_s
 from .image_sequence import PictureSequence, SequenceReader, find_sequence
 from .quicktime import focal_35mm
-from .still_images import is_picture, read_picture
+from .stills.still_images import is_picture, read_picture
 from .video_range import FootageRange, VideoRange
 
 cv2.setLogLevel(0)  # silent: failures are reported as exceptions
 
+# How lists of other files begin (ffconcat, HLS, DASH, SDP), which FFmpeg opens by their content, whatever the name.
+_LISTS = (b"ffconcat", b"#EXTM3U", b"<?xml", b"<MPD", b"v=0", b"[playlist]")
 _QUEUED_FRAMES = 4  # decoded ahead; a 4K frame takes 25 MB
 
 
@@ -105,7 +107,8 @@ def open_video(path: str | Path, wanted: FootageRange | None = None) -> Video:
     Image sequences (see `image_sequence`) count as videos, with the rate of ``wanted``, or else 30.
 
     :param wanted: the range of frames and their rate; None for all.
-    :raises VideoError: it does not exist, is not a file, holds nothing that can be decoded, or ends before the range.
+    :raises VideoError: it does not exist, is not a file, is a list of files, holds nothing that can be decoded, holds
+        images that are too large or too long (see `image_size`), or ends before the range.
     :raises UsageError: a timecode of the range does not exist at the footage's rate.
     """
     path = Path(path)
@@ -122,8 +125,8 @@ def open_video(path: str | Path, wanted: FootageRange | None = None) -> Video:
         status = path.stat()
         if not stat.S_ISREG(status.st_mode):  # opening a pipe would wait for a writer
             raise VideoError(f"{path} is a pipe or a device, and footage is read from files; save it as one first")
-        with path.open("rb"):
-            pass
+        with path.open("rb") as file:
+            head = file.read(64)
     except FileNotFoundError as error:
         web = re.match(r"\w{2,}:[/\\]", str(path))
         advice = "download it first, because footage is read from files" if web else "check the path"
@@ -132,6 +135,8 @@ def open_video(path: str | Path, wanted: FootageRange | None = None) -> Video:
         raise VideoError(f"{path} cannot be read ({error.strerror}); check its permissions") from error
     if status.st_size == 0:
         raise VideoError(f"{path} is empty (0 bytes); export or download it again")
+    if head.removeprefix(b"\xef\xbb\xbf").lstrip().startswith(_LISTS):
+        raise VideoError(f"{path} is a playlist or other text, not footage; give a video itself")
     return _open_still(path, wanted) if is_picture(path) else _open_moving(path, wanted)
 
 

@@ -135,11 +135,28 @@ class LandmarkNetwork:
         """
         return self._pool.submit(self._estimate, self._shared, image_rgb, region)
 
+    def mask(self, image_rgb: NDArray[np.uint8], region: Region) -> NDArray[np.float32]:
+        """Return the probability (256, 256) that a pixel of the region shows its person, also beside other people.
+
+        In a region where nobody is, the network invents somebody: `PoseEstimate.presence` tells.
+
+        :param image_rgb: (H, W, 3) uint8.
+        """
+        inputs = {"input": _blob(image_rgb, region), "with_mask": np.array(True)}
+        (logits,) = self._alone.run(["mask"], inputs)
+        probability: NDArray[np.float32] = 1.0 / (1.0 + np.exp(-np.clip(logits[0, 0], -50.0, 50.0)))
+        return probability
+
     @staticmethod
     def _estimate(session: onnxruntime.InferenceSession, image_rgb: NDArray[np.uint8], region: Region) -> PoseEstimate:
-        blob = cv2.dnn.blobFromImage(region.cut(image_rgb, INPUT_SIZE), 1 / 255.0)
-        landmarks, presence, heatmap, world = session.run(_OUTPUTS, {"input": blob})
+        landmarks, presence, heatmap, world = session.run(_OUTPUTS, {"input": _blob(image_rgb, region)})
         return interpret(landmarks[0], float(presence[0, 0]), heatmap[0], world[0], region)
+
+
+def _blob(image_rgb: NDArray[np.uint8], region: Region) -> NDArray[np.float32]:
+    """Return the network's input (1, 3, 256, 256) in [0, 1]."""
+    blob: NDArray[np.float32] = cv2.dnn.blobFromImage(region.cut(image_rgb, INPUT_SIZE), 1 / 255.0)
+    return blob
 
 
 def interpret(

@@ -16,6 +16,8 @@ import numpy as np
 from bpy_extras import anim_utils
 from numpy.typing import NDArray
 
+from .fcurve_modifiers import read_modifiers, write_modifiers
+
 # Values of Blender's keyframe interpolation enum, which foreach_set takes as integers.
 INTERPOLATION = {"CONSTANT": 0, "LINEAR": 1, "BEZIER": 2}
 
@@ -176,15 +178,15 @@ def change_keys(curve: bpy.types.FCurve, frames: NDArray[np.float64], values: ND
 
 
 def add_cycles(datablock: bpy.types.ID, offset_curves: set[tuple[str, int]] | None = None) -> None:
-    """Make every curve of a datablock cyclic.
+    """Make every curve of a datablock cyclic; its other modifiers stay, after the cycles, which must come first.
 
     :param offset_curves: data paths and indices of the curves to which each cycle adds an offset.
     """
     remove_cycles(datablock)
     for curve in fcurves(datablock):
-        modifier = curve.modifiers.new("CYCLES")
-        offset = (curve.data_path, curve.array_index) in (offset_curves or set())
-        modifier.mode_before = modifier.mode_after = "REPEAT_OFFSET" if offset else "REPEAT"
+        mode = "REPEAT_OFFSET" if (curve.data_path, curve.array_index) in (offset_curves or set()) else "REPEAT"
+        cycles = {"type": "CYCLES", "mode_before": mode, "mode_after": mode}
+        write_modifiers(curve, [cycles, *read_modifiers(curve)])
 
 
 def remove_cycles(datablock: bpy.types.ID) -> None:

@@ -16,12 +16,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import MotionFileError, UsageError
+from .retime import Retiming
 
 # Rates within this tolerance (frames per second) of a standard one are taken to be it: 23.98 is 24 / 1.001.
 TOLERANCE = 0.005
 BROADCAST = tuple(Fraction(n * 1000, 1001) for n in (24, 30, 48, 60, 72, 96, 120, 240))
 POLICIES = ("keep", "set")
 RATE_POLICIES = (*POLICIES, "resample")
+_RATE = "scope_rate"  # custom property of an armature: the scene's frame rate for which its keys were written
 _CYCLE = "scope_cycle"  # custom property of an armature: the frame range of the cycle, and that of the scene before it
 
 
@@ -77,6 +79,17 @@ def key_frames(timestamps: NDArray[np.float64], rate: float, start_frame: float 
     return np.where(np.abs(frames - whole) < 1e-3, whole, frames)
 
 
+def store_rate(armature: bpy.types.Object, rate: float) -> None:
+    """Store the frame rate for which an armature's keys were written, frames per second."""
+    armature[_RATE] = rate
+
+
+def keyed_rate(armature: bpy.types.Object, scene: bpy.types.Scene) -> float:
+    """Return the frame rate for which an armature's keys were written; older files do not say, and have the scene's."""
+    rate = armature.get(_RATE)
+    return float(rate) if isinstance(rate, float | int) and 0.01 <= rate <= 32767 else scene_rate(scene)
+
+
 def set_frame_range(scene: bpy.types.Scene, first: float, last: float) -> None:
     """Set the scene's frame range to that of the keys, rounded outwards to whole frames."""
     start, end = math.floor(first), math.ceil(last)
@@ -92,6 +105,17 @@ def play_cycle(scene: bpy.types.Scene, armature: bpy.types.Object, first: int, l
         before = scene.frame_start, scene.frame_end
     scene.frame_start, scene.frame_end = first, last
     armature[_CYCLE] = f"{scene.frame_start} {scene.frame_end} {before[0]} {before[1]}"
+
+
+def retime_cycle(scene: bpy.types.Scene, armature: bpy.types.Object, retiming: Retiming) -> None:
+    """Move the stored cycle with the armature's keys, and the scene's frame range if it is that of the cycle."""
+    cycle, before = _stored_ranges(armature)
+    if len(cycle) != 2 or len(before) != 2:
+        return
+    start, end = math.ceil(retiming.frame(cycle[0])), math.floor(retiming.frame(cycle[1] + 1)) - 1
+    if cycle == (scene.frame_start, scene.frame_end):
+        set_frame_range(scene, start, end)
+    armature[_CYCLE] = "{} {} {} {}".format(start, end, *retiming.span(*before))
 
 
 def restore_scene_range(scene: bpy.types.Scene, armature: bpy.types.Object) -> None:

@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Rolling back work that fails or is cancelled: new datablocks are removed, and changed ones are restored.
 
-Removed datablocks cannot be restored, so code under a transaction must remove them last.
+Datablocks are restored in place, never replaced: a failed operator adds no step to undo, and Blender crashes when it
+undoes an earlier step in which another datablock uses one that was replaced since. Removed datablocks cannot be
+restored, so code under a transaction must remove them last.
 """
 
 from __future__ import annotations
@@ -10,9 +12,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 import bpy
-import numpy as np
 
-from .actions import fcurves_of, read_keys
+from .action_content import restore_content
 
 # Kinds of datablock that the work may create; shape keys go with their mesh.
 _KINDS = (
@@ -113,7 +114,7 @@ class _SavedTransform:
 
 
 class _SavedAnimation:
-    """The action assigned to an object, and a copy of it in case the block changes the action itself."""
+    """The action assigned to an object, and a copy of its content in case the block changes the action itself."""
 
     def __init__(self, obj: bpy.types.Object) -> None:
         self._obj, data = obj, obj.animation_data
@@ -133,13 +134,8 @@ class _SavedAnimation:
         if action is None or copy is None:
             data.action = None
             return
-        if _same_keys(action, copy):
-            bpy.data.actions.remove(copy)
-        else:
-            name = action.name
-            action.user_remap(copy)
-            bpy.data.actions.remove(action)
-            copy.name, action = name, copy
+        restore_content(action, copy)
+        bpy.data.actions.remove(copy)
         if data.action != action:
             data.action = action
         if self._slot is not None:
@@ -156,13 +152,3 @@ def _restorable(owner: bpy.types.bpy_struct) -> dict[str, bool | int | float | s
     """Return the custom properties that are single values or datablocks."""
     kinds = (bool, int, float, str, bpy.types.ID)
     return {name: owner[name] for name in owner.keys() if isinstance(owner[name], kinds)}
-
-
-def _same_keys(a: bpy.types.Action, b: bpy.types.Action) -> bool:
-    """Return whether two actions have the same keys for the same properties."""
-    one, other = fcurves_of(a), fcurves_of(b)
-    return len(one) == len(other) and all(
-        (p.data_path, p.array_index, len(p.modifiers)) == (q.data_path, q.array_index, len(q.modifiers))
-        and np.array_equal(read_keys(p), read_keys(q))
-        for p, q in zip(one, other, strict=True)
-    )

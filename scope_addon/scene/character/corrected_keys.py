@@ -14,32 +14,64 @@ from numpy.typing import NDArray
 
 from ....solver.body import Body
 from ...edit.clip import Clip, sample
-from ...edit.pins.corrected_motion import shot_of
+from ...edit.pins.corrected_motion import shot_of, uncorrected
 from ...edit.pins.corrections import Pin
 from ...edit.pins.solve_pins import missed, resolve
 from ...edit.smooth import smoothed
 from ...errors import UsageError
 from ...motion import Motion
-from .keys import read_clip, write_keys
+from .keys import channel_curves, read_clip, write_keys
 from .root_object import clip_with_root_motion
+from .uncorrected_keys import UncorrectedKeys, changed_rows, differ, keyed_values, restore
 
+_SAME_FRAME = 2e-3
 _SAME_S = 1e-4  # keys' frames are single precision
 _MISSED_PX, _MISSED_M = 1.0, 0.005
 
 
-def rewrite_changed_keys(armature: bpy.types.Object, body: Body, rate: float, before: Motion, after: Motion) -> None:
+def rewrite_changed_keys(
+    armature: bpy.types.Object,
+    body: Body,
+    rate: float,
+    motions: tuple[Motion, Motion],
+    stored: object = None,
+    pin: Pin | None = None,
+) -> UncorrectedKeys:
     """Change the keys from one motion to another, which differs from it in its corrections.
 
+    Rows of keys that corrections have changed before, and nothing else since, begin again with the keys from before.
+
     :param rate: scene frames per second.
+    :param motions: before and after.
+    :param stored: bytes of the ``UncorrectedKeys`` of the last change.
+    :param pin: a new one, which is met even if edited keys differ from the motion.
+    :return: the keys that are now different from those without corrections.
     :raises UsageError: when a bone or its keys are missing.
     """
+    start, (before, after) = float(armature.get("scope_start", 0.0)), motions
+    known = UncorrectedKeys.from_bytes(stored, len(channel_curves(armature, body)))
+    restored = restore(armature, body, start, rate, known)
     clip, frames = read_clip(armature, body, rate)
     strength = float(armature.get("scope_smoothing", 1.0))
-    old, new = (_at(smoothed(body, m, strength), clip.times, _start(armature, rate)) for m in (before, after))
+    free, old, new = (
+        _at(smoothed(body, m, strength), clip.times, _start(armature, rate))
+        for m in (uncorrected(before), before, after)
+    )
+    exact = ~differ(free, old)
+    for row in restored:
+        exact |= np.abs(frames - (start + known.times[row] * rate)) < _SAME_FRAME
+    old.rotations[exact], old.root[exact] = free.rotations[exact], free.root[exact]
+    rows = frames.astype(np.float32)
+    values = keyed_values(armature, body, rows)
     _write_change(armature, body, clip, frames, (old, new))
+    if pin is not None:
+        _meet_pin(armature, body, rate, after, pin)
+    after_values = keyed_values(armature, body, rows)
+    same = (values == after_values) | (np.isnan(values) & np.isnan(after_values))
+    return changed_rows(rows, exact & (differ(free, new) | ~same.all(axis=1)), (values, after_values), start, rate)
 
 
-def meet_pin(armature: bpy.types.Object, body: Body, rate: float, motion: Motion, pin: Pin) -> None:
+def _meet_pin(armature: bpy.types.Object, body: Body, rate: float, motion: Motion, pin: Pin) -> None:
     """Correct the keys by one more pin, if edited keys do not meet it although the motion does.
 
     :param rate: scene frames per second.
@@ -95,7 +127,7 @@ def _write_change(
 ) -> None:
     """Apply the change between two clips to the keys at which they differ."""
     old, new = change
-    which = (old.rotations != new.rotations).any((1, 2, 3)) | (old.root != new.root).any(1)
+    which = differ(old, new)
     rotations, root = clip.rotations.copy(), clip.root.copy()
     inverse = np.swapaxes(old.rotations[which], -1, -2)
     shift = (inverse[:, 0] @ (new.root - old.root)[which, :, None])[..., 0]

@@ -160,6 +160,14 @@ def reduce_keys(
     return Reduction(before, after, float(off.max()), float(moved.max()))
 
 
+def channel_curves(armature: bpy.types.Object, body: Body) -> list[bpy.types.FCurve]:
+    """Return the curves of all bones' rotations and of the root's location, always in the same order.
+
+    :raises UsageError: when a bone or its keys are missing.
+    """
+    return [curve for bone in _curves(armature, body).values() for curve in bone]
+
+
 def location_path(body: Body) -> str:
     """Return the data path of the root's location."""
     return bone_path(body.joint_names[0], LOCATION)

@@ -18,6 +18,7 @@ from ...edit.clip import Clip
 from ...edit.root_motion import floor_trajectory, relative_to_trajectory, with_trajectory
 from ...errors import UsageError
 from ..animation_data.actions import Channels, fcurves, read_keys
+from ..animation_data.retime import Retiming
 from .keys import read_clip, write_clip
 
 ROOT_TAG = "scope_root"  # custom property of the empty
@@ -180,6 +181,14 @@ def removed_root_motion(
     x, y, angle = (np.interp(frames, rows[:, 0], rows[:, k]) for k in (1, 2, 3))
     positions = np.stack([x, y, np.full(len(x), empty.location.z)], axis=1)
     return positions / armature.matrix_basis.median_scale, angle
+
+
+def retime_unused_trajectory(empty: bpy.types.Object, retiming: Retiming) -> None:
+    """Move a trajectory in time that is stored but not in use."""
+    if _UNUSED_TRAJECTORY in empty:
+        rows = np.array(list(empty[_UNUSED_TRAJECTORY])).reshape(-1, 4)
+        rows[:, 0] = retiming.frames(rows[:, 0])
+        empty[_UNUSED_TRAJECTORY] = rows.ravel().tolist()
 
 
 def clip_as_displayed(armature: bpy.types.Object, clip: Clip, frames: NDArray[np.float64]) -> Clip:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from ....solver.rotations import quaternion_from_matrix
 from ...retarget.skeleton import Skeleton
 from ..animation_data.actions import Channels, bone_path, fcurves_of, read_keys
+from ..animation_data.retime import Retiming, retime_keys
 from ..character.animation import on_one_hemisphere
 
 _CHECKSUM = "scope_keys"  # custom property of an action: the checksum of its keys when they were written
@@ -88,6 +89,19 @@ def retire(former: bpy.types.Action | None) -> None:
         bpy.data.actions.remove(former)
     else:
         former.use_fake_user = True
+
+
+def retime_written_keys(action: bpy.types.Action, retiming: Retiming) -> None:
+    """Move the keys of a retargeted action; it counts as edited only if it was."""
+    unedited = action.get(_CHECKSUM) == _checksum(action)
+    retime_keys(action, retiming)
+    if unedited:
+        action[_CHECKSUM] = _checksum(action)
+
+
+def is_retargeted(action: bpy.types.Action) -> bool:
+    """Return whether retargeting has written the action."""
+    return _CHECKSUM in action
 
 
 def _checksum(action: bpy.types.Action) -> str:

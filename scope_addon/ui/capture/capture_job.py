@@ -28,6 +28,7 @@ from ...scene.packed_motion import pack_motion
 from ..declared_properties import option_values
 from ..preferences import cache, preferences
 from . import preview_picture
+from .frame_rate_operators import RATE_WARNING
 from .result import show_result
 
 
@@ -130,8 +131,8 @@ class CaptureJob:
         footage_rate = float(motions[0].mocap_framerate)
         if self._options.frame_rate == "keep" and abs(footage_rate - result.frame_rate) > 0.01:
             warnings.append(
-                f"the scene keeps its {result.frame_rate:.5g} frames/s, the footage has {footage_rate:.5g}: keys lie "
-                "between frames; to change the scene's rate, capture with Frame Rate: Set from Footage"
+                f"{RATE_WARNING} {result.frame_rate:.5g} frames/s, the footage has {footage_rate:.5g}: keys lie "
+                "between frames; Set Frame Rate from Footage changes the scene's rate and moves them"
             )
         report = dict(captured.report, warnings=[shown(warning) for warning in warnings + result.warnings])
         show_result(result.collection.scope_result, self._request.footage, report, result)

@@ -19,6 +19,7 @@ from ..view.comparison import camera_of, is_looking_through, side_area
 from . import preview_picture
 from .capture_operators import state
 from .captures import draw_captures, people_of, people_text, shown_capture
+from .frame_rate_operators import differs
 
 _PIXELS_PER_CHARACTER = 7.0
 
@@ -163,12 +164,15 @@ class SCOPE_PT_result(Tab, bpy.types.Panel):
             row.operator("scope.footage_to_sequencer", text="", icon="SEQUENCE")
             for background in camera.data.background_images[:1] if back else ():
                 layout.prop(background, "alpha", text="Footage Opacity", slider=True)
+        if differs(context.scene):
+            layout.operator("scope.match_frame_rate", icon="TIME")
         row = layout.row(align=True)
         row.label(text="", icon="EXPORT")
         for key, label, _, _ in FORMATS:
             cell = row.column()
             cell.enabled = is_available(key)
             cell.operator("scope.export", text=label).format = key
+        layout.operator("scope.mark_asset", icon="ASSET_MANAGER")
 
 
 class SCOPE_PT_warnings(Tab, bpy.types.Panel):

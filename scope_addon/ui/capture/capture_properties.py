@@ -41,6 +41,7 @@ class SCOPE_PG_result(bpy.types.PropertyGroup):
     valid_frames: IntProperty()
     reprojection_px: FloatProperty()
     frames_per_second: FloatProperty()
+    footage_rate: FloatProperty()  # frames per second of the footage; 0 for a picture
     camera: StringProperty()
     execution: StringProperty()
     resolution: IntVectorProperty(size=2)

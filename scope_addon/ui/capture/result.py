@@ -31,9 +31,10 @@ def show_result(shown: bpy.types.PropertyGroup, footage: str, report: dict[str, 
     residuals = np.concatenate([p.motion.residual_px[p.motion.valid] for p in result.people])
     shown.reprojection_px = float(residuals.mean()) if residuals.size else 0.0
     shown.frames_per_second = float(report.get("fps", {}).get("total", 0.0))
+    first = result.people[0].motion
+    shown.footage_rate = first.mocap_framerate if len(first) > 1 else 0.0
     shown.camera = str(report.get("camera", ""))
     shown.execution = str(report.get("execution", ""))
-    first = result.people[0].motion
     shown.resolution = [int(n) for n in first.image_size]
     shown.pixel_aspect = pixel_aspect(first)
     shown.warnings.clear()

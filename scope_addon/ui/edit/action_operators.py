@@ -16,7 +16,7 @@ def animated_armature(context: bpy.types.Context) -> bpy.types.Object | None:
     return active if active is not None and active.get(PERSON) else captured_armature(context)
 
 
-class _ActionOperator(ReportingOperator):
+class ActionOperator(ReportingOperator):
     """An operator on the action of an armature with captured motion. Not registered."""
 
     @classmethod
@@ -37,7 +37,7 @@ class _ActionOperator(ReportingOperator):
         return True
 
 
-class SCOPE_OT_push_to_nla(_ActionOperator):
+class SCOPE_OT_push_to_nla(ActionOperator):
     """Move the motion to a new track of the Nonlinear Animation editor, where takes are mixed and repeated"""
 
     bl_idname = "scope.push_to_nla"

@@ -13,7 +13,7 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty
 
 from .. import compiled_solver
-from ..captured_person import betas_of, motion_of
+from ..captured_person import betas_of, motion_of, set_motion_of
 from .edit_base import EditOperator, SpanOperator, edit_clip
 
 if TYPE_CHECKING:
@@ -41,18 +41,27 @@ class SCOPE_OT_smooth(EditOperator):
 
     def edit(self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float) -> str:
         """Replace the keys by those of the captured motion, smoothed."""
+        from ...edit.pins.corrected_motion import uncorrected
         from ...edit.smooth import smoothed
         from ...scene.animation_data.actions import remove_cycles
-        from ...scene.animation_data.timing import key_frames, restore_scene_range
+        from ...scene.animation_data.timing import key_frames, restore_scene_range, store_rate
         from ...scene.character.keys import bake_whole_frames, write_clip
         from ...scene.character.root_object import remove_root_object
+        from ...scene.character.uncorrected_keys import write_both
 
         motion = motion_of(armature)
         if motion.corrections:  # which are solved again
             compiled_solver.load()
+        frames = key_frames(motion.timestamps, rate, float(armature.get("scope_start", 0.0)))
         clip = smoothed(body, motion, self.strength)
-        write_clip(armature, body, clip, key_frames(motion.timestamps, rate, float(armature.get("scope_start", 0.0))))
+        if motion.corrections:
+            clips = smoothed(body, uncorrected(motion), self.strength), clip
+            keys = write_both(armature, body, clips, frames, rate)
+            set_motion_of(armature, motion, keys.to_bytes())
+        else:
+            write_clip(armature, body, clip, frames)
         armature["scope_smoothing"] = self.strength
+        store_rate(armature, rate)
         remove_cycles(armature)  # a loop becomes the whole motion again
         if armature.get("scope_resampled"):
             bake_whole_frames(armature, body, rate)

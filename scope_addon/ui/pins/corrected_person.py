@@ -24,22 +24,25 @@ def change_corrections(
     body: Body,
     rate: float,
     change: Callable[[tuple[Correction, ...]], tuple[Correction, ...]],
+    pin: Pin | None = None,
 ) -> Motion:
     """Change the corrections of a captured person: of the motion, the keys and the list.
 
     :param rate: scene frames per second.
     :param change: returns the new corrections for the present ones.
+    :param pin: the one that this adds, which is met even if edited keys differ from the motion.
     :return: the corrected motion.
     :raises UsageError: the motion is no longer there, or keys are missing.
     """
     from ...edit.pins.corrected_motion import corrections_of, with_corrections
     from ...scene.character.corrected_keys import rewrite_changed_keys
+    from ...scene.packed_motion import stored_keys
 
     compiled_solver.load()
     before = motion_of(armature)
     after = with_corrections(before, body, change(corrections_of(before)))
-    rewrite_changed_keys(armature, body, rate, before, after)
-    set_motion_of(armature, after)
+    keys = rewrite_changed_keys(armature, body, rate, (before, after), stored_keys(armature), pin)
+    set_motion_of(armature, after, keys.to_bytes() if len(keys.times) else b"")
     store_corrections(armature, after, rate)
     return after
 

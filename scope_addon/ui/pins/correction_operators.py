@@ -50,7 +50,6 @@ class SCOPE_OT_add_pin(EditOperator):
     def edit(self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float) -> str:
         """Add the pin and change the keys around it."""
         from ...edit.pins.corrections import added
-        from ...scene.character.corrected_keys import meet_pin
 
         scene = context.scene
         current = scene.frame_current, scene.frame_subframe
@@ -59,8 +58,7 @@ class SCOPE_OT_add_pin(EditOperator):
         try:
             place = tuple(self.location), self.in_image, self.reach
             pin = pin_at(context, armature, motion_of(armature), self.joint, place)
-            motion = change_corrections(armature, body, rate, lambda present: added(present, pin))
-            meet_pin(armature, body, rate, motion, pin)
+            change_corrections(armature, body, rate, lambda present: added(present, pin), pin)
         finally:
             scene.frame_set(current[0], subframe=current[1])
         return ""

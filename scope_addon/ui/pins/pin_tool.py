@@ -17,7 +17,7 @@ from ..captured_person import captured_armature
 from ..edit.edit_base import may_edit
 from ..reporting import iface_
 from ..view.comparison import camera_of
-from .drawing import draw_disc, draw_line
+from .drawing import draw_disc, draw_line, redraw_viewport, viewport_of
 
 _SIDED = ("shoulder", "elbow", "wrist", "hip", "knee", "ankle", "foot")
 HANDLES = ("head", "pelvis", *(f"{side}_{name}" for side in ("left", "right") for name in _SIDED))
@@ -56,7 +56,6 @@ class SCOPE_OT_pin_limb(bpy.types.Operator):
         armature = captured_armature(context)
         assert armature is not None  # checked by poll
         self._session = _Session(armature.name, context.area.as_pointer())
-        self._area = context.area
         draw = bpy.types.SpaceView3D.draw_handler_add
         self._handler = draw(_draw, (self._session,), "WINDOW", "POST_PIXEL")
         context.workspace.status_text_set(iface_(_HELP))
@@ -66,59 +65,58 @@ class SCOPE_OT_pin_limb(bpy.types.Operator):
 
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         """Follow the mouse."""
-        session, region = self._session, _main_region(self._area)
-        if region is None or session.armature not in bpy.data.objects:
+        session, viewport = self._session, viewport_of(context, self._session.area)
+        if viewport is None or session.armature not in bpy.data.objects:
             self.cancel(context)
             return {"CANCELLED"}
+        area, region = viewport
         session.mouse = (event.mouse_x - region.x, event.mouse_y - region.y)
         inside = 0 <= session.mouse[0] < region.width and 0 <= session.mouse[1] < region.height
         if event.type == "MOUSEMOVE":
             if not session.dragged:
-                session.hovered = _nearest(session, self._area, region) if inside else ""
-            self._area.tag_redraw()
+                session.hovered = _nearest(session, area, region) if inside else ""
+            area.tag_redraw()
             return {"RUNNING_MODAL"} if session.dragged else {"PASS_THROUGH"}
         busy = bool(session.dragged)
         if event.type == "LEFTMOUSE" and event.value == "PRESS" and inside:
-            session.hovered = _nearest(session, self._area, region)
+            session.hovered = _nearest(session, area, region)
             session.dragged, session.start = session.hovered, session.mouse
             busy = bool(session.dragged)
         elif event.type == "LEFTMOUSE" and event.value == "RELEASE" and busy:
-            self._drop(context, region)
+            self._drop(context, area, region)
         elif event.type in ("ESC", "RIGHTMOUSE", "RET", "NUMPAD_ENTER") and event.value == "PRESS":
             if not busy:
                 self.cancel(context)
                 return {"FINISHED"}
             session.dragged = ""
-            self._area.tag_redraw()
+            area.tag_redraw()
         return {"RUNNING_MODAL"} if busy else {"PASS_THROUGH"}
 
     def cancel(self, context: bpy.types.Context) -> None:
         """Remove the handles."""
         bpy.types.SpaceView3D.draw_handler_remove(self._handler, "WINDOW")
         context.workspace.status_text_set(None)
-        self._area.tag_redraw()
+        redraw_viewport(context, self._session.area)
 
-    def _drop(self, context: bpy.types.Context, region: bpy.types.Region) -> None:
+    def _drop(self, context: bpy.types.Context, area: bpy.types.Area, region: bpy.types.Region) -> None:
         """Pin the dragged joint under the mouse, which is a step to undo of its own."""
         session = self._session
         joint, session.dragged, session.hovered = session.dragged, "", ""
-        self._area.tag_redraw()
+        area.tag_redraw()
         if math.dist(session.mouse, session.start) < _MOVED:
             return
-        view = self._area.spaces.active.region_3d
-        was = _joint_positions(session)[joint]
-        offset = Vector(session.mouse) - Vector(session.start)
-        screen = location_3d_to_region_2d(region, view, was) + offset
+        view = area.spaces.active.region_3d
+        was = _joint_positions(session).get(joint)
+        at = location_3d_to_region_2d(region, view, was) if was is not None else None
+        if at is None:  # the bone was removed or renamed meanwhile, or is behind the viewer
+            return
+        screen = at + Vector(session.mouse) - Vector(session.start)
         location = region_2d_to_location_3d(region, view, screen, was)
         in_image = view.view_perspective == "CAMERA" and context.scene.camera == camera_of(context.scene)
         try:
             bpy.ops.scope.add_pin("EXEC_DEFAULT", True, joint=joint, location=location, in_image=in_image)
         except RuntimeError as error:
             self.report({"ERROR"}, str(error).removeprefix("Error: ").strip())
-
-
-def _main_region(area: bpy.types.Area) -> bpy.types.Region | None:
-    return next((region for region in area.regions if region.type == "WINDOW"), None)
 
 
 def _joint_positions(session: _Session) -> dict[str, Vector]:

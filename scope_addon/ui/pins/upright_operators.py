@@ -11,9 +11,9 @@ from bpy_extras.view3d_utils import region_2d_to_origin_3d, region_2d_to_vector_
 
 from ..captured_person import body_of, captured_armature, motion_of, set_motion_of
 from ..edit.edit_base import EditOperator, may_edit
-from ..reporting import iface_, tip_
+from ..reporting import iface_, sentence, tip_
 from ..view.comparison import camera_of
-from .drawing import draw_line
+from .drawing import draw_line, redraw_viewport, viewport_of
 
 if TYPE_CHECKING:
     from ....solver.body import Body
@@ -74,10 +74,10 @@ class SCOPE_OT_upright_line(bpy.types.Operator):
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         """Wait for the line."""
-        self._area = context.area
+        self._area = context.area.as_pointer()
         self._line: list[tuple[float, float]] = []
         draw = bpy.types.SpaceView3D.draw_handler_add
-        self._handler = draw(_draw, (self._line, context.area.as_pointer()), "WINDOW", "POST_PIXEL")
+        self._handler = draw(_draw, (self._line, self._area), "WINDOW", "POST_PIXEL")
         context.workspace.status_text_set(iface_(_HELP))
         context.window.cursor_modal_set("CROSSHAIR")
         context.window_manager.modal_handler_add(self)
@@ -85,7 +85,11 @@ class SCOPE_OT_upright_line(bpy.types.Operator):
 
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         """Follow the mouse."""
-        region = next(region for region in self._area.regions if region.type == "WINDOW")
+        viewport = viewport_of(context, self._area)
+        if viewport is None:
+            self.cancel(context)
+            return {"CANCELLED"}
+        area, region = viewport
         mouse = (event.mouse_x - region.x, event.mouse_y - region.y)
         if event.type in ("ESC", "RIGHTMOUSE") and event.value == "PRESS":
             self.cancel(context)
@@ -94,10 +98,10 @@ class SCOPE_OT_upright_line(bpy.types.Operator):
             self._line[:] = [mouse, mouse]
         elif event.type == "MOUSEMOVE" and self._line:
             self._line[1] = mouse
-            self._area.tag_redraw()
+            area.tag_redraw()
         elif event.type == "LEFTMOUSE" and event.value == "RELEASE" and self._line:
             self.cancel(context)
-            self._finish(context, region)
+            self._finish(context, area, region)
             return {"FINISHED"}
         return {"RUNNING_MODAL"}
 
@@ -106,32 +110,39 @@ class SCOPE_OT_upright_line(bpy.types.Operator):
         bpy.types.SpaceView3D.draw_handler_remove(self._handler, "WINDOW")
         context.workspace.status_text_set(None)
         context.window.cursor_modal_restore()
-        self._area.tag_redraw()
+        redraw_viewport(context, self._area)
 
-    def _finish(self, context: bpy.types.Context, region: bpy.types.Region) -> None:
+    def _finish(self, context: bpy.types.Context, area: bpy.types.Area, region: bpy.types.Region) -> None:
         """Set what is upright, which is a step to undo of its own."""
-        view = self._area.spaces.active.region_3d
+        from ....solver.errors import ScopeError
+
+        view = area.spaces.active.region_3d
         rays = [
             region_2d_to_origin_3d(region, view, at) + 3.0 * region_2d_to_vector_3d(region, view, at)
             for at in self._line
         ]
-        start, end = _pixels(context, rays)
         try:
+            start, end = _pixels(context, rays)
             bpy.ops.scope.set_upright("EXEC_DEFAULT", True, start=start, end=end)
-        except RuntimeError as error:
-            self.report({"ERROR"}, str(error).removeprefix("Error: ").strip())
+        except (RuntimeError, ScopeError) as error:
+            self.report({"ERROR"}, sentence(str(error).removeprefix("Error: ")))
 
 
 def _pixels(context: bpy.types.Context, points: list[object]) -> list[tuple[float, float]]:
-    """Return the pixels of the footage at which points of the scene are."""
+    """Return the pixels of the footage at which points of the scene are.
+
+    :raises UsageError: the person was removed, or their motion does not contain the current frame.
+    """
     import numpy as np
 
     from ...edit.pins.corrected_motion import shot_of
+    from ...errors import UsageError
     from ...scene.animation_data.timing import scene_rate
     from ...scene.character.corrected_keys import captured_points, source_frame
 
     armature, scene = captured_armature(context), context.scene
-    assert armature is not None  # checked by poll
+    if armature is None:  # since the line was begun
+        raise UsageError("the captured person was removed; select another one")
     motion, current = motion_of(armature), scene.frame_current + scene.frame_subframe
     frame = source_frame(armature, motion, current, scene_rate(scene))
     at = captured_points(armature, current, np.array(points, float))

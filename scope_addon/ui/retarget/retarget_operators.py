@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import bpy
-from bpy.props import EnumProperty, StringProperty
+from bpy.props import BoolProperty, EnumProperty, StringProperty
 
 from ..captured_person import PERSON, betas_of, body_of, captured_armature, captured_people
 from ..reporting import ReportingOperator, rpt_, sentence, tip_
@@ -136,13 +136,27 @@ class SCOPE_OT_save_bone_map(_BoneMapFileOperator):
     bl_label = "Save Bone Map"
 
     filepath: StringProperty(subtype="FILE_PATH", default="bones.json")
+    check_existing: BoolProperty(default=True, options={"HIDDEN"})  # the file browser asks before it overwrites
+
+    def check(self, context: bpy.types.Context) -> bool:
+        """Add the suffix while the name is typed, so that the file browser sees which file would be overwritten."""
+        path: str = bpy.path.ensure_ext(self.filepath, ".json")
+        changed, self.filepath = path != self.filepath, path
+        return bool(changed)
 
     def work(self, context: bpy.types.Context) -> str:
-        """Write the file."""
+        """Write the file.
+
+        :raises UsageError: the file has no name.
+        """
+        from ...errors import UsageError
         from ...retarget.bone_map import save_bone_map
 
-        save_bone_map(listed_map(context.scene.scope_retarget), bpy.path.abspath(self.filepath))
-        return rpt_("Saved {file}", file=self.filepath)
+        if not bpy.path.basename(self.filepath).removesuffix(".json"):
+            raise UsageError("the file has no name; enter one")
+        path = bpy.path.ensure_ext(bpy.path.abspath(self.filepath), ".json")
+        save_bone_map(listed_map(context.scene.scope_retarget), path)
+        return rpt_("Saved {file}", file=path)
 
 
 class SCOPE_OT_load_bone_map(_BoneMapFileOperator):

@@ -3,9 +3,11 @@
 
 import json
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
+from scope.scope_addon.capture.camera.calibration import read_calibration
 from scope.scope_addon.capture.camera.intrinsics import choose_camera
 from scope.solver.errors import InputError
 
@@ -153,3 +155,13 @@ def test_a_missing_file_is_refused(path, tmp_path):
     for missing in (path, tmp_path):
         with pytest.raises(InputError, match="cannot read the calibration"):
             choose_camera(640, 480, calibration=missing)
+
+
+@pytest.mark.parametrize("large", [False, True])
+def test_a_device_and_a_large_file_are_refused_unread(tmp_path, large):
+    path = tmp_path / "calibration.json" if large else Path("/dev/zero")
+    if large:
+        with path.open("wb") as file:
+            file.truncate(2 << 20)
+    with pytest.raises(InputError, match="too large for a calibration" if large else "is a pipe or a device"):
+        read_calibration(path)

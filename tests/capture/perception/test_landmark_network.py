@@ -14,7 +14,9 @@ from scope.scope_addon.capture.perception.person_detector import PersonDetector
 from scope.scope_addon.capture.perception.region import Region
 from scope.scope_addon.capture.perception.sessions import landmark_network_name
 from scope.scope_addon.errors import UsageError
+from scope.solver.loaders.body_file import ASSETS
 
+SAMPLE = ASSETS / "sample"
 TRUTH_NAMES = {
     "LShoulder": "left_shoulder", "RShoulder": "right_shoulder", "LElbow": "left_elbow", "RElbow": "right_elbow",
     "LWrist": "left_wrist", "RWrist": "right_wrist", "LHip": "left_hip", "RHip": "right_hip", "LKnee": "left_knee",
@@ -115,3 +117,22 @@ def test_batch_equals_one_by_one_and_follows_the_rotation(
 def test_unknown_quality_lists_the_presets() -> None:
     with pytest.raises(UsageError, match="fast, balanced, best"):
         landmark_network_name("superb")
+
+
+def test_mask_covers_the_person_alone(network: LandmarkNetwork) -> None:
+    """The true body of the sample clip's first frame, drawn into the region, covers what the network calls a person."""
+    cv2 = pytest.importorskip("cv2")
+    with np.load(SAMPLE / "sample_truth.npz") as truth:
+        joints, K = truth["joints_cam"][0], truth["intrinsics"]
+    _, image = cv2.VideoCapture(str(SAMPLE / "sample.mp4")).read()
+    pixels = (joints @ K.T)[:, :2] / (joints @ K.T)[:, 2:]
+    low, high = pixels.min(axis=0), pixels.max(axis=0)
+    center, height = (low + high) / 2, float((high - low)[1])
+    region = Region((float(center[0]), float(center[1])), 1.6 * height, 0.0)
+    mask = network.mask(np.ascontiguousarray(image[:, :, ::-1]), region)
+    assert mask.shape == (256, 256)
+    at = np.rint(region.crop_from_image(pixels) * 256 - 0.5).astype(int)
+    assert mask[at[:, 1], at[:, 0]].mean() > 0.9
+    assert mask[:, :20].mean() < 0.05
+    assert mask[:, -20:].mean() < 0.05
+    assert 0.05 < (mask > 0.5).mean() < 0.4

@@ -76,3 +76,16 @@ def test_frame_range_spans_all_datablocks(cube):
     actions.Channels(cube, action).write("location", np.array([3.0, 8.5]), np.zeros((2, 3)))
     assert actions.frame_range([cube]) == (3.0, 8.5)
     assert actions.frame_range([cube.data.shape_keys]) is None
+
+
+def test_cycles_come_before_the_users_own_modifiers_and_keep_them(cube):
+    actions.Channels(cube, bpy.data.actions.new("a")).write("location", np.arange(3.0), np.zeros((3, 3)))
+    noise = actions.fcurves(cube)[1].modifiers.new("NOISE")
+    noise.strength, noise.phase = 0.25, 3.5
+    for _ in range(2):
+        actions.add_cycles(cube, {("location", 0)})
+        first, second, third = actions.fcurves(cube)
+        assert [m.mode_after for m in first.modifiers] == ["REPEAT_OFFSET"]
+        assert [m.type for m in second.modifiers] == ["CYCLES", "NOISE"]
+        assert (second.modifiers[1].strength, second.modifiers[1].phase) == (0.25, 3.5)
+        assert [m.mode_before for m in third.modifiers] == ["REPEAT"]

@@ -23,6 +23,8 @@ def everything(person):
     return {
         "curves": sorted(curves),
         "action": (action.name, action.use_fake_user, keys.animation_data.action.name),
+        # Not only of the same name: undo crashes on a datablock that no step contains.
+        "identities": {b.session_uid for kind in kinds for b in getattr(bpy.data, kind)},
         "place": (rig.parent, np.array(rig.matrix_basis).tobytes(), np.array(rig.matrix_parent_inverse).tobytes()),
         "properties": ({k: str(rig[k]) for k in rig.keys()}, dict(rig.pose.bones[3].items())),
         "blocks": {kind: sorted(block.name for block in getattr(bpy.data, kind)) for kind in kinds},

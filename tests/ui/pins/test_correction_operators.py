@@ -86,6 +86,95 @@ def test_removing_pins_restores_the_motion_in_any_order(rig):
     np.testing.assert_allclose(seen(rig, frames), before, atol=1e-5)
 
 
+CORRECTIONS = {
+    "pin": lambda wrist: bpy.ops.scope.add_pin(joint="left_wrist", frame=FRAME, location=wrist + [0.1, 0.05, 0.15]),
+    "foot": lambda _: bpy.ops.scope.foot_stands(start=FRAME - 4, end=FRAME + 4, foot="right"),
+    "sides": lambda _: bpy.ops.scope.exchange_sides(start=FRAME - 8, end=FRAME + 2),
+}
+EDITS = {
+    "captured": lambda: None,
+    "reduced": lambda: bpy.ops.scope.reduce_keys(degrees=2.0),
+    "bridged": lambda: bpy.ops.scope.interpolate_span(start=FRAME - 5, end=FRAME + 5),
+    "smoothed": lambda: bpy.ops.scope.smooth(strength=2.5),
+    "on an object": lambda: bpy.ops.scope.root_motion(mode="OBJECT"),
+}
+
+
+def assert_same_keys(found, expected):
+    assert found.keys() == expected.keys()
+    for curve, values in expected.items():
+        np.testing.assert_array_equal(found[curve], values, err_msg=str(curve))
+
+
+@pytest.mark.parametrize("edit", EDITS)
+@pytest.mark.parametrize("order", [("pin",), ("foot",), ("sides",), ("pin", "sides", "foot")], ids="-".join)
+def test_without_corrections_keys_and_motion_are_again_the_same_to_the_bit(rig, order, edit):
+    EDITS[edit]()
+    before, motion = keys(rig), stored_motion_of(rig)
+    wrist = seen(rig)[0, WRIST]
+    for name in order:
+        CORRECTIONS[name](wrist)
+    assert any(not np.array_equal(now, before[curve]) for curve, now in keys(rig).items())
+    while listed_corrections(rig):
+        bpy.ops.scope.remove_correction(index=len(listed_corrections(rig)) // 2)
+    assert_same_keys(keys(rig), before)
+    again = stored_motion_of(rig)
+    for name in ("poses", "trans", "poses_raw", "trans_raw", "joints_cam", "world_from_camera"):
+        np.testing.assert_array_equal(getattr(again, name), getattr(motion, name))
+    assert again.corrections == {}
+
+
+def test_removing_one_of_several_leaves_what_the_others_alone_give(rig):
+    wrist = seen(rig)[0, WRIST]
+    CORRECTIONS["foot"](wrist)
+    alone = keys(rig)
+    CORRECTIONS["pin"](wrist)
+    bpy.ops.scope.remove_correction(index=0)
+    assert [e["kind"] for e in listed_corrections(rig)] == ["CONTACT"]
+    assert_same_keys(keys(rig), alone)
+
+
+def test_after_another_smoothing_the_last_removal_gives_that_smoothing_to_the_bit(rig):
+    bpy.ops.scope.smooth(strength=2.5)
+    expected = keys(rig)
+    bpy.ops.scope.smooth(strength=1.0)
+    CORRECTIONS["pin"](seen(rig)[0, WRIST])
+    bpy.ops.scope.smooth(strength=2.5)
+    bpy.ops.scope.remove_correction(index=0)
+    assert_same_keys(keys(rig), expected)
+
+
+def test_keys_that_were_edited_after_a_correction_keep_the_edit_when_it_is_removed(rig):
+    before = keys(rig)
+    CORRECTIONS["pin"](seen(rig)[0, WRIST])
+    curve = next(c for c in fcurves(rig) if c.data_path == 'pose.bones["pelvis"].location')
+    curve.keyframe_points[FRAME - 1].co.y += 0.5
+    bpy.ops.scope.remove_correction(index=0)
+    now = keys(rig)
+    for name, values in before.items():
+        assert now[name].shape == values.shape
+        shift = np.where(now[name][:, 0] == FRAME, 0.5, 0.0) * (name == (curve.data_path, curve.array_index))
+        np.testing.assert_allclose(now[name][:, 1], values[:, 1] + shift, atol=1e-5)
+
+
+def test_removal_is_exact_at_another_frame_rate_too(rig):
+    bpy.context.scene.render.fps = 24
+    bpy.ops.scope.smooth(strength=1.0)  # keys between frames
+    before = keys(rig)
+    CORRECTIONS["pin"](seen(rig)[0, WRIST])
+    bpy.ops.scope.remove_correction(index=0)
+    assert_same_keys(keys(rig), before)
+
+
+def test_a_damaged_record_of_earlier_keys_is_left_out(rig):
+    before = keys(rig)
+    CORRECTIONS["pin"](seen(rig)[0, WRIST])
+    rig["scope_motion"]["uncorrected_keys"] = b"PK\x03\x04 damaged"
+    bpy.ops.scope.remove_correction(index=0)
+    for curve, values in keys(rig).items():
+        np.testing.assert_allclose(values, before[curve], atol=1e-5)
+
+
 def test_the_list_is_in_the_order_that_numbers_refer_to(rig):
     target = seen(rig)[0, WRIST] + [0.1, 0.05, 0.15]
     bpy.ops.scope.foot_stands(start=60, end=63, foot="right")

@@ -39,6 +39,28 @@ def test_guess_keep_and_retarget(rig, tmp_path):
     assert np.ptp(seen(rig, ["pelvis"])[:, 0, 1]) > 1.0  # it walks
 
 
+def test_saving_a_bone_map_overwrites_bone_maps_only(rig, tmp_path):
+    bpy.ops.scope.guess_bones()
+    saved, other, empty = (tmp_path / name for name in ("bones.json", "package.json", "empty.json"))
+    bpy.ops.scope.save_bone_map(filepath=str(saved.with_suffix("")))  # the suffix is added
+    text = saved.read_text()
+    other.write_text(before := '{"name": "a game", "bones": {}}')
+    empty.touch()
+    with pytest.raises(RuntimeError, match=r"package\.json is not a bone map, so it is not overwritten"):
+        bpy.ops.scope.save_bone_map(filepath=str(other))
+    (tmp_path / "notes.json").write_bytes(b"\xff\xfe not JSON")
+    with pytest.raises(RuntimeError, match="not a bone map"):
+        bpy.ops.scope.save_bone_map(filepath=str(tmp_path / "notes"))
+    assert other.read_text() == before
+    bpy.context.scene.scope_retarget.pairs.remove(0)
+    for path in (saved, empty):
+        bpy.ops.scope.save_bone_map(filepath=str(path))
+        assert 0 < len(path.read_text()) < len(text)
+    assert bpy.ops.scope.save_bone_map.get_rna_type().properties["check_existing"].default is True
+    with pytest.raises(RuntimeError, match="no name"):
+        bpy.ops.scope.save_bone_map(filepath=f"{tmp_path}/")
+
+
 def test_choosing_another_rig_replaces_the_bone_list(rig):
     settings = bpy.context.scene.scope_retarget
     bpy.ops.scope.guess_bones()
@@ -227,6 +249,14 @@ def test_the_rig_is_exported_with_its_animation_and_only_its_mesh(rig, tmp_path,
     assert len(meshes) == (0 if kind == "bvh" else 1)
     way = seen(moved[0], ["pelvis"])[:, 0]
     assert np.ptp(way, axis=0).max() == pytest.approx(np.ptp(there, axis=0).max(), rel=0.05)
+
+
+def test_the_rig_is_exported_also_when_the_person_was_deleted(rig, tmp_path):
+    bpy.ops.scope.retarget()
+    bpy.data.objects.remove(rig["scope_person"])
+    path = tmp_path / "hero.bvh"
+    assert bpy.ops.scope.export(filepath=str(path), format="BVH", which="RIG") == {"FINISHED"}
+    assert path.is_file()
 
 
 def test_an_unwritable_bone_map_is_an_error_that_names_the_file(rig, tmp_path):

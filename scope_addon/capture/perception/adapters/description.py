@@ -10,7 +10,10 @@ from pathlib import Path
 from typing import Any
 
 from .....solver.errors import ModelFileError
+from .....solver.loaders.regular_file import check_regular
 from .keypoint_sets import KEYPOINT_SETS
+
+_LARGEST_BYTES = 1_000_000
 
 
 @dataclass(frozen=True)
@@ -52,6 +55,7 @@ def read_description(model: Path, types: tuple[str, ...]) -> Description:
     path = description_path(model)
     if not path.is_file():
         return Description()
+    check_regular(path, ModelFileError, "network's description", _LARGEST_BYTES)
     try:
         values = json.loads(path.read_text("utf-8"))
     except (OSError, ValueError, RecursionError) as error:

@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from .....solver.errors import ModelFileError
+from .....solver.loaders.regular_file import check_regular
 
 # Message: {field number: message in the field}.
 _FIELDS = {
@@ -32,13 +33,8 @@ def check_onnx_file(path: Path) -> None:
 
     :raises ModelFileError: it is not, it has, or the file cannot be read.
     """
+    check_regular(path, ModelFileError, "network in one ONNX file", _LARGEST_BYTES)
     try:
-        if path.exists() and not (path.is_file() or path.is_dir()):  # reading a device or a pipe may never end
-            raise ModelFileError(f"{path} is not a regular file; choose an ONNX file")
-        if path.stat().st_size > _LARGEST_BYTES:
-            raise ModelFileError(
-                f"{path} is larger than the 2 GiB of an ONNX file; export its weights to a separate file"
-            )
         data = memoryview(path.read_bytes())
     except OSError as error:
         raise ModelFileError(f"{path} cannot be read ({error.strerror}); choose an ONNX file") from error

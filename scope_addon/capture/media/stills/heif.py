@@ -18,9 +18,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from ....footage import MAX_PIXELS
+
 CODED = (b"hvc1", b"av01")
 MAX_TILES = 1000  # ffmpeg's limit
-MAX_PIXELS = 1 << 28  # more than any camera has; a few bytes of a malicious file can declare any number
 _MAX_BOXES = 10_000  # on one level; a file with more is not a picture
 _MAX_EXTENTS = 20_000  # of all items of a file together
 _MAX_TRANSFORMS = 16

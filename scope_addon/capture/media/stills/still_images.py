@@ -14,11 +14,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import VideoError
+from ....errors import VideoError
+from ....footage import MAX_PIXELS
+from ..file_names import utf8_name
+from ..frame_readers import decode_items
+from ..image_size import check_size, too_large
 from .exif import animation_length, read_exif
-from .file_names import utf8_name
-from .frame_readers import decode_items
-from .heif import MAX_PIXELS, assemble, read_layout
+from .heif import assemble, read_layout
 
 _JPEG_STREAMS = (".mjpeg", ".mjpg")  # begin like a JPEG, but are videos
 _HEIF_BRANDS = {b"mif1", b"heic", b"heix", b"heim", b"heis", b"avif"}  # of ISO 23008-12 and of AVIF
@@ -54,17 +56,20 @@ def is_picture(path: Path) -> bool:
 def read_picture(path: Path) -> Picture | None:
     """Decode a picture; None if that fails. Transparent parts become white, except in AVIF and HEIC.
 
-    :raises VideoError: it is AVIF or HEIC, and PyAV is not installed.
+    :raises VideoError: it is too large or too long (see `image_size`), or AVIF or HEIC, and PyAV is not installed.
     """
     data = path.read_bytes()
     if _brands(data[:64]) & _HEIF_BRANDS:
         return _read_heif(path, data)
     try:
         image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
-    except cv2.error:  # an empty file, or one too large
-        image = None
+    except cv2.error as error:
+        if "CV_IO_MAX_IMAGE" in str(error):
+            raise too_large(path, "too many pixels") from error
+        image = None  # an empty file
     if image is None:
         return None
+    check_size(path, image.shape[1], image.shape[0])
     exif = read_exif(data)
     rgb = _as_rgb8(image)
     if data[:4] not in (b"II*\0", b"MM\0*"):  # OpenCV rotates a TIFF upright even with IMREAD_UNCHANGED
@@ -85,7 +90,10 @@ def _read_heif(path: Path, data: bytes) -> Picture | None:
     if layout is None:
         return None
     whole = assemble(layout, decode_items(path, set(layout.tiles.ravel().tolist()), MAX_PIXELS))
-    return None if whole is None else Picture(whole, read_exif(layout.exif).focal_35mm)
+    if whole is None:
+        return None
+    check_size(path, whole.shape[1], whole.shape[0])
+    return Picture(whole, read_exif(layout.exif).focal_35mm)
 
 
 def _as_rgb8(image: NDArray[Any]) -> NDArray[np.uint8]:
@@ -97,9 +105,17 @@ def _as_rgb8(image: NDArray[Any]) -> NDArray[np.uint8]:
     if image.ndim == 2:
         return cast(NDArray[np.uint8], cv2.cvtColor(image, cv2.COLOR_GRAY2RGB))
     if image.shape[2] == 4:
-        alpha = image[:, :, 3:].astype(np.float32) / 255
-        image = (image[:, :, :3] * alpha + 255 * (1 - alpha) + 0.5).astype(np.uint8)
+        image = _on_white(image)
     return cast(NDArray[np.uint8], cv2.cvtColor(image, cv2.COLOR_BGR2RGB))
+
+
+def _on_white(bgra: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Blend with white, row by row: as numbers with a fraction, a whole image may take several gigabytes."""
+    bgr = np.empty((*bgra.shape[:2], 3), np.uint8)
+    for row, blended in zip(bgra, bgr, strict=True):
+        alpha = row[:, 3:].astype(np.float32) / 255
+        blended[:] = row[:, :3] * alpha + 255 * (1 - alpha) + 0.5
+    return bgr
 
 
 def _upright(image: NDArray[np.uint8], orientation: int) -> NDArray[np.uint8]:

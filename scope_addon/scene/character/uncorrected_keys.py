@@ -1,0 +1,138 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The keys as they were before corrections changed them, so that removing corrections restores them to the bit.
+
+They are stored with the motion's text, for the rows that corrections have changed: one row for each time at which any
+curve has a key, one column for each curve, NaN where that curve has no key. A row whose keys are still as the
+corrections wrote them is restored; a row that was edited since is not.
+"""
+
+from __future__ import annotations
+
+import io
+from dataclasses import dataclass
+from pathlib import Path
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ....solver.body import Body
+from ....solver.loaders.npz import read_npz
+from ...edit.clip import Clip
+from ...errors import MotionFileError
+from ..animation_data.actions import read_keys
+from .keys import channel_curves, write_clip
+
+_SAME = 2e-3  # frames; keys are single precision
+_NAMES = ("times", "before", "written")
+
+
+@dataclass(frozen=True)
+class UncorrectedKeys:
+    """R rows of C curves."""
+
+    times: NDArray[np.float64]  # (R,) seconds since timestamp 0, so that they are valid at any frame rate
+    before: NDArray[np.float32]  # (R, C)
+    written: NDArray[np.float32]  # (R, C)
+
+    def to_bytes(self) -> bytes:
+        """Return the arrays as an .npz file."""
+        file = io.BytesIO()
+        np.savez_compressed(file, **{name: getattr(self, name) for name in _NAMES})
+        return file.getvalue()
+
+    @staticmethod
+    def from_bytes(content: object, curves: int) -> UncorrectedKeys:
+        """Read what ``to_bytes`` returned; without rows if it is something else: a .blend file may be hostile."""
+        none = np.zeros((0, curves), np.float32)
+        if not isinstance(content, bytes):
+            return UncorrectedKeys(np.zeros(0), none, none)
+        try:
+            found = read_npz(Path("keys"), MotionFileError, "record of keys", content)
+            times, before, written = (np.asarray(found[name], float) for name in _NAMES)
+        except (MotionFileError, KeyError, ValueError, TypeError):
+            return UncorrectedKeys(np.zeros(0), none, none)
+        shapes = times.ndim == 1 and before.shape == written.shape == (len(times), curves)
+        if not shapes or not np.isfinite(times).all() or np.isinf(before).any():
+            return UncorrectedKeys(np.zeros(0), none, none)
+        return UncorrectedKeys(times, before.astype(np.float32), written.astype(np.float32))
+
+
+def keyed_values(armature: bpy.types.Object, body: Body, frames: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Return the keys' values (T, C) at scene frames (T,); NaN where a curve has no key."""
+    curves = channel_curves(armature, body)
+    out = np.full((len(frames), len(curves)), np.nan, np.float32)
+    for column, curve in enumerate(curves):
+        keys = read_keys(curve)
+        at = np.clip(np.searchsorted(keys[:, 0], frames - _SAME), 0, len(keys) - 1)
+        there = np.abs(keys[at, 0] - frames) < _SAME
+        out[there, column] = keys[at[there], 1]
+    return out
+
+
+def restore(armature: bpy.types.Object, body: Body, start: float, rate: float, known: UncorrectedKeys) -> set[int]:
+    """Give the rows that are as the corrections wrote them the keys from before; remove keys that were added.
+
+    :param start: scene frame of timestamp 0.
+    :param rate: scene frames per second.
+    :return: the numbers of the restored rows.
+    """
+    frames = (start + known.times * rate).astype(np.float32)
+    now = keyed_values(armature, body, frames)
+    same = (now == known.written) | (np.isnan(now) & np.isnan(known.written))
+    rows = np.flatnonzero(same.all(axis=1) & ~np.isnan(now).all(axis=1))
+    for column, curve in enumerate(channel_curves(armature, body)):
+        values, keys = known.before[rows, column], curve.keyframe_points
+        there = ~np.isnan(now[rows, column])
+        coordinates = read_keys(curve)
+        at = np.clip(np.searchsorted(coordinates[:, 0], frames[rows] - _SAME), 0, len(coordinates) - 1)
+        put = there & ~np.isnan(values)
+        coordinates[at[put], 1] = values[put]
+        keys.foreach_set("co", coordinates.ravel())
+        for index in sorted(at[there & np.isnan(values)].tolist(), reverse=True):
+            keys.remove(keys[index], fast=True)
+        curve.update()
+    return set(rows.tolist())
+
+
+def write_both(
+    armature: bpy.types.Object, body: Body, clips: tuple[Clip, Clip], frames: NDArray[np.float64], rate: float
+) -> UncorrectedKeys:
+    """Replace all keys by those of a corrected clip, at scene frames (T,).
+
+    :param clips: without and with corrections.
+    :param rate: scene frames per second.
+    :return: the keys that the corrections change.
+    """
+    free, corrected = clips
+    values = []
+    for clip in clips:
+        write_clip(armature, body, clip, frames)
+        values.append(keyed_values(armature, body, frames.astype(np.float32)))
+    start, rows = float(armature.get("scope_start", 0.0)), differ(free, corrected)
+    return changed_rows(frames.astype(np.float32), rows, (values[0], values[1]), start, rate)
+
+
+def differ(a: Clip, b: Clip) -> NDArray[np.bool_]:
+    """Return at which keys (T,) two clips differ."""
+    different: NDArray[np.bool_] = (a.rotations != b.rotations).any((1, 2, 3)) | (a.root != b.root).any(1)
+    return different
+
+
+def changed_rows(
+    frames: NDArray[np.float32],
+    rows: NDArray[np.bool_],
+    values: tuple[NDArray[np.float32], NDArray[np.float32]],
+    start: float,
+    rate: float,
+) -> UncorrectedKeys:
+    """Return rows that corrections have changed, even if not by as much as a key's precision.
+
+    :param frames: (T,) scene frames.
+    :param rows: (T,) which rows.
+    :param values: keys before and after, (T, C) each.
+    :param start: scene frame of timestamp 0.
+    :param rate: scene frames per second.
+    """
+    before, after = values
+    return UncorrectedKeys((frames[rows].astype(float) - start) / rate, before[rows], after[rows])

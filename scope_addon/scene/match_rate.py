@@ -1,0 +1,171 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Changing a scene's frame rate while the captures in it keep their speed.
+
+Keys lie at ``start + timestamp · rate``. For another rate, everything of a capture moves to ``start + (frame - start) ·
+new / old``: keys, NLA strips, cycles, the camera and its footage, review frames and markers, and rigs that the motion
+was retargeted to. So each capture still starts at its frame. Other animation keeps its frames, as when Blender's own
+setting is changed, and plays faster or slower.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable
+
+import bpy
+
+from ..motion import Motion
+from .animation_data import timing
+from .animation_data.actions import fcurves, frame_range
+from .animation_data.retime import Retiming, retime_keys, retime_strips
+from .camera import same_camera, show_footage_again
+from .character.confidence_curves import MARKER_NAMES
+from .character.correction_list import store_corrections
+from .character.root_object import retime_unused_trajectory, root_object
+from .character.shape_keys import shape_key_name
+from .rigs.rig_action import is_retargeted, retime_written_keys
+
+_MARKER = re.compile(rf"((?:person \d+ )?(?:{'|'.join(MARKER_NAMES.values())})) (-?\d+)(?:-(-?\d+))?")
+
+
+def change_rate(
+    scene: bpy.types.Scene,
+    rate: float,
+    people: dict[bpy.types.Object, Motion | None],
+    rigs: Iterable[tuple[bpy.types.Object, bpy.types.Object]],
+) -> list[str]:
+    """Set the scene's frame rate, and move the captures in time so that they keep their speed.
+
+    :param rate: frames per second.
+    :param people: every captured armature of the scene with its motion, None where that is lost.
+    :param rigs: rigs that captured motion was retargeted to, each with its captured armature.
+    :return: warnings about footage that will not align.
+    :raises UsageError: when Blender cannot store the rate.
+    """
+    timing.blender_rate(rate)
+    moves = {p: Retiming(_start(p), rate / timing.keyed_rate(p, scene)) for p in people}
+    own = {p: frame_range([p]) for p in people}
+    played = _played(scene, people)
+    done: set[bpy.types.Action] = set()
+    for person, retiming in moves.items():
+        for datablock in _datablocks(person):
+            _retime(datablock, retiming, done)
+        if (root := root_object(person)) is not None:
+            retime_unused_trajectory(root, retiming)
+    for rig, person in rigs:
+        _retime_rig(rig, moves[person], done)
+    for collection in scene.collection.children_recursive:
+        here = [person for person in people if person.name in collection.all_objects]
+        for camera in [obj for obj in collection.objects if obj.type == "CAMERA"] if here else ():
+            _retime(camera, moves[here[0]], done)
+    _retime_markers(scene, own, moves)
+    current = scene.frame_current + scene.frame_subframe
+    first = next(iter(moves.values()), Retiming(0.0, 1.0))
+    timing.set_scene_rate(scene, rate)
+    for person, retiming in moves.items():
+        timing.retime_cycle(scene, person, retiming)
+        timing.store_rate(person, rate)
+        motion = people[person]
+        if motion is not None and motion.corrections:
+            store_corrections(person, motion, rate)
+    if (after := frame_range(played)) is not None:
+        timing.set_frame_range(scene, *after)
+    warnings = _show_footage(scene, people, rate)
+    scene.frame_set(round(first.frame(current)))
+    return warnings
+
+
+def retimed_spans(spans: str, person: bpy.types.Object, rate: float, former: float) -> str:
+    """Move the frames of a result's spans, such as ``12-18,40``."""
+    move = Retiming(_start(person), rate / former)
+    return re.sub(r"(?<!\d)-?\d+", lambda found: str(round(move.frame(int(found.group())))), spans)
+
+
+def _start(person: bpy.types.Object) -> float:
+    return float(person.get("scope_start", 0.0))
+
+
+def _played(scene: bpy.types.Scene, people: Iterable[bpy.types.Object]) -> list[bpy.types.Object]:
+    """Return the people of the capture whose keys the scene's frame range spans; none if it is another range."""
+    people = list(people)
+    for together in [people, *([p for p in people if p.name in c.all_objects] for c in scene.collection.children)]:
+        span = frame_range(together)
+        if span and (math.floor(span[0]), math.ceil(span[1])) == (scene.frame_start, scene.frame_end):
+            return together
+    return []
+
+
+def _datablocks(person: bpy.types.Object) -> list[bpy.types.ID]:
+    """Return what a capture animates of a person: armature, root motion, and shape keys."""
+    keys = [getattr(child.data, "shape_keys", None) for child in person.children_recursive if child.type == "MESH"]
+    root = root_object(person)
+    shapes = [block for block in keys if block is not None and shape_key_name(0) in block.key_blocks]
+    return [person, *([root] if root is not None else []), *shapes]
+
+
+def _retime(datablock: bpy.types.ID, retiming: Retiming, done: set[bpy.types.Action]) -> None:
+    animation = datablock.animation_data
+    if animation is None:
+        return
+    for action in [animation.action, *retime_strips(animation, retiming)]:
+        if action is not None and action not in done:
+            done.add(action)
+            retime_keys(action, retiming)
+
+
+def _retime_rig(rig: bpy.types.Object, retiming: Retiming, done: set[bpy.types.Action]) -> None:
+    """Move the keys that retargeting has written; the rig's other actions keep their frames."""
+    action = rig.animation_data.action if rig.animation_data else None
+    if action is None or action in done or not is_retargeted(action):
+        return
+    done.add(action)
+    retime_written_keys(action, retiming)
+    if (root := root_object(rig)) is not None:
+        retime_unused_trajectory(root, retiming)
+        _retime(root, retiming, done)
+
+
+def _retime_markers(
+    scene: bpy.types.Scene,
+    ranges: dict[bpy.types.Object, tuple[float, float] | None],
+    moves: dict[bpy.types.Object, Retiming],
+) -> None:
+    """Move the markers of review spans, which are named after them, with the capture in whose keys they lie."""
+    for marker in scene.timeline_markers:
+        found = _MARKER.fullmatch(marker.name)
+        inside = [p for p, span in ranges.items() if span and span[0] - 1 <= marker.frame <= span[1] + 1]
+        if found is None or int(found.group(2)) != marker.frame or not inside:
+            continue
+        ends = [str(round(moves[inside[-1]].frame(int(end)))) for end in found.groups()[1:] if end is not None]
+        marker.name, marker.frame = f"{found.group(1)} {'-'.join(ends)}", int(ends[0])
+
+
+def _show_footage(scene: bpy.types.Scene, people: dict[bpy.types.Object, Motion | None], rate: float) -> list[str]:
+    """Show the footage of every capture's cameras in step with the moved keys."""
+    warnings: list[str] = []
+    for collection in scene.collection.children_recursive:
+        seen: list[Motion] = []
+        cameras = [obj for obj in collection.objects if obj.type == "CAMERA"]
+        for person, motion in people.items():
+            if motion is None or person.name not in collection.objects or any(same_camera(motion, m) for m in seen):
+                continue
+            if len(seen) < len(cameras):
+                frames = timing.key_frames(motion.timestamps, rate, _start(person))
+                warnings += show_footage_again(cameras[len(seen)], motion, frames)
+            seen.append(motion)
+    return warnings
+
+
+def other_animation(
+    scene: bpy.types.Scene, people: Iterable[bpy.types.Object], rigs: Iterable[tuple[bpy.types.Object, object]]
+) -> bool:
+    """Return whether anything else in the scene has keys, which keep their frames at another rate."""
+    moved = {obj.name for person in people for c in person.users_collection for obj in c.objects}
+    moved |= {rig.name for rig, _ in rigs}
+    others = [obj for obj in scene.objects if obj.name not in moved]
+    return any(len(fcurves(block)) for obj in others for block in (obj, obj.data) if block is not None and _has(block))
+
+
+def _has(block: bpy.types.ID) -> bool:
+    return getattr(block, "animation_data", None) is not None

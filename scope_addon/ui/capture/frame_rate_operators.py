@@ -1,0 +1,121 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The operator that gives the scene the frame rate of the footage after a capture."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import bpy
+
+from ..captured_person import PERSON, body_of, captured_people, library_of, motion_of
+from ..reporting import ReportingOperator, rpt_, sentence, tip_
+
+if TYPE_CHECKING:
+    from ...motion import Motion
+
+_SAME = 0.01  # frames per second
+RATE_WARNING = "the scene keeps its"  # how the warnings begin that another frame rate settles
+DRIFT_WARNING = "the background image drifts"
+
+
+def differs(scene: bpy.types.Scene) -> bool:
+    """Return whether the shown capture's footage has another frame rate than the scene."""
+    rate = scene.scope.result.footage_rate
+    return bool(rate > 0 and abs(rate - scene.render.fps / scene.render.fps_base) > _SAME)
+
+
+class SCOPE_OT_match_frame_rate(ReportingOperator):
+    """Set the scene to the footage's frame rate. Captures keep their speed, other animation keeps its frames"""
+
+    bl_idname = "scope.match_frame_rate"
+    bl_label = "Set Frame Rate from Footage"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Require a capture with a frame rate, and that everything to move is stored in this file."""
+        scene = context.scene
+        if scene.scope.result.footage_rate <= 0:
+            cls.poll_message_set(tip_("The scene contains no captured video"))
+            return False
+        linked = next((block for block in [scene, *captured_people(context)] if _library(block)), None)
+        library = _library(linked) if linked is not None else None
+        if linked is not None and library is not None:
+            name, file = linked.name, library.filepath
+            cls.poll_message_set(tip_("'{name}' is linked from {file}: make it local", name=name, file=file))
+            return False
+        return True
+
+    def work(self, context: bpy.types.Context) -> str:
+        """Change the rate and move the captures in time."""
+        from ...scene.animation_data.timing import keyed_rate, scene_rate
+        from ...scene.animation_data.transaction import all_or_nothing
+        from ...scene.character.keys import bake_whole_frames, read_clip
+        from ...scene.match_rate import change_rate, other_animation
+
+        scene = context.scene
+        people, former = captured_people(context), scene_rate(scene)
+        rate = _exact(scene.scope.result.footage_rate)
+        bodies = {person: body_of(person) for person in people if person.get("scope_resampled")}
+        for person, body in bodies.items():  # which fails without keys, before anything is changed
+            read_clip(person, body, former)
+        keyed = {person: keyed_rate(person, scene) for person in people}
+        motions = {person: _motion(person) for person in people}
+        rigs = [(obj, obj[PERSON]) for obj in scene.objects if obj.get(PERSON) in people]
+        cameras = [obj for obj in scene.objects if obj.type == "CAMERA"]
+        with all_or_nothing(scene, *people, *(rig for rig, _ in rigs), *cameras):
+            warnings = change_rate(scene, rate, motions, rigs)
+            for person, body in bodies.items():
+                bake_whole_frames(person, body, rate)
+        _update_results(scene, rate, keyed, warnings)
+        if other_animation(scene, people, rigs):
+            return rpt_(
+                "The scene has {rate:.5g} frames/s; animation that was not captured plays {factor:.3g} times as fast",
+                rate=rate,
+                factor=rate / former,
+            )
+        return rpt_("The scene has {rate:.5g} frames/s, as the footage", rate=rate)
+
+
+def _library(block: bpy.types.ID) -> bpy.types.Library | None:
+    return library_of(block) if isinstance(block, bpy.types.Object) else block.library
+
+
+def _exact(rate: float) -> float:
+    """Return the rate that Blender will store, which single precision has rounded."""
+    from ...scene.animation_data.timing import blender_rate
+
+    fps, base = blender_rate(rate)
+    return fps / base
+
+
+def _motion(person: bpy.types.Object) -> Motion | None:
+    """Return the person's motion; None if it is lost, without which keys can be moved too."""
+    from ....solver.errors import ScopeError
+
+    try:
+        return motion_of(person)
+    except ScopeError:
+        return None
+
+
+def _update_results(
+    scene: bpy.types.Scene, rate: float, keyed: dict[bpy.types.Object, float], warnings: list[str]
+) -> None:
+    """Move the frames that results name, and replace the warnings about the frame rate."""
+    from ...scene.match_rate import retimed_spans
+
+    for collection in scene.collection.children_recursive:
+        shown = collection.scope_result.warnings
+        person = next((p for p in keyed if p.name in collection.all_objects), None)
+        if person is None:
+            continue
+        for index in reversed(range(len(shown))):
+            if shown[index].text.startswith((sentence(RATE_WARNING), sentence(DRIFT_WARNING))):
+                shown.remove(index)
+            elif shown[index].spans:
+                shown[index].spans = retimed_spans(shown[index].spans, person, rate, keyed[person])
+    for text in dict.fromkeys(warnings):
+        scene.scope.result.warnings.add().text = sentence(text)
+
+
+CLASSES = (SCOPE_OT_match_frame_rate,)

@@ -1,0 +1,180 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Giving the scene the footage's frame rate: captures are at the same place at the same time, other keys stay."""
+
+import bpy
+import numpy as np
+import pytest
+from scope.scope_addon.motion import Motion
+from scope.scope_addon.scene.animation_data.actions import fcurves, read_keys
+from scope.scope_addon.scene.build import BuildOptions, build_scene
+from scope.scope_addon.scene.character.correction_list import listed_corrections
+from scope.scope_addon.scene.packed_motion import pack_motion
+from scope.scope_addon.ui.capture.result import show_result
+
+from ...edit.walking import BODY, NAMES, motion_of, walk
+from ...scene.made_rigs import build_rig
+
+START = 11.0
+TIMES = (0.0, 0.4, 1.0, 1.7)  # seconds of the footage
+
+
+def built(start=START, **changes):
+    """A capture of 30 frames per second in the scene, with its result."""
+    motion: Motion = motion_of(walk(2.0))
+    for name, value in changes.items():
+        setattr(motion, name, value)
+    result = build_scene([motion], BODY, None, BuildOptions(start_frame=start, name="walk"))
+    person = result.people[0].armature
+    pack_motion(person, motion.to_bytes())
+    show_result(result.collection.scope_result, "", {"warnings": ["the scene keeps its 20 frames/s"]}, result)
+    bpy.context.scene.scope.capture = result.collection
+    return person
+
+
+@pytest.fixture
+def scene():
+    """A scene of 20 frames per second with an animated cube of the user's."""
+    scene = bpy.context.scene
+    scene.render.fps, scene.render.fps_base = 20, 1.0
+    bpy.ops.mesh.primitive_cube_add()
+    cube = bpy.context.object
+    for frame in (3, 40):
+        cube.location.x = frame
+        cube.keyframe_insert("location", index=0, frame=frame)
+    scene["cube"] = cube
+    return scene
+
+
+def at_times(armature, names, start=START):
+    """Return where bones are at times of the footage, (T, B, 3)."""
+    scene, out = bpy.context.scene, []
+    for time in TIMES:
+        frame = start + time * scene.render.fps / scene.render.fps_base
+        scene.frame_set(int(frame), subframe=frame - int(frame))
+        posed = armature.evaluated_get(bpy.context.evaluated_depsgraph_get())
+        out.append([posed.matrix_world @ posed.pose.bones[name].head for name in names])
+    return np.array(out)
+
+
+def cube_frames(scene):
+    (curve,) = fcurves(scene["cube"])
+    return read_keys(curve)[:, 0].tolist()
+
+
+def test_keys_return_to_whole_frames_and_other_animation_stays(scene):
+    person = built()
+    before = at_times(person, NAMES)
+    scene.frame_set(19)
+    assert bpy.ops.scope.match_frame_rate() == {"FINISHED"}
+    assert (scene.render.fps, scene.render.fps_base) == (30, 1.0)
+    assert scene.frame_current == 23  # the same moment: 8 frames of 1/20 s are 12 of 1/30 s
+    assert cube_frames(scene) == [3, 40]
+    for curve in fcurves(person):
+        np.testing.assert_array_equal(read_keys(curve)[:, 0], START + np.arange(61))
+    assert (scene.frame_start, scene.frame_end) == (11, 71)
+    np.testing.assert_allclose(at_times(person, NAMES), before, atol=1e-4)
+    assert [w.text for w in scene.scope.result.warnings] == []
+    again = at_times(person, NAMES)
+    bpy.ops.scope.smooth(strength=1.0)  # which writes keys at the scene's rate
+    np.testing.assert_allclose(at_times(person, NAMES), again, atol=1e-3)
+
+
+def test_a_frame_range_of_the_users_stays(scene):
+    built()
+    scene.frame_start, scene.frame_end = 1, 250
+    bpy.ops.scope.match_frame_rate()
+    assert (scene.frame_start, scene.frame_end) == (1, 250)
+
+
+def test_edited_keys_keep_their_edits(scene):
+    person = built()
+    bpy.ops.scope.interpolate_span(start=20, end=30)
+    before = at_times(person, NAMES)
+    bpy.ops.scope.match_frame_rate()
+    np.testing.assert_allclose(at_times(person, NAMES), before, atol=1e-4)
+
+
+@pytest.mark.parametrize("mode", ["OBJECT", "IN_PLACE"])
+def test_root_motion_on_an_object_moves_along(scene, mode):
+    person = built()
+    bpy.ops.scope.root_motion(mode=mode)
+    before = at_times(person, NAMES)
+    bpy.ops.scope.match_frame_rate()
+    np.testing.assert_allclose(at_times(person, NAMES), before, atol=1e-4)
+    bpy.ops.scope.root_motion(mode="BONES")
+    assert np.ptp(at_times(person, ["pelvis"])[:, 0, 1]) > 1.5
+
+
+def test_nla_strips_and_their_actions_move(scene):
+    person = built()
+    bpy.ops.scope.push_to_nla()
+    before = at_times(person, NAMES)
+    bpy.ops.scope.match_frame_rate()
+    (strip,) = person.animation_data.nla_tracks[0].strips
+    assert (strip.frame_start, strip.frame_end) == (11.0, 71.0)
+    assert strip.scale == pytest.approx(1.0)
+    np.testing.assert_allclose(at_times(person, NAMES), before, atol=1e-4)
+
+
+def test_a_loop_stays_closed_and_the_scene_plays_it(scene):
+    person = built()
+    bpy.ops.scope.loop(start=12, end=50)
+    first, last = scene.frame_start, scene.frame_end
+    bpy.ops.scope.match_frame_rate()
+    frames = read_keys(fcurves(person)[0])[:, 0]
+    assert abs(scene.frame_start - frames[0]) < 1
+    assert abs(scene.frame_end + 1 - frames[-1]) < 1
+    assert (last - first) * 1.4 < scene.frame_end - scene.frame_start < (last - first) * 1.6
+    bpy.ops.scope.smooth(strength=1.0)
+    assert (scene.frame_start, scene.frame_end) == (11, 71)
+
+
+def test_a_retargeted_rig_moves_along_and_its_own_action_stays(scene):
+    person = built()
+    rig, bones = build_rig("mixamo")
+    rig.pose.bones[bones["head"]].keyframe_insert("location", frame=7)
+    own = rig.animation_data.action
+    scene.scope_retarget.rig = rig
+    bpy.context.view_layer.objects.active = person
+    bpy.ops.scope.retarget()
+    before = at_times(rig, list(bones.values()))
+    bpy.ops.scope.match_frame_rate()
+    np.testing.assert_allclose(at_times(rig, list(bones.values())), before, atol=1e-3)
+    rig.animation_data.action = own
+    assert read_keys(fcurves(rig)[0])[:, 0].tolist() == [7]
+
+
+def test_review_frames_and_corrections_name_the_moved_frames(scene):
+    valid = np.ones(61, bool)
+    valid[30:45] = False
+    person = built(valid=valid)
+    bpy.ops.scope.add_pin(joint="left_wrist", frame=31, location=at_times(person, ["left_wrist"])[2, 0])
+    assert (scene.timeline_markers[0].name, scene.timeline_markers[0].frame) == ("not seen 31-40", 31)
+    bpy.ops.scope.match_frame_rate()
+    assert (scene.timeline_markers[0].name, scene.timeline_markers[0].frame) == ("not seen 41-54", 41)
+    assert [w.spans for w in scene.scope.result.warnings if w.spans] == ["41-54"]
+    assert [e["first"] for e in listed_corrections(person)] == [41]
+
+
+def test_two_captures_keep_their_starts_and_speeds(scene):
+    first, second = built(), built(start=101.0)
+    before = at_times(first, NAMES), at_times(second, NAMES, 101.0)
+    bpy.ops.scope.match_frame_rate()
+    np.testing.assert_allclose(at_times(first, NAMES), before[0], atol=1e-4)
+    np.testing.assert_allclose(at_times(second, NAMES, 101.0), before[1], atol=1e-4)
+    assert (scene.frame_start, scene.frame_end) == (101, 161)
+
+
+def test_a_rate_that_was_changed_by_hand_is_taken_into_account(scene):
+    person = built()
+    before = at_times(person, NAMES)
+    scene.render.fps = 60  # the keys stay, so the motion plays three times as fast
+    bpy.ops.scope.match_frame_rate()
+    np.testing.assert_allclose(at_times(person, NAMES), before, atol=1e-4)
+
+
+def test_a_picture_has_no_frame_rate(scene, standing):
+    result = build_scene([motion_of(walk(0.0))], BODY, None, BuildOptions())
+    show_result(result.collection.scope_result, "", {}, result)
+    with pytest.raises(RuntimeError, match="no captured video"):
+        bpy.ops.scope.match_frame_rate()

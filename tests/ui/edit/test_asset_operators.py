@@ -1,0 +1,104 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Marking captured motion as an asset: picture, metadata, catalog."""
+
+import bpy
+import numpy as np
+import pytest
+from scope.scope_addon.scene.packed_motion import pack_motion
+
+from ...edit.walking import motion_of, walk
+from ...scene.made_rigs import build_rig, captured
+
+
+@pytest.fixture
+def motion():
+    """A walk whose first ten frames were not seen."""
+    motion = motion_of(walk(1.0))
+    motion.valid[:10] = False
+    return motion
+
+
+@pytest.fixture
+def rig(motion):
+    armature = captured(motion)
+    pack_motion(armature, motion.to_bytes())
+    return armature
+
+
+def picture(action):
+    """(256, 256, 4); the first row is the lowest one."""
+    assert tuple(action.preview.image_size) == (256, 256)
+    return np.array(action.preview.image_pixels_float[:]).reshape(256, 256, 4)
+
+
+def test_the_action_becomes_an_asset_with_picture_tags_and_details(rig):
+    scene = bpy.context.scene
+    scene.frame_set(7)
+    assert bpy.ops.scope.mark_asset(author="Ada") == {"FINISHED"}
+    data = rig.animation_data.action.asset_data
+    assert sorted(tag.name for tag in data.tags) == ["mocap", "scope"]
+    assert (data.author, data.description) == ("Ada", "Captured from walk.mp4, 1.0 s")
+    assert scene.frame_current == 7
+    seen = picture(rig.animation_data.action)
+    alpha = seen[..., 3] > 0.5
+    rows, columns = (np.flatnonzero(alpha.any(axis=axis)) for axis in (1, 0))
+    assert np.ptp(rows) > 0.8 * 256  # a person who stands fills the height
+    assert np.ptp(columns) < 0.7 * 256
+    red, blue = ((seen[..., c] > 0.4) & (seen[..., 2 - c] < 0.4) & alpha for c in (0, 2))
+    assert min(red.sum(), blue.sum()) > 500  # limbs of both sides, in their colours
+
+
+def test_the_picture_is_of_the_first_frame_that_needs_no_review(rig):
+    action, pictures = rig.animation_data.action, {}
+    for frame in (1, 11, 20):  # the footage's frame 10 is at the scene's frame 11
+        bpy.context.scene.frame_set(frame)
+        bpy.ops.scope.mark_asset(current_pose=True)
+        pictures[frame] = picture(action)
+    bpy.ops.scope.mark_asset()
+    np.testing.assert_array_equal(picture(action), pictures[11])
+    assert np.abs(pictures[11] - pictures[1]).mean() > 0.01
+
+
+def test_a_lost_motion_still_gives_an_asset(rig):
+    del rig["scope_motion"]
+    bpy.ops.scope.mark_asset(description_text="A walk")
+    assert rig.animation_data.action.asset_data.description == "A walk"
+    assert picture(rig.animation_data.action)[..., 3].max() == 1.0
+
+
+def test_the_picture_of_a_retargeted_rig_is_of_its_own_bones(rig):
+    own, _ = build_rig("mixamo")
+    bpy.context.scene.scope_retarget.rig = own
+    bpy.context.view_layer.objects.active = rig
+    bpy.ops.scope.retarget()
+    bpy.context.view_layer.objects.active = own
+    bpy.ops.scope.mark_asset()
+    assert rig.animation_data.action.asset_data is None
+    assert own.animation_data.action.asset_data is not None
+    assert (picture(own.animation_data.action)[..., 3] > 0.5).sum() > 3000
+
+
+def test_a_catalog_of_the_file_is_assigned_and_an_unknown_one_changes_nothing(rig, tmp_path):
+    uid = "d1f81597-d27c-42fd-8386-3a3def6c9200"
+    (tmp_path / "blender_assets.cats.txt").write_text(f"# comment\nVERSION 1\n\n{uid}:Motions/Walks:Motions-Walks\n")
+    with pytest.raises(RuntimeError, match="no asset catalog 'Motions/Walks'"):
+        bpy.ops.scope.mark_asset(catalog="Motions/Walks")  # the file has no folder yet
+    assert rig.animation_data.action.asset_data is None
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "walks.blend"))
+    with pytest.raises(RuntimeError, match=r"no asset catalog 'Runs'; there are Motions/Walks"):
+        bpy.ops.scope.mark_asset(catalog="Runs")
+    bpy.ops.scope.mark_asset(catalog="Motions/Walks")
+    assert rig.animation_data.action.asset_data.catalog_id == uid
+
+
+def test_the_picture_and_details_are_saved_with_the_file(rig, tmp_path):
+    bpy.ops.scope.mark_asset(author="Ada")
+    before, name = picture(rig.animation_data.action), rig.animation_data.action.name
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "walk.blend"))
+    bpy.ops.wm.read_homefile(use_empty=True)
+    with bpy.data.libraries.load(str(tmp_path / "walk.blend"), assets_only=True) as (found, wanted):
+        assert found.actions == [name]
+        wanted.actions = found.actions
+    (action,) = wanted.actions
+    np.testing.assert_array_equal(picture(action), before)
+    assert action.asset_data.author == "Ada"
