@@ -164,6 +164,7 @@ TEXTS = {
     "Execution Provider": "Recheneinheit",
     "Execution provider for the networks; if unavailable, the CPU is used and the result shows a warning": "Recheneinheit für die Netze; falls nicht verfügbar, wird die CPU benutzt und das Ergebnis zeigt eine Warnung",
     "Export the estimated camera": "Die geschätzte Kamera exportieren",
+    "Export": "Exportieren",
     "Fast": "Schnell",
     "Feet on the Floor": "Füße auf dem Boden",
     "Field of View": "Bildwinkel",

@@ -164,6 +164,7 @@ TEXTS = {
     "Execution Provider": "Motor de ejecución",
     "Execution provider for the networks; if unavailable, the CPU is used and the result shows a warning": "Motor de ejecución de las redes; si no está disponible, se usa la CPU y el resultado muestra una advertencia",
     "Export the estimated camera": "Exportar la cámara estimada",
+    "Export": "Exportar",
     "Fast": "Rápida",
     "Feet on the Floor": "Pies en el suelo",
     "Field of View": "Campo de visión",

@@ -164,6 +164,7 @@ TEXTS = {
     "Execution Provider": "Moteur d’exécution",
     "Execution provider for the networks; if unavailable, the CPU is used and the result shows a warning": "Moteur d’exécution des réseaux ; s’il est indisponible, le CPU est utilisé et le résultat affiche un avertissement",
     "Export the estimated camera": "Exporter la caméra estimée",
+    "Export": "Exporter",
     "Fast": "Rapide",
     "Feet on the Floor": "Pieds au sol",
     "Field of View": "Champ de vision",

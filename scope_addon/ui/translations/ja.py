@@ -164,6 +164,7 @@ TEXTS = {
     "Execution Provider": "実行プロバイダー",
     "Execution provider for the networks; if unavailable, the CPU is used and the result shows a warning": "ネットワークの実行プロバイダー。使用できない場合は CPU を使い、結果に警告を表示します",
     "Export the estimated camera": "推定カメラをエクスポート",
+    "Export": "エクスポート",
     "Fast": "高速",
     "Feet on the Floor": "足を床に接地",
     "Field of View": "視野角",

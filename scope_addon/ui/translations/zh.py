@@ -164,6 +164,7 @@ TEXTS = {
     "Execution Provider": "执行后端",
     "Execution provider for the networks; if unavailable, the CPU is used and the result shows a warning": "网络的执行后端；不可用时使用 CPU，并在结果中显示警告",
     "Export the estimated camera": "导出估算的摄像机",
+    "Export": "导出",
     "Fast": "快速",
     "Feet on the Floor": "双脚贴地",
     "Field of View": "视野",
