@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,6 +11,7 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, StringProperty
 
 from ..options import Place
+from .capture.captures import shown_capture
 from .captured_person import PERSON, motion_of
 from .declared_properties import with_options
 from .reporting import ReportingOperator, rpt_, tip_
@@ -42,11 +44,12 @@ class SCOPE_OT_export(ReportingOperator):
     which: EnumProperty(
         name="Captures",
         items=(
+            ("SHOWN", "Selected", "The capture that is selected in the panel, with all its people", 3),
             ("ALL", "All in the Scene", "Every capture of the scene, with all its people", 0),
             ("ACTIVE", "Active", "The capture that the active object belongs to", 1),
             ("RIG", "My Rig", "The rig chosen under Retarget, with its current animation and its meshes", 2),
         ),
-        default="ALL",
+        default="SHOWN",
         description="What to export",
     )
     shape: EnumProperty(
@@ -79,7 +82,8 @@ class SCOPE_OT_export(ReportingOperator):
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         """Ask for the file."""
         suffix = _SUFFIX[self.format]
-        name = Path(context.scene.scope.result.footage).stem or "capture"
+        shown = shown_capture(context.scene)
+        name = re.sub(r'[\\/:*?"<>|]', "_", shown.name) if shown else "capture"
         folder = Path(bpy.data.filepath).parent if bpy.data.filepath else Path.home()
         self.filepath, self.filter_glob = str(folder / f"{name}{suffix}"), f"*{suffix}"
         context.window_manager.fileselect_add(self)
@@ -127,6 +131,8 @@ class SCOPE_OT_export(ReportingOperator):
             raise UsageError("a motion file contains the captured motion, not a rig; choose another format")
         if self.which == "RIG" and rig is None:
             raise UsageError("no rig is chosen under Retarget; choose a rig there and press Retarget first")
+        if self.which == "SHOWN":
+            collections = [c for c in collections if c == shown_capture(context.scene)]
         if self.which == "ACTIVE":
             active = context.view_layer.objects.active
             collections = [c for c in collections if active and active.name in c.all_objects]

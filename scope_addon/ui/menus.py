@@ -45,11 +45,17 @@ class SCOPE_MT_motion_capture(bpy.types.Menu):
             layout.operator(f"scope.{name}")
         layout.operator_menu_enum("scope.root_motion", "mode")
         layout.separator()
+        layout.operator("scope.pin_limb", icon="PINNED")
+        layout.operator("scope.foot_stands", text="Left Foot Stands").foot = "left"
+        layout.operator("scope.foot_stands", text="Right Foot Stands").foot = "right"
+        layout.operator("scope.exchange_sides", icon="MOD_MIRROR")
+        layout.operator("scope.upright_line", icon="EMPTY_SINGLE_ARROW")
+        layout.separator()
         layout.operator("scope.retarget", text="Retarget to Rig", icon="ARMATURE_DATA")
         layout.operator("scope.rename_take", icon="GREASEPENCIL")
         layout.operator("scope.push_to_nla", icon="NLA_PUSHDOWN")
         layout.operator("scope.mark_asset", icon="ASSET_MANAGER")
-        layout.menu(SCOPE_MT_export.bl_idname, icon="EXPORT")
+        layout.menu(SCOPE_MT_export.bl_idname, text="Export", icon="EXPORT")
 
 
 def draw_import_video(layout: bpy.types.UILayout, icon: str) -> None:

@@ -19,7 +19,7 @@ from ..view.comparison import camera_of, is_looking_through, side_area
 from . import preview_picture
 from .capture_operators import state
 from .captures import draw_captures, people_of, people_text, shown_capture
-from .frame_rate_operators import differs
+from .frame_rate_operators import differs, keyed_for
 
 _PIXELS_PER_CHARACTER = 7.0
 
@@ -164,8 +164,7 @@ class SCOPE_PT_result(Tab, bpy.types.Panel):
             row.operator("scope.footage_to_sequencer", text="", icon="SEQUENCE")
             for background in camera.data.background_images[:1] if back else ():
                 layout.prop(background, "alpha", text="Footage Opacity", slider=True)
-        if differs(context.scene):
-            layout.operator("scope.match_frame_rate", icon="TIME")
+        _draw_frame_rate(context, layout)
         row = layout.row(align=True)
         row.label(text="", icon="EXPORT")
         for key, label, _, _ in FORMATS:
@@ -173,6 +172,22 @@ class SCOPE_PT_result(Tab, bpy.types.Panel):
             cell.enabled = is_available(key)
             cell.operator("scope.export", text=label).format = key
         layout.operator("scope.mark_asset", icon="ASSET_MANAGER")
+
+
+def _draw_frame_rate(context: bpy.types.Context, layout: bpy.types.UILayout) -> None:
+    """Draw what is to be known of the scene's frame rate, and the button that sets it."""
+    scene = context.scene
+    was = keyed_for(scene)
+    if was:
+        text = iface_(
+            "The scene's frame rate was changed from {was:.5g} to {now:.5g}, which changed the motion's speed; "
+            "importing an FBX file does that",
+            was=was,
+            now=scene.render.fps / scene.render.fps_base,
+        )
+        _draw_text(context, layout.box(), text, "ERROR")
+    if was or differs(scene):
+        layout.operator("scope.match_frame_rate", icon="TIME")
 
 
 class SCOPE_PT_warnings(Tab, bpy.types.Panel):

@@ -9,6 +9,7 @@ import bpy
 
 from ..captured_person import PERSON, body_of, captured_people, library_of, motion_of
 from ..reporting import ReportingOperator, rpt_, sentence, tip_
+from .captures import people_of, shown_capture
 
 if TYPE_CHECKING:
     from ...motion import Motion
@@ -22,6 +23,17 @@ def differs(scene: bpy.types.Scene) -> bool:
     """Return whether the shown capture's footage has another frame rate than the scene."""
     rate = scene.scope.result.footage_rate
     return bool(rate > 0 and abs(rate - scene.render.fps / scene.render.fps_base) > _SAME)
+
+
+def keyed_for(scene: bpy.types.Scene) -> float:
+    """Return the frame rate that the shown capture was keyed for, if the scene has another one since; otherwise 0.
+
+    Blender's importer of FBX files, for example, sets the scene's frame rate, which changes the speed of all keys.
+    """
+    now = scene.render.fps / scene.render.fps_base
+    capture = shown_capture(scene)
+    rates = [float(person.get("scope_rate", now)) for person in people_of(capture)] if capture else []
+    return next((rate for rate in rates if abs(rate - now) > _SAME), 0.0)
 
 
 class SCOPE_OT_match_frame_rate(ReportingOperator):

@@ -7,6 +7,7 @@ import bpy
 
 from ..capture.capture_panel import Tab
 from ..captured_person import draw_active_person, has_captured_person
+from .bone_list import common_prefix
 
 
 class SCOPE_UL_bone_pairs(bpy.types.UIList):
@@ -24,20 +25,17 @@ class SCOPE_UL_bone_pairs(bpy.types.UIList):
     ) -> None:
         """Draw one entry: part, bone, and a question mark if the guess is uncertain.
 
-        Blender's further arguments, ``index`` and ``flt_flag``, are optional and left out.
+        Labels leave room for long names; the chosen entry is edited below the list. Blender's further arguments,
+        ``index`` and ``flt_flag``, are optional and left out.
         """
         rig = settings.rig
-        chosen = item in settings.pairs[settings.active : settings.active + 1]
-        row = layout.split(factor=0.5 if chosen else 0.42, align=True)
-        if chosen or not item.part:
-            row.prop(item, "part", text="", placeholder="Body Part")
-        else:  # a label leaves enough room for the longest names
-            row.label(text=item.part)
-        row = row.row(align=True)
         known = rig is not None and item.bone in rig.data.bones
+        row = layout.split(factor=0.46, align=True)
+        row.label(text=item.part, translate=False)
+        row = row.row(align=True)
         row.alert = not known
-        if rig is not None:
-            row.prop_search(item, "bone", rig.data, "bones", text="")
+        prefix = common_prefix([pair.bone for pair in settings.pairs if pair.bone])
+        row.label(text=item.bone.removeprefix(prefix), translate=False)
         if not known or item.confidence <= 0.6:  # certain guesses need no icon
             row.label(text="", icon="QUESTION" if known else "ERROR")
 
@@ -66,10 +64,15 @@ class SCOPE_PT_retarget(Tab, bpy.types.Panel):
         row.operator("scope.load_bone_map", text="", icon="FILE_FOLDER")
         row.operator("scope.save_bone_map", text="", icon="FILE_TICK")
         row = layout.row()
-        row.template_list("SCOPE_UL_bone_pairs", "", settings, "pairs", settings, "active", rows=6)
+        row.template_list("SCOPE_UL_bone_pairs", "", settings, "pairs", settings, "active", rows=5)
         column = row.column(align=True)
         column.operator("scope.edit_bone_pair", text="", icon="ADD").action = "ADD"
         column.operator("scope.edit_bone_pair", text="", icon="REMOVE").action = "REMOVE"
+        for pair in settings.pairs[settings.active : settings.active + 1]:
+            column = layout.column(align=True)
+            column.prop(pair, "part", text="", placeholder="Body Part", icon="ARMATURE_DATA")
+            column.alert = pair.bone not in settings.rig.data.bones
+            column.prop_search(pair, "bone", settings.rig.data, "bones", text="")
         layout.prop(settings, "feet")
         column = layout.column()
         column.label(text="Root Motion")

@@ -140,6 +140,20 @@ def test_the_motion_is_undone_and_redone_with_the_capture(fake_worker, footage):
     assert bpy.ops.scope.smooth(strength=2.5) == {"FINISHED"}
 
 
+def test_the_capture_that_is_selected_in_the_list_is_exported(fake_worker, footage, tmp_path):
+    for take in ("first", "second"):
+        bpy.context.scene.scope.take = take
+        captured(fake_worker, footage)
+    for take in ("first", "second"):
+        bpy.context.scene.scope.capture = bpy.data.collections[take]
+        path = tmp_path / f"{take}.blend.glb"
+        bpy.ops.scope.export(filepath=str(path), format="GLB")
+        header = path.read_bytes()
+        assert f'"{take}'.encode() in header
+        other = {"first": "second", "second": "first"}[take]
+        assert f'"{other}'.encode() not in header
+
+
 def test_only_the_active_capture_is_exported(fake_worker, footage, tmp_path):
     captured(fake_worker, footage)
     bpy.ops.scope.capture()

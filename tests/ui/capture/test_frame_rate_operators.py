@@ -9,6 +9,7 @@ from scope.scope_addon.scene.animation_data.actions import fcurves, read_keys
 from scope.scope_addon.scene.build import BuildOptions, build_scene
 from scope.scope_addon.scene.character.correction_list import listed_corrections
 from scope.scope_addon.scene.packed_motion import pack_motion
+from scope.scope_addon.ui.capture.frame_rate_operators import keyed_for
 from scope.scope_addon.ui.capture.result import show_result
 
 from ...edit.walking import BODY, NAMES, motion_of, walk
@@ -77,6 +78,20 @@ def test_keys_return_to_whole_frames_and_other_animation_stays(scene):
     again = at_times(person, NAMES)
     bpy.ops.scope.smooth(strength=1.0)  # which writes keys at the scene's rate
     np.testing.assert_allclose(at_times(person, NAMES), again, atol=1e-3)
+
+
+def test_a_rate_that_an_importer_has_changed_is_noticed_and_restored(scene):
+    person = built()
+    before = at_times(person, NAMES)
+    assert keyed_for(scene) == 0
+    scene.render.fps = 24  # as Blender's importer of FBX files does
+    assert keyed_for(scene) == 20
+    bpy.ops.scope.match_frame_rate()
+    assert keyed_for(scene) == 0
+    np.testing.assert_allclose(at_times(person, NAMES), before, atol=1e-4)
+    scene.render.fps = 24
+    bpy.ops.scope.smooth(strength=1.0)  # which writes keys at the scene's rate
+    assert keyed_for(scene) == 0
 
 
 def test_a_frame_range_of_the_users_stays(scene):
