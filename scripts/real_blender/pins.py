@@ -15,6 +15,7 @@ from pathlib import Path
 
 import bpy
 from bpy_extras.view3d_utils import location_3d_to_region_2d
+from mathutils import Vector
 
 sys.path.insert(0, str(Path(__file__).parent))
 from session import FOOTAGE, OUT, captured, invoke, key, picture, run, show_tab, use, viewport
@@ -139,8 +140,7 @@ def corrected(first: int, frame: int) -> Iterator[float]:
     use(bpy.ops.scope.look_through)
     yield 1.5
     began = time.monotonic()
-    place = rig().matrix_world @ rig().pose.bones["head"].head
-    use(bpy.ops.scope.add_pin, joint="head", location=(place.x, place.y + 0.05, place.z))
+    use(bpy.ops.scope.add_pin, joint="head", location=place("head") + Vector((0.0, 0.05, 0.0)))
     report["pin_s"] = round(time.monotonic() - began, 2)
     use(bpy.ops.scope.foot_stands, start=frame + 20, end=frame + 30, foot="left")
     use(bpy.ops.scope.exchange_sides, start=first + 5, end=first + 12)
@@ -154,6 +154,35 @@ def corrected(first: int, frame: int) -> Iterator[float]:
     use(bpy.ops.scope.remove_correction, index=-1)
     yield 1.0
     assert listed() == []
+    out_of_reach()
+
+
+def out_of_reach() -> None:
+    """Pin a wrist a metre away: the body stays, and without the pin the keys are the same to the bit."""
+    before, shoulder, pelvis = keys(), place("left_shoulder"), place("pelvis")
+    use(bpy.ops.scope.add_pin, joint="left_wrist", location=shoulder + Vector((1.1, 0.0, 0.0)))
+    report["out_of_reach"] = listed()[0]["missed"]
+    report["pelvis_moved_cm"] = round(100 * (place("pelvis") - pelvis).length, 2)
+    assert report["pelvis_moved_cm"] < 3.5, report
+    assert 40 < float(listed()[0]["missed"].removesuffix(" cm")) < 70, listed()
+    use(bpy.ops.scope.remove_correction, index=0)
+    assert keys() == before
+
+
+def place(joint: str) -> Vector:
+    """Return where a joint is in the scene."""
+    viewport()["window"].view_layer.update()
+    return rig().matrix_world @ rig().pose.bones[joint].head
+
+
+def keys() -> list[list[float]]:
+    """Return the keys of all curves of the captured armature."""
+    found = []
+    for curve in rig().animation_data.action.fcurves:
+        values = [0.0] * (2 * len(curve.keyframe_points))
+        curve.keyframe_points.foreach_get("co", values)
+        found.append(values)
+    return found
 
 
 def scroll(sidebar: bpy.types.Region) -> None:

@@ -13,13 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....solver.body import Body
+from ....solver.names import BODY_JOINTS
 from ....solver.rotations import exp, log
 from ...errors import MotionFileError
 from ...kinematics.smoothing import smooth_rotations
 from ...motion import Motion
 from ..clip import Clip, clip_from_motion
 from ..spans import swap_sides
-from .corrections import Correction, Exchange, from_arrays, to_arrays
+from .corrections import Correction, Exchange, Pin, from_arrays, to_arrays
 from .solve_pins import Shot, resolve
 
 _KEPT = ("poses", "trans", "poses_raw", "trans_raw", "joints_cam")
@@ -40,6 +41,26 @@ def shot_of(motion: Motion, start: float = 0.0) -> Shot:
     :param start: seconds of the clip's clock at the footage's time 0.
     """
     return Shot(motion.frames, motion.timestamps + start, motion.world_from_camera, motion.intrinsics)
+
+
+def distance_from_pin(motion: Motion, pin: Pin, place: NDArray[np.float64] | None = None) -> float:
+    """Return how far a joint is from its pin: pixels of a pin in the image, metres of one in space.
+
+    :param place: (3,) metres, where the joint is in the world; where the motion has it if None.
+    :return: 0 in frames that the motion does not have, and without ``place`` of fingers, which depend on the body.
+    """
+    rows = np.flatnonzero(motion.frames == pin.frame)
+    if not len(rows) or (place is None and pin.joint not in BODY_JOINTS):
+        return 0.0
+    T = motion.world_from_camera[rows[0]]
+    if place is None:
+        where = motion.joints_cam[rows[0], BODY_JOINTS.index(pin.joint)].astype(float)
+    else:
+        where = T[:3, :3].T @ (place - T[:3, 3])
+    if pin.pixel is not None:
+        u, v, w = motion.intrinsics @ where
+        return float(np.hypot(u / w - pin.pixel[0], v / w - pin.pixel[1]))
+    return float(np.linalg.norm(T[:3, :3] @ where + T[:3, 3] - pin.position))
 
 
 def uncorrected(motion: Motion) -> Motion:

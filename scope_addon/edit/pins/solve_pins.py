@@ -6,7 +6,7 @@ it was as the prior. (2) What changed, as rotation vectors log(Ω_beforeᵀ Ω_a
 interpolated between the pinned keys and fades out beyond them. (3) Every key of that span is fitted again with the
 interpolated pose as the prior, the corrected joint where that pose has it, and feet that stand, other hands and the
 head where they were. Keys outside of the span are not touched. The joints of a limb, and limbs whose spans overlap, are
-treated in turns until all pins are met.
+treated in turns until all pins are met. A pin that its limb cannot reach is approached, see ``reach.py``.
 
 On captured walks whose arm was turned away from the known truth over half a second to a second, pins of elbow and wrist
 reduce the wrist's mean error over the span from 83 pixels to 27, 15 and 10 with one, two and three pinned frames, and
@@ -31,6 +31,7 @@ from ..spans import swap_sides
 from .corrections import Contact, Correction, Exchange, Pin
 from .fade import faded
 from .pose_refit import HELD, PINNED, PINNED_2D, STANDING, Points, PoseRefit, limb_of
+from .reach import SLACK_M, pixel_of, within_reach
 
 _UP = np.array([0.0, 0.0, 1.0])
 _CONTACT_REACH_S = 0.25
@@ -60,7 +61,7 @@ class Shot:
 
     def project(self, frame: int, point: NDArray[np.float64]) -> NDArray[np.float64]:
         """Project a point (3,), world, to the pixel (2,) of a source frame."""
-        return _pixel(self.camera(frame), point)
+        return pixel_of(self.camera(frame), point)
 
 
 @dataclass
@@ -75,11 +76,17 @@ class _Track:
 
 
 def resolve(
-    clip: Clip, body: Body, betas: NDArray[np.floating[Any]], corrections: Iterable[Correction], shot: Shot
+    clip: Clip,
+    body: Body,
+    betas: NDArray[np.floating[Any]],
+    corrections: Iterable[Correction],
+    shot: Shot,
+    slack: float = SLACK_M,
 ) -> Clip:
     """Correct a motion: exchanged sides first, then feet that stand, then pins.
 
     :param betas: (P,) shape coefficients.
+    :param slack: metres by which the body may help a limb to reach a pin.
     :return: a new clip; keys that no correction reaches are the same to the bit.
     :raises UsageError: a pin names a joint that the body does not have.
     """
@@ -91,10 +98,10 @@ def resolve(
     for contact in (c for c in corrections if isinstance(c, Contact)):
         track = _contact_track(refit, out, contact, shot)
         if track is not None:
-            _Correction(refit, out, [track]).run()
+            _Correction(refit, out, [track], slack).run()
     tracks = _pin_tracks(refit, out, [c for c in corrections if isinstance(c, Pin)], shot)
     for together in _clusters(out, tracks):
-        _Correction(refit, out, together).run()
+        _Correction(refit, out, together, slack).run()
     return out
 
 
@@ -122,13 +129,14 @@ def missed(clip: Clip, body: Body, betas: NDArray[np.floating[Any]], pin: Pin, s
 class _Correction:
     """The limbs of one cluster, treated in turns. Changes the clip that it is given."""
 
-    def __init__(self, refit: PoseRefit, clip: Clip, tracks: list[_Track]) -> None:
-        self._refit, self._clip, self._tracks = refit, clip, tracks
+    def __init__(self, refit: PoseRefit, clip: Clip, tracks: list[_Track], slack: float) -> None:
+        self._refit, self._clip, self._tracks, self._slack = refit, clip, tracks, slack
         self._spans = [_keys_within_reach(clip, track) for track in tracks]
         times = clip.times
         first, last = min(s[0] for s in self._spans), max(s[-1] for s in self._spans)
         around = np.flatnonzero((times >= times[first] - _AROUND_S) & (times <= times[last] + _AROUND_S))
         soles = refit.place(clip.rotations[around], clip.root[around])[2]
+        self._limited: set[int] = set()  # tracks whose pins are where the limb can reach them
         self._standing = np.zeros((len(clip), soles.shape[1]))
         self._standing[around] = standing_probability(soles, _UP, times[around])
 
@@ -148,6 +156,7 @@ class _Correction:
         track, span, clip = self._tracks[index], self._spans[index], self._clip
         before = Clip(clip.times[span], clip.rotations[span].copy(), clip.root[span].copy())
         _, at, soles = self._refit.place(before.rotations, before.root)
+        self._limit(index, at)
         held = [self._held(index, int(key), at[k], soles[k]) for k, key in enumerate(span)]
         hard = [h for h, points in enumerate(track.points) if any(joint in points for joint in joints)]
         turn, shift = self._changes(track, hard, span, before, held)
@@ -167,6 +176,29 @@ class _Correction:
                     self._follow(points, joint, track, at[k], soles[k])
             pose = self._refit.solve(rotations[k], root[k], tuple(track.joints), points, camera)
             clip.rotations[key], clip.root[key] = pose
+
+    def _limit(self, index: int, at: NDArray[np.float64]) -> None:
+        """Move the pins of a limb that are out of its reach to where it can reach them, before it is first treated.
+
+        :param at: (T, K+1, 3) the joints at the keys of the limb's span, world.
+        """
+        if index in self._limited:
+            return
+        self._limited.add(index)
+        track, first = self._tracks[index], self._spans[index][0]
+        for h, key in enumerate(track.keys):
+            pinned: dict[str, NDArray[np.float64]] = {}
+            moved: dict[str, Points] = {}
+            for joint in (joint for joint in track.joints if joint in track.points[h]):
+                points = track.points[h][joint]
+                moved[joint] = points
+                if len(points.numbers) == 1:  # not a foot that stands, which has several
+                    places = at[key - first], pinned
+                    reached = within_reach(self._refit, joint, points.values[0], places, track.cameras[h], self._slack)
+                    moved[joint] = Points(points.numbers, [reached], points.weights)
+                    if len(reached) == 3:
+                        pinned[joint] = reached
+            track.points[h] = moved
 
     def _changes(
         self, track: _Track, hard: list[int], span: NDArray[np.intp], before: Clip, held: list[Points]
@@ -235,15 +267,7 @@ def _met(
 ) -> bool:
     if len(target) == 3 or camera is None:
         return float(np.linalg.norm(where - target)) < _MET_M
-    return float(np.linalg.norm(_pixel(camera, where) - target)) < _MET_PX
-
-
-def _pixel(camera: tuple[NDArray[np.float64], NDArray[np.float64]], point: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Project a point (3,), world, to a pixel (2,)."""
-    T, K = camera
-    p = K @ (T[:3, :3].T @ (np.asarray(point, float) - T[:3, 3]))
-    pixel: NDArray[np.float64] = p[:2] / p[2]
-    return pixel
+    return float(np.linalg.norm(pixel_of(camera, where) - target)) < _MET_PX
 
 
 def _copied(points: Points) -> Points:
@@ -318,7 +342,8 @@ def _clusters(clip: Clip, tracks: list[_Track]) -> list[list[_Track]]:
             groups.append((begin, max(end, int(last)), [*together, track]))
         else:
             groups.append((int(first), int(last), [track]))
-    return [together for _, _, together in groups]
+    # The trunk first: how far the limbs reach depends on where it is.
+    return [sorted(together, key=lambda t: limb_of(t.joints[0]) != "trunk") for _, _, together in groups]
 
 
 def _contact_track(refit: PoseRefit, clip: Clip, contact: Contact, shot: Shot) -> _Track | None:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ....solver.body import Body
 from ...edit.clip import Clip, sample
-from ...edit.pins.corrected_motion import shot_of, uncorrected
+from ...edit.pins.corrected_motion import corrections_of, shot_of, uncorrected
 from ...edit.pins.corrections import Pin
 from ...edit.pins.solve_pins import missed, resolve
 from ...edit.smooth import smoothed
@@ -71,6 +71,23 @@ def rewrite_changed_keys(
     return changed_rows(rows, exact & (differ(free, new) | ~same.all(axis=1)), (values, after_values), start, rate)
 
 
+def pinned_places(
+    armature: bpy.types.Object, body: Body, rate: float, motion: Motion
+) -> dict[Pin, NDArray[np.float64]]:
+    """Return where the keys have each pinned joint in its frame, (3,) metres in the world of the capture.
+
+    :param rate: scene frames per second.
+    """
+    pins = [c for c in corrections_of(motion) if isinstance(c, Pin)]
+    if not pins:
+        return {}
+    clip, frames = read_clip(armature, body, rate)
+    shot = shot_of(motion, _start(armature, rate))
+    at = sample(clip_with_root_motion(armature, clip, frames), np.array([shot.time(pin.frame) for pin in pins]))
+    joints = at.joints(body, motion.betas)
+    return {pin: joints[k, list(body.joint_names).index(pin.joint)] for k, pin in enumerate(pins)}
+
+
 def _meet_pin(armature: bpy.types.Object, body: Body, rate: float, motion: Motion, pin: Pin) -> None:
     """Correct the keys by one more pin, if edited keys do not meet it although the motion does.
 
@@ -80,7 +97,7 @@ def _meet_pin(armature: bpy.types.Object, body: Body, rate: float, motion: Motio
     whole = clip_with_root_motion(armature, clip, frames)
     shot = shot_of(motion, _start(armature, rate))
     if missed(whole, body, motion.betas, pin, shot) > (_MISSED_M if pin.pixel is None else _MISSED_PX):
-        _write_change(armature, body, clip, frames, (whole, resolve(whole, body, motion.betas, [pin], shot)))
+        _write_change(armature, body, clip, frames, (whole, resolve(whole, body, motion.betas, [pin], shot, slack=0.0)))
 
 
 def captured_points(armature: bpy.types.Object, frame: float, points_world: NDArray[np.float64]) -> NDArray[np.float64]:

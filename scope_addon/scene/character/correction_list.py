@@ -9,15 +9,21 @@ from typing import TYPE_CHECKING, Any
 import bpy
 
 if TYPE_CHECKING:
-    from ...edit.pins.corrections import Correction
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from ...edit.pins.corrections import Correction, Pin
     from ...motion import Motion
 
 _LIST = "scope_corrections"  # custom property of the armature
+_MISSED_PX, _MISSED_M = 2.0, 0.01
 _ENTRY = {"kind": str, "text": str, "joint": str, "first": int, "last": int}
 
 
 def listed_corrections(armature: bpy.types.Object) -> list[dict[str, Any]]:
     """Return the corrections in their order: ``kind``, ``text``, ``joint``, scene frames ``first`` and ``last``.
+
+    A pin that its joint cannot reach has the distance in ``missed``, with its unit; otherwise, this is empty.
 
     A .blend file may be hostile: entries that are something else are left out.
     """
@@ -25,22 +31,31 @@ def listed_corrections(armature: bpy.types.Object) -> list[dict[str, Any]]:
         listed = json.loads(armature.get(_LIST, "[]"))
     except (TypeError, ValueError, RecursionError):
         return []
-    return [each for each in listed if _is_entry(each)] if isinstance(listed, list) else []
+    found = [each for each in listed if _is_entry(each)] if isinstance(listed, list) else []
+    return [{**each, "missed": str(each.get("missed", ""))} for each in found]
 
 
 def _is_entry(value: object) -> bool:
     return isinstance(value, dict) and all(type(value.get(name)) is kind for name, kind in _ENTRY.items())
 
 
-def store_corrections(armature: bpy.types.Object, motion: Motion, rate: float) -> None:
+def store_corrections(
+    armature: bpy.types.Object, motion: Motion, rate: float, places: dict[Pin, NDArray[np.float64]] | None = None
+) -> None:
     """Store the list of a motion's corrections with its armature.
 
     :param rate: scene frames per second.
+    :param places: where edited keys have the pinned joints, (3,) metres in the world; as in the motion if None.
     :raises MotionFileError: the motion's corrections are damaged.
     """
     from ...edit.pins.corrected_motion import corrections_of
+    from ...edit.pins.corrections import Pin
 
-    armature[_LIST] = json.dumps([_entry(armature, motion, c, rate) for c in corrections_of(motion)])
+    entries = [_entry(armature, motion, c, rate) for c in corrections_of(motion)]
+    for entry, correction in zip(entries, corrections_of(motion), strict=True):
+        if isinstance(correction, Pin):
+            entry["missed"] = _missed(motion, correction, (places or {}).get(correction))
+    armature[_LIST] = json.dumps(entries)
 
 
 def _entry(armature: bpy.types.Object, motion: Motion, correction: Correction, rate: float) -> dict[str, Any]:
@@ -58,3 +73,13 @@ def _entry(armature: bpy.types.Object, motion: Motion, correction: Correction, r
     first, last = (round(scene_frame(armature, motion, frame, rate)) for frame in span)
     joint = correction.joint if isinstance(correction, Pin) else ""
     return {"kind": kind, "text": text, "first": first, "last": last, "joint": joint}
+
+
+def _missed(motion: Motion, pin: Pin, place: NDArray[np.float64] | None) -> str:
+    """Return how far a joint is from a pin that it cannot reach, with the unit; empty if it is there."""
+    from ...edit.pins.corrected_motion import distance_from_pin
+
+    distance = distance_from_pin(motion, pin, place)
+    if distance < (_MISSED_M if pin.pixel is None else _MISSED_PX):
+        return ""
+    return f"{100 * distance:.0f} cm" if pin.pixel is None else f"{distance:.0f} px"

@@ -35,7 +35,7 @@ def change_corrections(
     :raises UsageError: the motion is no longer there, or keys are missing.
     """
     from ...edit.pins.corrected_motion import corrections_of, with_corrections
-    from ...scene.character.corrected_keys import rewrite_changed_keys
+    from ...scene.character.corrected_keys import pinned_places, rewrite_changed_keys
     from ...scene.packed_motion import stored_keys
 
     compiled_solver.load()
@@ -43,7 +43,7 @@ def change_corrections(
     after = with_corrections(before, body, change(corrections_of(before)))
     keys = rewrite_changed_keys(armature, body, rate, (before, after), stored_keys(armature), pin)
     set_motion_of(armature, after, keys.to_bytes() if len(keys.times) else b"")
-    store_corrections(armature, after, rate)
+    store_corrections(armature, after, rate, pinned_places(armature, body, rate, after))
     return after
 
 

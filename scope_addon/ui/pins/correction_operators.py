@@ -11,6 +11,7 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProp
 from ...scene.character.correction_list import listed_corrections
 from ..captured_person import motion_of
 from ..edit.edit_base import EditOperator, SpanOperator
+from ..reporting import iface_, rpt_
 from .corrected_person import change_corrections, pin_at
 
 if TYPE_CHECKING:
@@ -18,6 +19,18 @@ if TYPE_CHECKING:
     from ...edit.pins.corrections import Correction
 
 _NOW = -1_048_574  # the first frame that Blender allows; stands for the current one
+
+
+def unreached(armature: bpy.types.Object, joint: str, frame: int) -> str:
+    """Return the message about a joint that cannot reach its pin in a scene frame; empty if it does."""
+    for entry in listed_corrections(armature):
+        if entry["joint"] == joint and abs(entry["first"] - frame) <= 1 and entry["missed"]:
+            return rpt_(
+                "{joint} cannot reach the pin and stays {distance} away: move the pin closer, or pin the pelvis too",
+                joint=iface_(entry["text"]),
+                distance=entry["missed"],
+            )
+    return ""
 
 
 class SCOPE_OT_add_pin(EditOperator):
@@ -59,8 +72,11 @@ class SCOPE_OT_add_pin(EditOperator):
             place = tuple(self.location), self.in_image, self.reach
             pin = pin_at(context, armature, motion_of(armature), self.joint, place)
             change_corrections(armature, body, rate, lambda present: added(present, pin), pin)
+            here = scene.frame_current
         finally:
             scene.frame_set(current[0], subframe=current[1])
+        if missed := unreached(armature, self.joint, here):
+            self.report({"WARNING"}, missed)
         return ""
 
 

@@ -43,7 +43,7 @@ class SCOPE_PT_corrections(Tab, bpy.types.Panel):
             row = column.row(align=True)
             span = str(entry["first"]) if entry["first"] == entry["last"] else f"{entry['first']}–{entry['last']}"
             cells = row.split(factor=0.68, align=True)
-            cells.label(text=entry["text"], icon=_ICONS[entry["kind"]])
+            cells.label(text=entry["text"], icon="ERROR" if entry["missed"] else _ICONS[entry["kind"]])
             cells.operator("scope.go_to_frame", text=span).frame = entry["first"]
             row.operator("scope.remove_correction", text="", icon="X", emboss=False).index = index
         if len(listed) > 1:

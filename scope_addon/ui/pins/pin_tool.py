@@ -17,6 +17,7 @@ from ..captured_person import captured_armature
 from ..edit.edit_base import may_edit
 from ..reporting import iface_
 from ..view.comparison import camera_of
+from .correction_operators import unreached
 from .drawing import draw_disc, draw_line, redraw_viewport, viewport_of
 
 _SIDED = ("shoulder", "elbow", "wrist", "hip", "knee", "ankle", "foot")
@@ -117,6 +118,10 @@ class SCOPE_OT_pin_limb(bpy.types.Operator):
             bpy.ops.scope.add_pin("EXEC_DEFAULT", True, joint=joint, location=location, in_image=in_image)
         except RuntimeError as error:
             self.report({"ERROR"}, str(error).removeprefix("Error: ").strip())
+            return
+        armature = bpy.data.objects.get(session.armature)
+        if armature and (missed := unreached(armature, joint, context.scene.frame_current)):
+            self.report({"WARNING"}, missed)
 
 
 def _joint_positions(session: _Session) -> dict[str, Vector]:

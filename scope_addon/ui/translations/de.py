@@ -446,6 +446,7 @@ TEXTS = {
     "{count} people": "{count} Personen",
     "{count} person": "{count} Person",
     "{frames}, captured in {time}": "{frames}, erfasst in {time}",
+    "{joint} cannot reach the pin and stays {distance} away: move the pin closer, or pin the pelvis too": "{joint} erreicht den Pin nicht und bleibt {distance} entfernt: den Pin näher setzen oder auch das Becken anheften",
     "{path} is not a file; choose a video or image": "{path} ist keine Datei; ein Video oder Bild wählen",
     "{rate:.1f} frames/s": "{rate:.1f} Bilder/s",
     "{size} of captures in {folder}": "{size} an Erfassungen in {folder}",

@@ -446,6 +446,7 @@ TEXTS = {
     "{count} people": "{count} personas",
     "{count} person": "{count} persona",
     "{frames}, captured in {time}": "{frames}, capturados en {time}",
+    "{joint} cannot reach the pin and stays {distance} away: move the pin closer, or pin the pelvis too": "{joint} no alcanza el anclaje y queda a {distance}: acerque el anclaje o ancle también la pelvis",
     "{path} is not a file; choose a video or image": "{path} no es un archivo; elija un video o una imagen",
     "{rate:.1f} frames/s": "{rate:.1f} fotogramas/s",
     "{size} of captures in {folder}": "{size} de capturas en {folder}",

@@ -446,6 +446,7 @@ TEXTS = {
     "{count} people": "{count} personnes",
     "{count} person": "{count} personne",
     "{frames}, captured in {time}": "{frames}, capturées en {time}",
+    "{joint} cannot reach the pin and stays {distance} away: move the pin closer, or pin the pelvis too": "{joint} n’atteint pas l’épingle et reste à {distance} : rapprochez l’épingle, ou épinglez aussi le bassin",
     "{path} is not a file; choose a video or image": "{path} n’est pas un fichier ; choisissez une vidéo ou une image",
     "{rate:.1f} frames/s": "{rate:.1f} images/s",
     "{size} of captures in {folder}": "{size} de captures dans {folder}",

@@ -446,6 +446,7 @@ TEXTS = {
     "{count} people": "{count} 人",
     "{count} person": "{count} 人",
     "{frames}, captured in {time}": "{frames}、キャプチャ時間 {time}",
+    "{joint} cannot reach the pin and stays {distance} away: move the pin closer, or pin the pelvis too": "{joint} はピンに届かず、{distance} 離れています。ピンを近づけるか、骨盤もピン留めしてください",
     "{path} is not a file; choose a video or image": "{path} はファイルではありません。動画または画像を選択してください",
     "{rate:.1f} frames/s": "{rate:.1f} フレーム/秒",
     "{size} of captures in {folder}": "{folder} にキャプチャ {size}",

@@ -446,6 +446,7 @@ TEXTS = {
     "{count} people": "{count} 人",
     "{count} person": "{count} 人",
     "{frames}, captured in {time}": "{frames}，捕捉用时 {time}",
+    "{joint} cannot reach the pin and stays {distance} away: move the pin closer, or pin the pelvis too": "{joint} 够不到图钉，仍相距 {distance}：请将图钉移近，或同时钉住骨盆",
     "{path} is not a file; choose a video or image": "{path} 不是文件；请选择视频或图像",
     "{rate:.1f} frames/s": "{rate:.1f} 帧/秒",
     "{size} of captures in {folder}": "{folder} 中有 {size} 的捕捉",

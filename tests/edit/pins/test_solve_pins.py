@@ -138,6 +138,41 @@ def test_a_foot_that_stands_stays_on_the_floor():
     assert changed[-1] < 62 + 0.25 * RATE
 
 
+WAYS = {"side": (1.0, 0.0, 0.0), "front": (0.0, -1.0, 0.0), "up": (0.0, 0.0, 1.0), "across": (-0.96, -0.28, 0.0)}
+
+
+@pytest.mark.parametrize("way", WAYS.values(), ids=WAYS)
+@pytest.mark.parametrize("image", [False, True], ids=["space", "image"])
+def test_a_pin_out_of_reach_stretches_the_arm_and_leaves_the_body(way, image):
+    shoulder, elbow, wrist = (JOINTS[45, NAMES.index(f"left_{name}")] for name in ("shoulder", "elbow", "wrist"))
+    length = np.linalg.norm(elbow - shoulder) + np.linalg.norm(wrist - elbow)
+    place = shoulder + (length + 0.6) * np.array(way)  # 60 cm beyond reach
+    pin = Pin(45, "left_wrist", tuple(SHOT.project(45, place)) if image else None, None if image else tuple(place))
+    moved = resolve(TRUTH, BODY, BETAS, [pin], SHOT).joints(BODY, BETAS)
+    off = np.linalg.norm(moved - JOINTS, axis=-1)
+    others = [k for k, name in enumerate(NAMES) if not name.startswith("left_") or "hip" in name or "knee" in name]
+    assert off[:, others].max() < 0.035
+    if way == WAYS["front"] and image:
+        return  # towards the camera, where the picture says nothing about the distance
+    arm = moved[45, NAMES.index("left_wrist")] - moved[45, NAMES.index("left_shoulder")]
+    assert np.linalg.norm(arm) > 0.95 * length
+    towards = (place - shoulder) / np.linalg.norm(place - shoulder)
+    assert image or arm @ towards > 0.95 * length
+
+
+def test_a_pinned_elbow_out_of_reach_and_a_wrist_beyond_it_leave_the_body():
+    elbow = JOINTS[45, NAMES.index("left_elbow")]
+    wanted = [Pin(45, "left_elbow", position=tuple(elbow + [0.5, 0, 0]))]
+    wanted.append(Pin(45, "left_wrist", position=tuple(elbow + [1.2, 0, 0])))
+    moved = resolve(TRUTH, BODY, BETAS, wanted, SHOT).joints(BODY, BETAS)
+    assert np.linalg.norm(moved[:, 0] - JOINTS[:, 0], axis=-1).max() < 0.05
+
+
+def test_a_pinned_pelvis_moves_the_body_as_far_as_it_is_dragged():
+    pin = Pin(45, "pelvis", position=tuple(JOINTS[45, 0] + [0.6, 0.0, 0.0]))
+    assert missed(resolve(TRUTH, BODY, BETAS, [pin], SHOT), BODY, BETAS, pin, SHOT) < 0.002
+
+
 def test_exchanged_sides_are_exchanged_before_pins():
     swapped = swap_sides(TRUTH, BODY, TRUTH.times[30], TRUTH.times[50])
     fixed = resolve(swapped, BODY, BETAS, [Exchange(30, 50)], SHOT)

@@ -13,7 +13,7 @@ from scope.scope_addon.scene.character.correction_list import listed_corrections
 
 from ...edit.walking import BODY, motion_of, walk
 
-ENTRY = {"kind": "PIN", "text": "Left Wrist", "joint": "left_wrist", "first": 4, "last": 4}
+ENTRY = {"kind": "PIN", "text": "Left Wrist", "joint": "left_wrist", "first": 4, "last": 4, "missed": ""}
 
 
 def test_a_corrected_file_brings_its_list(tmp_path):

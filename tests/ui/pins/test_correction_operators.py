@@ -86,6 +86,22 @@ def test_removing_pins_restores_the_motion_in_any_order(rig):
     np.testing.assert_allclose(seen(rig, frames), before, atol=1e-5)
 
 
+def test_a_pin_out_of_reach_is_said_with_its_distance_and_listed(rig, capfd):
+    before = seen(rig)[0]
+    bpy.ops.scope.add_pin(joint="left_wrist", location=before[NAMES.index("left_shoulder")] + [1.1, 0, 0])
+    after = seen(rig)[0]
+    said = capfd.readouterr().out
+    (entry,) = listed_corrections(rig)
+    distance = np.linalg.norm(before[NAMES.index("left_shoulder")] + [1.1, 0, 0] - after[WRIST])
+    assert entry["missed"] == f"{100 * distance:.0f} cm"
+    assert f"Left Wrist cannot reach the pin and stays {entry['missed']} away" in said
+    assert np.linalg.norm(after[0] - before[0]) < 0.035
+    bpy.ops.scope.remove_correction(index=0)
+    bpy.ops.scope.add_pin(joint="left_wrist", location=before[WRIST] + [0.0, 0.05, 0.05])
+    assert "cannot reach" not in capfd.readouterr().out
+    assert listed_corrections(rig)[0]["missed"] == ""
+
+
 CORRECTIONS = {
     "pin": lambda wrist: bpy.ops.scope.add_pin(joint="left_wrist", frame=FRAME, location=wrist + [0.1, 0.05, 0.15]),
     "foot": lambda _: bpy.ops.scope.foot_stands(start=FRAME - 4, end=FRAME + 4, foot="right"),
