@@ -10,6 +10,8 @@ from ...solver.errors import InputError
 from ...solver.loaders.regular_file import check_regular
 from ..errors import UsageError
 from .bone_map import BoneMap, load_bone_map
+from .fbx_check import check_fbx
+from .gltf_check import check_gltf
 
 _LARGEST_BYTES = 4 << 30
 ROOTS = ("bone", "object", "in-place")  # where a rig stores the root motion
@@ -51,4 +53,8 @@ def rig_source(path: Path, armature: str = "", bone_map: Path | None = None) -> 
         raise InputError(f"{path}: Blender does not read FBX as text; save it as binary FBX")
     if suffix in _SIGNATURES and not header.startswith(_SIGNATURES[suffix]):
         raise InputError(f"{path}: this is not a {suffix} file; choose the file that holds your rig")
+    if suffix == ".fbx":
+        check_fbx(path)
+    elif suffix != ".blend":
+        check_gltf(path)
     return RigSource(path, armature, load_bone_map(bone_map) if bone_map is not None else None)

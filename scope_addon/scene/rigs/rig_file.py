@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -34,6 +35,7 @@ def load_rig(source: RigSource, collection: bpy.types.Collection) -> bpy.types.O
     path = source.path
     loaded = _append(path) if path.suffix.lower() == ".blend" else _import(path)
     rig = _choose(path, [obj for obj in loaded if obj.type == "ARMATURE"], source.armature)
+    _check_finite(path, rig)
     keep = with_meshes(rig, loaded)
     for obj in loaded:
         for other in obj.users_collection:
@@ -45,6 +47,12 @@ def load_rig(source: RigSource, collection: bpy.types.Collection) -> bpy.types.O
         _remove_animation(obj)
     bpy.context.view_layer.update()
     return rig
+
+
+def _check_finite(path: Path, rig: bpy.types.Object) -> None:
+    matrices = [rig.matrix_world, *(bone.matrix_local for bone in rig.data.bones)]
+    if not all(math.isfinite(value) for matrix in matrices for row in matrix for value in row):
+        raise InputError(f"{path}: bones of '{rig.name}' have positions that are no numbers; export the rig again")
 
 
 def with_meshes(rig: bpy.types.Object, objects: Iterable[bpy.types.Object]) -> list[bpy.types.Object]:

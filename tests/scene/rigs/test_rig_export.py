@@ -2,6 +2,7 @@
 """Retargeting from a rig file to exported files."""
 
 import json
+import struct
 import subprocess
 import sys
 from dataclasses import replace
@@ -174,6 +175,23 @@ def test_a_map_of_another_rig_is_refused(tmp_path):
     save_bone_map(BoneMap({bone: part for part, bone in names_of("unreal").items()}), tmp_path / "map.json")
     with pytest.raises(InputError, match="'pelvis' is not a bone of 'Rig0'"):
         check_rig(rig_source(path, bone_map=tmp_path / "map.json"))
+
+
+def test_bones_that_are_nowhere_are_refused(tmp_path):
+    """The inverse bind matrices, 24 of them, are the only matrices in the file."""
+    path = save_rig(tmp_path / "rig.glb")
+    data = bytearray(path.read_bytes())
+    (length,) = struct.unpack_from("<I", data, 12)
+    gltf = json.loads(data[20 : 20 + length])
+    accessor = next(each for each in gltf["accessors"] if each["type"] == "MAT4")
+    at = 28 + length + gltf["bufferViews"][accessor["bufferView"]].get("byteOffset", 0) + accessor.get("byteOffset", 0)
+    data[at : at + 64 * accessor["count"]] = np.full(16 * accessor["count"], np.nan, "<f4").tobytes()
+    path.write_bytes(data)
+    with pytest.raises(
+        InputError, match=r"rig\.glb: .*(bones of 'Rig0' have positions that are no numbers|cannot import)"
+    ):
+        check_rig(rig_source(path))
+    assert not bpy.data.armatures
 
 
 @pytest.mark.parametrize("suffix", [".blend", ".fbx", ".glb", ".gltf", ".obj"])

@@ -1,0 +1,85 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""FBX files whose arrays unpack to more than they say, or whose nodes do not fit into each other, are refused."""
+
+import random
+import struct
+import tracemalloc
+import zlib
+
+import pytest
+from scope.scope_addon.retarget.fbx_check import check_fbx
+from scope.solver.errors import InputError
+
+
+def array(kind, length, content, *, compressed=True, size=None):
+    data = zlib.compress(content) if compressed else content
+    return kind + struct.pack("<III", length, compressed, len(data) if size is None else size) + data
+
+
+def node(at, name, properties=(), children=()):
+    """A node of version 7400 at an offset; children are functions of their offset."""
+    body = b"".join(properties)
+    inside, inner = at + 13 + len(name) + len(body), b""
+    for child in children:
+        inner += child(inside + len(inner))
+    inner += bytes(13) if children else b""
+    end = inside + len(inner)
+    return struct.pack("<IIIB", end, len(properties), len(body), len(name)) + name + body + inner
+
+
+def fbx(path, *properties):
+    header = b"Kaydara FBX Binary  \0\x1a\0" + struct.pack("<I", 7400)
+    made = node(
+        27, b"Objects", [b"L" + bytes(8), b"S" + struct.pack("<I", 3) + b"abc"], [lambda at: node(at, b"A", properties)]
+    )
+    path.write_bytes(header + made + bytes(13) + b"footer of any content")
+    return path
+
+
+def test_a_whole_file_passes(tmp_path):
+    arrays = array(b"d", 3, bytes(24)), array(b"i", 2, bytes(8), compressed=False), array(b"b", 0, b"")
+    check_fbx(fbx(tmp_path / "rig.fbx", *arrays, b"C\x01", b"R" + struct.pack("<I", 2) + b"ab"))
+
+
+@pytest.mark.parametrize(
+    ("properties", "says"),
+    [
+        ([array(b"d", 4, bytes(24))], "not the size"),
+        ([array(b"d", 2, bytes(24))], "not the size"),
+        ([array(b"i", 3, bytes(8), compressed=False)], "not the size"),
+        ([array(b"i", 2, bytes(8), size=1000)], "does not lie within"),
+        ([array(b"d", 0xFFFFFFFF, bytes(24))], "too large"),
+        ([b"S" + struct.pack("<I", 0xFFFFFFFF)], "does not lie within"),
+        ([b"Q"], "of type 'Q'"),
+        ([b"d" + struct.pack("<III", 1, 1, 3) + b"bad"], "incorrect header"),
+    ],
+)
+def test_a_file_that_contradicts_itself_is_refused(tmp_path, properties, says):
+    with pytest.raises(InputError, match=rf"rig\.fbx: this FBX file is damaged .*{says}"):
+        check_fbx(fbx(tmp_path / "rig.fbx", *properties))
+
+
+def test_a_bomb_takes_no_memory(tmp_path):
+    """100 MB of zeros in 100 kB, said to be 24 bytes."""
+    path = fbx(tmp_path / "rig.fbx", array(b"d", 3, bytes(100_000_000)))
+    assert path.stat().st_size < 200_000
+    tracemalloc.start()
+    with pytest.raises(InputError, match="not the size"):
+        check_fbx(path)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 5_000_000
+
+
+def test_random_damage_never_gives_a_traceback(tmp_path):
+    whole = fbx(tmp_path / "rig.fbx", array(b"d", 3, bytes(24)), b"C\x01").read_bytes()
+    chance = random.Random(5)
+    for _ in range(300):
+        data = bytearray(whole)
+        for _ in range(chance.randint(1, 4)):
+            data[chance.randrange(23, len(data))] = chance.randrange(256)
+        (tmp_path / "rig.fbx").write_bytes(data[: chance.choice((None, chance.randrange(len(data))))])
+        try:
+            check_fbx(tmp_path / "rig.fbx")
+        except InputError as error:
+            assert "rig.fbx" in str(error)  # noqa: PT017

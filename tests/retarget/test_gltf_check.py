@@ -1,0 +1,135 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""glTF files that claim more than they hold, or name other files, are refused before an importer reads them."""
+
+import copy
+import json
+import os
+import random
+import struct
+
+import pytest
+from scope.scope_addon.retarget.gltf_check import check_gltf
+from scope.solver.errors import InputError
+
+GLTF = {
+    "asset": {"version": "2.0"},
+    "buffers": [{"byteLength": 400}],
+    "bufferViews": [{"buffer": 0, "byteOffset": 16, "byteLength": 384}, {"buffer": 0, "byteLength": 16}],
+    "accessors": [
+        {"bufferView": 0, "componentType": 5126, "type": "MAT4", "count": 6},
+        {
+            "componentType": 5126,
+            "type": "VEC3",
+            "count": 9,
+            "sparse": {
+                "count": 2,
+                "indices": {"bufferView": 1, "componentType": 5123},
+                "values": {"bufferView": 0},
+            },
+        },
+    ],
+}
+
+
+def glb(path, gltf, binary=bytes(400)):
+    text = json.dumps(gltf).encode()
+    text += b" " * (-len(text) % 4)
+    chunks = struct.pack("<I4s", len(text), b"JSON") + text + struct.pack("<I4s", len(binary), b"BIN\0") + binary
+    path.write_bytes(struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks)
+    return path
+
+
+def changed(*keys, to):
+    gltf = copy.deepcopy(GLTF)
+    inner = gltf
+    for key in keys[:-1]:
+        inner = inner[key]
+    inner[keys[-1]] = to
+    return gltf
+
+
+def test_a_whole_file_passes(tmp_path):
+    check_gltf(glb(tmp_path / "rig.glb", GLTF))
+    check_gltf(glb(tmp_path / "strided.glb", changed("bufferViews", 0, "byteStride", to=64)))
+
+
+@pytest.mark.parametrize(
+    "gltf",
+    [
+        changed("accessors", 0, "count", to=7),
+        changed("accessors", 0, "count", to=2_000_000_000),
+        changed("accessors", 0, "count", to=-1),
+        changed("accessors", 0, "count", to="6"),
+        changed("accessors", 0, "byteOffset", to=4),
+        changed("accessors", 0, "bufferView", to=2),
+        changed("accessors", 1, "count", to=2_000_000_000),
+        changed("accessors", 1, "sparse", "count", to=9),
+        changed("bufferViews", 0, "byteLength", to=385),
+        changed("bufferViews", 0, "byteStride", to=65),
+        changed("buffers", 0, "byteLength", to=401),
+        changed("buffers", 0, to=None),
+        changed("buffers", 0, "uri", to="data:application/octet-stream;base64,AAAA"),
+        [1, 2],
+    ],
+)
+def test_a_file_that_contradicts_itself_is_refused(tmp_path, gltf):
+    with pytest.raises(InputError, match=r"rig\.glb: this glTF file is damaged"):
+        check_gltf(glb(tmp_path / "rig.glb", gltf))
+
+
+def test_files_beside_the_rig_are_used(tmp_path):
+    (tmp_path / "textures").mkdir()
+    (tmp_path / "textures" / "my skin.png").write_bytes(b"png")
+    (tmp_path / "rig.bin").write_bytes(bytes(400))
+    gltf = changed("buffers", 0, "uri", to="rig.bin") | {"images": [{"uri": "textures/my%20skin.png"}]}
+    (tmp_path / "rig.gltf").write_text(json.dumps(gltf))
+    check_gltf(tmp_path / "rig.gltf")
+    (tmp_path / "rig.bin").write_bytes(bytes(399))
+    with pytest.raises(InputError, match="damaged"):
+        check_gltf(tmp_path / "rig.gltf")
+
+
+@pytest.mark.parametrize(
+    ("uri", "says"),
+    [
+        ("/dev/zero", "outside its own folder"),
+        ("../other.bin", "outside its own folder"),
+        ("..%2Fother.bin", "outside its own folder"),
+        ("file:///etc/passwd", "outside its own folder"),
+        ("https://example.com/a.bin", "outside its own folder"),
+        ("link.bin", "outside its own folder"),
+        ("missing.bin", "is missing"),
+    ],
+)
+@pytest.mark.parametrize("where", ["buffers", "images"])
+def test_other_files_are_not_read(tmp_path, uri, says, where):
+    folder = tmp_path / "rig"
+    folder.mkdir()
+    (tmp_path / "other.bin").write_bytes(bytes(400))
+    (folder / "link.bin").symlink_to(tmp_path / "other.bin")
+    gltf = changed("buffers", 0, "uri", to=uri) if where == "buffers" else {**GLTF, "images": [{"uri": uri}]}
+    with pytest.raises(InputError, match=says):
+        check_gltf(glb(folder / "rig.glb", gltf))
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="Windows has no named pipes in folders")
+def test_a_pipe_beside_the_rig_is_not_waited_for(tmp_path):
+    os.mkfifo(tmp_path / "rig.bin")
+    with pytest.raises(InputError, match=r"rig\.bin is a pipe or a device"):
+        check_gltf(glb(tmp_path / "rig.glb", changed("buffers", 0, "uri", to="rig.bin")))
+
+
+def test_random_damage_never_gives_a_traceback(tmp_path):
+    whole = glb(tmp_path / "rig.glb", GLTF).read_bytes()
+    chance = random.Random(3)
+    refused = 0
+    for _ in range(300):
+        data = bytearray(whole)
+        for _ in range(chance.randint(1, 5)):
+            data[chance.randrange(len(data) - 400)] = chance.randrange(256)
+        (tmp_path / "rig.glb").write_bytes(data[: chance.choice((None, chance.randrange(len(data))))])
+        try:
+            check_gltf(tmp_path / "rig.glb")
+        except InputError:
+            refused += 1
+    assert refused > 200
