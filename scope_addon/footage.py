@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Recognize footage by file names, and show these. Standard library only: menus and command lines load it quickly."""
 
-import json
 import os
 import re
 from pathlib import Path
@@ -61,6 +60,8 @@ def shown(path: str | Path) -> str:
 
 def json_text(value: object, indent: int | None = None) -> str:
     """Return JSON in ASCII, in which file names are as `shown`."""
+    import json  # here, because Blender loads this module when it starts
+
     return json.dumps(json.loads(shown(json.dumps(value, ensure_ascii=False))), indent=indent)
 
 

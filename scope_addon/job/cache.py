@@ -4,21 +4,19 @@
 - ``captures/<key>/report.json``, ``person1.npz``, …: a finished capture
 - ``jobs/<name>/``: a capture that is being written; it is moved to ``captures`` when it is complete
 - ``kernels/``: the machine code that was compiled here. Clearing keeps it, except for that of replaced versions
+
+Blender loads this when it starts, so that what only captures need is imported where it is used.
 """
 
 from __future__ import annotations
 
-import json
 import os
 import re
-import shutil
-import tempfile
 import time
 from collections.abc import Iterator
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 REPORT = "report.json"
 _VERSION = re.compile(
@@ -27,8 +25,7 @@ _VERSION = re.compile(
 _ABANDONED_S = 24 * 3600.0  # age above which a job folder belongs to no running process
 
 
-@dataclass(frozen=True)
-class CachedCapture:
+class CachedCapture(NamedTuple):
     """A finished capture on disk."""
 
     motions: list[Path]
@@ -48,6 +45,8 @@ class Cache:
 
     def find(self, key: str) -> CachedCapture | None:
         """Return the finished capture with this key; None if there is none."""
+        import json
+
         folder = self.root / "captures" / key
         try:
             content = json.loads((folder / REPORT).read_text(encoding="utf-8"))
@@ -66,6 +65,9 @@ class Cache:
 
         :raises OutputError: the cache folder cannot be written to.
         """
+        import shutil
+        import tempfile
+
         jobs = self.root / "jobs"
         try:
             jobs.mkdir(parents=True, exist_ok=True)
@@ -83,6 +85,9 @@ class Cache:
         :param motions: names of the motion files in the folder.
         :raises OutputError: the cache folder cannot be written to.
         """
+        import json
+        import shutil
+
         target = self.root / "captures" / key
         try:
             content = json.dumps({"motions": motions, "report": report})
@@ -103,6 +108,8 @@ class Cache:
 
         Running jobs and the compiled code in use are kept.
         """
+        import shutil
+
         before = self.size()
         for folder in self._owned():
             shutil.rmtree(folder, ignore_errors=True)
@@ -110,6 +117,8 @@ class Cache:
 
     def prune(self, limit: int) -> None:
         """Remove the least recently used captures until the others fit into ``limit`` bytes."""
+        import shutil
+
         total = 0
         for index, (folder, _) in enumerate(_by_time(self.root / "captures")):
             total += _size(folder)

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import math
-import tempfile
 import time
 from pathlib import Path
 
@@ -101,6 +100,8 @@ def user_folder() -> Path:
     try:
         return Path(bpy.utils.extension_path_user(PACKAGE, create=True))
     except ValueError:
+        import tempfile
+
         return Path(tempfile.gettempdir()) / "scope-user"
 
 

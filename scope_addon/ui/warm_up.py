@@ -9,11 +9,9 @@ when a capture begins. Only the standard library is loaded: the solver's librari
 from __future__ import annotations
 
 import contextlib
-import hashlib
-import subprocess
 import sys
-import tempfile
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import bpy
 
@@ -21,11 +19,14 @@ from ..job.start_worker import worker_command
 from .preferences import PACKAGE, cache, preferences
 from .reporting import iface_
 
+if TYPE_CHECKING:
+    import subprocess
+    import tempfile
+
 ROOT = Path(__file__).resolve().parents[2]
 KERNELS = 77  # that a capture and its preview compile
 _DELAY_S, _INTERVAL_S = 3.0, 1.0
 _REQUEST = b'{"warm_up": true}\n'
-_WINDOWS_FLAGS = getattr(subprocess, "CREATE_NO_WINDOW", 0) | getattr(subprocess, "IDLE_PRIORITY_CLASS", 0)
 
 
 class WarmUp:
@@ -65,6 +66,10 @@ def step() -> float | None:
 
 def start() -> bool:
     """Start the process; return whether that worked. If not, the first capture compiles the solver."""
+    import subprocess
+    import tempfile
+
+    windows_flags = getattr(subprocess, "CREATE_NO_WINDOW", 0) | getattr(subprocess, "IDLE_PRIORITY_CLASS", 0)
     python = [sys.executable, *getattr(bpy.app, "python_args", ("-I",))]
     kernels = cache().kernels
     try:
@@ -74,7 +79,7 @@ def start() -> bool:
         command, environment = worker_command(python, ROOT, Path(WarmUp.folder.name), kernels)
         quiet = subprocess.DEVNULL
         WarmUp.process = subprocess.Popen(
-            command, stdin=subprocess.PIPE, stdout=quiet, stderr=quiet, env=environment, creationflags=_WINDOWS_FLAGS
+            command, stdin=subprocess.PIPE, stdout=quiet, stderr=quiet, env=environment, creationflags=windows_flags
         )
         assert WarmUp.process.stdin is not None
         WarmUp.process.stdin.write(_REQUEST)  # it stays open: the process ends when Blender does
@@ -114,6 +119,8 @@ def _files() -> int:
 
 def _marker() -> Path:
     """Return the file that says that everything is compiled for this installation and this Blender's Python."""
+    import hashlib
+
     installed = (ROOT / "__init__.py").stat().st_mtime_ns
     digest = hashlib.sha256(f"{PACKAGE} {ROOT} {installed} {sys.version}".encode(errors="replace"))
     return cache().kernels / f"{digest.hexdigest()[:16]}.ready"

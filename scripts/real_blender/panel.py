@@ -14,6 +14,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import bpy
+from bpy_extras.view3d_utils import location_3d_to_region_2d
 
 sys.path.insert(0, str(Path(__file__).parent))
 from session import FOOTAGE, OUT, addon, inventory, invoke, key, picture, press, run, show_tab, until, viewport
@@ -38,6 +39,15 @@ def cancel() -> Iterator[float]:
         picture("4_question")
         key("Return", OVER_PANEL)
         yield 2.0
+
+
+def frame_covered() -> float:
+    """Return how far the frame of the scene's camera reaches under the sidebar or the toolbar, pixels."""
+    area, region, camera = viewport()["area"], viewport()["region"], bpy.context.scene.camera
+    corners = [camera.matrix_world @ corner for corner in camera.data.view_frame(scene=bpy.context.scene)]
+    across = [location_3d_to_region_2d(region, area.spaces.active.region_3d, corner).x for corner in corners]
+    tools, sidebar = (next(r for r in area.regions if r.type == kind) for kind in ("TOOLS", "UI"))
+    return max(tools.x + tools.width - region.x - min(across), max(across) - (sidebar.x - region.x))
 
 
 def steps() -> Iterator[float]:
@@ -117,6 +127,8 @@ def steps() -> Iterator[float]:
     scene.frame_set(result.frames // 2)
     yield 2.0
     picture("7_compared_with_footage")
+    report["frame_covered_px"] = frame_covered()
+    assert report["frame_covered_px"] <= 0, "the sidebar covers the camera's frame"
 
     invoke(bpy.ops.scope.look_through)
     yield 1.0

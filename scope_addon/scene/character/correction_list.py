@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import json
 from typing import TYPE_CHECKING, Any
 
 import bpy
@@ -27,6 +26,10 @@ def listed_corrections(armature: bpy.types.Object) -> list[dict[str, Any]]:
 
     A .blend file may be hostile: entries that are something else are left out.
     """
+    if _LIST not in armature:
+        return []
+    import json  # here, because Blender loads this module when it starts
+
     try:
         listed = json.loads(armature.get(_LIST, "[]"))
     except (TypeError, ValueError, RecursionError):
@@ -48,6 +51,8 @@ def store_corrections(
     :param places: where edited keys have the pinned joints, (3,) metres in the world; as in the motion if None.
     :raises MotionFileError: the motion's corrections are damaged.
     """
+    import json
+
     from ...edit.pins.corrected_motion import corrections_of
     from ...edit.pins.corrections import Pin
 

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import textwrap
 from pathlib import Path
 
 import bpy
@@ -273,6 +272,8 @@ def _split(layout: bpy.types.UILayout) -> bpy.types.UILayout:
 
 def _draw_text(context: bpy.types.Context, layout: bpy.types.UILayout, text: str, icon: str = "NONE") -> None:
     """Draw a sentence, wrapped to the width of the sidebar."""
+    import textwrap  # not while Blender starts
+
     scale = context.preferences.system.ui_scale
     width = max(20, int((context.region.width / scale - 60) / _PIXELS_PER_CHARACTER)) if context.region else 40
     column = layout.column(align=True)

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import blf
 import bpy
@@ -27,16 +26,18 @@ _FREE, _HOVERED, _PINNED, _LINE = (1.0, 1.0, 1.0, 0.8), (1.0, 0.8, 0.2, 1.0), (0
 _HELP = "Drag a handle to where the joint is.  Scrub or play to go to other frames.  Esc or Enter: done"
 
 
-@dataclass
 class _Session:
     """What the tool draws; Blender's objects are looked up by name, because undo replaces them."""
 
-    armature: str
-    area: int  # as_pointer
-    hovered: str = ""
-    dragged: str = ""
-    start: tuple[float, float] = (0.0, 0.0)
-    mouse: tuple[float, float] = (0.0, 0.0)
+    def __init__(self, armature: str, area: int) -> None:
+        """Begin with no handle under the mouse.
+
+        :param area: its ``as_pointer``.
+        """
+        self.armature, self.area = armature, area
+        self.hovered = self.dragged = ""
+        self.start: tuple[float, float] = (0.0, 0.0)
+        self.mouse: tuple[float, float] = (0.0, 0.0)
 
 
 class SCOPE_OT_pin_limb(bpy.types.Operator):

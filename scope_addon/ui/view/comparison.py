@@ -6,11 +6,17 @@ Views are not part of what Blender undoes and saves with a scene, so this state 
 
 from __future__ import annotations
 
+import math
+
 import bpy
-from mathutils import Matrix, Vector
+from mathutils import Matrix, Quaternion, Vector
 
 from ..captured_person import captured_armature
+from .frame_fit import fit_frame, unfit_frame
 
+_LEAST_SIDE = 0.3  # of the viewport's width
+_DRAWN_AFTER_S = 0.2
+_SIDE_TILT = math.radians(5.0)
 _SIDE_HEIGHT_M = 2.6  # vertical extent of the side view
 _SENSOR_MM = 72.0  # a viewport shows the distance times this over its focal length, across its longer side
 _had_bones: dict[int, bool] = {}  # by viewport: whether it showed bones before the comparison
@@ -44,12 +50,14 @@ def begin(context: bpy.types.Context, area: bpy.types.Area, collection: bpy.type
     if space.region_3d.view_perspective != "CAMERA":
         with _in(context.window, area):
             bpy.ops.view3d.view_camera()
+    fit_frame(context.scene, area)
 
 
 def end(window: bpy.types.Window, area: bpy.types.Area) -> None:
     """Show the scene in a viewport again as before the comparison."""
     space = area.spaces.active
     space.overlay.show_bones = _had_bones.pop(space.as_pointer(), True)  # unknown after the file was opened again
+    unfit_frame(space)
     with _in(window, area):
         if space.local_view:
             bpy.ops.view3d.localview(frame_selected=False)
@@ -77,8 +85,12 @@ def open_side_view(context: bpy.types.Context, area: bpy.types.Area) -> None:
     """Split a viewport, and show the capture from its side in the new one."""
     window, screen = context.window, context.window.screen
     before = {each.as_pointer() for each in screen.areas}
+    # What the sidebar and the toolbar leave is shared equally.
+    covered = sum(region.width for region in area.regions if region.type in ("TOOLS", "UI") and region.width > 1)
+    factor = max(_LEAST_SIDE, (1.0 - covered / max(1, area.width)) / 2.0)
+    width = factor * area.width
     with _in(window, area):
-        bpy.ops.screen.area_split(direction="VERTICAL", factor=0.5)
+        bpy.ops.screen.area_split(direction="VERTICAL", factor=factor)
     side = next(each for each in screen.areas if each.as_pointer() not in before)
     collection, camera = context.scene.scope.result.collection, camera_of(context.scene)
     people = [o for o in collection.all_objects if "scope_source" in o]
@@ -93,15 +105,36 @@ def open_side_view(context: bpy.types.Context, area: bpy.types.Area) -> None:
     space.lock_bone = space.lock_object.data.bones[0].name
     view = space.region_3d
     view.view_perspective = "ORTHO"
-    view.view_rotation = _side_rotation(camera.matrix_world).to_quaternion()
-    span = _SIDE_HEIGHT_M * max(1.0, area.width / 2 / max(1, area.height))
+    # Slightly from above: in an orthographic view that is level, Blender draws no floor.
+    view.view_rotation = _side_rotation(camera.matrix_world).to_quaternion() @ Quaternion((1.0, 0.0, 0.0), -_SIDE_TILT)
+    span = _SIDE_HEIGHT_M * max(1.0, width / max(1, area.height))
     view.view_distance = span * space.lens / _SENSOR_MM
+    _fit_later(area)
 
 
 def close_side_view(window: bpy.types.Window, side: bpy.types.Area) -> None:
     """Give the place of the side view back to the viewport that it was split from."""
     with _in(window, side):
         bpy.ops.screen.area_close()
+    for area in window.screen.areas:
+        if area.type == "VIEW_3D" and looks_through(window.scene, area.spaces.active):
+            _fit_later(area)
+
+
+def _fit_later(area: bpy.types.Area) -> None:
+    """Fit the camera's frame into a viewport whose size changes when it is drawn next."""
+    pointer = area.as_pointer()
+
+    def fit() -> None:
+        for window in bpy.context.window_manager.windows:
+            for each in window.screen.areas:
+                same = each.as_pointer() == pointer and each.type == "VIEW_3D"
+                if same and looks_through(window.scene, each.spaces.active):
+                    fit_frame(window.scene, each)
+                    each.tag_redraw()
+
+    if not bpy.app.background:
+        bpy.app.timers.register(fit, first_interval=_DRAWN_AFTER_S)
 
 
 def _side_rotation(camera: Matrix) -> Matrix:
