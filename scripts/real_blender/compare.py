@@ -51,6 +51,8 @@ def panel(video: Path, out: Path, shell_out: Path, report: dict) -> list[str]:
     problems = missing(out, report["exports"])
     if distance["median"] > 1e3 * TOLERANCE_M:
         problems.append("the window's motion is not the shell's")
+    if report["lowest_skin_m"] < -0.0105:
+        problems.append(f"the body goes {-100 * report['lowest_skin_m']:.1f} cm under the floor")
     if report["mouse_chose"] != "FAST":
         problems.append("the mouse did not reach the panel's buttons")
     if report["after_escape_elsewhere"] != {"capturing": True, "playing": False}:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import time
@@ -44,6 +45,28 @@ def one_clip() -> None:
     command("capture", "clips/walk.mp4", "--quality", "superb", status=2)
     command("capture", "clips/wall.png", *FAST, "-o", "out/wall.npz", status=3)
     assert not list(OUT.glob("broken*")) + list(OUT.glob("wall*"))
+
+
+def name_that_is_not_utf8() -> None:
+    """Capture a file with a name in Latin-1, at which OpenCV's functions crash."""
+    clip = OUT / os.fsdecode(b"caf\xe9.mp4")
+    shutil.copy("clips/walk.mp4", clip)
+    command("capture", str(clip), *FAST, "-o", "out/latin.npz", status=0)
+    assert (OUT / "latin.npz").stat().st_size > 1000
+
+
+def damaged_code() -> None:
+    """Damage some of the compiled code that comes with the extension: a capture compiles it again."""
+    files = Path("home/.config/blender").glob("*/extensions/user_default/scope/assets/kernels/*/*.code")
+    empty, cut, flipped = sorted(files, key=lambda path: path.stat().st_size)[:3]
+    whole = {path: path.read_bytes() for path in (empty, cut, flipped)}
+    empty.write_bytes(b"")
+    cut.write_bytes(whole[cut][:500])
+    flipped.write_bytes(whole[flipped][:-100] + bytes(byte ^ 255 for byte in whole[flipped][-100:]))
+    command("capture", "clips/walk.mp4", *FAST, "-o", "out/mended.npz", status=0)
+    assert (OUT / "mended.npz").stat().st_size > 1000
+    for path, content in whole.items():
+        path.write_bytes(content)
 
 
 def running(what: bytes) -> list[str]:
@@ -104,6 +127,8 @@ if __name__ == "__main__":
     subprocess.run(["convert", "-size", "320x240", "xc:gray", "clips/wall.png"], check=True)
     os.environ.pop("DISPLAY", None)
     one_clip()
+    name_that_is_not_utf8()
+    damaged_code()
     folder()
     stopped("SIGINT")
     stopped("SIGTERM")

@@ -14,6 +14,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import bpy
+import numpy as np
 from bpy_extras.view3d_utils import location_3d_to_region_2d
 
 sys.path.insert(0, str(Path(__file__).parent))
@@ -48,6 +49,24 @@ def frame_covered() -> float:
     across = [location_3d_to_region_2d(region, area.spaces.active.region_3d, corner).x for corner in corners]
     tools, sidebar = (next(r for r in area.regions if r.type == kind) for kind in ("TOOLS", "UI"))
     return max(tools.x + tools.width - region.x - min(across), max(across) - (sidebar.x - region.x))
+
+
+def lowest_skin(armature: bpy.types.Object) -> float:
+    """Return the height of the lowest vertex of the body over all frames, metres."""
+    scene, lowest = bpy.context.scene, float("inf")
+    body = next(o for o in armature.users_collection[0].objects if o.type == "MESH" and o.find_armature() == armature)
+    shown = scene.frame_current
+    for frame in range(scene.frame_start, scene.frame_end + 1):
+        scene.frame_set(frame)
+        posed = body.evaluated_get(bpy.context.evaluated_depsgraph_get())
+        mesh = posed.to_mesh()
+        points = np.empty(3 * len(mesh.vertices), np.float32)
+        mesh.vertices.foreach_get("co", points)
+        matrix = np.array(posed.matrix_world)
+        lowest = min(lowest, float((points.reshape(-1, 3) @ matrix[2, :3]).min() + matrix[2, 3]))
+        posed.to_mesh_clear()
+    scene.frame_set(shown)
+    return lowest
 
 
 def steps() -> Iterator[float]:
@@ -122,6 +141,7 @@ def steps() -> Iterator[float]:
     report["scene_rate"] = [scene.render.fps, round(scene.render.fps_base, 4)]
     armature = next(o for o in result.collection.objects if o.type == "ARMATURE")
     (OUT / "motion.npz").write_bytes(armature["scope_motion"]["motion"])
+    report["lowest_skin_m"] = round(lowest_skin(armature), 4)
 
     invoke(bpy.ops.scope.look_through)
     scene.frame_set(result.frames // 2)
