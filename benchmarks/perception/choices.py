@@ -61,7 +61,7 @@ CHOICES = (
     Choice("weight of 3D keypoints", prepared_track, "WEIGHTS", (2.5, 25.0), "keypoints3d"),
     Choice("weight of the orientation field", prepared_track, "WEIGHTS", (250.0, 1000.0), "orientation_field"),
     Choice("weight of the joint prior", prepared_track, "WEIGHTS", (2.0, 8.0), "joint_prior"),
-    Choice("weight of the shape prior", prepared_track, "WEIGHTS", (5.0, 20.0), "shape"),
+    Choice("weight of the shape prior", prepared_track, "WEIGHTS", (1.0, 10.0), "shape"),
     Choice("weight of the floor under standing feet", prepared_track, "WEIGHTS", (5e3, 2e4), "floor"),
     Choice("share lifted with world landmarks", lifter, "WORLD_SHARE", (0.5, 1.0)),
     Choice("speed at which balance is doubted, m/s", balance, "STANDING_M_S", (0.25, 1.0)),

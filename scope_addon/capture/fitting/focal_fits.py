@@ -31,6 +31,7 @@ from .track_fit import fit_single_frame
 
 LOG_RATIOS = np.array([-0.7, -0.35, 0.0, 0.35, 0.7])  # logarithms of the tried focal lengths, relative to the camera's
 SHARE = 0.2  # a; of 0 to 1.2, 0.2 to 0.3 is best for preset best, and 0.1 to 0.2 for fast
+SHAPE_WEIGHT = 10.0  # a body that follows keypoints further than that imitates the perspective of another focal length
 FIRST_GAP_S = 0.2  # between fitted frames; each further gap is twice as long: an hour has some fifteen frames
 
 
@@ -60,8 +61,10 @@ class FocalFits:
         for ratio in np.exp(LOG_RATIOS):
             candidate = replace(camera, intrinsics=pinhole(2 * K[0, 2], 2 * K[1, 2], ratio * K[0, 0]))
             prepared = prepare_track(self._body, track, candidate, self._ablation)
-            weights = replace(prepared.weights, keypoints2d=prepared.weights.keypoints2d * ratio**2)
-            found = fit_single_frame(replace(prepared, weights=weights))
+            keypoints2d = prepared.weights.keypoints2d * ratio**2
+            weights = replace(prepared.weights, keypoints2d=keypoints2d, shape=SHAPE_WEIGHT)
+            priors = replace(prepared.priors, shape_information=None)
+            found = fit_single_frame(replace(prepared, weights=weights, priors=priors))
             if found is None:
                 return None
             costs.append(found.cost)

@@ -19,7 +19,7 @@ from .ablation import NO_ABLATION, Ablation
 from .frame_measurements import DEPTH_SIGMA_M, Measurer
 from .hand_measurements import HandMeasurer, with_finger_limits
 from .keypoint_offsets import with_keypoint_offsets
-from .stature import with_stature
+from .stature import with_stature, with_unknown_stature
 from .weights import WEIGHTS, joint_weights
 
 SHAPE_CERTAINTY = 1e6  # information (1/σ² per coefficient) that fixes the shape once it is known
@@ -124,8 +124,7 @@ def prepare_track(
     measurer, pixels = Measurer(body, camera.intrinsics), camera.undistort(track.keypoints_px)
     lifted = _lift(measurer, track, pixels, ablation)
     priors = replace(default_priors(body), joint_weights=joint_weights(body))
-    if height_m is not None:
-        priors = with_stature(priors, body, height_m)
+    priors = with_unknown_stature(priors, body) if height_m is None else with_stature(priors, body, height_m)
     prepared = PreparedTrack(body, track, measurer, pixels, lifted, priors, ablation.weights(WEIGHTS))
     if track.hands is None:
         return prepared

@@ -14,6 +14,7 @@ from ...errors import UsageError
 SIGMA_M = 0.005
 SHORTEST_M, TALLEST_M = 0.5, 2.6  # statures outside are input errors
 MAX_DEVIATIONS = 4.5  # standard deviations of the population up to which the shapes of a body are realistic
+STIFFNESS = 4.0  # κ of ``with_unknown_stature``
 _ROUNDS = 3
 
 
@@ -28,6 +29,19 @@ def with_stature(priors: Priors, body: Body, height_m: float) -> Priors:
     information = np.eye(body.P) + np.outer(g, g) / SIGMA_M**2
     mean = g * (height_m - h0) / (SIGMA_M**2 + g @ g)
     return replace(priors, shape_mean=mean, shape_information=information)
+
+
+def with_unknown_stature(priors: Priors, body: Body) -> Priors:
+    """Return the priors for a person whose stature is unknown: proportions that differ hardly change the stature.
+
+    A single camera measures proportions, not size. Among people, short ones have relatively long trunks, so that under
+    N(0, I) a long trunk makes a person short: exact keypoints of a person of 1.75 m, with the mean's legs and a trunk
+    12 % longer, give 1.66 m. Λ = I + κ ĝĝᵀ, with ĝ the direction of β along which the stature h(β) grows,
+    divides that pull by 1 + κ.
+    """
+    *_, g = _shape_of(body, body.stature())
+    along = g / max(float(np.linalg.norm(g)), 1e-12)
+    return replace(priors, shape_information=np.eye(body.P) + STIFFNESS * np.outer(along, along))
 
 
 def require_stature(body: Body, height_m: float) -> None:
