@@ -39,6 +39,7 @@ ABLATION: dict[str, dict[str, Any]] = {
     "without 3D keypoints": {"ablation": Ablation(keypoints3d=False)},
     "without the orientation field": {"ablation": Ablation(orientation_field=False)},
     "without the joint prior": {"ablation": Ablation(joint_prior=False)},
+    "without the outline": {"ablation": Ablation(outline=False)},
     "without left-right repair": {"ablation": Ablation(left_right=False)},
     "without keypoint-jump repair": {"ablation": Ablation(keypoint_jumps=False)},
     "without the second pass": {"ablation": Ablation(second_pass=False)},

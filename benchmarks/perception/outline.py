@@ -81,12 +81,13 @@ def outline(quick: bool) -> dict[str, Any]:
     clips = [DATA / name for name in CLIPS + MORE_CLIPS] + sorted(RENDERS.glob("*.mp4"))
     figures: dict[str, Any] = {}
     for quality in (CaptureOptions().quality,) if quick else ("fast", "balanced", "best"):
-        rows = {}
+        rows: dict[str, dict[str, float]] = {}
         for path in clips:
             print(f"capturing {path.name}", file=sys.stderr, flush=True)
             rows[path.stem] = measure_clip(body, path, quality)
-        seen = [row for row in rows.values() if row]
-        rows["median"] = {key: _median([row.get(key) for row in seen]) for key in SHOWN if key != "height_m"}
+        rows["median"] = {}
+        for key in (*FIGURES, "true_iou"):
+            rows["median"] |= _median_of([rows[path.stem] for path in clips], key)
         figures[quality] = rows
         lines = [[name, *(row.get(key) for key in SHOWN)] for name, row in rows.items()]
         print(table((quality, *SHOWN.values()), lines), end="\n\n", flush=True)
@@ -182,9 +183,9 @@ def _medians(rows: list[dict[str, float]]) -> dict[str, float]:
     return {key: float(np.median([row[key] for row in rows])) for key in FIGURES} if rows else {}
 
 
-def _median(values: list[float | None]) -> float | None:
-    known = [value for value in values if value is not None]
-    return float(np.median(known)) if known else None
+def _median_of(rows: list[dict[str, float]], key: str) -> dict[str, float]:
+    known = [row[key] for row in rows if key in row]
+    return {key: float(np.median(known))} if known else {}
 
 
 def _frame_count(path: Path) -> int:

@@ -27,6 +27,7 @@ from ..compiled.part import Array
 from ..custom_residuals.external import INDEXES, MOST, Registered, external_residuals
 from ..errors import InvalidValueError
 from . import floor, foot_contact, joint_flow, joint_limits, joint_prior, pose_prior
+from .image import outline
 
 RESIDUALS = {
     "pose_prior": pose_prior,
@@ -35,6 +36,7 @@ RESIDUALS = {
     "joint_flow": joint_flow,
     "foot_contact": foot_contact,
     "floor": floor,
+    "outline": outline,
 }
 
 # Columns of a stage's weights: the measurements, the shape prior, then RESIDUALS in order, then external ones.

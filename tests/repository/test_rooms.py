@@ -20,7 +20,7 @@ CAPTURE = {
     "scope_addon/capture/perception": {"scope_addon/kinematics"},
     "scope_addon/capture/camera": {"scope_addon/capture/perception"},
     "scope_addon/capture/tracking": {"scope_addon/capture/camera"},
-    "scope_addon/capture/fitting": {"scope_addon/capture/tracking", "scope_addon/capture/media"},
+    "scope_addon/capture/fitting": {"scope_addon/capture/tracking", "scope_addon/capture/overlay"},
     "scope_addon/capture/world": {"scope_addon/capture/fitting"},
     "scope_addon/capture/overlay": {
         "scope_addon/capture/media",

@@ -22,6 +22,7 @@ class Ablation:
     keypoints3d: bool = True
     orientation_field: bool = True
     joint_prior: bool = True
+    outline: bool = True  # in the shape: the body's silhouette against person masks
     left_right: bool = True  # repair of left-right swaps and limb swaps
     keypoint_jumps: bool = True  # repair of keypoint jumps
     second_pass: bool = True  # refit with the distance that follows from floor and feet

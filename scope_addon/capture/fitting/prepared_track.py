@@ -62,6 +62,7 @@ class PreparedTrack:
     weights: Weights
     hand_measurer: HandMeasurer | None = None
     hands: NDArray[np.floating[Any]] | None = None  # (T, 2, 21, 6) as in the track, undistorted; None: not looked for
+    camera: Camera | None = None  # of the masks; None where the track has none
     stance: Stance | None = None  # in each frame's camera; the body's last keypoints are then its contact points
 
     def measure(self, k: int, root_cam: NDArray[np.floating[Any]] | None = None) -> Measurements:
@@ -125,7 +126,7 @@ def prepare_track(
     lifted = _lift(measurer, track, pixels, ablation)
     priors = replace(default_priors(body), joint_weights=joint_weights(body))
     priors = with_unknown_stature(priors, body) if height_m is None else with_stature(priors, body, height_m)
-    prepared = PreparedTrack(body, track, measurer, pixels, lifted, priors, ablation.weights(WEIGHTS))
+    prepared = PreparedTrack(body, track, measurer, pixels, lifted, priors, ablation.weights(WEIGHTS), camera=camera)
     if track.hands is None:
         return prepared
     hands = np.concatenate([camera.undistort(track.hands[..., :2]), track.hands[..., 2:]], axis=-1)

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from ....solver import ClipFit, Fit, State, fit_clip
 from .frame_measurements import NEAREST_M
 from .frame_sequence import FittedTrack, FrameSequence, is_usable
+from .outline.shape_fit import fit_shape_to_outline, usable_masks
 from .prepared_track import PreparedTrack, Stance
 from .weights import ROBUST, cold_stages
 
@@ -98,10 +99,13 @@ def _fit_shape(prepared: PreparedTrack, root_cam: NDArray[np.floating[Any]] | No
     """Estimate one shape from frames spread over the clip.
 
     The keypoint network misplaces a keypoint in the same way in every frame, so many frames constrain the shape no more
-    than one does. The weight of the shape prior therefore grows with the number of frames.
+    than one does. The weight of the shape prior therefore grows with the number of frames. Where frames have person
+    masks, these frames decide, with the body's outline.
 
     :param root_cam: (T, 3) known positions of the pelvis, camera frame, metres.
     """
+    if masks := usable_masks(prepared):
+        return fit_shape_to_outline(prepared, masks, root_cam)
     at = (lambda k: None) if root_cam is None else root_cam.__getitem__
     measurements = [prepared.measure(k, at(k)) for k in _spread(np.flatnonzero(prepared.track.seen), SHAPE_FRAMES)]
     weights = replace(prepared.weights, shape=prepared.weights.shape * len(measurements))

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import cv2
 import numpy as np
@@ -155,8 +155,7 @@ class LandmarkNetwork:
 
 def _blob(image_rgb: NDArray[np.uint8], region: Region) -> NDArray[np.float32]:
     """Return the network's input (1, 3, 256, 256) in [0, 1]."""
-    blob: NDArray[np.float32] = cv2.dnn.blobFromImage(region.cut(image_rgb, INPUT_SIZE), 1 / 255.0)
-    return blob
+    return cast(NDArray[np.float32], cv2.dnn.blobFromImage(region.cut(image_rgb, INPUT_SIZE), 1 / 255.0))
 
 
 def interpret(

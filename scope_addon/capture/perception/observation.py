@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from concurrent.futures import Future
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +14,18 @@ from .region import Region
 
 PendingReference = Future[NDArray[np.float64] | None]
 """Pending world landmarks (33, 3) of the reference network, or None if it finds nobody."""
+
+
+@dataclass(frozen=True)
+class PersonMask:
+    """Which pixels of a region show its person: ``probability`` (256, 256) in the crop of ``region``.
+
+    ``image_size``: width and height of the image in pixels; beyond its border the mask says nothing.
+    """
+
+    region: Region
+    probability: NDArray[np.floating[Any]]
+    image_size: tuple[int, int]
 
 
 @dataclass(frozen=True)
@@ -25,7 +38,7 @@ class Observation:
     ``acquired``: the person was not tracked from the previous frame; ``appearance``: see `appearance`, in some frames;
     ``reference_landmarks``: pending result of the heavy network, to replace ``world_landmarks``, in few frames. Order:
     `KEYPOINT_NAMES`. ``hands`` (2, 21, 6), if requested: pixels, confidence and world landmarks of the left and right
-    hand, see `hand_tracker`; zeros where not seen.
+    hand, see `hand_tracker`; zeros where not seen. ``mask``: the person's outline, in few frames.
     """
 
     keypoints_px: NDArray[np.float64]
@@ -37,3 +50,4 @@ class Observation:
     appearance: NDArray[np.float64] | None = None
     reference_landmarks: PendingReference | None = None
     hands: NDArray[np.float64] | None = None
+    mask: PersonMask | None = None

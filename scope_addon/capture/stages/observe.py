@@ -30,6 +30,7 @@ from ..perception.adapters.description import description_path
 from ..perception.execution import Execution
 from ..perception.observation import Observation
 from ..tracking.hand_tracker import HandTracker
+from ..tracking.landmarks.mask_schedule import MaskSchedule
 from ..tracking.people import PeopleBuilder
 from ..tracking.scene_cuts import SceneCuts
 from ..tracking.track import Track
@@ -85,7 +86,10 @@ def observe(
     live = LiveBody(body, camera, options.ablation, next(iter(options.heights_m), None))
     fits = FocalFits(body, options.ablation)
     with BackgroundEstimators(camera, video.width, video.height, live, fits) as background, _opencv_in_one_thread():
-        frames = _Frames(_tracker(options, threads, execution), _hands(options, threads, execution), background, clock)
+        tracker = _tracker(options, threads, execution)
+        network = tracker.mask_network if options.ablation.outline else None
+        masks = MaskSchedule(network, video.expected_frames)
+        frames = _Frames(tracker, _hands(options, threads, execution), masks, background, clock)
         frames.run(video, live, listeners)
     with clock.stage("solver"):
         camera = background.camera()
@@ -112,9 +116,15 @@ class _Frames:
     """Runs the networks on each frame. No frame is kept, so an hour takes no more memory than a minute."""
 
     def __init__(
-        self, tracker: PeopleTracker, hands: HandTracker | None, background: BackgroundEstimators, clock: StageClock
+        self,
+        tracker: PeopleTracker,
+        hands: HandTracker | None,
+        masks: MaskSchedule,
+        background: BackgroundEstimators,
+        clock: StageClock,
     ) -> None:
-        self._tracker, self._hands, self._background, self._clock = tracker, hands, background, clock
+        self._tracker, self._hands, self._masks = tracker, hands, masks
+        self._background, self._clock = background, clock
         self.people, self.cuts = PeopleBuilder(), SceneCuts()
 
     def run(self, video: Video, live: LiveBody, listeners: Listeners) -> None:
@@ -144,6 +154,7 @@ class _Frames:
                 self._tracker.forget()
                 self.people.cut()
             observations = self._tracker.step(lit, upcoming_lit, frame.timestamp_s)
+            observations = self._masks.add(lit, observations)
         if self._hands is not None:
             with self._clock.stage("hands"):
                 observations = self._hands.step(lit, observations, frame.timestamp_s)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..perception.landmark_network import KEYPOINT_COUNT
-from ..perception.observation import Observation, PendingReference
+from ..perception.observation import Observation, PendingReference, PersonMask
 from .appearance import SIZE as APPEARANCE_SIZE
 
 _TRUNK = [11, 12, 23, 24]  # shoulders and hips
@@ -24,7 +24,7 @@ class Track:
     ``acquired`` marks frames in which the person was found (again) rather than followed from the frame before.
     ``reference_rows`` and ``reference_landmarks`` are the reference network's world landmarks in a few frames, see
     `left_right`. ``hands`` holds pixels, confidence and world landmarks of the left and the right hand; None: hands
-    were not looked for.
+    were not looked for. ``masks`` holds the person's outline in a few frames, each with its row.
     """
 
     frames: NDArray[np.int64]  # (T,) source frame index
@@ -39,6 +39,7 @@ class Track:
         default_factory=lambda: np.zeros((0, KEYPOINT_COUNT, 3))
     )
     hands: NDArray[np.floating[Any]] | None = None  # (T, 2, 21, 6)
+    masks: tuple[tuple[int, PersonMask], ...] = ()
 
     def __len__(self) -> int:
         return len(self.frames)
@@ -67,6 +68,7 @@ class Tracklet:
     appearance: NDArray[np.float64] = field(default_factory=lambda: np.zeros(APPEARANCE_SIZE))  # sum over the frames
     references: list[tuple[int, PendingReference]] = field(default_factory=list)  # each with its row
     hands: list[NDArray[np.float32]] = field(default_factory=list)  # (2, 21, 6); empty if hands are not looked for
+    masks: list[tuple[int, PersonMask]] = field(default_factory=list)  # each with its row
 
     def add(self, row: int, observation: Observation) -> None:
         """Append the frame with index ``row``; an observation that is not finite counts as not seen."""
@@ -82,6 +84,8 @@ class Tracklet:
             self.appearance = self.appearance + o.appearance
         if o.reference_landmarks is not None:
             self.references.append((row, o.reference_landmarks))
+        if o.mask is not None:
+            self.masks.append((row, o.mask))
         if o.hands is not None:
             self.hands.append(np.where(np.isfinite(o.hands), o.hands, 0.0).astype(np.float32))
 
@@ -90,6 +94,7 @@ class Tracklet:
         if count < len(self.rows):
             end = self.rows[count]
             self.references = [(row, call) for row, call in self.references if row < end]
+            self.masks = [(row, mask) for row, mask in self.masks if row < end]
             del self.rows[count:], self.values[count:], self.centers_px[count:], self.sides_px[count:]
             del self.hands[count:]
 
@@ -132,11 +137,12 @@ def make_track(frames: Sequence[int], times: Sequence[float], tracklets: Sequenc
         reference_rows=np.array([row for row, _ in references], np.int64),
         reference_landmarks=np.array([w for _, w in references], float).reshape(-1, KEYPOINT_COUNT, 3),
         hands=hands,
+        masks=tuple(mask for tracklet in tracklets for mask in tracklet.masks),
     )
 
 
 def single_frame_track(observation: Observation) -> Track:
-    """Make a track of one frame, without hands, and without reference landmarks, which may still be pending."""
+    """Make a track of one frame, without hands and mask, and without reference landmarks, which may be pending."""
     tracklet = Tracklet()
-    tracklet.add(0, replace(observation, reference_landmarks=None, hands=None))
+    tracklet.add(0, replace(observation, reference_landmarks=None, hands=None, mask=None))
     return make_track([0], [0.0], [tracklet])

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ....solver.errors import ShapeError
 from ..perception.execution import Execution
-from ..perception.landmark_network import PoseEstimate
+from ..perception.landmark_network import LandmarkNetwork, PoseEstimate
 from ..perception.observation import Observation, PendingReference
 from ..perception.person_detector import Detection
 from ..perception.region import Region
@@ -92,6 +92,12 @@ class PeopleTracker:
         self._live: list[TrackedTarget] = []
         self._lost: list[TrackedTarget] = []
         self._schedule.forget()
+
+    @property
+    def mask_network(self) -> LandmarkNetwork | None:
+        """The network that gives person masks; only the largest one, whose preset is not made for speed."""
+        largest = self._networks.prefetches and isinstance(self._networks.landmarks, LandmarkNetwork)
+        return self._networks.begins_early if largest else None
 
     def step(
         self, image_rgb: NDArray[np.uint8], upcoming_rgb: NDArray[np.uint8] | None = None, time_s: float | None = None

@@ -31,14 +31,14 @@ def test_a_body_fills_the_region_where_it_projects_to(body: Body) -> None:
     pixels = cv2.projectPoints(vertices, np.zeros(3), np.zeros(3), K, dist)[0][:, 0]
     region = Region((330.0, 250.0), 820.0, 0.3)
     shape = silhouette(body, vertices, K, dist, (640, 480), region)
-    at = np.rint(region.crop_from_image(pixels) * 256 - 0.5).astype(int)
+    at = np.rint(region.crop_from_image(pixels.astype(np.float64)) * 256 - 0.5).astype(np.int32)
     inside = (
         (pixels > 1).all(axis=1) & (pixels < (638, 478)).all(axis=1) & (at > 0).all(axis=1) & (at < 255).all(axis=1)
     )
     grown = cv2.dilate((shape == 2).astype(np.uint8), np.ones((3, 3), np.uint8))
     assert grown[at[inside, 1], at[inside, 0]].all()
     hull = np.zeros((256, 256), np.uint8)
-    cv2.fillConvexPoly(hull, cv2.convexHull(at), 1)
+    cv2.fillConvexPoly(hull, cv2.convexHull(at), (1,))
     assert not ((shape == 2) & (cv2.dilate(hull, np.ones((3, 3), np.uint8)) == 0)).any()
     left = np.array([[-30.0, 240.0], [60.0, 240.0]])  # left of the image, and inside it beside the body
     (out_x, out_y), (in_x, in_y) = np.rint(region.crop_from_image(left) * 256 - 0.5).astype(int)

@@ -26,11 +26,13 @@ from scope.solver.residuals import (
     robust,
     shape_prior,
 )
+from scope.solver.residuals.image import outline
 
 from ..synthetic import INTRINSICS, random_body, random_flow, random_state
 
 P = 6
 AXIS = np.array([0.6, 0.0, 0.8])
+CONTOUR, NORMAL = np.array([0.3, -0.2]), np.array([0.6, -0.8])
 
 
 def random_part(rng, scale=1.0):
@@ -83,6 +85,7 @@ CASES = {
     "foot_contact": lambda part, w: foot_contact.evaluate(part, V_BAR, V, np.array([0.1, 0.2, 3.1]), w),
     "floor": lambda part, w: floor.evaluate(part, V_BAR, V, AXIS, 9.0, 2.0, 0.0, w),
     "floor_above": lambda part, w: floor.evaluate(part, V_BAR, V, AXIS, -9.0, 2.0, 3.0, w),
+    "outline": lambda part, w: outline.evaluate(part, V_BAR, V, CONTOUR, NORMAL, w),
     "pose_prior": lambda part, w: pose_prior.evaluate(part, HAT, np.array([0.1, 0.1, 2.5]), 2.0, 3.0, w),
     "joint_prior": lambda part, w: joint_prior.evaluate(part, HAT, w),
     "joint_flow": lambda part, w: joint_flow.evaluate(part, FLOW, w),
@@ -175,7 +178,7 @@ def check_blocks(tree, blocks, cost, i, found):
     "name",
     [
         *("pose_prior", "joint_prior", "joint_flow", "joint_flow_log_det", "joint_limits"),
-        *("foot_contact", "floor", "floor_above", "foot_contact_of_a_joint"),
+        *("foot_contact", "floor", "floor_above", "foot_contact_of_a_joint", "outline", "outline_inside"),
     ],
 )
 def test_table_kernels_accumulate_their_residual(name, seed):
@@ -206,6 +209,14 @@ def test_table_kernels_accumulate_their_residual(name, seed):
         tables = floor.pack([k], AXIS, offset, [2.0], [3.0])
         found = floor.evaluate(part, v_bar, shape, AXIS, offset, 2.0, 3.0, w)
         name = "floor"
+    elif name.startswith("outline"):
+        delta, normal = np.array([0.02, -0.01, 0.03]), NORMAL * (-1.0 if name.endswith("inside") else 1.0)
+        found = outline.evaluate(part, v_bar + delta, shape, CONTOUR, normal, 1.0)
+        inside = bool(found.r[0] < 0)
+        never = [[np.inf], [np.inf]]
+        tables = outline.pack([k], delta[None], CONTOUR[None], normal[None], ([2.0], [3.0]), never)
+        found = outline.evaluate(part, v_bar + delta, shape, CONTOUR, normal, (3.0 if inside else 2.0) * w)
+        name = "outline"
     else:
         tables = joint_limits.pack([i], AXIS[None], [-0.1], [0.1], [0.05], [2.0], [3.0])
         found = joint_limits.evaluate(part, AXIS, -0.1, 0.1, 0.05, 2.0, 3.0, w)

@@ -1,0 +1,164 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""From a person mask and a posed body to outline measurements: rim points and the contour points that belong to them.
+
+The rim are points of the skin whose normal is at right angles to the view, and beside which the body's silhouette ends.
+From each, the mask is searched along the projected normal for the nearest place where its probability crosses one half;
+there the contour's own normal is taken from the mask's gradient. A crossing counts if it lies within the image, near
+enough, and if both normals agree. Hands and feet are left out: they are small, and what they hold or stand on is not.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from .....solver import Body, Fit
+from .....solver.residuals.image.outline import FLOATS, INTS, pack
+from ...camera.intrinsics import Camera
+from ...overlay.rasterizer import Canvas, rasterize, vertex_normals
+from ...perception.observation import PersonMask
+from ...perception.region import Region
+
+SPACING_M = 0.03  # between candidates, at rest
+RIM_COS = 0.15  # of the angle between a rim point's normal and the view
+BESIDE_PX = 3.0  # of the mask: how far beside the rim the silhouette must have ended
+REACH = 20  # pixels of the mask searched to either side
+AGREEMENT_COS = 0.8  # of the angle between the two normals
+MOST_BLENDING_M = 0.02  # skin that blending moves further is not rigid
+BORDER_PX = 3.0  # of the image, within which contours are its edge
+_WIDTHS_M = {"head": 0.03, "neck": 0.03, "spine": 0.04, "pelvis": 0.04, "collar": 0.04, "hip": 0.03}
+_WIDTH_M = 0.02  # of limbs: how far clothes and hair reach beyond the body
+_LEFT_OUT = ("wrist", "hand", "ankle", "foot", "thumb", "index", "middle", "ring", "pinky")
+OUTSIDE_WEIGHT, INSIDE_WEIGHT = 1.0, 0.5
+OUTSIDE_SIGMA_M = 0.05
+SIZE = 256  # of the mask
+_NO_MAP = np.zeros(0, np.float32)  # the places are all in the first map
+_NOTHING = np.zeros((0, INTS), np.int64), np.zeros((0, FLOATS))
+
+
+class OutlineMeasurer:
+    """Converts masks to rows of the residual "outline" of one body.
+
+    ``body`` is the given one with the candidates as its last keypoints.
+    """
+
+    def __init__(self, body: Body, camera: Camera) -> None:
+        self._source, self._camera = body, camera
+        part = np.take_along_axis(body.skin_joints, body.skin_weights.argmax(axis=1)[:, None], axis=1)[:, 0]
+        names = [body.joint_names[i] for i in part]
+        usable = np.array([not any(key in name for key in _LEFT_OUT) for name in names])
+        usable &= np.bincount(body.faces.ravel(), minlength=len(part)) > 0
+        self.vertices = _spread(body.v_template, np.flatnonzero(usable))
+        self.part = part[self.vertices]
+        self._width = np.array([_width(body.joint_names[i]) for i in self.part])
+        self._triangles = np.ascontiguousarray(body.triangles(), np.int32)
+        self.first = len(body.keypoint_names)
+        self.body = replace(
+            body,
+            keypoint_names=body.keypoint_names + tuple(f"outline/{v}" for v in self.vertices),
+            keypoint_part=np.concatenate([body.keypoint_part, self.part]),
+            keypoint_template=np.concatenate([body.keypoint_template, body.v_template[self.vertices]]),
+            keypoint_shapedirs=np.concatenate([body.keypoint_shapedirs, body.shapedirs[self.vertices]]),
+        )
+
+    def measure(self, fit: Fit, mask: PersonMask) -> tuple[NDArray[Any], NDArray[Any]]:
+        """Return the residual's rows for the pose and shape of a fit: int64 (n, 1) and float64 (n, 11)."""
+        body, v = self._source, self.vertices
+        R, t, betas = fit.R_camera_part, fit.t_camera_part, fit.state.beta
+        skin = np.ascontiguousarray(body.skin(R, t, betas))
+        normals, points = vertex_normals(skin, self._triangles)[v], skin[v]
+        local = body.rest_vertices(betas)[v] - body.rest_joints(betas)[self.part]
+        delta = np.einsum("nji,nj->ni", R[self.part], points - t[self.part]) - local
+        facing = (normals * points).sum(axis=1) / np.linalg.norm(points, axis=1)
+        near = (np.abs(facing) < RIM_COS) & (points[:, 2] > 0.2) & (np.linalg.norm(delta, axis=1) < MOST_BLENDING_M)
+        rows = np.flatnonzero(near)
+        at = self._crop(mask.region, points[rows])
+        ahead = self._crop(mask.region, points[rows] + 0.01 * normals[rows]) - at
+        normal = ahead / np.maximum(np.linalg.norm(ahead, axis=1), 1e-9)[:, None]
+        beside = np.rint(at + BESIDE_PX * normal).astype(int)
+        inside = ((beside >= 0) & (beside < SIZE)).all(axis=1)
+        covered = self._coverage(skin, mask.region)
+        free = inside & ~covered[tuple(np.where(inside[:, None], beside, 0).T[::-1])]
+        rows, at, normal = rows[free], at[free], normal[free]
+        if not len(rows):
+            return _NOTHING
+        found, contour, outward = _crossings(mask.probability, at, normal)
+        rows = rows[found]
+        m_px = mask.region.image_from_crop((contour + 0.5) / SIZE)
+        visible = ((m_px > BORDER_PX) & (m_px < np.subtract(mask.image_size, 1 + BORDER_PX))).all(axis=1)
+        rows, contour, outward, m_px = rows[visible], contour[visible], outward[visible], m_px[visible]
+        if not len(rows):
+            return _NOTHING
+        m = self._normalized(m_px)
+        n = self._normalized(mask.region.image_from_crop((contour + outward + 0.5) / SIZE)) - m
+        n /= np.linalg.norm(n, axis=1)[:, None]
+        depth = points[rows, 2]
+        sigmas = (OUTSIDE_SIGMA_M / depth) ** 2, (self._width[rows] / depth) ** 2
+        weights = np.full(len(rows), OUTSIDE_WEIGHT), np.full(len(rows), INSIDE_WEIGHT)
+        return pack(self.first + rows, delta[rows], m, n, weights, sigmas)
+
+    def _normalized(self, pixels: NDArray[np.float64]) -> NDArray[np.float64]:
+        K = self._camera.intrinsics
+        straight = self._camera.undistort(pixels)
+        out: NDArray[np.float64] = (straight - K[:2, 2]) / np.diag(K)[:2]
+        return out
+
+    def _crop(self, region: Region, points_cam: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Project points (n, 3) to pixels (n, 2) of the mask."""
+        if not len(points_cam):
+            return np.zeros((0, 2))
+        camera = self._camera
+        pixels = cv2.projectPoints(points_cam, np.zeros(3), np.zeros(3), camera.intrinsics, camera.dist)[0][:, 0]
+        return region.crop_from_image(pixels.astype(np.float64)) * SIZE - 0.5
+
+    def _coverage(self, skin: NDArray[np.float64], region: Region) -> NDArray[np.bool_]:
+        """Return (256, 256) bool: where in the mask's region the body is."""
+        at = np.full((len(skin), 2), -1e4)
+        front = skin[:, 2] > 0.2
+        at[front] = self._crop(region, skin[front])
+        flat = np.column_stack([at * skin[:, 2:], skin[:, 2]])  # of a camera whose pixels are the mask's
+        canvas = Canvas.blank(SIZE, SIZE)
+        rasterize(canvas, flat, self._triangles, np.ones(3), np.eye(3))
+        return canvas.coverage
+
+
+def _crossings(
+    probability: NDArray[np.floating[Any]], at: NDArray[np.float64], normal: NDArray[np.float64]
+) -> tuple[NDArray[np.intp], NDArray[np.float64], NDArray[np.float64]]:
+    """Find the nearest crossing of one half along each normal, outwards: rows (n,), places (n, 2), normals (n, 2)."""
+    picture = np.ascontiguousarray(probability, np.float32)
+    steps = np.arange(-REACH, REACH + 1.0)
+    path = (at[:, None] + steps[:, None] * normal[:, None]).astype(np.float32)
+    values = cv2.remap(picture, path, _NO_MAP, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT)
+    falls = (values[:, :-1] >= 0.5) & (values[:, 1:] < 0.5)
+    share = (values[:, :-1] - 0.5) / np.maximum(values[:, :-1] - values[:, 1:], 1e-6)
+    where = np.where(falls, steps[:-1] + share, np.inf)
+    best = np.abs(where).argmin(axis=1)
+    rows = np.flatnonzero(falls.any(axis=1))
+    place = at[rows] + where[rows, best[rows]][:, None] * normal[rows]
+    if not len(rows):
+        return rows, place, place
+    smooth = cv2.GaussianBlur(picture, (0, 0), 1.5)
+    slope = [cv2.Sobel(smooth, cv2.CV_32F, *order, ksize=3) for order in ((1, 0), (0, 1))]
+    spots = place.astype(np.float32)[:, None]
+    down = [-cv2.remap(image, spots, _NO_MAP, cv2.INTER_LINEAR)[:, 0] for image in slope]
+    outward = np.stack(down, axis=1).astype(float)
+    outward /= np.maximum(np.linalg.norm(outward, axis=1), 1e-9)[:, None]
+    agree = (outward * normal[rows]).sum(axis=1) > AGREEMENT_COS
+    return rows[agree], place[agree], outward[agree]
+
+
+def _spread(points: NDArray[np.float64], candidates: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Return one of the candidates of each cube of `SPACING_M`."""
+    cells = np.floor(points[candidates] / SPACING_M).astype(int)
+    first = np.unique(cells, axis=0, return_index=True)[1]
+    chosen: NDArray[np.intp] = candidates[np.sort(first)]
+    return chosen
+
+
+def _width(joint: str) -> float:
+    return next((width for key, width in _WIDTHS_M.items() if key in joint), _WIDTH_M)

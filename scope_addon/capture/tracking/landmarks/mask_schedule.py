@@ -1,0 +1,55 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Person masks of everybody in a few frames of the clip, from which the shape is estimated later."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...perception.landmark_network import LandmarkNetwork
+from ...perception.observation import Observation, PersonMask
+
+MASKS = 16  # for a clip, about; 8 give the same shape on real clips
+LEAST_STRIDE = 12  # frames between two masks in short clips
+LEAST_PRESENCE = 0.5  # in a region without a person, the network invents one
+
+
+class MaskSchedule:
+    """Adds masks to the observations of every n-th frame.
+
+    When there are enough, n doubles: a clip of unknown length has hardly more masks than one of known length.
+
+    :param network: None: no frame has masks.
+    :param frames: how many frames are expected; 0 if that is unknown.
+    """
+
+    def __init__(self, network: LandmarkNetwork | None, frames: int) -> None:
+        self._network, self._stride = network, max(LEAST_STRIDE, frames // MASKS)
+        self._frames, self._masks = 0, 0
+
+    def add(
+        self, image_rgb: NDArray[np.uint8], observations: Sequence[tuple[int, Observation]]
+    ) -> list[tuple[int, Observation]]:
+        """Return the observations of the next frame with masks, if they are due.
+
+        :param image_rgb: (H, W, 3).
+        """
+        found, due = list(observations), self._frames % self._stride == 0
+        self._frames += bool(found)
+        if self._network is None or not found or not due:
+            return found
+        self._masks += 1
+        if self._masks % MASKS == 0:
+            self._stride *= 2
+        return [(number, self._with_mask(self._network, image_rgb, o)) for number, o in found]
+
+    @staticmethod
+    def _with_mask(network: LandmarkNetwork, image_rgb: NDArray[np.uint8], observation: Observation) -> Observation:
+        if observation.presence < LEAST_PRESENCE:
+            return observation
+        probability = network.mask(image_rgb, observation.region).astype(np.float16)
+        size = image_rgb.shape[1], image_rgb.shape[0]
+        return replace(observation, mask=PersonMask(observation.region, probability, size))
