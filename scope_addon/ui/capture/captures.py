@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import bpy
 
+from ..captured_person import captured_armature
 from ..reporting import iface_
 
 CAPTURE = "scope_capture"  # custom property that ``scene.build`` gives to a capture's collection
@@ -50,6 +51,21 @@ def show_index(settings: bpy.types.PropertyGroup, index: int) -> None:
     """Show the capture at an index among the file's collections."""
     if 0 <= index < len(bpy.data.collections):
         settings.capture = bpy.data.collections[index]
+        _make_active(settings.capture)
+
+
+def _make_active(capture: bpy.types.Collection) -> None:
+    """Make a person of the shown capture active, so that the sections below act on what is shown."""
+    context = bpy.context
+    layer = context.view_layer
+    people = [person for person in people_of(capture) if layer is not None and person.name in layer.objects]
+    active = layer.objects.active if people else None
+    if not people or captured_armature(context) in people or (active is not None and active.mode != "OBJECT"):
+        return
+    for obj in context.selected_objects:
+        obj.select_set(False)
+    people[0].select_set(True)
+    layer.objects.active = people[0]
 
 
 class SCOPE_UL_captures(bpy.types.UIList):

@@ -7,6 +7,7 @@ import bpy
 
 from ..capture.capture_panel import Tab
 from ..captured_person import draw_active_person, has_captured_person
+from ..translations import CONTEXT
 
 
 class SCOPE_PT_edit(Tab, bpy.types.Panel):
@@ -35,7 +36,7 @@ class SCOPE_PT_edit(Tab, bpy.types.Panel):
         row = layout.row(align=True)
         for text, mode in (("In Bones", "BONES"), ("On Object", "OBJECT"), ("In Place", "IN_PLACE")):
             row.operator("scope.root_motion", text=text).mode = mode
-        layout.label(text="Keys")
+        layout.label(text="Keys", text_ctxt=CONTEXT)
         column = layout.column(align=True)
         column.operator("scope.loop", icon="FILE_REFRESH")
         column.operator("scope.reduce_keys", icon="KEY_DEHLT")

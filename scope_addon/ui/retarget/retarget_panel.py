@@ -30,7 +30,7 @@ class SCOPE_UL_bone_pairs(bpy.types.UIList):
         """
         rig = settings.rig
         known = rig is not None and item.bone in rig.data.bones
-        row = layout.split(factor=0.46, align=True)
+        row = layout.split(factor=0.4, align=True)
         row.label(text=item.part, translate=False)
         row = row.row(align=True)
         row.alert = not known
@@ -63,11 +63,9 @@ class SCOPE_PT_retarget(Tab, bpy.types.Panel):
         row.operator("scope.guess_bones", icon="VIEWZOOM")
         row.operator("scope.load_bone_map", text="", icon="FILE_FOLDER")
         row.operator("scope.save_bone_map", text="", icon="FILE_TICK")
-        row = layout.row()
-        row.template_list("SCOPE_UL_bone_pairs", "", settings, "pairs", settings, "active", rows=5)
-        column = row.column(align=True)
-        column.operator("scope.edit_bone_pair", text="", icon="ADD").action = "ADD"
-        column.operator("scope.edit_bone_pair", text="", icon="REMOVE").action = "REMOVE"
+        row.operator("scope.edit_bone_pair", text="", icon="ADD").action = "ADD"
+        row.operator("scope.edit_bone_pair", text="", icon="REMOVE").action = "REMOVE"
+        layout.template_list("SCOPE_UL_bone_pairs", "", settings, "pairs", settings, "active", rows=5)
         for pair in settings.pairs[settings.active : settings.active + 1]:
             column = layout.column(align=True)
             column.prop(pair, "part", text="", placeholder="Body Part", icon="ARMATURE_DATA")

@@ -14,6 +14,8 @@ from bpy.props import (
     StringProperty,
 )
 
+from ..translations import CONTEXT
+
 
 def offered_parts(_pair: bpy.types.PropertyGroup | None, _context: bpy.types.Context, typed: str) -> list[str]:
     """Return the body parts whose names contain what was typed so far, for Blender to suggest."""
@@ -88,6 +90,7 @@ class SCOPE_PG_retarget(bpy.types.PropertyGroup):
             ("keep", "Overlap", "Show both in the same place", 2),
         ),
         default="hide",
+        translation_context=CONTEXT,  # Blender's own translations are too long for three buttons in a row
         description="How the captured person is shown after retargeting",
     )
 

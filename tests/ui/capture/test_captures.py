@@ -49,6 +49,25 @@ def test_each_capture_keeps_its_result(two):
     assert listed() == ["other", "person"]
 
 
+def test_what_is_edited_is_what_is_selected_in_the_list(two):
+    second = people_of(bpy.data.collections["other"])
+    bpy.context.view_layer.objects.active = second[1]
+    select("person")
+    assert captured_armature(bpy.context).name == "person"
+    assert [obj.name for obj in bpy.context.selected_objects] == ["person"]
+    select("other")
+    assert captured_armature(bpy.context) == second[0]
+
+
+def test_a_rig_with_the_motion_of_the_selected_capture_stays_active(two):
+    rig = bpy.data.objects.new("rig", bpy.data.armatures.new("rig"))
+    bpy.context.scene.collection.objects.link(rig)
+    rig[PERSON] = bpy.data.objects["person"]
+    bpy.context.view_layer.objects.active = rig
+    select("person")
+    assert bpy.context.view_layer.objects.active == rig
+
+
 def test_comparison_and_active_person_follow_the_selection(two):
     bpy.context.view_layer.objects.active = None
     select("person")

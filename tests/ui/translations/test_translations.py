@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 import string
 
+import bpy
 import pytest
 from scope.scope_addon.ui import reporting
 from scope.scope_addon.ui.translations import CONTEXT, LANGUAGES
@@ -97,3 +98,8 @@ def test_a_composed_text_that_is_not_looked_up_is_found(tmp_path):
         'layout.label(text=iface_("{n} frames", n=n))\nlayout.label(text=f"{n} %")\n'
     )
     assert texts_without_lookup(path) == ["Choose one", " frames", "Freed "]
+
+
+def test_buttons_in_a_row_have_our_short_words_in_place_of_blenders():
+    settings = bpy.types.Scene.bl_rna.properties["scope_retarget"].fixed_type
+    assert settings.properties["captured"].translation_context == CONTEXT
