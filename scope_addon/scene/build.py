@@ -153,7 +153,11 @@ def _build(
     first = float(min(person.frames[0] for person in people))
     last = float(max(person.frames[-1] for person in people))
     if options.set_frame_range:
-        timing.set_frame_range(scene, first, last)
+        captures = [each for each in scene.collection.children_recursive if CAPTURE_TAG in each]
+        if captures == [collection]:
+            timing.set_frame_range(scene, first, last)
+        else:  # the motions captured before stay in the range
+            timing.set_frame_range(scene, min(first, scene.frame_start), max(last, scene.frame_end))
     scene.frame_set(scene.frame_start if options.set_frame_range else scene.frame_current)
     report(1.0, "built")
     _select(people)
