@@ -66,7 +66,10 @@ class BoxDetector:
         return [box_detection(float(s), box) for s, box in zip(kept.scores, corners, strict=True)]
 
     def detect_small(self, image_rgb: NDArray[np.uint8]) -> list[Detection]:
-        """Return nothing: how small people may be is a property of the user's network, see `PersonDetector`."""
+        """Return nothing: how small people may be is a property of the user's network, see `PersonDetector`.
+
+        :param image_rgb: (H, W, 3) uint8.
+        """
         return []
 
     def _boxes(self, outputs: list[NDArray[Any]]) -> Boxes:
