@@ -250,3 +250,7 @@ def remove_blender_folder() -> None:
     folder = Path(sys.modules["bpy"].app.tempdir)
     if folder.name.startswith("blender_"):  # not a folder that the user has chosen
         shutil.rmtree(folder, ignore_errors=True)
+
+
+if __name__ == "__main__":
+    run()

@@ -131,9 +131,9 @@ class Motion:
 # Only in files with corrections. The first rows say what was corrected, the others how the changed frames were before.
 CORRECTION_KEYS = (
     *("pin_frames", "pin_joints", "pin_uv", "pin_xyz", "pin_reach"),
-    *("contact_spans", "contact_feet", "exchange_spans", "exchange_limbs"),
+    *("contact_spans", "contact_feet", "exchange_spans", "exchange_limbs", "upright"),
     *("uncorrected_rows", "uncorrected_poses", "uncorrected_trans", "uncorrected_poses_raw", "uncorrected_trans_raw"),
-    "uncorrected_joints_cam",
+    *("uncorrected_joints_cam", "uncorrected_world_from_camera"),
 )
 _SCHEMA: dict[str, tuple[tuple[str | int, ...], type]] = {
     "poses": (("T", "3K1"), np.float32),

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
 
 ROOT = Path(__file__).resolve().parent.parent
 SHARED = ROOT.parent / "shared"
+BLENDER_FOLDER = "scope-tests-blender-"  # begins the name of the user folder of Blender's module
 
 
 # In this order, ahead of all others. The first two compile the solver, each a version of its own, so that where two
@@ -80,6 +82,9 @@ def pytest_unconfigure(config: pytest.Config) -> None:
         from scope.scope_addon.cli import remove_blender_folder
 
         remove_blender_folder()
+        resources = Path(os.environ.get("BLENDER_USER_RESOURCES", ""))
+        if resources.name.startswith(BLENDER_FOLDER):
+            shutil.rmtree(resources, ignore_errors=True)
         os._exit(int(config.stash.get(EXIT_STATUS, 1)))
 
 

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -153,11 +154,18 @@ def _build(
     first = float(min(person.frames[0] for person in people))
     last = float(max(person.frames[-1] for person in people))
     if options.set_frame_range:
-        timing.set_frame_range(scene, first, last)
-    scene.frame_set(scene.frame_start if options.set_frame_range else scene.frame_current)
+        _set_frame_range(scene, collection, first, last)
+    scene.frame_set(math.floor(first) if options.set_frame_range else scene.frame_current)
     report(1.0, "built")
     _select(people)
     return BuildResult(collection, people, rate, (first, last), warnings)
+
+
+def _set_frame_range(scene: bpy.types.Scene, collection: bpy.types.Collection, first: float, last: float) -> None:
+    """Set the scene's frame range to a capture's, together with that of the captures before."""
+    if [each for each in scene.collection.children_recursive if CAPTURE_TAG in each] != [collection]:
+        first, last = min(first, scene.frame_start), max(last, scene.frame_end)
+    timing.set_frame_range(scene, first, last)
 
 
 def _build_person(

@@ -155,6 +155,18 @@ def corrected(first: int, frame: int) -> Iterator[float]:
     yield 1.0
     assert listed() == []
     out_of_reach()
+    upright_line()
+
+
+def upright_line() -> None:
+    """Turn the world by a line near the image's middle; without it, the keys are the same to the bit."""
+    before, (width, height) = keys(), bpy.context.scene.scope.result.resolution
+    use(bpy.ops.scope.set_upright, start=(0.5 * width, 0.2 * height), end=(0.52 * width, 0.8 * height))
+    assert [entry["kind"] for entry in listed()] == ["UPRIGHT"]
+    assert keys() != before
+    use(bpy.ops.scope.remove_correction, index=0)
+    assert keys() == before
+    assert listed() == []
 
 
 def out_of_reach() -> None:

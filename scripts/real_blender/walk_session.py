@@ -33,6 +33,8 @@ MOST_OBJECTS = 60  # above which a step begins a new file
 
 def everything() -> State:
     """Return everything in the file that may change, and which datablocks there are."""
+    scene = bpy.context.window_manager.windows[0].scene
+    scene.frame_set(scene.frame_current, subframe=scene.frame_subframe)  # evaluates what steps have left
     return state() | identities()
 
 

@@ -54,3 +54,10 @@ def visit(shared: Path) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         width = max(min(400, 1200 - x), 0)
         image[:500, x : x + width] = visits[t][:, :width]
         yield image, np.stack([stays_at[t], visits_at[t] + [x, 0]])
+
+
+def distant_view(image: np.ndarray) -> np.ndarray:
+    """The image at an eighth of its size, with its top left corner at (400, 200) of 1280 × 720 pixels."""
+    small = cv2.resize(image, None, fx=1 / 8, fy=1 / 8, interpolation=cv2.INTER_AREA)
+    height, width = small.shape[:2]
+    return cv2.copyMakeBorder(small, 200, 520 - height, 400, 880 - width, cv2.BORDER_REPLICATE)

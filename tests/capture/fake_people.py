@@ -86,6 +86,9 @@ class FakeDetector:
                 found.append(Detection(0.95, np.zeros(4), points))
         return found
 
+    def detect_small(self, image: np.ndarray) -> list[Detection]:
+        return []
+
 
 class FakeLandmarks:
     def __init__(self, people: list[Person], is_reliable: bool = False) -> None:

@@ -23,7 +23,7 @@ from scope.scope_addon.capture.perception.adapters.keypoints.keypoint_network im
 from scope.scope_addon.cli import SAMPLE, build_parser, main
 from scope.scope_addon.command_line.arguments import body_and_options
 from scope.scope_addon.edit.pins.corrected_motion import with_corrections
-from scope.scope_addon.edit.pins.corrections import Contact, Exchange, Pin
+from scope.scope_addon.edit.pins.corrections import Contact, Exchange, Pin, Upright
 from scope.scope_addon.motion import CORRECTION_KEYS, Motion
 from scope.scope_addon.scene.export.output_paths import check_output
 from scope.solver.loaders.body_file import BUILT_IN
@@ -138,10 +138,16 @@ def test_every_key_of_the_motion_file_is_defined_once():
 
 def test_shapes_and_types_of_the_motion_file_are_as_documented(body, tmp_path):
     motion = made_motion(body, np.zeros((7, 3 * (body.K + 1))), np.zeros((7, 3)))
-    changes = (Pin(2, "head", (320.0, 200.0)), Contact(1, 3, "left"), Exchange(1, 2), Exchange(4, 5))
+    changes = (
+        Pin(2, "head", (320.0, 200.0)),
+        Contact(1, 3, "left"),
+        Exchange(1, 2),
+        Exchange(4, 5),
+        Upright.of(np.eye(4)),
+    )
     motion = with_corrections(motion, body, changes)
     motion.save(tmp_path / "a.npz")
-    sizes = {"T": 7, "K": body.K, "P": body.P, "J": motion.keypoints2d.shape[1], "N": 1, "C": 1, "E": 2}
+    sizes = {"T": 7, "K": body.K, "P": body.P, "J": motion.keypoints2d.shape[1], "N": 1, "C": 1, "E": 2, "V": 1}
     sizes["U"] = len(motion.corrections["uncorrected_rows"])
     rows = [row for first, rows in tables(DOCS / "motion_file.md") if first == "key" for row in rows]
     with np.load(tmp_path / "a.npz") as file:

@@ -130,6 +130,15 @@ def test_a_new_scene_takes_rate_size_and_range(body, make_motion):
     assert scene.camera == result.people[0].camera
 
 
+def test_a_further_capture_keeps_the_range_of_those_before(body, make_motion):
+    scene = bpy.context.scene
+    ranges = []
+    for count, start in ((30, 5), (10, 8), (12, 30)):
+        build_scene([make_motion(body, count)], body, options=BuildOptions(frame_rate="set", start_frame=start))
+        ranges.append((scene.frame_start, scene.frame_end))
+    assert ranges == [(5, 34), (5, 34), (5, 41)]
+
+
 def test_a_scene_in_centimetres_gives_a_warning(body, make_motion):
     assert build_scene([make_motion(body, 2)], body).warnings == []
     bpy.context.scene.unit_settings.scale_length = 0.01

@@ -208,5 +208,5 @@ def _no_person_error(path: Path, frames: int, own_networks: list[Path]) -> NoPer
     )
     return NoPersonError(
         f"no person was found {where}: at least one person must be mostly in the image and at least "
-        f"a fifth as tall as its shorter side; crop footage of smaller people{networks}"
+        f"a tenth as tall as its shorter side; crop footage of smaller people{networks}"
     )

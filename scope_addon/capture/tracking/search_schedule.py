@@ -17,6 +17,8 @@ SEARCH_LARGEST_S = 20 * FRAME_S
 SEARCH_LOST_S = 4 * FRAME_S  # the same while a lost person is remembered, and for rivals in the opening
 OPENING_S = 2.0  # of the clip: a person who is visible from the start may be the most prominent one over the clip
 SMALL_SHARE = 0.39  # of the picture's longer side
+SMALL_SEARCH_S = 1.0  # between two searches for small people, each of which takes as long as some twenty plain ones
+SMALL_SIDE = 0.4  # of the picture's shorter side: a smaller region holds somebody whom a plain detection may miss
 EAGER_S = 15 * FRAME_S  # for which a lost person is looked for in every frame
 
 
@@ -34,7 +36,7 @@ class SearchSchedule:
 
     def forget(self) -> None:
         """Forget when the last searches were."""
-        self._search_s = self._close_search_s = -math.inf
+        self._search_s = self._close_search_s = self._small_search_s = -math.inf
 
     def is_due(
         self, image_rgb: NDArray[np.uint8], live: Sequence[TrackedTarget], lost: Sequence[TrackedTarget]
@@ -66,6 +68,23 @@ class SearchSchedule:
             self._close_search_s = clock.time_s
         return closely
 
+    def begin_small(
+        self, image_rgb: NDArray[np.uint8], live: Sequence[TrackedTarget], lost: Sequence[TrackedTarget]
+    ) -> bool:
+        """Return whether to look for small people in this frame, and if so, note it.
+
+        Only where nobody is tracked, and nobody is remembered whom a plain detection would find again.
+
+        :param image_rgb: (H, W, 3).
+        :param live: the people who are tracked.
+        :param lost: the people who are remembered.
+        """
+        due = self._clock.has_passed(SMALL_SEARCH_S, self._clock.time_s - self._small_search_s)
+        if live or not due or not _are_small(image_rgb, lost):
+            return False
+        self._small_search_s = self._clock.time_s
+        return True
+
     def _interval_s(
         self, image_rgb: NDArray[np.uint8], live: Sequence[TrackedTarget], lost: Sequence[TrackedTarget]
     ) -> float:
@@ -74,8 +93,8 @@ class SearchSchedule:
             return 0.0
         if lost or self._searches_for_rivals(image_rgb, live):
             return SEARCH_LOST_S
-        if self._largest_only:
-            return SEARCH_LARGEST_S
+        if self._largest_only:  # a small person may be somebody in the background, before the most prominent one comes
+            return SEARCH_LOST_S if _are_small(image_rgb, live) else SEARCH_LARGEST_S
         # As many as are wanted are tracked: a newcomer counts only if they become more prominent.
         complete = len(live) >= self._wanted and self._clock.time_s >= self._clock.begin_s + OPENING_S
         return SEARCH_LARGEST_S if complete else SEARCH_S
@@ -86,3 +105,9 @@ class SearchSchedule:
             return False
         sides = [f.estimate.next_region.side_px for f in live]
         return bool(sides) and max(sides) < SMALL_SHARE * max(image_rgb.shape[:2])
+
+
+def _are_small(image_rgb: NDArray[np.uint8], people: Sequence[TrackedTarget]) -> bool:
+    """Return whether nobody of these people is large enough to be found by a plain detection."""
+    side_px = SMALL_SIDE * min(image_rgb.shape[:2])
+    return all(person.estimate.region.side_px < side_px for person in people)

@@ -8,6 +8,7 @@ whole clip which tracklets are the same person.
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import numpy as np
@@ -197,20 +198,27 @@ class PeopleTracker:
                 self._live.append(lost)
 
     def _search(self, image_rgb: NDArray[np.uint8]) -> None:
-        """Start a tracklet for every plausible body that is detected and not tracked yet.
+        """Start a tracklet for everybody who is detected and not tracked yet; small people only if nobody else is."""
+        closely = self._schedule.begin(image_rgb, self._live, self._lost)
+        self._start_detected(image_rgb, self._networks.detector.detect(image_rgb, closely=closely), SURE_SCORE)
+        if self._schedule.begin_small(image_rgb, self._live, self._lost):
+            self._start_detected(image_rgb, self._networks.detector.detect_small(image_rgb), math.inf)
+
+    def _start_detected(self, image_rgb: NDArray[np.uint8], found: list[Detection], sure_score: float) -> None:
+        """Start a tracklet for every plausible body that is not tracked yet.
 
         Each is estimated twice: the landmarks give a better region than the detector.
+
+        :param sure_score: the score from which a detection is independent evidence of a body.
         """
-        closely = self._schedule.begin(image_rgb, self._live, self._lost)
-        detections = self._ranked(self._networks.detector.detect(image_rgb, closely=closely))
-        detections = [d for d in detections if self._may_be_new(d.region)]
+        detections = [d for d in self._ranked(found) if self._may_be_new(d.region)]
         detections = detections[: 3 if self._largest_only else 2 * self._max_live]
         if not detections:
             return
         first = self._networks.landmarks.estimate(image_rgb, [d.region for d in detections])
         likely = [k for k, e in enumerate(first) if e.presence >= PRESENCE_THRESHOLD]
         for sure in (True, False):
-            chosen = [k for k in likely if (detections[k].score >= SURE_SCORE) == sure]
+            chosen = [k for k in likely if (detections[k].score >= sure_score) == sure]
             for estimate in self._estimator.estimate(image_rgb, [first[k].next_region for k in chosen], sure):
                 if estimate is not None:
                     self._add(estimate, sure)

@@ -20,7 +20,8 @@ from ...kinematics.smoothing import smooth_rotations
 from ...motion import Motion
 from ..clip import Clip, clip_from_motion
 from ..spans import swap_sides
-from .corrections import Correction, Exchange, Pin, from_arrays, to_arrays
+from .corrections import Contact, Correction, Exchange, Pin, from_arrays, to_arrays, upright_of
+from .moved import moved_clip, moved_motion
 from .solve_pins import Shot, resolve
 
 _KEPT = ("poses", "trans", "poses_raw", "trans_raw", "joints_cam")
@@ -60,7 +61,16 @@ def distance_from_pin(motion: Motion, pin: Pin, place: NDArray[np.float64] | Non
     if pin.pixel is not None:
         u, v, w = motion.intrinsics @ where
         return float(np.hypot(u / w - pin.pixel[0], v / w - pin.pixel[1]))
-    return float(np.linalg.norm(T[:3, :3] @ where + T[:3, 3] - pin.position))
+    return float(np.linalg.norm(T[:3, :3] @ where + T[:3, 3] - pin_in_world(motion, pin).position))
+
+
+def pin_in_world(motion: Motion, pin: Pin) -> Pin:
+    """Return a pin in the world of the motion, which an upright line may have turned; one in the image is the same."""
+    transform = upright_of(corrections_of(motion))
+    if pin.position is None or transform is None:
+        return pin
+    x, y, z = transform[:3, :3] @ pin.position + transform[:3, 3]
+    return replace(pin, position=(float(x), float(y), float(z)))
 
 
 def uncorrected(motion: Motion) -> Motion:
@@ -78,6 +88,8 @@ def uncorrected(motion: Motion) -> Motion:
             before[name][rows] = motion.corrections[f"uncorrected_{name}"]
     except (KeyError, IndexError, ValueError) as error:
         raise MotionFileError(f"the motion's corrections are damaged: {error}; capture the footage again") from error
+    if "uncorrected_world_from_camera" in motion.corrections:
+        before["world_from_camera"] = motion.corrections["uncorrected_world_from_camera"]
     return replace(motion, **before, corrections={})
 
 
@@ -95,27 +107,43 @@ def with_corrections(motion: Motion, body: Body, corrections: tuple[Correction, 
     changed = np.zeros(len(base), bool)
     for raw in (False, True):
         before = clip_from_motion(body, base, raw)
-        after = corrected(clip_from_motion(body, captured, raw), wanted, body)
+        after = _pinned(clip_from_motion(body, captured, raw), wanted, body)
         new = (after.rotations != before.rotations).any((1, 2, 3)) | (after.root != before.root).any(1)
         changed |= new
         poses, trans = ("poses_raw", "trans_raw") if raw else ("poses", "trans")
         values[poses], values[trans] = getattr(base, poses).copy(), getattr(base, trans).copy()
-        values[poses][new] = log(after.rotations[new]).reshape(int(new.sum()), -1)
+        values[poses][new] = log(after.rotations[new]).reshape(values[poses][new].shape)
         values[trans][new] = after.root[new] - body.rest_joints(base.betas)[0]
         if not raw:
             values["joints_cam"] = base.joints_cam.copy()
             T = base.world_from_camera[new]
             joints = Clip(after.times[new], after.rotations[new], after.root[new]).joints(body, base.betas)
             values["joints_cam"][new] = (joints - T[:, None, :3, 3]) @ T[:, :3, :3]
+    out = replace(wanted, **values)
+    transform = upright_of(corrections)
+    if transform is not None:
+        out, changed = moved_motion(out, body, transform), np.ones(len(base), bool)
     rows = np.flatnonzero(changed)
     kept = {f"uncorrected_{name}": getattr(base, name)[rows] for name in _KEPT}
-    return replace(wanted, **values, corrections={**wanted.corrections, "uncorrected_rows": rows, **kept})
+    if transform is not None:
+        kept["uncorrected_world_from_camera"] = base.world_from_camera
+    return replace(out, corrections={**wanted.corrections, "uncorrected_rows": rows, **kept})
 
 
 def corrected(clip: Clip, motion: Motion, body: Body) -> Clip:
-    """Apply the motion's pins and contacts to another smoothing of it, which has its sides exchanged already."""
-    wanted = [c for c in corrections_of(motion) if not isinstance(c, Exchange)]
-    return resolve(clip, body, motion.betas, wanted, shot_of(motion)) if wanted else clip
+    """Apply the motion's pins, contacts and upright line to another smoothing of it.
+
+    :param clip: in the captured world, with its sides exchanged already.
+    """
+    clip = _pinned(clip, motion, body)
+    transform = upright_of(corrections_of(motion))
+    return clip if transform is None else moved_clip(clip, transform)
+
+
+def _pinned(clip: Clip, motion: Motion, body: Body) -> Clip:
+    """Apply the pins and contacts, in the captured world."""
+    wanted = [c for c in corrections_of(motion) if isinstance(c, Pin | Contact)]
+    return resolve(clip, body, motion.betas, wanted, shot_of(uncorrected(motion))) if wanted else clip
 
 
 def before_smoothing(motion: Motion, body: Body) -> Motion:
@@ -151,5 +179,5 @@ def _poses(clip: Clip, before: NDArray[np.floating[Any]]) -> NDArray[np.floating
     rotations = exp(before.reshape(len(before), -1, 3).astype(float))
     new = (clip.rotations != rotations).any((1, 2, 3))
     poses = before.copy()
-    poses[new] = log(clip.rotations[new]).reshape(int(new.sum()), -1)
+    poses[new] = log(clip.rotations[new]).reshape(poses[new].shape)
     return poses

@@ -7,7 +7,7 @@ keys have.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -27,7 +27,7 @@ class Pin:
     frame: int
     joint: str
     pixel: tuple[float, float] | None = None  # of the upright frame, without lens distortion
-    position: tuple[float, float, float] | None = None  # metres, world
+    position: tuple[float, float, float] | None = None  # metres, captured world: before an upright line turns it
     reach: float = REACH_S  # seconds
 
     def __post_init__(self) -> None:
@@ -80,7 +80,40 @@ class Exchange:
         _check_span(self.first, self.last)
 
 
-Correction = Pin | Contact | Exchange
+@dataclass(frozen=True)
+class Upright:
+    """The world, with the camera, is turned so that a line that the user drew is upright."""
+
+    rows: tuple[float, ...]  # 16 numbers of the rigid transform (4, 4), from the captured world
+
+    def __post_init__(self) -> None:
+        """Check the values.
+
+        :raises UsageError: the transform is not rigid.
+        """
+        T = np.array(self.rows, float)
+        rigid = T.shape == (16,) and np.isfinite(T).all()
+        T = T.reshape(4, 4) if rigid else np.zeros((4, 4))
+        if not np.allclose(T[:3, :3] @ T[:3, :3].T, np.eye(3), atol=1e-6) or not np.allclose(T[3], [0, 0, 0, 1]):
+            raise UsageError("an upright line needs a rigid transform of the world")
+
+    @staticmethod
+    def of(transform: NDArray[np.float64]) -> Upright:
+        """Return the correction of a transform (4, 4)."""
+        return Upright(tuple(float(x) for x in transform.ravel()))
+
+    @property
+    def transform(self) -> NDArray[np.float64]:
+        """The transform (4, 4) from the captured world to the upright one."""
+        return np.array(self.rows).reshape(4, 4)
+
+
+Correction = Pin | Contact | Exchange | Upright
+
+
+def upright_of(corrections: Iterable[Correction]) -> NDArray[np.float64] | None:
+    """Return the transform (4, 4) of the upright line; None without one."""
+    return next((c.transform for c in corrections if isinstance(c, Upright)), None)
 
 
 def _check_span(first: int, last: int) -> None:
@@ -91,8 +124,13 @@ def _check_span(first: int, last: int) -> None:
 def added(corrections: tuple[Correction, ...], new: Correction) -> tuple[Correction, ...]:
     """Return the corrections with a new one; a pin replaces the same joint's pin in the same frame.
 
-    The same exchange a second time undoes the first, so that neither remains.
+    The same exchange a second time undoes the first, so that neither remains. An upright line turns the world that the
+    one before has made, so that one remains, which is both.
     """
+    if isinstance(new, Upright):
+        before = upright_of(corrections)
+        both = new if before is None else Upright.of(new.transform @ before)
+        return (*(c for c in corrections if not isinstance(c, Upright)), both)
     if isinstance(new, Exchange) and new in corrections:
         return tuple(c for c in corrections if c != new)
     if isinstance(new, Pin):
@@ -107,6 +145,7 @@ def to_arrays(corrections: tuple[Correction, ...]) -> dict[str, NDArray[Any]]:
     pins = [c for c in corrections if isinstance(c, Pin)]
     contacts = [c for c in corrections if isinstance(c, Contact)]
     exchanges = [c for c in corrections if isinstance(c, Exchange)]
+    upright = [c for c in corrections if isinstance(c, Upright)]
     nan = float("nan")
     return {
         "pin_frames": np.array([p.frame for p in pins], np.int64),
@@ -118,6 +157,7 @@ def to_arrays(corrections: tuple[Correction, ...]) -> dict[str, NDArray[Any]]:
         "contact_feet": np.array([c.foot for c in contacts], np.str_),
         "exchange_spans": np.array([(e.first, e.last) for e in exchanges], np.int64).reshape(-1, 2),
         "exchange_limbs": np.array([e.limbs for e in exchanges], np.str_),
+        "upright": np.array([u.rows for u in upright], np.float64).reshape(-1, 4, 4),
     }
 
 
@@ -147,6 +187,7 @@ def from_arrays(arrays: Mapping[str, NDArray[Any]]) -> tuple[Correction, ...]:
             *(Pin(int(f), str(j), _numbers(uv), _numbers(xyz), float(r)) for f, j, uv, xyz, r in pins),
             *(Contact(int(a), int(b), str(foot)) for a, b, foot in contacts),
             *(Exchange(int(a), int(b), str(limbs)) for a, b, limbs in exchanges),
+            *(Upright.of(np.asarray(T, float)) for T in column("upright", 4, 4)[:1]),
         )
     except (ValueError, UsageError) as error:
         raise MotionFileError(f"the motion's corrections are damaged: {error}") from error

@@ -8,18 +8,15 @@ everything about a point on the floor, after which the feet are again as high as
 
 from __future__ import annotations
 
-from dataclasses import replace
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
 from ....solver.body import Body
-from ....solver.rotations import exp, log, shortest_turn
+from ....solver.rotations import shortest_turn
 from ...errors import UsageError
 from ...kinematics.standing import standing_probability
 from ...motion import Motion
-from ..clip import Clip, clip_from_motion
+from ..clip import clip_from_motion
 from .corrected_motion import shot_of
 
 _UP = np.array([0.0, 0.0, 1.0])
@@ -61,43 +58,3 @@ def upright_transform(
     out[:3, :3] = turn
     out[:3, 3] = pivot - turn @ pivot + _UP * (np.median(points[:, 2]) - np.median(moved[:, 2]))
     return out
-
-
-def moved_motion(motion: Motion, body: Body, transform: NDArray[np.float64]) -> Motion:
-    """Move a motion, its camera and its corrections in the world.
-
-    :param transform: (4, 4) rigid.
-    """
-    rest = body.rest_joints(motion.betas)[0]
-    changed: dict[str, Any] = {"world_from_camera": transform @ motion.world_from_camera}
-    corrections = dict(motion.corrections)
-    for poses, trans in (("poses", "trans"), ("poses_raw", "trans_raw")):
-        changed[poses], changed[trans] = _moved(getattr(motion, poses), getattr(motion, trans), rest, transform)
-        if f"uncorrected_{poses}" in corrections:
-            names = f"uncorrected_{poses}", f"uncorrected_{trans}"
-            before = corrections[names[0]], corrections[names[1]]
-            for name, value in zip(names, _moved(*before, rest, transform), strict=True):
-                corrections[name] = value
-    if "pin_xyz" in corrections:
-        corrections["pin_xyz"] = corrections["pin_xyz"] @ transform[:3, :3].T + transform[:3, 3]
-    return replace(motion, **changed, corrections=corrections)
-
-
-def moved_clip(clip: Clip, transform: NDArray[np.float64]) -> Clip:
-    """Move a clip in the world; ``transform`` (4, 4) is rigid."""
-    rotations = clip.rotations.copy()
-    rotations[:, 0] = transform[:3, :3] @ rotations[:, 0]
-    return Clip(clip.times, rotations, clip.root @ transform[:3, :3].T + transform[:3, 3])
-
-
-def _moved(
-    poses: NDArray[np.floating[Any]],
-    trans: NDArray[np.floating[Any]],
-    rest: NDArray[np.float64],
-    transform: NDArray[np.float64],
-) -> tuple[NDArray[np.floating[Any]], NDArray[np.floating[Any]]]:
-    """Move poses (T, 3(K+1)) and translations (T, 3) of a body whose pelvis rests at ``rest`` (3,)."""
-    new = poses.copy()
-    new[:, :3] = log(transform[:3, :3] @ exp(poses[:, :3].astype(float)))
-    pelvis = (rest + trans) @ transform[:3, :3].T + transform[:3, 3]
-    return new, (pelvis - rest).astype(trans.dtype)

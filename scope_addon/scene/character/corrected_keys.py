@@ -14,14 +14,15 @@ from numpy.typing import NDArray
 
 from ....solver.body import Body
 from ...edit.clip import Clip, sample
-from ...edit.pins.corrected_motion import corrections_of, shot_of, uncorrected
-from ...edit.pins.corrections import Pin
+from ...edit.pins.corrected_motion import corrections_of, pin_in_world, shot_of, uncorrected
+from ...edit.pins.corrections import Pin, upright_of
+from ...edit.pins.moved import moved_clip
 from ...edit.pins.solve_pins import missed, resolve
 from ...edit.smooth import smoothed
 from ...errors import UsageError
 from ...motion import Motion
 from .keys import channel_curves, read_clip, write_keys
-from .root_object import clip_with_root_motion
+from .root_object import clip_with_root_motion, root_object
 from .uncorrected_keys import UncorrectedKeys, changed_rows, differ, keyed_values, restore
 
 _SAME_FRAME = 2e-3
@@ -57,18 +58,23 @@ def rewrite_changed_keys(
         _at(smoothed(body, m, strength), clip.times, _start(armature, rate))
         for m in (uncorrected(before), before, after)
     )
-    exact = ~differ(free, old)
+    was, now = (upright_of(corrections_of(m)) for m in motions)
+    _check_root_motion(armature, was, now)
+    old, new = (c if T is None else moved_clip(c, np.linalg.inv(T)) for c, T in ((old, was), (new, now)))
+    again = np.zeros(len(frames), bool)  # rows that begin with the keys from before all corrections
     for row in restored:
-        exact |= np.abs(frames - (start + known.times[row] * rate)) < _SAME_FRAME
+        again |= np.abs(frames - (start + known.times[row] * rate)) < _SAME_FRAME
+    exact = again if was is not None else again | ~differ(free, old)
     old.rotations[exact], old.root[exact] = free.rotations[exact], free.root[exact]
     rows = frames.astype(np.float32)
     values = keyed_values(armature, body, rows)
-    _write_change(armature, body, clip, frames, (old, new))
+    _write_change(armature, body, clip, frames, (old, new), _moves(again, was, now))
     if pin is not None:
         _meet_pin(armature, body, rate, after, pin)
     after_values = keyed_values(armature, body, rows)
     same = (values == after_values) | (np.isnan(values) & np.isnan(after_values))
-    return changed_rows(rows, exact & (differ(free, new) | ~same.all(axis=1)), (values, after_values), start, rate)
+    changed = differ(free, new) | ~same.all(axis=1) | (now is not None)
+    return changed_rows(rows, exact & changed, (values, after_values), start, rate)
 
 
 def pinned_places(
@@ -93,6 +99,7 @@ def _meet_pin(armature: bpy.types.Object, body: Body, rate: float, motion: Motio
 
     :param rate: scene frames per second.
     """
+    pin = pin_in_world(motion, pin)
     clip, frames = read_clip(armature, body, rate)
     whole = clip_with_root_motion(armature, clip, frames)
     shot = shot_of(motion, _start(armature, rate))
@@ -139,10 +146,45 @@ def _at(clip: Clip, times: NDArray[np.float64], start: float) -> Clip:
     return sample(Clip(own, clip.rotations, clip.root), np.where(np.abs(nearest - times) < _SAME_S, nearest, times))
 
 
-def _write_change(
-    armature: bpy.types.Object, body: Body, clip: Clip, frames: NDArray[np.float64], change: tuple[Clip, Clip]
+def _check_root_motion(
+    armature: bpy.types.Object, was: NDArray[np.float64] | None, now: NDArray[np.float64] | None
 ) -> None:
-    """Apply the change between two clips to the keys at which they differ."""
+    """Refuse to turn the world of keys whose root motion is on an object.
+
+    :raises UsageError: it is, and the upright line changes.
+    """
+    same = was is now if was is None or now is None else np.array_equal(was, now)
+    if not same and root_object(armature) is not None:
+        raise UsageError(f"the root motion of '{armature.name}' is on an object; put it back with In Bones first")
+
+
+def _moves(
+    again: NDArray[np.bool_], was: NDArray[np.float64] | None, now: NDArray[np.float64] | None
+) -> NDArray[np.float64]:
+    """Return the transform (T, 4, 4) of each row for an upright line: rows with all corrections have the former one.
+
+    :param again: (T,) rows that begin without corrections.
+    """
+    moves = np.tile(np.eye(4) if now is None else now, (len(again), 1, 1))
+    if was is not None and now is not None and np.array_equal(was, now):
+        moves[~again] = np.eye(4)
+    elif was is not None:
+        moves[~again] = moves[~again] @ np.linalg.inv(was)
+    return moves
+
+
+def _write_change(
+    armature: bpy.types.Object,
+    body: Body,
+    clip: Clip,
+    frames: NDArray[np.float64],
+    change: tuple[Clip, Clip],
+    moves: NDArray[np.float64] | None = None,
+) -> None:
+    """Apply the change between two clips to the keys at which they differ, then move these in the world.
+
+    :param moves: (T, 4, 4) rigid; rows that it moves are all written.
+    """
     old, new = change
     which = differ(old, new)
     rotations, root = clip.rotations.copy(), clip.root.copy()
@@ -150,4 +192,9 @@ def _write_change(
     shift = (inverse[:, 0] @ (new.root - old.root)[which, :, None])[..., 0]
     root[which] += (clip.rotations[which, 0] @ shift[..., None])[..., 0]
     rotations[which] = clip.rotations[which] @ inverse @ new.rotations[which]
+    if moves is not None:
+        moved = (moves != np.eye(4)).any(axis=(1, 2))
+        rotations[moved, 0] = moves[moved, :3, :3] @ rotations[moved, 0]
+        root[moved] = (moves[moved, :3, :3] @ root[moved, :, None])[..., 0] + moves[moved, :3, 3]
+        which = which | moved
     write_keys(armature, body, Clip(clip.times, rotations, root), frames, which)

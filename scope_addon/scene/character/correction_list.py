@@ -65,13 +65,15 @@ def store_corrections(
 
 def _entry(armature: bpy.types.Object, motion: Motion, correction: Correction, rate: float) -> dict[str, Any]:
     """Describe a correction."""
-    from ...edit.pins.corrections import Contact, Pin
+    from ...edit.pins.corrections import Contact, Pin, Upright
     from .corrected_keys import scene_frame
 
     if isinstance(correction, Pin):
         kind, text, span = "PIN", correction.joint.replace("_", " ").title(), (correction.frame,) * 2
     elif isinstance(correction, Contact):
         kind, text, span = "CONTACT", f"{correction.foot.title()} Foot Stands", (correction.first, correction.last)
+    elif isinstance(correction, Upright):
+        kind, text, span = "UPRIGHT", "Upright Line", (int(motion.frames[0]), int(motion.frames[-1]))
     else:
         what = {"both": "Left and Right", "arms": "Arms", "legs": "Legs"}[correction.limbs]
         kind, text, span = "EXCHANGE", f"{what} Exchanged", (correction.first, correction.last)

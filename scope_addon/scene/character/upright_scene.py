@@ -1,33 +1,65 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Moving a captured person's keys and the capture's camera by a rigid transform of the captured world."""
+"""Turning the capture's camera with the captured world, and back to the bit."""
 
 from __future__ import annotations
+
+import json
 
 import bpy
 import numpy as np
 from mathutils import Matrix, Quaternion
 from numpy.typing import NDArray
 
-from ....solver.body import Body
-from ...edit.pins.upright import moved_clip
-from ...errors import UsageError
 from ..animation_data.actions import fcurves, read_keys, rewrite_keys
 from .animation import on_one_hemisphere
-from .keys import read_clip, write_clip
-from .root_object import parent_transform, root_object
+from .root_object import parent_transform
+
+_TURNED = (
+    "scope_turned"  # custom property of the camera: JSON of where it was before the first turn, and after the last
+)
 
 
-def move_person(armature: bpy.types.Object, body: Body, rate: float, transform: NDArray[np.float64]) -> None:
-    """Move the keys.
+def turn_camera(
+    camera: bpy.types.Object, armature: bpy.types.Object, transform: NDArray[np.float64], *, to_captured: bool
+) -> None:
+    """Move the capture's camera together with a person; where it was at first if it was not moved since.
 
-    :param rate: scene frames per second.
-    :param transform: (4, 4) rigid, of the captured world.
-    :raises UsageError: the root motion is on an object, or keys are missing.
+    :param transform: (4, 4) rigid, of the captured world, in which the armature's keys are.
+    :param to_captured: whether the world is then again as it was captured.
     """
-    if root_object(armature) is not None:
-        raise UsageError(f"the root motion of '{armature.name}' is on an object; put it back with In Bones first")
-    clip, frames = read_clip(armature, body, rate)
-    write_clip(armature, body, moved_clip(clip, transform), frames)
+    now = _place(camera)
+    try:
+        before, after = json.loads(camera.get(_TURNED, ""))
+    except (TypeError, ValueError):
+        before, after = now, now
+    if after != now:
+        before = None  # moved by the user
+    if to_captured and before is not None:
+        _put(camera, before)
+    else:
+        move_camera(camera, armature, transform)
+    if to_captured:
+        camera.pop(_TURNED, None)
+    else:
+        camera[_TURNED] = json.dumps([before, _place(camera)])
+
+
+def _place(camera: bpy.types.Object) -> list[list[float]]:
+    """Return the camera's keys, or without keys its own transform, as exact numbers."""
+    keys = [curve for curve in fcurves(camera) if curve.data_path in ("location", "rotation_quaternion")]
+    own = [*camera.location, *camera.rotation_quaternion, *camera.rotation_euler, *camera.scale]
+    return [[] if keys else own, *(read_keys(c).ravel().tolist() for c in keys)]
+
+
+def _put(camera: bpy.types.Object, place: list[list[float]]) -> None:
+    """Put the camera where ``_place`` found it."""
+    keys = [curve for curve in fcurves(camera) if curve.data_path in ("location", "rotation_quaternion")]
+    if own := place[0]:
+        camera.location, camera.rotation_quaternion = own[:3], own[3:7]
+        camera.rotation_euler, camera.scale = own[7:10], own[10:13]
+    for curve, values in zip(keys, place[1:], strict=True):
+        frames, numbers = np.array(values).reshape(-1, 2).T
+        rewrite_keys(curve, frames, numbers)
 
 
 def move_camera(camera: bpy.types.Object, armature: bpy.types.Object, transform: NDArray[np.float64]) -> None:

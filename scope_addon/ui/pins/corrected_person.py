@@ -9,7 +9,7 @@ import bpy
 
 from ...scene.character.correction_list import store_corrections
 from .. import compiled_solver
-from ..captured_person import motion_of, set_motion_of
+from ..captured_person import body_of, motion_of, set_motion_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -47,6 +47,48 @@ def change_corrections(
     return after
 
 
+def change_world(
+    scene: bpy.types.Scene,
+    armature: bpy.types.Object,
+    rate: float,
+    change: Callable[[tuple[Correction, ...]], tuple[Correction, ...]],
+) -> None:
+    """Change the upright line of everybody that the same camera has captured, and turn the camera with them.
+
+    :param rate: scene frames per second.
+    :param change: returns the new corrections for the present ones, and changes the same of everybody.
+    :raises UsageError: the root motion is on an object, or keys are missing.
+    """
+    import numpy as np
+
+    from ...edit.pins.corrected_motion import corrections_of
+    from ...edit.pins.corrections import upright_of
+    from ...scene.animation_data.transaction import all_or_nothing
+    from ...scene.camera import same_camera
+    from ...scene.character.upright_scene import turn_camera
+
+    motion = motion_of(armature)
+    near = [obj for c in armature.users_collection for obj in c.all_objects]
+    people = [obj for obj in near if obj != armature and "scope_source" in obj]
+    together = [armature, *(obj for obj in people if same_camera(motion_of(obj), motion))]
+    cameras = [obj for obj in near if obj.type == "CAMERA"][:1]
+    was = upright_of(corrections_of(motion))
+    now = upright_of(change(corrections_of(motion)))
+    turn = (np.eye(4) if now is None else now) @ np.linalg.inv(np.eye(4) if was is None else was)
+    with all_or_nothing(scene, *together[1:], *cameras):
+        for person in together:
+            change_corrections(person, body_of(person), rate, change)
+        for camera in cameras:
+            turn_camera(camera, armature, turn, to_captured=now is None)
+
+
+def without_upright(corrections: tuple[Correction, ...]) -> tuple[Correction, ...]:
+    """Return the corrections without the upright line."""
+    from ...edit.pins.corrections import Upright
+
+    return tuple(c for c in corrections if not isinstance(c, Upright))
+
+
 def pin_at(
     context: bpy.types.Context, armature: bpy.types.Object, motion: Motion, joint: str, place: tuple[Any, bool, float]
 ) -> Pin:
@@ -58,8 +100,8 @@ def pin_at(
     """
     import numpy as np
 
-    from ...edit.pins.corrected_motion import shot_of
-    from ...edit.pins.corrections import Pin
+    from ...edit.pins.corrected_motion import corrections_of, shot_of
+    from ...edit.pins.corrections import Pin, upright_of
     from ...scene.animation_data.timing import scene_rate
     from ...scene.character.corrected_keys import captured_points, source_frame
 
@@ -76,5 +118,6 @@ def pin_at(
     if len(at) == 2 and np.linalg.norm(at[1] - centre) < 0.02:
         u, v = shot_of(motion).project(frame, at[0])
         return Pin(frame, joint, pixel=(float(u), float(v)), reach=reach)
-    x, y, z = at[0]
+    upright = upright_of(corrections_of(motion))
+    x, y, z = at[0] if upright is None else (np.linalg.inv(upright) @ [*at[0], 1.0])[:3]
     return Pin(frame, joint, position=(float(x), float(y), float(z)), reach=reach)

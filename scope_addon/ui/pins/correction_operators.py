@@ -12,7 +12,7 @@ from ...scene.character.correction_list import listed_corrections
 from ..captured_person import motion_of
 from ..edit.edit_base import EditOperator, SpanOperator
 from ..reporting import iface_, rpt_
-from .corrected_person import change_corrections, pin_at
+from .corrected_person import change_corrections, change_world, pin_at, without_upright
 
 if TYPE_CHECKING:
     from ....solver.body import Body
@@ -163,12 +163,17 @@ class SCOPE_OT_remove_correction(EditOperator):
         count = len(listed_corrections(armature))
         if self.index >= count:
             raise UsageError(f"there is no correction {self.index}; '{armature.name}' has {count}, counted from 0")
-        change_corrections(
-            armature,
-            body,
-            rate,
-            lambda present: tuple(c for k, c in enumerate(present) if self.index >= 0 and k != self.index),
-        )
+        kinds = [entry["kind"] for entry in listed_corrections(armature)]
+        if "UPRIGHT" in (kinds if self.index < 0 else [kinds[self.index]]):  # which others of the capture share
+            change_world(context.scene, armature, rate, without_upright)
+            kinds.remove("UPRIGHT")
+        if self.index < len(kinds):  # it is the last in the list
+            change_corrections(
+                armature,
+                body,
+                rate,
+                lambda present: tuple(c for k, c in enumerate(present) if self.index >= 0 and k != self.index),
+            )
         context.scene.frame_set(context.scene.frame_current, subframe=context.scene.frame_subframe)
         return ""
 

@@ -9,11 +9,11 @@ from ...scene.character.correction_list import listed_corrections
 from ..capture.capture_panel import Tab
 from ..captured_person import captured_armature, has_captured_person
 
-_ICONS = {"PIN": "PINNED", "CONTACT": "SNAP_FACE", "EXCHANGE": "MOD_MIRROR"}
+_ICONS = {"PIN": "PINNED", "CONTACT": "SNAP_FACE", "EXCHANGE": "MOD_MIRROR", "UPRIGHT": "EMPTY_SINGLE_ARROW"}
 
 
 class SCOPE_PT_corrections(Tab, bpy.types.Panel):
-    """Pins, feet that stand and exchanged sides of the selected person."""
+    """Pins, feet that stand, exchanged sides and the upright line of the selected person."""
 
     bl_idname = "SCOPE_PT_corrections"
     bl_label = "Corrections"

@@ -9,10 +9,11 @@ import bpy
 from bpy.props import FloatVectorProperty
 from bpy_extras.view3d_utils import region_2d_to_origin_3d, region_2d_to_vector_3d
 
-from ..captured_person import body_of, captured_armature, motion_of, set_motion_of
+from ..captured_person import captured_armature, motion_of
 from ..edit.edit_base import EditOperator, may_edit
 from ..reporting import iface_, sentence, tip_
 from ..view.comparison import camera_of
+from .corrected_person import change_world
 from .drawing import draw_line, redraw_viewport, viewport_of
 
 if TYPE_CHECKING:
@@ -32,27 +33,14 @@ class SCOPE_OT_set_upright(EditOperator):
 
     def edit(self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float) -> str:
         """Move everybody of the capture, and the camera."""
-        from ...edit.pins.upright import moved_motion, upright_transform
-        from ...scene.animation_data.transaction import all_or_nothing
-        from ...scene.camera import same_camera
+        from ...edit.pins.corrections import Upright, added
+        from ...edit.pins.upright import upright_transform
         from ...scene.character.corrected_keys import source_frame
-        from ...scene.character.upright_scene import move_camera, move_person
 
         scene, motion = context.scene, motion_of(armature)
         frame = source_frame(armature, motion, scene.frame_current + scene.frame_subframe, rate)
         transform = upright_transform(motion, body, frame, (tuple(self.start), tuple(self.end)))
-        near = [obj for c in armature.users_collection for obj in c.all_objects]
-        people = [obj for obj in near if obj != armature and "scope_source" in obj]
-        together = [armature, *(obj for obj in people if same_camera(motion_of(obj), motion))]
-        cameras = [obj for obj in near if obj.type == "CAMERA"][:1]
-        with all_or_nothing(scene, *together[1:], *cameras):
-            for person in together:
-                own = body_of(person)
-                moved = moved_motion(motion_of(person), own, transform)
-                move_person(person, own, rate, transform)
-                set_motion_of(person, moved)
-            for camera in cameras:
-                move_camera(camera, armature, transform)
+        change_world(scene, armature, rate, lambda present: added(present, Upright.of(transform)))
         scene.frame_set(scene.frame_current, subframe=scene.frame_subframe)
         return ""
 

@@ -416,6 +416,7 @@ TEXTS = {
     "Unit": "Einheit",
     "Unit of length in .bvh files": "Längeneinheit in .bvh-Dateien",
     "Up": "Oben",
+    "Upright Line": "Senkrechte Linie",
     "Use the short clip that is included with Scope": "Den kurzen Clip benutzen, der Scope beiliegt",
     "Use this in the viewport with the footage": "Im Ansichtsfenster mit dem Filmmaterial benutzen",
     "Video or image of a person to capture": "Video oder Bild einer Person, die erfasst werden soll",

@@ -416,6 +416,7 @@ TEXTS = {
     "Unit": "Unidad",
     "Unit of length in .bvh files": "Unidad de longitud en archivos .bvh",
     "Up": "Arriba",
+    "Upright Line": "Línea vertical",
     "Use the short clip that is included with Scope": "Usar el clip corto incluido en Scope",
     "Use this in the viewport with the footage": "Úselo en la vista con la filmación",
     "Video or image of a person to capture": "Video o imagen de una persona para capturar",

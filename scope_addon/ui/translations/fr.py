@@ -416,6 +416,7 @@ TEXTS = {
     "Unit": "Unité",
     "Unit of length in .bvh files": "Unité de longueur des fichiers .bvh",
     "Up": "Haut",
+    "Upright Line": "Ligne verticale",
     "Use the short clip that is included with Scope": "Utiliser le court clip fourni avec Scope",
     "Use this in the viewport with the footage": "À utiliser dans la vue avec le métrage",
     "Video or image of a person to capture": "Vidéo ou image d’une personne à capturer",

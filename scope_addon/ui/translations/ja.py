@@ -416,6 +416,7 @@ TEXTS = {
     "Unit": "単位",
     "Unit of length in .bvh files": ".bvh ファイルの長さの単位",
     "Up": "上方向",
+    "Upright Line": "垂直線",
     "Use the short clip that is included with Scope": "Scope に付属の短いクリップを使用",
     "Use this in the viewport with the footage": "フッテージのあるビューポートで使ってください",
     "Video or image of a person to capture": "キャプチャする人物の動画または画像",

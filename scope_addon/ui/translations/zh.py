@@ -416,6 +416,7 @@ TEXTS = {
     "Unit": "单位",
     "Unit of length in .bvh files": ".bvh 文件的长度单位",
     "Up": "向上",
+    "Upright Line": "竖直线",
     "Use the short clip that is included with Scope": "使用 Scope 自带的短片",
     "Use this in the viewport with the footage": "请在显示素材的视图中使用",
     "Video or image of a person to capture": "要捕捉的人物的视频或图像",

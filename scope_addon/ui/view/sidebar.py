@@ -9,15 +9,18 @@ TAB = "Scope"
 _DRAWN_AFTER_S = 0.3  # a sidebar knows its tabs only after it has been drawn
 
 
+def viewport_of(context: bpy.types.Context) -> bpy.types.Area | None:
+    """Return the context's viewport, or else, as in a menu at the top, the largest of its window."""
+    window, area = context.window, context.area
+    if window is None or (area is not None and area.type == "VIEW_3D"):
+        return area if window is not None else None
+    viewports = [each for each in window.screen.areas if each.type == "VIEW_3D"]
+    return max(viewports, key=lambda each: each.width * each.height, default=None)
+
+
 def show_tab(context: bpy.types.Context) -> None:
     """Open the tab in the context's viewport, or else in the largest of its window: it shows a capture's progress."""
-    window = context.window
-    if window is None:
-        return
-    area = context.area
-    if area is None or area.type != "VIEW_3D":
-        viewports = [each for each in window.screen.areas if each.type == "VIEW_3D"]
-        area = max(viewports, key=lambda each: each.width * each.height, default=None)
+    area = viewport_of(context)
     if area is None:
         return
     area.spaces.active.show_region_ui = True

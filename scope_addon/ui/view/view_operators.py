@@ -10,6 +10,7 @@ from mathutils import Matrix
 from ..reporting import ReportingOperator, rpt_, tip_
 from . import comparison
 from .comparison import camera_of, is_looking_through, is_side_view
+from .sidebar import viewport_of
 
 
 def hide_startup_cube(context: bpy.types.Context) -> None:
@@ -23,9 +24,9 @@ def hide_startup_cube(context: bpy.types.Context) -> None:
 
 
 def frame_selected(context: bpy.types.Context) -> None:
-    """Frame the selected objects in the viewport of the context, unless it shows a camera's view."""
-    area = context.area
-    if context.window is None or area is None or area.type != "VIEW_3D":
+    """Frame the selected objects in the context's or the largest viewport, unless it shows a camera's view."""
+    area = viewport_of(context)
+    if area is None:
         return
     region = next((r for r in area.regions if r.type == "WINDOW"), None)
     view = area.spaces.active.region_3d

@@ -14,11 +14,14 @@ from scope.scope_addon.capture.perception.person_detector import (
     letterbox,
     make_anchors,
     merge_overlapping,
+    small_squares,
     squares,
 )
 from scope.scope_addon.capture.perception.sessions import network_path, open_session
 from scope.scope_addon.errors import SetupError, UsageError
 from scope.solver.errors import ModelFileError
+
+from ..composites import distant_view
 
 
 @pytest.fixture(scope="module")
@@ -66,6 +69,32 @@ def test_squares_cover_an_oblong_image() -> None:
     assert squares(500, 500) == []
     assert squares(1080, 1920) == [(0, 0, 1080), (840, 0, 1080)]
     assert squares(900, 300) == [(0, 0, 300), (0, 300, 300), (0, 600, 300)]
+
+
+@pytest.mark.parametrize(("height", "width"), [(480, 640), (1920, 1080), (31, 29), (1, 500)])
+def test_every_small_person_is_entirely_in_a_small_square(height: int, width: int) -> None:
+    corners = np.array(small_squares(height, width))
+    left, top, side = corners.T
+    assert min(left.min(), top.min()) == 0
+    assert [(left + side).max(), (top + side).max()] == [width, height]
+    person = int(0.4 * min(height, width) / 3)
+    for x in range(0, width - person, 7):
+        for y in range(0, height - person, 7):
+            around = (left <= x) & (x + person <= left + side) & (top <= y) & (y + person <= top + side)
+            assert around.any()
+
+
+def test_a_small_person_is_found_in_the_small_squares_alone(
+    detector: PersonDetector, first_frame: Callable[[str], np.ndarray]
+) -> None:
+    image = first_frame("clips/squats_5fps")
+    (person,) = detector.detect(image)
+    distant = distant_view(image)
+    assert detector.detect(distant, closely=True) == []
+    (small,) = detector.detect_small(distant)
+    expected = (person.points_px[:2] + 0.5) / 8 - 0.5 + [400, 200]
+    assert np.abs(small.points_px[:2] - expected).max() < 0.05 * person.region.side_px / 8
+    assert detector.detect_small(np.full((90, 160, 3), 128, np.uint8)) == []
 
 
 def test_finds_the_squatting_person(detector: PersonDetector, first_frame: Callable[[str], np.ndarray]) -> None:

@@ -223,6 +223,28 @@ def test_a_rival_at_the_start_is_searched_for_closely(monkeypatch: pytest.Monkey
         assert track.seen[4:].all()
 
 
+def test_small_people_are_looked_for_once_a_second_and_only_where_there_is_nobody(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    person = Person(lambda t: (300, 200) if 100 <= t < 150 else None, BLUE)
+    looked: list[int] = []
+
+    class Detector(FakeDetector):
+        def detect_small(self, image: np.ndarray) -> list[Detection]:
+            looked.append(t)
+            return []
+
+    monkeypatch.setattr(tracking_networks, "LandmarkNetwork", lambda name, *_: FakeLandmarks([person]))
+    monkeypatch.setattr(tracking_networks, "PersonDetector", lambda *_: Detector([person]))
+    tracker = PeopleTracker("best", 1)
+    for t, image in enumerate(pictures([person], 300)):
+        tracker.step(image, time_s=t / FPS)
+    assert [t for t in looked if t < 150] == [0, 30, 60, 90]
+    after = [t for t in looked if t >= 150]
+    assert after[0] >= 150 + 2 * FPS - 1  # for so long, a person of that size would be found again without it
+    assert (np.diff(after) == 30).all()
+
+
 def test_a_small_person_next_to_the_most_prominent_one_costs_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     people = [Person(lambda t: (300, 200), BLUE), Person(lambda t: (900, 200), RED, size_px=40)]
     networks = FakeLandmarks(people)

@@ -12,6 +12,8 @@ from scope.scope_addon.capture.perception.observation import Observation
 from scope.scope_addon.capture.tracking.tracker import PeopleTracker
 from scope.solver.errors import ShapeError
 
+from ..composites import distant_view
+
 Frames = Callable[..., Iterator[np.ndarray]]
 
 
@@ -51,6 +53,17 @@ def test_two_people_are_tracked_and_nobody_twice(frames: Frames) -> None:
         observations = dict(tracker.step(image))
         assert sorted(observations) == [0, 1]
         assert observations[0].region.center_px[0] > 500 > observations[1].region.center_px[0]
+
+
+def test_a_small_person_is_tracked_where_there_is_nobody_else(tracker: PeopleTracker, frames: Frames) -> None:
+    near = [largest(tracker, image) for image in frames("clips/squats_5fps", stop=4)]
+    tracker.reset()
+    for image, expected in zip(frames("clips/squats_5fps", stop=4), near, strict=True):
+        (entry,) = tracker.step(distant_view(image))
+        assert expected is not None
+        assert entry[0] == 0
+        off = entry[1].keypoints_px - ((expected[1].keypoints_px + 0.5) / 8 - 0.5 + [400, 200])
+        assert np.linalg.norm(off, axis=1).mean() < 0.03 * entry[1].region.side_px
 
 
 def test_a_hand_is_not_a_person(tracker: PeopleTracker, frames: Frames) -> None:

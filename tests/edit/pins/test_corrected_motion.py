@@ -43,7 +43,7 @@ def test_the_file_keeps_the_corrections_and_removing_them_restores_the_motion(tm
     motion.save(tmp_path / "a.npz")
     back = Motion.load(tmp_path / "a.npz")
     assert corrections_of(back) == corrections
-    assert set(back.corrections) == set(CORRECTION_KEYS)
+    assert set(back.corrections) == set(CORRECTION_KEYS) - {"uncorrected_world_from_camera"}
     for restored in (with_corrections(back, BODY, ()), uncorrected(back)):
         for name, value in vars(MOTION).items():
             np.testing.assert_array_equal(getattr(restored, name), value, err_msg=name)

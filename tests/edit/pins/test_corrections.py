@@ -3,7 +3,7 @@
 
 import numpy as np
 import pytest
-from scope.scope_addon.edit.pins.corrections import Contact, Exchange, Pin, added, from_arrays, to_arrays
+from scope.scope_addon.edit.pins.corrections import Contact, Exchange, Pin, Upright, added, from_arrays, to_arrays
 from scope.scope_addon.errors import MotionFileError, UsageError
 
 ALL = (
@@ -11,6 +11,7 @@ ALL = (
     Pin(9, "head", position=(0.1, -0.2, 1.7), reach=0.25),
     Contact(4, 8, "left"),
     Exchange(2, 6, "legs"),
+    Upright((1.0, 0, 0, 0.5, 0, 0, -1.0, 0, 0, 1.0, 0, 2.0, 0, 0, 0, 1.0)),
 )
 
 
@@ -29,6 +30,8 @@ def test_damaged_arrays_are_an_error():
         ("pin_uv", np.zeros((2, 3))),
         ("pin_frames", np.zeros(5)),
         ("contact_feet", np.array(["none"])),
+        ("upright", 2 * np.eye(4)[None]),
+        ("upright", np.full((1, 4, 4), np.nan)),
     ):
         with pytest.raises(MotionFileError):
             from_arrays(arrays | {name: value})
@@ -57,5 +60,12 @@ def test_a_new_pin_replaces_that_of_the_same_joint_and_frame():
     assert added(ALL, Pin(4, "left_wrist", pixel=(1.0, 2.0)))[:-1] == ALL
 
 
+def test_a_second_upright_line_turns_what_the_first_has_made():
+    first, second = np.eye(4), np.eye(4)
+    first[:3, :3], second[:3, 3] = [[0, -1, 0], [1, 0, 0], [0, 0, 1]], [1, 2, 3]
+    (both,) = added((Upright.of(first),), Upright.of(second))
+    np.testing.assert_array_equal(both.transform, second @ first)
+
+
 def test_the_same_exchange_again_undoes_the_first():
-    assert added(ALL, ALL[-1]) == ALL[:-1]
+    assert added(ALL, ALL[3]) == (*ALL[:3], ALL[4])

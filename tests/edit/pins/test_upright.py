@@ -4,9 +4,11 @@
 import numpy as np
 import pytest
 from scope.scope_addon.edit.clip import clip_from_motion
-from scope.scope_addon.edit.pins.corrected_motion import shot_of, with_corrections
-from scope.scope_addon.edit.pins.corrections import Pin
-from scope.scope_addon.edit.pins.upright import moved_clip, moved_motion, upright_transform
+from scope.scope_addon.edit.pins.corrected_motion import distance_from_pin, shot_of, with_corrections
+from scope.scope_addon.edit.pins.corrections import Pin, Upright
+from scope.scope_addon.edit.pins.moved import moved_clip, moved_motion
+from scope.scope_addon.edit.pins.upright import upright_transform
+from scope.scope_addon.edit.smooth import smoothed
 from scope.scope_addon.errors import UsageError
 from scope.solver.rotations import exp
 
@@ -36,9 +38,9 @@ def test_an_upright_line_brings_the_true_up_back():
 def test_the_body_stays_where_it_is_in_the_image_and_pins_move_along():
     motion, line = rolled()
     pin = Pin(30, "head", position=tuple(clip_from_motion(BODY, motion, raw=False).joints(BODY, motion.betas)[30, 15]))
-    motion = with_corrections(motion, BODY, (pin,))
     transform = upright_transform(motion, BODY, 20, line)
-    fixed = moved_motion(motion, BODY, transform)
+    before, motion = motion, with_corrections(motion, BODY, (pin,))
+    fixed = with_corrections(motion, BODY, (pin, Upright.of(transform)))
     np.testing.assert_array_equal(fixed.joints_cam, motion.joints_cam)
     clips = [clip_from_motion(BODY, m, raw=False) for m in (motion, fixed)]
     for frame in (0, 30, 60):
@@ -49,8 +51,22 @@ def test_the_body_stays_where_it_is_in_the_image_and_pins_move_along():
         np.testing.assert_allclose(at[0], at[1], atol=0.1)
     np.testing.assert_allclose(moved_clip(clips[0], transform).root, clips[1].root, atol=1e-5)
     assert angle(moved_clip(clips[0], transform).rotations, clips[1].rotations).max() < 1e-5
-    restored = with_corrections(fixed, BODY, ())
-    np.testing.assert_allclose(restored.poses, moved_motion(with_corrections(motion, BODY, ()), BODY, transform).poses)
+    assert distance_from_pin(fixed, pin) < 0.002
+    for removed, expected in (((pin,), motion), ((), before)):
+        again = with_corrections(fixed, BODY, removed)
+        for name in ("poses", "trans", "poses_raw", "trans_raw", "joints_cam", "world_from_camera"):
+            np.testing.assert_array_equal(getattr(again, name), getattr(expected, name))
+
+
+@pytest.mark.parametrize("strength", [0.0, 1.0, 2.5])
+def test_an_upright_line_turns_every_smoothing_as_the_motion(strength):
+    pin = Pin(30, "head", position=tuple(clip_from_motion(BODY, TRUTH, raw=False).joints(BODY, TRUTH.betas)[30, 15]))
+    T = np.eye(4)
+    T[:3, :3], T[:3, 3] = exp(np.array([0.1, 0.05, 0.0])), [0.3, 0.0, 0.1]
+    plain, turned = (with_corrections(TRUTH, BODY, c) for c in ((pin,), (pin, Upright.of(T))))
+    expected, found = moved_clip(smoothed(BODY, plain, strength), T), smoothed(BODY, turned, strength)
+    np.testing.assert_allclose(found.root, expected.root, atol=1e-6)
+    assert angle(found.rotations, expected.rotations).max() < 1e-5
 
 
 @pytest.mark.parametrize(("line", "says"), [(((10, 10), (12, 11)), "shorter"), (((10, 10), (200, 12)), "from upright")])

@@ -177,7 +177,7 @@ def test_two_captures_keep_their_starts_and_speeds(scene):
     bpy.ops.scope.match_frame_rate()
     np.testing.assert_allclose(at_times(first, NAMES), before[0], atol=1e-4)
     np.testing.assert_allclose(at_times(second, NAMES, 101.0), before[1], atol=1e-4)
-    assert (scene.frame_start, scene.frame_end) == (101, 161)
+    assert (scene.frame_start, scene.frame_end) == (11, 161)
 
 
 def test_a_rate_that_was_changed_by_hand_is_taken_into_account(scene):

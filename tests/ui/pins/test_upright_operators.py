@@ -7,8 +7,13 @@ import pytest
 from bpy_extras.object_utils import world_to_camera_view
 from mathutils import Vector
 from scope.scope_addon.edit.pins.corrected_motion import shot_of
-from scope.scope_addon.edit.pins.upright import moved_motion
+from scope.scope_addon.edit.pins.moved import moved_motion
 from scope.scope_addon.motion import Motion
+from scope.scope_addon.scene.animation_data.actions import fcurves, read_keys
+from scope.scope_addon.scene.build import BuildOptions, build_scene
+from scope.scope_addon.scene.character.correction_list import listed_corrections
+from scope.scope_addon.scene.packed_motion import pack_motion
+from scope.scope_addon.ui.captured_person import motion_of as stored_motion_of
 from scope.solver.rotations import exp
 
 from ...edit.walking import BODY, NAMES, motion_of, walk
@@ -66,6 +71,110 @@ def test_person_and_camera_turn_together_until_the_line_is_upright(rig):
     assert tilt_of_camera() < 1.5
     bpy.ops.scope.smooth(strength=1.0)  # the motion has turned with its keys
     np.testing.assert_allclose(in_image(armature), before, atol=2e-3)
+
+
+def everything(armature):
+    """Keys of the armature and the camera, the camera's place, and the motion's arrays."""
+    camera = next(o for o in bpy.context.scene.objects if o.type == "CAMERA")
+    curves = {(o.name, c.data_path, c.array_index): read_keys(c) for o in (armature, camera) for c in fcurves(o)}
+    motion = stored_motion_of(armature)
+    arrays = {n: getattr(motion, n) for n in ("poses", "trans", "poses_raw", "trans_raw", "world_from_camera")}
+    if not fcurves(camera):
+        arrays |= {"location": np.array(camera.location), "rotation": np.array(camera.rotation_quaternion)}
+    return curves | arrays
+
+
+def kinds(armature):
+    return [entry["kind"] for entry in listed_corrections(armature)]
+
+
+def pin(armature):
+    """Pin the wrist 15 cm away from where it is at frame 20; return where."""
+    bpy.context.scene.frame_set(20)
+    target = made_rigs.seen(armature, ["left_wrist"], [20])[0, 0] + [0.0, 0.1, 0.1]
+    bpy.ops.scope.add_pin(joint="left_wrist", location=target)
+    return target
+
+
+@pytest.mark.parametrize("removed", [[0], [0, 0], [1, 0], [-1]], ids=["alone", "pin first", "line first", "all"])
+def test_without_the_line_everything_is_the_same_to_the_bit(rig, removed):
+    armature, line = rig
+    before = everything(armature)
+    bpy.context.scene.frame_set(20)
+    bpy.ops.scope.set_upright(start=line[0], end=line[1])
+    assert kinds(armature) == ["UPRIGHT"]
+    if removed != [0]:
+        target = pin(armature)
+        assert kinds(armature) == ["PIN", "UPRIGHT"]
+        assert np.linalg.norm(made_rigs.seen(armature, ["left_wrist"], [20])[0, 0] - target) < 0.01
+    for index in removed:
+        bpy.ops.scope.remove_correction(index=index)
+    assert kinds(armature) == []
+    assert tilt_of_camera() > 7
+    after = everything(armature)
+    assert after.keys() == before.keys()
+    for name, values in before.items():
+        np.testing.assert_array_equal(after[name], values, err_msg=str(name))
+
+
+def test_a_pin_moves_with_the_line_and_back(rig):
+    armature, line = rig
+    pin(armature)
+    alone, seen = everything(armature), in_image(armature)
+    bpy.context.scene.frame_set(20)
+    bpy.ops.scope.set_upright(start=line[0], end=line[1])
+    np.testing.assert_allclose(in_image(armature), seen, atol=2e-3)
+    bpy.ops.scope.smooth(strength=2.5)
+    bpy.ops.scope.smooth(strength=1.0)
+    np.testing.assert_allclose(in_image(armature), seen, atol=2e-3)
+    assert [entry["missed"] for entry in listed_corrections(armature)] == ["", ""]
+    bpy.ops.scope.remove_correction(index=1)
+    assert kinds(armature) == ["PIN"]
+    for name, values in everything(armature).items():
+        np.testing.assert_allclose(values, alone[name], atol=2e-6, err_msg=str(name))
+
+
+def test_two_lines_are_removed_together(rig):
+    armature, line = rig
+    before = everything(armature)
+    for _ in range(2):
+        bpy.context.scene.frame_set(20)
+        bpy.ops.scope.set_upright(start=line[0], end=(line[1][0] + 5, line[1][1]))
+    assert kinds(armature) == ["UPRIGHT"]
+    bpy.ops.scope.remove_correction(index=0)
+    for name, values in everything(armature).items():
+        np.testing.assert_array_equal(values, before[name], err_msg=str(name))
+
+
+def test_a_camera_that_was_moved_by_hand_keeps_that(rig):
+    armature, line = rig
+    camera = bpy.context.scene.camera
+    if camera.animation_data:
+        pytest.skip("its keys hold it")
+    was = camera.matrix_world.copy()
+    bpy.context.scene.frame_set(20)
+    bpy.ops.scope.set_upright(start=line[0], end=line[1])
+    camera.location.x += 1.0
+    bpy.ops.scope.remove_correction(index=0)
+    assert 0.9 < (camera.matrix_basis.translation - was.translation).length < 1.1
+
+
+def test_the_line_of_one_person_is_that_of_everybody_of_the_capture():
+    bpy.context.scene.render.fps = 30
+    motions = [motion_of(walk(1.0)), motion_of(walk(1.0, speed=0.8))]
+    people = [p.armature for p in build_scene(motions, BODY, None, BuildOptions()).people]
+    for person, motion in zip(people, motions, strict=True):
+        pack_motion(person, motion.to_bytes())
+    before = [everything(person) for person in people]
+    bpy.context.scene.frame_set(10)
+    bpy.ops.scope.set_upright(start=(300, 100), end=(320, 300))
+    assert [kinds(person) for person in people] == [["UPRIGHT"]] * 2
+    bpy.context.view_layer.objects.active = people[1]
+    bpy.ops.scope.remove_correction(index=0)
+    assert [kinds(person) for person in people] == [[]] * 2
+    for person, expected in zip(people, before, strict=True):
+        for name, values in everything(person).items():
+            np.testing.assert_array_equal(values, expected[name], err_msg=str(name))
 
 
 def test_a_refused_line_changes_nothing(rig):

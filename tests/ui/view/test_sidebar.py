@@ -57,3 +57,10 @@ def test_without_a_viewport_or_before_the_first_drawing_nothing_fails():
     new = area(drawn=False)
     sidebar.show_tab(context([new]))
     assert new.spaces.active.show_region_ui
+
+
+def test_what_a_menu_at_the_top_imports_is_framed_in_the_largest_viewport():
+    menu, small, large = area("TOPBAR", (2000, 2000)), area(size=(100, 100)), area()
+    assert sidebar.viewport_of(context([menu, small, large], menu)) is large
+    assert sidebar.viewport_of(context([menu, small, large], small)) is small
+    assert sidebar.viewport_of(context([menu], menu)) is None

@@ -65,6 +65,13 @@ class BoxDetector:
         corners = fitted.to_image(kept.corners.reshape(-1, 2, 2)).reshape(-1, 4)
         return [box_detection(float(s), box) for s, box in zip(kept.scores, corners, strict=True)]
 
+    def detect_small(self, image_rgb: NDArray[np.uint8]) -> list[Detection]:
+        """Return nothing: how small people may be is a property of the user's network, see `PersonDetector`.
+
+        :param image_rgb: (H, W, 3) uint8.
+        """
+        return []
+
     def _boxes(self, outputs: list[NDArray[Any]]) -> Boxes:
         try:
             boxes = self._decode(outputs, self._graph, self._description)
