@@ -18,6 +18,7 @@ ROOT = Path(__file__).resolve().parents[2]
 PRODUCT = ("solver", "scope_addon")
 DATA = {
     "scope/assets/body/LICENSE.md",
+    "scope/assets/body/README.md",
     "scope/assets/body/scope.npz",
     "scope/assets/body/scope_h.npz",
     "scope/assets/prior/README.md",

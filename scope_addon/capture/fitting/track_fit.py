@@ -110,7 +110,10 @@ def _fit_shape(prepared: PreparedTrack, root_cam: NDArray[np.floating[Any]] | No
     measurements = [prepared.measure(k, at(k)) for k in _spread(np.flatnonzero(prepared.track.seen), SHAPE_FRAMES)]
     weights = replace(prepared.weights, shape=prepared.weights.shape * len(measurements))
     options = replace(ROBUST, stages=cold_stages(weights))
-    return fit_clip(prepared.body, measurements, priors=prepared.priors, options=options)
+    priors = prepared.priors
+    if root_cam is not None and priors.shape_mean is None:  # the distance, unlike proportions, tells an unknown stature
+        priors = replace(priors, shape_information=None)
+    return fit_clip(prepared.body, measurements, priors=priors, options=options)
 
 
 def _spread(indices: NDArray[np.intp], count: int) -> NDArray[np.intp]:
