@@ -219,7 +219,9 @@ def test_rows_that_do_not_fit_are_refused_as_the_solvers_own():
 
 def test_an_unknown_name_is_answered_with_the_known_ones():
     for make in (lambda: Weights(tables={"hight": 1.0}), lambda: fit(BODY, replace(SEEN, tables={"hight": ([], [])}))):
-        with pytest.raises(InvalidValueError, match="no residual named 'hight'; .* pose_prior, .* floor, outline, height"):
+        with pytest.raises(
+            InvalidValueError, match="no residual named 'hight'; .* pose_prior, .* floor, outline, height"
+        ):
             make()
 
 

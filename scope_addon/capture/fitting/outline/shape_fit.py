@@ -20,7 +20,7 @@ from ..prepared_track import PreparedTrack
 from ..weights import ROBUST, cold_stages, warm_stages
 from .rim import OutlineMeasurer
 
-MASKS = 32  # at most; more add little
+FEWEST, MOST = 4, 32  # masks; fewer, such as that of a still image, can mislead, and more add little
 ROUNDS = 3
 # A rim point's inverse variance: 0.0018 in normalized coordinates, 7 mm at 4 m. The outline says more of the shape than
 # keypoints do, so the prior may weigh less. MPJPE-root on the four pose2sim cameras: 72.7 mm without an outline, 72.5
@@ -30,20 +30,25 @@ PRIOR_SHARE = 2 / 3
 
 
 def usable_masks(prepared: PreparedTrack) -> list[tuple[int, PersonMask]]:
-    """Return masks of the track, evenly spread over it, each with its row; none where the camera is not known."""
+    """Return masks of the track, evenly spread over it, each with its row; none where there are too few."""
     if prepared.camera is None:
         return []
     seen = [(row, mask) for row, mask in prepared.track.masks if prepared.track.seen[row]]
-    chosen = np.unique(np.linspace(0, len(seen) - 1, min(MASKS, len(seen))).round().astype(int))
+    if len(seen) < FEWEST:
+        return []
+    chosen = np.unique(np.linspace(0, len(seen) - 1, min(MOST, len(seen))).round().astype(int))
     return [seen[k] for k in chosen]
 
 
 def fit_shape_to_outline(
     prepared: PreparedTrack, masks: list[tuple[int, PersonMask]], root_cam: NDArray[np.floating[Any]] | None
 ) -> ClipFit:
-    """Estimate one shape from the frames of some masks, of which there is at least one.
+    """Estimate one shape from the frames of some masks, as `usable_masks` returns them.
 
-    :param masks: of `usable_masks`.
+    A larger weight of few masks among many other frames moves the poses of their frames rather than the shape, so the
+    frames of the masks decide alone.
+
+    :param masks: each with its row.
     :param root_cam: (T, 3) known positions of the pelvis, camera frame, metres.
     """
     assert prepared.camera is not None

@@ -13,7 +13,7 @@ from ...perception.landmark_network import LandmarkNetwork
 from ...perception.observation import Observation, PersonMask
 
 MASKS = 16  # for a clip, about; 8 give the same shape on real clips
-LEAST_STRIDE = 12  # frames between two masks in short clips
+LEAST_STRIDE = 6  # frames between two masks in short clips
 LEAST_PRESENCE = 0.5  # in a region without a person, the network invents one
 
 

@@ -64,8 +64,9 @@ def test_a_track_keeps_masks_with_their_rows() -> None:
     masks, tracklet = schedule(40), Tracklet()
     for row in range(20):
         tracklet.add(row, masks.add(IMAGE, [(0, seen())])[0][1])
-    track = make_track(range(20), np.arange(20) / 30, [tracklet])
-    assert [(row, float(mask.probability[0, 0])) for row, mask in track.masks] == [(0, 1.0), (LEAST_STRIDE, 2.0)]
+    track = make_track(range(20), [row / 30 for row in range(20)], [tracklet])
+    expected = [(row, 1.0 + number) for number, row in enumerate(range(0, 20, LEAST_STRIDE))]
+    assert [(row, float(mask.probability[0, 0])) for row, mask in track.masks] == expected
     assert track.masks[0][1].image_size == (64, 48)
     tracklet.truncate(LEAST_STRIDE)
     assert [row for row, _ in tracklet.masks] == [0]
