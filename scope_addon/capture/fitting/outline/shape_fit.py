@@ -23,8 +23,8 @@ from .rim import OutlineMeasurer
 FEWEST, MOST = 4, 32  # masks; fewer, such as that of a still image, can mislead, and more add little
 ROUNDS = 3
 # A rim point's inverse variance: 0.0018 in normalized coordinates, 7 mm at 4 m. The outline says more of the shape than
-# keypoints do, so the prior may weigh less. MPJPE-root on the four pose2sim cameras: 72.7 mm without an outline, 72.5
-# with a fifth of the prior and no outline, 72.1 with an outline of 5e4 and the whole prior, 68.7 with these values.
+# keypoints do, so the prior may weigh less. MPJPE-root on the four pose2sim cameras with other weights of outline and
+# prior: 72.7 mm with 0 and 10, 72.5 with 0 and 2, 72.1 with 5e4 and 10, 68.7 with 3e5 and 2, which are today's.
 OUTLINE_WEIGHT = 3e5
 PRIOR_SHARE = 2 / 3
 
