@@ -127,7 +127,7 @@ def _build(scene: bpy.types.Scene, path: Path, imported: Imported, options: Buil
 
 
 def _draw_menu(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
-    menu.layout.operator(SCOPE_OT_import_motion.bl_idname, text="SMPL Motion (.npz)")
+    menu.layout.operator(SCOPE_OT_import_motion.bl_idname, text="Scope or SMPL Motion (.npz)")
 
 
 def attach() -> None:

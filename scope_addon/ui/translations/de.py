@@ -42,7 +42,7 @@ OPERATORS = {
     "Retarget to Rig": "Auf Rig übertragen",
     "Right Foot Stands": "Rechter Fuß steht",
     "Root Motion": "Wurzelbewegung",
-    "SMPL Motion (.npz)": "SMPL-Bewegung (.npz)",
+    "Scope or SMPL Motion (.npz)": "Scope- oder SMPL-Bewegung (.npz)",
     "Save Bone Map": "Knochenzuordnung speichern",
     "Set Frame Rate from Footage": "Bildrate vom Filmmaterial übernehmen",
     "Set Upright": "Senkrechte setzen",

@@ -42,7 +42,7 @@ OPERATORS = {
     "Retarget to Rig": "Transferir a un rig",
     "Right Foot Stands": "Pie derecho apoyado",
     "Root Motion": "Movimiento raíz",
-    "SMPL Motion (.npz)": "Movimiento SMPL (.npz)",
+    "Scope or SMPL Motion (.npz)": "Movimiento Scope o SMPL (.npz)",
     "Save Bone Map": "Guardar mapa de huesos",
     "Set Frame Rate from Footage": "Usar la velocidad de la filmación",
     "Set Upright": "Definir la vertical",

@@ -42,7 +42,7 @@ OPERATORS = {
     "Retarget to Rig": "Recibler sur le rig",
     "Right Foot Stands": "Pied droit posé",
     "Root Motion": "Mouvement racine",
-    "SMPL Motion (.npz)": "Mouvement SMPL (.npz)",
+    "Scope or SMPL Motion (.npz)": "Mouvement Scope ou SMPL (.npz)",
     "Save Bone Map": "Enregistrer la table des os",
     "Set Frame Rate from Footage": "Reprendre la fréquence du métrage",
     "Set Upright": "Définir la verticale",

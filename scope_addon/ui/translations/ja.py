@@ -42,7 +42,7 @@ OPERATORS = {
     "Retarget to Rig": "リグにリターゲット",
     "Right Foot Stands": "右足を接地",
     "Root Motion": "ルートモーション",
-    "SMPL Motion (.npz)": "SMPL モーション（.npz）",
+    "Scope or SMPL Motion (.npz)": "Scope・SMPL モーション（.npz）",
     "Save Bone Map": "ボーンマップを保存",
     "Set Frame Rate from Footage": "フッテージのフレームレートに設定",
     "Set Upright": "垂直を設定",

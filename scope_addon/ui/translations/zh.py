@@ -42,7 +42,7 @@ OPERATORS = {
     "Retarget to Rig": "重定向到绑定",
     "Right Foot Stands": "右脚站立",
     "Root Motion": "根运动",
-    "SMPL Motion (.npz)": "SMPL 动作 (.npz)",
+    "Scope or SMPL Motion (.npz)": "Scope 或 SMPL 动作 (.npz)",
     "Save Bone Map": "保存骨骼映射",
     "Set Frame Rate from Footage": "采用素材帧率",
     "Set Upright": "设置竖直",
