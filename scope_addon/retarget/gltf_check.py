@@ -9,10 +9,10 @@ from __future__ import annotations
 import base64
 import binascii
 import json
+import re
 import struct
 from pathlib import Path
 from typing import Any
-from urllib.parse import unquote
 
 from ...solver.errors import InputError
 from ...solver.loaders.regular_file import check_regular
@@ -78,13 +78,13 @@ def _uri_bytes(path: Path, uri: str) -> int:
     if uri.startswith("data:"):
         head, _, data = uri.partition(",")
         if not head.endswith(";base64"):
-            return len(unquote(data))
+            return len(_decoded(data))
         try:
             return len(base64.b64decode(data, validate=True))
         except binascii.Error as error:
             raise ValueError(str(error)) from error
     folder = path.resolve().parent
-    target = (folder / unquote(uri)).resolve()
+    target = (folder / _decoded(uri)).resolve()
     if not target.is_relative_to(folder) or ":" in uri.partition("/")[0]:
         raise InputError(f"{path} refers to {uri[:80]!r}, outside its own folder; export the rig as one .glb")
     if not target.exists():
@@ -92,6 +92,12 @@ def _uri_bytes(path: Path, uri: str) -> int:
     check_regular(target, InputError, "rig", _LARGEST_FILE)
     _require(target.is_file())
     return target.stat().st_size
+
+
+def _decoded(uri: str) -> str:
+    """Replace a URI's %XX by the bytes of UTF-8 that they stand for."""
+    text = re.sub(rb"%([0-9A-Fa-f]{2})", lambda match: bytes.fromhex(match[1].decode()), uri.encode())
+    return text.decode()
 
 
 def _check_accessor(accessor: dict[str, Any], views: list[dict[str, Any]]) -> None:

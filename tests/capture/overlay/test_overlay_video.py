@@ -156,14 +156,14 @@ def test_confident_keypoints_are_drawn_as_dots(tmp_path, footage, body):
 
 
 def test_odd_sizes_are_cropped_and_large_ones_are_limited(tmp_path, body):
-    picture = cv2.imencode(".jpg", np.full((61, 2401, 3), GREY, np.uint8))[1].tobytes()
+    picture = cv2.imencode(".jpg", np.full((121, 2401, 3), GREY, np.uint8))[1].tobytes()
     (tmp_path / "wide.mjpeg").write_bytes(picture * 3)
-    camera = np.array([[60.0, 0, 1200], [0, 60.0, 30.0], [0, 0, 1]])
-    motion = standing(body, [0, 1, 2], size=(2401, 61), intrinsics=camera)
+    camera = np.array([[60.0, 0, 1200], [0, 60.0, 60.0], [0, 0, 1]])
+    motion = standing(body, [0, 1, 2], size=(2401, 121), intrinsics=camera)
     write_overlay(tmp_path / "a.mp4", tmp_path / "wide.mjpeg", motion, body)
     with open_video(tmp_path / "a.mp4") as video:
         image = next(iter(video)).image_rgb
-    assert (video.width, video.height) == (1920, 48)
+    assert (video.width, video.height) == (1920, 96)
     u = np.nonzero(changed(image))[1]
     assert abs(u.mean() - 1200.5 * 1920 / 2401) < 2
 
