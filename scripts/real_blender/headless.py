@@ -60,13 +60,19 @@ def damaged_code() -> None:
     files = Path("home/.config/blender").glob("*/extensions/user_default/scope/assets/kernels/*/*.code")
     empty, cut, flipped = sorted(files, key=lambda path: path.stat().st_size)[:3]
     whole = {path: path.read_bytes() for path in (empty, cut, flipped)}
-    empty.write_bytes(b"")
-    cut.write_bytes(whole[cut][:500])
-    flipped.write_bytes(whole[flipped][:-100] + bytes(byte ^ 255 for byte in whole[flipped][-100:]))
+    replace(empty, b"")
+    replace(cut, whole[cut][:500])
+    replace(flipped, whole[flipped][:-100] + bytes(byte ^ 255 for byte in whole[flipped][-100:]))
     command("capture", "clips/walk.mp4", *FAST, "-o", "out/mended.npz", status=0)
     assert (OUT / "mended.npz").stat().st_size > 1000
     for path, content in whole.items():
-        path.write_bytes(content)
+        replace(path, content)
+
+
+def replace(path: Path, content: bytes) -> None:
+    """Write a new file, because the old one is also that of the other parts' homes."""
+    path.unlink(missing_ok=True)
+    path.write_bytes(content)
 
 
 def running(what: bytes) -> list[str]:

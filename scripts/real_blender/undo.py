@@ -96,16 +96,14 @@ def edits() -> dict[str, Callable[[], object]]:
         "retarget": lambda: use(scope.retarget),
         "retarget, root motion on an object, next to the person": retarget_beside,
         "mark as asset": lambda: use(scope.mark_asset, author="Ada"),
-        "frame rate from footage": set_rate,
         "footage to sequencer": lambda: use(scope.footage_to_sequencer),
     }
 
 
 def set_rate() -> None:
-    """Change the scene's rate by hand, as in the Output properties, and set it from the footage."""
+    """Change the scene's rate by hand, as in the Output properties."""
     bpy.context.scene.render.fps = 20
-    use(bpy.ops.scope.match_frame_rate)
-    assert bpy.context.scene.render.fps != 20
+    invoke(bpy.ops.ed.undo_push, message="Frame Rate")
 
 
 def retarget_beside() -> None:
@@ -185,6 +183,9 @@ def steps() -> Iterator[float]:
     yield 0.5
     for name, action in edits().items():
         yield from tried(name, action)
+    yield from tried("frame rate by hand", set_rate, keep=True)
+    yield from tried("frame rate from footage", lambda: use(bpy.ops.scope.match_frame_rate))
+    undo()
     yield from failing()
     yield from tried("root motion on an object", lambda: use(bpy.ops.scope.root_motion, mode="OBJECT"), keep=True)
     yield from tried("root motion in the bones", lambda: use(bpy.ops.scope.root_motion, mode="BONES"))
