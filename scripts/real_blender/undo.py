@@ -147,7 +147,7 @@ def failing() -> Iterator[float]:
     use(bpy.ops.scope.use_sample)  # only the scene changes, so that undoing this does not read the armature again
     yield 0.2
     before, there = state(), identities()
-    meet_pin, keys.meet_pin = keys.meet_pin, fail
+    meet_pin, keys._meet_pin = keys._meet_pin, fail
     try:
         use(bpy.ops.scope.add_pin, joint="left_wrist", location=(0.5, 0.0, 1.5), frame=20)
     except RuntimeError:
@@ -155,7 +155,7 @@ def failing() -> Iterator[float]:
     else:
         raise AssertionError("the correction did not fail")
     finally:
-        keys.meet_pin = meet_pin
+        keys._meet_pin = meet_pin
     yield 0.2
     same(state() | identities(), before | there, "after a correction that failed")
     undo()
