@@ -26,11 +26,10 @@ def check_fbx(path: Path) -> None:
     """Check that nodes lie within the file, and that arrays unpack to what they say, a gigabyte in all at most.
 
     :raises InputError: they do not.
+    :raises OSError: the file cannot be read.
     """
     try:
         _Checker(memoryview(path.read_bytes())).check()
-    except OSError as error:
-        raise InputError(f"{path}: the rig cannot be read ({error.strerror}); choose another file") from error
     except (ValueError, IndexError, struct.error, zlib.error) as error:
         raise InputError(f"{path}: this FBX file is damaged ({error}); export it again or choose another") from error
 

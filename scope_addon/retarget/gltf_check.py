@@ -27,7 +27,8 @@ _DAMAGED = (KeyError, IndexError, TypeError, ValueError, AttributeError, Overflo
 def check_gltf(path: Path) -> None:
     """Check that all data a .gltf or .glb speaks of is there, in the file itself or in files beside it.
 
-    :raises InputError: it is not, or the file cannot be read.
+    :raises InputError: it is not.
+    :raises OSError: the file cannot be read.
     """
     try:
         gltf, binary_bytes = _read(path)
@@ -40,8 +41,6 @@ def check_gltf(path: Path) -> None:
             _require(_natural(view.get("byteOffset", 0)) + _natural(view["byteLength"]) <= buffers[view["buffer"]])
         for accessor in gltf.get("accessors", ()):
             _check_accessor(accessor, views)
-    except OSError as error:
-        raise InputError(f"{path}: the rig cannot be read ({error.strerror}); choose another file") from error
     except _DAMAGED as error:
         raise InputError(f"{path}: this glTF file is damaged; export it again or choose another") from error
 

@@ -45,10 +45,16 @@ def rig_source(path: Path, armature: str = "", bone_map: Path | None = None) -> 
         raise UsageError(f"cannot read a rig from '{path.name}': its suffix must be one of {', '.join(RIG_SUFFIXES)}")
     check_regular(path, InputError, "rig", _LARGEST_BYTES)
     try:
-        with path.open("rb") as file:
-            header = file.read(32)
+        _check_content(path, suffix)
     except OSError as error:
         raise InputError(f"{path}: the rig cannot be read ({error.strerror}); choose another file") from error
+    return RigSource(path, armature, load_bone_map(bone_map) if bone_map is not None else None)
+
+
+def _check_content(path: Path, suffix: str) -> None:
+    """Check that a file is what its suffix says, and whole as far as that can be told."""
+    with path.open("rb") as file:
+        header = file.read(32)
     if suffix == ".fbx" and header.lstrip().startswith(b";"):
         raise InputError(f"{path}: Blender does not read FBX as text; save it as binary FBX")
     if suffix in _SIGNATURES and not header.startswith(_SIGNATURES[suffix]):
@@ -57,4 +63,3 @@ def rig_source(path: Path, armature: str = "", bone_map: Path | None = None) -> 
         check_fbx(path)
     elif suffix != ".blend":
         check_gltf(path)
-    return RigSource(path, armature, load_bone_map(bone_map) if bone_map is not None else None)

@@ -83,7 +83,7 @@ def longer_trunk(body, factor):
 
 
 def seen_from(person, heading):
-    """2D keypoints and limb directions of a person who stands 4.5 m from the camera with arms hanging."""
+    """2D keypoints and limb directions of a person standing 4.5 m from the camera, arms hanging."""
     K = np.array([[1000.0, 0, 640], [0, 1000, 480], [0, 0, 1]])
     names = person.joint_names
     rotations = np.tile(np.eye(3), (person.K + 1, 1, 1))

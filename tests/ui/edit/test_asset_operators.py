@@ -42,7 +42,7 @@ def test_the_action_becomes_an_asset_with_picture_tags_and_details(rig):
     seen = picture(rig.animation_data.action)
     alpha = seen[..., 3] > 0.5
     rows, columns = (np.flatnonzero(alpha.any(axis=axis)) for axis in (1, 0))
-    assert np.ptp(rows) > 0.8 * 256  # a person who stands fills the height
+    assert np.ptp(rows) > 0.8 * 256  # a standing person spans most of the height
     assert np.ptp(columns) < 0.7 * 256
     red, blue = ((seen[..., c] > 0.4) & (seen[..., 2 - c] < 0.4) & alpha for c in (0, 2))
     assert min(red.sum(), blue.sum()) > 500  # limbs of both sides, in their colours

@@ -27,7 +27,7 @@ WEIGHTS = Weights(keypoints2d=0.0, joint_prior=0.0, joint_limits=0.0, shape=1.0,
 
 @pytest.fixture(scope="module")
 def states(body: Body) -> list[State]:
-    """Six headings of a person who stands with the arms out to the side and the legs apart."""
+    """A person standing with arms out to the sides and legs apart, at six headings."""
     found = []
     for heading in np.linspace(0, np.pi, 6, endpoint=False):
         rotations = np.tile(np.eye(3), (body.K + 1, 1, 1))
