@@ -9,26 +9,22 @@ import bpy
 import gpu
 from gpu_extras.batch import batch_for_shader
 
+from ..view.viewports import viewport_at
+
 _ANGLES = [2 * math.pi * k / 20 for k in range(20)]
 
 
-def viewport_of(context: bpy.types.Context, pointer: int) -> tuple[bpy.types.Area, bpy.types.Region] | None:
-    """Return a viewport and its main region; None once it was closed or became another editor.
-
-    Blender frees a closed area, and a reference to it then crashes, so tools keep its address alone.
-
-    :param pointer: ``as_pointer`` of the viewport's area.
-    """
-    areas = [area for window in context.window_manager.windows for area in window.screen.areas]
-    area = next((area for area in areas if area.as_pointer() == pointer and area.type == "VIEW_3D"), None)
-    region = next((region for region in area.regions if region.type == "WINDOW"), None) if area else None
-    return (area, region) if area is not None and region is not None else None
+def viewport_of(pointer: int) -> tuple[bpy.types.Area, bpy.types.Region] | None:
+    """Return the viewport at an address and its main region; see `viewport_at`."""
+    found = viewport_at(pointer)
+    region = next((region for region in found[1].regions if region.type == "WINDOW"), None) if found else None
+    return (found[1], region) if found is not None and region is not None else None
 
 
-def redraw_viewport(context: bpy.types.Context, pointer: int) -> None:
+def redraw_viewport(pointer: int) -> None:
     """Redraw a viewport, if it is still there."""
-    if found := viewport_of(context, pointer):
-        found[0].tag_redraw()
+    if found := viewport_at(pointer):
+        found[1].tag_redraw()
 
 
 def draw_disc(center: tuple[float, float], radius: float, color: tuple[float, ...]) -> None:

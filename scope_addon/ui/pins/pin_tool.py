@@ -67,7 +67,7 @@ class SCOPE_OT_pin_limb(bpy.types.Operator):
 
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         """Follow the mouse."""
-        session, viewport = self._session, viewport_of(context, self._session.area)
+        session, viewport = self._session, viewport_of(self._session.area)
         if viewport is None or session.armature not in bpy.data.objects:
             self.cancel(context)
             return {"CANCELLED"}
@@ -98,7 +98,7 @@ class SCOPE_OT_pin_limb(bpy.types.Operator):
         """Remove the handles."""
         bpy.types.SpaceView3D.draw_handler_remove(self._handler, "WINDOW")
         context.workspace.status_text_set(None)
-        redraw_viewport(context, self._session.area)
+        redraw_viewport(self._session.area)
 
     def _drop(self, context: bpy.types.Context, area: bpy.types.Area, region: bpy.types.Region) -> None:
         """Pin the dragged joint under the mouse, which is a step to undo of its own."""

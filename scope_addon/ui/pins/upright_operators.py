@@ -73,7 +73,7 @@ class SCOPE_OT_upright_line(bpy.types.Operator):
 
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         """Follow the mouse."""
-        viewport = viewport_of(context, self._area)
+        viewport = viewport_of(self._area)
         if viewport is None:
             self.cancel(context)
             return {"CANCELLED"}
@@ -98,7 +98,7 @@ class SCOPE_OT_upright_line(bpy.types.Operator):
         bpy.types.SpaceView3D.draw_handler_remove(self._handler, "WINDOW")
         context.workspace.status_text_set(None)
         context.window.cursor_modal_restore()
-        redraw_viewport(context, self._area)
+        redraw_viewport(self._area)
 
     def _finish(self, context: bpy.types.Context, area: bpy.types.Area, region: bpy.types.Region) -> None:
         """Set what is upright, which is a step to undo of its own."""

@@ -13,6 +13,7 @@ from mathutils import Matrix, Quaternion, Vector
 
 from ..captured_person import captured_armature
 from .frame_fit import fit_frame, unfit_frame
+from .viewports import viewport_at
 
 _LEAST_SIDE = 0.3  # of the viewport's width
 _DRAWN_AFTER_S = 0.2
@@ -126,12 +127,10 @@ def _fit_later(area: bpy.types.Area) -> None:
     pointer = area.as_pointer()
 
     def fit() -> None:
-        for window in bpy.context.window_manager.windows:
-            for each in window.screen.areas:
-                same = each.as_pointer() == pointer and each.type == "VIEW_3D"
-                if same and looks_through(window.scene, each.spaces.active):
-                    fit_frame(window.scene, each)
-                    each.tag_redraw()
+        found = viewport_at(pointer)
+        if found is not None and looks_through(found[0].scene, found[1].spaces.active):
+            fit_frame(found[0].scene, found[1])
+            found[1].tag_redraw()
 
     if not bpy.app.background:
         bpy.app.timers.register(fit, first_interval=_DRAWN_AFTER_S)

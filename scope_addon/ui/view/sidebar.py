@@ -5,6 +5,8 @@ from __future__ import annotations
 
 import bpy
 
+from .viewports import viewport_at
+
 TAB = "Scope"
 _DRAWN_AFTER_S = 0.3  # a sidebar knows its tabs only after it has been drawn
 
@@ -31,11 +33,9 @@ def show_tab(context: bpy.types.Context) -> None:
 
 def _choose_tab_later(pointer: int) -> None:
     """Choose the tab in the viewport at an address, if that is still open."""
-    windows = bpy.context.window_manager.windows
-    areas = [area for window in windows for area in window.screen.areas if area.as_pointer() == pointer]
-    for area in areas:
-        if area.type == "VIEW_3D" and _choose_tab(area):
-            area.tag_redraw()
+    found = viewport_at(pointer)
+    if found is not None and _choose_tab(found[1]):
+        found[1].tag_redraw()
 
 
 def _choose_tab(area: bpy.types.Area) -> bool:
