@@ -106,11 +106,12 @@ class Batch:
         threads = {} if jobs == 1 else {"--threads": str(max(1, (os.cpu_count() or 1) // jobs))}
         entries: dict[str, dict[str, Any]] = {}
         with ThreadPoolExecutor(jobs) as pool:
-            futures: dict[Future[dict[str, Any]], str] = {
-                pool.submit(self._capture_one, name, path, previous.get(name), threads): name
-                for name, path in clips.items()
-            }
             try:
+                # Within the try, because a signal can arrive as soon as the first clip has begun.
+                futures: dict[Future[dict[str, Any]], str] = {
+                    pool.submit(self._capture_one, name, path, previous.get(name), threads): name
+                    for name, path in clips.items()
+                }
                 progress("clips", 0, len(clips))
                 pending = set(futures)
                 while pending:

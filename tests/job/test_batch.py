@@ -244,6 +244,27 @@ def test_an_interrupt_stops_the_running_clips_and_keeps_the_finished(folder, tmp
     assert "a.mp4" not in calls(folder)
 
 
+@pytest.mark.skipif(os.name == "nt", reason="select() on Windows is for sockets only")
+def test_an_interrupt_while_clips_are_being_started_stops_the_first(folder, tmp_path, monkeypatch):
+    """A signal can arrive before the last clip has been submitted."""
+    begun, ended = tmp_path / "begun", tmp_path / "ended"
+    code = (
+        f"import pathlib, select, sys; pathlib.Path({str(begun)!r}).touch()\n"
+        f"select.select([sys.stdin], [], [], 20)[0] or pathlib.Path({str(ended)!r}).touch()\n"
+    )
+
+    class Interrupting(dict):
+        def items(self):
+            yield next(iter(super().items()))
+            wait_for(begun.exists)
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(Batch, "clips", lambda *_: Interrupting({"a": folder / "a.mp4", "b": folder / "b.mov"}))
+    with pytest.raises(KeyboardInterrupt):
+        Batch(folder, tmp_path / "out", [sys.executable, "-c", code], {}, (".npz",)).run(1)
+    assert not ended.exists()
+
+
 def test_a_value_may_begin_with_a_hyphen(folder, tmp_path):
     options = {"--rig-object": "-Rig", "--quality": "fast", "--hands": None}
     batch(folder, tmp_path / "out", options).run(1)
