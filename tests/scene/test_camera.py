@@ -72,9 +72,11 @@ def test_a_static_camera_has_no_keys(body, make_motion):
     assert build_scene([make_motion(body)], body).people[0].camera.animation_data is None
 
 
-@pytest.fixture
-def clip(tmp_path) -> Path:
+@pytest.fixture(scope="module")
+def film(tmp_path_factory) -> bytes:
     """A video of five frames of 64 x 48 at 30 frames per second, encoded by Blender."""
+    path = tmp_path_factory.mktemp("film") / "film.mp4"
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     render = bpy.context.scene.render
     if bpy.app.version >= (5, 0, 0):
         render.image_settings.media_type = "VIDEO"
@@ -82,17 +84,22 @@ def clip(tmp_path) -> Path:
     render.ffmpeg.format, render.ffmpeg.codec = "MPEG4", "MPEG4"
     render.engine, render.fps = "CYCLES", 30
     render.resolution_x, render.resolution_y = 64, 48
-    render.filepath, render.use_file_extension = str(tmp_path / "film.mp4"), False
+    render.filepath, render.use_file_extension = str(path), False
     scene = bpy.context.scene
     scene.cycles.samples, scene.frame_start, scene.frame_end = 1, 1, 5
     camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
     scene.collection.objects.link(camera)
     scene.camera = camera
     bpy.ops.render.render(animation=True)
-    film = tmp_path / "film.mp4"
-    assert film.is_file()
-    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    return film
+    return path.read_bytes()
+
+
+@pytest.fixture
+def clip(film, tmp_path) -> Path:
+    """The video in a folder of the test's own."""
+    path = tmp_path / "film.mp4"
+    path.write_bytes(film)
+    return path
 
 
 def test_footage_is_shown_in_the_background(body, make_motion, clip):

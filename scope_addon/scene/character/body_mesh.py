@@ -61,8 +61,11 @@ def skin_to_armature(mesh: bpy.types.Object, armature: bpy.types.Object, body: B
     for k, joint_name in enumerate(body.joint_names):
         group = mesh.vertex_groups.new(name=joint_name)
         weight = np.where(joints == k, weights, 0.0).sum(axis=1)
-        for vertex in np.flatnonzero(weight > 0):
-            group.add((int(vertex),), float(weight[vertex]), "REPLACE")
+        whole = np.flatnonzero(weight == 1.0)
+        group.add(whole.tolist(), 1.0, "REPLACE")
+        shared = np.flatnonzero((weight > 0.0) & (weight != 1.0))
+        for vertex, share in zip(shared.tolist(), weight[shared].tolist(), strict=True):
+            group.add((vertex,), share, "REPLACE")
     modifier = mesh.modifiers.new("Armature", "ARMATURE")
     modifier.object = armature
     modifier.use_deform_preserve_volume = False

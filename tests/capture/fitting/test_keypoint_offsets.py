@@ -8,7 +8,6 @@ from types import SimpleNamespace
 
 import cv2
 import numpy as np
-import pytest
 from scope.scope_addon.capture.camera.intrinsics import choose_camera
 from scope.scope_addon.capture.fitting.ablation import Ablation
 from scope.scope_addon.capture.fitting.frame_measurements import Measurer
@@ -126,9 +125,8 @@ def test_known_offsets_are_recovered(body):
     np.testing.assert_allclose(found, shifts, atol=2e-3)
 
 
-@pytest.mark.parametrize("camera", ["cam1", "cam3"])
-def test_offsets_lower_the_reprojection_error_of_a_man_they_were_not_estimated_from(shared, body, camera):
-    video, wanted = shared / "data" / "pose2sim" / f"{camera}.mp4", VideoRange(end_s=0.6)
+def test_offsets_lower_the_reprojection_error_of_a_man_they_were_not_estimated_from(shared, body):
+    video, wanted = shared / "data" / "pose2sim" / "cam3.mp4", VideoRange(end_s=0.6)
     left_over = []
     for which, ablation in ((body, Ablation(keypoint_offsets=False)), (with_keypoint_offsets(body), Ablation())):
         (motion,) = capture(video, body, CaptureOptions(ablation=ablation, wanted=wanted)).motions
