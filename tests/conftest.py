@@ -6,6 +6,7 @@ from __future__ import annotations
 import os
 import shutil
 import sys
+import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -20,6 +21,9 @@ ROOT = Path(__file__).resolve().parent.parent
 SHARED = ROOT.parent / "shared"
 BLENDER_FOLDER = "scope-tests-blender-"  # begins the name of the user folder of Blender's module
 
+# Blender reads this once, when bpy is first imported: tests must not write in the home folder.
+if "BLENDER_USER_RESOURCES" not in os.environ:
+    os.environ["BLENDER_USER_RESOURCES"] = tempfile.mkdtemp(prefix=BLENDER_FOLDER)
 
 # In this order, ahead of all others. The first two compile the solver, each a version of its own, so that where two
 # processes run, neither compiles what the other does; files that take long would otherwise end last, alone.
@@ -76,15 +80,15 @@ def body() -> Body:
 @pytest.hookimpl(trylast=True)
 def pytest_unconfigure(config: pytest.Config) -> None:
     """Leave without Blender's exit handlers, which can wait forever for a thread of their own (see ``cli.run``)."""
+    resources = Path(os.environ.get("BLENDER_USER_RESOURCES", ""))
+    if resources.name.startswith(BLENDER_FOLDER):
+        shutil.rmtree(resources, ignore_errors=True)
     if "bpy" in sys.modules:
         sys.stdout.flush()
         sys.stderr.flush()
         from scope.scope_addon.cli import remove_blender_folder
 
         remove_blender_folder()
-        resources = Path(os.environ.get("BLENDER_USER_RESOURCES", ""))
-        if resources.name.startswith(BLENDER_FOLDER):
-            shutil.rmtree(resources, ignore_errors=True)
         os._exit(int(config.stash.get(EXIT_STATUS, 1)))
 
 

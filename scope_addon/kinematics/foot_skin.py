@@ -7,6 +7,7 @@ is lower at its end, by two centimetres and more, so the skin itself decides whe
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -37,10 +38,10 @@ class FootSkin:
         v, J = body.rest_vertices(betas), body.rest_joints(betas)
         strongest = body.skin_joints[np.arange(len(v)), body.skin_weights.argmax(1)]
         self.parts = [body.joint_names.index(name) for name in FOOT_PARTS]
-        self._points = []  # of each part, (n, 3) from its joint
+        self.points: list[NDArray[np.float64]] = []  # of each part, (n, 3) from its joint
         for part in self.parts:
             own = v[strongest == part] - J[part] if (strongest == part).any() else np.zeros((1, 3))
-            self._points.append(own[np.unique((own @ _directions().T).argmax(axis=0))])
+            self.points.append(own[np.unique((own @ _directions().T).argmax(axis=0))])
 
     def heights(
         self, R: NDArray[np.floating[Any]], t: NDArray[np.floating[Any]], up: NDArray[np.floating[Any]]
@@ -52,9 +53,25 @@ class FootSkin:
         """
         lowest = [
             (np.einsum("tji,j->ti", R[:, k], up) @ points.T).min(axis=1) + t[:, k] @ up
-            for k, points in zip(self.parts, self._points, strict=True)
+            for k, points in zip(self.parts, self.points, strict=True)
         ]
         return np.stack(lowest, axis=1)
+
+    def as_keypoints(self, body: Body) -> tuple[Body, NDArray[np.intp]]:
+        """Add the skin's outermost points to the body as keypoints, and return their numbers, (n,), too.
+
+        They are exact for this skin's betas; for others, they keep their positions relative to the joints.
+        """
+        points = np.concatenate(self.points)
+        parts = np.repeat(np.array(self.parts, np.int32), [len(own) for own in self.points])
+        extended = replace(
+            body,
+            keypoint_names=(*body.keypoint_names, *(f"foot_skin/{k}" for k in range(len(points)))),
+            keypoint_part=np.concatenate([body.keypoint_part, parts]),
+            keypoint_template=np.concatenate([body.keypoint_template, body.J_template[parts] + points]),
+            keypoint_shapedirs=np.concatenate([body.keypoint_shapedirs, body.J_shapedirs[parts]]),
+        )
+        return extended, len(body.keypoint_names) + np.arange(len(points))
 
 
 def foot_heights(motion: Motion, body: Body, raw: bool = False) -> NDArray[np.float64]:

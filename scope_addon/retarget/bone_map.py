@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from ...solver.errors import InputError
-from ...solver.loaders.regular_file import check_regular
 from ..atomic_write import atomic_path, reason
 from ..errors import OutputError
+from ..json_file import read_json_object
 
 SIDED_PARTS = ("hip", "knee", "ankle", "foot", "collar", "shoulder", "elbow", "wrist")
 SPINE = ("spine1", "spine2", "spine3")
@@ -21,7 +21,7 @@ PARTS = (
     *(f"{side}_{part}" for side in ("left", "right") for part in (*SIDED_PARTS, *PHALANGES)),
 )
 REQUIRED = ("pelvis", *(f"{side}_{part}" for side in ("left", "right") for part in ("hip", "knee")))
-_FORMAT, _LARGEST_BYTES = "scope bone map", 1_000_000
+_FORMAT = "scope bone map"
 
 
 @dataclass
@@ -76,15 +76,9 @@ def load_bone_map(path: str | Path) -> BoneMap:
     :raises InputError: when the file cannot be read or is not a valid map.
     """
     path = Path(path)
-    check_regular(path, InputError, "bone map that Scope saved", _LARGEST_BYTES)
-    try:
-        content = json.loads(path.read_text(encoding="utf-8-sig"))  # some editors write a byte order mark
-    except OSError as error:
-        raise InputError(f"{path}: the bone map cannot be read ({error.strerror}); choose another file") from error
-    except (ValueError, RecursionError) as error:
-        raise InputError(f"{path}: this is not JSON ({error}); choose a bone map that Scope saved") from error
-    bones = content.get("bones") if isinstance(content, dict) else None
-    if not isinstance(content, dict) or content.get("format") != _FORMAT or content.get("version") != 1:
+    content = read_json_object(path, InputError, "bone map", "choose one that Scope saved")
+    bones = content.get("bones")
+    if content.get("format") != _FORMAT or content.get("version") != 1:
         raise InputError(f"{path}: this JSON file is not a Scope bone map, version 1; choose another file")
     if not isinstance(bones, dict) or not all(_is_name(bone) and _is_name(part) for bone, part in bones.items()):
         raise InputError(f"{path}: 'bones' must be an object that maps bone names to body parts; correct the file")
@@ -99,11 +93,9 @@ def load_bone_map(path: str | Path) -> BoneMap:
 def _is_bone_map_or_empty(path: Path) -> bool:
     """Return whether a file has the format of a bone map, whatever its version and bones, or has no content."""
     try:
-        size = path.stat().st_size
-        content = json.loads(path.read_text(encoding="utf-8-sig")) if 0 < size <= _LARGEST_BYTES else None
-    except (OSError, ValueError, RecursionError):
+        return path.stat().st_size == 0 or read_json_object(path, InputError, "bone map", "")["format"] == _FORMAT
+    except (OSError, InputError, KeyError):
         return False
-    return size == 0 or (isinstance(content, dict) and content.get("format") == _FORMAT)
 
 
 def _is_name(text: object) -> bool:

@@ -27,12 +27,13 @@ DATA = (
 def state() -> State:
     """Return everything in the file that an operator may change, and the evaluated pose, as a flat table of values."""
     scene = bpy.context.window_manager.windows[0].scene
-    bpy.context.window_manager.windows[0].view_layer.update()
+    view_layer = bpy.context.window_manager.windows[0].view_layer
+    view_layer.update()
     found: State = {}
     for obj in scene.objects:
         about = {
             "parent": obj.parent.name if obj.parent else None,
-            "matrix": [round(x, 5) for row in _matrix(obj) for x in row],
+            "matrix": [round(x, 5) for row in _matrix(obj, view_layer.depsgraph) for x in row],
             "action": obj.animation_data.action.name if obj.animation_data and obj.animation_data.action else None,
             "collections": sorted(c.name for c in obj.users_collection),
             "selected": obj.select_get(),
@@ -66,9 +67,12 @@ def state() -> State:
     return found
 
 
-def _matrix(obj: bpy.types.Object) -> Matrix:
-    """Return where an object is; Blender does not evaluate those that are hidden."""
-    return obj.matrix_world if obj.visible_get() else obj.matrix_basis
+def _matrix(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Matrix:
+    """Return where an object is; Blender does not evaluate those that are hidden.
+
+    Objects of a linked scene that is not in the window yet are evaluated, but do not say so themselves.
+    """
+    return obj.evaluated_get(depsgraph).matrix_world.copy() if obj.visible_get() else obj.matrix_basis
 
 
 def _group(name: str, group: bpy.types.PropertyGroup) -> State:

@@ -48,7 +48,7 @@ ROOMS = {
     "scope_addon/command_line": {"scope_addon/scene", "scope_addon/job", "scope_addon/smpl_import"},
     "scope_addon/cli": {"scope_addon/command_line"},
 }
-SHARED = ("errors", "installed", "motion", "atomic_write", "footage", "review_spans", "__init__")
+SHARED = ("errors", "installed", "motion", "atomic_write", "footage", "json_file", "review_spans", "__init__")
 LARGEST_FOLDER = 14  # Python files
 CAPTURE_FILES = 3  # directly in scope_addon/capture, beside its rooms
 

@@ -3,16 +3,8 @@
 
 from __future__ import annotations
 
-import os
-import tempfile
 from dataclasses import dataclass, replace
 from pathlib import Path
-
-from ..conftest import BLENDER_FOLDER
-
-# Blender reads this once, when bpy is first imported: tests must not write in the home folder.
-if "BLENDER_USER_RESOURCES" not in os.environ:
-    os.environ["BLENDER_USER_RESOURCES"] = tempfile.mkdtemp(prefix=BLENDER_FOLDER)
 
 import bpy
 import numpy as np

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....solver.errors import InputError
-from ....solver.loaders.regular_file import check_regular
+from ...json_file import read_json_object
 
 # The name in our files, and the names that OpenCV's examples and other programs use.
 _NAMES = {
@@ -42,7 +42,6 @@ _LARGEST_TANGENTIAL = 0.5
 _LARGEST_MAGNIFICATION = 3.0  # by distortion, at half the shorter side
 _LARGEST_SKEW = 1e-3  # of the focal length; less than a pixel at the picture's edge
 _LARGEST_SIDE = 1e6
-_LARGEST_BYTES = 1_000_000
 _SIZE_TOLERANCE_PX = 1.0  # for sizes that were rounded
 
 
@@ -106,16 +105,7 @@ def read_calibration(path: Path) -> Calibration:
 
     :raises InputError: the file cannot be read, or holds an unknown key or an impossible value.
     """
-    check_regular(path, InputError, "calibration", _LARGEST_BYTES)
-    try:
-        data = json.loads(path.read_text("utf-8-sig"))
-    except OSError as error:
-        raise InputError(f"cannot read the calibration {path}: {error.strerror}") from error
-    except (ValueError, RecursionError) as error:
-        raise InputError(f"{path} is not a calibration: it is not a JSON file; {_format()}") from error
-    if not isinstance(data, dict):
-        raise InputError(f"{path} is not a calibration: it does not hold a JSON object; {_format()}")
-    values = _by_our_names(path, data)
+    values = _by_our_names(path, read_json_object(path, InputError, "calibration", _format()))
     if "intrinsics" not in values:
         raise InputError(f'{path} is not a calibration: it has no "intrinsics"; {_format()}')
     intrinsics = _intrinsics(path, values["intrinsics"])

@@ -22,6 +22,7 @@ from ..clip import Clip, clip_from_motion
 from ..spans import swap_sides
 from .corrections import Contact, Correction, Exchange, Pin, from_arrays, to_arrays, upright_of
 from .moved import moved_clip, moved_motion
+from .reach import pixel_of
 from .solve_pins import Shot, resolve
 
 _KEPT = ("poses", "trans", "poses_raw", "trans_raw", "joints_cam")
@@ -55,13 +56,10 @@ def distance_from_pin(motion: Motion, pin: Pin, place: NDArray[np.float64] | Non
         return 0.0
     T = motion.world_from_camera[rows[0]]
     if place is None:
-        where = motion.joints_cam[rows[0], BODY_JOINTS.index(pin.joint)].astype(float)
-    else:
-        where = T[:3, :3].T @ (place - T[:3, 3])
+        place = T[:3, :3] @ motion.joints_cam[rows[0], BODY_JOINTS.index(pin.joint)].astype(float) + T[:3, 3]
     if pin.pixel is not None:
-        u, v, w = motion.intrinsics @ where
-        return float(np.hypot(u / w - pin.pixel[0], v / w - pin.pixel[1]))
-    return float(np.linalg.norm(T[:3, :3] @ where + T[:3, 3] - pin_in_world(motion, pin).position))
+        return float(np.linalg.norm(pixel_of((T, motion.intrinsics), place) - pin.pixel))
+    return float(np.linalg.norm(place - pin_in_world(motion, pin).position))
 
 
 def pin_in_world(motion: Motion, pin: Pin) -> Pin:

@@ -4,7 +4,8 @@
     minimize  ½ Σ w_p |r_p|² + ½ Σ w_i |log(Ω̂_iᵀ Ω_i)|² + ½ w_R |log(R̂_0ᵀ R_0)|² + ½ w_t |t_0 − t̂_0|²
 
 where r_p are the corrected points, in the image or in space, and held points: other hands, feet and the head, which
-should stay where they were. The joints of the corrected limb are free to turn, all others are stiff.
+should stay where they were. The joints of the corrected limb are free to turn, all others are stiff. The skin of the
+feet has a one-sided residual, which keeps it above the floor.
 """
 
 from __future__ import annotations
@@ -25,12 +26,15 @@ from ....solver.body import Body
 from ....solver.residuals import joint_limits
 from ...errors import UsageError
 from ...kinematics.contact_points import SOLES, with_contact_points
+from ...kinematics.foot_skin import UNDER_FLOOR_M, FootSkin
 
 # Inverse variances: per radian² of joints, per metre² of points and of the pelvis, per squared image coordinate.
 FREE, GIRDLE, STIFF = 1.0, 10.0, 100.0
 PELVIS_ROTATION, PELVIS_POSITION = 400.0, 400.0
 PINNED, PINNED_2D = 1e6, 1e7  # 1 mm; 0.3 pixels at a focal length of 1000
 STANDING, HELD = 1e4, 1e3  # 1 cm, 3 cm
+ABOVE_FLOOR = 1e5  # 3 mm for each point of the skin that is under the floor
+FLOOR_M = -0.8 * UNDER_FLOOR_M  # a capture leaves feet nearly a centimetre under the floor, too
 _TRUNK = ("pelvis", "spine1", "spine2", "spine3", "neck", "head")
 _LIMBS = {"arm": ("collar", "shoulder", "elbow", "wrist", "hand"), "leg": ("hip", "knee", "ankle", "foot")}
 _ENDS = ("left_wrist", "right_wrist", "left_ankle", "right_ankle", "head")
@@ -43,6 +47,7 @@ class Points:
     numbers: list[int] = field(default_factory=list)
     values: list[NDArray[np.float64]] = field(default_factory=list)  # (3,) metres, or (2,) pixels
     weights: list[float] = field(default_factory=list)
+    floor: float | None = None  # height that the feet's skin may not go below; None: it may be anywhere
 
     def add(self, number: int, value: NDArray[np.float64], weight: float) -> None:
         """Add a point.
@@ -70,7 +75,9 @@ def compiled_solver() -> ModuleType:
 
 
 def _options(solver: ModuleType) -> Any:
-    weights = solver.Weights(keypoints2d=1.0, keypoints3d=1.0, joint_prior=1.0, joint_limits=500.0, shape=1.0)
+    weights = solver.Weights(
+        keypoints2d=1.0, keypoints3d=1.0, joint_prior=1.0, joint_limits=500.0, shape=1.0, floor=ABOVE_FLOOR
+    )
     return solver.Options(
         stages=(solver.Stage(weights, 1e-9, 60),),
         robust_keypoints2d=math.inf,
@@ -88,7 +95,8 @@ class PoseRefit:
 
         :param betas: (P,) shape coefficients.
         """
-        self.body, self.betas = with_contact_points(body, betas), np.asarray(betas, float)
+        self.betas, self.skin = np.asarray(betas, float), FootSkin(body, betas)
+        self.body, self._skin_points = self.skin.as_keypoints(with_contact_points(body, betas))
         self.names = list(body.joint_names)
         self._solver = compiled_solver()
         tree = import_module(".compiled.tree", self._solver.__name__)
@@ -161,6 +169,9 @@ class PoseRefit:
             uv = np.array([points.values[k] for k in in_image])
             measured.intrinsics = camera[1]
             measured.keypoints2d = self._solver.Keypoints2D(numbers[in_image], uv, weights[in_image])
+        if points.floor is not None:
+            numbers, up = self._skin_points, R_camera_world[:, 2]
+            measured.floor = self._solver.Floor(numbers, up, points.floor - center[2], np.zeros(len(numbers)))
         state = self._solver.State(
             R_camera_world @ rotations[0], R_camera_world @ (root - center), rotations[1:].copy(), np.zeros(0)
         )

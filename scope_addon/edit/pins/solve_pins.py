@@ -25,12 +25,13 @@ from numpy.typing import NDArray
 
 from ....solver.body import Body
 from ....solver.rotations import exp, log
+from ...kinematics.contact_points import FOOT_PARTS
 from ...kinematics.standing import standing_probability
 from ..clip import Clip, sample
 from ..spans import swap_sides
 from .corrections import Contact, Correction, Exchange, Pin
 from .fade import faded
-from .pose_refit import HELD, PINNED, PINNED_2D, STANDING, Points, PoseRefit, limb_of
+from .pose_refit import FLOOR_M, HELD, PINNED, PINNED_2D, STANDING, Points, PoseRefit, limb_of
 from .reach import SLACK_M, pixel_of, within_reach
 
 _UP = np.array([0.0, 0.0, 1.0])
@@ -135,7 +136,9 @@ class _Correction:
         times = clip.times
         first, last = min(s[0] for s in self._spans), max(s[-1] for s in self._spans)
         around = np.flatnonzero((times >= times[first] - _AROUND_S) & (times <= times[last] + _AROUND_S))
-        soles = refit.place(clip.rotations[around], clip.root[around])[2]
+        R, at, soles = refit.place(clip.rotations[around], clip.root[around])
+        self._floor = np.full(len(clip), FLOOR_M)  # what feet may not go below: where they were, if that is lower
+        self._floor[around] = np.minimum(FLOOR_M, refit.skin.heights(R, at, _UP).min(axis=1))
         self._limited: set[int] = set()  # tracks whose pins are where the limb can reach them
         self._standing = np.zeros((len(clip), soles.shape[1]))
         self._standing[around] = standing_probability(soles, _UP, times[around])
@@ -163,7 +166,8 @@ class _Correction:
         known, reach = clip.times[[track.keys[h] for h in hard]], np.array([track.reach[h] for h in hard])
         rotations = before.rotations @ exp(faded(before.times, known, turn, reach))
         root = before.root + faded(before.times, known, shift, reach)
-        _, at, soles = self._refit.place(rotations, root)
+        R, at, soles = self._refit.place(rotations, root)
+        rise = self._rise(track, span, self._refit.skin.heights(R, at, _UP))
         pinned = {track.keys[h]: h for h in hard}
         for k, key in enumerate(span):
             points, camera = _copied(held[k]), None
@@ -173,7 +177,7 @@ class _Correction:
                     _add_all(points, measured)
             else:
                 for joint in joints:
-                    self._follow(points, joint, track, at[k], soles[k])
+                    self._follow(points, joint, track, at[k] + rise[k], soles[k] + rise[k])
             pose = self._refit.solve(rotations[k], root[k], tuple(track.joints), points, camera)
             clip.rotations[key], clip.root[key] = pose
 
@@ -220,6 +224,8 @@ class _Correction:
         """Return the points of other limbs, which stay where they are while a limb is corrected."""
         refit, own, points = self._refit, self._tracks[index].joints, Points()
         limb = limb_of(own[0])
+        if not limb.endswith("arm"):
+            points.floor = float(self._floor[key])
         for k, name in enumerate(refit.sole_names):
             if name not in refit.soles_of(limb) and self._standing[key, k] > _STANDS:
                 points.add(refit.number(name), soles[k], STANDING * self._standing[key, k])
@@ -233,6 +239,16 @@ class _Correction:
                 for name in track.joints:
                     points.add(refit.number(name), joints[refit.joint(name)], PINNED * share)
         return points
+
+    def _rise(self, track: _Track, span: NDArray[np.intp], heights: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return by how much, (T, 3), the points of a leg have to be higher for its foot to be above the floor.
+
+        :param heights: (T, 4) of the feet's skin at the keys of the span.
+        """
+        own = [k for k, part in enumerate(FOOT_PARTS) if limb_of(part) == limb_of(track.joints[0])]
+        lowest = heights[:, own].min(axis=1, initial=np.inf)
+        rise: NDArray[np.float64] = np.maximum(self._floor[span] - lowest, 0.0)[:, None] * _UP
+        return rise
 
     def _share(self, index: int, key: int) -> float:
         """Return 1 at a track's pinned keys, fading to 0 at the ends of its span."""
@@ -271,7 +287,7 @@ def _met(
 
 
 def _copied(points: Points) -> Points:
-    return Points(list(points.numbers), list(points.values), list(points.weights))
+    return Points(list(points.numbers), list(points.values), list(points.weights), points.floor)
 
 
 def _add_all(points: Points, more: Points) -> None:

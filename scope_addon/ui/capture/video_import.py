@@ -53,7 +53,11 @@ class SCOPE_OT_import_video(bpy.types.Operator):
             return {"CANCELLED"}
         context.scene.scope.footage = str(path)
         show_tab(context)
-        bpy.ops.scope.capture("INVOKE_DEFAULT")
+        try:
+            bpy.ops.scope.capture("INVOKE_DEFAULT")
+        except RuntimeError as error:  # it has said why nothing can be captured here
+            self.report({"ERROR"}, str(error).removeprefix("Error: ").strip())
+            return {"CANCELLED"}
         return {"FINISHED"}
 
 

@@ -21,7 +21,29 @@ if TYPE_CHECKING:
 _NOW = -1_048_574  # the first frame that Blender allows; stands for the current one
 
 
-def unreached(armature: bpy.types.Object, joint: str, frame: int) -> str:
+def pin_warnings(armature: bpy.types.Object, body: Body, joint: str, frame: int) -> list[str]:
+    """Return what to warn of after a pin in a scene frame: that its joint cannot reach it, feet under the floor."""
+    return [*filter(None, (_unreached(armature, joint, frame), floor_warning(armature, body)))]
+
+
+def floor_warning(armature: bpy.types.Object, body: Body) -> str:
+    """Return the message about feet that corrections have put under the floor; empty if there are none."""
+    from ...edit.pins.under_floor import feet_under_floor
+
+    motion = motion_of(armature)
+    depth, count = feet_under_floor(motion, body)
+    if not count:
+        return ""
+    return rpt_(
+        "The corrections put a foot up to {depth:.0f} cm under the floor in {count} of {total} frames: move the pin "
+        "up, or use Snap Feet to Floor",
+        depth=100 * depth,
+        count=count,
+        total=len(motion),
+    )
+
+
+def _unreached(armature: bpy.types.Object, joint: str, frame: int) -> str:
     """Return the message about a joint that cannot reach its pin in a scene frame; empty if it does."""
     for entry in listed_corrections(armature):
         if entry["joint"] == joint and abs(entry["first"] - frame) <= 1 and entry["missed"]:
@@ -75,8 +97,8 @@ class SCOPE_OT_add_pin(EditOperator):
             here = scene.frame_current
         finally:
             scene.frame_set(current[0], subframe=current[1])
-        if missed := unreached(armature, self.joint, here):
-            self.report({"WARNING"}, missed)
+        for warning in pin_warnings(armature, body, self.joint, here):
+            self.report({"WARNING"}, warning)
         return ""
 
 
@@ -97,6 +119,8 @@ class CorrectSpanOperator(SpanOperator):
         first, last = (source_frame(armature, motion, frame, rate) for frame in (self.start, self.end))
         new = self.correction(first, last)
         change_corrections(armature, body, rate, lambda present: added(present, new))
+        if warning := floor_warning(armature, body):
+            self.report({"WARNING"}, warning)
         context.scene.frame_set(context.scene.frame_current, subframe=context.scene.frame_subframe)
         return ""
 

@@ -12,12 +12,13 @@ from bpy_extras.view3d_utils import location_3d_to_region_2d, region_2d_to_locat
 from mathutils import Vector
 
 from ...scene.character.correction_list import listed_corrections
-from ..captured_person import captured_armature
+from ..captured_person import body_of, captured_armature
 from ..edit.edit_base import may_edit
 from ..reporting import iface_
 from ..view.comparison import camera_of
-from .correction_operators import unreached
+from .correction_operators import pin_warnings
 from .drawing import draw_disc, draw_line, redraw_viewport, viewport_of
+from .pointer import Pointer
 
 _SIDED = ("shoulder", "elbow", "wrist", "hip", "knee", "ankle", "foot")
 HANDLES = ("head", "pelvis", *(f"{side}_{name}" for side in ("left", "right") for name in _SIDED))
@@ -38,6 +39,7 @@ class _Session:
         self.hovered = self.dragged = ""
         self.start: tuple[float, float] = (0.0, 0.0)
         self.mouse: tuple[float, float] = (0.0, 0.0)
+        self.pointer = Pointer()
 
 
 class SCOPE_OT_pin_limb(bpy.types.Operator):
@@ -72,7 +74,8 @@ class SCOPE_OT_pin_limb(bpy.types.Operator):
             self.cancel(context)
             return {"CANCELLED"}
         area, region = viewport
-        session.mouse = (event.mouse_x - region.x, event.mouse_y - region.y)
+        x, y = session.pointer.place(event)
+        session.mouse = (x - region.x, y - region.y)
         inside = 0 <= session.mouse[0] < region.width and 0 <= session.mouse[1] < region.height
         if event.type == "MOUSEMOVE":
             if not session.dragged:
@@ -121,8 +124,9 @@ class SCOPE_OT_pin_limb(bpy.types.Operator):
             self.report({"ERROR"}, str(error).removeprefix("Error: ").strip())
             return
         armature = bpy.data.objects.get(session.armature)
-        if armature and (missed := unreached(armature, joint, context.scene.frame_current)):
-            self.report({"WARNING"}, missed)
+        if armature:
+            for warning in pin_warnings(armature, body_of(armature), joint, context.scene.frame_current):
+                self.report({"WARNING"}, warning)
 
 
 def _joint_positions(session: _Session) -> dict[str, Vector]:

@@ -15,6 +15,7 @@ from ..reporting import iface_, sentence, tip_
 from ..view.comparison import camera_of
 from .corrected_person import change_world
 from .drawing import draw_line, redraw_viewport, viewport_of
+from .pointer import Pointer
 
 if TYPE_CHECKING:
     from ....solver.body import Body
@@ -64,6 +65,7 @@ class SCOPE_OT_upright_line(bpy.types.Operator):
         """Wait for the line."""
         self._area = context.area.as_pointer()
         self._line: list[tuple[float, float]] = []
+        self._pointer = Pointer()
         draw = bpy.types.SpaceView3D.draw_handler_add
         self._handler = draw(_draw, (self._line, self._area), "WINDOW", "POST_PIXEL")
         context.workspace.status_text_set(iface_(_HELP))
@@ -78,7 +80,8 @@ class SCOPE_OT_upright_line(bpy.types.Operator):
             self.cancel(context)
             return {"CANCELLED"}
         area, region = viewport
-        mouse = (event.mouse_x - region.x, event.mouse_y - region.y)
+        x, y = self._pointer.place(event)
+        mouse = (x - region.x, y - region.y)
         if event.type in ("ESC", "RIGHTMOUSE") and event.value == "PRESS":
             self.cancel(context)
             return {"CANCELLED"}

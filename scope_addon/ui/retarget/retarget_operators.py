@@ -89,15 +89,14 @@ class SCOPE_OT_retarget(_RigOperator):
 
         settings, source = context.scene.scope_retarget, captured_armature(context)
         assert source is not None  # checked by poll
-        if not len(settings.pairs):
-            fill_list(settings, guess_bone_map(settings.rig))
+        guessed = None if len(settings.pairs) else guess_bone_map(settings.rig)
         body = body_of(source)
         result = retarget(
             source,
             body,
             betas_of(source, body),
             settings.rig,
-            listed_map(settings),
+            guessed or listed_map(settings),
             scene_rate(context.scene),
             RetargetOptions(
                 feet=settings.feet,
@@ -105,6 +104,8 @@ class SCOPE_OT_retarget(_RigOperator):
                 offset=_SIDE_OFFSET_M if settings.captured == "beside" else (0, 0, 0),
             ),
         )
+        if guessed is not None:  # not before: what fails changes nothing
+            fill_list(settings, guessed)
         settings.rig[PERSON] = source
         if settings.captured == "hide":
             _select_only(context, settings.rig)

@@ -390,6 +390,7 @@ TEXTS = {
     "The capture that the active object belongs to": "Die Erfassung, zu der das aktive Objekt gehört",
     "The captured person was deleted": "Die erfasste Person wurde gelöscht",
     "The collection '{name}' is hidden; show it in the Outliner": "Die Sammlung '{name}' ist verborgen; im Outliner einblenden",
+    "The corrections put a foot up to {depth:.0f} cm under the floor in {count} of {total} frames: move the pin up, or use Snap Feet to Floor": "Die Korrekturen bringen einen Fuß in {count} von {total} Bildern bis zu {depth:.0f} cm unter den Boden: den Pin höher setzen oder „Füße auf den Boden setzen“ verwenden",
     "The footage is already in the sequencer": "Das Filmmaterial ist bereits im Sequenzer",
     "The left foot": "Der linke Fuß",
     "The most prominent people, up to a number": "Die auffälligsten Personen, bis zu einer Anzahl",

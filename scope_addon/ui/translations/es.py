@@ -390,6 +390,7 @@ TEXTS = {
     "The capture that the active object belongs to": "La captura a la que pertenece el objeto activo",
     "The captured person was deleted": "Se borró la persona capturada",
     "The collection '{name}' is hidden; show it in the Outliner": "La colección '{name}' está oculta; muéstrela en el listado",
+    "The corrections put a foot up to {depth:.0f} cm under the floor in {count} of {total} frames: move the pin up, or use Snap Feet to Floor": "Las correcciones ponen un pie hasta {depth:.0f} cm bajo el suelo en {count} de {total} fotogramas: suba el anclaje o use «Ajustar pies al suelo»",
     "The footage is already in the sequencer": "La filmación ya está en el editor de video",
     "The left foot": "El pie izquierdo",
     "The most prominent people, up to a number": "Las personas principales, hasta cierto número",

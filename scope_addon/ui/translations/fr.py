@@ -390,6 +390,7 @@ TEXTS = {
     "The capture that the active object belongs to": "La capture à laquelle appartient l’objet actif",
     "The captured person was deleted": "La personne capturée a été supprimée",
     "The collection '{name}' is hidden; show it in the Outliner": "La collection '{name}' est cachée ; affichez-la dans le synoptique",
+    "The corrections put a foot up to {depth:.0f} cm under the floor in {count} of {total} frames: move the pin up, or use Snap Feet to Floor": "Les corrections placent un pied jusqu’à {depth:.0f} cm sous le sol dans {count} images sur {total} : remontez l’épingle, ou utilisez « Poser les pieds au sol »",
     "The footage is already in the sequencer": "Le métrage est déjà dans le séquenceur",
     "The left foot": "Le pied gauche",
     "The most prominent people, up to a number": "Les personnes principales, jusqu’à un certain nombre",

@@ -390,6 +390,7 @@ TEXTS = {
     "The capture that the active object belongs to": "アクティブオブジェクトが属するキャプチャ",
     "The captured person was deleted": "キャプチャした人物は削除されました",
     "The collection '{name}' is hidden; show it in the Outliner": "コレクション '{name}' は非表示です。アウトライナーで表示してください",
+    "The corrections put a foot up to {depth:.0f} cm under the floor in {count} of {total} frames: move the pin up, or use Snap Feet to Floor": "修正により、{total} フレーム中 {count} フレームで足が床下に最大 {depth:.0f} cm 沈んでいます。ピンを上に動かすか、「足を床にスナップ」を使ってください",
     "The footage is already in the sequencer": "フッテージはすでにシーケンサーにあります",
     "The left foot": "左足",
     "The most prominent people, up to a number": "最も目立つ人物から、指定した人数まで",

@@ -390,6 +390,7 @@ TEXTS = {
     "The capture that the active object belongs to": "活动物体所属的捕捉",
     "The captured person was deleted": "捕捉的人物已被删除",
     "The collection '{name}' is hidden; show it in the Outliner": "集合“{name}”已隐藏；请在大纲视图中显示",
+    "The corrections put a foot up to {depth:.0f} cm under the floor in {count} of {total} frames: move the pin up, or use Snap Feet to Floor": "修正使脚在 {total} 帧中的 {count} 帧里低于地面最多 {depth:.0f} 厘米：请将图钉上移，或使用“双脚吸附到地面”",
     "The footage is already in the sequencer": "素材已在序列编辑器中",
     "The left foot": "左脚",
     "The most prominent people, up to a number": "最显著的人物，不超过指定数量",

@@ -153,7 +153,7 @@ def test_other_files_are_refused_by_name(path, text):
 
 def test_a_missing_file_is_refused(path, tmp_path):
     for missing in (path, tmp_path):
-        with pytest.raises(InputError, match="cannot read the calibration"):
+        with pytest.raises(InputError, match="the calibration cannot be read"):
             choose_camera(640, 480, calibration=missing)
 
 

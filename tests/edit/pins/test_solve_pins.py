@@ -8,6 +8,7 @@ from scope.scope_addon.edit.pins.corrections import Contact, Exchange, Pin
 from scope.scope_addon.edit.pins.solve_pins import Shot, missed, resolve
 from scope.scope_addon.edit.spans import swap_sides
 from scope.scope_addon.errors import UsageError
+from scope.scope_addon.kinematics.foot_skin import FootSkin
 from scope.solver.rotations import exp
 
 from ...made_motion import level_camera
@@ -190,3 +191,28 @@ def test_corrections_at_frames_without_keys_are_left_out():
 def test_an_unknown_joint_is_an_error_that_lists_the_joints():
     with pytest.raises(UsageError, match=r"no joint 'left_paw'.*left_wrist"):
         resolve(TRUTH, BODY, BETAS, [Pin(40, "left_paw", (1.0, 2.0))], SHOT)
+
+
+@pytest.fixture(scope="module")
+def on_floor():
+    """The walk with the lowest foot of every frame 5 mm under the floor at most."""
+    R, t = BODY.forward_kinematics(TRUTH.rotations, TRUTH.root - BODY.rest_joints(BETAS)[0], BETAS)
+    lowest = FootSkin(BODY, BETAS).heights(R, t, np.array([0, 0, 1.0])).min()
+    return Clip(TRUTH.times, TRUTH.rotations, TRUTH.root - [0, 0, lowest + 0.005])
+
+
+def depth(clip):
+    """How far the lowest vertex of the whole body's skin is under the floor, metres."""
+    R, t = BODY.forward_kinematics(clip.rotations, clip.root - BODY.rest_joints(BETAS)[0], BETAS)
+    return -min(BODY.skin(R[k], t[k], BETAS)[:, 2].min() for k in range(FIRST, LAST + 1))
+
+
+@pytest.mark.parametrize("name", ["left_ankle", "left_knee"])
+@pytest.mark.parametrize("image", [True, False], ids=["image", "space"])
+def test_a_leg_that_is_pinned_leaves_its_foot_above_the_floor(on_floor, name, image):
+    shift = [0.03, 0.05, -0.04] if image else [0.0, 0.12, -0.02]
+    at = on_floor.joints(BODY, BETAS)[45, NAMES.index(name)] + shift
+    pin = Pin(45, name, tuple(SHOT.project(45, at)) if image else None, None if image else tuple(at))
+    corrected = resolve(on_floor, BODY, BETAS, [pin], SHOT)
+    assert missed(corrected, BODY, BETAS, pin, SHOT) < (0.5 if image else 0.002)
+    assert depth(corrected) < 0.01

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 from bpy_extras.object_utils import world_to_camera_view
 from mathutils import Vector
+from scope.scope_addon.kinematics.foot_skin import foot_heights
 from scope.scope_addon.scene.animation_data.actions import fcurves, read_keys
 from scope.scope_addon.scene.character.correction_list import listed_corrections
 from scope.scope_addon.ui.captured_person import motion_of as stored_motion_of
 
-from ...edit.walking import NAMES, motion_of, walk
+from ...edit.walking import BETAS, BODY, NAMES, motion_of, walk
 from ...scene import made_rigs
 from ...scene.made_rigs import captured
 
@@ -100,6 +101,19 @@ def test_a_pin_out_of_reach_is_said_with_its_distance_and_listed(rig, capfd):
     bpy.ops.scope.add_pin(joint="left_wrist", location=before[WRIST] + [0.0, 0.05, 0.05])
     assert "cannot reach" not in capfd.readouterr().out
     assert listed_corrections(rig)[0]["missed"] == ""
+
+
+def test_a_pin_under_the_floor_is_said_with_its_depth(rig, tmp_path, capfd):
+    low = walk(3.0)
+    low.root[:, 2] -= 0.08  # 5 cm of the left foot are under the floor in frame 48
+    motion_of(low).save(tmp_path / "person1.npz")
+    ankle = low.joints(BODY, BETAS)[48, ANKLE]
+    bpy.ops.scope.smooth(strength=1.0)  # writes the keys of that motion
+    bpy.ops.scope.add_pin(joint="right_ankle", frame=49, location=[*ankle[:2], 0.04])
+    assert "under the floor" not in capfd.readouterr().out
+    bpy.ops.scope.add_pin(joint="right_ankle", frame=49, location=[*ankle[:2], -0.06])
+    heights = foot_heights(stored_motion_of(rig), BODY)[48, 2:]
+    assert f"up to {-100 * heights.min():.0f} cm under the floor in 1 of 91 frames" in capfd.readouterr().out
 
 
 CORRECTIONS = {

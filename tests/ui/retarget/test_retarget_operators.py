@@ -213,6 +213,15 @@ def test_a_bone_map_without_legs_is_an_error(rig):
     assert rig.animation_data is None or rig.animation_data.action is None
 
 
+def test_what_fails_leaves_the_bone_list_empty(rig):
+    settings = bpy.context.scene.scope_retarget
+    settings.pairs.clear()
+    del captured_armature(bpy.context)["scope_betas"]
+    with pytest.raises(RuntimeError, match="no stored body shape"):
+        bpy.ops.scope.retarget()
+    assert len(settings.pairs) == 0
+
+
 def test_undo_removes_the_motion(rig):
     name = rig.name
     bpy.ops.scope.guess_bones()

@@ -10,10 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from .....solver.errors import ModelFileError
-from .....solver.loaders.regular_file import check_regular
+from ....json_file import read_json_object
 from .keypoint_sets import KEYPOINT_SETS
-
-_LARGEST_BYTES = 1_000_000
 
 
 @dataclass(frozen=True)
@@ -55,13 +53,8 @@ def read_description(model: Path, types: tuple[str, ...]) -> Description:
     path = description_path(model)
     if not path.is_file():
         return Description()
-    check_regular(path, ModelFileError, "network's description", _LARGEST_BYTES)
-    try:
-        values = json.loads(path.read_text("utf-8"))
-    except (OSError, ValueError, RecursionError) as error:
-        raise ModelFileError(f"{path} cannot be read as JSON ({error}); correct it or remove it") from error
-    if not isinstance(values, dict):
-        raise ModelFileError(f'{path} must hold one JSON object such as {{"type": "{types[0]}"}}')
+    advice = f'write an object such as {{"type": "{types[0]}"}}, or remove the file'
+    values = read_json_object(path, ModelFileError, "network's description", advice)
     known = {field.name for field in fields(Description)}
     for key, value in values.items():
         if key not in known:

@@ -186,9 +186,9 @@ def test_a_graph_that_fails_at_run_time_is_refused(tmp_path: Path, opens: Open) 
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        ("{", "as JSON"),
-        ("[]", "one JSON object"),
-        ("[" * 100_000, "as JSON"),
+        ("{", "is not JSON"),
+        ("[]", "not hold a JSON object"),
+        ("[" * 100_000, "is not JSON"),
         ('{"colour": "rgb"}', "unknown entry 'colour'"),
         ('{"type": "yolov99"}', "type must be one of simcc, heatmap"),
         ('{"mean": [1, 2]}', "mean must be one number or three"),
