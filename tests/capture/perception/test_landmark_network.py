@@ -143,4 +143,5 @@ def test_mask_covers_the_person_alone(network: LandmarkNetwork) -> None:
     np.testing.assert_allclose(masked.mask, mask, atol=1e-3)
     np.testing.assert_array_equal(masked.keypoints_px, alone.keypoints_px)
     begun = network.begin(rgb, region, with_mask=True).result()
+    assert begun.mask is not None
     np.testing.assert_allclose(begun.mask, mask, atol=1e-3)
