@@ -100,7 +100,7 @@ class FakeLandmarks:
         self.batches.append(len(regions))
         return [self._one(_time(image), region) for region in regions]
 
-    def begin(self, image: np.ndarray, region: Region) -> Future[PoseEstimate]:
+    def begin(self, image: np.ndarray, region: Region, with_mask: bool = False) -> Future[PoseEstimate]:
         call: Future[PoseEstimate] = Future()
         call.set_result(self._one(_time(image), region))
         self.begun += 1

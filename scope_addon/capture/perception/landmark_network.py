@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
@@ -32,6 +32,7 @@ _HEAT_THRESHOLD = 0.5
 _WORKERS = 2  # regions processed in parallel
 _WORTH_ALL_THREADS = ("pose_landmark_heavy",)
 _OUTPUTS = ["landmarks", "presence", "heatmap", "world"]
+_WITH_MASK = {"with_mask": np.array(True)}  # an input without which the mask is not computed
 
 
 @dataclass(frozen=True)
@@ -41,7 +42,9 @@ class PoseEstimate:
     ``keypoints_px`` (33, 2) image pixels; ``visibility``, ``in_frame`` (33,) probabilities that a keypoint is not
     occluded and that it lies inside the image; ``world_landmarks`` (33, 3) metres in camera axes (x right, y down,
     z forward), the hip centre at 0, or all 0 from a network without depth; ``presence``: probability that there is a
-    person; ``region``: the input region; ``next_region``: the region for the next frame.
+    person; ``region``: the input region; ``next_region``: the region for the next frame; ``mask``: the probability
+    (256, 256), half precision, that a pixel of the region shows its person, if it was requested. In a region where
+    nobody is, the network invents somebody.
     """
 
     keypoints_px: NDArray[np.float64]
@@ -51,6 +54,7 @@ class PoseEstimate:
     presence: float
     region: Region
     next_region: Region
+    mask: NDArray[np.float16] | None = None
 
     @property
     def keypoints_confidence(self) -> NDArray[np.float64]:
@@ -122,35 +126,48 @@ class LandmarkNetwork:
     def _shared(self) -> onnxruntime.InferenceSession:
         return self._session(max(1, self._threads // _WORKERS))
 
-    def estimate(self, image_rgb: NDArray[np.uint8], regions: Sequence[Region]) -> list[PoseEstimate]:
+    def estimate(
+        self, image_rgb: NDArray[np.uint8], regions: Sequence[Region], with_masks: bool = False
+    ) -> list[PoseEstimate]:
         """Estimate one pose per region of an (H, W, 3) uint8 RGB image."""
         if len(regions) < 2 or self._threads == 1:
-            return [self._estimate(self._alone, image_rgb, region) for region in regions]
-        return [pending.result() for pending in [self.begin(image_rgb, region) for region in regions]]
+            return [self._estimate(self._alone, image_rgb, region, with_masks) for region in regions]
+        return [pending.result() for pending in [self.begin(image_rgb, region, with_masks) for region in regions]]
 
-    def begin(self, image_rgb: NDArray[np.uint8], region: Region) -> Future[PoseEstimate]:
+    def begin(self, image_rgb: NDArray[np.uint8], region: Region, with_mask: bool = False) -> Future[PoseEstimate]:
         """Start the estimate of one region in another thread; the image must not change until it is done.
 
         :param image_rgb: (H, W, 3) uint8.
         """
-        return self._pool.submit(self._estimate, self._shared, image_rgb, region)
+        return self._pool.submit(self._estimate, self._shared, image_rgb, region, with_mask)
 
     def mask(self, image_rgb: NDArray[np.uint8], region: Region) -> NDArray[np.float32]:
         """Return the probability (256, 256) that a pixel of the region shows its person, also beside other people.
 
-        In a region where nobody is, the network invents somebody: `PoseEstimate.presence` tells.
+        This is a run of its own; `estimate` and `begin` give the mask of the run that they make anyway.
 
         :param image_rgb: (H, W, 3) uint8.
         """
-        inputs = {"input": _blob(image_rgb, region), "with_mask": np.array(True)}
-        (logits,) = self._alone.run(["mask"], inputs)
-        probability: NDArray[np.float32] = 1.0 / (1.0 + np.exp(-np.clip(logits[0, 0], -50.0, 50.0)))
-        return probability
+        (logits,) = self._alone.run(["mask"], {"input": _blob(image_rgb, region)} | _WITH_MASK)
+        return _probability(logits)
 
     @staticmethod
-    def _estimate(session: onnxruntime.InferenceSession, image_rgb: NDArray[np.uint8], region: Region) -> PoseEstimate:
-        landmarks, presence, heatmap, world = session.run(_OUTPUTS, {"input": _blob(image_rgb, region)})
-        return interpret(landmarks[0], float(presence[0, 0]), heatmap[0], world[0], region)
+    def _estimate(
+        session: onnxruntime.InferenceSession, image_rgb: NDArray[np.uint8], region: Region, with_mask: bool
+    ) -> PoseEstimate:
+        inputs = {"input": _blob(image_rgb, region)}
+        if not with_mask:
+            landmarks, presence, heatmap, world = session.run(_OUTPUTS, inputs)
+            return interpret(landmarks[0], float(presence[0, 0]), heatmap[0], world[0], region)
+        landmarks, presence, heatmap, world, logits = session.run([*_OUTPUTS, "mask"], inputs | _WITH_MASK)
+        estimate = interpret(landmarks[0], float(presence[0, 0]), heatmap[0], world[0], region)
+        return replace(estimate, mask=_probability(logits).astype(np.float16))
+
+
+def _probability(logits: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Return the mask (256, 256) of the network's output (1, 1, 256, 256)."""
+    probability: NDArray[np.float32] = 1.0 / (1.0 + np.exp(-np.clip(logits[0, 0], -50.0, 50.0)))
+    return probability
 
 
 def _blob(image_rgb: NDArray[np.uint8], region: Region) -> NDArray[np.float32]:

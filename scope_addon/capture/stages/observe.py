@@ -153,7 +153,7 @@ class _Frames:
             if is_cut:
                 self._tracker.forget()
                 self.people.cut()
-            observations = self._tracker.step(lit, upcoming_lit, frame.timestamp_s)
+            observations = self._tracker.step(lit, upcoming_lit, frame.timestamp_s, self._masks.upcoming_is_due)
             observations = self._masks.add(lit, observations)
         if self._hands is not None:
             with self._clock.stage("hands"):

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ....solver.errors import ShapeError
 from ..perception.execution import Execution
 from ..perception.landmark_network import LandmarkNetwork, PoseEstimate
-from ..perception.observation import Observation, PendingReference
+from ..perception.observation import Observation, PendingReference, PersonMask
 from ..perception.person_detector import Detection
 from ..perception.region import Region
 from .appearance import appearance
@@ -101,7 +101,11 @@ class PeopleTracker:
         return self._networks.begins_early if largest else None
 
     def step(
-        self, image_rgb: NDArray[np.uint8], upcoming_rgb: NDArray[np.uint8] | None = None, time_s: float | None = None
+        self,
+        image_rgb: NDArray[np.uint8],
+        upcoming_rgb: NDArray[np.uint8] | None = None,
+        time_s: float | None = None,
+        upcoming_with_masks: bool = False,
     ) -> list[tuple[int, Observation]]:
         """Track everybody in the next frame.
 
@@ -112,12 +116,15 @@ class PeopleTracker:
         :param image_rgb: (H, W, 3) RGB.
         :param upcoming_rgb: (H, W, 3) the frame after it.
         :param time_s: when the frame is shown; None: a thirtieth of a second after the one before.
+        :param upcoming_with_masks: whether the people of the frame after it need masks; only `mask_network` gives them,
+            and not to people whom it was not already following.
         :return: tracklet number and observation of each person.
         :raises ShapeError: the frame is not (H, W, 3) uint8.
         """
         if image_rgb.ndim != 3 or image_rgb.shape[2] != 3 or image_rgb.dtype != np.uint8:
             raise ShapeError(f"A frame must be (H, W, 3) uint8 RGB, but got {image_rgb.shape} {image_rgb.dtype}.")
         self._clock.advance(time_s)
+        self._estimator.advance(upcoming_with_masks)
         self._update_live(image_rgb, upcoming_rgb)
         self._estimator.begin_upcoming(upcoming_rgb, self._live)
         self._redetect(image_rgb)
@@ -297,4 +304,5 @@ class PeopleTracker:
             acquired=target.age == 0,
             appearance=appearance(image_rgb, e.keypoints_px) if samples_appearance else None,
             reference_landmarks=reference,
+            mask=None if e.mask is None else PersonMask(e.region, e.mask, (image_rgb.shape[1], image_rgb.shape[0])),
         )

@@ -136,3 +136,12 @@ def test_mask_covers_the_person_alone(network: LandmarkNetwork) -> None:
     assert mask[:, :20].mean() < 0.05
     assert mask[:, -20:].mean() < 0.05
     assert 0.05 < (mask > 0.5).mean() < 0.4
+    rgb = np.ascontiguousarray(image[:, :, ::-1])
+    (alone,), (masked,) = network.estimate(rgb, [region]), network.estimate(rgb, [region], with_masks=True)
+    assert alone.mask is None
+    assert masked.mask is not None
+    np.testing.assert_allclose(masked.mask, mask, atol=1e-3)
+    np.testing.assert_array_equal(masked.keypoints_px, alone.keypoints_px)
+    begun = network.begin(rgb, region, with_mask=True).result()
+    assert begun.mask is not None
+    np.testing.assert_allclose(begun.mask, mask, atol=1e-3)

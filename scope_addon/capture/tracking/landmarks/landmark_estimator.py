@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ...perception.landmark_network import PoseEstimate
+from ...perception.landmark_network import LandmarkNetwork, PoseEstimate
 from ...perception.region import Region
 from ..tracked_target import MIN_VELOCITY_FRAMES, TrackedTarget
 from .plausibility import is_in_image, is_plausible, is_same_region
@@ -21,6 +21,14 @@ class LandmarkEstimator:
     def __init__(self, networks: TrackingNetworks) -> None:
         self._landmarks, self._early = networks.landmarks, networks.begins_early
         self._prefetches = networks.prefetches
+        self._with_masks = self._upcoming_with_masks = False
+
+    def advance(self, upcoming_with_masks: bool) -> None:
+        """Go to the next frame.
+
+        :param upcoming_with_masks: whether the people of the frame after it need masks.
+        """
+        self._with_masks, self._upcoming_with_masks = self._upcoming_with_masks, upcoming_with_masks
 
     def estimate(
         self, image_rgb: NDArray[np.uint8], regions: Sequence[Region], sure: bool = True
@@ -32,7 +40,11 @@ class LandmarkEstimator:
         :return: an estimate for each region; None where the landmarks are not those of a body.
         """
         useful = [k for k, region in enumerate(regions) if is_in_image(region, image_rgb)]
-        estimates = self._landmarks.estimate(image_rgb, [regions[k] for k in useful])
+        wanted = [regions[k] for k in useful]
+        if self._with_masks and isinstance(self._landmarks, LandmarkNetwork):
+            estimates = self._landmarks.estimate(image_rgb, wanted, with_masks=True)
+        else:
+            estimates = self._landmarks.estimate(image_rgb, wanted)
         out: list[PoseEstimate | None] = [None] * len(regions)
         for k, estimate in zip(useful, estimates, strict=True):
             out[k] = estimate if is_plausible(estimate, sure) else None
@@ -56,7 +68,7 @@ class LandmarkEstimator:
             if upcoming_rgb is None or self._early is None or not self._prefetches or f.age < MIN_VELOCITY_FRAMES:
                 continue
             if is_in_image(f.prefetch_region, upcoming_rgb):
-                f.pending = self._early.begin(upcoming_rgb, f.prefetch_region)
+                f.pending = self._early.begin(upcoming_rgb, f.prefetch_region, self._upcoming_with_masks)
         found: dict[int, PoseEstimate | None] = {}
         for f, call in zip(live, calls, strict=True):
             estimate = call.result() if call is not None else None
@@ -77,4 +89,4 @@ class LandmarkEstimator:
             return
         for f in live:
             if f.pending is None and is_in_image(f.estimate.next_region, upcoming_rgb):
-                f.pending = self._early.begin(upcoming_rgb, f.estimate.next_region)
+                f.pending = self._early.begin(upcoming_rgb, f.estimate.next_region, self._upcoming_with_masks)

@@ -20,7 +20,9 @@ LEAST_PRESENCE = 0.5  # in a region without a person, the network invents one
 class MaskSchedule:
     """Adds masks to the observations of every n-th frame.
 
-    When there are enough, n doubles: a clip of unknown length has hardly more masks than one of known length.
+    When there are enough, n doubles: a clip of unknown length has hardly more masks than one of known length. The
+    tracker is told beforehand which frame is due (`upcoming_is_due`), since its own run of the network gives masks at
+    a quarter of the cost of another one; only people whom it was not following take that other run.
 
     :param network: None: no frame has masks.
     :param frames: how many frames are expected; 0 if that is unknown.
@@ -29,6 +31,11 @@ class MaskSchedule:
     def __init__(self, network: LandmarkNetwork | None, frames: int) -> None:
         self._network, self._stride = network, max(LEAST_STRIDE, frames // MASKS)
         self._frames, self._masks = 0, 0
+
+    @property
+    def upcoming_is_due(self) -> bool:
+        """Whether the frame after the next one to be added will be due, if people are seen in the next one."""
+        return self._network is not None and (self._frames + 1) % self._stride == 0
 
     def add(
         self, image_rgb: NDArray[np.uint8], observations: Sequence[tuple[int, Observation]]
@@ -40,7 +47,7 @@ class MaskSchedule:
         found, due = list(observations), self._frames % self._stride == 0
         self._frames += bool(found)
         if self._network is None or not found or not due:
-            return found
+            return [(number, o if o.mask is None else replace(o, mask=None)) for number, o in found]
         self._masks += 1
         if self._masks % MASKS == 0:
             self._stride *= 2
@@ -49,6 +56,8 @@ class MaskSchedule:
     @staticmethod
     def _with_mask(network: LandmarkNetwork, image_rgb: NDArray[np.uint8], observation: Observation) -> Observation:
         if observation.presence < LEAST_PRESENCE:
+            return replace(observation, mask=None)
+        if observation.mask is not None:
             return observation
         probability = network.mask(image_rgb, observation.region).astype(np.float16)
         size = image_rgb.shape[1], image_rgb.shape[0]

@@ -8,7 +8,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 from scope.scope_addon.capture.perception.landmark_network import LandmarkNetwork
-from scope.scope_addon.capture.perception.observation import Observation
+from scope.scope_addon.capture.perception.observation import Observation, PersonMask
 from scope.scope_addon.capture.perception.region import Region
 from scope.scope_addon.capture.tracking.landmarks.mask_schedule import LEAST_STRIDE, MASKS, MaskSchedule
 from scope.scope_addon.capture.tracking.track import Tracklet, make_track, single_frame_track
@@ -50,6 +50,30 @@ def test_masks_spread_over_a_long_clip_whether_or_not_its_length_is_known(expect
     frames = masked(schedule(expected), 3000)
     assert MASKS <= len(frames) <= 6 * MASKS
     assert frames[-1] > 2400
+
+
+@pytest.mark.parametrize("expected", [3000, 40, 0])
+def test_the_frame_before_knows_which_one_is_due(expected: int) -> None:
+    masks, due, told = schedule(expected), [], []
+    for k in range(600):
+        told += [k + 1] if masks.upcoming_is_due else []
+        due += [k] if masks.add(IMAGE, [(0, seen())])[0][1].mask is not None else []
+    assert due[1:] == [k for k in told if k < 600]
+    assert len(due) > 3
+
+
+def test_a_mask_that_the_tracker_gives_is_not_computed_again() -> None:
+    network = Network()
+    masks = MaskSchedule(cast(LandmarkNetwork, network), 40)
+    given = PersonMask(Region((30.0, 20.0), 40.0, 0.0), np.full((256, 256), 0.7, np.float16), (64, 48))
+    ((_, kept),) = masks.add(IMAGE, [(0, seen(mask=given))])
+    assert kept.mask is given
+    assert network.calls == 0
+    other = MaskSchedule(cast(LandmarkNetwork, network), 40)
+    ((_, doubtful),) = other.add(IMAGE, [(0, seen(presence=0.3, mask=given))])
+    assert doubtful.mask is None
+    ((_, not_due),) = masks.add(IMAGE, [(0, seen(mask=given))])
+    assert not_due.mask is None
 
 
 def test_nobody_has_no_mask_and_does_not_use_up_a_turn() -> None:
