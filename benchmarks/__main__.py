@@ -15,7 +15,7 @@ for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
 
 from ..scope_addon.atomic_write import atomic_path  # noqa: E402
 from . import frames, report  # noqa: E402
-from .solver import peers, plots, startup, steps  # noqa: E402
+from .solver import clip_steps, peers, plots, startup, steps  # noqa: E402
 
 OUT = frames.CACHE
 
@@ -32,6 +32,10 @@ def solver(quick: bool) -> dict[str, Any]:
         print(report.experiment_lines(number, rows), end="\n\n", flush=True)
         plots.plot_experiment(OUT, number, rows)
     figures["experiments"] = experiments
+    figures["clip"] = clip_steps.clip_table(3 if quick else 10)
+    figures["clip_gradients"] = clip_steps.against_gradients(1 if quick else 5)
+    for rows in (figures["clip"], figures["clip_gradients"]):
+        print(report.rows_table(rows), end="\n\n", flush=True)
     figures |= _real_frames(quick)
     figures["peers"] = {} if quick else peers.run_all()
     print(report.target_lines(figures), end="\n\n")

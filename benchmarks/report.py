@@ -18,6 +18,11 @@ def table(head: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
     return "\n".join("| " + " | ".join(_cell(x) for x in line) + " |" for line in lines)
 
 
+def rows_table(rows: Sequence[dict[str, float]]) -> str:
+    """Return rows of one kind as a table, their keys as its head."""
+    return table(list(rows[0]), [[_exact(x) for x in row.values()] for row in rows])
+
+
 def _cell(x: object) -> str:
     if x is None:
         return ""

@@ -14,6 +14,9 @@ from .fitting.frame_solver import FrameSolver, fit, fit_tree
 from .learned_prior import JointPrior, load_joint_prior
 from .loaders import load_body
 from .measurements import Floor, FootContacts, Keypoints2D, Keypoints3D, Measurements, OrientationField, PosePriors
+from .motion.fit import MotionFit, fit_motion
+from .motion.prior import MotionPrior, StandingPoints
+from .motion.views import View
 from .options import COLD_STAGES, WARM_STAGES, Options, Priors, Stage, Weights, default_priors
 from .residuals.registry import register_residual
 from .state import ClipFit, Fit, State, Status
@@ -36,6 +39,8 @@ __all__ = [
     "Keypoints3D",
     "Measurements",
     "ModelFileError",
+    "MotionFit",
+    "MotionPrior",
     "Options",
     "OrientationField",
     "PosePriors",
@@ -44,11 +49,13 @@ __all__ = [
     "ScopeWarning",
     "ShapeError",
     "Stage",
+    "StandingPoints",
     "State",
     "Status",
     "Temporal",
     "Tree",
     "UnitsWarning",
+    "View",
     "Weights",
     "carry",
     "default_priors",
@@ -56,6 +63,7 @@ __all__ = [
     "fit_batch",
     "fit_clip",
     "fit_clips",
+    "fit_motion",
     "fit_tree",
     "load_body",
     "load_joint_prior",

@@ -40,10 +40,12 @@ index = list(body.keypoint_set("coco").values())[:17]  # COCO's 17 points
 fit = solver.fit(body, solver.Measurements(K, keypoints2d=solver.Keypoints2D(index, pixels, confidence)))
 fits = solver.fit_batch(body, frames)  # independent frames, on all cores
 clip = solver.fit_clip(body, frames)  # one shape for all frames
+motion = solver.fit_motion(body, frames, times)  # and little acceleration between them
 print(fit.status, fit.t_camera_part, fit.state.beta)  # why it stopped, joints in camera axes, shape
 ```
 
-`K` is the (3, 3) camera matrix, `pixels` (17, 2), `confidence` (17,), and `frames` a list of `Measurements`.
+`K` is the (3, 3) camera matrix, `pixels` (17, 2), `confidence` (17,), `frames` a list of `Measurements`
+and `times` their times in seconds. For several calibrated cameras, a frame is a list of one `View` for each.
 `solver/examples/` fits 3D joints, 2D keypoints, a marker set and an SMPL+H hand, and refines a regression network's
 output:
 
@@ -56,13 +58,14 @@ _SECTIONS = {
     "Body models": ("load_body", "Body", "BodyArrays", "Tree", "make_tree"),
     "Measurements": (
         "Measurements", "Keypoints2D", "Keypoints3D", "OrientationField", "PosePriors", "FootContacts", "Floor",
+        "View", "StandingPoints",
     ),
-    "Fitting": ("fit", "fit_batch", "fit_clip", "fit_clips", "FrameSolver", "fit_tree", "carry"),
+    "Fitting": ("fit", "fit_batch", "fit_clip", "fit_clips", "fit_motion", "FrameSolver", "fit_tree", "carry"),
     "Options and priors": (
         "Options", "Stage", "Weights", "COLD_STAGES", "WARM_STAGES", "Priors", "default_priors", "JointPrior",
-        "load_joint_prior", "Temporal", "with_previous",
+        "load_joint_prior", "Temporal", "with_previous", "MotionPrior",
     ),
-    "Results": ("Fit", "ClipFit", "State", "Status"),
+    "Results": ("Fit", "ClipFit", "MotionFit", "State", "Status"),
 }  # fmt: skip
 _ERRORS, _ROTATIONS, _OTHER = "Errors", "Rotations", "Other names"
 

@@ -87,7 +87,7 @@ def fit_clip(
     priors = default_priors(body) if priors is None else priors
     tree = make_tree(body)
     if init is None:
-        init = _fit_in_order(tree, measurements, priors, options, temporal)
+        init = fit_in_order(tree, measurements, priors, options, temporal)
     if temporal is not None:
         pulled = [with_previous(m, s, temporal) for m, s in zip(measurements[1:], init, strict=False)]
         measurements = [measurements[0], *pulled]
@@ -115,7 +115,7 @@ def fit_clip(
     )
 
 
-def _fit_in_order(
+def fit_in_order(
     tree: Tree, measurements: Sequence[Measurements], priors: Priors, options: Options, temporal: Temporal | None
 ) -> list[State]:
     """Fit each frame from the one before, carrying the shape's information; a lost person starts afresh.

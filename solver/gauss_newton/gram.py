@@ -87,3 +87,19 @@ def subtract_gram(C, W, X, x, x_row, count) -> None:  # type: ignore[no-untyped-
             _minus2(C, a * W + b, W, X, x + a, x_row, X, x + b, x_row, count)
         elif b + 4 == W:
             _minus1(C, a * W + b, W, X, x + a, x_row, X, x + b, x_row, count)
+
+
+@kernel
+def subtract_gram_rows(C, at, c_row, X, x, x_row, Z, z, z_row, count, width) -> None:  # type: ignore[no-untyped-def]
+    """C -= XᵀZ for four rows of C from the element `at` on, and a width that is a multiple of four.
+
+    X has four columns from x on, Z `width` from z on, and both `count` rows. C may follow them in one array.
+    """
+    b = 0
+    while b + 12 <= width:
+        _minus3(C, at + b, c_row, X, x, x_row, Z, z + b, z_row, count)
+        b += 12
+    if b + 8 == width:
+        _minus2(C, at + b, c_row, X, x, x_row, Z, z + b, z_row, count)
+    elif b + 4 == width:
+        _minus1(C, at + b, c_row, X, x, x_row, Z, z + b, z_row, count)

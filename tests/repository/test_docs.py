@@ -280,7 +280,7 @@ def test_every_python_block_runs(code, body, folder):
     pixels = (points / points[:, 2:] @ K.T)[:, :2]
     confidence = np.ones(17)
     frame = solver.Measurements(K, keypoints2d=solver.Keypoints2D(index, pixels, confidence))
-    names = {"K": K, "pixels": pixels, "confidence": confidence, "frames": [frame] * 3}
+    names = {"K": K, "pixels": pixels, "confidence": confidence, "frames": [frame] * 3, "times": [0.0, 0.04, 0.08]}
     exec(compile(code, "page", "exec"), names)
     if "fit" in names:
         error = np.linalg.norm(names["fit"].t_camera_part - t, axis=1)

@@ -1,0 +1,106 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The step of a whole clip: time per frame against the number of frames, and against conjugate gradients."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+
+import numpy as np
+
+from ...solver import Measurements, MotionPrior, Options, Priors, Stage, StandingPoints, Weights, rotations
+from ...solver.compiled.part import Pose
+from ...solver.compiled.tree import make_tree, with_fixed_shape
+from ...solver.gauss_newton.optimizer import make_settings
+from ...solver.gauss_newton.terms import pack_priors
+from ...solver.motion.band import make_factor, solve_clip
+from ...solver.motion.problem import ClipProblem, Globals, MotionTerms
+from ...solver.motion.system import make_poses, make_system
+from ...solver.motion.views import pack_views
+from .clip_gradients import ConjugateGradients
+from .problem import make_problem
+
+RATE = 30.0
+LENGTHS = (75, 150, 300, 600)
+GAP = 30  # frames without measurements
+
+
+def make_clip(
+    K: int, frames: int, gap: int = 0, fixed: bool = False, contacts: int = 4, pool: ThreadPoolExecutor | None = None
+) -> tuple[ClipProblem, Pose]:
+    """Return a clip with 120 terms a frame about one state, and poses that swing about it; `gap` frames see nothing."""
+    p = make_problem(K, 10, 120)
+    tree = make_tree(p.body)
+    if fixed:
+        tree = with_fixed_shape(tree, p.bank[3][0][:10])
+    priors = Priors()
+    packed = pack_priors(tree, replace(priors, shape_mean=None))
+    seen, _ = pack_views(tree, p.measurements, packed, "frame")
+    unseen, _ = pack_views(tree, Measurements(), packed, "frame")
+    first = (frames - gap) // 2
+    views = [unseen if first <= f < first + gap else seen for f in range(frames)]
+    poses = make_poses(tree, frames)
+    for f in range(frames):
+        swing = 0.1 * np.sin(3.0 * f / RATE)
+        poses.R[f, 0], poses.t[f, 0] = p.bank[0][0] @ rotations.exp([0.0, swing, 0.0]), p.bank[1][0] + [swing, 0.0, 0.0]
+        poses.Omega[f] = p.bank[2][0] @ rotations.exp([swing, 0.0, swing])
+    if not fixed:
+        poses.beta[:] = p.bank[3][0]
+    stands = StandingPoints(np.arange(contacts), np.full((frames, contacts), 0.5))
+    motion = MotionTerms.make(tree, np.arange(frames) / RATE, MotionPrior(), stands)
+    stage = Stage(Weights())
+    settings = make_settings(Options(stages=[stage]), [stage])
+    P = tree.shape
+    return ClipProblem(tree, views, motion, Globals(np.zeros(P), np.eye(P), 0.0), settings, pool), poses
+
+
+def clip_table(rounds: int) -> list[dict[str, float]]:
+    """Return rows of K, frames, and the least milliseconds a frame of linearization and of a step, two threads."""
+    rows = []
+    for K in (23, 51):
+        for frames in LENGTHS:
+            with ThreadPoolExecutor(2) as pool:
+                problem, poses = make_clip(K, frames, pool=pool)
+                system = make_system(problem.tree, frames)
+                factor, scale = make_factor(system), problem.settings.root_scale
+                linearize = _least(rounds, lambda p=problem, q=poses, s=system: p.linearize(0, q, s))
+                step = _least(
+                    rounds, lambda p=problem, s=system, f=factor, c=scale: solve_clip(p.tree, s, 1.0, c, f, pool)
+                )
+            rows.append({"K": K, "frames": frames, "linearize_ms": linearize / frames, "step_ms": step / frames})
+    return rows
+
+
+def against_gradients(rounds: int, frames: int = 300) -> list[dict[str, float]]:
+    """Return rows of a gap's length, a tolerance, iterations, and milliseconds a frame of both ways, in one thread."""
+    rows = []
+    for gap in (0, GAP):
+        problem, poses = make_clip(23, frames, gap, fixed=True, contacts=0)
+        system, scale = make_system(problem.tree, frames), problem.settings.root_scale
+        problem.linearize(0, poses, system)
+        factor, used = make_factor(system), 3 + 3 * len(problem.tree.parents)
+        eliminated = _least(rounds, lambda p=problem, s=system, f=factor, c=scale: solve_clip(p.tree, s, 1.0, c, f))
+        gradients = ConjugateGradients(problem, poses, 1.0, scale)
+        gradient = np.ascontiguousarray(system.N[:, :used, 0])
+        for tolerance in (1e-2, 1e-4, 1e-8):
+            d, iterations = gradients.solve(gradient, tolerance)
+            ms = _least(rounds, lambda g=gradients, r=gradient, t=tolerance: g.solve(r, t))
+            error = np.abs(d - factor.d[:, :used]).max() / np.abs(factor.d).max()
+            rows.append({
+                "gap": gap, "tolerance": tolerance, "iterations": iterations, "error": float(error),
+                "gradients_ms": ms / frames, "elimination_ms": eliminated / frames,
+            })  # fmt: skip
+    return rows
+
+
+def _least(rounds: int, run: Callable[[], object]) -> float:
+    """Return the least time of a run in milliseconds; the first, which may compile, does not count."""
+    run()
+    times = []
+    for _ in range(rounds):
+        start = time.perf_counter()
+        run()
+        times.append(time.perf_counter() - start)
+    return 1e3 * min(times)

@@ -1,0 +1,112 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+r"""Acceleration over three frames, of joints relative to their parents and of the root in the world.
+
+    phi_f = log(Omega_{f-1}ᵀ Omega_f),    v_f = phi_f / h_f,    a_f = (v_f - v_{f-1}) / h,   h = (h_f + h_{f-1}) / 2
+    cost  1/2 w h rho(|a_f|^2),   h_f the time from frame f-1 to f in seconds
+With Omega <- exp(b) Omega in the parent's axes, b = R_parᵀ u, and J^-1 the inverse left Jacobian,
+    d phi_f = J^-1(phi_f) Omega_{f-1}ᵀ (b_f - b_{f-1})
+The root's rotation enters in the same way, b = w, and its position with v_f = (t_f - t_{f-1}) / h_f, dt = nu. What the
+angular velocity of the root is measured in does not matter: its derivative is the same in body axes, turned.
+Robust, so that hits and landings stay sharp.
+docs/solver_mathematics.md, "A whole clip", has the objective.
+"""
+
+from ..compiled.kernel import kernel
+from ..residuals.robust import geman_mcclure
+from ..rotations import left_jacobian_inverse3, log3
+
+
+@kernel
+def _velocity(A, B, h, phi, J) -> None:  # type: ignore[no-untyped-def]
+    """Write phi = log(AᵀB) / h (3,) and J = J^-1(log(AᵀB)) Aᵀ / h (3, 3)."""
+    E = (
+        A[0, 0] * B[0, 0] + A[1, 0] * B[1, 0] + A[2, 0] * B[2, 0],
+        A[0, 0] * B[0, 1] + A[1, 0] * B[1, 1] + A[2, 0] * B[2, 1],
+        A[0, 0] * B[0, 2] + A[1, 0] * B[1, 2] + A[2, 0] * B[2, 2],
+        A[0, 1] * B[0, 0] + A[1, 1] * B[1, 0] + A[2, 1] * B[2, 0],
+        A[0, 1] * B[0, 1] + A[1, 1] * B[1, 1] + A[2, 1] * B[2, 1],
+        A[0, 1] * B[0, 2] + A[1, 1] * B[1, 2] + A[2, 1] * B[2, 2],
+        A[0, 2] * B[0, 0] + A[1, 2] * B[1, 0] + A[2, 2] * B[2, 0],
+        A[0, 2] * B[0, 1] + A[1, 2] * B[1, 1] + A[2, 2] * B[2, 1],
+        A[0, 2] * B[0, 2] + A[1, 2] * B[1, 2] + A[2, 2] * B[2, 2],
+    )
+    x, y, z = log3(E[0], E[1], E[2], E[3], E[4], E[5], E[6], E[7], E[8])
+    Ji = left_jacobian_inverse3(x, y, z)
+    phi[0], phi[1], phi[2] = x / h, y / h, z / h
+    for r in range(3):
+        J[0, r] = (Ji[0] * A[r, 0] + Ji[1] * A[r, 1] + Ji[2] * A[r, 2]) / h
+        J[1, r] = (Ji[3] * A[r, 0] + Ji[4] * A[r, 1] + Ji[5] * A[r, 2]) / h
+        J[2, r] = (Ji[6] * A[r, 0] + Ji[7] * A[r, 1] + Ji[8] * A[r, 2]) / h
+
+
+@kernel
+def _turn(J, R) -> None:  # type: ignore[no-untyped-def]
+    """J <- J Rᵀ, in place, both (3, 3)."""
+    for r in range(3):
+        a, b, c = J[r, 0], J[r, 1], J[r, 2]
+        for s in range(3):
+            J[r, s] = a * R[s, 0] + b * R[s, 1] + c * R[s, 2]
+
+
+@kernel
+def _add(system, f, at, slot, a, J, weight) -> None:  # type: ignore[no-untyped-def]
+    """Add a residual a (3,) of frames f-2, f-1, f with Jacobians J (3 frames, 3, 3) by the unknowns from `at` on."""
+    for p in range(3):
+        to = f - 2 + p
+        for r in range(3):
+            J0, J1, J2 = weight * J[p, 0, r], weight * J[p, 1, r], weight * J[p, 2, r]
+            system.N[to, at + r, 0] += J0 * a[0] + J1 * a[1] + J2 * a[2]
+            for q in range(p + 1):
+                for s in range(3):
+                    value = J0 * J[q, 0, s] + J1 * J[q, 1, s] + J2 * J[q, 2, s]
+                    if q == p:
+                        system.D[to, at + r, at + s] += value
+                    elif q == p - 1:
+                        system.B1[to, at + r, at + s] += value
+                    else:
+                        system.B2[to, slot, r, s] += value
+
+
+@kernel
+def accumulate(tree, poses, h, table, scratch, system) -> float:  # type: ignore[no-untyped-def]
+    """Add the accelerations of a clip to `system` and return their cost.
+
+    :param poses: of `make_poses`; h (T,) seconds since the frame before, of which the first is not used; table (K+2, 2)
+    of `MotionPrior.packed`; scratch (6, 3, 3) is overwritten.
+    """
+    cost: float = 0.0
+    parts = tree.parents.shape[0]
+    J, M, v = scratch[:3], scratch[3:5], scratch[5]
+    for f in range(2, h.shape[0]):
+        mean = 0.5 * (h[f] + h[f - 1])
+        for k in range(parts + 1):
+            weight = table[k, 0] * mean
+            if weight <= 0.0:
+                continue
+            if k == parts:
+                for r in range(3):
+                    v[0, r] = (poses.t[f - 1, 0, r] - poses.t[f - 2, 0, r]) / h[f - 1]
+                    v[1, r] = (poses.t[f, 0, r] - poses.t[f - 1, 0, r]) / h[f]
+                    for s in range(3):
+                        M[0, r, s] = 1.0 / h[f - 1] if r == s else 0.0
+                        M[1, r, s] = 1.0 / h[f] if r == s else 0.0
+            else:
+                turned = poses.R if k == 0 else poses.Omega
+                _velocity(turned[f - 2, k], turned[f - 1, k], h[f - 1], v[0], M[0])
+                _velocity(turned[f - 1, k], turned[f, k], h[f], v[1], M[1])
+            s2 = 0.0
+            for r in range(3):
+                v[2, r] = (v[1, r] - v[0, r]) / mean
+                s2 += v[2, r] * v[2, r]
+                for s in range(3):
+                    J[0, r, s] = M[0, r, s] / mean
+                    J[1, r, s] = -(M[0, r, s] + M[1, r, s]) / mean
+                    J[2, r, s] = M[1, r, s] / mean
+            if 0 < k < parts:
+                for p in range(3):
+                    _turn(J[p], poses.R[f - 2 + p, tree.parents[k]])
+            rho, w = geman_mcclure(s2, table[k, 1])
+            cost += 0.5 * weight * rho
+            at = 3 if k == parts else (0 if k == 0 else 3 + 3 * k)
+            _add(system, f, at, k, v[2], J, weight * w)
+    return cost

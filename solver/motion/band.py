@@ -1,0 +1,245 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+r"""Block-banded Cholesky over time, with an arrowhead of global columns: the exact step of a clip in O(T).
+
+Frame f is coupled to f+1 and f+2 and to the global columns. Its rows of the front, once the frames before it have been
+eliminated, are factorized in place,
+    [S | E_1 | E_2 | g N] -> L^-1 [S | E_1 | E_2 | g N] = Z,   S = L Lᵀ
+and Z without its first block takes ZᵀZ from what follows. The clip is eliminated from both of its ends, each in a
+thread of its own, and the ends meet at two frames in the middle; what is left are the global columns.
+    d_f = -L^-ᵀ (q + E_1 d_{f+1} + E_2 d_{f+2} + N dg)   in opposite order
+The factorization from both ends of a banded matrix is known as the twisted one.
+"""
+
+import math
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..compiled.kernel import kernel
+from ..compiled.part import Array
+from ..compiled.rows import add1, clear
+from ..compiled.tree import Tree
+from ..gauss_newton.gram import subtract_gram, subtract_gram_rows
+from ..gauss_newton.recursion import TINY, solve_globals
+from .system import GLOBALS, ClipSystem
+
+
+class Factor(NamedTuple):
+    """The factor of a clip, and the step. n and W as in `ClipSystem`."""
+
+    Z: Array  # (T, n, 3 n + 4 + W)
+    trails: (
+        Array  # (2, 2 n + 4 + W, 2 n + 4 + W): what is left of the two frames that follow, and of the global columns
+    )
+    d: Array  # (T, n)
+    C: Array  # (W, W), the reduced system of the global columns, then its factor
+    c: Array  # (W,)
+    dg: Array  # (W,)
+
+
+def make_factor(system: ClipSystem) -> Factor:
+    """Return the memory for the factor of a system of that size."""
+    frames, n, q = system.N.shape
+    W = len(system.c)
+    trails = np.zeros((2, 2 * n + q, 2 * n + q))
+    return Factor(np.zeros((frames, n, 3 * n + q)), trails, np.zeros((frames, n)), np.zeros((W, W)), *np.zeros((2, W)))
+
+
+@kernel
+def factorize_rows(Z, n: int, row: int, diagonal) -> None:  # type: ignore[no-untyped-def]
+    """Replace [S | rest], n rows of length `row` with S symmetric, by L^-1 [S | rest]: see `recursion.factorize`.
+
+    n is a multiple of four: four rows at a time take what the rows above them leave, in registers.
+    """
+    for j in range(n):
+        diagonal[j] = Z[j, j]
+    for first in range(0, n, 4):
+        subtract_gram_rows(Z, first * row + first, row, Z, first, row, Z, first, row, first, row - first)
+        for j in range(first, first + 4):
+            d = Z[j, j]
+            inverse = 1.0 / math.sqrt(d) if d > TINY * abs(diagonal[j]) and d > 1e-290 else 0.0
+            for i in range(j + 1, first + 4):
+                add1(Z, i * row + first, -Z[j, i] * inverse * inverse, Z, j * row + first, row - first)
+            for k in range(first, row):
+                Z[j, k] *= inverse
+            Z[j, j] = inverse
+
+
+@kernel
+def _load(system, f, step, damping, root_scale, trail, Z) -> None:  # type: ignore[no-untyped-def]
+    """Write frame f's rows of the front: what the frames before have left of it, and its own blocks, damped."""
+    n, q = system.N.shape[1], system.N.shape[2]
+    D, N = system.D[f], system.N[f]
+    last = system.D.shape[0] - 1
+    for a in range(n):
+        for b in range(a, n):
+            Z[a, b] = trail[a, b] + D[a, b]
+        if a < system.B2.shape[1] * 3:
+            Z[a, a] += damping * (root_scale * root_scale if 3 <= a < 6 else 1.0)
+        for b in range(n):
+            Z[a, n + b] = trail[a, n + b]
+            Z[a, 2 * n + b] = 0.0
+        for b in range(q):
+            Z[a, 3 * n + b] = trail[a, 2 * n + b] + N[a, b]
+    if step > 0 and f < last:
+        B = system.B1[f + 1]
+        for a in range(n):
+            for b in range(n):
+                Z[b, n + a] += B[a, b]
+    if step < 0 and f > 0:
+        B = system.B1[f]
+        for a in range(n):
+            for b in range(n):
+                Z[a, n + b] += B[a, b]
+    other = f + 2 * step
+    if 0 <= other <= last:
+        blocks = system.B2[max(f, other)]
+        for k in range(blocks.shape[0]):
+            at = 3 if k == blocks.shape[0] - 1 else (0 if k == 0 else 3 + 3 * k)
+            for r in range(3):
+                for s in range(3):
+                    Z[at + r, 2 * n + at + s] += blocks[k, r, s] if step < 0 else blocks[k, s, r]
+
+
+@kernel
+def _advance(trail, n: int, q: int) -> None:  # type: ignore[no-untyped-def]
+    """Move what is left by one frame: the second of the two becomes the first, and the next is still untouched."""
+    size = 2 * n + q
+    for a in range(n):
+        for b in range(a, n):
+            trail[a, b] = trail[n + a, n + b]
+        for b in range(q):
+            trail[a, 2 * n + b] = trail[n + a, 2 * n + b]
+        clear(trail, a * size + n, n)
+        clear(trail, (n + a) * size + n, n + q)
+
+
+@kernel
+def eliminate_frames(system, first, count, step, damping, root_scale, trail, Z) -> None:  # type: ignore[no-untyped-def]
+    """Eliminate `count` frames from `first` on, upwards or downwards by step 1 or -1.
+
+    `trail` (2 n + q, 2 n + q) is what the frames before have left of these two and of the global columns, and becomes
+    what is left of the two that follow.
+    """
+    n, q = system.N.shape[1], system.N.shape[2]
+    size, row = 2 * n + q, 3 * n + q
+    for k in range(count):
+        f = first + step * k
+        _load(system, f, step, damping, root_scale, trail, Z[f])
+        _advance(trail, n, q)
+        factorize_rows(Z[f], n, row, trail[size - 1])
+        subtract_gram(trail, size, Z[f], n, row, n)
+
+
+@kernel
+def substitute_frames(Z, first, count, step, dg, d) -> None:  # type: ignore[no-untyped-def]
+    """Fill d of `count` frames, whose elimination ended at `first` and went by `step`, from the next two and dg."""
+    n, row = Z.shape[1], Z.shape[2]
+    W = dg.shape[0]
+    for k in range(count):
+        f = first - step * k
+        for r in range(n - 1, -1, -1):
+            s = -Z[f, r, 3 * n]
+            for a in range(W):
+                s -= Z[f, r, row - W + a] * dg[a]
+            for hop in range(1, 3):
+                other = f + hop * step
+                if 0 <= other < Z.shape[0]:
+                    for b in range(n):
+                        s -= Z[f, r, hop * n + b] * d[other, b]
+            for b in range(r + 1, n):
+                s -= Z[f, r, b] * d[f, b]
+            d[f, r] = s * Z[f, r, r]
+
+
+@kernel
+def _join(front, back, n: int, q: int) -> None:  # type: ignore[no-untyped-def]
+    """Add what the elimination from the back has left, whose frames come in opposite order, to that from the front."""
+    for a in range(n):
+        for b in range(a, n):
+            front[a, b] += back[n + a, n + b]
+            front[n + a, n + b] += back[a, b]
+        for b in range(n):
+            front[a, n + b] += back[b, n + a]
+        for b in range(q):
+            front[a, 2 * n + b] += back[n + a, 2 * n + b]
+            front[n + a, 2 * n + b] += back[a, 2 * n + b]
+    for a in range(q):
+        for b in range(q):
+            front[2 * n + a, 2 * n + b] += back[2 * n + a, 2 * n + b]
+
+
+def eliminate_clip(
+    system: ClipSystem, damping: float, root_scale: float, factor: Factor, pool: ThreadPoolExecutor | None = None
+) -> None:
+    """Factorize the damped system and leave the reduced one of the global columns in factor.C, factor.c.
+
+    Damping lambda is added to all unknowns of the poses as in a single frame, lambda s^2 to the root's position;
+    `root_scale` is s, radians per metre. With `pool`, a thread of it eliminates the second half.
+    """
+    frames, n, q = system.N.shape
+    front, back = factor.trails
+    front[:] = 0.0
+    back[:] = 0.0
+    front[2 * n + GLOBALS :, 2 * n + GLOBALS :] = system.C
+    front[2 * n, 2 * n + GLOBALS :] = system.c
+    middle = _middle(frames)
+    half = (system, frames - 1, max(frames - 2 - middle, 0), -1, damping, root_scale, back, factor.Z)
+    _run_both(pool, eliminate_frames, (system, 0, middle, 1, damping, root_scale, front, factor.Z), half)
+    _join(front, back, n, q)
+    end = middle + min(frames, 2)
+    without_back = ClipSystem(system.D[:end], system.B1[:end], system.B2[:end], system.N[:end], system.C, system.c)
+    eliminate_frames(without_back, middle, end - middle, 1, damping, root_scale, front, factor.Z)
+    factor.C[:] = front[2 * n + GLOBALS :, 2 * n + GLOBALS :]
+    factor.c[:] = front[2 * n, 2 * n + GLOBALS :]
+
+
+def solve_clip(
+    tree: Tree,
+    system: ClipSystem,
+    damping: float,
+    root_scale: float,
+    factor: Factor,
+    pool: ThreadPoolExecutor | None = None,
+) -> float:
+    """Fill factor.d and factor.dg with the damped Gauss-Newton step and return the decrease it predicts.
+
+    For (H + Lambda) d = -g the decrease of 1/2 dᵀHd + gᵀd is -1/2 gᵀd + 1/2 dᵀ Lambda d; the global columns are not
+    damped.
+    """
+    eliminate_clip(system, damping, root_scale, factor, pool)
+    factor.dg[:] = 0.0
+    solve_globals(tree, factor.C, factor.c, factor.dg)
+    frames, middle = len(factor.d), _middle(len(factor.d))
+    both = min(frames, 2)
+    factor.d[:] = 0.0
+    _substitute_middle(factor, middle, both)
+    half = (factor.Z, middle + 2, max(frames - 2 - middle, 0), -1, factor.dg, factor.d)
+    _run_both(pool, substitute_frames, (factor.Z, middle - 1, middle, 1, factor.dg, factor.d), half)
+    moved = np.einsum("fa,fa->", system.N[:, :, 0], factor.d) + system.c @ factor.dg
+    damped = np.sum(factor.d**2) + (root_scale**2 - 1.0) * np.sum(factor.d[:, 3:6] ** 2)
+    return float(0.5 * (damping * damped - moved))
+
+
+def _run_both(pool: ThreadPoolExecutor | None, kernel: Any, front: tuple[Any, ...], back: tuple[Any, ...]) -> None:
+    """Run a kernel on both halves of a clip, the second in a thread of the pool if there is one."""
+    waiting = None if pool is None else pool.submit(kernel, *back)
+    kernel(*front)
+    if waiting is None:
+        kernel(*back)
+    else:
+        waiting.result()
+
+
+def _middle(frames: int) -> int:
+    """Return the first of the two frames at which the eliminations from both ends meet."""
+    return max(frames // 2 - 1, 0)
+
+
+def _substitute_middle(factor: Factor, middle: int, both: int) -> None:
+    """Fill d of the last frames eliminated, whose front reaches no others."""
+    for f in range(middle + both - 1, middle - 1, -1):
+        substitute_frames(
+            factor.Z[middle : middle + both], f - middle, 1, 1, factor.dg, factor.d[middle : middle + both]
+        )

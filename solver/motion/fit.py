@@ -1,0 +1,283 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""`fit_motion`: a whole clip as one problem."""
+
+import os
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import nullcontext
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..compiled.part import Array, Pose
+from ..compiled.tree import BodyArrays, Tree, make_tree, with_fixed_shape
+from ..errors import InvalidValueError, ShapeError
+from ..gauss_newton.optimizer import make_settings
+from ..gauss_newton.terms import pack_priors
+from ..measurements import Measurements
+from ..options import Options, Priors, default_priors
+from ..state import State, Status
+from ..validation import as_array, check_finite, check_type, check_weight
+from .covariance import joint_covariances
+from .initial import initial_states
+from .levenberg_marquardt import Optimizer
+from .prior import MotionPrior, StandingPoints
+from .problem import ClipProblem, Globals, MotionTerms
+from .system import make_poses
+from .views import View, pack_views
+from .windows import Window, combined, overlapping, tiles
+
+_FRAMES_FOR_TWO_THREADS = 16
+
+
+@dataclass
+class MotionFit:
+    """Result of a clip of T frames, in the axes of the world: the camera's, where no view says otherwise."""
+
+    states: list[State]
+    R_world_part: Array  # (T, K+1, 3, 3)
+    t_world_part: Array  # (T, K+1, 3), the joints, metres
+    beta: Array  # (P,)
+    beta_information: Array  # (P, P), shape prior included; zeros for a shape that was given
+    focal_scale: float  # estimated focal length over that of the intrinsics; 1 if it was not estimated
+    measurements: Array  # (T,) usable points, directions and rows of pose priors of each frame
+    status: Status
+    cost: float  # with windows, their sum: frames in two of them count twice
+    iterations: int
+    rejected: int
+    joint_covariance: Array | None = None  # (T, K+1, 3, 3) of the joints' positions, metres^2; with `covariance` only
+    cost_by_term: dict[str, float] = field(default_factory=dict)  # what couples the frames, and the shared priors
+
+
+def fit_motion(
+    body: BodyArrays,
+    frames: Sequence[Measurements | Sequence[View]],
+    times: ArrayLike,
+    *,
+    init: Sequence[State] | None = None,
+    priors: Priors | None = None,
+    options: Options = Options(),  # noqa: B008 - frozen
+    motion: MotionPrior = MotionPrior(),  # noqa: B008 - frozen
+    stands: StandingPoints | None = None,
+    shape: ArrayLike | None = None,
+    focal: bool = False,
+    focal_weight: float = 1.0,
+    covariance: bool = False,
+    window: float = 10.0,
+    overlap: float = 2.0,
+) -> MotionFit:
+    """Fit all poses of a clip and one shape at once.
+
+    minimize, over the poses of all frames, beta and with `focal` one focal length, the sum of every frame's terms, as
+    `fit` has them, and of 1/2 integral of w rho(|acceleration|^2) dt over joints and root, and of w p |v|^2 dt over
+    standing points. Frames before and after thus help where one has little to say, and a frame without measurements
+    is filled in.
+
+    :param frames: of each frame its measurements, or one `View` for each camera that saw something.
+    :param times: (T,) seconds, increasing; they need not be evenly spaced.
+    :param init: each frame's state in the world's axes; without it, the frames are first fitted in order, several
+        cameras by points triangulated from their 2D keypoints.
+    :param priors: `default_priors(body)` unless given.
+    :param options: the stages are those of a fit that starts from a state; `curvature` and `report` have no effect.
+    :param motion: weights of acceleration and of standing points.
+    :param stands: points that may stand still, with the probability that they do.
+    :param shape: (P,) where it is known; it is then kept.
+    :param focal: whether to estimate one focal length for all cameras, as a scale of that of their intrinsics;
+        `focal_weight` is a prior on the scale's squared logarithm.
+    :param covariance: whether to return the covariance of every joint's position; it is that of the weights, and
+        conditional on the other windows' frames and, with several windows, on the shape.
+    :param window, overlap: seconds. A longer clip is optimized in windows that overlap, each kept up to the middle of
+        its overlaps, with the shape that all of them together determine: memory does not grow with the clip.
+    :return: the poses and how they were reached.
+    :raises ShapeError: there is no frame, or an array does not fit the body or the clip.
+    :raises InvalidValueError: a value that no fit can use.
+    """
+    clock = _checked_times(times, len(frames))
+    if init is not None and len(init) != len(frames):
+        raise ShapeError(f"There must be one initial state a frame, {len(frames)}, but got {len(init)}.")
+    if not 0.0 <= overlap < window:
+        raise InvalidValueError(f"The overlap of windows must lie in 0..{window} s, but is {overlap} s.")
+    check_type(motion, MotionPrior, "motion")
+    check_weight(focal_weight, "focal_weight")
+    if shape is not None and focal:
+        raise InvalidValueError("The focal length can only be estimated together with the shape; leave `shape` out.")
+    priors = default_priors(body) if priors is None else priors
+    tree = make_tree(body)
+    if shape is not None:
+        shape = as_array(shape, (tree.shape,), "shape")
+        check_finite(shape, "shape")
+    if init is None:
+        init = _first_states(tree, frames, shape, priors, options)
+    many = len(frames) >= _FRAMES_FOR_TWO_THREADS and (os.cpu_count() or 1) > 1
+    with ThreadPoolExecutor(2) if many else nullcontext() as pool:
+        terms = MotionTerms.make(tree, clock, motion, StandingPoints() if stands is None else stands)
+        clip = _Clip(tree, frames, terms, init, _Settings(priors, options, focal, focal_weight, covariance), pool)
+        return clip.solve(make_tree(body, focal), shape, overlapping(clock, window, overlap))
+
+
+def _checked_times(times: ArrayLike, frames: int) -> Array:
+    if frames == 0:
+        raise ShapeError("A motion needs at least one frame of measurements, but got none.")
+    clock = as_array(times, (frames,), "times")
+    if not np.isfinite(clock).all() or (np.diff(clock) <= 0.0).any():
+        raise InvalidValueError("The times of a motion's frames must be finite and increase from frame to frame.")
+    return clock
+
+
+def _first_states(
+    tree: Tree,
+    frames: Sequence[Measurements | Sequence[View]],
+    shape: Array | None,
+    priors: Priors,
+    options: Options,
+) -> Sequence[State]:
+    """Return where a clip starts that was given no states."""
+    if shape is None:
+        return initial_states(tree, frames, priors, options)
+    states = initial_states(with_fixed_shape(tree, shape), frames, _without_shape(priors), options)
+    return [replace(state, beta=shape) for state in states]
+
+
+def _without_shape(priors: Priors) -> Priors:
+    return replace(priors, shape_mean=None, shape_information=None)
+
+
+@dataclass
+class _Settings:
+    """How to optimize a clip."""
+
+    priors: Priors
+    options: Options
+    focal: bool
+    focal_weight: float
+    covariance: bool
+
+
+class _Clip:
+    """A clip on its way to its motion."""
+
+    def __init__(
+        self,
+        tree: Tree,
+        frames: Sequence[Measurements | Sequence[View]],
+        motion: MotionTerms,
+        init: Sequence[State],
+        settings: _Settings,
+        pool: ThreadPoolExecutor | None,
+    ) -> None:
+        self.tree, self.frames, self.motion, self.settings, self.pool = tree, frames, motion, settings, pool
+        T, K, P = len(frames), len(tree.parents) - 1, tree.shape
+        self.R, self.t, self.Omega = np.empty((T, K + 1, 3, 3)), np.empty((T, K + 1, 3)), np.empty((T, K, 3, 3))
+        for f, state in enumerate(init):
+            pose = replace(state, beta=np.zeros(P)).pose(tree)
+            self.R[f, 0], self.t[f, 0], self.Omega[f] = pose.R[0], pose.t[0], pose.Omega[1:]
+        self.beta, self.log_focal = as_array(init[-1].beta, (P,), "beta").copy(), 0.0
+        self.information = np.zeros((P, P))
+        self.covariances = np.empty((T, K + 1, 3, 3)) if settings.covariance else None
+        self.counts = np.zeros(T, np.int64)
+        self.status, self.cost, self.iterations, self.rejected = Status.NO_MEASUREMENTS, 0.0, 0, 0
+        self.costs: dict[str, float] = {}
+
+    def solve(self, free: Tree, shape: Array | None, windows: list[Window]) -> MotionFit:
+        """Optimize the clip and return the result.
+
+        `free` has the global columns that are unknown unless the shape is given.
+        """
+        if shape is None and len(windows) == 1:
+            self._keep(free, self._optimize(free, windows[0]), windows[0])
+        else:
+            if shape is None:
+                self._find_shared(free, tiles(windows))
+            else:
+                self.beta = shape.copy()
+            fixed = with_fixed_shape(self.tree, self.beta)
+            for window in windows:
+                self._keep(fixed, self._optimize(fixed, window), window)
+        return self._result()
+
+    def _optimize(self, tree: Tree, window: Window) -> Optimizer:
+        """Optimize the frames of a window with the global columns of `tree`."""
+        settings, P = self.settings, tree.shape
+        priors = settings.priors if P else _without_shape(settings.priors)
+        packed = pack_priors(tree, priors)
+        frames = []
+        for f in range(window.frames.start, window.frames.stop):
+            views, self.counts[f] = pack_views(tree, self.frames[f], packed, f"frames[{f}]")
+            frames.append(views)
+        poses = make_poses(tree, len(frames))
+        poses.R[:, 0], poses.t[:, 0] = self.R[window.frames, 0], self.t[window.frames, 0]
+        poses.Omega[:, 1:] = self.Omega[window.frames]
+        poses.beta[:P], poses.log_focal[:] = self.beta[:P], self.log_focal
+        shared = Globals(*priors.packed_shape(P), settings.focal_weight)
+        options = settings.options
+        problem = ClipProblem(
+            tree, frames, self.motion.part(window.frames), shared,
+            make_settings(options, options.schedule(cold=False)), self.pool,
+        )  # fmt: skip
+        optimizer = Optimizer(problem, poses, self.pool)
+        if self.counts[window.frames].any():
+            status = Status(optimizer.run())
+            # the worst of the windows'
+            if self.status in (Status.NO_MEASUREMENTS, Status.CONVERGED) or status is Status.NON_FINITE:
+                self.status = status
+        else:
+            optimizer.cost = problem.linearize(-1, optimizer.poses, optimizer.system)
+        self.iterations += optimizer.iterations
+        self.rejected += optimizer.rejected
+        return optimizer
+
+    def _find_shared(self, tree: Tree, parts: list[Window]) -> None:
+        """Set the shape, and the focal length, to what parts of the clip say together; keep the parts' poses."""
+        estimates, informations = [], []
+        P, G = tree.shape, tree.globals
+        for part in parts:
+            optimizer = self._optimize(tree, part)
+            self._keep_poses(optimizer.poses, part)
+            estimates.append(np.append(optimizer.poses.beta[:P], optimizer.poses.log_focal)[:G])
+            informations.append(optimizer.information())
+        prior, mean = np.zeros((G, G)), np.zeros(G)
+        mean[:P], information = self.settings.priors.packed_shape(P)
+        prior[:P, :P] = optimizer.problem.shape_weights[-1] * information
+        if G > P:
+            prior[P, P] = self.settings.focal_weight
+        self.information = sum(informations) - (len(parts) - 1) * prior
+        shared = combined(estimates, informations, mean, prior)
+        self.beta, self.log_focal = shared[:P], float(shared[P]) if G > P else 0.0
+        self.information = _marginal(self.information, P)
+
+    def _keep_poses(self, poses: Pose, window: Window) -> None:
+        inner = slice(window.kept.start - window.frames.start, window.kept.stop - window.frames.start)
+        self.R[window.kept], self.t[window.kept] = poses.R[inner], poses.t[inner]
+        self.Omega[window.kept] = poses.Omega[inner, 1:]
+
+    def _keep(self, tree: Tree, optimizer: Optimizer, window: Window) -> None:
+        """Take over what a window is kept for."""
+        poses = optimizer.poses
+        self._keep_poses(poses, window)
+        self.cost += optimizer.cost
+        for name, cost in optimizer.costs.items():
+            self.costs[name] = self.costs.get(name, 0.0) + cost
+        if tree.shape:
+            self.beta, self.log_focal = poses.beta[: tree.shape].copy(), float(poses.log_focal[0])
+            self.information = _marginal(optimizer.information(), tree.shape)
+        if self.covariances is not None:
+            root_scale = optimizer.problem.settings.root_scale
+            found, _ = joint_covariances(tree, optimizer.system, poses, root_scale, optimizer.factor)
+            inner = slice(window.kept.start - window.frames.start, window.kept.stop - window.frames.start)
+            self.covariances[window.kept] = found[inner]
+
+    def _result(self) -> MotionFit:
+        states = [State(self.R[f, 0], self.t[f, 0], self.Omega[f], self.beta) for f in range(len(self.frames))]
+        return MotionFit(
+            states, self.R, self.t, self.beta, self.information, float(np.exp(self.log_focal)), self.counts,
+            self.status, float(self.cost), self.iterations, self.rejected, self.covariances, self.costs,
+        )  # fmt: skip
+
+
+def _marginal(information: Array, P: int) -> Array:
+    """Return the information (P, P) of the first P unknowns with the others eliminated."""
+    out = information[:P, :P].copy()
+    if len(information) > P and information[P, P] > 0.0:
+        out -= np.outer(information[:P, P], information[P, :P]) / information[P, P]
+    return out

@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Where a clip's optimization starts: frames fitted in order, what several cameras see triangulated first."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..compiled.part import Array
+from ..compiled.tree import Tree
+from ..fitting.clip import fit_in_order
+from ..measurements import Keypoints3D, Measurements
+from ..options import Options, Priors
+from ..state import State
+from .views import View
+
+_LEAST_CONDITION = 1e-4  # of a point's rays: smallest over largest eigenvalue, below which they are too nearly parallel
+
+
+def initial_states(
+    tree: Tree, frames: Sequence[Measurements | Sequence[View]], priors: Priors, options: Options
+) -> list[State]:
+    """Return each frame's state in the world's axes, of one shape."""
+    views = [[View(frame)] if isinstance(frame, Measurements) else list(frame) for frame in frames]
+    if any(len(v) > 1 for v in views):
+        measured, cameras = [triangulated(v, len(tree.point_part)) for v in views], [View(Measurements())] * len(views)
+    else:
+        cameras = [v[0] if v else View(Measurements()) for v in views]
+        measured = [camera.measurements for camera in cameras]
+    states = fit_in_order(tree, measured, priors, options, None)
+    out = []
+    for state, camera in zip(states, cameras, strict=True):
+        R, t = np.asarray(camera.R_camera_world, dtype=float), np.asarray(camera.t_camera_world, dtype=float)
+        out.append(State(R.T @ state.R_camera_root, R.T @ (state.t_camera_root - t), state.Omega, states[-1].beta))
+    return out
+
+
+def triangulated(views: Sequence[View], points: int) -> Measurements:
+    """Return the points of the world that rays of several cameras or 3D keypoints fix, numbered as in measurements.
+
+    A ray (u, v, 1) of a camera with R, t as in `View` says (R_0 - u R_2) p = u t_2 - t_0 and likewise for v; rows are
+    divided by the depth of a first solution, so that the second minimizes errors in the image. A 3D keypoint weighs as
+    much as one ray from a metre away.
+    """
+    p = np.full((points, 3), np.nan)
+    for _ in range(2):
+        A, b = np.zeros((points, 3, 3)), np.zeros((points, 3))
+        for view in views:
+            R, t = np.asarray(view.R_camera_world, dtype=float), np.asarray(view.t_camera_world, dtype=float)
+            indices, m = view.measurements.packed2d(points)
+            usable = np.isfinite(m).all(axis=1) & (m[:, 2] > 0.0)
+            indices, m = indices[usable], m[usable]
+            depth = np.nan_to_num(p[indices] @ R[2] + t[2], nan=1.0)
+            weight = m[:, 2] / np.maximum(depth, 0.1) ** 2
+            for axis in range(2):
+                row = R[axis] - m[:, axis, None] * R[2]
+                _add_rows(A, b, indices, row, m[:, axis] * t[2] - t[axis], weight)
+            indices, q = view.measurements.packed3d(points)
+            usable = np.isfinite(q).all(axis=1) & (q[:, 3] > 0.0)
+            for axis in range(3):
+                row = np.broadcast_to(R[axis], (usable.sum(), 3))
+                _add_rows(A, b, indices[usable], row, q[usable, axis] - t[axis], q[usable, 3])
+        values = np.linalg.eigvalsh(A)
+        fixed = values[:, 0] > _LEAST_CONDITION * np.maximum(values[:, 2], 1e-12)
+        p = np.full((points, 3), np.nan)
+        p[fixed] = np.linalg.solve(A[fixed], b[fixed][..., None])[..., 0]
+    index = np.flatnonzero(fixed)
+    return Measurements(keypoints3d=Keypoints3D(index, p[index], np.ones(len(index))))
+
+
+def _add_rows(A: Array, b: Array, indices: Array, row: Array, value: Array, weight: Array) -> None:
+    """Add the normal equations of row (n, 3) times p = value (n,) to those of the points with these indices."""
+    np.add.at(A, indices, weight[:, None, None] * row[:, :, None] * row[:, None, :])
+    np.add.at(b, indices, (weight * value)[:, None] * row)

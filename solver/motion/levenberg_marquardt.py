@@ -1,0 +1,111 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Levenberg-Marquardt over all poses of a clip and what they share, with the control of a single frame's fit."""
+
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+
+from ..compiled.kernel import kernel
+from ..compiled.part import Array, Pose
+from ..gauss_newton.optimizer import (
+    CONVERGED,
+    DAMPING_LEAST,
+    FIRST_GROWTH,
+    LEAST_DECREASE,
+    MAX_ITERATIONS,
+    NON_FINITE,
+    RUNNING,
+    judge_trial,
+)
+from ..rotations import exp3
+from .band import eliminate_clip, make_factor, solve_clip
+from .problem import ClipProblem
+from .system import make_poses, make_system
+
+
+@kernel
+def retract_clip(tree, poses, d, dg, trial) -> None:  # type: ignore[no-untyped-def]
+    """Write the moved poses to `trial`: see `recursion.retract`. R, t and D of parts 1..K are left to linearize."""
+    for f in range(d.shape[0]):
+        for i in range(tree.parents.shape[0]):
+            if i == 0:
+                E = exp3(d[f, 0], d[f, 1], d[f, 2])
+                old, new = poses.R[f, 0], trial.R[f, 0]
+            else:
+                R, u = poses.R[f, tree.parents[i]], d[f, 3 + 3 * i : 6 + 3 * i]
+                E = exp3(
+                    R[0, 0] * u[0] + R[1, 0] * u[1] + R[2, 0] * u[2],
+                    R[0, 1] * u[0] + R[1, 1] * u[1] + R[2, 1] * u[2],
+                    R[0, 2] * u[0] + R[1, 2] * u[1] + R[2, 2] * u[2],
+                )
+                old, new = poses.Omega[f, i], trial.Omega[f, i]
+            for k in range(3):
+                a, b, c = old[0, k], old[1, k], old[2, k]
+                new[0, k] = E[0] * a + E[1] * b + E[2] * c
+                new[1, k] = E[3] * a + E[4] * b + E[5] * c
+                new[2, k] = E[6] * a + E[7] * b + E[8] * c
+        for r in range(3):
+            trial.t[f, 0, r] = poses.t[f, 0, r] + d[f, 3 + r]
+    for a in range(tree.shape):
+        trial.beta[a] = poses.beta[a] + dg[a]
+    trial.log_focal[0] = poses.log_focal[0]
+    if tree.globals > tree.shape:
+        trial.log_focal[0] += dg[tree.shape]
+
+
+class Optimizer:
+    """Optimizes one clip; `poses`, `system` and `costs` are those of the best point so far."""
+
+    def __init__(self, problem: ClipProblem, poses: Pose, pool: ThreadPoolExecutor | None) -> None:
+        """Allocate two systems, of which the trial point's becomes the current one when it is accepted."""
+        self.problem, self.pool = problem, pool
+        frames = len(problem.frames)
+        self.poses, self._trial = poses, make_poses(problem.tree, frames)
+        self.system, self._other = make_system(problem.tree, frames), make_system(problem.tree, frames)
+        self.factor = make_factor(self.system)
+        self.cost, self.costs = 0.0, dict[str, float]()
+        self.iterations, self.rejected = 0, 0
+
+    def run(self) -> int:
+        """Optimize through all stages and return the last one's status."""
+        status = CONVERGED
+        for s in range(len(self.problem.settings.stages)):
+            status = self._run_stage(s)
+            if status == NON_FINITE:
+                break
+        return status
+
+    def _run_stage(self, s: int) -> int:
+        settings, problem = self.problem.settings, self.problem
+        damping, growth, tolerance = settings.damping, FIRST_GROWTH, settings.tolerances[s]
+        self.cost = problem.linearize(s, self.poses, self.system)
+        self.costs = problem.costs
+        if not np.isfinite(self.cost):
+            return NON_FINITE
+        for _ in range(settings.limits[s]):
+            predicted = solve_clip(problem.tree, self.system, damping, settings.root_scale, self.factor, self.pool)
+            if predicted <= LEAST_DECREASE * self.cost:
+                return CONVERGED
+            self.iterations += 1
+            cost = np.inf
+            if np.isfinite(predicted):
+                retract_clip(problem.tree, self.poses, self.factor.d, self.factor.dg, self._trial)
+                cost = problem.linearize(s, self._trial, self._other)
+            accepted, damping, growth, verdict = judge_trial(self.cost, cost, predicted, damping, growth, tolerance)
+            if accepted:
+                self.cost, self.costs = cost, problem.costs
+                self.poses, self._trial = self._trial, self.poses
+                self.system, self._other = self._other, self.system
+            else:
+                self.rejected += 1
+            if verdict != RUNNING:
+                return verdict
+        return MAX_ITERATIONS
+
+    def information(self) -> Array:
+        """Return the information (G, G) of the global columns with all poses eliminated, priors included."""
+        G, root_scale = self.problem.tree.globals, self.problem.settings.root_scale
+        eliminate_clip(self.system, DAMPING_LEAST, root_scale, self.factor, self.pool)
+        C = np.triu(self.factor.C[:G, :G])
+        information: Array = C + np.triu(C, 1).T
+        return information

@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What is expected of any motion: little acceleration, and points that stand still while they stand."""
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..compiled.part import Array
+from ..errors import InvalidValueError
+from ..validation import as_array, as_indices, as_number, check_finite, check_not_negative, check_weight
+
+
+@dataclass(frozen=True)
+class MotionPrior:
+    """Weights of acceleration and of a standing point's velocity, per second of the clip.
+
+    The cost is 1/2 integral of w rho(|a|^2) dt, and for standing points of w p |v|^2 dt with p their probability, so
+    that a weight means the same at any frame rate.
+
+    joints: weight of each joint's angular acceleration relative to its parent, (K,) or one for all, s^3/rad^2;
+    root_rotation: of the root's in the world, s^3/rad^2; root_position: of its origin, s^3/m^2.
+    robust_joints, robust_root_rotation: Geman-McClure sigma of squared accelerations, (rad/s^2)^2;
+    robust_root_position: (m/s^2)^2. Infinity turns the kernel off.
+    contact: weight of standing points, s/m^2.
+    """
+
+    joints: ArrayLike = 0.1
+    root_rotation: float = 0.1
+    root_position: float = 3.0
+    robust_joints: float = 1e4
+    robust_root_rotation: float = 1e4
+    robust_root_position: float = 400.0
+    contact: float = 3e3
+
+    def __post_init__(self) -> None:
+        """Check the values.
+
+        :raises InvalidValueError: a weight is negative or infinite, or a sigma is not positive.
+        """
+        for name in ("root_rotation", "root_position", "contact"):
+            check_weight(getattr(self, name), f"MotionPrior.{name}")
+        for name in ("robust_joints", "robust_root_rotation", "robust_root_position"):
+            value = getattr(self, name)
+            if not as_number(value, f"MotionPrior.{name}") > 0.0:
+                raise InvalidValueError(f"MotionPrior.{name} must be positive, or infinite for none, but is {value}.")
+
+    def packed(self, K: int) -> Array:
+        """Return (K+2, 2) weights and 1/sigma: the root's rotation, joints 1..K, the root's position.
+
+        :raises ShapeError: `joints` is neither one number nor (K,).
+        :raises InvalidValueError: a weight of `joints` is negative or not finite.
+        """
+        joints = np.asarray(self.joints, dtype=np.float64)
+        joints = np.full(K, float(joints)) if joints.ndim == 0 else as_array(joints, (K,), "MotionPrior.joints")
+        check_finite(joints, "MotionPrior.joints")
+        check_not_negative(joints, "MotionPrior.joints")
+        table = np.empty((K + 2, 2))
+        table[0] = self.root_rotation, _inverse(self.robust_root_rotation)
+        table[1:-1, 0], table[1:-1, 1] = joints, _inverse(self.robust_joints)
+        table[-1] = self.root_position, _inverse(self.robust_root_position)
+        return table
+
+
+def _inverse(sigma: float) -> float:
+    return 0.0 if math.isinf(sigma) else 1.0 / float(sigma)
+
+
+@dataclass
+class StandingPoints:
+    """Points that may stand still: indices (C,), numbered as in the measurements, and the probability (T, C) that each
+    does in each frame. Between two frames a point stands with the smaller of their probabilities.
+    """
+
+    indices: ArrayLike = field(default_factory=lambda: np.zeros(0, np.int64))
+    probability: ArrayLike = field(default_factory=lambda: np.zeros((0, 0)))
+
+    def packed(self, points: int, frames: int) -> tuple[Array, Array]:
+        """Return indices (C,) and (T, C) probability of standing since the frame before, 0 for the first.
+
+        :raises ShapeError: an array has another shape, or an index lies outside.
+        :raises InvalidValueError: a probability is negative or not finite.
+        """
+        indices = as_indices(self.indices, points, "Indices of standing points")
+        if len(indices) == 0:
+            return indices, np.zeros((frames, 0))
+        p = as_array(self.probability, (frames, len(indices)), "Probability of standing points")
+        check_finite(p, "Probability of standing points")
+        check_not_negative(p.ravel(), "Probability of standing points")
+        both = np.zeros((frames, len(indices)))
+        both[1:] = np.minimum(p[1:], p[:-1])
+        return indices, both

@@ -1,0 +1,203 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""`fit_motion` against known motions, and what its result must not depend on."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scope.solver import (
+    InvalidValueError,
+    Keypoints3D,
+    Measurements,
+    Options,
+    Priors,
+    ShapeError,
+    Stage,
+    State,
+    Status,
+    Weights,
+    rotations,
+)
+from scope.solver.motion.fit import fit_motion
+from scope.solver.motion.prior import MotionPrior, StandingPoints
+from scope.solver.motion.views import View
+
+from ..synthetic import RandomBody, forward, random_body
+from .clips import K, M, P, noisy_clip, walk
+
+MARKERS = 28  # four on each part
+TIGHT = Options(stages=[Stage(Weights(joint_prior=1e-2, joint_limits=0.0, shape=1.0), 1e-12, 60)])
+SMOOTH = MotionPrior(robust_joints=np.inf, robust_root_rotation=np.inf, robust_root_position=np.inf)
+
+
+def joints(body, states):
+    """The joints (T, K+1, 3) of states, from the definition."""
+    return np.array([forward(body, s.R_camera_root, s.t_camera_root, s.Omega, s.beta)[1] for s in states])
+
+
+def smooth_walk(rng, frames, rate):
+    """A body, its states in a smooth motion, and their times."""
+    body, (first,), _ = walk(rng, 1, random_body(rng, K, P, MARKERS))
+    times = np.arange(frames) / rate
+    swing, turn = 0.4 * rng.standard_normal((K, 3)), rng.uniform(1.0, 3.0, (K, 1))
+    states = [
+        State(
+            rotations.exp([0.0, 0.4 * t, 0.1 * np.sin(t)]) @ first.R_camera_root,
+            first.t_camera_root + [0.3 * np.sin(t), 0.05 * np.cos(3.0 * t), 0.1 * t],
+            first.Omega @ rotations.exp(swing * np.sin(turn * t)), first.beta,
+        )
+        for t in times
+    ]  # fmt: skip
+    return body, states, times
+
+
+def markers(body, states, rng, noise=0.01):
+    """Measured points of every frame, in the world."""
+    out = []
+    for s in states:
+        points = forward(body, s.R_camera_root, s.t_camera_root, s.Omega, s.beta)[2]
+        out.append(
+            Keypoints3D(np.arange(MARKERS), points + noise * rng.standard_normal(points.shape), np.ones(MARKERS))
+        )
+    return out
+
+
+def test_covariance_and_estimate_of_linear_motion_in_closed_form():
+    """One point with no joints: the estimate is the linear smoother's, y -> A^-1 w y with A = w I + D'D w_a / h^3."""
+    T, h, weight, w_a = 24, 1 / 30, 24000.0, 40.0
+    rng = np.random.default_rng(0)
+    empty = np.zeros((1, 3, 1))
+    body = RandomBody(np.array([-1]), empty, np.zeros((1, 3)), np.array([0]), np.zeros((1, 3)), empty)
+    truth = np.array([0.1, 0.2, 4.0]) + np.arange(T)[:, None] * h * np.array([1.0, -0.5, 0.3])
+    y = truth + rng.standard_normal((T, 3)) / np.sqrt(weight)
+    frames = [Measurements(keypoints3d=Keypoints3D([0], y[f : f + 1], [1.0])) for f in range(T)]
+    init = [State(np.eye(3), p, np.zeros((0, 3, 3)), np.zeros(1)) for p in y]
+    prior = replace(SMOOTH, root_position=w_a)
+    exact = replace(TIGHT, robust_keypoints3d=np.inf)
+    found = fit_motion(body, frames, np.arange(T) * h, init=init, priors=Priors(), options=exact, motion=prior,
+                       covariance=True)  # fmt: skip
+    second = np.diff(np.eye(T), 2, axis=0)
+    A = weight * np.eye(T) + w_a / h**3 * second.T @ second
+    np.testing.assert_allclose(found.t_world_part[:, 0], np.linalg.solve(A, weight * y), atol=1e-8)
+    expected = np.diag(np.linalg.inv(A))
+    np.testing.assert_allclose(found.joint_covariance[:, 0], expected[:, None, None] * np.eye(3), rtol=1e-6, atol=1e-12)
+    # an error of linear motion is as large as the covariance says, or smaller: the acceleration's prior is right too
+    chi = np.mean((found.t_world_part[:, 0] - truth) ** 2 / expected[:, None])
+    assert 0.2 < chi < 1.5
+    assert expected[T // 2] < 0.3 / weight
+
+
+def test_reversed_in_time_the_motion_is_the_same():
+    rng = np.random.default_rng(1)
+    body, states, times = smooth_walk(rng, 20, 30.0)
+    frames = [Measurements(keypoints3d=m) for m in markers(body, states, rng)]
+    stands = rng.uniform(0.0, 1.0, (20, 1))
+    forwards = fit_motion(body, frames, times, init=states, priors=Priors(), options=TIGHT,
+                          stands=StandingPoints([2], stands))  # fmt: skip
+    backwards = fit_motion(body, frames[::-1], -times[::-1], init=states[::-1], priors=Priors(), options=TIGHT,
+                           stands=StandingPoints([2], stands[::-1]))  # fmt: skip
+    np.testing.assert_allclose(backwards.t_world_part[::-1], forwards.t_world_part, atol=1e-6)
+    np.testing.assert_allclose(backwards.beta, forwards.beta, atol=1e-5)
+    assert forwards.status is Status.CONVERGED
+
+
+@pytest.mark.parametrize("known", [True, False])
+def test_windows_agree_with_the_whole_clip(known):
+    rng = np.random.default_rng(2)
+    body, states, times = smooth_walk(rng, 120, 15.0)
+    frames = [Measurements(keypoints3d=m) for m in markers(body, states, rng)]
+    given = {"init": states, "priors": Priors(), "options": TIGHT, "shape": states[0].beta if known else None}
+    whole = fit_motion(body, frames, times, **given)
+    cut = fit_motion(body, frames, times, window=3.0, overlap=1.0, **given)
+    difference = np.linalg.norm(cut.t_world_part - whole.t_world_part, axis=-1)
+    assert difference.max() < 1e-4
+    assert 0.0 < difference.max()  # they were cut
+    assert np.linalg.norm(whole.t_world_part - joints(body, states), axis=-1).mean() < 0.01
+
+
+def test_moved_with_its_cameras_the_motion_moves_along():
+    clip = noisy_clip(5, frames=5)
+    G, g = rotations.exp(np.array([0.4, -0.8, 0.3])), np.array([1.0, -2.0, 0.5])
+    frames, elsewhere = [], []
+    for first, *others in clip.frames():  # without 3D keypoints, which are in the first camera's axes
+        views = [replace(first, measurements=replace(first.measurements, keypoints3d=None)), *others]
+        frames.append(views)
+        elsewhere.append(
+            [View(v.measurements, v.R_camera_world @ G.T, v.t_camera_world - v.R_camera_world @ G.T @ g) for v in views]
+        )
+    starts = [State(G @ s.R_camera_root, G @ s.t_camera_root + g, s.Omega, s.beta) for s in clip.starts]
+    still = fit_motion(clip.body, frames, clip.times, init=clip.starts, priors=Priors(), options=TIGHT)
+    turned = fit_motion(clip.body, elsewhere, clip.times, init=starts, priors=Priors(), options=TIGHT)
+    np.testing.assert_allclose(turned.t_world_part, still.t_world_part @ G.T + g, atol=1e-6)
+
+
+def test_markers_come_and_go():
+    rng = np.random.default_rng(6)
+    body, states, times = smooth_walk(rng, 40, 30.0)
+    measured = markers(body, states, rng, noise=0.001)
+    frames = [Measurements(keypoints3d=m) for m in measured]
+    for f in range(15, 21):
+        frames[f] = Measurements() if f < 18 else []
+    for f in range(40):
+        if f % 3 and frames[f] and f not in range(15, 21):
+            keep = rng.permutation(MARKERS)[: MARKERS // 2]
+            frames[f] = Measurements(keypoints3d=Keypoints3D(keep, measured[f].points[keep], np.ones(len(keep))))
+    found = fit_motion(body, frames, times, priors=Priors(), options=TIGHT)
+    error = np.linalg.norm(found.t_world_part - joints(body, states), axis=-1)
+    assert error[:15].max() < 0.02
+    assert error[15:21, 0].max() < 0.02
+    assert list(found.measurements[14:22]) == [len(frames[14].keypoints3d.indices), *[0] * 6, MARKERS]
+
+
+def test_several_cameras_without_a_state_to_start_from():
+    clip = noisy_clip(7, frames=4)
+    frames = clip.frames()
+    for views in frames:
+        views[0] = replace(views[0], measurements=replace(views[0].measurements, keypoints3d=None))
+    found = fit_motion(clip.body, frames, clip.times, priors=Priors(), options=TIGHT)
+    error = np.linalg.norm(found.t_world_part - joints(clip.body, clip.starts), axis=-1)
+    assert np.median(error) < 0.03
+    # one camera elsewhere in the world, alone
+    alone = [[replace(v[1], measurements=replace(v[1].measurements, keypoints3d=Keypoints3D(
+        np.arange(M), clip.points[f] @ np.asarray(v[1].R_camera_world).T + v[1].t_camera_world, np.ones(M))))]
+        for f, v in enumerate(frames)]  # fmt: skip
+    one = fit_motion(clip.body, alone, clip.times, priors=Priors(), options=TIGHT)
+    assert np.median(np.linalg.norm(one.t_world_part - joints(clip.body, clip.starts), axis=-1)) < 0.05
+
+
+def test_a_standing_point_stands():
+    rng = np.random.default_rng(8)
+    body, states, times = smooth_walk(rng, 20, 30.0)
+    frames = [Measurements(keypoints3d=m) for m in markers(body, states, rng, noise=0.003)]
+    held = StandingPoints([3], np.ones((20, 1)))
+    found = fit_motion(body, frames, times, init=states, priors=Priors(), options=TIGHT, stands=held,
+                       motion=MotionPrior(contact=1e7))  # fmt: skip
+    points = np.array([forward(body, s.R_camera_root, s.t_camera_root, s.Omega, s.beta)[2][3] for s in found.states])
+    loose = fit_motion(body, frames, times, init=states, priors=Priors(), options=TIGHT)
+    free = np.array([forward(body, s.R_camera_root, s.t_camera_root, s.Omega, s.beta)[2][3] for s in loose.states])
+    assert np.linalg.norm(np.diff(points, axis=0), axis=1).max() < 1e-3
+    assert np.linalg.norm(np.diff(free, axis=0), axis=1).max() > 5e-3
+
+
+def test_what_cannot_be_used_is_refused():
+    body, states, times = walk(np.random.default_rng(0), 3)
+    frames = [Measurements()] * 3
+    with pytest.raises(InvalidValueError, match="increase from frame to frame"):
+        fit_motion(body, frames, times[::-1])
+    with pytest.raises(ShapeError, match="at least one frame"):
+        fit_motion(body, [], [])
+    with pytest.raises(ShapeError, match="one initial state a frame"):
+        fit_motion(body, frames, times, init=states[:2])
+    with pytest.raises(InvalidValueError, match="overlap of windows"):
+        fit_motion(body, frames, times, overlap=12.0)
+    with pytest.raises(InvalidValueError, match="leave `shape` out"):
+        fit_motion(body, frames, times, shape=np.zeros(P), focal=True)
+    with pytest.raises(InvalidValueError, match="MotionPrior.contact"):
+        MotionPrior(contact=-1.0)
+    with pytest.raises(InvalidValueError, match="Probability of standing"):
+        fit_motion(body, frames, times, stands=StandingPoints([0], [[1.0], [np.nan], [1.0]]))
+    with pytest.raises(InvalidValueError, match=r"frames\[1\]\[0\]"):
+        fit_motion(body, [frames[0], [frames[1]], frames[2]], times, init=states)
+    assert fit_motion(body, frames, times, init=states).status is Status.NO_MEASUREMENTS
+    with pytest.raises(InvalidValueError, match="rotation"):
+        fit_motion(body, [[View(Measurements(), 2.0 * np.eye(3))]] * 3, times, init=states)
