@@ -170,7 +170,7 @@ def test_nan_and_infinity_are_ignored(tmp_path: Path, value: float) -> None:
 
 def test_of_millions_of_boxes_only_the_best_are_compared() -> None:
     """All of a million, which lie apart, would take hours."""
-    corners = np.stack([np.arange(1e6), np.zeros(1e6), np.arange(1e6) + 0.5, np.ones(1e6)], axis=1)
+    corners = np.stack([np.arange(1e6), np.zeros(10**6), np.arange(1e6) + 0.5, np.ones(10**6)], axis=1)
     kept = suppress(Boxes(corners, np.linspace(0.5, 1.0, 1_000_000)), 0.4)
     assert len(kept.scores) == MOST_BOXES
-    np.testing.assert_array_equal(kept.corners[:, 0], np.arange(1e6 - 1, 1e6 - 1 - MOST_BOXES, -1))
+    np.testing.assert_array_equal(kept.corners[:, 0], np.arange(10**6 - MOST_BOXES, 10**6)[::-1])
