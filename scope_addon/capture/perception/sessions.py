@@ -3,13 +3,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 from types import ModuleType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from ....solver.errors import ModelFileError
+from ....solver.errors import ModelFileError, ScopeError
 from ...errors import SetupError, UsageError
+from .adapters.network_server import make_session
 from .execution import CPU, DIRECTML, PROVIDERS, Execution, SerializedSession
 
 if TYPE_CHECKING:
@@ -46,9 +48,15 @@ def network_path(name: str, folder: Path | None = None) -> Path:
     return path
 
 
-def open_session(path: Path, threads: int, execution: Execution | None = None) -> onnxruntime.InferenceSession:
+def open_session(
+    path: Path,
+    threads: int,
+    execution: Execution | None = None,
+    open_on: Callable[[str, Path, int], Any] | None = None,
+) -> onnxruntime.InferenceSession:
     """Open an onnxruntime session with ``threads`` threads, on the requested provider if it is available.
 
+    :param open_on: opens the session on a provider, given by our name; None: in this process.
     :raises ModelFileError: the file is damaged, or uses operators that onnxruntime does not have.
     :raises SetupError: onnxruntime cannot be imported.
     :raises UsageError: there are fewer than 1 thread.
@@ -58,7 +66,9 @@ def open_session(path: Path, threads: int, execution: Execution | None = None) -
     runtime, execution = _runtime(), execution or Execution()
     for name in execution.candidates(runtime.get_available_providers()):
         try:
-            session = _open_on(name, path, threads)
+            session = (open_on or _open_on)(name, path, threads)
+        except ScopeError:  # it takes too much time or memory, on any provider
+            raise
         except Exception as error:  # onnxruntime's exceptions have no common base
             if name == CPU:
                 raise ModelFileError(_cannot_load(path, error)) from error
@@ -74,16 +84,8 @@ def open_session(path: Path, threads: int, execution: Execution | None = None) -
 
 
 def _open_on(name: str, path: Path, threads: int) -> onnxruntime.InferenceSession:
-    runtime = _runtime()
-    options = runtime.SessionOptions()
-    options.intra_op_num_threads = threads
-    options.inter_op_num_threads = 1
-    # Threads of one network that spin while waiting would take the cores from the next one.
-    options.add_session_config_entry("session.force_spinning_stop", "1")
-    options.log_severity_level = 4  # errors are raised as exceptions, with our messages
-    options.enable_mem_pattern = name != DIRECTML  # which does not support it
     providers = [PROVIDERS[n][0] for n in dict.fromkeys((name, CPU))]
-    session = runtime.InferenceSession(str(path), options, providers=providers)
+    session = make_session(_runtime(), str(path), threads, providers, name != DIRECTML)  # no patterns of memory there
     return SerializedSession(session) if name == DIRECTML else session
 
 

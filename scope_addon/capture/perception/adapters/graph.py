@@ -14,6 +14,7 @@ from .....solver.errors import ModelFileError
 from ..execution import Execution
 from ..sessions import open_session
 from .description import Description, description_path
+from .network_process import NetworkProcess
 from .onnx_file import check_onnx_file
 
 _TYPES = {"tensor(float)": np.float32, "tensor(float16)": np.float16, "tensor(uint8)": np.uint8}
@@ -52,13 +53,10 @@ class Graph:
     def __init__(self, path: Path, description: Description, threads: int, execution: Execution | None = None) -> None:
         check_onnx_file(path)
         self.path = path
-        self._session = open_session(path, threads, execution)
+        self._session = open_session(path, threads, execution, NetworkProcess)
         inputs = self._session.get_inputs()
-        try:
-            names, shapes = [i.name for i in inputs], [i.shape for i in inputs]
-            self.names = [output.name for output in self._session.get_outputs()]
-        except UnicodeDecodeError as error:
-            raise ModelFileError(f"{path} has a name that is not UTF-8 text ({error}); export it again") from error
+        names, shapes = [i.name for i in inputs], [i.shape for i in inputs]
+        self.names = [output.name for output in self._session.get_outputs()]
         if len(inputs) != 1:
             raise ModelFileError(
                 f"{path} takes {len(inputs)} inputs ({', '.join(names)}); only graphs with one image input can be used"
@@ -89,13 +87,11 @@ class Graph:
         blob = picture[None] if self._channels_last else picture.transpose(2, 0, 1)[None]
         try:
             outputs = self._session.run(None, {self._name: np.ascontiguousarray(blob, self._type)})
-        except Exception as error:  # onnxruntime's exceptions have no common base
+        except RuntimeError as error:
             raise ModelFileError(
                 f"{self.path} cannot be run on an image of {self.width} x {self.height} "
                 f"({' '.join(str(error).split())}); export it again, or correct {description_path(self.path).name}"
             ) from error
-        if not all(isinstance(output, np.ndarray) for output in outputs):
-            raise ModelFileError(f"{self.path} has outputs that are not arrays; export it without these")
         return [o.astype(np.float32) if o.dtype.kind == "f" else o for o in outputs]
 
     def _input_layout(self, shape: list[Any], description: Description) -> tuple[bool, int, int]:

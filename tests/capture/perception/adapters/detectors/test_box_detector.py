@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scope.scope_addon.capture.perception.adapters.detectors.box_detector import BoxDetector
-from scope.scope_addon.capture.perception.adapters.detectors.boxes import letterbox
+from scope.scope_addon.capture.perception.adapters.detectors.boxes import MOST_BOXES, Boxes, letterbox, suppress
 from scope.scope_addon.capture.perception.adapters.detectors.yolox import cells
 from scope.solver.errors import ModelFileError
 
@@ -166,3 +166,11 @@ def test_nan_and_infinity_are_ignored(tmp_path: Path, value: float) -> None:
     scores = [found.score for found in detector.detect(IMAGE)]
     assert len(scores) > 0  # the person, whom they do not hide
     assert np.isfinite(scores).all()
+
+
+def test_of_millions_of_boxes_only_the_best_are_compared() -> None:
+    """All of a million, which lie apart, would take hours."""
+    corners = np.stack([np.arange(1e6), np.zeros(10**6), np.arange(1e6) + 0.5, np.ones(10**6)], axis=1)
+    kept = suppress(Boxes(corners, np.linspace(0.5, 1.0, 1_000_000)), 0.4)
+    assert len(kept.scores) == MOST_BOXES
+    np.testing.assert_array_equal(kept.corners[:, 0], np.arange(10**6 - MOST_BOXES, 10**6)[::-1])

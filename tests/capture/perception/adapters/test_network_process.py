@@ -1,0 +1,170 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Networks that loop, grow or crash end with one sentence, and leave no process behind."""
+
+from __future__ import annotations
+
+import gc
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from onnx import TensorProto, helper
+from scope.scope_addon.capture.perception.adapters import network_process
+from scope.scope_addon.capture.perception.adapters.keypoints.keypoint_network import KeypointNetwork
+from scope.scope_addon.capture.perception.adapters.network_process import SERVER, NetworkProcess
+from scope.scope_addon.capture.perception.adapters.network_server import OUT_OF_MEMORY
+from scope.solver.errors import ModelFileError
+
+from ...small_graphs import picture_input, save, simcc
+
+LONGEST = np.array(2**62, np.int64)
+
+
+def grey(network: NetworkProcess) -> list[np.ndarray]:
+    return network.run(None, {"images": np.zeros((1, 3, 32, 32), np.float32)})
+
+
+def looping(path: Path, *, while_bright: bool = False) -> Path:
+    """Write a network that loops for ever, for every image, or for those of which a pixel exceeds 1000."""
+    inside = [helper.make_node("Identity", ["go"], ["go_on"]), helper.make_node("Sin", ["x"], ["y"])]
+    body = helper.make_graph(
+        inside,
+        "body",
+        [
+            helper.make_tensor_value_info("i", TensorProto.INT64, []),
+            helper.make_tensor_value_info("go", TensorProto.BOOL, []),
+            helper.make_tensor_value_info("x", TensorProto.FLOAT, None),
+        ],
+        [
+            helper.make_tensor_value_info("go_on", TensorProto.BOOL, []),
+            helper.make_tensor_value_info("y", TensorProto.FLOAT, None),
+        ],
+    )
+    nodes = [
+        helper.make_node("ReduceMax", ["images"], ["most"], keepdims=0),
+        helper.make_node("Greater", ["most", "threshold"], ["start"]),
+        helper.make_node("Loop", ["longest", "start", "images"], ["out"], body=body),
+    ]
+    out = helper.make_tensor_value_info("out", TensorProto.FLOAT, [1, 3, 32, 32])
+    threshold = np.array(1000.0 if while_bright else -1.0, np.float32)
+    return save(path, nodes, [picture_input(32, 32)], [out], {"longest": LONGEST, "threshold": threshold})
+
+
+def huge(path: Path, elements: int) -> Path:
+    """Write a network with a constant of so many floats, which depends on the image, so that it is made in a run."""
+    nodes = [
+        helper.make_node("ReduceMin", ["images"], ["least"], keepdims=0),
+        helper.make_node("Cast", ["least"], ["zero"], to=TensorProto.INT64),
+        helper.make_node("Mul", ["zero", "nothing"], ["none"]),
+        helper.make_node("Add", ["none", "elements"], ["shape"]),
+        helper.make_node("ConstantOfShape", ["shape"], ["block"]),
+        helper.make_node("ReduceSum", ["block"], ["out"], keepdims=0),
+    ]
+    constants = {"elements": np.array([elements], np.int64), "nothing": np.array([0], np.int64)}
+    out = helper.make_tensor_value_info("out", TensorProto.FLOAT, [])
+    return save(path, nodes, [picture_input(32, 32)], [out], constants)
+
+
+def test_an_endless_loop_ends_at_the_trial(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(network_process, "DEFAULT_OPENING_S", 1.5)
+    with pytest.raises(ModelFileError, match=r"m\.onnx was stopped because it gave no result within 1\.5 s; choose"):
+        KeypointNetwork(looping(tmp_path / "m.onnx"), threads=1)
+
+
+def test_a_loop_that_only_some_images_start_ends_as_well(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(network_process, "RUN_S", 0.5)
+    network = NetworkProcess("cpu", looping(tmp_path / "m.onnx", while_bright=True), 1)
+    grey(network)
+    with pytest.raises(ModelFileError, match=r"no result within 0\.5 s"):
+        network.run(None, {"images": np.full((1, 3, 32, 32), 2000, np.float32)})
+    with pytest.raises(RuntimeError, match="its process has ended"):
+        grey(network)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems watch the memory, see below")
+def test_memory_is_refused_by_the_system(tmp_path: Path) -> None:
+    with pytest.raises(ModelFileError, match=r"m\.onnx cannot be run .*[Ff]ailed to allocate") as caught:
+        KeypointNetwork(huge(tmp_path / "m.onnx", 3_000_000_000), threads=1)
+    assert "\n" not in str(caught.value)
+
+
+def test_watched_memory_ends_the_process() -> None:
+    code = (
+        f"import sys, threading; sys.path.insert(0, {str(SERVER.parent)!r}); import network_server as n\n"
+        "now = n.used_bytes(); assert 5e6 < now < 1e9, now\n"
+        "threading.Thread(target=n.watch_memory, args=(100_000_000,), daemon=True).start()\n"
+        "threading.Event().wait(0.2); print('small', flush=True)\n"
+        "block = bytearray(b'1') * 200_000_000; threading.Event().wait(20)\n"
+    )
+    ended = subprocess.run([sys.executable, "-I", "-c", code], capture_output=True, text=True, timeout=40)
+    assert (ended.returncode, ended.stdout) == (OUT_OF_MEMORY, "small\n"), ended.stderr
+
+
+@pytest.mark.parametrize(
+    ("code", "says"),
+    [
+        ("import os, sys; os._exit(77)", r"m\.onnx was stopped because it took more than 4\.\d GB of memory"),
+        ("import os; os.kill(os.getpid(), 9)", r"cannot load this network \(onnxruntime crashed in its process"),
+        ("import os; os.write(1, b'ORT_ERROR: no answer')", "sent no valid answer: a message is too long"),
+        ("import os; os.write(1, b'\\2\\0\\0\\0[]')", "sent no valid answer: a message is no object"),
+        ("import os; os.write(1, b'\\2\\0\\0\\0{}')", "sent no valid answer: 'arrays'"),
+    ],
+)
+def test_a_process_that_ends_or_answers_nonsense(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, code: str, says: str
+) -> None:
+    script = tmp_path / "server.py"
+    script.write_text(code)
+    monkeypatch.setattr(network_process, "SERVER", script)
+    with pytest.raises(ModelFileError, match=says) as caught:
+        KeypointNetwork(simcc(tmp_path / "m.onnx", 17, 32, 32), threads=1)
+    assert "\n" not in str(caught.value)
+
+
+def test_results_are_those_of_this_process_and_the_process_ends_with_the_network(tmp_path: Path) -> None:
+    import onnxruntime
+
+    path = simcc(tmp_path / "m.onnx", 17, 32, 32)
+    network = NetworkProcess("cpu", path, 1)
+    image = np.random.default_rng(0).normal(size=(1, 3, 32, 32)).astype(np.float32)
+    here = onnxruntime.InferenceSession(str(path), providers=["CPUExecutionProvider"]).run(None, {"images": image})
+    for ours, truth in zip(network.run(None, {"images": image}), here, strict=True):
+        np.testing.assert_array_equal(ours, truth)
+    process = network._process
+    del network
+    gc.collect()
+    assert process.returncode is not None
+
+
+def test_the_process_ends_when_the_capture_is_killed(tmp_path: Path) -> None:
+    path = simcc(tmp_path / "m.onnx", 17, 32, 32)
+    code = (
+        "import os, pathlib, sys\n"
+        "from scope.scope_addon.capture.perception.adapters.network_process import NetworkProcess\n"
+        f"network = NetworkProcess('cpu', pathlib.Path({str(path)!r}), 1)\n"
+        "print(network._process.pid, flush=True)\n"
+        "os._exit(9)\n"
+    )
+    killed = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
+    assert killed.returncode == 9, killed.stderr
+    pid = int(killed.stdout)
+    for _ in range(600):
+        if not _runs(pid):
+            return
+        time.sleep(0.1)
+    raise AssertionError("the process still runs")
+
+
+def _runs(pid: int) -> bool:
+    state = Path(f"/proc/{pid}/stat")
+    if state.parent.parent.joinpath("self").exists():  # ended, although nobody has asked for its status
+        return state.exists() and state.read_text().rpartition(")")[2].split()[0] != "Z"
+    try:
+        os.kill(pid, 0)
+    except OSError:
+        return False
+    return True
