@@ -31,11 +31,13 @@ FIRST = (
     "solver/test_validation.py",
     "solver/residuals/test_registry.py",
     "capture/test_pipeline.py",
+    "tools/test_build_body.py",
     "capture/tracking/test_tracker.py",
     "capture/test_pipeline_own_networks.py",
     "tools/test_convert_networks.py",
     "capture/tracking/test_people.py",
     "job/test_batch.py",
+    "ui/test_compiled_solver.py",
     "scene/export/test_export.py",
 )
 
