@@ -59,7 +59,8 @@ def distance_from_pin(motion: Motion, pin: Pin, place: NDArray[np.float64] | Non
         place = T[:3, :3] @ motion.joints_cam[rows[0], BODY_JOINTS.index(pin.joint)].astype(float) + T[:3, 3]
     if pin.pixel is not None:
         return float(np.linalg.norm(pixel_of((T, motion.intrinsics), place) - pin.pixel))
-    return float(np.linalg.norm(place - pin_in_world(motion, pin).position))
+    target = np.array(pin_in_world(motion, pin).position, float)
+    return float(np.linalg.norm(place - target))
 
 
 def pin_in_world(motion: Motion, pin: Pin) -> Pin:

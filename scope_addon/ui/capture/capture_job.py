@@ -45,6 +45,7 @@ class CaptureJob:
         self._cache: Cache = cache()
         self.progress = JobProgress()
         self.cancel_requested = False
+        self.messages = 0  # of the worker so far
         self._scene_uid = scene.session_uid
         self._options = build_options(scene)
         self._request = capture_request(scene)
@@ -96,6 +97,7 @@ class CaptureJob:
     def _listen(self) -> None:
         assert self._worker is not None
         for message in self._worker.poll():
+            self.messages += 1
             if message["event"] == "progress":
                 self.progress.update(message["stage"], message["done"], message["total"])
             elif message["event"] == "preview":

@@ -109,6 +109,7 @@ class SCOPE_OT_capture(bpy.types.Operator):
         if bpy.app.background or not self._start(context):
             return self.execute(context) if bpy.app.background else {"CANCELLED"}
         manager = context.window_manager
+        self._shown: tuple[str, int] | None = None
         self._timer = manager.event_timer_add(TIMER_S, window=context.window)
         manager.modal_handler_add(self)
         return {"RUNNING_MODAL"}
@@ -134,13 +135,13 @@ class SCOPE_OT_capture(bpy.types.Operator):
         except Exception:  # Blender drops the operator without calling ``cancel``
             self._end(context, {"CANCELLED"})
             raise
-        context.workspace.status_text_set(
-            iface_(
-                "Scope: {progress}   (Esc over the Scope panel to cancel)",
-                progress=", ".join(job.progress.lines(iface_)),
+        progress = ", ".join(job.progress.lines(iface_))
+        if self._shown != (progress, job.messages):  # drawing the same again costs time in which Blender does not react
+            self._shown = progress, job.messages
+            context.workspace.status_text_set(
+                iface_("Scope: {progress}   (Esc over the Scope panel to cancel)", progress=progress)
             )
-        )
-        redraw(context)
+            redraw(context)
         return self._end(context, outcome) if outcome else {"PASS_THROUGH"}
 
     def cancel(self, context: bpy.types.Context) -> None:

@@ -184,6 +184,25 @@ def test_an_unexpected_error_ends_the_capture():
     assert state.job is None  # otherwise no other capture could be started
 
 
+def test_the_panel_is_drawn_again_only_for_news(monkeypatch):
+    drawn = []
+    monkeypatch.setattr(capture_operators, "redraw", drawn.append)
+    lines = ["Finding the person"]
+    progress = SimpleNamespace(lines=lambda _: lines)
+    state.job = SimpleNamespace(progress=progress, messages=0, step=lambda: True, cancel_requested=False)
+    operator = SimpleNamespace(_shown=None)
+    operator._step = partial(capture_operators.SCOPE_OT_capture._step, operator)
+    timer = SimpleNamespace(type="TIMER", value="NOTHING")
+    counts = []
+    for change in (None, None, "messages", None, "lines", None):
+        state.job.messages += change == "messages"
+        lines += ["1 s left"] if change == "lines" else []
+        capture_operators.SCOPE_OT_capture.modal(operator, bpy.context, timer)
+        counts.append(len(drawn))
+    state.job = None
+    assert counts == [1, 1, 2, 2, 3, 3]
+
+
 def test_a_linked_scene_is_refused(footage, tmp_path):
     bpy.context.scene.scope.footage = str(footage)
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "library.blend"))
