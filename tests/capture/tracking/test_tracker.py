@@ -66,6 +66,25 @@ def test_a_small_person_is_tracked_where_there_is_nobody_else(tracker: PeopleTra
         assert np.linalg.norm(off, axis=1).mean() < 0.03 * entry[1].region.side_px
 
 
+def test_masks_come_with_the_frame_for_which_they_were_requested(tracker: PeopleTracker, frames: Frames) -> None:
+    images = list(frames("clips/gesture_square", stop=6))
+    found = [
+        tracker.step(image, upcoming, upcoming_with_masks=k in (1, 2))[0][1]
+        for k, (image, upcoming) in enumerate(zip(images, [*images[1:], None], strict=True))
+    ]
+    assert [o.mask is not None for o in found] == [False, False, True, True, False, False]
+    tracker.reset()
+    plain = [tracker.step(image)[0][1] for image in images]
+    for one, other in zip(found, plain, strict=True):
+        np.testing.assert_allclose(one.keypoints_px, other.keypoints_px, atol=0.1)
+    mask = found[2].mask
+    assert mask is not None
+    assert mask.region == found[2].region
+    assert mask.image_size == (images[0].shape[1], images[0].shape[0])
+    at = np.rint(mask.region.crop_from_image(found[2].keypoints_px) * 256 - 0.5).astype(int).clip(0, 255)
+    assert np.median(mask.probability[at[:, 1], at[:, 0]]) > 0.9
+
+
 def test_a_hand_is_not_a_person(tracker: PeopleTracker, frames: Frames) -> None:
     seen = [tracker.step(image) for image in frames("clips/hand_closeup", every=18)]
     assert sum(len(observations) > 0 for observations in seen) <= 0.1 * len(seen)
