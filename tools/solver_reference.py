@@ -46,8 +46,8 @@ print(fit.status, fit.t_camera_part, fit.state.beta)  # why it stopped, joints i
 
 `K` is the (3, 3) camera matrix, `pixels` (17, 2), `confidence` (17,), `frames` a list of `Measurements`
 and `times` their times in seconds. For several calibrated cameras, a frame is a list of one `View` for each.
-`solver/examples/` fits 3D joints, 2D keypoints, a marker set and an SMPL+H hand, and refines a regression network's
-output:
+`solver/examples/` fits 3D joints, 2D keypoints, a marker set, an SMPL+H hand and a clip from three cameras, and refines
+a regression network's output:
 
 ```sh
 .venv/bin/python -m scope.solver.examples.from_markers

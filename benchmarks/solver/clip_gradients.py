@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...solver.compiled.kernel import kernel
+from ...solver.compiled.part import Pose
 from ...solver.gauss_newton.linearize import linearize, make_blocks
 from ...solver.gauss_newton.recursion import eliminate, make_workspace
 from ...solver.motion import acceleration
@@ -124,7 +125,7 @@ def add_couplings(D, B1, B2, d, out) -> None:  # type: ignore[no-untyped-def]
 class ConjugateGradients:
     """The damped step of a clip of fixed shape, one own-axes camera and no contacts, by conjugate gradients."""
 
-    def __init__(self, problem: ClipProblem, poses: object, damping: float, root_scale: float) -> None:
+    def __init__(self, problem: ClipProblem, poses: Pose, damping: float, root_scale: float) -> None:
         """Linearize and factorize every frame."""
         tree, T = problem.tree, len(problem.frames)
         self.tree, self.damping, self.root_scale = tree, damping, root_scale

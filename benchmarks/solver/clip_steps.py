@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -65,10 +66,9 @@ def clip_table(rounds: int) -> list[dict[str, float]]:
                 problem, poses = make_clip(K, frames, pool=pool)
                 system = make_system(problem.tree, frames)
                 factor, scale = make_factor(system), problem.settings.root_scale
-                linearize = _least(rounds, lambda p=problem, q=poses, s=system: p.linearize(0, q, s))
-                step = _least(
-                    rounds, lambda p=problem, s=system, f=factor, c=scale: solve_clip(p.tree, s, 1.0, c, f, pool)
-                )
+                linearize = _least(rounds, partial(problem.linearize, 0, poses, system))
+                solve = partial(solve_clip, problem.tree, system, 1.0, scale, factor, pool)
+                step = _least(rounds, solve)
             rows.append({"K": K, "frames": frames, "linearize_ms": linearize / frames, "step_ms": step / frames})
     return rows
 
@@ -81,12 +81,12 @@ def against_gradients(rounds: int, frames: int = 300) -> list[dict[str, float]]:
         system, scale = make_system(problem.tree, frames), problem.settings.root_scale
         problem.linearize(0, poses, system)
         factor, used = make_factor(system), 3 + 3 * len(problem.tree.parents)
-        eliminated = _least(rounds, lambda p=problem, s=system, f=factor, c=scale: solve_clip(p.tree, s, 1.0, c, f))
+        eliminated = _least(rounds, partial(solve_clip, problem.tree, system, 1.0, scale, factor))
         gradients = ConjugateGradients(problem, poses, 1.0, scale)
         gradient = np.ascontiguousarray(system.N[:, :used, 0])
         for tolerance in (1e-2, 1e-4, 1e-8):
             d, iterations = gradients.solve(gradient, tolerance)
-            ms = _least(rounds, lambda g=gradients, r=gradient, t=tolerance: g.solve(r, t))
+            ms = _least(rounds, partial(gradients.solve, gradient, tolerance))
             error = np.abs(d - factor.d[:, :used]).max() / np.abs(factor.d).max()
             rows.append({
                 "gap": gap, "tolerance": tolerance, "iterations": iterations, "error": float(error),

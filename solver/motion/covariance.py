@@ -63,6 +63,7 @@ def _next(tree: Tree, poses: Pose, Z: Array, later: Array, f: int, out: Array) -
     P = -inverse @ X
     PS = P @ later
     own = inverse @ inverse.T + PS @ P.T
+    own = 0.5 * (own + own.T)  # what is not symmetric of rounding would double from frame to frame
     out[f] = _of_joints(tree, poses, f, own, PS[:, 2 * n :], later[2 * n :, 2 * n :])
     following = np.zeros_like(later)
     keep = np.r_[:n, 2 * n : 2 * n + G]  # of `later`: the frame that follows, and the globals

@@ -5,7 +5,14 @@ import subprocess
 import sys
 
 import pytest
-from scope.solver.examples import from_2d_keypoints, from_3d_joints, from_hand, from_markers, refine_regression
+from scope.solver.examples import (
+    from_2d_keypoints,
+    from_3d_joints,
+    from_hand,
+    from_markers,
+    from_several_cameras,
+    refine_regression,
+)
 
 
 def test_from_3d_joints():
@@ -22,6 +29,10 @@ def test_from_markers():
 
 def test_from_hand():
     assert from_hand.main() < 8.0
+
+
+def test_from_several_cameras():
+    assert from_several_cameras.main() < 12.0
 
 
 def test_refine_regression():

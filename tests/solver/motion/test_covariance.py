@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Marginal covariances against the dense inverse of the normal equations."""
 
+from dataclasses import replace
+
 import numpy as np
 from scope.solver.gauss_newton.optimizer import DAMPING_LEAST
 from scope.solver.motion.band import make_factor
@@ -9,7 +11,7 @@ from scope.solver.motion.covariance import joint_covariances
 from ..dense import H as TINY
 from ..dense import moved
 from ..synthetic import forward
-from .clips import K, P, noisy_clip
+from .clips import PRIOR, K, P, noisy_clip
 from .test_band import dense_step
 
 
@@ -32,3 +34,35 @@ def test_covariance_is_that_of_the_dense_inverse():
             J[:, :, k] = np.imag(forward(clip.body, *moved(clip.body, state, d))[1]) / TINY
         expected = J @ S[np.ix_(rows, rows)] @ J.transpose(0, 2, 1)
         np.testing.assert_allclose(found[f], expected, rtol=1e-6, atol=1e-9 * np.abs(expected).max())
+
+
+def dense_matrix(system, T):
+    """The symmetric matrix (T n + G, T n + G) that a system stands for."""
+    n, G = 6 + 3 * K, P + 1
+    A = np.zeros((T * n + G, T * n + G))
+    slots = [0, *range(6, n, 3), 3]
+    for f in range(T):
+        here = slice(f * n, (f + 1) * n)
+        A[here, here] = np.triu(system.D[f, :n, :n])
+        if f > 0:
+            A[(f - 1) * n : f * n, here] = system.B1[f, :n, :n].T
+        if f > 1:
+            for block, at in zip(system.B2[f], slots, strict=True):
+                A[(f - 2) * n + at : (f - 2) * n + at + 3, f * n + at : f * n + at + 3] = block.T
+        A[here, T * n :] = system.N[f, :n, 4 : 4 + G]
+    A[T * n :, T * n :] = np.triu(system.C[:G, :G])
+    return np.triu(A) + np.triu(A, 1).T
+
+
+def test_covariances_far_from_the_middle_of_a_long_clip_are_exact():
+    T, n = 60, 6 + 3 * K
+    clip = noisy_clip(4, frames=T, cameras=1)
+    stiff = replace(PRIOR, joints=30.0, root_rotation=30.0, root_position=500.0, robust_joints=np.inf)
+    problem, poses, system = clip.problem(stiff)
+    problem.linearize(0, poses, system)
+    found, _ = joint_covariances(problem.tree, system, poses, 1.0, make_factor(system))
+    S = np.linalg.inv(dense_matrix(system, T))
+    for f in (0, 30, T - 1):
+        expected = S[f * n + 3 : f * n + 6, f * n + 3 : f * n + 6]  # the pelvis moves as its twist says
+        np.testing.assert_allclose(found[f, 0], expected, rtol=1e-6)
+        assert (np.linalg.eigvalsh(found[f]) > 0.0).all()
