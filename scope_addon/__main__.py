@@ -10,14 +10,30 @@ import os
 import signal
 from types import FrameType
 
+from .command_line.signals import stopping_signals
+
 
 def main() -> None:
     """Load the command line and run it."""
-    for number in (signal.SIGINT, signal.SIGTERM):
+    for number in stopping_signals():
         signal.signal(number, _stop)
-    from .cli import run
-
+    try:
+        from .cli import run
+    except (MemoryError, ImportError, OSError) as error:
+        if not (isinstance(error, MemoryError) or _memory_is_limited()):
+            raise
+        os.write(2, b"scope: there is too little memory to load the program; free memory and try again\n")
+        os._exit(1)
     run()
+
+
+def _memory_is_limited() -> bool:
+    """Return whether a library that cannot be loaded may have met the shell's limit; each says so in its own words."""
+    try:
+        import resource
+    except ImportError:  # on Windows
+        return False
+    return 0 <= resource.getrlimit(resource.RLIMIT_AS)[0] < 1_000_000_000
 
 
 def _stop(number: int, _: FrameType | None) -> None:

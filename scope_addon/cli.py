@@ -20,7 +20,9 @@ from ..solver.errors import ScopeError
 from ..solver.loaders.body_file import ASSETS
 from .command_line.arguments import add_options, body_and_options, non_default_arguments, path_argument
 from .command_line.import_command import add_import
+from .command_line.memory_limit import check_memory_limit
 from .command_line.outputs import (
+    MOTION_SUFFIXES,
     check_blender,
     check_outputs,
     checked_rig,
@@ -31,7 +33,15 @@ from .command_line.outputs import (
 )
 from .command_line.signals import interrupted, stopped_by_signals
 from .command_line.terminal import ProgressBar, open_standard_streams, say, stdout_for_report
-from .errors import FAILED, OutputError, UsageError, exit_status, internal_error_message, system_error_message
+from .errors import (
+    FAILED,
+    OutputError,
+    UsageError,
+    exit_status,
+    internal_error_message,
+    lacks_memory,
+    system_error_message,
+)
 from .footage import json_text
 from .installed import CAPTURE, check_installed
 from .job.parent import stop_with_parent
@@ -136,7 +146,8 @@ def main(argv: Sequence[str] | None = None, program: Sequence[str] = PROGRAM) ->
     except Exception as error:
         if os.environ.get("SCOPE_TRACEBACK"):
             raise
-        print(f"scope: {internal_error_message(error)}", file=sys.stderr)
+        text = system_error_message(MemoryError()) if lacks_memory(error) else internal_error_message(error)
+        print(f"scope: {text}", file=sys.stderr)
         return FAILED
 
 
@@ -167,6 +178,7 @@ def run_capture(args: argparse.Namespace) -> dict[str, Any]:
     outputs = distinct_paths(args.output) or default_outputs(video)
     check_outputs(outputs, args.overlay, video)
     check_blender(outputs)
+    check_memory_limit(with_scene=any(path.suffix.lower() not in MOTION_SUFFIXES for path in outputs))
     rig = checked_rig(args, outputs)
 
     body, options = body_and_options(args)

@@ -68,3 +68,11 @@ def system_error_message(error: OSError | MemoryError) -> str:
     """Describe an error of the operating system, and what to do."""
     cause = str(error) or "out of memory"
     return f"the operating system reports an error: {cause}; free disk space or memory and try again"
+
+
+_WITHOUT_MEMORY = ("bad_alloc", "can't start new thread", "failed to map segment", "annot allocate memory")
+
+
+def lacks_memory(error: BaseException) -> bool:
+    """Return whether an error means that there is too little memory; libraries have errors of their own for that."""
+    return isinstance(error, MemoryError) or any(text in str(error) for text in _WITHOUT_MEMORY)

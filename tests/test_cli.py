@@ -262,7 +262,7 @@ def test_no_temporary_folder_of_blender_is_left(tmp_path):
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows ends a process at once")
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGINT)])
 def test_a_signal_while_the_program_is_loaded_has_its_word(number):
     """Numpy is imported after the handlers are installed; this stand-in sends the signal then."""
     code = (
@@ -276,3 +276,22 @@ def test_a_signal_while_the_program_is_loaded_has_its_word(number):
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout, done.stderr) == (130, "", "scope: stopped\n")
+
+
+@pytest.mark.parametrize(
+    "error",
+    [
+        MemoryError(),
+        RuntimeError("can't start new thread"),
+        ImportError("libx.so: failed to map segment from shared object"),
+        RuntimeError("[ONNXRuntimeError] : 6 : std::bad_alloc"),
+    ],
+)
+def test_too_little_memory_is_no_bug(tmp_path, capsys, monkeypatch, error):
+    def fail(args):
+        raise error
+
+    monkeypatch.setattr(cli, "run_capture", fail)
+    status, _, err = run(capsys, "capture", str(SAMPLE), "-o", str(tmp_path / "out.npz"))
+    assert (status, err.count("\n")) == (1, 1)
+    assert "out of memory; free disk space or memory and try again" in err

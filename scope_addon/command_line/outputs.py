@@ -101,8 +101,10 @@ def checked_rig(args: argparse.Namespace, outputs: list[Path]) -> RigSource | No
         if path.exists() and path.samefile(rig.path):
             raise UsageError(f"{path} is the rig's own file; choose another name")
     from ..scene.rigs.rig_file import check_rig
+    from .bounded_import import bounded_import
 
-    check_rig(rig, fingers=args.hands)
+    with bounded_import(rig.path):
+        check_rig(rig, fingers=args.hands)
     return rig
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Convert SIGINT and SIGTERM to a KeyboardInterrupt whose message says what has been written."""
+"""Convert SIGINT, SIGTERM and SIGHUP to a KeyboardInterrupt whose message says what has been written."""
 
 from __future__ import annotations
 
@@ -30,9 +30,17 @@ def _interrupt(number: int, _: FrameType | None) -> None:
     raise KeyboardInterrupt
 
 
+def stopping_signals() -> list[signal.Signals]:
+    """Return the signals that end a command: Ctrl-C, a request, and a closed terminal, unless that is to be ignored."""
+    found = [signal.SIGINT, signal.SIGTERM]
+    if hasattr(signal, "SIGHUP") and signal.getsignal(signal.SIGHUP) != signal.SIG_IGN:  # as nohup sets it
+        found.append(signal.SIGHUP)
+    return found
+
+
 @contextmanager
 def stopped_by_signals() -> Iterator[None]:
-    """Raise KeyboardInterrupt on SIGINT and SIGTERM, so that no partial file and no process is left behind.
+    """Raise KeyboardInterrupt on SIGINT, SIGTERM and SIGHUP, so that no partial file and no process is left behind.
 
     Blender's own handler of Ctrl-C only sets a flag, with which a batch would run to its end.
 
@@ -42,7 +50,7 @@ def stopped_by_signals() -> Iterator[None]:
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    before = {number: signal.signal(number, _interrupt) for number in (signal.SIGINT, signal.SIGTERM)}
+    before = {number: signal.signal(number, _interrupt) for number in stopping_signals()}
     try:
         yield
     finally:

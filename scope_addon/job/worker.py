@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import IO, NoReturn
 
 from ...solver.errors import ScopeError
-from ..errors import exit_status, system_error_message
+from ..errors import exit_status, lacks_memory, system_error_message
 from ..footage import json_text
 from .parent import when_parent_ends
 from .request import WARM_UP, JobRequest
@@ -65,6 +65,9 @@ def run(request: JobRequest | None, job_folder: Path, reporter: Reporter) -> int
         reporter.send("error", message=str(error))
         return exit_status(error)
     except ImportError as error:
+        if lacks_memory(error):
+            reporter.send("error", message=system_error_message(MemoryError()))
+            return 1
         reporter.send("error", message=f"a part of Scope cannot be loaded ({error}); reinstall the extension")
     except (OSError, MemoryError) as error:
         reporter.send("error", message=system_error_message(error))

@@ -10,7 +10,7 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from ....solver.errors import ModelFileError, ScopeError
-from ...errors import SetupError, UsageError
+from ...errors import SetupError, UsageError, lacks_memory
 from .adapters.network_server import make_session
 from .execution import CPU, DIRECTML, PROVIDERS, Execution, SerializedSession
 
@@ -60,6 +60,7 @@ def open_session(
     :raises ModelFileError: the file is damaged, or uses operators that onnxruntime does not have.
     :raises SetupError: onnxruntime cannot be imported.
     :raises UsageError: there are fewer than 1 thread.
+    :raises MemoryError: there is too little memory.
     """
     if threads < 1:
         raise UsageError(f"{threads} threads were requested; at least 1 is needed.")
@@ -70,6 +71,8 @@ def open_session(
         except ScopeError:  # it takes too much time or memory, on any provider
             raise
         except Exception as error:  # onnxruntime's exceptions have no common base
+            if name == CPU and open_on is None and lacks_memory(error):
+                raise MemoryError from error
             if name == CPU:
                 raise ModelFileError(_cannot_load(path, error)) from error
             execution.fell_back(name, error)
@@ -100,6 +103,9 @@ def _cannot_load(path: Path, error: Exception) -> str:
 def _runtime() -> ModuleType:
     try:
         import onnxruntime
+
+        if not hasattr(onnxruntime, "InferenceSession"):  # it swallows the reason why its library was not loaded
+            raise ImportError("its library cannot be loaded")
     except ImportError as error:
         raise SetupError(
             f"onnxruntime cannot be imported ({error}). Run ./scripts/capture, which installs it."

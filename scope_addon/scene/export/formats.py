@@ -10,7 +10,7 @@ import re
 import struct
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager, redirect_stdout
+from contextlib import contextmanager, nullcontext, redirect_stderr, redirect_stdout
 from pathlib import Path
 from typing import Any
 
@@ -219,13 +219,17 @@ class _NullStream(io.TextIOBase):
 
 @contextmanager
 def quiet() -> Iterator[None]:
-    """Suppress the output of Blender's exporters, because standard output may carry a machine-readable report."""
+    """Suppress the output of Blender's importers and exporters: standard output may carry a machine-readable report.
+
+    Blender prints the traceback of one that fails; with SCOPE_TRACEBACK set, it is left alone.
+    """
     sys.stdout.flush()
+    errors = nullcontext() if os.environ.get("SCOPE_TRACEBACK") else redirect_stderr(_NullStream())
     keep = os.dup(1)
     devnull = os.open(os.devnull, os.O_WRONLY)
     try:
         os.dup2(devnull, 1)  # output of Blender's C++ code
-        with redirect_stdout(_NullStream()):  # output of exporters in Python
+        with redirect_stdout(_NullStream()), errors:  # output of Python
             yield
     finally:
         sys.stdout.flush()

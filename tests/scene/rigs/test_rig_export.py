@@ -211,6 +211,16 @@ def test_damaged_files_are_refused_in_one_sentence(tmp_path, suffix, damage):
     assert not bpy.data.armatures
 
 
+def test_an_importer_that_fails_prints_no_traceback(tmp_path, capfd):
+    """The file is whole, but one model's name lacks its class, at which Blender's importer raises."""
+    path = save_rig(tmp_path / "rig.fbx")
+    path.write_bytes(path.read_bytes().replace(b"\0\x01Model", b"..Model"))
+    with pytest.raises(InputError, match=r"rig\.fbx: Blender cannot import this file"):
+        check_rig(rig_source(path))
+    said = capfd.readouterr()
+    assert (said.out, said.err) == ("", "")
+
+
 @pytest.mark.parametrize("kind", [".blend", ".fbx", ".glb"])
 def test_root_motion_on_an_object_is_the_same_in_every_format(tmp_path, kind):
     source = rig_source(save_rig(tmp_path / "rig.glb"))

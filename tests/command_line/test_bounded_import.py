@@ -1,0 +1,40 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A rig that takes the importer too long, or too much memory, ends the command with one sentence."""
+
+import subprocess
+import sys
+
+import pytest
+
+CODE = """
+import pathlib, sys, time
+from scope.scope_addon.command_line import bounded_import as b
+b.BASE_S, b.BASE_BYTES = 0.6, 100_000_000
+with b.bounded_import(pathlib.Path(sys.argv[1])):
+    pass
+with b.bounded_import(pathlib.Path(sys.argv[1])):
+    {work}
+print("whole", flush=True)
+"""
+
+
+@pytest.mark.parametrize(
+    ("work", "says"),
+    [
+        ("while True: pass", "Blender did not finish importing this file within 1 s; export it again"),
+        ("block = bytearray(b'1') * 300_000_000; time.sleep(20)", "takes more than 0.1 GB of memory; export it again"),
+        ("block = bytearray(b'1') * 30_000_000", None),
+    ],
+)
+def test_time_and_memory_are_bounded(tmp_path, work, says):
+    rig = tmp_path / "rig.fbx"
+    rig.write_bytes(b"short")
+    command = [sys.executable, "-c", CODE.format(work=work), rig]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
+    if says is None:
+        assert (done.returncode, done.stdout, done.stderr) == (0, "whole\n", "")
+    else:
+        assert (done.returncode, done.stdout) == (1, "")
+        assert done.stderr.startswith(f"scope: {rig}: ")
+        assert says in done.stderr
+        assert done.stderr.count("\n") == 1
