@@ -7,18 +7,19 @@ import cv2
 
 # Name of the picture: screenshot, and the part of it to show (left, top, right, bottom in pixels).
 PICTURES = {
-    "footage": ("2_footage_chosen", (1000, 60, 1330, 330)),
+    "footage": ("2_footage_chosen", (1000, 60, 1330, 280)),
     "capturing": ("9_body_over_footage", (700, 60, 1330, 560)),
-    "result": ("6_result", (1000, 60, 1330, 900)),
+    "result": ("6_result", (1000, 60, 1330, 870)),
     "compared": ("7_compared_with_footage", (0, 25, 1330, 900)),
-    "export": ("8_export_window", (0, 0, 1600, 1000)),
-    "preferences": ("11_preferences", (0, 0, 1600, 1000)),
+    "export": ("8_export_window", (230, 165, 1370, 850)),
+    "preferences": ("11_preferences", (830, 36, 1518, 572)),
 }
+_SCALE = 0.6  # of wide pictures
 ROOT = Path(__file__).resolve().parents[2]
 
 for name, (screenshot, (left, top, right, bottom)) in PICTURES.items():
     picture = cv2.imread(str(ROOT / "build" / "screenshots" / f"{screenshot}.png"))[top:bottom, left:right]
     if picture.shape[1] > 1000:
-        picture = cv2.resize(picture, None, fx=0.6, fy=0.6, interpolation=cv2.INTER_AREA)
+        picture = cv2.resize(picture, None, fx=_SCALE, fy=_SCALE, interpolation=cv2.INTER_AREA)
     cv2.imwrite(str(ROOT / "assets" / "guide" / f"{name}.jpg"), picture, [cv2.IMWRITE_JPEG_QUALITY, 85])
 print("The guide's pictures in assets/guide are new; look at them.")

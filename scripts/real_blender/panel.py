@@ -147,7 +147,7 @@ def steps() -> Iterator[float]:
 
     invoke(bpy.ops.scope.look_through)
     scene.frame_set(result.frames // 2)
-    yield 2.0
+    yield 5.0  # Blender moves the panels below gradually
     picture("7_compared_with_footage")
     report["frame_covered_px"] = frame_covered()
     assert report["frame_covered_px"] <= 0, "the sidebar covers the camera's frame"
@@ -179,7 +179,7 @@ def steps() -> Iterator[float]:
         report["exports"].append(f"export.{suffix}")
     yield 1.0
     invoke(bpy.ops.scope.export, "INVOKE_DEFAULT", format="GLB")
-    yield 3.0
+    yield 5.0
     picture("8_export_window")
     for window in list(bpy.context.window_manager.windows)[1:]:
         with bpy.context.temp_override(window=window):
@@ -209,7 +209,7 @@ def steps() -> Iterator[float]:
         invoke(bpy.ops.scope.capture, "INVOKE_DEFAULT")
     except RuntimeError as error:
         report["missing_footage"] = str(error).strip()
-    yield 5.0  # Blender moves the panels below gradually
+    yield 5.0
     picture("10_missing_footage")
     bpy.ops.screen.userpref_show()
     bpy.context.preferences.active_section = "ADDONS"

@@ -133,7 +133,20 @@ def dragged(was: tuple[float, float], by: tuple[int, int]) -> Iterator[float]:
         use(bpy.ops.scope.smooth, strength=strength)
         yield 0.5
         report[f"smoothed_{strength}_px"] = off("left_wrist", target)
+    yield from dragged_while_busy("left_ankle", (24, -20))
     key("Escape")
+    yield 1.0
+
+
+def dragged_while_busy(joint: str, by: tuple[int, int]) -> Iterator[float]:
+    """Drag a handle while Blender does not react: the drag is over before Blender handles the press."""
+    before, (x, y) = len(listed()), on_screen(joint)
+    xdotool(*move(x - 3, y), *move(x, y), "mousedown", 1, *move(x + by[0], y + by[1]), "mouseup", 1)
+    time.sleep(3.0)
+    yield 3.0
+    assert [e["joint"] for e in listed()[before:]] == [joint], listed()
+    report["dragged_while_busy_px"] = off(joint, (x + by[0], y + by[1]))
+    invoke(bpy.ops.ed.undo)
     yield 1.0
 
 

@@ -14,7 +14,7 @@ from ...footage import FOOTAGE_SUFFIXES
 from ...job.progress import duration
 from .. import warm_up
 from ..reporting import iface_, rpt_, sentence, tip_
-from ..view.sidebar import is_over_tab, show_tab
+from ..view.sidebar import is_over_tab, redraw_sidebars, redraw_sidebars_twice, show_tab
 from ..view.view_operators import frame_selected, hide_startup_cube
 from . import preview_picture
 
@@ -141,7 +141,7 @@ class SCOPE_OT_capture(bpy.types.Operator):
             context.workspace.status_text_set(
                 iface_("Scope: {progress}   (Esc over the Scope panel to cancel)", progress=progress)
             )
-            redraw(context)
+            redraw_sidebars(context)
         return self._end(context, outcome) if outcome else {"PASS_THROUGH"}
 
     def cancel(self, context: bpy.types.Context) -> None:
@@ -192,7 +192,7 @@ class SCOPE_OT_capture(bpy.types.Operator):
     def _fail(self, error: Exception | str) -> bool:
         state.message = sentence(error)
         stop_job()  # before the report, which raises in a script
-        redraw_twice(bpy.context)
+        redraw_sidebars_twice(bpy.context)
         self.report({"ERROR"}, state.message)
         return False
 
@@ -205,7 +205,7 @@ class SCOPE_OT_capture(bpy.types.Operator):
         if "FINISHED" in outcome:
             hide_startup_cube(context)
             frame_selected(context)
-        redraw_twice(context)
+        redraw_sidebars_twice(context)
         return outcome
 
 
@@ -255,20 +255,6 @@ def clear_status_bar() -> None:
     for workspace in bpy.data.workspaces:
         with bpy.context.temp_override(workspace=workspace):  # Blender sets only the context's text
             workspace.status_text_set(None)
-
-
-def redraw(context: bpy.types.Context) -> None:
-    """Redraw the sidebars, but not the viewports, because redrawing a large scene repeatedly is slow."""
-    areas = [a for window in context.window_manager.windows for a in window.screen.areas if a.type == "VIEW_3D"]
-    for region in (r for area in areas for r in area.regions if r.type == "UI"):
-        region.tag_redraw()
-
-
-def redraw_twice(context: bpy.types.Context) -> None:
-    """Redraw now and again shortly: panels below one whose height changed move only at the second redraw."""
-    redraw(context)
-    if not bpy.app.background:
-        bpy.app.timers.register(lambda: redraw(bpy.context), first_interval=0.3)
 
 
 CLASSES = (SCOPE_OT_choose_footage, SCOPE_OT_use_sample, SCOPE_OT_capture, SCOPE_OT_cancel)

@@ -63,3 +63,17 @@ def is_over_tab(window: bpy.types.Window, event: bpy.types.Event) -> bool:
         for sidebar in _sidebars(area)
         if sidebar.width > 1  # a hidden one is 1 pixel wide
     )
+
+
+def redraw_sidebars(context: bpy.types.Context) -> None:
+    """Redraw the sidebars, but not the viewports, because redrawing a large scene repeatedly is slow."""
+    areas = [a for window in context.window_manager.windows for a in window.screen.areas if a.type == "VIEW_3D"]
+    for region in (sidebar for area in areas for sidebar in _sidebars(area)):
+        region.tag_redraw()
+
+
+def redraw_sidebars_twice(context: bpy.types.Context) -> None:
+    """Redraw now and again shortly: panels below one whose height changed move only at the second redraw."""
+    redraw_sidebars(context)
+    if not bpy.app.background:
+        bpy.app.timers.register(lambda: redraw_sidebars(bpy.context), first_interval=_DRAWN_AFTER_S)

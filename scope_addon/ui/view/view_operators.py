@@ -10,7 +10,7 @@ from mathutils import Matrix
 from ..reporting import ReportingOperator, rpt_, tip_
 from . import comparison
 from .comparison import camera_of, is_looking_through, is_side_view
-from .sidebar import viewport_of
+from .sidebar import redraw_sidebars_twice, viewport_of
 
 
 def hide_startup_cube(context: bpy.types.Context) -> None:
@@ -74,6 +74,7 @@ class SCOPE_OT_look_through(bpy.types.Operator):
                 comparison.close_side_view(context.window, side)
             for obj in [obj for obj in scene.scope.result.collection.all_objects if "scope_source" in obj]:
                 hide_again(obj, context.view_layer)
+            redraw_sidebars_twice(context)
             return {"FINISHED"}
         assert camera is not None  # checked by poll
         scene.camera = camera
@@ -82,6 +83,7 @@ class SCOPE_OT_look_through(bpy.types.Operator):
         set_resolution(scene, scene.scope.result.collection)
         if not bpy.app.background and context.area and context.area.type == "VIEW_3D":
             comparison.begin(context, context.area, scene.scope.result.collection)
+        redraw_sidebars_twice(context)
         return {"FINISHED"}
 
 
