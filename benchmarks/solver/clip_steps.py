@@ -26,6 +26,7 @@ from .problem import make_problem
 RATE = 30.0
 LENGTHS = (75, 150, 300, 600)
 GAP = 30  # frames without measurements
+MOTION = MotionPrior(joints=0.1, root_rotation=0.1, root_position=3.0)  # larger ones need more conjugate gradients
 
 
 def make_clip(
@@ -50,7 +51,7 @@ def make_clip(
     if not fixed:
         poses.beta[:] = p.bank[3][0]
     stands = StandingPoints(np.arange(contacts), np.full((frames, contacts), 0.5))
-    motion = MotionTerms.make(tree, np.arange(frames) / RATE, MotionPrior(), stands)
+    motion = MotionTerms.make(tree, np.arange(frames) / RATE, MOTION, stands)
     stage = Stage(Weights())
     settings = make_settings(Options(stages=[stage]), [stage])
     P = tree.shape

@@ -24,14 +24,18 @@ class MotionPrior:
     robust_joints, robust_root_rotation: Geman-McClure sigma of squared accelerations, (rad/s^2)^2;
     robust_root_position: (m/s^2)^2. Infinity turns the kernel off.
     contact: weight of standing points, s/m^2.
+
+    The defaults suit keypoints of a network at 60 frames per second. Errors of a network in neighbouring frames are
+    alike, so that more frames say less than their number: at other rates, weights of acceleration times (rate / 60)^2
+    were found better. Markers, whose errors are independent, need less.
     """
 
-    joints: ArrayLike = 0.1
-    root_rotation: float = 0.1
-    root_position: float = 3.0
-    robust_joints: float = 1e4
-    robust_root_rotation: float = 1e4
-    robust_root_position: float = 400.0
+    joints: ArrayLike = 1.0
+    root_rotation: float = 1.0
+    root_position: float = 30.0
+    robust_joints: float = 4e4
+    robust_root_rotation: float = 4e4
+    robust_root_position: float = 1600.0
     contact: float = 3e3
 
     def __post_init__(self) -> None:

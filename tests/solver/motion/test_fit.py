@@ -154,14 +154,15 @@ def test_several_cameras_without_a_state_to_start_from():
     frames = clip.frames()
     for views in frames:
         views[0] = replace(views[0], measurements=replace(views[0].measurements, keypoints3d=None))
-    found = fit_motion(clip.body, frames, clip.times, priors=Priors(), options=TIGHT)
+    loose = MotionPrior(joints=0.01, root_rotation=0.01, root_position=0.1)  # the walk is jerky
+    found = fit_motion(clip.body, frames, clip.times, priors=Priors(), options=TIGHT, motion=loose)
     error = np.linalg.norm(found.t_world_part - joints(clip.body, clip.starts), axis=-1)
     assert np.median(error) < 0.03
     # one camera elsewhere in the world, alone
     alone = [[replace(v[1], measurements=replace(v[1].measurements, keypoints3d=Keypoints3D(
         np.arange(M), clip.points[f] @ np.asarray(v[1].R_camera_world).T + v[1].t_camera_world, np.ones(M))))]
         for f, v in enumerate(frames)]  # fmt: skip
-    one = fit_motion(clip.body, alone, clip.times, priors=Priors(), options=TIGHT)
+    one = fit_motion(clip.body, alone, clip.times, priors=Priors(), options=TIGHT, motion=loose)
     assert np.median(np.linalg.norm(one.t_world_part - joints(clip.body, clip.starts), axis=-1)) < 0.05
 
 
