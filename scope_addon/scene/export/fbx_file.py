@@ -109,8 +109,10 @@ def _name_take(root: _Node, name: bytes) -> None:
 
 
 def _number_objects(root: _Node) -> None:
-    """Number the document and the objects in their order in the file, in place, wherever they are referred to."""
-    listed = [node for top in _below(root, b"Documents", b"Objects") for node in top.elems if node.props_type[:1] == b"L"]
+    """Replace the numbers of the document and the objects by their order in the file, in place."""
+    listed = [
+        node for top in _below(root, b"Documents", b"Objects") for node in top.elems if node.props_type[:1] == b"L"
+    ]
     number = {node.props[0]: _FIRST_ID + place for place, node in enumerate(listed)}
     holders = [(node, (0,)) for node in listed]
     poses = (node for node in listed if node.id == b"Pose")

@@ -6,7 +6,7 @@ from scope.scope_addon.scene.export.export import export_motions
 
 
 def test_files_do_not_depend_on_the_time_or_on_hashes(body, make_motion, tmp_path, monkeypatch):
-    """Blender's exporter numbers objects by hashes that every process salts; another salt stands for another process."""
+    """Blender's exporter numbers objects by hashes that every process salts; a salt here stands for a process."""
     motion, files = make_motion(body, 3), []
     for folder, salt in (("a", "first"), ("b", "second")):
         path = tmp_path / folder / "walk.fbx"
