@@ -11,6 +11,7 @@ import bpy
 from bpy.props import IntProperty, StringProperty
 
 from ..job.cache import Cache
+from ..job.private_folder import private_folder
 from ..options import Place
 from . import keymap
 from .declared_properties import with_options
@@ -96,13 +97,11 @@ def cache() -> Cache:
 
 
 def user_folder() -> Path:
-    """Return a folder that upgrades keep; in the system's temporary folder if Scope is not enabled as an extension."""
+    """Return a folder that upgrades keep; one among the user's caches if Scope is not enabled as an extension."""
     try:
         return Path(bpy.utils.extension_path_user(PACKAGE, create=True))
     except ValueError:
-        import tempfile
-
-        return Path(tempfile.gettempdir()) / "scope-user"
+        return private_folder()
 
 
 def _cache_size(root: Path) -> int:

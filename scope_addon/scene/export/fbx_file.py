@@ -7,7 +7,8 @@ object is scaled: vertices and shapes, translations and their curves, the transl
 of cameras.
 
 Blender's exporter starts at the time of the scene's first frame, which is 1/20 s at frame 1 and 20 frames per second,
-and names the take after the scene.
+and names the take after the scene. It numbers objects at random and writes the time of day; here both are replaced, so
+that the same motion gives the same file.
 
 The file is read and written with the parser and the encoder of Blender's FBX add-on, which need not be enabled.
 """
@@ -46,6 +47,9 @@ _ADD = {
 _MATRICES = (b"Matrix", b"Transform", b"TransformLink", b"TransformAssociateModel")
 _TRANSLATION = slice(12, 15)  # of a matrix's 16 elements
 _SEPARATOR = b"\0\x01"  # between an object's name and its class
+# The moment that Blender's exporter writes as the file's CreationTime.
+_CREATED = {b"Year": 1970, b"Month": 1, b"Day": 1, b"Hour": 10, b"Minute": 0, b"Second": 0, b"Millisecond": 0}
+_FIRST_ID = 1_000_000
 _LIMITS = (b"LocalStart", b"LocalStop", b"ReferenceStart", b"ReferenceStop")
 _LENGTHS = (
     *(b"Lcl Translation", b"Size"),
@@ -72,6 +76,8 @@ def correct_fbx(path: Path, take: str) -> None:
         _multiply_lengths(root, factor)
     _start_at_zero(root)
     _name_take(root, take.encode())
+    _number_objects(root)
+    _set_creation_time(root)
     encode_bin.write(str(path), _encoded(root, encode_bin.FBXElem), version)
 
 
@@ -100,6 +106,28 @@ def _name_take(root: _Node, name: bytes) -> None:
             current.props[0] = name if current.props[0] else b""
         for take in _below(takes, b"Take"):
             take.props[0] = name
+
+
+def _number_objects(root: _Node) -> None:
+    """Replace the numbers of the document and the objects by their order in the file, in place."""
+    listed = [
+        node for top in _below(root, b"Documents", b"Objects") for node in top.elems if node.props_type[:1] == b"L"
+    ]
+    number = {node.props[0]: _FIRST_ID + place for place, node in enumerate(listed)}
+    holders = [(node, (0,)) for node in listed]
+    poses = (node for node in listed if node.id == b"Pose")
+    holders += [(n, (0,)) for pose in poses for each in _below(pose, b"PoseNode") for n in _below(each, b"Node")]
+    holders += [(link, (1, 2)) for top in _below(root, b"Connections") for link in _below(top, b"C")]
+    for node, places in holders:
+        for place in places:
+            node.props[place] = number.get(node.props[place], node.props[place])  # 0 is the scene
+
+
+def _set_creation_time(root: _Node) -> None:
+    """Set the time of creation to a fixed one, in place."""
+    for header in _below(root, b"FBXHeaderExtension"):
+        for part in (part for stamp in _below(header, b"CreationTimeStamp") for part in stamp.elems):
+            part.props[0] = _CREATED.get(part.id, part.props[0])
 
 
 def _multiply_lengths(root: _Node, factor: float) -> None:
