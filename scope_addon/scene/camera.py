@@ -116,6 +116,8 @@ def show_footage(
     Blender shows one frame of a movie clip per frame of the scene, so a clip is synchronized only if the scene has the
     constant rate of the footage. Otherwise, the footage is shown as an image, whose frame can be keyed. Only a clip can
     be undistorted; therefore footage of a distorting lens is always a clip, even if it drifts or is a single picture.
+    Blender 4.3 can crash when a clip is deleted that the viewport shows, or when that is undone; with an image in its
+    place, the same was repeated without a crash.
 
     :param footage: video or picture; the first one of numbered pictures.
     :param frames: (T,) scene frame of each pose.
