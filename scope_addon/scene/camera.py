@@ -10,6 +10,9 @@ Pixel aspect and resolution belong to the scene in Blender; the camera alone is 
 a display aspect of its own, without which it would not fill the picture. The clip's lens has a third one, fy / fx,
 because it measures rows in units of columns. Source: Blender's BKE_camera_params_compute_viewplane, overlay_image.cc
 and tracking.cc.
+
+Blender 4.3 can crash when a movie clip is deleted that the viewport shows, or when that is undone; with an image in its
+place, the same was repeated without a crash.
 """
 
 from __future__ import annotations
@@ -116,8 +119,6 @@ def show_footage(
     Blender shows one frame of a movie clip per frame of the scene, so a clip is synchronized only if the scene has the
     constant rate of the footage. Otherwise, the footage is shown as an image, whose frame can be keyed. Only a clip can
     be undistorted; therefore footage of a distorting lens is always a clip, even if it drifts or is a single picture.
-    Blender 4.3 can crash when a clip is deleted that the viewport shows, or when that is undone; with an image in its
-    place, the same was repeated without a crash.
 
     :param footage: video or picture; the first one of numbered pictures.
     :param frames: (T,) scene frame of each pose.
