@@ -3,8 +3,8 @@
 
 They keep clear of what crashes Blender 4.3 without Scope: linking from the file that is open; removing the library of
 the scene that the window shows (``bpy.data.libraries.remove`` leaves the window without a scene); deleting a movie clip
-that the viewport shows as a camera's background, and undoing that, after which drawing reads the clip's freed textures;
-scenes that share their objects (``scene.new(type="LINK_COPY")``) with undo, and then showing another scene.
+that the viewport shows as a camera's background, after which, at once or after undo, drawing reads the clip's freed
+textures; scenes that share their objects (``scene.new(type="LINK_COPY")``) with undo, and then showing another scene.
 """
 
 from __future__ import annotations
