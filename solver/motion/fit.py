@@ -79,7 +79,7 @@ def fit_motion(
     :param init: each frame's state in the world's axes; without it, the frames are first fitted in order, several
         cameras by points triangulated from their 2D keypoints.
     :param priors: `default_priors(body)` unless given.
-    :param options: the stages are those of a fit that starts from a state; `curvature` and `report` have no effect.
+    :param options: the stages are those of a fit that starts from a state; `report` has no effect.
     :param motion: weights of acceleration and of standing points.
     :param stands: points that may stand still, with the probability that they do.
     :param shape: (P,) where it is known; it is then kept.

@@ -19,6 +19,7 @@ from ..gauss_newton.optimizer import (
 )
 from ..rotations import exp3
 from .band import eliminate_clip, make_factor, solve_clip
+from .curvature import ClipCurvature
 from .problem import ClipProblem
 from .system import make_poses, make_system
 
@@ -77,30 +78,39 @@ class Optimizer:
 
     def _run_stage(self, s: int) -> int:
         settings, problem = self.problem.settings, self.problem
+        verdict = RUNNING
         damping, growth, tolerance = settings.damping, FIRST_GROWTH, settings.tolerances[s]
         self.cost = problem.linearize(s, self.poses, self.system)
         self.costs = problem.costs
         if not np.isfinite(self.cost):
             return NON_FINITE
+        learned = ClipCurvature(problem.tree, len(problem.frames), settings.curvature and not problem.coupled)
+        learned.set_current(self.poses, problem.H_uu, problem.g_u)
         for _ in range(settings.limits[s]):
+            learned.apply(self.poses, self.system)
             predicted = solve_clip(problem.tree, self.system, damping, settings.root_scale, self.factor, self.pool)
             if predicted <= LEAST_DECREASE * self.cost:
-                return CONVERGED
+                verdict = CONVERGED
+                break
             self.iterations += 1
             cost = np.inf
             if np.isfinite(predicted):
                 retract_clip(problem.tree, self.poses, self.factor.d, self.factor.dg, self._trial)
                 cost = problem.linearize(s, self._trial, self._other)
             accepted, damping, growth, verdict = judge_trial(self.cost, cost, predicted, damping, growth, tolerance)
+            if np.isfinite(cost):
+                learned.update(self.poses, self.factor.d, self._trial, problem.H_uu, problem.g_u, accepted)
             if accepted:
                 self.cost, self.costs = cost, problem.costs
                 self.poses, self._trial = self._trial, self.poses
                 self.system, self._other = self._other, self.system
+                learned.set_current(self.poses, problem.H_uu, problem.g_u)
             else:
                 self.rejected += 1
             if verdict != RUNNING:
-                return verdict
-        return MAX_ITERATIONS
+                break
+        learned.apply(self.poses, self.system, wanted=False)
+        return MAX_ITERATIONS if verdict == RUNNING else verdict
 
     def information(self) -> Array:
         """Return the information (G, G) of the global columns with all poses eliminated, priors included."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..compiled.part import Array, Blocks, Pose
+from ..compiled.part import GRADIENT, Array, Blocks, Pose
 from ..compiled.tree import Tree
 from ..custom_residuals.external import raise_failure
 from ..gauss_newton.linearize import clear_blocks, linearize, make_blocks, make_pose, make_scratch, place_parts
@@ -92,6 +92,9 @@ class ClipProblem:
         self.settings.stages[:, 0, SHAPE_PRIOR] = 0.0
         self._memories = [_Memory.make(self.tree) for _ in range(2 if self.pool is not None else 1)]
         K, W = len(self.tree.parents) - 1, self.tree.S.shape[2]
+        T = len(self.frames)
+        self.H_uu, self.g_u = np.zeros((T, K, 3, 3)), np.zeros((T, K, 3))  # of the joints alone, as last linearized
+        self.coupled = False  # whether a residual couples a joint's state with its part's pose
         self._triple = np.zeros((6, 3, 3))
         self._rows, self._columns = np.zeros((3, 3, 6 + 3 * K + W)), np.zeros(6 + 3 * K, np.int64)
 
@@ -148,6 +151,8 @@ class ClipProblem:
                 if not alone:
                     add_turned(view.R, blocks, total)
             own = blocks if alone else total
+            self.coupled = self.coupled or bool(own.cross[0])
+            self.H_uu[f], self.g_u[f] = own.H_uu[1:], own.H_u[1:, :, GRADIENT]
             write_frame(tree, pose, own, memory.sums, system.D[f], system.N[f], C, c)
         return cost
 
