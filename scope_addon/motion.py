@@ -125,7 +125,13 @@ class Motion:
         if missing:
             raise MotionFileError(f"{path} lacks {', '.join(missing)}: it is not a motion file of this version")
         values: dict[str, Any] = {k: v.item() if v.ndim == 0 else v for k, v in data.items() if k in known}
-        return cls(**values, corrections={key: data[key] for key in CORRECTION_KEYS if key in data})
+        corrections = {key: data[key] for key in CORRECTION_KEYS if key in data}
+        try:
+            return cls(**values, corrections=corrections)
+        except MotionFileError:
+            raise
+        except (TypeError, ValueError, OverflowError) as error:  # of numpy's conversions
+            raise MotionFileError(f"{path} holds a value of the wrong kind ({error}); capture again") from error
 
 
 # Only in files with corrections. The first rows say what was corrected, the others how the changed frames were before.
