@@ -11,7 +11,7 @@ from __future__ import annotations
 import io
 from dataclasses import dataclass, field, fields
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -96,20 +96,18 @@ class Motion:
         """
         path = Path(path)
         try:
-            with atomic_path(path) as temporary, temporary.open("wb") as file:
-                self._write(file)
+            with atomic_path(path) as temporary:
+                # In one piece: where the disk is full, a ZipFile would raise again when it is destroyed.
+                temporary.write_bytes(self.to_bytes())
         except OSError as error:
             raise OutputError(f"cannot write {path}: {reason(error)}") from error
 
     def to_bytes(self) -> bytes:
         """Return the content of the motion file."""
         file = io.BytesIO()
-        self._write(file)
-        return file.getvalue()
-
-    def _write(self, file: BinaryIO) -> None:
         arrays = {f.name: np.asarray(getattr(self, f.name)) for f in fields(self) if f.name != "corrections"}
         np.savez_compressed(file, **arrays, **self.corrections)
+        return file.getvalue()
 
     @classmethod
     def load(cls, path: str | Path, content: bytes | None = None) -> Motion:
