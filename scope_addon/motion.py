@@ -11,7 +11,7 @@ from __future__ import annotations
 import io
 from dataclasses import dataclass, field, fields
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -96,20 +96,18 @@ class Motion:
         """
         path = Path(path)
         try:
-            with atomic_path(path) as temporary, temporary.open("wb") as file:
-                self._write(file)
+            with atomic_path(path) as temporary:
+                # In one piece: where the disk is full, a ZipFile would raise again when it is destroyed.
+                temporary.write_bytes(self.to_bytes())
         except OSError as error:
             raise OutputError(f"cannot write {path}: {reason(error)}") from error
 
     def to_bytes(self) -> bytes:
         """Return the content of the motion file."""
         file = io.BytesIO()
-        self._write(file)
-        return file.getvalue()
-
-    def _write(self, file: BinaryIO) -> None:
         arrays = {f.name: np.asarray(getattr(self, f.name)) for f in fields(self) if f.name != "corrections"}
         np.savez_compressed(file, **arrays, **self.corrections)
+        return file.getvalue()
 
     @classmethod
     def load(cls, path: str | Path, content: bytes | None = None) -> Motion:
@@ -125,7 +123,13 @@ class Motion:
         if missing:
             raise MotionFileError(f"{path} lacks {', '.join(missing)}: it is not a motion file of this version")
         values: dict[str, Any] = {k: v.item() if v.ndim == 0 else v for k, v in data.items() if k in known}
-        return cls(**values, corrections={key: data[key] for key in CORRECTION_KEYS if key in data})
+        corrections = {key: data[key] for key in CORRECTION_KEYS if key in data}
+        try:
+            return cls(**values, corrections=corrections)
+        except MotionFileError:
+            raise
+        except (TypeError, ValueError, OverflowError) as error:  # of numpy's conversions
+            raise MotionFileError(f"{path} holds a value of the wrong kind ({error}); capture again") from error
 
 
 # Only in files with corrections. The first rows say what was corrected, the others how the changed frames were before.

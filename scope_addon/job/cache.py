@@ -93,8 +93,16 @@ class Cache:
             content = json.dumps({"motions": motions, "report": report})
             (job_folder / REPORT).write_text(content, encoding="utf-8")
             target.parent.mkdir(parents=True, exist_ok=True)
-            shutil.rmtree(target, ignore_errors=True)
-            os.replace(job_folder, target)
+            former = job_folder.with_name(f"{job_folder.name}.former")
+            if target.exists():
+                os.replace(target, former)
+            try:
+                os.replace(job_folder, target)
+            except OSError:
+                if former.exists():
+                    os.replace(former, target)
+                raise
+            shutil.rmtree(former, ignore_errors=True)
         except OSError as error:
             raise self._not_writable(error) from error
         return CachedCapture([target / name for name in motions], report)

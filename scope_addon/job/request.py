@@ -46,7 +46,7 @@ class JobRequest:
         """
         try:
             return cls(**json.loads(text))
-        except (ValueError, TypeError) as error:
+        except (ValueError, TypeError, RecursionError) as error:
             raise UsageError(f"this is not a capture request: {error}") from error
 
     def key(self, code_version: str) -> str:

@@ -114,7 +114,7 @@ def _number_objects(root: _Node) -> None:
         node for top in _below(root, b"Documents", b"Objects") for node in top.elems if node.props_type[:1] == b"L"
     ]
     number = {node.props[0]: _FIRST_ID + place for place, node in enumerate(listed)}
-    holders = [(node, (0,)) for node in listed]
+    holders: list[tuple[_Node, tuple[int, ...]]] = [(node, (0,)) for node in listed]
     poses = (node for node in listed if node.id == b"Pose")
     holders += [(n, (0,)) for pose in poses for each in _below(pose, b"PoseNode") for n in _below(each, b"Node")]
     holders += [(link, (1, 2)) for top in _below(root, b"Connections") for link in _below(top, b"C")]

@@ -1,0 +1,239 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What reads files and messages of others: each a function that may raise nothing but ScopeError, and valid inputs."""
+
+from __future__ import annotations
+
+import base64
+import io
+import json
+import pickle
+import struct
+import zlib
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+ASSETS = Path(__file__).resolve().parents[2] / "assets"
+
+
+@dataclass(frozen=True)
+class Target:
+    """A reader of a file with one of ``suffixes``, and ``seeds``, which make valid inputs in a folder."""
+
+    read: Callable[[Path], object]
+    suffixes: tuple[str, ...]
+    seeds: Callable[[Path], list[bytes]]
+
+
+def _open_picture_or_video(path: Path) -> None:
+    from scope.scope_addon.capture.media.video import open_video
+
+    with open_video(path) as video:
+        for number, _ in enumerate(video):
+            if number == 3:
+                break
+
+
+def _read_layout(path: Path) -> None:
+    from scope.scope_addon.capture.media.stills.heif import read_layout
+
+    read_layout(path.read_bytes())
+
+
+def _read_exif(path: Path) -> None:
+    from scope.scope_addon.capture.media.stills.exif import animation_length, read_exif
+
+    read_exif(path.read_bytes())
+    animation_length(path.read_bytes())
+
+
+def _read_quicktime(path: Path) -> None:
+    from scope.scope_addon.capture.media.quicktime import focal_35mm
+
+    focal_35mm(path)
+
+
+def _load_body(path: Path) -> None:
+    from scope.solver.loaders.body_file import load_body
+
+    load_body(path)
+
+
+def _load_motion(path: Path) -> None:
+    from scope.scope_addon.motion import Motion
+
+    Motion.load(path)
+
+
+def _read_calibration(path: Path) -> None:
+    from scope.scope_addon.capture.camera.calibration import read_calibration
+
+    read_calibration(path).intrinsics_for(640, 360)
+
+
+def _load_bone_map(path: Path) -> None:
+    from scope.scope_addon.retarget.bone_map import load_bone_map
+
+    load_bone_map(path)
+
+
+def _check_network(path: Path) -> None:
+    from scope.scope_addon.capture.perception.adapters.onnx_file import check_onnx_file
+
+    check_onnx_file(path)
+
+
+def _rig_source(path: Path) -> None:
+    from scope.scope_addon.retarget.rig_source import rig_source
+
+    rig_source(path)
+
+
+def _read_request(path: Path) -> None:
+    from scope.scope_addon.job.request import JobRequest
+
+    JobRequest.from_json(path.read_bytes().decode("utf-8", "replace"))
+
+
+def _pictures(_: Path) -> list[bytes]:
+    import cv2
+
+    picture = (np.indices((24, 32)).sum(axis=0) * 4).astype(np.uint8)[..., None].repeat(3, axis=2)
+    return [cv2.imencode(suffix, picture)[1].tobytes() for suffix in (".png", ".jpg", ".webp", ".tiff", ".bmp")]
+
+
+def _videos(folder: Path) -> list[bytes]:
+    import cv2
+
+    path = folder / "seed.mp4"
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*"mp4v"), 10.0, (64, 48))  # type: ignore[attr-defined]
+    for level in range(4):
+        writer.write(np.full((48, 64, 3), 60 * level, np.uint8))
+    writer.release()
+    return [path.read_bytes()]
+
+
+def _box(name: bytes, content: bytes) -> bytes:
+    return struct.pack(">I", len(content) + 8) + name + content
+
+
+def _heif(_: Path) -> list[bytes]:
+    locations = _box(b"iloc", struct.pack(">IBBH", 0, 0x44, 0, 1) + struct.pack(">HHHII", 1, 0, 1, 400, 20))
+    entry = _box(b"infe", struct.pack(">IHH", 2 << 24, 1, 0) + b"hvc1\0")
+    size = _box(b"ispe", struct.pack(">III", 0, 32, 24)) + _box(b"irot", b"\1")
+    uses = _box(b"ipma", struct.pack(">II", 0, 1) + struct.pack(">HBBB", 1, 2, 1, 2))
+    inside = [
+        _box(b"pitm", struct.pack(">IH", 0, 1)),
+        _box(b"iinf", struct.pack(">IH", 0, 1) + entry),
+        locations,
+        _box(b"iprp", _box(b"ipco", size) + uses),
+        _box(b"iref", struct.pack(">I", 0) + _box(b"dimg", struct.pack(">HHH", 1, 1, 1))),
+    ]
+    return [_box(b"ftyp", b"heic\0\0\0\0mif1heic") + _box(b"meta", struct.pack(">I", 0) + b"".join(inside))]
+
+
+def _exif(_: Path) -> list[bytes]:
+    found = []
+    for order in "<>":
+        tags = struct.pack(f"{order}HHIHH", 274, 3, 1, 6, 0) + struct.pack(f"{order}HHII", 34665, 4, 1, 38)
+        inner = struct.pack(f"{order}HHHIHHI", 1, 41989, 3, 1, 26, 0, 0)
+        start = (b"II*\0" if order == "<" else b"MM\0*") + struct.pack(f"{order}I", 8)
+        found.append(start + struct.pack(f"{order}H", 2) + tags + bytes(4) + inner)
+    jpeg = b"\xff\xd8\xff\xe1" + struct.pack(">H", len(found[0]) + 8) + b"Exif\0\0" + found[0] + b"\xff\xd9"
+    chunk = struct.pack(">I", len(found[1])) + b"eXIf" + found[1] + bytes(4)
+    return [*found, jpeg, b"\x89PNG\r\n\x1a\n" + chunk]
+
+
+def _bodies(_: Path) -> list[bytes]:
+    with np.load(ASSETS / "body" / "scope.npz") as file:
+        arrays = {key: file[key] for key in file.files}
+    return [npz(arrays)]
+
+
+def _pickled_bodies(_: Path) -> list[bytes]:
+    arrays = {"v_template": np.zeros((4, 3)), "kintree_table": np.zeros((2, 2), int), "f": np.zeros((2, 3), np.uint32)}
+    return [pickle.dumps(arrays, protocol) for protocol in (0, 2, 4)]
+
+
+def _motions(_: Path) -> list[bytes]:
+    from scope.solver.loaders.body_file import load_body
+
+    from ..made_motion import made_motion
+
+    return [made_motion(load_body("scope"), np.zeros((3, 72)), np.zeros((3, 3))).to_bytes()]
+
+
+def npz(arrays: dict[str, Any]) -> bytes:
+    """Return the content of a .npz file."""
+    out = io.BytesIO()
+    np.savez(out, **arrays)
+    return out.getvalue()
+
+
+def _calibrations(_: Path) -> list[bytes]:
+    ours = {"intrinsics": [[500, 0, 320], [0, 500, 180], [0, 0, 1]], "dist": [0.1, 0, 0, 0, 0], "size": [640, 360]}
+    return [json.dumps(ours).encode()]
+
+
+def _bone_maps(_: Path) -> list[bytes]:
+    from scope.scope_addon.retarget.bone_map import REQUIRED
+
+    bones = {f"Bone {part}": part for part in REQUIRED}
+    return [json.dumps({"format": "scope bone map", "version": 1, "bones": bones}).encode()]
+
+
+def _networks(_: Path) -> list[bytes]:
+    from ..capture.small_graphs import simcc
+
+    return [simcc(_ / "seed.onnx", 17, 32, 32).read_bytes()]
+
+
+def _rigs(_: Path) -> list[bytes]:
+    data = struct.pack("<9f", *range(9))
+    document = {
+        "asset": {"version": "2.0"},
+        "buffers": [{"byteLength": len(data)}],
+        "bufferViews": [{"buffer": 0, "byteOffset": 0, "byteLength": len(data)}],
+        "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"}],
+        "nodes": [{"name": "Hips", "children": [1]}, {"name": "Spine", "translation": [0, 1, 0]}],
+        "skins": [{"joints": [0, 1]}],
+    }
+    uri = "data:application/octet-stream;base64," + base64.b64encode(data).decode()
+    separate = json.dumps({**document, "buffers": [{"byteLength": len(data), "uri": uri}]}).encode()
+    text = json.dumps(document).encode()
+    text += b" " * (-len(text) % 4)
+    chunks = struct.pack("<I4s", len(text), b"JSON") + text + struct.pack("<I4s", len(data), b"BIN\0") + data
+    glb = struct.pack("<4sII", b"glTF", 2, len(chunks) + 12) + chunks
+    packed = zlib.compress(bytes(24))
+    array = b"d" + struct.pack("<III", 3, 1, len(packed)) + packed
+    header = b"Kaydara FBX Binary  \0\x1a\0" + struct.pack("<I", 7400)
+    end = len(header) + 13 + 1 + len(array)
+    fbx = header + struct.pack("<IIIB", end, 1, len(array), 1) + b"A" + array + bytes(13)
+    return [glb, separate, fbx]
+
+
+def _requests(_: Path) -> list[bytes]:
+    from scope.scope_addon.options import Place, options_at
+
+    values = {option.name: option.default for option in options_at(Place.WORKER)}
+    return [json.dumps({"footage": "walk.mp4", **values}, default=str).encode()]
+
+
+TARGETS = {
+    "picture": Target(_open_picture_or_video, (".png", ".jpg", ".webp", ".tiff", ".bmp", ".heic"), _pictures),
+    "video": Target(_open_picture_or_video, (".mp4", ".mov"), _videos),
+    "heif": Target(_read_layout, (".heic",), _heif),
+    "exif": Target(_read_exif, (".jpg",), _exif),
+    "quicktime": Target(_read_quicktime, (".mov",), _videos),
+    "body": Target(_load_body, (".npz",), _bodies),
+    "pickle": Target(_load_body, (".pkl",), _pickled_bodies),
+    "motion": Target(_load_motion, (".npz",), _motions),
+    "calibration": Target(_read_calibration, (".json",), _calibrations),
+    "bone_map": Target(_load_bone_map, (".json",), _bone_maps),
+    "network": Target(_check_network, (".onnx",), _networks),
+    "rig": Target(_rig_source, (".glb", ".gltf", ".fbx"), _rigs),
+    "request": Target(_read_request, (".json",), _requests),
+}
