@@ -1,0 +1,180 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""`./scripts/gate [--update]`: fail where accuracy or speed is worse than recorded, by more than its noise.
+
+The record, `gate.json`, holds of every figure its value and its noise: of accuracy, twice the standard deviation over
+copies of the clip whose pixels differ by their encoding alone; of ratios of times, the larger of twice that over
+several runs and `MACHINES`. `--update` measures both again.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ.setdefault(_name, "1")  # before numpy
+
+import numpy as np  # noqa: E402
+
+from ..scope_addon.atomic_write import atomic_path  # noqa: E402
+from ..scope_addon.capture.options import CaptureOptions  # noqa: E402
+from ..scope_addon.capture.pipeline import capture  # noqa: E402
+from ..scope_addon.cli import SAMPLE  # noqa: E402
+from ..solver.body import Body  # noqa: E402
+from ..solver.loaders.body_file import load_body  # noqa: E402
+from . import report  # noqa: E402
+from .frames import DATA  # noqa: E402
+from .perception.accuracy import CAMERAS, evaluate_clip  # noqa: E402
+from .solver.problem import make_problem  # noqa: E402
+from .solver.steps import compare  # noqa: E402
+
+RECORD = Path(__file__).with_name("gate.json")
+ACCURACY = ("mpjpe_root", "pa_mpjpe", "foot_slide_cm", "jitter_rel", "flipped")
+LEAST_NOISE = {"mpjpe_root": 1.0, "pa_mpjpe": 1.0, "foot_slide_cm": 0.2, "jitter_rel": 2.0, "flipped": 0.02}
+MACHINES = 0.35  # by which a ratio of times differs between machines, of its value
+JPEG_QUALITIES = (80, 88, 96)  # of the copies
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A recorded figure and the difference that means nothing."""
+
+    value: float
+    noise: float
+    higher_is_better: bool = False
+
+    def is_worse(self, found: float) -> bool:
+        """Whether a figure is worse than this one by more than its noise, or no number."""
+        loss = self.value - found if self.higher_is_better else found - self.value
+        return not loss <= self.noise
+
+    def is_better(self, found: float) -> bool:
+        """Whether a figure is better than this one by more than its noise."""
+        gain = found - self.value if self.higher_is_better else self.value - found
+        return gain > self.noise
+
+
+def read(path: Path = RECORD) -> dict[str, Figure]:
+    """Return the recorded figures by name."""
+    return {name: Figure(**entry) for name, entry in json.loads(path.read_text()).items()}
+
+
+def verdict(record: dict[str, Figure], found: dict[str, float]) -> tuple[list[tuple[Any, ...]], list[str]]:
+    """Return the rows of the table, and the names of the figures that are worse than recorded.
+
+    A figure that was measured and is not in the record is one of them; one that could not be measured is not.
+    """
+    rows: list[tuple[Any, ...]] = []
+    worse = []
+    for name, value in found.items():
+        known = record.get(name)
+        if known is None:
+            said = "not recorded"
+        else:
+            said = "worse" if known.is_worse(value) else "better" if known.is_better(value) else ""
+        if said in ("worse", "not recorded"):
+            worse.append(name)
+        rows.append((name, value, *((known.value, known.noise) if known else ("", "")), said))
+    return rows, worse
+
+
+def clips() -> dict[str, tuple[Path, Path]]:
+    """Return the clips with ground truth, video and truth by name; none where the evaluation tool is missing."""
+    folder = DATA / "pose2sim"
+    if not folder.is_dir():
+        print(f"{folder} does not exist: accuracy is not measured; put the clips there", file=sys.stderr)
+        return {}
+    found = {camera: (folder / f"{camera}.mp4", folder / f"truth_{camera}.npz") for camera in CAMERAS}
+    return found | {"sample": (SAMPLE, SAMPLE.with_name("sample_truth.npz"))}
+
+
+def accuracy(body: Body, videos: dict[str, tuple[Path, Path]]) -> dict[str, float]:
+    """Return the figures of `ACCURACY` of the default preset: means of the pose2sim cameras, and of our own clip."""
+    of_clip = {name: evaluate_clip(body, *files, CaptureOptions())[1] for name, files in videos.items()}
+    found = {}
+    for key in ACCURACY:
+        cameras = [float(of_clip[camera][key]) for camera in CAMERAS if camera in of_clip]
+        if cameras:
+            found[f"pose2sim {key}"] = float(np.mean(cameras))
+        if "sample" in of_clip:
+            found[f"sample {key}"] = float(of_clip["sample"][key])
+    return found
+
+
+def ratios(body: Body, rounds: int) -> dict[str, float]:
+    """Return ratios of times of one run; higher is better."""
+    sizes = {"K=23": (23, 10, 120), "K=51": (51, 10, 120)}
+    sparse, dense = compare({name: make_problem(*size) for name, size in sizes.items()}, rounds)
+    found = {f"dense over sparse step, {name}": dense[name] / sparse[name] for name in sizes}
+    speeds = [capture(SAMPLE, body, CaptureOptions(quality="fast")).report["fps"] for _ in range(3)]
+    found["capture over its networks, fast"] = float(np.median([fps["total"] / fps["networks"] for fps in speeds]))
+    return found
+
+
+def measured_noise(body: Body, videos: dict[str, tuple[Path, Path]], folder: Path) -> dict[str, float]:
+    """Return twice the standard deviation of every figure of accuracy over copies of the clips."""
+    found = [accuracy(body, videos)]
+    for quality in JPEG_QUALITIES:
+        copies = {}
+        for name, (video, truth) in videos.items():
+            copies[name] = (folder / f"{name}_{quality}.avi", truth)
+            _encode(video, copies[name][0], quality)
+        found.append(accuracy(body, copies))
+    return {
+        name: max(2 * float(np.std([each[name] for each in found], ddof=1)), LEAST_NOISE[name.split()[-1]])
+        for name in found[0]
+    }
+
+
+def _encode(video: Path, out: Path, quality: int) -> None:
+    """Write a copy of a clip of constant frame rate, every frame a JPEG of this quality."""
+    import cv2
+
+    reader = cv2.VideoCapture(str(video))
+    size = int(reader.get(cv2.CAP_PROP_FRAME_WIDTH)), int(reader.get(cv2.CAP_PROP_FRAME_HEIGHT))
+    writer = cv2.VideoWriter(str(out), cv2.VideoWriter.fourcc(*"MJPG"), reader.get(cv2.CAP_PROP_FPS), size)
+    writer.set(cv2.VIDEOWRITER_PROP_QUALITY, quality)
+    while (frame := reader.read())[0]:
+        writer.write(frame[1])
+    writer.release()
+
+
+def update(body: Body) -> None:
+    """Measure the figures and their noise, and write the record."""
+    videos = clips()
+    with tempfile.TemporaryDirectory() as folder:
+        noise = measured_noise(body, videos, Path(folder))
+    record = {name: Figure(round(value, 4), round(noise[name], 4)) for name, value in accuracy(body, videos).items()}
+    runs = [ratios(body, 60) for _ in range(3)]
+    for name in runs[0]:
+        values = [run[name] for run in runs]
+        value = float(np.median(values))
+        spread = max(2 * float(np.std(values, ddof=1)), MACHINES * value)
+        record[name] = Figure(round(value, 3), round(spread, 3), higher_is_better=True)
+    with atomic_path(RECORD) as temporary:
+        temporary.write_text(json.dumps({name: vars(figure) for name, figure in record.items()}, indent=1) + "\n")
+
+
+def main() -> int:
+    """Run the command line; return 1 if a figure is worse than recorded."""
+    parser = argparse.ArgumentParser(prog="gate", description="Fail where accuracy or speed is worse than recorded.")
+    parser.add_argument("--update", action="store_true", help=f"measure the record, {RECORD.name}, again")
+    args = parser.parse_args()
+    body = load_body("scope")
+    if args.update:
+        update(body)
+    rows, worse = verdict(read(), accuracy(body, clips()) | ratios(body, 30))
+    print(report.table(("figure", "now", "recorded", "noise", ""), rows))
+    if worse:
+        print(f"gate: worse than recorded: {', '.join(worse)}; mend it, or record it with ./scripts/gate --update")
+    return 1 if worse else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
