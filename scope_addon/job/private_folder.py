@@ -6,7 +6,6 @@ from __future__ import annotations
 import os
 import stat
 import sys
-import tempfile
 from functools import cache
 from pathlib import Path
 
@@ -27,6 +26,8 @@ def private_folder() -> Path:
             return folder
     except (OSError, RuntimeError):  # the latter where there is no home
         pass
+    import tempfile  # adds to the time that Blender takes to start
+
     return Path(tempfile.mkdtemp(prefix=f"{_NAME}-"))
 
 
