@@ -25,17 +25,19 @@ BLENDER_FOLDER = "scope-tests-blender-"  # begins the name of the user folder of
 if "BLENDER_USER_RESOURCES" not in os.environ:
     os.environ["BLENDER_USER_RESOURCES"] = tempfile.mkdtemp(prefix=BLENDER_FOLDER)
 
-# In this order, ahead of all others. The first two compile the solver, each a version of its own, so that where two
-# processes run, neither compiles what the other does; files that take long would otherwise end last, alone.
+# In this order, ahead of all others. The first compiles the solver, and the second a version of its own; the next ones
+# need none, so that where two processes run, they do not compile the same. Files that take long would otherwise end
+# last, alone.
 FIRST = (
     "solver/test_validation.py",
     "solver/residuals/test_registry.py",
-    "capture/test_pipeline.py",
-    "tools/test_build_body.py",
     "capture/tracking/test_tracker.py",
-    "capture/test_pipeline_own_networks.py",
+    "tools/test_build_body.py",
+    "tools/test_mocap_library.py",
     "tools/test_convert_networks.py",
     "capture/tracking/test_people.py",
+    "capture/test_pipeline.py",
+    "capture/test_pipeline_own_networks.py",
     "job/test_batch.py",
     "ui/test_compiled_solver.py",
     "scene/export/test_export.py",

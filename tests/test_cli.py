@@ -263,10 +263,11 @@ def test_no_temporary_folder_of_blender_is_left(tmp_path):
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows ends a process at once")
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGINT)])
-def test_a_signal_while_the_program_is_loaded_has_its_word(number):
+def test_a_signal_while_the_program_is_loaded_has_its_word(tmp_path, number):
     """Numpy is imported after the handlers are installed; this stand-in sends the signal then."""
     code = (
-        "import os, runpy, sys\n"
+        "import os, runpy, signal, sys\n"
+        f"signal.signal({int(number)}, signal.SIG_DFL)\n"  # under nohup, SIGHUP is ignored, and stays so
         "class Finder:\n"
         "    def find_spec(name, *_):\n"
         f"        name == 'numba' and os.kill(os.getpid(), {int(number)})\n"
@@ -274,7 +275,8 @@ def test_a_signal_while_the_program_is_loaded_has_its_word(number):
         "sys.argv = ['scope', 'capture']\n"
         "runpy.run_module('scope.scope_addon', run_name='__main__')\n"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    command = [sys.executable, "-c", code]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout, done.stderr) == (130, "", "scope: stopped\n")
 
 

@@ -292,7 +292,7 @@ def test_the_clips_of_a_killed_batch_end_and_leave_no_partial_file(tmp_path, at)
         "cli.run()\n"
     )
     argv = ["batch", str(clips), "--out", str(out), "--jobs", "2", "--formats", "npz", "--overlays"]
-    argv += ["--quality", "fast"]
+    argv += ["--quality", "fast", "--end", "1"]
     code = (
         "import sys\n"
         "from scope.scope_addon.cli import main\n"
