@@ -141,7 +141,7 @@ class SCOPE_OT_capture(bpy.types.Operator):
             context.workspace.status_text_set(
                 iface_("Scope: {progress}   (Esc over the Scope panel to cancel)", progress=progress)
             )
-            redraw_sidebars(context)
+            redraw_sidebars()
         return self._end(context, outcome) if outcome else {"PASS_THROUGH"}
 
     def cancel(self, context: bpy.types.Context) -> None:
@@ -192,7 +192,7 @@ class SCOPE_OT_capture(bpy.types.Operator):
     def _fail(self, error: Exception | str) -> bool:
         state.message = sentence(error)
         stop_job()  # before the report, which raises in a script
-        redraw_sidebars_twice(bpy.context)
+        redraw_sidebars_twice()
         self.report({"ERROR"}, state.message)
         return False
 
@@ -205,7 +205,7 @@ class SCOPE_OT_capture(bpy.types.Operator):
         if "FINISHED" in outcome:
             hide_startup_cube(context)
             frame_selected(context)
-        redraw_sidebars_twice(context)
+        redraw_sidebars_twice()
         return outcome
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import bpy
 
-from .viewports import viewport_at
+from .viewports import viewport_at, viewports
 
 TAB = "Scope"
 _DRAWN_AFTER_S = 0.3  # a sidebar knows its tabs only after it has been drawn
@@ -65,15 +65,14 @@ def is_over_tab(window: bpy.types.Window, event: bpy.types.Event) -> bool:
     )
 
 
-def redraw_sidebars(context: bpy.types.Context) -> None:
+def redraw_sidebars() -> None:
     """Redraw the sidebars, but not the viewports, because redrawing a large scene repeatedly is slow."""
-    areas = [a for window in context.window_manager.windows for a in window.screen.areas if a.type == "VIEW_3D"]
-    for region in (sidebar for area in areas for sidebar in _sidebars(area)):
+    for region in (sidebar for _, area in viewports() for sidebar in _sidebars(area)):
         region.tag_redraw()
 
 
-def redraw_sidebars_twice(context: bpy.types.Context) -> None:
+def redraw_sidebars_twice() -> None:
     """Redraw now and again shortly: panels below one whose height changed move only at the second redraw."""
-    redraw_sidebars(context)
+    redraw_sidebars()
     if not bpy.app.background:
-        bpy.app.timers.register(lambda: redraw_sidebars(bpy.context), first_interval=_DRAWN_AFTER_S)
+        bpy.app.timers.register(redraw_sidebars, first_interval=_DRAWN_AFTER_S)

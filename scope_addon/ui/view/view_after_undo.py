@@ -7,6 +7,7 @@ import bpy
 from bpy.app.handlers import persistent
 
 from .comparison import close_side_view, end, looks_through, side_area
+from .viewports import viewports
 
 _looked_through: set[int] = set()  # areas that showed a capture through its camera before the undo
 _sides: set[int] = set()  # areas that showed a capture from its side
@@ -28,7 +29,7 @@ def detach() -> None:
 def _before(*_: object) -> None:
     _looked_through.clear()
     _sides.clear()
-    for window, area in _viewports():
+    for window, area in viewports():
         if area == side_area(window.screen):
             _sides.add(area.as_pointer())
         if looks_through(window.scene, area.spaces.active):
@@ -44,15 +45,10 @@ def _after(*_: object) -> None:
 def _leave() -> None:
     """Leave local view and camera view in the viewports that no longer show a capture through its camera."""
     left = False
-    for window, area in _viewports():
+    for window, area in viewports():
         if area.as_pointer() in _looked_through and not looks_through(window.scene, area.spaces.active):
             end(window, area)
             left = True
-    for window, side in [pair for pair in _viewports() if left and pair[1].as_pointer() in _sides]:
+    for window, side in [pair for pair in viewports() if left and pair[1].as_pointer() in _sides]:
         close_side_view(window, side)
     _looked_through.clear()
-
-
-def _viewports() -> list[tuple[bpy.types.Window, bpy.types.Area]]:
-    windows = bpy.context.window_manager.windows
-    return [(window, area) for window in windows for area in window.screen.areas if area.type == "VIEW_3D"]

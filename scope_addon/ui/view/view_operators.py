@@ -74,7 +74,7 @@ class SCOPE_OT_look_through(bpy.types.Operator):
                 comparison.close_side_view(context.window, side)
             for obj in [obj for obj in scene.scope.result.collection.all_objects if "scope_source" in obj]:
                 hide_again(obj, context.view_layer)
-            redraw_sidebars_twice(context)
+            redraw_sidebars_twice()
             return {"FINISHED"}
         assert camera is not None  # checked by poll
         scene.camera = camera
@@ -83,7 +83,7 @@ class SCOPE_OT_look_through(bpy.types.Operator):
         set_resolution(scene, scene.scope.result.collection)
         if not bpy.app.background and context.area and context.area.type == "VIEW_3D":
             comparison.begin(context, context.area, scene.scope.result.collection)
-        redraw_sidebars_twice(context)
+        redraw_sidebars_twice()
         return {"FINISHED"}
 
 

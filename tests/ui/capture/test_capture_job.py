@@ -186,7 +186,7 @@ def test_an_unexpected_error_ends_the_capture():
 
 def test_the_panel_is_drawn_again_only_for_news(monkeypatch):
     drawn = []
-    monkeypatch.setattr(capture_operators, "redraw_sidebars", drawn.append)
+    monkeypatch.setattr(capture_operators, "redraw_sidebars", lambda: drawn.append(None))
     lines = ["Finding the person"]
     progress = SimpleNamespace(lines=lambda _: lines)
     state.job = SimpleNamespace(progress=progress, messages=0, step=lambda: True, cancel_requested=False)
