@@ -24,6 +24,11 @@ CHOICES = (AUTO, *(name for name in reversed(PROVIDERS)))
 _AUTOMATIC = ("cuda", DIRECTML, "coreml")
 
 
+def session_options_of(name: str) -> tuple[list[str], bool]:
+    """Return onnxruntime's names of a provider and of the CPU as its fallback, and whether it takes memory patterns."""
+    return [PROVIDERS[each][0] for each in dict.fromkeys((name, CPU))], name != DIRECTML
+
+
 @dataclass
 class Execution:
     """The requested execution provider, and which providers opened sessions or failed to.

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from ....solver.errors import ModelFileError, ScopeError
 from ...errors import SetupError, UsageError, lacks_memory
 from .adapters.network_server import make_session
-from .execution import CPU, DIRECTML, PROVIDERS, Execution, SerializedSession
+from .execution import CPU, DIRECTML, PROVIDERS, Execution, SerializedSession, session_options_of
 
 if TYPE_CHECKING:
     import onnxruntime
@@ -87,8 +87,7 @@ def open_session(
 
 
 def _open_on(name: str, path: Path, threads: int) -> onnxruntime.InferenceSession:
-    providers = [PROVIDERS[n][0] for n in dict.fromkeys((name, CPU))]
-    session = make_session(_runtime(), str(path), threads, providers, name != DIRECTML)  # no patterns of memory there
+    session = make_session(_runtime(), str(path), threads, *session_options_of(name))
     return SerializedSession(session) if name == DIRECTML else session
 
 

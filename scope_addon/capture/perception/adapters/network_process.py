@@ -21,7 +21,7 @@ from typing import Any
 
 from .....solver.errors import ModelFileError
 from ....errors import SetupError
-from ..execution import CPU, DIRECTML, PROVIDERS
+from ..execution import session_options_of
 from .network_server import LARGEST_ARRAYS, OUT_OF_MEMORY, receive, send
 
 SERVER = Path(__file__).with_name("network_server.py")
@@ -48,12 +48,13 @@ class NetworkProcess:
         self._opening_s = self._limit_s = OPENING_S.get(provider, DEFAULT_OPENING_S)
         self._process = _start()
         self._end = weakref.finalize(self, _end, self._process)
+        providers, mem_pattern = session_options_of(provider)
         opened = self._ask(
             {
                 "path": str(path),
                 "threads": threads,
-                "providers": [PROVIDERS[name][0] for name in dict.fromkeys((provider, CPU))],
-                "mem_pattern": provider != DIRECTML,  # which does not support it
+                "providers": providers,
+                "mem_pattern": mem_pattern,
                 "limit_bytes": self._limit_bytes,
             }
         )
