@@ -126,8 +126,8 @@ def ratios(body: Body, rounds: int) -> dict[str, float]:
     }
 
 
-def measured_noise(body: Body, videos: dict[str, tuple[Path, Path]], folder: Path) -> dict[str, float]:
-    """Return twice the standard deviation of every figure of accuracy over copies of the clips."""
+def accuracy_and_noise(body: Body, videos: dict[str, tuple[Path, Path]], folder: Path) -> dict[str, Figure]:
+    """Return the figures of accuracy, each with twice its standard deviation over copies of the clips."""
     found = [accuracy(body, videos)]
     for quality in JPEG_QUALITIES:
         copies = {}
@@ -136,9 +136,13 @@ def measured_noise(body: Body, videos: dict[str, tuple[Path, Path]], folder: Pat
             _encode(video, copies[name][0], quality)
         found.append(accuracy(body, copies))
     return {
-        name: max(2 * float(np.std([each[name] for each in found], ddof=1)), LEAST_NOISE[name.split()[-1]])
-        for name in found[0]
+        name: _figure(value, [each[name] for each in found], LEAST_NOISE[name.split()[-1]])
+        for name, value in found[0].items()
     }
+
+
+def _figure(value: float, values: list[float], least_noise: float) -> Figure:
+    return Figure(round(value, 4), round(max(2 * float(np.std(values, ddof=1)), least_noise), 4))
 
 
 def _encode(video: Path, out: Path, quality: int) -> None:
@@ -158,15 +162,13 @@ def update(body: Body) -> None:
     """Measure the figures and their noise, and write the record."""
     videos = clips()
     with tempfile.TemporaryDirectory() as folder:
-        noise = measured_noise(body, videos, Path(folder))
-    record = {name: Figure(round(value, 4), round(noise[name], 4)) for name, value in accuracy(body, videos).items()}
+        record = accuracy_and_noise(body, videos, Path(folder))
     runs = [ratios(body, 60) for _ in range(3)]
     for name in runs[0]:
         values = [run[name] for run in runs]
         value = float(np.median(values))
         share = MACHINES_OF_NETWORKS if "networks" in name else MACHINES
-        spread = max(2 * float(np.std(values, ddof=1)), share * value)
-        record[name] = Figure(round(value, 3), round(spread, 3))
+        record[name] = _figure(value, values, share * value)
     with atomic_path(RECORD) as temporary:
         temporary.write_text(json.dumps({name: vars(figure) for name, figure in record.items()}, indent=1) + "\n")
 
