@@ -20,6 +20,7 @@ from .validation import (
     check_finite,
     check_information,
     check_not_negative,
+    check_robust,
     check_rotations,
     check_type,
     check_weight,
@@ -161,9 +162,7 @@ class Options:
             if not 0.0 < as_number(value, f"Options.{name}") < math.inf:
                 raise InvalidValueError(f"Options.{name} must be positive and finite, but is {value}.")
         for name in ("robust_keypoints2d", "robust_keypoints3d", "robust_orientation_field"):
-            value = getattr(self, name)
-            if not as_number(value, f"Options.{name}") > 0.0:
-                raise InvalidValueError(f"Options.{name} must be positive, or infinite for none, but is {value}.")
+            check_robust(getattr(self, name), f"Options.{name}")
         if not 0.0 <= as_number(self.triggs, "Options.triggs") <= 1.0:
             raise InvalidValueError(f"Options.triggs must lie in 0..1, but is {self.triggs}.")
         check_type(self.stages, (Sequence, type(None)), "Options.stages")

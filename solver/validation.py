@@ -108,6 +108,15 @@ def check_weight(value: Any, name: str) -> None:
         raise InvalidValueError(f"{name} must be finite and not negative, but is {value}.")
 
 
+def check_robust(value: Any, name: str) -> None:
+    """Check the scale of a robust kernel, a single number.
+
+    :raises InvalidValueError: it is not positive, or no number.
+    """
+    if not as_number(value, name) > 0.0:
+        raise InvalidValueError(f"{name} must be positive, or infinite for none, but is {value}.")
+
+
 def check_not_negative(values: Array, name: str) -> None:
     """Check weights (n,); NaN passes, because it leaves a measurement out.
 

@@ -323,7 +323,12 @@ class _Joint:
             prior: NDArray[np.float64] = self.shape_weights[-1] * self.prior
             return prior
         C, _, _ = self._reduced(len(self.stages) - 1, DAMPING_LEAST)
-        out = C[:P, :P].copy()
-        if self.tree.globals > P and C[P, P] > 0.0:
-            out -= np.outer(C[:P, P], C[P, :P]) / C[P, P]
-        return out
+        return shape_information(C[: self.tree.globals, : self.tree.globals], P)
+
+
+def shape_information(information: NDArray[np.float64], P: int) -> NDArray[np.float64]:
+    """Return the information (P, P) of the shape from that (G, G) of the global columns: the others are eliminated."""
+    out = information[:P, :P].copy()
+    if len(information) > P and information[P, P] > 0.0:
+        out -= np.outer(information[:P, P], information[P, :P]) / information[P, P]
+    return out

@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..compiled.kernel import kernel
+from ..compiled.kernel import expanded_kernel, kernel
 from ..compiled.part import GRADIENT, SHAPE, Array, Blocks, Pose
 from ..compiled.rows import add1, add3, copy
 from ..compiled.tree import Tree
@@ -254,14 +254,20 @@ def step(tree: Tree, pose: Pose, blocks: Blocks, damping: float, root_scale: flo
 
 @kernel
 def retract(tree: Tree, pose: Pose, work: Workspace, trial: Pose) -> None:
+    """Write the pose moved by the step in `work` to `trial`: see `move`."""
+    move(tree, pose, work.x[0], work.u, work.dbeta, trial)
+
+
+@expanded_kernel
+def move(tree, pose, x, u, dg, trial):  # type: ignore[no-untyped-def]
     """Write the moved pose to `trial`: R_0 <- exp(w) R_0, t_0 <- t_0 + nu, Omega <- exp(R_parᵀ u) Omega.
 
-    R, t and D of the other parts are left to `place_parts`.
+    x (6,) is (w, nu), u (K+1, 3) without its row 0, dg (W,) the step of the global columns. R, t and D of the other
+    parts are left to `place_parts`.
     """
-    x, u = work.x, work.u
     for i in range(tree.parents.shape[0]):
         if i == 0:
-            E = exp3(x[0, 0], x[0, 1], x[0, 2])
+            E = exp3(x[0], x[1], x[2])
             old, new = pose.R[0], trial.R[0]
         else:
             R = pose.R[tree.parents[i]]
@@ -277,9 +283,9 @@ def retract(tree: Tree, pose: Pose, work: Workspace, trial: Pose) -> None:
             new[1, k] = E[3] * a + E[4] * b + E[5] * d
             new[2, k] = E[6] * a + E[7] * b + E[8] * d
     for r in range(3):
-        trial.t[0, r] = pose.t[0, r] + x[0, 3 + r]
+        trial.t[0, r] = pose.t[0, r] + x[3 + r]
     for a in range(tree.shape):
-        trial.beta[a] = pose.beta[a] + work.dbeta[a]
+        trial.beta[a] = pose.beta[a] + dg[a]
     trial.log_focal[0] = pose.log_focal[0]
     if tree.globals > tree.shape:
-        trial.log_focal[0] += work.dbeta[tree.shape]
+        trial.log_focal[0] += dg[tree.shape]

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from ..compiled.part import Array, Pose
 from ..compiled.tree import BodyArrays, Tree, make_tree, with_fixed_shape
 from ..errors import InvalidValueError, ShapeError
+from ..fitting.clip import shape_information
 from ..gauss_newton.optimizer import make_settings
 from ..gauss_newton.terms import pack_priors
 from ..measurements import Measurements
@@ -244,7 +245,7 @@ class _Clip:
         self.information = sum(informations) - (len(parts) - 1) * prior
         shared = combined(estimates, informations, mean, prior)
         self.beta, self.log_focal = shared[:P], float(shared[P]) if G > P else 0.0
-        self.information = _marginal(self.information, P)
+        self.information = shape_information(self.information, P)
 
     def _keep_poses(self, poses: Pose, window: Window) -> None:
         inner = slice(window.kept.start - window.frames.start, window.kept.stop - window.frames.start)
@@ -260,7 +261,7 @@ class _Clip:
             self.costs[name] = self.costs.get(name, 0.0) + cost
         if tree.shape:
             self.beta, self.log_focal = poses.beta[: tree.shape].copy(), float(poses.log_focal[0])
-            self.information = _marginal(optimizer.information(), tree.shape)
+            self.information = shape_information(optimizer.information(), tree.shape)
         if self.covariances is not None:
             root_scale = optimizer.problem.settings.root_scale
             found, _ = joint_covariances(tree, optimizer.system, poses, root_scale, optimizer.factor)
@@ -273,11 +274,3 @@ class _Clip:
             states, self.R, self.t, self.beta, self.information, float(np.exp(self.log_focal)), self.counts,
             self.status, float(self.cost), self.iterations, self.rejected, self.covariances, self.costs,
         )  # fmt: skip
-
-
-def _marginal(information: Array, P: int) -> Array:
-    """Return the information (P, P) of the first P unknowns with the others eliminated."""
-    out = information[:P, :P].copy()
-    if len(information) > P and information[P, P] > 0.0:
-        out -= np.outer(information[:P, P], information[P, :P]) / information[P, P]
-    return out

@@ -17,41 +17,20 @@ from ..gauss_newton.optimizer import (
     RUNNING,
     judge_trial,
 )
-from ..rotations import exp3
+from ..gauss_newton.recursion import move
 from .band import eliminate_clip, make_factor, solve_clip
 from .curvature import ClipCurvature
 from .problem import ClipProblem
-from .system import make_poses, make_system
+from .system import make_poses, make_system, pose_of
 
 
 @kernel
 def retract_clip(tree, poses, d, dg, trial) -> None:  # type: ignore[no-untyped-def]
-    """Write the moved poses to `trial`: see `recursion.retract`. R, t and D of parts 1..K are left to linearize."""
+    """Write the poses moved by d (T, n) and dg to `trial`: see `move`."""
+    parts = tree.parents.shape[0]
     for f in range(d.shape[0]):
-        for i in range(tree.parents.shape[0]):
-            if i == 0:
-                E = exp3(d[f, 0], d[f, 1], d[f, 2])
-                old, new = poses.R[f, 0], trial.R[f, 0]
-            else:
-                R, u = poses.R[f, tree.parents[i]], d[f, 3 + 3 * i : 6 + 3 * i]
-                E = exp3(
-                    R[0, 0] * u[0] + R[1, 0] * u[1] + R[2, 0] * u[2],
-                    R[0, 1] * u[0] + R[1, 1] * u[1] + R[2, 1] * u[2],
-                    R[0, 2] * u[0] + R[1, 2] * u[1] + R[2, 2] * u[2],
-                )
-                old, new = poses.Omega[f, i], trial.Omega[f, i]
-            for k in range(3):
-                a, b, c = old[0, k], old[1, k], old[2, k]
-                new[0, k] = E[0] * a + E[1] * b + E[2] * c
-                new[1, k] = E[3] * a + E[4] * b + E[5] * c
-                new[2, k] = E[6] * a + E[7] * b + E[8] * c
-        for r in range(3):
-            trial.t[f, 0, r] = poses.t[f, 0, r] + d[f, 3 + r]
-    for a in range(tree.shape):
-        trial.beta[a] = poses.beta[a] + dg[a]
-    trial.log_focal[0] = poses.log_focal[0]
-    if tree.globals > tree.shape:
-        trial.log_focal[0] += dg[tree.shape]
+        u = d[f, 3 : 3 + 3 * parts].reshape(parts, 3)  # row 0 is the root's position
+        move(tree, pose_of(poses, f), d[f], u, dg, pose_of(trial, f))
 
 
 class Optimizer:

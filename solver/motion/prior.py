@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..compiled.part import Array
-from ..errors import InvalidValueError
-from ..validation import as_array, as_indices, as_number, check_finite, check_not_negative, check_weight
+from ..validation import as_array, as_indices, check_finite, check_not_negative, check_robust, check_weight
 
 
 @dataclass(frozen=True)
@@ -46,9 +45,7 @@ class MotionPrior:
         for name in ("root_rotation", "root_position", "contact"):
             check_weight(getattr(self, name), f"MotionPrior.{name}")
         for name in ("robust_joints", "robust_root_rotation", "robust_root_position"):
-            value = getattr(self, name)
-            if not as_number(value, f"MotionPrior.{name}") > 0.0:
-                raise InvalidValueError(f"MotionPrior.{name} must be positive, or infinite for none, but is {value}.")
+            check_robust(getattr(self, name), f"MotionPrior.{name}")
 
     def packed(self, K: int) -> Array:
         """Return (K+2, 2) weights and 1/sigma: the root's rotation, joints 1..K, the root's position.

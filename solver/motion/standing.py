@@ -9,15 +9,14 @@ docs/solver_mathematics.md, "A whole clip", has the objective.
 """
 
 from ..compiled.kernel import kernel
-from ..compiled.part import Pose
 from ..residuals.accumulation import lever
-from .system import GLOBALS
+from .system import GLOBALS, pose_of
 
 
 @kernel
 def _jacobian(tree, poses, f, j, p, J, columns) -> int:  # type: ignore[no-untyped-def]
     """Write p (3,), its Jacobian J (3, most) by the unknowns columns[:count] and then the shape; return count."""
-    pose = Pose(poses.Omega[f], poses.R[f], poses.t[f], poses.D[f], poses.beta, poses.log_focal)
+    pose = pose_of(poses, f)
     i = tree.point_part[j]
     x, y, z = lever(tree, pose, j)
     p[0], p[1], p[2] = x + pose.t[i, 0], y + pose.t[i, 1], z + pose.t[i, 2]

@@ -14,6 +14,7 @@ Source: section 3 of the paper; composite rigid bodies in Featherstone, Rigid Bo
 from typing import NamedTuple
 
 import numpy as np
+from numba.extending import register_jitable
 
 from ..compiled.kernel import kernel
 from ..compiled.part import GRADIENT, SHAPE, Array, Blocks, Pose
@@ -51,8 +52,9 @@ def make_poses(tree: Tree, frames: int) -> Pose:
     return Pose(eye, eye.copy(), t, D, np.zeros(W), np.zeros(1))
 
 
+@register_jitable
 def pose_of(poses: Pose, f: int) -> Pose:
-    """Return views of frame f's arrays."""
+    """Return views of frame f's arrays; for kernels as well."""
     return Pose(poses.Omega[f], poses.R[f], poses.t[f], poses.D[f], poses.beta, poses.log_focal)
 
 
