@@ -103,7 +103,7 @@ _CLASSES = {name: type(name, (PickledObject,), {}) for name in (*_SPARSE, "Ch", 
 
 
 def _refuse(*_: object) -> NoReturn:
-    raise ModelFileError("it makes an object in a way that body files do not")
+    raise ModelFileError("it makes an object in a way that such files do not")
 
 
 _NDARRAY, _OBJECT = Global(_refuse), Global(_refuse)

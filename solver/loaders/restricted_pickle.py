@@ -31,26 +31,27 @@ _REFUSED = {pickle.PERSID, pickle.BINPERSID, pickle.EXT1, pickle.EXT2, pickle.EX
 _REFUSED |= {pickle.NEXT_BUFFER, pickle.READONLY_BUFFER}
 
 
-def read_pickle(path: Path) -> dict[str, Any]:
+def read_pickle(path: Path, what: str = "a body") -> dict[str, Any]:
     """Return the dictionary at the top of a body pickle, e.g. of an SMPL .pkl file; values as in ``pickled_values``.
 
+    :param what: what the file should hold, for messages.
     :raises ModelFileError: unreadable, too large, damaged, or asks for anything but arrays; nothing has run then.
     """
     try:
         with path.open("rb") as file:  # read() sets aside as much as it is asked for
             data = file.read(min(path.stat().st_size, LARGEST_FILE) + 1)
     except OSError as cause:
-        raise ModelFileError(f"{path} cannot be read ({cause.strerror}); choose another body file") from cause
+        raise ModelFileError(f"{path} cannot be read ({cause.strerror}); choose another file") from cause
     if len(data) > LARGEST_FILE:
-        raise ModelFileError(f"{path} is larger than {LARGEST_FILE >> 20} MiB, too large for a body file")
+        raise ModelFileError(f"{path} is larger than {LARGEST_FILE >> 20} MiB, too large for {what}")
     try:
         result = _BodyUnpickler(data).load()
     except ModelFileError as cause:
-        raise ModelFileError(f"{path} cannot be used as a body: {cause}; get it from its publisher again") from None
+        raise ModelFileError(f"{path} cannot be used as {what}: {cause}; get it from its publisher again") from None
     except _UNREADABLE as cause:
         raise ModelFileError(f"{path} is not a readable pickle ({cause}); download it again") from cause
     if not isinstance(result, dict):
-        raise ModelFileError(f"{path} contains a {type(result).__name__}, not a table of arrays; choose a body file")
+        raise ModelFileError(f"{path} contains a {type(result).__name__}, not a table of arrays; choose another file")
     return result
 
 
@@ -79,16 +80,16 @@ class _BodyUnpickler(pickle._Unpickler):
         found = stand_in(f"{module}.{name}")
         if found is None:
             shown = f"{module:.80}.{name:.80}"
-            raise ModelFileError(f"it asks for {shown}, which a body file has no use for and which may be an attack")
+            raise ModelFileError(f"it asks for {shown}, which such a file has no use for and which may be an attack")
         return found
 
     def _encode(self, text: str, codec: str | bytes) -> bytes:
         """Return bytes that Python 3 wrote as text for old protocols; each at most once, so that the sum is bounded."""
         if not isinstance(text, str) or codec not in ("latin1", "latin-1", b"latin1"):
-            raise ModelFileError("it recodes text in a way that body files do not")
+            raise ModelFileError("it recodes text in a way that such files do not")
         self._recodable -= len(text)
         if self._recodable < 0:
-            raise ModelFileError("it repeats its data more often than a body file does")
+            raise ModelFileError("it repeats its data more often than such a file does")
         return text.encode("latin1")
 
     def set_items(self, items: list[Any]) -> None:
@@ -133,11 +134,11 @@ class _Handlers(dict[int, Callable[[Any], object]]):
     def __getitem__(self, opcode: int) -> Callable[[Any], object]:
         self._count += 1
         if self._count > MOST_OPCODES:
-            raise ModelFileError(f"it has more than {MOST_OPCODES} pickle instructions, too many for a body file")
+            raise ModelFileError(f"it has more than {MOST_OPCODES} pickle instructions, too many for such a file")
         return super().__getitem__(opcode)
 
     def __missing__(self, opcode: int) -> Callable[[Any], object]:
-        raise ModelFileError(f"it uses the pickle instruction {bytes([opcode])!r}, which a body file has no use for")
+        raise ModelFileError(f"it uses the pickle instruction {bytes([opcode])!r}, which such a file has no use for")
 
 
 _HANDLERS: dict[int, Callable[[Any], object]] = {

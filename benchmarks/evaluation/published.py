@@ -1,0 +1,91 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Figures that others have published, each with the table that it is from.
+
+Only figures whose source was read are listed, and only for the measures that this source states. Others evaluate with
+SMPL and with networks that were trained on the data sets' training splits; `docs/evaluation.md` says what differs.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+_GVHMR = "Shen et al., GVHMR, SIGGRAPH Asia 2024 (arXiv:2409.06662)"
+_GVHMR_CAMERA, _GVHMR_WORLD = f"{_GVHMR}, table 2", f"{_GVHMR}, table 1"
+_HUMAN3R = "Chen et al., Human3R (arXiv:2510.06219), table of 3DPW and EMDB-1"
+_ONLINE_CAMERA = "OnlineHMR, table of EMDB-1 (there PHMR, offline, is PromptHMR-Vid)"
+_ONLINE_WORLD = "OnlineHMR, table of EMDB-2 (there PHMR, offline, is PromptHMR-Vid)"
+_METRIC = "MetricHMSR, table of 3DPW"
+_SAM3D = "Yang et al., SAM 3D Body (arXiv:2602.15989), main table of accuracy, ViT-H"
+_GENMO = "GENMO, ICCV 2025, table of EMDB-2; the same in Human3R"
+
+
+@dataclass(frozen=True)
+class Published:
+    """A row: the method, its figures by key of `protocols.MEASURES`, and where they are stated."""
+
+    method: str
+    source: str
+    figures: dict[str, float] = field(default_factory=dict)
+
+
+def _mesh(pa_mpjpe: float, mpjpe: float, mpvpe: float, acceleration: float | None = None) -> dict[str, float]:
+    figures = {"mpjpe": mpjpe, "pa_mpjpe": pa_mpjpe, "mpvpe": mpvpe}
+    return figures if acceleration is None else figures | {"acceleration": acceleration}
+
+
+def _world(
+    wa: float, w: float, rte: float, jitter: float | None = None, slide: float | None = None
+) -> dict[str, float]:
+    figures = {"wa_mpjpe": wa, "w_mpjpe": w, "rte": rte, "jitter": jitter, "foot_slide": slide}
+    return {key: value for key, value in figures.items() if value is not None}
+
+
+PUBLISHED: dict[str, list[Published]] = {
+    "h36m-p2": [
+        Published(
+            "HMR 2.0a (4DHumans)",
+            "Goel et al., Humans in 4D, ICCV 2023 (arXiv:2305.20091), table of 3DPW and Human3.6M",
+            {"mpjpe": 44.8, "pa_mpjpe": 33.6},
+        ),
+    ],
+    "3dhp": [
+        Published(
+            "OriNet",
+            "Luo et al., OriNet, BMVC 2018, its repository's table for the corrected test set",
+            {"pck": 84.3, "auc": 47.5, "mpjpe": 84.5},
+        ),
+    ],
+    "3dpw-mesh": [
+        Published("SPIN", "Kolotouros et al., SPIN, ICCV 2019, table of 3DPW", {"mpjpe": 96.9, "pa_mpjpe": 59.2}),
+        Published("HMR 2.0a (4DHumans)", _GVHMR_CAMERA, _mesh(44.4, 69.8, 82.2, 18.1)),
+        Published("WHAM", _GVHMR_CAMERA, _mesh(35.9, 57.8, 68.7, 6.6)),
+        Published("TRAM", _METRIC, _mesh(35.6, 59.3, 69.6)),
+        Published("GVHMR", _GVHMR_CAMERA, _mesh(36.2, 55.6, 67.2, 5.0)),
+        Published("PromptHMR", _HUMAN3R, _mesh(36.6, 58.7, 69.4)),
+        Published("PromptHMR-Vid", f"{_METRIC} (there PromptHMR)", _mesh(35.5, 56.9, 67.3)),
+        Published("SAM 3D Body", _SAM3D, {"pa_mpjpe": 33.2}),
+    ],
+    "emdb1": [
+        Published("HMR 2.0 (4DHumans)", _ONLINE_CAMERA, _mesh(60.7, 98.3, 120.8, 19.9)),
+        Published("WHAM", _GVHMR_CAMERA, {"pa_mpjpe": 50.4}),
+        Published("TRAM", _ONLINE_CAMERA, _mesh(45.7, 74.4, 86.6, 4.9)),
+        Published("GVHMR", _GVHMR_CAMERA, {"pa_mpjpe": 42.7}),
+        Published("GVHMR, as others evaluated it", _ONLINE_CAMERA, _mesh(44.5, 74.2, 85.9)),
+        Published("PromptHMR", _HUMAN3R, _mesh(41.0, 71.7, 84.5)),
+        Published("PromptHMR-Vid", _ONLINE_CAMERA, _mesh(40.1, 68.1, 79.2)),
+        Published("SAM 3D Body", _SAM3D, {"mpjpe": 62.9, "mpvpe": 74.3}),
+    ],
+    "emdb2": [
+        Published("WHAM (DPVO)", _GVHMR_WORLD, _world(135.6, 354.8, 6.0, 22.5, 4.4)),
+        Published("GVHMR (DPVO)", _GVHMR_WORLD, _world(111.0, 276.5, 2.0, 16.7, 3.5)),
+        Published("TRAM", _GENMO, _world(76.4, 222.4, 1.4)),
+        Published("PromptHMR-Vid", _ONLINE_WORLD, _world(71.0, 216.5, 1.3)),
+    ],
+    "rich": [
+        Published("HMR 2.0 (4DHumans)", _GVHMR_CAMERA, {"mpjpe": 96.0}),
+        Published("WHAM", f"{_GVHMR}, tables 1 and 2", {"mpjpe": 80.0} | _world(109.9, 184.6, 4.1, 19.7, 3.3)),
+        Published("GVHMR", f"{_GVHMR}, tables 1 and 2", {"mpjpe": 66.0} | _world(78.8, 126.3, 2.4, 12.8, 3.0)),
+        Published("PromptHMR", _SAM3D, {"pa_mpjpe": 37.3}),
+        Published("SAM 3D Body", _SAM3D, {"pa_mpjpe": 31.9}),
+    ],
+}
