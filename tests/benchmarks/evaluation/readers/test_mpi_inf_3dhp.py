@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""MPI-INF-3DHP's test set: MATLAB 7.3 files, whose axes are in the opposite order."""
+
+import h5py
+import numpy as np
+import pytest
+from scope.benchmarks.evaluation.files import DatasetError
+from scope.benchmarks.evaluation.models import Models
+from scope.benchmarks.evaluation.readers.mpi_inf_3dhp import clips
+
+from ..made_data import K, write_3dhp
+
+JOINTS = np.random.default_rng(0).normal(scale=500, size=(4, 17, 3)) + [0, 0, 4000]
+VALID = np.array([1, 0, 1, 1])
+FILE = "mpi_inf_3dhp_test_set/TS3/annot_data.mat"
+
+
+def test_valid_frames_of_the_universal_joints_in_metres(tmp_path):
+    write_3dhp(tmp_path, JOINTS, VALID)
+    for root in (tmp_path, tmp_path / "mpi_inf_3dhp_test_set"):
+        found = clips(root, Models())
+        assert [clip.name for clip in found] == ["TS1", "TS2", "TS3", "TS4", "TS5", "TS6"]
+        truth = found[2].truth()
+        (person,) = truth.people
+        assert person.rows.tolist() == [0, 2, 3]
+        # The data set's order of joints: head top, neck, right arm, left arm, right leg, left leg, pelvis, …
+        for name, number in {
+            "head_top": 0,
+            "right_wrist": 4,
+            "left_shoulder": 5,
+            "left_ankle": 13,
+            "pelvis": 14,
+        }.items():
+            assert np.allclose(person.camera.joints([name])[1, 0], 0.9 * JOINTS[2, number] / 1000)
+        assert np.allclose(truth.intrinsics, K)  # from the joints of true size
+
+
+def replace(path, key, value):
+    with h5py.File(path, "r+") as file:
+        del file[key]
+        if value is not None:
+            file[key] = value
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "said"),
+    [
+        ("univ_annot3", None, "lacks univ_annot3"),
+        ("univ_annot3", np.zeros((4, 1, 16, 3)), r"univ_annot3 must have shape \(any, 1, 17, 3\)"),
+        ("univ_annot3", np.zeros((3, 1, 17, 3)), r"univ_annot3 must have shape \(4, 1, 17, 3\)"),
+        ("univ_annot3", np.full((4, 1, 17, 3), 1e9), "m from the origin"),
+        ("valid_frame", np.ones((9, 1)), "univ_annot3 must have shape"),
+        ("annot2", h5py.SoftLink("/annot3"), "annot2 is no array of the file itself"),
+        ("annot2", h5py.ExternalLink("other.mat", "annot2"), "annot2 is no array of the file itself"),
+    ],
+)
+def test_damage_is_one_sentence(tmp_path, key, value, said):
+    write_3dhp(tmp_path, JOINTS, VALID)
+    replace(tmp_path / FILE, key, value)
+    with pytest.raises(DatasetError, match=said) as found:
+        clips(tmp_path, Models())[2].truth()
+    assert str(tmp_path / FILE) in str(found.value)
+
+
+def test_an_array_that_claims_more_than_memory_is_not_read(tmp_path):
+    write_3dhp(tmp_path, JOINTS, VALID)
+    with h5py.File(tmp_path / FILE, "r+") as file:
+        del file["annot3"]
+        file.create_dataset("annot3", (1 << 40, 1, 17, 3), "f8", chunks=(1, 1, 17, 3))
+    with pytest.raises(DatasetError, match="annot3 claims shape"):
+        clips(tmp_path, Models())[2].truth()
+
+
+def test_values_in_other_files_are_not_read(tmp_path):
+    write_3dhp(tmp_path, JOINTS, VALID)
+    (tmp_path / "secret").write_bytes(bytes(4 * 17 * 3 * 8))
+    with h5py.File(tmp_path / FILE, "r+") as file:
+        del file["annot3"]
+        outside = [(str(tmp_path / "secret"), 0, h5py.h5f.UNLIMITED)]
+        file.create_dataset("annot3", (4, 1, 17, 3), "f8", external=outside)
+    with pytest.raises(DatasetError, match="annot3 is no array of the file itself"):
+        clips(tmp_path, Models())[2].truth()
+
+
+@pytest.mark.parametrize("content", [b"", b"MATLAB 5.0 MAT-file", b"\x89HDF\r\n\x1a\n" + bytes(100)])
+def test_what_is_no_hdf5_is_one_sentence(tmp_path, content):
+    write_3dhp(tmp_path, JOINTS, VALID)
+    (tmp_path / FILE).write_bytes(content)
+    with pytest.raises(DatasetError, match=r"is not a readable \.mat file of MATLAB 7\.3"):
+        clips(tmp_path, Models())[2].truth()
+
+
+def test_another_folder_is_one_sentence(tmp_path):
+    with pytest.raises(DatasetError, match=r"TS1 does not exist, where imageSequence and annot_data\.mat"):
+        clips(tmp_path, Models())
