@@ -25,12 +25,12 @@ def solver(quick: bool) -> dict[str, Any]:
     rounds = 20 if quick else 100
     figures: dict[str, Any] = steps.target_table(rounds)
     figures |= startup.startup()
-    experiments = {}
-    for number in (1, 2, 3):
-        rows = steps.experiment(number, 5 if quick else 40)
-        experiments[number] = rows
+    experiments: dict[str, list[dict[str, float]]] = {}
+    for number, terms in ((1, None), (2, None), (3, None), (3, 600)):
+        suffix = f"_N{terms}" if terms else ""
+        rows = experiments[f"{number}{suffix}"] = steps.experiment(number, 5 if quick else 40, terms)
         print(report.experiment_lines(number, rows), end="\n\n", flush=True)
-        plots.plot_experiment(OUT, number, rows)
+        plots.plot_experiment(OUT, number, rows, suffix)
     figures["experiments"] = experiments
     figures["clip"] = clip_steps.clip_table(3 if quick else 10)
     figures["clip_gradients"] = clip_steps.against_gradients(1 if quick else 5)

@@ -9,6 +9,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from .problem import BODIES
+
 SIZE, MARGIN = (720, 480), (80, 40, 30, 60)  # width, height; left, top, right, bottom
 COLOURS = ((180, 90, 20), (40, 110, 220), (60, 150, 60), (150, 60, 150))
 FONT, INK = cv2.FONT_HERSHEY_SIMPLEX, (40, 40, 40)
@@ -51,17 +53,17 @@ def plot(path: Path, title: str, x_label: str, y_label: str, lines: Lines) -> No
     cv2.imwrite(str(path), picture)
 
 
-def plot_experiment(folder: Path, number: int, rows: list[dict[str, float]]) -> list[Path]:
-    """Write the pictures of one experiment and return their paths."""
+def plot_experiment(folder: Path, number: int, rows: list[dict[str, float]], suffix: str = "") -> list[Path]:
+    """Write the pictures of one experiment and return their paths, whose names end with ``suffix``."""
     key = "P" if number == 3 else "N"
     times, speedups = {}, {}
-    for K, name in ((23, "SMPL"), (51, "SMPL+H")):
+    for K, name in BODIES.items():
         chosen = [row for row in rows if row["K"] == K]
         x = [row[key] for row in chosen]
         for method in ("sparse", "dense"):
             times[f"{name} {method}"] = x, [row[method] for row in chosen]
         speedups[name] = x, [row["dense"] / row["sparse"] for row in chosen]
-    paths = [folder / f"experiment{number}_{what}.png" for what in ("times", "speedups")]
+    paths = [folder / f"experiment{number}_{what}{suffix}.png" for what in ("times", "speedups")]
     plot(paths[0], f"Experiment {number}", key, "us a step", times)
     plot(paths[1], f"Experiment {number}", key, "dense over sparse", speedups)
     return paths

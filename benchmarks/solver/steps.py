@@ -34,6 +34,12 @@ def sparse_run(p: Problem) -> Callable[[int], object]:
     return lambda n: loops.steps(n, p.tree, p.terms, p.stage, p.damping, p.root_scale, p.bank, pose, blocks, work)
 
 
+def called_run(p: Problem) -> Callable[[int], object]:
+    """Return run(n): n steps of the solver, each called from Python, as those of the dense baseline are."""
+    steps = sparse_run(p)
+    return lambda n: [steps(1) for _ in range(n)]
+
+
 def dense_run(p: Problem) -> Callable[[int], object]:
     """Return run(n): n dense steps."""
     dense = Dense(p)
@@ -55,20 +61,25 @@ def prior_run(p: Problem) -> Callable[[int], object]:
     return lambda n: loops.priors(n, p.tree, p.terms, p.stage, p.bank, pose, blocks)
 
 
-def compare(problems: dict[str, Problem], rounds: int) -> tuple[dict[str, float], dict[str, float]]:
-    """Return the times of a sparse and of a dense step in microseconds, measured in turns."""
+def compare(problems: dict[str, Problem], rounds: int) -> tuple[dict[str, float], dict[str, float], dict[str, float]]:
+    """Return the times of a sparse step in a compiled loop, of one called from Python, and of a dense step.
+
+    Microseconds, measured in turns. The dense step is called from Python.
+    """
     runs, counts = {}, {}
     for name, p in problems.items():
         runs[f"s {name}"], counts[f"s {name}"] = sparse_run(p), SPARSE_BATCH
+        runs[f"c {name}"], counts[f"c {name}"] = called_run(p), SPARSE_BATCH
         runs[f"d {name}"], counts[f"d {name}"] = dense_run(p), DENSE_BATCH
     times = take_turns(runs, counts, rounds)
-    return {n: times[f"s {n}"] for n in problems}, {n: times[f"d {n}"] for n in problems}
+    sparse, called, dense = ({n: times[f"{kind} {n}"] for n in problems} for kind in "scd")
+    return sparse, called, dense
 
 
 def target_table(rounds: int) -> dict[str, object]:
-    """Return gn_step, dense_over_sparse, iteration and prior_23_joints."""
+    """Return gn_step, dense_over_sparse, dense_over_called, iteration and prior_23_joints."""
     problems = {name: make_problem(K, P, N, prior) for name, (K, P, N, prior, _) in TARGETS.items()}
-    sparse, dense = compare(problems, rounds)
+    sparse, called, dense = compare(problems, rounds)
     more = take_turns(
         {
             "iteration": iteration_run(make_problem(23, 10, 120, everything=True)),
@@ -77,17 +88,23 @@ def target_table(rounds: int) -> dict[str, object]:
         {"iteration": SPARSE_BATCH, "prior_23_joints": SPARSE_BATCH},
         rounds,
     )
-    return {"gn_step": sparse, "dense_over_sparse": {n: dense[n] / sparse[n] for n in sparse}, **more}
+    ratios = {n: dense[n] / sparse[n] for n in sparse}
+    called_ratios = {n: dense[n] / called[n] for n in sparse}
+    return {"gn_step": sparse, "dense_over_sparse": ratios, "dense_over_called": called_ratios, **more}
 
 
-def experiment(which: int, rounds: int) -> list[dict[str, float]]:
-    """Return the rows of the paper's Experiment 1 (P = 0, growing N), 2 (P = 10, growing N) or 3 (N = 600, growing P).
+def experiment(which: int, rounds: int, terms: int | None = None) -> list[dict[str, float]]:
+    """Return the rows of the paper's Experiment 1 (P = 0, growing N), 2 (P = 10, growing N) or 3 (growing P).
 
-    A row: K, P, N, sparse and dense time in microseconds.
+    :param terms: N of Experiment 3. If None, as in the paper: one term of each kind for every part, N = 3 (K + 1).
+    :return: rows of K, P, N, and the times of a sparse and of a dense step in microseconds.
     """
-    points = [(P, 600) for P in SHAPES] if which == 3 else [(10 * (which - 1), N) for N in SIZES]
-    problems = {(K, P, N): make_problem(K, P, N) for K in (23, 51) for P, N in points}
-    sparse, dense = compare({str(key): p for key, p in problems.items()}, rounds)
+    if which == 3:
+        points = [(K, P, terms or 3 * (K + 1)) for K in (23, 51) for P in SHAPES]
+    else:
+        points = [(K, 10 * (which - 1), N) for K in (23, 51) for N in SIZES]
+    problems = {point: make_problem(*point) for point in points}
+    sparse, _, dense = compare({str(key): p for key, p in problems.items()}, rounds)
     return [
         {"K": K, "P": P, "N": N, "sparse": sparse[str((K, P, N))], "dense": dense[str((K, P, N))]}
         for K, P, N in problems
@@ -101,7 +118,6 @@ def growth(rows: list[dict[str, float]], K: int, method: str) -> float:
 
 
 def growth_in_joints(rows: list[dict[str, float]], method: str) -> float:
-    """Return the median exponent a of time ~ K^a between the bodies of the rows, over points of equal P and N."""
-    by_place = {(row["K"], row["P"], row["N"]): row[method] for row in rows}
-    pairs = [(t, by_place[51, P, N]) for (K, P, N), t in by_place.items() if K == 23]
-    return float(np.median([np.log(b / a) / np.log(51 / 23) for a, b in pairs]))
+    """Return the median exponent a of time ~ K^a between the bodies of the rows, whose points are in the same order."""
+    small, large = ([row[method] for row in rows if row["K"] == K] for K in (23, 51))
+    return float(np.median([np.log(b / a) / np.log(51 / 23) for a, b in zip(small, large, strict=True)]))
