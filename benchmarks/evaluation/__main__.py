@@ -125,9 +125,10 @@ def _lines(name: str, protocol: Protocol, figures: dict[str, Any], joints: str, 
     means, rows = figures["figures"], PUBLISHED.get(name, [])
     keys = [key for key in protocol.measures if key in means or any(key in row.figures for row in rows)]
     head = ["", *(MEASURES[key] for key in keys), "source"]
-    table = [head, ["---"] * len(head)]
-    for number, row in enumerate(rows, 1):
-        table.append([row.method, *(_cell(row.figures.get(key)) for key in keys), f"[{number}]"])
+    table, sources = [head, ["---"] * len(head)], list(dict.fromkeys(row.source for row in rows))
+    for row in rows:
+        figures_of = [_cell(row.figures.get(key)) for key in keys]
+        table.append([row.method, *figures_of, f"[{sources.index(row.source) + 1}]"])
     table.append([f"Scope, {settings.quality}", *(_cell(means.get(key)) for key in keys), "this run"])
     found = f"{figures['frames_seen']} of {figures['frames']} frames were captured"
     missed = f"; {figures['missed']} of {figures['people']} people were not found" if figures["missed"] else ""
@@ -138,7 +139,7 @@ def _lines(name: str, protocol: Protocol, figures: dict[str, Any], joints: str, 
         "",
         f"Follows {protocol.follows}.",
         f"Scope: {found}{missed}; joints: {joints}; camera {'given' if settings.camera else 'unknown'}.",
-        *(f"[{number}] {row.source}" for number, row in enumerate(rows, 1)),
+        *(f"[{number}] {source}" for number, source in enumerate(sources, 1)),
     ]
 
 

@@ -78,7 +78,7 @@ PROTOCOLS = {
         SMPL24,
         PELVIS,
         ("mpjpe", "pa_mpjpe", "pck", "auc", "acceleration"),
-        "3DPW's own challenge: relative to the pelvis; not the joints of the published rows",
+        "3DPW's own challenge: relative to the pelvis; the joints of most publications need --smpl and --regressor",
         SMPL24,
     ),
     "emdb1": Protocol(
