@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Shots of the held-out motion-capture takes: one section of each, with a random body and a random camera."""
+"""Shots of the takes that the lifter was not trained on: a section of each, with a random body and a random camera.
+
+The joint prior was trained on all of them but one: it is split by performer (`assets/prior/README.md`).
+"""
 
 from __future__ import annotations
 
@@ -47,7 +50,7 @@ class Take:
 
 
 def held_out_takes(path: Path) -> list[Take]:
-    """Read the held-out takes of a file written by ``tools.mocap.fit_body``."""
+    """Read the takes held out from the lifter's training, of a file written by ``tools.mocap.fit_body``."""
     with np.load(path) as data:
         arrays = {key: data[key] for key in ("poses", "trans", "valid")}
         start, names, betas, fps = (data[f"take_{key}"] for key in ("start", "name", "betas", "fps"))
