@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Figures that others have published, each with the table that it is from.
 
-Only figures whose source was read are listed, and only for the measures that this source states. Others evaluate with
-SMPL and with networks that were trained on the data sets' training splits; `docs/evaluation.md` says what differs.
+They were transcribed from summaries of these tables, and only those are listed for which one was found: look a figure
+up in its paper before citing it. Others evaluate with SMPL and with networks that were trained on the data sets'
+training splits; `docs/evaluation.md` says what differs.
 """
 
 from __future__ import annotations

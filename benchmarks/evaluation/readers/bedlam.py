@@ -8,6 +8,7 @@
     validation/20221019_3-8_250_highbmihand_orbit_stadium_6fps/png/seq_000000/seq_000000_0000.png
 
 The numbers of the images count frames of 30 per second. The mean of a sequence's shapes is used, which are equal.
+Scenes of closeups are left out: their images are stored sideways, their ground truth is upright.
 """
 
 from __future__ import annotations
@@ -40,6 +41,8 @@ def clips(folder: Path, models: Models) -> list[Clip]:
     """
     found = []
     for path in existing_files(folder, "all_npz_12_validation/*.npz", "ground truth of BEDLAM's validation split"):
+        if "closeup" in path.stem:
+            continue
         images = existing_folder(folder / "validation" / path.stem / "png", "the images of BEDLAM")
         for sequence in sorted(_rows_of(path)):
             pictures = frames_in(images / sequence)

@@ -50,7 +50,7 @@ def _truth(path: Path, frames: int, models: Models) -> Truth:
     camera, smpl = _inner(path, table, "camera"), _inner(path, table, "smpl")
     T_camera_world = array(path, camera, "extrinsics", (None, 4, 4))
     count = len(T_camera_world)
-    if count != frames:
+    if count > frames:
         raise DatasetError(f"{path} is about {count} frames, but {path.parent / 'images'} holds {frames}")
     gender = table.get("gender")
     gender = gender.decode("latin1") if isinstance(gender, bytes) else gender

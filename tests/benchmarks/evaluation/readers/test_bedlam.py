@@ -54,6 +54,12 @@ def test_damage_is_one_sentence(tmp_path, models, changes, said):
     assert str(path) in str(found.value)
 
 
+def test_closeups_are_left_out(tmp_path, models):
+    path = write_bedlam(tmp_path)
+    np.savez(path.with_name("20221019_1_250_highbmihand_closeup_suburb_b_6fps.npz"))
+    assert len(clips(tmp_path, models)) == 1
+
+
 def test_missing_images_are_named(tmp_path, models):
     write_bedlam(tmp_path)
     (tmp_path / "validation").rename(tmp_path / "elsewhere")

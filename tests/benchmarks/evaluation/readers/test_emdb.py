@@ -58,7 +58,7 @@ def test_a_gender_without_a_file_is_named(tmp_path, models):
         ({"gender": "robot"}, "gender must be one of"),
         ({"smpl": 3}, "lacks smpl"),
         ({"camera": {"intrinsics": K}}, "lacks extrinsics"),
-        ({"camera": {"intrinsics": K, "extrinsics": np.zeros((2, 4, 4))}}, "is about 2 frames"),
+        ({"camera": {"intrinsics": K, "extrinsics": np.zeros((9, 4, 4))}}, "is about 9 frames"),
         ({"good_frames_mask": np.zeros(6, bool)}, "marks no frame"),
         ({"good_frames_mask": np.zeros(5, bool)}, r"good_frames_mask must have shape \(6\)"),
     ],
