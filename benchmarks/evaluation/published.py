@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+_HMR_P2 = "Kanazawa et al., HMR, CVPR 2018, table of protocol 2; repeated by Arnab et al., CVPR 2019, table 2"
 _GVHMR = "Shen et al., GVHMR, SIGGRAPH Asia 2024 (arXiv:2409.06662)"
 _GVHMR_CAMERA, _GVHMR_WORLD = f"{_GVHMR}, table 2", f"{_GVHMR}, table 1"
 _HUMAN3R = "Chen et al., Human3R (arXiv:2510.06219), table of 3DPW and EMDB-1"
@@ -42,7 +43,13 @@ def _world(
 
 
 PUBLISHED: dict[str, list[Published]] = {
+    "h36m-p1": [
+        Published("HMR", "Kanazawa et al., HMR, CVPR 2018, table of protocol 1", {"mpjpe": 88.0}),
+    ],
     "h36m-p2": [
+        Published("SMPLify", _HMR_P2, {"pa_mpjpe": 82.3}),
+        Published("HMR", _HMR_P2, {"pa_mpjpe": 56.8}),
+        Published("VIBE", "Kocabas et al., VIBE, CVPR 2020, table of Human3.6M", {"mpjpe": 65.6, "pa_mpjpe": 41.4}),
         Published(
             "HMR 2.0a (4DHumans)",
             "Goel et al., Humans in 4D, ICCV 2023 (arXiv:2305.20091), table of 3DPW and Human3.6M",
