@@ -32,7 +32,13 @@ from .plots import Span as MarkedSpan
 from .viewer_data import shown_rows, viewer_data
 
 CONTACTS = ("left heel", "left toe", "right heel", "right toe")  # the columns of `foot_contact`
-_SHORT = {"unseen": "not seen", "far": "far from the footage", "unsure": "low confidence", "floor": "under the floor"}
+_SHORT = {
+    "unseen": "not seen",
+    "far": "far from the footage",
+    "unsure": "low confidence",
+    "floor": "under the floor",
+    "warned": "warning",
+}
 _MOST_SPANS = 60  # that the page lists
 _GAP_S = 0.25  # between spans that are listed as one
 _AT_TIME = re.compile(r"at (\d+\.\d) s")  # in warnings
@@ -78,14 +84,15 @@ def capture_page(clip: CapturedClip, rows: NDArray[np.int64], pictures: Sequence
     captions = [f"frame {first.frames[rows[p.row]]}, {first.timestamps[rows[p.row]]:.2f} s" for p in pictures]
     spans = [_review(motion, clip.body) for motion in clip.motions]
     colors = [page.person_color(n) for n in range(len(clip.motions))]
-    thinned = "" if len(rows) == len(first) else f"Of this long clip, every {rows[1]}. frame is shown in 3D."
+    warnings = clip.report["warnings"]
+    thinned = "" if len(rows) == len(first) else f"Of this long clip, one frame in {rows[1]} is shown in 3D."
     now = datetime.now().astimezone().strftime("%Y-%m-%d %H:%M")
     content = [
         page.header(name, f"Motion capture by Scope, {now}", header_facts(clip)),
         page.stage(len(rows), first.image_size.tolist()),
         page.strip(pictures, captions),
-        page.section("Over time", *over_time(clip.motions, spans), note=thinned),
-        page.section("Warnings", *warning_list(clip.report["warnings"]), review_table(clip.motions, spans)),
+        page.section("Over time", *over_time(clip.motions, marked_spans(clip.motions, spans, warnings)), note=thinned),
+        page.section("Warnings", *warning_list(warnings), review_table(clip.motions, spans)),
         page.section("Figures", figures_table(clip.motions, clip.body)),
         page.section(
             "How it was made",
@@ -114,16 +121,15 @@ def header_facts(clip: CapturedClip) -> dict[str, str]:
     }
 
 
-def over_time(motions: Sequence[Motion], spans: Sequence[Sequence[Span]]) -> list[Markup]:
+def over_time(motions: Sequence[Motion], marked: Sequence[MarkedSpan] = ()) -> list[Markup]:
     """Return the plots over time: confidence, reprojection error, contact of the feet.
 
-    :param spans: of each motion, those that should be reviewed.
+    :param marked: intervals of time that the plots mark; their kinds are keys of ``_SHORT``.
     """
     times = motions[0].timestamps
     x_axis = time_axis(times)
     colors = [page.person_color(n) for n in range(len(motions))]
     legend = {_name(n, motions): color for n, color in enumerate(colors)} if len(motions) > 1 else None
-    marked = [_marked(span, times, n, motions) for n, of_one in enumerate(spans) for span in of_one]
     confidence = [
         Curve(times, body_confidence(m).astype(float), color, _name(n, motions))
         for n, (m, color) in enumerate(zip(motions, colors, strict=True))
@@ -149,6 +155,18 @@ def over_time(motions: Sequence[Motion], spans: Sequence[Sequence[Span]]) -> lis
         title = "Contact of the feet" + (f", {_name(n, motions)}" if len(motions) > 1 else "")
         figures.append(page.plot_figure(title, band_plot(rows, times, x_axis, label=title, color=color)))
     return figures
+
+
+def marked_spans(
+    motions: Sequence[Motion], spans: Sequence[Sequence[Span]], warnings: Sequence[str]
+) -> list[MarkedSpan]:
+    """Return what the plots mark: the spans of each motion that should be reviewed, and the times in warnings."""
+    times = motions[0].timestamps
+    marked = [_marked(span, times, n, motions) for n, of_one in enumerate(spans) for span in of_one]
+    for text in warnings:
+        at = [float(match[1]) for match in _AT_TIME.finditer(text)]
+        marked += [MarkedSpan(time, time, "warned", text) for time in at if times[0] <= time <= times[-1]]
+    return marked
 
 
 def time_axis(times: NDArray[np.float64]) -> Axis:

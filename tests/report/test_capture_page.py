@@ -121,6 +121,15 @@ def test_times_in_warnings_lead_to_their_frames_and_the_text_stays_as_printed():
     assert "".join(re.sub("<[^>]*>", "", "".join(warning_list([said])))).strip() == said
 
 
+def test_warnings_are_marked_at_their_times(body):
+    text = f"a.mp4 cuts to another scene {at_times([0.2, 9.0])}"  # the clip ends at 8/30 s
+    page = capture_page(clip(body, Path("a.mp4"), warnings=[text]), np.arange(FRAMES), [])
+    marks = re.findall(
+        r'<rect class="span warned" x="([\d.]+)" y="0" width="([\d.]+)" height="100"><title>([^<]*)<', page
+    )
+    assert marks == [("750.0", "1.5", text)] * 2  # in both plots of lines
+
+
 def test_frames_without_the_person_are_listed_and_marked(body):
     text = capture_page(clip(body, Path("a.mp4")), np.arange(FRAMES), [])
     assert "not visible, the pose is filled in" in text

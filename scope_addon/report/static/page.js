@@ -18,7 +18,7 @@
     byId("view").hidden = true;
     byId("no-view").hidden = false;
     document.querySelector(".views").hidden = true;
-    if (error.message !== "no WebGL 2") throw error;
+    if (error.message !== "no WebGL 2") console.error(error);
   }
 
   /** The row at a time: the last one that has begun. */
