@@ -97,7 +97,9 @@ def capture_page(clip: CapturedClip, rows: NDArray[np.int64], pictures: Sequence
         page.section(
             "How it was made",
             page.command_line(clip.command),
-            page.fact_list({"Machine": machine(), "Versions": versions(), "Networks on": clip.report["execution"]}),
+            page.fact_list(
+                {"Machine": machine(), "Versions": versions(), "Networks on": clip.report["execution"]}, single=True
+            ),
         ),
     ]
     return page.document(f"{name} – Scope", content, viewer_data(clip.motions, clip.body, rows, colors))

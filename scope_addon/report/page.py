@@ -55,10 +55,10 @@ def header(title: str, subtitle: str, facts: Mapping[str, str]) -> Markup:
     )
 
 
-def fact_list(facts: Mapping[str, str]) -> Markup:
-    """Return names and values as a list of definitions."""
+def fact_list(facts: Mapping[str, str], single: bool = False) -> Markup:
+    """Return names and values as a list of definitions; with ``single``, in one column."""
     items = "".join(f"<div><dt>{escape(name)}</dt><dd>{escape(value)}</dd></div>" for name, value in facts.items())
-    return Markup(f'<dl class="facts">{items}</dl>')
+    return Markup(f'<dl class="facts{" single" if single else ""}">{items}</dl>')
 
 
 def section(title: str, *content: Markup, note: str = "") -> Markup:
@@ -67,19 +67,24 @@ def section(title: str, *content: Markup, note: str = "") -> Markup:
     return Markup(f"<section><h2>{escape(title)}</h2>{said}{''.join(content)}</section>\n")
 
 
-def table(head: Sequence[str], rows: Sequence[Sequence[str | Markup]], markup_columns: Sequence[int] = ()) -> Markup:
+def table(
+    head: Sequence[str],
+    rows: Sequence[Sequence[str | Markup]],
+    markup_columns: Sequence[int] = (),
+    numbers: bool = False,
+) -> Markup:
     """Return a table, the first cell of each row its heading.
 
     :param markup_columns: columns whose cells are markup already.
+    :param numbers: whether all columns but the first hold numbers, which are written to the right.
     """
     lines = ["<tr>" + "".join(f'<th scope="col">{escape(cell)}</th>' for cell in head) + "</tr>"]
     for row in rows:
         cells = [cell if n in markup_columns else escape(cell) for n, cell in enumerate(row)]
         first = f'<th scope="row">{cells[0]}</th>'
         lines.append(f"<tr>{first}{''.join(f'<td>{cell}</td>' for cell in cells[1:])}</tr>")
-    return Markup(
-        f'<div class="wide"><table><thead>{lines[0]}</thead><tbody>{"".join(lines[1:])}</tbody></table></div>'
-    )
+    kind, below = ' class="numbers"' if numbers else "", "".join(lines[1:])
+    return Markup(f'<div class="wide"><table{kind}><thead>{lines[0]}</thead><tbody>{below}</tbody></table></div>')
 
 
 def plot_figure(

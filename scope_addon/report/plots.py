@@ -49,7 +49,7 @@ class Axis:
             decades = range(math.floor(math.log10(self.low)), math.ceil(math.log10(self.high)) + 1)
             values = [digit * 10.0**decade for decade in decades for digit in (1, 2, 5)]
             inside = [v for v in values if self.low * 0.999 <= v <= self.high * 1.001]
-            return inside if len(inside) <= 2 * count else [v for v in inside if f"{v:e}".startswith("1.0")]
+            return inside if len(inside) <= count + 2 else [v for v in inside if f"{v:e}".startswith("1.0")]
         step = _round_step((self.high - self.low) / count)
         first = math.ceil(self.low / step - 1e-9)
         return [n * step for n in range(first, math.floor(self.high / step + 1e-9) + 1)]
