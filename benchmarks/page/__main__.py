@@ -10,7 +10,7 @@ from datetime import datetime
 from pathlib import Path
 
 from ...scope_addon.atomic_write import atomic_path, reason
-from ...scope_addon.errors import exit_status
+from ...scope_addon.errors import SetupError, exit_status
 from ...scope_addon.motion import Motion
 from ...scope_addon.report import page
 from ...scope_addon.report.capture_page import figures_table, over_time, warning_list
@@ -55,6 +55,9 @@ def report_page(quick: bool) -> str:
     """Run the commands and return the page."""
     body = load_body("scope")
     captured = [(name, video, run_capture(video, FOLDER / f"{name}.npz", say)) for name, video in clips(quick)]
+    if captured[0][2].status:
+        last = captured[0][2].said.strip().splitlines()[-1:] or ["it said nothing"]
+        raise SetupError(f"{captured[0][2].command.text} failed ({last[0]}); mend that and run this again")
     measured = [run(command, FOLDER, say) for command in commands(quick)]
     name, video, outcome = captured[0]
     motion = Motion.load(FOLDER / f"{name}.npz")

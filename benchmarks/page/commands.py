@@ -83,6 +83,7 @@ def run(command: Command, folder: Path, say: Callable[[str], None]) -> Outcome:
 def run_capture(video: Path, target: Path, say: Callable[[str], None]) -> Outcome:
     """Capture a clip into the motion file ``target``; the figures are the capture's report."""
     command = Command(video.name, "capture", (str(video), "-o", str(target), "--json", "--quiet"))
+    target.unlink(missing_ok=True)
     say(f"running {command.text}")
     since = time.monotonic()
     arguments = [sys.executable, "-m", SCRIPTS["capture"], "capture", *command.arguments]

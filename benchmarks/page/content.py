@@ -56,7 +56,7 @@ def plots(figures: dict[str, Any]) -> list[Markup]:
 
 def clip_plot(rows: Sequence[dict[str, float]]) -> Markup:
     """Return the plot of a whole clip as one problem: milliseconds a frame by the number of frames."""
-    curves = []
+    curves: list[Curve] = []
     for K, body in BODIES:
         chosen = [row for row in rows if row["K"] == K]
         x = np.array([row["frames"] for row in chosen], float)

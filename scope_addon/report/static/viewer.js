@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The 3D view: people as skinned meshes on a ground grid, in the world frame of the motion file (metres, z up).
-// Without a library: it draws one kind of mesh, a grid and a few lines, and is a fiftieth of one in size.
+// Without a library: what is drawn is one kind of mesh, a grid and a few lines, and a library of 0.7 MB or more would have
+// to be fetched at set-up, shipped in the extension, and inlined into every page.
 "use strict";
 
 /** Decode base64 of little-endian values into a typed array of the given kind. */
