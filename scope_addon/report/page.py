@@ -19,6 +19,7 @@ Markup = NewType("Markup", str)
 
 PEOPLE_COLORS = 5  # as many as the overlay's tints
 _FILES = Path(__file__).with_name("static")
+_SCRIPTS = ("motion.js", "webgl.js", "viewer.js", "page.js")  # in this order
 _POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'"
 
 
@@ -37,7 +38,7 @@ def document(title: str, content: Sequence[Markup], data: Mapping[str, Any] | No
         # "<" could end the element; in JSON it can only be inside a string.
         text = json.dumps(data, separators=(",", ":")).replace("<", "\\u003c")
         scripts = f'<script type="application/json" id="data">{text}</script>\n'
-        scripts += "".join(f"<script>\n{_file(name)}</script>\n" for name in ("viewer.js", "page.js"))
+        scripts += "".join(f"<script>\n{_file(name)}</script>\n" for name in _SCRIPTS)
     return Markup(
         f'<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         f'<meta http-equiv="Content-Security-Policy" content="{_POLICY}">\n'

@@ -89,7 +89,7 @@ def test_the_page_is_well_formed_and_all_that_users_name_is_text(body, people):
     assert page.texts["li"][0] == f"{HOSTILE} cuts to another scene "
     tags = [tag for tag, _ in page.elements]
     assert tags.count("img") == 3
-    assert tags.count("script") == 3
+    assert tags.count("script") == 5
     assert not [name for _, attributes in page.elements for name in attributes if name.startswith("on")]
     assert len(text) < 2_000_000
 

@@ -38,7 +38,7 @@ def test_figures_are_those_of_this_run_alone(tmp_path, monkeypatch):
     assert (failed.figures, failed.status, failed.printed, failed.said) == ({}, 1, "printed", "said")
     done |= {"status": 0, "json": {"new": 2}}
     assert run(Command("Gate", "gate", ()), tmp_path, lambda text: None).figures == {"new": 2}
-    done["status"] = 3
+    done |= {"status": 3, "json": None}
     said = []
     outcome = run_capture(Path("a b.mp4"), tmp_path / "a.npz", said.append)
     assert (outcome.status, outcome.figures) == (3, {})
