@@ -11,6 +11,7 @@ import shutil
 import subprocess
 import tempfile
 import time
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -57,6 +58,10 @@ class Browser:
         return self
 
     def __exit__(self, *_: object) -> None:
+        self._session = None
+        with suppress(RuntimeError, OSError, subprocess.TimeoutExpired):
+            self.call("Browser.close")  # with all its processes, which otherwise write into the profile for a moment
+            self._process.wait(20)
         self._process.kill()
         self._process.wait()
         os.close(self._commands)
