@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import subprocess
 import sys
 from datetime import datetime
@@ -53,7 +54,7 @@ def main() -> int:
 
 def report_page(quick: bool) -> str:
     """Run the commands and return the page."""
-    body = load_body("scope")
+    body, load = load_body("scope"), other_load()
     captured = [(name, video, run_capture(video, FOLDER / f"{name}.npz", say)) for name, video in clips(quick)]
     if captured[0][2].status:
         last = captured[0][2].said.strip().splitlines()[-1:] or ["it said nothing"]
@@ -66,7 +67,9 @@ def report_page(quick: bool) -> str:
     captions = [f"frame {motion.frames[rows[p.row]]}, {motion.timestamps[rows[p.row]]:.2f} s" for p in pictures]
     everything = [each for _, _, each in captured] + measured
     content = [
-        page.header("Scope on this machine", datetime.now().astimezone().strftime("%Y-%m-%d %H:%M"), facts(everything)),
+        page.header(
+            "Scope on this machine", datetime.now().astimezone().strftime("%Y-%m-%d %H:%M"), facts(everything, load)
+        ),
         page.stage(len(rows), motion.image_size.tolist()),
         page.strip(pictures, captions),
         page.section("The capture above", *over_time([motion]), figures_table([motion], body)),
@@ -77,8 +80,18 @@ def report_page(quick: bool) -> str:
     return page.document("Scope on this machine", content, viewer_data([motion], body, rows, [page.person_color(0)]))
 
 
-def facts(outcomes: list[Outcome]) -> dict[str, str]:
-    """Return the facts at the head of the page."""
+def other_load() -> str:
+    """Describe how busy the machine is with other work: its times then are not those of an idle one."""
+    if not hasattr(os, "getloadavg"):
+        return "not known on this system"
+    return f"{os.getloadavg()[0]:.1f} processes on {os.cpu_count()} cores; more than a tenth of a core distorts times"
+
+
+def facts(outcomes: list[Outcome], load: str) -> dict[str, str]:
+    """Return the facts at the head of the page.
+
+    :param load: of the machine before the first command.
+    """
     done = subprocess.run(
         ["git", "describe", "--always", "--dirty"], cwd=ROOT, capture_output=True, text=True, check=False
     )
@@ -86,6 +99,7 @@ def facts(outcomes: list[Outcome]) -> dict[str, str]:
         "Machine": machine(),
         "Versions": versions(),
         "Revision": done.stdout.strip() or "not a checkout",
+        "Load before": load,
         "Measured in": f"{sum(each.seconds for each in outcomes) / 60:.0f} minutes",
     }
 
