@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`./scripts/gate [--update]`: fail where accuracy or speed is worse than recorded, by more than its noise.
+"""`./scripts/gate [--update] [--json FILE]`: fail where accuracy or speed is worse than recorded by more than noise.
 
 The record, `gate.json`, holds of every figure its value and its noise: of accuracy, twice the standard deviation over
 copies of the clip whose pixels differ by their encoding alone; of ratios of times, the larger of twice that over
@@ -177,12 +177,16 @@ def main() -> int:
     """Run the command line; return 1 if a figure is worse than recorded."""
     parser = argparse.ArgumentParser(prog="gate", description="Fail where accuracy or speed is worse than recorded.")
     parser.add_argument("--update", action="store_true", help=f"measure the record, {RECORD.name}, again")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures as JSON")
     args = parser.parse_args()
     body = load_body("scope")
     if args.update:
         update(body)
     rows, worse = verdict(read(), accuracy(body, clips()) | ratios(body, 30))
     print(report.table(("figure", "now", "recorded", "noise", ""), rows))
+    if args.json:
+        with atomic_path(args.json) as temporary:
+            temporary.write_text(json.dumps({name: value for name, value, *_ in rows}, indent=1))
     if worse:
         print(f"gate: worse than recorded: {', '.join(worse)}; mend it, or record it with ./scripts/gate --update")
     return 1 if worse else 0

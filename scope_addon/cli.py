@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import shlex
 import shutil
 import sys
 from collections.abc import Sequence
@@ -48,6 +49,7 @@ from .job.parent import stop_with_parent
 from .scene.export.output_paths import SUFFIXES
 
 SAMPLE = ASSETS / "sample" / "sample.mp4"
+STOP_WITH_STDIN = "--stop-with-stdin"
 PROGRAM = (sys.executable, "-m", str(__package__))
 
 
@@ -94,8 +96,14 @@ def _add_capture_files(capture: argparse.ArgumentParser) -> None:
     capture.add_argument(
         "--overlay", type=path_argument, metavar="FILE", help="draw the body over the footage: .mp4, .png, .jpg"
     )
+    capture.add_argument(
+        "--report",
+        type=path_argument,
+        metavar="FILE",
+        help="one page about the capture to open in a browser: overlay, 3D view, plots, warnings: .html",
+    )
     # Passed by a batch to its processes.
-    capture.add_argument("--stop-with-stdin", action="store_true", help=argparse.SUPPRESS)
+    capture.add_argument(STOP_WITH_STDIN, action="store_true", help=argparse.SUPPRESS)
 
 
 def _add_batch_files(batch: argparse.ArgumentParser) -> None:
@@ -110,6 +118,7 @@ def _add_batch_files(batch: argparse.ArgumentParser) -> None:
         help=f"formats to write for every clip: {', '.join(s[1:] for s in SUFFIXES)} (default: npz,glb)",
     )
     batch.add_argument("--overlays", action="store_true", help="also write NAME.overlay.mp4 for every video")
+    batch.add_argument("--reports", action="store_true", help="also write the page NAME.report.html for every clip")
     batch.add_argument("--recursive", action="store_true", help="include subfolders")
     batch.add_argument("--jobs", type=int, default=1, metavar="N", help="clips captured in parallel (default: 1)")
     batch.add_argument("--again", action="store_true", help="capture every clip again, including finished ones")
@@ -127,6 +136,8 @@ def main(argv: Sequence[str] | None = None, program: Sequence[str] = PROGRAM) ->
             several = "; use scope batch for several clips" if not unknown[0].startswith("-") else ""
             raise UsageError(f"unknown arguments: {' '.join(unknown)} (see scope {args.command} --help{several})")
         args.program = list(program)
+        given = [*program, *(sys.argv[1:] if argv is None else argv)]
+        args.command_text = shlex.join([each for each in given if each != STOP_WITH_STDIN])
         with stopped_by_signals(), stdout_for_report() as stdout:
             if getattr(args, "stop_with_stdin", False):
                 stop_with_parent()
@@ -176,7 +187,7 @@ def run_capture(args: argparse.Namespace) -> dict[str, Any]:
     if not args.video and not SAMPLE.is_file():
         raise UsageError("the sample clip is only in the repository, not in this installation; give a VIDEO to capture")
     outputs = distinct_paths(args.output) or default_outputs(video)
-    check_outputs(outputs, args.overlay, video)
+    check_outputs(outputs, video, args.overlay, args.report)
     check_blender(outputs)
     check_memory_limit(with_scene=any(path.suffix.lower() not in MOTION_SUFFIXES for path in outputs))
     rig = checked_rig(args, outputs)
@@ -185,6 +196,7 @@ def run_capture(args: argparse.Namespace) -> dict[str, Any]:
     # Imported here, so that --help and errors in the arguments are printed immediately.
     from .capture.overlay.overlay_video import write_overlay
     from .capture.pipeline import capture
+    from .report.capture_page import CapturedClip, write_capture_page
 
     with ProgressBar(sys.stderr, show=sys.stderr.isatty() and not args.quiet) as progress:
         result = capture(video, body, options, progress)
@@ -201,6 +213,10 @@ def run_capture(args: argparse.Namespace) -> dict[str, Any]:
                     wanted=options.wanted,
                 )
                 written.append(args.overlay)
+            if args.report:
+                clip = CapturedClip(video, result.motions, body, result.report, args.command_text, options.wanted)
+                write_capture_page(args.report, clip, lambda i, n: progress("report", i, n))
+                written.append(args.report)
     report = dict(result.report, outputs=[str(p) for p in written])
     for warning in report["warnings"]:
         say(f"warning: {warning}")
@@ -216,7 +232,7 @@ def run_batch(args: argparse.Namespace) -> dict[str, Any]:
     """
     check_installed(CAPTURE)
     from .capture.options import check_networks
-    from .job.batch import Batch
+    from .job.batch import Batch, Extras
 
     formats = [f".{f.strip().lstrip('.').lower()}" for f in args.formats.split(",") if f.strip()]
     for suffix in formats or ["."]:
@@ -230,7 +246,8 @@ def run_batch(args: argparse.Namespace) -> dict[str, Any]:
     checked_rig(args, clips)
     _, options = body_and_options(args)
     check_networks(options)  # an unusable network is reported once, before the first clip
-    batch = Batch(args.folder, args.out, args.program, non_default_arguments(args), formats, args.overlays)
+    extras = Extras(args.overlays, args.reports)
+    batch = Batch(args.folder, args.out, args.program, non_default_arguments(args), formats, extras)
     with ProgressBar(sys.stderr, show=sys.stderr.isatty() and not args.quiet) as progress:
         with interrupted("finished clips are kept; run the same command again to continue"):
             report = batch.run(args.jobs, recursive=args.recursive, again=args.again, progress=progress, say=say)

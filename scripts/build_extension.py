@@ -234,6 +234,8 @@ def check(archive: Path, target: Target) -> None:
     wanted += ["assets/lifter/lifter.onnx", "assets/prior/joint_prior.npz", "assets/sample/sample.mp4"]
     wanted += [f"assets/{folder}/LICENSE.md" for folder in ("body", "lifter", "sample")]
     wanted += ["LICENSE", "THIRD_PARTY.md", "scope_addon/ui/__init__.py", *GUIDE]
+    static = [path.relative_to(ROOT).as_posix() for path in (ROOT / "scope_addon" / "report" / "static").iterdir()]
+    wanted += static
     problems += [f"{w} is missing" for w in wanted if w not in names]
     if stated["platforms"] != [target.platform]:
         problems.append(f"made for {', '.join(stated['platforms'])}, not for {target.platform}")

@@ -57,6 +57,8 @@ def test_unreadable_footage_gives_one_sentence_status_1_and_no_file(tmp_path, ca
         (["capture", "-o", "{tmp}/a.xyz"], 2, ".xyz"),
         (["capture", "-o", "{tmp}/noext"], 2, "suffix"),
         (["capture", "--overlay", "{tmp}/a.avi"], 2, ".avi"),
+        (["capture", "--report", "{tmp}/a.pdf"], 2, ".pdf"),
+        (["capture", "--report", "{tmp}/none/a.html"], 1, "none"),
         (["capture", "-o", "{tmp}/none/a.npz"], 1, "none"),
         (["capture", "-o", "{tmp}"], 2, "suffix"),
         (["capture", "", "-o", "{tmp}/a.npz"], 2, "VIDEO: the path is empty"),
@@ -199,6 +201,8 @@ def test_a_picture_gives_a_motion_of_one_frame_and_only_json_on_stdout(tmp_path,
         "--json",
         "--overlay",
         tmp_path / f"{name}.o.png",
+        "--report",
+        tmp_path / f"{name}.html",
     ]
     for path in outputs:
         argv += ["-o", path]
@@ -208,7 +212,10 @@ def test_a_picture_gives_a_motion_of_one_frame_and_only_json_on_stdout(tmp_path,
     json.dumps(report, ensure_ascii=False).encode()  # no half characters
     assert report["frames"] == 1
     assert report["people"] == 1
-    assert set(report["outputs"]) == {shown(p) for p in [*outputs, tmp_path / f"{name}.o.png"]}
+    assert set(report["outputs"]) == {
+        shown(p) for p in [*outputs, tmp_path / f"{name}.o.png", tmp_path / f"{name}.html"]
+    }
+    assert f"<h1>{shown(f'{name}.png')}</h1>" in (tmp_path / f"{name}.html").read_text("utf-8")
     assert {"fps", "reprojection_px", "warnings"} <= set(report)
     motion = Motion.load(outputs[0])
     assert len(motion) == 1

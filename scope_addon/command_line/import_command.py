@@ -44,7 +44,7 @@ def run_import(args: argparse.Namespace) -> dict[str, Any]:
     :raises ScopeError: an argument is invalid, the motion cannot be used, or an output failed.
     """
     outputs = distinct_paths(args.output) or [args.motion.with_suffix(".glb")]
-    check_outputs(outputs, None, args.motion)
+    check_outputs(outputs, args.motion)
     check_blender(outputs)
     values = option_values(args, Place.IMPORT)
     for option in options_at(Place.IMPORT):

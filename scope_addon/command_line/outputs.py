@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
 MOTION_SUFFIXES = (".npz",)
 OVERLAY_SUFFIXES = (".mp4", ".png", ".jpg")
+REPORT_SUFFIXES = (".html",)
 
 
 def default_outputs(video: Path) -> list[Path]:
@@ -46,8 +47,8 @@ def _is_shipped(folder: Path) -> bool:
     return folder.resolve().is_relative_to(ASSETS.resolve())
 
 
-def check_outputs(outputs: list[Path], overlay: Path | None, video: Path) -> None:
-    """Check, before the capture starts, that the outputs can be written after it.
+def check_outputs(outputs: list[Path], video: Path, overlay: Path | None = None, report: Path | None = None) -> None:
+    """Check, before the capture starts, that the outputs, overlay and page can be written after it.
 
     :raises UsageError: an output has an unknown suffix, is a folder, or is the footage itself.
     :raises OutputError: see `check_output`.
@@ -56,8 +57,9 @@ def check_outputs(outputs: list[Path], overlay: Path | None, video: Path) -> Non
         check_output(path)
     if overlay:
         check_output(overlay, OVERLAY_SUFFIXES)
-    paths = [*outputs, overlay] if overlay else outputs
-    for path in paths:
+    if report:
+        check_output(report, REPORT_SUFFIXES)
+    for path in [*outputs, *filter(None, (overlay, report))]:
         if path.exists() and video.exists() and path.samefile(video):
             raise UsageError(f"{path} is the input itself; choose another name")
 

@@ -17,7 +17,7 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, Any, NamedTuple
 
 from ...solver.errors import InputError
 from ..atomic_write import atomic_path
@@ -28,6 +28,7 @@ from .parent import GRACE_S
 from .request import code_version
 
 REPORT_NAME = "scope-batch.json"
+REPORT = ".report"  # between a clip's name and the suffix of its page
 STATUSES = ("done", "skipped", "no_person", "failed")
 _ROOT = Path(__file__).resolve().parents[2]
 _WAIT_S = 1.0  # longest wait for a clip to finish, after which the wait is repeated
@@ -37,13 +38,23 @@ _OWN_GROUP: dict[str, Any] = {"creationflags": _NEW_GROUP} if _NEW_GROUP else {"
 _GRACE_S = GRACE_S + 3.0  # time for a clip to clean up after the batch is stopped
 
 
+class Extras(NamedTuple):
+    """What a batch writes of every clip besides the result files."""
+
+    overlays: bool = False
+    reports: bool = False
+
+
+NO_EXTRAS = Extras()
+
+
 class Batch:
     """A folder of footage and an output folder.
 
     :param program: command that takes ``capture FILE -o OUT --json``.
     :param options: arguments of every capture: flag to text; None for a flag that takes no value.
     :param suffixes: suffixes of the result files, such as ``.npz``.
-    :param overlays: also write an overlay of each clip.
+    :param extras: what else to write of each clip.
     :raises InputError: the folder of footage does not exist.
     :raises OutputError: the output folder cannot be created.
     """
@@ -55,7 +66,7 @@ class Batch:
         program: Sequence[str],
         options: dict[str, str | None],
         suffixes: Sequence[str],
-        overlays: bool = False,
+        extras: Extras = NO_EXTRAS,
     ) -> None:
         if not folder.is_dir():
             raise InputError(f"{folder} is not a folder; give the folder with the footage")
@@ -65,7 +76,7 @@ class Batch:
             raise OutputError(f"cannot create the folder {out}: {error.strerror}; choose another with --out") from error
         self.folder, self.out = folder.resolve(), out.resolve()
         self.report_file = out / REPORT_NAME
-        self._program, self._options, self._suffixes, self._overlays = list(program), options, suffixes, overlays
+        self._program, self._options, self._suffixes, self._extras = list(program), options, suffixes, extras
         self._basis = self._key_basis()
         self._running: dict[subprocess.Popen[str], IO[str]] = {}  # process to its stdin, whose closing ends the process
         self._start_lock = threading.Lock()
@@ -168,7 +179,9 @@ class Batch:
         arguments = [*self._program, "capture", str(path), "--json", "--quiet", "--stop-with-stdin"]
         for suffix in self._suffixes:
             arguments += ["-o", f"{target}{suffix}"]
-        if self._overlays:
+        if self._extras.reports:
+            arguments += ["--report", f"{target}{REPORT}.html"]
+        if self._extras.overlays:
             suffix = ".png" if path.suffix.lower() in PICTURE_SUFFIXES else ".mp4"
             arguments += ["--overlay", f"{target}{OVERLAY}{suffix}"]
         for option, value in (threads | self._options).items():
@@ -219,7 +232,7 @@ class Batch:
         """Hash what is the same for every clip: the program, the options, and the files that they name."""
         digest = hashlib.sha256(code_version(_ROOT).encode())
         values = {k: v for k, v in self._options.items() if k != "--threads"}
-        digest.update(json.dumps([sorted(values.items()), list(self._suffixes), self._overlays]).encode())
+        digest.update(json.dumps([sorted(values.items()), list(self._suffixes), self._extras]).encode())
         for value in values.values():
             files = [Path(value)] if value else []  # a body, a calibration, a network
             files += [path.with_suffix(".json") for path in files if path.suffix == ".onnx"]  # a network's description

@@ -273,6 +273,16 @@ def test_a_value_may_begin_with_a_hyphen(folder, tmp_path):
     assert (args.rig_object, args.quality, args.hands) == ("-Rig", "fast", True)
 
 
+def test_overlays_and_pages_of_a_batch_lie_next_to_the_results(folder, tmp_path):
+    argv = ["batch", str(folder), "--out", str(tmp_path / "out"), "--formats", "npz", "--overlays", "--reports"]
+    main(argv, program=[sys.executable, "-c", PROGRAM])
+    passed = [json.loads(line) for line in (folder / "calls.log").read_text().splitlines()]
+    args = {Path(each[1]).name: cli.build_parser().parse_args(each) for each in passed}
+    assert args["a.mp4"].report == tmp_path / "out" / "a.report.html"
+    assert args["a.mp4"].overlay == tmp_path / "out" / "a.overlay.mp4"
+    assert args["c.png"].report == tmp_path / "out" / "c.report.html"
+
+
 @pytest.mark.skipif(os.name == "nt", reason="looks at /proc")
 @pytest.mark.parametrize("at", ["finding the person", "overlay"])
 def test_the_clips_of_a_killed_batch_end_and_leave_no_partial_file(tmp_path, at):

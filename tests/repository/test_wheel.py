@@ -23,6 +23,11 @@ DATA = {
     "scope/assets/body/scope_h.npz",
     "scope/assets/prior/README.md",
     "scope/assets/prior/joint_prior.npz",
+    "scope/scope_addon/report/static/motion.js",
+    "scope/scope_addon/report/static/page.js",
+    "scope/scope_addon/report/static/style.css",
+    "scope/scope_addon/report/static/viewer.js",
+    "scope/scope_addon/report/static/webgl.js",
 }
 CAPTURE_MODULES = ("cv2", "onnxruntime", "av", "bpy")
 

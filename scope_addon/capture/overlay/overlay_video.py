@@ -7,7 +7,7 @@ The mesh is posed in the world from the motion file and transformed into each fr
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from pathlib import Path
 from typing import Any, cast
 
@@ -82,6 +82,34 @@ def write_overlay(
                     _write_video(temporary, painter, video, path, progress)
         except OSError as error:
             raise OutputError(f"cannot write {path}: {reason(error)}") from error
+
+
+def painted_frames(
+    video_path: str | Path,
+    motions: Sequence[Motion],
+    body: Body,
+    indices: Collection[int],
+    *,
+    wanted: FootageRange | None = None,
+    opacity: float = 0.6,
+) -> Iterator[tuple[int, NDArray[np.uint8]]]:
+    """Generate some frames of the overlay: source frame index and (H, W, 3) RGB, at most 1920 pixels wide and high.
+
+    :param indices: source frame indices; those that the footage does not have are left out.
+    :param wanted: the range of the footage that was captured.
+    :param opacity: of the bodies, 0..1.
+    :raises VideoError: the footage cannot be read.
+    :raises ShapeError: a motion does not have the joints of the body.
+    """
+    remaining = set(indices)
+    with open_video(video_path, wanted) as video:
+        painter = _Painter(list(motions), body, video, opacity, even=False)
+        for frame in video:
+            if frame.index in remaining:
+                remaining.remove(frame.index)
+                yield frame.index, painter.paint(frame)
+            if not remaining:
+                return
 
 
 def draw_overlay(

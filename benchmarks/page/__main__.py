@@ -1,0 +1,133 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""`./scripts/report [--quick] [OUT.html]`: run what this machine can run, and write one page about it."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import subprocess
+import sys
+from datetime import datetime
+from pathlib import Path
+
+from ...scope_addon.atomic_write import atomic_path, reason
+from ...scope_addon.errors import SetupError, exit_status
+from ...scope_addon.motion import Motion
+from ...scope_addon.report import page
+from ...scope_addon.report.capture_page import figures_table, over_time, warning_list
+from ...scope_addon.report.footage_pictures import overlay_pictures
+from ...scope_addon.report.machine import machine, versions
+from ...scope_addon.report.viewer_data import shown_rows, viewer_data
+from ...scope_addon.scene.export.output_paths import check_output
+from ...solver.body import Body
+from ...solver.errors import ScopeError
+from ...solver.loaders.body_file import load_body
+from ..frames import ROOT
+from .commands import Outcome, clips, commands, run, run_capture
+from .content import outcome_section
+from .shots import strips
+
+FOLDER = ROOT / "build" / "report"
+
+
+def main() -> int:
+    """Run the command line; return the exit status."""
+    parser = argparse.ArgumentParser(prog="report", description="One page about this machine.")
+    parser.add_argument("out", nargs="?", type=Path, metavar="OUT.html", default=FOLDER / "report.html")
+    parser.add_argument("--quick", action="store_true", help="a few minutes: fewer repetitions, fewer clips")
+    args = parser.parse_args()
+    try:
+        FOLDER.mkdir(parents=True, exist_ok=True)
+        check_output(args.out, (".html",))
+        content = report_page(args.quick)
+        with atomic_path(args.out) as temporary:
+            temporary.write_text(content, encoding="utf-8")
+    except ScopeError as error:
+        print(f"report: {error}", file=sys.stderr)
+        return exit_status(error)
+    except OSError as error:
+        print(f"report: cannot write {args.out}: {reason(error)}", file=sys.stderr)
+        return 1
+    print(f"{args.out}: {args.out.stat().st_size / 1e6:.1f} MB")
+    return 0
+
+
+def report_page(quick: bool) -> str:
+    """Run the commands and return the page."""
+    body, load = load_body("scope"), other_load()
+    captured = [(name, video, run_capture(video, FOLDER / f"{name}.npz", say)) for name, video in clips(quick)]
+    if captured[0][2].status:
+        last = captured[0][2].said.strip().splitlines()[-1:] or ["it said nothing"]
+        raise SetupError(f"{captured[0][2].command.text} failed ({last[0]}); mend that and run this again")
+    measured = [run(command, FOLDER, say) for command in commands(quick)]
+    name, video, outcome = captured[0]
+    motion = Motion.load(FOLDER / f"{name}.npz")
+    rows = shown_rows([motion])
+    pictures = overlay_pictures(video, [motion], body, rows)
+    captions = [f"frame {motion.frames[rows[p.row]]}, {motion.timestamps[rows[p.row]]:.2f} s" for p in pictures]
+    everything = [each for _, _, each in captured] + measured
+    content = [
+        page.header(
+            "Scope on this machine", datetime.now().astimezone().strftime("%Y-%m-%d %H:%M"), facts(everything, load)
+        ),
+        page.stage(len(rows), motion.image_size.tolist()),
+        page.strip(pictures, captions),
+        page.section("The capture above", *over_time([motion]), figures_table([motion], body)),
+        *(capture_section(name, video, each, body) for name, video, each in captured if each.status == 0),
+        *(outcome_section(each) for each in measured),
+        page.section("Commands", page.command_line("\n".join(each.command.text for each in everything))),
+    ]
+    return page.document("Scope on this machine", content, viewer_data([motion], body, rows, [page.person_color(0)]))
+
+
+def other_load() -> str:
+    """Describe how busy the machine is with other work: its times then are not those of an idle one."""
+    if not hasattr(os, "getloadavg"):
+        return "not known on this system"
+    return f"{os.getloadavg()[0]:.1f} processes on {os.cpu_count()} cores; more than a tenth of a core distorts times"
+
+
+def facts(outcomes: list[Outcome], load: str) -> dict[str, str]:
+    """Return the facts at the head of the page.
+
+    :param load: of the machine before the first command.
+    """
+    done = subprocess.run(
+        ["git", "describe", "--always", "--dirty"], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    return {
+        "Machine": machine(),
+        "Versions": versions(),
+        "Revision": done.stdout.strip() or "not a checkout",
+        "Load before": load,
+        "Measured in": f"{sum(each.seconds for each in outcomes) / 60:.0f} minutes",
+    }
+
+
+def capture_section(name: str, video: Path, outcome: Outcome, body: Body) -> page.Markup:
+    """Return the section of a captured clip: strips of footage, overlay and the view from the side, and figures."""
+    motion, report = Motion.load(FOLDER / f"{name}.npz"), outcome.figures
+    shown = {
+        "Frames": f"{report['frames']} at {report['frame_rate'][0] / report['frame_rate'][1]:.6g} per second",
+        "Preset": report["quality"],
+        "Camera": report["camera"],
+        "Reprojection error": f"{report['reprojection_px']:.1f} px",
+        "Speed": f"{report['fps']['total']:.1f} frames per second, networks on {report['execution']}",
+    }
+    return page.section(
+        f"Clip {name}",
+        page.command_line(outcome.command.text),
+        page.fact_list(shown),
+        strips(video, motion, body),
+        *(warning_list(report["warnings"]) if report["warnings"] else []),
+        note="Footage, overlay, and the same frames from the side.",
+    )
+
+
+def say(text: str) -> None:
+    """Print a message."""
+    print(f"report: {text}", file=sys.stderr, flush=True)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

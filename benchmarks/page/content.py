@@ -1,0 +1,108 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a command printed, as parts of the page: Markdown tables, other text, and plots of its figures."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from html import escape
+from itertools import groupby
+from typing import Any
+
+import numpy as np
+
+from ...scope_addon.report import page
+from ...scope_addon.report.page import Markup
+from ...scope_addon.report.plots import Axis, Curve, line_plot
+from ..perception.accuracy import SHOWN
+from .commands import Outcome
+
+BODIES = ((23, "SMPL"), (51, "SMPL+H"))  # number of joints, and whose skeleton has as many
+_RULE = re.compile(r"\|(\s*:?-+:?\s*\|)+")
+
+
+def printed_parts(text: str) -> list[Markup]:
+    """Return Markdown tables as tables and everything else as paragraphs, in their order.
+
+    In the first column, the keys of the evaluation are replaced by its headings.
+    """
+    parts: list[Markup] = []
+    for block in re.split(r"\n\s*\n", text.strip()):
+        for is_table, group in groupby(block.splitlines(), lambda line: line.startswith("|")):
+            lines = list(group)
+            if is_table and len(lines) > 1 and _RULE.fullmatch(lines[1]):
+                cells = [[cell.strip() for cell in line.strip("|").split("|")] for line in (lines[0], *lines[2:])]
+                rows = [[with_headings(row[0]), *row[1:]] for row in cells[1:]]
+                parts.append(page.table(cells[0], rows, numbers=True))
+            elif text := " ".join(lines).strip():
+                parts.append(Markup(f"<p>{escape(text)}</p>\n"))
+    return parts
+
+
+def with_headings(name: str) -> str:
+    """Return the name of a figure with the evaluation's heading for its key, such as ``pa_mpjpe``, in it."""
+    return " ".join(SHOWN[word][0] if word in SHOWN else word for word in name.split(" "))
+
+
+def plots(figures: dict[str, Any]) -> list[Markup]:
+    """Return plots of the figures of ``bench solver``: times and speedups of its experiments, and of whole clips."""
+    parts = []
+    for number, rows in sorted(figures.get("experiments", {}).items()):
+        parts += experiment_plots(str(number), rows)
+    if clip := figures.get("clip"):
+        parts.append(clip_plot(clip))
+    return parts
+
+
+def clip_plot(rows: Sequence[dict[str, float]]) -> Markup:
+    """Return the plot of a whole clip as one problem: milliseconds a frame by the number of frames."""
+    curves: list[Curve] = []
+    for K, body in BODIES:
+        chosen = [row for row in rows if row["K"] == K]
+        x = np.array([row["frames"] for row in chosen], float)
+        for key, name in (("linearize_ms", "linearize"), ("step_ms", "step")):
+            y = np.array([row[key] for row in chosen], float)
+            curves.append(Curve(x, y, page.person_color(len(curves)), f"{body}, {name}", with_points=True))
+    return plot("A whole clip as one problem: milliseconds a frame by its frames, logarithmic", curves)
+
+
+def experiment_plots(number: str, rows: Sequence[dict[str, float]]) -> list[Markup]:
+    """Return the plots of one experiment: microseconds of a step, and how much slower the dense step is."""
+    key = "P" if number == "3" else "N"
+    times, speedups = [], []
+    for n, (K, body) in enumerate(BODIES):
+        chosen = [row for row in rows if row["K"] == K]
+        x = np.array([row[key] for row in chosen], float)
+        dense, sparse = (np.array([row[method] for row in chosen], float) for method in ("dense", "sparse"))
+        times.append(Curve(x, sparse, page.person_color(2 * n), f"{body}, sparse", with_points=True))
+        times.append(Curve(x, dense, page.person_color(2 * n + 1), f"{body}, dense", with_points=True))
+        speedups.append(Curve(x, dense / sparse, page.person_color(2 * n), body, with_points=True))
+    return [
+        plot(f"Experiment {number}: µs of a step by {key}, logarithmic", times),
+        plot(f"Experiment {number}: time of a dense step over a sparse one's, by {key}, logarithmic", speedups),
+    ]
+
+
+def plot(title: str, curves: Sequence[Curve]) -> Markup:
+    """Return a plot of curves over common, logarithmic y, with its legend."""
+    x = np.concatenate([curve.x for curve in curves])
+    y = np.concatenate([curve.y for curve in curves])
+    x_axis = Axis(float(x.min()), float(x.max()) if x.max() > x.min() else float(x.min()) + 1)
+    y_axis = Axis(float(y.min()) / 1.3, float(y.max()) * 1.3, logarithmic=True)
+    svg = line_plot(curves, x_axis, y_axis, label=title, timed=False)
+    return page.plot_figure(title, svg, {curve.name: curve.color for curve in curves})
+
+
+def outcome_section(outcome: Outcome) -> Markup:
+    """Return the section of one command: the command, how long it took, what it printed, and plots."""
+    ended = "" if outcome.status == 0 else f"; it ended with status {outcome.status}"
+    last = outcome.said.strip().splitlines()
+    said = [Markup(f"<p>{escape(last[-1])}</p>\n")] if last and (outcome.status or not outcome.printed.strip()) else []
+    return page.section(
+        outcome.command.title,
+        page.command_line(outcome.command.text),
+        *said,
+        *plots(outcome.figures),
+        *printed_parts(outcome.printed),
+        note=f"It took {outcome.seconds:.0f} s{ended}.",
+    )

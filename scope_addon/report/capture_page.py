@@ -1,0 +1,229 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The page about one capture."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from html import escape
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...solver.body import Body
+from ..atomic_write import atomic_path, reason
+from ..capture.media.video_range import FootageRange
+from ..errors import OutputError
+from ..footage import shown
+from ..kinematics.foot_skin import under_floor
+from ..motion import Motion
+from ..review_spans import FAR_SHARE, REASONS, Span, body_confidence, find_review_spans
+from . import page
+from .footage_pictures import Picture, Progress, overlay_pictures
+from .machine import machine, versions
+from .motion_figures import motion_figures
+from .page import Markup
+from .plots import Axis, Curve, band_plot, line_plot
+from .plots import Span as MarkedSpan
+from .viewer_data import shown_rows, viewer_data
+
+CONTACTS = ("left heel", "left toe", "right heel", "right toe")  # the columns of `foot_contact`
+_SHORT = {
+    "unseen": "not seen",
+    "far": "far from the footage",
+    "unsure": "low confidence",
+    "floor": "under the floor",
+    "warned": "warning",
+}
+_MOST_SPANS = 60  # that the page lists
+_GAP_S = 0.25  # between spans that are listed as one
+_AT_TIME = re.compile(r"at (\d+\.\d) s")  # in warnings
+
+
+@dataclass(frozen=True)
+class CapturedClip:
+    """What the page is about: the footage, what the capture found in it, and the command that made it."""
+
+    video: Path
+    motions: Sequence[Motion]
+    body: Body
+    report: dict[str, Any]
+    command: str
+    wanted: FootageRange | None = None
+
+
+def write_capture_page(path: Path, clip: CapturedClip, progress: Progress | None = None) -> None:
+    """Write the page about a capture. The write is atomic: a failure leaves an earlier file as it was.
+
+    :param progress: called with (pictures done, pictures expected).
+    :raises OutputError: the file cannot be written.
+    :raises VideoError: the footage cannot be read.
+    :raises ShapeError: a motion does not have the joints of the body.
+    """
+    rows = shown_rows(clip.motions)
+    pictures = overlay_pictures(clip.video, clip.motions, clip.body, rows, clip.wanted, progress)
+    content = shown(capture_page(clip, rows, pictures)).encode()
+    try:
+        with atomic_path(path) as temporary:
+            temporary.write_bytes(content)
+    except OSError as error:
+        raise OutputError(f"cannot write {path}: {reason(error)}") from error
+
+
+def capture_page(clip: CapturedClip, rows: NDArray[np.int64], pictures: Sequence[Picture]) -> Markup:
+    """Return the page about a capture.
+
+    :param rows: (n,) rows of the motions that the page shows.
+    :param pictures: of the overlay.
+    """
+    name, first = Path(clip.video).name, clip.motions[0]
+    captions = [f"frame {first.frames[rows[p.row]]}, {first.timestamps[rows[p.row]]:.2f} s" for p in pictures]
+    spans = [_review(motion, clip.body) for motion in clip.motions]
+    colors = [page.person_color(n) for n in range(len(clip.motions))]
+    warnings = clip.report["warnings"]
+    thinned = "" if len(rows) == len(first) else f"Of this long clip, one frame in {rows[1]} is shown in 3D."
+    now = datetime.now().astimezone().strftime("%Y-%m-%d %H:%M")
+    content = [
+        page.header(name, f"Motion capture by Scope, {now}", header_facts(clip)),
+        page.stage(len(rows), first.image_size.tolist()),
+        page.strip(pictures, captions),
+        page.section("Over time", *over_time(clip.motions, marked_spans(clip.motions, spans, warnings)), note=thinned),
+        page.section("Warnings", *warning_list(warnings), review_table(clip.motions, spans)),
+        page.section("Figures", figures_table(clip.motions, clip.body)),
+        page.section(
+            "How it was made",
+            page.command_line(clip.command),
+            page.fact_list(
+                {"Machine": machine(), "Versions": versions(), "Networks on": clip.report["execution"]}, single=True
+            ),
+        ),
+    ]
+    return page.document(f"{name} – Scope", content, viewer_data(clip.motions, clip.body, rows, colors))
+
+
+def header_facts(clip: CapturedClip) -> dict[str, str]:
+    """Return the facts at the head of the page."""
+    report, motion = clip.report, clip.motions[0]
+    rate = report["frame_rate"][0] / report["frame_rate"][1]
+    width, height = motion.image_size.tolist()
+    people = report["people"]
+    return {
+        "Duration": f"{len(motion) / rate:.2f} s, {len(motion)} frames at {rate:.6g} per second",
+        "Image": f"{width} × {height}",
+        "People": "1 person" if people == 1 else f"{people} people",
+        "Preset": str(report["quality"]),
+        "Body": str(report["body"]),
+        "Camera": str(report["camera"]),
+        "Reprojection error": f"{report['reprojection_px']:.1f} px",
+        "Speed": f"{report['fps']['total']:.1f} frames per second",
+    }
+
+
+def over_time(motions: Sequence[Motion], marked: Sequence[MarkedSpan] = ()) -> list[Markup]:
+    """Return the plots over time: confidence, reprojection error, contact of the feet.
+
+    :param marked: intervals of time that the plots mark; their kinds are keys of ``_SHORT``.
+    """
+    times = motions[0].timestamps
+    x_axis = time_axis(times)
+    colors = [page.person_color(n) for n in range(len(motions))]
+    legend = {_name(n, motions): color for n, color in enumerate(colors)} if len(motions) > 1 else None
+    confidence = [
+        Curve(times, body_confidence(m).astype(float), color, _name(n, motions))
+        for n, (m, color) in enumerate(zip(motions, colors, strict=True))
+    ]
+    error = [
+        Curve(times, np.where(m.valid, m.residual_px, np.nan).astype(float), color, _name(n, motions))
+        for n, (m, color) in enumerate(zip(motions, colors, strict=True))
+    ]
+    far = FAR_SHARE * float(motions[0].image_size.max())
+    known = [float(np.nanmax(curve.y)) for curve in error if np.isfinite(curve.y).any()]
+    top = 1.1 * max([1.0, *known])
+    plots = [
+        ("Confidence", line_plot(confidence, x_axis, Axis(0, 1), label="Confidence over time", spans=marked)),
+        (
+            "Reprojection error in pixels",
+            line_plot(error, x_axis, Axis(0, top), label="Reprojection error over time", threshold=far, spans=marked),
+        ),
+    ]
+    areas = {_SHORT[reason]: f"var(--{reason})" for reason in sorted({span.kind for span in marked})}
+    figures = [page.plot_figure(title, svg, legend, areas) for title, svg in plots]
+    for n, (motion, color) in enumerate(zip(motions, colors, strict=True)):
+        rows = [(name, motion.foot_contact[:, k].astype(float)) for k, name in enumerate(CONTACTS)]
+        title = "Contact of the feet" + (f", {_name(n, motions)}" if len(motions) > 1 else "")
+        figures.append(page.plot_figure(title, band_plot(rows, times, x_axis, label=title, color=color)))
+    return figures
+
+
+def marked_spans(
+    motions: Sequence[Motion], spans: Sequence[Sequence[Span]], warnings: Sequence[str]
+) -> list[MarkedSpan]:
+    """Return what the plots mark: the spans of each motion that should be reviewed, and the times in warnings."""
+    times = motions[0].timestamps
+    marked = [_marked(span, times, n, motions) for n, of_one in enumerate(spans) for span in of_one]
+    for text in warnings:
+        at = [float(match[1]) for match in _AT_TIME.finditer(text)]
+        marked += [MarkedSpan(time, time, "warned", text) for time in at if times[0] <= time <= times[-1]]
+    return marked
+
+
+def time_axis(times: NDArray[np.float64]) -> Axis:
+    """Return the axis of frames at times (T,), in seconds."""
+    first, last = float(times[0]), float(times[-1])
+    return Axis(first, last if last > first else first + 1.0, unit="s")
+
+
+def warning_list(warnings: Sequence[str]) -> list[Markup]:
+    """Return the warnings as the command line prints them; a time in one moves the page there."""
+    if not warnings:
+        return [Markup('<p class="none">None.</p>\n')]
+    items = []
+    for text in warnings:
+        parts, end = [], 0
+        for match in _AT_TIME.finditer(text):
+            parts += [escape(text[end : match.start()]), page.seek_button(match[0], float(match[1]))]
+            end = match.end()
+        items.append(f"<li>{''.join(parts)}{escape(text[end:])}</li>")
+    return [Markup(f'<ul class="warnings">{"".join(items)}</ul>\n')]
+
+
+def review_table(motions: Sequence[Motion], spans: Sequence[Sequence[Span]]) -> Markup:
+    """Return a table of the frames that should be reviewed; empty if there are none."""
+    rows: list[list[str | Markup]] = []
+    for n, (motion, of_one) in enumerate(zip(motions, spans, strict=True)):
+        for span in of_one:
+            first, last = float(motion.timestamps[span.first]), float(motion.timestamps[span.last])
+            frames = f"{motion.frames[span.first]} to {motion.frames[span.last]}"
+            rows.append([page.seek_button(f"{first:.2f} to {last:.2f} s", first), frames, REASONS[span.reason]])
+            if len(motions) > 1:
+                rows[-1].append(_name(n, motions))
+    if not rows:
+        return Markup("")
+    more = len(rows) - _MOST_SPANS
+    head = ("Time", "Frames", "To review", *(("Person",) if len(motions) > 1 else ()))
+    said = f'<p class="note">and {more} more</p>' if more > 0 else ""
+    return Markup(page.table(head, rows[:_MOST_SPANS], markup_columns=(0,)) + said)
+
+
+def figures_table(motions: Sequence[Motion], body: Body) -> Markup:
+    """Return the table of the motions' figures, one column for each person."""
+    columns = [motion_figures(motion, body) for motion in motions]
+    rows = [[name, *(column[name] for column in columns)] for name in columns[0]]
+    return page.table(("", *(_name(n, motions).capitalize() for n in range(len(motions)))), rows)
+
+
+def _review(motion: Motion, body: Body) -> list[Span]:
+    return find_review_spans(motion, _GAP_S, under_floor(motion, body))
+
+
+def _marked(span: Span, times: NDArray[np.float64], person: int, motions: Sequence[Motion]) -> MarkedSpan:
+    who = f"{_name(person, motions)}: " if len(motions) > 1 else ""
+    return MarkedSpan(float(times[span.first]), float(times[span.last]), span.reason, who + REASONS[span.reason])
+
+
+def _name(person: int, motions: Sequence[Motion]) -> str:
+    return f"person {person + 1}" if len(motions) > 1 else "the person"
