@@ -42,10 +42,10 @@ ABLATION: dict[str, dict[str, Any]] = {
     "without the outline": {"ablation": Ablation(outline=False)},
     "without left-right repair": {"ablation": Ablation(left_right=False)},
     "without keypoint-jump repair": {"ablation": Ablation(keypoint_jumps=False)},
-    "without the second pass": {"ablation": Ablation(second_pass=False)},
+    "without the stance": {"ablation": Ablation(stance=False)},
     "without balance in it": {"ablation": Ablation(balance=False)},
     "without the floor in it": {"ablation": Ablation(floor=False)},
-    "without foot locking": {"ablation": Ablation(contact=False)},
+    "without contact": {"ablation": Ablation(contact=False)},
     "without smoothing": {"smoothing": False},
 }
 FLIPS = ("lr_swap", "mirror", "mirror_swap")

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from ...scope_addon.capture.fitting import prepared_track
 from ...scope_addon.capture.options import CaptureOptions
 from ...scope_addon.capture.perception import lifter
-from ...scope_addon.capture.world import balance, foot_lock, ground_plane
+from ...scope_addon.capture.world import balance, ground_plane
 from ...scope_addon.kinematics import standing
 from ...solver import load_body
 from ..frames import DATA
@@ -67,7 +67,6 @@ CHOICES = (
     Choice("speed at which balance is doubted, m/s", balance, "STANDING_M_S", (0.25, 1.0)),
     Choice("deviation of feet from the floor, m", ground_plane, "FLOOR_SIGMA_M", (0.015, 0.06)),
     Choice("depth error that a still foot may have, m", standing, "WRONG_DEPTH_M", (0.2, 0.8)),
-    Choice("image motion allowed to locked feet, m", foot_lock, "PICTURE_SIGMA_M", (0.001, 0.01)),
 )
 
 

@@ -16,9 +16,10 @@ from .pins.corrected_motion import before_smoothing, corrected
 def smoothed(body: Body, motion: Motion, strength: float) -> Clip:
     """Smooth the raw motion without phase shift, and correct it where the user did.
 
-    The cut-off frequency is 4.5 Hz / strength: 0 leaves the raw motion, 1 is what a capture does, 3 is very smooth. The
-    capture also locks feet in contact. That correction is the difference between the finished motion and plain
-    smoothing at strength 1; it is added to the result, and fades out below strength 1. The distance from the camera,
+    Strength 0 is the raw motion, of which every frame is fitted alone, 1 the finished one, of all frames together, and
+    3 very smooth. Anything else is the raw motion through a filter whose cut-off frequency is 4.5 Hz / strength. What the
+    finished motion has besides, above all feet that stay in place, is its difference from the filtered one at strength
+    1; it is added to the result, and fades out below strength 1. The distance from the camera,
     which a single camera measures inaccurately, is smoothed more than the position in the image.
 
     :raises UsageError: when the strength is negative or not a number.

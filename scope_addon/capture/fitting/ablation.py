@@ -25,10 +25,10 @@ class Ablation:
     outline: bool = True  # in the shape: the body's silhouette against person masks
     left_right: bool = True  # repair of left-right swaps and limb swaps
     keypoint_jumps: bool = True  # repair of keypoint jumps
-    second_pass: bool = True  # refit with the distance that follows from floor and feet
-    balance: bool = True  # in the second pass: the zero moment point lies between the contact points
-    floor: bool = True  # in the second pass: feet in contact lie on the floor
-    contact: bool = True  # foot locking
+    stance: bool = True  # distance and lean that follow from floor, feet and balance
+    balance: bool = True  # in the stance: the zero moment point lies between the contact points
+    floor: bool = True  # in the stance: feet in contact lie on the floor
+    contact: bool = True  # feet in contact stay in place, and none goes below the floor
 
     def __post_init__(self) -> None:
         """Require a source of depth."""

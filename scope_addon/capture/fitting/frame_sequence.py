@@ -52,7 +52,6 @@ class FrameSequence:
         self._rotations = np.tile(np.eye(3), (T, body.K + 1, 1, 1))
         self._root, self._valid, self._cost = np.zeros((T, 3)), np.zeros(T, bool), np.zeros(T)
         self._iterations = 0
-        self._initial: State | None = None  # the initial state of the previous frame's refit
         self._last: Fit | None = None
         self._last_s = -np.inf
 
@@ -65,17 +64,11 @@ class FrameSequence:
         if gain > 0.0 and self._last is not None:
             self._refit_backwards(k, self._last.state, gain)
 
-    def refit(self, k: int, initial: State | None) -> None:
-        """Fit frame ``k`` with known root, from a state of an earlier pass, or from a cold start.
-
-        If two poses explain a frame equally well, the frame must keep the one of the previous frame. The initial state
-        is therefore first changed by what the refit changed in the previous frame.
-        """
-        previous, self._initial = self._initial, initial
-        start = initial
-        if initial is not None and previous is not None and self._last is not None and self._is_continued(k):
-            start = with_same_rotations(initial, previous, self._last.state)
-        self._fit(k, start, known_root=True)
+    def refit(self, k: int, initial: State) -> None:
+        """Fit frame ``k`` from its state in another motion, independently of its neighbours."""
+        found = self._solve(self._prepared.measure_all(k), initial, self._warm)
+        if is_usable(found):
+            self._last, self._valid[k] = found, True
 
     def repeat_last(self, k: int) -> None:
         """Give frame ``k`` the state of the last frame that was fitted."""
@@ -104,14 +97,13 @@ class FrameSequence:
         track = self._prepared.track
         return bool(not track.acquired[k] and track.times[k] - self._last_s <= LONGEST_COAST_S)
 
-    def _fit(self, k: int, initial: State | None, known_root: bool = False) -> float:
+    def _fit(self, k: int, initial: State | None) -> float:
         """Fit frame ``k`` from an initial state, or from a cold start if there is none.
 
         :return: by how much the stages of a cold start lowered the cost of a warm start that contradicted the lifter.
         """
         prepared = self._prepared
-        root_cam = initial.t_camera_root if initial is not None and known_root else None
-        measurements = prepared.measure_all(k, root_cam)
+        measurements = prepared.measure_all(k)
         found = self._solve(measurements, initial, self._cold if initial is None else self._warm)
         if not is_usable(found):
             return 0.0
@@ -149,13 +141,6 @@ class FrameSequence:
 def is_usable(fit: Fit) -> bool:
     """Whether a fit had measurements and gave finite values."""
     return fit.status not in (Status.NO_MEASUREMENTS, Status.NON_FINITE)
-
-
-def with_same_rotations(state: State, before: State, after: State) -> State:
-    """Apply to a state the rotations that lead from ``before`` to ``after``, for the root and every joint."""
-    R = after.R_camera_root @ before.R_camera_root.T @ state.R_camera_root
-    Omega = after.Omega @ np.swapaxes(before.Omega, 1, 2) @ state.Omega
-    return replace(state, R_camera_root=R, Omega=Omega)
 
 
 def _is_same_pose(a: NDArray[np.floating[Any]], b: NDArray[np.floating[Any]]) -> bool:

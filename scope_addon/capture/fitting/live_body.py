@@ -7,13 +7,13 @@ shown cost time, and the motion does not depend on which frames these are.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ....solver import Body, State
+from ....solver import Body, Measurements, Stage, StandingPoints, State, View, fit_motion
 from ..camera.intrinsics import Camera
 from ..perception.landmark_network import KEYPOINT_NAMES
 from ..perception.lifter import HIPS
@@ -23,6 +23,7 @@ from ..tracking.track import single_frame_track
 from .ablation import NO_ABLATION, Ablation
 from .prepared_track import prepare_track
 from .track_fit import fit_single_frame
+from .weights import ROBUST
 
 
 @dataclass(frozen=True)
@@ -44,9 +45,25 @@ class LiveBody:
         self.is_ready = False  # whether everything is loaded, so that a fit takes some milliseconds
 
     def load(self) -> None:
-        """Load what the first fit needs, by fitting the body to its own projection."""
-        self._solve(_rest_observation(self._body, self._camera))
+        """Load what the fits of a clip need, by fitting the body to its own projection."""
+        observation = _rest_observation(self._body, self._camera)
+        state = self._solve(observation)
         self.is_ready = True
+        if state is not None:
+            self._load_motion(observation, state)
+
+    def _load_motion(self, observation: Observation, state: State) -> None:
+        """Load what the fit of a whole clip needs besides."""
+        track = single_frame_track(observation)
+        prepared = prepare_track(self._body, track, self._camera, self._ablation, self._height_m)
+        measured = prepared.measure_all(0)
+        frames: list[Measurements | list[View]] = [measured, [View(measured, np.diag([-1.0, -1.0, 1.0]))], measured]
+        times, stands = np.arange(3) / 30.0, StandingPoints([0], np.ones((3, 1)))
+        options = replace(ROBUST, stages=(Stage(prepared.weights, 1e-4, 1),))
+        fit_motion(
+            self._body, frames, times, init=[state] * 3, priors=prepared.priors, options=options, stands=stands,
+            shape=state.beta,
+        )  # fmt: skip
 
     def fit(self, observation: Observation) -> LivePose | None:
         """Fit the body to an observation; None if the observation does not suffice."""

@@ -37,6 +37,7 @@ class Stance:
     floor_normal: NDArray[np.floating[Any]]  # (T, 3) unit, upwards
     floor_offset: NDArray[np.floating[Any]]  # (T,) normal . p on the floor
     contact: NDArray[np.floating[Any]]  # (T, 6) probability that each contact point rests on the floor
+    resting: NDArray[np.floating[Any]]  # (T, 6) probability that it rests on anything
 
     def floor(self, k: int, indices: NDArray[np.intp]) -> Floor:
         """Return the floor of frame ``k`` for the solver.
@@ -73,20 +74,22 @@ class PreparedTrack:
         points, sigma = self.lifted.points[k], self.lifted.sigma_along[k]
         return self.measurer.measure(self.pixels[k], self.track.confidence[k], points, sigma, root_cam)
 
-    def measure_all(self, k: int, root_cam: NDArray[np.floating[Any]] | None = None) -> Measurements:
-        """Return the measurements of frame ``k`` with the floor and the hands, where these are known.
+    def measure_all(self, k: int) -> Measurements:
+        """Return the measurements of frame ``k`` with pelvis, floor and hands, where these are known.
 
-        The shape is estimated without them, because they hardly depend on it.
-
-        :param root_cam: (3,) known position of the pelvis, camera frame, metres.
+        The shape is estimated without floor and hands, because they hardly depend on it.
         """
-        measured = self.measure(k, root_cam)
+        measured = self.measure(k, None if self.stance is None else self.stance.root_cam[k])
         if self.stance is not None:
-            indices = np.arange(len(CONTACT_POINTS)) + len(self.body.keypoint_names) - len(CONTACT_POINTS)
-            measured = replace(measured, floor=self.stance.floor(k, indices))
+            measured = replace(measured, floor=self.stance.floor(k, self.contact_point_indices))
         if self.hand_measurer is None or self.hands is None:
             return measured
         return self.hand_measurer.add(measured, self.hands[k])
+
+    @property
+    def contact_point_indices(self) -> NDArray[np.intp]:
+        """The (6,) keypoint indices of the contact points, which the body has if there is a stance."""
+        return np.arange(len(CONTACT_POINTS)) + len(self.body.keypoint_names) - len(CONTACT_POINTS)
 
     def rotated(self, R: NDArray[np.floating[Any]]) -> PreparedTrack:
         """Rotate the lifted points about the hips; the image measurements stay as they are.
@@ -97,8 +100,8 @@ class PreparedTrack:
         rotated = (points @ np.swapaxes(R, 1, 2).astype(points.dtype)).astype(points.dtype)
         return replace(self, lifted=replace(self.lifted, points=rotated))
 
-    def with_floor(self, stance: Stance, betas: NDArray[np.floating[Any]]) -> PreparedTrack:
-        """Add the floor, and to the body the contact points of this shape.
+    def with_stance(self, stance: Stance, betas: NDArray[np.floating[Any]]) -> PreparedTrack:
+        """Add the pelvis and the floor, and to the body the contact points of this shape.
 
         :param stance: in each frame's camera.
         :param betas: (P,) shape coefficients.

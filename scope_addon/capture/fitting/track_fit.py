@@ -3,7 +3,8 @@
 
 1. Some frames, spread over the clip, are fitted separately and then together with one shape (``fit_clip``).
 2. Every frame is fitted with this shape, from the previous frame; after a gap from a cold start (`frame_sequence`).
-3. Once floor, feet and balance are known, every frame is fitted again, from its first fit.
+3. Once floor, feet and balance are known (`ground`), all frames are fitted together (`world/clip_fit`).
+4. From there, every frame is fitted alone once more: the raw motion.
 """
 
 from __future__ import annotations
@@ -20,9 +21,10 @@ from .frame_measurements import NEAREST_M
 from .frame_sequence import FittedTrack, FrameSequence, is_usable
 from .outline.shape_fit import fit_shape_to_outline, usable_masks
 from .prepared_track import PreparedTrack, Stance
-from .weights import ROBUST, cold_stages
+from .weights import ROBUST, clip_weights, cold_stages
 
 SHAPE_FRAMES = 64  # from which the shape is estimated; more frames add little
+PROGRESS_FRAMES = 16  # between two reports
 RESIZE = 0.03  # relative change of the distance from which on the shape is estimated again
 
 
@@ -32,7 +34,15 @@ def fit_track(prepared: PreparedTrack, progress: Callable[[str, int, int], None]
     :param progress: called with the stage's name, the frames done and the total; 0: unknown.
     """
     progress("finding the shape", 0, 0)
-    return _fit_frames(prepared, _fit_shape(prepared).beta, None, progress)
+    frames, track = FrameSequence(prepared, _fit_shape(prepared).beta), prepared.track
+    T = len(track)
+    for k in range(T):
+        if track.seen[k]:
+            frames.fit_next(k)
+        frames.repeat_last(k)
+        if k % PROGRESS_FRAMES == 0 or k == T - 1:
+            progress("solving", k + 1, T)
+    return frames.fitted()
 
 
 def fit_single_frame(prepared: PreparedTrack) -> Fit | None:
@@ -41,10 +51,8 @@ def fit_single_frame(prepared: PreparedTrack) -> Fit | None:
     return found if is_usable(found) else None
 
 
-def refit_track(
-    prepared: PreparedTrack, first: FittedTrack, stance: Stance, progress: Callable[[str, int, int], None]
-) -> FittedTrack:
-    """Fit every frame again, from its first fit, with the pelvis and the floor as estimated in the stance.
+def ground(prepared: PreparedTrack, first: FittedTrack, stance: Stance) -> tuple[PreparedTrack, FittedTrack]:
+    """Add the pelvis and the floor as estimated in a stance to the measurements, and move the first fit there.
 
     A pose and a distance that explain the image together can both be wrong. With the distance estimated from the floor,
     the pose follows. So does the shape, if the distance of the whole clip has changed: a person on the same floor as
@@ -52,46 +60,31 @@ def refit_track(
 
     :param first: the first fit, in each frame's camera.
     :param stance: in each frame's camera.
-    :param progress: called with the stage's name, the frames done and the total; 0: unknown.
+    :return: the measurements, and the states and the shape to start from.
     """
     prepared, betas, root_cam = prepared.rotated(stance.turn), first.betas, stance.root_cam
     if first.valid.any():
         new, old = (np.linalg.norm(at[first.valid], axis=1) for at in (root_cam, first.t_camera_root))
         if abs(np.log(np.median(new / np.maximum(old, NEAREST_M)))) > RESIZE:
             betas = _fit_shape(prepared, root_cam).beta
-    if prepared.weights.floor > 0.0:
-        prepared = prepared.with_floor(stance, betas)
-
-    def initial_state(k: int) -> State | None:
-        if not first.valid[k]:
-            return None
-        return State(first.rotations[k, 0], root_cam[k], first.rotations[k, 1:], betas)
-
-    return _fit_frames(prepared, betas, initial_state, progress)
+    return prepared.with_stance(stance, betas), replace(first, t_camera_root=root_cam, betas=betas)
 
 
-def _fit_frames(
-    prepared: PreparedTrack,
-    betas: NDArray[np.floating[Any]],
-    initial_state: Callable[[int], State | None] | None,
-    progress: Callable[[str, int, int], None],
+def fit_each_frame(
+    prepared: PreparedTrack, start: FittedTrack, progress: Callable[[str, int, int], None]
 ) -> FittedTrack:
-    """Fit every seen frame in order.
+    """Fit every frame alone, from its state in another motion.
 
-    :param initial_state: the initial state of each frame, whose root position is then a prior; None: frames start from
-        the previous frame.
+    :param progress: called with the stage's name, the frames done and the total.
     """
-    frames, track = FrameSequence(prepared, betas), prepared.track
-    T = len(track)
+    frames = FrameSequence(replace(prepared, weights=clip_weights(prepared.weights)), start.betas)
+    T = len(start.valid)
     for k in range(T):
-        if track.seen[k]:
-            if initial_state is None:
-                frames.fit_next(k)
-            else:
-                frames.refit(k, initial_state(k))
+        if start.valid[k]:
+            frames.refit(k, State(start.rotations[k, 0], start.t_camera_root[k], start.rotations[k, 1:], start.betas))
         frames.repeat_last(k)
-        if k % 16 == 0 or k == T - 1:
-            progress("solving" if initial_state is None else "solving on the floor", k + 1, T)
+        if k % PROGRESS_FRAMES == 0 or k == T - 1:
+            progress("solving each frame", k + 1, T)
     return frames.fitted()
 
 

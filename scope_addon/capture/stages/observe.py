@@ -37,7 +37,7 @@ from ..tracking.track import Track
 from ..tracking.tracker import PeopleTracker
 from .clock import COMPILING, Progress, StageClock
 
-_KERNELS = 65  # that fitting a frame compiles
+_KERNELS = 85  # that fitting a clip compiles
 
 # Called with each decoded frame, its largest person, and the object that fits the body to such an observation.
 Watch = Callable[[Frame, Observation | None, LiveBody], None]

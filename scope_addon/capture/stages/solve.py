@@ -6,17 +6,19 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from ...kinematics.single_precision import to_single_precision
 from ...motion import Motion
 from ..fitting.frame_sequence import FittedTrack
 from ..fitting.prepared_track import PreparedTrack, prepare_track
-from ..fitting.track_fit import fit_track, refit_track
+from ..fitting.track_fit import fit_each_frame, fit_track, ground
 from ..tracking.track import Track
 from ..world.above_floor import raise_feet
 from ..world.assemble import assemble_motion
 from ..world.camera_path import CameraPath
 from ..world.camera_travel import camera_travel
-from ..world.foot_lock import lock_feet
+from ..world.clip_fit import fit_clip
 from ..world.placement import PlacedTrack, place_track
 from ..world.shot import FittedPerson, Shot
 from ..world.stance import stance_on_floor
@@ -42,13 +44,15 @@ def solve(shot: Shot, tracks: Sequence[Track], progress: Progress, heights_m: Se
     """
     prepared = prepare(shot, tracks, heights_m)
     fits = [to_single_precision(fit_track(each, progress)) for each in prepared]
-    shot = replace(shot, path=find_camera_path(shot, prepared[0], fits[0]))
-    if shot.ablation.second_pass and not shot.is_still:
-        fits = refit(shot, prepared, fits, progress)
+    shot, iterations = replace(shot, path=find_camera_path(shot, prepared[0], fits[0])), fits[0].iterations
     people = [FittedPerson(each.track, fit, each.body) for each, fit in zip(prepared, fits, strict=True)]
-    iterations = fits[0].iterations
-    del prepared, fits
-    placed = [place(shot, person.track, person.fit, shot.smoothing) for person in people]
+    if shot.ablation.stance and not shot.is_still:
+        prepared, fits = ground_all(shot, prepared, fits)
+    placed = []
+    for k, person in enumerate(people):
+        raw, finished = refine(shot, prepared.pop(0), fits.pop(0), progress)
+        people[k] = replace(person, fit=raw)
+        placed.append(place(shot, person.track, finished, smoothing=False))
     world = find_world(placed, shot.lines)
     motions: list[Motion] = []
     while people:
@@ -80,26 +84,37 @@ def find_camera_path(shot: Shot, first: PreparedTrack, fit: FittedTrack) -> Came
     return replace(shot.path, center=camera_travel(placed.soles, placed.valid, up, placed.times))
 
 
-def refit(
-    shot: Shot, prepared: Sequence[PreparedTrack], fits: Sequence[FittedTrack], progress: Progress
-) -> list[FittedTrack]:
-    """Fit each person once more, with the distance and lean estimated from floor, feet and balance."""
+def ground_all(
+    shot: Shot, prepared: Sequence[PreparedTrack], fits: Sequence[FittedTrack]
+) -> tuple[list[PreparedTrack], list[FittedTrack]]:
+    """Add to each person's measurements the distance and lean that follow from floor, feet and balance."""
     placed = [place(shot, each.track, fit) for each, fit in zip(prepared, fits, strict=True)]
     world = find_world(placed, shot.lines)
-    floors = [world.floor_from_camera(k) for k in range(len(placed))]
-    stances = [stance_on_floor(*each, shot.ablation.balance) for each in zip(placed, floors, strict=True)]
-    del placed
-    return [
-        to_single_precision(refit_track(each, fit, shot.path.stance_to_frames(stance), progress))
-        for each, fit, stance in zip(prepared, fits, stances, strict=True)
-    ]
+    grounded, starts = [], []
+    for k, (each, fit) in enumerate(zip(prepared, fits, strict=True)):
+        stance = stance_on_floor(placed[k], world.floor_from_camera(k), shot.ablation.balance)
+        if not shot.ablation.contact:
+            stance = replace(stance, resting=np.zeros_like(stance.resting))
+        measured, start = ground(each, fit, shot.path.stance_to_frames(stance))
+        grounded.append(measured)
+        starts.append(to_single_precision(start))
+    return grounded, starts
+
+
+def refine(
+    shot: Shot, prepared: PreparedTrack, start: FittedTrack, progress: Progress
+) -> tuple[FittedTrack, FittedTrack]:
+    """Return the raw motion, of which every frame is fitted alone, and the finished one, of all frames together."""
+    if shot.is_still:
+        return start, start
+    finished = fit_clip(prepared, start, shot.path, progress) if shot.smoothing else start
+    raw = to_single_precision(fit_each_frame(prepared, finished, progress))
+    return raw, to_single_precision(finished) if shot.smoothing else raw
 
 
 def finish(shot: Shot, person: FittedPerson, placed: PlacedTrack, world: SharedWorld, number: int) -> Motion:
-    """Lock the feet of one person, the ``number``-th of the world, above the floor, and assemble the motion."""
+    """Raise the feet of one person, the ``number``-th of the world, out of the floor, and assemble the motion."""
     contact = placed.contact(world.up)
-    if shot.smoothing and shot.ablation.contact:
-        placed = lock_feet(placed, contact, world.floor_from_camera(number))
     if shot.ablation.contact and (shot.smoothing or shot.is_still):
         placed = raise_feet(placed, contact, world.floor_from_camera(number))
     return assemble_motion(shot, person, placed, contact, world.T_world_camera)

@@ -48,6 +48,15 @@ class CameraPath:
         root = np.einsum("tij,tj->ti", self.R_first_camera, fit.t_camera_root) + self.center
         return replace(fit, rotations=rotations, t_camera_root=root)
 
+    def to_frames(self, fit: FittedTrack) -> FittedTrack:
+        """Transform a fit from the first frame's axes to each frame's camera; the argument for a static camera."""
+        if self.is_static:
+            return fit
+        rotations = fit.rotations.copy()
+        rotations[:, 0] = np.swapaxes(self.R_first_camera, 1, 2) @ rotations[:, 0]
+        root = self.points_to_frames(fit.t_camera_root[:, None])[:, 0]
+        return replace(fit, rotations=rotations, t_camera_root=root)
+
     def points_to_frames(self, points: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
         """Transform points from the first frame's axes to each frame's camera.
 
@@ -69,6 +78,7 @@ class CameraPath:
             np.einsum("tji,tj->ti", self.R_first_camera, stance.floor_normal),
             stance.floor_offset - (stance.floor_normal * self.center).sum(axis=1),
             stance.contact,
+            stance.resting,
         )
 
     def world_from_frames(self, T_world_first: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -26,7 +26,7 @@ class Shot:
     fps: Fraction
     image_size: tuple[int, int]  # width and height, pixels
     source: str  # name of the footage
-    smoothing: bool = True  # of the motion, with foot locking
+    smoothing: bool = True  # False: every frame is fitted alone
     ablation: Ablation = NO_ABLATION
 
     @property

@@ -6,14 +6,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ...kinematics.smoothing import gaussian_smooth
 from ...kinematics.standing import line_of_sight
 from ..fitting.prepared_track import Stance
 from .balance import balancing_rotations
 from .ground_plane import correct_depth, floor_probability
 from .placement import PlacedTrack
-
-FLOOR_CUTOFF_HZ = 1.0  # so that legs do not jerk when the floor term sets in or ends
 
 
 def stance_on_floor(placed: PlacedTrack, T_floor_camera: NDArray[np.float64], balanced: bool) -> Stance:
@@ -31,6 +28,6 @@ def stance_on_floor(placed: PlacedTrack, T_floor_camera: NDArray[np.float64], ba
         turn, pivot = balancing_rotations(placed, contact, up)
         root = pivot + np.einsum("tij,tj->ti", turn, root - pivot)
     height = (placed.contact_points + shift[:, None]) @ up + T_floor_camera[2, 3]
-    on_floor = gaussian_smooth(contact * floor_probability(height), placed.times, FLOOR_CUTOFF_HZ)
+    on_floor = contact * floor_probability(height)
     T_frames = np.broadcast_to(T_floor_camera, (len(root), 4, 4))
-    return Stance(root + shift, turn, T_frames[:, 2, :3], -T_frames[:, 2, 3], on_floor)
+    return Stance(root + shift, turn, T_frames[:, 2, :3], -T_frames[:, 2, 3], on_floor, contact)

@@ -108,6 +108,7 @@ def test_a_stance_is_the_same_in_every_camera():
         floor_normal=np.tile(up, (5, 1)),
         floor_offset=np.full(5, -1.4),
         contact=rng.uniform(size=(5, 4)),
+        resting=rng.uniform(size=(5, 4)),
     )
     frames = path.stance_to_frames(first)
     points = rng.standard_normal((5, 1, 3))
@@ -123,7 +124,7 @@ def test_a_stance_is_the_same_in_every_camera():
 
 
 def test_without_smoothing_the_camera_travels_as_far(shared):
-    """Without smoothing and foot locking, positions are still estimated in the same way."""
+    """Where every frame is fitted alone, positions are still estimated in the same way."""
     body, clip = load_body("scope"), shared / "data/clips/run_moving_camera.mp4"
     wanted = VideoRange(end_s=1.5)
     smooth, raw = (

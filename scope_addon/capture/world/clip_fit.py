@@ -1,0 +1,150 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The finished motion of a track: all frames of a clip fitted at once, coupled by the acceleration of joints and root.
+
+    minimize  Σ_f E_f(x_f) + ½ ∫ w ρ(|a|²) dt + ½ ∫ w_c p |v|² dt   over the poses x_f of all frames
+
+with the terms E_f of single frames, their shape fixed, accelerations a, and velocities v of the soles and palms that
+rest with probability p (`solver.fit_motion`). A keypoint that jumps for one frame loses against its neighbours, a limb
+seen in one frame tells where it was in the next, feet that stand stay where they are, and no filter follows.
+Long clips are fitted in windows of consecutive frames. Where two windows overlap, their motions are blended.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from typing import TypeVar, overload
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ....solver import Measurements, MotionFit, StandingPoints, State, View, fit_motion
+from ....solver.rotations import exp, log
+from ..fitting.frame_sequence import LONGEST_COAST_S, FittedTrack
+from ..fitting.prepared_track import PreparedTrack
+from ..fitting.weights import ROBUST, clip_weights, motion_prior, warm_stages
+from .camera_path import CameraPath
+
+WINDOW_UNKNOWNS = 24_000  # unknowns of a window, whose equations take some 100 MB: 320 frames of a body of 24 parts
+OVERLAP = 0.2  # of a window's frames; two windows differ by 2 to 4 mm where one of them has 1 s more to its end
+LONGEST_STEP = 2.5  # between two frames that are fitted together, in units of the median step
+_Item = TypeVar("_Item")
+_Progress = Callable[[str, int, int], None]
+
+
+class _Computed(Sequence[_Item]):
+    """Frames' items, each computed when it is asked for: an hour's measurements would not fit into memory."""
+
+    def __init__(self, frames: NDArray[np.intp], item: Callable[[int], _Item]) -> None:
+        self._frames, self._item = frames, item
+
+    def __len__(self) -> int:
+        return len(self._frames)
+
+    @overload
+    def __getitem__(self, k: int) -> _Item: ...
+    @overload
+    def __getitem__(self, k: slice) -> Sequence[_Item]: ...
+    def __getitem__(self, k: int | slice) -> _Item | Sequence[_Item]:
+        return _Computed(self._frames[k], self._item) if isinstance(k, slice) else self._item(int(self._frames[k]))
+
+
+def fit_clip(prepared: PreparedTrack, start: FittedTrack, path: CameraPath, progress: _Progress) -> FittedTrack:
+    """Fit all frames of a track together, between longer gaps.
+
+    :param start: the states to start from, and the shape, in each frame's camera.
+    :param progress: called with the stage's name, the frames done and the total; it may raise to cancel.
+    :return: the states in each frame's camera; those of invalid frames are as given.
+    """
+    clip = _Clip(prepared, start, path, progress)
+    for run in runs(start.valid, prepared.track.times):
+        for window in windows(len(run), _window_frames(prepared)):
+            clip.fit(run[window])
+    return clip.fitted()
+
+
+class _Clip:
+    """A track on its way to its motion, in the first frame's axes."""
+
+    def __init__(self, prepared: PreparedTrack, start: FittedTrack, path: CameraPath, progress: _Progress) -> None:
+        self._prepared, self._path, self._progress = prepared, path, progress
+        self._start, first = start, path.to_first(start)
+        self._rotations, self._root = first.rotations.copy(), first.t_camera_root.copy()
+        self._weights = clip_weights(prepared.weights)
+        self._done = np.zeros(len(start.valid), bool)
+
+    def fit(self, frames: NDArray[np.intp]) -> None:
+        """Fit one window; frames that an earlier one has fitted are blended from that one's motion to this one's."""
+        times = self._prepared.track.times[frames]
+        self._progress("solving the clip", int(self._done.sum()), len(self._done))
+        found = fit_motion(
+            self._prepared.body,
+            _Computed(frames, self._measure),
+            times,
+            init=_Computed(frames, self._state),
+            priors=self._prepared.priors,
+            options=replace(ROBUST, stages=warm_stages(self._weights)),
+            motion=motion_prior(times),
+            stands=self._standing_points(frames),
+            shape=np.asarray(self._start.betas, float),
+            window=np.inf,
+        )
+        self._keep(frames, found)
+
+    def fitted(self) -> FittedTrack:
+        """Return the states in each frame's camera."""
+        first = replace(self._start, rotations=self._rotations, t_camera_root=self._root)
+        return self._path.to_frames(first)
+
+    def _standing_points(self, frames: NDArray[np.intp]) -> StandingPoints | None:
+        prepared = self._prepared
+        if prepared.stance is None:
+            return None
+        return StandingPoints(prepared.contact_point_indices, prepared.stance.resting[frames])
+
+    def _measure(self, k: int) -> Measurements | Sequence[View]:
+        measured = self._prepared.measure_all(k)
+        if self._path.is_static:
+            return measured
+        R = self._path.R_first_camera[k].T
+        return [View(measured, R, -R @ self._path.center[k])]
+
+    def _state(self, k: int) -> State:
+        return State(self._rotations[k, 0], self._root[k], self._rotations[k, 1:], self._start.betas)
+
+    def _keep(self, frames: NDArray[np.intp], found: MotionFit) -> None:
+        rotations = np.array([[state.R_camera_root, *state.Omega] for state in found.states])
+        root = np.array([state.t_camera_root for state in found.states])
+        both = int(self._done[frames].sum())
+        share = (np.arange(both) + 1.0) / (both + 1.0)
+        earlier = self._rotations[frames[:both]].astype(float)
+        turn = log(np.swapaxes(earlier, -1, -2) @ rotations[:both])
+        rotations[:both] = earlier @ exp(share[:, None, None] * turn)
+        root[:both] = self._root[frames[:both]] * (1 - share[:, None]) + root[:both] * share[:, None]
+        self._rotations[frames], self._root[frames], self._done[frames] = rotations, root, True
+
+
+def runs(valid: NDArray[np.bool_], times: NDArray[np.float64]) -> Iterator[NDArray[np.intp]]:
+    """Yield the valid frames between gaps in which too much can happen for acceleration to tell it.
+
+    :param valid: (T,).
+    :param times: (T,) seconds.
+    """
+    frames = np.flatnonzero(valid)
+    if len(frames):
+        usual = float(np.median(np.diff(times))) if len(times) > 1 else 0.0
+        gaps = np.diff(times[frames]) > max(LONGEST_COAST_S, LONGEST_STEP * usual)
+        yield from np.split(frames, np.flatnonzero(gaps) + 1)
+
+
+def windows(count: int, length: int) -> list[slice]:
+    """Divide ``count`` frames into slices of ``length`` that overlap by at least `OVERLAP`; one if that suffices."""
+    if count <= length:
+        return [slice(0, count)]
+    steps = int(np.ceil((count - length) / ((1.0 - OVERLAP) * length)))
+    starts = np.linspace(0, count - length, steps + 1).round().astype(int)
+    return [slice(int(start), int(start) + length) for start in starts]
+
+
+def _window_frames(prepared: PreparedTrack) -> int:
+    return WINDOW_UNKNOWNS // (3 * (prepared.body.K + 2))

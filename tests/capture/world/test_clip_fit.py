@@ -1,0 +1,205 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""All frames of a track at once, on motions whose truth is known."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scope.scope_addon.capture.camera.intrinsics import choose_camera
+from scope.scope_addon.capture.fitting.frame_sequence import FittedTrack
+from scope.scope_addon.capture.fitting.keypoint_offsets import with_keypoint_offsets
+from scope.scope_addon.capture.fitting.prepared_track import PreparedTrack, Stance, prepare_track
+from scope.scope_addon.capture.fitting.weights import motion_prior
+from scope.scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES
+from scope.scope_addon.capture.perception.lifter import Lifted
+from scope.scope_addon.capture.tracking.track import Track
+from scope.scope_addon.capture.world import clip_fit
+from scope.scope_addon.capture.world.camera_path import CameraPath
+from scope.scope_addon.capture.world.placement import place_track
+from scope.solver import load_body
+from scope.solver.rotations import exp
+
+FPS, FRAMES = 30.0, 24
+BODY, CAMERA = load_body("scope"), choose_camera(1080, 1920)
+JOINTS = len(KEYPOINT_NAMES)
+HIPS = [KEYPOINT_NAMES.index(f"{side}_hip") for side in ("left", "right")]
+LEG = [KEYPOINT_NAMES.index(f"right_{name}") for name in ("knee", "ankle", "heel", "foot_index")]
+
+
+def _person(frames: int = FRAMES, path: CameraPath | None = None) -> tuple[Track, FittedTrack]:
+    """Somebody upright, 4 m away, one leg bent, who waves an arm up and down once a second.
+
+    :param path: of the camera; by default it is static.
+    :return: what the camera sees, and the true states in the first frame's axes.
+    """
+    times = np.arange(frames) / FPS
+    rotations = np.tile(np.eye(3), (frames, BODY.K + 1, 1, 1))
+    rotations[:, 0] = np.diag([1.0, -1.0, -1.0])  # body y up, OpenCV y down
+    for joint, angle in (("right_hip", 0.3), ("right_knee", 0.9)):
+        rotations[:, BODY.joint_names.index(joint)] = exp(np.array([angle, 0.0, 0.0]))
+    wave = 0.5 * np.sin(2 * np.pi * times)
+    rotations[:, BODY.joint_names.index("left_shoulder")] = exp(wave[:, None] * [0.0, 0.0, 1.0])
+    root = np.tile([0.0, 0.0, 4.0], (frames, 1))
+    R, t = BODY.forward_kinematics(rotations, root - BODY.rest_joints()[0], np.zeros(BODY.P))
+    at = BODY.keypoint_set("blazepose")
+    points = with_keypoint_offsets(BODY).keypoints(R, t, np.zeros(BODY.P), [at[name] for name in KEYPOINT_NAMES])
+    if path is not None:
+        points = path.points_to_frames(points)
+    pixels = points[..., :2] / points[..., 2:] * CAMERA.intrinsics[0, 0] + CAMERA.intrinsics[:2, 2]
+    track = Track(
+        frames=np.arange(frames),
+        times=times,
+        keypoints_px=pixels,
+        confidence=np.ones((frames, JOINTS)),
+        world_landmarks=points - points[:, HIPS].mean(axis=1, keepdims=True),
+        seen=np.ones(frames, bool),
+        acquired=np.arange(frames) == 0,
+    )
+    seen = np.ones((frames, BODY.K + 1))
+    return track, FittedTrack(rotations, root, np.zeros(BODY.P), np.ones(frames, bool), seen, 1.0)
+
+
+def _prepared(track: Track, lifted_m: np.ndarray | None = None, sigma_m: np.ndarray | float = 0.1) -> PreparedTrack:
+    """The track with lifted points and their deviation; by default those of the track, which are exact."""
+    sigma = np.broadcast_to(sigma_m, (len(track), JOINTS)).copy()
+    points = track.world_landmarks if lifted_m is None else lifted_m
+    return replace(prepare_track(BODY, track, CAMERA), lifted=Lifted(points, sigma, sigma))
+
+
+def _fit(prepared: PreparedTrack, start: FittedTrack, path: CameraPath | None = None) -> FittedTrack:
+    return clip_fit.fit_clip(prepared, start, path or CameraPath.static(len(start.valid)), lambda *_: None)
+
+
+def _joints(fit: FittedTrack) -> np.ndarray:
+    """The joints (T, K+1, 3) in each frame's camera."""
+    return BODY.forward_kinematics(fit.rotations, fit.t_camera_root - BODY.rest_joints(fit.betas)[0], fit.betas)[1]
+
+
+@pytest.mark.parametrize("flipped", [1, 4, 8])
+def test_a_limb_that_is_lifted_to_its_mirror_image_for_some_frames_stays_where_it_was(flipped):
+    """The image shows a leg bent towards the camera as one bent away; the lifter is half as sure where it is wrong."""
+    track, true = _person()
+    wrong, sigma = track.world_landmarks.copy(), np.full((FRAMES, JOINTS), 0.1)
+    span = slice(6, 6 + flipped)
+    mirrored = 2 * wrong[:, HIPS[1], None, 2] - wrong[:, LEG, 2]
+    wrong[span, LEG, 2] = mirrored[span]
+    sigma[span, LEG] = 0.25
+    hip, knee = (BODY.joint_names.index(f"right_{name}") for name in ("hip", "knee"))
+    start = replace(true, rotations=true.rotations.copy())
+    start.rotations[span, hip] = exp(np.array([-0.3, 0.0, 0.0]))
+    start.rotations[span, knee] = exp(np.array([-0.9, 0.0, 0.0]))
+    ankle = BODY.joint_names.index("right_ankle")
+    depth = [_joints(fit)[:, ankle, 2] for fit in (true, start, _fit(_prepared(track, wrong, sigma), start))]
+    assert np.abs(depth[1] - depth[0])[span].min() > 0.5
+    np.testing.assert_allclose(depth[2], depth[0], atol=0.06)
+
+
+def test_noise_of_single_frames_is_averaged_and_a_motion_keeps_its_amplitude():
+    track, true = _person(48)
+    rng = np.random.default_rng(0)
+    noisy = replace(track, keypoints_px=track.keypoints_px + rng.normal(0.0, 4.0, track.keypoints_px.shape))
+    lifted = track.world_landmarks + rng.normal(0.0, 0.03, track.world_landmarks.shape)
+    prepared = _prepared(noisy, lifted)
+    together = _fit(prepared, true)
+    alone = [
+        clip_fit.fit_clip(prepared, replace(true, valid=np.arange(48) == k), CameraPath.static(48), lambda *_: None)
+        for k in range(48)
+    ]
+    wrist = BODY.joint_names.index("left_wrist")
+    truth = _joints(true)
+    one_by_one = np.array([_joints(fit)[k] for k, fit in enumerate(alone)])
+    error, before = (np.linalg.norm(J - truth, axis=-1).mean() for J in (_joints(together), one_by_one))
+    assert error < 0.6 * before
+    assert abs(np.ptp(_joints(together)[:, wrist, 1]) / np.ptp(truth[:, wrist, 1]) - 1) < 0.05
+
+
+def test_soles_that_rest_stay_in_place():
+    track, true = _person()
+    rng = np.random.default_rng(1)
+    shaken = replace(track, keypoints_px=track.keypoints_px + rng.normal(0.0, 6.0, track.keypoints_px.shape))
+    stance = Stance(
+        true.t_camera_root,
+        np.tile(np.eye(3), (FRAMES, 1, 1)),
+        np.tile([0.0, -1.0, 0.0], (FRAMES, 1)),
+        np.full(FRAMES, -5.0),
+        np.zeros((FRAMES, 6)),
+        np.tile([1.0, 1.0, 0.0, 0.0, 0.0, 0.0], (FRAMES, 1)),
+    )
+    slides = []
+    for resting in (np.zeros((FRAMES, 6)), stance.resting):
+        prepared = _prepared(shaken).with_stance(replace(stance, resting=resting), true.betas)
+        soles = place_track(BODY, track, _fit(prepared, true), smoothing=False).soles[:, :2]
+        slides.append(np.linalg.norm(np.diff(soles, axis=0), axis=-1).mean())
+    assert slides[0] > 5e-4
+    assert slides[1] < 0.2 * slides[0]
+
+
+def test_a_moving_camera_gives_the_same_motion_as_a_static_one():
+    angle = 0.1 * np.sin(np.arange(FRAMES) / 5.0)
+    path = CameraPath(exp(angle[:, None] * [0.0, 1.0, 0.0]), np.outer(np.arange(FRAMES), [0.02, 0.0, 0.01]))
+    (still, true), (moved, _) = _person(), _person(path=path)
+    static = _fit(_prepared(still), true)
+    start = path.to_frames(true)
+    assert np.abs(start.t_camera_root - true.t_camera_root).max() > 0.2
+    moving = path.to_first(_fit(_prepared(moved), start, path))
+    assert (
+        np.linalg.norm(_joints(moving) - _joints(static), axis=-1).max() < 0.025
+    )  # the depth of a limb is another direction
+    np.testing.assert_allclose(path.to_first(start).t_camera_root, true.t_camera_root, atol=1e-12)
+    np.testing.assert_allclose(path.to_first(start).rotations, true.rotations, atol=1e-12)
+
+
+def test_windows_agree_with_the_whole_and_join_smoothly(monkeypatch):
+    track, true = _person(90)
+    rng = np.random.default_rng(2)
+    prepared = _prepared(replace(track, keypoints_px=track.keypoints_px + rng.normal(0.0, 3.0, (90, JOINTS, 2))))
+    whole = _joints(_fit(prepared, true))
+    monkeypatch.setattr(clip_fit, "WINDOW_UNKNOWNS", 40 * 3 * (BODY.K + 2))
+    parts = _joints(_fit(prepared, true))
+    assert (
+        np.linalg.norm(parts - whole, axis=-1).max() < 0.008
+    )  # metres; the whole itself is only that near to its minimum
+    jerk = [np.abs(np.diff(J, n=3, axis=0)).max() for J in (whole, parts)]
+    assert jerk[1] < 1.5 * jerk[0]
+
+
+def test_windows_cover_all_frames_and_overlap():
+    assert clip_fit.windows(100, 100) == [slice(0, 100)]
+    for count, length in ((101, 100), (1000, 320), (7, 5)):
+        found = clip_fit.windows(count, length)
+        assert found[0].start == 0
+        assert found[-1].stop == count
+        for a, b in zip(found[:-1], found[1:], strict=True):
+            assert b.stop - b.start == length
+            assert a.stop - b.start >= clip_fit.OVERLAP * length - 1
+
+
+def test_longer_gaps_separate_what_is_fitted_together():
+    times = np.arange(60) / FPS
+    valid = np.ones(60, bool)
+    valid[10:14], valid[30:50] = False, False  # 0.17 s and 0.7 s
+    first, second = clip_fit.runs(valid, times)
+    assert first.tolist() == [*range(10), *range(14, 30)]
+    assert second.tolist() == [*range(50, 60)]
+    assert list(clip_fit.runs(np.zeros(3, bool), times[:3])) == []
+    (slow,) = clip_fit.runs(np.ones(4, bool), np.arange(4.0))  # one frame a second has no gaps
+    assert len(slow) == 4
+
+
+def test_frames_that_were_not_seen_stay_as_they_are():
+    track, true = _person()
+    start = replace(true, valid=np.arange(FRAMES) < 12)
+    found = _fit(_prepared(track), start)
+    np.testing.assert_array_equal(found.rotations[12:], start.rotations[12:])
+    np.testing.assert_array_equal(found.valid, start.valid)
+
+
+def test_acceleration_weighs_more_the_more_frames_there_are():
+    at = {rate: motion_prior(np.arange(5) / rate) for rate in (10.0, 30.0, 60.0, 120.0)}
+    reference = at[60.0].root_position
+    scales = [at[rate].root_position / reference for rate in (10.0, 30.0, 120.0)]
+    np.testing.assert_allclose(scales, [1 / 36, 1 / 4, 2.0])
+    assert motion_prior(np.zeros(1)).root_position == reference
+    assert len({prior.contact for prior in at.values()}) == 1
