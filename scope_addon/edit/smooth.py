@@ -17,9 +17,9 @@ def smoothed(body: Body, motion: Motion, strength: float) -> Clip:
     """Smooth the raw motion without phase shift, and correct it where the user did.
 
     Strength 0 is the raw motion, of which every frame is fitted alone, 1 the finished one, of all frames together, and
-    3 very smooth. Anything else is the raw motion through a filter whose cut-off frequency is 4.5 Hz / strength. What the
-    finished motion has besides, above all feet that stay in place, is its difference from the filtered one at strength
-    1; it is added to the result, and fades out below strength 1. The distance from the camera,
+    3 very smooth. Anything else is the raw motion through a filter whose cut-off frequency is 4.5 Hz / strength. What
+    the finished motion has besides, above all feet that stay in place, is its difference from the filtered one at
+    strength 1; it is added to the result, and fades out below strength 1. The distance from the camera,
     which a single camera measures inaccurately, is smoothed more than the position in the image.
 
     :raises UsageError: when the strength is negative or not a number.
