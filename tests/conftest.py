@@ -41,6 +41,9 @@ FIRST = (
     "job/test_batch.py",
     "ui/test_compiled_solver.py",
     "scene/export/test_export.py",
+    "ui/pins/test_correction_operators.py",
+    "ui/capture/test_capture_job.py",
+    "test_cli.py",
 )
 
 

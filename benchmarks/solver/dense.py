@@ -18,11 +18,13 @@ from ...solver.compiled.kernel import kernel
 from ...solver.compiled.part import GRADIENT
 from ...solver.gauss_newton.linearize import clear_blocks, make_blocks, make_pose, place_parts
 from ...solver.gauss_newton.terms import HAS_2D, HAS_3D, HAS_DIRECTION
-from ...solver.residuals import keypoint2d
-from ...solver.residuals.registry import KEYPOINT2D, KEYPOINT3D, ORIENTATION_FIELD, SHAPE_PRIOR, accumulate_tables
+from ...solver.residuals import joint_flow, keypoint2d
+from ...solver.residuals.registry import KEYPOINT2D, KEYPOINT3D, ORIENTATION_FIELD, RESIDUALS, SHAPE_PRIOR, column_of
 from ...solver.residuals.robust import geman_mcclure
 from .loops import put
 from .problem import Problem
+
+FLOW, FLOW_COLUMN = list(RESIDUALS).index("joint_flow"), column_of("joint_flow")  # the problem's one prior
 
 
 @kernel
@@ -135,9 +137,10 @@ def _solve(L, g, out) -> None:  # type: ignore[no-untyped-def]
 
 @kernel
 def _add_priors(tree, terms, stage, pose, blocks, H, g) -> None:  # type: ignore[no-untyped-def]
-    """Add the joint priors, each of which sees one joint alone, to the normal equations."""
+    """Add the prior of the joints' states, each of which is of one joint alone, to the normal equations."""
     clear_blocks(blocks)
-    accumulate_tables(tree, terms.ints, terms.floats, stage[0], stage[1], 0.0, pose, blocks)
+    ints, floats, weight, inv_sigma = terms.ints[FLOW], terms.floats[FLOW], stage[0, FLOW_COLUMN], stage[1, FLOW_COLUMN]
+    joint_flow.accumulate(tree, ints, floats, weight, inv_sigma, 0.0, pose, blocks)
     for i in range(1, tree.parents.shape[0]):
         at = 3 + 3 * i
         for r in range(3):
@@ -161,7 +164,7 @@ class Dense:
         self.r = np.zeros(len(self.J))
         self.moved = np.zeros((2, 3, max(P, 1)))
         self.pose, self.direction = make_pose(tree), np.zeros(self.J.shape[1])
-        self.blocks, self.priors = make_blocks(tree), any(len(table) for table in terms.ints)
+        self.blocks, self.priors = make_blocks(tree), len(terms.ints[FLOW]) > 0
         damped = np.ones(self.J.shape[1])
         damped[3:6] = self.problem.root_scale**2
         damped[6 + 3 * K :] = 0.0

@@ -11,7 +11,10 @@ from .code_cache import CodeCache
 
 # Reordering sums and fusing multiplications is allowed; assuming that no NaN or infinity occurs is not, because the
 # optimizer must recognise them. The GIL is released, so that frames can be solved in threads.
-_OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": {"reassoc", "contract", "arcp", "nsz"}}
+_OPTIONS: dict[str, Any] = {
+    "nogil": True, "error_model": "numpy", "fastmath": {"reassoc", "contract", "arcp", "nsz"},
+    "no_cfunc_wrapper": True,  # no C code calls a kernel; to compile an entry for it takes long
+}  # fmt: skip
 
 
 _LOG = logging.getLogger(__name__)
@@ -37,9 +40,9 @@ def allocating_kernel(function: Callable[..., Any]) -> Any:
 def inlined_kernel(function: Callable[..., Any]) -> Any:
     """Compile a kernel that only others call: as `kernel`, but kept on disk within its callers alone.
 
-    For functions made in a loop, which numba's cache cannot tell apart.
+    For functions made in a loop, which numba's cache cannot tell apart. Python cannot call it.
     """
-    options = dict(_OPTIONS, _nrt=False)
+    options = dict(_OPTIONS, _nrt=False, no_cpython_wrapper=True)
     return njit(**options)(function)
 
 

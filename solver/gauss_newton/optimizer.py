@@ -138,7 +138,8 @@ def optimize(tree, terms, measured, settings, memory):  # type: ignore[no-untype
     Without measurements, or for a cost that is not finite, the pose stays where it is. At the end memory.work.C is
     the reduced Gauss-Newton system of the result: see `eliminate`.
     """
-    work, at, iterations, rejected = memory.work, 0, 0, 0
+    # Not the constant 0, for which `_run_stage` would be compiled once more.
+    work, at, iterations, rejected = memory.work, np.int64(0), 0, 0
     if measured:
         cost, status = 0.0, CONVERGED
         for s in range(settings.stages.shape[0]):

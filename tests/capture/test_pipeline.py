@@ -23,7 +23,7 @@ from scope.solver.loaders.body_file import load_body
 
 @pytest.fixture(scope="module")
 def sample(body):
-    return capture(SAMPLE, body, CaptureOptions(quality="best"))
+    return capture(SAMPLE, body, CaptureOptions(quality="balanced"))
 
 
 def smpl_by_hand(body, pose, trans, betas):
@@ -99,9 +99,10 @@ def test_the_report_can_be_written_as_json_and_counts_right(sample):
     assert {"decode", "networks", "solver", "total"} <= set(report["fps"])
 
 
-def evaluated(shared, body, camera, quality, folder):
+def evaluated(shared, body, camera, folder, **options):
     """The figures of one of the four cameras, by a script that shares nothing with us."""
-    result = capture(shared / f"data/pose2sim/{camera}.mp4", body, CaptureOptions(quality=quality))
+    result = capture(shared / f"data/pose2sim/{camera}.mp4", body, CaptureOptions(**options))
+    assert result.motions[0].valid.all()
     result.motions[0].save(folder / "result.npz")
     truth = shared / f"data/pose2sim/truth_{camera}.npz"
     argv = [sys.executable, shared / "tools/evaluate.py", truth, folder / "result.npz"]
@@ -111,14 +112,14 @@ def evaluated(shared, body, camera, quality, folder):
 @pytest.mark.parametrize("quality", ["fast", "balanced"])
 def test_the_smaller_networks_do_not_flip_a_person_with_a_blurred_face(shared, body, tmp_path, quality):
     """BlazePose-full confuses front and back, or left and right, in 29 % of this camera's frames."""
-    figures = evaluated(shared, body, "cam2", quality, tmp_path)
-    assert figures["coverage"] == 1.0
+    figures = evaluated(shared, body, "cam2", tmp_path, quality=quality, wanted=VideoRange(end_s=1.0))
+    assert figures["coverage"] > 0.6  # of the whole clip
     assert figures["lr_swap"] + figures["mirror"] + figures["mirror_swap"] <= 0.01
 
 
 def test_real_footage_with_truth_beats_the_raw_landmarks(shared, body, tmp_path):
     """Raw BlazePose-heavy has 129.7 mm MPJPE-root and 89 mm PA-MPJPE here, and we 73.7, 54.7 and a jitter of 14.9."""
-    figures = evaluated(shared, body, "cam3", "best", tmp_path)
+    figures = evaluated(shared, body, "cam3", tmp_path, quality="best")
     assert "warnings" not in figures
     assert figures["coverage"] == 1.0
     assert figures["mpjpe_root"] < 83

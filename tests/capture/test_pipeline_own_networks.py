@@ -79,7 +79,8 @@ def test_left_right_swaps_of_a_users_network_are_repaired(shared: Path, tmp_path
     assert spec.loader is not None
     tool = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(tool)
-    options = CaptureOptions(keypoints=coco_simcc(tmp_path / "full.onnx", "pose_landmark_full"), threads=2)
+    keypoints = coco_simcc(tmp_path / "full.onnx", "pose_landmark_full")
+    options = CaptureOptions(keypoints=keypoints, threads=2, wanted=VideoRange(end_s=1.0))
     found = capture(shared / "data/pose2sim/cam2.mp4", load_body("scope"), options)
     found.motions[0].save(tmp_path / "cam2.npz")
     with np.errstate(all="ignore"), warnings.catch_warnings():

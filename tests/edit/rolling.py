@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A synthetic walk whose feet roll from heel to ball; each is at rest on the floor while it is in contact."""
 
+from functools import cache
+
 import numpy as np
 from scope.scope_addon.edit.clip import Clip
 from scope.scope_addon.kinematics.axes import R_WORLD_MODEL
@@ -19,6 +21,7 @@ def joint(part):
     return J[NAMES.index(part)]
 
 
+@cache
 def heel_of(side):
     """Return the heel on the floor, a centimetre in front of the rear end of the sole."""
     ankle = joint(f"{side}_ankle")

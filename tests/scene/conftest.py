@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -193,15 +194,21 @@ def joints_world():
 
 @pytest.fixture(scope="session")
 def rigify_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A file with Rigify's metarig and the rig generated from it, which takes seconds."""
+    """A file with Rigify's metarig and the rig generated from it, which takes seconds: once for all processes."""
     import addon_utils  # bpy puts it on the path
 
+    path = tmp_path_factory.mktemp("rigify") / "rigs.blend"
+    if "PYTEST_XDIST_WORKER" in os.environ:  # this process's folder lies in the one of the whole run
+        path = tmp_path_factory.getbasetemp().parent / "rigify.blend"
+    if path.is_file():
+        return path
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     addon_utils.enable("rigify", default_set=True)
     bpy.ops.object.armature_human_metarig_add()
     bpy.ops.pose.rigify_generate()
-    path = tmp_path_factory.mktemp("rigify") / "rigs.blend"
-    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    made = tmp_path_factory.mktemp("rigify") / "rigs.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(made))
+    os.replace(made, path)
     return path
 
 

@@ -12,7 +12,7 @@ from scope.tools.build_body.joints import make_skeleton, other_side
 from scope.tools.build_body.keypoints import SURFACE
 from scope.tools.build_body.landmarks import DENSITY, Landmarks
 from scope.tools.build_body.population import draw_population
-from scope.tools.build_body.source import WHEEL_NAME, fetch_wheel, read_source
+from scope.tools.build_body.source import WHEEL_NAME, fetch_wheel
 from scope.tools.build_body.survey_targets import read_survey_targets
 from scope.tools.build_body.write import write_body
 
@@ -158,10 +158,9 @@ def test_weight_and_its_gradient_are_those_of_a_closed_skin():
         )
 
 
-def test_people_measure_what_the_surveys_say():
-    wheel = fetch_wheel()
-    source = read_source(wheel)
-    people = draw_population(source, read_survey_targets(wheel, source.mirror), 16, 3)
+def test_people_measure_what_the_surveys_say(shaped):
+    source = shaped.source
+    people = draw_population(source, read_survey_targets(fetch_wheel(), source.mirror), 16, 3)
     off = {key: np.abs(people.measured[key] - people.wanted[key]) for key in people.wanted}
     for key in ("stature", "hip", "shoulder", "knee", "upper_arm", "forearm", "foot"):
         assert np.nanmedian(off[key]) < 0.008, key

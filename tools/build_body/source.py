@@ -165,5 +165,5 @@ def _read_mirror(text: str, count: int) -> NDArray[np.intp]:
 
 def _read_target(content: bytes) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
     rows = [line for line in content.decode().splitlines() if line and not line.startswith("#")]
-    table = np.array(" ".join(rows).split(), float).reshape(-1, 4)
+    table = np.fromstring(" ".join(rows), sep=" ").reshape(-1, 4)
     return table[:, 0].astype(np.int64), table[:, 1:] * METRES_PER_UNIT

@@ -20,11 +20,11 @@ def source():
     return captured(motion_of(walk(2.0)))
 
 
-def direction_error(rig, bone_of, pairs):
+def direction_error(rig, bone_of, pairs, frames=FRAMES):
     """Return the largest angle between a limb of the rig and the body's, degrees."""
-    joints, worst = truth()[[f - 1 for f in FRAMES]], 0.0
+    joints, worst = truth()[[f - 1 for f in frames]], 0.0
     for a, b in pairs:
-        ours = seen(rig, [bone_of[a], bone_of[b]])
+        ours = seen(rig, [bone_of[a], bone_of[b]], frames)
         ours = ours[:, 1] - ours[:, 0]
         theirs = joints[:, NAMES.index(b)] - joints[:, NAMES.index(a)]
         cosine = (ours * theirs).sum(1) / np.linalg.norm(ours, axis=1) / np.linalg.norm(theirs, axis=1)
@@ -114,7 +114,8 @@ def test_a_rig_of_controls_alone_stands_on_its_lowest_bone(source):
     np.testing.assert_allclose(seen(rig, bone_of.values()), before, atol=1e-5)
 
 
-def test_rigify(source, rigify_rigs):
+def test_rigify(rigify_rigs):
+    source, frames = captured(motion_of(walk(1.0))), range(1, 31, 6)
     limbs = ("thigh", "shin", "foot", "upper_arm", "forearm", "hand")
     parts = ("hip", "knee", "ankle", "shoulder", "elbow", "wrist")
     for rig, prefix in rigify_rigs:
@@ -124,9 +125,9 @@ def test_rigify(source, rigify_rigs):
             for part, limb in zip(parts, limbs, strict=True)
         }
         assert run(source, rig, feet=False).warnings == []
-        assert direction_error(rig, bone_of, ARMS + LEGS) < 1.0
+        assert direction_error(rig, bone_of, ARMS + LEGS, frames) < 1.0
         assert run(source, rig).warnings == []
-        assert direction_error(rig, bone_of, ARMS) < 1.0
+        assert direction_error(rig, bone_of, ARMS, frames) < 1.0
     metarig = rigify_rigs[0][0]
     before = guess_bone_map(metarig).parts
     for bone in metarig.data.bones:  # the bones that a game gets

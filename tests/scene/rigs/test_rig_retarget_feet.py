@@ -11,6 +11,7 @@ from ...edit.walking import motion_of, walk
 from ..made_rigs import FBX, build_rig, captured, seen
 from .test_rig_retarget import run
 
+_, STANDS = rolling_walk()
 PART = {"thigh": "hip", "shin": "knee", "foot": "ankle", "toe": "foot"}
 
 
@@ -25,22 +26,26 @@ def contacts(stands):
     return [slice(a, b) for a, b in zip(edges[::2], edges[1::2], strict=True) if b - a > 2]
 
 
-def points(rig, foot, ball):
-    """Return heel and ball (T, 2, 3) in the world, and their positions at rest."""
-    _, stands = rolling_walk()
-    ankle = np.array(rig.matrix_world @ rig.data.bones[foot].head_local)
-    back = ankle - np.array(rig.matrix_world @ rig.data.bones[ball].head_local)
-    heel = ankle + back * [1, 1, 0] * 0.3
-    heel[2] = 0.0
-    local = np.linalg.inv(np.array(rig.matrix_world @ rig.data.bones[foot].matrix_local)) @ [*heel, 1]
-    seen = []
-    for frame in range(1, len(stands["left"]) + 1):
+def points(rig, feet):
+    """Return for each (foot, ball): heel and ball (T, 2, 3) in the world, and their positions at rest."""
+    heels_of_bones, rests, moved = [], [], []
+    for foot, ball in feet:
+        ankle = np.array(rig.matrix_world @ rig.data.bones[foot].head_local)
+        rest_ball = np.array(rig.matrix_world @ rig.data.bones[ball].head_local)
+        heel = ankle + (ankle - rest_ball) * [1, 1, 0] * 0.3
+        heel[2] = 0.0
+        heels_of_bones.append(
+            np.linalg.inv(np.array(rig.matrix_world @ rig.data.bones[foot].matrix_local)) @ [*heel, 1]
+        )
+        rests.append(np.array([heel, rest_ball]))
+    for frame in range(1, len(STANDS["left"]) + 1):
         bpy.context.scene.frame_set(frame)
         posed = rig.evaluated_get(bpy.context.evaluated_depsgraph_get())
-        at = np.array(posed.matrix_world @ posed.pose.bones[foot].matrix) @ local
-        seen.append([at[:3], np.array(posed.matrix_world @ posed.pose.bones[ball].head)])
-    rest_ball = np.array(rig.matrix_world @ rig.data.bones[ball].head_local)
-    return np.array(seen), np.array([heel, rest_ball])
+        world, bones = np.array(posed.matrix_world), posed.pose.bones
+        heels = [world @ np.array(bones[foot].matrix) @ at for (foot, _), at in zip(feet, heels_of_bones, strict=True)]
+        balls = [world @ [*bones[ball].head, 1] for _, ball in feet]
+        moved.append([[heel[:3], ball[:3]] for heel, ball in zip(heels, balls, strict=True)])
+    return list(zip(np.swapaxes(moved, 0, 1), rests, strict=True))
 
 
 def leg_length(rig, spell):
@@ -50,22 +55,21 @@ def leg_length(rig, spell):
 
 def check_contacts(rig, spell):
     """Check that in every contact a point slides and rises by less than 1 cm, and that steps scale."""
-    _, stands = rolling_walk()
     scale = leg_length(rig, spell) / sum(
         np.linalg.norm(joint(f"left_{a}") - joint(f"left_{b}")) for a, b in (("hip", "knee"), ("knee", "ankle"))
     )
-    for side in ("left", "right"):
-        seen, rest = points(rig, spell(side, "foot"), spell(side, "toe"))
+    feet = points(rig, [(spell(side, "foot"), spell(side, "toe")) for side in STANDS])
+    for side, (moved, rest) in zip(STANDS, feet, strict=True):
         for k, what in enumerate(("heel", "ball")):
-            spans = contacts(stands[side][:, k])
+            spans = contacts(STANDS[side][:, k])
             assert spans
             for span in spans:
-                p = seen[span, k]
+                p = moved[span, k]
                 slide = np.linalg.norm(p[:, None, :2] - p[None, :, :2], axis=-1).max()
                 off = np.abs(p[:, 2] - rest[k, 2]).max()
                 assert slide < 0.01, (side, what, span, slide)
                 assert off < 0.01, (side, what, span, off)
-            first, second = (seen[span, k, :2].mean(axis=0) for span in spans[-2:])
+            first, second = (moved[span, k, :2].mean(axis=0) for span in spans[-2:])
             assert abs(np.linalg.norm(second - first) - scale * STRIDE) < 0.02
 
 
@@ -91,25 +95,24 @@ def test_a_rig_whose_bones_do_not_inherit_rotation_moves_as_one_whose_bones_do(l
 
 
 def test_feet_of_a_capture_below_the_floor_stay_on_it():
-    clip, stands = rolling_walk()
+    clip, _ = rolling_walk()
     clip.root[:, 2] -= 0.05
     rig, bone_of = build_rig("mixamo")
     run(captured(motion_of(clip)), rig)
-    for side in ("left", "right"):
-        seen, rest = points(rig, bone_of[f"{side}_ankle"], bone_of[f"{side}_foot"])
-        assert (seen[..., 2] - rest[:, 2]).min() > -0.01
-        assert np.abs(seen[stands[side][:, 1], 1, 2] - rest[1, 2]).max() < 0.01
+    feet = points(rig, [(bone_of[f"{side}_ankle"], bone_of[f"{side}_foot"]) for side in STANDS])
+    for side, (moved, rest) in zip(STANDS, feet, strict=True):
+        assert (moved[..., 2] - rest[:, 2]).min() > -0.01
+        assert np.abs(moved[STANDS[side][:, 1], 1, 2] - rest[1, 2]).max() < 0.01
 
 
 def test_toes_without_captured_bending_stay_flat():
     rig, bone_of = build_rig("mixamo")
     run(captured(motion_of(rolling_walk(stiff_toes=True)[0])), rig)
-    _, stands = rolling_walk()
     bpy.context.view_layer.update()
     for side in ("left", "right"):
         bone = bone_of[f"{side}_foot"]
         rest = np.array(rig.matrix_world @ rig.data.bones[bone].matrix_local)[:3, 1]
-        for frame in np.flatnonzero(stands[side][:, 1]):
+        for frame in np.flatnonzero(STANDS[side][:, 1]):
             bpy.context.scene.frame_set(int(frame) + 1)
             posed = rig.evaluated_get(bpy.context.evaluated_depsgraph_get())
             along = np.array(posed.matrix_world @ posed.pose.bones[bone].matrix)[:3, 1]
