@@ -10,6 +10,7 @@ import os
 import signal
 from types import FrameType
 
+from .command_line.address_space import address_space_limit
 from .command_line.signals import stopping_signals
 
 
@@ -29,11 +30,8 @@ def main() -> None:
 
 def _memory_is_limited() -> bool:
     """Return whether a library that cannot be loaded may have met the shell's limit; each says so in its own words."""
-    try:
-        import resource
-    except ImportError:  # on Windows
-        return False
-    return 0 <= resource.getrlimit(resource.RLIMIT_AS)[0] < 1_000_000_000
+    limit = address_space_limit()
+    return limit is not None and limit < 1_000_000_000
 
 
 def _stop(number: int, _: FrameType | None) -> None:

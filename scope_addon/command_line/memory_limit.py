@@ -3,9 +3,8 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
-
 from ..errors import SetupError
+from .address_space import address_space_limit
 
 # Of addresses, most of which are never used: 1.6 to 2.1 GB were measured without a scene, 2.8 GB with one.
 _NEEDED_BYTES, _NEEDED_WITH_SCENE = 2_500_000_000, 3_200_000_000
@@ -17,13 +16,10 @@ def check_memory_limit(*, with_scene: bool) -> None:
     :param with_scene: whether Blender's module will be loaded.
     :raises SetupError: it is too low.
     """
-    with suppress(ImportError):  # on Windows
-        import resource
-
-        limit = resource.getrlimit(resource.RLIMIT_AS)[0]
-        needed = _NEEDED_WITH_SCENE if with_scene else _NEEDED_BYTES
-        if limit != resource.RLIM_INFINITY and limit < needed:
-            raise SetupError(
-                f"this shell limits a process to {limit / 1e9:.2f} GB of address space, but a capture needs "
-                f"{needed / 1e9:.2f} GB: run ulimit -v unlimited first"
-            )
+    limit = address_space_limit()
+    needed = _NEEDED_WITH_SCENE if with_scene else _NEEDED_BYTES
+    if limit is not None and limit < needed:
+        raise SetupError(
+            f"this shell limits a process to {limit / 1e9:.2f} GB of address space, but a capture needs "
+            f"{needed / 1e9:.2f} GB: run ulimit -v unlimited first"
+        )

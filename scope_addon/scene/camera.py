@@ -7,12 +7,13 @@ OpenCV's pinhole ``u = fx x/z + cx, v = fy y/z + cy`` in a W × H picture is, wi
     pixel_aspect_x / pixel_aspect_y = fy / fx,     shift_y = (cy − H/2) / W · fx / fy.
 
 Pixel aspect and resolution belong to the scene in Blender; the camera alone is exact for square pixels. The footage has
-a display aspect of its own, without which it would not fill the picture. The clip's lens has a third one, fy / fx,
+a display aspect of its own, without which it would not fill the picture. A movie clip's lens has a third one, fy / fx,
 because it measures rows in units of columns. Source: Blender's BKE_camera_params_compute_viewplane, overlay_image.cc
 and tracking.cc.
 
-Blender 4.3 can crash when a movie clip is deleted that the viewport shows, or when that is undone; with an image in its
-place, the same was repeated without a crash.
+Footage is shown as an image: the frame of an image can be keyed for any frame rate, its colours do not go through the
+scene's view transform, and Blender 4.3 crashes, also without this extension, when a movie clip is deleted that the
+viewport shows. Only a clip can be undistorted, so footage of a distorting lens is one.
 """
 
 from __future__ import annotations
@@ -114,11 +115,10 @@ def same_camera(a: Motion, b: Motion) -> bool:
 def show_footage(
     camera: bpy.types.Object, footage: str | Path, motion: Motion, frames: NDArray[np.float64]
 ) -> list[str]:
-    """Show the footage as the camera's background.
+    """Show the footage as the camera's background, in step with the poses.
 
-    Blender shows one frame of a movie clip per frame of the scene, so a clip is synchronized only if the scene has the
-    constant rate of the footage. Otherwise, the footage is shown as an image, whose frame can be keyed. Only a clip can
-    be undistorted; therefore footage of a distorting lens is always a clip, even if it drifts or is a single picture.
+    Blender shows one frame of a movie clip per frame of the scene, so footage of a distorting lens drifts in a scene
+    without the constant rate of the footage.
 
     :param footage: video or picture; the first one of numbered pictures.
     :param frames: (T,) scene frame of each pose.
@@ -144,24 +144,23 @@ def show_footage(
     else:
         # Always a new clip, because another capture may have another start or lens.
         clip = bpy.data.movieclips.load(str(path))
-        clip.frame_start = round(frames[0] - motion.frames[0])
-        drift = float(np.abs(frames - (clip.frame_start + motion.frames)).max())
+        clip.frame_start = _start(motion, frames)
         size = tuple(clip.size)
-        if drift > _MAX_OFFSET and min(size) and not motion.dist.any():
-            rate = clip.fps
-            bpy.data.movieclips.remove(clip)
-            _show_synchronized(camera.data, background, path, motion, frames, rate)
-        else:
+        if motion.dist.any():
             background.source = "MOVIE_CLIP"
             background.clip = clip
             clip.display_aspect = pixel_aspect(motion)
             _set_lens_distortion(clip, background, motion)
-            if drift > 1.0:
+            if (drift := _drift(motion, frames)) > 1.0:
                 warnings.append(
                     f"the background image drifts from the motion by up to {drift:.0f} frames, because the scene "
                     "does not have the footage's constant frame rate and the lens distorts; the motion keeps its "
                     "speed"
                 )
+        else:
+            rate = clip.fps
+            bpy.data.movieclips.remove(clip)  # which was never shown
+            _show_video(camera.data, background, path, motion, frames, rate)
     if not min(size):
         warnings = [f"Blender cannot decode {path.name}, so the camera shows no footage"]
     elif tuple(motion.image_size) != size:
@@ -193,17 +192,27 @@ def show_footage_again(camera: bpy.types.Object, motion: Motion, frames: NDArray
         camera.data.animation_data.action = None
         if action.users == 0:
             bpy.data.actions.remove(action)
-    former.clip = former.image = None  # Blender goes on counting what a removed background image shows as used
+    # Blender goes on counting what a removed background image shows as used. A clip without users stays, because the
+    # viewport may show it, until Blender saves the file without it.
+    former.clip = former.image = None
     camera.data.background_images.remove(former)
-    if shown.users == 0 and isinstance(shown, bpy.types.MovieClip):
-        bpy.data.movieclips.remove(shown)
     warnings = show_footage(camera, path, motion, frames)
     again = camera.data.background_images[0]
     again.alpha, again.show_background_image = opacity, visible
     return warnings
 
 
-def _show_synchronized(
+def _start(motion: Motion, frames: NDArray[np.float64]) -> int:
+    """Return the scene frame of the footage's first frame, which need not be captured, if the rates are the same."""
+    return round(float(frames[0] - motion.frames[0]))
+
+
+def _drift(motion: Motion, frames: NDArray[np.float64]) -> float:
+    """Return how many frames the poses deviate from footage of which each scene frame shows the next frame."""
+    return float(np.abs(frames - (_start(motion, frames) + motion.frames)).max())
+
+
+def _show_video(
     camera: bpy.types.Camera,
     background: bpy.types.CameraBackgroundImage,
     footage: Path,
@@ -211,15 +220,16 @@ def _show_synchronized(
     frames: NDArray[np.float64],
     rate: float,
 ) -> None:
-    """Show a video as an image whose frame is keyed, so that it is synchronized at any frame rate.
-
-    At scene frame s Blender shows frame s − frame_start + frame_offset of an image, counted from 0.
+    """Show a video as an image, whose frame is keyed unless each frame of the scene shows the next one.
 
     :param rate: frames per second at which Blender counts the video's frames.
     """
     background.source = "IMAGE"
     background.image = image = bpy.data.images.load(str(footage), check_existing=True)
     image.display_aspect = pixel_aspect(motion)
+    if _drift(motion, frames) <= _MAX_OFFSET:
+        _show_frames(background.image_user, _start(motion, frames))
+        return
     scene_frames = np.arange(np.floor(frames[0]), np.ceil(frames[-1]) + 1)
     _key_footage(camera, background, scene_frames, np.round(np.interp(scene_frames, frames, motion.timestamps) * rate))
 
@@ -256,14 +266,21 @@ def _key_footage(
     shown: NDArray[np.float64],
 ) -> None:
     """Key the background image to show the frames ``shown`` (counted from 0) at ``scene_frames``, both (N,)."""
-    user = background.image_user
-    user.frame_start, user.frame_duration = int(scene_frames[0]), _MAX_DURATION
-    user.use_auto_refresh, user.use_cyclic = True, False
+    _show_frames(background.image_user, int(scene_frames[0]))
     offsets = shown - (scene_frames - scene_frames[0])
     changes = np.flatnonzero(np.diff(offsets, prepend=np.inf))
     path = f"background_images[{len(camera.background_images) - 1}].image_user.frame_offset"
     channels = Channels(camera, bpy.data.actions.new(f"{camera.name}_footage"))
     channels.write(path, scene_frames[changes], offsets[changes], "CONSTANT")
+
+
+def _show_frames(user: bpy.types.ImageUser, start: int) -> None:
+    """Show one frame after the other of a video or sequence, the first one at the scene frame ``start``.
+
+    At scene frame s Blender shows frame s − frame_start + frame_offset of a video, counted from 0.
+    """
+    user.frame_start, user.frame_offset, user.frame_duration = start, 0, _MAX_DURATION
+    user.use_auto_refresh, user.use_cyclic = True, False
 
 
 def _set_lens_distortion(

@@ -61,6 +61,8 @@ def panel(video: Path, out: Path, shell_out: Path, report: dict) -> list[str]:
         problems.append(f"cancelling left {report['left_after_cancel']}")
     if report["timer_gap_ms"]["p99"] > 1000:  # on a quiet machine it is below 100: see the figure above
         problems.append("the window hung")
+    if report["main_thread_ms"]["p99"] > 100:
+        problems.append(f"Blender's main thread was busy: {report['main_thread_ms']}")
     return problems
 
 

@@ -155,6 +155,25 @@ def closed(how: str) -> Iterator[float]:
     report[f"Blender's {how}"] = "nothing left"
 
 
+def deleted_footage() -> Iterator[float]:
+    """Delete what the comparison with the footage shows, and undo it: if that is a movie clip, Blender crashes."""
+    invoke(bpy.ops.scope.look_through)
+    yield 1.0
+    for k in range(3):
+        use(bpy.ops.ed.undo_push, message="Shown")
+        shown = [*bpy.data.movieclips, *(image for image in bpy.data.images if image.source == "MOVIE")]
+        assert shown, "the comparison shows no footage"
+        bpy.data.batch_remove(shown)
+        use(bpy.ops.ed.undo_push, message="Deleted")
+        yield 0.5
+        bpy.context.scene.frame_set(10 + k)
+        yield 0.5
+        invoke(bpy.ops.ed.undo)
+        yield 0.5
+    invoke(bpy.ops.scope.look_through)
+    report["deleted footage"] = "no crash"
+
+
 def steps() -> Iterator[float]:
     """Run the session; yield the seconds to wait before each next step."""
     show_tab()
@@ -171,6 +190,7 @@ def steps() -> Iterator[float]:
     yield from captured()
     assert len([c for c in bpy.data.collections if "scope_capture" in c]) == before + 1, addon().state.message
     report["afterwards"] = "captured as usual"
+    yield from deleted_footage()
     (OUT / "trouble.json").write_text(json.dumps(report))
 
 

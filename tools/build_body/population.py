@@ -60,7 +60,13 @@ class Population:
 
 
 def draw_population(source: SourceMesh, targets: SurveyTargets, count: int, seed: int) -> Population:
-    """Draw people, the children after the adults. The pelvis joint is at the origin."""
+    """Draw people, the children after the adults. The pelvis joint is at the origin.
+
+    :param count: of people; up to ten are all adults.
+    :raises ValueError: ``count`` is not positive.
+    """
+    if count < 1:
+        raise ValueError(f"cannot draw {count} people; draw at least one")
     solver = _Solver(source, targets)
     rng = np.random.default_rng(seed)
     children = round(CHILD_SHARE * count)
@@ -68,15 +74,17 @@ def draw_population(source: SourceMesh, targets: SurveyTargets, count: int, seed
     of_adults, (of_children, years) = draw_adults(rng, male[children:]), draw_children(rng, male[:children])
     adults = _Sliders.draw(rng, male[children:], rng.uniform(18.0, 75.0, count - children))
     young = _Sliders.draw(rng, male[:children], years)
-    parts = [solver.solve(adults, of_adults), solver.solve(young, of_children)]
+    groups = [(group, survey) for group, survey in ((adults, of_adults), (young, of_children)) if len(group)]
+    parts = [solver.solve(group, survey) for group, survey in groups]
+    counts = [len(group) for group, _ in groups]
     return Population(
         solver.base,
         solver.moves,
         np.concatenate([part[0] for part in parts]),
         np.concatenate([male[children:], male[:children]]),
         np.concatenate([adults.years, young.years]),
-        _joined([part[1] for part in parts], [len(adults), children]),
-        _joined([part[2] for part in parts], [len(adults), children]),
+        _joined([part[1] for part in parts], counts),
+        _joined([part[2] for part in parts], counts),
     )
 
 

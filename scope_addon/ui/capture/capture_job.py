@@ -7,6 +7,7 @@ The modal operator calls ``step`` on a timer; scripts and tests call it in a loo
 from __future__ import annotations
 
 import sys
+import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -32,6 +33,8 @@ from . import preview_picture
 from .frame_rate_operators import RATE_WARNING
 from .result import show_result
 
+_ENDING_S = 5.0  # after which a worker that has sent its result is killed
+
 
 class CaptureJob:
     """A capture for one scene, with the current settings of the scene."""
@@ -52,6 +55,8 @@ class CaptureJob:
         self._key = self._request.key(code_version(ROOT))
         self._captured: CachedCapture | None = self._cache.find(self._key)
         self._worker: WorkerProcess | None = None
+        self._result: dict[str, Any] | None = None  # of a worker that may still be ending
+        self._result_s = 0.0
         self._building = False
         if self._captured is None:
             # Blender 4.2 has no such attribute; its Python is isolated as well.
@@ -103,13 +108,16 @@ class CaptureJob:
             elif message["event"] == "preview":
                 self._show_preview(message)
             elif message["event"] == "result":
-                self._worker.wait()
-                self._captured = self._cache.keep(
-                    self._worker.job_folder, self._key, message["motions"], message["report"]
-                )
-                limit = preferences()
-                self._cache.prune((limit.cache_limit_gb if limit else 2) * 10**9)
-                self._worker.close()
+                self._result, self._result_s = message, time.monotonic()
+        if self._result is None or (self._worker.alive and time.monotonic() - self._result_s < _ENDING_S):
+            return  # its files are moved once they are closed
+        self._worker.wait(0.0)
+        self._captured = self._cache.keep(
+            self._worker.job_folder, self._key, self._result["motions"], self._result["report"]
+        )
+        limit = preferences()
+        self._cache.prune((limit.cache_limit_gb if limit else 2) * 10**9)
+        self._worker.close()
 
     def _show_preview(self, message: dict[str, Any]) -> None:
         assert self._worker is not None

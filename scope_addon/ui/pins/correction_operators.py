@@ -20,8 +20,11 @@ if TYPE_CHECKING:
 
 _NOW = -1_048_574  # the first frame that Blender allows; stands for the current one
 
+# Of the last pin. Blender does not show what an operator reports that another one has called, so that one shows these.
+last_pin_warnings: list[str] = []
 
-def pin_warnings(armature: bpy.types.Object, body: Body, joint: str, frame: int) -> list[str]:
+
+def _pin_warnings(armature: bpy.types.Object, body: Body, joint: str, frame: int) -> list[str]:
     """Return what to warn of after a pin in a scene frame: that its joint cannot reach it, feet under the floor."""
     return [*filter(None, (_unreached(armature, joint, frame), floor_warning(armature, body)))]
 
@@ -97,7 +100,8 @@ class SCOPE_OT_add_pin(EditOperator):
             here = scene.frame_current
         finally:
             scene.frame_set(current[0], subframe=current[1])
-        for warning in pin_warnings(armature, body, self.joint, here):
+        last_pin_warnings[:] = _pin_warnings(armature, body, self.joint, here)
+        for warning in last_pin_warnings:
             self.report({"WARNING"}, warning)
         return ""
 

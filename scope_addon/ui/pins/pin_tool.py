@@ -12,11 +12,11 @@ from bpy_extras.view3d_utils import location_3d_to_region_2d, region_2d_to_locat
 from mathutils import Vector
 
 from ...scene.character.correction_list import listed_corrections
-from ..captured_person import body_of, captured_armature
+from ..captured_person import captured_armature
 from ..edit.edit_base import may_edit
 from ..reporting import iface_
 from ..view.comparison import camera_of
-from .correction_operators import pin_warnings
+from .correction_operators import last_pin_warnings
 from .drawing import draw_disc, draw_line, redraw_viewport, viewport_of
 from .pointer import Pointer
 
@@ -123,10 +123,8 @@ class SCOPE_OT_pin_limb(bpy.types.Operator):
         except RuntimeError as error:
             self.report({"ERROR"}, str(error).removeprefix("Error: ").strip())
             return
-        armature = bpy.data.objects.get(session.armature)
-        if armature:
-            for warning in pin_warnings(armature, body_of(armature), joint, context.scene.frame_current):
-                self.report({"WARNING"}, warning)
+        for warning in last_pin_warnings:
+            self.report({"WARNING"}, warning)
 
 
 def _joint_positions(session: _Session) -> dict[str, Vector]:

@@ -72,6 +72,21 @@ def test_a_result_is_built_shown_and_cached(fake_worker, footage):
     assert len(captures()) == 2
 
 
+def test_blender_does_not_wait_for_a_worker_that_is_ending(fake_worker, footage, tmp_path):
+    fake_worker(f"finish()\nwhile not os.path.exists({str(tmp_path / 'end')!r}):\n    time.sleep(0.01)")
+    bpy.context.scene.scope.footage = str(footage)
+    job = CaptureJob(bpy.context.scene)
+    wait_for(lambda: job.step() and job.worker.finished)
+    for _ in range(3):
+        assert job.step()
+        assert job.worker.alive
+    assert not captures()
+    (tmp_path / "end").touch()
+    run_to_end(job)
+    assert len(captures()) == 1
+    assert job_files() == []
+
+
 def test_several_people_are_built_and_distinguished(fake_worker, footage):
     fake_worker("assert request['people'] == 3\nfinish(2)")
     scene = bpy.context.scene

@@ -10,6 +10,7 @@ from scope.scope_addon.kinematics.foot_skin import foot_heights
 from scope.scope_addon.scene.animation_data.actions import fcurves, read_keys
 from scope.scope_addon.scene.character.correction_list import listed_corrections
 from scope.scope_addon.ui.captured_person import motion_of as stored_motion_of
+from scope.scope_addon.ui.pins.correction_operators import last_pin_warnings
 
 from ...edit.walking import BETAS, BODY, NAMES, motion_of, walk
 from ...scene import made_rigs
@@ -96,10 +97,13 @@ def test_a_pin_out_of_reach_is_said_with_its_distance_and_listed(rig, capfd):
     distance = np.linalg.norm(before[NAMES.index("left_shoulder")] + [1.1, 0, 0] - after[WRIST])
     assert entry["missed"] == f"{100 * distance:.0f} cm"
     assert f"Left Wrist cannot reach the pin and stays {entry['missed']} away" in said
+    (for_the_tool,) = last_pin_warnings
+    assert for_the_tool in said
     assert np.linalg.norm(after[0] - before[0]) < 0.035
     bpy.ops.scope.remove_correction(index=0)
     bpy.ops.scope.add_pin(joint="left_wrist", location=before[WRIST] + [0.0, 0.05, 0.05])
     assert "cannot reach" not in capfd.readouterr().out
+    assert last_pin_warnings == []
     assert listed_corrections(rig)[0]["missed"] == ""
 
 
