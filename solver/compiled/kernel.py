@@ -8,11 +8,16 @@ from typing import Any
 from numba import njit
 
 from .code_cache import CodeCache
+from .pipeline import KernelCompiler
 
 # Reordering sums and fusing multiplications is allowed; assuming that no NaN or infinity occurs is not, because the
 # optimizer must recognise them. The GIL is released, so that frames can be solved in threads.
-_OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": {"reassoc", "contract", "arcp", "nsz"}}
-
+_OPTIONS: dict[str, Any] = {
+    "nogil": True,
+    "error_model": "numpy",
+    "fastmath": {"reassoc", "contract", "arcp", "nsz"},
+    "pipeline_class": KernelCompiler,
+}
 
 _LOG = logging.getLogger(__name__)
 
