@@ -179,7 +179,8 @@ def test_the_code_version_changes_with_every_file_that_decides_the_result(tmp_pa
 
 def test_compiled_code_is_stored_in_the_given_folder(folder, tmp_path):
     script = tmp_path / "script.py"
-    script.write_text("import json, os; print(json.dumps({'event': 'result', 'at': os.environ['NUMBA_CACHE_DIR']}))")
+    result = "{'event': 'result', 'motions': ['a.npz'], 'report': {}, 'at': os.environ['NUMBA_CACHE_DIR']}"
+    script.write_text(f"import json, os; print(json.dumps({result}))")
     worker = WorkerProcess(JobRequest(SAMPLE), folder, tmp_path / "kernels", [sys.executable, "-I"], script)
     messages = []
     wait_for(lambda: messages.extend(worker.poll()) or worker.finished)
