@@ -19,9 +19,11 @@ import sys
 import tomllib
 import zipfile
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
+from bill_of_materials import bill_of_materials
 from shipped_kernels import add_kernels
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -42,7 +44,9 @@ PACKAGES = ("numba", "llvmlite", "onnxruntime", "opencv-contrib-python-headless"
 CONTENT = ("__init__.py", "LICENSE", "THIRD_PARTY.md", "solver", "scope_addon", "assets")
 GUIDE = ("docs/guide.md",)  # with its pictures in assets/guide
 LEFT_OUT = ("__pycache__", "*.pyc", ".*", "sample_truth.npz", "pictures", "examples")
+BILL = "bill_of_materials.cdx.json"  # in the zip; a copy with the zip's name lies beside it
 GOAL_MB, LIMIT_MB = 200, 240
+_OLDEST = 315532800  # 1980-01-01, the first time that a zip can state
 
 
 @dataclass(frozen=True)
@@ -108,11 +112,42 @@ def build(target: Target, folder: Path, website: str = "", *, kernels: bool = Tr
     if kernels:
         add_kernels(STAGING, target.platform, target.python, wheels)
     version = tomllib.loads((STAGING / "blender_manifest.toml").read_text())["version"]
-    archive = folder / target.file_name(version)
-    blender_extension("build", "--source-dir", str(STAGING), "--output-filepath", str(archive))
+    archive, made = folder / target.file_name(version), source_time()
+    bill = bill_of_materials(STAGING, wheels, target.platform, made)
+    (STAGING / BILL).write_text(bill, "utf-8")
+    archive.with_suffix(".cdx.json").write_text(bill, "utf-8")
+    blender_extension("validate", str(STAGING))
+    write_zip(STAGING, archive, made)
     blender_extension("validate", str(archive))
     check(archive, target)
     return archive
+
+
+def source_time() -> datetime:
+    """Return the time that everything in a zip states: SOURCE_DATE_EPOCH, or that of the last commit."""
+    stated = os.environ.get("SOURCE_DATE_EPOCH", "")
+    if not stated:
+        command = ["git", "-C", str(ROOT), "log", "-1", "--format=%ct"]
+        try:
+            stated = subprocess.run(command, capture_output=True, text=True, check=False).stdout.strip()
+        except OSError:  # there is no git
+            stated = ""
+    return datetime.fromtimestamp(max(int(stated or 0), _OLDEST), UTC)
+
+
+def write_zip(folder: Path, archive: Path, made: datetime) -> None:
+    """Pack a folder so that the same content gives the same bytes: sorted, and with one time and mode.
+
+    Blender's own tool packs in the order of the file system, and with the times of the files.
+    """
+    temporary = archive.with_suffix(".partial")
+    with zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as file:
+        for path in sorted(p for p in folder.rglob("*") if p.is_file()):
+            entry = zipfile.ZipInfo(path.relative_to(folder).as_posix(), made.timetuple()[:6])
+            entry.compress_type = zipfile.ZIP_STORED if path.suffix == ".whl" else zipfile.ZIP_DEFLATED
+            entry.create_system, entry.external_attr = 3, 0o644 << 16
+            file.writestr(entry, path.read_bytes(), compresslevel=9)
+    temporary.replace(archive)
 
 
 def download_wheels(target: Target) -> list[Path]:
@@ -233,7 +268,7 @@ def check(archive: Path, target: Target) -> None:
     wanted += ["assets/networks/LICENSE-mediapipe.txt", "assets/body/scope.npz", "assets/body/scope_h.npz"]
     wanted += ["assets/lifter/lifter.onnx", "assets/prior/joint_prior.npz", "assets/sample/sample.mp4"]
     wanted += [f"assets/{folder}/LICENSE.md" for folder in ("body", "lifter", "sample")]
-    wanted += ["LICENSE", "THIRD_PARTY.md", "scope_addon/ui/__init__.py", *GUIDE]
+    wanted += ["LICENSE", "THIRD_PARTY.md", "scope_addon/ui/__init__.py", BILL, *GUIDE]
     static = [path.relative_to(ROOT).as_posix() for path in (ROOT / "scope_addon" / "report" / "static").iterdir()]
     wanted += static
     problems += [f"{w} is missing" for w in wanted if w not in names]

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import contextlib
-import json
 import queue
 import shutil
 import subprocess
@@ -14,8 +13,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from ...solver.errors import ScopeError
 from ..errors import SetupError
+from .messages import LONGEST_LINE, WorkerFailedError, parse_message
 from .request import WARM_UP, JobRequest
 from .start_worker import worker_command
 
@@ -23,10 +22,6 @@ ROOT = Path(__file__).resolve().parents[2]
 START_SCRIPT = Path(__file__).with_name("start_worker.py")
 LOG = "worker.log"
 _WINDOWS_FLAGS = getattr(subprocess, "CREATE_NO_WINDOW", 0) | getattr(subprocess, "BELOW_NORMAL_PRIORITY_CLASS", 0)
-
-
-class WorkerFailedError(ScopeError):
-    """The worker reported an error, or ended without a result."""
 
 
 class WorkerProcess:
@@ -50,7 +45,7 @@ class WorkerProcess:
         :raises SetupError: the process cannot be started.
         """
         self.job_folder = job_folder
-        self.finished = False
+        self.finished, self._captures = False, request is not None
         command, environment = worker_command(python, ROOT, job_folder, kernels, script)
         try:
             with (job_folder / LOG).open("wb") as log:
@@ -85,7 +80,7 @@ class WorkerProcess:
     def poll(self) -> list[dict[str, Any]]:
         """Return the messages since the last call, and set ``finished`` when the result is among them.
 
-        :raises WorkerFailedError: the worker reported an error or ended without a result.
+        :raises WorkerFailedError: the worker reported an error, ended without a result, or sent what is no message.
         """
         messages: list[dict[str, Any]] = []
         while True:
@@ -97,11 +92,11 @@ class WorkerProcess:
                 if not self.finished:
                     raise WorkerFailedError(self._cause_of_end())
                 return messages
-            message = _parse(line)
+            message = parse_message(line, captures=self._captures)
             if message is None:
                 continue
             if message["event"] == "error":
-                raise WorkerFailedError(str(message.get("message", "the capture failed")))
+                raise WorkerFailedError(message["message"])
             self.finished = self.finished or message["event"] == "result"
             messages.append(message)
 
@@ -130,7 +125,7 @@ class WorkerProcess:
         """Read the messages in a thread, because not every system can read pipes without blocking."""
         assert self._process.stdout is not None
         with contextlib.suppress(OSError, ValueError), self._process.stdout as stream:
-            for line in stream:
+            while line := stream.readline(LONGEST_LINE + 1):
                 self._lines.put(line)
         self._lines.put(None)
 
@@ -146,12 +141,3 @@ class WorkerProcess:
         last = next((text for text in reversed(log.decode("utf-8", "replace").splitlines()) if text.strip()), "")
         hint = f" ({last.strip()[:200]})" if last else "; the system may have run out of memory"
         return f"the capture process {how} before it was finished{hint}; capture again"
-
-
-def _parse(line: bytes) -> dict[str, Any] | None:
-    """Return a message; None for a line that is not one."""
-    try:
-        message = json.loads(line)
-    except ValueError:
-        return None
-    return message if isinstance(message, dict) and "event" in message else None

@@ -8,13 +8,17 @@ from typing import Any
 from numba import njit
 
 from .code_cache import CodeCache
+from .pipeline import KernelCompiler
 
 # Reordering sums and fusing multiplications is allowed; assuming that no NaN or infinity occurs is not, because the
 # optimizer must recognise them. The GIL is released, so that frames can be solved in threads.
 _OPTIONS: dict[str, Any] = {
-    "nogil": True, "error_model": "numpy", "fastmath": {"reassoc", "contract", "arcp", "nsz"},
+    "nogil": True,
+    "error_model": "numpy",
+    "fastmath": {"reassoc", "contract", "arcp", "nsz"},
     "no_cfunc_wrapper": True,  # no C code calls a kernel; to compile an entry for it takes long
-}  # fmt: skip
+    "pipeline_class": KernelCompiler,
+}
 
 
 _LOG = logging.getLogger(__name__)

@@ -98,6 +98,23 @@ def _read_request(path: Path) -> None:
     JobRequest.from_json(path.read_bytes().decode("utf-8", "replace"))
 
 
+def _read_reply(path: Path) -> None:
+    from scope.scope_addon.job.messages import parse_message
+    from scope.scope_addon.job.progress import JobProgress
+
+    progress = JobProgress()
+    for line in path.read_bytes().splitlines(keepends=True):
+        message = parse_message(line)
+        if message and message["event"] == "progress":
+            progress.update(message["stage"], message["done"], message["total"])
+            assert all("\n" not in text for text in progress.lines())
+        if message and message["event"] == "result" and "motions" in message:
+            assert all((path.parent / name).parent == path.parent for name in message["motions"])
+        if message and message["event"] == "preview":
+            assert (path.parent / message["file"]).parent == path.parent
+            assert 0 < 4 * message["width"] * message["height"] < 1 << 27
+
+
 def _pictures(_: Path) -> list[bytes]:
     import cv2
 
@@ -222,6 +239,16 @@ def _requests(_: Path) -> list[bytes]:
     return [json.dumps({"footage": "walk.mp4", **values}, default=str).encode()]
 
 
+def _replies(_: Path) -> list[bytes]:
+    messages: list[dict[str, Any]] = [
+        {"event": "progress", "stage": "solving", "done": 3, "total": 10},
+        {"event": "preview", "file": "preview.rgba", "width": 320, "height": 180, "frame": 7},
+        {"event": "result", "motions": ["person1.npz"], "report": {"fps": {"total": 9.5}, "warnings": ["dark"]}},
+        {"event": "error", "message": "the footage is too short"},
+    ]
+    return [json.dumps(message).encode() + b"\n" for message in messages]
+
+
 TARGETS = {
     "picture": Target(_open_picture_or_video, (".png", ".jpg", ".webp", ".tiff", ".bmp", ".heic"), _pictures),
     "video": Target(_open_picture_or_video, (".mp4", ".mov"), _videos),
@@ -235,5 +262,6 @@ TARGETS = {
     "bone_map": Target(_load_bone_map, (".json",), _bone_maps),
     "network": Target(_check_network, (".onnx",), _networks),
     "rig": Target(_rig_source, (".glb", ".gltf", ".fbx"), _rigs),
+    "reply": Target(_read_reply, (".json",), _replies),
     "request": Target(_read_request, (".json",), _requests),
 }

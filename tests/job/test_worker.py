@@ -14,7 +14,8 @@ from scope.scope_addon.capture import pipeline
 from scope.scope_addon.capture.perception.lifter import LIFTER_FILE
 from scope.scope_addon.capture.perception.sessions import LANDMARK_NETWORK_OF_QUALITY, network_path
 from scope.scope_addon.errors import SetupError, UsageError
-from scope.scope_addon.job.process import START_SCRIPT, WorkerFailedError, WorkerProcess
+from scope.scope_addon.job.messages import WorkerFailedError
+from scope.scope_addon.job.process import START_SCRIPT, WorkerProcess
 from scope.scope_addon.job.request import JobRequest, code_version
 from scope.scope_addon.motion import Motion
 from scope.scope_addon.scene.export.export import export
@@ -179,7 +180,8 @@ def test_the_code_version_changes_with_every_file_that_decides_the_result(tmp_pa
 
 def test_compiled_code_is_stored_in_the_given_folder(folder, tmp_path):
     script = tmp_path / "script.py"
-    script.write_text("import json, os; print(json.dumps({'event': 'result', 'at': os.environ['NUMBA_CACHE_DIR']}))")
+    result = "{'event': 'result', 'motions': ['a.npz'], 'report': {}, 'at': os.environ['NUMBA_CACHE_DIR']}"
+    script.write_text(f"import json, os; print(json.dumps({result}))")
     worker = WorkerProcess(JobRequest(SAMPLE), folder, tmp_path / "kernels", [sys.executable, "-I"], script)
     messages = []
     wait_for(lambda: messages.extend(worker.poll()) or worker.finished)

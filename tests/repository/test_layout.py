@@ -27,6 +27,7 @@ CROSS_CUTTING = {
     "repository/test_rooms.py": "which folder may import which",
     "repository/test_wheel.py": "the wheel, installed",
     "fuzz/test_faults.py": "what writes files, on failing system calls",
+    "fuzz/test_faults_outputs.py": "exports, outputs of captures and batches, on failing system calls",
     "fuzz/test_fuzz.py": "every reader of files and messages of others, on damaged ones",
     "test_required.py": "a helper of the tests",
 }

@@ -4,6 +4,7 @@
 import ast
 import hashlib
 import importlib.util
+import os
 import shutil
 import sys
 import tomllib
@@ -63,10 +64,13 @@ def with_empty_wheels(builder, small_root, tmp_path, monkeypatch):
         folder.mkdir(parents=True, exist_ok=True)
         for name in names:
             with zipfile.ZipFile(folder / name, "w") as file:
-                file.writestr("module.py", name)
+                package, version = name.split("-")[:2]
+                stated = f"Name: {package}\nVersion: {version}\nLicense-Expression: MIT\n"
+                file.writestr(zipfile.ZipInfo(f"{package}-{version}.dist-info/METADATA"), stated)
             lock[target.python] += f"--hash=sha256:{hashlib.sha256((folder / name).read_bytes()).hexdigest()}\n"
         return [folder / name for name in names]
 
+    (small_root / "THIRD_PARTY.md").write_text("of empty wheels")
     monkeypatch.setattr(builder, "ROOT", small_root)
     monkeypatch.setattr(builder, "download_wheels", wheels)
     monkeypatch.setattr(builder, "locked", lock.__getitem__)
@@ -180,6 +184,29 @@ def test_six_zips_with_empty_wheels(with_empty_wheels, monkeypatch, capsys, tmp_
     refused(archive, "0 wheels of forgotten")
 
 
+@pytest.mark.usefixtures("networks")
+def test_a_repeated_build_gives_the_same_bytes(with_empty_wheels, monkeypatch):
+    builder = with_empty_wheels
+    target = builder.Target("linux-x64", "3.13")
+    builder.DIST.mkdir()
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", "1700000000")
+    archive = builder.build(target, builder.DIST)
+    first = archive.read_bytes()
+    bill = archive.with_suffix(".cdx.json").read_bytes()
+    with zipfile.ZipFile(archive) as file:
+        assert file.read(builder.BILL) == bill
+        assert file.namelist() == sorted(file.namelist())
+        assert {entry.date_time for entry in file.infolist()} == {(2023, 11, 14, 22, 13, 20)}
+    for path in builder.ROOT.rglob("*"):  # as after another checkout
+        os.utime(path, (1e9, 1e9))
+    unsorted_folder = Path.rglob
+    monkeypatch.setattr(Path, "rglob", lambda *arguments: reversed(list(unsorted_folder(*arguments))))
+    assert builder.build(target, builder.DIST).read_bytes() == first
+    assert archive.with_suffix(".cdx.json").read_bytes() == bill
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", "1700000002")
+    assert builder.build(target, builder.DIST).read_bytes() != first
+
+
 def changed(target, archive, contents):
     """A copy of an archive with other content in some files, or without those whose content is None."""
     with zipfile.ZipFile(archive) as source, zipfile.ZipFile(target, "w") as file:
@@ -205,7 +232,8 @@ def test_a_zip_for_a_distributions_blender_leaves_the_others_alone(with_empty_wh
     builder.DIST.mkdir()
     (builder.DIST / "kept.zip").touch()
     assert run(builder, monkeypatch, "linux-x64", "--python", "3.13", "--any-blender") == 0
-    assert [p.name for p in builder.OTHER_DIST.iterdir()] == ["scope-0.1.0-python_3.13-linux_x64.zip"]
+    names = sorted(p.name for p in builder.OTHER_DIST.iterdir())
+    assert names == [f"scope-0.1.0-python_3.13-linux_x64.{end}" for end in ("cdx.json", "zip")]
     assert [p.name for p in builder.DIST.iterdir()] == ["kept.zip"]
 
 

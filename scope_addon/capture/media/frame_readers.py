@@ -1,20 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Decoders of video files: frames in order, upright and with square pixels.
+"""The decoder of video files: frames in order, upright and with square pixels.
 
-OpenCV decodes most files. Its packages have no decoder for AV1 and HEIC, which PyAV decodes.
+PyAV decodes all of them. OpenCV's packages contain further copies of FFmpeg, which are older, lack decoders and differ
+from platform to platform; none of them is given a file to read.
 """
 
 from __future__ import annotations
 
 import itertools
-import os
 from collections.abc import Collection, Iterator
 from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol, cast
-
-# OpenCV reads this when it first opens a video. -8 silences ffmpeg's messages, because Scope reports errors itself.
-os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
 
 import cv2
 import numpy as np
@@ -32,10 +29,11 @@ if TYPE_CHECKING:
 _FORMATS = (
     "mov", "matroska", "webm", "avi", "mpegts", "mpeg", "mpegvideo", "flv", "asf", "ogg", "mxf", "gif", "apng", "mjpeg",
     "h264", "hevc", "m4v", "av1", "obu", "ivf", "yuv4mpegpipe", "dv", "wtv", "nut", "gxf", "rm", "webp_pipe", "nsv",
+    "jpeg_pipe", "vc1", "dnxhd", "h263", "h261", "vvc",
 )  # fmt: skip
 _ONLY = {"protocol_whitelist": "file", "format_whitelist": ",".join(_FORMATS)}
 _MIN_SEEK_S = 20.0  # start from which seeking is tried
-_AV1 = ("av01", "AV01")
+_DAMAGED_PACKETS = 4096  # in a row, after which no more are tried
 # Degrees clockwise by which an image has to be rotated to be upright.
 _ROTATIONS = {90: cv2.ROTATE_90_CLOCKWISE, 180: cv2.ROTATE_180, 270: cv2.ROTATE_90_COUNTERCLOCKWISE}
 
@@ -64,14 +62,10 @@ class FrameReader(Protocol):
 
 
 def open_reader(path: Path) -> FrameReader:
-    """Open the file with the first reader that can decode it.
+    """Open a file.
 
-    :raises VideoError: no reader can.
+    :raises VideoError: see `PyavReader`.
     """
-    reader = OpencvReader(path)
-    if reader.codec not in _AV1:
-        return reader
-    reader.close()
     return PyavReader(path)
 
 
@@ -96,84 +90,8 @@ def _upright(path: Path, image: NDArray[np.uint8], aspect: float, clockwise_deg:
     return image if rotation is None else cast(NDArray[np.uint8], cv2.rotate(image, rotation))
 
 
-class OpencvReader:
-    """cv2.VideoCapture with rotation and pixel aspect applied here, because OpenCV versions differ in applying them.
-
-    :raises VideoError: OpenCV cannot open the file, or its images are too large or too long (see `image_size`).
-    """
-
-    def __init__(self, path: Path) -> None:
-        self._path = path
-        with utf8_name(path) as name:
-            self._capture = cv2.VideoCapture(name, cv2.CAP_FFMPEG)
-        if not self._capture.isOpened():
-            raise VideoError(
-                f"{path} is not a video or image that can be decoded; copy it again if it may be incomplete, or "
-                "convert it to an H.264 .mp4"
-            )
-        self._capture.set(cv2.CAP_PROP_ORIENTATION_AUTO, 0)
-        self._rotation_deg = round(self._get(cv2.CAP_PROP_ORIENTATION_META))
-        num, den = self._get(cv2.CAP_PROP_SAR_NUM), self._get(cv2.CAP_PROP_SAR_DEN)
-        self._aspect = num / den if num > 0 and den > 0 else 1.0
-        check_size(
-            path, *_size(self._get(cv2.CAP_PROP_FRAME_WIDTH), self._get(cv2.CAP_PROP_FRAME_HEIGHT), self._aspect)
-        )
-        self._grabbed = False
-        self._bgr: NDArray[np.uint8] | None = None  # reused for every frame: allocating memory takes time
-        self.rate, self.frame_count = self._get(cv2.CAP_PROP_FPS), self._get(cv2.CAP_PROP_FRAME_COUNT)
-
-    @property
-    def codec(self) -> str:
-        """The FourCC of the video stream."""
-        code = int(self._get(cv2.CAP_PROP_FOURCC)) & 0xFFFFFFFF
-        return code.to_bytes(4, "little").decode("ascii", "replace")
-
-    def _get(self, prop: int) -> float:
-        return float(self._capture.get(prop))
-
-    def read(self) -> tuple[float, NDArray[np.uint8]] | None:
-        """See `FrameReader`."""
-        ok, decoded = self._capture.retrieve(self._bgr) if self._grabbed else self._capture.read(self._bgr)
-        self._grabbed = False
-        if not ok or decoded is None:
-            return None
-        self._bgr = cast(NDArray[np.uint8], decoded)
-        image = cv2.cvtColor(_upright(self._path, self._bgr, self._aspect, self._rotation_deg), cv2.COLOR_BGR2RGB)
-        return self._get(cv2.CAP_PROP_POS_MSEC) / 1000, cast(NDArray[np.uint8], image)
-
-    def skip_to(self, seconds: float, fps: Fraction) -> int:
-        """See `FrameReader`.
-
-        Seeks if the container reports where the seek has led, which saves decoding; else reads frame by frame.
-        """
-        if seconds > _MIN_SEEK_S:
-            early = seconds - _MIN_SEEK_S / 2
-            self._capture.set(cv2.CAP_PROP_POS_FRAMES, int(early * fps))
-            index = round(self._get(cv2.CAP_PROP_POS_FRAMES))
-            landed = self._capture.grab()
-            time = self._get(cv2.CAP_PROP_POS_MSEC) / 1000
-            if landed and time < seconds and abs(time - index / fps) < 0.5 / fps:
-                return self._grab_to(seconds, index, time, fps)
-            self._capture.set(cv2.CAP_PROP_POS_FRAMES, 0)
-        if not self._capture.grab():
-            return 0
-        return self._grab_to(seconds, 0, self._get(cv2.CAP_PROP_POS_MSEC) / 1000, fps)
-
-    def _grab_to(self, seconds: float, index: int, time: float, fps: Fraction) -> int:
-        """Skip from the frame that was just grabbed. The next ``read`` gives the frame whose index is returned."""
-        while time < seconds - 1e-6 and self._capture.grab():
-            stamp = self._get(cv2.CAP_PROP_POS_MSEC) / 1000
-            index, time = index + 1, stamp if stamp > time else time + float(1 / fps)
-        self._grabbed = True
-        return index
-
-    def close(self) -> None:
-        """See `FrameReader`."""
-        self._capture.release()
-
-
 def _open_with_pyav(path: Path) -> tuple[type[Exception], InputContainer | None]:
-    """Open a file with PyAV, which is imported here because few files need it.
+    """Open a file with PyAV, which is imported here because not every installation has it.
 
     :return: the base of PyAV's exceptions, and the container; None if PyAV cannot open the file.
     :raises VideoError: PyAV is not installed.
@@ -182,8 +100,8 @@ def _open_with_pyav(path: Path) -> tuple[type[Exception], InputContainer | None]
         import av
     except ImportError as error:
         raise VideoError(
-            f"{path} is AV1 or HEIC, which needs the package 'av' that is not installed; install it, or convert a "
-            "video to H.264 .mp4, an image to JPEG"
+            f"{path} is a video, HEIC or AVIF, which needs the package 'av' that is not installed; install it, or give "
+            "JPEG or PNG images"
         ) from error
     try:
         with utf8_name(path) as name:
@@ -197,11 +115,16 @@ def _rgb(frame: av.VideoFrame) -> NDArray[np.uint8]:
     return cast(NDArray[np.uint8], frame.to_ndarray(format="rgb24"))
 
 
+def _bt601_rgb(frame: av.VideoFrame) -> NDArray[np.uint8]:
+    """Convert a frame by ITU-R BT.601, also where it states another matrix, so that a tag alone changes no result."""
+    image = frame.to_ndarray(format="rgb24", src_colorspace="ITU601", dst_colorspace="ITU601")
+    return cast(NDArray[np.uint8], image)
+
+
 def presented_duration_s(path: Path) -> float | None:
     """Read for how many seconds a video is shown; None if that is unknown.
 
-    A video that was cut without re-encoding holds more frames than it shows. OpenCV also counts the frames that an edit
-    list leaves out, and in Matroska those before the start.
+    A video that was cut without re-encoding holds more frames than it shows.
     """
     try:
         _, container = _open_with_pyav(path)
@@ -254,7 +177,7 @@ def decode_items(path: Path, numbers: Collection[int], max_pixels: int) -> dict[
 
 
 class PyavReader:
-    """PyAV's decoders, for AV1.
+    """PyAV's decoders.
 
     :raises VideoError: PyAV is not installed or cannot open the file, or its images are too large or too long (see
         `image_size`).
@@ -263,44 +186,89 @@ class PyavReader:
     def __init__(self, path: Path) -> None:
         self._path = path
         self._failure, container = _open_with_pyav(path)
-        if container is None:
-            raise VideoError(f"{path} is not a video that can be decoded; convert it to an H.264 .mp4")
-        self._container = container
-        self._stream = self._container.streams.video[0]
+        stream = next(iter(container.streams.video), None) if container is not None else None
+        if container is None or stream is None or not stream.codec_context:
+            raise VideoError(
+                f"{path} is not a video or image that can be decoded; copy it again if it may be incomplete, or "
+                "convert it to an H.264 .mp4"
+            )
+        self._container, self._stream = container, stream
         self._stream.thread_type = "AUTO"
-        self._frames: Iterator[av.VideoFrame] = self._container.decode(self._stream)
-        self._start_s = float((self._stream.start_time or 0) * (self._stream.time_base or 0))
+        self._frames: Iterator[av.VideoFrame] = self._decoded()
+        self._start = self._stream.start_time or 0  # in units of the stream
         self._aspect = float(self._stream.sample_aspect_ratio or 1)
         check_size(path, *_size(self._stream.width, self._stream.height, self._aspect))
-        self.rate, self.frame_count = float(self._stream.average_rate or 0), float(self._stream.frames)
+        self.rate = float(self._stream.guessed_rate or self._stream.average_rate or 0)
+        duration_s = (container.duration or 0) / 1e6
+        self.frame_count = float(self._stream.frames or round(duration_s * self.rate))
 
-    def _next(self) -> av.VideoFrame | None:
-        try:
-            return next(self._frames, None)
-        except (self._failure, OSError, ValueError):  # damaged: the video ends here
-            return None
+    def _decoded(self) -> Iterator[av.VideoFrame]:
+        """Decode from where the container is; what is damaged is left out."""
+        damaged = 0
+        packets = self._container.demux(self._stream)
+        while damaged < _DAMAGED_PACKETS:
+            try:
+                packet = next(packets, None)
+                if packet is None:
+                    return
+                yield from packet.decode()
+                damaged = 0
+            except EOFError:  # the decoder has given its last frame
+                return
+            except (self._failure, OSError, ValueError):
+                damaged += 1
 
     def _time(self, frame: av.VideoFrame) -> float:
-        return 0.0 if frame.time is None else float(frame.time) - self._start_s
+        base = self._stream.time_base
+        if frame.pts is None or not base:
+            return 0.0
+        milliseconds = (frame.pts - self._start) * (base.numerator / base.denominator) * 1000
+        return milliseconds / 1000
 
     def read(self) -> tuple[float, NDArray[np.uint8]] | None:
         """See `FrameReader`."""
-        frame = self._next()
+        frame = next(self._frames, None)
         if frame is None:
             return None
-        image = _upright(self._path, _rgb(frame), self._aspect, -round(frame.rotation))
+        image = _upright(self._path, _bt601_rgb(frame), self._aspect, -round(frame.rotation))
         return self._time(frame), image
 
     def skip_to(self, seconds: float, fps: Fraction) -> int:
-        """See `FrameReader`."""
-        index, time, frame = 0, -1.0, self._next()
-        while frame is not None:
+        """See `FrameReader`.
+
+        Seeks if the timestamps tell which frame the seek has led to, which saves decoding; else decodes frame by frame.
+        """
+        if seconds > _MIN_SEEK_S and self._seek(seconds - _MIN_SEEK_S / 2):
+            frame = next(self._frames, None)
+            time = 0.0 if frame is None else self._time(frame)
+            index = round(time * fps)
+            if frame is not None and time < seconds and abs(time - index / fps) < 0.5 / fps:
+                return self._skip(itertools.chain([frame], self._frames), index, seconds, fps)
+            self._seek(0.0)
+        return self._skip(self._frames, 0, seconds, fps)
+
+    def _seek(self, seconds: float) -> bool:
+        """Go to a keyframe before a time; return whether that was possible."""
+        base = self._stream.time_base
+        if not base:
+            return False
+        try:
+            self._container.seek(int(seconds / base) + self._start, stream=self._stream)
+        except (self._failure, OSError, ValueError):
+            return False
+        self._frames = self._decoded()
+        return True
+
+    def _skip(self, frames: Iterator[av.VideoFrame], index: int, seconds: float, fps: Fraction) -> int:
+        """Skip frames, the first of which has an index; return the index of the one that is read next."""
+        time = -1.0
+        for frame in frames:
             stamp = self._time(frame)
             time = stamp if stamp > time else time + float(1 / fps)
             if time >= seconds - 1e-6:
-                self._frames = itertools.chain([frame], self._frames)
+                self._frames = itertools.chain([frame], frames)
                 break
-            index, frame = index + 1, self._next()
+            index += 1
         return index
 
     def close(self) -> None:

@@ -24,21 +24,18 @@ from ...atomic_write import atomic_path, reason
 from ...errors import OutputError
 from ...motion import Motion
 from ..camera.intrinsics import scaled_intrinsics
-from ..media.file_names import utf8_name
 from ..media.frame import Frame
 from ..media.video import Video, open_video
 from ..media.video_range import FootageRange
 from ..perception.landmark_network import KEYPOINT_COUNT
 from .rasterizer import Canvas, rasterize
+from .video_writer import VideoWriter
 
 VIDEO_SUFFIXES = (".mp4", ".mov", ".mkv")
 STILL_SUFFIXES = (".png", ".jpg", ".jpeg", ".webp")
 LONGEST_SIDE = 1920
 _FAINT = 0.35  # opacity of a filled-in pose, relative to one that was seen
 _TINTS = np.array([[1.0, 0.55, 0.15], [0.2, 0.75, 1.0], [0.55, 0.9, 0.3], [0.95, 0.4, 0.75], [0.95, 0.85, 0.25]])
-# H.264 plays everywhere, but OpenCV's Linux wheels have no encoder for it. All wheels have MPEG-4 Part 2, which plays
-# in desktop players, editors and Blender. VP9, which they also have, takes 60 times as long.
-_CODECS = (("avc1", cv2.CAP_ANY), ("mp4v", cv2.CAP_FFMPEG), ("mp4v", cv2.CAP_ANY))
 
 Progress = Callable[[int, int], None]
 
@@ -308,33 +305,13 @@ def _write_video(temporary: Path, painter: _Painter, video: Video, path: Path, p
         for frame in video:
             image = painter.paint(frame)
             if writer is None:
-                writer = _open_writer(temporary, float(video.fps), image.shape[1], image.shape[0], path)
-            writer.write(cv2.cvtColor(image, cv2.COLOR_RGB2BGR))
+                writer = VideoWriter(temporary, video.fps, image.shape[1], image.shape[0], path)
+            writer.write(image)
             if progress is not None:
                 progress(frame.index + 1, max(video.frame_count, frame.index + 1))
-    finally:
         if writer is not None:
-            writer.release()
-    if not _is_readable(temporary):  # the encoder does not report what it could not write
-        raise OutputError(f"could not finish writing {path}; free some space or choose another folder")
-
-
-def _open_writer(temporary: Path, fps: float, width: int, height: int, path: Path) -> cv2.VideoWriter:
-    for codec, backend in _CODECS:
-        fourcc = cv2.VideoWriter.fourcc(*codec)
-        with utf8_name(temporary) as name:
-            writer = cv2.VideoWriter(name, backend, fourcc, fps, (width, height))
-        if writer.isOpened():
-            return writer
-        writer.release()
-    raise OutputError(f"cannot write {path}: no video encoder was found; choose a .png or .jpg overlay")
-
-
-def _is_readable(video: Path) -> bool:
-    """Check if a video can be read, that is, has its index, which is written last."""
-    with utf8_name(video) as name:
-        reader = cv2.VideoCapture(name)
-    try:
-        return reader.isOpened() and reader.grab()
-    finally:
-        reader.release()
+            writer.close()
+    except BaseException:
+        if writer is not None:
+            writer.abandon()
+        raise

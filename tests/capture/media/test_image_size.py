@@ -95,5 +95,5 @@ def test_a_list_of_other_files_is_no_footage(tmp_path: Path, text: str) -> None:
     with pytest.raises(VideoError, match=r"list\.mp4 is a playlist or other text, not footage"):
         open_video(path)
     assert presented_duration_s(path) is None
-    with pytest.raises(VideoError, match=r"list\.mp4 is not a video that can be decoded"):
+    with pytest.raises(VideoError, match=r"list\.mp4 is not a video or image that can be decoded"):
         PyavReader(path)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import scope.solver.compiled
 
-FILES = ("kernel", "code_cache", "code_files", "code_folders")
+FILES = ("kernel", "pipeline", "code_cache", "code_files", "code_folders")
 
 
 def make_package(folder: Path) -> Path:

@@ -65,7 +65,7 @@ def test_damaged_avif(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         with pytest.raises(VideoError, match=r"cut\.avif is an image that cannot be decoded"):
             open_video(tmp_path / "cut.avif")
     monkeypatch.setitem(sys.modules, "av", None)
-    with pytest.raises(VideoError, match=r"a\.avif is AV1 or HEIC, which needs the package 'av'.*JPEG"):
+    with pytest.raises(VideoError, match=r"a\.avif is a video, HEIC or AVIF, which needs the package 'av'.*JPEG"):
         open_video(tmp_path / "a.avif")
 
 

@@ -1,0 +1,97 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Writes videos with PyAV: H.264, or MPEG-4 Part 2 where its FFmpeg has been built without x264."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from fractions import Fraction
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import OutputError
+from ..media.file_names import utf8_name
+
+if TYPE_CHECKING:
+    import av
+
+# Codec, and its options: visually without loss at a size and speed that suit a preview.
+_CODECS = (("libx264", {"preset": "veryfast", "crf": "20"}), ("mpeg4", {"qscale": "4"}))
+_LARGEST = 65535  # of numerator and denominator of MPEG-4's clock
+
+
+class VideoWriter:
+    """A video that is being written. Its file is complete after `close` alone.
+
+    :raises OutputError: PyAV is not installed, or the file cannot be written.
+    """
+
+    def __init__(self, temporary: Path, fps: Fraction, width: int, height: int, path: Path) -> None:
+        """Open the file.
+
+        :param width: in pixels, even; ``height`` likewise.
+        :param path: the name to use in messages.
+        """
+        try:
+            import av
+        except ImportError as error:
+            raise OutputError(
+                f"cannot write {path}: it needs the package 'av', which is not installed; choose a .png or .jpg overlay"
+            ) from error
+        self._av, self._path = av, path
+        self._failures = (av.error.FFmpegError, OSError, ValueError)
+        temporary.touch()  # a name that is not UTF-8 is opened by a link to the file
+        try:
+            with utf8_name(temporary) as name:
+                self._container: av.container.OutputContainer = av.open(name, "w")
+        except self._failures as error:
+            raise self._refused() from error
+        self._stream = self._add_stream(_rate(fps), width, height)
+
+    def _add_stream(self, rate: Fraction, width: int, height: int) -> Any:
+        for codec, options in _CODECS:
+            if codec not in self._av.codecs_available:
+                continue
+            stream: Any = self._container.add_stream(codec, rate=rate, options=options)
+            stream.width, stream.height, stream.pix_fmt = width, height, "yuv420p"
+            return stream
+        self._container.close()
+        raise OutputError(f"cannot write {self._path}: no video encoder was found; choose a .png or .jpg overlay")
+
+    def write(self, image: NDArray[np.uint8]) -> None:
+        """Append an image.
+
+        :param image: (H, W, 3) uint8 RGB.
+        :raises OutputError: the system refused.
+        """
+        frame = self._av.VideoFrame.from_ndarray(np.ascontiguousarray(image), format="rgb24")
+        try:
+            self._container.mux(self._stream.encode(frame))
+        except self._failures as error:
+            raise self._refused() from error
+
+    def close(self) -> None:
+        """Write what is left, and the index.
+
+        :raises OutputError: the system refused.
+        """
+        try:
+            self._container.mux(self._stream.encode())
+            self._container.close()
+        except self._failures as error:
+            raise self._refused() from error
+
+    def abandon(self) -> None:
+        """Close the file, which then is of no use."""
+        with suppress(*self._failures):
+            self._container.close()
+
+    def _refused(self) -> OutputError:
+        return OutputError(f"could not finish writing {self._path}; free some space or choose another folder")
+
+
+def _rate(fps: Fraction) -> Fraction:
+    """Return the nearest rate that every codec can state."""
+    return fps.limit_denominator(_LARGEST) if fps <= _LARGEST else Fraction(_LARGEST)

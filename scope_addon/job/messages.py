@@ -1,0 +1,97 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The worker's messages, checked before anything acts on them.
+
+The worker decodes footage of others with libraries in C. What it writes after one of them has gone wrong may be
+anything.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from typing import Any
+
+from ...solver.errors import ScopeError
+
+LONGEST_LINE = 16 << 20  # bytes; a report of 10 people has some 100 kB
+_LARGEST_NUMBER = 1 << 53
+_LARGEST_SIDE = 4096  # of a preview, in pixels
+_LONGEST_TEXT = 2000
+
+
+class WorkerFailedError(ScopeError):
+    """The worker reported an error, ended without a result, or sent what is no message."""
+
+
+def _is_number(value: object) -> bool:
+    return type(value) is int and 0 <= value < _LARGEST_NUMBER
+
+
+def _is_side(value: object) -> bool:
+    return type(value) is int and 0 < value <= _LARGEST_SIDE
+
+
+def _is_text(value: object) -> bool:
+    return isinstance(value, str) and len(value) <= _LONGEST_TEXT
+
+
+def _is_name(value: object) -> bool:
+    """Whether it is the name of a file in the job's folder, not a way to another."""
+    return (
+        isinstance(value, str) and 0 < len(value) < 200 and value.isprintable() and not set(value) & set('/\\:"*?<>|')
+    )
+
+
+def _are_names(value: object) -> bool:
+    return isinstance(value, list) and bool(value) and all(_is_name(name) and name.endswith(".npz") for name in value)
+
+
+def _is_report(value: object) -> bool:
+    if not isinstance(value, dict):
+        return False
+    warnings, rates = value.get("warnings", []), value.get("fps", {})
+    if not isinstance(warnings, list) or not isinstance(rates, dict):
+        return False
+    are_finite = all(type(rate) in (int, float) and 0 <= rate < _LARGEST_NUMBER for rate in rates.values())
+    return are_finite and all(isinstance(text, str) for text in warnings)
+
+
+# The fields that a message must have, and what they may be.
+_FIELDS: dict[str, dict[str, Callable[[object], bool]]] = {
+    "progress": {"stage": _is_text, "done": _is_number, "total": _is_number},
+    "preview": {"file": _is_name, "width": _is_side, "height": _is_side, "frame": _is_number},
+    "result": {"motions": _are_names, "report": _is_report},
+}
+
+
+def parse_message(line: bytes, *, captures: bool = True) -> dict[str, Any] | None:
+    """Read a line of the worker.
+
+    :param captures: whether the job is a capture, whose result needs motions and a report.
+    :return: the message; None for a line that is none, such as a library may print, or one of an unknown event.
+    :raises WorkerFailedError: the line is too long, or a message lacks what its event needs.
+    """
+    if len(line) > LONGEST_LINE:
+        raise _unreadable(f"a line of more than {LONGEST_LINE >> 20} MB")
+    try:
+        message = json.loads(line)
+    except (ValueError, RecursionError):
+        return None
+    event = message.get("event") if isinstance(message, dict) else None
+    if event == "error":
+        return {"event": "error", "message": _one_line(message.get("message"))}
+    if not isinstance(event, str) or event not in _FIELDS:
+        return None
+    for field, is_valid in _FIELDS[event].items():
+        if (captures or event != "result") and not is_valid(message.get(field)):
+            raise _unreadable(f"{event} without a valid {field}")
+    return dict(message)
+
+
+def _one_line(text: object) -> str:
+    said = " ".join(text.split()) if isinstance(text, str) else ""
+    return said[:_LONGEST_TEXT] or "the capture failed"
+
+
+def _unreadable(what: str) -> WorkerFailedError:
+    return WorkerFailedError(f"the capture process sent a message that cannot be used ({what}); capture again")

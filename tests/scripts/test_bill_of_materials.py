@@ -1,0 +1,176 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The bill of materials: valid, the same when repeated, and true to what the packages contain."""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.util
+import json
+import sys
+import zipfile
+from datetime import UTC, datetime
+from importlib import metadata
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent.parent
+SHIPPED = ("numba", "llvmlite", "onnxruntime", "opencv-contrib-python-headless", "av")
+MADE = datetime(2026, 1, 2, 3, 4, 5, tzinfo=UTC)
+BUILD_INFORMATION = (
+    b"General configuration for OpenCV 9\n  3rdparty dependencies:       %s\n  PNG:  build (ver 1.6.43)\n"
+)
+
+
+@pytest.fixture(scope="module")
+def bills():
+    spec = importlib.util.spec_from_file_location("bill_of_materials", ROOT / "scripts" / "bill_of_materials.py")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules["bill_of_materials"] = module  # as its dataclass needs
+    spec.loader.exec_module(module)
+    yield module
+    del sys.modules["bill_of_materials"]
+
+
+@pytest.fixture(scope="module")
+def installed(bills):
+    """The libraries in each shipped package, as pip has installed it from the wheel."""
+    found = {}
+    for package in SHIPPED:
+        files = [f for f in metadata.files(package) if bills.library_name(str(f)) or str(f).startswith("cv2/cv2")]
+        found[package] = bills.libraries(package, ((str(f), f.locate().read_bytes()) for f in files))
+    return found
+
+
+def wheel(folder, name, version, files):
+    path = folder / f"{name}-{version}-py3-none-any.whl"
+    with zipfile.ZipFile(path, "w") as file:
+        file.writestr(
+            f"{name}-{version}.dist-info/METADATA", f"Name: {name}\nVersion: {version}\nLicense-Expression: MIT\n"
+        )
+        for inside, content in files.items():
+            file.writestr(inside, content)
+    return path
+
+
+@pytest.fixture
+def extension(tmp_path):
+    """A staged extension with one network, and its wheel with one library."""
+    staged = tmp_path / "staged"
+    (staged / "assets" / "networks").mkdir(parents=True)
+    (staged / "assets" / "networks" / "pose.onnx").write_bytes(b"network")
+    (staged / "blender_manifest.toml").write_text('version = "0.1.0"\n')
+    (staged / "THIRD_PARTY.md").write_text("| Opus | BSD-3-Clause | made L |\n")
+    return staged, [wheel(tmp_path, "made", "1.0", {"made.libs/libopus-0123abcd.so.0.11.1": b"opus"})]
+
+
+@pytest.mark.parametrize(
+    ("file", "name", "version"),
+    [
+        ("av.libs/libx264-d6533a8d.so.165", "libx264", "165"),
+        ("opencv.libs/libopenblas-r0-f650aae0.3.3.so", "libopenblas", "0.3.3"),
+        ("av.libs/avcodec-62-984de33114b7fa384296817dec999c9d.dll", "avcodec", "62"),
+        ("av.libs/libgcc_s_seh-1-4c0a762e4178b574f72d1ef1f8bb5fc9.dll", "libgcc_s_seh", "1"),
+        ("av.libs/libstdc++-6-2d5c346d47ad531ef9f5185db0e8cef3.dll", "libstdc++", "6"),
+        ("cv2/.dylibs/libSvtAv1Enc.2.2.0.dylib", "libSvtAv1Enc", "2.2.0"),
+        ("cv2/opencv_videoio_ffmpeg4110_64.dll", "opencv_videoio_ffmpeg", ""),
+        ("opencv.libs/libpng16-ef62451c.so.16.44.0", "libpng16", "16.44.0"),
+    ],
+)
+def test_a_librarys_name_is_read_from_its_file(bills, file, name, version):
+    assert bills.library_name(file) == (name, version)
+
+
+@pytest.mark.parametrize(
+    "file", ["cv2/cv2.abi3.so", "a/b.cpython-311-x86_64-linux-gnu.so", "cv2/cv2.pyd", "a/b_state.so", "a/so.py"]
+)
+def test_a_packages_own_modules_are_no_libraries(bills, file):
+    assert bills.library_name(file) is None
+
+
+def test_third_party_states_what_the_installed_packages_contain(bills, installed):
+    """The wheels of other platforms are compared by the build."""
+    text = (ROOT / "THIRD_PARTY.md").read_text("utf-8")
+    for package, found in installed.items():
+        assert bills.check_third_party(package, "linux-x64", found, text) == []
+    assert len(installed["av"]) > 20
+    without = text.replace("| x264 |", "| x2640 |")
+    problems = bills.check_third_party("av", "linux-x64", installed["av"], without)
+    assert problems == ["av contains x264, which THIRD_PARTY.md lacks", "THIRD_PARTY.md has x2640, which av lacks"]
+    wrong = text.replace("| x264 | GPL-2.0-or-later |", "| x264 | MIT |")
+    (problem,) = bills.check_third_party("av", "linux-x64", installed["av"], wrong)
+    assert problem == "THIRD_PARTY.md states MIT for x264 of av, not GPL-2.0-or-later"
+
+
+def test_licences_that_conflict_with_ours_are_named(bills, installed):
+    found = {
+        f"{library.project} {library.version}" for every in installed.values() for library in bills.conflicts(every)
+    }
+    assert found == {"OpenSSL 1.1.1w", "Intel IPP ICV 2021.12.0"}
+    said = (ROOT / "docs" / "publishing.md").read_text("utf-8").partition("### Licences that conflict")[2]
+    for name in ("OpenSSL 1.1.1w", "Intel IPP ICV", "Microsoft C++ runtime"):
+        assert name in said
+
+
+def test_every_listed_library_is_documented(bills):
+    text = (ROOT / "THIRD_PARTY.md").read_text("utf-8")
+    for project in bills.PROJECTS:
+        assert f"| {project.removesuffix(' in cv2')} | " in text
+
+
+def test_a_library_that_is_not_listed_is_refused(bills):
+    with pytest.raises(SystemExit, match="made contains made.libs/libnew.so.1, which is not in"):
+        bills.libraries("made", [("made.libs/libnew.so.1", b"")])
+    with pytest.raises(SystemExit, match="contains libnew in cv2/cv2.abi3.so"):
+        bills.libraries("made", [("cv2/cv2.abi3.so", BUILD_INFORMATION % b"libpng libnew")])
+    (png,) = bills.libraries("made", [("cv2/cv2.abi3.so", BUILD_INFORMATION % b"libpng")])
+    assert (png.version, png.licence) == ("1.6.43", "libpng-2.0")
+
+
+def test_ffmpeg_has_the_licence_of_what_it_is_built_with(bills):
+    plain = bills.libraries("made", [("libavutil.60.dylib", b"FFmpeg version 8.1.2\0")])
+    assert [(f.version, f.licence) for f in plain] == [("8.1.2", "LGPL-2.1-or-later")]
+    both = bills.libraries("made", [("libavutil.60.dylib", b""), ("libx264.165.dylib", b"")])
+    assert {library.licence for library in both} == {"GPL-2.0-or-later"}
+
+
+def test_a_bill_is_valid_and_has_all_parts(bills, extension):
+    from cyclonedx.schema import SchemaVersion
+    from cyclonedx.validation.json import JsonStrictValidator
+
+    staged, wheels = extension
+    text = bills.bill_of_materials(staged, wheels, "linux-x64", MADE)
+    validator = JsonStrictValidator(SchemaVersion.V1_6)
+    assert validator.validate_str(text) is None
+    assert validator.validate_str(text.replace('"SHA-256"', '"SHA-257"')) is not None
+    bill = json.loads(text)
+    assert bill["metadata"]["component"]["version"] == "0.1.0"
+    assert bill["metadata"]["timestamp"] == "2026-01-02T03:04:05+00:00"
+    parts = {part["name"]: part for part in bill["components"]}
+    made, network = parts["made"], parts["assets/networks/pose.onnx"]
+    assert made["purl"] == "pkg:pypi/made@1.0?file_name=made-1.0-py3-none-any.whl"
+    assert made["licenses"] == [{"expression": "MIT"}]
+    assert made["hashes"] == [{"alg": "SHA-256", "content": hashlib.sha256(wheels[0].read_bytes()).hexdigest()}]
+    (opus,) = made["components"]
+    assert (opus["name"], opus["version"], opus["licenses"]) == ("Opus", "0.11.1", [{"expression": "BSD-3-Clause"}])
+    assert opus["hashes"] == [{"alg": "SHA-256", "content": hashlib.sha256(b"opus").hexdigest()}]
+    assert network["type"] == "machine-learning-model"
+    assert network["licenses"] == [{"expression": "Apache-2.0"}]
+    assert network["hashes"] == [{"alg": "SHA-256", "content": hashlib.sha256(b"network").hexdigest()}]
+    (needed,) = [d["dependsOn"] for d in bill["dependencies"] if d["ref"] == "scope"]
+    assert needed == sorted([made["bom-ref"], network["bom-ref"]])
+
+
+def test_a_bill_is_the_same_when_repeated(bills, extension):
+    staged, wheels = extension
+    first = bills.bill_of_materials(staged, wheels, "linux-x64", MADE)
+    assert bills.bill_of_materials(staged, wheels, "linux-x64", MADE) == first
+    (staged / "assets" / "networks" / "pose.onnx").write_bytes(b"other")
+    second = bills.bill_of_materials(staged, wheels, "linux-x64", MADE)
+    assert json.loads(first)["serialNumber"] != json.loads(second)["serialNumber"]
+
+
+def test_a_wheel_with_other_libraries_than_documented_is_refused(bills, extension):
+    staged, wheels = extension
+    with pytest.raises(SystemExit, match="made contains Opus, which THIRD_PARTY.md lacks"):
+        bills.bill_of_materials(staged, wheels, "windows-x64", MADE)
