@@ -173,10 +173,9 @@ def test_people_measure_what_the_surveys_say(shaped):
 
 
 @pytest.mark.parametrize("count", [1, 10])
-def test_few_people_are_all_adults(count):
-    wheel = fetch_wheel()
-    source = read_source(wheel)
-    people = draw_population(source, read_survey_targets(wheel, source.mirror), count, 3)
+def test_few_people_are_all_adults(shaped, count):
+    source = shaped.source
+    people = draw_population(source, read_survey_targets(fetch_wheel(), source.mirror), count, 3)
     assert len(people.coefficients) == len(people.measured["stature"]) == count
     assert people.age.min() >= 18.0
     np.testing.assert_allclose(people.measured["stature"], people.wanted["stature"], atol=0.02)
