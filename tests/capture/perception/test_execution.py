@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import shutil
 import threading
 from pathlib import Path
 from types import SimpleNamespace
@@ -128,8 +129,10 @@ def test_the_command_line_offers_the_same_choices() -> None:
 
 
 @pytest.mark.usefixtures("networks")
-def test_the_real_cpu() -> None:
-    path = network_path("pose_detection")
+def test_the_real_cpu(tmp_path: Path) -> None:
+    # A copy, because the tests open Scope's own networks with one thread.
+    path = tmp_path / "detection.onnx"
+    shutil.copy(network_path("pose_detection"), path)
     execution = Execution("tensorrt")
     session = open_session(path, 2, execution)
     if PROVIDERS["tensorrt"][0] in session.get_providers():
