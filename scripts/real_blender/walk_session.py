@@ -134,6 +134,7 @@ faulthandler.enable()
 if bpy.app.background:
     in_module()
 bpy.context.preferences.view.show_splash = False
+bpy.context.preferences.system.vbo_collection_rate = 1  # a second, not a minute, before drawing meets what was deleted
 bpy.context.preferences.filepaths.use_auto_save_temporary_files = False
 walk = Walk()
 bpy.app.timers.register(walk.advance, first_interval=3.0, persistent=True)
