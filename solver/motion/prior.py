@@ -20,7 +20,8 @@ class MotionPrior:
 
     joints: weight of each joint's angular acceleration relative to its parent, (K,) or one for all, s^3/rad^2;
     root_rotation: of the root's in the world, s^3/rad^2; root_position: of its origin, s^3/m^2.
-    robust_joints, robust_root_rotation: Geman-McClure sigma of squared accelerations, (rad/s^2)^2;
+    robust_joints, robust_root_rotation: Geman-McClure sigma of squared accelerations, (rad/s^2)^2, of joints (K,) or
+    one for all;
     robust_root_position: (m/s^2)^2. Infinity turns the kernel off.
     contact: weight of standing points, s/m^2.
 
@@ -32,7 +33,7 @@ class MotionPrior:
     joints: ArrayLike = 1.0
     root_rotation: float = 1.0
     root_position: float = 30.0
-    robust_joints: float = 4e4
+    robust_joints: ArrayLike = 4e4
     robust_root_rotation: float = 4e4
     robust_root_position: float = 1600.0
     contact: float = 3e3
@@ -44,24 +45,32 @@ class MotionPrior:
         """
         for name in ("root_rotation", "root_position", "contact"):
             check_weight(getattr(self, name), f"MotionPrior.{name}")
-        for name in ("robust_joints", "robust_root_rotation", "robust_root_position"):
+        for name in ("robust_root_rotation", "robust_root_position"):
             check_robust(getattr(self, name), f"MotionPrior.{name}")
 
     def packed(self, K: int) -> Array:
         """Return (K+2, 2) weights and 1/sigma: the root's rotation, joints 1..K, the root's position.
 
-        :raises ShapeError: `joints` is neither one number nor (K,).
-        :raises InvalidValueError: a weight of `joints` is negative or not finite.
+        :raises ShapeError: `joints` or `robust_joints` is neither one number nor (K,).
+        :raises InvalidValueError: a weight of `joints` is negative or not finite, or a sigma is not positive.
         """
-        joints = np.asarray(self.joints, dtype=np.float64)
-        joints = np.full(K, float(joints)) if joints.ndim == 0 else as_array(joints, (K,), "MotionPrior.joints")
+        joints = _each(self.joints, K, "MotionPrior.joints")
         check_finite(joints, "MotionPrior.joints")
         check_not_negative(joints, "MotionPrior.joints")
         table = np.empty((K + 2, 2))
         table[0] = self.root_rotation, _inverse(self.robust_root_rotation)
-        table[1:-1, 0], table[1:-1, 1] = joints, _inverse(self.robust_joints)
+        sigmas = _each(self.robust_joints, K, "MotionPrior.robust_joints")
+        for sigma in sigmas:
+            check_robust(sigma, "MotionPrior.robust_joints")
+        table[1:-1, 0], table[1:-1, 1] = joints, 1.0 / sigmas
         table[-1] = self.root_position, _inverse(self.robust_root_position)
         return table
+
+
+def _each(values: ArrayLike, K: int, name: str) -> Array:
+    """Return one number for each joint (K,)."""
+    array = np.asarray(values, dtype=np.float64)
+    return np.full(K, float(array)) if array.ndim == 0 else as_array(array, (K,), name)
 
 
 def _inverse(sigma: float) -> float:

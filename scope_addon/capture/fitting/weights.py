@@ -32,10 +32,18 @@ ROBUST = Options(robust_keypoints2d=0.01, robust_keypoints3d=0.1, robust_orienta
 # weigh more, and the lifted directions, whose errors last for many frames, less. Feet that rest stay on the floor by
 # this weight alone; with ten times as much, renders whose floor is wrong have errors larger by 4 mm.
 _CLIP_KEYPOINTS2D, _CLIP_DIRECTIONS, _CLIP_FLOOR = 2.0, 0.7, 3.0
-# Of joints and root, s³/rad² and s³/m², at 60 frames per second. A network's errors in neighbouring frames are alike,
+# Typical accelerations, rad/s², and of the root's position, m/s²: the root mean square at 30 frames per second of each
+# performer of the recordings that also train the joint prior, and the median of these. One weight for all joints would
+# tell a fast crouch by a trunk that arches, because four joints of the spine share its rotation.
+_USUAL = {"hip": 35.0, "knee": 41.0, "ankle": 56.0, "foot": 107.0, "spine1": 19.0, "spine2": 11.3, "spine3": 12.9}
+_USUAL |= {"neck": 20.0, "head": 10.2, "collar": 9.6, "shoulder": 33.0, "elbow": 24.5, "wrist": 30.0, "hand": 11.8}
+_USUAL_ROOT, _USUAL_ROOT_POSITION = 20.3, 3.8
+# Of accelerations in these units, at 60 frames per second. A network's errors in neighbouring frames are alike,
 # so more frames say less than their number: weights that mean the same at any rate smooth a jump at 10 frames per
-# second away. Robust only against what no body does: 630 rad/s² and 126 m/s². Velocity of points that rest: s/m².
-_MOTION = MotionPrior(4.0, 4.0, 120.0, 4e5, 4e5, 1.6e4, contact=5e4)
+# second away.
+_ACCELERATION = 2400.0
+_LANDING = 3.0  # typical accelerations from which on a landing or a hit is likelier than noise
+_CONTACT = 5e4  # of the velocity of points that rest, s/m²
 _RATE_HZ = 60.0
 # Joints that no pair of landmarks determines stay closer to rest.
 _STIFF_JOINTS = {"spine": 5.0, "collar": 5.0, "foot": 5.0, "hand": 5.0, "neck": 3.0, "head": 3.0}
@@ -77,19 +85,38 @@ def clip_weights(weights: Weights) -> Weights:
     )
 
 
-def motion_prior(times: NDArray[np.float64]) -> MotionPrior:
-    """Return the weights of what couples frames: acceleration's with the square of the frame rate up to 60 Hz.
+def motion_priors(body: Body, times: NDArray[np.float64]) -> tuple[MotionPrior, MotionPrior]:
+    """Return the weights of what couples frames, for a first and a second fit: the second lets go of hard landings.
 
-    Beyond, they grow with the rate, as the number of measurements does.
+    If the first were robust as well, noise would pass for landings: from frame to frame it accelerates more than bodies
+    do. Weights of acceleration grow with the square of the frame rate up to 60 Hz; beyond, with the rate, as the number
+    of measurements does.
 
     :param times: (T,) seconds.
     """
-    if len(times) < 2:
-        return _MOTION
-    rate, p = 1.0 / (_RATE_HZ * float(np.median(np.diff(times)))), _MOTION
-    scale = min(rate * rate, rate)
-    joints = scale * np.asarray(p.joints)
-    return replace(p, joints=joints, root_rotation=scale * p.root_rotation, root_position=scale * p.root_position)
+    rate = 1.0 / (_RATE_HZ * float(np.median(np.diff(times)))) if len(times) > 1 else 1.0
+    scale = _ACCELERATION * min(rate * rate, rate)
+    usual = np.array([_usual_acceleration(name) for name in body.joint_names[1:]])
+    quadratic = MotionPrior(
+        joints=scale / usual**2,
+        root_rotation=scale / _USUAL_ROOT**2,
+        root_position=scale / _USUAL_ROOT_POSITION**2,
+        robust_joints=np.inf,
+        robust_root_rotation=np.inf,
+        robust_root_position=np.inf,
+        contact=_CONTACT,
+    )
+    return quadratic, replace(
+        quadratic,
+        robust_joints=(_LANDING * usual) ** 2,
+        robust_root_rotation=(_LANDING * _USUAL_ROOT) ** 2,
+        robust_root_position=(_LANDING * _USUAL_ROOT_POSITION) ** 2,
+    )
+
+
+def _usual_acceleration(joint: str) -> float:
+    """Return a joint's typical angular acceleration; that of the hand for fingers."""
+    return next((usual for name, usual in _USUAL.items() if joint.endswith(name)), _USUAL["hand"])
 
 
 def joint_weights(body: Body) -> NDArray[np.float64]:

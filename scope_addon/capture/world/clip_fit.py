@@ -22,7 +22,7 @@ from ....solver import Measurements, MotionFit, StandingPoints, State, View, fit
 from ....solver.rotations import exp, log
 from ..fitting.frame_sequence import LONGEST_COAST_S, FittedTrack
 from ..fitting.prepared_track import PreparedTrack
-from ..fitting.weights import ROBUST, clip_weights, motion_prior, warm_stages
+from ..fitting.weights import ROBUST, clip_weights, motion_priors, warm_stages
 from .camera_path import CameraPath
 
 WINDOW_UNKNOWNS = 24_000  # unknowns of a window, whose equations take some 100 MB: 320 frames of a body of 24 parts
@@ -77,18 +77,21 @@ class _Clip:
         """Fit one window; frames that an earlier one has fitted are blended from that one's motion to this one's."""
         times = self._prepared.track.times[frames]
         self._progress("solving the clip", int(self._done.sum()), len(self._done))
-        found = fit_motion(
-            self._prepared.body,
-            _Computed(frames, self._measure),
-            times,
-            init=_Computed(frames, self._state),
-            priors=self._prepared.priors,
-            options=replace(ROBUST, stages=warm_stages(self._weights)),
-            motion=motion_prior(times),
-            stands=self._standing_points(frames),
-            shape=np.asarray(self._start.betas, float),
-            window=np.inf,
-        )
+        states: Sequence[State] = _Computed(frames, self._state)
+        for prior in motion_priors(self._prepared.body, times):
+            found = fit_motion(
+                self._prepared.body,
+                _Computed(frames, self._measure),
+                times,
+                init=states,
+                priors=self._prepared.priors,
+                options=replace(ROBUST, stages=warm_stages(self._weights)),
+                motion=prior,
+                stands=self._standing_points(frames),
+                shape=np.asarray(self._start.betas, float),
+                window=np.inf,
+            )
+            states = found.states
         self._keep(frames, found)
 
     def fitted(self) -> FittedTrack:

@@ -11,7 +11,7 @@ from scope.scope_addon.capture.camera.intrinsics import choose_camera
 from scope.scope_addon.capture.fitting.frame_sequence import FittedTrack
 from scope.scope_addon.capture.fitting.keypoint_offsets import with_keypoint_offsets
 from scope.scope_addon.capture.fitting.prepared_track import PreparedTrack, Stance, prepare_track
-from scope.scope_addon.capture.fitting.weights import motion_prior
+from scope.scope_addon.capture.fitting.weights import motion_priors
 from scope.scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES
 from scope.scope_addon.capture.perception.lifter import Lifted
 from scope.scope_addon.capture.tracking.track import Track
@@ -197,9 +197,20 @@ def test_frames_that_were_not_seen_stay_as_they_are():
 
 
 def test_acceleration_weighs_more_the_more_frames_there_are():
-    at = {rate: motion_prior(np.arange(5) / rate) for rate in (10.0, 30.0, 60.0, 120.0)}
+    at = {rate: motion_priors(BODY, np.arange(5) / rate)[0] for rate in (10.0, 30.0, 60.0, 120.0)}
     reference = at[60.0].root_position
     scales = [at[rate].root_position / reference for rate in (10.0, 30.0, 120.0)]
     np.testing.assert_allclose(scales, [1 / 36, 1 / 4, 2.0])
-    assert motion_prior(np.zeros(1)).root_position == reference
+    assert motion_priors(BODY, np.zeros(1))[0].root_position == reference
     assert len({prior.contact for prior in at.values()}) == 1
+
+
+def test_the_second_fit_lets_go_of_what_is_three_times_as_fast_as_usual():
+    first, second = motion_priors(BODY, np.arange(5) / 60.0)
+    assert first.robust_root_position == np.inf
+    assert second.robust_root_position == pytest.approx((3 * 3.8) ** 2)
+    spine, knee = (BODY.joint_names.index(name) - 1 for name in ("spine2", "left_knee"))
+    for prior in (first, second):  # a knee accelerates more than a spine
+        assert np.asarray(prior.joints)[spine] > 5 * np.asarray(prior.joints)[knee]
+    sigmas = np.asarray(second.robust_joints)
+    np.testing.assert_allclose(np.asarray(second.joints) * sigmas, np.asarray(second.joints)[0] * sigmas[0])
