@@ -10,7 +10,7 @@ from importlib.util import find_spec
 from .errors import SetupError
 
 CAPTURE = ("cv2", "onnxruntime", "av")
-EXTRAS = {**dict.fromkeys(CAPTURE, "capture"), "bpy": "bpy"}
+EXTRAS = {**dict.fromkeys(CAPTURE, "capture"), "bpy": "bpy", "pythonosc": "live"}
 
 
 def check_installed(modules: Sequence[str]) -> None:

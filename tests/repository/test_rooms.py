@@ -44,8 +44,14 @@ ROOMS = {
     "scope_addon/scene/animation_data": {"scope_addon/files"},
     "scope_addon/scene/character": {"scope_addon/scene/animation_data", "scope_addon/edit"},
     "scope_addon/job": {"scope_addon/capture", "scope_addon/edit"},
+    "scope_addon/live": {"scope_addon/capture"},
     "scope_addon/ui": {"scope_addon/scene", "scope_addon/job", "scope_addon/smpl_import", "scope_addon/cli"},
-    "scope_addon/command_line": {"scope_addon/scene", "scope_addon/job", "scope_addon/smpl_import"},
+    "scope_addon/command_line": {
+        "scope_addon/scene",
+        "scope_addon/job",
+        "scope_addon/smpl_import",
+        "scope_addon/live",
+    },
     "scope_addon/cli": {"scope_addon/command_line"},
 }
 SHARED = ("errors", "installed", "motion", "atomic_write", "footage", "json_file", "review_spans", "__init__")
