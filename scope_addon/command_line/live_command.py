@@ -7,6 +7,7 @@ import argparse
 import sys
 from collections.abc import Mapping
 from contextlib import ExitStack
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import UsageError
@@ -14,6 +15,7 @@ from ..installed import CAPTURE, check_installed
 from ..options import Place, options_at
 from .arguments import add_options, option_values
 from .memory_limit import check_memory_limit
+from .outputs import MOTION_SUFFIXES, check_outputs
 from .terminal import ProgressLine, say
 
 if TYPE_CHECKING:
@@ -37,20 +39,28 @@ def run_live_command(args: argparse.Namespace) -> dict[str, Any]:
 
     :raises ScopeError: an argument is invalid, the source cannot be read, or an output failed.
     """
-    check_installed(CAPTURE)
-    check_memory_limit(with_scene=False)
     values = option_values(args, Place.LIVE)
+    check_installed(CAPTURE if values["vmc"] is None else (*CAPTURE, "pythonosc"))
+    check_memory_limit(with_scene=False)
     options = _checked(values)
+    if values["record"]:
+        check_outputs([values["record"]], None, Path(args.source))
     # Imported here, so that errors in the arguments are printed immediately.
     from ...solver.loaders.body_file import load_body
+    from ..live.recording import Recording
     from ..live.run import Listeners, run_live
     from ..live.sources import open_source
 
     source, body = open_source(args.source), load_body(values["body"])
     with ExitStack() as stack:
         outputs = _outputs(values, body, stack)
+        recording = Recording(values["record"], body, source) if values["record"] else None
+        if recording:
+            outputs.append(recording)
         line = stack.enter_context(ProgressLine(sys.stderr, show=not args.quiet))
-        report = run_live(source, body, options, outputs, Listeners(say, line))
+        begin = recording.begin if recording else lambda *_: None
+        report = run_live(source, body, options, outputs, Listeners(say, line, begin))
+    report["outputs"] = [str(recording.save())] if recording else []
     if not args.json:
         say(_summary(report))
     return report
@@ -64,6 +74,8 @@ def _checked(values: Mapping[str, Any]) -> LiveOptions:
     for option in options_at(Place.LIVE):
         if problem := option.range_error(values[option.name]):
             raise UsageError(f"{option.flag} {problem}")
+    if values["record"] and values["record"].suffix.lower() not in MOTION_SUFFIXES:
+        raise UsageError(f"--record writes a motion file: give a name that ends in .npz, not {values['record'].name}")
     if len(values["heights_m"]) > 1:
         raise UsageError("a live capture follows one person: give one --height")
     from ..capture.camera.calibration import read_calibration
@@ -98,6 +110,10 @@ def _outputs(values: Mapping[str, Any], body: Body, stack: ExitStack) -> list[Ou
         server = stack.enter_context(JsonServer(body, values["listen"], values["json_port"]))
         say(f"lines of JSON on {values['listen']} port {server.port}")
         outputs.append(server)
+    if values["vmc"] is not None:
+        from ..live.vmc import VmcSender, parse_address
+
+        outputs.append(stack.enter_context(VmcSender(body, *parse_address(values["vmc"]))))
     return outputs
 
 
@@ -106,4 +122,5 @@ def _summary(report: Mapping[str, Any]) -> str:
     return (
         f"{report['poses']} poses, {report['poses_per_second']:g}/s, latency {latency['median']:.0f} ms"
         f" (p95 {latency['p95']:.0f} ms), {report['dropped']} of {report['frames']} frames dropped"
+        + "".join(f"; wrote {path}" for path in report["outputs"])
     )

@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from ...solver import Body
 from ..capture.camera.bars import find_bars, longer_content_side
 from ..capture.camera.intrinsics import Camera, assumed_camera
-from ..capture.camera.line_segments import Lines, Segments, find_segments
+from ..capture.camera.line_segments import Segments, find_segments
+from ..capture.camera.verticals import estimate_up_from_lines
 from ..capture.fitting.focal_fits import FocalFits
 from ..capture.fitting.focal_length import camera_by_edges, camera_by_fits
 from ..capture.fitting.frame_sequence import FittedTrack
@@ -26,8 +27,11 @@ from ..capture.fitting.track_fit import fit_track
 from ..capture.perception.observation import Observation
 from ..capture.tracking.track import Track, Tracklet, make_track
 from ..capture.world.placement import place_track
-from ..capture.world.world_frame import find_world
-from ..kinematics.axes import world_from_level_camera
+from ..capture.world.world_frame import find_world, floor_height
+from ..kinematics.axes import transform_points, world_from_level_camera
+from ..kinematics.contact_points import SOLES
+
+SAME_FOCAL = 0.02  # relative difference of focal lengths, for which the lines of the background point alike
 
 
 @dataclass(frozen=True)
@@ -84,6 +88,8 @@ class Calibrator:
         self._longer_px = float(max(size))
         self._by_edges = camera
         self._segments = Segments.none()
+        self._up_of_lines: NDArray[np.float64] | None = None
+        self._focal_of_lines = 1e-9  # for which that was estimated
 
     def look_at(self, image_rgb: NDArray[np.uint8], observation: Observation) -> None:
         """Find the edges of the background in a frame in which somebody is seen."""
@@ -119,9 +125,24 @@ class Calibrator:
         return replace(calibration, up=found.up, camera_position=position)
 
     def _with_world(self, calibration: Calibration, track: Track, fitted: FittedTrack) -> Calibration:
-        lines = self._segments.lines(calibration.camera) if len(self._segments.ends_px) else Lines.none()
-        T = find_world([place_track(self._body, track, fitted, smoothing=True)], lines).T_world_camera
+        """Add the world: as offline where no lines tell which way is up, otherwise with their direction."""
+        placed = place_track(self._body, track, fitted, smoothing=True)
+        T = find_world([placed]).T_world_camera
+        if self._lines_differ(calibration.camera):
+            self._up_of_lines = estimate_up_from_lines(self._segments.lines(calibration.camera), T[2, :3]).up
+            self._focal_of_lines = float(calibration.camera.intrinsics[0, 0])
+        if self._up_of_lines is not None:
+            up, valid = self._up_of_lines, placed.valid
+            contact = placed.contact(up)[valid, : len(SOLES)]
+            T = world_from_level_camera(up, -floor_height(placed.soles[valid], contact, up))
+            T[:2, 3] -= transform_points(T, placed.joints[valid.argmax(), :1])[0, :2]
         return replace(calibration, up=T[2, :3], camera_position=T[:3, 3])
+
+    def _lines_differ(self, camera: Camera) -> bool:
+        """Whether to search for the lines' direction again, which takes long: the focal length has changed."""
+        if not len(self._segments.ends_px):
+            return False
+        return abs(np.log(camera.intrinsics[0, 0] / self._focal_of_lines)) > SAME_FOCAL
 
 
 def track_of(times_s: Sequence[float], observations: Sequence[Observation]) -> Track:

@@ -15,13 +15,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...solver import Body, Fit, Measurements, Options, State, fit_tree, make_tree
+from ...solver import Body, Fit, FrameSolver, Measurements, Options, State
 from ..capture.camera.intrinsics import Camera
 from ..capture.fitting.frame_measurements import Measurer
 from ..capture.fitting.frame_sequence import LONGEST_COAST_S, is_usable
 from ..capture.fitting.prepared_track import prepare_track
 from ..capture.fitting.weights import ROBUST, cold_stages, warm_stages
-from ..capture.perception.lifter import default_lifter
+from ..capture.perception.lifter import KEYPOINT_COUNT, default_lifter
 from ..capture.perception.lifter_window import OFFSETS_S, windows_around
 from ..capture.perception.observation import Observation
 from ..capture.tracking.track import single_frame_track
@@ -45,11 +45,13 @@ class CausalFit:
 
     def __init__(self, body: Body, observation: Observation, camera: Camera, height_m: float | None = None) -> None:
         prepared = prepare_track(body, single_frame_track(observation), camera, height_m=height_m)
-        self._prepared, self._tree = prepared, make_tree(prepared.body)
+        self._prepared, self._solver = prepared, FrameSolver(prepared.body)
         self._cold, self._warm = (
             replace(ROBUST, stages=stages(prepared.weights)) for stages in (cold_stages, warm_stages)
         )
         self._camera, self._measurer = camera, prepared.measurer
+        # Confidences of joints are means of those of landmarks, here as a matrix (33, K+1).
+        self._shares = prepared.measurer.joint_confidence(np.eye(KEYPOINT_COUNT))
         self._betas: NDArray[np.floating[Any]] = np.zeros(body.P)
         self._priors = prepared.priors_with_shape(self._betas)
         self._window: deque[tuple[float, Observation]] = deque()
@@ -85,15 +87,15 @@ class CausalFit:
             restarted = self._solve(measurements, initial, self._cold)
             found = restarted if restarted.cost < found.cost else found
         self._last, self._last_s = found, time_s
-        state, confidence = found.state, observation.keypoints_confidence[None]
+        state = found.state
         return FittedFrame(
             np.concatenate([state.R_camera_root[None], state.Omega]),
             state.t_camera_root,
-            self._measurer.joint_confidence(confidence)[0],
+            observation.keypoints_confidence @ self._shares,
         )
 
     def _solve(self, measurements: Measurements, initial: State | None, options: Options) -> Fit:
-        return fit_tree(self._tree, measurements, initial, self._priors, options)
+        return self._solver.fit(measurements, initial, self._priors, options)
 
     def _measure(self, time_s: float, observation: Observation) -> Measurements:
         """Lift the observation within the window that ends with it, and convert it to measurements."""

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...solver import Body
+from ...solver import Body, make_tree
 from ..capture.world.foot_lock import LockedPoints, lock_points
 from ..capture.world.ground_plane import correct_depth, floor_probability
 from ..capture.world.placement import VISIBLE_CONFIDENCE, PlacedTrack
@@ -41,7 +41,7 @@ class FootHold:
     def __init__(self, body: Body) -> None:
         self._body = body
         self._betas: NDArray[np.floating[Any]] | None = None
-        self._with_points = body
+        self._with_points, self._tree = body, make_tree(body)
         self._visible_parts = [body.joint_names.index(n) for n in (*FOOT_PARTS, "left_wrist", "right_wrist")]
         self.reset()
 
@@ -89,12 +89,13 @@ class FootHold:
         offset = lowest * (1 - float(floor_probability(np.array(lowest)))) - float(t[2])
         held = (self._weight > 0).astype(float)
         locked = LockedPoints(((targets - t) @ R)[None], held[None], R[2], np.array([offset]))
-        new_rotations, new_root = lock_points(placed, locked)
+        new_rotations, new_root = lock_points(placed, locked, self._tree)
         return new_rotations[0], new_root[0], contact
 
     def _set_shape(self, betas: NDArray[np.floating[Any]]) -> None:
         if self._betas is None or np.abs(betas - self._betas).max(initial=0.0) > SAME_SHAPE:
             self._betas, self._with_points = betas, with_contact_points(self._body, betas)
+            self._tree = make_tree(self._with_points)
 
     def _points(
         self,

@@ -45,6 +45,14 @@ LIVE_OPTIONS = (
         argument=Argument(metavar="ADDRESS"),
     ),
     Option(
+        "vmc",
+        str,
+        None,
+        Place.LIVE,
+        "receiver of the poses in the VMC protocol, such as 127.0.0.1:39539",
+        argument=Argument(metavar="HOST:PORT"),
+    ),
+    Option(
         "reconnect_s",
         float,
         2.0,

@@ -30,6 +30,7 @@ from ....solver import (
     fit_tree,
     make_tree,
 )
+from ....solver.compiled.tree import Tree
 from ....solver.rotations import shortest_turn
 from ...kinematics.contact_points import CONTACT_POINTS, SOLES
 from ...kinematics.frame_blocks import by_blocks
@@ -112,16 +113,19 @@ def _locked_points(
     return LockedPoints((locked - t) @ R, contact, R[2], lowest * (1 - floor_probability(lowest)) - float(t[2]))
 
 
-def lock_points(placed: PlacedTrack, locked: LockedPoints) -> tuple[NDArray[np.floating[Any]], NDArray[np.float64]]:
+def lock_points(
+    placed: PlacedTrack, locked: LockedPoints, tree: Tree | None = None
+) -> tuple[NDArray[np.floating[Any]], NDArray[np.float64]]:
     """Fit each frame once more with locked points above a floor; everything else stays close to the given motion.
 
     The projections of head, arms, hips and knees keep their positions, except for wrists whose palms are locked. The
     body therefore moves along the line of sight, the least certain direction, rather than across it. Each frame is
     fitted in the axes of a camera that looks straight at the pelvis.
 
+    :param tree: of the motion's body, if it was made already.
     :return: rotations (T, K+1, 3, 3) and root positions (T, 3), camera frame.
     """
-    frames = _LockedFrames(placed, locked)
+    frames = _LockedFrames(placed, locked, tree or make_tree(placed.body))
     rotations, root = placed.rotations.copy(), np.array(placed.root, float)
     for t in np.flatnonzero(locked.weights.max(1) > MIN_CONTACT):
         turn, found = frames.turns[t], frames.fit(t)
@@ -133,10 +137,10 @@ def lock_points(placed: PlacedTrack, locked: LockedPoints) -> tuple[NDArray[np.f
 class _LockedFrames:
     """The single-frame problems of `lock_points`."""
 
-    def __init__(self, placed: PlacedTrack, locked: LockedPoints) -> None:
+    def __init__(self, placed: PlacedTrack, locked: LockedPoints, tree: Tree) -> None:
         body = placed.body
         self._placed, self._locked = placed, locked
-        self._tree = make_tree(body)
+        self._tree = tree
         self._contact_points = np.arange(len(body.keypoint_names) - len(CONTACT_POINTS), len(body.keypoint_names))
         self._visible = [body.keypoint_set("blazepose")[name] for name in _VISIBLE]
         self._points = _keypoints(body, placed, self._visible)
