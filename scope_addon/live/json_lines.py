@@ -105,7 +105,8 @@ class _Client:
             connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
             connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SEND_BUFFER_BYTES)
             connection.settimeout(_SEND_TIMEOUT_S)
-        threading.Thread(target=self._run, name="scope-live-client", daemon=True).start()
+        self._thread = threading.Thread(target=self._run, name="scope-live-client", daemon=True)
+        self._thread.start()
 
     def queue(self, data: bytes) -> None:
         self._lines.append(data)

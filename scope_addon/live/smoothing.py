@@ -8,20 +8,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .one_euro import OneEuro, RotationOneEuro
+from .low_pass import Response, RotationFilter, VectorFilter
 
-# Least cut-off frequency in Hz, and its growth per rad/s or 1/s.
-ROTATIONS = 1.5, 1.0
-DIRECTION = 2.0, 8.0  # of the pelvis, a unit vector
-DISTANCE = 0.7, 2.0  # its logarithm: an order of magnitude noisier than the direction
+MOTION = Response(stages=4, cutoff_hz=6.0, lead_s=0.08)  # delays by 26 ms
+DISTANCE = Response(stages=2, cutoff_hz=1.5)  # its logarithm: an order of magnitude noisier than the direction
 
 
 class PoseFilter:
     """Filters poses in the order of their frames; distance and direction separately, as offline."""
 
     def __init__(self) -> None:
-        self._rotations = RotationOneEuro(*ROTATIONS)
-        self._direction, self._distance = OneEuro(*DIRECTION), OneEuro(*DISTANCE)
+        self._rotations = RotationFilter(MOTION)
+        self._direction, self._distance = VectorFilter(MOTION), VectorFilter(DISTANCE)
         self._last_s = -np.inf
 
     def reset(self) -> None:
