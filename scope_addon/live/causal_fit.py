@@ -70,12 +70,15 @@ class CausalFit:
         """Continue with another shape (P,)."""
         self._betas, self._priors = betas, self._prepared.priors_with_shape(betas)
 
-    def fit(self, time_s: float, observation: Observation) -> FittedFrame | None:
+    def fit(
+        self, time_s: float, observation: Observation, root_cam: NDArray[np.floating[Any]] | None = None
+    ) -> FittedFrame | None:
         """Fit the next observation; None if it does not suffice.
 
         :param time_s: of its frame, later than that of the observation before.
+        :param root_cam: (3,) about where the pelvis is, from feet that rest on the floor, camera frame, metres.
         """
-        measurements = self._measure(time_s, observation)
+        measurements = self._measure(time_s, observation, root_cam)
         is_continued = not observation.acquired and time_s - self._last_s <= LONGEST_COAST_S
         initial = self._last.state if self._last is not None and is_continued else None
         if initial is not None:
@@ -97,7 +100,9 @@ class CausalFit:
     def _solve(self, measurements: Measurements, initial: State | None, options: Options) -> Fit:
         return self._solver.fit(measurements, initial, self._priors, options)
 
-    def _measure(self, time_s: float, observation: Observation) -> Measurements:
+    def _measure(
+        self, time_s: float, observation: Observation, root_cam: NDArray[np.floating[Any]] | None
+    ) -> Measurements:
         """Lift the observation within the window that ends with it, and convert it to measurements."""
         if observation.acquired:  # maybe of somebody else
             self._window.clear()
@@ -111,4 +116,4 @@ class CausalFit:
         world = np.array([o.world_landmarks for o in seen])
         windows, rays = windows_around(times, np.ones(len(times), bool)), self._measurer.rays(pixels)
         lifted = default_lifter().lift_mixture(rays, confidence, world, windows, rows=np.array([len(seen) - 1]))
-        return self._measurer.measure(pixels[-1], confidence[-1], lifted.points[0], lifted.sigma_along[0])
+        return self._measurer.measure(pixels[-1], confidence[-1], lifted.points[0], lifted.sigma_along[0], root_cam)

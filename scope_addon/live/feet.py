@@ -53,6 +53,11 @@ class FootHold:
         self._is_held = np.zeros(n, bool)
         self._weight = np.zeros(n)  # 1: at the anchor; it decreases while the point is let go
 
+    @property
+    def is_holding(self) -> bool:
+        """Whether a foot or palm was held in the last frame."""
+        return bool(self._is_held.any())
+
     def hold(
         self,
         time_s: float,

@@ -114,12 +114,20 @@ class LiveSession:
             self._fit = CausalFit(self._body, observation, self._current.camera, self._height_m)
             self._fit.set_shape(self._current.betas)
             self._first_s, self._calibrations = time_s, 1
-        fitted = self._fit.fit(time_s, observation)
+        fitted = self._fit.fit(time_s, observation, self._root_of_feet(time_s))
         if fitted is not None:
             self._seen.append(_Seen(time_s, observation, fitted))
             while self._seen[0].time_s < time_s - FOLLOWED_S:
                 self._seen.popleft()
         return fitted
+
+    def _root_of_feet(self, time_s: float) -> NDArray[np.floating[Any]] | None:
+        """Return about where the pelvis is, camera frame, if feet rested on the floor in the frame before.
+
+        The size of a body in the picture does not tell a squat from a step back, but feet at rest do.
+        """
+        is_recent = time_s - self._last_seen_s < HOLD_S
+        return self._last.root_cam if self._last is not None and is_recent and self._feet.is_holding else None
 
     def _settle(self, time_s: float) -> None:
         """Start estimates that are due, take those that are done, and approach the newest one."""

@@ -11,7 +11,9 @@ from numpy.typing import NDArray
 from .low_pass import Response, RotationFilter, VectorFilter
 
 MOTION = Response(stages=4, cutoff_hz=6.0, lead_s=0.08)  # delays by 26 ms
-DISTANCE = Response(stages=2, cutoff_hz=1.5)  # its logarithm: an order of magnitude noisier than the direction
+DISTANCE = Response(
+    stages=3, cutoff_hz=2.0, lead_s=0.18
+)  # its logarithm: an order of magnitude noisier than the direction
 
 
 class PoseFilter:
