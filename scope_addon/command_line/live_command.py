@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import UsageError
-from ..installed import CAPTURE, check_installed
+from ..installed import CAPTURE, check_installed, check_live
 from ..options import Place, options_at
 from .arguments import add_options, option_values
 from .memory_limit import check_memory_limit
@@ -39,6 +39,7 @@ def run_live_command(args: argparse.Namespace) -> dict[str, Any]:
 
     :raises ScopeError: an argument is invalid, the source cannot be read, or an output failed.
     """
+    check_live()
     values = option_values(args, Place.LIVE)
     check_installed(CAPTURE if values["vmc"] is None else (*CAPTURE, "pythonosc"))
     check_memory_limit(with_scene=False)
@@ -47,7 +48,7 @@ def run_live_command(args: argparse.Namespace) -> dict[str, Any]:
         check_outputs([values["record"]], None, Path(args.source))
     # Imported here, so that errors in the arguments are printed immediately.
     from ...solver.loaders.body_file import load_body
-    from ..live.recording import Recording
+    from ..live.outputs.recording import Recording
     from ..live.run import Listeners, run_live
     from ..live.sources import open_source
 
@@ -105,13 +106,13 @@ def _outputs(values: Mapping[str, Any], body: Body, stack: ExitStack) -> list[Ou
     """
     outputs: list[Output] = []
     if values["json_port"] is not None:
-        from ..live.json_lines import JsonServer
+        from ..live.outputs.json_lines import JsonServer
 
         server = stack.enter_context(JsonServer(body, values["listen"], values["json_port"]))
         say(f"lines of JSON on {values['listen']} port {server.port}")
         outputs.append(server)
     if values["vmc"] is not None:
-        from ..live.vmc import VmcSender, parse_address
+        from ..live.outputs.vmc import VmcSender, parse_address
 
         outputs.append(stack.enter_context(VmcSender(body, *parse_address(values["vmc"]))))
     return outputs

@@ -92,7 +92,7 @@ class Calibrator:
         self._focal_of_lines = 1e-9  # for which that was estimated
 
     def look_at(self, image_rgb: NDArray[np.uint8], observation: Observation) -> None:
-        """Find the edges of the background in a frame in which somebody is seen."""
+        """Find the edges of the background in a frame (H, W, 3) in which somebody is seen."""
         people, bars = [observation.keypoints_px], find_bars(image_rgb)
         self._segments = find_segments(image_rgb, people, bars=bars)
         if self._given.focal_deviation > 0.0:
@@ -142,7 +142,7 @@ class Calibrator:
         """Whether to search for the lines' direction again, which takes long: the focal length has changed."""
         if not len(self._segments.ends_px):
             return False
-        return abs(np.log(camera.intrinsics[0, 0] / self._focal_of_lines)) > SAME_FOCAL
+        return bool(abs(np.log(camera.intrinsics[0, 0] / self._focal_of_lines)) > SAME_FOCAL)
 
 
 def track_of(times_s: Sequence[float], observations: Sequence[Observation]) -> Track:

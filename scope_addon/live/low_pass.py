@@ -61,7 +61,8 @@ class VectorFilter:
         share, before = self._response.share(step_s), self._values[-1]
         for k, state in enumerate(self._values):
             self._values[k] = x = state + share * (x - state)
-        return x + self._response.lead_s / step_s * (x - before)
+        moved: NDArray[np.float64] = x + self._response.lead_s / step_s * (x - before)
+        return moved
 
 
 class RotationFilter:
@@ -81,16 +82,21 @@ class RotationFilter:
         :param R: (J, 3, 3).
         :param step_s: seconds since the rotations before.
         """
-        x = np.array(R, float)
+        x: NDArray[np.float64] = np.array(R, float)
         if not self._values or not 0.0 < step_s <= LONGEST_STEP_S:
             self._values = [x] * self._response.stages
             return x
         share, before = self._response.share(step_s), self._values[-1]
         for k, state in enumerate(self._values):
-            x = rotations.nearest_rotation(state @ rotations.exp(share * _between(state, x)))
-            self._values[k] = x
+            self._values[k] = x = _nearest(state @ rotations.exp(share * _between(state, x)))
         moved: NDArray[np.float64] = x @ rotations.exp(self._response.lead_s / step_s * _between(before, x))
         return moved
+
+
+def _nearest(matrices: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the rotations nearest to matrices (J, 3, 3), without what rounding has added up."""
+    nearest: NDArray[np.float64] = rotations.nearest_rotation(matrices)
+    return nearest
 
 
 def _between(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -116,7 +116,10 @@ class StreamSource:
         self.focal_35mm: float | None = None
 
     def pictures(self, clock: Clock) -> Iterator[Picture]:
-        """See `Source`."""
+        """See `Source`.
+
+        :raises VideoError: it cannot be opened, carries no video, or was interrupted.
+        """
         import av
 
         container = self._open()
@@ -174,7 +177,10 @@ class CameraSource:
             raise VideoError(f"{self.name} does not exist; there are {', '.join(found) or 'no cameras'}")
 
     def pictures(self, clock: Clock) -> Iterator[Picture]:
-        """See `Source`."""
+        """See `Source`.
+
+        :raises VideoError: it cannot be opened, or gives no more frames.
+        """
         capture = self._open()
         try:
             index = 0

@@ -17,10 +17,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...solver import Body
-from ...solver.rotations import quaternion_from_matrix
-from ..errors import OutputError
-from .pose import LivePose
+from ....solver import Body
+from ....solver.rotations import quaternion_from_matrix
+from ...errors import OutputError
+from ..pose import LivePose
 
 VERSION = 1
 MOST_CLIENTS = 16

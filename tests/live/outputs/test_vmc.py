@@ -7,8 +7,7 @@ import struct
 import numpy as np
 import pytest
 from scope.scope_addon.errors import OutputError, UsageError
-from scope.scope_addon.live.pose import LivePose, Presence
-from scope.scope_addon.live.vmc import (
+from scope.scope_addon.live.outputs.vmc import (
     BONES,
     LARGEST_DATAGRAM,
     VmcSender,
@@ -16,6 +15,7 @@ from scope.scope_addon.live.vmc import (
     unity_position,
     unity_quaternion,
 )
+from scope.scope_addon.live.pose import LivePose, Presence
 from scope.solver import rotations
 
 R_WORLD_MODEL = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])

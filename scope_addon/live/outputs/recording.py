@@ -15,21 +15,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...solver import Body
-from ..capture.camera.intrinsics import Camera
-from ..capture.camera.line_segments import Lines
-from ..capture.fitting.frame_sequence import FittedTrack
-from ..capture.perception.landmark_network import KEYPOINT_COUNT
-from ..capture.tracking.track import Track
-from ..capture.world.assemble import assemble_motion
-from ..capture.world.camera_path import CameraPath
-from ..capture.world.placement import place_track
-from ..capture.world.shot import FittedPerson, Shot
-from ..errors import NoPersonError
-from ..motion import Motion
-from .pose import LivePose, Presence
-from .session import LiveSession
-from .sources import Source
+from ....solver import Body
+from ...capture.camera.intrinsics import Camera
+from ...capture.camera.line_segments import Lines
+from ...capture.fitting.frame_sequence import FittedTrack
+from ...capture.perception.landmark_network import KEYPOINT_COUNT
+from ...capture.tracking.track import Track
+from ...capture.world.assemble import assemble_motion
+from ...capture.world.camera_path import CameraPath
+from ...capture.world.placement import place_track
+from ...capture.world.shot import FittedPerson, Shot
+from ...errors import NoPersonError
+from ...motion import Motion
+from ..pose import LivePose, Presence
+from ..session import LiveSession
+from ..sources import Source
 
 
 class Recording:

@@ -22,11 +22,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...solver import Body
-from ...solver.rotations import quaternion_from_matrix
-from ..errors import OutputError, UsageError
-from ..kinematics.axes import R_WORLD_MODEL
-from .pose import LivePose, Presence
+from ....solver import Body
+from ....solver.rotations import quaternion_from_matrix
+from ...errors import OutputError, UsageError
+from ...kinematics.axes import R_WORLD_MODEL
+from ..pose import LivePose, Presence
 
 if TYPE_CHECKING:
     from pythonosc.osc_message import OscMessage
@@ -140,7 +140,7 @@ def datagrams(messages: list[OscMessage]) -> list[bytes]:
         if size + message.size + 4 > LARGEST_DATAGRAM:
             bundles.append(OscBundleBuilder(IMMEDIATELY))
             size = 16  # of an empty bundle
-        bundles[-1].add_content(message)  # type: ignore[arg-type]  # the library's annotation leaves messages out
+        bundles[-1].add_content(message)
         size += message.size + 4
     return [bundle.build().dgram for bundle in bundles]
 
