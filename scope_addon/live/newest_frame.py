@@ -35,6 +35,7 @@ class NewestFrame:
         self._newest: Picture | None = None
         self._error: BaseException | None = None
         self._is_over = False
+        self._said = ""  # what was said of the interruption that lasts
         self._next_index, self._last_s, self._began_s = 0, 0.0, 0.0
         self.received = self.dropped = 0
         self._thread = threading.Thread(target=self._run, name="scope-live-source", daemon=True)
@@ -96,12 +97,15 @@ class NewestFrame:
             if not self.received:
                 raise VideoError(f"{self._source.name} gave no frames; check that it shows a picture")
             return True
-        self._say(f"{problem}; connecting again in {self._reconnect_s:g} s")
+        if problem != self._said:  # once, not at every attempt
+            self._said = problem
+            self._say(f"{problem}; connecting again in {self._reconnect_s:g} s")
         return False
 
     def _give(self, picture: Picture, is_first: bool) -> None:
         """Replace the newest frame, with its number and time in the whole capture."""
         if is_first:
+            self._said = ""
             self._first_index = self._next_index
             if not self.received:
                 self._began_s = 0.0 if self._source.ends else picture.timestamp_s

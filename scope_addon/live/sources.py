@@ -211,4 +211,5 @@ class CameraSource:
 
 
 def _reason(error: Exception) -> str:
-    return str(getattr(error, "strerror", None) or error).lower()
+    text = str(getattr(error, "strerror", None) or error).lower()
+    return f"nothing came for {STALLED_S:g} s" if "immediate exit" in text else text  # as FFmpeg calls a timeout

@@ -16,6 +16,7 @@ class FakeClock(Clock):
         super().__init__()
         self.time_s = 100.0
         self.slept = []
+        self.stop_after = None  # sleeps
 
     def now(self):
         return self.time_s
@@ -23,6 +24,8 @@ class FakeClock(Clock):
     def sleep(self, seconds):
         self.slept.append(seconds)
         self.time_s += max(seconds, 0.0)
+        if len(self.slept) == self.stop_after:
+            self.stopped.set()
 
 
 class FakeSource:

@@ -54,6 +54,16 @@ def test_an_interrupted_source_is_opened_again_and_numbers_and_times_continue():
     assert 3.0 in clock.slept
 
 
+def test_an_interruption_that_lasts_is_said_once():
+    said, clock = [], FakeClock()
+    source = FakeSource([0.0])  # and then it cannot be opened any more
+    clock.stop_after = 5
+    with NewestFrame(source, clock, reconnect_s=1.0, say=said.append) as reader:
+        all_taken(reader)
+    assert source.opened > 3
+    assert said == ["fake has ended; connecting again in 1 s", "fake is gone; connecting again in 1 s"]
+
+
 def test_every_opened_source_is_closed():
     source = FakeSource([0.0], ends=True)
     with NewestFrame(source, FakeClock()) as reader:

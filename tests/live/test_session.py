@@ -20,7 +20,7 @@ from scope.scope_addon.live.pose import Presence
 from scope.scope_addon.live.session import HOLD_S, LiveSession
 from scope.scope_addon.motion import Motion
 
-FRAMES, EMPTY = 46, 18  # one and a half seconds, and frames without a person after them
+FRAMES, EMPTY = 46, 8  # one and a half seconds, and frames without a person after them, a tenth of a second apart
 
 
 @pytest.fixture(scope="module")
@@ -28,7 +28,7 @@ def frames():
     with open_video(SAMPLE) as video:
         seen = list(islice(video, FRAMES))
     grey = np.full_like(seen[0].image_rgb, 128)
-    return seen + [Frame(FRAMES + k, (FRAMES + k) / 30, grey) for k in range(EMPTY)]
+    return seen + [Frame(FRAMES + k, FRAMES / 30 + k / 10, grey) for k in range(EMPTY)]
 
 
 def session_of(body, frames):
