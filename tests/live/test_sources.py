@@ -45,31 +45,6 @@ def test_a_stream_is_read_and_after_its_end_read_again(pictures):
     assert said[0].endswith("connecting again in 0.05 s")
 
 
-def test_a_stream_never_opens_files_of_this_computer(tmp_path, pictures):
-    """A playlist that a server gives may name any address; FFmpeg would open it."""
-    from http.server import BaseHTTPRequestHandler, HTTPServer
-    from threading import Thread
-
-    playlist = f"#EXTM3U\n#EXT-X-TARGETDURATION:1\n#EXTINF:1,\nfile://{SAMPLE}\n#EXT-X-ENDLIST\n".encode()
-
-    class Handler(BaseHTTPRequestHandler):
-        def do_GET(self):
-            self.send_response(200)
-            self.send_header("Content-Type", "application/vnd.apple.mpegurl")
-            self.end_headers()
-            self.wfile.write(playlist)
-
-        def log_message(self, *_):
-            pass
-
-    with HTTPServer(("127.0.0.1", 0), Handler) as server:
-        Thread(target=server.serve_forever, kwargs={"poll_interval": 0.02}, daemon=True).start()
-        source = open_source(f"http://127.0.0.1:{server.server_port}/list.m3u8")
-        with pytest.raises(VideoError):
-            next(iter(source.pictures(Clock())))
-        server.shutdown()
-
-
 @pytest.mark.parametrize(
     ("text", "message"),
     [
