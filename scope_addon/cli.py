@@ -21,6 +21,7 @@ from ..solver.errors import ScopeError
 from ..solver.loaders.body_file import ASSETS
 from .command_line.arguments import add_options, body_and_options, non_default_arguments, path_argument
 from .command_line.import_command import add_import
+from .command_line.live_command import add_live
 from .command_line.memory_limit import check_memory_limit
 from .command_line.outputs import (
     MOTION_SUFFIXES,
@@ -72,6 +73,7 @@ def build_parser() -> argparse.ArgumentParser:
     _add_batch_files(batch)
     add_options(batch)
     add_import(commands.add_parser("import", help="convert a motion file, of Scope or of another SMPL-based tool"))
+    add_live(commands.add_parser("live", help="capture a camera, a stream or a playing video while it runs"))
     return parser
 
 

@@ -10,7 +10,19 @@ from importlib.util import find_spec
 from .errors import SetupError
 
 CAPTURE = ("cv2", "onnxruntime", "av")
-EXTRAS = {**dict.fromkeys(CAPTURE, "capture"), "bpy": "bpy"}
+EXTRAS = {**dict.fromkeys(CAPTURE, "capture"), "bpy": "bpy", "pythonosc": "live"}
+
+
+def check_live() -> None:
+    """Check that this installation can capture live.
+
+    :raises SetupError: it is Blender's extension, which contains nothing that uses the network.
+    """
+    if find_spec(f"{__package__}.live") is None:
+        raise SetupError(
+            "Blender's extension cannot capture live; use ./scripts/live in the repository, or install the package: "
+            "pip install 'scope-mocap[capture,live]'"
+        )
 
 
 def check_installed(modules: Sequence[str]) -> None:

@@ -68,6 +68,26 @@ class ProgressBar:
             self.stream.write(_CLEAR_LINE)
 
 
+class ProgressLine:
+    """One line of text that is replaced by the next one, on a terminal; silent elsewhere."""
+
+    def __init__(self, stream: TextIO, *, show: bool) -> None:
+        self.stream, self.show = stream, show and stream.isatty()
+
+    def __call__(self, text: str) -> None:
+        """Show a text."""
+        if self.show:
+            self.stream.write(f"{_CLEAR_LINE}{text[:100]}")
+            self.stream.flush()
+
+    def __enter__(self) -> ProgressLine:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self.show:
+            self.stream.write(_CLEAR_LINE)
+
+
 @contextmanager
 def stdout_for_report() -> Iterator[TextIO]:
     """Redirect everything that libraries print to stdout, including from C, to stderr.

@@ -4,19 +4,27 @@
 The arguments of the command line (`command_line.arguments`), the request to the worker (`job.request`), and the
 properties of the panel and of the preferences (`ui.declared_properties`) are made from these records. The typed fields
 of `capture.options.CaptureOptions` take their defaults from them; a test compares the two. To add an option, add a
-record to `capture`, `networks`, `output` or `motion_import`.
+record to `capture`, `networks`, `output`, `motion_import` or `live`.
 """
 
 from __future__ import annotations
 
 from .capture import CAPTURE_OPTIONS
+from .live import LIVE_OPTIONS
 from .motion_import import IMPORT_OPTIONS
 from .networks import NETWORK_OPTIONS
 from .output import OUTPUT_OPTIONS, REPORT_OPTIONS
 from .record import Argument, Choice, Option, Place, Property
 
 # In the order of the command line's help.
-OPTIONS: tuple[Option, ...] = (*CAPTURE_OPTIONS, *OUTPUT_OPTIONS, *NETWORK_OPTIONS, *IMPORT_OPTIONS, *REPORT_OPTIONS)
+OPTIONS: tuple[Option, ...] = (
+    *CAPTURE_OPTIONS,
+    *OUTPUT_OPTIONS,
+    *NETWORK_OPTIONS,
+    *IMPORT_OPTIONS,
+    *LIVE_OPTIONS,
+    *REPORT_OPTIONS,
+)
 
 __all__ = ["OPTIONS", "Argument", "Choice", "Option", "Place", "Property", "option", "options_at"]
 

@@ -130,16 +130,23 @@ OUTPUT_OPTIONS = (
     ),
 )
 
+_REPORTING = Place.COMMAND_LINE | Place.IMPORT | Place.LIVE
+
 REPORT_OPTIONS = (
     Option(
         "json",
         bool,
         False,
-        Place.COMMAND_LINE | Place.IMPORT,
+        _REPORTING,
         "print a machine-readable report on stdout",
         argument=Argument(inherited=False),
     ),
     Option(
-        "quiet", bool, False, Place.COMMAND_LINE | Place.IMPORT, "no progress bar", argument=Argument(inherited=False)
+        "quiet",
+        bool,
+        False,
+        _REPORTING,
+        "no progress bar",
+        argument=Argument(inherited=False),
     ),
 )

@@ -22,6 +22,7 @@ class Place(enum.Flag):
     PREFERENCES = enum.auto()  # a property of the extension's preferences
     EXPORT = enum.auto()  # a property of the export operator
     IMPORT = enum.auto()  # an argument of the command that imports motion files
+    LIVE = enum.auto()  # an argument of the command that captures a camera or stream
 
 
 class Choice(NamedTuple):

@@ -186,6 +186,7 @@ class Lifter:
         confidence: NDArray[np.floating[Any]],
         world: NDArray[np.floating[Any]],
         windows: Windows | None = None,
+        rows: NDArray[np.intp] | None = None,
     ) -> Lifted:
         """Mix the estimates with and without world landmarks, which is more accurate on real clips than either.
 
@@ -193,6 +194,7 @@ class Lifter:
         :param confidence: (T, 33) 0..1.
         :param world: (T, 33, 3) world landmarks in metres, hip-centred.
         :param windows: of the frames around each; None if every frame is a still.
+        :param rows: (n,) the frames to lift, ascending; None: all.
         :raises ShapeError: an array has the wrong shape.
         """
         around = _windows(rays, confidence, windows)
@@ -204,7 +206,7 @@ class Lifter:
             mixed = mixture([with_world, self._lift(x, R)], [WORLD_SHARE, 1 - WORLD_SHARE], R)
             return mixed.points, mixed.sigma_across, mixed.sigma_along
 
-        return Lifted(*by_blocks(lift, np.arange(len(rays))))
+        return Lifted(*by_blocks(lift, np.arange(len(rays)) if rows is None else rows))
 
     def _lift(self, x: NDArray[np.float32], R_virtual_camera: NDArray[np.floating[Any]]) -> Lifted:
         points, log_sigma = self.run(x)

@@ -1,0 +1,127 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The command that captures a camera, a stream or a playing video while it runs."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Mapping
+from contextlib import ExitStack
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ..errors import UsageError
+from ..installed import CAPTURE, check_installed, check_live
+from ..options import Place, options_at
+from .arguments import add_options, option_values
+from .memory_limit import check_memory_limit
+from .outputs import MOTION_SUFFIXES, check_outputs
+from .terminal import ProgressLine, say
+
+if TYPE_CHECKING:
+    from ...solver.body import Body
+    from ..live.run import LiveOptions, Output
+
+
+def add_live(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of ``scope live``."""
+    parser.add_argument(
+        "source",
+        metavar="SOURCE",
+        help="camera number or device, stream (rtsp://, http://, ...), or video, which is played in real time",
+    )
+    add_options(parser, Place.LIVE)
+    parser.set_defaults(run=run_live_command)
+
+
+def run_live_command(args: argparse.Namespace) -> dict[str, Any]:
+    """Run ``scope live`` until the source ends or Ctrl-C; return the report.
+
+    :raises ScopeError: an argument is invalid, the source cannot be read, or an output failed.
+    """
+    check_live()
+    values = option_values(args, Place.LIVE)
+    check_installed(CAPTURE if values["vmc"] is None else (*CAPTURE, "pythonosc"))
+    check_memory_limit(with_scene=False)
+    options = _checked(values)
+    if values["record"]:
+        check_outputs([values["record"]], Path(args.source))
+    # Imported here, so that errors in the arguments are printed immediately.
+    from ...solver.loaders.body_file import load_body
+    from ..live.outputs.recording import Recording
+    from ..live.run import Listeners, run_live
+    from ..live.sources import open_source
+
+    source, body = open_source(args.source), load_body(values["body"])
+    with ExitStack() as stack:
+        outputs = _outputs(values, body, stack)
+        recording = Recording(values["record"], body, source) if values["record"] else None
+        if recording:
+            outputs.append(recording)
+        line = stack.enter_context(ProgressLine(sys.stderr, show=not args.quiet))
+        begin = recording.begin if recording else lambda *_: None
+        report = run_live(source, body, options, outputs, Listeners(say, line, begin))
+    report["outputs"] = [str(recording.save())] if recording else []
+    if not args.json:
+        say(_summary(report))
+    return report
+
+
+def _checked(values: Mapping[str, Any]) -> LiveOptions:
+    """Check the options as far as possible without opening the source.
+
+    :raises UsageError: a value is out of its range, or contradicts another.
+    """
+    for option in options_at(Place.LIVE):
+        if problem := option.range_error(values[option.name]):
+            raise UsageError(f"{option.flag} {problem}")
+    if values["record"] and values["record"].suffix.lower() not in MOTION_SUFFIXES:
+        raise UsageError(f"--record writes a motion file: give a name that ends in .npz, not {values['record'].name}")
+    if len(values["heights_m"]) > 1:
+        raise UsageError("a live capture follows one person: give one --height")
+    from ..capture.camera.calibration import read_calibration
+    from ..capture.camera.intrinsics import choose_camera
+    from ..live.run import LiveOptions
+
+    if values["focal_mm"] is not None or values["fov_deg"] is not None:
+        choose_camera(1, 1, focal_mm=values["focal_mm"], fov_deg=values["fov_deg"], calibration=values["calibration"])
+    elif values["calibration"]:
+        read_calibration(values["calibration"])
+    return LiveOptions(
+        values["live_quality"],
+        next(iter(values["heights_m"]), None),
+        values["focal_mm"],
+        values["fov_deg"],
+        values["calibration"],
+        values["threads"],
+        values["provider"],
+        values["reconnect_s"],
+    )
+
+
+def _outputs(values: Mapping[str, Any], body: Body, stack: ExitStack) -> list[Output]:
+    """Open the outputs; the stack closes them.
+
+    :raises ScopeError: one cannot be opened.
+    """
+    outputs: list[Output] = []
+    if values["json_port"] is not None:
+        from ..live.outputs.json_lines import JsonServer
+
+        server = stack.enter_context(JsonServer(body, values["listen"], values["json_port"]))
+        say(f"lines of JSON on {values['listen']} port {server.port}")
+        outputs.append(server)
+    if values["vmc"] is not None:
+        from ..live.outputs.vmc import VmcSender, parse_address
+
+        outputs.append(stack.enter_context(VmcSender(body, *parse_address(values["vmc"]))))
+    return outputs
+
+
+def _summary(report: Mapping[str, Any]) -> str:
+    latency = report["latency_ms"]
+    return (
+        f"{report['poses']} poses, {report['poses_per_second']:g}/s, latency {latency['median']:.0f} ms"
+        f" (p95 {latency['p95']:.0f} ms), {report['dropped']} of {report['frames']} frames dropped"
+        + "".join(f"; wrote {path}" for path in report["outputs"])
+    )

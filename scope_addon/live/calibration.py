@@ -1,0 +1,155 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Focal length, shape, up direction and floor from what was seen so far, by the offline stages.
+
+They are estimated from a growing set of observations during the first two seconds. After that, focal length and shape
+stay as they are, and the world follows the last seconds slowly.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...solver import Body
+from ..capture.camera.bars import find_bars, longer_content_side
+from ..capture.camera.intrinsics import Camera, assumed_camera
+from ..capture.camera.line_segments import Segments, find_segments
+from ..capture.camera.verticals import estimate_up_from_lines
+from ..capture.fitting.focal_fits import FocalFits
+from ..capture.fitting.focal_length import camera_by_edges, camera_by_fits
+from ..capture.fitting.frame_sequence import FittedTrack
+from ..capture.fitting.prepared_track import prepare_track
+from ..capture.fitting.track_fit import fit_track
+from ..capture.perception.observation import Observation
+from ..capture.tracking.track import Track, Tracklet, make_track
+from ..capture.world.placement import place_track
+from ..capture.world.world_frame import find_world, floor_height
+from ..kinematics.axes import transform_points, world_from_level_camera
+from ..kinematics.contact_points import SOLES
+
+SAME_FOCAL = 0.02  # relative difference of focal lengths, for which the lines of the background point alike
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """What all frames share: camera, shape, and the world as up direction, height and horizontal position."""
+
+    camera: Camera
+    betas: NDArray[np.floating[Any]]  # (P,)
+    up: NDArray[np.floating[Any]]  # (3,) unit, camera axes
+    camera_position: NDArray[np.floating[Any]]  # (3,) metres, world
+
+    @property
+    def T_world_camera(self) -> NDArray[np.float64]:
+        """The (4, 4) camera pose."""
+        T = world_from_level_camera(self.up)
+        T[:3, 3] = self.camera_position
+        return T
+
+    def towards(self, target: Calibration, share: float, share_of_world: float) -> Calibration:
+        """Return the calibration that lies between this one and another.
+
+        :param share: of the way to the other one, 0..1, for focal length (its logarithm) and shape.
+        :param share_of_world: the same for the world.
+        """
+        up = self.up + share_of_world * (target.up - self.up)
+        return Calibration(
+            _between(self.camera, target.camera, share),
+            self.betas + share * (target.betas - self.betas),
+            up / np.linalg.norm(up),
+            self.camera_position + share_of_world * (target.camera_position - self.camera_position),
+        )
+
+
+def _between(camera: Camera, target: Camera, share: float) -> Camera:
+    ratio = target.intrinsics[0, 0] / camera.intrinsics[0, 0]
+    if share >= 1.0 or abs(ratio - 1) < 1e-4:
+        return target
+    intrinsics = camera.intrinsics.copy()
+    intrinsics[[0, 1], [0, 1]] *= ratio**share
+    return replace(target, intrinsics=intrinsics)
+
+
+class Calibrator:
+    """Estimates the calibration; calls must not overlap, but may come from another thread.
+
+    :param camera: as known from the user or the source.
+    :param height_m: the person's stature, if it is known, metres.
+    """
+
+    def __init__(self, body: Body, camera: Camera, size: tuple[int, int], height_m: float | None = None) -> None:
+        self._body, self._given, self._size, self._height_m = body, camera, size, height_m
+        self._fits = FocalFits(body)
+        self._costs: list[NDArray[np.float64]] = []
+        self._longer_px = float(max(size))
+        self._by_edges = camera
+        self._segments = Segments.none()
+        self._up_of_lines: NDArray[np.float64] | None = None
+        self._focal_of_lines = 1e-9  # for which that was estimated
+
+    def look_at(self, image_rgb: NDArray[np.uint8], observation: Observation) -> None:
+        """Find the edges of the background in a frame (H, W, 3) in which somebody is seen."""
+        people, bars = [observation.keypoints_px], find_bars(image_rgb)
+        self._segments = find_segments(image_rgb, people, bars=bars)
+        if self._given.focal_deviation > 0.0:
+            self._longer_px = longer_content_side(bars, *self._size)
+            self._by_edges = camera_by_edges(self._segments, *self._size, self._longer_px)
+
+    def estimate(self, times_s: Sequence[float], observations: Sequence[Observation]) -> Calibration:
+        """Estimate everything from all observations so far, at least one."""
+        if self._given.focal_deviation > 0.0:
+            assumed = assumed_camera(*self._size, self._longer_px)
+            for time_s, observation in zip(times_s, observations, strict=True):
+                if self._fits.is_due(time_s) and (costs := self._fits.costs(observation, assumed)) is not None:
+                    self._costs.append(costs)
+            camera = camera_by_fits(self._by_edges, assumed, self._costs, self._longer_px)
+        else:
+            camera = self._given
+        track = track_of(times_s, observations)
+        prepared = prepare_track(self._body, track, camera, height_m=self._height_m)
+        fitted = fit_track(prepared, lambda *_: None)
+        return self._with_world(Calibration(camera, fitted.betas, np.zeros(3), np.zeros(3)), track, fitted)
+
+    def follow(self, calibration: Calibration, track: Track, fitted: FittedTrack) -> Calibration:
+        """Estimate the floor's inclination and height again, from the last seconds.
+
+        The horizontal position stays: nothing in the picture says where the origin was.
+        """
+        found = self._with_world(calibration, track, fitted)
+        position = calibration.camera_position.copy()
+        position[2] = found.camera_position[2]
+        return replace(calibration, up=found.up, camera_position=position)
+
+    def _with_world(self, calibration: Calibration, track: Track, fitted: FittedTrack) -> Calibration:
+        """Add the world: as offline where no lines tell which way is up, otherwise with their direction."""
+        placed = place_track(self._body, track, fitted, smoothing=True)
+        T = find_world([placed]).T_world_camera
+        if self._lines_differ(calibration.camera):
+            self._up_of_lines = estimate_up_from_lines(self._segments.lines(calibration.camera), T[2, :3]).up
+            self._focal_of_lines = float(calibration.camera.intrinsics[0, 0])
+        if self._up_of_lines is not None:
+            up, valid = self._up_of_lines, placed.valid
+            contact = placed.contact(up)[valid, : len(SOLES)]
+            T = world_from_level_camera(up, -floor_height(placed.soles[valid], contact, up))
+            T[:2, 3] -= transform_points(T, placed.joints[valid.argmax(), :1])[0, :2]
+        return replace(calibration, up=T[2, :3], camera_position=T[:3, 3])
+
+    def _lines_differ(self, camera: Camera) -> bool:
+        """Whether to search for the lines' direction again, which takes long: the focal length has changed."""
+        if not len(self._segments.ends_px):
+            return False
+        return bool(abs(np.log(camera.intrinsics[0, 0] / self._focal_of_lines)) > SAME_FOCAL)
+
+
+def track_of(times_s: Sequence[float], observations: Sequence[Observation]) -> Track:
+    """Make a track of frames in all of which the person was seen."""
+    tracklet = Tracklet()
+    for row, observation in enumerate(observations):
+        tracklet.add(row, replace(observation, reference_landmarks=None, hands=None, mask=None))
+    track = make_track(range(len(times_s)), times_s, [tracklet])
+    track.acquired[:] = [observation.acquired for observation in observations]
+    return track

@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The body fitted to one observation after another, each from the state of the one before.
+
+The lifting network's window ends with the newest frame, which stands for the samples after it: at the end of a clip,
+it is the same (see `lifter_window`). A frame whose fit contradicts the lifter is fitted again with the stages of a
+cold start, and keeps the fit of lower cost, as in `frame_sequence`; earlier frames stay as they were given.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...solver import Body, Fit, FrameSolver, Measurements, Options, State
+from ..capture.camera.intrinsics import Camera
+from ..capture.fitting.frame_measurements import Measurer
+from ..capture.fitting.frame_sequence import LONGEST_COAST_S, is_usable
+from ..capture.fitting.prepared_track import prepare_track
+from ..capture.fitting.weights import ROBUST, cold_stages, warm_stages
+from ..capture.perception.lifter import KEYPOINT_COUNT, default_lifter
+from ..capture.perception.lifter_window import OFFSETS_S, windows_around
+from ..capture.perception.observation import Observation
+from ..capture.tracking.track import single_frame_track
+
+
+@dataclass(frozen=True)
+class FittedFrame:
+    """The state of one frame in its camera, and how far it was measured."""
+
+    rotations: NDArray[np.floating[Any]]  # (K+1, 3, 3); row 0 R_camera_root
+    root_cam: NDArray[np.floating[Any]]  # (3,) the pelvis, metres
+    joint_confidence: NDArray[np.floating[Any]]  # (K+1,) 0..1
+
+
+class CausalFit:
+    """Fits observations in order.
+
+    :param observation: the first one, from which only what every frame shares is prepared.
+    :param height_m: the person's stature, if it is known, metres.
+    """
+
+    def __init__(self, body: Body, observation: Observation, camera: Camera, height_m: float | None = None) -> None:
+        prepared = prepare_track(body, single_frame_track(observation), camera, height_m=height_m)
+        self._prepared, self._solver = prepared, FrameSolver(prepared.body)
+        self._cold, self._warm = (
+            replace(ROBUST, stages=stages(prepared.weights)) for stages in (cold_stages, warm_stages)
+        )
+        self._camera, self._measurer = camera, prepared.measurer
+        # Confidences of joints are means of those of landmarks, here as a matrix (33, K+1).
+        self._shares = prepared.measurer.joint_confidence(np.eye(KEYPOINT_COUNT))
+        self._betas: NDArray[np.floating[Any]] = np.zeros(body.P)
+        self._priors = prepared.priors_with_shape(self._betas)
+        self._window: deque[tuple[float, Observation]] = deque()
+        self._last: Fit | None = None
+        self._last_s = -np.inf
+
+    def set_camera(self, camera: Camera) -> None:
+        """Continue with another focal length; the person's distance changes in proportion."""
+        ratio = camera.intrinsics[0, 0] / self._camera.intrinsics[0, 0]
+        self._camera, self._measurer = camera, Measurer(self._prepared.body, camera.intrinsics)
+        if self._last is not None:
+            state = self._last.state
+            self._last = replace(self._last, state=replace(state, t_camera_root=state.t_camera_root * [1, 1, ratio]))
+
+    def set_shape(self, betas: NDArray[np.floating[Any]]) -> None:
+        """Continue with another shape (P,)."""
+        self._betas, self._priors = betas, self._prepared.priors_with_shape(betas)
+
+    def fit(
+        self, time_s: float, observation: Observation, root_cam: NDArray[np.floating[Any]] | None = None
+    ) -> FittedFrame | None:
+        """Fit the next observation; None if it does not suffice.
+
+        :param time_s: of its frame, later than that of the observation before.
+        :param root_cam: (3,) about where the pelvis is, from feet that rest on the floor, camera frame, metres.
+        """
+        measurements = self._measure(time_s, observation, root_cam)
+        is_continued = not observation.acquired and time_s - self._last_s <= LONGEST_COAST_S
+        initial = self._last.state if self._last is not None and is_continued else None
+        if initial is not None:
+            initial = replace(initial, beta=self._betas)
+        found = self._solve(measurements, initial, self._cold if initial is None else self._warm)
+        if not is_usable(found):
+            return None
+        if initial is not None and self._measurer.contradicts(measurements, found.t_camera_part):
+            restarted = self._solve(measurements, initial, self._cold)
+            found = restarted if restarted.cost < found.cost else found
+        self._last, self._last_s = found, time_s
+        state = found.state
+        return FittedFrame(
+            np.concatenate([state.R_camera_root[None], state.Omega]),
+            state.t_camera_root,
+            observation.keypoints_confidence @ self._shares,
+        )
+
+    def _solve(self, measurements: Measurements, initial: State | None, options: Options) -> Fit:
+        return self._solver.fit(measurements, initial, self._priors, options)
+
+    def _measure(
+        self, time_s: float, observation: Observation, root_cam: NDArray[np.floating[Any]] | None
+    ) -> Measurements:
+        """Lift the observation within the window that ends with it, and convert it to measurements."""
+        if observation.acquired:  # maybe of somebody else
+            self._window.clear()
+        self._window.append((time_s, observation))
+        while len(self._window) > 1 and self._window[1][0] <= time_s + OFFSETS_S[0]:
+            self._window.popleft()
+        times = np.array([time for time, _ in self._window])
+        seen = [o for _, o in self._window]
+        confidence = np.array([o.keypoints_confidence for o in seen])
+        pixels = self._camera.undistort(np.array([o.keypoints_px for o in seen]))
+        world = np.array([o.world_landmarks for o in seen])
+        windows, rays = windows_around(times, np.ones(len(times), bool)), self._measurer.rays(pixels)
+        lifted = default_lifter().lift_mixture(rays, confidence, world, windows, rows=np.array([len(seen) - 1]))
+        return self._measurer.measure(pixels[-1], confidence[-1], lifted.points[0], lifted.sigma_along[0], root_cam)

@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Reads a source in its own thread and keeps the newest frame only: those that come while it is not taken are dropped.
+
+An interrupted stream is opened again after a pause, and frame numbers and times continue.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Generator
+from contextlib import closing
+from dataclasses import replace
+from typing import cast
+
+from ...solver.errors import ScopeError
+from ..errors import VideoError
+from .clock import Clock
+from .sources import Picture, Source
+
+_POLLING_INTERVAL_S = 0.2  # in which a waiting main thread reacts to Ctrl-C on every system
+
+
+class NewestFrame:
+    """A context in which `take` gives the newest frame.
+
+    :param reconnect_s: pause before an interrupted source is opened again; 0: the capture ends there.
+    :param say: is told of interruptions, from the reading thread.
+    """
+
+    def __init__(
+        self, source: Source, clock: Clock, reconnect_s: float = 0.0, say: Callable[[str], None] = lambda _: None
+    ) -> None:
+        self._source, self._clock, self._reconnect_s, self._say = source, clock, reconnect_s, say
+        self._changed = threading.Condition()
+        self._newest: Picture | None = None
+        self._error: BaseException | None = None
+        self._is_over = False
+        self._said = ""  # what was said of the interruption that lasts
+        self._next_index, self._last_s, self._began_s = 0, 0.0, 0.0
+        self.received = self.dropped = 0
+        self._thread = threading.Thread(target=self._run, name="scope-live-source", daemon=True)
+
+    def __enter__(self) -> NewestFrame:
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._clock.stopped.set()
+        self._thread.join(timeout=2.0)  # a read that never returns must not keep the program from ending
+
+    def now(self) -> float:
+        """Return the time of the clock by which frames arrive, in seconds."""
+        return self._clock.now()
+
+    def take(self) -> Picture | None:
+        """Wait for the next frame and return the newest one; None after the last.
+
+        :raises VideoError: the source cannot be read.
+        """
+        with self._changed:
+            while self._newest is None and not self._is_over:
+                self._changed.wait(_POLLING_INTERVAL_S)
+            if self._newest is None and self._error is not None:
+                raise self._error
+            taken, self._newest = self._newest, None
+            return taken
+
+    def _run(self) -> None:
+        try:
+            while not self._read() and not self._clock.stopped.is_set():
+                self._clock.sleep(self._reconnect_s)
+        except BaseException as error:  # of a broken file or library: raised where frames are taken
+            self._error = error
+        with self._changed:
+            self._is_over = True
+            self._changed.notify_all()
+
+    def _read(self) -> bool:
+        """Read the source until it ends or is interrupted; return whether the capture is over.
+
+        :raises ScopeError: the source failed, and is not to be opened again.
+        """
+        before = self.received
+        try:
+            # Closing it closes the camera or the connection, on every way out.
+            with closing(cast("Generator[Picture, None, None]", self._source.pictures(self._clock))) as pictures:
+                for picture in pictures:
+                    if self._clock.stopped.is_set():
+                        return True
+                    self._give(picture, is_first=self.received == before)
+            problem = f"{self._source.name} has ended"
+        except ScopeError as error:
+            if self._source.ends or self._reconnect_s <= 0 or not self.received:
+                raise
+            problem = str(error)
+        if self._source.ends or self._reconnect_s <= 0:
+            if not self.received:
+                raise VideoError(f"{self._source.name} gave no frames; check that it shows a picture")
+            return True
+        if problem != self._said:  # once, not at every attempt
+            self._said = problem
+            self._say(f"{problem}; connecting again in {self._reconnect_s:g} s")
+        return False
+
+    def _give(self, picture: Picture, is_first: bool) -> None:
+        """Replace the newest frame, with its number and time in the whole capture."""
+        if is_first:
+            self._said = ""
+            self._first_index = self._next_index
+            if not self.received:
+                self._began_s = 0.0 if self._source.ends else picture.timestamp_s
+        index = self._first_index + picture.index
+        time_s = max(picture.timestamp_s - self._began_s, self._last_s + 1e-3 if self.received else 0.0)
+        with self._changed:
+            self.dropped += self._newest is not None
+            self.received += 1
+            self._newest = replace(picture, index=index, timestamp_s=time_s)
+            self._next_index, self._last_s = index + 1, time_s
+            self._changed.notify_all()

@@ -1,0 +1,167 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Poses as lines of JSON on a TCP socket, for several clients.
+
+Each client first gets one line that describes the body, then one line per pose. A client that reads too slowly misses
+poses; it never delays the capture or other clients.
+"""
+
+from __future__ import annotations
+
+import json
+import socket
+import threading
+from collections import deque
+from contextlib import suppress
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ....solver import Body
+from ....solver.rotations import quaternion_from_matrix
+from ...errors import OutputError
+from ..pose import LivePose
+
+VERSION = 1
+MOST_CLIENTS = 16
+_QUEUED_LINES = 2  # per client; older ones are dropped
+_SEND_BUFFER_BYTES = 32768  # some eight poses: what the system queues for a slow client is delay as well
+_SEND_TIMEOUT_S = 10.0  # after which a client that reads nothing is disconnected
+
+
+class JsonServer:
+    """A context that serves poses.
+
+    :param address: to listen on.
+    :param port: 0: any free one, see `port`.
+    :raises OutputError: the port is in use, or the address is not one of this computer's.
+    """
+
+    def __init__(self, body: Body, address: str, port: int) -> None:
+        self._header = line(description(body))
+        self._clients: list[_Client] = []
+        self._lock = threading.Lock()
+        try:
+            family = socket.AF_INET6 if ":" in address else socket.AF_INET
+            self._socket = socket.create_server((address, port), family=family)
+        except (OSError, OverflowError) as error:
+            reason = getattr(error, "strerror", None) or error
+            raise OutputError(
+                f"cannot listen on {address} port {port} ({reason}); choose another --json-port or --listen address"
+            ) from error
+        self.port: int = self._socket.getsockname()[1]
+        self._thread = threading.Thread(target=self._accept, name="scope-live-json", daemon=True)
+        self._thread.start()
+
+    def send(self, pose: LivePose, latency_ms: float) -> None:
+        """Queue a pose for every client."""
+        with self._lock:
+            self._clients = [client for client in self._clients if not client.is_gone]
+            clients = list(self._clients)
+        if clients:
+            data = line(values(pose, latency_ms))
+            for client in clients:
+                client.queue(data)
+
+    @property
+    def clients(self) -> int:
+        """How many are connected."""
+        with self._lock:
+            return sum(not client.is_gone for client in self._clients)
+
+    def __enter__(self) -> JsonServer:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        with suppress(OSError):  # wakes the accepting thread, which closing alone does not
+            self._socket.shutdown(socket.SHUT_RDWR)
+        self._socket.close()
+        for client in self._clients:
+            client.close()
+
+    def _accept(self) -> None:
+        while True:
+            try:
+                connection, _ = self._socket.accept()
+            except OSError:
+                return
+            with self._lock:
+                self._clients = [client for client in self._clients if not client.is_gone]
+                if len(self._clients) >= MOST_CLIENTS:
+                    connection.close()
+                    continue
+                self._clients.append(_Client(connection, self._header))
+
+
+class _Client:
+    """One connection, with a thread of its own."""
+
+    def __init__(self, connection: socket.socket, header: bytes) -> None:
+        self._connection, self._header = connection, header
+        self._lines: deque[bytes] = deque(maxlen=_QUEUED_LINES)
+        self._ready = threading.Semaphore(0)
+        self.is_gone = False
+        with suppress(OSError):
+            connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SEND_BUFFER_BYTES)
+            connection.settimeout(_SEND_TIMEOUT_S)
+        self._thread = threading.Thread(target=self._run, name="scope-live-client", daemon=True)
+        self._thread.start()
+
+    def queue(self, data: bytes) -> None:
+        self._lines.append(data)
+        self._ready.release()
+
+    def close(self) -> None:
+        self.is_gone = True
+        self._ready.release()
+
+    def _run(self) -> None:
+        with self._connection, suppress(OSError):
+            self._connection.sendall(self._header)
+            while not self.is_gone:
+                self._ready.acquire()
+                with suppress(IndexError):  # dropped, since a newer line took its place
+                    self._connection.sendall(self._lines.popleft())
+        self.is_gone = True
+
+
+def line(values: dict[str, Any]) -> bytes:
+    """Return values as one line."""
+    return json.dumps(values, separators=(",", ":"), allow_nan=False).encode() + b"\n"
+
+
+def description(body: Body) -> dict[str, Any]:
+    """Return what does not change: the joints and their tree."""
+    return {
+        "format": "scope live",
+        "version": VERSION,
+        "body": body.name,
+        "joints": list(body.joint_names),
+        "parents": [int(parent) for parent in body.parents],
+        "axes": "right-handed, z up, metres; rotations are quaternions w, x, y, z relative to the parent joint",
+    }
+
+
+def values(pose: LivePose, latency_ms: float) -> dict[str, Any]:
+    """Return a pose as JSON values; without a body before somebody was seen."""
+    start = {
+        "frame": pose.index,
+        "time_s": round(pose.timestamp_s, 4),
+        "latency_ms": round(latency_ms, 1),
+        "presence": pose.presence.value,
+        "settled": pose.is_settled,
+    }
+    if not pose.is_known:
+        return start
+    rotations = np.concatenate([pose.R_world_root[None], pose.rotations[1:]])
+    return start | {
+        "rotations": _rounded(quaternion_from_matrix(rotations), 5),
+        "positions": _rounded(pose.joints, 4),
+        "contact": _rounded(pose.contact, 2),
+        "betas": _rounded(pose.betas, 3),
+    }
+
+
+def _rounded(array: NDArray[Any], digits: int) -> Any:
+    return np.round(np.asarray(array, float), digits).tolist()

@@ -1,0 +1,118 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A live capture as a motion file.
+
+The rows are the source's frames, from the first to the last in which the person was seen. Frames that were dropped, and
+those in which the person was not seen, are filled in and not valid, as in an offline capture. The motion is the one
+that was given live. Its world changes a little in the first seconds, so that `world_from_camera` does, too; the shape
+is the final one.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ....solver import Body
+from ...capture.camera.intrinsics import Camera
+from ...capture.camera.line_segments import Lines
+from ...capture.fitting.frame_sequence import FittedTrack
+from ...capture.perception.landmark_network import KEYPOINT_COUNT
+from ...capture.tracking.track import Track
+from ...capture.world.assemble import assemble_motion
+from ...capture.world.camera_path import CameraPath
+from ...capture.world.placement import place_track
+from ...capture.world.shot import FittedPerson, Shot
+from ...errors import NoPersonError
+from ...motion import Motion
+from ..pose import LivePose, Presence
+from ..session import LiveSession
+from ..sources import Source
+
+
+class Recording:
+    """Keeps every pose, some 3 kB each."""
+
+    def __init__(self, path: Path, body: Body, source: Source) -> None:
+        self._path, self._body, self._source = path, body, source
+        self._poses: list[LivePose] = []
+        self._session: LiveSession | None = None
+        self._size = (1, 1)
+
+    def begin(self, session: LiveSession, size: tuple[int, int]) -> None:
+        """Note where the poses come from."""
+        self._session, self._size = session, size
+
+    def send(self, pose: LivePose, latency_ms: float) -> None:
+        """Keep a pose in which the person is seen."""
+        if pose.presence is Presence.SEEN:
+            self._poses.append(pose)
+
+    def save(self) -> Path:
+        """Write the motion file.
+
+        :raises NoPersonError: nobody was seen.
+        :raises OutputError: the file cannot be written.
+        """
+        if not self._poses or self._session is None or self._session.camera is None:
+            raise NoPersonError(
+                f"nobody was seen in {self._source.name}, so {self._path} was not written; at least one person must be"
+                " mostly in the picture"
+            )
+        self.motion(self._session.camera).save(self._path)
+        return self._path
+
+    def motion(self, camera: Camera) -> Motion:
+        """Return the motion so far, at least one pose.
+
+        :param camera: as estimated at the end.
+        """
+        poses, rows = self._poses, np.array([pose.index for pose in self._poses])
+        rows -= rows[0]
+        T = int(rows[-1]) + 1
+        nearest = np.maximum(np.searchsorted(rows, np.arange(T), side="right") - 1, 0)
+        T_world_frame = _stacked(poses, "T_world_camera")[nearest]
+        T_first_frame = np.linalg.inv(T_world_frame[0]) @ T_world_frame
+        path = CameraPath(T_first_frame[:, :3, :3], T_first_frame[:, :3, 3])
+        given, raw = (self._fitted(rows, nearest, prefix) for prefix in ("", "raw_"))
+        track = self._track(rows, T)
+        placed = place_track(self._body, track, given, smoothing=False, path=path)
+        contact = np.zeros((T, len(poses[0].contact)))
+        contact[rows] = _stacked(poses, "contact")
+        shot = Shot(self._body, camera, path, Lines.none(), self._source.fps, self._size, self._source.name)
+        return assemble_motion(shot, FittedPerson(track, raw, self._body), placed, contact, T_world_frame[0])
+
+    def _track(self, rows: NDArray[np.intp], T: int) -> Track:
+        first, times = self._poses[0].index, np.array([pose.timestamp_s for pose in self._poses])
+        keypoints = np.zeros((T, KEYPOINT_COUNT, 3), np.float32)
+        keypoints[rows] = _stacked(self._poses, "keypoints")
+        seen = np.zeros(T, bool)
+        seen[rows] = True
+        return Track(
+            frames=first + np.arange(T),
+            times=np.interp(np.arange(T), rows, times),
+            seen=seen,
+            keypoints_px=keypoints[..., :2],
+            confidence=keypoints[..., 2],
+            world_landmarks=np.zeros((T, KEYPOINT_COUNT, 3), np.float32),
+            acquired=np.zeros(T, bool),
+        )
+
+    def _fitted(self, rows: NDArray[np.intp], nearest: NDArray[np.intp], prefix: str) -> FittedTrack:
+        valid = np.zeros(len(nearest), bool)
+        valid[rows] = True
+        confidence = _stacked(self._poses, "joint_confidence")[nearest] * valid[:, None]
+        return FittedTrack(
+            _stacked(self._poses, f"{prefix}rotations")[nearest],
+            _stacked(self._poses, f"{prefix}root_cam")[nearest],
+            self._poses[-1].betas,
+            valid,
+            confidence,
+            0.0,
+        )
+
+
+def _stacked(poses: list[LivePose], name: str) -> NDArray[Any]:
+    return np.array([getattr(pose, name) for pose in poses])

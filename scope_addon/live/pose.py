@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a live capture knows of one frame."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+class Presence(Enum):
+    """Whether the person is seen."""
+
+    SEEN = "seen"
+    HELD = "held"  # not seen for a moment: the last pose is repeated
+    LOST = "lost"  # not seen for longer, or never yet
+
+
+@dataclass(frozen=True)
+class LivePose:
+    """The body in one frame; lengths in metres. Before somebody was seen, the rest pose in front of the camera.
+
+    ``rotations`` (K+1, 3, 3): row 0 R_camera_root, the others relative to their parents; ``root_cam`` (3,) the pelvis;
+    ``joints`` (K+1, 3) world; ``contact`` (4,) probability that each point of the soles rests on the floor;
+    ``raw_rotations`` and ``raw_root_cam``: before smoothing and foot locking; ``keypoints`` (33, 3) pixels and
+    confidence, zeros where the person is not seen; ``is_settled``: whether size, focal length and floor have been
+    estimated from enough frames.
+    """
+
+    index: int  # of the source's frame
+    timestamp_s: float  # of the source's frame
+    presence: Presence
+    is_settled: bool
+    betas: NDArray[np.floating[Any]]  # (P,)
+    rotations: NDArray[np.floating[Any]]
+    root_cam: NDArray[np.floating[Any]]
+    T_world_camera: NDArray[np.float64]  # (4, 4)
+    joints: NDArray[np.floating[Any]]
+    contact: NDArray[np.floating[Any]]
+    raw_rotations: NDArray[np.floating[Any]]
+    raw_root_cam: NDArray[np.floating[Any]]
+    keypoints: NDArray[np.floating[Any]]
+    joint_confidence: NDArray[np.floating[Any]]  # (K+1,)
+    is_known: bool = True  # whether somebody was seen in this frame or before
+
+    @property
+    def R_world_root(self) -> NDArray[np.float64]:
+        """Rotation (3, 3) of the pelvis."""
+        R: NDArray[np.float64] = self.T_world_camera[:3, :3] @ self.rotations[0]
+        return R

@@ -1,0 +1,169 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The loop of a live capture: the newest frame in, a pose out to everybody who listens, until the source or user ends.
+
+Networks and solver are loaded before the source is opened. The first pose takes longer than the others, because it
+includes the first estimates of focal length, shape and floor.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Protocol
+
+import cv2
+
+from ...solver import Body
+from ..capture.camera.intrinsics import assumed_camera, choose_camera
+from ..capture.fitting.live_body import LiveBody
+from ..capture.media.frame import Frame
+from ..capture.perception.execution import Execution
+from ..capture.tracking.tracker import PeopleTracker
+from .clock import Clock
+from .newest_frame import NewestFrame
+from .pose import LivePose
+from .session import LiveSession
+from .sources import CAMERA_SIZE, Picture, Source
+from .statistics import Statistics
+
+PROGRESS_S = 0.5  # between two lines of progress
+
+
+@dataclass(frozen=True)
+class LiveOptions:
+    """How to capture; see the options of the command line."""
+
+    quality: str = "fast"
+    height_m: float | None = None
+    focal_mm: float | None = None
+    fov_deg: float | None = None
+    calibration: Path | None = None
+    threads: int = 0
+    provider: str = "auto"
+    reconnect_s: float = 2.0
+
+
+class Output(Protocol):
+    """Takes poses, and must not delay the capture."""
+
+    def send(self, pose: LivePose, latency_ms: float) -> None:
+        """Take a pose whose frame came ``latency_ms`` ago."""
+
+
+@dataclass(frozen=True)
+class Listeners:
+    """Who is told what happens: ``say`` gets sentences, ``progress`` the state of the capture, from time to time."""
+
+    say: Callable[[str], None] = lambda _: None
+    progress: Callable[[str], None] = lambda _: None
+    camera: Callable[[LiveSession, tuple[int, int]], None] = lambda *_: None  # once the first frame has come
+
+
+def run_live(
+    source: Source,
+    body: Body,
+    options: LiveOptions,
+    outputs: Sequence[Output],
+    listeners: Listeners,
+    clock: Clock | None = None,
+) -> dict[str, Any]:
+    """Capture until the source ends or a KeyboardInterrupt comes, which ends it cleanly; return the report.
+
+    :raises ScopeError: an option is invalid, the source cannot be read, or an output failed.
+    """
+    clock = clock or Clock()
+    execution = Execution(options.provider)
+    cores = os.cpu_count() or 1
+    tracker = PeopleTracker(options.quality, min(options.threads or cores, cores), None, execution=execution)
+    LiveBody(body, assumed_camera(*CAMERA_SIZE, CAMERA_SIZE[0])).load()
+    statistics = Statistics()
+    reader = NewestFrame(source, clock, options.reconnect_s, listeners.say)
+    stopped = False
+    with ThreadPoolExecutor(1, "scope-live-calibration") as executor, _opencv_in_one_thread(), reader:
+        try:
+            _loop(reader, _Poses(source, body, options, tracker, executor, listeners), outputs, statistics, listeners)
+        except KeyboardInterrupt:
+            stopped = True
+        finally:
+            executor.shutdown(wait=False, cancel_futures=True)
+    median_ms, p95_ms = statistics.latency_ms()
+    return {
+        "source": source.name,
+        "frames": reader.received,
+        "dropped": reader.received - statistics.poses,
+        "poses": statistics.poses,
+        "poses_per_second": round(statistics.rate, 1),
+        "latency_ms": {"median": round(median_ms, 1), "p95": round(p95_ms, 1)},
+        "stopped": stopped,
+    }
+
+
+class _Poses:
+    """Opens a session for the size of the frames, and another one where that changes, as after a reconnection."""
+
+    def __init__(
+        self,
+        source: Source,
+        body: Body,
+        options: LiveOptions,
+        tracker: PeopleTracker,
+        executor: ThreadPoolExecutor,
+        listeners: Listeners,
+    ) -> None:
+        self._source, self._body, self._options = source, body, options
+        self._tracker, self._executor, self._listeners = tracker, executor, listeners
+        self._size: tuple[int, int] | None = None
+        self._session: LiveSession | None = None
+
+    def of(self, picture: Picture) -> LivePose:
+        """Return the pose in a picture."""
+        height, width = picture.image_rgb.shape[:2]
+        if self._session is None or self._size != (width, height):
+            options = self._options
+            camera = choose_camera(
+                width,
+                height,
+                focal_mm=options.focal_mm,
+                fov_deg=options.fov_deg,
+                calibration=options.calibration,
+                metadata_focal_mm=self._source.focal_35mm,
+            )
+            self._size = width, height
+            self._tracker.reset()
+            self._session = LiveSession(self._body, self._tracker, camera, self._size, options.height_m, self._executor)
+            self._listeners.camera(self._session, self._size)
+        return self._session.step(Frame(picture.index, picture.timestamp_s, picture.image_rgb))
+
+
+def _loop(
+    reader: NewestFrame, poses: _Poses, outputs: Sequence[Output], statistics: Statistics, listeners: Listeners
+) -> None:
+    shown_s = -PROGRESS_S
+    while (picture := reader.take()) is not None:
+        pose = poses.of(picture)
+        now_s = reader.now()
+        latency_ms = statistics.add(picture.arrived_s, now_s)
+        for output in outputs:
+            output.send(pose, latency_ms)
+        if now_s - shown_s >= PROGRESS_S:
+            shown_s = now_s
+            median_ms, p95_ms = statistics.latency_ms()
+            listeners.progress(
+                f"{pose.presence.value}, {statistics.recent_rate:.1f} poses/s, latency {median_ms:.0f} ms"
+                f" (p95 {p95_ms:.0f} ms), {reader.dropped} of {reader.received} frames dropped"
+            )
+
+
+@contextmanager
+def _opencv_in_one_thread() -> Iterator[None]:
+    """Leave the cores to the networks and the reader."""
+    before = cv2.getNumThreads()
+    cv2.setNumThreads(1)
+    try:
+        yield
+    finally:
+        cv2.setNumThreads(before)

@@ -1,0 +1,267 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""From frames to poses: the causal stages in their order. One person, the largest one when the capture begins."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Sequence
+from concurrent.futures import Executor, Future
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...solver import Body, State
+from ..capture.camera.intrinsics import Camera
+from ..capture.fitting.frame_sequence import FittedTrack
+from ..capture.media.exposure import AutoExposure
+from ..capture.media.frame import Frame
+from ..capture.perception.observation import Observation
+from ..capture.tracking.tracker import PeopleTracker
+from .calibration import Calibration, Calibrator, track_of
+from .causal_fit import CausalFit, FittedFrame
+from .feet.hold import FootHold
+from .pose import LivePose, Presence
+from .smoothing import PoseFilter
+
+CALIBRATED_S = 2.0  # after the person was first seen
+CALIBRATE_AT_S = (0.0, 0.3, 0.7, 1.2, CALIBRATED_S)
+FOLLOW_S, FOLLOWED_S = 1.0, 4.0  # between two estimates of the world afterwards, and how much each of them sees
+SETTLING_S, FOLLOWING_S = 0.3, 10.0  # time constants towards the estimates
+HOLD_S = 0.5  # for which the pose of a person who is not seen is held, rather than lost
+
+Start = Callable[..., "Future[Calibration]"]
+
+
+def start_at_once(function: Callable[..., Calibration], *args: object) -> Future[Calibration]:
+    """Call a function as an executor would, but before returning: results do not depend on the speed of threads."""
+    future: Future[Calibration] = Future()
+    future.set_result(function(*args))
+    return future
+
+
+@dataclass(frozen=True)
+class _Seen:
+    """A frame in which the person was seen, and its fit; kept for a few seconds."""
+
+    time_s: float
+    observation: Observation
+    fitted: FittedFrame
+
+
+class LiveSession:
+    """Turns the frames of one source into poses; one call per frame, in order.
+
+    :param camera: as known from the user or the source.
+    :param size: width and height of the frames, pixels.
+    :param height_m: the person's stature, if it is known, metres.
+    :param executor: of one thread, in which everything but the first calibration runs; None: in the calling thread.
+    """
+
+    def __init__(
+        self,
+        body: Body,
+        tracker: PeopleTracker,
+        camera: Camera,
+        size: tuple[int, int],
+        height_m: float | None = None,
+        executor: Executor | None = None,
+    ) -> None:
+        self._body, self._tracker, self._height_m = body, tracker, height_m
+        self._start: Start = executor.submit if executor else start_at_once
+        self._calibrator = Calibrator(body, camera, size, height_m)
+        self._exposure, self._filter, self._feet = AutoExposure(), PoseFilter(), FootHold(body)
+        self._tracklet: int | None = None
+        self._fit: CausalFit | None = None
+        self._current: Calibration | None = None
+        self._target: Calibration | None = None
+        self._pending: Future[Calibration] | None = None
+        self._seen: deque[_Seen] = deque()
+        self._first_s = self._last_seen_s = self._last_s = -np.inf
+        self._calibrations = 0
+        self._next_follow_s = np.inf
+        self._last: LivePose | None = None
+
+    def step(self, frame: Frame) -> LivePose:
+        """Return the pose in the next frame."""
+        observations = self._tracker.step(self._exposure.brighten(frame.image_rgb), None, frame.timestamp_s)
+        observation = self._choose(observations)
+        fitted = self._fit_person(frame, observation) if observation is not None else None
+        self._settle(frame.timestamp_s)
+        self._last_s = frame.timestamp_s
+        if observation is None or fitted is None:
+            self._last = self._without_person(frame)
+        else:
+            self._last = self._pose(frame, observation, fitted)
+        return self._last
+
+    def _choose(self, observations: Sequence[tuple[int, Observation]]) -> Observation | None:
+        """Follow the same person while they are seen, and then the largest one."""
+        people = dict(observations)
+        if self._tracklet not in people:
+            self._tracklet = max(people, key=lambda k: people[k].region.side_px, default=None)
+        return None if self._tracklet is None else people.get(self._tracklet)
+
+    def _fit_person(self, frame: Frame, observation: Observation) -> FittedFrame | None:
+        time_s = frame.timestamp_s
+        values = (observation.keypoints_px, observation.keypoints_confidence, observation.world_landmarks)
+        if not all(np.isfinite(value).all() for value in values):
+            return None
+        if self._fit is None:
+            self._calibrator.look_at(frame.image_rgb, observation)
+            self._current = self._target = self._calibrator.estimate([time_s], [observation])
+            self._fit = CausalFit(self._body, observation, self._current.camera, self._height_m)
+            self._fit.set_shape(self._current.betas)
+            self._first_s, self._calibrations = time_s, 1
+        fitted = self._fit.fit(time_s, observation, self._root_of_feet(time_s))
+        if fitted is not None:
+            self._seen.append(_Seen(time_s, observation, fitted))
+            while self._seen[0].time_s < time_s - FOLLOWED_S:
+                self._seen.popleft()
+        return fitted
+
+    def _root_of_feet(self, time_s: float) -> NDArray[np.floating[Any]] | None:
+        """Return about where the pelvis is, camera frame, if feet rested on the floor in the frame before.
+
+        The size of a body in the picture does not tell a squat from a step back, but feet at rest do.
+        """
+        is_recent = time_s - self._last_seen_s < HOLD_S
+        return self._last.root_cam if self._last is not None and is_recent and self._feet.is_holding else None
+
+    def _settle(self, time_s: float) -> None:
+        """Start estimates that are due, take those that are done, and approach the newest one."""
+        if self._fit is None or self._current is None or self._target is None:
+            return
+        if self._pending is not None and self._pending.done():
+            self._target, self._pending = self._pending.result(), None
+        if self._pending is None:
+            self._start_estimate(time_s)
+        step_s = max(time_s - self._last_s, 0.0) if np.isfinite(self._last_s) else 0.0
+        early = 1 - np.exp(-step_s / SETTLING_S)
+        late = early if not self.is_settled(time_s) else 1 - np.exp(-step_s / FOLLOWING_S)
+        before, self._current = self._current, self._current.towards(self._target, float(early), float(late))
+        if self._current.camera is not before.camera:
+            self._fit.set_camera(self._current.camera)
+        if not np.array_equal(self._current.betas, before.betas):
+            self._fit.set_shape(self._current.betas)
+
+    def _start_estimate(self, time_s: float) -> None:
+        times, observations = [s.time_s for s in self._seen], [s.observation for s in self._seen]
+        if not times or self._target is None:
+            return
+        if self._calibrations < len(CALIBRATE_AT_S):
+            if time_s - self._first_s >= CALIBRATE_AT_S[self._calibrations]:
+                self._calibrations = int(np.searchsorted(CALIBRATE_AT_S, time_s - self._first_s, side="right"))
+                self._pending = self._start(self._calibrator.estimate, times, observations)
+                self._next_follow_s = time_s + FOLLOW_S
+        elif time_s >= self._next_follow_s:
+            self._next_follow_s = time_s + FOLLOW_S
+            track, fitted = track_of(times, observations), self._fitted_track()
+            self._pending = self._start(self._calibrator.follow, self._target, track, fitted)
+
+    def _fitted_track(self) -> FittedTrack:
+        assert self._current is not None
+        fits = [s.fitted for s in self._seen]
+        return FittedTrack(
+            np.array([fit.rotations for fit in fits]),
+            np.array([fit.root_cam for fit in fits]),
+            self._current.betas,
+            np.ones(len(fits), bool),
+            np.array([fit.joint_confidence for fit in fits]),
+            0.0,
+        )
+
+    def is_settled(self, time_s: float) -> bool:
+        """Whether the estimates of the first seconds have been reached at this time."""
+        return bool(
+            self._calibrations == len(CALIBRATE_AT_S) and time_s - self._first_s > CALIBRATED_S + 5 * SETTLING_S
+        )
+
+    @property
+    def camera(self) -> Camera | None:
+        """The camera as it is known now; None before somebody was seen."""
+        return None if self._current is None else self._current.camera
+
+    def _pose(self, frame: Frame, observation: Observation, fitted: FittedFrame) -> LivePose:
+        assert self._current is not None
+        time_s, now, T = frame.timestamp_s, self._current, self._current.T_world_camera
+        if time_s - self._last_seen_s > HOLD_S:
+            self._filter.reset()
+            self._feet.reset()
+        self._last_seen_s = time_s
+        rotations, root = self._filter(fitted.rotations, fitted.root_cam, time_s)
+        rotations, root, contact = self._feet.hold(time_s, now.betas, rotations, root, fitted.joint_confidence, T)
+        keypoints = np.concatenate([observation.keypoints_px, observation.keypoints_confidence[:, None]], axis=1)
+        return LivePose(
+            frame.index,
+            time_s,
+            Presence.SEEN,
+            self.is_settled(time_s),
+            now.betas,
+            rotations,
+            root,
+            T,
+            self._joints(now.betas, rotations, root, T),
+            contact[:4],
+            fitted.rotations,
+            fitted.root_cam,
+            keypoints,
+            fitted.joint_confidence,
+        )
+
+    def _without_person(self, frame: Frame) -> LivePose:
+        last = self._last or self._rest()
+        is_held = frame.timestamp_s - self._last_seen_s <= HOLD_S
+        return replace(
+            last,
+            index=frame.index,
+            timestamp_s=frame.timestamp_s,
+            presence=Presence.HELD if is_held else Presence.LOST,
+            is_settled=self.is_settled(frame.timestamp_s),
+            contact=np.zeros_like(last.contact),
+            keypoints=np.zeros_like(last.keypoints),
+            joint_confidence=np.zeros_like(last.joint_confidence),
+        )
+
+    def _rest(self) -> LivePose:
+        body, state = self._body, State.rest(self._body.K, self._body.P)
+        rotations = np.concatenate([state.R_camera_root[None], state.Omega])
+        height = float(body.stature(state.beta)) / 2
+        level = Calibration(
+            Camera(np.eye(3), np.zeros(5), ""), state.beta, np.array([0, -1.0, 0]), np.array([0, -3.0, height])
+        )
+        T, root = level.T_world_camera, state.t_camera_root
+        joints = self._joints(state.beta, rotations, root, T)
+        nothing: tuple[NDArray[Any], ...] = np.zeros(4), np.zeros((33, 3)), np.zeros(body.K + 1)
+        contact, keypoints, confidence = nothing
+        return LivePose(
+            0,
+            0.0,
+            Presence.LOST,
+            False,
+            state.beta,
+            rotations,
+            root,
+            T,
+            joints,
+            contact,
+            rotations,
+            root,
+            keypoints,
+            confidence,
+            is_known=False,
+        )
+
+    def _joints(
+        self,
+        betas: NDArray[np.floating[Any]],
+        rotations: NDArray[np.floating[Any]],
+        root: NDArray[np.floating[Any]],
+        T_world_camera: NDArray[np.float64],
+    ) -> NDArray[np.float64]:
+        """Return the (K+1, 3) joints, world."""
+        body = self._body
+        _, joints = body.forward_kinematics(rotations, root - body.rest_joints(betas)[0], betas)
+        world: NDArray[np.float64] = joints @ T_world_camera[:3, :3].T + T_world_camera[:3, 3]
+        return world

@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The options of a live capture alone."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from .capture import QUALITIES
+from .record import Argument, Option, Place
+
+LIVE_OPTIONS = (
+    Option(
+        "live_quality",
+        str,
+        "fast",
+        Place.LIVE,
+        "speed versus accuracy",
+        choices=QUALITIES[:2],
+        argument=Argument("--quality"),
+    ),
+    Option(
+        "record",
+        Path,
+        None,
+        Place.LIVE,
+        "motion file (.npz) to write at the end",
+        argument=Argument(metavar="OUT"),
+    ),
+    Option(
+        "json_port",
+        int,
+        None,
+        Place.LIVE,
+        "TCP port on which poses are served as lines of JSON; 0: any free one",
+        minimum=0,
+        maximum=65535,
+        argument=Argument(metavar="N"),
+    ),
+    Option(
+        "listen",
+        str,
+        "127.0.0.1",
+        Place.LIVE,
+        "address on which --json-port listens; 0.0.0.0: every network that the computer is in",
+        argument=Argument(metavar="ADDRESS"),
+    ),
+    Option(
+        "vmc",
+        str,
+        None,
+        Place.LIVE,
+        "receiver of the poses in the VMC protocol, such as 127.0.0.1:39539",
+        argument=Argument(metavar="HOST:PORT"),
+    ),
+    Option(
+        "reconnect_s",
+        float,
+        2.0,
+        Place.LIVE,
+        "pause before an interrupted stream or camera is opened again; 0: the capture ends",
+        unit="s",
+        minimum=0.0,
+        maximum=3600.0,
+        argument=Argument("--reconnect", "SECONDS"),
+    ),
+)

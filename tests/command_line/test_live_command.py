@@ -1,0 +1,75 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The command of live captures as users see it: a sentence and a status for what is wrong, a file that is kept."""
+
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+from importlib.machinery import PathFinder
+
+import pytest
+from scope.scope_addon import installed
+from scope.scope_addon.cli import SAMPLE, main
+from scope.scope_addon.motion import Motion
+
+
+@pytest.mark.parametrize(
+    ("arguments", "status", "sentence"),
+    [
+        (["missing.mp4"], 1, "missing.mp4 does not exist; check the path"),
+        (["ftp://host/x"], 1, "'ftp' is not a kind of stream that can be read"),
+        (["x.mp4", "--record", "a.glb"], 2, "--record writes a motion file: give a name that ends in .npz, not a.glb"),
+        (["x.mp4", "--record", "none/a.npz"], 1, "none"),
+        (["x.mp4", "--vmc", "39539"], 1, "x.mp4 does not exist"),
+        ([str(SAMPLE), "--vmc", "39539"], 2, "--vmc must be HOST:PORT, such as 127.0.0.1:39539, not '39539'"),
+        (["x.mp4", "--height", "170,180"], 2, "a live capture follows one person: give one --height"),
+        (["x.mp4", "--json-port", "70000"], 2, "--json-port must be from 0 to 65535, not 70000"),
+        (["x.mp4", "--reconnect", "-1"], 2, "--reconnect must be from 0 to 3600 s, not -1"),
+        (["x.mp4", "--focal-mm", "26", "--fov", "60"], 2, "--focal-mm and --fov contradict each other"),
+    ],
+)
+def test_what_is_wrong_is_said_in_one_sentence(arguments, status, sentence, capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main(["live", *arguments]) == status
+    error = capsys.readouterr().err
+    assert sentence in error
+    assert error.count("\n") == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_port_in_use_is_said(capsys):
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = taken.getsockname()[1]
+        assert main(["live", str(SAMPLE), "--json-port", str(port)]) == 1
+    assert f"cannot listen on 127.0.0.1 port {port}" in capsys.readouterr().err
+
+
+def test_the_extension_says_where_live_captures_are(capsys, monkeypatch):
+    def find_spec(name, *_):
+        return None if name.endswith(".live") else PathFinder.find_spec(name)
+
+    monkeypatch.setattr(installed, "find_spec", find_spec)
+    assert main(["live", "0"]) == 1
+    assert "Blender's extension cannot capture live; use ./scripts/live" in capsys.readouterr().err
+
+
+@pytest.mark.skipif(os.name == "nt", reason="SIGINT of POSIX")
+@pytest.mark.usefixtures("networks")
+def test_ctrl_c_ends_the_capture_and_keeps_the_recording(tmp_path):
+    target = tmp_path / "take.npz"
+    command = [sys.executable, "-m", "scope.scope_addon", "live", str(SAMPLE), "--json-port", "0"]
+    with subprocess.Popen(
+        [*command, "--record", str(target), "--json"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as process:
+        port = int(process.stderr.readline().rsplit(" ", 1)[1])
+        with socket.create_connection(("127.0.0.1", port), timeout=60) as client, client.makefile("rb") as lines:
+            client.settimeout(60)
+            for _ in range(5):
+                lines.readline()
+            process.send_signal(signal.SIGINT)
+            out, _ = process.communicate(timeout=60)
+    report = json.loads(out)
+    assert (process.returncode, report["stopped"], report["outputs"]) == (0, True, [str(target)])
+    assert Motion.load(target).valid.sum() == report["poses"]

@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Lines of JSON: what they say, several clients, and a slow one that delays nobody."""
+
+import json
+import socket
+
+import numpy as np
+import pytest
+from scope.scope_addon.errors import OutputError
+from scope.scope_addon.live.outputs.json_lines import JsonServer, values
+
+from .test_vmc import pose_of
+
+
+@pytest.fixture
+def server(body):
+    with JsonServer(body, "127.0.0.1", 0) as serving:
+        yield serving
+
+
+def connected(server, count):
+    clients = [socket.create_connection(("127.0.0.1", server.port), timeout=5) for _ in range(count)]
+    files = [client.makefile("rb") for client in clients]
+    return clients, files
+
+
+def test_every_client_gets_the_description_and_then_poses(server, body):
+    clients, files = connected(server, 2)
+    for file in files:
+        description = json.loads(file.readline())
+        assert description["joints"] == list(body.joint_names)
+        assert description["parents"] == list(body.parents)
+    server.send(pose_of(body), 12.34)
+    for client, file in zip(clients, files, strict=True):
+        pose = json.loads(file.readline())
+        assert (pose["frame"], pose["presence"], pose["latency_ms"]) == (3, "seen", 12.3)
+        assert pose["positions"][0] == [0.0, 0.0, 0.95]
+        assert np.allclose(np.linalg.norm(pose["rotations"], axis=1), 1, atol=1e-4)
+        file.close()
+        client.close()
+
+
+def test_the_root_rotates_in_the_world_and_joints_relative_to_their_parents(body):
+    half = np.sqrt(0.5)
+    given = values(pose_of(body), 0.0)["rotations"]
+    assert given[0] == pytest.approx([half, half, 0, 0], abs=1e-4)  # model y up becomes world z up
+    assert given[5] == [1, 0, 0, 0]
+
+
+def test_a_client_that_reads_nothing_neither_delays_nor_grows_and_others_get_the_newest(server, body):
+    (slow, quick), files = connected(server, 2)
+    files[0].close()
+    files[1].readline()
+    for _ in range(500):  # far more than the system's buffers hold
+        server.send(pose_of(body), 0.0)
+    assert all(len(client._lines) <= 2 for client in server._clients)
+    assert json.loads(files[1].readline())["frame"] == 3
+    files[1].close()
+    slow.close()
+    quick.close()
+
+
+def test_clients_that_left_are_forgotten(server, body):
+    (client,), (file,) = connected(server, 1)
+    file.readline()
+    assert server.clients == 1
+    file.close()
+    client.close()
+    for _ in range(200):
+        server.send(pose_of(body), 0.0)
+        if server.clients == 0:
+            break
+        server._clients[0]._thread.join(0.02)
+    assert server.clients == 0
+
+
+def test_a_port_in_use_is_said(server, body):
+    with pytest.raises(OutputError, match=f"port {server.port} .* choose another --json-port"):
+        JsonServer(body, "127.0.0.1", server.port)
+
+
+def test_an_address_of_another_computer_is_said(body):
+    with pytest.raises(OutputError, match=r"cannot listen on 192\.0\.2\.1"):
+        JsonServer(body, "192.0.2.1", 0)

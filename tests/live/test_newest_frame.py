@@ -1,0 +1,90 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The newest frame wins, late ones are counted, and interrupted sources are opened again."""
+
+import threading
+
+import pytest
+from scope.scope_addon.errors import VideoError
+from scope.scope_addon.live.newest_frame import NewestFrame
+
+from .fake_source import FakeClock, FakeSource
+
+
+def all_taken(reader):
+    taken = []
+    while (picture := reader.take()) is not None:
+        taken.append(picture)
+    return taken
+
+
+def test_frames_that_come_while_one_is_processed_are_dropped_and_counted():
+    given, go_on = threading.Event(), threading.Event()
+
+    def before(index):
+        if index == 1:  # the first frame has been given; it must be taken before the others come
+            go_on.wait(5)
+        if index == 5:
+            given.set()
+            go_on.wait(5)
+
+    source = FakeSource([0.0, 0.1, 0.2, 0.3, 0.4], ends=True, before=before)
+    with NewestFrame(source, FakeClock()) as reader:
+        first = reader.take()
+        go_on.set()
+        reader._thread.join(5)  # all have come while the first one was processed
+        rest = all_taken(reader)
+    assert [first.index, *(p.index for p in rest)] == [0, 4]
+    assert (reader.received, reader.dropped) == (5, 3)
+
+
+def test_an_interrupted_source_is_opened_again_and_numbers_and_times_continue():
+    said, clock = [], FakeClock()
+    taken, next_one = [], threading.Semaphore(1)
+    source = FakeSource([50.0, 50.1], [7.0, 7.5], before=lambda _: next_one.acquire(timeout=5))
+    with NewestFrame(source, clock, reconnect_s=3.0, say=said.append) as reader:
+        for _ in range(4):
+            taken.append(reader.take())
+            next_one.release()
+        clock.stopped.set()
+    assert [p.index for p in taken] == [0, 1, 2, 3]
+    times = [p.timestamp_s for p in taken]
+    assert times[:2] == pytest.approx([0.0, 0.1])
+    assert all(b > a for a, b in zip(times, times[1:], strict=False))
+    assert said[0] == "fake has ended; connecting again in 3 s"
+    assert 3.0 in clock.slept
+
+
+def test_an_interruption_that_lasts_is_said_once():
+    said, clock = [], FakeClock()
+    source = FakeSource([0.0])  # and then it cannot be opened any more
+    clock.stop_after = 5
+    with NewestFrame(source, clock, reconnect_s=1.0, say=said.append) as reader:
+        all_taken(reader)
+    assert source.opened > 3
+    assert said == ["fake has ended; connecting again in 1 s", "fake is gone; connecting again in 1 s"]
+
+
+def test_every_opened_source_is_closed():
+    source = FakeSource([0.0], ends=True)
+    with NewestFrame(source, FakeClock()) as reader:
+        all_taken(reader)
+    assert (source.opened, source.closed) == (1, 1)
+
+
+def test_without_reconnecting_the_end_of_a_stream_is_the_end():
+    with NewestFrame(FakeSource([0.0]), FakeClock()) as reader:
+        assert [p.index for p in all_taken(reader)] == [0]
+
+
+def test_a_source_that_cannot_be_opened_at_first_fails_even_if_it_could_be_tried_again():
+    with NewestFrame(FakeSource(), FakeClock(), reconnect_s=1.0) as reader:
+        with pytest.raises(VideoError, match="fake is gone"):
+            reader.take()
+
+
+def test_an_error_in_a_running_stream_is_said_and_survived():
+    said, clock = [], FakeClock()
+    source = FakeSource([0.0], error=VideoError("fake was interrupted (timed out)"))
+    with NewestFrame(source, clock, reconnect_s=1.0, say=lambda s: (said.append(s), clock.stopped.set())) as reader:
+        all_taken(reader)
+    assert said == ["fake was interrupted (timed out); connecting again in 1 s"]

@@ -1,0 +1,107 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Poses of the first two seconds of the sample clip: causal, calm, and close to the offline capture."""
+
+from fractions import Fraction
+from itertools import islice
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scope.scope_addon.capture.camera.intrinsics import choose_camera
+from scope.scope_addon.capture.media.frame import Frame
+from scope.scope_addon.capture.media.video import open_video
+from scope.scope_addon.capture.media.video_range import VideoRange
+from scope.scope_addon.capture.options import CaptureOptions
+from scope.scope_addon.capture.pipeline import capture
+from scope.scope_addon.capture.tracking.tracker import PeopleTracker
+from scope.scope_addon.cli import SAMPLE
+from scope.scope_addon.live.outputs.recording import Recording
+from scope.scope_addon.live.pose import Presence
+from scope.scope_addon.live.session import HOLD_S, LiveSession
+from scope.scope_addon.motion import Motion
+
+FRAMES, EMPTY = 46, 8  # one and a half seconds, and frames without a person after them, a tenth of a second apart
+
+
+@pytest.fixture(scope="module")
+def frames():
+    with open_video(SAMPLE) as video:
+        seen = list(islice(video, FRAMES))
+    grey = np.full_like(seen[0].image_rgb, 128)
+    return seen + [Frame(FRAMES + k, FRAMES / 30 + k / 10, grey) for k in range(EMPTY)]
+
+
+def session_of(body, frames):
+    height, width = frames[0].image_rgb.shape[:2]
+    return LiveSession(body, PeopleTracker("fast", 2), choose_camera(width, height), (width, height))
+
+
+@pytest.fixture(scope="module")
+def live(body, networks, frames):
+    session = session_of(body, frames)
+    return session, [session.step(frame) for frame in frames]
+
+
+@pytest.fixture(scope="module")
+def recorded(body, live, frames, tmp_path_factory):
+    session, poses = live
+    path = tmp_path_factory.mktemp("live") / "live.npz"
+    recording = Recording(path, body, SimpleNamespace(name="sample.mp4", fps=Fraction(30)))
+    height, width = frames[0].image_rgb.shape[:2]
+    recording.begin(session, (width, height))
+    for pose in [*poses[:20], *poses[22:]]:  # two frames were dropped
+        recording.send(pose, 0.0)
+    recording.save()
+    return Motion.load(path)
+
+
+def test_later_frames_do_not_change_earlier_poses(body, live, frames):
+    session = session_of(body, frames)
+    for frame, earlier in zip(frames[:14], live[1], strict=False):
+        pose = session.step(frame)
+        assert np.array_equal(pose.rotations, earlier.rotations)
+        assert np.array_equal(pose.joints, earlier.joints)
+
+
+def test_the_recording_is_close_to_the_offline_capture(body, recorded):
+    (offline,) = capture(
+        SAMPLE, body, CaptureOptions(quality="fast", wanted=VideoRange(end_s=(FRAMES - 1) / 30))
+    ).motions
+    assert len(recorded) == len(offline) == FRAMES
+    assert list(recorded.frames) == list(offline.frames)
+    relative = [m.joints_cam - m.joints_cam[:, :1] for m in (recorded, offline)]
+    assert np.median(np.linalg.norm(relative[0] - relative[1], axis=-1)) < 0.025
+
+
+def test_dropped_frames_are_filled_in_and_not_valid(recorded, live):
+    assert list(np.flatnonzero(~recorded.valid)) == [20, 21]
+    given = np.array([pose.joints for pose in live[1][:FRAMES]])
+    T = recorded.world_from_camera
+    world = np.einsum("tij,tkj->tki", T[:, :3, :3], recorded.joints_cam) + T[:, None, :3, 3]
+    # Only the first frames differ, since the file has the final shape.
+    assert np.linalg.norm(world - given, axis=-1)[-10:].max() < 0.01
+
+
+def test_feet_stand_on_the_floor_and_the_world_does_not_jump(live):
+    poses = live[1][:FRAMES]
+    feet = np.array([pose.joints[[10, 11], 2] for pose in poses])
+    assert np.abs(np.median(feet)) < 0.12  # the joints of toes are some centimetres above their soles
+    camera = np.array([pose.T_world_camera[:3, 3] for pose in poses])
+    assert np.linalg.norm(np.diff(camera, axis=0), axis=1).max() < 0.05
+
+
+def test_without_a_person_the_pose_is_held_and_then_lost(live):
+    last, rest = live[1][FRAMES - 1], live[1][FRAMES + 2 :]
+    assert last.presence is Presence.SEEN
+    for pose in rest:
+        elapsed_s = pose.timestamp_s - last.timestamp_s
+        assert pose.presence is (Presence.HELD if elapsed_s <= HOLD_S else Presence.LOST)
+        assert not pose.contact.any()
+    assert np.array_equal(rest[0].rotations, rest[-1].rotations)
+    assert rest[-1].presence is Presence.LOST
+
+
+def test_nobody_seen_yet_gives_a_pose_that_is_not_known(body, networks, frames):
+    pose = session_of(body, frames).step(frames[-1])
+    assert (pose.presence, pose.is_known) == (Presence.LOST, False)
+    assert pose.joints[0, 2] > 0.7  # the rest pose stands on the floor
