@@ -41,19 +41,20 @@ def test_a_video_is_read_and_an_overlay_written(tmp_path):
     shutil.copy(SAMPLE, video)
     code = """
 import sys
+from fractions import Fraction
 from pathlib import Path
 from scope.scope_addon.capture.media.video import open_video
 from scope.scope_addon.capture.media.video_range import VideoRange
-from scope.scope_addon.capture.overlay.overlay_video import _is_readable, _open_writer
+from scope.scope_addon.capture.overlay.video_writer import VideoWriter
 video, overlay = map(Path, sys.argv[1:])
 with open_video(video, VideoRange(end_s=0.1)) as opened:
     images = [frame.image_rgb for frame in opened]
-overlay.touch()
-writer = _open_writer(overlay, 30.0, *images[0].shape[1::-1], overlay)
+writer = VideoWriter(overlay, Fraction(30), *images[0].shape[1::-1], overlay)
 for image in images:
     writer.write(image)
-writer.release()
-print(len(images), _is_readable(overlay))
+writer.close()
+with open_video(overlay, VideoRange()) as opened:
+    print(len(images), sum(1 for _ in opened))
 """
     done = subprocess.run([sys.executable, "-c", code, video, overlay], capture_output=True, text=True, check=False)
-    assert (done.stdout, done.returncode) == ("4 True\n", 0), done.stderr
+    assert (done.stdout, done.returncode) == ("4 4\n", 0), done.stderr
