@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -42,11 +42,13 @@ class VideoWriter:
             ) from error
         self._av, self._path = av, path
         self._failures = (av.error.FFmpegError, OSError, ValueError)
-        temporary.touch()  # a name that is not UTF-8 is opened by a link to the file
+        temporary.touch()  # a name that is not UTF-8 is opened by a link to the file, with the first image
+        self._name = ExitStack()
         try:
-            with utf8_name(temporary) as name:
-                self._container: av.container.OutputContainer = av.open(name, "w")
+            name = self._name.enter_context(utf8_name(temporary))
+            self._container: av.container.OutputContainer = av.open(name, "w")
         except self._failures as error:
+            self._name.close()
             raise self._refused() from error
         self._stream = self._add_stream(_rate(fps), width, height)
 
@@ -57,7 +59,7 @@ class VideoWriter:
             stream: Any = self._container.add_stream(codec, rate=rate, options=options)
             stream.width, stream.height, stream.pix_fmt = width, height, "yuv420p"
             return stream
-        self._container.close()
+        self.abandon()
         raise OutputError(f"cannot write {self._path}: no video encoder was found; choose a .png or .jpg overlay")
 
     def write(self, image: NDArray[np.uint8]) -> None:
@@ -82,10 +84,12 @@ class VideoWriter:
             self._container.close()
         except self._failures as error:
             raise self._refused() from error
+        finally:
+            self._name.close()
 
     def abandon(self) -> None:
         """Close the file, which then is of no use."""
-        with suppress(*self._failures):
+        with self._name, suppress(*self._failures):
             self._container.close()
 
     def _refused(self) -> OutputError:
