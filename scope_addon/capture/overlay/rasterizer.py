@@ -86,6 +86,36 @@ def rasterize(
 
 @cached
 @njit(nogil=True)
+def fill_silhouette(coverage: NDArray[np.bool_], screen: NDArray[np.float64], triangles: NDArray[np.int32]) -> None:
+    """Set the pixels whose centres triangles cover that are seen from outside, as `rasterize` would draw them.
+
+    :param coverage: (H, W), modified in place.
+    :param screen: (V, 2) pixels; triangles with a vertex that is not finite are left out.
+    :param triangles: (F, 3) vertex indices, counter-clockwise seen from outside.
+    """
+    height, width = coverage.shape
+    for f in range(len(triangles)):
+        a, b, c = triangles[f]
+        ax, ay, bx, by, cx, cy = screen[a, 0], screen[a, 1], screen[b, 0], screen[b, 1], screen[c, 0], screen[c, 1]
+        area = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
+        if not (area < 0 and abs(area) < 1e18):
+            continue
+        u0 = int(np.ceil(min(max(min(ax, bx, cx), 0.0), width)))
+        u1 = int(np.floor(min(max(max(ax, bx, cx), -1.0), width - 1.0)))
+        v0 = int(np.ceil(min(max(min(ay, by, cy), 0.0), height)))
+        v1 = int(np.floor(min(max(max(ay, by, cy), -1.0), height - 1.0)))
+        du_a, dv_a = -(cy - by) / area, (cx - bx) / area
+        du_b, dv_b = -(ay - cy) / area, (ax - cx) / area
+        for v in range(v0, v1 + 1):
+            for u in range(u0, u1 + 1):
+                la = du_a * (u - bx) + dv_a * (v - by)
+                lb = du_b * (u - cx) + dv_b * (v - cy)
+                if la >= -1e-9 and lb >= -1e-9 and 1.0 - la - lb >= -1e-9:
+                    coverage[v, u] = True
+
+
+@cached
+@njit(nogil=True)
 def vertex_normals(vertices: NDArray[np.float64], triangles: NDArray[np.int32]) -> NDArray[np.float64]:
     """Calculate unit normals (V, 3), area-weighted means of the triangles around each vertex (zero without triangles).
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 import pytest
-from scope.scope_addon.capture.overlay.rasterizer import NEAR, Canvas, rasterize, vertex_normals
+from scope.scope_addon.capture.overlay.rasterizer import NEAR, Canvas, fill_silhouette, rasterize, vertex_normals
 
 WIDTH, HEIGHT = 160, 120
 K = np.array([[150.0, 0.0, 80.5], [0.0, 140.0, 60.25], [0.0, 0.0, 1.0]])
@@ -48,6 +48,24 @@ def test_a_sphere_has_the_depth_and_outline_of_ray_casting():
     assert differ.sum() < 0.02 * np.isfinite(expected).sum()
     well_inside = cv2.erode(np.isfinite(expected).astype(np.uint8), np.ones((5, 5))) > 0
     np.testing.assert_allclose(canvas.depth[well_inside], expected[well_inside], atol=6e-3)
+
+
+def test_a_silhouette_covers_the_pixels_that_opencv_fills_but_for_their_edge():
+    vertices, triangles = sphere((0.55, -0.1, 3.0), 0.7)  # beyond the right edge
+    screen = (vertices / vertices[:, 2:] @ K.T)[:, :2]
+    coverage = np.zeros((HEIGHT, WIDTH), np.bool_)
+    fill_silhouette(coverage, screen, triangles)
+    drawn = np.zeros((HEIGHT, WIDTH), np.uint8)
+    for corners in screen[triangles]:
+        cv2.fillConvexPoly(drawn, np.round(corners * 16).astype(np.int32), 1, shift=4)
+    differ = coverage != drawn.astype(bool)
+    edge = cv2.morphologyEx(drawn, cv2.MORPH_GRADIENT, np.ones((3, 3), np.uint8)).astype(bool)
+    assert coverage.sum() > 2000
+    assert not (differ & ~edge).any()
+    screen[:, 0] = np.nan
+    nothing = np.zeros_like(coverage)
+    fill_silhouette(nothing, screen, triangles)
+    assert not nothing.any()
 
 
 def test_the_nearer_surface_wins_in_either_order():

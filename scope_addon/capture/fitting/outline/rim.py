@@ -19,13 +19,14 @@ from numpy.typing import NDArray
 from .....solver import Body, Fit
 from .....solver.residuals.image.outline import FLOATS, INTS, pack
 from ...camera.intrinsics import Camera
-from ...overlay.rasterizer import Canvas, rasterize, vertex_normals
+from ...overlay.rasterizer import fill_silhouette, vertex_normals
 from ...perception.observation import PersonMask
 from ...perception.region import Region
 
 SPACING_M = 0.03  # between candidates, at rest
 RIM_COS = 0.15  # of the angle between a rim point's normal and the view
 BESIDE_PX = 3.0  # of the mask: how far beside the rim the silhouette must have ended
+NEAR_M = 0.2  # from the camera's plane; what is nearer is not compared
 REACH = 20  # pixels of the mask searched to either side
 AGREEMENT_COS = 0.8  # of the angle between the two normals
 MOST_BLENDING_M = 0.02  # skin that blending moves further is not rigid
@@ -56,6 +57,7 @@ class OutlineMeasurer:
         self.part = part[self.vertices]
         self._width = np.array([_width(body.joint_names[i]) for i in self.part])
         self._triangles = np.ascontiguousarray(body.triangles(), np.int32)
+        self._around = self._triangles[np.isin(self._triangles, self.vertices).any(axis=1)]
         self.first = len(body.keypoint_names)
         self.body = replace(
             body,
@@ -70,11 +72,11 @@ class OutlineMeasurer:
         body, v = self._source, self.vertices
         R, t, betas = fit.R_camera_part, fit.t_camera_part, fit.state.beta
         skin = np.ascontiguousarray(body.skin(R, t, betas))
-        normals, points = vertex_normals(skin, self._triangles)[v], skin[v]
+        normals, points = vertex_normals(skin, self._around)[v], skin[v]
         local = body.rest_vertices(betas)[v] - body.rest_joints(betas)[self.part]
         delta = np.einsum("nji,nj->ni", R[self.part], points - t[self.part]) - local
         facing = (normals * points).sum(axis=1) / np.linalg.norm(points, axis=1)
-        near = (np.abs(facing) < RIM_COS) & (points[:, 2] > 0.2) & (np.linalg.norm(delta, axis=1) < MOST_BLENDING_M)
+        near = (np.abs(facing) < RIM_COS) & (points[:, 2] > NEAR_M) & (np.linalg.norm(delta, axis=1) < MOST_BLENDING_M)
         rows = np.flatnonzero(near)
         at = self._crop(mask.region, points[rows])
         ahead = self._crop(mask.region, points[rows] + 0.01 * normals[rows]) - at
@@ -117,13 +119,12 @@ class OutlineMeasurer:
 
     def _coverage(self, skin: NDArray[np.float64], region: Region) -> NDArray[np.bool_]:
         """Return (256, 256) bool: where in the mask's region the body is."""
-        at = np.full((len(skin), 2), -1e4)
-        front = skin[:, 2] > 0.2
+        at = np.full((len(skin), 2), np.nan)
+        front = skin[:, 2] > NEAR_M
         at[front] = self._crop(region, skin[front])
-        flat = np.column_stack([at * skin[:, 2:], skin[:, 2]])  # of a camera whose pixels are the mask's
-        canvas = Canvas.blank(SIZE, SIZE)
-        rasterize(canvas, flat, self._triangles, np.ones(3), np.eye(3))
-        return canvas.coverage
+        covered = np.zeros((SIZE, SIZE), np.bool_)
+        fill_silhouette(covered, at, self._triangles)
+        return covered
 
 
 def _crossings(
