@@ -39,6 +39,7 @@ RECORD = Path(__file__).with_name("gate.json")
 ACCURACY = ("mpjpe_root", "pa_mpjpe", "foot_slide_cm", "jitter_rel", "flipped")
 LEAST_NOISE = {"mpjpe_root": 1.0, "pa_mpjpe": 1.0, "foot_slide_cm": 0.2, "jitter_rel": 2.0, "flipped": 0.02}
 MACHINES, MACHINES_OF_NETWORKS = 0.35, 0.6  # by which a ratio of times may differ between machines, of its value
+TRIES = 3
 JPEG_QUALITIES = (80, 88, 96)  # of the copies
 
 
@@ -126,6 +127,19 @@ def ratios(body: Body, rounds: int) -> dict[str, float]:
     }
 
 
+def unloaded_ratios(body: Body, record: dict[str, Figure]) -> dict[str, float]:
+    """Return the least ratios of up to `TRIES` runs, where a run's ratios are worse than recorded.
+
+    What else the machine does can slow down one side of a ratio for a whole run; slower code is slower in all runs.
+    """
+    found = ratios(body, 30)
+    for _ in range(TRIES - 1):
+        if not verdict(record, found)[1]:
+            break
+        found = {name: min(found[name], again) for name, again in ratios(body, 30).items()}
+    return found
+
+
 def accuracy_and_noise(body: Body, videos: dict[str, tuple[Path, Path]], folder: Path) -> dict[str, Figure]:
     """Return the figures of accuracy, each with twice its standard deviation over copies of the clips."""
     found = [accuracy(body, videos)]
@@ -182,7 +196,7 @@ def main() -> int:
     body = load_body("scope")
     if args.update:
         update(body)
-    rows, worse = verdict(read(), accuracy(body, clips()) | ratios(body, 30))
+    rows, worse = verdict(read(), accuracy(body, clips()) | unloaded_ratios(body, read()))
     print(report.table(("figure", "now", "recorded", "noise", ""), rows))
     if args.json:
         with atomic_path(args.json) as temporary:
