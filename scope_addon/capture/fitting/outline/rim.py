@@ -49,6 +49,7 @@ class OutlineMeasurer:
 
     def __init__(self, body: Body, camera: Camera) -> None:
         self._source, self._camera = body, camera
+        self._shaped = np.full(body.P, np.nan), body
         part = np.take_along_axis(body.skin_joints, body.skin_weights.argmax(axis=1)[:, None], axis=1)[:, 0]
         names = [body.joint_names[i] for i in part]
         usable = np.array([not any(key in name for key in _LEFT_OUT) for name in names])
@@ -69,11 +70,11 @@ class OutlineMeasurer:
 
     def measure(self, fit: Fit, mask: PersonMask) -> tuple[NDArray[Any], NDArray[Any]]:
         """Return the residual's rows for the pose and shape of a fit: int64 (n, 1) and float64 (n, 11)."""
-        body, v = self._source, self.vertices
-        R, t, betas = fit.R_camera_part, fit.t_camera_part, fit.state.beta
-        skin = np.ascontiguousarray(body.skin(R, t, betas))
+        body, v = self._with_shape(fit.state.beta), self.vertices
+        R, t = fit.R_camera_part, fit.t_camera_part
+        skin = np.ascontiguousarray(body.skin(R, t))
         normals, points = vertex_normals(skin, self._around)[v], skin[v]
-        local = body.rest_vertices(betas)[v] - body.rest_joints(betas)[self.part]
+        local = body.v_template[v] - body.J_template[self.part]
         delta = np.einsum("nji,nj->ni", R[self.part], points - t[self.part]) - local
         facing = (normals * points).sum(axis=1) / np.linalg.norm(points, axis=1)
         near = (np.abs(facing) < RIM_COS) & (points[:, 2] > NEAR_M) & (np.linalg.norm(delta, axis=1) < MOST_BLENDING_M)
@@ -102,6 +103,15 @@ class OutlineMeasurer:
         sigmas = (OUTSIDE_SIGMA_M / depth) ** 2, (self._width[rows] / depth) ** 2
         weights = np.full(len(rows), OUTSIDE_WEIGHT), np.full(len(rows), INSIDE_WEIGHT)
         return pack(self.first + rows, delta[rows], m, n, weights, sigmas)
+
+    def _with_shape(self, betas: NDArray[np.float64]) -> Body:
+        """Return the body whose template has this shape, which the frames of a round share."""
+        known, shaped = self._shaped
+        if not np.array_equal(known, betas):
+            body = self._source
+            shaped = replace(body, v_template=body.rest_vertices(betas), J_template=body.rest_joints(betas))
+            self._shaped = betas.copy(), shaped
+        return shaped
 
     def _normalized(self, pixels: NDArray[np.float64]) -> NDArray[np.float64]:
         K = self._camera.intrinsics

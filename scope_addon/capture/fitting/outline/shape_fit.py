@@ -7,6 +7,7 @@ rim and contour are matched and everything is fitted again, a few times.
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from typing import Any
 
@@ -22,6 +23,7 @@ from .rim import OutlineMeasurer
 
 FEWEST, MOST = 4, 32  # masks; fewer, such as that of a still image, can mislead, and more add little
 ROUNDS = 3
+THREADS = 2
 # A rim point's inverse variance: 0.0018 in normalized coordinates, 7 mm at 4 m. The outline says more of the shape than
 # keypoints do, so the prior may weigh less. MPJPE-root on the four pose2sim cameras with other weights of outline and
 # prior: 72.7 mm with 0 and 10, 72.5 with 0 and 2, 72.1 with 5e4 and 10, 68.7 with 3e5 and 2, which are today's.
@@ -61,11 +63,10 @@ def fit_shape_to_outline(
     weights = replace(base, shape=shape, tables={**base.tables, "outline": OUTLINE_WEIGHT})
     cold, warm = (replace(ROBUST, stages=stages(weights)) for stages in (cold_stages, warm_stages))
     found = fit_clip(outline.body, measured, priors=prepared.priors, options=cold)
-    for _ in range(ROUNDS):
-        matched = [
-            replace(frame, tables={"outline": outline.measure(fit, mask)})
-            for frame, fit, (_, mask) in zip(measured, found.frames, masks, strict=True)
-        ]
-        states = [fit.state for fit in found.frames]
-        found = fit_clip(outline.body, matched, init=states, priors=prepared.priors, options=warm)
+    with ThreadPoolExecutor(THREADS, "scope-outline") as pool:
+        for _ in range(ROUNDS):
+            tables = pool.map(outline.measure, found.frames, [mask for _, mask in masks])
+            matched = [replace(frame, tables={"outline": rows}) for frame, rows in zip(measured, tables, strict=True)]
+            states = [fit.state for fit in found.frames]
+            found = fit_clip(outline.body, matched, init=states, priors=prepared.priors, options=warm)
     return found
