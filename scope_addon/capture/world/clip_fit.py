@@ -13,7 +13,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from typing import TypeVar, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,25 +27,7 @@ from .camera_path import CameraPath
 WINDOW_UNKNOWNS = 24_000  # unknowns of a window, whose equations take some 100 MB: 320 frames of a body of 24 parts
 OVERLAP = 0.2  # of a window's frames; two windows differ by 2 to 4 mm where one of them has 1 s more to its end
 LONGEST_STEP = 2.5  # between two frames that are fitted together, in units of the median step
-_Item = TypeVar("_Item")
 _Progress = Callable[[str, int, int], None]
-
-
-class _Computed(Sequence[_Item]):
-    """Frames' items, each computed when it is asked for: an hour's measurements would not fit into memory."""
-
-    def __init__(self, frames: NDArray[np.intp], item: Callable[[int], _Item]) -> None:
-        self._frames, self._item = frames, item
-
-    def __len__(self) -> int:
-        return len(self._frames)
-
-    @overload
-    def __getitem__(self, k: int) -> _Item: ...
-    @overload
-    def __getitem__(self, k: slice) -> Sequence[_Item]: ...
-    def __getitem__(self, k: int | slice) -> _Item | Sequence[_Item]:
-        return _Computed(self._frames[k], self._item) if isinstance(k, slice) else self._item(int(self._frames[k]))
 
 
 def fit_clip(prepared: PreparedTrack, start: FittedTrack, path: CameraPath, progress: _Progress) -> FittedTrack:
@@ -77,21 +58,18 @@ class _Clip:
         """Fit one window; frames that an earlier one has fitted are blended from that one's motion to this one's."""
         times = self._prepared.track.times[frames]
         self._progress("solving the clip", int(self._done.sum()), len(self._done))
-        states: Sequence[State] = _Computed(frames, self._state)
-        for prior in motion_priors(self._prepared.body, times):
-            found = fit_motion(
-                self._prepared.body,
-                _Computed(frames, self._measure),
-                times,
-                init=states,
-                priors=self._prepared.priors,
-                options=replace(ROBUST, stages=warm_stages(self._weights)),
-                motion=prior,
-                stands=self._standing_points(frames),
-                shape=np.asarray(self._start.betas, float),
-                window=np.inf,
-            )
-            states = found.states
+        found = fit_motion(
+            self._prepared.body,
+            [self._measure(k) for k in frames],
+            times,
+            init=[self._state(k) for k in frames],
+            priors=self._prepared.priors,
+            options=replace(ROBUST, stages=warm_stages(self._weights)),
+            motion=motion_priors(self._prepared.body, times),
+            stands=self._standing_points(frames),
+            shape=np.asarray(self._start.betas, float),
+            window=np.inf,
+        )
         self._keep(frames, found)
 
     def fitted(self) -> FittedTrack:
