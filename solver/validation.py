@@ -324,12 +324,12 @@ def _refuse_unless_numbers(value: Any, kinds: str, what: str, shape: tuple[int |
     """Raise ShapeError for strings, None, ragged lists and numbers of another kind; an empty list is of any kind."""
     try:
         array = np.asarray(value)
-        usable = array.dtype.kind in kinds or (array.size == 0 and array.dtype.kind == "f")
+        if array.dtype.kind in kinds or (array.size == 0 and array.dtype.kind == "f"):
+            return
         found = f"{array.dtype} of shape {array.shape}" if array.dtype.kind in "fiubc" else _described(value)
     except ValueError:  # numpy's, for lists of different lengths
-        usable, found = False, "a ragged list"
-    if not usable:
-        raise ShapeError(f"{name} must be {what} of shape {_written(shape)}, but got {found}.")
+        found = "a ragged list"
+    raise ShapeError(f"{name} must be {what} of shape {_written(shape)}, but got {found}.")
 
 
 def _written(shape: tuple[int | None, ...]) -> str:
