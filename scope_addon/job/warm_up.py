@@ -7,10 +7,13 @@ processor or Python), it runs once in the background, after the extension has be
 
 from __future__ import annotations
 
+import numpy as np
+
 from ...solver.compiled.code_cache import compiled_kernels
 from ...solver.loaders.body_file import ASSETS, load_body
 from ..capture.media.video_range import VideoRange
 from ..capture.options import CaptureOptions
+from ..capture.overlay.rasterizer import fill_silhouette
 from ..capture.pipeline import capture
 from ..capture.stages.clock import Progress
 from ..edit.pins.corrected_motion import with_corrections
@@ -27,6 +30,7 @@ def warm_up(progress: Progress) -> int:
     :raises ScopeError: the sample cannot be captured.
     """
     load_rasterizer()
+    fill_silhouette(np.zeros((1, 1), np.bool_), np.zeros((1, 2)), np.zeros((0, 3), np.int32))  # of the preset best
     options = CaptureOptions(quality="fast", wanted=VideoRange(end_s=_SECONDS), threads=1)
     body = load_body("scope")
     motion = capture(ASSETS / "sample" / "sample.mp4", body, options, progress).motions[0]

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Time the first capture after installation, and the second: ``blender --background --python first_capture.py``.
 
-The second begins with a cleared cache, which keeps the compiled solver. Writes out/first.json, and fails if the
-first takes more than 15 s longer, or says that it finds the person when it does not.
+The second begins with a cleared cache, which keeps the compiled solver. Writes out/first.json, and fails if a capture
+compiles what the extension should contain, if the first takes more than 15 s longer, or if it says that it finds the
+person when it does not.
 """
 
 from __future__ import annotations
@@ -45,6 +46,7 @@ def main() -> None:
     found |= {"stages_first_s": first_stages, "stages_second_s": second_stages}
     Path("/scope/out/first.json").write_text(json.dumps(found, indent=1))
     print(json.dumps(found))
+    assert not kept, f"the extension comes without {kept}"
     assert "compiling the solver" not in second_stages, second_stages
     assert first < second + MOST_LONGER_S, found
 

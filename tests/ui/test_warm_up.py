@@ -83,16 +83,18 @@ def test_it_ends_with_the_extension(process):
     assert running.poll() is not None
 
 
-def test_a_capture_ends_it(process, fake_worker, footage):
+def test_a_capture_ends_it_for_good(process, fake_worker, footage):
     import bpy
 
     process("import time; time.sleep(100)")
     fake_worker("finish()")
     assert warm_up.step() is not None
     running = warm_up.WarmUp.process
+    bpy.app.timers.register(warm_up.step, first_interval=100.0)  # as attach() does
     bpy.context.scene.scope.footage = str(footage)
     assert bpy.ops.scope.capture() == {"FINISHED"}
     assert running.poll() is not None
+    assert not bpy.app.timers.is_registered(warm_up.step)  # which would begin again, beside the capture
 
 
 def test_without_a_window_it_does_not_begin():

@@ -168,7 +168,7 @@ class SCOPE_OT_capture(bpy.types.Operator):
             return self._fail(f"a part of Scope cannot be loaded ({error}); reinstall the extension")
         from ....solver.errors import ScopeError
 
-        warm_up.stop()  # its processor time is the capture's; what it has compiled is kept
+        warm_up.detach()  # the capture compiles what is left; what it has compiled is kept
         try:
             state.job = CaptureJob(context.scene)
         except (ScopeError, OSError) as error:
