@@ -20,8 +20,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .arrays import as_array
 from .errors import ModelFileError, ShapeError
-from .validation import as_array
 
 Array = NDArray[np.float64]
 

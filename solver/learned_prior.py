@@ -10,11 +10,12 @@ from pathlib import Path
 
 import numpy as np
 
+from .arrays import as_array
 from .compiled.part import Array
 from .errors import InvalidValueError, ModelFileError, ShapeError
 from .loaders.npz import read_npz
 from .residuals import joint_flow
-from .validation import as_array, check_weight
+from .validation import check_weight
 
 BUILT_IN = Path(__file__).resolve().parent.parent / "assets" / "prior" / "joint_prior.npz"
 

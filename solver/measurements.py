@@ -13,12 +13,12 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .arrays import as_array
 from .compiled.kernel import kernel
 from .compiled.part import Array
 from .errors import InvalidValueError, ShapeError
 from .residuals import floor, foot_contact, pose_prior
 from .validation import (
-    as_array,
     as_indices,
     as_number,
     check_intrinsics,

@@ -6,11 +6,12 @@ from enum import Enum
 
 import numpy as np
 
+from .arrays import as_array
 from .compiled.part import Array, Pose
 from .compiled.tree import Tree
 from .gauss_newton.linearize import make_pose, place_parts
 from .rotations import nearest_rotation
-from .validation import as_array, check_rotations
+from .validation import check_rotations
 
 
 class Status(Enum):

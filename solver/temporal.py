@@ -9,10 +9,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from .arrays import as_array
 from .measurements import Measurements, PosePriors
 from .residuals import joint_prior
 from .state import State
-from .validation import as_array, check_rotations, check_weight
+from .validation import check_rotations, check_weight
 
 
 @dataclass(frozen=True)

@@ -15,46 +15,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .arrays import as_integers, described
 from .compiled.kernel import allocating_kernel, kernel
 from .compiled.part import Array
 from .errors import InvalidValueError, ShapeError, UnitsWarning
 
-_FLOAT64 = np.dtype(np.float64)
 ROTATION_TOLERANCE = 0.01  # of the entries of R Rᵀ - I: rotations rounded to two decimals pass, scaled ones do not
 LARGEST_STEP = 10.0  # metres between two points or joints of one person, one after the other in a list
 _NO_WEIGHTS = np.zeros(0)
 _UNITS = "Scope's unit is the metre; divide millimetres by 1000"
-
-
-def as_array(value: ArrayLike, shape: tuple[int | None, ...], name: str) -> Array:
-    """Return `value` as contiguous float64.
-
-    :param value: an array, or lists of numbers, of `shape`.
-    :param shape: the expected one, for instance (None, 3) for (n, 3): None is any length.
-    :param name: what the array is, as a message begins.
-    :raises ShapeError: it has another shape, or is no array of numbers.
-    """
-    if type(value) is not np.ndarray or value.dtype is not _FLOAT64:
-        _refuse_unless_numbers(value, "fiub", "numbers", shape, name)
-    array = np.ascontiguousarray(value, dtype=np.float64)
-    if array.shape == shape and array.ndim:
-        return array
-    if len(shape) != np.ndim(value) or any(n is not None and n != m for n, m in zip(shape, array.shape, strict=True)):
-        raise ShapeError(f"{name} must have shape {_written(shape)}, but got shape {np.shape(value)}.")
-    return array
-
-
-def as_integers(value: ArrayLike, name: str) -> Array:
-    """Return `value` as contiguous int64 (n,).
-
-    :raises ShapeError: it is no list of whole numbers.
-    """
-    if type(value) is not np.ndarray or value.dtype.kind not in "iu":
-        _refuse_unless_numbers(value, "iu", "integers", (None,), name)
-    array = np.asarray(value)
-    if array.ndim != 1:
-        raise ShapeError(f"{name} must be integers of shape (n,), but got {array.dtype} of shape {array.shape}.")
-    return np.ascontiguousarray(array, dtype=np.int64)
 
 
 def as_indices(value: ArrayLike, limit: int, name: str) -> Array:
@@ -68,35 +37,17 @@ def as_indices(value: ArrayLike, limit: int, name: str) -> Array:
     return array
 
 
-def as_table(value: Any, ints: int, floats: int, name: str) -> tuple[Array, Array]:
-    """Return the rows of a residual as int64 (n, ints) and float64 (n, floats).
-
-    :raises ShapeError: it is no pair of such arrays.
-    """
-    if not isinstance(value, (tuple, list)) or len(value) != 2:
-        raise ShapeError(f"Tables of {name!r} must be a pair of arrays (ints, floats), but got {_described(value)}.")
-    _refuse_unless_numbers(value[0], "iu", "integers", (None, ints), f"Whole numbers of {name!r}")
-    _refuse_unless_numbers(value[1], "fiub", "numbers", (None, floats), f"Numbers of {name!r}")
-    table = np.asarray(value[0], dtype=np.int64), np.asarray(value[1], dtype=np.float64)
-    if (table[0].shape[1:], table[1].shape[1:]) != ((ints,), (floats,)) or len(table[0]) != len(table[1]):
-        raise ShapeError(
-            f"Tables of {name!r} must have shapes (n, {ints}) and (n, {floats}), "
-            f"but got {table[0].shape} and {table[1].shape}."
-        )
-    return table
-
-
 def as_number(value: Any, name: str) -> float:
     """Return a single number, which may be NaN.
 
     :raises InvalidValueError: it is none.
     """
     if isinstance(value, (str, bytes)) or value is None or np.ndim(value) != 0:
-        raise InvalidValueError(f"{name} must be a number, but is {_described(value)}.")
+        raise InvalidValueError(f"{name} must be a number, but is {described(value)}.")
     try:
         return float(value)
     except (TypeError, ValueError):
-        raise InvalidValueError(f"{name} must be a number, but is {_described(value)}.") from None
+        raise InvalidValueError(f"{name} must be a number, but is {described(value)}.") from None
 
 
 def check_weight(value: Any, name: str) -> None:
@@ -193,7 +144,7 @@ def check_type(value: Any, wanted: type | tuple[type, ...], name: str) -> None:
     if not isinstance(value, wanted):
         kinds = wanted if isinstance(wanted, tuple) else (wanted,)
         allowed = " or ".join("None" if kind is type(None) else kind.__name__ for kind in kinds)
-        raise InvalidValueError(f"{name} must be {allowed}, but is {_described(value)}.")
+        raise InvalidValueError(f"{name} must be {allowed}, but is {described(value)}.")
 
 
 def warn_of_units(points: Array, name: str) -> None:
@@ -318,31 +269,3 @@ def _far_apart(points: Array, most: float) -> bool:
                 far += 1
         before = k
     return 2 * far > steps
-
-
-def _refuse_unless_numbers(value: Any, kinds: str, what: str, shape: tuple[int | None, ...], name: str) -> None:
-    """Raise ShapeError for strings, None, ragged lists and numbers of another kind; an empty list is of any kind."""
-    try:
-        array = np.asarray(value)
-        if array.dtype.kind in kinds or (array.size == 0 and array.dtype.kind == "f"):
-            return
-        found = f"{array.dtype} of shape {array.shape}" if array.dtype.kind in "fiubc" else _described(value)
-    except ValueError:  # numpy's, for lists of different lengths
-        found = "a ragged list"
-    raise ShapeError(f"{name} must be {what} of shape {_written(shape)}, but got {found}.")
-
-
-def _written(shape: tuple[int | None, ...]) -> str:
-    """Return a shape as numpy writes it, with n for any length."""
-    return f"({', '.join('n' if n is None else str(n) for n in shape)}{',' if len(shape) == 1 else ''})"
-
-
-def _described(value: Any) -> str:
-    """Return the words for a value of the wrong kind in a message."""
-    if value is None:
-        return "None"
-    if isinstance(value, str):
-        return f"the text {value[:40]!r}"
-    if isinstance(value, np.ndarray):
-        return f"an array of {value.dtype} of shape {value.shape}"
-    return f"a {type(value).__name__}"

@@ -277,7 +277,7 @@ def test_a_signal_while_the_program_is_loaded_has_its_word(tmp_path, number):
         f"signal.signal({int(number)}, signal.SIG_DFL)\n"  # under nohup, SIGHUP is ignored, and stays so
         "class Finder:\n"
         "    def find_spec(name, *_):\n"
-        f"        name == 'numba' and os.kill(os.getpid(), {int(number)})\n"
+        f"        name == 'numpy' and os.kill(os.getpid(), {int(number)})\n"
         "sys.meta_path.insert(0, Finder)\n"
         "sys.argv = ['scope', 'capture']\n"
         "runpy.run_module('scope.scope_addon', run_name='__main__')\n"
@@ -304,3 +304,10 @@ def test_too_little_memory_is_no_bug(tmp_path, capsys, monkeypatch, error):
     status, _, err = run(capsys, "capture", str(SAMPLE), "-o", str(tmp_path / "out.npz"))
     assert (status, err.count("\n")) == (1, 1)
     assert "out of memory; free disk space or memory and try again" in err
+
+
+def test_the_start_loads_no_library_that_only_a_capture_needs():
+    heavy = {"numba", "cv2", "onnxruntime", "bpy"}
+    code = f"import sys; from scope.scope_addon import cli; print(sorted({heavy} & set(sys.modules)))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"

@@ -6,8 +6,9 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..arrays import as_array, as_integers
 from ..errors import ShapeError
-from ..validation import as_array, as_indices, as_integers, check_finite, warn_of_units
+from ..validation import as_indices, check_finite, warn_of_units
 from .rows import padded
 
 

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import as_array
 from ..compiled.part import Blocks, Pose
 from ..compiled.tree import BodyArrays, Tree, make_tree, with_fixed_shape
 from ..custom_residuals.external import raise_failure
@@ -37,7 +38,6 @@ from ..options import Options, Priors, default_priors
 from ..residuals.registry import SHAPE_PRIOR
 from ..state import ClipFit, Fit, State, Status
 from ..temporal import Temporal, with_previous
-from ..validation import as_array
 from .frame_solver import fit_tree
 from .report import Outcome, cost_by_term, make_fit
 

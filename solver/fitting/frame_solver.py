@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import as_array
 from ..compiled.kernel import announce_compilation, kernel
 from ..compiled.tree import BodyArrays, Tree, make_tree
 from ..custom_residuals.external import raise_failure
@@ -20,7 +21,6 @@ from ..options import Options, Priors, Stage, default_priors
 from ..residuals.registry import SHAPE_PRIOR
 from ..rotations import nearest_rotation, orthonormalize
 from ..state import Fit, State, Status
-from ..validation import as_array
 from .initialize import initial_state
 from .report import Outcome, cost_by_term, make_fit
 

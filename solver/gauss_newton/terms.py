@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from ..arrays import as_table
 from ..compiled.kernel import allocating_kernel, kernel
 from ..compiled.part import Array
 from ..compiled.tree import Tree
@@ -12,7 +13,7 @@ from ..custom_residuals.external import NONE, External, pack_external
 from ..errors import ShapeError
 from ..measurements import LARGEST, Measurements
 from ..residuals.registry import FIRST_EXTERNAL, RESIDUALS, empty_tables, registered
-from ..validation import all_within, as_table
+from ..validation import all_within
 
 if TYPE_CHECKING:
     from ..options import Priors

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arrays import as_array
 from ..compiled.part import Array, Pose
 from ..compiled.tree import BodyArrays, Tree, make_tree, with_fixed_shape
 from ..errors import InvalidValueError, ShapeError
@@ -19,7 +20,7 @@ from ..gauss_newton.terms import pack_priors
 from ..measurements import Measurements
 from ..options import Options, Priors, default_priors
 from ..state import State, Status
-from ..validation import as_array, check_finite, check_type, check_weight
+from ..validation import check_finite, check_type, check_weight
 from .covariance import joint_covariances
 from .initial import initial_states
 from .levenberg_marquardt import Optimizer

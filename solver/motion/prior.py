@@ -7,8 +7,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arrays import as_array
 from ..compiled.part import Array
-from ..validation import as_array, as_indices, check_finite, check_not_negative, check_robust, check_weight
+from ..validation import as_indices, check_finite, check_not_negative, check_robust, check_weight
 
 
 @dataclass(frozen=True)

@@ -13,13 +13,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arrays import as_array
 from ..compiled.part import Array, Pose
 from ..compiled.tree import Tree
 from ..gauss_newton.terms import PackedPriors, Terms, fill_terms, usable
 from ..measurements import Measurements
 from ..residuals.registry import empty_tables
 from ..rotations import nearest_rotation
-from ..validation import as_array, check_finite, check_rotations, check_type
+from ..validation import check_finite, check_rotations, check_type
 
 
 @dataclass

@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Conversion of what comes in from outside to arrays of the expected shape; every message names the field.
+
+`validation` checks their values with compiled kernels. This file needs no numba, which takes long to load: bodies are
+described and command lines read without it.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .errors import ShapeError
+
+Array = NDArray[Any]
+_FLOAT64 = np.dtype(np.float64)
+
+
+def as_array(value: ArrayLike, shape: tuple[int | None, ...], name: str) -> Array:
+    """Return `value` as contiguous float64.
+
+    :param value: an array, or lists of numbers, of `shape`.
+    :param shape: the expected one, for instance (None, 3) for (n, 3): None is any length.
+    :param name: what the array is, as a message begins.
+    :raises ShapeError: it has another shape, or is no array of numbers.
+    """
+    if type(value) is not np.ndarray or value.dtype is not _FLOAT64:
+        _refuse_unless_numbers(value, "fiub", "numbers", shape, name)
+    array = np.ascontiguousarray(value, dtype=np.float64)
+    if array.shape == shape and array.ndim:
+        return array
+    if len(shape) != np.ndim(value) or any(n is not None and n != m for n, m in zip(shape, array.shape, strict=True)):
+        raise ShapeError(f"{name} must have shape {_written(shape)}, but got shape {np.shape(value)}.")
+    return array
+
+
+def as_integers(value: ArrayLike, name: str) -> Array:
+    """Return `value` as contiguous int64 (n,).
+
+    :raises ShapeError: it is no list of whole numbers.
+    """
+    if type(value) is not np.ndarray or value.dtype.kind not in "iu":
+        _refuse_unless_numbers(value, "iu", "integers", (None,), name)
+    array = np.asarray(value)
+    if array.ndim != 1:
+        raise ShapeError(f"{name} must be integers of shape (n,), but got {array.dtype} of shape {array.shape}.")
+    return np.ascontiguousarray(array, dtype=np.int64)
+
+
+def as_table(value: Any, ints: int, floats: int, name: str) -> tuple[Array, Array]:
+    """Return the rows of a residual as int64 (n, ints) and float64 (n, floats).
+
+    :raises ShapeError: it is no pair of such arrays.
+    """
+    if not isinstance(value, (tuple, list)) or len(value) != 2:
+        raise ShapeError(f"Tables of {name!r} must be a pair of arrays (ints, floats), but got {described(value)}.")
+    _refuse_unless_numbers(value[0], "iu", "integers", (None, ints), f"Whole numbers of {name!r}")
+    _refuse_unless_numbers(value[1], "fiub", "numbers", (None, floats), f"Numbers of {name!r}")
+    table = np.asarray(value[0], dtype=np.int64), np.asarray(value[1], dtype=np.float64)
+    if (table[0].shape[1:], table[1].shape[1:]) != ((ints,), (floats,)) or len(table[0]) != len(table[1]):
+        raise ShapeError(
+            f"Tables of {name!r} must have shapes (n, {ints}) and (n, {floats}), "
+            f"but got {table[0].shape} and {table[1].shape}."
+        )
+    return table
+
+
+def described(value: Any) -> str:
+    """Return the words for a value of the wrong kind in a message."""
+    if value is None:
+        return "None"
+    if isinstance(value, str):
+        return f"the text {value[:40]!r}"
+    if isinstance(value, np.ndarray):
+        return f"an array of {value.dtype} of shape {value.shape}"
+    return f"a {type(value).__name__}"
+
+
+def _refuse_unless_numbers(value: Any, kinds: str, what: str, shape: tuple[int | None, ...], name: str) -> None:
+    """Raise ShapeError for strings, None, ragged lists and numbers of another kind; an empty list is of any kind."""
+    try:
+        array = np.asarray(value)
+        if array.dtype.kind in kinds or (array.size == 0 and array.dtype.kind == "f"):
+            return
+        found = f"{array.dtype} of shape {array.shape}" if array.dtype.kind in "fiubc" else described(value)
+    except ValueError:  # numpy's, for lists of different lengths
+        found = "a ragged list"
+    raise ShapeError(f"{name} must be {what} of shape {_written(shape)}, but got {found}.")
+
+
+def _written(shape: tuple[int | None, ...]) -> str:
+    """Return a shape as numpy writes it, with n for any length."""
+    return f"({', '.join('n' if n is None else str(n) for n in shape)}{',' if len(shape) == 1 else ''})"
