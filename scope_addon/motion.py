@@ -52,10 +52,15 @@ class Motion:
     residual_px: NDArray[np.floating[Any]]  # (T,)
     image_size: NDArray[np.int64]  # (2,) width, height of the decoded, upright frame
     source: str = ""  # file name of the footage
+    joint_sigma_m: NDArray[np.floating[Any]] | None = None  # (T, K+1), NaN where not known; always an array once made
+    joint_sigma_depth_m: NDArray[np.floating[Any]] | None = None  # (T, K+1), likewise
     # What the user corrected, which `poses` and `joints_cam` contain: the arrays named CORRECTION_KEYS, or none.
     corrections: dict[str, NDArray[Any]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        for name in SIGMA_KEYS:
+            if getattr(self, name) is None:
+                setattr(self, name, np.full(np.shape(self.joints_cam)[:2], np.nan))
         for name, (_, dtype) in _SCHEMA.items():
             value = getattr(self, name)
             setattr(self, name, np.asarray(value, dtype) if dtype is not str else str(value))
@@ -119,7 +124,7 @@ class Motion:
         path = Path(path)
         data = read_npz(path, MotionFileError, "motion file", content)
         known = {f.name for f in fields(cls)} - {"corrections"}
-        missing = sorted(known - set(data) - {"source"})
+        missing = sorted(known - set(data) - {"source", *SIGMA_KEYS})
         if missing:
             raise MotionFileError(f"{path} lacks {', '.join(missing)}: it is not a motion file of this version")
         values: dict[str, Any] = {k: v.item() if v.ndim == 0 else v for k, v in data.items() if k in known}
@@ -139,6 +144,7 @@ CORRECTION_KEYS = (
     *("uncorrected_rows", "uncorrected_poses", "uncorrected_trans", "uncorrected_poses_raw", "uncorrected_trans_raw"),
     *("uncorrected_joints_cam", "uncorrected_world_from_camera"),
 )
+SIGMA_KEYS = ("joint_sigma_m", "joint_sigma_depth_m")  # not in files of earlier versions
 _SCHEMA: dict[str, tuple[tuple[str | int, ...], type]] = {
     "poses": (("T", "3K1"), np.float32),
     "trans": (("T", 3), np.float32),
@@ -161,4 +167,6 @@ _SCHEMA: dict[str, tuple[tuple[str | int, ...], type]] = {
     "residual_px": (("T",), np.float32),
     "image_size": ((2,), np.int64),
     "source": ((), str),
+    "joint_sigma_m": (("T", "K1"), np.float32),
+    "joint_sigma_depth_m": (("T", "K1"), np.float32),
 }

@@ -6,7 +6,7 @@ import pickle
 import numpy as np
 import pytest
 from scope.scope_addon.errors import MotionFileError, OutputError
-from scope.scope_addon.motion import Motion
+from scope.scope_addon.motion import SIGMA_KEYS, Motion
 
 
 def make_motion(T=4, K1=24, J=33, P=10):
@@ -43,7 +43,7 @@ def test_a_saved_motion_loads_the_same(tmp_path):
     back = Motion.load(tmp_path / "a.npz")
     for name, value in vars(motion).items():
         got = getattr(back, name)
-        assert np.array_equal(got, value), name
+        assert np.array_equal(got, value, equal_nan=name in SIGMA_KEYS), name
         assert getattr(got, "dtype", None) == getattr(value, "dtype", None), name
     assert [p.name for p in tmp_path.iterdir()] == ["a.npz"]
 
@@ -90,6 +90,16 @@ def test_a_missing_key_is_named(tmp_path):
     np.savez(tmp_path / "thin.npz", poses=np.zeros((1, 72)))
     with pytest.raises(MotionFileError, match="lacks .*trans"):
         Motion.load(tmp_path / "thin.npz")
+
+
+def test_files_of_earlier_versions_have_unknown_deviations(tmp_path):
+    make_motion().save(tmp_path / "a.npz")
+    with np.load(tmp_path / "a.npz") as file:
+        np.savez(tmp_path / "old.npz", **{key: file[key] for key in file.files if "sigma" not in key})
+    old = Motion.load(tmp_path / "old.npz")
+    assert old.joint_sigma_m.shape == old.joint_sigma_depth_m.shape == old.joint_confidence.shape
+    assert np.isnan(old.joint_sigma_m).all()
+    assert np.isnan(old.joint_sigma_depth_m).all()
 
 
 def test_an_unwritable_folder_is_an_output_error_and_keeps_the_earlier_file(tmp_path):

@@ -21,6 +21,7 @@ def motion_figures(motion: Motion, body: Body) -> dict[str, str]:
     path = np.linalg.norm(np.diff(pelvis[:, :2], axis=0), axis=1)
     error = motion.residual_px[seen]
     contact = motion.foot_contact > _CONTACT
+    sigma = motion.joint_sigma_m[seen]
     spans = find_review_spans(motion)
     review = sum(span.last - span.first + 1 for span in spans)
     return {
@@ -32,6 +33,7 @@ def motion_figures(motion: Motion, body: Body) -> dict[str, str]:
         "Reprojection error, mean": f"{error.mean():.1f} px" if len(error) else "–",
         "Reprojection error, 95th percentile": f"{np.percentile(error, 95):.1f} px" if len(error) else "–",
         "Confidence, mean": f"{body_confidence(motion).mean():.2f}",
+        "Standard deviation of joints, mean": f"{100 * np.nanmean(sigma):.1f} cm" if np.isfinite(sigma).any() else "–",
         "Left foot in contact": f"{100 * contact[:, :2].any(axis=1).mean():.0f} % of frames",
         "Right foot in contact": f"{100 * contact[:, 2:].any(axis=1).mean():.0f} % of frames",
         "Frames to review": f"{review}",

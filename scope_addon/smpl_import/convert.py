@@ -25,7 +25,7 @@ from ..kinematics.axes import R_WORLD_LEVELCAMERA, R_WORLD_MODEL, transform_poin
 from ..kinematics.contact_points import SOLES
 from ..kinematics.frame_blocks import by_blocks
 from ..kinematics.standing import standing_probability
-from ..motion import Motion
+from ..motion import SIGMA_KEYS, Motion
 from .layouts import SmplMotion, has_face, read_smpl_motion
 
 DEFAULT_RATE = 30.0  # frames per second
@@ -58,7 +58,7 @@ def import_motion(path: Path, body: str = "scope", up: str = "auto", rate: float
         raise UsageError(f"the up axis must be one of auto, {', '.join(R_WORLD_FILE)}, not '{up}'")
     if not (np.isfinite(rate) and rate >= 0):
         raise UsageError(f"the frame rate must be above zero, not {rate}")
-    own_keys = {each.name for each in fields(Motion)} - {"source", "corrections"}  # optional keys
+    own_keys = {each.name for each in fields(Motion)} - {"source", "corrections", *SIGMA_KEYS}  # optional keys
     if own_keys <= npz_keys(path):
         own = Motion.load(path)
         chosen = own.body_model if body == "scope" else body
@@ -80,7 +80,12 @@ def _own(motion: Motion, body: Body, path: Path) -> Imported:
         raise MotionFileError(f"{path} has no frames; choose another file")
     for each in fields(motion):
         value = getattr(motion, each.name)
-        if isinstance(value, np.ndarray) and value.dtype.kind == "f" and not np.isfinite(value).all():
+        if (
+            each.name not in SIGMA_KEYS
+            and isinstance(value, np.ndarray)
+            and value.dtype.kind == "f"
+            and not np.isfinite(value).all()
+        ):
             raise MotionFileError(f"{path}: {each.name} contains NaN or infinity; choose another file")
     if not 0 < motion.mocap_framerate <= 10_000 or (np.diff(motion.timestamps) <= 0).any():
         raise MotionFileError(f"{path}: its frame rate or timestamps cannot be used; choose another file")

@@ -186,7 +186,7 @@ def eliminate_clip(
     front[2 * n, 2 * n + GLOBALS :] = system.c
     middle = _middle(frames)
     half = (system, frames - 1, max(frames - 2 - middle, 0), -1, damping, root_scale, back, factor.Z)
-    _run_both(pool, eliminate_frames, (system, 0, middle, 1, damping, root_scale, front, factor.Z), half)
+    run_both(pool, eliminate_frames, (system, 0, middle, 1, damping, root_scale, front, factor.Z), half)
     _join(front, back, n, q)
     end = middle + min(frames, 2)
     without_back = ClipSystem(system.D[:end], system.B1[:end], system.B2[:end], system.N[:end], system.C, system.c)
@@ -216,13 +216,13 @@ def solve_clip(
     factor.d[:] = 0.0
     _substitute_middle(factor, middle, both)
     half = (factor.Z, middle + 2, max(frames - 2 - middle, 0), -1, factor.dg, factor.d)
-    _run_both(pool, substitute_frames, (factor.Z, middle - 1, middle, 1, factor.dg, factor.d), half)
+    run_both(pool, substitute_frames, (factor.Z, middle - 1, middle, 1, factor.dg, factor.d), half)
     moved = np.einsum("fa,fa->", system.N[:, :, 0], factor.d) + system.c @ factor.dg
     damped = np.sum(factor.d**2) + (root_scale**2 - 1.0) * np.sum(factor.d[:, 3:6] ** 2)
     return float(0.5 * (damping * damped - moved))
 
 
-def _run_both(pool: ThreadPoolExecutor | None, kernel: Any, front: tuple[Any, ...], back: tuple[Any, ...]) -> None:
+def run_both(pool: ThreadPoolExecutor | None, kernel: Any, front: tuple[Any, ...], back: tuple[Any, ...]) -> None:
     """Run a kernel on both halves of a clip, the second in a thread of the pool if there is one."""
     waiting = None if pool is None else pool.submit(kernel, *back)
     kernel(*front)

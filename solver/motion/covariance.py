@@ -1,95 +1,205 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 r"""Marginal covariances of a clip's joints and of its global columns, by selected inversion of the factor.
 
-With the covariance S of the two frames that were eliminated after frame f, and of the global columns, and X their
-columns of L^-1 [E_1 | E_2 | N],
-    P = -L^-ᵀ X,    cov(f, later) = P S,    cov(f, f) = L^-ᵀ L^-1 + P S Pᵀ
-so the diagonal blocks follow in one pass in opposite order, with nothing wider than 2 n + P. A joint's position is
+Row i of a frame's factor, divided by its pivot, says how unknown i follows from those that are eliminated after it:
+the later ones of the frame, the two frames after it and the global columns. With R_ij the row, S the covariance of all
+these, and u_i the pivot,
+    S_ij = -sum over k > i of R_ik S_kj / u_i,     S_ii = 1/u_i^2 - sum over k > i of R_ik S_ki / u_i
+so the diagonal blocks follow in one pass in opposite order, with nothing wider than 3 n + W. A joint's position is
 linear in these unknowns: t_i = t_0 + sum over its parents, dt_i = J_i d_f + D_i dbeta.
 The scale is that of the weights, which are inverse variances.
 Source: the recursion for the entries of a sparse inverse by Takahashi, Fagan and Chin (1973).
 """
 
+from concurrent.futures import ThreadPoolExecutor
+from typing import NamedTuple
+
 import numpy as np
 
+from ..compiled.kernel import kernel
 from ..compiled.part import Array, Pose
+from ..compiled.rows import add1, clear
 from ..compiled.tree import Tree
+from ..gauss_newton.gram import subtract_gram_rows
 from ..gauss_newton.optimizer import DAMPING_LEAST
-from .band import Factor, eliminate_clip
+from .band import Factor, eliminate_clip, run_both
 from .system import GLOBALS, ClipSystem
 
 
+class ClipCovariance(NamedTuple):
+    """Covariances of T frames and of what they share."""
+
+    joints: Array  # (T, K+1, 3, 3) of the joints' positions, metres^2
+    from_root: Array  # (T, K+1, 3, 3) of their positions relative to part 0
+    shared: Array  # (G, G) of the global columns
+
+
+class _Memory(NamedTuple):
+    """What one thread works in."""
+
+    S: Array  # (3 n + W, 3 n + W): the frame, the two eliminated after it, the global columns
+    X: Array  # (3 n + W, 4)
+    J: Array  # (2, 3, 6 + 3K + W)
+    columns: Array  # (6 + 3K + W,) integers
+
+
 def joint_covariances(
-    tree: Tree, system: ClipSystem, poses: Pose, root_scale: float, factor: Factor
-) -> tuple[Array, Array]:
-    """Return the covariances (T, K+1, 3, 3) of the joints' positions, metres^2, and (G, G) of the global columns.
+    tree: Tree,
+    system: ClipSystem,
+    poses: Pose,
+    root_scale: float,
+    factor: Factor,
+    pool: ThreadPoolExecutor | None = None,
+) -> ClipCovariance:
+    """Return the covariances of the joints' positions and of the global columns.
 
     :param system: linearized at `poses`; `factor` is overwritten.
+    :param pool: a thread of it takes the second half.
     """
-    eliminate_clip(system, DAMPING_LEAST, root_scale, factor)
-    T, n, q = system.N.shape
-    G = tree.globals
+    eliminate_clip(system, DAMPING_LEAST, root_scale, factor, pool)
+    T, n, _ = system.N.shape
+    G, parts, W = tree.globals, len(tree.parents), len(factor.c)
     C = np.triu(factor.C[:G, :G])
-    of_globals = np.linalg.pinv(C + np.triu(C, 1).T, hermitian=True)
+    shared = np.linalg.pinv(C + np.triu(C, 1).T, hermitian=True)
     middle = max(T // 2 - 1, 0)
-    out = np.empty((T, len(tree.parents), 3, 3))
-    start = np.zeros((2 * n + G, 2 * n + G))
-    start[2 * n :, 2 * n :] = of_globals
-    for f in range(min(middle + 1, T - 1), middle - 1, -1):
-        start = _next(tree, poses, factor.Z[f], start, f, out)
-    front = start
-    back = np.empty_like(start)  # seen from the back, the first of the two is the later
-    order = np.r_[n : 2 * n, :n, 2 * n : 2 * n + G]
-    back[:] = start[np.ix_(order, order)]
-    for f in range(middle - 1, -1, -1):
-        front = _next(tree, poses, factor.Z[f], front, f, out)
-    for f in range(middle + 2, T):
-        back = _next(tree, poses, factor.Z[f], back, f, out)
-    return out, of_globals
+    out = ClipCovariance(np.empty((T, parts, 3, 3)), np.empty((T, parts, 3, 3)), shared)
+    front, back = _make_memory(n, W, parts), _make_memory(n, W, parts)
+    front.S[3 * n : 3 * n + G, 3 * n : 3 * n + G] = shared
+    both = min(T, 2)
+    _select(tree, poses, factor.Z, middle + both - 1, both, -1, front, out.joints, out.from_root)
+    # seen from the back, the first of the two frames is the later one
+    order = np.r_[:n, 2 * n : 3 * n, n : 2 * n, 3 * n : 3 * n + W]
+    back.S[:] = front.S[np.ix_(order, order)]
+    half = (tree, poses, factor.Z, middle + 2, max(T - 2 - middle, 0), 1, back, out.joints, out.from_root)
+    run_both(pool, _select, (tree, poses, factor.Z, middle - 1, middle, -1, front, out.joints, out.from_root), half)
+    return out
 
 
-def _next(tree: Tree, poses: Pose, Z: Array, later: Array, f: int, out: Array) -> Array:
-    """Write frame f's covariances and return that of frame f, the first of `later`, and the global columns."""
-    n, G = Z.shape[0], tree.globals
-    used = 3 + 3 * len(tree.parents)
-    U = np.triu(Z[:used, :used], 1)
-    diagonal = np.diagonal(Z)[:used]
-    known = diagonal > 0.0
-    # L^-ᵀ = U^-1, of which the diagonal is stored inverted; an unknown without a pivot does not move
-    U[np.arange(used), np.arange(used)] = 1.0 / np.where(known, diagonal, 1.0)
-    inverse = np.zeros((n, n))
-    inverse[:used, :used] = np.linalg.inv(U) * known
-    X = np.concatenate([Z[:, n : 3 * n], Z[:, 3 * n + GLOBALS : 3 * n + GLOBALS + G]], axis=1)
-    P = -inverse @ X
-    PS = P @ later
-    own = inverse @ inverse.T + PS @ P.T
-    own = 0.5 * (own + own.T)  # what is not symmetric of rounding would double from frame to frame
-    out[f] = _of_joints(tree, poses, f, own, PS[:, 2 * n :], later[2 * n :, 2 * n :])
-    following = np.zeros_like(later)
-    keep = np.r_[:n, 2 * n : 2 * n + G]  # of `later`: the frame that follows, and the globals
-    into = np.r_[n : 2 * n, 2 * n : 2 * n + G]
-    following[:n, :n] = own
-    following[:n, into] = PS[:, keep]
-    following[into, :n] = PS[:, keep].T
-    following[np.ix_(into, into)] = later[np.ix_(keep, keep)]
-    return following
+def _make_memory(n: int, W: int, parts: int) -> _Memory:
+    size, columns = 3 * n + W, 3 + 3 * parts + W
+    return _Memory(
+        np.zeros((size, size)), np.zeros((size, 4)), np.zeros((2, 3, columns)), np.zeros(columns, dtype=np.int64)
+    )
 
 
-def _of_joints(tree: Tree, poses: Pose, f: int, own: Array, cross: Array, shared: Array) -> Array:
-    """Return the covariances (K+1, 3, 3) of the joints' positions."""
-    K1, P, n = len(tree.parents), tree.shape, len(own)
-    t = poses.t[f]
-    J = np.zeros((K1, 3, n))
-    J[:, :, 3:6] = np.eye(3)
-    for i in range(1, K1):
-        k = int(tree.parents[i])
+@kernel
+def _select(tree, poses, Z, first, count, step, memory, joints, from_root) -> None:  # type: ignore[no-untyped-def]
+    """Write the covariances of `count` frames from `first` on, by step 1 or -1, each eliminated before the last one."""
+    n = Z.shape[1]
+    for k in range(count):
+        f = first + step * k
+        _invert_frame(Z[f], n, memory.S, memory.X)
+        _write_joints(tree, poses, f, memory, joints[f], from_root[f])
+        _advance(n, memory.S)
+
+
+@kernel
+def _invert_frame(Z, n: int, S, X) -> None:  # type: ignore[no-untyped-def]
+    """Fill the rows and columns of S (3 n + W, 3 n + W) of a frame, from those of what was eliminated after it.
+
+    Four rows at a time: first their sums over the columns after these four, in registers. X (3 n + W, 4) is
+    overwritten. An unknown without a pivot, of which Z holds the inverse 0, does not move.
+    """
+    size = S.shape[0]
+    for first in range(n - 4, -1, -4):
+        after = first + 4
+        width = size - after
+        for r in range(4):
+            clear(S, (first + r) * size + after, width)
+            for k in range(after, 3 * n):
+                X[k, r] = Z[first + r, k]
+            for k in range(3 * n, size):
+                X[k, r] = Z[first + r, k + GLOBALS]
+        subtract_gram_rows(S, first * size + after, size, X, after * 4, 4, S, after * size + after, size, width, width)
+        for r in range(3, -1, -1):
+            i = first + r
+            for q in range(r + 1, 4):
+                add1(S, i * size + after, -Z[i, first + q], S, (first + q) * size + after, width)
+            u = Z[i, i]
+            for k in range(after, size):
+                S[i, k] *= u
+            for q in range(3, r - 1, -1):
+                j = first + q
+                s = 0.0
+                for k in range(after, size):
+                    s += X[k, r] * S[j, k]
+                for p in range(r + 1, 4):
+                    s += Z[i, first + p] * S[j, first + p]
+                S[i, j] = (u if q == r else 0.0) * u - u * s
+                S[j, i] = S[i, j]
+        for k in range(after, size):
+            for r in range(4):
+                S[k, first + r] = S[first + r, k]
+
+
+@kernel
+def _advance(n: int, S) -> None:  # type: ignore[no-untyped-def]
+    """Move S by one frame: its frame becomes the first of the two after the next one."""
+    size = S.shape[0]
+    for a in range(n):
+        for b in range(n):
+            S[2 * n + a, 2 * n + b] = S[n + a, n + b]
+        for b in range(3 * n, size):
+            S[2 * n + a, b] = S[n + a, b]
+            S[b, 2 * n + a] = S[n + a, b]
+    for a in range(n):
+        for b in range(n):
+            S[n + a, 2 * n + b] = S[a, n + b]
+            S[2 * n + b, n + a] = S[a, n + b]
+        for b in range(3 * n, size):
+            S[n + a, b] = S[a, b]
+            S[b, n + a] = S[a, b]
+    for a in range(n):
+        for b in range(n):
+            S[n + a, n + b] = S[a, b]
+
+
+@kernel
+def _write_joints(tree, poses, f, memory, joints, from_root) -> None:  # type: ignore[no-untyped-def]
+    """Write the covariances (K+1, 3, 3) of the joints' positions, and relative to part 0, of frame f."""
+    n = (memory.S.shape[0] - tree.S.shape[2]) // 3
+    J, columns = memory.J, memory.columns
+    t, D = poses.t[f], poses.D[f]
+    for i in range(tree.parents.shape[0]):
+        count = 0
+        k = tree.parents[i]
         while k >= 0:
-            first = 0 if k == 0 else 3 + 3 * k
-            e = t[i] - t[k]
-            J[i, :, first : first + 3] = [[0.0, e[2], -e[1]], [-e[2], 0.0, e[0]], [e[1], -e[0], 0.0]]
-            k = int(tree.parents[k])
-    D = poses.D[f][:, :, :P]
-    mixed = J @ cross[:, :P] @ D.transpose(0, 2, 1)
-    covariance: Array = J @ own @ J.transpose(0, 2, 1) + mixed + mixed.transpose(0, 2, 1)
-    covariance += D @ shared[:P, :P] @ D.transpose(0, 2, 1)
-    return covariance
+            x, y, z = t[i, 0] - t[k, 0], t[i, 1] - t[k, 1], t[i, 2] - t[k, 2]
+            for r in range(3):
+                columns[count + r] = r if k == 0 else 3 + 3 * k + r
+            J[0, 0, count], J[0, 0, count + 1], J[0, 0, count + 2] = 0.0, z, -y
+            J[0, 1, count], J[0, 1, count + 1], J[0, 1, count + 2] = -z, 0.0, x
+            J[0, 2, count], J[0, 2, count + 1], J[0, 2, count + 2] = y, -x, 0.0
+            count += 3
+            k = tree.parents[k]
+        for a in range(tree.shape):
+            columns[count] = 3 * n + a
+            for r in range(3):
+                J[0, r, count] = D[i, r, a]
+            count += 1
+        _project(memory.S, J, columns, count, from_root[i])
+        for s in range(3):
+            columns[count + s] = 3 + s
+            for r in range(3):
+                J[0, r, count + s] = 1.0 if r == s else 0.0
+        _project(memory.S, J, columns, count + 3, joints[i])
+
+
+@kernel
+def _project(S, J, columns, count: int, out) -> None:  # type: ignore[no-untyped-def]
+    """Write J S Jᵀ (3, 3) to out: rows and columns columns[:count] of S, J[0] (3, count). J[1] is overwritten."""
+    for b in range(count):
+        x = y = z = 0.0
+        for a in range(count):
+            s = S[columns[b], columns[a]]
+            x += J[0, 0, a] * s
+            y += J[0, 1, a] * s
+            z += J[0, 2, a] * s
+        J[1, 0, b], J[1, 1, b], J[1, 2, b] = x, y, z
+    for r in range(3):
+        for s in range(r, 3):
+            value = 0.0
+            for a in range(count):
+                value += J[1, r, a] * J[0, s, a]
+            out[r, s] = value
+            out[s, r] = value

@@ -49,6 +49,7 @@ class MotionFit:
     iterations: int
     rejected: int
     joint_covariance: Array | None = None  # (T, K+1, 3, 3) of the joints' positions, metres^2; with `covariance` only
+    covariance_from_root: Array | None = None  # (T, K+1, 3, 3) of their positions relative to the root; likewise
     cost_by_term: dict[str, float] = field(default_factory=dict)  # what couples the frames, and the shared priors
 
 
@@ -183,7 +184,7 @@ class _Clip:
             self.R[f, 0], self.t[f, 0], self.Omega[f] = pose.R[0], pose.t[0], pose.Omega[1:]
         self.beta, self.log_focal = as_array(init[-1].beta, (P,), "beta").copy(), 0.0
         self.information = np.zeros((P, P))
-        self.covariances = np.empty((T, K + 1, 3, 3)) if settings.covariance else None
+        self.covariances = np.empty((2, T, K + 1, 3, 3)) if settings.covariance else None
         self.counts = np.zeros(T, np.int64)
         self.status, self.cost, self.iterations, self.rejected = Status.NO_MEASUREMENTS, 0.0, 0, 0
         self.costs: dict[str, float] = {}
@@ -276,13 +277,14 @@ class _Clip:
             self.information = shape_information(optimizer.information(), tree.shape)
         if self.covariances is not None:
             root_scale = optimizer.problem.settings.root_scale
-            found, _ = joint_covariances(tree, optimizer.system, poses, root_scale, optimizer.factor)
+            found = joint_covariances(tree, optimizer.system, poses, root_scale, optimizer.factor, self.pool)
             inner = slice(window.kept.start - window.frames.start, window.kept.stop - window.frames.start)
-            self.covariances[window.kept] = found[inner]
+            self.covariances[:, window.kept] = found.joints[inner], found.from_root[inner]
 
     def _result(self) -> MotionFit:
         states = [State(self.R[f, 0], self.t[f, 0], self.Omega[f], self.beta) for f in range(len(self.frames))]
+        joints, from_root = (None, None) if self.covariances is None else self.covariances
         return MotionFit(
             states, self.R, self.t, self.beta, self.information, float(np.exp(self.log_focal)), self.counts,
-            self.status, float(self.cost), self.iterations, self.rejected, self.covariances, self.costs,
+            self.status, float(self.cost), self.iterations, self.rejected, joints, from_root, self.costs,
         )  # fmt: skip

@@ -87,6 +87,21 @@ def test_the_motion_is_complete_and_its_values_are_sane(sample):
     assert not np.array_equal(m.poses, m.poses_raw)
 
 
+def test_errors_are_as_large_as_the_joints_deviations_say(sample):
+    m = sample.motions[0]
+    truth = np.load(SAMPLE.with_name("sample_truth.npz"))["joints_cam"]
+    limbs = [4, 5, 7, 8, 16, 17, 18, 19, 20, 21]
+    error = (m.joints_cam - m.joints_cam[:, :1] - truth + truth[:, :1])[m.valid][:, limbs]
+    sight = (m.joints_cam / np.linalg.norm(m.joints_cam, axis=-1, keepdims=True))[m.valid][:, limbs]
+    sigma, along = m.joint_sigma_m[m.valid][:, limbs], m.joint_sigma_depth_m[m.valid][:, limbs]
+    across = np.sqrt((3 * sigma**2 - along**2) / 2)
+    depth = (error * sight).sum(-1)
+    rest = np.sqrt(((error**2).sum(-1) - depth**2) / 2)
+    assert 0.7 < np.sqrt(np.mean((depth / along) ** 2)) < 1.5
+    assert 0.7 < np.sqrt(np.mean((rest / across) ** 2)) < 1.4
+    assert np.isfinite(m.joint_sigma_m).all(1).tolist() == m.valid.tolist()
+
+
 def test_the_motion_states_the_gender_of_its_body(body):
     options = CaptureOptions(quality="fast", wanted=VideoRange(end_s=0.05))
     assert capture(SAMPLE, replace(body, gender="female"), options).motions[0].gender == "female"

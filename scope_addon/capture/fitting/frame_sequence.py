@@ -34,6 +34,7 @@ class FittedTrack:
     valid: NDArray[np.bool_]  # (T,)
     joint_confidence: NDArray[np.floating[Any]]  # (T, K+1) 0..1
     iterations: float  # mean per frame
+    joint_sigma_m: NDArray[np.floating[Any]] | None = None  # (T, K+1, 2) of `joint_sigma`, NaN where not valid
 
 
 class FrameSequence:

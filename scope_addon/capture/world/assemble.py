@@ -54,6 +54,7 @@ def assemble_motion(
     poses_raw, trans_raw = by_blocks(to_world, *raw_motion(track, person.fit, path))
     poses, trans = by_blocks(to_world, placed.rotations, placed.root)
     joints = placed.place(placed.rotations, placed.root)[0]
+    sigma = person.fit.joint_sigma_m
     return Motion(
         poses=poses,
         trans=trans,
@@ -77,6 +78,8 @@ def assemble_motion(
         residual_px=reprojection_error(shot, person, placed),
         image_size=np.array(shot.image_size),
         source=shot.source,
+        joint_sigma_m=None if sigma is None else np.sqrt((sigma[..., 0] ** 2 + 2.0 * sigma[..., 1] ** 2) / 3.0),
+        joint_sigma_depth_m=None if sigma is None else sigma[..., 0],
     )
 
 

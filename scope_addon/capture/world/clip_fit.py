@@ -23,6 +23,7 @@ from ..fitting.frame_sequence import LONGEST_COAST_S, FittedTrack
 from ..fitting.prepared_track import PreparedTrack
 from ..fitting.weights import ROBUST, clip_weights, motion_priors, warm_stages
 from .camera_path import CameraPath
+from .joint_sigma import joint_sigma
 
 WINDOW_UNKNOWNS = 24_000  # unknowns of a window, whose equations take some 100 MB: 320 frames of a body of 24 parts
 OVERLAP = 0.2  # of a window's frames; two windows differ by 2 to 4 mm where one of them has 1 s more to its end
@@ -53,6 +54,7 @@ class _Clip:
         self._rotations, self._root = first.rotations.copy(), first.t_camera_root.copy()
         self._weights = clip_weights(prepared.weights)
         self._done = np.zeros(len(start.valid), bool)
+        self._sigma = np.full((*first.rotations.shape[:2], 2), np.nan, np.float32)
 
     def fit(self, frames: NDArray[np.intp]) -> None:
         """Fit one window; frames that an earlier one has fitted are blended from that one's motion to this one's."""
@@ -68,6 +70,7 @@ class _Clip:
             motion=motion_priors(self._prepared.body, times),
             stands=self._standing_points(frames),
             shape=np.asarray(self._start.betas, float),
+            covariance=True,
             window=np.inf,
         )
         self._keep(frames, found)
@@ -75,7 +78,7 @@ class _Clip:
     def fitted(self) -> FittedTrack:
         """Return the states in each frame's camera."""
         first = replace(self._start, rotations=self._rotations, t_camera_root=self._root)
-        return self._path.to_frames(first)
+        return replace(self._path.to_frames(first), joint_sigma_m=self._sigma)
 
     def _standing_points(self, frames: NDArray[np.intp]) -> StandingPoints | None:
         prepared = self._prepared
@@ -102,7 +105,22 @@ class _Clip:
         turn = log(np.swapaxes(earlier, -1, -2) @ rotations[:both])
         rotations[:both] = earlier @ exp(share[:, None, None] * turn)
         root[:both] = self._root[frames[:both]] * (1 - share[:, None]) + root[:both] * share[:, None]
-        self._rotations[frames], self._root[frames], self._done[frames] = rotations, root, True
+        self._rotations[frames], self._root[frames] = rotations, root
+        self._sigma[frames] = self._blended_sigma(frames, found, share)
+        self._done[frames] = True
+
+    def _blended_sigma(
+        self, frames: NDArray[np.intp], found: MotionFit, share: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Return the deviations of a window's frames, the first blended by `share` with those of an earlier window."""
+        assert found.joint_covariance is not None
+        assert found.covariance_from_root is not None
+        joints = found.t_world_part - self._path.center[frames, None]
+        times = self._prepared.track.times[frames]
+        sigma = joint_sigma(found.joint_covariance[:, 0], found.covariance_from_root, joints, times)
+        earlier, w = self._sigma[frames[: len(share)]], share[:, None, None]
+        sigma[: len(share)] = (1.0 - w) * earlier + w * sigma[: len(share)]
+        return sigma
 
 
 def runs(valid: NDArray[np.bool_], times: NDArray[np.float64]) -> Iterator[NDArray[np.intp]]:

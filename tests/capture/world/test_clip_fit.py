@@ -115,6 +115,24 @@ def test_noise_of_single_frames_is_averaged_and_a_motion_keeps_its_amplitude():
     assert abs(np.ptp(_joints(together)[:, wrist, 1]) / np.ptp(truth[:, wrist, 1]) - 1) < 0.05
 
 
+def test_a_limb_that_nothing_shows_has_larger_deviations_than_its_twin():
+    track, true = _person()
+    arm = [KEYPOINT_NAMES.index(f"left_{name}") for name in ("elbow", "wrist", "pinky", "index", "thumb")]
+    sigma = np.full((FRAMES, JOINTS), 0.1)
+    track.confidence[12:, arm], sigma[12:, arm] = 0.0, 10.0
+    found = _fit(_prepared(track, sigma_m=sigma), true).joint_sigma_m
+    left, right = (found[:, BODY.joint_names.index(f"{side}_wrist")] for side in ("left", "right"))
+    assert (left[18:] > 2.0 * right[18:]).all()
+    assert (left[:6] < 1.5 * right[:6]).all()
+
+
+def test_windows_agree_on_the_deviations(monkeypatch):
+    track, true = _person(40)
+    whole = _fit(_prepared(track), true).joint_sigma_m
+    monkeypatch.setattr(clip_fit, "WINDOW_UNKNOWNS", 24 * 3 * (BODY.K + 2))
+    np.testing.assert_allclose(_fit(_prepared(track), true).joint_sigma_m[4:-4], whole[4:-4], rtol=0.3)
+
+
 def test_soles_that_rest_stay_in_place():
     track, true = _person()
     rng = np.random.default_rng(1)

@@ -19,7 +19,7 @@ def test_covariance_is_that_of_the_dense_inverse():
     clip = noisy_clip(4, frames=7)
     problem, poses, system = clip.problem()
     problem.linearize(0, poses, system)
-    found, shared = joint_covariances(problem.tree, system, poses, 1.0, make_factor(system))
+    found, from_root, shared = joint_covariances(problem.tree, system, poses, 1.0, make_factor(system))
     _, _, _, H = dense_step(clip)
     n, T = 6 + 3 * K, len(clip.times)
     S = np.linalg.inv(H + DAMPING_LEAST * np.diag(np.r_[np.ones(T * n), np.zeros(P + 1)]))
@@ -34,6 +34,9 @@ def test_covariance_is_that_of_the_dense_inverse():
             J[:, :, k] = np.imag(forward(clip.body, *moved(clip.body, state, d))[1]) / TINY
         expected = J @ S[np.ix_(rows, rows)] @ J.transpose(0, 2, 1)
         np.testing.assert_allclose(found[f], expected, rtol=1e-6, atol=1e-9 * np.abs(expected).max())
+        J -= J[:1].copy()
+        expected = J @ S[np.ix_(rows, rows)] @ J.transpose(0, 2, 1)
+        np.testing.assert_allclose(from_root[f], expected, rtol=1e-6, atol=1e-9 * np.abs(expected).max())
 
 
 def dense_matrix(system, T):
@@ -60,7 +63,7 @@ def test_covariances_far_from_the_middle_of_a_long_clip_are_exact():
     stiff = replace(PRIOR, joints=30.0, root_rotation=30.0, root_position=500.0, robust_joints=np.inf)
     problem, poses, system = clip.problem(stiff)
     problem.linearize(0, poses, system)
-    found, _ = joint_covariances(problem.tree, system, poses, 1.0, make_factor(system))
+    found, _, _ = joint_covariances(problem.tree, system, poses, 1.0, make_factor(system))
     S = np.linalg.inv(dense_matrix(system, T))
     for f in (0, 30, T - 1):
         expected = S[f * n + 3 : f * n + 6, f * n + 3 : f * n + 6]  # the pelvis moves as its twist says
