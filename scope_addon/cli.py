@@ -234,7 +234,8 @@ def run_batch(args: argparse.Namespace) -> dict[str, Any]:
     """
     check_installed(CAPTURE)
     from .capture.options import check_networks
-    from .job.batch import Batch, Extras
+    from .job.batch import Batch
+    from .job.clips.task import Extras
 
     formats = [f".{f.strip().lstrip('.').lower()}" for f in args.formats.split(",") if f.strip()]
     for suffix in formats or ["."]:
