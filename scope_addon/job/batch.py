@@ -181,3 +181,13 @@ def _say_outcome(entry: Entry, number: str, say: Callable[[str], None]) -> None:
     if entry["status"] == "done":
         for warning in entry["report"].get("warnings", []):
             say(f"warning: {warning}")
+
+
+def worker_table(report: dict[str, Any]) -> list[str]:
+    """Return the lines of the table of a cluster's workers for a terminal; empty for a batch on one machine."""
+    if not report.get("workers"):
+        return []
+    columns = list(report["workers"][0])
+    rows = [columns, *([str(row[name]) for name in columns] for row in report["workers"])]
+    widths = [max(len(row[k]) for row in rows) for k in range(len(columns))]
+    return ["  ".join(text.ljust(width) for text, width in zip(row, widths, strict=True)).rstrip() for row in rows]

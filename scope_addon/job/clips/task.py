@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import shlex
 import time
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
@@ -17,6 +18,7 @@ from ...errors import NO_PERSON, system_error_message
 from ...footage import PICTURE_SUFFIXES
 from .find import OVERLAY
 
+SHOWN_COMMAND, STOP_WITH_STDIN = "--shown-command", "--stop-with-stdin"  # options that only a batch passes
 REPORT = ".report"  # between a clip's name and the suffix of its page
 
 Entry = dict[str, Any]  # the outcome of a clip, as the report has it
@@ -68,6 +70,7 @@ class ClipTask(NamedTuple):
     :param out: output folder.
     :param basis: see `CaptureSettings.basis`.
     :param previous: entry of the previous report, if its files still exist.
+    :param final: folder to which the results are moved later; empty if they stay in ``out``.
     """
 
     name: str
@@ -77,6 +80,7 @@ class ClipTask(NamedTuple):
     basis: str
     settings: CaptureSettings
     previous: Entry | None = None
+    final: str = ""
 
 
 def capture_clip(
@@ -103,7 +107,11 @@ def capture_clip(
     target = out / task.name
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
-        status, stdout, stderr = run([*program, *_arguments(footage, target, task.settings, threads)])
+        arguments = [*program, *_arguments(footage, target, task.settings, threads)]
+        if task.final:  # a page about the capture shows its command
+            shown = _arguments(footage, Path(task.final) / task.name, task.settings, threads)
+            arguments += [SHOWN_COMMAND, shlex.join([*program, *(each for each in shown if each != STOP_WITH_STDIN)])]
+        status, stdout, stderr = run(arguments)
     except OSError as error:
         return entry | {"status": "failed", "message": system_error_message(error)}
     entry["seconds"] = round(time.monotonic() - start, 2)
@@ -119,7 +127,7 @@ def capture_clip(
 
 def _arguments(footage: Path, target: Path, settings: CaptureSettings, threads: int | None) -> list[str]:
     """Return the arguments that capture a clip; ``target`` is the path of its results without suffix."""
-    arguments = ["capture", str(footage), "--json", "--quiet", "--stop-with-stdin"]
+    arguments = ["capture", str(footage), "--json", "--quiet", STOP_WITH_STDIN]
     for suffix in settings.suffixes:
         arguments += ["-o", f"{target}{suffix}"]
     if settings.extras.reports:
