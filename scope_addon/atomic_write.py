@@ -44,7 +44,7 @@ def atomic_path(path: Path) -> Iterator[Path]:
     start = f".{path.stem[:40].encode('utf-8', 'ignore').decode()}.scope-"
     suffix = path.suffix.lower()
     _remove_abandoned(target.parent, start, suffix)
-    handle, name = tempfile.mkstemp(prefix=f"{start}{_computer()}-{os.getpid()}-", suffix=suffix, dir=target.parent)
+    handle, name = tempfile.mkstemp(prefix=f"{start}{computer()}-{os.getpid()}-", suffix=suffix, dir=target.parent)
     temporary = Path(name)
     _temporary_files.add(temporary)
     try:
@@ -89,18 +89,18 @@ def _remove_abandoned(folder: Path, start: str, suffix: str) -> None:
     """Remove temporary files of processes that do not run any more."""
     with contextlib.suppress(OSError):
         for path in folder.glob(f"{glob.escape(start)}*-*-*{glob.escape(suffix)}"):
-            computer, process, _ = path.name.removeprefix(start).split("-", 2)
+            where, process, _ = path.name.removeprefix(start).split("-", 2)
             old = time.time() - path.stat().st_mtime > _ABANDONED_S
-            if old or (computer == _computer() and process.isdecimal() and not _runs(int(process))):
+            if old or (where == computer() and process.isdecimal() and not runs(int(process))):
                 path.unlink(missing_ok=True)
 
 
-def _computer() -> str:
+def computer() -> str:
     """Return a short name of this computer: folders may be shared with others."""
     return f"{zlib.crc32(platform.node().encode('utf-8', 'replace')):08x}"
 
 
-def _runs(process: int) -> bool:
+def runs(process: int) -> bool:
     """Return whether a process of this computer runs, or cannot be asked about."""
     if os.name == "nt":  # where the signal 0 would end it
         return True

@@ -13,7 +13,7 @@ import shlex
 import shutil
 import sys
 from collections.abc import Sequence
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import Any, NoReturn, TextIO
 
@@ -46,11 +46,11 @@ from .errors import (
 )
 from .footage import json_text
 from .installed import CAPTURE, check_installed
+from .job.clips.task import SHOWN_COMMAND, STOP_WITH_STDIN, Extras
 from .job.parent import stop_with_parent
 from .scene.export.output_paths import SUFFIXES
 
 SAMPLE = ASSETS / "sample" / "sample.mp4"
-STOP_WITH_STDIN = "--stop-with-stdin"
 PROGRAM = (sys.executable, "-m", str(__package__))
 
 
@@ -106,6 +106,7 @@ def _add_capture_files(capture: argparse.ArgumentParser) -> None:
     )
     # Passed by a batch to its processes.
     capture.add_argument(STOP_WITH_STDIN, action="store_true", help=argparse.SUPPRESS)
+    capture.add_argument(SHOWN_COMMAND, default="", help=argparse.SUPPRESS)
 
 
 def _add_batch_files(batch: argparse.ArgumentParser) -> None:
@@ -123,6 +124,12 @@ def _add_batch_files(batch: argparse.ArgumentParser) -> None:
     batch.add_argument("--reports", action="store_true", help="also write the page NAME.report.html for every clip")
     batch.add_argument("--recursive", action="store_true", help="include subfolders")
     batch.add_argument("--jobs", type=int, default=1, metavar="N", help="clips captured in parallel (default: 1)")
+    batch.add_argument(
+        "--scheduler",
+        metavar="ADDRESS",
+        help="capture on the Dask cluster of this scheduler (tcp://HOST:8786, or its scheduler file); --jobs then "
+        "counts the clips of each worker",
+    )
     batch.add_argument("--again", action="store_true", help="capture every clip again, including finished ones")
 
 
@@ -139,7 +146,8 @@ def main(argv: Sequence[str] | None = None, program: Sequence[str] = PROGRAM) ->
             raise UsageError(f"unknown arguments: {' '.join(unknown)} (see scope {args.command} --help{several})")
         args.program = list(program)
         given = [*program, *(sys.argv[1:] if argv is None else argv)]
-        args.command_text = shlex.join([each for each in given if each != STOP_WITH_STDIN])
+        shown = shlex.join([each for each in given if each != STOP_WITH_STDIN])
+        args.command_text = getattr(args, "shown_command", "") or shown
         with stopped_by_signals(), stdout_for_report() as stdout:
             if getattr(args, "stop_with_stdin", False):
                 stop_with_parent()
@@ -234,7 +242,7 @@ def run_batch(args: argparse.Namespace) -> dict[str, Any]:
     """
     check_installed(CAPTURE)
     from .capture.options import check_networks
-    from .job.batch import Batch, Extras
+    from .job.batch import Batch, worker_table
 
     formats = [f".{f.strip().lstrip('.').lower()}" for f in args.formats.split(",") if f.strip()]
     for suffix in formats or ["."]:
@@ -249,11 +257,22 @@ def run_batch(args: argparse.Namespace) -> dict[str, Any]:
     _, options = body_and_options(args)
     check_networks(options)  # an unusable network is reported once, before the first clip
     extras = Extras(args.overlays, args.reports)
-    batch = Batch(args.folder, args.out, args.program, non_default_arguments(args), formats, extras)
-    with ProgressBar(sys.stderr, show=sys.stderr.isatty() and not args.quiet) as progress:
-        with interrupted("finished clips are kept; run the same command again to continue"):
-            report = batch.run(args.jobs, recursive=args.recursive, again=args.again, progress=progress, say=say)
+    with ExitStack() as stack:
+        runner = None
+        if args.scheduler is not None:
+            from .command_line.cluster_runner import dask_runner
+
+            runner = dask_runner(args, None if args.program == list(PROGRAM) else args.program)
+            stack.callback(runner.close)
+        batch = Batch(args.folder, args.out, args.program, non_default_arguments(args), formats, extras)
+        progress = stack.enter_context(ProgressBar(sys.stderr, show=sys.stderr.isatty() and not args.quiet))
+        stack.enter_context(interrupted("finished clips are kept; run the same command again to continue"))
+        report = batch.run(
+            args.jobs, recursive=args.recursive, again=args.again, progress=progress, say=say, runner=runner
+        )
     if not args.json:
+        for line in worker_table(report):
+            say(line)
         counts = ", ".join(f"{count} {status.replace('_', ' ')}" for status, count in report["counts"].items() if count)
         say(f"{counts or 'nothing to capture'}; report in {batch.report_file}")
     return report

@@ -11,6 +11,7 @@
     ├── NoPersonError           no person was found in the footage                exit 3
     ├── OutputError             a result cannot be written
     ├── SetupError              something that Scope needs is not installed or built
+    ├── ClusterError            a cluster cannot be reached, was lost, or cannot capture
     └── CancelledError          the user cancelled; nothing was written
 
 Each message says what was wrong, with which file or value, and what to do about it.
@@ -45,6 +46,10 @@ class OutputError(ScopeError):
 
 class SetupError(ScopeError):
     """Something that Scope needs is not installed or was not built."""
+
+
+class ClusterError(ScopeError):
+    """A cluster cannot be reached, was lost, or none of its workers can capture."""
 
 
 class CancelledError(ScopeError):

@@ -10,7 +10,7 @@ from importlib.util import find_spec
 from .errors import SetupError
 
 CAPTURE = ("cv2", "onnxruntime", "av")
-EXTRAS = {**dict.fromkeys(CAPTURE, "capture"), "bpy": "bpy", "pythonosc": "live"}
+EXTRAS = {**dict.fromkeys(CAPTURE, "capture"), "bpy": "bpy", "pythonosc": "live", "distributed": "cluster"}
 
 
 def check_live() -> None:
@@ -18,10 +18,23 @@ def check_live() -> None:
 
     :raises SetupError: it is Blender's extension, which contains nothing that uses the network.
     """
-    if find_spec(f"{__package__}.live") is None:
+    _check_room("live", "capture live", "live")
+
+
+def check_cluster() -> None:
+    """Check that this installation can use a cluster.
+
+    :raises SetupError: it is Blender's extension, which contains nothing that uses the network; or Dask is missing.
+    """
+    _check_room("cluster", "use a cluster", "batch")
+    check_installed(["distributed"])
+
+
+def _check_room(room: str, what: str, script: str) -> None:
+    if find_spec(f"{__package__}.{room}") is None:
         raise SetupError(
-            "Blender's extension cannot capture live; use ./scripts/live in the repository, or install the package: "
-            "pip install 'scope-mocap[capture,live]'"
+            f"Blender's extension cannot {what}; use ./scripts/{script} in the repository, or install the package: "
+            f"pip install 'scope-mocap[capture,{room}]'"
         )
 
 

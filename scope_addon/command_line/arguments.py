@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,6 +16,8 @@ from ..options import Option, Place, options_at
 
 if TYPE_CHECKING:
     from ..capture.options import CaptureOptions
+
+BODY_SUFFIXES = (".npz", ".pkl")
 
 
 def path_argument(text: str) -> Path:
@@ -88,8 +91,14 @@ def non_default_arguments(args: argparse.Namespace) -> dict[str, str | None]:
     for option in options_at(Place.COMMAND_LINE):
         value = _argument(option, args)
         if value != _default(option) and option.argument.inherited:
-            arguments[option.flag] = None if option.value_type is bool else str(value)
+            arguments[option.flag] = None if option.value_type is bool else _text(option, value)
     return arguments
+
+
+def _text(option: Option, value: Any) -> str:
+    """Return an argument's text for a process that may have another current folder."""
+    is_file = option.value_type is Path or (option.name == "body" and Path(value).suffix.lower() in BODY_SUFFIXES)
+    return os.path.abspath(value) if is_file else str(value)
 
 
 def _argument(option: Option, args: argparse.Namespace) -> Any:

@@ -1,51 +1,34 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Capture a folder of footage, one process per clip: a clip that fails affects no other, finished clips are skipped.
 
-``scope-batch.json`` in the output folder is rewritten after every clip, so that an interrupted batch can continue. A
+``scope-batch.json`` in the output folder is rewritten as clips finish, so that an interrupted batch can continue. A
 clip is finished if its content (SHA-256), the options and the program are unchanged and its result files exist.
 """
 
 from __future__ import annotations
 
-import hashlib
 import json
-import os
-import subprocess
-import threading
 import time
 from collections import Counter
-from collections.abc import Callable, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from pathlib import Path
-from typing import IO, Any, NamedTuple
+from typing import Any
 
 from ...solver.errors import InputError
 from ..atomic_write import atomic_path
-from ..errors import NO_PERSON, OutputError, UsageError, system_error_message
-from ..footage import FOOTAGE_SUFFIXES, PICTURE_SUFFIXES, json_text
-from .clips import OVERLAY, find_clips
-from .parent import GRACE_S
-from .request import code_version
+from ..errors import NO_PERSON, OutputError, UsageError
+from ..footage import FOOTAGE_SUFFIXES, json_text
+from .clips.find import find_clips
+from .clips.runner import LocalRunner, Runner
+from .clips.task import NO_EXTRAS, CaptureSettings, ClipTask, Entry, Extras
+from .request import program_version
 
 REPORT_NAME = "scope-batch.json"
-REPORT = ".report"  # between a clip's name and the suffix of its page
 STATUSES = ("done", "skipped", "no_person", "failed")
-_ROOT = Path(__file__).resolve().parents[2]
-_WAIT_S = 1.0  # longest wait for a clip to finish, after which the wait is repeated
-# Ctrl-C on a terminal must reach the batch only, which stops its clips: a second signal would interrupt their clean-up.
-_NEW_GROUP = getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0)
-_OWN_GROUP: dict[str, Any] = {"creationflags": _NEW_GROUP} if _NEW_GROUP else {"process_group": 0}
-_GRACE_S = GRACE_S + 3.0  # time for a clip to clean up after the batch is stopped
-
-
-class Extras(NamedTuple):
-    """What a batch writes of every clip besides the result files."""
-
-    overlays: bool = False
-    reports: bool = False
-
-
-NO_EXTRAS = Extras()
+ROOT = Path(__file__).resolve().parents[2]
+_WRITING_SHARE = 0.1  # of the time that may be spent on writing the report, which grows with the number of clips
+_QUICK_S = 0.1  # a report that is written faster is written after every clip
 
 
 class Batch:
@@ -76,11 +59,10 @@ class Batch:
             raise OutputError(f"cannot create the folder {out}: {error.strerror}; choose another with --out") from error
         self.folder, self.out = folder.resolve(), out.resolve()
         self.report_file = out / REPORT_NAME
-        self._program, self._options, self._suffixes, self._extras = list(program), options, suffixes, extras
-        self._basis = self._key_basis()
-        self._running: dict[subprocess.Popen[str], IO[str]] = {}  # process to its stdin, whose closing ends the process
-        self._start_lock = threading.Lock()
-        self._stopped = False
+        self.settings = CaptureSettings(options, tuple(suffixes), extras)
+        self._program, self._options = list(program), options
+        self._basis = self.settings.basis(program_version(ROOT))
+        self._next_report = 0.0
 
     def clips(self, recursive: bool) -> dict[str, Path]:
         """Return the clips by the name of their results; see `find_clips`."""
@@ -95,14 +77,16 @@ class Batch:
         again: bool = False,
         progress: Callable[[str, int, int], None] = lambda stage, done, total: None,
         say: Callable[[str], None] = lambda text: None,
+        runner: Runner | None = None,
     ) -> dict[str, Any]:
         """Capture the clips that are not finished and return the report, which is also written to disk.
 
-        :param jobs: number of clips that are captured in parallel.
+        :param jobs: number of clips that are captured in parallel, by a runner of this machine.
         :param recursive: include subfolders.
         :param again: capture finished clips as well.
         :param progress: called with the stage, the number of finished clips and that of all clips.
         :param say: called with messages for the user.
+        :param runner: captures the clips; None for this machine.
         :return: the report; its ``exit_status`` is 1 if a clip failed, else 3 if a clip showed no person, else 0.
         :raises UsageError: the folder contains no footage.
         :raises OutputError: the report cannot be written.
@@ -114,148 +98,40 @@ class Batch:
                 + ("" if recursive else "; --recursive includes subfolders")
             )
         previous = {} if again else self._previous_entries()
-        threads = {} if jobs == 1 else {"--threads": str(max(1, (os.cpu_count() or 1) // jobs))}
-        entries: dict[str, dict[str, Any]] = {}
-        with ThreadPoolExecutor(jobs) as pool:
-            try:
-                # Within the try, because a signal can arrive as soon as the first clip has begun.
-                futures: dict[Future[dict[str, Any]], str] = {
-                    pool.submit(self._capture_one, name, path, previous.get(name), threads): name
-                    for name, path in clips.items()
-                }
-                progress("clips", 0, len(clips))
-                pending = set(futures)
-                while pending:
-                    # The timeout is needed because a signal delivered to another thread does not wake this one.
-                    finished, pending = wait(pending, timeout=_WAIT_S, return_when=FIRST_COMPLETED)
-                    if not finished:
-                        progress("clips", len(entries), len(clips))
-                        continue
-                    for future in finished:
-                        entry = entries[futures[future]] = future.result()
-                        message = f": {entry['message']}" if entry.get("message") else ""
-                        say(f"{len(entries)}/{len(clips)} {entry['file']} {entry['status'].replace('_', ' ')}{message}")
-                        if entry["status"] == "done":
-                            for warning in entry["report"].get("warnings", []):
-                                say(f"warning: {warning}")
-                    report = self._write_report({name: entries[name] for name in clips if name in entries}, previous)
-                    progress("clips", len(entries), len(clips))
-            except BaseException:
-                self._stop()
-                pool.shutdown(cancel_futures=True)
-                raise
-        return report
-
-    def _capture_one(
-        self, name: str, path: Path, previous: dict[str, Any] | None, threads: dict[str, str]
-    ) -> dict[str, Any]:
-        """Capture a clip unless it is finished, and return its entry in the report, also if the clip fails."""
-        start = time.monotonic()
-        entry: dict[str, Any] = {"file": self._relative(path).as_posix(), "name": name}
+        entries: dict[str, Entry] = {}
+        runner = runner or LocalRunner(self._program, jobs)
         try:
-            entry["key"] = self._key(path)
-        except OSError as error:
-            return entry | {"status": "failed", "message": f"{path} cannot be read: {error.strerror}"}
-        if previous and previous.get("key") == entry["key"] and self._is_finished(previous):
-            return previous | {"file": entry["file"], "status": previous["status"].replace("done", "skipped")}
-        target = self.out / name
-        try:
-            target.parent.mkdir(parents=True, exist_ok=True)
-            status, stdout, stderr = self._run_process(self._command(path, target, threads))
-        except OSError as error:
-            return entry | {"status": "failed", "message": system_error_message(error)}
-        entry["seconds"] = round(time.monotonic() - start, 2)
-        report = _last_object(stdout)
-        if status == 0 and report is not None:
-            outputs = [Path(p).relative_to(self.out).as_posix() for p in report.pop("outputs")]
-            return entry | {"status": "done", "outputs": outputs, "report": report}
-        if status == NO_PERSON:
-            return entry | {"status": "no_person", "outputs": [], "message": _error_message(stderr)}
-        message = _error_message(stderr) or f"the process ended with status {status}"
-        return entry | {"status": "failed", "message": message}
+            # The tasks are made within the try, because a signal can arrive as soon as the first clip has begun.
+            for finished in runner.outcomes(self._tasks(clips, previous)):
+                for name, entry in finished.items():
+                    entries[name] = entry
+                    _say_outcome(entry, f"{len(entries)}/{len(clips)}", say)
+                if finished:
+                    self._write_report(_in_order(entries, clips), previous, runner, last=False)
+                progress("clips", len(entries), len(clips))
+        except BaseException:
+            runner.stop()
+            with suppress(OutputError):
+                if entries:
+                    self._write_report(_in_order(entries, clips), previous, runner, last=True)
+            raise
+        return self._write_report(_in_order(entries, clips), previous, runner, last=True)
 
-    def _command(self, path: Path, target: Path, threads: dict[str, str]) -> list[str]:
-        """Return the command that captures a clip; ``target`` is the path of its results without suffix."""
-        arguments = [*self._program, "capture", str(path), "--json", "--quiet", "--stop-with-stdin"]
-        for suffix in self._suffixes:
-            arguments += ["-o", f"{target}{suffix}"]
-        if self._extras.reports:
-            arguments += ["--report", f"{target}{REPORT}.html"]
-        if self._extras.overlays:
-            suffix = ".png" if path.suffix.lower() in PICTURE_SUFFIXES else ".mp4"
-            arguments += ["--overlay", f"{target}{OVERLAY}{suffix}"]
-        for option, value in (threads | self._options).items():
-            arguments.append(option if value is None else f"{option}={value}")  # one argument: a value may begin with -
-        return arguments
+    def _tasks(self, clips: dict[str, Path], previous: dict[str, Entry]) -> Iterator[ClipTask]:
+        """Yield the task of each clip."""
+        for name, path in clips.items():
+            file, entry = path.relative_to(self.folder).as_posix(), previous.get(name)
+            known = entry if entry and self._is_finished(entry) else None
+            yield ClipTask(name, file, str(path), str(self.out), self._basis, self.settings, known)
 
-    def _run_process(self, arguments: list[str]) -> tuple[int, str, str]:
-        """Run a process and return its exit status, stdout and stderr."""
-        with self._start_lock:  # so that _stop() knows every process
-            if self._stopped:
-                return 130, "", ""
-            process = subprocess.Popen(
-                arguments,
-                stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE,
-                stderr=subprocess.PIPE,
-                text=True,
-                encoding="utf-8",
-                errors="replace",
-                **_OWN_GROUP,
-            )
-            assert process.stdin is not None
-            # Taken from the process, because communicate() would close it immediately.
-            lifeline, process.stdin = process.stdin, None
-            self._running[process] = lifeline
-        try:
-            with lifeline:
-                stdout, stderr = process.communicate()
-        finally:
-            del self._running[process]
-        return process.returncode, stdout, stderr
-
-    def _stop(self) -> None:
-        """Close stdin of all running processes, and kill those that do not end in time."""
-        with self._start_lock:
-            self._stopped = True
-            running = dict(self._running)
-        for lifeline in running.values():
-            lifeline.close()
-        end = time.monotonic() + _GRACE_S
-        for process in running:
-            try:
-                process.wait(max(0.0, end - time.monotonic()))
-            except subprocess.TimeoutExpired:
-                process.kill()
-
-    def _key_basis(self) -> hashlib._Hash:
-        """Hash what is the same for every clip: the program, the options, and the files that they name."""
-        digest = hashlib.sha256(code_version(_ROOT).encode())
-        values = {k: v for k, v in self._options.items() if k != "--threads"}
-        digest.update(json.dumps([sorted(values.items()), list(self._suffixes), self._extras]).encode())
-        for value in values.values():
-            files = [Path(value)] if value else []  # a body, a calibration, a network
-            files += [path.with_suffix(".json") for path in files if path.suffix == ".onnx"]  # a network's description
-            for file in filter(Path.is_file, files):
-                _add_content(digest, file)
-        return digest
-
-    def _key(self, path: Path) -> str:
-        """Hash the program, the options and the footage."""
-        digest = self._basis.copy()
-        for file in sorted(path.iterdir()) if path.is_dir() else [path]:
-            if file.is_file():
-                _add_content(digest, file)
-        return digest.hexdigest()
-
-    def _is_finished(self, entry: dict[str, Any]) -> bool:
+    def _is_finished(self, entry: Entry) -> bool:
         """Return whether an entry of the previous report is of a finished clip whose files still exist."""
         if entry.get("status") not in ("done", "skipped", "no_person"):
             return False
         outputs = entry.get("outputs")
         return isinstance(outputs, list) and all(isinstance(p, str) and (self.out / p).is_file() for p in outputs)
 
-    def _previous_entries(self) -> dict[str, dict[str, Any]]:
+    def _previous_entries(self) -> dict[str, Entry]:
         """Return the entries of the previous report by name; empty if the report is missing or damaged."""
         try:
             entries = json.loads(self.report_file.read_text(encoding="utf-8"))["files"]
@@ -263,8 +139,16 @@ class Batch:
         except (OSError, ValueError, KeyError, TypeError):
             return {}
 
-    def _write_report(self, entries: dict[str, dict[str, Any]], previous: dict[str, dict[str, Any]]) -> dict[str, Any]:
-        """Write and return the report. Clips that are still pending keep their entries of the previous report."""
+    def _write_report(
+        self, entries: dict[str, Entry], previous: dict[str, Entry], runner: Runner, *, last: bool
+    ) -> dict[str, Any]:
+        """Write and return the report. Clips that are still pending keep their entries of the previous report.
+
+        A report of many thousand clips is not written after every clip, unless it is the last one.
+        """
+        start = time.monotonic()
+        if start < self._next_report and not last:
+            return {}
         counts = Counter(e["status"] for e in entries.values())
         status = 1 if counts["failed"] else NO_PERSON if counts["no_person"] else 0
         report = {
@@ -273,37 +157,37 @@ class Batch:
             "counts": {s: counts[s] for s in STATUSES},
             "files": list(({n: e for n, e in previous.items() if n not in entries} | entries).values()),
             "exit_status": status,
+            **runner.report(),
         }
         try:
             with atomic_path(self.report_file) as temporary:
                 temporary.write_text(json_text(report, indent=1), encoding="utf-8")
         except OSError as error:
             raise OutputError(f"cannot write {self.report_file}: {error.strerror}; free some space") from error
+        taken = time.monotonic() - start
+        self._next_report = 0.0 if taken < _QUICK_S else start + taken / _WRITING_SHARE
         return report
 
-    def _relative(self, path: Path) -> Path:
-        return path.relative_to(self.folder)
+
+def _in_order(entries: dict[str, Entry], clips: dict[str, Path]) -> dict[str, Entry]:
+    """Return the entries in the order of the clips, not in that in which they were finished."""
+    return {name: entries[name] for name in clips if name in entries}
 
 
-def _add_content(digest: hashlib._Hash, file: Path) -> None:
-    with file.open("rb") as stream:
-        digest.update(hashlib.file_digest(stream, "sha256").digest())
+def _say_outcome(entry: Entry, number: str, say: Callable[[str], None]) -> None:
+    """Tell the user how a clip ended, and its warnings."""
+    message = f": {entry['message']}" if entry.get("message") else ""
+    say(f"{number} {entry['file']} {entry['status'].replace('_', ' ')}{message}")
+    if entry["status"] == "done":
+        for warning in entry["report"].get("warnings", []):
+            say(f"warning: {warning}")
 
 
-def _last_object(text: str) -> dict[str, Any] | None:
-    """Return the JSON object on the last line; the lines before it are other output of the program."""
-    for line in reversed(text.splitlines()):
-        if line.startswith("{"):
-            try:
-                report = json.loads(line)
-            except ValueError:
-                return None
-            return report if isinstance(report, dict) else None
-    return None
-
-
-def _error_message(stderr: str) -> str:
-    """Return the error message without the prefix of the program's name."""
-    lines = [line.strip() for line in stderr.splitlines() if line.strip()]
-    own = [line.removeprefix("scope: ") for line in lines if line.startswith("scope: ") and "warning:" not in line]
-    return (own or lines or [""])[-1]
+def worker_table(report: dict[str, Any]) -> list[str]:
+    """Return the lines of the table of a cluster's workers for a terminal; empty for a batch on one machine."""
+    if not report.get("workers"):
+        return []
+    columns = list(report["workers"][0])
+    rows = [columns, *([str(row[name]) for name in columns] for row in report["workers"])]
+    widths = [max(len(row[k]) for row in rows) for k in range(len(columns))]
+    return ["  ".join(text.ljust(width) for text, width in zip(row, widths, strict=True)).rstrip() for row in rows]

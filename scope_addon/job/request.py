@@ -7,10 +7,11 @@ import hashlib
 import json
 import os
 from collections.abc import Mapping
+from functools import cache
 from pathlib import Path
 from typing import Any
 
-from ..errors import UsageError
+from ..errors import SetupError, UsageError
 from ..options import Place, options_at
 
 WARM_UP = json.dumps({"warm_up": True})  # the request to compile what a capture needs, without capturing anything
@@ -90,11 +91,32 @@ def _add_file(digest: hashlib._Hash, path: Path) -> None:
 
 
 def code_version(root: Path) -> str:
-    """Hash the installed program: names, sizes and modification times of sources, networks, bodies and priors."""
+    """Hash the installed program: names, sizes and modification times of what decides the result of a capture."""
+    status = {name: file.stat() for name, file in _program_files(root)}
+    stamps = [(name, s.st_size, s.st_mtime_ns) for name, s in status.items()]
+    return hashlib.sha256(json.dumps(stamps).encode()).hexdigest()
+
+
+@cache
+def program_version(root: Path) -> str:
+    """Hash names and contents of what decides the result of a capture: equal on machines with the same program.
+
+    :raises SetupError: a file cannot be read.
+    """
+    digest = hashlib.sha256()
+    for name, file in _program_files(root):
+        try:
+            content = file.read_bytes()
+        except OSError as error:
+            raise SetupError(f"{file}, a part of Scope, cannot be read ({error.strerror}); install it again") from error
+        digest.update(json.dumps([name, hashlib.sha256(content).hexdigest()]).encode())
+    return digest.hexdigest()
+
+
+def _program_files(root: Path) -> list[tuple[str, Path]]:
+    """Return the sources, networks, bodies and priors, sorted by their names below the root."""
     files = [*(root / "solver").rglob("*.py"), *(root / "scope_addon").rglob("*.py")]
     files += [f for kind in ("*.onnx", "*.npz", "*.json") for f in (root / "assets").rglob(kind)]
     # Neither the panel nor the sample clip changes the result of a capture.
     excluded = (root / "scope_addon" / "ui", root / "assets" / "sample")
-    status = {f.relative_to(root).as_posix(): f.stat() for f in files if not any(map(f.is_relative_to, excluded))}
-    stamps = sorted((name, s.st_size, s.st_mtime_ns) for name, s in status.items())
-    return hashlib.sha256(json.dumps(stamps).encode()).hexdigest()
+    return sorted((f.relative_to(root).as_posix(), f) for f in files if not any(map(f.is_relative_to, excluded)))

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import os
+
 import pytest
 from scope.scope_addon.cli import build_parser
 from scope.scope_addon.command_line.arguments import body_and_options, non_default_arguments
@@ -42,3 +44,27 @@ def test_a_batch_passes_the_rig_on(tmp_path):
     assert non_default_arguments(args) == {"--retarget": str(rig), "--rig-object": "Rig"}
     args = build_parser().parse_args(["batch", ".", "--out", ".", "--retarget", str(rig), "--retarget-root", "object"])
     assert non_default_arguments(args) == {"--retarget": str(rig), "--retarget-root": "object"}
+
+
+def test_processes_with_another_current_folder_find_the_files_of_the_options(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    argv = [
+        "batch",
+        ".",
+        "--out",
+        "out",
+        "--calibration",
+        "lens.json",
+        "--body",
+        "my/SMPL.npz",
+        "--detector",
+        "/a.onnx",
+    ]
+    given = non_default_arguments(build_parser().parse_args(argv))
+    assert given == {
+        "--calibration": str(tmp_path / "lens.json"),
+        "--body": str(tmp_path / "my" / "SMPL.npz"),
+        "--detector": os.path.abspath("/a.onnx"),
+    }
+    args = build_parser().parse_args(["batch", ".", "--out", "out", "--body", "scope_h"])
+    assert non_default_arguments(args) == {"--body": "scope_h"}

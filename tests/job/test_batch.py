@@ -17,6 +17,7 @@ from scope.scope_addon.cli import SAMPLE, main
 from scope.scope_addon.command_line import signals
 from scope.scope_addon.errors import UsageError
 from scope.scope_addon.job.batch import REPORT_NAME, Batch
+from scope.scope_addon.job.clips.runner import LocalRunner
 from scope.scope_addon.motion import Motion
 from scope.solver.errors import InputError
 from scope.solver.loaders.body_file import BUILT_IN
@@ -65,6 +66,17 @@ def calls(folder):
 def batch(folder, out, options=None, suffixes=(".npz", ".glb")):
     program = [sys.executable, "-c", PROGRAM]
     return Batch(folder, out, program, options or {}, suffixes)
+
+
+def test_a_report_that_takes_long_to_write_is_not_written_after_every_clip(folder, tmp_path, monkeypatch):
+    monkeypatch.setattr("scope.scope_addon.job.batch._QUICK_S", 0.0)
+    monkeypatch.setattr("scope.scope_addon.job.batch._WRITING_SHARE", 1e-6)
+    written = []
+    text = "scope.scope_addon.job.batch.json_text"
+    monkeypatch.setattr(text, lambda report, indent: written.append(len(report["files"])) or json.dumps(report))
+    report = batch(folder, tmp_path / "out").run(1)
+    assert written == [1, 5]  # after the first clip, and at the end
+    assert json.loads((tmp_path / "out" / REPORT_NAME).read_text()) == report
 
 
 @pytest.mark.parametrize("jobs", [1, 3])
@@ -351,12 +363,12 @@ def test_a_signal_ends_the_batch_and_its_clips_despite_an_earlier_handler(folder
 def test_a_signal_whose_exception_is_lost_ends_the_batch_too(folder, tmp_path, monkeypatch, capsys):
     """The exception is lost while clips run, as in a callback of a weak reference."""
 
-    def runs_on(batch, name, *_):
+    def runs_on(runner, task):
         signals.received.append(signal.SIGINT)
         time.sleep(3)
-        return {"status": "failed", "file": name, "message": ""}
+        return {"status": "failed", "file": task.name, "message": ""}
 
-    monkeypatch.setattr(Batch, "_capture_one", runs_on)
+    monkeypatch.setattr(LocalRunner, "_capture", runs_on)
     assert main(["batch", str(folder), "--out", str(tmp_path / "out"), "--jobs", "2"]) == 130
     assert "stopped; finished clips are kept" in capsys.readouterr().err
 

@@ -129,7 +129,7 @@ def test_the_extras_contain_every_package_of_a_missing_module():
 
     extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
     assert set(EXTRAS.values()) == set(extras)
-    assert set(EXTRAS) == {*CAPTURE_MODULES, "pythonosc"}
+    assert set(EXTRAS) == {*CAPTURE_MODULES, "pythonosc", "distributed"}
 
 
 def test_the_solver_fits_with_only_numpy_and_numba(installed):

@@ -7,7 +7,7 @@ import re
 from collections import Counter
 from pathlib import Path
 
-from ..footage import FOOTAGE_SUFFIXES, VIDEO_SUFFIXES, is_sequence, pictures_in
+from ...footage import FOOTAGE_SUFFIXES, VIDEO_SUFFIXES, is_sequence, pictures_in
 
 OVERLAY = ".overlay"  # precedes the suffix of an overlay, which is not footage
 _PERSON = re.compile(r"(.+)\.person[0-9]+")  # as person_paths names the results of one of several people

@@ -1,0 +1,267 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Give the clips of a batch to the workers of a Dask cluster, each to one worker at a time, and publish the results.
+
+Which worker captures what is decided here and not by the scheduler, because workers have to be checked before they
+get a clip, also those that join later, and because a capture uses all threads of a worker, not one.
+"""
+
+from __future__ import annotations
+
+import queue
+import time
+from collections import Counter, deque
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from distributed import Client, Future
+
+from ...solver.errors import ScopeError
+from ..errors import ClusterError, internal_error_message, system_error_message
+from ..job.batch import ROOT
+from ..job.clips.task import ClipTask, Entry
+from ..job.request import program_version
+from . import worker as worker_side
+from .staging import Staging
+from .workers import Workers
+
+_POLLING_INTERVAL_S = 1.0  # for the list of workers
+_RESULT_TIMEOUT_S = 30.0  # for fetching an outcome that a worker holds
+ATTEMPTS = 3  # of a clip whose workers are lost
+
+
+class _Attempt(NamedTuple):
+    """A clip on a worker; `task` is None for the check of a worker."""
+
+    future: Future
+    worker: str
+    task: ClipTask | None
+    folder: Path
+
+
+class DaskRunner:
+    """Captures clips on a cluster.
+
+    :param client: connected to the scheduler; it is closed at the end.
+    :param folder: footage, under the same path on all machines.
+    :param out: output folder, under the same path on all machines.
+    :param jobs: number of clips that a worker captures at a time.
+    :param program: command that takes ``capture FILE -o OUT --json``; None for each worker's own installation.
+    :param say: called with messages for the user.
+    """
+
+    def __init__(
+        self,
+        client: Client,
+        folder: Path,
+        out: Path,
+        jobs: int,
+        program: Sequence[str] | None,
+        say: Callable[[str], None],
+    ) -> None:
+        self._client, self._folder, self._out, self._jobs = client, folder, out, jobs
+        self._program = None if program is None else tuple(program)
+        self._say, self._workers = say, Workers(say)
+        self._staging: Staging | None = None
+        self._attempts: dict[str, _Attempt] = {}  # by Dask's key
+        self._done: queue.SimpleQueue[str] = queue.SimpleQueue()  # keys
+        self._waiting: deque[ClipTask] = deque()
+        self._lost: Counter[str] = Counter()  # attempts of a clip
+        self._count = 0
+        self._looked = -_POLLING_INTERVAL_S
+        self._told_to_wait = False
+
+    def outcomes(self, tasks: Iterable[ClipTask]) -> Iterator[dict[str, Entry]]:
+        """See `Runner.outcomes`.
+
+        :raises ClusterError: the scheduler is lost, or no worker can capture.
+        :raises OutputError: the folder of the attempts cannot be created.
+        """
+        self._waiting.extend(tasks)
+        self._staging = Staging(self._out)
+        wanted = self._wanted(self._waiting[0])
+        yield {}
+        while self._waiting or any(attempt.task for attempt in self._attempts.values()):
+            found: dict[str, Entry] = {}
+            if time.monotonic() - self._looked > _POLLING_INTERVAL_S:
+                found = self._look_at_workers(wanted)
+            while self._waiting and self._client.status == "running" and (record := self._workers.free(self._jobs)):
+                self._start(self._waiting.popleft(), record.address)
+            yield found | self._next_outcome()
+        self.close()
+
+    def stop(self) -> None:
+        """See `Runner.stop`; workers end what nobody waits for."""
+        self.close()
+
+    def close(self) -> None:
+        """Give up all attempts and disconnect."""
+        attempts, self._attempts = list(self._attempts.values()), {}
+        self._cancel([attempt.future for attempt in attempts])
+        if self._staging:
+            self._staging.close()
+        self._client.close(timeout=5)
+
+    def report(self) -> dict[str, Any]:
+        """See `Runner.report`."""
+        return self._workers.report()
+
+    def _wanted(self, task: ClipTask) -> dict[str, Any]:
+        """Return what every worker is asked for before its first clip."""
+        assert self._staging is not None
+        return {
+            "program": program_version(ROOT),
+            "bpy": self._program is None and any(suffix != ".npz" for suffix in task.settings.suffixes),
+            "folder": str(self._folder),
+            "out": str(self._out),
+            "attempts": str(self._staging.folder),
+            "token": self._staging.token,
+            "options": dict(task.settings.options),
+            "suffixes": list(task.settings.suffixes),
+            "extras": list(task.settings.extras),
+            "basis": task.basis,
+        }
+
+    def _look_at_workers(self, wanted: dict[str, Any]) -> dict[str, Entry]:
+        """Check workers that have joined, and give up the attempts of those that have left.
+
+        :return: clips that are given up.
+        :raises ClusterError: the scheduler is lost, or no worker can capture.
+        """
+        self._looked = time.monotonic()
+        if self._client.status == "connecting":  # all futures are lost, and will be reported as such
+            return {}
+        if self._client.status != "running":
+            raise ClusterError(
+                "the connection to the Dask scheduler was lost; finished clips are kept, run the same command again to "
+                "continue"
+            )
+        try:  # not scheduler_info(), which may return a list without workers if the scheduler does not answer
+            present = list(self._client.sync(self._client.scheduler.identity, n_workers=-1)["workers"])
+        except (OSError, TimeoutError):
+            return {}
+        found: dict[str, Entry] = {}
+        for address in self._workers.gone(present):
+            for key in [key for key, attempt in self._attempts.items() if attempt.worker == address]:
+                found |= self._give_up(key, "left the cluster")
+        for address in self._workers.new(present):
+            self._submit(None, address, Path(), worker_side.check_worker, wanted)
+        if self._workers.all_refused():
+            problems = [e["event"] for e in self._workers.log if e["event"].startswith("gets no clips: ")]
+            raise ClusterError(f"no worker of the cluster can capture: {problems[-1].removeprefix('gets no clips: ')}")
+        if not present and not self._told_to_wait:
+            self._say("the cluster has no workers; waiting for one")
+        self._told_to_wait = not present
+        return found
+
+    def _start(self, task: ClipTask, address: str) -> None:
+        """Begin an attempt to capture a clip."""
+        assert self._staging is not None
+        folder = self._staging.folder / str(self._count)
+        remote = task._replace(footage=str(self._folder / task.file), out=str(folder), final=str(self._out))
+        arguments = (self._program, self._jobs, program_version(ROOT))
+        self._submit(task, address, folder, worker_side.capture_on_worker, remote, *arguments)
+        self._workers.records[address].running += 1
+
+    def _submit(
+        self, task: ClipTask | None, address: str, folder: Path, function: Callable[..., Any], first: Any, *others: Any
+    ) -> None:
+        assert self._staging is not None
+        key = f"scope-{'check' if task is None else 'clip'}-{self._staging.folder.name}-{self._count}"
+        self._count += 1
+        arguments = (first,) if task is None else (first, key, *others)
+        future = self._client.submit(
+            function, *arguments, key=key, workers=[address], allow_other_workers=False, retries=0, pure=False
+        )
+        self._attempts[key] = _Attempt(future, address, task, folder)
+        future.add_done_callback(lambda done: self._done.put(done.key))
+
+    def _next_outcome(self) -> dict[str, Entry]:
+        """Wait a second for an attempt to end, and return the clip's entry if that is its last one."""
+        try:
+            key = self._done.get(timeout=_POLLING_INTERVAL_S)
+        except queue.Empty:
+            return {}
+        attempt = self._attempts.get(key)
+        if attempt is None:  # given up before
+            return {}
+        if attempt.future.status in ("cancelled", "lost"):
+            return self._give_up(key, "the connection to the scheduler was lost", blame=False)
+        try:
+            result = attempt.future.result(timeout=_RESULT_TIMEOUT_S)
+        except Exception as error:  # of the worker, or of unpickling there
+            return self._failed(key, attempt, error)
+        if attempt.task is None:
+            self._forget(key)
+            self._workers.checked(attempt.worker, result)
+            return {}
+        return self._outcome(key, attempt, attempt.task, result)
+
+    def _outcome(self, key: str, attempt: _Attempt, task: ClipTask, entry: Entry) -> dict[str, Entry]:
+        """Publish the results of an attempt and return the clip's entry."""
+        assert self._staging is not None
+        if entry["status"] == worker_side.REFUSED:
+            self._workers.checked(attempt.worker, {"problem": entry["message"]})
+            return self._give_up(key, entry["message"], blame=False)
+        if entry["status"] == worker_side.LOST:
+            return self._give_up(key, entry["message"])
+        content = entry.pop("content", {})
+        try:
+            if entry["status"] == "done" and not self._staging.publish(attempt.folder, entry["outputs"], content):
+                return self._give_up(key, f"the results of {task.file} are not what the worker has written")
+        except (ScopeError, OSError) as error:
+            text = system_error_message(error) if isinstance(error, OSError) else str(error)
+            entry = {"file": task.file, "name": task.name, "status": "failed", "message": text}
+        self._forget(key)
+        entry["worker"] = attempt.worker
+        self._workers.finished(attempt.worker, entry)
+        return {task.name: entry}
+
+    def _failed(self, key: str, attempt: _Attempt, error: Exception) -> dict[str, Entry]:
+        """Handle an exception that is not Scope's own: a lost worker, or an installation that does not fit."""
+        text = " ".join(f"{type(error).__name__}: {error}".split())[:300]
+        if attempt.task is None:
+            self._forget(key)
+            self._workers.checked(attempt.worker, {"problem": f"Scope does not run there ({text}); install it"})
+            return {}
+        if type(error).__name__ in ("KilledWorker", "TimeoutError", "FutureCancelledError", "CommClosedError"):
+            return self._give_up(key, text)
+        entry = {"file": attempt.task.file, "name": attempt.task.name, "status": "failed", "worker": attempt.worker}
+        self._forget(key)
+        self._workers.finished(attempt.worker, entry)
+        return {attempt.task.name: entry | {"message": internal_error_message(error)}}
+
+    def _give_up(self, key: str, why: str, *, blame: bool = True) -> dict[str, Entry]:
+        """Let another worker capture the clip, or return its entry if too many were lost.
+
+        :param blame: whether the clip may be the cause.
+        """
+        attempt = self._attempts[key]
+        self._forget(key)
+        task = attempt.task
+        if task is None:
+            return {}
+        self._workers.event(attempt.worker, f"{task.file} is captured again: {why}", tell=True)
+        self._workers.records[attempt.worker].attempts_lost += 1
+        self._lost[task.name] += blame
+        if self._lost[task.name] < ATTEMPTS:
+            self._waiting.appendleft(task)
+            return {}
+        message = f"{ATTEMPTS} workers were lost while they captured it; does it need more memory than they have?"
+        entry = {"file": task.file, "name": task.name, "status": "failed", "message": message}
+        return {task.name: entry | {"worker": attempt.worker}}
+
+    def _forget(self, key: str) -> None:
+        """Forget an attempt; what a worker still does for it is in vain."""
+        attempt = self._attempts.pop(key)
+        if attempt.task is not None:
+            assert self._staging is not None
+            self._workers.records[attempt.worker].running -= 1
+            self._staging.remove(attempt.folder)
+        self._cancel([attempt.future])
+
+    def _cancel(self, futures: list[Future]) -> None:
+        if futures and self._client.status == "running":
+            with suppress(OSError, TimeoutError):  # the scheduler is lost, and forgets them by itself
+                self._client.cancel(futures, force=True)

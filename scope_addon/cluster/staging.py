@@ -1,0 +1,104 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Folders of attempts below the output folder, and publishing: only checked results get their final names.
+
+An attempt that was given up has no folder any more. A worker that was thought lost and still runs can therefore not
+publish anything, because only this machine renames results.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import secrets
+import shutil
+import time
+from pathlib import Path
+from typing import Any
+
+from ..atomic_write import atomic_path, computer, reason, resolve_link, runs
+from ..errors import OutputError
+from ..job.clips.task import file_hash
+
+_NAME = ".scope-attempts"
+TOKEN = "token"  # file by which a worker shows that it sees the same folder
+_ABANDONED_S = 7 * 24 * 3600.0
+
+
+class Staging:
+    """The folders of one batch.
+
+    :param out: output folder.
+    :raises OutputError: the folder cannot be created.
+    """
+
+    def __init__(self, out: Path) -> None:
+        self._out = out
+        self.token = secrets.token_hex(16)
+        _remove_abandoned(out / _NAME)
+        self.folder = out / _NAME / f"{computer()}-{os.getpid()}-{self.token[:8]}"
+        try:
+            self.folder.mkdir(parents=True)
+            (self.folder / TOKEN).write_text(self.token)
+        except OSError as error:
+            raise OutputError(f"cannot write {self.folder}: {reason(error)}") from error
+
+    def publish(self, attempt: Path, outputs: list[str], content: dict[str, Any]) -> bool:
+        """Give the results of an attempt their final names, and return True; False if one is not what was captured.
+
+        :param outputs: the results, relative to the attempt's folder and to the output folder.
+        :param content: their SHA-256, as the worker has computed them.
+        :raises OSError: a result cannot be renamed.
+        :raises OutputError: a final name is that of a folder or device.
+        """
+        try:
+            if not all(file_hash(attempt / name) == content[name] for name in outputs):
+                return False
+        except (OSError, KeyError):
+            return False
+        for name in outputs:
+            _rename(attempt / name, self._out / name)
+        return True
+
+    def remove(self, attempt: Path) -> None:
+        """Remove the folder of an attempt, after which its results cannot be published."""
+        shutil.rmtree(attempt, ignore_errors=True)
+
+    def close(self) -> None:
+        """Remove the folders of all attempts."""
+        shutil.rmtree(self.folder, ignore_errors=True)
+        _remove_if_empty(self.folder.parent)
+
+
+def _rename(staged: Path, final: Path) -> None:
+    final.parent.mkdir(parents=True, exist_ok=True)
+    try:
+        os.replace(staged, resolve_link(final))
+    except OSError as error:
+        if error.errno != errno.EXDEV:
+            raise
+        with atomic_path(final) as temporary:  # a folder of the results is a link to another disk
+            shutil.copyfile(staged, temporary)
+
+
+def _remove_abandoned(folder: Path) -> None:
+    """Remove the folders of batches that do not run any more."""
+    try:
+        found = list(folder.iterdir())
+    except OSError:
+        return
+    for path in found:
+        where, process, _ = [*path.name.split("-", 2), "", ""][:3]
+        try:
+            old = time.time() - path.stat().st_mtime > _ABANDONED_S
+        except OSError:
+            continue
+        if old or (where == computer() and process.isdecimal() and not runs(int(process))):
+            shutil.rmtree(path, ignore_errors=True)
+    _remove_if_empty(folder)
+
+
+def _remove_if_empty(folder: Path) -> None:
+    try:
+        folder.rmdir()
+    except OSError:
+        pass

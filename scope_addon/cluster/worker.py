@@ -1,0 +1,88 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What runs on a Dask worker: the check whether it can capture, and the capture of a clip in a process of its own.
+
+The capture is a subprocess, because the workers of a Dask nanny may not have children of `multiprocessing`. It ends
+with the worker, because the worker's end closes its standard input.
+"""
+
+from __future__ import annotations
+
+import os
+import platform
+import sys
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from distributed import Status, Worker, get_worker
+
+from ...solver.errors import ScopeError
+from ..installed import CAPTURE, check_installed
+from ..job.batch import ROOT
+from ..job.clips.processes import ClipProcesses
+from ..job.clips.task import CaptureSettings, ClipTask, Entry, Extras, capture_clip, file_hash
+from ..job.request import program_version
+from .staging import TOKEN
+
+PROGRAM = (sys.executable, "-m", __name__.rpartition(".cluster")[0])
+LOST, REFUSED = "lost", "refused"  # statuses of an attempt, in addition to those of a clip
+
+
+def check_worker(wanted: dict[str, Any]) -> dict[str, Any]:
+    """Return what the worker is, and as ``problem`` why it cannot capture; empty if it can.
+
+    :param wanted: plain values, because a worker with another version of Scope has to understand them.
+    """
+    try:
+        problem = _problem(wanted)
+    except (ScopeError, OSError) as error:
+        problem = str(error)
+    return {"host": platform.node(), "threads": get_worker().state.nthreads, "problem": problem}
+
+
+def _problem(wanted: dict[str, Any]) -> str:
+    ours, theirs = program_version(ROOT), wanted["program"]
+    if ours != theirs:
+        return f"it runs another version of Scope ({ours[:8]}, and not {theirs[:8]}); install the same version there"
+    check_installed(CAPTURE + (("bpy",) if wanted["bpy"] else ()))
+    if not Path(wanted["folder"]).is_dir():
+        return f"it has no folder {wanted['folder']}; all machines need the footage under the same path"
+    token = Path(wanted["attempts"]) / TOKEN
+    if not token.is_file() or token.read_text() != wanted["token"]:
+        return f"it does not see the output folder {wanted['out']}; all machines need it under the same path"
+    settings = CaptureSettings(wanted["options"], tuple(wanted["suffixes"]), Extras(*wanted["extras"]))
+    if settings.basis(ours) != wanted["basis"]:
+        return "a file that the options name is missing or different there; all machines need the same under its path"
+    return ""
+
+
+def capture_on_worker(task: ClipTask, key: str, program: tuple[str, ...] | None, jobs: int, version: str) -> Entry:
+    """Capture a clip into the folder of an attempt, ``task.out``, and return its entry with the hashes of the results.
+
+    :param key: Dask's key of this task.
+    :param program: command that takes ``capture FILE -o OUT --json``; None for this installation.
+    :param jobs: number of clips that are captured in parallel on this worker.
+    :param version: the version of Scope, which a worker that was started again may not have any more.
+    """
+    if program_version(ROOT) != version:
+        return {"status": REFUSED, "message": "it runs another version of Scope now; install the same version there"}
+    attempt, worker = Path(task.out), get_worker()
+    try:
+        attempt.mkdir()
+    except OSError as error:  # given up meanwhile, or begun before this worker was started again
+        return {"status": LOST, "message": f"the folder of the attempt cannot be made ({error.strerror})"}
+    run = partial(ClipProcesses().run, wanted=partial(_is_wanted, worker, key))
+    threads = max(1, min(worker.state.nthreads, os.cpu_count() or 1) // jobs)
+    entry = capture_clip(task, program or PROGRAM, run, threads)
+    try:
+        outputs = entry["outputs"] if entry["status"] == "done" else []
+        return entry | {"content": {name: file_hash(attempt / name) for name in outputs}}
+    except OSError as error:
+        return {"status": LOST, "message": f"a result cannot be read again ({error.strerror})"}
+
+
+def _is_wanted(worker: Worker, key: str) -> bool:
+    """Return whether the scheduler still waits for a task; if not, or if it is lost, nobody does."""
+    state = worker.state.tasks.get(key)
+    alive = worker.status in (Status.running, Status.paused)
+    return alive and state is not None and state.state in ("executing", "long-running")

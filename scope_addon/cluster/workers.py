@@ -1,0 +1,121 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What is known of the workers of a cluster: the table and the log in the batch's report."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import Any
+
+from ..job.clips.task import Entry
+
+CHECKED, READY, REFUSED, LOST = "being checked", "ready", "refused", "left"  # states of a worker
+
+
+@dataclass
+class WorkerRecord:
+    """One worker: its state, and what it has done."""
+
+    address: str
+    state: str = CHECKED
+    host: str = ""
+    threads: int = 0
+    running: int = 0
+    clips: int = 0
+    failed: int = 0
+    attempts_lost: int = 0
+    frames: int = 0
+    busy_s: float = 0.0
+
+    def row(self) -> dict[str, Any]:
+        """Return the row of the report's table."""
+        return {
+            "worker": self.address,
+            "host": self.host,
+            "threads": self.threads,
+            "state": self.state,
+            "clips": self.clips,
+            "failed": self.failed,
+            "attempts_lost": self.attempts_lost,
+            "frames": self.frames,
+            "busy_s": round(self.busy_s, 1),
+            "frames_per_s": round(self.frames / self.busy_s, 1) if self.busy_s else 0.0,
+        }
+
+
+class Workers:
+    """The workers that have been seen, by address.
+
+    :param say: called with messages for the user.
+    """
+
+    def __init__(self, say: Callable[[str], None]) -> None:
+        self._say, self._start = say, time.monotonic()
+        self.records: dict[str, WorkerRecord] = {}
+        self.log: list[dict[str, Any]] = []
+
+    def event(self, address: str, text: str, *, tell: bool = False) -> None:
+        """Add a line to the log, and tell the user if it matters to them."""
+        self.log.append({"second": round(time.monotonic() - self._start, 1), "worker": address, "event": text})
+        if tell:
+            self._say(f"worker {address}: {text}")
+
+    def new(self, addresses: Iterable[str]) -> list[str]:
+        """Record workers that have joined, and return their addresses."""
+        known = {address for address, record in self.records.items() if record.state != LOST}
+        joined = sorted(set(addresses) - known)
+        for address in joined:
+            self.records.setdefault(address, WorkerRecord(address)).state = CHECKED
+        return joined
+
+    def gone(self, addresses: Iterable[str]) -> list[str]:
+        """Record workers that have left, and return their addresses."""
+        present = set(addresses)
+        left = [a for a, record in self.records.items() if record.state != LOST and a not in present]
+        for address in left:
+            self.records[address].state = LOST
+            self.event(address, "left the cluster")
+        return left
+
+    def checked(self, address: str, found: dict[str, Any]) -> None:
+        """Record the result of a worker's check."""
+        record, problem = self.records[address], found.get("problem")
+        record.host, record.threads = str(found.get("host", record.host)), int(found.get("threads", record.threads))
+        record.state = REFUSED if problem else READY
+        self.event(address, f"gets no clips: {problem}" if problem else "ready", tell=bool(problem))
+
+    def free(self, jobs: int) -> WorkerRecord | None:
+        """Return the ready worker with the fewest clips, if it may have another one."""
+        ready = [r for r in self.records.values() if r.state == READY and r.running < jobs]
+        return min(ready, key=lambda record: record.running, default=None)
+
+    def all_refused(self) -> bool:
+        """Return whether there are workers, and none of them can capture."""
+        states = {record.state for record in self.records.values()} - {LOST}
+        return states == {REFUSED}
+
+    def finished(self, address: str, entry: Entry) -> None:
+        """Count a clip."""
+        record = self.records[address]
+        record.clips += 1
+        record.failed += entry["status"] == "failed"
+        if entry["status"] != "skipped":  # whose seconds are those of an earlier batch
+            record.busy_s += entry.get("seconds", 0.0)
+        if entry["status"] == "done":
+            record.frames += int(entry["report"].get("frames", 0))
+
+    def report(self) -> dict[str, Any]:
+        """Return the table, the throughput of the whole cluster, and the log."""
+        seconds = time.monotonic() - self._start
+        frames = sum(record.frames for record in self.records.values())
+        throughput = {
+            "seconds": round(seconds, 1),
+            "frames": frames,
+            "frames_per_s": round(frames / max(seconds, 1e-3), 1),
+        }
+        return {
+            "throughput": throughput,
+            "workers": [record.row() for record in self.records.values()],
+            "log": list(self.log),
+        }

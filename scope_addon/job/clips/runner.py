@@ -1,0 +1,69 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Where the clips of a batch are captured: a runner takes tasks and yields outcomes. This one uses this machine."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from typing import Any, Protocol
+
+from .processes import ClipProcesses
+from .task import ClipTask, Entry, capture_clip
+
+_WAIT_S = 1.0  # longest wait for a clip to finish
+
+
+class Runner(Protocol):
+    """Captures clips."""
+
+    def outcomes(self, tasks: Iterable[ClipTask]) -> Iterator[dict[str, Entry]]:
+        """Capture clips, and yield the entries of those that are finished by their names, as they come.
+
+        Yields at least once a second, if need be an empty dictionary: a signal delivered to another thread does not
+        wake this one.
+        """
+        ...
+
+    def stop(self) -> None:
+        """End what is running, because the batch ends early."""
+        ...
+
+    def report(self) -> dict[str, Any]:
+        """Return what the batch's report says besides the clips."""
+        ...
+
+
+class LocalRunner:
+    """Captures clips in processes of this machine.
+
+    :param program: command that takes ``capture FILE -o OUT --json``.
+    :param jobs: number of clips that are captured in parallel.
+    """
+
+    def __init__(self, program: Sequence[str], jobs: int) -> None:
+        self._program, self._processes = list(program), ClipProcesses()
+        self._threads = None if jobs == 1 else max(1, (os.cpu_count() or 1) // jobs)
+        self._pool = ThreadPoolExecutor(jobs)
+
+    def outcomes(self, tasks: Iterable[ClipTask]) -> Iterator[dict[str, Entry]]:
+        """See `Runner.outcomes`."""
+        futures: dict[Future[Entry], str] = {self._pool.submit(self._capture, task): task.name for task in tasks}
+        yield {}
+        pending = set(futures)
+        while pending:
+            finished, pending = wait(pending, timeout=_WAIT_S, return_when=FIRST_COMPLETED)
+            yield {futures[future]: future.result() for future in finished}
+        self._pool.shutdown()
+
+    def stop(self) -> None:
+        """See `Runner.stop`."""
+        self._processes.stop()
+        self._pool.shutdown(cancel_futures=True)
+
+    def report(self) -> dict[str, Any]:
+        """See `Runner.report`."""
+        return {}
+
+    def _capture(self, task: ClipTask) -> Entry:
+        return capture_clip(task, self._program, self._processes.run, self._threads)

@@ -1,0 +1,181 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Capture one clip of a batch in a process of its own, and describe the outcome for the report.
+
+A task and its outcome consist of plain values, so that another process, or another machine, can do it.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import shlex
+import time
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from ...errors import NO_PERSON, system_error_message
+from ...footage import PICTURE_SUFFIXES
+from .find import OVERLAY
+
+SHOWN_COMMAND, STOP_WITH_STDIN = "--shown-command", "--stop-with-stdin"  # options that only a batch passes
+REPORT = ".report"  # between a clip's name and the suffix of its page
+
+Entry = dict[str, Any]  # the outcome of a clip, as the report has it
+
+
+class Extras(NamedTuple):
+    """What a batch writes of every clip besides the result files."""
+
+    overlays: bool = False
+    reports: bool = False
+
+
+NO_EXTRAS = Extras()
+
+
+class CaptureSettings(NamedTuple):
+    """What is the same for every clip of a batch.
+
+    :param options: arguments of every capture: flag to text; None for a flag that takes no value.
+    :param suffixes: suffixes of the result files, such as ``.npz``.
+    :param extras: what else to write of each clip.
+    """
+
+    options: dict[str, str | None]
+    suffixes: tuple[str, ...]
+    extras: Extras = NO_EXTRAS
+
+    def basis(self, program_version: str) -> str:
+        """Return the part of the clips' keys that is the same for all: program, options, and files that these name.
+
+        :raises OSError: a file cannot be read.
+        """
+        values = {k: v for k, v in self.options.items() if k != "--threads"}
+        text = json.dumps([program_version, sorted(values.items()), list(self.suffixes), self.extras])
+        digest = hashlib.sha256(text.encode())
+        for value in values.values():
+            files = [Path(value)] if value else []  # a body, a calibration, a network
+            files += [path.with_suffix(".json") for path in files if path.suffix == ".onnx"]  # a network's description
+            _add_files(digest, filter(Path.is_file, files))
+        return digest.hexdigest()
+
+
+class ClipTask(NamedTuple):
+    """One clip to capture.
+
+    :param name: name of its results below ``out``, without suffix.
+    :param file: name of the footage in the report.
+    :param footage: path of a video, an image, or a folder with an image sequence.
+    :param out: output folder.
+    :param basis: see `CaptureSettings.basis`.
+    :param previous: entry of the previous report, if its files still exist.
+    :param final: folder to which the results are moved later; empty if they stay in ``out``.
+    """
+
+    name: str
+    file: str
+    footage: str
+    out: str
+    basis: str
+    settings: CaptureSettings
+    previous: Entry | None = None
+    final: str = ""
+
+
+def capture_clip(
+    task: ClipTask,
+    program: Sequence[str],
+    run: Callable[[list[str]], tuple[int, str, str]],
+    threads: int | None = None,
+) -> Entry:
+    """Capture a clip unless it is finished, and return its entry in the report, also if the clip fails.
+
+    :param program: command that takes ``capture FILE -o OUT --json``.
+    :param run: runs a process and returns its exit status, stdout and stderr.
+    :param threads: of the networks; None if no number is to be given.
+    """
+    start = time.monotonic()
+    footage, out = Path(task.footage), Path(task.out)
+    entry: Entry = {"file": task.file, "name": task.name}
+    try:
+        entry["key"] = _key(task.basis, footage)
+    except OSError as error:
+        return entry | {"status": "failed", "message": f"{footage} cannot be read: {error.strerror}"}
+    if task.previous and task.previous.get("key") == entry["key"]:
+        return task.previous | {"file": task.file, "status": task.previous["status"].replace("done", "skipped")}
+    target = out / task.name
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        arguments = [*program, *_arguments(footage, target, task.settings, threads)]
+        if task.final:  # a page about the capture shows its command
+            shown = _arguments(footage, Path(task.final) / task.name, task.settings, threads)
+            arguments += [SHOWN_COMMAND, shlex.join([*program, *(each for each in shown if each != STOP_WITH_STDIN)])]
+        status, stdout, stderr = run(arguments)
+    except OSError as error:
+        return entry | {"status": "failed", "message": system_error_message(error)}
+    entry["seconds"] = round(time.monotonic() - start, 2)
+    report = _last_object(stdout)
+    if status == 0 and report is not None:
+        outputs = [Path(p).relative_to(out).as_posix() for p in report.pop("outputs")]
+        return entry | {"status": "done", "outputs": outputs, "report": report}
+    if status == NO_PERSON:
+        return entry | {"status": "no_person", "outputs": [], "message": _error_message(stderr)}
+    message = _error_message(stderr) or f"the process ended with status {status}"
+    return entry | {"status": "failed", "message": message}
+
+
+def _arguments(footage: Path, target: Path, settings: CaptureSettings, threads: int | None) -> list[str]:
+    """Return the arguments that capture a clip; ``target`` is the path of its results without suffix."""
+    arguments = ["capture", str(footage), "--json", "--quiet", STOP_WITH_STDIN]
+    for suffix in settings.suffixes:
+        arguments += ["-o", f"{target}{suffix}"]
+    if settings.extras.reports:
+        arguments += ["--report", f"{target}{REPORT}.html"]
+    if settings.extras.overlays:
+        suffix = ".png" if footage.suffix.lower() in PICTURE_SUFFIXES else ".mp4"
+        arguments += ["--overlay", f"{target}{OVERLAY}{suffix}"]
+    given: dict[str, str | None] = {} if threads is None else {"--threads": str(threads)}
+    for option, value in (given | settings.options).items():
+        arguments.append(option if value is None else f"{option}={value}")  # one argument: a value may begin with -
+    return arguments
+
+
+def _key(basis: str, footage: Path) -> str:
+    """Hash the program, the options and the footage."""
+    digest = hashlib.sha256(basis.encode())
+    _add_files(digest, filter(Path.is_file, sorted(footage.iterdir())) if footage.is_dir() else [footage])
+    return digest.hexdigest()
+
+
+def _add_files(digest: hashlib._Hash, files: Iterable[Path]) -> None:
+    for file in files:
+        digest.update(bytes.fromhex(file_hash(file)))
+
+
+def file_hash(file: Path) -> str:
+    """Return the SHA-256 of a file's content.
+
+    :raises OSError: it cannot be read.
+    """
+    with file.open("rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()
+
+
+def _last_object(text: str) -> dict[str, Any] | None:
+    """Return the JSON object on the last line; the lines before it are other output of the program."""
+    for line in reversed(text.splitlines()):
+        if line.startswith("{"):
+            try:
+                report = json.loads(line)
+            except ValueError:
+                return None
+            return report if isinstance(report, dict) else None
+    return None
+
+
+def _error_message(stderr: str) -> str:
+    """Return the error message without the prefix of the program's name."""
+    lines = [line.strip() for line in stderr.splitlines() if line.strip()]
+    own = [line.removeprefix("scope: ") for line in lines if line.startswith("scope: ") and "warning:" not in line]
+    return (own or lines or [""])[-1]

@@ -1,0 +1,236 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A batch on a cluster of two worker processes: one good output per clip, whatever becomes of workers and scheduler."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import threading
+from contextlib import ExitStack, contextmanager
+
+import pytest
+from scope.scope_addon.cli import main
+from scope.scope_addon.job.batch import REPORT_NAME
+
+from ..job.processes import runs, wait_for
+from ..required import package
+
+distributed = package("distributed")
+pytestmark = pytest.mark.skipif(os.name == "nt", reason="sends signals to worker processes")
+
+# Replaces the capture. The clip's text decides the outcome; every call is logged beside the clip. The first process of
+# a clip "hangs" runs until its standard input ends, as it does when the worker dies or stops the process.
+PROGRAM = """
+import json, os, pathlib, sys
+clip = pathlib.Path(sys.argv[2])
+text = clip.read_text()
+with open(clip.with_suffix(".calls"), "a") as log:
+    log.write(json.dumps({"pid": os.getpid(), "parent": os.getppid(), "arguments": sys.argv[1:]}) + "\\n")
+if text == "nobody":
+    print("scope: no person found", file=sys.stderr); sys.exit(3)
+if text == "broken":
+    print("scope: it is not a video", file=sys.stderr); sys.exit(1)
+if text == "hangs" and len(clip.with_suffix(".calls").read_text().splitlines()) == 1:
+    sys.stdin.read(); sys.exit(130)
+if text == "kills":
+    os.kill(os.getppid(), 9); sys.stdin.read(); sys.exit(130)
+outputs = [sys.argv[i + 1] for i, a in enumerate(sys.argv) if a == "-o"]
+for path in outputs:
+    pathlib.Path(path).write_text("result of " + text)
+print(json.dumps({"frames": 3, "outputs": outputs, "warnings": []}))
+"""
+
+
+@contextmanager
+def started(**options):
+    defaults = {"threads_per_worker": 1, "dashboard_address": ":0", "silence_logs": 60}
+    with distributed.LocalCluster(**defaults | options) as cluster:
+        yield cluster
+
+
+@pytest.fixture(scope="module")
+def cluster():
+    with started(n_workers=2, processes=True) as cluster:
+        yield cluster
+
+
+@pytest.fixture
+def folder(tmp_path):
+    clips = tmp_path / "clips"
+    (clips / "below").mkdir(parents=True)
+    return clips
+
+
+def calls(clip):
+    log = clip.with_suffix(".calls")
+    return [json.loads(line) for line in log.read_text().splitlines()] if log.exists() else []
+
+
+def run(cluster, folder, *options):
+    """Run the command with a cluster or a scheduler file, and return its status and its report."""
+    out = folder.parent / "out"
+    argv = ["batch", str(folder), "--out", str(out), "--formats", "npz,glb", "--recursive", *options]
+    status = main(
+        [*argv, "--scheduler", str(getattr(cluster, "scheduler_address", cluster))],
+        program=[sys.executable, "-c", PROGRAM],
+    )
+    report = json.loads((out / REPORT_NAME).read_text()) if (out / REPORT_NAME).exists() else None
+    return status, report
+
+
+def files(folder):
+    return sorted(p.relative_to(folder.parent / "out").as_posix() for p in (folder.parent / "out").rglob("*"))
+
+
+def workers(cluster):
+    """Process ids of the workers."""
+    with distributed.Client(cluster.scheduler_address, set_as_default=False) as client:
+        return client.run(os.getpid)
+
+
+def test_every_clip_has_its_outcome_and_a_second_run_captures_what_has_changed(cluster, folder, capsys):
+    for name, text in {"a.mp4": "a", "b.mp4": "broken", "c.png": "nobody", "below/d.mp4": "d"}.items():
+        (folder / name).write_text(text)
+    status, report = run(cluster, folder)
+    assert status == 1
+    found = {e["file"]: (e["status"], e.get("message")) for e in report["files"]}
+    assert {name: each[0] for name, each in found.items()} == {
+        "a.mp4": "done",
+        "b.mp4": "failed",
+        "below/d.mp4": "done",
+        "c.png": "no_person",
+    }
+    assert found["b.mp4"][1] == "it is not a video"
+    outputs = ["a.glb", "a.npz", "below", "below/d.glb", "below/d.npz"]
+    assert files(folder) == sorted([*outputs, REPORT_NAME])
+    assert (folder.parent / "out" / "below" / "d.npz").read_text() == "result of d"
+    staged, shown = (calls(folder / "below" / "d.mp4")[0]["arguments"][k] for k in (6, -1))
+    assert ".scope-attempts" in staged
+    assert f"-o {folder.parent}/out/below/d.npz" in shown  # what a page about the capture shows
+    assert sum(row["clips"] for row in report["workers"]) == 4
+    assert sum(row["frames"] for row in report["workers"]) == report["throughput"]["frames"] == 6
+    assert {e["worker"] for e in report["files"]} <= {row["worker"] for row in report["workers"]}
+    said = capsys.readouterr().err.splitlines()
+    assert "scope: 4/4" in said[3]
+    assert said[4].split()[1:5] == ["worker", "host", "threads", "state"]
+
+    (folder / "a.mp4").write_text("changed")
+    (folder.parent / "out" / "below" / "d.glb").unlink()
+    status, report = run(cluster, folder)
+    assert report["counts"] == {"done": 2, "skipped": 0, "no_person": 1, "failed": 1}
+    assert [len(calls(folder / name)) for name in ("a.mp4", "b.mp4", "c.png", "below/d.mp4")] == [2, 2, 1, 2]
+    assert (folder.parent / "out" / "a.npz").read_text() == "result of changed"
+
+
+def test_a_clip_of_a_killed_worker_is_captured_by_another_and_its_process_ends(cluster, folder):
+    for name in ("a", "b", "c"):
+        (folder / f"{name}.mp4").write_text("hangs" if name == "b" else name)
+    pids = set(workers(cluster).values())
+
+    def kill():
+        wait_for(lambda: calls(folder / "b.mp4"))
+        parent = calls(folder / "b.mp4")[0]["parent"]
+        assert parent in pids
+        os.kill(parent, signal.SIGKILL)
+
+    thread = threading.Thread(target=kill)
+    thread.start()
+    status, report = run(cluster, folder)
+    thread.join()
+    assert status == 0
+    assert [e["status"] for e in report["files"]] == ["done"] * 3
+    assert files(folder) == sorted([*(f"{n}.{s}" for n in "abc" for s in ("npz", "glb")), REPORT_NAME])
+    first, second = calls(folder / "b.mp4")
+    assert first["arguments"][6] != second["arguments"][6]  # a folder of its own for each attempt
+    wait_for(lambda: not runs(first["pid"]))
+    lost = [row for row in report["workers"] if row["attempts_lost"]]
+    assert [row["state"] for row in lost] == ["left"]
+    assert any("b.mp4 is captured again" in event["event"] for event in report["log"])
+
+
+def test_a_clip_that_ends_its_workers_fails_and_the_others_are_captured(cluster, folder, monkeypatch):
+    monkeypatch.setattr("scope.scope_addon.cluster.runner.ATTEMPTS", 1)
+    for name in ("a", "b", "c"):
+        (folder / f"{name}.mp4").write_text("kills" if name == "a" else name)
+    status, report = run(cluster, folder)
+    assert status == 1
+    assert [e["status"] for e in report["files"]] == ["failed", "done", "done"]
+    assert "lost while they captured it" in report["files"][0]["message"]
+    assert files(folder) == sorted([*(f"{n}.{s}" for n in "bc" for s in ("npz", "glb")), REPORT_NAME])
+
+
+def test_an_interrupt_ends_the_captures_on_the_workers(cluster, folder, monkeypatch):
+    (folder / "a.mp4").write_text("hangs")
+
+    def interrupt(self, stage, done, total):
+        if calls(folder / "a.mp4"):
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr("scope.scope_addon.cli.ProgressBar.__call__", interrupt)
+    status, report = run(cluster, folder)
+    assert (status, report) == (130, None)
+    wait_for(lambda: not runs(calls(folder / "a.mp4")[0]["pid"]))
+    assert files(folder) == []
+
+
+def test_workers_of_another_version_get_no_clips(cluster, folder, monkeypatch, capsys):
+    (folder / "a.mp4").write_text("a")
+    monkeypatch.setattr("scope.scope_addon.cluster.runner.program_version", lambda root: "0" * 64)
+    assert run(cluster, folder) == (1, None)
+    said = capsys.readouterr().err.splitlines()
+    assert said[-1].startswith("scope: no worker of the cluster can capture: it runs another version of Scope (")
+    assert calls(folder / "a.mp4") == []
+    assert files(folder) == []
+
+
+@pytest.mark.parametrize(
+    ("attribute", "value", "says"),
+    [("_folder", "/no/such/clips", "it has no folder /no/such/clips"), ("_out", None, "it does not see the output")],
+)
+def test_workers_that_see_other_folders_get_no_clips(cluster, folder, monkeypatch, capsys, attribute, value, says):
+    (folder / "a.mp4").write_text("a")
+    from scope.scope_addon.cluster.runner import DaskRunner
+
+    ask = DaskRunner._wanted
+
+    def wanted(self, task):
+        asked = ask(self, task)
+        return asked | ({"folder": value} if attribute == "_folder" else {"token": "other"})
+
+    monkeypatch.setattr(DaskRunner, "_wanted", wanted)
+    assert run(cluster, folder) == (1, None)
+    assert says in capsys.readouterr().err.splitlines()[-1]
+
+
+def test_a_lost_scheduler_is_a_sentence_and_finished_clips_are_kept(folder, tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr("scope.scope_addon.cluster.connection._TIMEOUT_S", 2.0)
+    for name in ("a", "b"):
+        (folder / f"{name}.mp4").write_text("hangs" if name == "b" else name)
+    file = tmp_path / "scheduler.json"
+    dask = [sys.executable, "-W", "ignore", "-m", "dask"]
+    options = ["--scheduler-file", str(file), "--no-dashboard"]
+    silent = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    with ExitStack() as stack:
+        scheduler = subprocess.Popen([*dask, "scheduler", "--port", "0", "--host", "127.0.0.1", *options], **silent)
+        stack.callback(scheduler.wait)
+        stack.callback(scheduler.kill)
+        worker = subprocess.Popen([*dask, "worker", "--no-nanny", "--nthreads", "1", *options], **silent)
+        stack.callback(worker.wait)
+        stack.callback(worker.kill)
+        wait_for(file.exists)
+
+        def lose():
+            wait_for(lambda: calls(folder / "b.mp4"))
+            scheduler.kill()
+
+        thread = threading.Thread(target=lose)
+        thread.start()
+        status, report = run(file, folder)
+        thread.join()
+        assert status == 1
+        said = capsys.readouterr().err.splitlines()
+        assert "the connection to the Dask scheduler was lost; finished clips are kept" in said[-1]
+        assert [e["status"] for e in report["files"]] == ["done"]
+        assert files(folder) == ["a.glb", "a.npz", REPORT_NAME]
+        wait_for(lambda: not runs(calls(folder / "b.mp4")[0]["pid"]))
