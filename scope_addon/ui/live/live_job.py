@@ -1,0 +1,224 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A live capture, from the button to the last pose or the recorded keys. ``step`` never waits for the worker.
+
+The modal operator calls ``step`` on a timer; tests call it in a loop.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import bpy
+
+from ....solver.loaders.body_file import load_body
+from ...errors import UsageError, VideoError
+from ...footage import shown
+from ...job.live.process import LiveProcess, ShownPose
+from ...job.live.request import LiveRequest
+from ...job.process import START_SCRIPT
+from ...options import Place, options_at
+from ...scene.live.live_body import LiveBody
+from ...scene.local_scene import check_local
+from ..capture.capture_job import build_capture, build_options, chosen_values, window_shows
+from ..preferences import cache
+from .live_state import state
+
+NOTICE_S = 1.0  # for which poses that were under way when a notice came do not end it
+QUIET_S = 2.0  # without a pose, after which the panel says so
+_WRITING_S = 60.0  # for which the recording is waited for
+
+
+@dataclass
+class LiveStatus:
+    """What the panel shows."""
+
+    presence: str = ""  # as in `ShownPose`; empty before the first picture
+    rate: float = 0.0  # poses per second
+    latency_ms: float = 0.0
+    dropped: int = 0
+    received: int = 0
+    recorded_s: float = 0.0
+    notice: str = ""  # why nothing comes from the source
+
+
+class LiveJob:
+    """A live capture for one scene, with the current settings of the scene."""
+
+    def __init__(self, scene: bpy.types.Scene, python: Sequence[str] = ()) -> None:
+        """Start the process.
+
+        :param python: its interpreter and arguments; if empty, Blender's own.
+        :raises ScopeError: a setting is invalid, or the process cannot be started.
+        """
+        check_local(scene)
+        self.status = LiveStatus()
+        self.recording = self.finishing = self.cancelled = False
+        self.messages = 0  # of the process, and poses, so far
+        self._scene_uid = scene.session_uid
+        self._request = live_request(scene)
+        self._is_stream = scene.scope_live.source == "STREAM"
+        self._footage = self._request.source if scene.scope_live.source == "FILE" else ""
+        self._scene_body = load_body(self._request.values["body"])
+        self._body = LiveBody(scene, "Live", self._scene_body)
+        self._last_pose_s = self._notice_s = self._stopped_s = time.monotonic()
+        self.created = False  # whether the last step created the body
+        # Blender 4.2 has no such attribute; its Python is isolated as well.
+        python = python or [sys.executable, *getattr(bpy.app, "python_args", ("-I",))]
+        folders = cache()
+        self._worker = LiveProcess(self._request, folders.new_job_folder(), folders.kernels, python, START_SCRIPT)
+
+    @property
+    def worker(self) -> LiveProcess:
+        """The process."""
+        return self._worker
+
+    @property
+    def has_body(self) -> bool:
+        """Whether somebody was seen so far."""
+        return self._body.armature is not None
+
+    @property
+    def quiet_s(self) -> float:
+        """Seconds since the last pose; 0 while poses come."""
+        seconds = time.monotonic() - self._last_pose_s
+        return seconds if seconds > QUIET_S and self.status.presence else 0.0
+
+    def record(self) -> None:
+        """Keep the poses from now on, for ``stop``."""
+        self.recording = True
+        self._worker.record()
+
+    def stop(self) -> None:
+        """End the capture; ``step`` returns False when all is done. Without a recording, the last pose stays."""
+        self.finishing, self._stopped_s = True, time.monotonic()
+        if self.recording:
+            self._worker.stop()
+        else:
+            self._worker.close()
+
+    def cancel(self) -> None:
+        """End the process, and remove what was created."""
+        self.cancelled = True
+        self.close()
+        self._body.remove()
+
+    def close(self) -> None:
+        """End the process in any state, without leaving a file behind; the scene stays as it is."""
+        self._worker.close()
+
+    def step(self) -> bool:
+        """Continue as far as possible without waiting; return False at the end.
+
+        :raises ScopeError: the capture failed; what it created is removed.
+        """
+        try:
+            return self._step()
+        except BaseException:
+            self.cancel()
+            raise
+
+    def _step(self) -> bool:
+        self.created = False
+        scene = next((s for s in bpy.data.scenes if s.session_uid == self._scene_uid), None)
+        if scene is None:
+            raise UsageError("the scene was removed during the live capture; start in another scene")
+        if self.finishing and not self.recording:
+            self._leave_pose(scene)
+            return False
+        if self._is_stream and not bpy.app.online_access:
+            raise UsageError(offline_text())
+        result = self._listen()
+        pose = None if self.finishing else self._worker.newest_pose(self._scene_body.K + 1, self._scene_body.P)
+        if pose is not None:
+            self._show(scene, pose)
+        if result is None:
+            if self.finishing and time.monotonic() - self._stopped_s > _WRITING_S:
+                raise UsageError("the recording was not written in time; record again")
+            return True
+        self._build(scene, result)
+        return False
+
+    def _listen(self) -> dict[str, Any] | None:
+        """Read the messages; return the recording's, once there is one."""
+        for message in self._worker.poll():
+            self.messages += 1
+            if message["event"] == "status":
+                for name in ("presence", "rate", "latency_ms", "dropped", "received", "recorded_s"):
+                    setattr(self.status, name, message[name])
+            elif message["event"] == "notice":
+                self.status.notice, self._notice_s = shown(message["text"]), time.monotonic()
+            elif message["event"] == "ended":  # the source has, and nothing was recorded
+                self.stop()
+            elif message["event"] == "result":
+                return message
+        return None
+
+    def _show(self, scene: bpy.types.Scene, pose: ShownPose) -> None:
+        self.messages += 1
+        self._last_pose_s = time.monotonic()
+        self.status.presence = pose.presence
+        if self.status.notice and self._last_pose_s - self._notice_s > NOTICE_S:
+            self.status.notice = ""
+        if bpy.context.scene == scene:  # in another one nobody sees it
+            self.created = self._body.show(pose.rotations, pose.pelvis, pose.betas)
+
+    def _leave_pose(self, scene: bpy.types.Scene) -> None:
+        """Leave the last pose, on an armature at rest in the shape that was estimated last."""
+        with window_shows(scene):
+            self._body.rest_at_shape()
+
+    def _build(self, scene: bpy.types.Scene, result: dict[str, Any]) -> None:
+        """Write the recording's keys, as a capture of footage does, and remove the body that followed."""
+        self._worker.wait(1.0)
+        paths = [self._worker.job_folder / Path(name).name for name in result["motions"]]
+        contents = [(path, path.read_bytes()) for path in paths]
+        build_capture(
+            scene, contents, self._request.values["body"], self._footage, result["report"], build_options(scene)
+        )
+        self._body.remove()
+        self._worker.close()
+
+
+def live_request(scene: bpy.types.Scene) -> LiveRequest:
+    """Make the request to the worker from the scene's settings and the preferences.
+
+    :raises UsageError: no source or body file is chosen, or the source is a stream, and Blender is not to go online.
+    :raises VideoError: the video does not exist.
+    """
+    settings = scene.scope_live
+    online = False
+    if settings.source == "FILE":
+        if not settings.file:
+            raise UsageError("no video is chosen; choose one first")
+        source = bpy.path.abspath(settings.file)
+        if not Path(source).is_file():
+            raise VideoError(f"{source} does not exist; choose the video again")
+    elif settings.source == "STREAM":
+        source = settings.stream.strip()
+        if "://" not in source:
+            raise UsageError("no stream is given; enter its address, such as rtsp://192.168.1.20/stream")
+        if not bpy.app.online_access:
+            raise UsageError(offline_text())
+        online = True
+        if login := state.logins.get(source):
+            source = source.replace("://", f"://{login}", 1)
+    else:
+        source = settings.camera.strip()
+        if not (source.isdecimal() and len(source) <= 3) and not source.startswith("/dev/video"):
+            raise UsageError(f"'{source}' is no camera; enter its number, 0 for the first")
+    names = {option.name for option in options_at(Place.LIVE_WORKER)}
+    values = {name: value for name, value in chosen_values(scene).items() if name in names}
+    values["heights_m"] = values["heights_m"][:1]
+    return LiveRequest(source, online=online, **values, live_quality=settings.quality.lower())
+
+
+def offline_text() -> str:
+    """Return why a stream cannot be opened."""
+    from ...live.sources import OFFLINE
+
+    return OFFLINE

@@ -1,0 +1,28 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The running live capture, and what is remembered until Blender ends. Never saved."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from .live_job import LiveJob
+
+
+class _State:
+    """The running live capture, the message of the last one, and the logins of streams."""
+
+    job: LiveJob | None = None
+    scene_uid = 0  # of the scene that the job or the message belongs to
+    message = ""  # why the last live capture failed
+    logins: dict[str, str] = {}  # by the address of the stream without it
+
+
+state = _State()
+
+
+def stop_job() -> None:
+    """End the process in any state; the scene stays as it is."""
+    if state.job is not None:
+        state.job.close()
+    state.job = None
