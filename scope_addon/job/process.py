@@ -22,6 +22,7 @@ from .start_worker import worker_command
 ROOT = Path(__file__).resolve().parents[2]
 START_SCRIPT = Path(__file__).with_name("start_worker.py")
 LOG = "worker.log"
+_LAST = ("result", "ended")  # events after which a worker ends
 _WINDOWS_FLAGS = getattr(subprocess, "CREATE_NO_WINDOW", 0) | getattr(subprocess, "BELOW_NORMAL_PRIORITY_CLASS", 0)
 
 
@@ -77,7 +78,7 @@ class WorkerProcess:
         return self._process.poll() is None
 
     def poll(self) -> list[dict[str, Any]]:
-        """Return the messages since the last call, and set ``finished`` when the result is among them.
+        """Return the messages since the last call, and set ``finished`` when the last one is among them.
 
         :raises WorkerFailedError: the worker reported an error, ended without a result, or sent what is no message.
         """
@@ -96,7 +97,7 @@ class WorkerProcess:
                 continue
             if message["event"] == "error":
                 raise WorkerFailedError(message["message"])
-            self.finished = self.finished or message["event"] == "result"
+            self.finished = self.finished or message["event"] in _LAST
             messages.append(message)
 
     def wait(self, timeout_s: float = 5.0) -> None:

@@ -148,14 +148,14 @@ def _exit(status: int) -> NoReturn:
     os._exit(status)
 
 
-def _exit_with_parent(job_folder: Path, commands: Commands) -> None:
+def _exit_with_parent(job_folder: Path, commands: Commands | None = None) -> None:
     """Exit and remove the job's folder when the parent ends or closes the job; pass its commands on."""
 
     def end() -> NoReturn:
         _remove(job_folder)
         os._exit(1)
 
-    when_parent_ends(end, commands.hear)
+    when_parent_ends(end, (commands or Commands()).hear)
 
 
 def _remove(job_folder: Path) -> None:

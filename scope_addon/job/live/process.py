@@ -4,15 +4,15 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..messages import CAPTURE_FIELDS, LONGEST_LINE, is_number, is_text, unreadable
+from ..messages import CAPTURE_FIELDS, LONGEST_LINE, Fields, is_number, is_text, unreadable
 from ..process import START_SCRIPT, WorkerProcess
 from .commands import RECORD, STOP
 from .request import LiveRequest
@@ -27,7 +27,7 @@ def _is_measure(value: object) -> bool:
     return type(value) in (int, float) and 0 <= value < 1e12  # type: ignore[operator]
 
 
-_FIELDS = {
+_FIELDS: Fields = {
     "progress": CAPTURE_FIELDS["progress"],
     "status": {
         "presence": lambda value: value in PRESENCES,

@@ -2,8 +2,8 @@
 """A body that is posed as poses come: the armature and mesh of a capture, without keys.
 
 The armature rests at the shape β⁰ that was known first, because bones can only be moved in Edit Mode, while β settles
-in the first seconds. With δ_i = R_world_model (J_i(β) − J_i(β⁰)), M_i the rest orientation of bone i and Ω_i the rotation
-of joint i, the location channels
+in the first seconds. With δ_i = R_world_model (J_i(β) − J_i(β⁰)), M_i the rest orientation of bone i and Ω_i the
+rotation of joint i, the location channels
 
     i > 0:  M_iᵀ (I − R_world_model Ω_i R_world_modelᵀ) δ_i
     root:   pelvis − R_0 R_world_modelᵀ δ_0 − h_0, along the world's axes
@@ -96,8 +96,10 @@ class LiveBody:
         scene = next(scene for scene in bpy.data.scenes if scene.session_uid == self._scene_uid)
         collection = bpy.data.collections.new(self._name)
         scene.collection.children.link(collection)
-        rest = armature.rest_pose(body, betas)
+        rest, layer = armature.rest_pose(body, betas), bpy.context.view_layer
+        active = layer.objects.active
         rig = armature.build_armature(self._name, body, rest, collection)
+        layer.objects.active = active or rig
         vertices = body_mesh.rest_vertices_world(body, rest.lift)
         mesh = body_mesh.build_mesh(f"{self._name}_body", body, vertices, collection)
         bone_display.show_bones(rig, body, rest, body_mesh.rest_vertices_world(body, rest.lift, betas))

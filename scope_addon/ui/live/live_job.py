@@ -15,6 +15,7 @@ from typing import Any
 
 import bpy
 
+from ....solver.body import Body
 from ....solver.loaders.body_file import load_body
 from ...errors import UsageError, VideoError
 from ...footage import shown
@@ -23,9 +24,15 @@ from ...job.live.request import LiveRequest
 from ...job.process import START_SCRIPT
 from ...options import Place, options_at
 from ...scene.live.live_body import LiveBody
+from ...scene.live.live_rig import LiveRig
+from ...scene.live.scene_before import SceneBefore, select_only
 from ...scene.local_scene import check_local
+from ...scene.rigs.rig_retarget import guess_bone_map
+from ...scene.visibility import hide
 from ..capture.capture_job import build_capture, build_options, chosen_values, window_shows
 from ..preferences import cache
+from ..retarget.bone_list import listed_map
+from ..retarget.retarget_operators import retarget_options, retarget_to_chosen_rig
 from .live_state import state
 
 NOTICE_S = 1.0  # for which poses that were under way when a notice came do not end it
@@ -58,15 +65,18 @@ class LiveJob:
         check_local(scene)
         self.status = LiveStatus()
         self.recording = self.finishing = self.cancelled = False
-        self.messages = 0  # of the process, and poses, so far
+        self.warnings: list[str] = []  # of the retargeting of a recording
+        self.poses = 0  # shown so far
         self._scene_uid = scene.session_uid
         self._request = live_request(scene)
         self._is_stream = scene.scope_live.source == "STREAM"
         self._footage = self._request.source if scene.scope_live.source == "FILE" else ""
         self._scene_body = load_body(self._request.values["body"])
         self._body = LiveBody(scene, "Live", self._scene_body)
+        self._before = SceneBefore()
+        self._rig = live_rig(scene, self._scene_body) if scene.scope_live.with_rig else None
         self._last_pose_s = self._notice_s = self._stopped_s = time.monotonic()
-        self.created = False  # whether the last step created the body
+        self.created = self._was_created = False  # whether the last step, or one before, created the body
         # Blender 4.2 has no such attribute; its Python is isolated as well.
         python = python or [sys.executable, *getattr(bpy.app, "python_args", ("-I",))]
         folders = cache()
@@ -106,6 +116,9 @@ class LiveJob:
         self.cancelled = True
         self.close()
         self._body.remove()
+        if self._rig is not None:
+            self._rig.restore()
+        self._before.restore()
 
     def close(self) -> None:
         """End the process in any state, without leaving a file behind; the scene stays as it is."""
@@ -146,7 +159,6 @@ class LiveJob:
     def _listen(self) -> dict[str, Any] | None:
         """Read the messages; return the recording's, once there is one."""
         for message in self._worker.poll():
-            self.messages += 1
             if message["event"] == "status":
                 for name in ("presence", "rate", "latency_ms", "dropped", "received", "recorded_s"):
                     setattr(self.status, name, message[name])
@@ -159,29 +171,56 @@ class LiveJob:
         return None
 
     def _show(self, scene: bpy.types.Scene, pose: ShownPose) -> None:
-        self.messages += 1
+        self.poses += 1
         self._last_pose_s = time.monotonic()
         self.status.presence = pose.presence
         if self.status.notice and self._last_pose_s - self._notice_s > NOTICE_S:
             self.status.notice = ""
         if bpy.context.scene == scene:  # in another one nobody sees it
-            self.created = self._body.show(pose.rotations, pose.pelvis, pose.betas)
+            created = self._body.show(pose.rotations, pose.pelvis, pose.betas)
+            self.created, self._was_created = created and not self._was_created, True
+            if self.created:
+                select_only(bpy.context.view_layer, self._body.armature)
+            if self._rig is not None:
+                if created and scene.scope_retarget.captured == "hide":
+                    hide(self._body.armature, bpy.context.view_layer)
+                self._rig.show(pose.rotations, pose.pelvis, self._body.betas)
 
     def _leave_pose(self, scene: bpy.types.Scene) -> None:
         """Leave the last pose, on an armature at rest in the shape that was estimated last."""
         with window_shows(scene):
             self._body.rest_at_shape()
+            armature = self._body.armature
+            if self._rig is not None and armature is not None and scene.scope_retarget.captured == "hide":
+                hide(armature, bpy.context.view_layer)
 
     def _build(self, scene: bpy.types.Scene, result: dict[str, Any]) -> None:
         """Write the recording's keys, as a capture of footage does, and remove the body that followed."""
         self._worker.wait(1.0)
         paths = [self._worker.job_folder / Path(name).name for name in result["motions"]]
         contents = [(path, path.read_bytes()) for path in paths]
-        build_capture(
-            scene, contents, self._request.values["body"], self._footage, result["report"], build_options(scene)
-        )
+        body, options = self._request.values["body"], build_options(scene)
+        built = build_capture(scene, contents, body, self._footage, result["report"], options)
         self._body.remove()
+        if self._rig is not None and self._rig.rig is not None:
+            self._rig.restore()
+            with window_shows(scene):
+                self.warnings = retarget_to_chosen_rig(bpy.context, built.people[0].armature).warnings
         self._worker.close()
+
+
+def live_rig(scene: bpy.types.Scene, body: Body) -> LiveRig:
+    """Prepare the rig of the Retarget section.
+
+    :raises ScopeError: there is none, or it cannot be used.
+    """
+    settings = scene.scope_retarget
+    if settings.rig is None or settings.rig.name not in bpy.context.view_layer.objects:
+        raise UsageError("no rig is chosen that is in the scene's view layer; choose one, or switch off Rig")
+    if settings.rig.library is not None:
+        raise UsageError(f"'{settings.rig.name}' is linked; make an override of it, or switch off Rig")
+    bones = listed_map(settings) if len(settings.pairs) else guess_bone_map(settings.rig)
+    return LiveRig(settings.rig, body, bones, retarget_options(settings))
 
 
 def live_request(scene: bpy.types.Scene) -> LiveRequest:

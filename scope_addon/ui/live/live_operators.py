@@ -8,7 +8,7 @@ import bpy
 from .. import warm_up
 from ..capture.capture_operators import clear_status_bar
 from ..capture.capture_operators import state as capture_state
-from ..reporting import iface_, sentence, tip_
+from ..reporting import sentence, tip_
 from ..view.sidebar import is_over_tab, redraw_sidebars, redraw_sidebars_twice
 from ..view.view_operators import frame_selected, hide_startup_cube
 from ..view.viewports import viewports
@@ -100,19 +100,21 @@ class SCOPE_OT_live(bpy.types.Operator):
 
         job = state.job
         assert job is not None
-        before = job.messages
+        before = job.poses
         try:
             running = job.step()
         except (ScopeError, OSError, MemoryError) as error:
             self._fail(error)
             return {"CANCELLED"}
         if not running:
+            for warning in job.warnings:
+                self.report({"WARNING"}, sentence(warning))
             self.report({"INFO"}, "Live capture recorded" if job.recording else "Live capture stopped")
             return {"FINISHED"}
         if job.created:
             hide_startup_cube(context)
             frame_selected(context)
-        if job.messages != before:
+        if job.poses != before:
             redraw_viewports()
         status = job.status
         panel = (status.presence, round(status.rate), status.notice, status.recorded_s, round(job.quiet_s))
