@@ -46,7 +46,11 @@ class Transfer:
     def __init__(
         self, body: Body, betas: NDArray[np.floating[Any]], rig: Skeleton, bone_map: BoneMap, *, feet: bool = True
     ) -> None:
-        """Compare both at rest; the parameters are those of ``transfer``."""
+        """Compare both at rest.
+
+        :param betas: (P,) shape coefficients of the body.
+        :param feet: as in ``transfer``.
+        """
         self._body, self._betas, self._rig = body, betas, rig
         self._index = index = {part: k for k, part in enumerate(body.joint_names)}
         rest = body.rest_joints(betas) @ R_WORLD_MODEL.T

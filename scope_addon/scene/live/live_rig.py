@@ -69,7 +69,12 @@ class LiveRig:
     def show(
         self, rotations: NDArray[np.float64], pelvis: NDArray[np.float64], betas: NDArray[np.floating[Any]]
     ) -> None:
-        """Pose the rig; see `LiveBody.show`."""
+        """Pose the rig.
+
+        :param rotations: (K+1, 4) w, x, y, z; the root relative to the world, the others to their parents.
+        :param pelvis: (3,) metres, world.
+        :param betas: (P,) shape coefficients.
+        """
         rig = self.rig
         if rig is None:
             return

@@ -33,7 +33,7 @@ from ..capture.capture_job import build_capture, build_options, chosen_values, w
 from ..preferences import cache
 from ..retarget.bone_list import listed_map
 from ..retarget.retarget_operators import retarget_options, retarget_to_chosen_rig
-from .live_state import state
+from .stream_logins import with_login
 
 NOTICE_S = 1.0  # for which poses that were under way when a notice came do not end it
 QUIET_S = 2.0  # without a pose, after which the panel says so
@@ -243,9 +243,7 @@ def live_request(scene: bpy.types.Scene) -> LiveRequest:
             raise UsageError("no stream is given; enter its address, such as rtsp://192.168.1.20/stream")
         if not bpy.app.online_access:
             raise UsageError(offline_text())
-        online = True
-        if login := state.logins.get(source):
-            source = source.replace("://", f"://{login}", 1)
+        online, source = True, with_login(source)
     else:
         source = settings.camera.strip()
         if not (source.isdecimal() and len(source) <= 3) and not source.startswith("/dev/video"):

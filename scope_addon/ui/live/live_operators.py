@@ -12,6 +12,7 @@ from ..reporting import sentence, tip_
 from ..view.sidebar import is_over_tab, redraw_sidebars, redraw_sidebars_twice
 from ..view.view_operators import frame_selected, hide_startup_cube
 from ..view.viewports import viewports
+from . import stream_logins
 from .live_state import state, stop_job
 
 TIMER_S = 1 / 60  # poses come at half of this rate
@@ -21,7 +22,7 @@ def end_live() -> None:
     """End a running live capture: the extension is being disabled, or a test begins."""
     stop_job()
     state.message = ""
-    state.logins.clear()
+    stream_logins.forget()
 
 
 class SCOPE_OT_live(bpy.types.Operator):

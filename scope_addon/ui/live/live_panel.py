@@ -9,8 +9,6 @@ from ..capture.capture_panel import Tab, draw_text
 from ..reporting import iface_
 from .live_state import state
 
-_PRESENCES = {"held": "Not seen for a moment", "lost": "Nobody is seen"}
-
 
 class SCOPE_PT_live(Tab, bpy.types.Panel):
     """Source, buttons and state of live captures."""
@@ -28,7 +26,7 @@ class SCOPE_PT_live(Tab, bpy.types.Panel):
         if settings.source == "CAMERA":
             column.prop(settings, "camera", icon="CAMERA_DATA")
         elif settings.source == "STREAM":
-            column.prop(settings, "stream", text="", icon="URL", placeholder="rtsp://192.168.1.20/stream")
+            column.prop(settings, "stream", text="", icon="URL")
         else:
             column.prop(settings, "file", text="", icon="FILE_MOVIE")
         column.row(align=True).prop(settings, "quality", expand=True)
@@ -50,7 +48,7 @@ class SCOPE_PT_live(Tab, bpy.types.Panel):
 def _draw_rig(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     settings = context.scene.scope_live
     row = layout.row(align=True)
-    row.prop(settings, "with_rig", text="Rig" if settings.with_rig else "Rig Follows")
+    row.prop(settings, "with_rig")
     if settings.with_rig:
         row.prop(context.scene.scope_retarget, "rig", text="")
 
@@ -71,8 +69,9 @@ def _draw_status(context: bpy.types.Context, layout: bpy.types.UILayout) -> None
     else:
         said = iface_("{rate:.0f} poses/s, latency {latency:.0f} ms", rate=status.rate, latency=status.latency_ms)
         draw_text(context, layout, said)
-        if status.presence in _PRESENCES:
-            draw_text(context, layout, iface_(_PRESENCES[status.presence]), "INFO")
+        if status.presence != "seen":
+            text = iface_("Nobody is seen" if status.presence == "lost" else "Not seen for a moment")
+            draw_text(context, layout, text, "INFO")
     if job.recording:
         draw_text(context, layout, iface_("Recorded: {seconds:.1f} s", seconds=status.recorded_s), "REC")
 

@@ -3,14 +3,13 @@
 
 from __future__ import annotations
 
-import re
-
 import bpy
 from bpy.props import BoolProperty, EnumProperty, PointerProperty, StringProperty
 
 from ...options import Place
 from ..declared_properties import PATH_OPTIONS, with_options
 from .live_state import state
+from .stream_logins import take_login
 
 
 def _forget_message(_settings: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
@@ -21,10 +20,8 @@ def _forget_message(_settings: bpy.types.PropertyGroup, _context: bpy.types.Cont
 def _keep_login(settings: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
     """Take name and password out of the address, so that no .blend file contains them."""
     state.message = ""
-    login = re.fullmatch(r"([A-Za-z][\w+.-]*://)([^/?#]*@)(.*)", settings.stream, re.S)
-    if login:
-        address = login[1] + login[3]
-        state.logins[address] = login[2]
+    address = take_login(settings.stream)
+    if address != settings.stream:
         settings.stream = address
 
 
@@ -66,7 +63,7 @@ class SCOPE_PG_live(bpy.types.PropertyGroup):
         description="Video of a person, which is played in real time",
     )
     with_rig: BoolProperty(
-        name="Rig",
+        name="Rig Follows",
         default=False,
         options=set(),
         description="Let the rig of the Retarget section follow as well",

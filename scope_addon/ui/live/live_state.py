@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The running live capture, and what is remembered until Blender ends. Never saved."""
+"""The running live capture, and the message of the last one. Never saved."""
 
 from __future__ import annotations
 
@@ -10,12 +10,11 @@ if TYPE_CHECKING:
 
 
 class _State:
-    """The running live capture, the message of the last one, and the logins of streams."""
+    """The running live capture, and the message of the last one."""
 
     job: LiveJob | None = None
     scene_uid = 0  # of the scene that the job or the message belongs to
     message = ""  # why the last live capture failed
-    logins: dict[str, str] = {}  # by the address of the stream without it
 
 
 state = _State()
