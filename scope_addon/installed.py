@@ -14,14 +14,14 @@ EXTRAS = {**dict.fromkeys(CAPTURE, "capture"), "bpy": "bpy", "pythonosc": "live"
 
 
 def check_live() -> None:
-    """Check that this installation can capture live.
+    """Check that this installation has the command for live captures.
 
-    :raises SetupError: it is Blender's extension, which contains nothing that uses the network.
+    :raises SetupError: it is Blender's extension, which contains nothing that sends to the network.
     """
-    if find_spec(f"{__package__}.live") is None:
+    if find_spec(f"{__package__}.live.outputs.json_lines") is None:
         raise SetupError(
-            "Blender's extension cannot capture live; use ./scripts/live in the repository, or install the package: "
-            "pip install 'scope-mocap[capture,live]'"
+            "Blender's extension captures live in its panel alone; use ./scripts/live in the repository, or install the "
+            "package: pip install 'scope-mocap[capture,live]'"
         )
 
 

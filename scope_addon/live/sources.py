@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from ..capture.media.image_size import check_size
 from ..capture.media.video import open_video
-from ..errors import VideoError
+from ..errors import OfflineError, VideoError
 from .clock import Clock
 
 if TYPE_CHECKING:
@@ -33,7 +33,6 @@ _FORMATS = (
     "nut"
 )
 STALLED_S = 5.0  # without a frame, after which a stream counts as interrupted
-OFFLINE = "a stream needs the network: switch on Allow Online Access in Blender's preferences, under System"
 DEFAULT_FPS = Fraction(30)
 CAMERA_SIZE = (1280, 720)
 
@@ -83,7 +82,7 @@ def open_source(text: str, *, online: bool = True) -> Source:
         if scheme.lower() not in SCHEMES:
             raise VideoError(f"{text}: '{scheme}' is not a kind of stream that can be read; use {', '.join(SCHEMES)}")
         if not online:
-            raise VideoError(OFFLINE)
+            raise OfflineError
         return StreamSource(text)
     return FileSource(Path(text))
 

@@ -85,7 +85,7 @@ class LiveBody:
         self.show(*shown, self._betas)
 
     def remove(self) -> None:
-        """Remove everything that was created."""
+        """Remove everything that was created, also what redo has brought back."""
         remove(self._blocks)
         self._blocks = set()
 
@@ -106,7 +106,7 @@ class LiveBody:
         if body.P:
             shape_keys.add_shape_keys(mesh, body, betas)
         body_mesh.skin_to_armature(mesh, rig, body)
-        self._blocks = new.all()
+        self._blocks |= new.all()  # redo may bring back former ones
         self._armature, self._mesh = (rig.name, rig.session_uid), (mesh.name, mesh.session_uid)
         self._betas, self._rest_joints, self._head = betas, body.rest_joints(betas), rest.joints[0]
         self._M = armature.rest_orientations(rig, body)

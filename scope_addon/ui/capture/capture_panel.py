@@ -29,6 +29,7 @@ class Tab:
     bl_space_type = "VIEW_3D"
     bl_region_type = "UI"
     bl_category = "Scope"
+    bl_order = 2  # below Capture and Live
     bl_translation_context = CONTEXT
 
 
@@ -37,6 +38,7 @@ class SCOPE_PT_capture(Tab, bpy.types.Panel):
 
     bl_idname = "SCOPE_PT_capture"
     bl_label = "Capture"
+    bl_order = 0
 
     def draw_header_preset(self, _context: bpy.types.Context) -> None:
         """Draw the button of the presets in the header."""

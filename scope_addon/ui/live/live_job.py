@@ -17,7 +17,7 @@ import bpy
 
 from ....solver.body import Body
 from ....solver.loaders.body_file import load_body
-from ...errors import UsageError, VideoError
+from ...errors import OfflineError, UsageError, VideoError
 from ...footage import shown
 from ...job.live.process import LiveProcess, ShownPose
 from ...job.live.request import LiveRequest
@@ -144,7 +144,7 @@ class LiveJob:
             self._leave_pose(scene)
             return False
         if self._is_stream and not bpy.app.online_access:
-            raise UsageError(offline_text())
+            raise OfflineError
         result = self._listen()
         pose = None if self.finishing else self._worker.newest_pose(self._scene_body.K + 1, self._scene_body.P)
         if pose is not None:
@@ -242,7 +242,7 @@ def live_request(scene: bpy.types.Scene) -> LiveRequest:
         if "://" not in source:
             raise UsageError("no stream is given; enter its address, such as rtsp://192.168.1.20/stream")
         if not bpy.app.online_access:
-            raise UsageError(offline_text())
+            raise OfflineError
         online, source = True, with_login(source)
     else:
         source = settings.camera.strip()
@@ -252,10 +252,3 @@ def live_request(scene: bpy.types.Scene) -> LiveRequest:
     values = {name: value for name, value in chosen_values(scene).items() if name in names}
     values["heights_m"] = values["heights_m"][:1]
     return LiveRequest(source, online=online, **values, live_quality=settings.quality.lower())
-
-
-def offline_text() -> str:
-    """Return why a stream cannot be opened."""
-    from ...live.sources import OFFLINE
-
-    return OFFLINE

@@ -15,6 +15,7 @@ class SCOPE_PT_live(Tab, bpy.types.Panel):
 
     bl_idname = "SCOPE_PT_live"
     bl_label = "Live"
+    bl_order = 1
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context: bpy.types.Context) -> None:

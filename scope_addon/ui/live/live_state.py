@@ -3,16 +3,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from .live_job import LiveJob
+from typing import Any
 
 
 class _State:
     """The running live capture, and the message of the last one."""
 
-    job: LiveJob | None = None
+    job: Any = None  # a LiveJob; named here, its module would import this one again
     scene_uid = 0  # of the scene that the job or the message belongs to
     message = ""  # why the last live capture failed
 
