@@ -20,8 +20,8 @@ def check_live() -> None:
     """
     if find_spec(f"{__package__}.live.outputs.json_lines") is None:
         raise SetupError(
-            "Blender's extension captures live in its panel alone; use ./scripts/live in the repository, or install the "
-            "package: pip install 'scope-mocap[capture,live]'"
+            "Blender's extension captures live in its panel alone; use ./scripts/live in the repository, or install "
+            "the package: pip install 'scope-mocap[capture,live]'"
         )
 
 

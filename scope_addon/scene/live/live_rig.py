@@ -50,7 +50,7 @@ class LiveRig:
         self._position = rig.data.pose_position
         try:
             with at_rest(rig):
-                self._skeleton, self._place = probe(rig, self._map.parts), np.array(rig.matrix_world, float)
+                self._skeleton, place = probe(rig, self._map.parts), np.array(rig.matrix_world, float)
         except BaseException:
             self.restore()
             raise
@@ -58,6 +58,10 @@ class LiveRig:
         self._root = self._skeleton.names.index(self._map.bone("pelvis") or "")
         # The pose is one in the world, so the parent's transform is cancelled.
         self._inverse = np.array(parent_transform(topmost(rig)).inverted_safe(), float)
+        self._turn = self._inverse[:3, :3] / np.cbrt(np.linalg.det(self._inverse[:3, :3]))
+        # The location channel is linear in the head's offset. Nothing is inverted for each pose: LAPACK's threads wait.
+        self._rest = self._skeleton.heads[self._root]
+        self._location = root_locations(rig, place, self._skeleton, self._root, self._rest + np.eye(3))
         self._transfer: Transfer | None = None
         self._betas = np.full(body.P, np.nan)
 
@@ -85,11 +89,10 @@ class LiveRig:
         pose = self._transfer.pose(clip)
         heads = pose.heads[:, self._root] + self._options.offset
         if self._options.root == "in-place":
-            heads[:, :2] = self._skeleton.heads[self._root, :2]
-        turn = self._inverse[:3, :3] / np.cbrt(np.linalg.det(self._inverse[:3, :3]))
+            heads[:, :2] = self._rest[:2]
         heads = heads @ self._inverse[:3, :3].T + self._inverse[:3, 3]
-        turns = basis(self._skeleton, turn @ pose.rotations)[0]
-        location = root_locations(rig, self._place, self._skeleton, self._root, heads)[0]
+        turns = basis(self._skeleton, self._turn @ pose.rotations)[0]
+        location = (heads[0] - self._rest) @ self._location
         quaternions = quaternion_from_matrix(turns).tolist()
         bones = rig.pose.bones
         for name, turned, quaternion in zip(self._skeleton.names, turns, quaternions, strict=True):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A live capture in a scene, with a scripted process: the body follows, and Stop, Record, Cancel and failures end it."""
+"""A live capture in a scene, with a scripted process: the body follows, until Stop, Cancel or a failure ends it."""
 
 import sys
 import textwrap
