@@ -79,9 +79,12 @@ class LiveBody:
         rig = self.armature
         if rig is None:
             return
-        shown = self._shown
-        remove(self._blocks)
-        self._create(self._betas)
+        shown, layer = self._shown, bpy.context.view_layer
+        was_active, was_selected = layer.objects.active == rig, rig.select_get(view_layer=layer)
+        rig, _ = self._create(self._betas)
+        rig.select_set(was_selected, view_layer=layer)
+        if was_active:
+            layer.objects.active = rig
         self.show(*shown, self._betas)
 
     def remove(self) -> None:

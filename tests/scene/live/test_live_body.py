@@ -53,7 +53,10 @@ def test_the_rest_pose_becomes_that_of_the_last_shape(live, body):
     live.show(quaternion_from_matrix(rotations), pelvis, np.zeros(body.P))
     live.show(quaternion_from_matrix(rotations), pelvis, betas)
     names = sorted(obj.name for obj in bpy.data.objects)
+    live.armature.select_set(True)
     live.rest_at_shape()
+    assert bpy.context.view_layer.objects.active == live.armature
+    assert live.armature.select_get()
     assert sorted(obj.name for obj in bpy.data.objects) == names
     for bone in list(live.armature.pose.bones)[1:]:
         assert bone.location.length < 1e-6
