@@ -191,12 +191,13 @@ def recorded() -> Iterator[float]:
     picture("23_live_recording")
     worker, recorded_s, began = state().job.worker, time.monotonic() - began, time.monotonic()
     use(bpy.ops.scope.stop_live)
-    yield from until(lambda: not worker.alive, 5, "the recording")
+    yield from until(lambda: not worker.alive, 30, "the recording")
     report["recorded_and_gone_s"] = round(time.monotonic() - began, 2)
     yield from until(lambda: state().job is None, 10, "the keys")
     assert len(captures()) == 1, state().message
     person = next(o for o in captures()[0].all_objects if o.type == "ARMATURE")
     assert "scope_motion" in person
+    assert person.pose.bones["head"].custom_shape is not None
     first, last = person.animation_data.action.frame_range
     report["recorded_s"] = (last - first) / bpy.context.scene.render.fps
     assert 0.5 * recorded_s < report["recorded_s"] < recorded_s + 1.0, (report["recorded_s"], recorded_s)

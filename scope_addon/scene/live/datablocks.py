@@ -39,4 +39,7 @@ class NewDatablocks:
 
 def remove(blocks: set[tuple[str, int]]) -> None:
     """Remove those of the datablocks that still exist."""
+    if not blocks:
+        return
     bpy.data.batch_remove([block for kind, uid in blocks if (block := found(kind, "", uid)) is not None])
+    bpy.context.view_layer.update()  # it would still list removed objects

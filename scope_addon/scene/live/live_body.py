@@ -91,6 +91,7 @@ class LiveBody:
         """Remove everything that was created, also what redo has brought back."""
         remove(self._blocks)
         self._blocks = set()
+        bone_display.remove_if_unused()
 
     def _create(self, betas: NDArray[np.float64]) -> tuple[bpy.types.Object, bpy.types.Object]:
         """Create the objects, in place of what is left of former ones."""
@@ -109,7 +110,9 @@ class LiveBody:
         if body.P:
             shape_keys.add_shape_keys(mesh, body, betas)
         body_mesh.skin_to_armature(mesh, rig, body)
-        self._blocks |= new.all()  # redo may bring back former ones
+        ring = bpy.data.objects[bone_display.RING]  # which all captures share
+        shared = {("objects", ring.session_uid), ("meshes", ring.data.session_uid)}
+        self._blocks |= new.all() - shared  # former ones stay in it, since redo may bring them back
         self._armature, self._mesh = (rig.name, rig.session_uid), (mesh.name, mesh.session_uid)
         self._betas, self._rest_joints, self._head = betas, body.rest_joints(betas), rest.joints[0]
         self._M = armature.rest_orientations(rig, body)

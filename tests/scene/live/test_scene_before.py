@@ -24,3 +24,16 @@ def test_what_changed_is_restored_and_what_is_gone_is_left_out():
     assert bpy.context.object.mode == "POSE"
     assert objects["a"].hide_get()
     assert objects["c"].select_get()
+
+
+def test_another_scene_is_left_alone():
+    first, other = bpy.context.scene, bpy.data.scenes.new("other")
+    before, window = SceneBefore(), bpy.context.window_manager.windows[0]
+    hidden = bpy.data.objects.new("hidden", None)
+    other.collection.objects.link(hidden)
+    hidden.hide_set(True, view_layer=other.view_layers[0])
+    with bpy.context.temp_override(window=window):
+        window.scene = other
+        before.restore()
+        assert hidden.hide_get(view_layer=other.view_layers[0])
+        window.scene = first

@@ -103,6 +103,7 @@ def test_a_recording_becomes_a_capture_and_the_body_goes(live):
     person = bpy.data.objects["Jump"]
     assert isinstance(person["scope_motion"]["motion"], bytes)
     assert person.animation_data.action.name == "Jump"
+    assert person.pose.bones["head"].custom_shape is not None
     assert "Live" not in bpy.data.objects
     assert "Live" not in bpy.data.collections
     assert scene.scope.result.frames_per_second == 28.0
