@@ -37,7 +37,7 @@ class LiveBody:
         self._scene_uid, self._name, self._body = scene.session_uid, name, body
         self._blocks: set[tuple[str, int]] = set()
         self._armature = self._mesh = ("", 0)
-        self._betas = np.zeros(body.P)
+        self._betas, self._names = np.zeros(body.P), list[str]()
 
     @property
     def armature(self) -> bpy.types.Object | None:
@@ -60,12 +60,15 @@ class LiveBody:
         """
         betas = np.clip(np.asarray(betas, float), -shape_keys.SLIDER_LIMIT, shape_keys.SLIDER_LIMIT)
         rig, mesh = self.armature, found("objects", *self._mesh)
-        created = rig is None or mesh is None
-        if rig is None or mesh is None:
+        if rig is not None and rig.mode == "EDIT":
+            return False
+        created = False
+        if rig is None or mesh is None or [bone.name for bone in rig.pose.bones] != self._names:
             rig, mesh = self._create(betas)
-        if np.abs(betas - self._betas).max(initial=0.0) > _LEAST_CHANGE and mesh.data.shape_keys is not None:
+            created = True
+        blocks = mesh.data.shape_keys.key_blocks if mesh.data.shape_keys else ()
+        if np.abs(betas - self._betas).max(initial=0.0) > _LEAST_CHANGE and len(blocks) == len(betas) + 1:
             self._betas = betas
-            blocks = mesh.data.shape_keys.key_blocks
             for p, beta in enumerate(betas.tolist()):
                 blocks[p + 1].value = beta  # after Basis
         values, locations = self._channels(rotations, pelvis)
@@ -116,8 +119,8 @@ class LiveBody:
         self._armature, self._mesh = (rig.name, rig.session_uid), (mesh.name, mesh.session_uid)
         self._betas, self._rest_joints, self._head = betas, body.rest_joints(betas), rest.joints[0]
         self._M = armature.rest_orientations(rig, body)
-        names = [bone.name for bone in rig.pose.bones]
-        self._order = np.array([body.joint_names.index(name) for name in names])
+        self._names = [bone.name for bone in rig.pose.bones]
+        self._order = np.array([body.joint_names.index(name) for name in self._names])
         return rig, mesh
 
     def _channels(

@@ -81,3 +81,19 @@ def test_coefficients_that_blender_cannot_show_are_limited(live, body):
     live.show(quaternion_from_matrix(rotations), pelvis, np.full(body.P, 30.0))
     assert np.isfinite(shown(live)).all()
     assert live.betas.max() == 10.0
+
+
+def test_a_body_that_the_user_edits_waits_and_is_created_again_if_it_lost_bones(live, body):
+    rotations, pelvis = pose(4)
+    q, betas = quaternion_from_matrix(rotations), np.zeros(body.P)
+    live.show(q, pelvis, betas)
+    bpy.context.view_layer.objects.active = live.armature
+    bpy.ops.object.mode_set(mode="EDIT")
+    assert not live.show(q, pelvis, betas)
+    bones = live.armature.data.edit_bones
+    bones.remove(bones["head"])
+    bpy.ops.object.mode_set(mode="OBJECT")
+    assert live.show(q, pelvis, betas)
+    mesh = next(child for child in live.armature.children if child.type == "MESH")
+    mesh.shape_key_clear()
+    assert not live.show(q, pelvis, np.ones(body.P))
