@@ -5,6 +5,7 @@
     ├── InputError              (solver) the user's file or value cannot be used
     │   ├── ModelFileError      (solver) a body or network file is missing or malformed
     │   ├── VideoError          a video or image cannot be opened or decoded
+    │   │   └── OfflineError    a stream, while Blender is not to go online
     │   └── MotionFileError     a motion file is missing or malformed
     ├── ShapeError              (solver) an array of the wrong shape or type
     ├── UsageError              invalid or contradictory arguments                exit 2
@@ -26,6 +27,13 @@ FAILED, BAD_ARGUMENTS, NO_PERSON = 1, 2, 3  # exit statuses
 
 class VideoError(InputError):
     """A video or image cannot be opened or decoded."""
+
+
+class OfflineError(VideoError):
+    """A stream, while Blender is not to go online."""
+
+    def __init__(self) -> None:
+        super().__init__("a stream needs the network: switch on Allow Online Access in Blender's preferences, System")
 
 
 class MotionFileError(InputError):

@@ -14,11 +14,11 @@ EXTRAS = {**dict.fromkeys(CAPTURE, "capture"), "bpy": "bpy", "pythonosc": "live"
 
 
 def check_live() -> None:
-    """Check that this installation can capture live.
+    """Check that this installation has the command for live captures.
 
-    :raises SetupError: it is Blender's extension, which contains nothing that uses the network.
+    :raises SetupError: it is Blender's extension, which contains nothing that sends to the network.
     """
-    _check_room("live", "capture live", "live")
+    _check_has("live.outputs.json_lines", "captures live in its panel alone", "live")
 
 
 def check_cluster() -> None:
@@ -26,15 +26,16 @@ def check_cluster() -> None:
 
     :raises SetupError: it is Blender's extension, which contains nothing that uses the network; or Dask is missing.
     """
-    _check_room("cluster", "use a cluster", "batch")
+    _check_has("cluster", "cannot use a cluster", "batch")
     check_installed(["distributed"])
 
 
-def _check_room(room: str, what: str, script: str) -> None:
-    if find_spec(f"{__package__}.{room}") is None:
+def _check_has(module: str, otherwise: str, script: str) -> None:
+    if find_spec(f"{__package__}.{module}") is None:
+        extra = module.split(".")[0]
         raise SetupError(
-            f"Blender's extension cannot {what}; use ./scripts/{script} in the repository, or install the package: "
-            f"pip install 'scope-mocap[capture,{room}]'"
+            f"Blender's extension {otherwise}; use ./scripts/{script} in the repository, or install the package: "
+            f"pip install 'scope-mocap[capture,{extra}]'"
         )
 
 

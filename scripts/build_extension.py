@@ -43,8 +43,10 @@ BLENDERS = {"3.11": ("4.2.0", "5.1.0"), "3.13": ("5.1.0", None)}
 PACKAGES = ("numba", "llvmlite", "onnxruntime", "opencv-contrib-python-headless", "av")
 CONTENT = ("__init__.py", "LICENSE", "THIRD_PARTY.md", "solver", "scope_addon", "assets")
 GUIDE = ("docs/guide.md",)  # with its pictures in assets/guide
-# Live captures and clusters use the network, for which the extension asks no permission.
-LEFT_OUT = ("__pycache__", "*.pyc", ".*", "sample_truth.npz", "pictures", "examples", "live", "cluster")
+# Clusters use the network, and live captures send poses to other programs, from the shell only: nothing in the
+# extension opens a socket.
+SENDERS = ("json_lines.py", "vmc.py")
+LEFT_OUT = ("__pycache__", "*.pyc", ".*", "sample_truth.npz", "pictures", "examples", "cluster", *SENDERS)
 BILL = "bill_of_materials.cdx.json"  # in the zip; a copy with the zip's name lies beside it
 GOAL_MB, LIMIT_MB = 200, 240
 _OLDEST = 315532800  # 1980-01-01, the first time that a zip can state

@@ -60,7 +60,7 @@ def run_live_command(args: argparse.Namespace) -> dict[str, Any]:
             outputs.append(recording)
         line = stack.enter_context(ProgressLine(sys.stderr, show=not args.quiet))
         begin = recording.begin if recording else lambda *_: None
-        report = run_live(source, body, options, outputs, Listeners(say, line, begin))
+        report = run_live(source, body, options, outputs, Listeners(say, lambda state: line(str(state)), begin))
     report["outputs"] = [str(recording.save())] if recording else []
     if not args.json:
         say(_summary(report))

@@ -23,7 +23,8 @@ class WorkerFailedError(ScopeError):
     """The worker reported an error, ended without a result, or sent what is no message."""
 
 
-def _is_number(value: object) -> bool:
+def is_number(value: object) -> bool:
+    """Return whether it is an integer from 0."""
     return type(value) is int and 0 <= value < _LARGEST_NUMBER
 
 
@@ -31,7 +32,8 @@ def _is_side(value: object) -> bool:
     return type(value) is int and 0 < value <= _LARGEST_SIDE
 
 
-def _is_text(value: object) -> bool:
+def is_text(value: object) -> bool:
+    """Return whether it is a text of moderate length."""
     return isinstance(value, str) and len(value) <= _LONGEST_TEXT
 
 
@@ -56,23 +58,24 @@ def _is_report(value: object) -> bool:
     return are_finite and all(isinstance(text, str) for text in warnings)
 
 
-# The fields that a message must have, and what they may be.
-_FIELDS: dict[str, dict[str, Callable[[object], bool]]] = {
-    "progress": {"stage": _is_text, "done": _is_number, "total": _is_number},
-    "preview": {"file": _is_name, "width": _is_side, "height": _is_side, "frame": _is_number},
+# The fields that a message must have, by its event, and what they may be.
+Fields = dict[str, dict[str, Callable[[object], bool]]]
+WARM_UP_FIELDS: Fields = {"progress": {"stage": is_text, "done": is_number, "total": is_number}, "result": {}}
+CAPTURE_FIELDS: Fields = WARM_UP_FIELDS | {
+    "preview": {"file": _is_name, "width": _is_side, "height": _is_side, "frame": is_number},
     "result": {"motions": _are_names, "report": _is_report},
 }
 
 
-def parse_message(line: bytes, *, captures: bool = True) -> dict[str, Any] | None:
+def parse_message(line: bytes, fields: Fields = CAPTURE_FIELDS) -> dict[str, Any] | None:
     """Read a line of the worker.
 
-    :param captures: whether the job is a capture, whose result needs motions and a report.
+    :param fields: what the messages of this job have.
     :return: the message; None for a line that is none, such as a library may print, or one of an unknown event.
     :raises WorkerFailedError: the line is too long, or a message lacks what its event needs.
     """
     if len(line) > LONGEST_LINE:
-        raise _unreadable(f"a line of more than {LONGEST_LINE >> 20} MB")
+        raise unreadable(f"a line of more than {LONGEST_LINE >> 20} MB")
     try:
         message = json.loads(line)
     except (ValueError, RecursionError):
@@ -80,11 +83,11 @@ def parse_message(line: bytes, *, captures: bool = True) -> dict[str, Any] | Non
     event = message.get("event") if isinstance(message, dict) else None
     if event == "error":
         return {"event": "error", "message": _one_line(message.get("message"))}
-    if not isinstance(event, str) or event not in _FIELDS:
+    if not isinstance(event, str) or event not in fields:
         return None
-    for field, is_valid in _FIELDS[event].items():
-        if (captures or event != "result") and not is_valid(message.get(field)):
-            raise _unreadable(f"{event} without a valid {field}")
+    for field, is_valid in fields[event].items():
+        if not is_valid(message.get(field)):
+            raise unreadable(f"{event} without a valid {field}")
     return dict(message)
 
 
@@ -93,5 +96,6 @@ def _one_line(text: object) -> str:
     return said[:_LONGEST_TEXT] or "the capture failed"
 
 
-def _unreadable(what: str) -> WorkerFailedError:
+def unreadable(what: str) -> WorkerFailedError:
+    """Return the error for a message that cannot be used."""
     return WorkerFailedError(f"the capture process sent a message that cannot be used ({what}); capture again")

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """End a process when its parent ends, on every operating system and even if the parent crashes.
 
-The parent keeps the other end of the child's standard input open without writing to it. The operating system closes
-that end when the parent ends, killed or crashed parents included; the child waits for this in a thread.
+The parent keeps the other end of the child's standard input open, and writes nothing to it, or commands. The operating
+system closes that end when the parent ends, killed or crashed parents included; the child waits for this in a thread.
 """
 
 from __future__ import annotations
@@ -20,12 +20,15 @@ GRACE_S = 5.0  # time for the main thread to clean up, after which the process e
 _POLLING_INTERVAL_S = 0.2  # of the pipe, on Windows
 
 
-def when_parent_ends(end: Callable[[], object]) -> None:
-    """Call ``end`` in a new thread when standard input, a pipe, is closed; immediately if it is closed already."""
+def when_parent_ends(end: Callable[[], object], hear: Callable[[bytes], object] = lambda _: None) -> None:
+    """Call ``end`` in a new thread when standard input, a pipe, is closed; immediately if it is closed already.
+
+    :param hear: gets what the parent writes before, in any pieces.
+    """
 
     def wait() -> None:
         try:
-            _wait_for_end_of_stdin()
+            _wait_for_end_of_stdin(hear)
         except BrokenPipeError:  # Windows reports the end of the pipe this way
             pass
         except OSError:
@@ -49,7 +52,7 @@ def stop_with_parent() -> None:
     when_parent_ends(stop)
 
 
-def _wait_for_end_of_stdin() -> None:
+def _wait_for_end_of_stdin(hear: Callable[[bytes], object]) -> None:
     if sys.platform == "win32":
         # A blocking read would lock the pipe, and numpy's libraries, which query its state while they are loaded, would
         # wait for the read to end: https://github.com/numpy/numpy/issues/24290
@@ -58,8 +61,11 @@ def _wait_for_end_of_stdin() -> None:
 
         handle = msvcrt.get_osfhandle(0)
         while True:
-            _winapi.PeekNamedPipe(handle, 0)
-            time.sleep(_POLLING_INTERVAL_S)
+            available, _ = _winapi.PeekNamedPipe(handle, 0)
+            if available:
+                hear(os.read(0, available))
+            else:
+                time.sleep(_POLLING_INTERVAL_S)
     # Not sys.stdin, whose lock would block the exit of the interpreter.
-    while os.read(0, 4096):
-        pass
+    while piece := os.read(0, 4096):
+        hear(piece)

@@ -14,13 +14,15 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import SetupError
-from .messages import LONGEST_LINE, WorkerFailedError, parse_message
+from .live.request import LiveRequest
+from .messages import CAPTURE_FIELDS, LONGEST_LINE, WARM_UP_FIELDS, Fields, WorkerFailedError, parse_message
 from .request import WARM_UP, JobRequest
 from .start_worker import worker_command
 
 ROOT = Path(__file__).resolve().parents[2]
 START_SCRIPT = Path(__file__).with_name("start_worker.py")
 LOG = "worker.log"
+_LAST = ("result", "ended")  # events after which a worker ends
 _WINDOWS_FLAGS = getattr(subprocess, "CREATE_NO_WINDOW", 0) | getattr(subprocess, "BELOW_NORMAL_PRIORITY_CLASS", 0)
 
 
@@ -29,7 +31,7 @@ class WorkerProcess:
 
     def __init__(
         self,
-        request: JobRequest | None,
+        request: JobRequest | LiveRequest | None,
         job_folder: Path,
         kernels: Path | None,
         python: Sequence[str] = (sys.executable,),
@@ -45,7 +47,8 @@ class WorkerProcess:
         :raises SetupError: the process cannot be started.
         """
         self.job_folder = job_folder
-        self.finished, self._captures = False, request is not None
+        self.finished = False
+        self._fields: Fields = CAPTURE_FIELDS if request else WARM_UP_FIELDS
         command, environment = worker_command(python, ROOT, job_folder, kernels, script)
         try:
             with (job_folder / LOG).open("wb") as log:
@@ -62,10 +65,7 @@ class WorkerProcess:
             raise SetupError(f"cannot start {python[0]}: {error.strerror}; reinstall Blender") from error
         self._lines: queue.SimpleQueue[bytes | None] = queue.SimpleQueue()
         threading.Thread(target=self._read, name="scope-worker-lines", daemon=True).start()
-        with contextlib.suppress(OSError):  # the worker has ended already; poll() reports that
-            assert self._process.stdin is not None
-            self._process.stdin.write((request.to_json() if request else WARM_UP).encode() + b"\n")
-            self._process.stdin.flush()
+        self._tell((request.to_json() if request else WARM_UP).encode() + b"\n")
 
     @property
     def pid(self) -> int:
@@ -78,7 +78,7 @@ class WorkerProcess:
         return self._process.poll() is None
 
     def poll(self) -> list[dict[str, Any]]:
-        """Return the messages since the last call, and set ``finished`` when the result is among them.
+        """Return the messages since the last call, and set ``finished`` when the last one is among them.
 
         :raises WorkerFailedError: the worker reported an error, ended without a result, or sent what is no message.
         """
@@ -92,12 +92,12 @@ class WorkerProcess:
                 if not self.finished:
                     raise WorkerFailedError(self._cause_of_end())
                 return messages
-            message = parse_message(line, captures=self._captures)
+            message = parse_message(line, self._fields)
             if message is None:
                 continue
             if message["event"] == "error":
                 raise WorkerFailedError(message["message"])
-            self.finished = self.finished or message["event"] == "result"
+            self.finished = self.finished or message["event"] in _LAST
             messages.append(message)
 
     def wait(self, timeout_s: float = 5.0) -> None:
@@ -111,6 +111,16 @@ class WorkerProcess:
         """End the worker if it is running, and remove its folder if it exists."""
         self._end()
         shutil.rmtree(self.job_folder, ignore_errors=True)
+
+    def _tell(self, line: bytes) -> None:
+        with contextlib.suppress(OSError):  # the worker has ended already; poll() reports that
+            assert self._process.stdin is not None
+            self._process.stdin.write(line)
+            self._process.stdin.flush()
+
+    def _keep(self, line: bytes) -> None:
+        """Keep a line for ``poll``."""
+        self._lines.put(line)
 
     def _end(self) -> None:
         if self.alive:
@@ -126,7 +136,7 @@ class WorkerProcess:
         assert self._process.stdout is not None
         with contextlib.suppress(OSError, ValueError), self._process.stdout as stream:
             while line := stream.readline(LONGEST_LINE + 1):
-                self._lines.put(line)
+                self._keep(line)
         self._lines.put(None)
 
     def _cause_of_end(self) -> str:

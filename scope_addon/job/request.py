@@ -27,7 +27,7 @@ class JobRequest:
         :raises UsageError: an option does not exist, or its value has the wrong type or is none of the choices.
         """
         self.footage = footage
-        self.values: dict[str, Any] = _checked(values)
+        self.values: dict[str, Any] = checked_values(values, Place.WORKER)
 
     def __eq__(self, other: object) -> bool:
         """Compare footage and values."""
@@ -68,9 +68,12 @@ class JobRequest:
         return digest.hexdigest()[:32]
 
 
-def _checked(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the value of each option of the worker, with defaults."""
-    options = {option.name: option for option in options_at(Place.WORKER)}
+def checked_values(values: Mapping[str, Any], place: Place) -> dict[str, Any]:
+    """Return the value of each option of a worker, with defaults.
+
+    :raises UsageError: an option does not exist, or its value has the wrong type or is none of the choices.
+    """
+    options = {option.name: option for option in options_at(place)}
     for name, value in values.items():
         if name not in options:
             raise UsageError(f"a capture request has no option {name!r}; its options are {', '.join(options)}")

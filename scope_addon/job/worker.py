@@ -15,6 +15,8 @@ from typing import IO, NoReturn
 from ...solver.errors import ScopeError
 from ..errors import exit_status, lacks_memory, system_error_message
 from ..footage import json_text
+from .live.commands import Commands
+from .live.request import LiveRequest
 from .parent import when_parent_ends
 from .request import WARM_UP, JobRequest
 
@@ -47,10 +49,13 @@ class Reporter:
         self.send("progress", stage=stage, done=done, total=total)
 
 
-def run(request: JobRequest | None, job_folder: Path, reporter: Reporter) -> int:
+def run(
+    request: JobRequest | LiveRequest | None, job_folder: Path, reporter: Reporter, commands: Commands | None = None
+) -> int:
     """Do what is requested and return the exit status. Every failure is reported as an ``error`` message.
 
     :param request: the capture; None to compile what captures need.
+    :param commands: of the parent, to a live capture.
     """
     try:
         reporter.progress("starting", 0, 0)
@@ -58,6 +63,10 @@ def run(request: JobRequest | None, job_folder: Path, reporter: Reporter) -> int
             from .warm_up import warm_up
 
             reporter.send("result", compiled=warm_up(reporter.progress))
+        elif isinstance(request, LiveRequest):
+            from .live.capture import capture_live
+
+            capture_live(request, job_folder, reporter.send, commands or Commands())
         else:
             _capture(request, job_folder, reporter)
         return 0
@@ -102,21 +111,34 @@ def main(job_folder: Path) -> NoReturn:
     # Everything that libraries print to stdout, including from C, goes to stderr; the messages get the real stdout.
     stream = os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(2, 1)
-    line = sys.stdin.readline()
+    # Unbuffered, so that the commands after the request are not read with it.
+    with open(0, "rb", buffering=0, closefd=False) as stdin:
+        line = stdin.readline().decode("utf-8", "replace")
     if not line:  # the parent ended before it sent the request
         _remove(job_folder)
         _exit(1)
-    _exit_with_parent(job_folder)
+    commands = Commands()
+    _exit_with_parent(job_folder, commands)
     status = 1
     reporter = Reporter(stream)
     with contextlib.suppress(BrokenPipeError):
         try:
-            request = None if line.strip() == WARM_UP else JobRequest.from_json(line)
+            request = _parsed(line)
             _lower_priority(_NICENESS if request else 19)
-            status = run(request, job_folder, reporter)
+            status = run(request, job_folder, reporter, commands)
         except ScopeError as error:
             reporter.send("error", message=str(error))
     _exit(status)
+
+
+def _parsed(line: str) -> JobRequest | LiveRequest | None:
+    """Return the request in a line; None to compile what captures need.
+
+    :raises UsageError: it is none.
+    """
+    if line.strip() == WARM_UP:
+        return None
+    return LiveRequest.from_json(line) if LiveRequest.is_in(line) else JobRequest.from_json(line)
 
 
 def _exit(status: int) -> NoReturn:
@@ -126,14 +148,14 @@ def _exit(status: int) -> NoReturn:
     os._exit(status)
 
 
-def _exit_with_parent(job_folder: Path) -> None:
-    """Exit and remove the job's folder when the parent ends or closes the job."""
+def _exit_with_parent(job_folder: Path, commands: Commands | None = None) -> None:
+    """Exit and remove the job's folder when the parent ends or closes the job; pass its commands on."""
 
     def end() -> NoReturn:
         _remove(job_folder)
         os._exit(1)
 
-    when_parent_ends(end)
+    when_parent_ends(end, (commands or Commands()).hear)
 
 
 def _remove(job_folder: Path) -> None:

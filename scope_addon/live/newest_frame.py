@@ -18,6 +18,7 @@ from .clock import Clock
 from .sources import Picture, Source
 
 _POLLING_INTERVAL_S = 0.2  # in which a waiting main thread reacts to Ctrl-C on every system
+_CLOSING_S = 0.5  # for which the end of the capture waits for the source to be closed
 
 
 class NewestFrame:
@@ -46,19 +47,21 @@ class NewestFrame:
 
     def __exit__(self, *_: object) -> None:
         self._clock.stopped.set()
-        self._thread.join(timeout=2.0)  # a read that never returns must not keep the program from ending
+        self._thread.join(_CLOSING_S)  # a read that never returns must not keep the program from ending
 
     def now(self) -> float:
         """Return the time of the clock by which frames arrive, in seconds."""
         return self._clock.now()
 
     def take(self) -> Picture | None:
-        """Wait for the next frame and return the newest one; None after the last.
+        """Wait for the next frame and return the newest one; None after the last, or when the clock is stopped.
 
         :raises VideoError: the source cannot be read.
         """
         with self._changed:
             while self._newest is None and not self._is_over:
+                if self._clock.stopped.is_set():  # the source may be stalled, and its thread with it
+                    return None
                 self._changed.wait(_POLLING_INTERVAL_S)
             if self._newest is None and self._error is not None:
                 raise self._error

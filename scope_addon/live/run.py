@@ -25,7 +25,7 @@ from ..capture.perception.execution import Execution
 from ..capture.tracking.tracker import PeopleTracker
 from .clock import Clock
 from .newest_frame import NewestFrame
-from .pose import LivePose
+from .pose import LivePose, Presence
 from .session import LiveSession
 from .sources import CAMERA_SIZE, Picture, Source
 from .statistics import Statistics
@@ -55,11 +55,30 @@ class Output(Protocol):
 
 
 @dataclass(frozen=True)
+class LiveProgress:
+    """The state of a capture; rates per second over the last seconds, latencies in milliseconds."""
+
+    presence: Presence
+    rate: float
+    median_ms: float
+    p95_ms: float
+    dropped: int
+    received: int
+
+    def __str__(self) -> str:
+        """Return a line for a terminal."""
+        return (
+            f"{self.presence.value}, {self.rate:.1f} poses/s, latency {self.median_ms:.0f} ms"
+            f" (p95 {self.p95_ms:.0f} ms), {self.dropped} of {self.received} frames dropped"
+        )
+
+
+@dataclass(frozen=True)
 class Listeners:
     """Who is told what happens: ``say`` gets sentences, ``progress`` the state of the capture, from time to time."""
 
     say: Callable[[str], None] = lambda _: None
-    progress: Callable[[str], None] = lambda _: None
+    progress: Callable[[LiveProgress], None] = lambda _: None
     camera: Callable[[LiveSession, tuple[int, int]], None] = lambda *_: None  # once the first frame has come
 
 
@@ -71,7 +90,7 @@ def run_live(
     listeners: Listeners,
     clock: Clock | None = None,
 ) -> dict[str, Any]:
-    """Capture until the source ends or a KeyboardInterrupt comes, which ends it cleanly; return the report.
+    """Capture until the source ends, the clock is stopped, or a KeyboardInterrupt comes; return the report.
 
     :raises ScopeError: an option is invalid, the source cannot be read, or an output failed.
     """
@@ -152,10 +171,8 @@ def _loop(
         if now_s - shown_s >= PROGRESS_S:
             shown_s = now_s
             median_ms, p95_ms = statistics.latency_ms()
-            listeners.progress(
-                f"{pose.presence.value}, {statistics.recent_rate:.1f} poses/s, latency {median_ms:.0f} ms"
-                f" (p95 {p95_ms:.0f} ms), {reader.dropped} of {reader.received} frames dropped"
-            )
+            rate, counts = statistics.recent_rate, (reader.dropped, reader.received)
+            listeners.progress(LiveProgress(pose.presence, rate, median_ms, p95_ms, *counts))
 
 
 @contextmanager

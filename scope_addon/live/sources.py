@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from ..capture.media.image_size import check_size
 from ..capture.media.video import open_video
-from ..errors import VideoError
+from ..errors import OfflineError, VideoError
 from .clock import Clock
 
 if TYPE_CHECKING:
@@ -62,21 +62,27 @@ class Source(Protocol):
         """
 
 
-def open_source(text: str) -> Source:
+def is_stream(text: str) -> bool:
+    """Return whether the source that a text names is on the network, rather than a camera or a file."""
+    return re.match(r"[A-Za-z][\w+.-]+:", text) is not None and "//" in text
+
+
+def open_source(text: str, *, online: bool = True) -> Source:
     """Return the source that a text names: a camera's number or device, a URL, or a file.
 
-    :raises VideoError: it is none of these.
+    :param online: whether the network may be used.
+    :raises VideoError: it is none of these, or a stream that may not be used.
     """
     if re.fullmatch(r"\d{1,3}", text):
         return CameraSource(int(text))
     if re.match(r"/dev/video\d+$", text):
         return CameraSource(text)
-    scheme = re.match(r"([A-Za-z][\w+.-]+):", text)
-    if scheme and "//" in text:
-        if scheme[1].lower() not in SCHEMES:
-            raise VideoError(
-                f"{text}: '{scheme[1]}' is not a kind of stream that can be read; use {', '.join(SCHEMES)}"
-            )
+    if is_stream(text):
+        scheme = text.partition(":")[0]
+        if scheme.lower() not in SCHEMES:
+            raise VideoError(f"{text}: '{scheme}' is not a kind of stream that can be read; use {', '.join(SCHEMES)}")
+        if not online:
+            raise OfflineError
         return StreamSource(text)
     return FileSource(Path(text))
 

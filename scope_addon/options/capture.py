@@ -13,6 +13,7 @@ from .record import Argument, Choice, Option, Place, Property
 LARGEST, ALL = "largest", "all"  # people
 
 _EVERYWHERE = Place.COMMAND_LINE | Place.WORKER | Place.CAPTURE | Place.PANEL
+_LIVE = Place.LIVE | Place.LIVE_WORKER
 
 QUALITIES = (
     Choice("fast", "Fast", "Smallest network: for a first look or a slow computer", 0),
@@ -151,7 +152,7 @@ CAPTURE_OPTIONS = (
         "body",
         str,
         "scope",
-        Place.COMMAND_LINE | Place.WORKER | Place.PANEL | Place.IMPORT | Place.LIVE,
+        Place.COMMAND_LINE | Place.WORKER | Place.PANEL | Place.IMPORT | _LIVE,
         "the body that is fitted to the person",
         argument=Argument(help="body model: scope, scope_h, or your own .npz or .pkl file"),
         blender=Property(choices=BODIES),
@@ -175,7 +176,7 @@ CAPTURE_OPTIONS = (
         "heights_m",
         float,
         (),
-        _EVERYWHERE | Place.LIVE,
+        _EVERYWHERE | _LIVE,
         "heights of the people, most prominent first; sets the scale of the scene",
         unit="m",
         minimum=0.5,
@@ -201,7 +202,7 @@ CAPTURE_OPTIONS = (
         "focal_mm",
         float,
         None,
-        _EVERYWHERE | Place.LIVE,
+        _EVERYWHERE | _LIVE,
         "35 mm equivalent focal length of the camera",
         unit="mm",
         minimum=1.0,
@@ -220,7 +221,7 @@ CAPTURE_OPTIONS = (
         "fov_deg",
         float,
         None,
-        _EVERYWHERE | Place.LIVE,
+        _EVERYWHERE | _LIVE,
         "field of view along the longer side of the image",
         unit="degrees",
         minimum=1.0,
@@ -241,7 +242,7 @@ CAPTURE_OPTIONS = (
         "calibration",
         Path,
         None,
-        _EVERYWHERE | Place.LIVE,
+        _EVERYWHERE | _LIVE,
         "JSON file with OpenCV intrinsics (3x3), optionally dist (five values) and size (width, height)",
         argument=Argument(metavar="FILE", help="JSON file with intrinsics, dist and size"),
         blender=Property(

@@ -6,17 +6,18 @@ from __future__ import annotations
 from pathlib import Path
 
 from .capture import QUALITIES
-from .record import Argument, Option, Place
+from .record import Argument, Option, Place, Property
 
 LIVE_OPTIONS = (
     Option(
         "live_quality",
         str,
         "fast",
-        Place.LIVE,
+        Place.LIVE | Place.LIVE_WORKER | Place.LIVE_PANEL,
         "speed versus accuracy",
         choices=QUALITIES[:2],
         argument=Argument("--quality"),
+        blender=Property("quality"),
     ),
     Option(
         "record",
@@ -56,7 +57,7 @@ LIVE_OPTIONS = (
         "reconnect_s",
         float,
         2.0,
-        Place.LIVE,
+        Place.LIVE | Place.LIVE_WORKER,
         "pause before an interrupted stream or camera is opened again; 0: the capture ends",
         unit="s",
         minimum=0.0,

@@ -23,6 +23,8 @@ class Place(enum.Flag):
     EXPORT = enum.auto()  # a property of the export operator
     IMPORT = enum.auto()  # an argument of the command that imports motion files
     LIVE = enum.auto()  # an argument of the command that captures a camera or stream
+    LIVE_WORKER = enum.auto()  # part of the request to the worker process of a live capture
+    LIVE_PANEL = enum.auto()  # a property of the scene for live captures
 
 
 class Choice(NamedTuple):

@@ -36,26 +36,33 @@ class RigMotion:
     heads: NDArray[np.float64]  # (T, B, 3)
 
 
-def body_feet(body: Body, betas: NDArray[np.floating[Any]], joints: NDArray[np.float64]) -> BodyFeet:
-    """Measure the feet of the body at rest and collect the ankles of its motion.
+def body_feet(body: Body, rest: dict[str, FootRest], joints: NDArray[np.float64]) -> BodyFeet:
+    """Collect the ankles of the body's motion.
+
+    :param rest: of ``feet_at_rest``.
+    :param joints: (T, K+1, 3) metres, world frame.
+    """
+    return BodyFeet(rest, {side: joints[:, body.joint_names.index(f"{side}_ankle")] for side in rest})
+
+
+def feet_at_rest(body: Body, betas: NDArray[np.floating[Any]]) -> dict[str, FootRest]:
+    """Measure the feet of the body at rest, by side.
 
     The heel is the rear end of what the foot, without its toes, stands on.
 
     :param betas: (P,) shape coefficients.
-    :param joints: (T, K+1, 3) metres, world frame.
     """
     v, J = body.rest_vertices(betas) @ R_WORLD_MODEL.T, body.rest_joints(betas) @ R_WORLD_MODEL.T
     strongest = body.skin_joints[np.arange(len(v)), body.skin_weights.argmax(1)]
     low = float(v[:, 2].min())
-    rest, ankles = {}, {}
+    rest = {}
     for side in ("left", "right"):
         part = body.joint_names.index(f"{side}_ankle")
         ankle, ball = J[part], J[body.joint_names.index(f"{side}_foot")]
         sole = v[(strongest == part) & (v[:, 2] < low + _SOLE_M)]
         heel = sole[sole[:, 1] > sole[:, 1].max() - _HEEL_M].mean(axis=0) if len(sole) else ankle
         rest[side] = FootRest(np.array([*heel[:2], low]) - ankle, ball - ankle, float(ankle[2]) - low)
-        ankles[side] = joints[:, part]
-    return BodyFeet(rest, ankles)
+    return rest
 
 
 def place_feet(

@@ -24,7 +24,7 @@ from ...solver.body import Body
 from ..edit.clip import Clip, interpolate_rotations
 from ..kinematics.axes import R_WORLD_MODEL
 from .bone_map import SPINE, BoneMap
-from .foot_placement import RigMotion, body_feet, place_feet
+from .foot_placement import RigMotion, body_feet, feet_at_rest, place_feet
 from .rest_alignment import heading_alignment, rest_alignment
 from .skeleton import Pose, Skeleton, head_positions
 
@@ -37,29 +37,51 @@ def transfer(
     :param betas: (P,) shape coefficients of the body.
     :param feet: place the feet where the body's are, scaled by the ratio of leg lengths; bends the legs a little.
     """
-    index = {part: k for k, part in enumerate(body.joint_names)}
-    rest = body.rest_joints(betas) @ R_WORLD_MODEL.T
-    R, joints = body.forward_kinematics(clip.rotations, clip.root - body.rest_joints(betas)[0], betas)
-    D = R @ R_WORLD_MODEL.T
-    row = {part: rig.names.index(bone) for bone, part in bone_map.parts.items() if bone in rig.names}
-    part_of = [bone_map.parts[name] for name in rig.names]
-    F = heading_alignment(rig, row)
-    alignment = rest_alignment(rig, part_of, row, rest, index, F) @ F
-    turns = _turns(D, part_of, index)
-    world = turns @ (alignment @ rig.rotations)
-    scale = _leg_length(rig.heads, row) / _leg_length(rest, {part: index[part] for part in row})
-    heads = head_positions(rig, world)
-    hips = [row["left_hip"], row["right_hip"]]
-    source_hips = joints[:, [index["left_hip"], index["right_hip"]]].mean(axis=1)
-    # Both stand on their floors at rest: heights are measured from there.
-    lift = np.zeros(3)
-    rested = rest[[index["left_hip"], index["right_hip"]], 2].mean() - _sole_height(body, betas)
-    lift[2] = (rig.heads[hips, 2].mean() - rig.floor) - scale * rested
-    heads += (scale * source_hips + lift - heads[:, hips].mean(axis=1))[:, None]
-    if feet:
-        motion = RigMotion(turns, alignment, world, heads)
-        world, heads = place_feet(rig, row, motion, body_feet(body, betas, joints), scale, clip.times)
-    return Pose(world, heads, float(np.arctan2(F[1, 0], F[0, 0])))
+    return Transfer(body, betas, rig, bone_map, feet=feet).pose(clip)
+
+
+class Transfer:
+    """The transfer from one body to one rig, with everything that does not depend on the motion computed once."""
+
+    def __init__(
+        self, body: Body, betas: NDArray[np.floating[Any]], rig: Skeleton, bone_map: BoneMap, *, feet: bool = True
+    ) -> None:
+        """Compare both at rest.
+
+        :param betas: (P,) shape coefficients of the body.
+        :param feet: as in ``transfer``.
+        """
+        self._body, self._betas, self._rig = body, betas, rig
+        self._index = index = {part: k for k, part in enumerate(body.joint_names)}
+        rest = body.rest_joints(betas) @ R_WORLD_MODEL.T
+        self._row = row = {part: rig.names.index(bone) for bone, part in bone_map.parts.items() if bone in rig.names}
+        self._part_of = [bone_map.parts[name] for name in rig.names]
+        F = heading_alignment(rig, row)
+        self._facing = float(np.arctan2(F[1, 0], F[0, 0]))
+        self._alignment = rest_alignment(rig, self._part_of, row, rest, index, F) @ F
+        self._scale = _leg_length(rig.heads, row) / _leg_length(rest, {part: index[part] for part in row})
+        self._hips = [row["left_hip"], row["right_hip"]]
+        self._source_hips = [index["left_hip"], index["right_hip"]]
+        # Both stand on their floors at rest: heights are measured from there.
+        self._lift = np.zeros(3)
+        rested = rest[self._source_hips, 2].mean() - _sole_height(body, betas)
+        self._lift[2] = (rig.heads[self._hips, 2].mean() - rig.floor) - self._scale * rested
+        self._feet = feet_at_rest(body, betas) if feet else None
+
+    def pose(self, clip: Clip) -> Pose:
+        """Compute the rig's motion."""
+        body, betas, rig = self._body, self._betas, self._rig
+        R, joints = body.forward_kinematics(clip.rotations, clip.root - body.rest_joints(betas)[0], betas)
+        turns = _turns(R @ R_WORLD_MODEL.T, self._part_of, self._index)
+        world = turns @ (self._alignment @ rig.rotations)
+        heads = head_positions(rig, world)
+        source_hips = joints[:, self._source_hips].mean(axis=1)
+        heads += (self._scale * source_hips + self._lift - heads[:, self._hips].mean(axis=1))[:, None]
+        if self._feet is not None:
+            motion = RigMotion(turns, self._alignment, world, heads)
+            source = body_feet(body, self._feet, joints)
+            world, heads = place_feet(rig, self._row, motion, source, self._scale, clip.times)
+        return Pose(world, heads, self._facing)
 
 
 def _leg_length(points: NDArray[np.float64], rows: dict[str, int]) -> float:

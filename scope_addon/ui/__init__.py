@@ -31,6 +31,7 @@ from .capture import (
     video_import,
 )
 from .edit import action_operators, asset_operators, edit_operators, edit_panel, key_operators
+from .live import live_operators, live_panel, live_properties
 from .pins import correction_operators, correction_panel, pin_tool, upright_operators
 from .retarget import retarget_operators, retarget_panel, retarget_properties
 from .view import view_after_undo, view_operators
@@ -39,8 +40,8 @@ _MODULES = (
     *(capture_properties, preferences, capture_operators, export_operators, import_operators, view_operators, drop),
     *(video_import, presets, menus, action_operators, asset_operators, frame_rate_operators),
     *(edit_operators, key_operators, correction_operators, pin_tool, upright_operators),
-    *(retarget_properties, retarget_operators),
-    *(captures, capture_panel, edit_panel, correction_panel, retarget_panel),
+    *(retarget_properties, retarget_operators, live_properties, live_operators),
+    *(captures, capture_panel, live_panel, edit_panel, correction_panel, retarget_panel),
 )
 
 
@@ -54,6 +55,7 @@ def register() -> None:
                 registered.append(cls)
         capture_properties.attach()
         retarget_properties.attach()
+        live_properties.attach()
         command.register()
         correction_panel.attach()
         view_after_undo.attach()
@@ -69,8 +71,9 @@ def register() -> None:
 
 
 def unregister() -> None:
-    """Stop a running capture, and unregister everything."""
+    """Stop a running capture, live or not, and unregister everything."""
     capture_operators.end_capture()
+    live_operators.end_live()
     compiled_solver.detach()
     translations.unregister()
     warm_up.detach()
@@ -80,6 +83,7 @@ def unregister() -> None:
     view_after_undo.detach()
     correction_panel.detach()
     command.unregister()
+    live_properties.detach()
     retarget_properties.detach()
     capture_properties.detach()
     for module in reversed(_MODULES):

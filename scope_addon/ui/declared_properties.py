@@ -100,4 +100,4 @@ def _value(option: Option, settings: Any) -> Any:
 
 
 def _keywords(place: Place) -> dict[str, Any]:
-    return {"options": _NOT_ANIMATABLE} if place is Place.PANEL else {}
+    return {"options": _NOT_ANIMATABLE} if place in Place.PANEL | Place.LIVE_PANEL else {}

@@ -30,14 +30,15 @@ def missing(folder: Path, names: list[str]) -> list[str]:
 def written_into_the_extension(work: Path) -> list[str]:
     """Return a message for each file in an installed extension's folder that the zip did not bring.
 
-    The byte code of a module is Python's own; no other file may be there, such as a result or compiled kernel.
+    The byte code of a module is Python's own, also half of it where a process was killed; no other file may be there,
+    such as a result or compiled kernel.
     """
     with zipfile.ZipFile(work / "scope.zip") as file:
         shipped = set(file.namelist())
     problems = []
     inside_home = ".config/blender/*/extensions/user_default/scope"
     for folder in [*work.glob(f"home/{inside_home}"), *work.glob(f"homes/*/{inside_home}")]:
-        found = {str(p.relative_to(folder)) for p in folder.rglob("*") if p.is_file() and p.suffix != ".pyc"}
+        found = {str(p.relative_to(folder)) for p in folder.rglob("*") if p.is_file() and ".pyc" not in p.name}
         problems += [f"{name} was written into {folder}" for name in sorted(found - shipped)]
         problems += [f"{name} is gone from {folder}" for name in sorted(n for n in shipped - found if n[-1] != "/")]
     return problems
@@ -99,7 +100,7 @@ def main(video: Path, work: Path, parts: list[str]) -> int:
         problems += panel(video, work / "out", shell_out, report)
     if "headless" in parts:
         problems += headless((work / "clips").resolve(), work / "out", shell_out, report)
-    for part in ("undo", "trouble", "stored", "pins", "first", "startup", "walk"):
+    for part in ("undo", "trouble", "stored", "pins", "live", "first", "startup", "walk"):
         if part in parts:
             report[part] = json.loads((work / "out" / f"{part}.json").read_text())
     print(json.dumps(report, indent=1))

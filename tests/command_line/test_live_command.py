@@ -48,11 +48,11 @@ def test_a_port_in_use_is_said(capsys):
 
 def test_the_extension_says_where_live_captures_are(capsys, monkeypatch):
     def find_spec(name, *_):
-        return None if name.endswith(".live") else PathFinder.find_spec(name)
+        return None if name.endswith(".json_lines") else PathFinder.find_spec(name)
 
     monkeypatch.setattr(installed, "find_spec", find_spec)
     assert main(["live", "0"]) == 1
-    assert "Blender's extension cannot capture live; use ./scripts/live" in capsys.readouterr().err
+    assert "Blender's extension captures live in its panel alone; use ./scripts/live" in capsys.readouterr().err
 
 
 @pytest.mark.skipif(os.name == "nt", reason="SIGINT of POSIX")

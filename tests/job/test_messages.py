@@ -8,7 +8,7 @@ import sys
 import time
 
 import pytest
-from scope.scope_addon.job.messages import LONGEST_LINE, WorkerFailedError, parse_message
+from scope.scope_addon.job.messages import LONGEST_LINE, WARM_UP_FIELDS, WorkerFailedError, parse_message
 from scope.scope_addon.job.process import WorkerProcess
 
 PROGRESS = {"event": "progress", "stage": "solving", "done": 3, "total": 10}
@@ -27,7 +27,7 @@ def test_messages_are_read(message):
 
 def test_only_a_capture_must_have_motions():
     compiled = {"event": "result", "compiled": 12}
-    assert parse_message(line(compiled), captures=False) == compiled
+    assert parse_message(line(compiled), WARM_UP_FIELDS) == compiled
     with pytest.raises(WorkerFailedError, match="result without a valid motions"):
         parse_message(line(compiled))
 

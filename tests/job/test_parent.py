@@ -47,7 +47,7 @@ def test_no_partial_file_is_left_whether_or_not_the_main_thread_stops(tmp_path, 
 
 @pytest.mark.parametrize(("error", "ends"), [(BrokenPipeError(), True), (OSError(9, "Bad file descriptor"), False)])
 def test_only_the_end_of_the_pipe_ends_the_process(monkeypatch, error, ends):
-    def fails():
+    def fails(_):
         raise error
 
     monkeypatch.setattr(parent, "_wait_for_end_of_stdin", fails)
@@ -59,18 +59,38 @@ def test_only_the_end_of_the_pipe_ends_the_process(monkeypatch, error, ends):
     assert ended.is_set() == ends
 
 
-def test_on_windows_the_pipe_is_polled_and_never_read(monkeypatch):
+def test_what_the_parent_writes_is_heard(tmp_path):
+    code = (
+        "import sys, time\nfrom scope.scope_addon.job import parent\n"
+        "parent.when_parent_ends(lambda: print('ended', flush=True), lambda piece: print(piece, flush=True))\n"
+        "print('begun', flush=True)\ntime.sleep(60)"
+    )
+    with subprocess.Popen([sys.executable, "-c", code], stdin=subprocess.PIPE, stdout=subprocess.PIPE) as child:
+        assert child.stdin is not None
+        assert child.stdout is not None
+        heard = [child.stdout.readline()]
+        child.stdin.write(b"stop\n")
+        child.stdin.flush()
+        heard.append(child.stdout.readline())
+        child.stdin.close()
+        heard.append(child.stdout.readline())
+        child.kill()
+    assert [line.strip() for line in heard] == [b"begun", rb"b'stop\n'", b"ended"]
+
+
+def test_on_windows_the_pipe_is_polled_and_only_what_is_there_is_read(monkeypatch):
     """A pending read would block the loading of numpy's libraries there."""
-    looks = []
+    looks, heard = [], []
 
     def peek(handle, size):
         looks.append((handle, size))
-        if len(looks) == 3:
+        if len(looks) == 4:
             raise BrokenPipeError
-        return 0, 0
+        return (5, 0) if len(looks) == 2 else (0, 0)
 
-    def read(*_):
-        raise AssertionError
+    def read(handle, size):
+        assert (handle, size, len(looks)) == (0, 5, 2)
+        return b"stop\n"
 
     monkeypatch.setattr(sys, "platform", "win32")
     monkeypatch.setattr(parent.os, "read", read)
@@ -78,5 +98,6 @@ def test_on_windows_the_pipe_is_polled_and_never_read(monkeypatch):
     monkeypatch.setitem(sys.modules, "_winapi", types.SimpleNamespace(PeekNamedPipe=peek))
     monkeypatch.setitem(sys.modules, "msvcrt", types.SimpleNamespace(get_osfhandle=lambda fd: 100 + fd))
     with pytest.raises(BrokenPipeError):
-        parent._wait_for_end_of_stdin()
-    assert looks == [(100, 0)] * 3
+        parent._wait_for_end_of_stdin(heard.append)
+    assert looks == [(100, 0)] * 4
+    assert heard == [b"stop\n"]

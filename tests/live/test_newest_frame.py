@@ -88,3 +88,14 @@ def test_an_error_in_a_running_stream_is_said_and_survived():
     with NewestFrame(source, clock, reconnect_s=1.0, say=lambda s: (said.append(s), clock.stopped.set())) as reader:
         all_taken(reader)
     assert said == ["fake was interrupted (timed out); connecting again in 1 s"]
+
+
+def test_stopping_does_not_wait_for_a_source_that_is_stalled():
+    clock, stalled = FakeClock(), threading.Event()
+    try:
+        with NewestFrame(FakeSource([0.0], before=lambda _: stalled.wait(30)), clock) as reader:
+            clock.stopped.set()
+            assert reader.take() is None
+        assert reader._thread.is_alive()
+    finally:
+        stalled.set()

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from scope.scope_addon.capture.media.video import open_video
 from scope.scope_addon.cli import SAMPLE
-from scope.scope_addon.errors import VideoError
+from scope.scope_addon.errors import OfflineError, VideoError
 from scope.scope_addon.live.clock import Clock
 from scope.scope_addon.live.newest_frame import NewestFrame
-from scope.scope_addon.live.sources import open_source
+from scope.scope_addon.live.sources import is_stream, open_source
 
 from .fake_source import FakeClock
 from .mjpeg_server import mjpeg_server
@@ -67,3 +67,15 @@ def test_a_camera_that_does_not_exist_is_said():
 def test_a_server_that_does_not_run_is_said_without_the_password():
     with pytest.raises(VideoError, match=r"^http://127.0.0.1:9/v cannot be opened \(connection refused\); check"):
         next(iter(open_source("http://me:secret@127.0.0.1:9/v").pictures(Clock())))
+
+
+@pytest.mark.parametrize("address", ["rtsp://camera/x", "http://127.0.0.1:1/v", "UDP://@:5000"])
+def test_a_stream_is_refused_without_online_access(address):
+    assert is_stream(address)
+    with pytest.raises(OfflineError, match="Allow Online Access"):
+        open_source(address, online=False)
+
+
+@pytest.mark.parametrize("text", ["0", "/dev/video0", str(SAMPLE)])
+def test_cameras_and_files_are_no_streams(text):
+    assert not is_stream(text)

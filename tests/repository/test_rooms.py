@@ -43,7 +43,7 @@ ROOMS = {
     "scope_addon/scene": {"scope_addon/scene/character", "scope_addon/retarget"},
     "scope_addon/scene/animation_data": {"scope_addon/files"},
     "scope_addon/scene/character": {"scope_addon/scene/animation_data", "scope_addon/edit"},
-    "scope_addon/job": {"scope_addon/capture", "scope_addon/edit"},
+    "scope_addon/job": {"scope_addon/capture", "scope_addon/edit", "scope_addon/live"},
     "scope_addon/cluster": {"scope_addon/job"},
     "scope_addon/report": {"scope_addon/capture/overlay", "scope_addon/kinematics"},
     "scope_addon/live": {"scope_addon/capture"},

@@ -147,6 +147,14 @@ def test_the_manifest_names_licences_and_holders_of_all_that_the_zip_contains(bu
     assert validate is None or validate(manifest["copyright"], True) is None
 
 
+def test_every_permission_has_a_reason_that_the_platform_accepts():
+    permissions = tomllib.loads((ROOT / "blender_manifest.toml").read_text())["permissions"]
+    assert set(permissions) == {"files", "camera", "network"}
+    for reason in permissions.values():
+        assert 10 < len(reason) <= 64, reason
+        assert not reason.endswith("."), reason
+
+
 @pytest.mark.usefixtures("networks")
 def test_six_zips_with_empty_wheels(with_empty_wheels, monkeypatch, capsys, tmp_path):
     builder = with_empty_wheels
@@ -164,6 +172,12 @@ def test_six_zips_with_empty_wheels(with_empty_wheels, monkeypatch, capsys, tmp_
     manifest = tomllib.loads((ROOT / "blender_manifest.toml").read_text())
     for folder in (p.strip("/") for p in manifest["build"]["paths_exclude_pattern"] if p.endswith("/")):
         assert not any(n.startswith(f"{folder}/") or f"/{folder}/" in n for n in names), folder
+    senders = [p.strip("/") for p in manifest["build"]["paths_exclude_pattern"] if "/live/" in p]
+    assert [Path(sender).name for sender in senders] == list(builder.SENDERS)
+    assert not set(senders) & set(names)
+    assert {"scope_addon/live/run.py", "scope_addon/job/live/capture.py", "scope_addon/ui/live/live_job.py"} <= set(
+        names
+    )
 
     def refused(file, match, **made_for):
         with pytest.raises(SystemExit, match=match):

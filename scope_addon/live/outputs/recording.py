@@ -35,7 +35,12 @@ from ..sources import Source
 class Recording:
     """Keeps every pose, some 3 kB each."""
 
-    def __init__(self, path: Path, body: Body, source: Source) -> None:
+    def __init__(self, path: Path, body: Body, source: Source, *, from_zero: bool = False) -> None:
+        """Begin a recording without poses.
+
+        :param from_zero: whether frame numbers and times begin with 0, rather than with those of the source.
+        """
+        self._from_zero = from_zero
         self._path, self._body, self._source = path, body, source
         self._poses: list[LivePose] = []
         self._session: LiveSession | None = None
@@ -58,11 +63,25 @@ class Recording:
         """
         if not self._poses or self._session is None or self._session.camera is None:
             raise NoPersonError(
-                f"nobody was seen in {self._source.name}, so {self._path} was not written; at least one person must be"
-                " mostly in the picture"
+                f"nobody was seen in {self._source.name}, so nothing was recorded; at least one person must be mostly"
+                " in the picture"
             )
-        self.motion(self._session.camera).save(self._path)
+        motion = self.motion(self._session.camera)
+        if self._from_zero:
+            motion.frames -= motion.frames[0]
+            motion.timestamps -= motion.timestamps[0]
+        motion.save(self._path)
         return self._path
+
+    @property
+    def seconds(self) -> float:
+        """Duration so far."""
+        return self._poses[-1].timestamp_s - self._poses[0].timestamp_s if self._poses else 0.0
+
+    @property
+    def camera(self) -> Camera | None:
+        """The camera as it is known now; None before somebody was seen."""
+        return None if self._session is None else self._session.camera
 
     def motion(self, camera: Camera) -> Motion:
         """Return the motion so far, at least one pose.

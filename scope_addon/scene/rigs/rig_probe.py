@@ -21,7 +21,7 @@ from ...retarget.skeleton import Skeleton
 from ..character.root_object import root_object, topmost
 
 # Rigify's properties: limbs by FK, neck and head with the chest.
-_SWITCHES = ("IK_FK", "neck_follow", "head_follow")
+SWITCHES = ("IK_FK", "neck_follow", "head_follow")
 _CARRIER_TOLERANCE = 0.02  # of a head's position relative to its carrier, as a share of their distance
 _MIN_RESPONSE = 0.1  # change of a rotation matrix's entries; the probe changes them by more than 0.3
 _CHECKED_FRAMES, _MAX_DEVIATION = 5, np.radians(20)
@@ -234,7 +234,7 @@ class _RigState:
             self._animation.action, self._animation.use_nla = None, False
         for bone, _ in self._bases:
             bone.matrix_basis = Matrix()
-            for switch in _SWITCHES:
+            for switch in SWITCHES:
                 if switch in bone:
                     bone[switch] = 1.0
         rig.update_tag()

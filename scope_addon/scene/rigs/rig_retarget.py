@@ -105,7 +105,7 @@ def retarget(
     :raises InputError: when the map cannot be used, or a mapped bone does not move.
     """
     options = options or RetargetOptions()
-    bone_map = _usable_map(source, body, rig, bone_map)
+    bone_map = usable_map(source, body, rig, bone_map)
     clip, frames = read_clip(source, body, rate)
     clip = clip_as_displayed(source, clip, frames)
     if rig.animation_data and rig.animation_data.use_tweak_mode:  # in which no action can be assigned
@@ -131,9 +131,10 @@ def retarget(
     return RetargetResult(action, warnings)
 
 
-def _usable_map(source: bpy.types.Object, body: Body, rig: bpy.types.Object, bone_map: BoneMap) -> BoneMap:
+def usable_map(source: bpy.types.Object | None, body: Body, rig: bpy.types.Object, bone_map: BoneMap) -> BoneMap:
     """Return the bone map without the parts that the body lacks.
 
+    :param source: the captured armature, if there is one.
     :raises UsageError: when the rig is the source, or lacks a mapped bone.
     :raises InputError: when the map cannot be used.
     """

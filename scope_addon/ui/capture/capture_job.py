@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -128,26 +128,50 @@ class CaptureJob:
         preview_picture.show(pixels, message["width"], message["height"])
 
     def _build(self, scene: bpy.types.Scene, captured: CachedCapture) -> None:
-        contents = [(path, path.read_bytes()) for path in captured.motions]
-        motions = [Motion.load(path, content) for path, content in contents]
-        body = load_body(self._request.values["body"])
-        warnings = list(captured.report.get("warnings", ()))
-        footage: str | None = self._request.footage
-        if not Path(self._request.footage).is_file():
-            warnings.append(f"{footage} no longer exists, so the camera shows no footage")
-            footage = None
-        with _window_shows(scene):
-            result = build_scene(motions, body, footage, self._options)
-        store_motions(result, [content for _, content in contents], self._request.values["body"])
-        footage_rate = float(motions[0].mocap_framerate)
-        if self._options.frame_rate == "keep" and abs(footage_rate - result.frame_rate) > 0.01:
-            warnings.append(
-                f"{RATE_WARNING} {result.frame_rate:.5g} frames/s, the footage has {footage_rate:.5g}: keys lie "
-                "between frames; Set Frame Rate from Footage changes the scene's rate and moves them"
-            )
-        report = dict(captured.report, warnings=[shown(warning) for warning in warnings + result.warnings])
-        show_result(result.collection.scope_result, self._request.footage, report, result)
-        scene.scope.capture = result.collection
+        build_capture(
+            scene,
+            [(path, path.read_bytes()) for path in captured.motions],
+            self._request.values["body"],
+            self._request.footage,
+            captured.report,
+            self._options,
+        )
+
+
+def build_capture(
+    scene: bpy.types.Scene,
+    contents: Sequence[tuple[Path, bytes]],
+    body: str,
+    footage: str,
+    report: Mapping[str, Any],
+    options: BuildOptions,
+) -> BuildResult:
+    """Build a capture in a scene, show its result, and store its motions.
+
+    :param contents: path and bytes of each person's motion file.
+    :param body: name or file of the body.
+    :param footage: path of the video or picture; empty if there is none.
+    :param report: of the capture.
+    :raises ScopeError: the motions cannot be built; the scene is unchanged.
+    """
+    motions = [Motion.load(path, content) for path, content in contents]
+    warnings = list(report.get("warnings", ()))
+    shows_footage = bool(footage) and Path(footage).is_file()
+    if footage and not shows_footage:
+        warnings.append(f"{footage} no longer exists, so the camera shows no footage")
+    with window_shows(scene):
+        result = build_scene(motions, load_body(body), footage if shows_footage else None, options)
+    store_motions(result, [content for _, content in contents], body)
+    footage_rate = float(motions[0].mocap_framerate)
+    if options.frame_rate == "keep" and abs(footage_rate - result.frame_rate) > 0.01:
+        warnings.append(
+            f"{RATE_WARNING} {result.frame_rate:.5g} frames/s, the footage has {footage_rate:.5g}: keys lie "
+            "between frames; Set Frame Rate from Footage changes the scene's rate and moves them"
+        )
+    report = dict(report, warnings=[shown(warning) for warning in warnings + result.warnings])
+    show_result(result.collection.scope_result, footage, report, result)
+    scene.scope.capture = result.collection
+    return result
 
 
 def capture_request(scene: bpy.types.Scene) -> JobRequest:
@@ -157,7 +181,7 @@ def capture_request(scene: bpy.types.Scene) -> JobRequest:
         empty.
     :raises VideoError: the footage does not exist.
     """
-    settings, chosen = scene.scope, preferences()
+    settings = scene.scope
     check_local(scene)
     if not settings.footage:
         raise UsageError("no footage is chosen; choose a video or image first")
@@ -169,15 +193,25 @@ def capture_request(scene: bpy.types.Scene) -> JobRequest:
         raise UsageError("the part of the video ends before it starts; change From or To")
     if settings.lens == "FILE" and not settings.calibration_file:
         raise UsageError("no calibration file is chosen; choose one, or another kind of lens")
+    values = chosen_values(scene)
+    if values["hands"]:
+        values["body"] = body_with_hands(values["body"])
+    return JobRequest(str(footage), **values)
+
+
+def chosen_values(scene: bpy.types.Scene) -> dict[str, Any]:
+    """Return the values of a worker's options from the scene's settings and the preferences.
+
+    :raises UsageError: no body file is chosen.
+    """
+    settings, chosen = scene.scope, preferences()
     values = option_values(settings, Place.PANEL) | option_values(chosen, Place.PREFERENCES)
     if values["body"] == "file":
         path = settings.body_file or (chosen.body_file if chosen else "")
         if not path:
             raise UsageError("no body file is chosen; choose one here or in the preferences, or use the built-in body")
         values["body"] = bpy.path.abspath(path)
-    if values["hands"]:
-        values["body"] = body_with_hands(values["body"])
-    return JobRequest(str(footage), **values)
+    return values
 
 
 def build_options(scene: bpy.types.Scene) -> BuildOptions:
@@ -212,7 +246,7 @@ def _is_animated(scene: bpy.types.Scene) -> bool:
 
 
 @contextmanager
-def _window_shows(scene: bpy.types.Scene) -> Iterator[None]:
+def window_shows(scene: bpy.types.Scene) -> Iterator[None]:
     """Show the scene in the window while it is built: the user may have switched to another one."""
     if bpy.context.scene == scene:
         yield

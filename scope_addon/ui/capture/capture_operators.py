@@ -13,6 +13,7 @@ from bpy.props import StringProperty
 from ...footage import FOOTAGE_SUFFIXES
 from ...job.progress import duration
 from .. import warm_up
+from ..live.live_state import state as live_state
 from ..reporting import iface_, rpt_, sentence, tip_
 from ..view.sidebar import is_over_tab, redraw_sidebars, redraw_sidebars_twice, show_tab
 from ..view.view_operators import frame_selected, hide_startup_cube
@@ -96,7 +97,7 @@ class SCOPE_OT_capture(bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Require that footage is chosen and nothing is running."""
-        if state.job is not None:
+        if state.job is not None or live_state.job is not None:
             cls.poll_message_set(tip_("A capture is running; wait for it or cancel it"))
             return False
         if not context.scene.scope.footage:

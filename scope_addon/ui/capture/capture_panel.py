@@ -29,6 +29,7 @@ class Tab:
     bl_space_type = "VIEW_3D"
     bl_region_type = "UI"
     bl_category = "Scope"
+    bl_order = 2  # below Capture and Live
     bl_translation_context = CONTEXT
 
 
@@ -37,6 +38,7 @@ class SCOPE_PT_capture(Tab, bpy.types.Panel):
 
     bl_idname = "SCOPE_PT_capture"
     bl_label = "Capture"
+    bl_order = 0
 
     def draw_header_preset(self, _context: bpy.types.Context) -> None:
         """Draw the button of the presets in the header."""
@@ -66,7 +68,7 @@ class SCOPE_PT_capture(Tab, bpy.types.Panel):
             row.operator("scope.capture", icon="ARMATURE_DATA")
             warm_up.draw(layout)
         if state.message and state.scene_uid == context.scene.session_uid:
-            _draw_text(context, layout.box(), state.message, "ERROR")
+            draw_text(context, layout.box(), state.message, "ERROR")
 
 
 def _draw_progress(context: bpy.types.Context, layout: bpy.types.UILayout, progress: JobProgress) -> None:
@@ -74,7 +76,7 @@ def _draw_progress(context: bpy.types.Context, layout: bpy.types.UILayout, progr
     if icon := preview_picture.icon_id():
         layout.template_icon(icon_value=icon, scale=10.0)
     for part in progress.lines(iface_):
-        _draw_text(context, layout, part)
+        draw_text(context, layout, part)
     row = layout.row()
     row.scale_y = 1.6
     row.operator("scope.cancel", text="Cancel", icon="CANCEL")
@@ -184,7 +186,7 @@ def _draw_frame_rate(context: bpy.types.Context, layout: bpy.types.UILayout) -> 
             was=was,
             now=scene.render.fps / scene.render.fps_base,
         )
-        _draw_text(context, layout.box(), text, "ERROR")
+        draw_text(context, layout.box(), text, "ERROR")
     if was or differs(scene):
         layout.operator("scope.match_frame_rate", icon="TIME")
 
@@ -251,7 +253,7 @@ def _draw_figures(layout: bpy.types.UILayout, result: bpy.types.PropertyGroup) -
 
 def _draw_warning(context: bpy.types.Context, box: bpy.types.UILayout, warning: bpy.types.PropertyGroup) -> None:
     """Draw a warning, and for each of its spans a button that goes to the first frame."""
-    _draw_text(context, box, warning.text, "ERROR")
+    draw_text(context, box, warning.text, "ERROR")
     if warning.spans:
         grid = box.grid_flow(columns=4, even_columns=True, align=True, row_major=True)
         for span in warning.spans.split(","):
@@ -270,7 +272,7 @@ def _split(layout: bpy.types.UILayout) -> bpy.types.UILayout:
     return layout
 
 
-def _draw_text(context: bpy.types.Context, layout: bpy.types.UILayout, text: str, icon: str = "NONE") -> None:
+def draw_text(context: bpy.types.Context, layout: bpy.types.UILayout, text: str, icon: str = "NONE") -> None:
     """Draw a sentence, wrapped to the width of the sidebar."""
     import textwrap  # not while Blender starts
 

@@ -3,12 +3,17 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import bpy
 from bpy.props import BoolProperty, EnumProperty, StringProperty
 
 from ..captured_person import PERSON, betas_of, body_of, captured_armature, captured_people
 from ..reporting import ReportingOperator, rpt_, sentence, tip_
 from .bone_list import fill_list, listed_map
+
+if TYPE_CHECKING:
+    from ...scene.rigs.rig_retarget import RetargetOptions, RetargetResult
 
 _SIDE_OFFSET_M = (1.5, 0.0, 0.0)  # to the left of a person who faces the front view
 
@@ -83,40 +88,53 @@ class SCOPE_OT_retarget(_RigOperator):
 
     def work(self, context: bpy.types.Context) -> str:
         """Write the rig's keys."""
-        from ...scene.animation_data.timing import scene_rate
-        from ...scene.rigs.rig_retarget import RetargetOptions, guess_bone_map, retarget
-        from ...scene.visibility import hide, show
-
         settings, source = context.scene.scope_retarget, captured_armature(context)
         assert source is not None  # checked by poll
-        guessed = None if len(settings.pairs) else guess_bone_map(settings.rig)
-        body = body_of(source)
-        result = retarget(
-            source,
-            body,
-            betas_of(source, body),
-            settings.rig,
-            guessed or listed_map(settings),
-            scene_rate(context.scene),
-            RetargetOptions(
-                feet=settings.feet,
-                root=settings.root,
-                offset=_SIDE_OFFSET_M if settings.captured == "beside" else (0, 0, 0),
-            ),
-        )
-        if guessed is not None:  # not before: what fails changes nothing
-            fill_list(settings, guessed)
-        settings.rig[PERSON] = source
-        if settings.captured == "hide":
-            _select_only(context, settings.rig)
-            hide(source, context.view_layer)
-        else:
-            show(source, context.view_layer)
+        result = retarget_to_chosen_rig(context, source)
         if result.warnings:
             self.report({"WARNING"}, sentence(result.warnings[0]))
             return ""
         name, action = settings.rig.name, result.action.name
         return rpt_("'{rig}' is now animated by the action '{action}'", rig=name, action=action)
+
+
+def retarget_to_chosen_rig(context: bpy.types.Context, source: bpy.types.Object) -> RetargetResult:
+    """Retarget a captured armature to the rig of the settings, and show both as the settings say.
+
+    :raises ScopeError: the rig or its bones cannot be used; nothing is changed.
+    """
+    from ...scene.animation_data.timing import scene_rate
+    from ...scene.rigs.rig_retarget import guess_bone_map, retarget
+    from ...scene.visibility import hide, show
+
+    settings, body = context.scene.scope_retarget, body_of(source)
+    guessed = None if len(settings.pairs) else guess_bone_map(settings.rig)
+    result = retarget(
+        source,
+        body,
+        betas_of(source, body),
+        settings.rig,
+        guessed or listed_map(settings),
+        scene_rate(context.scene),
+        retarget_options(settings),
+    )
+    if guessed is not None:  # not before: what fails changes nothing
+        fill_list(settings, guessed)
+    settings.rig[PERSON] = source
+    if settings.captured == "hide":
+        _select_only(context, settings.rig)
+        hide(source, context.view_layer)
+    else:
+        show(source, context.view_layer)
+    return result
+
+
+def retarget_options(settings: bpy.types.PropertyGroup) -> RetargetOptions:
+    """Return the options of the settings."""
+    from ...scene.rigs.rig_retarget import RetargetOptions
+
+    offset = _SIDE_OFFSET_M if settings.captured == "beside" else (0.0, 0.0, 0.0)
+    return RetargetOptions(feet=settings.feet, root=settings.root, offset=offset)
 
 
 class _BoneMapFileOperator(_RigOperator):

@@ -7,7 +7,8 @@ import socket
 import numpy as np
 import pytest
 from scope.scope_addon.errors import OutputError
-from scope.scope_addon.live.outputs.json_lines import JsonServer, values
+from scope.scope_addon.live.outputs.json_lines import JsonServer
+from scope.scope_addon.live.outputs.pose_values import values
 
 from .test_vmc import pose_of
 

@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The worker's side of a live capture: poses as messages, and a recording from when the parent asks for it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ...live.outputs.pose_values import values
+from ...live.outputs.recording import Recording
+from ...live.run import Listeners, LiveOptions, LiveProgress, run_live
+from ...live.sources import Source, open_source
+from .commands import Commands
+from .request import LiveRequest
+
+if TYPE_CHECKING:
+    from ....solver import Body
+    from ...live.pose import LivePose
+    from ...live.session import LiveSession
+
+Send = Callable[..., None]  # an event and its values
+MOTION = "person1.npz"
+
+
+def capture_live(request: LiveRequest, job_folder: Path, send: Send, commands: Commands) -> None:
+    """Capture until the source ends or the parent stops it; send poses, and at the end the recording, if there is one.
+
+    :raises ScopeError: an option is invalid, the source cannot be read, or nobody was seen in the recording.
+    """
+    from ....solver.loaders.body_file import load_body
+    from ...live.clock import Clock
+
+    chosen = request.values
+    source, body = open_source(request.source, online=request.online), load_body(chosen["body"])
+    options = LiveOptions(
+        chosen["live_quality"],
+        next(iter(chosen["heights_m"]), None),
+        chosen["focal_mm"],
+        chosen["fov_deg"],
+        Path(chosen["calibration"]) if chosen["calibration"] else None,
+        chosen["threads"],
+        chosen["provider"],
+        chosen["reconnect_s"],
+    )
+    clock = Clock()
+    clock.stopped = commands.stopped
+    recorder = _Recorder(job_folder / MOTION, body, source, commands)
+    listeners = Listeners(
+        lambda text: send("notice", text=text), lambda state: send("status", **_status(state, recorder)), recorder.begin
+    )
+    report = run_live(source, body, options, (recorder, _Sender(send)), listeners, clock)
+    recording = recorder.recording
+    if recording is None:
+        send("ended")
+        return
+    recording.save()
+    camera = recording.camera
+    told = {"camera": camera.source if camera else "", "fps": {"total": report["poses_per_second"]}, "warnings": []}
+    send("result", motions=[MOTION], report=told)
+
+
+class _Sender:
+    """Sends every pose; the parent uses the newest one only."""
+
+    def __init__(self, send: Send) -> None:
+        self._send = send
+
+    def send(self, pose: LivePose, latency_ms: float) -> None:
+        self._send("pose", **values(pose, latency_ms))
+
+
+class _Recorder:
+    """Keeps poses from when the parent asks for it; ``recording`` is None before."""
+
+    def __init__(self, path: Path, body: Body, source: Source, commands: Commands) -> None:
+        self._path, self._body, self._source, self._commands = path, body, source, commands
+        self._session: tuple[LiveSession, tuple[int, int]] | None = None
+        self.recording: Recording | None = None
+
+    def begin(self, session: LiveSession, size: tuple[int, int]) -> None:
+        """Note where the poses come from."""
+        self._session = session, size
+        if self.recording is not None:
+            self.recording.begin(session, size)
+
+    def send(self, pose: LivePose, latency_ms: float) -> None:
+        """Keep a pose if one is asked for."""
+        if self.recording is None and self._commands.recording.is_set() and self._session is not None:
+            # A file keeps its times, so that its pictures and the poses belong together.
+            self.recording = Recording(self._path, self._body, self._source, from_zero=not self._source.ends)
+            self.recording.begin(*self._session)
+        if self.recording is not None:
+            self.recording.send(pose, latency_ms)
+
+
+def _status(state: LiveProgress, recorder: _Recorder) -> dict[str, Any]:
+    return {
+        "presence": state.presence.value,
+        "rate": round(state.rate, 1),
+        "latency_ms": round(state.median_ms, 1),
+        "dropped": state.dropped,
+        "received": state.received,
+        "recorded_s": round(recorder.recording.seconds, 1) if recorder.recording else 0.0,
+    }

@@ -1,0 +1,27 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the parent tells a live capture while it runs: lines on the standard input."""
+
+from __future__ import annotations
+
+import threading
+
+RECORD, STOP = b"record\n", b"stop\n"
+_LONGEST = 4096  # bytes without an end of line, which is no command
+
+
+class Commands:
+    """The commands so far. ``hear`` may be called from another thread."""
+
+    def __init__(self) -> None:
+        self.recording, self.stopped = threading.Event(), threading.Event()
+        self._unfinished = b""
+
+    def hear(self, piece: bytes) -> None:
+        """Take what was written, in any pieces; lines that are no command are ignored."""
+        *lines, self._unfinished = (self._unfinished + piece).split(b"\n")
+        self._unfinished = self._unfinished[-_LONGEST:]
+        for line in lines:
+            if line + b"\n" == RECORD:
+                self.recording.set()
+            elif line + b"\n" == STOP:
+                self.stopped.set()

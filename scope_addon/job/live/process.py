@@ -1,0 +1,130 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The parent's side of a live capture: the newest pose, messages, and commands."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..messages import CAPTURE_FIELDS, LONGEST_LINE, Fields, is_number, is_text, unreadable
+from ..process import START_SCRIPT, WorkerProcess
+from .commands import RECORD, STOP
+from .request import LiveRequest
+
+PRESENCES = ("seen", "held", "lost")
+_POSE = b'{"event": "pose"'
+_FARTHEST_M, _LARGEST_BETA = 1e4, 1e3
+_UNIT_TOLERANCE = 0.01  # of a quaternion's length, which is rounded
+
+
+def _is_measure(value: object) -> bool:
+    return type(value) in (int, float) and 0 <= value < 1e12  # type: ignore[operator]
+
+
+_FIELDS: Fields = {
+    "progress": CAPTURE_FIELDS["progress"],
+    "status": {
+        "presence": lambda value: value in PRESENCES,
+        "rate": _is_measure,
+        "latency_ms": _is_measure,
+        "dropped": is_number,
+        "received": is_number,
+        "recorded_s": _is_measure,
+    },
+    "notice": {"text": is_text},
+    "ended": {},
+    "result": CAPTURE_FIELDS["result"],
+}
+
+
+@dataclass(frozen=True)
+class ShownPose:
+    """A pose as it came from the capture."""
+
+    frame: int
+    presence: str  # one of `PRESENCES`
+    rotations: NDArray[np.float64]  # (K+1, 4) w, x, y, z: the pelvis relative to the world, the others to their parents
+    pelvis: NDArray[np.float64]  # (3,) metres, world
+    betas: NDArray[np.float64]  # (P,)
+
+
+class LiveProcess(WorkerProcess):
+    """A live capture. Call ``poll`` and ``newest_pose`` regularly; ``close`` ends it at once."""
+
+    def __init__(
+        self,
+        request: LiveRequest,
+        job_folder: Path,
+        kernels: Path | None,
+        python: Sequence[str],
+        script: Path = START_SCRIPT,
+    ) -> None:
+        """Start the capture; see `WorkerProcess`.
+
+        :raises SetupError: the process cannot be started.
+        """
+        self._newest: bytes | None = None
+        super().__init__(request, job_folder, kernels, python, script)
+        self._fields = _FIELDS
+
+    def record(self) -> None:
+        """Have the poses kept from now on."""
+        self._tell(RECORD)
+
+    def stop(self) -> None:
+        """Have the source closed, and the recording sent as a result."""
+        self._tell(STOP)
+
+    def newest_pose(self, joints: int, coefficients: int) -> ShownPose | None:
+        """Return the newest pose if there is one since the last call; older ones are never seen.
+
+        :param joints: K+1 of the body.
+        :param coefficients: P of the body.
+        :raises WorkerFailedError: it cannot be used.
+        """
+        line, self._newest = self._newest, None
+        return None if line is None else parse_pose(line, joints, coefficients)
+
+    def _keep(self, line: bytes) -> None:
+        if line.startswith(_POSE):
+            self._newest = line
+        else:
+            super()._keep(line)
+
+
+def parse_pose(line: bytes, joints: int, coefficients: int) -> ShownPose | None:
+    """Read the message of a pose; None before somebody was seen.
+
+    :raises WorkerFailedError: it cannot be used.
+    """
+    if len(line) > LONGEST_LINE:
+        raise unreadable(f"a line of more than {LONGEST_LINE >> 20} MB")
+    try:
+        message: dict[str, Any] = json.loads(line)
+        if "rotations" not in message:
+            return None
+        rotations = np.array(message["rotations"], float)
+        pelvis = np.array(message["positions"][0], float)
+        betas = np.array(message["betas"], float)
+        frame, presence = message["frame"], message["presence"]
+    except (ValueError, TypeError, KeyError, IndexError, RecursionError) as error:
+        raise unreadable("a pose that is none") from error
+    if rotations.shape != (joints, 4) or pelvis.shape != (3,) or betas.shape != (coefficients,):
+        raise unreadable("a pose of another body")
+    lengths = np.linalg.norm(rotations, axis=1)
+    is_usable = (
+        (np.abs(lengths - 1) < _UNIT_TOLERANCE).all()
+        and (np.abs(pelvis) < _FARTHEST_M).all()
+        and (np.abs(betas) < _LARGEST_BETA).all()
+        and is_number(frame)
+        and presence in PRESENCES
+    )
+    if not is_usable:  # NaN included
+        raise unreadable("a pose that no body can have")
+    return ShownPose(frame, presence, rotations / lengths[:, None], pelvis, betas)

@@ -1,0 +1,45 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Datablocks that are looked up again at every use: undo may have removed or replaced them since the last one."""
+
+from __future__ import annotations
+
+import bpy
+
+KINDS = ("objects", "meshes", "armatures", "collections", "materials")
+
+
+def found(kind: str, name: str, uid: int) -> bpy.types.ID | None:
+    """Return the datablock with a session's identifier; None if it was removed.
+
+    :param kind: the collection of ``bpy.data``.
+    :param name: which it had last.
+    """
+    blocks = getattr(bpy.data, kind)
+    block = blocks.get(name)
+    if block is not None and block.session_uid == uid:
+        return block
+    return next((block for block in blocks if block.session_uid == uid), None)
+
+
+class NewDatablocks:
+    """The datablocks that are new since a moment, to remove them later."""
+
+    def __init__(self) -> None:
+        self._before = {kind: {block.session_uid for block in getattr(bpy.data, kind)} for kind in KINDS}
+
+    def all(self) -> set[tuple[str, int]]:
+        """Return the kind and identifier of each."""
+        return {
+            (kind, block.session_uid)
+            for kind in KINDS
+            for block in getattr(bpy.data, kind)
+            if block.session_uid not in self._before[kind]
+        }
+
+
+def remove(blocks: set[tuple[str, int]]) -> None:
+    """Remove those of the datablocks that still exist."""
+    if not blocks:
+        return
+    bpy.data.batch_remove([block for kind, uid in blocks if (block := found(kind, "", uid)) is not None])
+    bpy.context.view_layer.update()  # it would still list removed objects

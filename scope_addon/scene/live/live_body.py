@@ -1,0 +1,141 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A body that is posed as poses come: the armature and mesh of a capture, without keys.
+
+The armature rests at the shape β⁰ that was known first, because bones can only be moved in Edit Mode, while β settles
+in the first seconds. With δ_i = R_world_model (J_i(β) − J_i(β⁰)), M_i the rest orientation of bone i and Ω_i the
+rotation of joint i, the location channels
+
+    i > 0:  M_iᵀ (I − R_world_model Ω_i R_world_modelᵀ) δ_i
+    root:   pelvis − R_0 R_world_modelᵀ δ_0 − h_0, along the world's axes
+
+make Blender deform the mesh of shape β as SMPL does: bone i maps a vertex v to D_i (v − h_i − δ_i) + joint_i. The
+rotation channels are those of ``character/animation.py``.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ....solver.body import Body
+from ....solver.rotations import matrix_from_quaternion
+from ...kinematics.axes import R_WORLD_MODEL
+from ..character import armature, body_mesh, bone_display, shape_keys
+from ..character.animation import quaternion_from_matrix, quaternion_product
+from .datablocks import NewDatablocks, found, remove
+
+_LEAST_CHANGE = 0.01  # of a shape coefficient that changes the mesh: less than half a millimetre
+
+
+class LiveBody:
+    """The objects of one live capture; they are created by the first pose, and again if something removes them."""
+
+    def __init__(self, scene: bpy.types.Scene, name: str, body: Body) -> None:
+        self._scene_uid, self._name, self._body = scene.session_uid, name, body
+        self._blocks: set[tuple[str, int]] = set()
+        self._armature = self._mesh = ("", 0)
+        self._betas, self._names = np.zeros(body.P), list[str]()
+
+    @property
+    def armature(self) -> bpy.types.Object | None:
+        """The armature; None if it does not exist, yet or any more."""
+        return found("objects", *self._armature)
+
+    @property
+    def betas(self) -> NDArray[np.float64]:
+        """The shape (P,) that is shown."""
+        return self._betas
+
+    def show(
+        self, rotations: NDArray[np.float64], pelvis: NDArray[np.float64], betas: NDArray[np.floating[Any]]
+    ) -> bool:
+        """Pose the body; return whether it was created for this.
+
+        :param rotations: (K+1, 4) w, x, y, z; the root relative to the world, the others to their parents.
+        :param pelvis: (3,) metres, world.
+        :param betas: (P,) shape coefficients, of which Blender can show ±10.
+        """
+        betas = np.clip(np.asarray(betas, float), -shape_keys.SLIDER_LIMIT, shape_keys.SLIDER_LIMIT)
+        rig, mesh = self.armature, found("objects", *self._mesh)
+        if rig is not None and rig.mode == "EDIT":
+            return False
+        created = False
+        if rig is None or mesh is None or [bone.name for bone in rig.pose.bones] != self._names:
+            rig, mesh = self._create(betas)
+            created = True
+        blocks = mesh.data.shape_keys.key_blocks if mesh.data.shape_keys else ()
+        if np.abs(betas - self._betas).max(initial=0.0) > _LEAST_CHANGE and len(blocks) == len(betas) + 1:
+            self._betas = betas
+            for p, beta in enumerate(betas.tolist()):
+                blocks[p + 1].value = beta  # after Basis
+        values, locations = self._channels(rotations, pelvis)
+        rig.pose.bones.foreach_set("rotation_quaternion", values[self._order].astype(np.float32).ravel())
+        rig.pose.bones.foreach_set("location", locations[self._order].astype(np.float32).ravel())
+        rig.update_tag(refresh={"DATA"})
+        return created
+
+    def rest_at_shape(self) -> None:
+        """Give the armature the rest pose of the shape that is shown, as a capture has it. The pose stays the same."""
+        rig = self.armature
+        if rig is None:
+            return
+        shown, layer = self._shown, bpy.context.view_layer
+        was_active, was_selected = layer.objects.active == rig, rig.select_get(view_layer=layer)
+        rig, _ = self._create(self._betas)
+        rig.select_set(was_selected, view_layer=layer)
+        if was_active:
+            layer.objects.active = rig
+        self.show(*shown, self._betas)
+
+    def remove(self) -> None:
+        """Remove everything that was created, also what redo has brought back."""
+        remove(self._blocks)
+        self._blocks = set()
+        bone_display.remove_if_unused()
+
+    def _create(self, betas: NDArray[np.float64]) -> tuple[bpy.types.Object, bpy.types.Object]:
+        """Create the objects, in place of what is left of former ones."""
+        body, new = self._body, NewDatablocks()
+        remove(self._blocks)
+        scene = next(scene for scene in bpy.data.scenes if scene.session_uid == self._scene_uid)
+        collection = bpy.data.collections.new(self._name)
+        scene.collection.children.link(collection)
+        rest, layer = armature.rest_pose(body, betas), bpy.context.view_layer
+        active = layer.objects.active
+        rig = armature.build_armature(self._name, body, rest, collection)
+        layer.objects.active = active or rig
+        vertices = body_mesh.rest_vertices_world(body, rest.lift)
+        mesh = body_mesh.build_mesh(f"{self._name}_body", body, vertices, collection)
+        bone_display.show_bones(rig, body, rest, body_mesh.rest_vertices_world(body, rest.lift, betas))
+        if body.P:
+            shape_keys.add_shape_keys(mesh, body, betas)
+        body_mesh.skin_to_armature(mesh, rig, body)
+        ring = bpy.data.objects[bone_display.RING]  # which all captures share
+        shared = {("objects", ring.session_uid), ("meshes", ring.data.session_uid)}
+        self._blocks |= new.all() - shared  # former ones stay in it, since redo may bring them back
+        self._armature, self._mesh = (rig.name, rig.session_uid), (mesh.name, mesh.session_uid)
+        self._betas, self._rest_joints, self._head = betas, body.rest_joints(betas), rest.joints[0]
+        self._M = armature.rest_orientations(rig, body)
+        self._names = [bone.name for bone in rig.pose.bones]
+        self._order = np.array([body.joint_names.index(name) for name in self._names])
+        return rig, mesh
+
+    def _channels(
+        self, rotations: NDArray[np.float64], pelvis: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return the quaternions (K+1, 4) and locations (K+1, 3) of the bones, in the order of the joints."""
+        self._shown = rotations, pelvis
+        values = rotations.copy()
+        values[0] = quaternion_product(quaternion_from_matrix(R_WORLD_MODEL.T), rotations[0])
+        C = np.swapaxes(self._M, 1, 2) @ R_WORLD_MODEL
+        values[:, 1:] = np.einsum("kij,kj->ki", C, values[:, 1:])
+        offsets = (self._body.rest_joints(self._betas) - self._rest_joints) @ R_WORLD_MODEL.T
+        turned = R_WORLD_MODEL @ matrix_from_quaternion(rotations) @ R_WORLD_MODEL.T
+        turned[0] = matrix_from_quaternion(rotations[0]) @ R_WORLD_MODEL.T
+        moved = offsets - np.einsum("kij,kj->ki", turned, offsets)
+        locations = np.einsum("kji,kj->ki", self._M, moved)
+        locations[0] = pelvis - turned[0] @ offsets[0] - self._head
+        return values, locations

@@ -1,0 +1,123 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The user's rig, posed as poses come: the retargeting of ``rigs/rig_retarget.py`` for one frame, without keys.
+
+What does not depend on the pose is measured once, by posing the rig at rest. IK controls of a Rigify rig are not posed:
+its limbs are switched to FK.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+import numpy as np
+from mathutils import Matrix
+from numpy.typing import NDArray
+
+from ....solver.body import Body
+from ....solver.rotations import matrix_from_quaternion, quaternion_from_matrix
+from ...edit.clip import Clip
+from ...retarget.bone_map import BoneMap
+from ...retarget.skeleton import basis
+from ...retarget.transfer import Transfer
+from ..character.root_object import parent_transform, topmost
+from ..rigs.rig_action import root_locations
+from ..rigs.rig_probe import SWITCHES, at_rest, probe
+from ..rigs.rig_retarget import RetargetOptions, usable_map
+from .datablocks import found
+
+_LEAST_CHANGE = 0.05  # of a shape coefficient, for which the proportions are compared again
+
+
+class LiveRig:
+    """A rig that follows one live capture."""
+
+    def __init__(
+        self, rig: bpy.types.Object, body: Body, bone_map: BoneMap, options: RetargetOptions | None = None
+    ) -> None:
+        """Measure the rig at rest.
+
+        :param options: of root motion, ``object`` counts as ``bone``.
+        :raises UsageError: when the rig lacks a mapped bone.
+        :raises InputError: when the map cannot be used, or a mapped bone does not move.
+        """
+        self._rig, self._body, self._options = (rig.name, rig.session_uid), body, options or RetargetOptions()
+        self._map = usable_map(None, body, rig, bone_map)
+        self._before = [
+            (bone.name, bone.matrix_basis.copy(), {name: bone[name] for name in SWITCHES if name in bone})
+            for bone in rig.pose.bones
+        ]
+        self._position = rig.data.pose_position
+        try:
+            with at_rest(rig):
+                self._skeleton, place = probe(rig, self._map.parts), np.array(rig.matrix_world, float)
+        except BaseException:
+            self.restore()
+            raise
+        rig.data.pose_position = "POSE"
+        self._root = self._skeleton.names.index(self._map.bone("pelvis") or "")
+        # The pose is one in the world, so the parent's transform is cancelled.
+        self._inverse = np.array(parent_transform(topmost(rig)).inverted_safe(), float)
+        self._turn = self._inverse[:3, :3] / np.cbrt(np.linalg.det(self._inverse[:3, :3]))
+        # The location channel is linear in the head's offset. Nothing is inverted for each pose: LAPACK's threads wait.
+        self._rest = self._skeleton.heads[self._root]
+        self._location = root_locations(rig, place, self._skeleton, self._root, self._rest + np.eye(3))
+        self._transfer: Transfer | None = None
+        self._betas = np.full(body.P, np.nan)
+
+    @property
+    def rig(self) -> bpy.types.Object | None:
+        """The rig; None if it was removed."""
+        return found("objects", *self._rig)
+
+    def show(
+        self, rotations: NDArray[np.float64], pelvis: NDArray[np.float64], betas: NDArray[np.floating[Any]]
+    ) -> None:
+        """Pose the rig.
+
+        :param rotations: (K+1, 4) w, x, y, z; the root relative to the world, the others to their parents.
+        :param pelvis: (3,) metres, world.
+        :param betas: (P,) shape coefficients.
+        """
+        rig = self.rig
+        if rig is None:
+            return
+        if self._transfer is None or np.abs(betas - self._betas).max(initial=0.0) > _LEAST_CHANGE:
+            self._betas = np.array(betas, float)
+            self._transfer = Transfer(self._body, self._betas, self._skeleton, self._map, feet=self._options.feet)
+        clip = Clip(np.zeros(1), matrix_from_quaternion(rotations)[None], pelvis[None])
+        pose = self._transfer.pose(clip)
+        heads = pose.heads[:, self._root] + self._options.offset
+        if self._options.root == "in-place":
+            heads[:, :2] = self._rest[:2]
+        heads = heads @ self._inverse[:3, :3].T + self._inverse[:3, 3]
+        turns = basis(self._skeleton, self._turn @ pose.rotations)[0]
+        location = (heads[0] - self._rest) @ self._location
+        quaternions = quaternion_from_matrix(turns).tolist()
+        bones = rig.pose.bones
+        for name, turned, quaternion in zip(self._skeleton.names, turns, quaternions, strict=True):
+            bone = bones.get(name)
+            if bone is None:
+                continue
+            if bone.rotation_mode == "QUATERNION":
+                bone.rotation_quaternion = quaternion
+            else:
+                place = bone.location.copy()
+                bone.matrix_basis = Matrix(turned.tolist()).to_4x4()  # in the bone's own rotation mode
+                bone.location = place
+        if (root := bones.get(self._skeleton.names[self._root])) is not None:
+            root.location = location.tolist()
+
+    def restore(self) -> None:
+        """Give the rig the pose from before."""
+        rig = self.rig
+        if rig is None:
+            return
+        rig.data.pose_position = self._position
+        for name, matrix, switches in self._before:
+            bone = rig.pose.bones.get(name)
+            if bone is not None:
+                bone.matrix_basis = matrix
+                for switch, value in switches.items():
+                    bone[switch] = value
+        rig.update_tag(refresh={"DATA"})

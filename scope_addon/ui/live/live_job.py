@@ -1,0 +1,254 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A live capture, from the button to the last pose or the recorded keys. ``step`` never waits for the worker.
+
+The modal operator calls ``step`` on a timer; tests call it in a loop.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import bpy
+
+from ....solver.body import Body
+from ....solver.loaders.body_file import load_body
+from ...errors import OfflineError, UsageError, VideoError
+from ...footage import shown
+from ...job.live.process import LiveProcess, ShownPose
+from ...job.live.request import LiveRequest
+from ...job.process import START_SCRIPT
+from ...options import Place, options_at
+from ...scene.live.live_body import LiveBody
+from ...scene.live.live_rig import LiveRig
+from ...scene.live.scene_before import SceneBefore, select_only
+from ...scene.local_scene import check_local
+from ...scene.rigs.rig_retarget import guess_bone_map
+from ...scene.visibility import hide
+from ..capture.capture_job import build_capture, build_options, chosen_values, window_shows
+from ..preferences import cache
+from ..retarget.bone_list import listed_map
+from ..retarget.retarget_operators import retarget_options, retarget_to_chosen_rig
+from .stream_logins import with_login
+
+NOTICE_S = 1.0  # for which poses that were under way when a notice came do not end it
+QUIET_S = 2.0  # without a pose, after which the panel says so
+_WRITING_S = 60.0  # for which the recording is waited for
+
+
+@dataclass
+class LiveStatus:
+    """What the panel shows."""
+
+    presence: str = ""  # as in `ShownPose`; empty before the first picture
+    rate: float = 0.0  # poses per second
+    latency_ms: float = 0.0
+    dropped: int = 0
+    received: int = 0
+    recorded_s: float = 0.0
+    notice: str = ""  # why nothing comes from the source
+
+
+class LiveJob:
+    """A live capture for one scene, with the current settings of the scene."""
+
+    def __init__(self, scene: bpy.types.Scene, python: Sequence[str] = ()) -> None:
+        """Start the process.
+
+        :param python: its interpreter and arguments; if empty, Blender's own.
+        :raises ScopeError: a setting is invalid, or the process cannot be started.
+        """
+        check_local(scene)
+        self.status = LiveStatus()
+        self.recording = self.finishing = self.cancelled = False
+        self.warnings: list[str] = []  # of the retargeting of a recording
+        self.poses = 0  # shown so far
+        self._scene_uid = scene.session_uid
+        self._request = live_request(scene)
+        self._is_stream = scene.scope_live.source == "STREAM"
+        self._footage = self._request.source if scene.scope_live.source == "FILE" else ""
+        self._scene_body = load_body(self._request.values["body"])
+        self._body = LiveBody(scene, "Live", self._scene_body)
+        self._before = SceneBefore()
+        self._rig = live_rig(scene, self._scene_body) if scene.scope_live.with_rig else None
+        self._last_pose_s = self._notice_s = self._stopped_s = time.monotonic()
+        self.created = self._was_created = False  # whether the last step, or one before, created the body
+        # Blender 4.2 has no such attribute; its Python is isolated as well.
+        python = python or [sys.executable, *getattr(bpy.app, "python_args", ("-I",))]
+        folders = cache()
+        self._worker = LiveProcess(self._request, folders.new_job_folder(), folders.kernels, python, START_SCRIPT)
+
+    @property
+    def worker(self) -> LiveProcess:
+        """The process."""
+        return self._worker
+
+    @property
+    def has_body(self) -> bool:
+        """Whether somebody was seen so far."""
+        return self._body.armature is not None
+
+    @property
+    def quiet_s(self) -> float:
+        """Seconds since the last pose; 0 while poses come."""
+        seconds = time.monotonic() - self._last_pose_s
+        return seconds if seconds > QUIET_S and self.status.presence else 0.0
+
+    def record(self) -> None:
+        """Keep the poses from now on, for ``stop``."""
+        self.recording = True
+        self._worker.record()
+
+    def stop(self) -> None:
+        """End the capture; ``step`` returns False when all is done. Without a recording, the last pose stays."""
+        self.finishing, self._stopped_s = True, time.monotonic()
+        if self.recording:
+            self._worker.stop()
+        else:
+            self._worker.close()
+
+    def cancel(self) -> None:
+        """End the process, and remove what was created."""
+        self.cancelled = True
+        self.close()
+        self._body.remove()
+        if self._rig is not None:
+            self._rig.restore()
+        self._before.restore()
+
+    def close(self) -> None:
+        """End the process in any state, without leaving a file behind; the scene stays as it is."""
+        self._worker.close()
+
+    def step(self) -> bool:
+        """Continue as far as possible without waiting; return False at the end.
+
+        :raises ScopeError: the capture failed; what it created is removed.
+        """
+        try:
+            return self._step()
+        except BaseException:
+            self.cancel()
+            raise
+
+    def _step(self) -> bool:
+        self.created = False
+        scene = next((s for s in bpy.data.scenes if s.session_uid == self._scene_uid), None)
+        if scene is None:
+            raise UsageError("the scene was removed during the live capture; start in another scene")
+        if self.finishing and not self.recording:
+            self._leave_pose(scene)
+            return False
+        if self._is_stream and not bpy.app.online_access:
+            raise OfflineError
+        result = self._listen()
+        pose = None if self.finishing else self._worker.newest_pose(self._scene_body.K + 1, self._scene_body.P)
+        if pose is not None:
+            self._show(scene, pose)
+        if result is None:
+            if self.finishing and time.monotonic() - self._stopped_s > _WRITING_S:
+                raise UsageError("the recording was not written in time; record again")
+            return True
+        self._build(scene, result)
+        return False
+
+    def _listen(self) -> dict[str, Any] | None:
+        """Read the messages; return the recording's, once there is one."""
+        for message in self._worker.poll():
+            if message["event"] == "status":
+                for name in ("presence", "rate", "latency_ms", "dropped", "received", "recorded_s"):
+                    setattr(self.status, name, message[name])
+            elif message["event"] == "notice":
+                self.status.notice, self._notice_s = shown(message["text"]), time.monotonic()
+            elif message["event"] == "ended":  # the source has, and nothing was recorded
+                self.stop()
+            elif message["event"] == "result":
+                return message
+        return None
+
+    def _show(self, scene: bpy.types.Scene, pose: ShownPose) -> None:
+        self.poses += 1
+        self._last_pose_s = time.monotonic()
+        self.status.presence = pose.presence
+        if self.status.notice and self._last_pose_s - self._notice_s > NOTICE_S:
+            self.status.notice = ""
+        if bpy.context.scene == scene:  # in another one nobody sees it
+            created = self._body.show(pose.rotations, pose.pelvis, pose.betas)
+            self.created, self._was_created = created and not self._was_created, True
+            if self.created:
+                select_only(bpy.context.view_layer, self._body.armature)
+            if self._rig is not None:
+                if created and scene.scope_retarget.captured == "hide":
+                    hide(self._body.armature, bpy.context.view_layer)
+                self._rig.show(pose.rotations, pose.pelvis, self._body.betas)
+
+    def _leave_pose(self, scene: bpy.types.Scene) -> None:
+        """Leave the last pose, on an armature at rest in the shape that was estimated last."""
+        with window_shows(scene):
+            self._body.rest_at_shape()
+            armature = self._body.armature
+            if self._rig is not None and armature is not None and scene.scope_retarget.captured == "hide":
+                hide(armature, bpy.context.view_layer)
+
+    def _build(self, scene: bpy.types.Scene, result: dict[str, Any]) -> None:
+        """Write the recording's keys, as a capture of footage does, and remove the body that followed."""
+        self._worker.wait(1.0)
+        paths = [self._worker.job_folder / Path(name).name for name in result["motions"]]
+        contents = [(path, path.read_bytes()) for path in paths]
+        body, options = self._request.values["body"], build_options(scene)
+        built = build_capture(scene, contents, body, self._footage, result["report"], options)
+        self._body.remove()
+        if self._rig is not None and self._rig.rig is not None:
+            self._rig.restore()
+            with window_shows(scene):
+                self.warnings = retarget_to_chosen_rig(bpy.context, built.people[0].armature).warnings
+        self._worker.close()
+
+
+def live_rig(scene: bpy.types.Scene, body: Body) -> LiveRig:
+    """Prepare the rig of the Retarget section.
+
+    :raises ScopeError: there is none, or it cannot be used.
+    """
+    settings = scene.scope_retarget
+    if settings.rig is None or settings.rig.name not in bpy.context.view_layer.objects:
+        raise UsageError("no rig is chosen that is in the scene's view layer; choose one, or switch off Rig")
+    if settings.rig.library is not None:
+        raise UsageError(f"'{settings.rig.name}' is linked; make an override of it, or switch off Rig")
+    bones = listed_map(settings) if len(settings.pairs) else guess_bone_map(settings.rig)
+    return LiveRig(settings.rig, body, bones, retarget_options(settings))
+
+
+def live_request(scene: bpy.types.Scene) -> LiveRequest:
+    """Make the request to the worker from the scene's settings and the preferences.
+
+    :raises UsageError: no source or body file is chosen, or the source is a stream, and Blender is not to go online.
+    :raises VideoError: the video does not exist.
+    """
+    settings = scene.scope_live
+    online = False
+    if settings.source == "FILE":
+        if not settings.file:
+            raise UsageError("no video is chosen; choose one first")
+        source = bpy.path.abspath(settings.file)
+        if not Path(source).is_file():
+            raise VideoError(f"{source} does not exist; choose the video again")
+    elif settings.source == "STREAM":
+        source = settings.stream.strip()
+        if "://" not in source:
+            raise UsageError("no stream is given; enter its address, such as rtsp://192.168.1.20/stream")
+        if not bpy.app.online_access:
+            raise OfflineError
+        online, source = True, with_login(source)
+    else:
+        source = settings.camera.strip()
+        if not (source.isdecimal() and len(source) <= 3) and not source.startswith("/dev/video"):
+            raise UsageError(f"'{source}' is no camera; enter its number, 0 for the first")
+    names = {option.name for option in options_at(Place.LIVE_WORKER)}
+    values = {name: value for name, value in chosen_values(scene).items() if name in names}
+    values["heights_m"] = values["heights_m"][:1]
+    return LiveRequest(source, online=online, **values, live_quality=settings.quality.lower())

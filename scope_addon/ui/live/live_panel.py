@@ -1,0 +1,80 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The panel of live captures."""
+
+from __future__ import annotations
+
+import bpy
+
+from ..capture.capture_panel import Tab, draw_text
+from ..reporting import iface_
+from .live_state import state
+
+
+class SCOPE_PT_live(Tab, bpy.types.Panel):
+    """Source, buttons and state of live captures."""
+
+    bl_idname = "SCOPE_PT_live"
+    bl_label = "Live"
+    bl_order = 1
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Draw the panel."""
+        layout, settings, job = self.layout, context.scene.scope_live, state.job
+        column = layout.column()
+        column.enabled = job is None
+        column.row(align=True).prop(settings, "source", expand=True)
+        if settings.source == "CAMERA":
+            column.prop(settings, "camera", icon="CAMERA_DATA")
+        elif settings.source == "STREAM":
+            column.prop(settings, "stream", text="", icon="URL")
+        else:
+            column.prop(settings, "file", text="", icon="FILE_MOVIE")
+        column.row(align=True).prop(settings, "quality", expand=True)
+        _draw_rig(column, context)
+        row = layout.row(align=True)
+        row.scale_y = 1.6
+        if job is None:
+            row.operator("scope.live", icon="PLAY")
+        else:
+            text = "Recording" if job.recording else "Record"
+            row.operator("scope.record_live", text=text, icon="REC", depress=job.recording)
+            row.operator("scope.stop_live", icon="SNAP_FACE")
+            row.operator("scope.cancel_live", text="", icon="CANCEL")
+            _draw_status(context, layout)
+        if state.message and state.scene_uid == context.scene.session_uid:
+            draw_text(context, layout.box(), state.message, "ERROR")
+
+
+def _draw_rig(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    settings = context.scene.scope_live
+    row = layout.row(align=True)
+    row.prop(settings, "with_rig")
+    if settings.with_rig:
+        row.prop(context.scene.scope_retarget, "rig", text="")
+
+
+def _draw_status(context: bpy.types.Context, layout: bpy.types.UILayout) -> None:
+    job = state.job
+    assert job is not None
+    status = job.status
+    if job.finishing:
+        draw_text(context, layout, iface_("Writing the recording"))
+    elif status.notice:
+        draw_text(context, layout.box(), status.notice, "ERROR")
+    elif not status.presence:
+        draw_text(context, layout, iface_("Waiting for the source"))
+    elif job.quiet_s:
+        text = iface_("Nothing has come from the source for {seconds:.0f} s", seconds=job.quiet_s)
+        draw_text(context, layout.box(), text, "ERROR")
+    else:
+        said = iface_("{rate:.0f} poses/s, latency {latency:.0f} ms", rate=status.rate, latency=status.latency_ms)
+        draw_text(context, layout, said)
+        if status.presence != "seen":
+            text = iface_("Nobody is seen" if status.presence == "lost" else "Not seen for a moment")
+            draw_text(context, layout, text, "INFO")
+    if job.recording:
+        draw_text(context, layout, iface_("Recorded: {seconds:.1f} s", seconds=status.recorded_s), "REC")
+
+
+CLASSES = (SCOPE_PT_live,)

@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The settings of live captures, stored with the scene."""
+
+from __future__ import annotations
+
+import bpy
+from bpy.props import BoolProperty, EnumProperty, PointerProperty, StringProperty
+
+from ...options import Place
+from ..declared_properties import PATH_OPTIONS, with_options
+from .live_state import state
+from .stream_logins import take_login
+
+
+def _forget_message(_settings: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
+    """Clear the error message, which was about another source."""
+    state.message = ""
+
+
+def _keep_login(settings: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
+    """Take name and password out of the address, so that no .blend file contains them."""
+    state.message = ""
+    address = take_login(settings.stream)
+    if address != settings.stream:
+        settings.stream = address
+
+
+@with_options(Place.LIVE_PANEL)
+class SCOPE_PG_live(bpy.types.PropertyGroup):
+    """The settings of live captures: the source, and the declared options."""
+
+    source: EnumProperty(
+        name="Source",
+        items=(
+            ("CAMERA", "Camera", "A camera of this computer", 0),
+            ("STREAM", "Stream", "A network camera or another stream", 1),
+            ("FILE", "File", "A video that is played in real time", 2),
+        ),
+        default="CAMERA",
+        options=set(),
+        update=_forget_message,
+        description="Where the pictures come from",
+    )
+    camera: StringProperty(
+        name="Camera",
+        default="0",
+        options=set(),
+        update=_forget_message,
+        description="Number of the camera, 0 for the first; on Linux also its device, such as /dev/video2",
+    )
+    stream: StringProperty(
+        name="Address",
+        options=set(),
+        update=_keep_login,
+        description="Address of the stream, such as rtsp://192.168.1.20/stream; name and password in it are kept until "
+        "Blender ends, and never saved",
+    )
+    file: StringProperty(
+        name="Video",
+        subtype="FILE_PATH",
+        options=PATH_OPTIONS,
+        update=_forget_message,
+        description="Video of a person, which is played in real time",
+    )
+    with_rig: BoolProperty(
+        name="Rig Follows",
+        default=False,
+        options=set(),
+        description="Let the rig of the Retarget section follow as well",
+    )
+
+
+CLASSES = (SCOPE_PG_live,)
+
+
+def attach() -> None:
+    """Add the settings to every scene."""
+    bpy.types.Scene.scope_live = PointerProperty(type=SCOPE_PG_live)
+
+
+def detach() -> None:
+    """Remove the settings."""
+    del bpy.types.Scene.scope_live

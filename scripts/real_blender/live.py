@@ -1,0 +1,280 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Live captures of a network camera in a Blender with a window: start, record, stop, undo, save, reopen, trouble.
+
+Usage: ``blender --python live.py -- VIDEO OUT_FOLDER``
+"""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parent))
+from session import OUT, addon, inventory, invoke, key, picture, run, show_tab, until, use
+
+OVER_PANEL = (1174, 300)
+ADDRESS, PORT = "http://127.0.0.1:8099/video", "8099"
+SAVED = OUT / "live.blend"
+MEASURED_S, RECORDED_S, GONE_S = 3.0, 5.0, 1.0
+report: dict = {}
+
+
+def module(name: str):
+    """Return a module of the extension's interface."""
+    return sys.modules[addon().__name__.replace("capture.capture_operators", name)]
+
+
+def state():
+    """Return the state of live captures."""
+    return module("live.live_state").state
+
+
+def camera() -> subprocess.Popen:
+    """Start the network camera."""
+    script = str(Path(__file__).with_name("mjpeg_camera.py"))
+    return subprocess.Popen([sys.executable, script, "/scope/pictures", PORT])
+
+
+def begin() -> None:
+    """Press Start."""
+    assert use(bpy.ops.scope.live, "INVOKE_DEFAULT") == {"RUNNING_MODAL"}, state().message
+
+
+def start() -> Iterator[float]:
+    """Press Start, and wait until the body follows."""
+    begin()
+    yield from until(lambda: state().job is None or state().job.has_body, 300, "the first pose")
+    assert state().job is not None, state().message
+
+
+def gone(worker, what: str) -> Iterator[float]:
+    """Check that a process ends within a second."""
+    began = time.monotonic()
+    yield from until(lambda: not worker.alive, GONE_S, f"the process to end after {what}")
+    report.setdefault("gone_s", {})[what] = round(time.monotonic() - began, 2)
+    assert not worker.job_folder.exists() or state().job is not None, f"{worker.job_folder} is left after {what}"
+
+
+def moving() -> Iterator[float]:
+    """Check that the body moves."""
+    seen = []
+    for _ in range(3):
+        yield from until(lambda: state().job.has_body, 5, "the body")
+        body = state().job._body.armature
+        seen.append(tuple(body.pose.bones["left_hip"].rotation_quaternion))
+        before = state().job.poses
+        yield from until(lambda before=before: state().job.poses > before, 5, "another pose")
+    assert len(set(seen)) == 3, seen
+
+
+def measured(seconds: float) -> Iterator[float]:
+    """Measure the timer's gaps and the steps of the running capture, without and with a new pose."""
+    job, steps, gaps = state().job, [], []
+    original = job.step
+
+    def step() -> bool:
+        before, began = job.poses, time.perf_counter()
+        running = original()
+        if job.poses != before:
+            steps.append(time.perf_counter() - began)
+        return running
+
+    job.step = step
+    poses, began = job.poses, time.monotonic()
+    last = began
+    while last - began < seconds:
+        yield 0.005
+        now = time.monotonic()
+        gaps.append(now - last)
+        last = now
+    job.step = original
+    for name, values in (("timer_gap_ms", gaps), ("apply_ms", steps)):
+        shares = np.percentile(1e3 * np.array(values), [50, 99, 100])
+        report[name] = dict(zip(("median", "p99", "largest"), np.round(shares, 2).tolist(), strict=True))
+    report["poses_shown_per_second"] = round((job.poses - poses) / (last - began), 1)
+    report["status"] = vars(job.status)
+
+
+def redrawn(seconds: float) -> Iterator[float]:
+    """Measure the timer's gaps while the window draws a moving body, without a live capture."""
+    bone, gaps, last = bpy.context.object.pose.bones["left_hip"], [], time.monotonic()
+    while sum(gaps) < seconds:
+        bone.rotation_quaternion.x += 0.01
+        yield 0.005
+        now = time.monotonic()
+        gaps.append(now - last)
+        last = now
+    shares = np.percentile(1e3 * np.array(gaps), [50, 99, 100])
+    report["drawing_gap_ms"] = dict(zip(("median", "p99", "largest"), np.round(shares, 2).tolist(), strict=True))
+
+
+def captures() -> list[bpy.types.Collection]:
+    """Return the captures of the file."""
+    return [collection for collection in bpy.data.collections if "scope_capture" in collection]
+
+
+def prepared() -> Iterator[float]:
+    """Open the panel, and be refused while Blender may not go online."""
+    panel = next(p for p in bpy.types.Panel.__subclasses__() if p.__name__ == "SCOPE_PT_live")
+    bpy.utils.unregister_class(panel)
+    panel.bl_options = set()
+    bpy.utils.register_class(panel)
+    show_tab()
+    yield 1.0
+    show_tab()
+    settings = bpy.context.scene.scope_live
+    settings.source, settings.stream = "STREAM", ADDRESS.replace("//", "//me:secret@")
+    assert settings.stream == ADDRESS, settings.stream
+    bpy.context.preferences.system.use_online_access = False
+    try:
+        use(bpy.ops.scope.live, "INVOKE_DEFAULT")
+    except RuntimeError as error:
+        report["offline"] = str(error).strip()
+    assert "Online Access" in report["offline"]
+    assert state().job is None
+    yield 0.5
+    picture("20_live_offline")
+    bpy.context.preferences.system.use_online_access = True
+    use(bpy.ops.ed.undo_push, message="Prepared")
+
+
+def followed() -> Iterator[float]:
+    """Start, change the scene and undo it while live, and redo it."""
+    yield from start()
+    yield from moving()
+    yield 1.0
+    picture("21_live")
+    yield from measured(MEASURED_S)
+    use(bpy.ops.object.empty_add)
+    yield 0.3
+    for operator in (bpy.ops.ed.undo, bpy.ops.ed.redo, bpy.ops.ed.undo):
+        invoke(operator)
+        yield from moving()
+    report["undone_while_live"] = "the body follows"
+
+
+def interrupted(server: subprocess.Popen) -> Iterator[float]:
+    """Kill the camera, see what the panel says, and start it again."""
+    server.kill()
+    server.wait()
+    yield from until(lambda: state().job.status.notice, 10, "a sentence about the interruption")
+    yield 0.5
+    report["interrupted"] = state().job.status.notice
+    picture("22_live_interrupted")
+
+
+def cancelled(before: dict) -> Iterator[float]:
+    """Press Escape over the panel."""
+    worker = state().job.worker
+    key("Escape", OVER_PANEL)
+    yield from gone(worker, "Escape")
+    yield from until(lambda: state().job is None, 10, "the end")
+    assert inventory() == before, (inventory(), before)
+
+
+def recorded() -> Iterator[float]:
+    """Save while live, record, stop, undo and redo."""
+    yield from start()
+    bpy.ops.wm.save_as_mainfile(filepath=str(SAVED))
+    assert b"secret" not in SAVED.read_bytes()
+    yield from moving()
+    use(bpy.ops.scope.record_live)
+    began = time.monotonic()
+    yield RECORDED_S
+    picture("23_live_recording")
+    worker, recorded_s, began = state().job.worker, time.monotonic() - began, time.monotonic()
+    use(bpy.ops.scope.stop_live)
+    yield from until(lambda: not worker.alive, 30, "the recording")
+    report["recorded_and_gone_s"] = round(time.monotonic() - began, 2)
+    yield from until(lambda: state().job is None, 10, "the keys")
+    assert len(captures()) == 1, state().message
+    person = next(o for o in captures()[0].all_objects if o.type == "ARMATURE")
+    assert "scope_motion" in person
+    assert person.pose.bones["head"].custom_shape is not None
+    first, last = person.animation_data.action.frame_range
+    report["recorded_s"] = (last - first) / bpy.context.scene.render.fps
+    assert 0.5 * recorded_s < report["recorded_s"] < recorded_s + 1.0, (report["recorded_s"], recorded_s)
+    yield 0.5
+    picture("24_live_recorded")
+    invoke(bpy.ops.ed.undo)
+    yield 0.5
+    assert not captures(), "one undo does not remove the recording"
+    invoke(bpy.ops.ed.redo)
+    yield 0.5
+    assert len(captures()) == 1, "redo does not bring it back"
+    use(bpy.ops.scope.smooth, strength=2.5)
+
+
+def reopened() -> Iterator[float]:
+    """Open the file that was saved while live, while live again."""
+    begin()
+    yield 0.5
+    worker = state().job.worker
+    assert worker.alive
+    bpy.ops.wm.open_mainfile(filepath=str(SAVED))
+    yield from gone(worker, "opening a file")
+    assert state().job is None, "a live capture survived another file"
+    assert not captures()
+    assert "Live" in bpy.data.objects
+    assert bpy.context.scene.scope_live.stream == ADDRESS
+
+
+def stopped() -> Iterator[float]:
+    """Stop without a recording: the last pose stays, and undo removes it."""
+    before = inventory()
+    yield from start()
+    yield 0.5
+    worker = state().job.worker
+    use(bpy.ops.scope.stop_live)
+    yield from gone(worker, "Stop")
+    yield from until(lambda: state().job is None, 10, "the end")
+    assert inventory() != before
+    yield 0.5
+    picture("25_live_stopped")
+    yield from redrawn(2.0)
+    invoke(bpy.ops.ed.undo)
+    yield 0.5
+    assert inventory() == before, (inventory(), before)
+
+
+def disabled() -> Iterator[float]:
+    """Disable the extension while live."""
+    begin()
+    yield 0.5
+    worker = state().job.worker
+    assert worker.alive
+    name = next(a.module for a in bpy.context.preferences.addons if a.module.endswith(".scope"))
+    bpy.ops.preferences.addon_disable(module=name)
+    began = time.monotonic()
+    yield from until(lambda: not worker.alive, GONE_S, "the process to end after disabling")
+    report["gone_s"]["disabling"] = round(time.monotonic() - began, 2)
+
+
+def steps() -> Iterator[float]:
+    """Run the session; yield the seconds to wait before each next step."""
+    yield from prepared()
+    server = camera()
+    yield 1.0
+    before = inventory()
+    yield from followed()
+    yield from interrupted(server)
+    server = camera()
+    yield from until(lambda: not state().job.status.notice, 15, "the camera to come back")
+    yield from moving()
+    yield from cancelled(before)
+    yield from recorded()
+    yield from reopened()
+    yield from stopped()
+    yield from disabled()
+    server.kill()
+    (OUT / "live.json").write_text(json.dumps(report))
+
+
+run(steps())

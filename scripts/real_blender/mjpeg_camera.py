@@ -1,0 +1,55 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A network camera on this computer: JPEG pictures at 30 per second, again and again.
+
+Usage: ``mjpeg_camera.py FOLDER PORT``
+"""
+
+from __future__ import annotations
+
+import fcntl
+import itertools
+import socket
+import struct
+import sys
+import time
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
+
+RATE = 30.0
+_SET_FLAGS, _UP_AND_RUNNING = 0x8914, 0x41  # of Linux
+
+
+def enable_loopback() -> None:
+    """Switch on the loopback interface, which is off in the new network of a part."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as any_socket:
+        fcntl.ioctl(any_socket, _SET_FLAGS, struct.pack("16sh14x", b"lo", _UP_AND_RUNNING))
+
+
+def main(folder: str, port: str) -> None:
+    """Serve until the process is ended."""
+    pictures = [path.read_bytes() for path in sorted(Path(folder).glob("*.jpg"))]
+
+    class Camera(BaseHTTPRequestHandler):
+        def do_GET(self) -> None:
+            """Send pictures until the client leaves."""
+            self.send_response(200)
+            self.send_header("Content-Type", "multipart/x-mixed-replace; boundary=frame")
+            self.end_headers()
+            began = time.monotonic()
+            try:
+                for index, picture in enumerate(itertools.cycle(pictures)):
+                    head = f"--frame\r\nContent-Type: image/jpeg\r\nContent-Length: {len(picture)}\r\n\r\n"
+                    self.wfile.write(head.encode() + picture + b"\r\n")
+                    time.sleep(max(0.0, began + index / RATE - time.monotonic()))
+            except OSError:
+                return
+
+        def log_message(self, *_: object) -> None:
+            """Say nothing."""
+
+    enable_loopback()
+    ThreadingHTTPServer(("127.0.0.1", int(port)), Camera).serve_forever()
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The real process of a live capture: poses of a playing video, a recording of them, and refused streams."""
+
+import sys
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scope.scope_addon.errors import VideoError
+from scope.scope_addon.job.live.capture import MOTION, _Recorder, capture_live
+from scope.scope_addon.job.live.commands import RECORD, Commands
+from scope.scope_addon.job.live.process import LiveProcess
+from scope.scope_addon.job.live.request import LiveRequest
+from scope.scope_addon.job.messages import WorkerFailedError
+from scope.scope_addon.job.process import START_SCRIPT
+from scope.scope_addon.motion import Motion
+
+from ...live.fake_source import FakeSource
+from ...live.outputs.test_vmc import pose_of
+from ..processes import wait_for
+
+SAMPLE = str(START_SCRIPT.parents[2] / "assets" / "sample" / "sample.mp4")
+
+
+@pytest.fixture
+def folder(tmp_path):
+    (tmp_path / "job").mkdir()
+    return tmp_path / "job"
+
+
+def test_what_is_recorded_is_what_was_shown(folder, networks, body):
+    live = LiveProcess(LiveRequest(SAMPLE, reconnect_s=0.0), folder, None, [sys.executable, "-I"])
+    live.record()
+    poses, result = [], []
+
+    def step():
+        result.extend(m for m in live.poll() if m["event"] == "result")
+        if (pose := live.newest_pose(body.K + 1, body.P)) is not None:
+            poses.append(pose)
+            if len(poses) == 8:
+                live.stop()
+        return result
+
+    wait_for(step, 120)
+    wait_for(lambda: not live.alive, 30)
+    assert result[0]["motions"] == [MOTION]
+    motion = Motion.load(folder / MOTION)
+    live.close()
+    assert motion.frames[0] <= poses[0].frame
+    rows = {frame: row for row, frame in enumerate(motion.frames)}
+    compared = [pose for pose in poses if pose.presence == "seen" and pose.frame in rows]
+    assert compared
+    for pose in compared:
+        pelvis = body.rest_joints(motion.betas)[0] + motion.trans[rows[pose.frame]]
+        np.testing.assert_allclose(pelvis, pose.pelvis, atol=0.002)
+
+
+def test_a_recording_begins_when_it_is_asked_for(folder, body):
+    commands = Commands()
+    recorder = _Recorder(folder / MOTION, body, FakeSource(), commands)
+    session = SimpleNamespace(camera=None)
+    recorder.begin(session, (640, 480))
+    recorder.send(pose_of(body), 0.0)
+    assert recorder.recording is None
+    commands.hear(RECORD)
+    for time_s in (1.0, 1.5):
+        recorder.send(replace(pose_of(body), timestamp_s=time_s), 0.0)
+    assert recorder.recording.seconds == 0.5
+
+
+def test_a_stream_is_refused_without_the_network(folder):
+    request = LiveRequest("rtsp://127.0.0.1:1/video")
+    with pytest.raises(VideoError, match="Allow Online Access"):
+        capture_live(request, folder, lambda *_, **__: None, Commands())
+
+
+def test_a_source_that_is_not_there_is_an_error_of_one_sentence(folder):
+    live = LiveProcess(LiveRequest("nowhere.mp4"), folder, None, [sys.executable, "-I"])
+    with pytest.raises(WorkerFailedError, match=r"nowhere\.mp4"):
+        wait_for(lambda: live.poll() and False, 60)
+    live.close()
+    assert not folder.exists()

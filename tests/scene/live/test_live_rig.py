@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A rig that follows is posed as the same frame of a retargeted capture, and can be given its pose back."""
+
+import bpy
+import numpy as np
+import pytest
+from mathutils import Matrix
+from scope.scope_addon.errors import UsageError
+from scope.scope_addon.scene.live.live_rig import LiveRig
+from scope.scope_addon.scene.rigs.rig_retarget import RetargetOptions, guess_bone_map, retarget
+from scope.solver.rotations import exp, quaternion_from_matrix
+
+from ...edit.walking import BODY, RATE, motion_of, walk
+from ..made_rigs import FRAMES, build_rig, captured, seen
+
+
+@pytest.mark.parametrize("options", [RetargetOptions(offset=(1.5, 0, 0)), RetargetOptions(False, "in-place")])
+def test_the_pose_is_that_of_the_retargeted_frame(options):
+    motion = motion_of(walk(2.0))
+    rig, bones = build_rig("mixamo")
+    bone_map = guess_bone_map(rig)
+    live, followed = LiveRig(rig, BODY, bone_map, options), []
+    for frame in FRAMES:
+        rotations = exp(motion.poses[frame - 1].reshape(-1, 3).astype(float))
+        pelvis = BODY.rest_joints(motion.betas)[0] + motion.trans[frame - 1]
+        live.show(quaternion_from_matrix(rotations), pelvis, motion.betas)
+        posed = rig.evaluated_get(bpy.context.evaluated_depsgraph_get())
+        followed.append([np.array(posed.matrix_world @ posed.pose.bones[name].head) for name in bones.values()])
+    retarget(captured(motion), BODY, np.zeros(BODY.P), rig, bone_map, RATE, options)
+    # The pelvis is lowered smoothly in time for stretched legs, and without the later frames a little differently.
+    np.testing.assert_allclose(followed, seen(rig, bones.values()), atol=0.002)
+
+
+def test_the_pose_and_the_parent_from_before_are_kept():
+    rig, bones = build_rig("unreal")
+    parent = bpy.data.objects.new("parent", None)
+    bpy.context.scene.collection.objects.link(parent)
+    parent.matrix_world = Matrix.Translation((3, 4, 0)) @ Matrix.Rotation(1.0, 4, "Z")
+    rig.parent = parent
+    first = rig.pose.bones[0]
+    first.location = (0.1, 0.2, 0.3)
+    before = [bone.matrix_basis.copy() for bone in rig.pose.bones]
+    live = LiveRig(rig, BODY, guess_bone_map(rig))
+    assert [bone.matrix_basis for bone in rig.pose.bones] == before
+    pelvis = np.array([0.5, 0.5, 0.9])
+    upright = quaternion_from_matrix(exp(np.array([[np.pi / 2, 0, 0], *np.zeros((23, 3))])))
+    live.show(upright, pelvis, np.zeros(BODY.P))
+    bpy.context.view_layer.update()
+    assert [bone.matrix_basis for bone in rig.pose.bones] != before
+    head = rig.matrix_world @ rig.pose.bones[bones["pelvis"]].head
+    assert abs(head.x) < 1.0  # where the body is, rather than where the parent is
+    live.restore()
+    np.testing.assert_allclose([bone.matrix_basis for bone in rig.pose.bones], before, atol=1e-5)
+    assert rig.parent == parent
+
+
+def test_a_removed_rig_is_left_out():
+    rig, _ = build_rig("unity")
+    live = LiveRig(rig, BODY, guess_bone_map(rig))
+    bpy.data.objects.remove(rig)
+    assert live.rig is None
+    live.show(np.tile([1.0, 0, 0, 0], (24, 1)), np.zeros(3), np.zeros(BODY.P))
+    live.restore()
+
+
+def test_a_missing_bone_is_an_error():
+    rig, bones = build_rig("unity")
+    bone_map = guess_bone_map(rig)
+    rig.data.bones[bones["left_knee"]].name = "other"
+    with pytest.raises(UsageError, match="has no bone"):
+        LiveRig(rig, BODY, bone_map)

@@ -1,0 +1,267 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A live capture in a scene, with a scripted process: the body follows, until Stop, Cancel or a failure ends it."""
+
+import sys
+import textwrap
+import time
+
+import bpy
+import numpy as np
+import pytest
+from scope.scope_addon.errors import OfflineError, UsageError, VideoError
+from scope.scope_addon.job.live.process import LiveProcess
+from scope.scope_addon.job.messages import WorkerFailedError
+from scope.scope_addon.ui.live import live_job
+from scope.scope_addon.ui.live.live_job import LiveJob, live_request
+
+from ...job.processes import runs, wait_for
+from ...scene.made_rigs import build_rig
+from ..conftest import inventory
+
+
+@pytest.fixture
+def live(tmp_path, monkeypatch, standing):
+    """Return a function that starts a live capture with a scripted process.
+
+    The script may use ``pose(index)``, ``send(event, **values)``, ``hear()``, which waits for a command, and
+    ``finish()``, which sends the motion ``standing``.
+    """
+    standing.save(tmp_path / "standing.npz")
+    script, jobs = tmp_path / "fake_live.py", []
+    monkeypatch.setattr(live_job, "START_SCRIPT", script)
+    monkeypatch.setattr(live_job, "LiveProcess", lambda r, folder, _, *rest: LiveProcess(r, folder, None, *rest))
+    (tmp_path / "walk.mp4").touch()
+    settings = bpy.context.scene.scope_live
+    settings.source, settings.file = "FILE", str(tmp_path / "walk.mp4")
+
+    def start(body):
+        script.write_text(
+            textwrap.dedent(f"""
+                import json, math, os, shutil, sys, time
+                folder, request = sys.argv[2], json.loads(sys.stdin.readline())
+                def send(event, **values):
+                    print(json.dumps({{"event": event}} | values), flush=True)
+                def hear():
+                    return sys.stdin.readline().strip()
+                def pose(index, betas=(0.0,) * 10):
+                    turned = [math.cos(0.1 * index), math.sin(0.1 * index), 0, 0]
+                    send("pose", frame=index, presence="seen", rotations=[turned] + [[1, 0, 0, 0]] * 23,
+                         positions=[[0.0, 0.0, 1.0]], betas=betas)
+                def finish():
+                    shutil.copy({str(tmp_path / "standing.npz")!r}, os.path.join(folder, "person1.npz"))
+                    send("result", motions=["person1.npz"],
+                         report={{"camera": "estimated", "fps": {{"total": 28.0}}, "warnings": []}})
+            """)
+            + textwrap.dedent(body)
+        )
+        jobs.append(LiveJob(bpy.context.scene, [sys.executable]))
+        return jobs[-1]
+
+    yield start
+    for job in jobs:
+        job.close()
+
+
+def until(job, condition):
+    wait_for(lambda: job.step() and condition(), 60)
+
+
+def to_end(job):
+    wait_for(lambda: not job.step(), 60)
+
+
+def test_the_newest_pose_is_shown_and_stays_after_stop(live):
+    job = live("pose(1); pose(2); pose(7, [0.5] * 10); hear()")
+    until(job, lambda: job.poses)
+    while job.poses < 3 and job._worker._newest is not None:
+        job.step()
+    assert job.has_body
+    armature = job._body.armature
+    assert bpy.context.view_layer.objects.active == armature
+    shown = tuple(armature.pose.bones["pelvis"].rotation_quaternion)
+    pid = job.worker.pid
+    job.stop()
+    wait_for(lambda: not runs(pid), 1.0)
+    to_end(job)
+    left = bpy.data.objects["Live"]
+    np.testing.assert_allclose(left.pose.bones["pelvis"].rotation_quaternion, shown, atol=1e-3)
+    assert left.animation_data is None
+    assert "scope_source" not in left  # nothing was recorded that could be refined
+    assert not job.worker.job_folder.exists()
+
+
+def test_a_recording_becomes_a_capture_and_the_body_goes(live):
+    bpy.context.scene.scope.take = "Jump"
+    job = live('pose(1); assert hear() == "record"; pose(2); assert hear() == "stop"; finish()')
+    until(job, lambda: job.has_body)
+    job.record()
+    until(job, lambda: job.poses == 2)
+    job.stop()
+    to_end(job)
+    scene = bpy.context.scene
+    assert scene.scope.capture.name == "Jump"
+    person = bpy.data.objects["Jump"]
+    assert isinstance(person["scope_motion"]["motion"], bytes)
+    assert person.animation_data.action.name == "Jump"
+    assert person.pose.bones["head"].custom_shape is not None
+    assert "Live" not in bpy.data.objects
+    assert "Live" not in bpy.data.collections
+    assert scene.scope.result.frames_per_second == 28.0
+    assert not job.worker.job_folder.exists()
+
+
+def test_a_recorded_file_that_ends_by_itself_becomes_a_capture(live):
+    job = live('pose(1); assert hear() == "record"; pose(2); finish()')
+    until(job, lambda: job.has_body)
+    job.record()
+    to_end(job)
+    assert bpy.context.scene.scope.capture is not None
+
+
+def test_a_file_that_ends_leaves_the_last_pose(live):
+    job = live('pose(1); time.sleep(0.5); send("ended")')
+    to_end(job)
+    assert "Live" in bpy.data.objects
+
+
+@pytest.mark.parametrize("recording", [False, True])
+def test_cancelling_leaves_the_scene_as_it_was(live, recording):
+    bpy.ops.object.armature_add()
+    rig, _ = build_rig("mixamo")
+    bpy.context.view_layer.objects.active = bpy.data.objects["Armature"]
+    scene = bpy.context.scene
+    scene.scope_live.with_rig, scene.scope_retarget.rig = True, rig
+    before, posed = inventory(), [bone.matrix_basis.copy() for bone in rig.pose.bones]
+    job = live("pose(1); hear(); hear()")
+    until(job, lambda: job.has_body)
+    assert [bone.matrix_basis for bone in rig.pose.bones] != posed
+    assert job._body.armature.hide_get()  # as the Retarget section says
+    if recording:
+        job.record()
+    pid = job.worker.pid
+    job.cancel()
+    wait_for(lambda: not runs(pid), 1.0)
+    assert inventory() == before
+    np.testing.assert_allclose([bone.matrix_basis for bone in rig.pose.bones], posed, atol=1e-5)
+    assert bpy.context.view_layer.objects.active == bpy.data.objects["Armature"]
+    assert not job.worker.job_folder.exists()
+
+
+def test_a_recording_is_retargeted_to_the_rig_that_followed(live):
+    rig, _ = build_rig("mixamo")
+    scene = bpy.context.scene
+    scene.scope_live.with_rig, scene.scope_retarget.rig = True, rig
+    job = live('pose(1); assert hear() == "record"; assert hear() == "stop"; finish()')
+    until(job, lambda: job.has_body)
+    job.record()
+    job.stop()
+    to_end(job)
+    assert rig.animation_data.action.name.startswith("mixamo_")
+    assert rig["scope_person"] == scene.scope.capture.objects[0]
+
+
+@pytest.mark.parametrize(
+    ("script", "says"),
+    [
+        ('send("error", message="camera 0 cannot be opened; check that it is plugged in")', "plugged in"),
+        ('send("pose", rotations=[], positions=[], betas=[]); hear()', "cannot be used"),
+        ("os._exit(3)", "ended with status 3"),
+    ],
+)
+def test_what_fails_leaves_the_scene_as_it_was(live, script, says):
+    before = inventory()
+    job = live(f"pose(1); time.sleep(0.3); {script}")
+    with pytest.raises(WorkerFailedError, match=says):
+        to_end(job)
+    assert inventory() == before
+    assert not job.worker.alive
+    assert not job.worker.job_folder.exists()
+
+
+def test_an_interruption_is_said_until_poses_come_again(live, monkeypatch):
+    monkeypatch.setattr(live_job, "NOTICE_S", 0.0)
+    job = live('pose(1); time.sleep(0.5); send("notice", text="it was interrupted"); hear(); pose(2); hear()')
+    until(job, lambda: job.status.notice and job.poses == 1)
+    assert job.status.notice == "it was interrupted"
+    job.record()  # a command, for which the script waits
+    until(job, lambda: job.poses == 2)
+    assert job.status.notice == ""
+
+
+def test_silence_of_the_source_is_noticed(live, monkeypatch):
+    monkeypatch.setattr(live_job, "QUIET_S", 0.05)
+    job = live("pose(1); hear()")
+    until(job, lambda: job.poses == 1)
+    time.sleep(0.1)
+    assert job.quiet_s > 0.05
+
+
+def test_a_body_that_undo_removed_comes_back_and_the_others_selection_stays(live):
+    job = live("pose(1); hear(); pose(2); hear()")
+    until(job, lambda: job.has_body)
+    bpy.data.objects.remove(job._body.armature)
+    bpy.ops.object.empty_add()
+    job.record()
+    until(job, lambda: job.poses == 2)
+    assert job.has_body
+    assert bpy.context.view_layer.objects.active.name == "Empty"
+    job.cancel()
+    assert [obj.name for obj in bpy.data.objects] == ["Empty"]
+
+
+def test_a_removed_scene_ends_the_capture(live):
+    job = live("pose(1); hear()")
+    bpy.data.scenes.new("other")
+    bpy.data.scenes.remove(bpy.context.scene)
+    with pytest.raises(UsageError, match="scene was removed"):
+        to_end(job)
+    assert not job.worker.alive
+
+
+@pytest.mark.parametrize(
+    ("source", "value", "says"),
+    [
+        ("CAMERA", "front", "is no camera"),
+        ("CAMERA", "rtsp://a/b", "is no camera"),
+        ("STREAM", "", "no stream is given"),
+        ("FILE", "", "no video is chosen"),
+    ],
+)
+def test_a_source_that_is_none_is_an_error(source, value, says):
+    settings = bpy.context.scene.scope_live
+    settings.source = source
+    setattr(settings, source.lower(), value)
+    with pytest.raises(UsageError, match=says):
+        live_request(bpy.context.scene)
+
+
+def test_a_missing_video_is_an_error():
+    settings = bpy.context.scene.scope_live
+    settings.source, settings.file = "FILE", "/nowhere/walk.mp4"
+    with pytest.raises(VideoError, match="does not exist"):
+        live_request(bpy.context.scene)
+
+
+def test_a_stream_needs_online_access_and_gets_its_login(monkeypatch):
+    settings, system = bpy.context.scene.scope_live, bpy.context.preferences.system
+    settings.source, settings.stream = "STREAM", "rtsp://me:secret@camera/stream"
+    assert settings.stream == "rtsp://camera/stream"
+    system.use_online_access = False
+    with pytest.raises(OfflineError, match="Allow Online Access"):
+        live_request(bpy.context.scene)
+    system.use_online_access = True
+    request = live_request(bpy.context.scene)
+    assert request.source == "rtsp://me:secret@camera/stream"
+    assert request.online
+
+
+def test_the_capture_has_the_options_of_the_panel():
+    scene = bpy.context.scene
+    scene.scope_live.quality = "BALANCED"
+    scene.scope.height_cm, scene.scope.lens, scene.scope.focal_mm = 181, "FOCAL", 28
+    request = live_request(scene)
+    assert request.source == "0"
+    assert not request.online
+    values = request.values
+    assert (values["live_quality"], values["focal_mm"], values["body"]) == ("balanced", 28, "scope")
+    assert values["heights_m"] == pytest.approx((1.81,))

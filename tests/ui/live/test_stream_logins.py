@@ -1,0 +1,28 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Names and passwords of streams are taken out of addresses, and put in again."""
+
+import pytest
+from scope.scope_addon.ui.live.stream_logins import forget, take_login, with_login
+
+
+@pytest.mark.parametrize(
+    ("typed", "kept"),
+    [
+        ("rtsp://me:a@b@camera:554/x", "rtsp://camera:554/x"),
+        ("http://me@camera", "http://camera"),
+        (" https://:pw@[::1]:80/video?x=a@b ", "https://[::1]:80/video?x=a@b"),
+    ],
+)
+def test_a_login_is_taken_out_and_put_in_again(typed, kept):
+    assert take_login(typed) == kept
+    assert with_login(kept) == typed.strip()
+    forget()
+    assert with_login(kept) == kept
+
+
+@pytest.mark.parametrize("address", ["", "rtsp://camera/a@b", "http://camera?x=a@b", "udp://@", "not an address"])
+def test_an_address_without_a_login_is_kept(address):
+    taken = take_login(address)
+    assert taken in (address, "udp://")
+    assert with_login(taken) == address
+    forget()
