@@ -105,7 +105,7 @@ NETWORKS = (
         FACE_TARBALL,
         f"{_FACE_TASK}/face_landmarks_detector.tflite",
         (1, 256, 256, 3),
-        ((0, "landmarks", (1, 1, 1, 1434)), (1, "presence", (1, 1, 1, 1)), (2, "tongue", (1, 1))),
+        ((0, "landmarks", (1, 1, 1, 1434)), (1, "presence", (1, 1, 1, 1))),
         splits_prelu=True,
     ),
     Network(

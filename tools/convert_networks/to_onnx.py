@@ -20,7 +20,7 @@ Outputs = tuple[tuple[int, str, tuple[int, ...]], ...]
 def convert_model(
     model: Model, input_shape: tuple[int, ...], outputs: Outputs, on_request: Outputs = (), splits_prelu: bool = False
 ) -> onnx.ModelProto:
-    """Return an ONNX model with the given outputs and one input ``input``; pictures as (batch, channels, height, width).
+    """Return an ONNX model with the given outputs and one input, pictures as (batch, channels, height, width).
 
     ``input_shape`` and the shapes in ``outputs``, (position, name, shape), are TFLite's (NHWC) and are checked. Rank-4
     outputs become NCHW.

@@ -14,6 +14,7 @@ from ...kinematics.frame_blocks import by_blocks
 from ...motion import Motion
 from ..fitting.hand_measurements import HAND_KEYPOINT_NAMES
 from ..perception.landmark_network import KEYPOINT_NAMES
+from ..tracking.face.expression_motion import expression_motion
 from ..tracking.track import Track
 from .camera_path import CameraPath
 from .placement import PlacedTrack, raw_motion
@@ -77,6 +78,7 @@ def assemble_motion(
         residual_px=reprojection_error(shot, person, placed),
         image_size=np.array(shot.image_size),
         source=shot.source,
+        face={} if track.face is None else expression_motion(track.face, placed.times, shot.smoothing),
     )
 
 
