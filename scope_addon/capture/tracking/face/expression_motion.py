@@ -20,6 +20,8 @@ GAZE_NOISE = 0.06
 SURE_PX = 64.0  # size of a face from which it is large
 RELEASE_S = 0.5  # in which an expression goes to rest after the face was last seen, and comes back before it is again
 CLOSED = 0.5  # weight of a blink above which the iris is not seen
+LEAST_S = 2.0  # of a face, from which it is known how the network sees its open eyes
+MOST_OPEN = 0.65  # weight of a blink that may be an open eye
 _BLINKS = [EXPRESSIONS.index(f"eyeBlink{side}") for side in ("Left", "Right")]
 _FORWARD = np.array([0.0, 0.0, 1.0])
 
@@ -35,15 +37,16 @@ def expression_motion(
     """
     confidence, size, weights, directions, contours = parts(np.asarray(rows, float))
     seen = confidence > 0
+    weights = with_open_eyes(weights, seen, times)
+    open_eyes = seen[:, None] & (weights[:, _BLINKS] < CLOSED)
     weights, sure = released(weights, seen, times, np.zeros(len(EXPRESSIONS))), confidence
     if smoothing and len(rows) > 2:
         noise = np.where(seen, np.clip((SURE_PX / np.maximum(size, 1.0)) ** 2, 1.0, MOST_NOISE), 1.0)
         weights = np.clip(calmed(weights, times, NOISE * noise[:, None]), 0.0, 1.0)
         sure = np.where(seen, np.clip(gaussian_smooth(confidence, times, CALM_HZ), 0.0, 1.0), 0.0)
     eyes = np.empty_like(directions)
-    for k, blink in enumerate(_BLINKS):
-        open_eye = seen & (rows[:, 2 + blink] < CLOSED)
-        eyes[:, k] = released(directions[:, k], open_eye, times, _FORWARD)
+    for k in range(len(_BLINKS)):
+        eyes[:, k] = released(directions[:, k], open_eyes[:, k], times, _FORWARD)
         if smoothing and len(rows) > 2:
             eyes[:, k] = calmed(eyes[:, k], times, np.array(GAZE_NOISE))
     eyes /= np.linalg.norm(eyes, axis=-1, keepdims=True)
@@ -56,6 +59,28 @@ def expression_motion(
         np.array(CONTOURS, np.int64),
     )
     return dict(zip(FACE_KEYS, values, strict=True))
+
+
+def with_open_eyes(
+    weights: NDArray[np.floating[Any]], seen: NDArray[np.bool_], times: NDArray[np.float64]
+) -> NDArray[np.floating[Any]]:
+    """Take from the blinks what the network sees in this person's open eyes, as narrow ones, or those behind glasses.
+
+    With the median m of a blink's weight over the clip, in most of which eyes are open: w' = max(0, (w − m) / (1 − m)).
+    Weights of faces that are seen for less than `LEAST_S` stay, and those of eyes that are closed for half of the clip.
+
+    :param weights: (T, 52).
+    :param seen: (T,) where the face was seen.
+    :param times: (T,) seconds.
+    """
+    if len(times) < 2 or seen.sum() * float(np.median(np.diff(times))) < LEAST_S:
+        return weights
+    out = weights.copy()
+    for blink in _BLINKS:
+        rest = float(np.median(weights[seen, blink]))
+        if rest < MOST_OPEN:
+            out[:, blink] = np.maximum(0.0, (weights[:, blink] - rest) / (1.0 - rest))
+    return out
 
 
 def released(

@@ -28,13 +28,13 @@ def test_rest_is_calm_and_a_blink_stays_sharp():
     blink = np.zeros(T)
     blink[60:64] = 0.4, 0.9, 0.8, 0.3
     rows[:, 2 + JAW] = 0.3 + 0.02 * rng.standard_normal(T)
-    rows[:, 2 + BLINK] = 0.1 + blink + 0.01 * rng.standard_normal(T)
+    rows[:, 2 + BLINK] = blink + 0.01 * np.abs(rng.standard_normal(T))
     weights = expression_motion(rows.copy(), TIMES, smoothing=True)["expressions"]
     assert np.abs(np.diff(weights[:, JAW])).mean() < 0.3 * np.abs(np.diff(rows[:, 2 + JAW])).mean()
     assert weights[:, JAW].mean() == pytest.approx(0.3, abs=0.01)
     found = weights[:, BLINK]
     assert abs(int(found.argmax()) - 61) <= 1
-    assert found.max() > 0.9 * (0.1 + 0.9)
+    assert found.max() > 0.9 * 0.9
     assert (found > 0.5).sum() == 2
     assert np.abs(np.diff(found[:55])).max() < 0.01
 
@@ -86,3 +86,23 @@ def test_the_gaze_waits_while_the_eye_is_closed():
     rows[60:63, GAZE] = [0, -1, 0, 0, 0, 1]
     face = expression_motion(rows, TIMES, smoothing=True)
     np.testing.assert_allclose(face["gaze"][:, 0], np.tile([0, 0, 1.0], (T, 1)), atol=0.02)
+
+
+@pytest.mark.parametrize("smoothing", [False, True])
+def test_eyes_that_look_half_closed_are_open(smoothing):
+    rows = seen_face()
+    rows[:, 2 + BLINK] = 0.45 + 0.02 * np.random.default_rng(0).standard_normal(T)
+    rows[60:63, 2 + BLINK] = 0.9
+    found = expression_motion(rows, TIMES, smoothing)["expressions"][:, BLINK]
+    assert np.median(found) < 0.03
+    assert found[61] == pytest.approx((0.9 - 0.45) / 0.55, abs=0.06)
+
+
+@pytest.mark.parametrize(("weight", "frames"), [(0.9, T), (0.45, 40)])
+def test_eyes_that_may_be_closed_stay_so(weight, frames):
+    """Closed for the whole clip, or seen too briefly to know."""
+    rows = seen_face()
+    rows[:, 2 + BLINK] = weight
+    rows[frames:] = 0.0
+    found = expression_motion(rows, TIMES, smoothing=True)["expressions"][:, BLINK]
+    np.testing.assert_allclose(found[: frames - 5], weight, atol=0.05)
