@@ -56,6 +56,8 @@ class Motion:
     joint_sigma_depth_m: NDArray[np.floating[Any]] | None = None  # (T, K+1), likewise
     # What the user corrected, which `poses` and `joints_cam` contain: the arrays named CORRECTION_KEYS, or none.
     corrections: dict[str, NDArray[Any]] = field(default_factory=dict)
+    # The face, if it was looked for: the arrays named FACE_KEYS, or none.
+    face: dict[str, NDArray[Any]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for name in SIGMA_KEYS:
@@ -64,6 +66,7 @@ class Motion:
         for name, (_, dtype) in _SCHEMA.items():
             value = getattr(self, name)
             setattr(self, name, np.asarray(value, dtype) if dtype is not str else str(value))
+        self.face = {name: np.asarray(value, _FACE_SCHEMA[name][1]) for name, value in self.face.items()}
         self.mocap_framerate = float(self.mocap_framerate)
         self.validate()
 
@@ -93,6 +96,20 @@ class Motion:
             got = getattr(self, name).shape
             if got != expected:
                 raise MotionFileError(f"{where}: {name} must have shape {expected}, but has {got}")
+        self._validate_face(where)
+
+    def _validate_face(self, where: str) -> None:
+        if not self.face:
+            return
+        if missing := sorted(set(FACE_KEYS) - set(self.face)):
+            raise MotionFileError(f"{where} has a face, but lacks {', '.join(missing)}; capture again")
+        sizes = {"T": len(self.frames), "E": self.face["expression_names"].size, "F": self.face["face_landmarks"].size}
+        for name, (shape, dtype) in _FACE_SCHEMA.items():
+            expected = tuple(sizes[s] if isinstance(s, str) else s for s in shape)
+            if self.face[name].shape != expected:
+                raise MotionFileError(f"{where}: {name} must have shape {expected}, but has {self.face[name].shape}")
+            if dtype is np.float32 and not np.isfinite(self.face[name]).all():
+                raise MotionFileError(f"{where}: {name} has values that are not finite; capture again")
 
     def save(self, path: str | Path) -> None:
         """Write the motion to an .npz file. The write is atomic, so that a failure never leaves a partial file.
@@ -110,8 +127,8 @@ class Motion:
     def to_bytes(self) -> bytes:
         """Return the content of the motion file."""
         file = io.BytesIO()
-        arrays = {f.name: np.asarray(getattr(self, f.name)) for f in fields(self) if f.name != "corrections"}
-        np.savez_compressed(file, **arrays, **self.corrections)
+        arrays = {f.name: np.asarray(getattr(self, f.name)) for f in fields(self) if f.name not in _GROUPS}
+        np.savez_compressed(file, **arrays, **self.corrections, **self.face)
         return file.getvalue()
 
     @classmethod
@@ -123,14 +140,15 @@ class Motion:
         """
         path = Path(path)
         data = read_npz(path, MotionFileError, "motion file", content)
-        known = {f.name for f in fields(cls)} - {"corrections"}
+        known = {f.name for f in fields(cls)} - set(_GROUPS)
         missing = sorted(known - set(data) - {"source", *SIGMA_KEYS})
         if missing:
             raise MotionFileError(f"{path} lacks {', '.join(missing)}: it is not a motion file of this version")
         values: dict[str, Any] = {k: v.item() if v.ndim == 0 else v for k, v in data.items() if k in known}
         corrections = {key: data[key] for key in CORRECTION_KEYS if key in data}
+        face = {key: data[key] for key in FACE_KEYS if key in data}
         try:
-            return cls(**values, corrections=corrections)
+            return cls(**values, corrections=corrections, face=face)
         except MotionFileError:
             raise
         except (TypeError, ValueError, OverflowError) as error:  # of numpy's conversions
@@ -145,6 +163,17 @@ CORRECTION_KEYS = (
     *("uncorrected_joints_cam", "uncorrected_world_from_camera"),
 )
 SIGMA_KEYS = ("joint_sigma_m", "joint_sigma_depth_m")  # not in files of earlier versions
+# Only in files of captures that looked for the face: the first are what it expresses, the others where it was seen.
+FACE_KEYS = ("expressions", "expression_names", "expression_confidence", "gaze", "face_points", "face_landmarks")
+_GROUPS = ("corrections", "face")  # fields that are not keys themselves
+_FACE_SCHEMA: dict[str, tuple[tuple[str | int, ...], type]] = {
+    "expressions": (("T", "E"), np.float32),
+    "expression_names": (("E",), np.str_),
+    "expression_confidence": (("T",), np.float32),
+    "gaze": (("T", 2, 3), np.float32),
+    "face_points": (("T", "F", 2), np.float32),
+    "face_landmarks": (("F",), np.int64),
+}
 _SCHEMA: dict[str, tuple[tuple[str | int, ...], type]] = {
     "poses": (("T", "3K1"), np.float32),
     "trans": (("T", 3), np.float32),

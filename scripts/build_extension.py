@@ -266,9 +266,10 @@ def check(archive: Path, target: Target) -> None:
     if any(w.lower().startswith("numpy") for w in listed):
         problems.append("numpy is shipped")
     networks = ("pose_detection", "pose_landmark_lite", "pose_landmark_full", "pose_landmark_heavy")
-    networks += ("palm_detection", "hand_landmark")
+    networks += ("palm_detection", "hand_landmark", "face_landmark", "face_expression")
     wanted = [f"assets/networks/{n}.onnx" for n in networks]
     wanted += ["assets/networks/LICENSE-mediapipe.txt", "assets/body/scope.npz", "assets/body/scope_h.npz"]
+    wanted += ["assets/body/expressions.npz"]
     wanted += ["assets/lifter/lifter.onnx", "assets/prior/joint_prior.npz", "assets/sample/sample.mp4"]
     wanted += [f"assets/{folder}/LICENSE.md" for folder in ("body", "lifter", "sample")]
     wanted += ["LICENSE", "THIRD_PARTY.md", "scope_addon/ui/__init__.py", BILL, *GUIDE]

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from scope.scope_addon.motion import Motion
 from scope.solver.body import Body
+from scope.solver.names import EXPRESSIONS
 
 
 def made_motion(body: Body, poses: np.ndarray, trans: np.ndarray, rate: float = 30.0, **given) -> Motion:
@@ -42,6 +43,21 @@ def made_motion(body: Body, poses: np.ndarray, trans: np.ndarray, rate: float = 
         "source": "walk.mp4",
     }
     return Motion(**(fields | given))
+
+
+def made_face(T: int, **weights: np.ndarray | float) -> dict[str, np.ndarray]:
+    """The arrays of a face that is seen in T frames and looks ahead; ``weights`` of expressions, others are 0."""
+    expressions = np.zeros((T, len(EXPRESSIONS)))
+    for name, values in weights.items():
+        expressions[:, EXPRESSIONS.index(name)] = values
+    return {
+        "expressions": expressions,
+        "expression_names": np.array(EXPRESSIONS),
+        "expression_confidence": np.ones(T),
+        "gaze": np.tile([0.0, 0.0, 1.0], (T, 2, 1)),
+        "face_points": np.full((T, 3, 2), 50.0),
+        "face_landmarks": np.array([1, 33, 263]),
+    }
 
 
 def level_camera(T: int) -> np.ndarray:

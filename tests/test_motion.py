@@ -2,11 +2,14 @@
 """The motion file: a saved motion loads unchanged, and damaged files are errors."""
 
 import pickle
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from scope.scope_addon.errors import MotionFileError, OutputError
-from scope.scope_addon.motion import SIGMA_KEYS, Motion
+from scope.scope_addon.motion import FACE_KEYS, SIGMA_KEYS, Motion
+
+from .made_motion import made_face
 
 
 def make_motion(T=4, K1=24, J=33, P=10):
@@ -105,3 +108,35 @@ def test_files_of_earlier_versions_have_unknown_deviations(tmp_path):
 def test_an_unwritable_folder_is_an_output_error_and_keeps_the_earlier_file(tmp_path):
     with pytest.raises(OutputError, match="nowhere"):
         make_motion().save(tmp_path / "nowhere" / "a.npz")
+
+
+def test_a_face_is_saved_and_loaded_and_absent_where_it_was_not_looked_for(tmp_path):
+    motion = make_motion()
+    motion.save(tmp_path / "without.npz")
+    assert not set(np.load(tmp_path / "without.npz")) & set(FACE_KEYS)
+    assert Motion.load(tmp_path / "without.npz").face == {}
+    face = made_face(4, jawOpen=[0.0, 0.25, 0.5, 1.0])
+    replace(motion, face=face).save(tmp_path / "with.npz")
+    loaded = Motion.load(tmp_path / "with.npz")
+    assert set(loaded.face) == set(FACE_KEYS)
+    for key, value in face.items():
+        np.testing.assert_array_equal(loaded.face[key], value)
+    assert loaded.face["expressions"].dtype == np.float32
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "message"),
+    [
+        ("gaze", None, "lacks gaze"),
+        ("expressions", np.zeros((3, 52)), "expressions must have shape \\(4, 52\\)"),
+        ("expression_confidence", np.full(4, np.nan), "not finite"),
+        ("expressions", np.array("x"), "wrong kind"),
+    ],
+)
+def test_a_damaged_face_is_an_error_that_names_it(tmp_path, key, value, message):
+    replace(make_motion(), face=made_face(4)).save(tmp_path / "a.npz")
+    arrays = dict(np.load(tmp_path / "a.npz"))
+    del arrays[key]
+    np.savez(tmp_path / "a.npz", **arrays, **({} if value is None else {key: value}))
+    with pytest.raises(MotionFileError, match=message):
+        Motion.load(tmp_path / "a.npz")

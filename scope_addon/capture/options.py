@@ -44,6 +44,7 @@ class CaptureOptions:
     smoothing: bool = _DEFAULT["smoothing"]
     threads: int = _DEFAULT["threads"]  # 0: as many as there are cores
     hands: bool = _DEFAULT["hands"]  # the fingers as well; the body needs finger joints
+    face: bool = _DEFAULT["face"]  # expressions and gaze as well
     provider: str = _DEFAULT["provider"]  # what the networks run on; see `execution`
     detector: Path | None = _DEFAULT["detector"]  # the user's own networks, ONNX files; see `adapters`
     keypoints: Path | None = _DEFAULT["keypoints"]

@@ -149,7 +149,7 @@ def track_of(times_s: Sequence[float], observations: Sequence[Observation]) -> T
     """Make a track of frames in all of which the person was seen."""
     tracklet = Tracklet()
     for row, observation in enumerate(observations):
-        tracklet.add(row, replace(observation, reference_landmarks=None, hands=None, mask=None))
+        tracklet.add(row, replace(observation, reference_landmarks=None, hands=None, face=None, mask=None))
     track = make_track(range(len(times_s)), times_s, [tracklet])
     track.acquired[:] = [observation.acquired for observation in observations]
     return track

@@ -173,6 +173,13 @@ CAPTURE_OPTIONS = (
         argument=Argument(help="capture the fingers as well, on scope_h unless --body names another body"),
     ),
     Option(
+        "face",
+        bool,
+        False,
+        _EVERYWHERE,
+        "capture the expressions of the face and the gaze as well; takes longer",
+    ),
+    Option(
         "heights_m",
         float,
         (),

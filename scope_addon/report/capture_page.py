@@ -124,7 +124,7 @@ def header_facts(clip: CapturedClip) -> dict[str, str]:
 
 
 def over_time(motions: Sequence[Motion], marked: Sequence[MarkedSpan] = ()) -> list[Markup]:
-    """Return the plots over time: confidence, reprojection error, contact of the feet.
+    """Return the plots over time: confidence, reprojection error, contact of the feet, and the face if it was captured.
 
     :param marked: intervals of time that the plots mark; their kinds are keys of ``_SHORT``.
     """
@@ -154,9 +154,24 @@ def over_time(motions: Sequence[Motion], marked: Sequence[MarkedSpan] = ()) -> l
     figures = [page.plot_figure(title, svg, legend, areas) for title, svg in plots]
     for n, (motion, color) in enumerate(zip(motions, colors, strict=True)):
         rows = [(name, motion.foot_contact[:, k].astype(float)) for k, name in enumerate(CONTACTS)]
-        title = "Contact of the feet" + (f", {_name(n, motions)}" if len(motions) > 1 else "")
+        of_whom = f", {_name(n, motions)}" if len(motions) > 1 else ""
+        title = f"Contact of the feet{of_whom}"
         figures.append(page.plot_figure(title, band_plot(rows, times, x_axis, label=title, color=color)))
+        if motion.face:
+            title = f"Face{of_whom}"
+            figures.append(
+                page.plot_figure(title, band_plot(face_rows(motion), times, x_axis, label=title, color=color))
+            )
     return figures
+
+
+def face_rows(motion: Motion) -> list[tuple[str, NDArray[np.float64]]]:
+    """Return the shares of a face over time: name and values (T,) from 0 to 1."""
+    names = motion.face["expression_names"].tolist()
+    weights = motion.face["expressions"].astype(float)
+    shown_names = {"jaw open": "jawOpen", "left eye shut": "eyeBlinkLeft", "right eye shut": "eyeBlinkRight"}
+    rows = [(label, weights[:, names.index(name)]) for label, name in shown_names.items() if name in names]
+    return [*rows, ("confidence", motion.face["expression_confidence"].astype(float))]
 
 
 def marked_spans(

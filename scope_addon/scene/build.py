@@ -15,12 +15,14 @@ from numpy.typing import NDArray
 from ...solver.body import Body
 from ..errors import MotionFileError, UsageError
 from ..footage import shown
+from ..kinematics.expressions import expressions_of
 from ..kinematics.foot_skin import under_floor
 from ..motion import Motion
 from . import camera
 from .animation_data import timing
+from .animation_data.actions import Channels
 from .animation_data.transaction import all_or_nothing
-from .character import animation, armature, body_mesh, bone_display, confidence_curves, shape_keys
+from .character import animation, armature, body_mesh, bone_display, confidence_curves, expression_keys, shape_keys
 from .character.correction_list import store_corrections
 from .character.keys import bake_whole_frames
 from .local_scene import check_local
@@ -122,7 +124,7 @@ def _build(
     report: Progress,
 ) -> BuildResult:
     name = options.name or shown(Path(str(footage or motions[0].source or "capture")).stem)
-    warnings: list[str] = []
+    warnings = _face_warnings(motions, body)
     if options.frame_rate == "set":
         timing.set_scene_rate(scene, motions[0].mocap_framerate)
     rate = timing.scene_rate(scene)
@@ -161,6 +163,15 @@ def _build(
     return BuildResult(collection, people, rate, (first, last), warnings)
 
 
+def _face_warnings(motions: list[Motion], body: Body) -> list[str]:
+    if expressions_of(body) or not any(motion.face for motion in motions):
+        return []
+    return [
+        f"the body '{body.name}' has no expressions, so it does not show the face, which is in the motion file; the "
+        "built-in bodies do"
+    ]
+
+
 def _set_frame_range(scene: bpy.types.Scene, collection: bpy.types.Collection, first: float, last: float) -> None:
     """Set the scene's frame range to a capture's, together with that of the captures before."""
     if [each for each in scene.collection.children_recursive if CAPTURE_TAG in each] != [collection]:
@@ -186,9 +197,13 @@ def _build_person(
     if options.frame_rate == "resample":
         bake_whole_frames(rig, body, rate)
         rig["scope_resampled"] = True  # smoothing again resamples too
+    of_keys = None
     if not baked and body.P:
         shape_keys.add_shape_keys(mesh, body, motion.betas)
-        shape_keys.key_shape(mesh, action, motion.betas, frames, per_frame=options.shape == "per_frame")
+        of_keys = shape_keys.key_shape(mesh, action, motion.betas, frames, per_frame=options.shape == "per_frame")
+    if motion.face and expression_keys.add_expression_keys(mesh, body):
+        of_keys = of_keys or Channels(mesh.data.shape_keys, action)
+        expression_keys.key_expressions(mesh, of_keys, motion, frames, options.frame_rate == "resample")
     body_mesh.skin_to_armature(mesh, rig, body)
     rig["scope_source"] = motion.source
     rig["scope_body"] = body.name

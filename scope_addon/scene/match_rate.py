@@ -22,6 +22,7 @@ from .animation_data.retime import Retiming, retime_keys, retime_strips
 from .camera import same_camera, show_footage_again
 from .character.confidence_curves import MARKER_NAMES
 from .character.correction_list import store_corrections
+from .character.expression_keys import has_expression_keys
 from .character.root_object import retime_unused_trajectory, root_object
 from .character.shape_keys import shape_key_name
 from .rigs.rig_action import is_retargeted, retime_written_keys
@@ -100,7 +101,11 @@ def _datablocks(person: bpy.types.Object) -> list[bpy.types.ID]:
     """Return what a capture animates of a person: armature, root motion, and shape keys."""
     keys = [getattr(child.data, "shape_keys", None) for child in person.children_recursive if child.type == "MESH"]
     root = root_object(person)
-    shapes = [block for block in keys if block is not None and shape_key_name(0) in block.key_blocks]
+    shapes = [
+        block
+        for block in keys
+        if block is not None and (shape_key_name(0) in block.key_blocks or has_expression_keys(block))
+    ]
     return [person, *([root] if root is not None else []), *shapes]
 
 

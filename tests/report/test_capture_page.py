@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 import os
 import re
+from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -14,10 +15,17 @@ import numpy as np
 import pytest
 from scope.scope_addon.capture.stages.clock import at_times
 from scope.scope_addon.errors import OutputError, VideoError
-from scope.scope_addon.report.capture_page import CapturedClip, capture_page, warning_list, write_capture_page
+from scope.scope_addon.report.capture_page import (
+    CapturedClip,
+    capture_page,
+    face_rows,
+    over_time,
+    warning_list,
+    write_capture_page,
+)
 from scope.scope_addon.report.footage_pictures import small_picture
 
-from ..made_motion import made_motion
+from ..made_motion import made_face, made_motion
 
 VOID = {"meta", "link", "img", "input", "br"}
 HOSTILE = "<img src=x onerror=alert(1)>&\"'</script><!--.mp4"
@@ -162,3 +170,17 @@ def test_a_page_that_cannot_be_written_leaves_the_earlier_one(body, footage, tmp
         write_capture_page(out, clip(body, footage))
     assert out.read_text() == "earlier"
     assert sorted(os.listdir(tmp_path)) == ["footage.mp4", "out.html"]
+
+
+def test_a_captured_face_is_shown_over_time(body):
+    about = clip(body, Path("talk.mp4"))
+    without = over_time(about.motions)
+    (motion,) = about.motions
+    blink = (np.arange(FRAMES) == 3).astype(float)
+    talking = replace(motion, face=made_face(FRAMES, jawOpen=0.25, eyeBlinkLeft=blink))
+    assert [name for name, _ in face_rows(talking)] == ["jaw open", "left eye shut", "right eye shut", "confidence"]
+    for (_, values), expected in zip(face_rows(talking), (0.25, blink, 0.0, 1.0), strict=True):
+        np.testing.assert_allclose(values, np.broadcast_to(expected, FRAMES))
+    figures = over_time([talking])
+    assert len(figures) == len(without) + 1
+    assert "left eye shut" in figures[-1]

@@ -24,12 +24,13 @@ from scope.scope_addon.cli import SAMPLE, build_parser, main
 from scope.scope_addon.command_line.arguments import body_and_options
 from scope.scope_addon.edit.pins.corrected_motion import with_corrections
 from scope.scope_addon.edit.pins.corrections import Contact, Exchange, Pin, Upright
-from scope.scope_addon.motion import CORRECTION_KEYS, Motion
+from scope.scope_addon.motion import CORRECTION_KEYS, FACE_KEYS, Motion
 from scope.scope_addon.scene.export.output_paths import check_output
 from scope.solver.loaders.body_file import BUILT_IN
+from scope.solver.names import EXPRESSIONS
 from scope.tools import solver_reference
 
-from ..made_motion import made_motion
+from ..made_motion import made_face, made_motion
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
@@ -132,12 +133,12 @@ def test_every_option_is_defined_once_in_the_command_line_page():
 
 
 def test_every_key_of_the_motion_file_is_defined_once():
-    keys = [field.name for field in fields(Motion) if field.name != "corrections"] + list(CORRECTION_KEYS)
+    keys = {field.name for field in fields(Motion)} - {"corrections", "face"} | {*CORRECTION_KEYS, *FACE_KEYS}
     assert defined({"key"}) == Counter({("motion_file.md", key): 1 for key in keys})
 
 
 def test_shapes_and_types_of_the_motion_file_are_as_documented(body, tmp_path):
-    motion = made_motion(body, np.zeros((7, 3 * (body.K + 1))), np.zeros((7, 3)))
+    motion = made_motion(body, np.zeros((7, 3 * (body.K + 1))), np.zeros((7, 3)), face=made_face(7))
     changes = (
         Pin(2, "head", (320.0, 200.0)),
         Contact(1, 3, "left"),
@@ -148,6 +149,7 @@ def test_shapes_and_types_of_the_motion_file_are_as_documented(body, tmp_path):
     motion = with_corrections(motion, body, changes)
     motion.save(tmp_path / "a.npz")
     sizes = {"T": 7, "K": body.K, "P": body.P, "J": motion.keypoints2d.shape[1], "N": 1, "C": 1, "E": 2, "V": 1}
+    sizes |= {"W": len(EXPRESSIONS), "F": motion.face["face_landmarks"].size}
     sizes["U"] = len(motion.corrections["uncorrected_rows"])
     rows = [row for first, rows in tables(DOCS / "motion_file.md") if first == "key" for row in rows]
     with np.load(tmp_path / "a.npz") as file:

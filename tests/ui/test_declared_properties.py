@@ -34,6 +34,7 @@ LABELS = {
     "body": "Body",
     "body_file": "Body File",
     "hands": "Hands",
+    "face": "Face",
     "height_cm": "Height (cm)",
     "lens": "Lens",
     "focal_mm": "Focal Length",

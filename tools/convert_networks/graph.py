@@ -15,6 +15,8 @@ from onnx import NodeProto, TensorProto, helper, numpy_helper
 from ...solver.errors import ModelFileError
 from .tflite import ACTIVATIONS, Model, Operator
 
+NCHW_AXIS = (0, 2, 3, 1)  # TFLite axis -> ONNX axis of a rank-4 activation
+
 
 @dataclass(frozen=True)
 class SpatialPad:
@@ -37,6 +39,7 @@ class Graph:
     initializers: list[TensorProto] = field(default_factory=list)
     names: dict[int, str] = field(default_factory=dict)
     pads: dict[int, SpatialPad] = field(default_factory=dict)
+    splits_prelu: bool = False  # see `operators.prelu`
     _shared: dict[tuple[str, bytes, tuple[int, ...]], str] = field(default_factory=dict)
 
     def known(self) -> tuple[dict[Any, Any], ...]:
@@ -50,6 +53,16 @@ class Graph:
     def shape(self, tensor: int) -> tuple[int, ...]:
         """Return the TFLite (NHWC) shape of a tensor."""
         return self.model.tensors[tensor].shape
+
+    def axis(self, operator: Operator, tensor: int, axis: int) -> int:
+        """Return the ONNX number of the axis ``axis`` of a tensor, which may count from the end.
+
+        :raises ModelFileError: when the tensor has no such axis.
+        """
+        rank = len(self.shape(tensor))
+        if not -rank <= axis < rank:
+            raise self.fail(operator, f"axis {axis} of a rank-{rank} tensor")
+        return NCHW_AXIS[axis % rank] if rank == 4 else axis % rank
 
     def fail(self, operator: Operator, why: str) -> ModelFileError:
         """Return the error for an operator that cannot be converted."""
@@ -95,6 +108,14 @@ class Graph:
         else:
             raise ModelFileError(f"{self.model.name}: tensor {tensor} is used before it is computed.")
         return self.names[tensor]
+
+    def operand(self, tensor: int, rank: int) -> str:
+        """Return the value of a tensor for elementwise use; a constant gets leading axes of 1 up to ``rank``."""
+        constant = self.constants.get(tensor)
+        if constant is None or constant.ndim >= rank:
+            return self.value(tensor)
+        padded = constant.reshape((1,) * (rank - constant.ndim) + constant.shape)
+        return self.initializer(padded.transpose(0, 3, 1, 2) if rank == 4 else padded)
 
     def channels_last(self, tensor: int) -> str:
         """Return the value with its elements in TFLite order, without a transpose where both orders agree."""

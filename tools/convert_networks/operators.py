@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One function per TFLite operator, each appending the ONNX nodes that compute the same."""
+"""The TFLite operators of convolutional networks, each function appending the ONNX nodes that compute the same."""
 
 from collections.abc import Callable
 from typing import Any
@@ -7,18 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .arithmetic import ARITHMETIC
 from .graph import Graph, SpatialPad
+from .layout import LAYOUT
 from .tflite import PADDINGS, Operator
-
-_NCHW_AXIS = (0, 2, 3, 1)  # TFLite axis -> ONNX axis of a rank-4 activation
-
-
-def _axis(graph: Graph, tensor: int, axis: int, operator: Operator) -> int:
-    rank = len(graph.shape(tensor))
-    if not -rank <= axis < rank:
-        raise graph.fail(operator, f"axis {axis} of a rank-{rank} tensor")
-    axis %= rank
-    return _NCHW_AXIS[axis] if rank == 4 else axis
 
 
 def _window_pads(graph: Graph, operator: Operator, size: tuple[int, ...], kernel: tuple[int, ...]) -> list[int]:
@@ -88,14 +80,6 @@ def depthwise_conv_2d(graph: Graph, operator: Operator) -> None:
     _convolution(graph, operator, weights.transpose(3, 0, 1, 2), graph.shape(operator.inputs[0])[-1])
 
 
-def add(graph: Graph, operator: Operator) -> None:
-    """Convert the sum of two activations of the same shape."""
-    a, b = operator.inputs
-    if graph.shape(a) != graph.shape(b):
-        raise graph.fail(operator, f"shapes {graph.shape(a)} and {graph.shape(b)} differ")
-    graph.finish(operator, graph.node("Add", [graph.value(a), graph.value(b)]))
-
-
 def pad(graph: Graph, operator: Operator) -> None:
     """Convert zero padding; padding of rows and columns alone is left to the following convolutions."""
     amounts = graph.constant(operator, 1)
@@ -133,30 +117,6 @@ def resize_bilinear(graph: Graph, operator: Operator) -> None:
     graph.finish(operator, graph.node("Resize", inputs, mode="linear", coordinate_transformation_mode=grid))
 
 
-def reshape(graph: Graph, operator: Operator) -> None:
-    """Convert a reshape to the output tensor's shape; the first dimension stays free for the batch."""
-    source, target = operator.inputs[0], graph.shape(operator.outputs[0])
-    if not target or target[0] != graph.shape(source)[0]:
-        raise graph.fail(operator, f"reshape of {graph.shape(source)} to {target} changes the batch")
-    name = graph.node(
-        "Reshape", [graph.channels_last(source), graph.initializer(np.array([-1, *target[1:]], np.int64))]
-    )
-    if len(target) == 4:
-        name = graph.node("Transpose", [name], perm=[0, 3, 1, 2])
-    graph.finish(operator, name)
-
-
-def concatenation(graph: Graph, operator: Operator) -> None:
-    """Convert a concatenation along the same axis, renumbered for rank 4."""
-    axis = _axis(graph, operator.outputs[0], operator.options["axis"], operator)
-    graph.finish(operator, graph.node("Concat", [graph.value(i) for i in operator.inputs], axis=axis))
-
-
-def logistic(graph: Graph, operator: Operator) -> None:
-    """Convert the sigmoid, 1 / (1 + exp(−x))."""
-    graph.finish(operator, graph.node("Sigmoid", [graph.value(operator.inputs[0])]))
-
-
 def depth_to_space(graph: Graph, operator: Operator) -> None:
     """Convert depth to space; TFLite's depth is ordered by block row, block column and channel, ONNX's mode DCR."""
     block = operator.options["block_size"]
@@ -165,23 +125,24 @@ def depth_to_space(graph: Graph, operator: Operator) -> None:
 
 
 def prelu(graph: Graph, operator: Operator) -> None:
-    """Convert PReLU: x where positive, slope · x elsewhere; slopes (1, 1, channels)."""
+    """Convert PReLU: x where positive, slope · x elsewhere; slopes (1, 1, channels).
+
+    If ``graph.splits_prelu``, as slope · x + (1 − slope) · max(x, 0) with the products as convolutions, which stay in
+    onnxruntime's blocked layout: its PRelu takes longer than all convolutions of such a network.
+    """
     slope = graph.constant(operator, 1)
     if slope.ndim != 3:
         raise graph.fail(operator, f"slopes of shape {slope.shape}")
-    graph.finish(
-        operator, graph.node("PRelu", [graph.value(operator.inputs[0]), graph.initializer(slope.transpose(2, 0, 1))])
-    )
-
-
-def mean(graph: Graph, operator: Operator) -> None:
-    """Convert the mean over rows and columns; other axes do not occur."""
-    source = operator.inputs[0]
-    axes = sorted(_axis(graph, source, int(a), operator) for a in np.atleast_1d(graph.constant(operator, 1)))
-    if len(graph.shape(source)) != 4 or axes != [2, 3]:
-        raise graph.fail(operator, f"mean over axes {axes} of a rank-{len(graph.shape(source))} tensor")
-    keep = bool(operator.options["keep_dims"])
-    graph.finish(operator, graph.node("ReduceMean", [graph.value(source)], axes=axes, keepdims=int(keep)))
+    source = graph.value(operator.inputs[0])
+    if not graph.splits_prelu:
+        graph.finish(operator, graph.node("PRelu", [source, graph.initializer(slope.transpose(2, 0, 1))]))
+        return
+    weights = slope.astype(np.float32).reshape(-1, 1, 1, 1)
+    terms = [
+        graph.node("Conv", [x, graph.initializer(w)], kernel_shape=[1, 1], group=len(weights))
+        for x, w in ((source, weights), (graph.node("Relu", [source]), 1.0 - weights))
+    ]
+    graph.finish(operator, graph.node("Add", terms))
 
 
 def fully_connected(graph: Graph, operator: Operator) -> None:
@@ -197,17 +158,14 @@ def fully_connected(graph: Graph, operator: Operator) -> None:
 
 
 CONVERTERS: dict[str, Callable[[Graph, Operator], None]] = {
-    "ADD": add,
-    "CONCATENATION": concatenation,
+    **ARITHMETIC,
+    **LAYOUT,
     "CONV_2D": conv_2d,
     "DEPTHWISE_CONV_2D": depthwise_conv_2d,
     "DEPTH_TO_SPACE": depth_to_space,
     "FULLY_CONNECTED": fully_connected,
-    "LOGISTIC": logistic,
     "MAX_POOL_2D": max_pool_2d,
-    "MEAN": mean,
     "PAD": pad,
     "PRELU": prelu,
-    "RESHAPE": reshape,
     "RESIZE_BILINEAR": resize_bilinear,
 }

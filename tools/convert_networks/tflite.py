@@ -21,10 +21,15 @@ _OPTIONS: dict[str, Any] = {
     "CONV_2D": tflite.Conv2DOptions,
     "DEPTHWISE_CONV_2D": tflite.DepthwiseConv2DOptions,
     "DEPTH_TO_SPACE": tflite.DepthToSpaceOptions,
+    "DIV": tflite.DivOptions,
     "FULLY_CONNECTED": tflite.FullyConnectedOptions,
     "MAX_POOL_2D": tflite.Pool2DOptions,
     "MEAN": tflite.ReducerOptions,
+    "MUL": tflite.MulOptions,
     "RESIZE_BILINEAR": tflite.ResizeBilinearOptions,
+    "STRIDED_SLICE": tflite.StridedSliceOptions,
+    "SUB": tflite.SubOptions,
+    "SUM": tflite.ReducerOptions,
 }
 _INDEX_VECTORS = {1: tflite.Int32Vector, 2: tflite.Uint16Vector, 3: tflite.Uint8Vector}
 _NO_FIELDS = struct.pack("<HHi", 4, 4, 4)  # a table at 4 whose vtable, at 0, lists no field: all have their defaults

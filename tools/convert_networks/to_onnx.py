@@ -18,9 +18,9 @@ Outputs = tuple[tuple[int, str, tuple[int, ...]], ...]
 
 
 def convert_model(
-    model: Model, input_shape: tuple[int, ...], outputs: Outputs, on_request: Outputs = ()
+    model: Model, input_shape: tuple[int, ...], outputs: Outputs, on_request: Outputs = (), splits_prelu: bool = False
 ) -> onnx.ModelProto:
-    """Return an ONNX model with one input ``input`` (batch, channels, height, width) and the given outputs.
+    """Return an ONNX model with the given outputs and one input, pictures as (batch, channels, height, width).
 
     ``input_shape`` and the shapes in ``outputs``, (position, name, shape), are TFLite's (NHWC) and are checked. Rank-4
     outputs become NCHW.
@@ -28,6 +28,7 @@ def convert_model(
     :param on_request: further outputs, each computed only if the scalar boolean input ``with_NAME``, false by default,
         is true; of shape (1, ...) and 0 otherwise. onnxruntime runs every node of a graph whatever outputs it is asked
         for, but only the branch of an ``If`` that is taken.
+    :param splits_prelu: whether PReLU becomes convolutions, which are faster; see `operators.prelu`.
     :raises ModelFileError: when shapes differ from those given, or an operator is not supported.
     """
     input_shapes = [model.tensors[i].shape for i in model.inputs]
@@ -37,7 +38,7 @@ def convert_model(
         found = model.tensors[model.outputs[position]].shape if position < len(model.outputs) else None
         if found != shape:
             raise ModelFileError(f"{model.name}: output {position} ({name}) has shape {found}, expected {shape}.")
-    graph = Graph(model, fold_constants(model))
+    graph = Graph(model, fold_constants(model), splits_prelu=splits_prelu)
     graph.names[model.inputs[0]] = "input"
     kept = [model.outputs[position] for position, _, _ in outputs]
     done = _append_needed(graph, kept, frozenset())
@@ -103,8 +104,9 @@ def _append(graph: Graph, operator: Operator) -> None:
 
 
 def _batched(shape: tuple[int, ...]) -> list[int | str]:
-    order = (0, 3, 1, 2) if len(shape) == 4 else range(len(shape))
-    return ["batch", *(shape[i] for i in list(order)[1:])]
+    order = [0, 3, 1, 2] if len(shape) == 4 else list(range(len(shape)))
+    kept = order[1:] if shape[:1] == (1,) else order  # a network may drop the batch of one, ours never does
+    return ["batch", *(shape[i] for i in kept)]
 
 
 def _needed(model: Model, outputs: list[int]) -> list[Operator]:

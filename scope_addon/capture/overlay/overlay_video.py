@@ -34,6 +34,7 @@ from .video_writer import VideoWriter
 VIDEO_SUFFIXES = (".mp4", ".mov", ".mkv")
 STILL_SUFFIXES = (".png", ".jpg", ".jpeg", ".webp")
 LONGEST_SIDE = 1920
+_FACE_COLOR = (255, 255, 255)
 _FAINT = 0.35  # opacity of a filled-in pose, relative to one that was seen
 _TINTS = np.array([[1.0, 0.55, 0.15], [0.2, 0.75, 1.0], [0.55, 0.9, 0.3], [0.95, 0.4, 0.75], [0.95, 0.85, 0.25]])
 
@@ -269,6 +270,7 @@ class _Painter:
         for i, row in shown:
             if self._people[i].valid[row]:
                 self._draw_keypoints(image, self._people[i].keypoints2d[row], tint(i))
+                self._draw_face(image, self._people[i].face, row)
         return image
 
     def _draw_keypoints(
@@ -282,6 +284,14 @@ class _Painter:
                 if k < KEYPOINT_COUNT:  # those of a hand are too close together for a dark rim
                     cv2.circle(image, center, radius + 1, (20, 20, 20), -1, cv2.LINE_AA)
                 cv2.circle(image, center, radius, tuple(int(c) for c in 255 * (0.5 + 0.5 * color)), -1, cv2.LINE_AA)
+
+    def _draw_face(self, image: NDArray[np.uint8], face: dict[str, NDArray[Any]], row: int) -> None:
+        """Draw the points of one person's face into the image, in place, if it was seen."""
+        if not face or face["expression_confidence"][row] <= 0:
+            return
+        for u, v in face["face_points"][row] * self._scale:
+            if max(abs(u), abs(v)) < 1e5:
+                cv2.circle(image, (round(float(u)), round(float(v))), 1, _FACE_COLOR, -1, cv2.LINE_AA)
 
 
 def _first_seen(people: list[Motion]) -> int:

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -29,6 +30,7 @@ from ..options import CaptureOptions, most_people
 from ..perception.adapters.description import description_path
 from ..perception.execution import Execution
 from ..perception.observation import Observation
+from ..tracking.face.face_tracker import FaceTracker
 from ..tracking.hand_tracker import HandTracker
 from ..tracking.landmarks.mask_schedule import MaskSchedule
 from ..tracking.people import PeopleBuilder
@@ -89,7 +91,8 @@ def observe(
         tracker = _tracker(options, threads, execution)
         network = tracker.mask_network if options.ablation.outline else None
         masks = MaskSchedule(network, video.expected_frames)
-        frames = _Frames(tracker, _hands(options, threads, execution), masks, background, clock)
+        parts = _part_trackers(options, threads, execution)
+        frames = _Frames(tracker, parts, masks, background, clock)
         frames.run(video, live, listeners)
     with clock.stage("solver"):
         camera = background.camera()
@@ -112,18 +115,25 @@ def observe(
     return footage, tracks
 
 
+class _Parts(NamedTuple):
+    """The trackers of what is captured only on request."""
+
+    hands: HandTracker | None
+    faces: FaceTracker | None
+
+
 class _Frames:
     """Runs the networks on each frame. No frame is kept, so an hour takes no more memory than a minute."""
 
     def __init__(
         self,
         tracker: PeopleTracker,
-        hands: HandTracker | None,
+        parts: _Parts,
         masks: MaskSchedule,
         background: BackgroundEstimators,
         clock: StageClock,
     ) -> None:
-        self._tracker, self._hands, self._masks = tracker, hands, masks
+        self._tracker, self._parts, self._masks = tracker, parts, masks
         self._background, self._clock = background, clock
         self.people, self.cuts = PeopleBuilder(), SceneCuts()
 
@@ -155,9 +165,12 @@ class _Frames:
                 self.people.cut()
             observations = self._tracker.step(lit, upcoming_lit, frame.timestamp_s, self._masks.upcoming_is_due)
             observations = self._masks.add(lit, observations)
-        if self._hands is not None:
+        if self._parts.hands is not None:
             with self._clock.stage("hands"):
-                observations = self._hands.step(lit, observations, frame.timestamp_s)
+                observations = self._parts.hands.step(lit, observations, frame.timestamp_s)
+        if self._parts.faces is not None:
+            with self._clock.stage("face"):
+                observations = self._parts.faces.step(lit, observations, frame.timestamp_s)
         self.people.add(frame.index, frame.timestamp_s, observations)
         people = [observation for _, observation in observations]
         largest = max(people, key=lambda observation: observation.region.side_px, default=None)
@@ -185,8 +198,9 @@ def _tracker(options: CaptureOptions, threads: int, execution: Execution) -> Peo
     )
 
 
-def _hands(options: CaptureOptions, threads: int, execution: Execution) -> HandTracker | None:
-    return HandTracker(threads, execution=execution) if options.hands else None
+def _part_trackers(options: CaptureOptions, threads: int, execution: Execution) -> _Parts:
+    hands = HandTracker(threads, execution=execution) if options.hands else None
+    return _Parts(hands, FaceTracker(threads, execution=execution) if options.face else None)
 
 
 @contextmanager

@@ -18,6 +18,7 @@ from .floor_warnings import floor_warnings
 from .observe import Footage
 from .solve import Solved
 
+CLOSED = 0.5  # weight of a blink above which an eye is closed
 MIN_LEG_CONFIDENCE = 0.05  # of the shanks; below it, legs count as not seen
 
 
@@ -78,7 +79,20 @@ def capture_warnings(name: str, options: CaptureOptions, cuts_s: list[float], mo
             warnings.append(
                 f"{name}: no hands of {who} were found; come closer, or show the palms to the camera more often"
             )
+        if options.face and not face_frames(motion).get("face_frames"):
+            warnings.append(f"{name}: the face of {who} was not found; come closer, and look towards the camera")
     return warnings
+
+
+def face_frames(motion: Motion) -> dict[str, Any]:
+    """Count the frames in which the face was seen, and its blinks; empty where it was not looked for."""
+    if not motion.face:
+        return {}
+    names = motion.face["expression_names"].tolist()
+    seen = motion.face["expression_confidence"] > 0
+    closed = motion.face["expressions"][:, [names.index(f"eyeBlink{side}") for side in ("Left", "Right")]].min(1)
+    closed = seen & (closed > CLOSED)
+    return {"face_frames": int(seen.sum()), "blinks": int((closed[1:] & ~closed[:-1]).sum() + closed[:1].sum())}
 
 
 def hand_frames(motion: Motion) -> dict[str, int]:
@@ -91,13 +105,17 @@ def hand_frames(motion: Motion) -> dict[str, int]:
 
 def _about_person(body: Body, motion: Motion) -> dict[str, Any]:
     seen = motion.frames[motion.valid]
-    return hand_frames(motion) | {
-        "valid_frames": len(seen),
-        "first_frame": int(seen[0]),
-        "last_frame": int(seen[-1]),
-        "reprojection_px": float(motion.residual_px[motion.valid].mean()),
-        "height_m": round(body.stature(motion.betas), 3),
-    }
+    return (
+        hand_frames(motion)
+        | face_frames(motion)
+        | {
+            "valid_frames": len(seen),
+            "first_frame": int(seen[0]),
+            "last_frame": int(seen[-1]),
+            "reprojection_px": float(motion.residual_px[motion.valid].mean()),
+            "height_m": round(body.stature(motion.betas), 3),
+        }
+    )
 
 
 def _legs_confidence(motion: Motion) -> float:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..perception.face.face_record import RECORD
 from ..perception.landmark_network import KEYPOINT_COUNT
 from ..perception.observation import Observation, PendingReference, PersonMask
 from .appearance import SIZE as APPEARANCE_SIZE
@@ -24,7 +25,8 @@ class Track:
     ``acquired`` marks frames in which the person was found (again) rather than followed from the frame before.
     ``reference_rows`` and ``reference_landmarks`` are the reference network's world landmarks in a few frames, see
     `left_right`. ``hands`` holds pixels, confidence and world landmarks of the left and the right hand; None: hands
-    were not looked for. ``masks`` holds the person's outline in a few frames, each with its row.
+    were not looked for. ``masks`` holds the person's outline in a few frames, each with its row. ``face`` holds what
+    was seen of the face, see `face_record`; None: it was not looked for.
     """
 
     frames: NDArray[np.int64]  # (T,) source frame index
@@ -40,6 +42,7 @@ class Track:
     )
     hands: NDArray[np.floating[Any]] | None = None  # (T, 2, 21, 6)
     masks: tuple[tuple[int, PersonMask], ...] = ()
+    face: NDArray[np.floating[Any]] | None = None  # (T, RECORD)
 
     def __len__(self) -> int:
         return len(self.frames)
@@ -69,6 +72,7 @@ class Tracklet:
     references: list[tuple[int, PendingReference]] = field(default_factory=list)  # each with its row
     hands: list[NDArray[np.float32]] = field(default_factory=list)  # (2, 21, 6); empty if hands are not looked for
     masks: list[tuple[int, PersonMask]] = field(default_factory=list)  # each with its row
+    faces: list[NDArray[np.float32]] = field(default_factory=list)  # (RECORD,); empty if faces are not looked for
 
     def add(self, row: int, observation: Observation) -> None:
         """Append the frame with index ``row``; an observation that is not finite counts as not seen."""
@@ -88,6 +92,8 @@ class Tracklet:
             self.masks.append((row, o.mask))
         if o.hands is not None:
             self.hands.append(np.where(np.isfinite(o.hands), o.hands, 0.0).astype(np.float32))
+        if o.face is not None:
+            self.faces.append(o.face.astype(np.float32))
 
     def truncate(self, count: int) -> None:
         """Keep the first ``count`` frames."""
@@ -96,7 +102,7 @@ class Tracklet:
             self.references = [(row, call) for row, call in self.references if row < end]
             self.masks = [(row, mask) for row, mask in self.masks if row < end]
             del self.rows[count:], self.values[count:], self.centers_px[count:], self.sides_px[count:]
-            del self.hands[count:]
+            del self.hands[count:], self.faces[count:]
 
     @property
     def prominence(self) -> float:
@@ -116,6 +122,7 @@ def make_track(frames: Sequence[int], times: Sequence[float], tracklets: Sequenc
     references: list[tuple[int, NDArray[Any]]] = []
     shapes = {hands.shape for tracklet in tracklets for hands in tracklet.hands[:1]}
     hands = np.zeros((len(frames), *shapes.pop()), np.float32) if shapes else None
+    face = np.zeros((len(frames), RECORD), np.float32) if any(tracklet.faces for tracklet in tracklets) else None
     for tracklet in tracklets:
         if tracklet.rows:
             for row, value in zip(tracklet.rows, tracklet.values, strict=True):
@@ -126,6 +133,8 @@ def make_track(frames: Sequence[int], times: Sequence[float], tracklets: Sequenc
             references += [(row, landmarks) for row, landmarks in results if landmarks is not None]
         if hands is not None and tracklet.hands:
             hands[tracklet.rows] = tracklet.hands
+        if face is not None and tracklet.faces:
+            face[tracklet.rows] = tracklet.faces
     return Track(
         frames=np.array(frames, np.int64),
         times=np.array(times, float),
@@ -138,11 +147,12 @@ def make_track(frames: Sequence[int], times: Sequence[float], tracklets: Sequenc
         reference_landmarks=np.array([w for _, w in references], float).reshape(-1, KEYPOINT_COUNT, 3),
         hands=hands,
         masks=tuple(mask for tracklet in tracklets for mask in tracklet.masks),
+        face=face,
     )
 
 
 def single_frame_track(observation: Observation) -> Track:
-    """Make a track of one frame, without hands and mask, and without reference landmarks, which may be pending."""
+    """Make a track of one frame, without hands, face, mask, and reference landmarks, which may be pending."""
     tracklet = Tracklet()
-    tracklet.add(0, replace(observation, reference_landmarks=None, hands=None, mask=None))
+    tracklet.add(0, replace(observation, reference_landmarks=None, hands=None, face=None, mask=None))
     return make_track([0], [0.0], [tracklet])

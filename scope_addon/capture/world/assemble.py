@@ -14,6 +14,7 @@ from ...kinematics.frame_blocks import by_blocks
 from ...motion import Motion
 from ..fitting.hand_measurements import HAND_KEYPOINT_NAMES
 from ..perception.landmark_network import KEYPOINT_NAMES
+from ..tracking.face.expression_motion import expression_motion
 from ..tracking.track import Track
 from .camera_path import CameraPath
 from .placement import PlacedTrack, raw_motion
@@ -80,6 +81,7 @@ def assemble_motion(
         source=shot.source,
         joint_sigma_m=None if sigma is None else np.sqrt((sigma[..., 0] ** 2 + 2.0 * sigma[..., 1] ** 2) / 3.0),
         joint_sigma_depth_m=None if sigma is None else sigma[..., 0],
+        face={} if track.face is None else expression_motion(track.face, placed.times, shot.smoothing),
     )
 
 

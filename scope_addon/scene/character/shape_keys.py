@@ -7,6 +7,7 @@ shape, so at the fitted values Blender's deformation is exactly SMPL's.
 
 from __future__ import annotations
 
+from collections.abc import Container
 from typing import Any
 
 import bpy
@@ -57,8 +58,8 @@ def key_shape(
     betas: NDArray[np.floating[Any]],
     frames: NDArray[np.float64],
     per_frame: bool = False,
-) -> None:
-    """Key the shape coefficients.
+) -> Channels:
+    """Key the shape coefficients, and return the channels of the mesh's shape keys.
 
     :param betas: (P,) the fitted shape.
     :param frames: (T,) scene frames.
@@ -68,16 +69,20 @@ def key_shape(
     at = frames if per_frame else frames[:1]
     for p, beta in enumerate(betas):
         channels.write(shape_key_path(shape_key_name(p)), at, np.full(len(at), beta), "CONSTANT", group="Shape")
+    return channels
 
 
-def mixed_vertices(mesh: bpy.types.Object) -> NDArray[np.float32]:
-    """Return the rest vertices (V, 3) at the current slider values: ``basis + Σ_p value_p (key_p − basis)``."""
+def mixed_vertices(mesh: bpy.types.Object, without: Container[str] = ()) -> NDArray[np.float32]:
+    """Return the rest vertices (V, 3) at the current slider values: ``basis + Σ_p value_p (key_p − basis)``.
+
+    :param without: names of keys that are left out.
+    """
     blocks = mesh.data.shape_keys.key_blocks
     basis = np.empty(3 * len(mesh.data.vertices), np.float32)
     blocks[0].data.foreach_get("co", basis)
     mixed, key = basis.astype(float), np.empty_like(basis)
     for block in blocks[1:]:
-        if not block.mute:
+        if not block.mute and block.name not in without:
             block.data.foreach_get("co", key)
             mixed += block.value * (key - basis)
     return mixed.astype(np.float32).reshape(-1, 3)

@@ -15,6 +15,7 @@ from ...errors import UsageError
 from ..animation_data import actions
 from ..camera import set_resolution
 from ..character.animation import on_one_hemisphere
+from ..character.expression_keys import copy_expressions, expression_offsets
 from ..character.shape_keys import mixed_vertices
 
 
@@ -166,12 +167,13 @@ def actions_over_scene_range(scene: bpy.types.Scene) -> Iterator[None]:
 
 @contextmanager
 def baked_meshes(scene: bpy.types.Scene) -> Iterator[None]:
-    """Replace meshes with shape keys by meshes of their current shape inside the block."""
+    """Replace meshes with shape keys by meshes of their current shape inside the block; expressions stay keys."""
     shaped = [(obj, obj.data, obj.data.name) for obj in scene.objects if obj.type == "MESH" and obj.data.shape_keys]
-    baked = []
+    baked, actions_made = [], []
     try:
         for obj, mesh, name in shaped:
-            vertices = mixed_vertices(obj)
+            expressions = expression_offsets(obj)
+            vertices = mixed_vertices(obj, without=expressions)
             plain = bpy.data.meshes.new_from_object(obj)
             baked.append(plain)
             if mesh.library is None:  # a linked mesh's name does not conflict with one in this file
@@ -180,12 +182,14 @@ def baked_meshes(scene: bpy.types.Scene) -> Iterator[None]:
             plain.vertices.foreach_set("co", vertices.ravel())
             plain.update()
             obj.data = plain
+            if expressions:
+                actions_made.append(copy_expressions(obj, mesh.shape_keys, expressions))
         bpy.context.view_layer.update()
         yield
     finally:
         for obj, mesh, _ in shaped:
             obj.data = mesh
-        bpy.data.batch_remove(baked)
+        bpy.data.batch_remove([*baked, *actions_made])
         for _, mesh, name in shaped:
             if mesh.library is None:
                 mesh.name = name

@@ -103,6 +103,7 @@ class SCOPE_PT_person(Tab, bpy.types.Panel):
             layout.prop(settings, "body_file", text="File")
         layout.prop(settings, "height_cm")
         layout.prop(settings, "hands")
+        layout.prop(settings, "face")
         layout.prop(settings, "shape")
         layout.prop(settings, "lens")
         if settings.lens == "FOCAL":

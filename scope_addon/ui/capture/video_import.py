@@ -42,7 +42,7 @@ class SCOPE_OT_import_video(bpy.types.Operator):
         layout, settings = self.layout, context.scene.scope
         layout.use_property_split = True
         layout.use_property_decorate = False
-        for name in ("quality", "people", "hands", "height_cm", "take"):
+        for name in ("quality", "people", "hands", "face", "height_cm", "take"):
             layout.prop(settings, name)
 
     def execute(self, context: bpy.types.Context) -> set[str]:

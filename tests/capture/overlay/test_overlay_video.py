@@ -14,6 +14,7 @@ from scope.scope_addon.capture.overlay.overlay_video import (
     body_colors,
     camera_vertices,
     draw_overlay,
+    painted_frames,
     write_overlay,
 )
 from scope.scope_addon.errors import CancelledError, OutputError, VideoError
@@ -22,7 +23,7 @@ from scope.scope_addon.motion import Motion
 from scope.solver.body import Body
 from scope.solver.errors import ShapeError
 
-from ...made_motion import made_motion
+from ...made_motion import made_face, made_motion
 
 W, H = 160, 120
 K = np.array([[130.0, 0, 80.0], [0, 130.0, 60.0], [0, 0, 1]])
@@ -213,3 +214,14 @@ def test_missing_footage_and_a_wrong_body_are_errors(tmp_path, footage, body):
     with pytest.raises(ShapeError, match="52 joints"):
         write_overlay(tmp_path / "a.mp4", footage, motion, body)
     assert [p.name for p in tmp_path.iterdir()] == ["footage.mp4"]
+
+
+def test_the_points_of_a_face_are_drawn_where_it_was_seen(tmp_path, footage, body):
+    motion = standing(body, [0, 1])
+    motion.face = made_face(2) | {"face_points": np.full((2, 3, 2), 20.0), "expression_confidence": np.array([0, 1.0])}
+    with open_video(footage) as video:
+        size = (video.height, video.width)
+    shown = dict(painted_frames(footage, [motion], body, [0, 1], opacity=0.0))
+    assert shown[0].shape[:2] == size
+    assert abs(int(shown[0][20, 20].max()) - GREY) < 10
+    assert shown[1][20, 20].min() > 200

@@ -1,0 +1,128 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Expression weights and gaze over time: calm at rest, sharp in a blink, and back to rest where no face is seen."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .....solver.names import EXPRESSIONS
+from ....kinematics.smoothing import gaussian_smooth
+from ....motion import FACE_KEYS
+from ...perception.face.face_record import CONTOURS, parts
+
+CALM_HZ = 2.0  # cut-off frequency at rest
+NOISE = 0.05  # deviation of a weight from the calm motion that counts as noise, of a large face
+MOST_NOISE = 8.0  # times as much for a small one, by the inverse of its area
+GAZE_NOISE = 0.06
+SURE_PX = 64.0  # size of a face from which it is large
+RELEASE_S = 0.5  # in which an expression goes to rest after the face was last seen, and comes back before it is again
+CLOSED = 0.5  # weight of a blink above which the iris is not seen
+LEAST_S = 2.0  # of a face, from which it is known how the network sees its open eyes
+MOST_OPEN = 0.65  # weight of a blink that may be an open eye
+_BLINKS = [EXPRESSIONS.index(f"eyeBlink{side}") for side in ("Left", "Right")]
+_FORWARD = np.array([0.0, 0.0, 1.0])
+
+
+def expression_motion(
+    rows: NDArray[np.floating[Any]], times: NDArray[np.float64], smoothing: bool
+) -> dict[str, NDArray[Any]]:
+    """Return a motion file's arrays about the face, named as `FACE_KEYS`.
+
+    :param rows: (T, RECORD) see `face_record`.
+    :param times: (T,) seconds.
+    :param smoothing: False keeps the networks' weights and directions where the face is seen.
+    """
+    confidence, size, weights, directions, contours = parts(np.asarray(rows, float))
+    seen = confidence > 0
+    weights = with_open_eyes(weights, seen, times)
+    open_eyes = seen[:, None] & (weights[:, _BLINKS] < CLOSED)
+    weights, sure = released(weights, seen, times, np.zeros(len(EXPRESSIONS))), confidence
+    if smoothing and len(rows) > 2:
+        noise = np.where(seen, np.clip((SURE_PX / np.maximum(size, 1.0)) ** 2, 1.0, MOST_NOISE), 1.0)
+        weights = np.clip(calmed(weights, times, NOISE * noise[:, None]), 0.0, 1.0)
+        sure = np.where(seen, np.clip(gaussian_smooth(confidence, times, CALM_HZ), 0.0, 1.0), 0.0)
+    eyes = np.empty_like(directions)
+    for k in range(len(_BLINKS)):
+        eyes[:, k] = released(directions[:, k], open_eyes[:, k], times, _FORWARD)
+        if smoothing and len(rows) > 2:
+            eyes[:, k] = calmed(eyes[:, k], times, np.array(GAZE_NOISE))
+    eyes /= np.linalg.norm(eyes, axis=-1, keepdims=True)
+    values = (
+        weights.astype(np.float32),
+        np.array(EXPRESSIONS),
+        sure.astype(np.float32),
+        eyes.astype(np.float32),
+        contours.astype(np.float32),
+        np.array(CONTOURS, np.int64),
+    )
+    return dict(zip(FACE_KEYS, values, strict=True))
+
+
+def with_open_eyes(
+    weights: NDArray[np.floating[Any]], seen: NDArray[np.bool_], times: NDArray[np.float64]
+) -> NDArray[np.floating[Any]]:
+    """Take from the blinks what the network sees in this person's open eyes, as narrow ones, or those behind glasses.
+
+    With the median m of a blink's weight over the clip, in most of which eyes are open: w' = max(0, (w − m) / (1 − m)).
+    Weights of faces that are seen for less than `LEAST_S` stay, and those of eyes that are closed for half of the clip.
+
+    :param weights: (T, 52).
+    :param seen: (T,) where the face was seen.
+    :param times: (T,) seconds.
+    """
+    if len(times) < 2 or seen.sum() * float(np.median(np.diff(times))) < LEAST_S:
+        return weights
+    out = weights.copy()
+    for blink in _BLINKS:
+        rest = float(np.median(weights[seen, blink]))
+        if rest < MOST_OPEN:
+            out[:, blink] = np.maximum(0.0, (weights[:, blink] - rest) / (1.0 - rest))
+    return out
+
+
+def released(
+    values: NDArray[np.floating[Any]], seen: NDArray[np.bool_], times: NDArray[np.float64], rest: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Fill the frames without measurement: from the last value to rest and from rest to the next one.
+
+    With the times since the last and until the next measurement, both values count by s(t) = (1 + cos(π t / τ)) / 2 for
+    t < τ = `RELEASE_S`; what remains of their sum to 1 is rest.
+
+    :param values: (T, n).
+    :param seen: (T,) which were measured.
+    :param times: (T,) seconds.
+    :param rest: (n,).
+    """
+    T, out = len(values), np.tile(rest, (len(values), 1)).astype(float)
+    rows = np.flatnonzero(seen)
+    if not len(rows):
+        return out
+    place = np.searchsorted(rows, np.arange(T), side="right")
+    last, following = rows[np.maximum(place - 1, 0)], rows[np.minimum(place, len(rows) - 1)]
+    since = np.where(place > 0, times - times[last], np.inf)
+    until = np.where(place < len(rows), times[following] - times, np.inf)
+    shares = [0.5 * (1 + np.cos(np.pi * np.minimum(t / RELEASE_S, 1.0))) for t in (since, until)]
+    total = np.maximum(shares[0] + shares[1], 1.0)
+    for share, source in zip(shares, (last, following), strict=True):
+        out += (share / total)[:, None] * (values[source] - rest)
+    out[seen] = values[seen]
+    return out
+
+
+def calmed(
+    values: NDArray[np.floating[Any]], times: NDArray[np.float64], noise: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Remove noise from values (T, n) without phase, and without rounding what moves quickly.
+
+    With the calm motion c, a low-pass of x, and d = x − c: y = c + d · d² / (d² + noise²). What deviates by less than
+    the noise follows c; a blink deviates by much more and stays as it is.
+
+    :param noise: (T, 1) or ().
+    """
+    calm = gaussian_smooth(values, times, CALM_HZ)
+    deviation = values - calm
+    kept: NDArray[np.float64] = calm + deviation**3 / (deviation**2 + noise**2)
+    return kept

@@ -1,0 +1,118 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Tracking of faces: the body's head says where to look first, the face's own landmarks where in the next frame."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...perception.execution import Execution
+from ...perception.face.face_landmarks import FaceEstimate, FaceNetwork
+from ...perception.face.face_record import record
+from ...perception.face.face_region import HEAD, region_from_body
+from ...perception.observation import Observation
+from ...perception.region import Region
+from ..frame_clock import FRAME_S
+
+PRESENCE_THRESHOLD = 0.5
+MAX_DISTANCE = 0.35  # between the face and where the body's head predicts it, in sides of the predicted region
+MIN_SIZE, MAX_SIZE = 0.5, 1.6  # side of the face's region over that of the predicted one
+SMALLEST_REGION_PX = 24.0
+EAGER_S = 10 * FRAME_S  # for which a lost face is looked for in every frame
+PATIENCE_S = 4 * FRAME_S  # between two attempts afterwards
+TIME_TOLERANCE_S = 0.005  # of a frame's time
+
+
+@dataclass
+class _Face:
+    """The state of one person's face: its region in the frame before, and where the body's head was, if it was seen."""
+
+    region: Region | None
+    head_px: NDArray[np.float64]
+    seen_s: float  # when it was last seen; if never, when it was first looked for
+    searched_s: float  # when it was last looked for
+
+
+class FaceTracker:
+    """Tracks the faces of the people whom `PeopleTracker` tracks; frames are given in order.
+
+    :param threads: of the landmark network.
+    :param folder: of the networks; None: the built-in ones.
+    :param execution: what the networks run on.
+    :raises SetupError: a network is missing.
+    """
+
+    def __init__(self, threads: int, folder: Path | None = None, execution: Execution | None = None) -> None:
+        self._network = FaceNetwork(threads, folder, execution)
+        self._faces: dict[int, _Face] = {}
+
+    def step(
+        self, image_rgb: NDArray[np.uint8], observations: Sequence[tuple[int, Observation]], time_s: float
+    ) -> list[tuple[int, Observation]]:
+        """Add ``face`` to the observations of one frame.
+
+        :param image_rgb: (H, W, 3).
+        :param observations: tracklet number and observation of each person.
+        :param time_s: when the frame is shown.
+        """
+        before, self._faces = self._faces, {}
+        found = []
+        for number, person in observations:
+            head = person.keypoints_px[list(HEAD)].mean(axis=0)
+            face = before.get(number) or _Face(None, head, time_s, time_s - PATIENCE_S)
+            estimate = self._find(image_rgb, face, person, head, time_s)
+            face.region, face.head_px = (estimate.next_region if estimate else None), head
+            if estimate:
+                face.seen_s = time_s
+            self._faces[number] = face
+            values = record(estimate, None if estimate is None else self._network.expression(estimate))
+            found.append((number, replace(person, face=values)))
+        return found
+
+    def _find(
+        self,
+        image_rgb: NDArray[np.uint8],
+        face: _Face,
+        person: Observation,
+        head_px: NDArray[np.float64],
+        time_s: float,
+    ) -> FaceEstimate | None:
+        """Look for the face where it was a frame ago, moved with the head, otherwise where the body predicts it.
+
+        There it is estimated twice: the landmarks give a better region than the body.
+        """
+        predicted = region_from_body(person.keypoints_px)
+        if predicted.side_px < SMALLEST_REGION_PX or not np.isfinite(predicted.side_px):
+            return None
+        if face.region is not None:
+            x, y = np.asarray(face.region.center_px) + head_px - face.head_px
+            estimate = self._network.estimate(image_rgb, replace(face.region, center_px=(float(x), float(y))))
+            if belongs(estimate, predicted):
+                return estimate
+        elif (
+            time_s - face.seen_s > EAGER_S + TIME_TOLERANCE_S
+            and time_s - face.searched_s < PATIENCE_S - TIME_TOLERANCE_S
+        ):
+            return None
+        face.searched_s = time_s
+        first = self._network.estimate(image_rgb, predicted)
+        if not np.isfinite(first.landmarks).all():
+            return None
+        second = self._network.estimate(image_rgb, first.next_region)
+        return second if belongs(second, predicted) else None
+
+
+def belongs(estimate: FaceEstimate, predicted: Region) -> bool:
+    """Return whether this is a face, and the one of the person for whom the body's head predicts a region."""
+    if estimate.presence < PRESENCE_THRESHOLD or not np.isfinite(estimate.landmarks).all():
+        return False
+    region = estimate.next_region
+    distance = float(np.hypot(*np.subtract(region.center_px, predicted.center_px)))
+    return (
+        distance <= MAX_DISTANCE * predicted.side_px
+        and MIN_SIZE * predicted.side_px <= region.side_px <= MAX_SIZE * predicted.side_px
+    )

@@ -1,0 +1,55 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The facial expressions of the built-in bodies: how far each moves the vertices of the mesh at rest.
+
+Displacements add to the shape, v̄ + Σ_p β_p shapedirs_p + Σ_k w_k e_k: neither depends on the other.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...solver.body import Body
+from ...solver.errors import ModelFileError
+from ...solver.loaders.body_file import BUILT_IN
+from ...solver.loaders.npz import read_npz
+
+FILE = Path(BUILT_IN["scope"]).with_name("expressions.npz")
+
+
+@dataclass(frozen=True)
+class Expression:
+    """One expression: ``vertices`` (n,) that it moves by ``offsets`` (n, 3), metres in the model frame, at weight 1."""
+
+    name: str
+    vertices: NDArray[np.intp]
+    offsets: NDArray[np.float64]
+
+
+def expressions_of(body: Body) -> tuple[Expression, ...]:
+    """Return the body's expressions in the order of `solver.names.EXPRESSIONS`; none of a user's own body.
+
+    :raises ModelFileError: the file of the expressions is damaged.
+    """
+    if body.name not in BUILT_IN or body.file:
+        return ()
+    count, found = _read()
+    return found if count == len(body.v_template) else ()
+
+
+@cache
+def _read() -> tuple[int, tuple[Expression, ...]]:
+    data = read_npz(FILE, ModelFileError, "file of expressions")
+    try:
+        starts, step = data["starts"], float(data["step_m"])
+        found = tuple(
+            Expression(str(name), data["vertices"][a:b].astype(np.intp), step * data["moves"][a:b].astype(float))
+            for name, a, b in zip(data["names"], starts[:-1], starts[1:], strict=True)
+        )
+        return int(data["vertex_count"]), found
+    except (KeyError, IndexError, TypeError, ValueError) as error:
+        raise ModelFileError(f"{FILE} is damaged ({error}); install Scope again") from error

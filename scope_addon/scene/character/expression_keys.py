@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Facial expressions as shape keys with ARKit's names, from 0 to 1, and their weights as keyframes."""
+
+from __future__ import annotations
+
+import math
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ....solver.body import Body
+from ....solver.names import EXPRESSIONS
+from ...kinematics.axes import R_WORLD_MODEL
+from ...kinematics.expressions import expressions_of
+from ...motion import Motion
+from ..animation_data.actions import Channels, fcurves, read_keys, shape_key_path
+
+MOVES = 1e-3  # change of a weight from which an expression counts as moving
+
+
+def has_expression_keys(keys: bpy.types.Key) -> bool:
+    """Return whether a mesh's shape keys contain those of the face."""
+    return EXPRESSIONS[0] in keys.key_blocks
+
+
+def add_expression_keys(mesh: bpy.types.Object, body: Body) -> bool:
+    """Add one key per expression, each at 0, and ``Basis`` if there is none; False if the body has no expressions."""
+    expressions = expressions_of(body)
+    if not expressions:
+        return False
+    if mesh.data.shape_keys is None:
+        mesh.shape_key_add(name="Basis", from_mix=False)
+    rest = np.empty((len(mesh.data.vertices), 3), np.float32)
+    mesh.data.shape_keys.key_blocks[0].data.foreach_get("co", rest.ravel())
+    for expression in expressions:
+        moved = rest.copy()
+        moved[expression.vertices] += (expression.offsets @ R_WORLD_MODEL.T).astype(np.float32)
+        key = mesh.shape_key_add(name=expression.name, from_mix=False)
+        key.data.foreach_set("co", moved.ravel())
+        key.value = 0.0
+    return True
+
+
+def key_expressions(
+    mesh: bpy.types.Object,
+    channels: Channels,
+    motion: Motion,
+    frames: NDArray[np.float64],
+    whole_frames: bool = False,
+) -> None:
+    """Key the weights of the motion's face; an expression that never changes gets one key, one that never shows none.
+
+    :param channels: of the mesh's shape keys.
+    :param frames: (T,) scene frames.
+    :param whole_frames: key whole frames only, by linear interpolation.
+    """
+    weights = motion.face["expressions"].astype(float)
+    at = np.arange(math.ceil(frames[0] - 1e-4), math.floor(frames[-1] + 1e-4) + 1.0) if whole_frames else frames
+    at = at if len(at) else np.round(frames[:1])
+    for name, column in zip(motion.face["expression_names"].tolist(), weights.T, strict=True):
+        if name not in mesh.data.shape_keys.key_blocks or column.max() < MOVES:
+            continue
+        values = np.interp(at, frames, column) if whole_frames else column
+        moves = np.ptp(column) >= MOVES
+        path = shape_key_path(name)
+        mesh.data.shape_keys.key_blocks[name].value = float(values[0])
+        if moves:
+            channels.write(path, at, values, group="Face")
+        else:
+            channels.write(path, at[:1], values[:1], "CONSTANT", group="Face")
+
+
+def expression_offsets(mesh: bpy.types.Object) -> dict[str, NDArray[np.float32]]:
+    """Return how far each expression's key moves the vertices (V, 3), by name; none if there are no such keys."""
+    blocks = mesh.data.shape_keys.key_blocks
+    basis, moved = (np.empty((len(mesh.data.vertices), 3), np.float32) for _ in range(2))
+    blocks[0].data.foreach_get("co", basis.ravel())
+    offsets = {}
+    for name in EXPRESSIONS:
+        if name in blocks:
+            blocks[name].data.foreach_get("co", moved.ravel())
+            offsets[name] = moved - basis
+    return offsets
+
+
+def copy_expressions(
+    mesh: bpy.types.Object, source: bpy.types.Key, offsets: dict[str, NDArray[np.float32]]
+) -> bpy.types.Action:
+    """Give a mesh without shape keys those of another one's expressions, with their keyframes.
+
+    :param source: the other mesh's shape keys.
+    :param offsets: (V, 3) each, as from `expression_offsets`.
+    :return: the new action.
+    """
+    mesh.shape_key_add(name="Basis", from_mix=False)
+    rest = np.empty((len(mesh.data.vertices), 3), np.float32)
+    mesh.data.shape_keys.key_blocks[0].data.foreach_get("co", rest.ravel())
+    for name, offset in offsets.items():
+        key = mesh.shape_key_add(name=name, from_mix=False)
+        key.data.foreach_set("co", (rest + offset).ravel())
+        key.value = source.key_blocks[name].value
+    animated = {curve.data_path: curve for curve in fcurves(source)}
+    channels = Channels(mesh.data.shape_keys, bpy.data.actions.new(f"{mesh.name}_expressions"))
+    for name in offsets:
+        if (curve := animated.get(shape_key_path(name))) is not None:
+            keys = read_keys(curve).astype(float)
+            if len(keys):
+                channels.write(curve.data_path, keys[:, 0], keys[:, 1])
+    return channels.action

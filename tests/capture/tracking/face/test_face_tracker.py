@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Faces with a fake network: found by the body, followed by themselves, lost, and somebody else's."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scope.scope_addon.capture.perception.face.face_landmarks import FACE_POINTS, FaceEstimate
+from scope.scope_addon.capture.perception.face.face_record import parts
+from scope.scope_addon.capture.perception.face.face_region import region_from_body
+from scope.scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES
+from scope.scope_addon.capture.perception.observation import Observation
+from scope.scope_addon.capture.perception.region import Region
+from scope.scope_addon.capture.tracking.face import face_tracker
+from scope.scope_addon.capture.tracking.face.face_tracker import FaceTracker
+from scope.solver.names import EXPRESSIONS
+
+IMAGE = np.zeros((800, 800, 3), np.uint8)
+SHAPE = np.random.default_rng(0).uniform(-0.5, 0.5, (FACE_POINTS, 3))
+SHAPE[:2] = [[-0.5] * 3, [0.5] * 3]  # the corners of its box
+SHAPE[[33, 263]] = [[-0.3, 0, 0], [0.3, 0, 0]]
+SHAPE[[10, 152]] = [[0, -0.5, 0], [0, 0.5, 0]]
+
+
+def person(x: float, y: float, scale: float = 500.0) -> Observation:
+    """A frontal head with its eyes around (x, y)."""
+    points = np.zeros((33, 2))
+    places = {
+        "left_eye": (0.03, 0),
+        "right_eye": (-0.03, 0),
+        "mouth_left": (0.02, 0.068),
+        "mouth_right": (-0.02, 0.068),
+    }
+    for name, offset in places.items():
+        points[KEYPOINT_NAMES.index(name)] = offset
+    points[[0, 7, 8]] = (0, 0.03), (0.07, 0.01), (-0.07, 0.01)
+    points = scale * points + [x, y]
+    return Observation(points, np.ones(33), np.zeros((33, 3)), 1.0, Region((x, y), 400.0, 0.0), False)
+
+
+class FakeNetwork:
+    """Sees the faces (x, y, size) whose middle is inside the inner half of a region."""
+
+    def __init__(self, *_):
+        self.faces, self.calls = [], 0
+
+    def estimate(self, _image, region):
+        self.calls += 1
+        for x, y, size in self.faces:
+            if np.abs(np.subtract((x, y), region.center_px)).max() < region.side_px / 4:
+                return FaceEstimate(size * SHAPE + [x, y, 0], 0.99, region)
+        return FaceEstimate(region.side_px * SHAPE + [*region.center_px, 0], 0.01, region)
+
+    def expression(self, _estimate):
+        return np.linspace(0, 1, len(EXPRESSIONS))
+
+
+@pytest.fixture
+def tracker(monkeypatch):
+    monkeypatch.setattr(face_tracker, "FaceNetwork", FakeNetwork)
+    return FaceTracker(1)
+
+
+def face_of(tracker, people, time_s=0.0):
+    return {n: parts(o.face[None]) for n, o in tracker.step(IMAGE, list(people.items()), time_s)}
+
+
+def middle(x, y, scale=500.0):
+    return np.array(region_from_body(person(x, y, scale).keypoints_px).center_px)
+
+
+def test_a_face_is_found_and_then_followed_with_one_run_of_the_network(tracker):
+    tracker._network.faces = [(*middle(300, 200), 92.0)]
+    confidence, size, weights, _, _ = face_of(tracker, {7: person(300, 200)})[7]
+    assert size[0] == pytest.approx(92, abs=1)
+    assert confidence[0] > 0
+    np.testing.assert_allclose(weights[0], np.linspace(0, 1, 52))
+    assert tracker._network.calls == 2
+    tracker._network.faces = [(*middle(360, 200), 92.0)]  # farther than it would be seen from where it was
+    assert face_of(tracker, {7: person(360, 200)}, 1 / 30)[7][0][0] > 0
+    assert tracker._network.calls == 3
+
+
+def test_there_is_nothing_where_no_face_is(tracker):
+    values = face_of(tracker, {1: person(300, 200)})[1]
+    assert not any(v.any() for v in values)
+
+
+def test_a_face_of_another_size_is_not_this_persons(tracker):
+    tracker._network.faces = [(*middle(300, 200), 30.0)]
+    assert face_of(tracker, {1: person(300, 200)})[1][0][0] == 0
+
+
+def test_a_lost_face_is_looked_for_less_often(tracker):
+    for k in range(60):
+        face_of(tracker, {1: person(300, 200)}, k / 30)
+    assert 30 < tracker._network.calls < 60  # two runs each: ten eager frames, then every fourth
+
+
+def test_a_head_too_small_is_not_looked_at(tracker):
+    assert face_of(tracker, {1: person(300, 200, 70.0)})[1][0][0] == 0
+    assert tracker._network.calls == 0

@@ -1,0 +1,121 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The face in Blender: keys with ARKit's names, keyframes for those that move, and morph targets in files."""
+
+from __future__ import annotations
+
+import json
+import struct
+from dataclasses import replace
+from pathlib import Path
+
+import bpy
+import numpy as np
+import pytest
+from scope.scope_addon.kinematics.expressions import expressions_of
+from scope.scope_addon.scene.animation_data import actions
+from scope.scope_addon.scene.build import NEW_SCENE, BuildOptions, build_scene
+from scope.scope_addon.scene.character.shape_keys import mixed_vertices
+from scope.scope_addon.scene.export.export import ExportOptions, export_motions
+from scope.solver.names import EXPRESSIONS
+
+from ...made_motion import made_face
+from ..exported import read_back
+
+JAW = np.array([0.0, 0.3, 0.9, 0.2])
+
+
+@pytest.fixture
+def motion(whole_body, make_motion):
+    return replace(make_motion(whole_body, 4), face=made_face(4, jawOpen=JAW, eyeBlinkLeft=0.4))
+
+
+def test_52_keys_of_which_those_that_move_are_animated(whole_body, motion):
+    mesh = build_scene([motion], whole_body, options=NEW_SCENE).people[0].mesh
+    blocks = mesh.data.shape_keys.key_blocks
+    assert blocks.keys()[-52:] == list(EXPRESSIONS)
+    assert {(blocks[n].slider_min, blocks[n].slider_max) for n in EXPRESSIONS} == {(0.0, 1.0)}
+    curves = {c.data_path: actions.read_keys(c) for c in actions.fcurves(mesh.data.shape_keys)}
+    faces = {path: keys for path, keys in curves.items() if "Shape" not in path}
+    assert set(faces) == {'key_blocks["jawOpen"].value', 'key_blocks["eyeBlinkLeft"].value'}
+    np.testing.assert_allclose(faces['key_blocks["jawOpen"].value'][:, 1], JAW, atol=1e-6)
+    np.testing.assert_allclose(faces['key_blocks["eyeBlinkLeft"].value'][:, 1], [0.4], atol=1e-6)
+
+
+@pytest.mark.parametrize("shape", ["keyed", "baked"])
+def test_a_key_moves_the_mesh_as_the_expression_says(whole_body, motion, shape):
+    mesh = build_scene([motion], whole_body, options=BuildOptions(shape=shape)).people[0].mesh
+    bpy.context.scene.frame_set(0)
+    before = mixed_vertices(mesh)
+    mesh.data.shape_keys.key_blocks["mouthSmileLeft"].value = 0.5
+    smile = next(e for e in expressions_of(whole_body) if e.name == "mouthSmileLeft")
+    x, y, z = 0.5 * smile.offsets.T
+    moved = mixed_vertices(mesh) - before
+    np.testing.assert_allclose(moved[smile.vertices], np.stack([x, -z, y], axis=1), atol=1e-5)
+    assert np.count_nonzero(np.abs(moved).max(axis=1) > 1e-6) <= len(smile.vertices)
+
+
+def test_whole_frames_where_they_are_asked_for(whole_body, motion):
+    bpy.context.scene.render.fps = 45  # three scene frames for two pictures
+    options = BuildOptions(frame_rate="resample")
+    mesh = build_scene([motion], whole_body, options=options).people[0].mesh
+    (curve,) = [c for c in actions.fcurves(mesh.data.shape_keys) if "jawOpen" in c.data_path]
+    keys = actions.read_keys(curve)
+    np.testing.assert_array_equal(keys[:, 0], np.arange(len(keys)))
+    np.testing.assert_allclose(keys[3, 1], 0.9, atol=1e-5)  # the third picture
+    np.testing.assert_allclose(keys[1, 1], 0.2, atol=1e-5)  # between the first and the second
+
+
+def test_a_motion_without_a_face_gets_no_keys(whole_body, make_motion):
+    mesh = build_scene([make_motion(whole_body, 4)], whole_body).people[0].mesh
+    assert not set(mesh.data.shape_keys.key_blocks.keys()) & set(EXPRESSIONS)
+
+
+def test_a_body_without_expressions_says_so(body, make_motion):
+    built = build_scene([replace(make_motion(body, 4), face=made_face(4, jawOpen=JAW))], body)
+    assert "has no expressions" in built.warnings[0]
+    assert built.people[0].mesh.data.shape_keys.key_blocks.keys()[-1] == f"Shape{body.P - 1:03d}"
+
+
+def morph_animation(path: Path) -> dict[str, np.ndarray]:
+    """The (T,) animated weights of a .glb by target, read without Blender: the file is JSON and float32 arrays."""
+    data = path.read_bytes()
+    length = struct.unpack("<I", data[12:16])[0]
+    gltf, binary = json.loads(data[20 : 20 + length]), data[28 + length :]
+    (mesh,) = [m for m in gltf["meshes"] if "extras" in m]
+    (animation,) = gltf["animations"]
+    (sampler,) = [
+        animation["samplers"][c["sampler"]] for c in animation["channels"] if c["target"]["path"] == "weights"
+    ]
+    accessor = gltf["accessors"][sampler["output"]]
+    view = gltf["bufferViews"][accessor["bufferView"]]
+    start = view.get("byteOffset", 0) + accessor.get("byteOffset", 0)
+    values = np.frombuffer(binary, "<f4", accessor["count"], start)
+    names = mesh["extras"]["targetNames"]
+    return dict(zip(names, values.reshape(-1, len(names)).T, strict=True))
+
+
+@pytest.mark.parametrize("shape", ["keys", "baked"])
+def test_a_glb_has_the_expressions_as_animated_morph_targets(whole_body, motion, tmp_path, shape):
+    path = tmp_path / "talk.glb"
+    export_motions([motion], whole_body, path, export_options=ExportOptions(shape=shape))
+    weights = morph_animation(path)
+    assert list(weights)[-52:] == list(EXPRESSIONS)
+    assert ("Shape000" in weights) == (shape == "keys")
+    np.testing.assert_allclose(weights["jawOpen"], JAW, atol=1e-5)
+    np.testing.assert_allclose(weights["eyeBlinkLeft"], 0.4, atol=1e-5)
+    assert not weights["mouthSmileLeft"].any()
+    if shape == "baked":
+        kinds = [len(getattr(bpy.data, kind)) for kind in ("meshes", "shape_keys", "actions")]
+        assert kinds == [0, 0, 0]  # nothing of what was baked is left behind
+
+
+def test_an_fbx_has_the_expressions_as_blend_shapes(whole_body, motion, blender, tmp_path):
+    path = tmp_path / "talk.fbx"
+    export_motions([motion], whole_body, path)
+    first = read_back(path)
+    keys = blender.only("MESH").data.shape_keys.key_blocks
+    assert set(EXPRESSIONS) <= set(keys.keys())
+    for t, value in enumerate(JAW):
+        blender.go_to(first + t)
+        assert keys["jawOpen"].value == pytest.approx(value, abs=1e-3)
+        assert keys["eyeBlinkLeft"].value == pytest.approx(0.4, abs=1e-3)
