@@ -34,7 +34,7 @@ ATTEMPTS = 3  # of a clip whose workers are lost
 class _Attempt(NamedTuple):
     """A clip on a worker; `task` is None for the check of a worker."""
 
-    future: Future
+    future: Future[Any]
     worker: str
     task: ClipTask | None
     folder: Path
@@ -138,6 +138,7 @@ class DaskRunner:
                 "continue"
             )
         try:  # not scheduler_info(), which may return a list without workers if the scheduler does not answer
+            assert self._client.scheduler is not None
             present = list(self._client.sync(self._client.scheduler.identity, n_workers=-1)["workers"])
         except (OSError, TimeoutError):
             return {}
@@ -261,7 +262,7 @@ class DaskRunner:
             self._staging.remove(attempt.folder)
         self._cancel([attempt.future])
 
-    def _cancel(self, futures: list[Future]) -> None:
+    def _cancel(self, futures: list[Future[Any]]) -> None:
         if futures and self._client.status == "running":
             with suppress(OSError, TimeoutError):  # the scheduler is lost, and forgets them by itself
                 self._client.cancel(futures, force=True)

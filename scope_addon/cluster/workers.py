@@ -86,8 +86,8 @@ class Workers:
         self.event(address, f"gets no clips: {problem}" if problem else "ready", tell=bool(problem))
 
     def free(self, jobs: int) -> WorkerRecord | None:
-        """Return the ready worker with the fewest clips, if it may have another one."""
-        ready = [r for r in self.records.values() if r.state == READY and r.running < jobs]
+        """Return the ready worker with the fewest clips, if it may have another one, for which it needs a thread."""
+        ready = [r for r in self.records.values() if r.state == READY and r.running < min(jobs, r.threads)]
         return min(ready, key=lambda record: record.running, default=None)
 
     def all_refused(self) -> bool:
