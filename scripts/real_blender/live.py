@@ -22,7 +22,7 @@ from session import OUT, addon, inventory, invoke, key, picture, run, show_tab, 
 OVER_PANEL = (1174, 300)
 ADDRESS, PORT = "http://127.0.0.1:8099/video", "8099"
 SAVED = OUT / "live.blend"
-MEASURED_S, RECORDED_S, GONE_S = 3.0, 5.0, 1.0
+MEASURED_S, RECORDED_S, GONE_S = 2.0, 5.0, 1.0
 report: dict = {}
 
 
@@ -257,7 +257,7 @@ def stopped() -> Iterator[float]:
     yield 0.5
     assert rig_pose() != posed
     picture("25_live_stopped")
-    yield from redrawn(2.0)
+    yield from redrawn(1.0)
     invoke(bpy.ops.ed.undo)
     yield 0.5
     assert inventory() == before, (inventory(), before)
