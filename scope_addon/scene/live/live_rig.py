@@ -7,6 +7,7 @@ its limbs are switched to FK.
 
 from __future__ import annotations
 
+import time
 from typing import Any
 
 import bpy
@@ -26,7 +27,8 @@ from ..rigs.rig_probe import SWITCHES, at_rest, probe
 from ..rigs.rig_retarget import RetargetOptions, usable_map
 from .datablocks import found
 
-_LEAST_CHANGE = 0.05  # of a shape coefficient, for which the proportions are compared again
+# The proportions are compared again for such a change of a shape coefficient, but not at every pose while these settle.
+_LEAST_CHANGE, _LEAST_PAUSE_S = 0.05, 0.25
 
 
 class LiveRig:
@@ -63,7 +65,7 @@ class LiveRig:
         self._rest = self._skeleton.heads[self._root]
         self._location = root_locations(rig, place, self._skeleton, self._root, self._rest + np.eye(3))
         self._transfer: Transfer | None = None
-        self._betas = np.full(body.P, np.nan)
+        self._betas, self._due_s = np.zeros(body.P), 0.0
 
     @property
     def rig(self) -> bpy.types.Object | None:
@@ -82,11 +84,8 @@ class LiveRig:
         rig = self.rig
         if rig is None:
             return
-        if self._transfer is None or np.abs(betas - self._betas).max(initial=0.0) > _LEAST_CHANGE:
-            self._betas = np.array(betas, float)
-            self._transfer = Transfer(self._body, self._betas, self._skeleton, self._map, feet=self._options.feet)
         clip = Clip(np.zeros(1), matrix_from_quaternion(rotations)[None], pelvis[None])
-        pose = self._transfer.pose(clip)
+        pose = self._transfer_of(betas).pose(clip)
         heads = pose.heads[:, self._root] + self._options.offset
         if self._options.root == "in-place":
             heads[:, :2] = self._rest[:2]
@@ -107,6 +106,15 @@ class LiveRig:
                 bone.location = place
         if (root := bones.get(self._skeleton.names[self._root])) is not None:
             root.location = location.tolist()
+
+    def _transfer_of(self, betas: NDArray[np.floating[Any]]) -> Transfer:
+        """Return the transfer for a shape, or for a slightly older one."""
+        now_s = time.monotonic()
+        is_due = np.abs(betas - self._betas).max(initial=0.0) > _LEAST_CHANGE and now_s > self._due_s
+        if self._transfer is None or is_due:
+            self._betas, self._due_s = np.array(betas, float), now_s + _LEAST_PAUSE_S
+            self._transfer = Transfer(self._body, self._betas, self._skeleton, self._map, feet=self._options.feet)
+        return self._transfer
 
     def restore(self) -> None:
         """Give the rig the pose from before."""

@@ -16,6 +16,7 @@ from typing import Any
 import bpy
 
 from ....solver.body import Body
+from ....solver.errors import ScopeError
 from ....solver.loaders.body_file import load_body
 from ...errors import OfflineError, UsageError, VideoError
 from ...footage import shown
@@ -37,7 +38,8 @@ from .stream_logins import with_login
 
 NOTICE_S = 1.0  # for which poses that were under way when a notice came do not end it
 QUIET_S = 2.0  # without a pose, after which the panel says so
-_WRITING_S = 60.0  # for which the recording is waited for
+_WRITING_S = 600.0  # for which the recording is waited for, which may have lasted for hours
+_ENDING_S = 5.0  # after which a process that has sent its recording is killed
 
 
 @dataclass
@@ -75,7 +77,8 @@ class LiveJob:
         self._body = LiveBody(scene, "Live", self._scene_body)
         self._before = SceneBefore()
         self._rig = live_rig(scene, self._scene_body) if scene.scope_live.with_rig else None
-        self._last_pose_s = self._notice_s = self._stopped_s = time.monotonic()
+        self._result: dict[str, Any] | None = None  # the recording's message
+        self._last_pose_s = self._notice_s = self._stopped_s = self._result_s = time.monotonic()
         self.created = self._was_created = False  # whether the last step, or one before, created the body
         # Blender 4.2 has no such attribute; its Python is isolated as well.
         python = python or [sys.executable, *getattr(bpy.app, "python_args", ("-I",))]
@@ -143,21 +146,25 @@ class LiveJob:
         if self.finishing and not self.recording:
             self._leave_pose(scene)
             return False
-        if self._is_stream and not bpy.app.online_access:
-            raise OfflineError
-        result = self._listen()
+        if self._is_stream and not bpy.app.online_access and not self.finishing:
+            if not self.recording:
+                raise OfflineError
+            self.stop()  # what was recorded is written
+        self._listen()
         pose = None if self.finishing else self._worker.newest_pose(self._scene_body.K + 1, self._scene_body.P)
         if pose is not None:
             self._show(scene, pose)
-        if result is None:
+        if self._result is None:
             if self.finishing and time.monotonic() - self._stopped_s > _WRITING_S:
                 raise UsageError("the recording was not written in time; record again")
             return True
-        self._build(scene, result)
+        if self._worker.alive and time.monotonic() - self._result_s < _ENDING_S:
+            return True  # its files are read once they are closed
+        self._build(scene, self._result)
         return False
 
-    def _listen(self) -> dict[str, Any] | None:
-        """Read the messages; return the recording's, once there is one."""
+    def _listen(self) -> None:
+        """Read the messages."""
         for message in self._worker.poll():
             if message["event"] == "status":
                 for name in ("presence", "rate", "latency_ms", "dropped", "received", "recorded_s"):
@@ -165,10 +172,10 @@ class LiveJob:
             elif message["event"] == "notice":
                 self.status.notice, self._notice_s = shown(message["text"]), time.monotonic()
             elif message["event"] == "ended":  # the source has, and nothing was recorded
+                self.recording = False
                 self.stop()
             elif message["event"] == "result":
-                return message
-        return None
+                self._result, self._result_s = message, time.monotonic()
 
     def _show(self, scene: bpy.types.Scene, pose: ShownPose) -> None:
         self.poses += 1
@@ -196,7 +203,7 @@ class LiveJob:
 
     def _build(self, scene: bpy.types.Scene, result: dict[str, Any]) -> None:
         """Write the recording's keys, as a capture of footage does, and remove the body that followed."""
-        self._worker.wait(1.0)
+        self._worker.wait(0.0)
         paths = [self._worker.job_folder / Path(name).name for name in result["motions"]]
         contents = [(path, path.read_bytes()) for path in paths]
         body, options = self._request.values["body"], build_options(scene)
@@ -204,8 +211,11 @@ class LiveJob:
         self._body.remove()
         if self._rig is not None and self._rig.rig is not None:
             self._rig.restore()
-            with window_shows(scene):
-                self.warnings = retarget_to_chosen_rig(bpy.context, built.people[0].armature).warnings
+            try:
+                with window_shows(scene):
+                    self.warnings = retarget_to_chosen_rig(bpy.context, built.people[0].armature).warnings
+            except ScopeError as error:  # the recording is there, and can be retargeted later
+                self.warnings = [str(error)]
         self._worker.close()
 
 

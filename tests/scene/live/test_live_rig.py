@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from mathutils import Matrix
 from scope.scope_addon.errors import UsageError
+from scope.scope_addon.scene.live import live_rig
 from scope.scope_addon.scene.live.live_rig import LiveRig
 from scope.scope_addon.scene.rigs.rig_retarget import RetargetOptions, guess_bone_map, retarget
 from scope.solver.rotations import exp, quaternion_from_matrix
@@ -69,3 +70,16 @@ def test_a_missing_bone_is_an_error():
     rig.data.bones[bones["left_knee"]].name = "other"
     with pytest.raises(UsageError, match="has no bone"):
         LiveRig(rig, BODY, bone_map)
+
+
+def test_the_proportions_follow_the_shape_but_not_at_every_pose(monkeypatch):
+    rig, _ = build_rig("unity")
+    live, now = LiveRig(rig, BODY, guess_bone_map(rig)), [100.0]
+    monkeypatch.setattr(live_rig.time, "monotonic", lambda: now[0])
+    first, tall = live._transfer_of(np.zeros(BODY.P)), np.linspace(1, 0, BODY.P)
+    assert live._transfer_of(tall) is first  # not yet
+    now[0] += 1.0
+    second = live._transfer_of(tall)
+    assert second is not first
+    now[0] += 1.0
+    assert live._transfer_of(tall + 0.01) is second  # too little

@@ -124,6 +124,43 @@ def test_a_file_that_ends_leaves_the_last_pose(live):
     assert "Live" in bpy.data.objects
 
 
+def test_a_recording_that_was_asked_for_too_late_leaves_the_last_pose(live):
+    job = live('pose(1); time.sleep(0.5); hear(); send("ended")')
+    until(job, lambda: job.has_body)
+    job.record()
+    to_end(job)
+    assert "Live" in bpy.data.objects
+
+
+def test_a_recording_whose_retargeting_fails_is_kept(live, monkeypatch):
+    rig, _ = build_rig("mixamo")
+    scene = bpy.context.scene
+    scene.scope_live.with_rig, scene.scope_retarget.rig = True, rig
+    job = live("pose(1); hear(); hear(); finish()")
+    until(job, lambda: job.has_body)
+    job.record()
+    scene.scope_retarget.pairs.add().bone, scene.scope_retarget.pairs[0].part = "gone", "pelvis"
+    job.stop()
+    to_end(job)
+    assert scene.scope.capture is not None
+    assert len(job.warnings) == 1
+
+
+def test_a_stream_ends_when_online_access_does(live, monkeypatch):
+    settings, system = bpy.context.scene.scope_live, bpy.context.preferences.system
+    settings.source, settings.stream = "STREAM", "rtsp://camera/stream"
+    system.use_online_access = True
+    jobs = [live("pose(1); hear()"), live('pose(1); hear(); assert hear() == "stop"; finish()')]
+    for job in jobs:
+        until(job, lambda job=job: job.poses)
+    jobs[1].record()
+    system.use_online_access = False
+    with pytest.raises(OfflineError):
+        to_end(jobs[0])
+    to_end(jobs[1])
+    assert bpy.context.scene.scope.capture is not None
+
+
 @pytest.mark.parametrize("recording", [False, True])
 def test_cancelling_leaves_the_scene_as_it_was(live, recording):
     bpy.ops.object.armature_add()
