@@ -37,12 +37,20 @@ def expressions_of(body: Body) -> tuple[Expression, ...]:
     """
     if body.name not in BUILT_IN or body.file:
         return ()
-    count, found = _read()
+    count, found, _ = _read()
     return found if count == len(body.v_template) else ()
 
 
+def mouth_faces_of(body: Body) -> NDArray[np.intp]:
+    """Return which faces (n,) of the body line its mouth; none where there are no expressions.
+
+    :raises ModelFileError: the file of the expressions is damaged.
+    """
+    return _read()[2] if expressions_of(body) else np.zeros(0, np.intp)
+
+
 @cache
-def _read() -> tuple[int, tuple[Expression, ...]]:
+def _read() -> tuple[int, tuple[Expression, ...], NDArray[np.intp]]:
     data = read_npz(FILE, ModelFileError, "file of expressions")
     try:
         starts, step = data["starts"], float(data["step_m"])
@@ -50,6 +58,6 @@ def _read() -> tuple[int, tuple[Expression, ...]]:
             Expression(str(name), data["vertices"][a:b].astype(np.intp), step * data["moves"][a:b].astype(float))
             for name, a, b in zip(data["names"], starts[:-1], starts[1:], strict=True)
         )
-        return int(data["vertex_count"]), found
+        return int(data["vertex_count"]), found, data["mouth_faces"].astype(np.intp)
     except (KeyError, IndexError, TypeError, ValueError) as error:
         raise ModelFileError(f"{FILE} is damaged ({error}); install Scope again") from error

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scope.scope_addon.kinematics.expressions import Expression, expressions_of
+from scope.scope_addon.kinematics.expressions import Expression, expressions_of, mouth_faces_of
 from scope.solver.loaders.body_file import load_body
 from scope.solver.names import EXPRESSIONS
 
@@ -78,7 +78,24 @@ def test_a_blink_covers_the_pupil_of_every_shape(body, side):
         assert covered(pupil, closed[skin])
 
 
+def test_the_inside_of_the_mouth_shows_when_it_opens(body):
+    """From in front, a closed mouth shows none of it, an open one some."""
+    jaw = by_name(body)["jawOpen"]
+    others = np.setdiff1d(np.arange(len(body.faces)), mouth_faces_of(body))
+    skin = np.concatenate([body.faces[others][:, [0, 1, 2]], body.faces[others][:, [0, 2, 3]]])
+    rest = body.v_template.astype(float)
+    opened = rest.copy()
+    opened[jaw.vertices] += jaw.offsets
+    visible = [
+        sum(not covered(center, vertices[skin]) for center in vertices[body.faces[mouth_faces_of(body)]].mean(axis=1))
+        for vertices in (rest, opened)
+    ]
+    assert visible[0] == 0
+    assert visible[1] >= 10
+
+
 def test_a_users_body_has_none(body):
     assert expressions_of(replace(body, file="mine.npz")) == ()
     assert expressions_of(replace(body, name="smpl")) == ()
     assert expressions_of(replace(body, v_template=body.v_template[:100])) == ()
+    assert not len(mouth_faces_of(replace(body, name="smpl")))

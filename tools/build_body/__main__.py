@@ -26,12 +26,13 @@ def main() -> int:
     arguments = parser.parse_args()
     try:
         shaped = shape_mesh(arguments.downloads, arguments.surveyed)
-        expressions = build_expressions(fetch_wheel(arguments.downloads), shaped.mesh.kept)
-        write_body(arguments.output / "expressions.npz", expressions)
         for name, arrays in build_bodies(shaped).items():
             path = arguments.output / f"{name}.npz"
             write_body(path, arrays)
+            rest = arrays["v_template"].astype(float)
             print(f"{path}: {len(arrays['v_template'])} vertices, {path.stat().st_size / 1e6:.2f} MB")
+        expressions = build_expressions(fetch_wheel(arguments.downloads), shaped.mesh, rest)
+        write_body(arguments.output / "expressions.npz", expressions)
     except ScopeError as error:
         print(f"build_body: {error}", file=sys.stderr)
         return exit_status(error)

@@ -42,6 +42,16 @@ def build_mesh(
     return obj
 
 
+def colour_faces(mesh: bpy.types.Object, faces: NDArray[np.intp], name: str, color: tuple[float, float, float]) -> None:
+    """Give some faces (n,) of a mesh a matte material of their own, of a linear RGB colour."""
+    material = _material(name, np.array([*color, 1.0]))
+    mesh.data.materials.append(material)
+    index = np.empty(len(mesh.data.polygons), np.int32)
+    mesh.data.polygons.foreach_get("material_index", index)
+    index[faces] = len(mesh.data.materials) - 1
+    mesh.data.polygons.foreach_set("material_index", index)
+
+
 def rest_vertices_world(
     body: Body, lift: NDArray[np.float64], betas: NDArray[np.floating[Any]] | None = None
 ) -> NDArray[np.float64]:

@@ -12,10 +12,12 @@ from numpy.typing import NDArray
 from ....solver.body import Body
 from ....solver.names import EXPRESSIONS
 from ...kinematics.axes import R_WORLD_MODEL
-from ...kinematics.expressions import expressions_of
+from ...kinematics.expressions import expressions_of, mouth_faces_of
 from ...motion import Motion
 from ..animation_data.actions import Channels, fcurves, read_keys, shape_key_path
+from .body_mesh import colour_faces
 
+MOUTH_COLOR = (0.06, 0.01, 0.01)  # linear
 MOVES = 1e-3  # change of a weight from which an expression counts as moving
 
 
@@ -25,7 +27,10 @@ def has_expression_keys(keys: bpy.types.Key) -> bool:
 
 
 def add_expression_keys(mesh: bpy.types.Object, body: Body) -> bool:
-    """Add one key per expression, each at 0, and ``Basis`` if there is none; False if the body has no expressions."""
+    """Add one key per expression, each at 0, and ``Basis`` if there is none, and make the inside of the mouth dark.
+
+    :return: False if the body has no expressions.
+    """
     expressions = expressions_of(body)
     if not expressions:
         return False
@@ -39,6 +44,7 @@ def add_expression_keys(mesh: bpy.types.Object, body: Body) -> bool:
         key = mesh.shape_key_add(name=expression.name, from_mix=False)
         key.data.foreach_set("co", moved.ravel())
         key.value = 0.0
+    colour_faces(mesh, mouth_faces_of(body), "mouth", MOUTH_COLOR)
     return True
 
 

@@ -1,18 +1,25 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Faces with a fake network: found by the body, followed by themselves, lost, and somebody else's."""
+"""Faces in real footage, and with a fake network: found by the body, followed, lost, and somebody else's."""
 
 from __future__ import annotations
 
+from dataclasses import fields
+
 import numpy as np
 import pytest
+from scope.scope_addon.capture.media.video_range import VideoRange
+from scope.scope_addon.capture.options import CaptureOptions
 from scope.scope_addon.capture.perception.face.face_landmarks import FACE_POINTS, FaceEstimate
 from scope.scope_addon.capture.perception.face.face_record import parts
 from scope.scope_addon.capture.perception.face.face_region import region_from_body
 from scope.scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES
 from scope.scope_addon.capture.perception.observation import Observation
 from scope.scope_addon.capture.perception.region import Region
+from scope.scope_addon.capture.pipeline import capture
 from scope.scope_addon.capture.tracking.face import face_tracker
 from scope.scope_addon.capture.tracking.face.face_tracker import FaceTracker
+from scope.scope_addon.motion import Motion
+from scope.solver.loaders.body_file import load_body
 from scope.solver.names import EXPRESSIONS
 
 IMAGE = np.zeros((800, 800, 3), np.uint8)
@@ -100,3 +107,21 @@ def test_a_lost_face_is_looked_for_less_often(tracker):
 def test_a_head_too_small_is_not_looked_at(tracker):
     assert face_of(tracker, {1: person(300, 200, 70.0)})[1][0][0] == 0
     assert tracker._network.calls == 0
+
+
+def test_a_real_face_is_captured_and_changes_nothing_else(shared):
+    clip, body = shared / "data" / "clips" / "squats_5fps.mp4", load_body("scope")
+    without, found = (
+        capture(clip, body, CaptureOptions(quality="fast", wanted=VideoRange(end_s=2.0), face=face)).motions[0]
+        for face in (False, True)
+    )
+    assert without.face == {}
+    assert (found.face["expression_confidence"] > 0.8).all()
+    assert found.face["expressions"].any()
+    face = found.face["face_points"]
+    nose = found.keypoints2d[:, KEYPOINT_NAMES.index("nose"), :2]
+    assert (face.min(axis=1) < nose).all()
+    assert (nose < face.max(axis=1)).all()
+    for field in fields(Motion):
+        if field.name != "face":
+            np.testing.assert_array_equal(getattr(found, field.name), getattr(without, field.name))
