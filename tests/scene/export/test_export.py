@@ -24,9 +24,8 @@ SCENE_SUFFIXES = [s for s in SUFFIXES if s != ".npz"]
 
 
 @pytest.mark.parametrize("suffix", SCENE_SUFFIXES)
-@pytest.mark.parametrize("rate", [30.0, 30000 / 1001])
-def test_joints_and_skin_survive(whole_body, make_motion, truth, joints_world, blender, tmp_path, suffix, rate):
-    body = whole_body
+def test_joints_and_skin_survive(whole_body, make_motion, truth, joints_world, blender, tmp_path, suffix):
+    body, rate = whole_body, 30000 / 1001
     motion = make_motion(body, 12, rate=rate)
     path = tmp_path / f"walk{suffix}"
     assert export_motions([motion], body, path) == ([path], [])

@@ -140,8 +140,14 @@ def assert_same_keys(found, expected):
         np.testing.assert_array_equal(found[curve], values, err_msg=str(curve))
 
 
-@pytest.mark.parametrize("edit", EDITS)
-@pytest.mark.parametrize("order", [("pin",), ("foot",), ("sides",), ("pin", "sides", "foot")], ids="-".join)
+ALL_KINDS = ("pin", "sides", "foot")
+
+
+@pytest.mark.parametrize(
+    ("order", "edit"),
+    [*(((name,), "captured") for name in CORRECTIONS), *((ALL_KINDS, edit) for edit in EDITS)],
+    ids=lambda value: value if isinstance(value, str) else "-".join(value),
+)
 def test_without_corrections_keys_and_motion_are_again_the_same_to_the_bit(rig, order, edit):
     EDITS[edit]()
     before, motion = keys(rig), stored_motion_of(rig)
