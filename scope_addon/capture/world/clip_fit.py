@@ -5,7 +5,8 @@
 
 with the terms E_f of single frames, their shape fixed, accelerations a, and velocities v of the soles and palms that
 rest with probability p (`solver.fit_motion`). A keypoint that jumps for one frame loses against its neighbours, a limb
-seen in one frame tells where it was in the next, feet that stand stay where they are, and no filter follows.
+seen in one frame tells where it was in the next, feet that stand stay where they are (in a second fit, at the place
+that the first one found), and no filter follows.
 Long clips are fitted in windows of consecutive frames. Where two windows overlap, their motions are blended.
 """
 
@@ -18,13 +19,15 @@ from typing import TypeVar, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from ....solver import Measurements, MotionFit, StandingPoints, State, View, fit_motion
+from ....solver import FootContacts, Measurements, MotionFit, StandingPoints, State, View, fit_motion
 from ....solver.rotations import exp, log
+from ...kinematics.contact_points import contact_point_positions
 from ..fitting.frame_sequence import LONGEST_COAST_S, FittedTrack
 from ..fitting.prepared_track import PreparedTrack
 from ..fitting.weights import ROBUST, clip_weights, motion_priors, warm_stages
 from .camera_path import CameraPath
 from .joint_sigma import joint_sigma
+from .resting_places import resting_places
 
 WINDOW_UNKNOWNS = 24_000  # unknowns of a window, whose equations take some 100 MB: 320 frames of a body of 24 parts
 OVERLAP = 0.2  # of a window's frames; two windows differ by 2 to 4 mm where one of them has 1 s more to its end
@@ -74,6 +77,7 @@ class _Clip:
         self._weights = clip_weights(prepared.weights)
         self._done = np.zeros(len(start.valid), bool)
         self._sigma = np.full((*first.rotations.shape[:2], 2), np.nan, np.float32)
+        self._places: dict[int, tuple[NDArray[np.float64], NDArray[np.float64]]] = {}  # of a window's frames
 
     def fit(self, frames: NDArray[np.intp]) -> None:
         """Fit one window; frames that an earlier one has fitted are blended from that one's motion to this one's."""
@@ -81,6 +85,7 @@ class _Clip:
         self._progress("solving the clip", int(self._done.sum()), len(self._done))
         states: Sequence[State] = _Computed(frames, self._state)
         priors = motion_priors(self._prepared.body, times)
+        self._places = {}
         for prior in priors:
             found = fit_motion(
                 self._prepared.body,
@@ -96,6 +101,7 @@ class _Clip:
                 window=np.inf,
             )
             states = found.states
+            self._find_places(frames, found)
         self._keep(frames, found)
 
     def fitted(self) -> FittedTrack:
@@ -109,8 +115,19 @@ class _Clip:
             return None
         return StandingPoints(prepared.contact_point_indices, prepared.stance.resting[frames])
 
+    def _find_places(self, frames: NDArray[np.intp], found: MotionFit) -> None:
+        prepared = self._prepared
+        if prepared.stance is not None:
+            points = contact_point_positions(prepared.body, found.R_world_part, found.t_world_part)
+            rows = zip(*resting_places(points, prepared.stance.resting[frames]), strict=True)
+            self._places = dict(zip(frames.tolist(), rows, strict=True))
+
     def _measure(self, k: int) -> Measurements | Sequence[View]:
         measured = self._prepared.measure_all(k)
+        if k in self._places:
+            places, p = self._places[k]
+            points = (places - self._path.center[k]) @ self._path.R_first_camera[k]
+            measured = replace(measured, foot_contacts=FootContacts(self._prepared.contact_point_indices, points, p))
         if self._path.is_static:
             return measured
         R = self._path.R_first_camera[k].T
