@@ -21,7 +21,7 @@ def motion_figures(motion: Motion, body: Body) -> dict[str, str]:
     path = np.linalg.norm(np.diff(pelvis[:, :2], axis=0), axis=1)
     error = motion.residual_px[seen]
     contact = motion.foot_contact > _CONTACT
-    sigma = np.asarray(motion.joint_sigma_m)[seen]
+    sigma = np.asarray(motion.joint_sigma_m, float)[seen]
     spans = find_review_spans(motion)
     review = sum(span.last - span.first + 1 for span in spans)
     return {

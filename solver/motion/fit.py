@@ -61,7 +61,7 @@ def fit_motion(
     init: Sequence[State] | None = None,
     priors: Priors | None = None,
     options: Options = Options(),  # noqa: B008 - frozen
-    motion: MotionPrior | Sequence[MotionPrior] = MotionPrior(),  # noqa: B008 - frozen
+    motion: MotionPrior = MotionPrior(),  # noqa: B008 - frozen
     stands: StandingPoints | None = None,
     shape: ArrayLike | None = None,
     focal: bool = False,
@@ -83,8 +83,7 @@ def fit_motion(
         cameras by points triangulated from their 2D keypoints.
     :param priors: `default_priors(body)` unless given.
     :param options: the stages are those of a fit that starts from a state; `report` has no effect.
-    :param motion: weights of acceleration and of standing points. Several are used one after the other, each from
-        the poses that the one before it led to, such as quadratic ones before robust ones.
+    :param motion: weights of acceleration and of standing points.
     :param stands: points that may stand still, with the probability that they do.
     :param shape: (P,) where it is known; it is then kept.
     :param focal: whether to estimate one focal length for all cameras, as a scale of that of their intrinsics;
@@ -102,12 +101,7 @@ def fit_motion(
         raise ShapeError(f"There must be one initial state a frame, {len(frames)}, but got {len(init)}.")
     if not 0.0 <= overlap < window:
         raise InvalidValueError(f"The overlap of windows must lie in 0..{window} s, but is {overlap} s.")
-    motions = [motion] if isinstance(motion, MotionPrior) else motion
-    check_type(motions, Sequence, "motion")
-    if not motions:
-        raise InvalidValueError("`motion` must be at least one MotionPrior, but is empty.")
-    for each in motions:
-        check_type(each, MotionPrior, "motion")
+    check_type(motion, MotionPrior, "motion")
     check_weight(focal_weight, "focal_weight")
     if shape is not None and focal:
         raise InvalidValueError("The focal length can only be estimated together with the shape; leave `shape` out.")
@@ -120,8 +114,7 @@ def fit_motion(
         init = _first_states(tree, frames, shape, priors, options)
     many = len(frames) >= _FRAMES_FOR_TWO_THREADS and (os.cpu_count() or 1) > 1
     with ThreadPoolExecutor(2) if many else nullcontext() as pool:
-        standing = StandingPoints() if stands is None else stands
-        terms = [MotionTerms.make(tree, clock, each, standing) for each in motions]
+        terms = MotionTerms.make(tree, clock, motion, StandingPoints() if stands is None else stands)
         clip = _Clip(tree, frames, terms, init, _Settings(priors, options, focal, focal_weight, covariance), pool)
         return clip.solve(make_tree(body, focal), shape, overlapping(clock, window, overlap))
 
@@ -171,12 +164,12 @@ class _Clip:
         self,
         tree: Tree,
         frames: Sequence[Measurements | Sequence[View]],
-        motions: Sequence[MotionTerms],
+        motion: MotionTerms,
         init: Sequence[State],
         settings: _Settings,
         pool: ThreadPoolExecutor | None,
     ) -> None:
-        self.tree, self.frames, self.motions, self.settings, self.pool = tree, frames, motions, settings, pool
+        self.tree, self.frames, self.motion, self.settings, self.pool = tree, frames, motion, settings, pool
         T, K, P = len(frames), len(tree.parents) - 1, tree.shape
         self.R, self.t, self.Omega = np.empty((T, K + 1, 3, 3)), np.empty((T, K + 1, 3)), np.empty((T, K, 3, 3))
         for f, state in enumerate(init):
@@ -222,16 +215,12 @@ class _Clip:
         shared = Globals(*priors.packed_shape(P), settings.focal_weight)
         options = settings.options
         problem = ClipProblem(
-            tree, frames, self.motions[-1].part(window.frames), shared,
+            tree, frames, self.motion.part(window.frames), shared,
             make_settings(options, options.schedule(cold=False)), self.pool,
         )  # fmt: skip
         optimizer = Optimizer(problem, poses, self.pool)
         if self.counts[window.frames].any():
-            for motion in self.motions:
-                problem.motion = motion.part(window.frames)
-                status = Status(optimizer.run())
-                if status is Status.NON_FINITE:
-                    break
+            status = Status(optimizer.run())
             # the worst of the windows'
             if self.status in (Status.NO_MEASUREMENTS, Status.CONVERGED) or status is Status.NON_FINITE:
                 self.status = status

@@ -32,6 +32,7 @@ ROBUST = Options(robust_keypoints2d=0.01, robust_keypoints3d=0.1, robust_orienta
 # weigh more, and the lifted directions, whose errors last for many frames, less. Feet that rest stay on the floor by
 # this weight alone; with ten times as much, renders whose floor is wrong have errors larger by 4 mm.
 _CLIP_KEYPOINTS2D, _CLIP_DIRECTIONS, _CLIP_FLOOR = 2.0, 0.7, 3.0
+_RESTING_PLACE = 5e5  # 1/m²; with 1e5, feet still drift by 0.7 cm in the sample, with 1e6 other errors grow
 # Typical accelerations, rad/s², and of the root's position, m/s²: the root mean square at 30 frames per second of each
 # performer of the recordings that also train the joint prior, and the median of these. One weight for all joints would
 # tell a fast crouch by a trunk that arches, because four joints of the spine share its rotation.
@@ -39,8 +40,8 @@ _USUAL = {"hip": 35.0, "knee": 41.0, "ankle": 56.0, "foot": 107.0, "spine1": 19.
 _USUAL |= {"neck": 20.0, "head": 10.2, "collar": 9.6, "shoulder": 33.0, "elbow": 24.5, "wrist": 30.0, "hand": 11.8}
 _USUAL_ROOT, _USUAL_ROOT_POSITION = 20.3, 3.8
 # Of the weights of legs: they move gently most of the time and suddenly now and then. With 1, the trunk still arched by
-# 20 degrees in a crouch that takes a seventh of a second; with less, legs jitter.
-_LEGS = 0.35
+# 20 degrees in a crouch that takes a seventh of a second, now by 8; with less, legs jitter.
+_LEGS = 0.5
 # Of accelerations in these units, at 60 frames per second. A network's errors in neighbouring frames are alike,
 # so more frames say less than their number: weights that mean the same at any rate smooth a jump at 10 frames per
 # second away.
@@ -85,6 +86,7 @@ def clip_weights(weights: Weights) -> Weights:
         keypoints2d=_CLIP_KEYPOINTS2D * weights.keypoints2d,
         orientation_field=_CLIP_DIRECTIONS * weights.orientation_field,
         floor=_CLIP_FLOOR * weights.floor,
+        foot_contact=_RESTING_PLACE,
     )
 
 

@@ -5,7 +5,8 @@
 
 with the terms E_f of single frames, their shape fixed, accelerations a, and velocities v of the soles and palms that
 rest with probability p (`solver.fit_motion`). A keypoint that jumps for one frame loses against its neighbours, a limb
-seen in one frame tells where it was in the next, feet that stand stay where they are, and no filter follows.
+seen in one frame tells where it was in the next, feet that stand stay where they are (in a second fit, at the place
+that the first one found), and no filter follows.
 Long clips are fitted in windows of consecutive frames. Where two windows overlap, their motions are blended.
 """
 
@@ -17,13 +18,15 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ....solver import Measurements, MotionFit, StandingPoints, State, View, fit_motion
+from ....solver import FootContacts, Measurements, MotionFit, StandingPoints, State, View, fit_motion
 from ....solver.rotations import exp, log
+from ...kinematics.contact_points import contact_point_positions
 from ..fitting.frame_sequence import LONGEST_COAST_S, FittedTrack
 from ..fitting.prepared_track import PreparedTrack
 from ..fitting.weights import ROBUST, clip_weights, motion_priors, warm_stages
 from .camera_path import CameraPath
 from .joint_sigma import joint_sigma
+from .resting_places import resting_places
 
 WINDOW_UNKNOWNS = 24_000  # unknowns of a window, whose equations take some 100 MB: 320 frames of a body of 24 parts
 OVERLAP = 0.2  # of a window's frames; two windows differ by 2 to 4 mm where one of them has 1 s more to its end
@@ -60,19 +63,25 @@ class _Clip:
         """Fit one window; frames that an earlier one has fitted are blended from that one's motion to this one's."""
         times = self._prepared.track.times[frames]
         self._progress("solving the clip", int(self._done.sum()), len(self._done))
-        found = fit_motion(
-            self._prepared.body,
-            [self._measure(k) for k in frames],
-            times,
-            init=[self._state(k) for k in frames],
-            priors=self._prepared.priors,
-            options=replace(ROBUST, stages=warm_stages(self._weights)),
-            motion=motion_priors(self._prepared.body, times),
-            stands=self._standing_points(frames),
-            shape=np.asarray(self._start.betas, float),
-            covariance=True,
-            window=np.inf,
-        )
+        measured: Sequence[Measurements] = [self._prepared.measure_all(k) for k in frames]
+        states: Sequence[State] = [self._state(k) for k in frames]
+        for last, prior in enumerate(motion_priors(self._prepared.body, times)):
+            found = fit_motion(
+                self._prepared.body,
+                self._views(frames, measured),
+                times,
+                init=states,
+                priors=self._prepared.priors,
+                options=replace(ROBUST, stages=warm_stages(self._weights)),
+                motion=prior,
+                stands=self._standing_points(frames),
+                shape=np.asarray(self._start.betas, float),
+                covariance=bool(last),
+                window=np.inf,
+            )
+            states = found.states
+            if not last:
+                measured = self._with_places(frames, measured, found)
         self._keep(frames, found)
 
     def fitted(self) -> FittedTrack:
@@ -86,12 +95,29 @@ class _Clip:
             return None
         return StandingPoints(prepared.contact_point_indices, prepared.stance.resting[frames])
 
-    def _measure(self, k: int) -> Measurements | Sequence[View]:
-        measured = self._prepared.measure_all(k)
+    def _with_places(
+        self, frames: NDArray[np.intp], measured: Sequence[Measurements], found: MotionFit
+    ) -> Sequence[Measurements]:
+        """Add to the measurements of frames where points rest in a motion."""
+        prepared, path = self._prepared, self._path
+        if prepared.stance is None:
+            return measured
+        points = contact_point_positions(prepared.body, found.R_world_part, found.t_world_part)
+        places, resting = resting_places(points, prepared.stance.resting[frames])
+        places_cam = (places - path.center[frames, None]) @ path.R_first_camera[frames]
+        return [
+            replace(each, foot_contacts=FootContacts(prepared.contact_point_indices, place_cam, p))
+            for each, place_cam, p in zip(measured, places_cam, resting, strict=True)
+        ]
+
+    def _views(
+        self, frames: NDArray[np.intp], measured: Sequence[Measurements]
+    ) -> Sequence[Measurements] | Sequence[Sequence[View]]:
         if self._path.is_static:
             return measured
-        R = self._path.R_first_camera[k].T
-        return [View(measured, R, -R @ self._path.center[k])]
+        R = np.swapaxes(self._path.R_first_camera[frames], 1, 2)
+        t = -np.einsum("fij,fj->fi", R, self._path.center[frames])
+        return [[View(*seen)] for seen in zip(measured, R, t, strict=True)]
 
     def _state(self, k: int) -> State:
         return State(self._rotations[k, 0], self._root[k], self._rotations[k, 1:], self._start.betas)

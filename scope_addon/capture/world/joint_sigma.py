@@ -5,8 +5,8 @@ Networks' errors are not independent: those of neighbouring frames and keypoints
 Positions relative to the pelvis are off by a multiple of what independent errors would give. That multiple differs
 little from person to person and from joint to joint, and grows less with the frame rate than smoothing lowers the
 covariance:
-    sigma = c s (rate / 60 Hz)^0.3,   s of the covariance,   c = 15.5 along the line of sight and 12.4 across it
-Fitted by maximum likelihood to the twelve limb joints of real clips and renders with ground truth
+    sigma = c s (rate / 60 Hz)^0.3,   s of the covariance,   c = 15.5 along the line of sight and 11.5 across it
+Fitted to the twelve limb joints of real clips and renders with ground truth
 (benchmarks/NOTEBOOK.md, "A clip as one problem").
 """
 
@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-ALONG, ACROSS = 15.5, 12.4
+ALONG, ACROSS = 15.5, 11.5
 _RATE_HZ, _EXPONENT = 60.0, 0.3
 _LEAST_HZ = 10.0  # acceleration hardly couples frames that are further apart
 

@@ -202,18 +202,3 @@ def test_what_cannot_be_used_is_refused():
     assert fit_motion(body, frames, times, init=states).status is Status.NO_MEASUREMENTS
     with pytest.raises(InvalidValueError, match="rotation"):
         fit_motion(body, [[View(Measurements(), 2.0 * np.eye(3))]] * 3, times, init=states)
-
-
-def test_several_weights_are_used_one_after_the_other():
-    rng = np.random.default_rng(11)
-    body, states, times = smooth_walk(rng, 8, 30.0)
-    frames = [Measurements(keypoints3d=m) for m in markers(body, states, rng, noise=0.05)]
-    robust = MotionPrior(robust_joints=1.0)
-    both = fit_motion(body, frames, times, init=states, options=TIGHT, motion=(SMOOTH, robust))
-    first = fit_motion(body, frames, times, init=states, options=TIGHT, motion=SMOOTH)
-    second = fit_motion(body, frames, times, init=first.states, options=TIGHT, motion=robust)
-    assert both.iterations == first.iterations + second.iterations
-    assert both.cost == pytest.approx(second.cost, rel=1e-12)
-    np.testing.assert_allclose(both.t_world_part, second.t_world_part, atol=1e-9)
-    with pytest.raises(InvalidValueError, match="at least one MotionPrior"):
-        fit_motion(body, frames, times, init=states, motion=())
