@@ -12,6 +12,7 @@ import os
 import shlex
 import shutil
 import sys
+import tempfile
 from collections.abc import Sequence
 from contextlib import ExitStack, suppress
 from pathlib import Path
@@ -20,6 +21,7 @@ from typing import Any, NoReturn, TextIO
 from ..solver.errors import ScopeError
 from ..solver.loaders.body_file import ASSETS
 from .command_line.arguments import add_options, body_and_options, non_default_arguments, path_argument
+from .command_line.cluster_runner import dask_runner, folder_argument, local_folders
 from .command_line.import_command import add_import
 from .command_line.live_command import add_live
 from .command_line.memory_limit import check_memory_limit
@@ -111,9 +113,12 @@ def _add_capture_files(capture: argparse.ArgumentParser) -> None:
 
 def _add_batch_files(batch: argparse.ArgumentParser) -> None:
     batch.add_argument(
-        "folder", type=path_argument, metavar="FOLDER", help="folder of videos, images and image sequences"
+        "folder",
+        type=folder_argument,
+        metavar="FOLDER",
+        help="folder of videos, images and image sequences, or its URL",
     )
-    batch.add_argument("--out", type=path_argument, required=True, metavar="FOLDER", help="output folder")
+    batch.add_argument("--out", type=folder_argument, required=True, metavar="FOLDER", help="output folder, or its URL")
     batch.add_argument(
         "--formats",
         default="npz,glb",
@@ -251,7 +256,7 @@ def run_batch(args: argparse.Namespace) -> dict[str, Any]:
             raise UsageError(f"--formats must be a list of formats among {known}, not {args.formats!r}")
     if args.jobs < 1:
         raise UsageError(f"--jobs must be at least 1, not {args.jobs}")
-    clips = [args.out / f"clip{suffix}" for suffix in formats]
+    clips = [Path(args.out) / f"clip{suffix}" for suffix in formats]
     check_blender(clips)
     checked_rig(args, clips)
     _, options = body_and_options(args)
@@ -259,12 +264,11 @@ def run_batch(args: argparse.Namespace) -> dict[str, Any]:
     extras = Extras(args.overlays, args.reports)
     with ExitStack() as stack:
         runner = None
+        folder, out = local_folders(args, Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="scope-batch-"))))
         if args.scheduler is not None:
-            from .command_line.cluster_runner import dask_runner
-
             runner = dask_runner(args, None if args.program == list(PROGRAM) else args.program)
             stack.callback(runner.close)
-        batch = Batch(args.folder, args.out, args.program, non_default_arguments(args), formats, extras)
+        batch = Batch(folder, out, args.program, non_default_arguments(args), formats, extras)
         progress = stack.enter_context(ProgressBar(sys.stderr, show=sys.stderr.isatty() and not args.quiet))
         stack.enter_context(interrupted("finished clips are kept; run the same command again to continue"))
         report = batch.run(
@@ -274,7 +278,7 @@ def run_batch(args: argparse.Namespace) -> dict[str, Any]:
         for line in worker_table(report):
             say(line)
         counts = ", ".join(f"{count} {status.replace('_', ' ')}" for status, count in report["counts"].items() if count)
-        say(f"{counts or 'nothing to capture'}; report in {batch.report_file}")
+        say(f"{counts or 'nothing to capture'}; report in {args.out}/{batch.report_file.name}")
     return report
 
 

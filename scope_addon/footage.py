@@ -49,6 +49,11 @@ def numbered_from(first: Path) -> list[Path]:
     return numbered(first.parent, before, after, int(number.group()))
 
 
+def is_url(text: object) -> bool:
+    """Return whether a text is the address of a file or folder in a store, such as ``s3://bucket/clips``."""
+    return isinstance(text, str) and "://" in text
+
+
 def shown(path: str | Path) -> str:
     """Return a path as text for people and other programs: bytes that are not UTF-8 become U+FFFD.
 

@@ -19,10 +19,12 @@ from distributed import Client, Future
 
 from ...solver.errors import ScopeError
 from ..errors import ClusterError, internal_error_message, system_error_message
+from ..footage import is_url
 from ..job.batch import ROOT
 from ..job.clips.task import ClipTask, Entry
 from ..job.request import program_version
 from . import worker as worker_side
+from .remote import RemoteStaging
 from .staging import Staging
 from .workers import Workers
 
@@ -37,15 +39,15 @@ class _Attempt(NamedTuple):
     future: Future[Any]
     worker: str
     task: ClipTask | None
-    folder: Path
+    folder: str
 
 
 class DaskRunner:
     """Captures clips on a cluster.
 
     :param client: connected to the scheduler; it is closed at the end.
-    :param folder: footage, under the same path on all machines.
-    :param out: output folder, under the same path on all machines.
+    :param folder: URL of the footage, or its path, the same on all machines.
+    :param out: URL of the output folder, or its path, the same on all machines.
     :param jobs: number of clips that a worker captures at a time.
     :param program: command that takes ``capture FILE -o OUT --json``; None for each worker's own installation.
     :param say: called with messages for the user.
@@ -54,8 +56,8 @@ class DaskRunner:
     def __init__(
         self,
         client: Client,
-        folder: Path,
-        out: Path,
+        folder: str,
+        out: str,
         jobs: int,
         program: Sequence[str] | None,
         say: Callable[[str], None],
@@ -63,7 +65,7 @@ class DaskRunner:
         self._client, self._folder, self._out, self._jobs = client, folder, out, jobs
         self._program = None if program is None else tuple(program)
         self._say, self._workers = say, Workers(say)
-        self._staging: Staging | None = None
+        self._staging: Staging | RemoteStaging | None = None
         self._attempts: dict[str, _Attempt] = {}  # by Dask's key
         self._done: queue.SimpleQueue[str] = queue.SimpleQueue()  # keys
         self._waiting: deque[ClipTask] = deque()
@@ -79,7 +81,7 @@ class DaskRunner:
         :raises OutputError: the folder of the attempts cannot be created.
         """
         self._waiting.extend(tasks)
-        self._staging = Staging(self._out)
+        self._staging = RemoteStaging(self._out) if is_url(self._out) else Staging(Path(self._out))
         wanted = self._wanted(self._waiting[0])
         yield {}
         while self._waiting or any(attempt.task for attempt in self._attempts.values()):
@@ -89,23 +91,30 @@ class DaskRunner:
             while self._waiting and self._client.status == "running" and (record := self._workers.free(self._jobs)):
                 self._start(self._waiting.popleft(), record.address)
             yield found | self._next_outcome()
-        self.close()
 
     def stop(self) -> None:
         """See `Runner.stop`; workers end what nobody waits for."""
-        self.close()
-
-    def close(self) -> None:
-        """Give up all attempts and disconnect."""
         attempts, self._attempts = list(self._attempts.values()), {}
         self._cancel([attempt.future for attempt in attempts])
+        self._client.close(timeout=5)
+
+    def close(self) -> None:
+        """Give up all attempts, disconnect, and remove what is not published; after the report is written."""
+        self.stop()
         if self._staging:
             self._staging.close()
-        self._client.close(timeout=5)
 
     def report(self) -> dict[str, Any]:
         """See `Runner.report`."""
-        return self._workers.report()
+        return {"folder": self._folder, **self._workers.report()}
+
+    def report_written(self, file: Path) -> None:
+        """See `Runner.report_written`.
+
+        :raises OutputError: the store of the results cannot be written.
+        """
+        if self._staging:
+            self._staging.write_report(file)
 
     def _wanted(self, task: ClipTask) -> dict[str, Any]:
         """Return what every worker is asked for before its first clip."""
@@ -113,8 +122,8 @@ class DaskRunner:
         return {
             "program": program_version(ROOT),
             "bpy": self._program is None and any(suffix != ".npz" for suffix in task.settings.suffixes),
-            "folder": str(self._folder),
-            "out": str(self._out),
+            "folder": self._folder,
+            "out": self._out,
             "attempts": str(self._staging.folder),
             "token": self._staging.token,
             "options": dict(task.settings.options),
@@ -147,7 +156,7 @@ class DaskRunner:
             for key in [key for key, attempt in self._attempts.items() if attempt.worker == address]:
                 found |= self._give_up(key, "left the cluster")
         for address in self._workers.new(present):
-            self._submit(None, address, Path(), worker_side.check_worker, wanted)
+            self._submit(None, address, "", worker_side.check_worker, wanted)
         if self._workers.all_refused():
             problems = [e["event"] for e in self._workers.log if e["event"].startswith("gets no clips: ")]
             raise ClusterError(f"no worker of the cluster can capture: {problems[-1].removeprefix('gets no clips: ')}")
@@ -159,17 +168,18 @@ class DaskRunner:
     def _start(self, task: ClipTask, address: str) -> None:
         """Begin an attempt to capture a clip."""
         assert self._staging is not None
-        folder = self._staging.folder / str(self._count)
-        remote = task._replace(footage=str(self._folder / task.file), out=str(folder), final=str(self._out))
+        folder = self._staging.attempt(self._count)
+        footage = f"{self._folder.rstrip('/')}/{task.file}"
+        remote = task._replace(footage=footage, out=folder, final=self._out)
         arguments = (self._program, self._jobs, program_version(ROOT))
         self._submit(task, address, folder, worker_side.capture_on_worker, remote, *arguments)
         self._workers.records[address].running += 1
 
     def _submit(
-        self, task: ClipTask | None, address: str, folder: Path, function: Callable[..., Any], first: Any, *others: Any
+        self, task: ClipTask | None, address: str, folder: str, function: Callable[..., Any], first: Any, *others: Any
     ) -> None:
         assert self._staging is not None
-        key = f"scope-{'check' if task is None else 'clip'}-{self._staging.folder.name}-{self._count}"
+        key = f"scope-{'check' if task is None else 'clip'}-{self._staging.token}-{self._count}"
         self._count += 1
         arguments = (first,) if task is None else (first, key, *others)
         future = self._client.submit(

@@ -19,7 +19,7 @@ from ..atomic_write import atomic_path, computer, reason, resolve_link, runs
 from ..errors import OutputError
 from ..job.clips.task import file_hash
 
-_NAME = ".scope-attempts"
+ATTEMPTS = ".scope-attempts"
 TOKEN = "token"  # file by which a worker shows that it sees the same folder
 _ABANDONED_S = 7 * 24 * 3600.0
 
@@ -34,32 +34,39 @@ class Staging:
     def __init__(self, out: Path) -> None:
         self._out = out
         self.token = secrets.token_hex(16)
-        _remove_abandoned(out / _NAME)
-        self.folder = out / _NAME / f"{computer()}-{os.getpid()}-{self.token[:8]}"
+        _remove_abandoned(out / ATTEMPTS)
+        self.folder = out / ATTEMPTS / f"{computer()}-{os.getpid()}-{self.token[:8]}"
         try:
             self.folder.mkdir(parents=True)
             (self.folder / TOKEN).write_text(self.token)
         except OSError as error:
             raise OutputError(f"cannot write {self.folder}: {reason(error)}") from error
 
-    def publish(self, attempt: Path, outputs: list[str], content: dict[str, Any]) -> bool:
+    def attempt(self, number: int) -> str:
+        """Return the path of an attempt's folder, which the worker makes."""
+        return str(self.folder / str(number))
+
+    def publish(self, attempt: str, outputs: list[str], content: dict[str, Any]) -> bool:
         """Give the results of an attempt their final names, and return True; False if one is not what was captured.
 
         :param outputs: the results, relative to the attempt's folder and to the output folder.
-        :param content: their SHA-256, as the worker has computed them.
+        :param content: their ``sha256`` and ``bytes``, as the worker has computed them.
         :raises OSError: a result cannot be renamed.
         :raises OutputError: a final name is that of a folder or device.
         """
         try:
-            if not all(file_hash(attempt / name) == content[name] for name in outputs):
+            if not all(file_hash(Path(attempt, name)) == content[name]["sha256"] for name in outputs):
                 return False
         except (OSError, KeyError):
             return False
         for name in outputs:
-            _rename(attempt / name, self._out / name)
+            _rename(Path(attempt, name), self._out / name)
         return True
 
-    def remove(self, attempt: Path) -> None:
+    def write_report(self, file: Path) -> None:
+        """Do nothing: the report is written to the output folder itself."""
+
+    def remove(self, attempt: str) -> None:
         """Remove the folder of an attempt, after which its results cannot be published."""
         shutil.rmtree(attempt, ignore_errors=True)
 

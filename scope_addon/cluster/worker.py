@@ -10,18 +10,22 @@ from __future__ import annotations
 import os
 import platform
 import sys
+import tempfile
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 from distributed import Status, Worker, get_worker
 
-from ...solver.errors import ScopeError
+from ...solver.errors import InputError, ScopeError
+from ..errors import OutputError
+from ..footage import is_url
 from ..installed import CAPTURE, check_installed
 from ..job.batch import ROOT
 from ..job.clips.processes import ClipProcesses
 from ..job.clips.task import CaptureSettings, ClipTask, Entry, Extras, capture_clip, file_hash
 from ..job.request import program_version
+from . import remote
 from .staging import TOKEN
 
 PROGRAM = (sys.executable, "-m", __name__.rpartition(".cluster")[0])
@@ -45,10 +49,14 @@ def _problem(wanted: dict[str, Any]) -> str:
     if ours != theirs:
         return f"it runs another version of Scope ({ours[:8]}, and not {theirs[:8]}); install the same version there"
     check_installed(CAPTURE + (("bpy",) if wanted["bpy"] else ()))
-    if not Path(wanted["folder"]).is_dir():
-        return f"it has no folder {wanted['folder']}; all machines need the footage under the same path"
-    token = Path(wanted["attempts"]) / TOKEN
-    if not token.is_file() or token.read_text() != wanted["token"]:
+    folder, attempts = wanted["folder"], wanted["attempts"]
+    with remote.store_errors(InputError, folder):
+        if not (remote.is_folder(folder) if is_url(folder) else Path(folder).is_dir()):
+            return f"it has no folder {folder}; all machines need the footage under the same path"
+    token = Path(attempts, TOKEN)
+    with remote.store_errors(OutputError, attempts):
+        text = remote.read_text(f"{attempts}/{TOKEN}") if is_url(attempts) else token.is_file() and token.read_text()
+    if text != wanted["token"]:
         return f"it does not see the output folder {wanted['out']}; all machines need it under the same path"
     settings = CaptureSettings(wanted["options"], tuple(wanted["suffixes"]), Extras(*wanted["extras"]))
     if settings.basis(ours) != wanted["basis"]:
@@ -66,19 +74,43 @@ def capture_on_worker(task: ClipTask, key: str, program: tuple[str, ...] | None,
     """
     if program_version(ROOT) != version:
         return {"status": REFUSED, "message": "it runs another version of Scope now; install the same version there"}
-    attempt, worker = Path(task.out), get_worker()
-    try:
-        attempt.mkdir()
-    except OSError as error:  # given up meanwhile, or begun before this worker was started again
-        return {"status": LOST, "message": f"the folder of the attempt cannot be made ({error.strerror})"}
+    worker = get_worker()
+    if not is_url(task.out):
+        try:
+            Path(task.out).mkdir()
+        except OSError as error:  # given up meanwhile, or begun before this worker was started again
+            return {"status": LOST, "message": f"the folder of the attempt cannot be made ({error.strerror})"}
     run = partial(ClipProcesses().run, wanted=partial(_is_wanted, worker, key))
     threads = max(1, min(worker.state.nthreads, os.cpu_count() or 1) // jobs)
-    entry = capture_clip(task, program or PROGRAM, run, threads)
-    try:
-        outputs = entry["outputs"] if entry["status"] == "done" else []
-        return entry | {"content": {name: file_hash(attempt / name) for name in outputs}}
-    except OSError as error:
-        return {"status": LOST, "message": f"a result cannot be read again ({error.strerror})"}
+    with tempfile.TemporaryDirectory(prefix="scope-clip-") as scratch:
+        local = task
+        try:
+            if is_url(task.footage):
+                with remote.store_errors(InputError, task.footage):
+                    local = local._replace(footage=str(remote.download(task.footage, Path(scratch))))
+        except ScopeError as error:
+            return {"file": task.file, "name": task.name, "status": "failed", "message": str(error)}
+        if is_url(task.out):
+            local = local._replace(out=str(Path(scratch, "results")))
+        entry = capture_clip(local, program or PROGRAM, run, threads)
+        if "message" in entry:
+            entry["message"] = entry["message"].replace(local.footage, task.footage)
+        try:
+            return entry | {"content": _content(Path(local.out), entry, task.out)}
+        except (ScopeError, OSError) as error:
+            return {"status": LOST, "message": f"a result cannot be read again or uploaded ({error})"}
+
+
+def _content(folder: Path, entry: Entry, out: str) -> dict[str, dict[str, Any]]:
+    """Return what the results contain, after they are uploaded if the attempt is in a store."""
+    content = {}
+    for name in entry["outputs"] if entry["status"] == "done" else []:
+        file = folder / name
+        content[name] = {"sha256": file_hash(file), "bytes": file.stat().st_size}
+        if is_url(out):
+            with remote.store_errors(OutputError, out):
+                remote.upload(file, f"{out}/{name}")
+    return content
 
 
 def _is_wanted(worker: Worker, key: str) -> bool:

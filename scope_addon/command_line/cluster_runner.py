@@ -10,7 +10,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..errors import UsageError
+from ..footage import is_url
 from ..installed import check_cluster
+from .arguments import path_argument
 from .terminal import say
 
 if TYPE_CHECKING:
@@ -24,11 +26,34 @@ def dask_runner(args: argparse.Namespace, program: Sequence[str] | None) -> Dask
     :raises ScopeError: the package is missing, or the scheduler cannot be reached.
     """
     check_cluster()
-    if args.folder.is_file():
-        raise UsageError(f"{args.folder} is a file; give the folder with the footage")
     from ..cluster.connection import connect
     from ..cluster.runner import DaskRunner
 
     # As given, not resolved: a link may lead elsewhere on other machines.
-    folder, out = (Path(os.path.abspath(path)) for path in (args.folder, args.out))
+    folder, out = (path if is_url(path) else os.path.abspath(path) for path in (args.folder, args.out))
     return DaskRunner(connect(args.scheduler), folder, out, args.jobs, program, say)
+
+
+def folder_argument(text: str) -> Path | str:
+    """Convert the argument to a path, or leave it as the URL that it is."""
+    return text if is_url(text) else path_argument(text)
+
+
+def local_folders(args: argparse.Namespace, scratch: Path) -> tuple[Path, Path]:
+    """Return the folders of footage and results; for a URL, a folder with files of the same names.
+
+    :raises UsageError: there is a URL, but no cluster.
+    :raises ScopeError: a store cannot be read.
+    """
+    folder, out = args.folder, args.out
+    if is_url(folder) or is_url(out):
+        if args.scheduler is None:
+            raise UsageError(
+                "footage and results at a URL need a cluster: give its --scheduler, or download the footage"
+            )
+        check_cluster()
+        from ..cluster.remote import mirror_footage, mirror_results
+
+        folder = mirror_footage(folder, str(out), scratch / "clips") if is_url(folder) else folder
+        out = mirror_results(out, scratch / "results") if is_url(out) else out
+    return folder, out

@@ -164,6 +164,7 @@ class Batch:
                 temporary.write_text(json_text(report, indent=1), encoding="utf-8")
         except OSError as error:
             raise OutputError(f"cannot write {self.report_file}: {error.strerror}; free some space") from error
+        runner.report_written(self.report_file)
         taken = time.monotonic() - start
         self._next_report = 0.0 if taken < _QUICK_S else start + taken / _WRITING_SHARE
         return report

@@ -203,6 +203,23 @@ def test_workers_that_see_other_folders_get_no_clips(cluster, folder, monkeypatc
     assert says in capsys.readouterr().err.splitlines()[-1]
 
 
+def test_footage_and_results_may_be_at_urls(cluster, folder, capsys):
+    for name, text in {"a.mp4": "a", "b.mp4": "broken", "below/d.mp4": "d"}.items():
+        (folder / name).write_text(text)
+    out = folder.parent / "out"
+    argv = ["batch", folder.as_uri(), "--out", out.as_uri(), "--formats", "npz", "--recursive"]
+    argv += ["--scheduler", cluster.scheduler_address]
+    program = [sys.executable, "-c", PROGRAM.replace('clip.with_suffix(".calls")', 'pathlib.Path("/dev/null")')]
+    for counts in ({"done": 2, "skipped": 0}, {"done": 0, "skipped": 2}):
+        assert main(argv, program=program) == 1
+        report = json.loads((out / REPORT_NAME).read_text())
+        assert report["counts"] == {**counts, "no_person": 0, "failed": 1}
+        assert report["folder"] == folder.as_uri()
+        assert files(folder) == ["a.npz", "below", "below/d.npz", REPORT_NAME]
+        assert (out / "below" / "d.npz").read_text() == "result of d"
+    assert capsys.readouterr().err.splitlines()[-1].endswith(f"report in {out.as_uri()}/{REPORT_NAME}")
+
+
 def test_a_lost_scheduler_is_a_sentence_and_finished_clips_are_kept(folder, tmp_path, monkeypatch, capsys):
     monkeypatch.setattr("scope.scope_addon.cluster.connection._TIMEOUT_S", 2.0)
     for name in ("a", "b"):

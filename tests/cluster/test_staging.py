@@ -23,7 +23,7 @@ def attempt(staging, name, text):
     folder = staging.folder / name
     (folder / "below").mkdir(parents=True)
     (folder / "below" / "a.npz").write_text(text)
-    return folder, {"below/a.npz": hashlib.sha256(text.encode()).hexdigest()}
+    return folder, {"below/a.npz": {"sha256": hashlib.sha256(text.encode()).hexdigest(), "bytes": len(text)}}
 
 
 def names(folder):

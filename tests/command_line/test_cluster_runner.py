@@ -30,3 +30,9 @@ def test_an_address_that_is_none_is_a_bad_argument(tmp_path, capsys):
     assert batch(tmp_path, "8786") == 2
     assert "--scheduler must be an address" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
+
+
+def test_a_url_without_a_cluster_is_a_bad_argument(tmp_path, capsys):
+    assert main(["batch", "s3://bucket/clips", "--out", str(tmp_path / "out")]) == 2
+    assert "footage and results at a URL need a cluster" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()

@@ -6,6 +6,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from pathlib import Path
 from typing import Any, Protocol
 
 from .processes import ClipProcesses
@@ -31,6 +32,10 @@ class Runner(Protocol):
 
     def report(self) -> dict[str, Any]:
         """Return what the batch's report says besides the clips."""
+        ...
+
+    def report_written(self, file: Path) -> None:
+        """Put the report, which was written to a file, where the results are."""
         ...
 
 
@@ -64,6 +69,9 @@ class LocalRunner:
     def report(self) -> dict[str, Any]:
         """See `Runner.report`."""
         return {}
+
+    def report_written(self, file: Path) -> None:
+        """See `Runner.report_written`."""
 
     def _capture(self, task: ClipTask) -> Entry:
         return capture_clip(task, self._program, self._processes.run, self._threads)

@@ -1,0 +1,215 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Footage and results in a store of files that is addressed by URLs (``s3://``, ``gs://``, ``sftp://``), by `fsspec`.
+
+A store moves a file to its final name by copying (S3, Google Cloud) or renaming (SFTP); either way a reader finds the
+earlier file or the complete new one.
+"""
+
+from __future__ import annotations
+
+import os
+import secrets
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path, PurePosixPath
+from typing import Any
+
+import fsspec
+
+from ...solver.errors import InputError, ScopeError
+from ..atomic_write import computer, runs
+from ..errors import OutputError, UsageError
+from ..footage import is_url
+from ..job.batch import REPORT_NAME
+from .staging import ATTEMPTS, TOKEN
+
+
+@contextmanager
+def store_errors(error: type[InputError] | type[OutputError], url: str) -> Iterator[None]:
+    """Raise whatever a store raises, whose classes differ from store to store, as ``error``.
+
+    :raises InputError: or OutputError, as given.
+    """
+    try:
+        yield
+    except ScopeError:
+        raise
+    except Exception as failure:
+        cause = " ".join(f"{failure}".split())[:200] or type(failure).__name__
+        raise error(f"{url} cannot be used ({cause}); check the address and the credentials") from failure
+
+
+def _open(url: str) -> tuple[Any, str]:
+    """Return the file system of a URL and the path in it.
+
+    :raises UsageError: there is no such kind of URL, or its package is missing.
+    """
+    try:
+        file_system, path = fsspec.core.url_to_fs(url)
+    except (ImportError, ValueError) as error:
+        raise UsageError(f"{url} cannot be used: {error}") from error
+    return file_system, path.rstrip("/")
+
+
+def names_below(url: str, without: str = "") -> list[str]:
+    """Return the names of all files below a URL, relative to it; names that would lead elsewhere are left out.
+
+    :param without: URL of a folder to leave out.
+    """
+    file_system, root = _open(url)
+    left_out = _open(without)[1] + "/" if without else ""
+    file_system.invalidate_cache()
+    found = [str(path) for path in file_system.find(root) if not (left_out and str(path).startswith(left_out))]
+    names = [path.removeprefix(root).lstrip("/") for path in found]
+    return [n for n in names if n and "\\" not in n and not {"..", ATTEMPTS} & set(PurePosixPath(n).parts)]
+
+
+def mirror_footage(url: str, out: str, folder: Path) -> Path:
+    """Make a folder with an empty file for each one below a URL, from which the clips can be told by their names.
+
+    :param out: URL or path of the results, which are no footage.
+    :raises InputError: the store cannot be read.
+    """
+    with store_errors(InputError, url):
+        _touch(folder, names_below(url, out if is_url(out) else ""))
+    return folder
+
+
+def mirror_results(url: str, folder: Path) -> Path:
+    """Make a folder with an empty file for each result below a URL, and with the report of the previous batch.
+
+    :raises OutputError: the store cannot be read.
+    """
+    with store_errors(OutputError, url):
+        names = names_below(url)
+        _touch(folder, names)
+        if REPORT_NAME in names:
+            file_system, root = _open(url)
+            file_system.get_file(f"{root}/{REPORT_NAME}", str(folder / REPORT_NAME))
+    return folder
+
+
+def _touch(folder: Path, names: list[str]) -> None:
+    folder.mkdir(parents=True)
+    for name in names:
+        path = folder / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.touch()
+
+
+def download(url: str, folder: Path) -> Path:
+    """Download a file, or a folder of images, into a folder, and return its path."""
+    file_system, path = _open(url)
+    target = folder / PurePosixPath(path).name
+    if file_system.isdir(path):
+        target.mkdir()
+        for each in file_system.find(path, maxdepth=1):
+            file_system.get_file(each, str(target / PurePosixPath(each).name))
+    else:
+        file_system.get_file(path, str(target))
+    return target
+
+
+def upload(file: Path, url: str) -> None:
+    """Upload a file, and check its size there.
+
+    :raises OSError: it has another size.
+    """
+    file_system, path = _open(url)
+    file_system.makedirs(path.rpartition("/")[0], exist_ok=True)
+    file_system.put_file(str(file), path)
+    file_system.invalidate_cache()
+    if file_system.size(path) != file.stat().st_size:
+        raise OSError(f"{url} is not as large as what was written")
+
+
+def read_text(url: str) -> str:
+    """Return the text of a file; empty if it does not exist."""
+    file_system, path = _open(url)
+    return str(file_system.cat_file(path).decode()) if file_system.exists(path) else ""
+
+
+def is_folder(url: str) -> bool:
+    """Return whether there are files below a URL."""
+    file_system, path = _open(url)
+    return bool(file_system.isdir(path))
+
+
+class RemoteStaging:
+    """The attempts of a batch below a URL; see `Staging`.
+
+    :raises OutputError: the store cannot be written.
+    """
+
+    def __init__(self, out: str) -> None:
+        self._out = out.rstrip("/")
+        self.token = secrets.token_hex(16)
+        self.folder = f"{self._out}/{ATTEMPTS}/{computer()}-{os.getpid()}-{self.token[:8]}"
+        with store_errors(OutputError, out):
+            self._remove_abandoned()
+            file_system, path = _open(f"{self.folder}/{TOKEN}")
+            file_system.makedirs(path.rpartition("/")[0], exist_ok=True)
+            file_system.pipe_file(path, self.token.encode())
+
+    def attempt(self, number: int) -> str:
+        """Return the URL of an attempt's folder."""
+        return f"{self.folder}/{number}"
+
+    def publish(self, attempt: str, outputs: list[str], content: dict[str, Any]) -> bool:
+        """Give the results of an attempt their final names; see `Staging.publish`. Their sizes are compared.
+
+        :raises OutputError: the store cannot be written.
+        """
+        with store_errors(OutputError, self._out):
+            file_system, root = _open(attempt)
+            file_system.invalidate_cache()
+            for name in outputs:
+                staged = f"{root}/{name}"
+                if not file_system.exists(staged) or file_system.size(staged) != content[name]["bytes"]:
+                    return False
+            for name in outputs:
+                self._move(f"{root}/{name}", name)
+        return True
+
+    def write_report(self, file: Path) -> None:
+        """Upload the batch's report.
+
+        :raises OutputError: the store cannot be written.
+        """
+        with store_errors(OutputError, self._out):
+            staged = f"{self.folder}/{REPORT_NAME}"
+            upload(file, staged)
+            self._move(_open(staged)[1], REPORT_NAME)
+
+    def _move(self, staged: str, name: str) -> None:
+        file_system, final = _open(f"{self._out}/{name}")
+        file_system.makedirs(final.rpartition("/")[0], exist_ok=True)
+        file_system.mv(staged, final)
+
+    def remove(self, attempt: str) -> None:
+        """Remove what an attempt has uploaded."""
+        _remove(attempt)
+
+    def close(self) -> None:
+        """Remove the folders of all attempts."""
+        _remove(self.folder)
+        with suppress(Exception):  # it is not empty, or the store has no folders
+            file_system, path = _open(f"{self._out}/{ATTEMPTS}")
+            file_system.rmdir(path)
+
+    def _remove_abandoned(self) -> None:
+        """Remove the attempts of batches of this computer that do not run any more."""
+        file_system, root = _open(f"{self._out}/{ATTEMPTS}")
+        for path in file_system.ls(root, detail=False) if file_system.isdir(root) else []:
+            where, process, _ = [*PurePosixPath(path).name.split("-", 2), "", ""][:3]
+            if where == computer() and process.isdecimal() and not runs(int(process)):
+                file_system.rm(path, recursive=True)
+
+
+def _remove(url: str) -> None:
+    """Remove a folder; what cannot be removed is left, and removed by a later batch."""
+    with suppress(Exception):
+        file_system, path = _open(url)
+        file_system.invalidate_cache()
+        if file_system.exists(path):
+            file_system.rm(path, recursive=True)

@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Footage and results in a store: listing, and what is published; `file://` and `memory://` stand for other stores."""
+
+import pytest
+from scope.scope_addon.cluster import remote
+from scope.scope_addon.cluster.remote import RemoteStaging, mirror_footage, mirror_results, upload
+from scope.scope_addon.errors import OutputError, UsageError
+from scope.scope_addon.job.batch import REPORT_NAME
+from scope.solver.errors import InputError
+
+from ..required import package
+
+fsspec = package("fsspec")
+
+
+@pytest.fixture
+def store():
+    """A store in memory with a clip and an earlier result."""
+    memory = fsspec.filesystem("memory")
+    for path in list(memory.store):
+        del memory.store[path]
+    memory.pipe_file("/bucket/clips/below/a.mp4", b"clip")
+    memory.pipe_file("/bucket/clips/out/old.mp4", b"result")
+    memory.pipe_file(f"/bucket/clips/out/{REPORT_NAME}", b"{}")
+    return memory
+
+
+def files(folder):
+    return sorted(str(p.relative_to(folder)) for p in folder.rglob("*") if p.is_file())
+
+
+def test_footage_and_results_are_mirrored_by_their_names(store, tmp_path):
+    folder = mirror_footage("memory://bucket/clips", "memory://bucket/clips/out", tmp_path / "clips")
+    assert files(folder) == ["below/a.mp4"]
+    assert (folder / "below" / "a.mp4").read_bytes() == b""
+    folder = mirror_results("memory://bucket/clips/out", tmp_path / "out")
+    assert files(folder) == ["old.mp4", REPORT_NAME]
+    assert (folder / REPORT_NAME).read_text() == "{}"
+
+
+def test_names_that_lead_elsewhere_are_left_out(store, tmp_path, monkeypatch):
+    names = ["/bucket/a.mp4", "/bucket/../../b.mp4", "/bucket/c\\..\\d.mp4"]
+    monkeypatch.setattr(type(store), "find", lambda *_: names)
+    assert files(mirror_footage("memory://bucket", "", tmp_path / "clips")) == ["a.mp4"]
+
+
+def test_results_replace_earlier_ones_and_nothing_else_stays(store, tmp_path):
+    out, file = "memory://bucket/out", tmp_path / "a.npz"
+    for text in ("first", "second"):
+        staging = RemoteStaging(out)
+        file.write_text(text)
+        upload(file, f"{staging.attempt(0)}/below/a.npz")
+        assert staging.publish(staging.attempt(0), ["below/a.npz"], {"below/a.npz": {"bytes": len(text)}})
+        staging.write_report(file)
+        staging.close()
+        assert store.find("/bucket/out") == ["/bucket/out/below/a.npz", f"/bucket/out/{REPORT_NAME}"]
+        assert store.cat_file("/bucket/out/below/a.npz").decode() == text
+
+
+@pytest.mark.parametrize("damage", ["cut", "given up"])
+def test_a_damaged_or_late_result_is_not_published(store, tmp_path, damage):
+    staging = RemoteStaging("memory://bucket/out")
+    (tmp_path / "a.npz").write_text("result")
+    upload(tmp_path / "a.npz", f"{staging.attempt(0)}/a.npz")
+    if damage == "given up":
+        staging.remove(staging.attempt(0))
+    assert not staging.publish(staging.attempt(0), ["a.npz"], {"a.npz": {"bytes": 7 if damage == "cut" else 6}})
+    staging.close()
+    assert not store.exists("/bucket/out/a.npz")
+
+
+def test_an_upload_that_is_cut_is_an_error(store, tmp_path, monkeypatch):
+    (tmp_path / "a.npz").write_text("result")
+    monkeypatch.setattr(type(store), "put_file", lambda self, file, path: self.pipe_file(path, b"res"))
+    with pytest.raises(OSError, match="not as large"):
+        upload(tmp_path / "a.npz", "memory://bucket/out/a.npz")
+
+
+def test_what_a_store_raises_is_a_sentence(store, tmp_path, monkeypatch):
+    def fails(*_):
+        raise RuntimeError("no\nsuch bucket")
+
+    monkeypatch.setattr(type(store), "find", fails)
+    with pytest.raises(InputError, match="memory://bucket cannot be used .no such bucket.; check the address"):
+        mirror_footage("memory://bucket", "", tmp_path / "clips")
+    with pytest.raises(OutputError):
+        mirror_results("memory://bucket", tmp_path / "out")
+    with pytest.raises(UsageError, match="nosuch://bucket cannot be used"):
+        remote.is_folder("nosuch://bucket")
