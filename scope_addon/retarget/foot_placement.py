@@ -97,12 +97,18 @@ def place_feet(
     rested = [[np.linalg.norm(rig.heads[b] - rig.heads[a]) for a, b in zip(leg, leg[1:], strict=False)] for leg in legs]
     lengths = 0.9995 * np.array(rested).sum(1)
     heads[..., 2] -= pelvis_drop(heads[:, hips], np.stack(goals, 1), lengths, times)[:, None]
-    for (thigh, shin, foot_bone), goal in zip(legs, goals, strict=True):
-        joints = heads[:, thigh], heads[:, shin], heads[:, foot_bone]
-        world[:, thigh], world[:, shin] = solve_leg(world[:, thigh], world[:, shin], joints, goal)
+    thighs, shins, ankles = (list(bones) for bones in zip(*legs, strict=True))
+    joints = _rows(heads[:, thighs]), _rows(heads[:, shins]), _rows(heads[:, ankles])
+    solved = solve_leg(_rows(world[:, thighs]), _rows(world[:, shins]), joints, _rows(np.stack(goals, 1)))
+    world[:, thighs], world[:, shins] = (R.reshape(len(world), len(legs), 3, 3) for R in solved)
     placed = head_positions(rig, world)
     placed += (heads[:, hips[0]] - placed[:, hips[0]])[:, None]
     return world, placed
+
+
+def _rows(of_legs: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the entries (T·L, ...) of T frames and L legs, (T, L, ...), which are solved at once."""
+    return of_legs.reshape(-1, *of_legs.shape[2:])
 
 
 def _rig_foot(

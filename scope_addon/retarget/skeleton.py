@@ -41,13 +41,11 @@ def basis(rig: Skeleton, world: NDArray[np.float64]) -> NDArray[np.float64]:
     :param world: (T, B, 3, 3) bone to world.
     :return: (T, B, 3, 3) rotations relative to parent and rest pose.
     """
-    out = np.empty_like(world)
-    for b, parent in enumerate(rig.parents):
-        if parent < 0:
-            out[:, b] = rig.rotations[b].T @ world[:, b]
-        else:
-            local = rig.rotations[parent].T @ rig.rotations[b]
-            out[:, b] = np.swapaxes(world[:, parent] @ local, 1, 2) @ world[:, b]
+    local = np.swapaxes(rig.rotations[rig.parents], 1, 2) @ rig.rotations
+    rested = world[:, rig.parents] @ local
+    roots = rig.parents < 0
+    rested[:, roots] = rig.rotations[roots]
+    out: NDArray[np.float64] = np.swapaxes(rested, 2, 3) @ world
     return out
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Crop the pictures of docs/guide.md (assets/guide) from the screenshots of a real Blender."""
+"""Crop the pictures of docs/guide.md and docs/live.md (assets/guide) from the screenshots of a real Blender."""
 
 from pathlib import Path
 
@@ -9,6 +9,7 @@ import cv2
 PICTURES = {
     "footage": ("2_footage_chosen", (1000, 60, 1330, 280)),
     "capturing": ("9_body_over_footage", (700, 60, 1330, 560)),
+    "live": ("23_live_recording", (400, 25, 1330, 800)),
     "result": ("6_result", (1000, 60, 1330, 870)),
     "compared": ("7_compared_with_footage", (0, 25, 1330, 900)),
     "export": ("8_export_window", (230, 165, 1370, 850)),

@@ -17,7 +17,7 @@ import bpy
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
-from session import OUT, addon, inventory, invoke, key, picture, run, show_tab, until, use
+from session import OUT, addon, inventory, invoke, key, picture, run, show_tab, until, use, viewport
 
 OVER_PANEL = (1174, 300)
 ADDRESS, PORT = "http://127.0.0.1:8099/video", "8099"
@@ -83,7 +83,7 @@ def shares(values: list[float]) -> dict[str, float]:
 def measured(seconds: float, what: str) -> Iterator[float]:
     """Measure the timer's gaps, and the time in which the running capture applies a pose.
 
-    The processor time of this is the same on a busy machine; the gaps contain the drawing of the window.
+    The viewport is hidden meanwhile: without a graphics card, one drawing of it takes a second on a busy machine.
     """
     job, steps, own, gaps = state().job, [], [], []
     original = job.step
@@ -97,6 +97,9 @@ def measured(seconds: float, what: str) -> Iterator[float]:
         return running
 
     job.step = step
+    area = viewport()["area"]
+    area.type = "TEXT_EDITOR"
+    yield 0.5
     poses, began = job.poses, time.monotonic()
     last = began
     while last - began < seconds:
@@ -105,6 +108,7 @@ def measured(seconds: float, what: str) -> Iterator[float]:
         gaps.append(now - last)
         last = now
     job.step = original
+    area.type = "VIEW_3D"
     report[what] = {
         "timer_gap_ms": shares(gaps),
         "apply_ms": shares(steps),
@@ -112,18 +116,6 @@ def measured(seconds: float, what: str) -> Iterator[float]:
         "poses_shown_per_second": round((job.poses - poses) / (last - began), 1),
         "status": dict(vars(job.status)),
     }
-
-
-def redrawn(seconds: float) -> Iterator[float]:
-    """Measure the timer's gaps while the window draws a moving body, without a live capture."""
-    bone, gaps, last = bpy.context.object.pose.bones["left_hip"], [], time.monotonic()
-    while sum(gaps) < seconds:
-        bone.rotation_quaternion.x += 0.01
-        yield 0.005
-        now = time.monotonic()
-        gaps.append(now - last)
-        last = now
-    report["drawing_gap_ms"] = shares(gaps)
 
 
 def captures() -> list[bpy.types.Collection]:
@@ -188,6 +180,7 @@ def cancelled(before: dict) -> Iterator[float]:
     yield from gone(worker, "Escape")
     yield from until(lambda: state().job is None, 10, "the end")
     assert inventory() == before, (inventory(), before)
+    key("Shift_L")  # moves the mouse away, whose tooltip would cover the panel
 
 
 def recorded() -> Iterator[float]:
@@ -257,7 +250,6 @@ def stopped() -> Iterator[float]:
     yield 0.5
     assert rig_pose() != posed
     picture("25_live_stopped")
-    yield from redrawn(1.0)
     invoke(bpy.ops.ed.undo)
     yield 0.5
     assert inventory() == before, (inventory(), before)
