@@ -178,9 +178,11 @@ def _pickled_bodies(_: Path) -> list[bytes]:
 def _motions(_: Path) -> list[bytes]:
     from scope.solver.loaders.body_file import load_body
 
-    from ..made_motion import made_motion
+    from ..made_motion import made_face, made_motion
 
-    return [made_motion(load_body("scope"), np.zeros((3, 72)), np.zeros((3, 3))).to_bytes()]
+    poses, trans = np.zeros((3, 72)), np.zeros((3, 3))
+    body = load_body("scope")
+    return [made_motion(body, poses, trans, face=face).to_bytes() for face in ({}, made_face(3))]
 
 
 def npz(arrays: dict[str, Any]) -> bytes:
