@@ -15,7 +15,8 @@ pytest.importorskip("resource", reason="Windows has no such limit")
     [
         (1_500_000, "out.glb", "this shell limits a process to 1.54 GB of address space, but a capture needs 3.20 GB"),
         (500_000, "out.npz", "this shell limits a process to 0.51 GB of address space, but a capture needs 2.50 GB"),
-        (60_000, "out.npz", "there is too little memory to load the program; free memory"),
+        (250_000, "out.npz", "there is too little memory to load the program; free memory"),
+        (110_000, "out.npz", "there is too little memory to load the program; free memory"),
     ],
 )
 def test_a_low_limit_is_one_sentence(tmp_path, limit_kb, output, says):
