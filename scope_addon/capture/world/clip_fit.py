@@ -23,7 +23,7 @@ from ....solver.rotations import exp, log
 from ...kinematics.contact_points import contact_point_positions
 from ..fitting.frame_sequence import LONGEST_COAST_S, FittedTrack
 from ..fitting.prepared_track import PreparedTrack
-from ..fitting.weights import ROBUST, clip_weights, motion_priors, warm_stages
+from ..fitting.weights import ROBUST, clip_stages, motion_priors
 from .camera_path import CameraPath
 from .joint_sigma import joint_sigma
 from .resting_places import resting_places
@@ -55,7 +55,7 @@ class _Clip:
         self._prepared, self._path, self._progress = prepared, path, progress
         self._start, first = start, path.to_first(start)
         self._rotations, self._root = first.rotations.copy(), first.t_camera_root.copy()
-        self._weights = clip_weights(prepared.weights)
+        self._options = replace(ROBUST, stages=clip_stages(prepared.weights))
         self._done = np.zeros(len(start.valid), bool)
         self._sigma = np.full((*first.rotations.shape[:2], 2), np.nan, np.float32)
 
@@ -72,7 +72,7 @@ class _Clip:
                 times,
                 init=states,
                 priors=self._prepared.priors,
-                options=replace(ROBUST, stages=warm_stages(self._weights)),
+                options=self._options,
                 motion=prior,
                 stands=self._standing_points(frames),
                 shape=np.asarray(self._start.betas, float),
