@@ -141,7 +141,7 @@ class Motion:
         path = Path(path)
         data = read_npz(path, MotionFileError, "motion file", content)
         known = {f.name for f in fields(cls)} - set(_GROUPS)
-        missing = sorted(known - set(data) - {"source", *SIGMA_KEYS})
+        missing = sorted(known - set(data) - OPTIONAL_KEYS)
         if missing:
             raise MotionFileError(f"{path} lacks {', '.join(missing)}: it is not a motion file of this version")
         values: dict[str, Any] = {k: v.item() if v.ndim == 0 else v for k, v in data.items() if k in known}
@@ -166,6 +166,7 @@ SIGMA_KEYS = ("joint_sigma_m", "joint_sigma_depth_m")  # not in files of earlier
 # Only in files of captures that looked for the face: the first are what it expresses, the others where it was seen.
 FACE_KEYS = ("expressions", "expression_names", "expression_confidence", "gaze", "face_points", "face_landmarks")
 _GROUPS = ("corrections", "face")  # fields that are not keys themselves
+OPTIONAL_KEYS = {"source", *SIGMA_KEYS, *CORRECTION_KEYS, *FACE_KEYS}
 _FACE_SCHEMA: dict[str, tuple[tuple[str | int, ...], type]] = {
     "expressions": (("T", "E"), np.float32),
     "expression_names": (("E",), np.str_),
@@ -199,3 +200,4 @@ _SCHEMA: dict[str, tuple[tuple[str | int, ...], type]] = {
     "joint_sigma_m": (("T", "K1"), np.float32),
     "joint_sigma_depth_m": (("T", "K1"), np.float32),
 }
+REQUIRED_KEYS = set(_SCHEMA) - OPTIONAL_KEYS

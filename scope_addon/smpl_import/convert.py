@@ -25,7 +25,7 @@ from ..kinematics.axes import R_WORLD_LEVELCAMERA, R_WORLD_MODEL, transform_poin
 from ..kinematics.contact_points import SOLES
 from ..kinematics.frame_blocks import by_blocks
 from ..kinematics.standing import standing_probability
-from ..motion import SIGMA_KEYS, Motion
+from ..motion import REQUIRED_KEYS, SIGMA_KEYS, Motion
 from .layouts import SmplMotion, has_face, read_smpl_motion
 
 DEFAULT_RATE = 30.0  # frames per second
@@ -58,8 +58,7 @@ def import_motion(path: Path, body: str = "scope", up: str = "auto", rate: float
         raise UsageError(f"the up axis must be one of auto, {', '.join(R_WORLD_FILE)}, not '{up}'")
     if not (np.isfinite(rate) and rate >= 0):
         raise UsageError(f"the frame rate must be above zero, not {rate}")
-    own_keys = {each.name for each in fields(Motion)} - {"source", "corrections", *SIGMA_KEYS}  # optional keys
-    if own_keys <= npz_keys(path):
+    if npz_keys(path) >= REQUIRED_KEYS:
         own = Motion.load(path)
         chosen = own.body_model if body == "scope" else body
         if body != "scope" or chosen in BUILT_IN:

@@ -83,6 +83,8 @@ def test_a_step_between_frames_and_a_late_start_are_matched_by_number(body):
     rows = np.array([0, 5, 10])
     late = replace(
         motion,
+        joint_sigma_m=None,
+        joint_sigma_depth_m=None,
         **{key: getattr(motion, key)[3:] for key in ("poses", "trans", "poses_raw", "trans_raw", "frames", "valid")},
         **{key: getattr(motion, key)[3:] for key in ("timestamps", "joints_cam", "keypoints2d", "joint_confidence")},
         **{key: getattr(motion, key)[3:] for key in ("world_from_camera", "foot_contact", "residual_px")},
