@@ -24,9 +24,12 @@ def write_modifiers(curve: bpy.types.FCurve, wanted: list[dict[str, Any]]) -> No
         curve.modifiers.remove(modifier)
     for values in wanted:
         modifier = curve.modifiers.new(values["type"])
-        for frame, low, high in values.get(_POINTS, ()):
-            point = modifier.control_points.add(frame)
-            point.min, point.max = low, high
+        points = values.get(_POINTS, ())
+        for frame, _, _ in points:
+            modifier.control_points.add(frame)
+        if points:  # Blender 5.2 can crash when one point's value is assigned; foreach_set calls no update
+            modifier.control_points.foreach_set("min", [low for _, low, _ in points])
+            modifier.control_points.foreach_set("max", [high for _, _, high in points])
         for _ in range(2):  # some settings are limited by others
             for name, value in values.items():
                 if name not in ("type", "active", _POINTS):

@@ -25,8 +25,9 @@ def animated():
     noise = curves[2].modifiers.new("NOISE")
     noise.strength, noise.use_restricted_range, noise.frame_start, noise.frame_end = 0.5, True, 2.0, 4.0
     envelope = curves[2].modifiers.new("ENVELOPE")
-    added = envelope.control_points.add(3.0)
-    added.min, added.max = -0.5, 0.25
+    envelope.control_points.add(3.0)
+    envelope.control_points.foreach_set("min", [-0.5])  # Blender 5.2 can crash on assigning to one point
+    envelope.control_points.foreach_set("max", [0.25])
     generator = curves[2].modifiers.new("GENERATOR")
     generator.poly_order = 2
     generator.coefficients = (1.0, 2.0, 3.0)
