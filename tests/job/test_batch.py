@@ -11,6 +11,7 @@ import sys
 import time
 from pathlib import Path
 
+import av
 import pytest
 from scope.scope_addon import cli
 from scope.scope_addon.cli import SAMPLE, main
@@ -23,6 +24,8 @@ from scope.solver.errors import InputError
 from scope.solver.loaders.body_file import BUILT_IN
 
 from .processes import runs, wait_for
+
+FRAMES = 31  # of the sample clip up to --end 1, both ends included
 
 # Replaces the capture: the clip's text decides the outcome, and every call is logged in the folder of the clips.
 PROGRAM = """
@@ -327,9 +330,12 @@ def test_the_clips_of_a_killed_batch_end_and_leave_no_partial_file(tmp_path, at)
     process.wait()
     pids = [int(p.read_text()) for p in clips.glob("*.pid")]
     wait_for(lambda: not any(runs(pid) for pid in pids))
-    assert {p.name for p in out.iterdir()} <= {"a.npz", "b.npz"}
-    for path in out.iterdir():
-        Motion.load(path)
+    assert {p.name for p in out.iterdir()} <= {"a.npz", "b.npz", "a.overlay.mp4", "b.overlay.mp4"}
+    for path in out.glob("*.npz"):
+        assert len(Motion.load(path)) == FRAMES
+    for path in out.glob("*.mp4"):  # of a clip that ended before the batch was killed
+        with av.open(path) as video:
+            assert sum(1 for _ in video.decode(video=0)) == FRAMES
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no signals to send")
