@@ -9,7 +9,7 @@ import pytest
 CODE = """
 import pathlib, sys, time
 from scope.scope_addon.command_line import bounded_import as b
-b.BASE_S, b.BASE_BYTES = 0.6, 100_000_000
+b.BASE_S, b.BASE_BYTES = {seconds}, 100_000_000
 with b.bounded_import(pathlib.Path(sys.argv[1])):
     pass
 with b.bounded_import(pathlib.Path(sys.argv[1])):
@@ -19,17 +19,17 @@ print("whole", flush=True)
 
 
 @pytest.mark.parametrize(
-    ("work", "says"),
+    ("seconds", "work", "says"),
     [
-        ("while True: pass", "Blender did not finish importing this file within 1 s; export it again"),
-        ("block = bytearray(b'1') * 300_000_000; time.sleep(20)", "takes more than 0.1 GB of memory; export it again"),
-        ("block = bytearray(b'1') * 30_000_000", None),
+        (0.6, "while True: pass", "Blender did not finish importing this file within 1 s; export it again"),
+        (20, "block = bytearray(b'1') * 300_000_000; time.sleep(20)", "takes more than 0.1 GB of memory; export it again"),
+        (20, "block = bytearray(b'1') * 30_000_000", None),
     ],
 )
-def test_time_and_memory_are_bounded(tmp_path, work, says):
+def test_time_and_memory_are_bounded(tmp_path, seconds, work, says):
     rig = tmp_path / "rig.fbx"
     rig.write_bytes(b"short")
-    command = [sys.executable, "-c", CODE.format(work=work), rig]
+    command = [sys.executable, "-c", CODE.format(seconds=seconds, work=work), rig]
     done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
     if says is None:
         assert (done.returncode, done.stdout, done.stderr) == (0, "whole\n", "")

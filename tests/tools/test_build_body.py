@@ -188,7 +188,7 @@ def test_weight_and_its_gradient_are_those_of_a_closed_skin():
 
 def test_people_measure_what_the_surveys_say(shaped, targets):
     source = shaped.source
-    people = draw_population(source, targets, 16, 3)
+    people = draw_population(source, targets, 9, 3)
     off = {key: np.abs(people.measured[key] - people.wanted[key]) for key in people.wanted}
     for key in ("stature", "hip", "shoulder", "knee", "upper_arm", "forearm", "foot"):
         assert np.nanmedian(off[key]) < 0.008, key
