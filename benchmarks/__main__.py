@@ -7,6 +7,7 @@ import argparse
 import json
 import os
 import sys
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,15 @@ from . import frames, report  # noqa: E402
 from .solver import clip_steps, peers, plots, startup, steps  # noqa: E402
 
 OUT = frames.CACHE
+ELSEWHERE = {  # imported where they are wanted: some need packages that others do not
+    "perception": (".perception.perception", "perception"),
+    "choices": (".perception.choices", "choices"),
+    "renders": (".perception.renders", "renders"),
+    "scenes": (".scenes.accuracy", "scenes"),
+    "outline": (".perception.outline", "outline"),
+    "blender": (".blender", "blender"),
+    "cluster": (".cluster", "cluster"),
+}
 
 
 def solver(quick: bool) -> dict[str, Any]:
@@ -76,36 +86,15 @@ def _real_frames(quick: bool) -> dict[str, Any]:
 def main() -> int:
     """Run the command line; return the exit status."""
     parser = argparse.ArgumentParser(prog="bench")
-    parser.add_argument("what", choices=["solver", "perception", "choices", "renders", "outline", "blender", "cluster"])
+    parser.add_argument("what", choices=["solver", *ELSEWHERE])
     parser.add_argument("--quick", action="store_true", help="fewer repetitions, the default preset alone")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures as JSON")
     args = parser.parse_args()
     if args.what == "solver":
         figures = solver(args.quick)
-    elif args.what == "blender":
-        from .blender import blender
-
-        figures = blender(args.quick)
-    elif args.what == "choices":
-        from .perception.choices import choices
-
-        figures = choices(args.quick)
-    elif args.what == "renders":
-        from .perception.renders import renders
-
-        figures = renders(args.quick)
-    elif args.what == "outline":
-        from .perception.outline import outline
-
-        figures = outline(args.quick)
-    elif args.what == "cluster":
-        from .cluster import cluster
-
-        figures = cluster(args.quick)
     else:
-        from .perception.perception import perception
-
-        figures = perception(args.quick)
+        module, function = ELSEWHERE[args.what]
+        figures = getattr(import_module(module, __package__), function)(args.quick)
     if args.json:
         with atomic_path(args.json) as temporary:
             temporary.write_text(json.dumps(figures, indent=1))

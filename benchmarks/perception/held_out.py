@@ -51,37 +51,38 @@ class Take:
 
 def held_out_takes(path: Path) -> list[Take]:
     """Read the takes held out from the lifter's training, of a file written by ``tools.mocap.fit_body``."""
+    return [take for take in all_takes(path) if is_held_out(np.array(take.number))]
+
+
+def all_takes(path: Path) -> list[Take]:
+    """Read all takes of a file written by ``tools.mocap.fit_body``."""
     with np.load(path) as data:
         arrays = {key: data[key] for key in ("poses", "trans", "valid")}
         start, names, betas, fps = (data[f"take_{key}"] for key in ("start", "name", "betas", "fps"))
     takes = []
-    for k in np.flatnonzero(is_held_out(np.arange(len(names)))):
+    for k in range(len(names)):
         rows = {key: array[start[k] : start[k + 1]] for key, array in arrays.items()}
-        takes.append(Take(int(k), str(names[k]), **rows, betas=betas[k], fps=round(float(fps[k]), 1)))
+        takes.append(Take(k, str(names[k]), **rows, betas=betas[k], fps=round(float(fps[k]), 1)))
     return takes
 
 
 def draw_shot(body: Body, take: Take, seed: int = SEED) -> Shot:
     """Return a section of the take with a random body in front of a random camera, reproducible by its seed.
 
-    The root trajectory is the performer's times the ratio of leg lengths, so that feet at rest remain at rest.
     Camera, heading and place are drawn until the person is well inside the image and the room.
 
     :raises ValueError: when no such camera was found, or the take has no section of valid frames.
     """
     rng = np.random.default_rng([seed, take.number])
-    frames = _stretch(rng, body, take)
+    frames = draw_section(rng, body, take, SECONDS)
     betas = np.clip(rng.standard_normal(body.P), -MOST_BETA, MOST_BETA)
-    states = exp(take.poses[frames].reshape(len(frames), -1, 3).astype(float))
-    states[:, 0] = R_WORLD_MODEL @ states[:, 0]
-    share = _leg_length(body, betas) / _leg_length(body, take.betas)
-    pelvis = share * (body.rest_joints(take.betas)[0] + take.trans[frames].astype(float)) @ R_WORLD_MODEL.T
+    states, pelvis = states_and_pelvis(body, take, frames, betas)
     stands = np.zeros((len(frames), 2), bool)
     trans = pelvis - body.rest_joints(betas)[0]
     shot = Shot(states, trans, betas, np.eye(3), np.eye(4), SIZE, take.fps, stands)
     skin = np.array([shot.vertices_world(body, k) for k in range(len(shot))])
     low, high = skin.min((0, 1)), skin.max((0, 1))
-    floor = np.quantile(skin[:, _skin_of_feet(body), 2].min(axis=1), FLOOR_QUANTILE)
+    floor = floor_under(body, skin)
     offset = np.append(-(low + high)[:2] / 2, -floor)
     shot, R_heading = _draw_camera(rng, shot, skin + offset)
     states[:, 0] = R_heading @ states[:, 0]
@@ -106,17 +107,38 @@ def feet_world(
     return points[:, sides].mean(axis=2)
 
 
-def _stretch(rng: np.random.Generator, body: Body, take: Take) -> NDArray[np.intp]:
-    """Return the indices (n,) of consecutive valid frames: as many as a shot has, or fewer if the take has no more."""
+def draw_section(rng: np.random.Generator, body: Body, take: Take, seconds: float) -> NDArray[np.intp]:
+    """Return the indices (n,) of consecutive valid frames: as many as wanted, or fewer if the take has no more.
+
+    :raises ValueError: when the take has no section of valid frames.
+    """
     states = exp(take.poses.reshape(len(take.poses), -1, 3).astype(float))
     points = body.keypoints(*body.forward_kinematics(states, take.trans, take.betas), take.betas)
     unsound = np.concatenate([[0], np.cumsum(~take.valid | (points[..., 1].min(axis=1) < -SUNK_M))])
-    least, most = (round(seconds * take.fps) for seconds in (LEAST_SECONDS, SECONDS))
+    least, most = (round(length * take.fps) for length in (LEAST_SECONDS, seconds))
     for count in range(min(most, len(take.valid)), least - 1, -1):
         starts = np.flatnonzero(unsound[count:] == unsound[: len(unsound) - count])
         if len(starts):
             return rng.choice(starts) + np.arange(count)
     raise ValueError(f"take {take.name} has no {least} sound frames in a row")
+
+
+def states_and_pelvis(
+    body: Body, take: Take, frames: NDArray[np.intp], betas: NDArray[np.floating[Any]]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the take's joint states (n, K+1, 3, 3) and pelvis (n, 3) in a world with z up, for a body of that shape.
+
+    The root trajectory is the performer's times the ratio of leg lengths, so that feet at rest remain at rest.
+    """
+    states = exp(take.poses[frames].reshape(len(frames), -1, 3).astype(float))
+    states[:, 0] = R_WORLD_MODEL @ states[:, 0]
+    share = _leg_length(body, betas) / _leg_length(body, take.betas)
+    return states, share * (body.rest_joints(take.betas)[0] + take.trans[frames].astype(float)) @ R_WORLD_MODEL.T
+
+
+def floor_under(body: Body, skin: NDArray[np.float64]) -> float:
+    """Return the height of the floor under the feet of a skin in motion (T, V, 3), z up."""
+    return float(np.quantile(skin[:, _skin_of_feet(body), 2].min(axis=1), FLOOR_QUANTILE))
 
 
 def _leg_length(body: Body, betas: NDArray[np.floating[Any]]) -> float:

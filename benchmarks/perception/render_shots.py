@@ -33,11 +33,16 @@ def video_and_truth(name: str) -> tuple[Path, Path]:
 
 def shots(body: Body) -> dict[str, Shot]:
     """Return the shot of every held-out take, by the take's name."""
+    return {take.name: draw_shot(body, take) for take in held_out_takes(fitted_motions())}
+
+
+def fitted_motions() -> Path:
+    """Return the file of all recordings fitted by the default body, which is made if it is missing."""
     if not MOTIONS.is_file():
         print(f"fitting the body to the recordings in {DATA / 'mocap'}, once", file=sys.stderr, flush=True)
         command = ("scope.tools.mocap.fit_body", str(DATA / "mocap"), "-o", str(MOTIONS))
         subprocess.run([sys.executable, "-m", *command], check=True, stdout=subprocess.DEVNULL)
-    return {take.name: draw_shot(body, take) for take in held_out_takes(MOTIONS)}
+    return MOTIONS
 
 
 def render_missing(body: Body) -> None:

@@ -36,16 +36,18 @@ def render_pictures(body: Body, shot: Shot, frames: Iterable[int], folder: Path)
     for f in frames:
         vertices = shot.vertices_world(body, f)
         pose_person(person, vertices)
-        left, top, right, bottom = _affected(shot, vertices, lamps)
+        left, top, right, bottom = affected_box(shot, vertices, lamps)
         width, height = shot.size
         pictures.append(folder / f"{f:04d}.png")
         render_part((left / width, right / width, 1 - bottom / height, 1 - top / height), pictures[-1])
-        _into_room(room, pictures[-1], (left, top, right, bottom))
+        blend_into(room, pictures[-1], (left, top, right, bottom))
         print(f"{f + 1} / {len(shot)}", file=sys.stderr, flush=True)
     return pictures
 
 
-def _affected(shot: Shot, vertices_world: NDArray[np.float64], lamps: NDArray[np.float64]) -> tuple[int, int, int, int]:
+def affected_box(
+    shot: Shot, vertices_world: NDArray[np.float64], lamps: NDArray[np.float64]
+) -> tuple[int, int, int, int]:
     """Return left, top, right and bottom, in pixels, of the area that person and shadows can change."""
     points = [vertices_world]
     for lamp in lamps:
@@ -57,7 +59,7 @@ def _affected(shot: Shot, vertices_world: NDArray[np.float64], lamps: NDArray[np
     return int(low[0]), int(low[1]), int(high[0]), int(high[1])
 
 
-def _into_room(room: NDArray[Any], path: Path, box: tuple[int, int, int, int]) -> None:
+def blend_into(room: NDArray[Any], path: Path, box: tuple[int, int, int, int]) -> None:
     """Complete a partly rendered picture with the empty room, without a visible seam."""
     left, top, right, bottom = box
     weight = np.zeros(room.shape[:2], np.float32)

@@ -25,11 +25,11 @@ def build_stage(
     """Build the scene, ready to render; return the person's mesh object, whose vertices are in the world frame."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     scene = bpy.context.scene
-    _render_settings(scene, size)
-    _camera(scene, intrinsics, size, world_from_camera)
+    set_up_rendering(scene, size)
+    add_camera(scene, intrinsics, size, world_from_camera)
     _light(scene)
     _room()
-    return _person(body)
+    return add_person(body)
 
 
 def pose_person(person: bpy.types.Object, vertices_world: NDArray[np.float64]) -> None:
@@ -42,7 +42,7 @@ def render_room(person: bpy.types.Object, path: Path) -> None:
     """Render the empty room to a .png, once and well: nothing in it moves."""
     scene = bpy.context.scene
     person.hide_render, scene.cycles.samples = True, _SAMPLES_ROOM
-    _render_to(path)
+    render_to(path)
     person.hide_render, scene.cycles.samples = False, _SAMPLES_PERSON
 
 
@@ -51,10 +51,11 @@ def render_part(box: tuple[float, float, float, float], path: Path) -> None:
     render = bpy.context.scene.render
     render.use_border, render.use_crop_to_border = True, False
     render.border_min_x, render.border_max_x, render.border_min_y, render.border_max_y = box
-    _render_to(path)
+    render_to(path)
 
 
-def _render_to(path: Path) -> None:
+def render_to(path: Path) -> None:
+    """Render the frame, or what was chosen of it, to a .png."""
     bpy.context.scene.render.filepath = str(path)
     bpy.ops.render.render(write_still=True)
 
@@ -87,7 +88,8 @@ def encode(frames: list[Path], path: Path, size: tuple[int, int], fps: int, kbit
     bpy.ops.render.render(animation=True)
 
 
-def _render_settings(scene: bpy.types.Scene, size: tuple[int, int]) -> None:
+def set_up_rendering(scene: bpy.types.Scene, size: tuple[int, int]) -> None:
+    """Choose Cycles with few samples, denoised, and the size of the pictures in pixels."""
     scene.render.engine = "CYCLES"
     scene.render.resolution_x, scene.render.resolution_y = size
     scene.render.resolution_percentage = 100
@@ -105,7 +107,7 @@ def _render_settings(scene: bpy.types.Scene, size: tuple[int, int]) -> None:
     cycles.seed = 1
 
 
-def _camera(
+def add_camera(
     scene: bpy.types.Scene, K: NDArray[np.float64], size: tuple[int, int], world_from_camera: NDArray[np.float64]
 ) -> None:
     """Add a camera of the given pinhole intrinsics; pixel (u, v) is the centre of a pixel, as in OpenCV."""
@@ -147,19 +149,27 @@ def _aim(scene: bpy.types.Scene) -> bpy.types.Object:
 
 
 def _room() -> None:
-    boards = _material("boards", (0.34, 0.21, 0.12), (0.24, 0.14, 0.075), stretch=(1.2, 14.0, 1.0))
-    wall = _material("wall", (0.62, 0.60, 0.55), (0.55, 0.54, 0.50), stretch=(3.0, 3.0, 3.0))
-    dark = _material("skirting", (0.20, 0.19, 0.18))
-    _box("floor", (0, 0, -0.05), (12, 12, 0.1), boards)
-    _box("back wall", (0, 2.45, 2), (12, 0.1, 4), wall)
-    _box("skirting board", (0, 2.39, 0.06), (12, 0.03, 0.12), dark)
-    _box("picture frame", (-1.45, 2.38, 1.75), (0.95, 0.03, 0.7), dark)
-    _box("picture", (-1.45, 2.36, 1.75), (0.85, 0.02, 0.6), _material("canvas", (0.13, 0.30, 0.38), (0.62, 0.42, 0.18)))
-    _box("bench", (1.75, 2.05, 0.22), (1.1, 0.4, 0.44), _material("bench", (0.45, 0.30, 0.16), (0.38, 0.25, 0.13)))
-    _box("mat", (0.05, -0.1, 0.004), (2.4, 1.5, 0.008), _material("mat", (0.22, 0.26, 0.30), (0.19, 0.22, 0.26)))
+    boards = make_material("boards", (0.34, 0.21, 0.12), (0.24, 0.14, 0.075), stretch=(1.2, 14.0, 1.0))
+    wall = make_material("wall", (0.62, 0.60, 0.55), (0.55, 0.54, 0.50), stretch=(3.0, 3.0, 3.0))
+    dark = make_material("skirting", (0.20, 0.19, 0.18))
+    add_box("floor", (0, 0, -0.05), (12, 12, 0.1), boards)
+    add_box("back wall", (0, 2.45, 2), (12, 0.1, 4), wall)
+    add_box("skirting board", (0, 2.39, 0.06), (12, 0.03, 0.12), dark)
+    add_box("picture frame", (-1.45, 2.38, 1.75), (0.95, 0.03, 0.7), dark)
+    add_box(
+        "picture",
+        (-1.45, 2.36, 1.75),
+        (0.85, 0.02, 0.6),
+        make_material("canvas", (0.13, 0.30, 0.38), (0.62, 0.42, 0.18)),
+    )
+    add_box(
+        "bench", (1.75, 2.05, 0.22), (1.1, 0.4, 0.44), make_material("bench", (0.45, 0.30, 0.16), (0.38, 0.25, 0.13))
+    )
+    add_box("mat", (0.05, -0.1, 0.004), (2.4, 1.5, 0.008), make_material("mat", (0.22, 0.26, 0.30), (0.19, 0.22, 0.26)))
 
 
-def _box(name: str, center: Triple, size: Triple, material: bpy.types.Material) -> None:
+def add_box(name: str, center: Triple, size: Triple, material: bpy.types.Material) -> None:
+    """Add a box with edges along the axes of the world."""
     corners = [(x, y, z) for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)]
     faces = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
     mesh = bpy.data.meshes.new(name)
@@ -168,7 +178,7 @@ def _box(name: str, center: Triple, size: Triple, material: bpy.types.Material) 
     bpy.context.scene.collection.objects.link(bpy.data.objects.new(name, mesh))
 
 
-def _material(
+def make_material(
     name: str,
     color: Triple,
     second: Triple | None = None,
@@ -197,13 +207,14 @@ def _material(
     return material
 
 
-def _person(body: Body) -> bpy.types.Object:
+def add_person(body: Body) -> bpy.types.Object:
+    """Add the body's mesh, in the colours of its materials."""
     if body.face_material is None or body.material_colors is None:
         raise ValueError(f"body '{body.name}' has no materials")
     mesh = bpy.data.meshes.new("person")
     mesh.from_pydata(body.v_template.tolist(), [], body.faces.tolist())
     for name, color in zip(body.material_names, body.material_colors, strict=True):
-        material = _material(name, tuple(color[:3]))
+        material = make_material(name, tuple(color[:3]))
         material.node_tree.nodes["Principled BSDF"].inputs["Roughness"].default_value = 0.25 if "eye" in name else 0.6
         mesh.materials.append(material)
     mesh.polygons.foreach_set("material_index", body.face_material.astype(np.int32))

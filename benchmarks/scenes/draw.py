@@ -1,0 +1,195 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Random scenes, reproducible by their number.
+
+Two of three scenes are for testing: their first person moves as in a recording that the lifting network was not trained
+on, and no choice may be made by their results. The others, for development, use the other recordings.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ...solver import Body
+from ...solver.rotations import exp
+from ...tools.train_lifter.split import is_held_out
+from ..perception.held_out import Take, draw_section, floor_under, states_and_pelvis
+from .people import Person, Points
+from .scene import INDOORS, OUTDOORS, PANNING, STATIC, TRAVELLING, Block, Scene
+
+SEED, SCENES = 11, 60
+FPS, SECONDS = 30.0, 1.2
+SIZES = ((640, 480), (640, 480), (480, 640), (854, 480), (384, 288))
+CAMERAS = (STATIC, STATIC, STATIC, PANNING, TRAVELLING)
+CHILD, TWO_PEOPLE, BLOCK, CLOTHES = 0.15, 0.3, 0.25, 0.5  # shares of the scenes
+MOST_BETA, BETA_SPREAD = 4.0, 1.5  # wider than the default body's population
+CHILD_SCALE, HEAD_GROWTH = (0.62, 0.85), 0.6  # a child of 0.62 has a head 1 + 0.6 * 0.38 times as large, relatively
+LOOSE_M, HAIR_M = (0.008, 0.03), (0.0, 0.05)
+FOCAL = (0.7, 1.7)  # over the longer side of the picture
+HEIGHT_M, DISTANCE_M = (0.5, 2.3), (2.2, 8.0)
+SHAKE_DEG, PAN_LAG = 0.3, 0.8  # of a held camera; the share of the person's way that it follows
+MARGIN, LEAST_FILL, MOST_FILL = 0.01, 0.3, 0.92  # of the picture's height, and of the longer side of the person's box
+NEAREST_M, APART_M = 0.9, 0.35  # skin to camera; people from each other and from the block
+EVERY_VERTEX, EVERY_FRAME = 40, 4  # that a camera is tested with
+TRIES = 4000
+
+
+def draw_scene(body: Body, takes: Sequence[Take], number: int) -> Scene:
+    """Return the scene of that number.
+
+    :param takes: all recordings, as of `all_takes`.
+    :raises ValueError: when no camera was found that has the first person in its picture.
+    """
+    rng = np.random.default_rng([SEED, number])
+    is_test = number % 3 != 0
+    own = [take for take in takes if bool(is_held_out(np.array(take.number))) == is_test]
+    for _ in range(TRIES):
+        first = draw_person(rng, body, own[rng.integers(len(own))])
+        if first is None:
+            continue
+        people = [first]
+        if rng.random() < TWO_PEOPLE:
+            second = draw_person(rng, body, takes[rng.integers(len(takes))], len(first))
+            people += [] if second is None else [_beside(rng, body, first, second)]
+        scene = _film(rng, body, tuple(people), number, is_test)
+        if scene is not None:
+            return scene
+    raise ValueError(f"no camera was found for scene {number}: the limits are too narrow")
+
+
+def draw_person(rng: np.random.Generator, body: Body, take: Take, frames: int | None = None) -> Person | None:
+    """Draw shape, size, clothes and a part of the take, with the feet on the floor; None if it is too short.
+
+    The person stands at the origin in the middle of the clip, and is turned at random.
+    """
+    fps = round(take.fps)
+    if fps != FPS:
+        return None
+    try:
+        section = draw_section(rng, body, take, SECONDS if frames is None else frames / FPS)
+    except ValueError:
+        return None
+    if frames is not None and len(section) < frames:
+        return None
+    is_child = rng.random() < CHILD
+    betas = np.clip(BETA_SPREAD * rng.standard_normal(body.P), -MOST_BETA, MOST_BETA)
+    scale = float(rng.uniform(*CHILD_SCALE)) if is_child else 1.0
+    states, pelvis = states_and_pelvis(body, take, section, betas)
+    R_heading = exp(np.array([0.0, 0.0, rng.uniform(0, 2 * np.pi)]))
+    states[:, 0] = R_heading @ states[:, 0]
+    pelvis = pelvis @ R_heading.T
+    pelvis[:, :2] -= pelvis[len(pelvis) // 2, :2]
+    loose = rng.uniform(*LOOSE_M) if rng.random() < CLOTHES else 0.0
+    hair, seed = rng.uniform(*HAIR_M), int(rng.integers(1 << 31))
+    head = 1.0 + HEAD_GROWTH * (1.0 - scale)
+    person = Person(take.name, states, pelvis - body.rest_joints(betas)[0], betas, scale, head, loose, hair, seed)
+    floor = floor_under(body, _skin(body, person, every=1)) / scale
+    return _moved(person, np.array([0.0, 0.0, -floor * scale]))
+
+
+def _moved(person: Person, by: Points) -> Person:
+    """Return the person moved by metres in the world."""
+    rest = (person.rotations, person.trans + by / person.scale, person.betas, person.scale, person.head_scale)
+    return Person(person.take, *rest, person.loose_m, person.hair_m, person.seed)
+
+
+def _beside(rng: np.random.Generator, body: Body, first: Person, second: Person) -> Person:
+    """Return the second person somewhere around the first, as near as they keep apart."""
+    angle, a, b = rng.uniform(0, 2 * np.pi), first.joints(body), second.joints(body)
+    toward = np.array([np.cos(angle), np.sin(angle), 0.0])
+    for distance in np.arange(0.6, 6.0, 0.2):
+        gap = np.linalg.norm(a[:, :, None, :2] - b[:, None, :, :2] - distance * toward[:2], axis=-1)
+        if gap.min() > APART_M:
+            return _moved(second, (distance + rng.uniform(0, 1.0)) * toward)
+    return _moved(second, 6.0 * toward)
+
+
+def _film(rng: np.random.Generator, body: Body, people: tuple[Person, ...], number: int, is_test: bool) -> Scene | None:
+    """Draw a camera, and what stands in front of the first person; None if the person is not well in the picture."""
+    first, frames = people[0], len(people[0])
+    width, height = SIZES[rng.integers(len(SIZES))]
+    kind = CAMERAS[rng.integers(len(CAMERAS))]
+    focal = rng.uniform(*FOCAL) * max(width, height)
+    angle, eye_m = rng.uniform(0, 2 * np.pi), rng.uniform(*HEIGHT_M)
+    distance = first.scale * rng.uniform(*DISTANCE_M)
+    pelvis = first.joints(body)[:, 0]
+    target = pelvis.mean(axis=0) + rng.normal(0, 0.15, 3)
+    eye = np.array([*(target[:2] + distance * np.array([np.cos(angle), np.sin(angle)])), eye_m])
+    eyes, targets = np.tile(eye, (frames, 1)), np.tile(target, (frames, 1))
+    follows = PAN_LAG * (_smooth(pelvis) - pelvis.mean(axis=0)) * [1, 1, 0]
+    if kind != STATIC:
+        targets = targets + follows
+    if kind == TRAVELLING:
+        eyes = eyes + follows + np.linspace(0, 1, frames)[:, None] * rng.normal(0, 0.25, 3) * [1, 1, 0.2]
+    poses = np.array([look_at(e, t) for e, t in zip(eyes, targets, strict=True)])
+    if kind != STATIC:
+        shake = _smooth(np.radians(SHAKE_DEG) * rng.normal(0, 3.0, (frames, 3)))
+        poses[:, :3, :3] = poses[:, :3, :3] @ exp(shake)
+    intrinsics = np.array([[focal, 0, width / 2 - 0.5], [0, focal, height / 2 - 0.5], [0, 0, 1]])
+    surroundings = OUTDOORS if rng.random() < 0.5 else INDOORS
+    block = _block(rng, body, people, eyes[0], target) if rng.random() < BLOCK else None
+    seed = int(rng.integers(1 << 31))
+    scene = Scene(number, is_test, people, intrinsics, poses, (width, height), FPS, kind, surroundings, block, seed)
+    return scene if _well_inside(body, scene) else None
+
+
+def look_at(eye: Points, target: Points) -> Points:
+    """Return world_from_camera (4, 4) of a level camera at eye (3,) that looks at target (3,)."""
+    forward = (target - eye) / np.linalg.norm(target - eye)
+    right = np.cross(forward, [0.0, 0.0, 1.0])
+    right /= np.linalg.norm(right)
+    T_world_camera = np.eye(4)
+    T_world_camera[:3, :3] = np.stack([right, np.cross(forward, right), forward], axis=1)
+    T_world_camera[:3, 3] = eye
+    return T_world_camera
+
+
+def _block(
+    rng: np.random.Generator, body: Body, people: tuple[Person, ...], eye: Points, target: Points
+) -> Block | None:
+    """Draw a box between camera and first person that hides some of the legs, and that nobody touches."""
+    joints = np.concatenate([person.joints(body).reshape(-1, 3) for person in people])
+    toward = (eye - target)[:2] / np.linalg.norm((eye - target)[:2])
+    tall = rng.uniform(0.3, 0.9) * people[0].scale
+    half = np.append(rng.uniform(0.15, 0.7, 2), tall / 2)
+    for distance in np.arange(0.5, 2.5, 0.1):
+        center = np.append(target[:2] + distance * toward, tall / 2)
+        gap = np.linalg.norm(np.maximum(np.abs(joints - center)[:, :2] - half[:2], 0), axis=1)
+        if gap.min() > APART_M:
+            outside = (np.abs(eye - center) > half + 0.3).any()
+            return Block(center - half, center + half) if outside else None
+    return None
+
+
+def _well_inside(body: Body, scene: Scene) -> bool:
+    """Return whether all of the first person is in the picture, large enough, and nobody is too near the camera."""
+    width, height = scene.size
+    for k, person in enumerate(scene.people):
+        skin = _skin(body, person, EVERY_FRAME)[:, ::EVERY_VERTEX]
+        poses = scene.world_from_camera[::EVERY_FRAME]
+        camera = np.einsum("tji,tvj->tvi", poses[:, :3, :3], skin - poses[:, None, :3, 3])
+        if camera[..., 2].min() < NEAREST_M:
+            return False
+        if k == 0:
+            pixels = scene.project(camera)
+            margin = MARGIN * height
+            if pixels.min() < margin or (pixels.max((0, 1)) > np.array(scene.size) - 1 - margin).any():
+                return False
+            fill = np.median(np.ptp(pixels, axis=1).max(axis=1)) / height
+            if not LEAST_FILL <= fill <= MOST_FILL * max(1.0, width / height):
+                return False
+    return True
+
+
+def _skin(body: Body, person: Person, every: int) -> Points:
+    return np.array([person.skin(body, f) for f in range(0, len(person), every)])
+
+
+def _smooth(values: Points) -> Points:
+    """Return the values (T, 3), each the mean of those within a third of a second."""
+    reach = round(FPS / 6)
+    padded = np.pad(values, ((reach, reach), (0, 0)), mode="edge")
+    sums = np.cumsum(np.concatenate([np.zeros((1, values.shape[1])), padded]), axis=0)
+    smooth: Points = (sums[2 * reach + 1 :] - sums[: -2 * reach - 1]) / (2 * reach + 1)
+    return smooth

@@ -1,0 +1,38 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Means over people, with confidence intervals by the bootstrap over people."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+RESAMPLES, SEED, CONFIDENCE = 4000, 5, 0.95
+
+
+class Estimate(NamedTuple):
+    """A mean over people, its interval, and how many people have a value."""
+
+    mean: float
+    low: float
+    high: float
+    people: int
+
+
+def mean_over_people(values: Sequence[float] | NDArray[np.float64]) -> Estimate:
+    """Return the mean of one value a person, with the bootstrap's percentile interval (Efron 1979) of 95 %.
+
+    Frames of one clip resemble each other, so people are drawn with replacement, not frames. With fewer than two
+    people, the interval is NaN.
+
+    :param values: (n,), NaN where a person has no value.
+    """
+    found = np.asarray(values, float)
+    found = found[np.isfinite(found)]
+    if len(found) < 2:
+        return Estimate(float(found.mean()) if len(found) else np.nan, np.nan, np.nan, len(found))
+    drawn = np.random.default_rng(SEED).integers(len(found), size=(RESAMPLES, len(found)))
+    low, high = np.quantile(found[drawn].mean(axis=1), [(1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2])
+    return Estimate(float(found.mean()), float(low), float(high), len(found))

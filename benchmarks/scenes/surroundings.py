@@ -1,0 +1,199 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Rooms and streets, light and dressed people of a scene in Blender. Needs bpy."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ...scope_addon.scene.axes import blender_camera_matrix
+from ...solver import Body
+from ...tools.render_sample.stage import Triple, add_box, add_camera, add_person, make_material, set_up_rendering
+from .people import Person
+from .scene import INDOORS, Scene
+
+WALL_M, ROOM_HEIGHT_M = 0.1, 2.7
+FREE_M = 0.6  # around people and camera
+FAR_M = 40.0  # of the ground outdoors
+SKIN, HAIR, SUIT, ACCENT = "skin", "hair", "suit", "suit_accent"
+Rng = np.random.Generator
+
+
+def build_scene(scene: Scene, body: Body) -> tuple[list[bpy.types.Object], NDArray[np.float64]]:
+    """Build everything, ready to render; return the people's mesh objects and the positions of the lamps (n, 3)."""
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    set_up_rendering(bpy.context.scene, scene.size)
+    add_camera(bpy.context.scene, scene.intrinsics, scene.size, scene.world_from_camera[0])
+    rng = np.random.default_rng(scene.seed)
+    low, high = _occupied(scene, body)
+    lamps = _room(rng, low, high) if scene.surroundings == INDOORS else _street(rng, low, high)
+    if scene.block is not None:
+        size = scene.block.high - scene.block.low
+        center = (scene.block.low + scene.block.high) / 2
+        add_box("block", _triple(center), _triple(size), _mottled(rng, "block", rng.uniform(0.05, 0.6, 3)))
+    return [_dressed(body, person) for person in scene.people], lamps
+
+
+def move_camera(world_from_camera: NDArray[np.float64]) -> None:
+    """Put the camera at a pose (4, 4)."""
+    bpy.context.scene.camera.matrix_world = blender_camera_matrix(world_from_camera).T.tolist()
+
+
+def _occupied(scene: Scene, body: Body) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the least and largest x and y (2,) of the people, the block and the camera, with room around them."""
+    points = [person.joints(body).reshape(-1, 3) for person in scene.people]
+    points.append(scene.world_from_camera[:, :3, 3])
+    if scene.block is not None:
+        points.append(np.array([scene.block.low, scene.block.high]))
+    every = np.concatenate(points)[:, :2]
+    return every.min(axis=0) - FREE_M, every.max(axis=0) + FREE_M
+
+
+def _room(rng: Rng, low: NDArray[np.float64], high: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Build four walls, floor, ceiling, pictures, furniture along the walls, and lamps."""
+    low, high = low - rng.uniform(0, 2.0, 2), high + rng.uniform(0, 2.0, 2)
+    (x0, y0), (x1, y1) = low, high
+    cx, cy, wide, deep, tall = (x0 + x1) / 2, (y0 + y1) / 2, x1 - x0, y1 - y0, ROOM_HEIGHT_M
+    stretch = (1.2, 14.0, 1.0) if rng.random() < 0.5 else (3.0, 3.0, 3.0)
+    boards = _mottled(rng, "floor", rng.uniform(0.08, 0.5) * np.array([1.0, 0.8, 0.6]), stretch)
+    wall = _mottled(rng, "wall", rng.uniform(0.3, 0.8) + rng.normal(0, 0.05, 3))
+    dark = make_material("skirting", _triple(np.full(3, rng.uniform(0.05, 0.6))))
+    add_box("floor", (cx, cy, -0.05), (wide, deep, 0.1), boards)
+    add_box("ceiling", (cx, cy, tall + 0.05), (wide, deep, 0.1), make_material("ceiling", (0.8, 0.8, 0.8)))
+    for side, (place, size, inward) in enumerate(
+        [
+            ((x0 - WALL_M / 2, cy), (WALL_M, deep), (1, 0)),
+            ((x1 + WALL_M / 2, cy), (WALL_M, deep), (-1, 0)),
+            ((cx, y0 - WALL_M / 2), (wide, WALL_M), (0, 1)),
+            ((cx, y1 + WALL_M / 2), (wide, WALL_M), (0, -1)),
+        ]
+    ):
+        add_box(f"wall {side}", (*place, tall / 2), (*size, tall), wall)
+        along = np.array([abs(inward[1]), abs(inward[0])])
+        face = np.array(place) + WALL_M / 2 * np.array(inward)
+        add_box(f"skirting {side}", (*face, 0.05), (*(np.array(size) * along + 0.02), 0.1), dark)
+        length = float(np.array(size) @ along)
+        for k in range(rng.integers(1, 4)):  # pictures, doors, shelves
+            at = face + along * rng.uniform(-0.4, 0.4) * length
+            w, h, z = rng.uniform(0.4, 1.2), rng.uniform(0.4, 1.0), rng.uniform(1.2, 1.8)
+            if rng.random() < 0.3:
+                w, h, z = 0.9, 2.0, 1.0
+            thick = 0.04 if rng.random() < 0.6 else rng.uniform(0.15, 0.35)
+            add_box(f"on wall {side} {k}", (*at, z), (*(along * w + (1 - along) * thick), h), _any(rng, "picture"))
+    for k in range(rng.integers(0, 2)):
+        add_box(f"rug {k}", (cx, cy, 0.004), (wide / 3, deep / 3, 0.008), _any(rng, "rug"))
+    lamps = np.array(
+        [[cx + rng.uniform(-1, 1), cy + rng.uniform(-1, 1), tall - 0.1] for _ in range(rng.integers(1, 3))]
+    )
+    for k, lamp in enumerate(lamps):
+        data = bpy.data.lights.new(f"lamp {k}", "AREA")
+        data.energy, data.size = rng.uniform(120, 260) * (wide * deep / 30) ** 0.5, rng.uniform(0.6, 1.8)
+        data.color = (1.0, rng.uniform(0.8, 1.0), rng.uniform(0.6, 1.0))
+        _link(bpy.data.objects.new(f"lamp {k}", data)).location = lamp.tolist()
+    _sky((0.9, 0.95, 1.0), rng.uniform(0.3, 0.6))
+    return lamps
+
+
+def _street(rng: Rng, low: NDArray[np.float64], high: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Build ground, houses with windows, trees and posts, and a sun."""
+    center = (low + high) / 2
+    green = rng.random() < 0.5
+    ground = np.array([0.10, 0.16, 0.05]) if green else np.full(3, rng.uniform(0.08, 0.35))
+    add_box("ground", (*center, -0.05), (2 * FAR_M, 2 * FAR_M, 0.1), _mottled(rng, "ground", ground, (6.0, 6.0, 6.0)))
+    reach = (high - low) / 2
+    for k in range(rng.integers(1, 4)):  # houses to some sides
+        axis, sign = k % 2, 1 if rng.random() < 0.5 else -1
+        away = np.zeros(2)
+        away[axis] = sign * (reach[axis] + rng.uniform(2.0, 9.0) + 3.0)
+        size = np.array([6.0, 6.0, rng.uniform(3.0, 8.0)])
+        size[1 - axis] = rng.uniform(8.0, 20.0)
+        at = center + away
+        add_box(f"house {k}", (*at, size[2] / 2), _triple(size), _mottled(rng, "house", rng.uniform(0.2, 0.7, 3)))
+        face = at.copy()
+        face[axis] -= sign * (3.0 + 0.02)
+        for row in np.arange(0.9, size[2] - 1.2, 2.6):
+            for column in np.arange(-size[1 - axis] / 2 + 1.2, size[1 - axis] / 2 - 1.0, 2.2):
+                place, extent = np.array([*face, row + 0.7]), np.array([0.05, 0.05, 1.4])
+                place[1 - axis] += column
+                extent[1 - axis] = 1.0
+                add_box("window", _triple(place), _triple(extent), _shared("glass", (0.06, 0.08, 0.10)))
+    for k in range(rng.integers(2, 7)):
+        angle = rng.uniform(0, 2 * np.pi)
+        at = center + (np.linalg.norm(reach) + rng.uniform(1.0, 12.0)) * np.array([np.cos(angle), np.sin(angle)])
+        tall = rng.uniform(2.0, 4.5)
+        if rng.random() < 0.6:
+            bpy.ops.mesh.primitive_cylinder_add(radius=rng.uniform(0.1, 0.25), depth=tall, location=(*at, tall / 2))
+            bpy.context.object.data.materials.append(_shared("bark", (0.12, 0.08, 0.05)))
+            for _ in range(4):
+                crown = (*(at + rng.normal(0, 0.5, 2)), tall + rng.uniform(-0.3, 1.0))
+                bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=3, radius=rng.uniform(0.7, 1.4), location=crown)
+                bpy.context.object.data.materials.append(_shared("leaves", (0.05, 0.13, 0.03)))
+        else:
+            add_box(f"post {k}", (*at, tall / 2), (0.12, 0.12, tall), _shared("post", (0.25, 0.25, 0.27)))
+    elevation, azimuth = np.radians(rng.uniform(20, 70)), rng.uniform(0, 2 * np.pi)
+    toward = np.array([np.cos(azimuth) * np.cos(elevation), np.sin(azimuth) * np.cos(elevation), np.sin(elevation)])
+    data = bpy.data.lights.new("sun", "SUN")
+    overcast = rng.random() < 0.3
+    data.energy, data.angle = (0.8, 0.8) if overcast else (rng.uniform(2.5, 4.0), 0.01)
+    sun = _link(bpy.data.objects.new("sun", data))
+    sun.rotation_euler = (np.pi / 2 - elevation, 0.0, azimuth + np.pi / 2)
+    _sky((0.6, 0.75, 1.0) if not overcast else (0.9, 0.92, 0.95), rng.uniform(0.6, 1.0))
+    return np.array([[*center, 0.0] + 1000.0 * toward])
+
+
+def _dressed(body: Body, person: Person) -> bpy.types.Object:
+    """Add a person with colours of its own; trousers differ from what is worn above in most."""
+    mesh = add_person(body)
+    rng = np.random.default_rng(person.seed)
+    colors = {
+        SKIN: np.array([0.62, 0.40, 0.30]) * rng.uniform(0.2, 1.0),
+        HAIR: rng.uniform(0.01, 0.35) * np.array([1.0, 0.75, 0.5]),
+        SUIT: rng.uniform(0.02, 0.7, 3) if rng.random() < 0.6 else np.full(3, rng.uniform(0.02, 0.6)),
+        ACCENT: rng.uniform(0.02, 0.7, 3),
+    }
+    for slot, name in enumerate(body.material_names):
+        if name in colors:
+            material = make_material(f"{name} of {mesh.name}", _triple(colors[name]))
+            material.node_tree.nodes["Principled BSDF"].inputs["Roughness"].default_value = 0.6
+            mesh.data.materials[slot] = material
+    if rng.random() < 0.7 and body.face_material is not None:
+        heights = body.v_template[body.faces, 1].mean(axis=1) - body.rest_joints(np.zeros(body.P))[0, 1]
+        legs = (body.face_material == body.material_names.index(SUIT)) & (heights < 0.05)
+        mesh.data.materials.append(make_material(f"trousers of {mesh.name}", _triple(rng.uniform(0.02, 0.5, 3))))
+        slots = np.where(legs, len(body.material_names), body.face_material).astype(np.int32)
+        mesh.data.polygons.foreach_set("material_index", slots)
+    return mesh
+
+
+def _sky(color: Triple, strength: float) -> None:
+    world = bpy.data.worlds.new("sky")
+    bpy.context.scene.world = world
+    world.use_nodes = True
+    background = world.node_tree.nodes["Background"]
+    background.inputs["Color"].default_value = (*color, 1.0)
+    background.inputs["Strength"].default_value = strength
+
+
+def _link(thing: bpy.types.Object) -> bpy.types.Object:
+    bpy.context.scene.collection.objects.link(thing)
+    return thing
+
+
+def _shared(name: str, color: Triple) -> bpy.types.Material:
+    found: bpy.types.Material = bpy.data.materials.get(name) or make_material(name, color)
+    return found
+
+
+def _mottled(rng: Rng, name: str, color: NDArray[np.float64], stretch: Triple = (3.0, 3.0, 3.0)) -> bpy.types.Material:
+    color = np.clip(color, 0.01, 0.9)
+    return make_material(name, _triple(color), _triple(np.clip(color * rng.uniform(0.6, 1.2), 0.01, 0.9)), stretch)
+
+
+def _any(rng: Rng, name: str) -> bpy.types.Material:
+    return _mottled(rng, name, rng.uniform(0.03, 0.7, 3))
+
+
+def _triple(values: NDArray[np.float64]) -> Triple:
+    x, y, z = (float(v) for v in values)
+    return x, y, z

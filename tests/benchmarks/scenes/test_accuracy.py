@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Errors of captures of scenes with known differences from the ground truth."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scope.benchmarks.scenes import accuracy
+from scope.benchmarks.scenes.people import LIMB_JOINTS
+from scope.scope_addon.errors import NoPersonError
+
+T, FOCAL = 6, 500.0
+K = np.array([[FOCAL, 0, 320], [0, FOCAL, 240], [0, 0, 1.0]])
+
+
+@pytest.fixture
+def truth(body):
+    """Two people who stand at rest, 4 m away and 2 m apart; the second is partly hidden."""
+    at = [body.joint_names.index(name) for name in LIMB_JOINTS]
+    rest = body.rest_joints(np.zeros(body.P))[at] * [1, -1, -1]
+    limbs = np.stack([np.tile(rest + [x, 0.0, 4.0], (T, 1, 1)) for x in (-1.0, 1.0)])
+    hidden = np.zeros((2, T, 12), bool)
+    hidden[1, :3, :2] = True
+    return {
+        "limbs": limbs,
+        "limbs_cam": limbs,
+        "view_deg": np.full((2, T), 20.0),
+        "hidden": hidden,
+        "stature_m": np.array([1.7, 1.4]),
+        "mass_index": np.array([20.0, 24.0]),
+        "loose_m": np.zeros(2),
+        "intrinsics": K,
+        "size": np.array([640, 480]),
+        "fps": np.array(30.0),
+        "camera": np.array("static"),
+        "surroundings": np.array("indoors"),
+    }
+
+
+def motion(body, limbs_cam, valid=None):
+    joints = np.zeros((T, body.K + 1, 3))
+    joints[:, [body.joint_names.index(name) for name in LIMB_JOINTS]] = limbs_cam
+    rows = np.ones(T, bool) if valid is None else valid
+    return SimpleNamespace(joints_cam=joints, valid=rows, frames=np.arange(T), intrinsics=K, betas=np.zeros(body.P))
+
+
+def evaluate(body, truth, motions, monkeypatch):
+    monkeypatch.setattr(accuracy, "capture", lambda *_: SimpleNamespace(motions=motions))
+    return accuracy.evaluate_scene(body, accuracy.FOLDER / "test_01.mp4", truth)
+
+
+def test_errors_are_those_put_in(body, truth, monkeypatch):
+    wrong = truth["limbs_cam"][0].copy()
+    wrong[:, LIMB_JOINTS.index("left_wrist"), 2] += 0.12  # one of twelve joints
+    valid = np.arange(T) > 0
+    people = [motion(body, truth["limbs_cam"][1] + [0.0, 0.0, 0.3]), motion(body, wrong, valid)]
+    first, second = evaluate(body, truth, people, monkeypatch)
+    assert np.isnan(first.mpjpe_root[0])
+    np.testing.assert_allclose(first.mpjpe_root[1:], 10.0, atol=1e-6)
+    assert (first.pa_mpjpe[1:] < 120.0 / np.sqrt(12)).all()  # alignment lowers the root mean square
+    np.testing.assert_allclose(second.mpjpe_root, 0.0, atol=1e-6)  # relative to the hips
+    assert second.size == pytest.approx(body.stature(np.zeros(body.P)) / 1.4)
+
+
+def test_who_is_not_captured_has_no_errors(body, truth, monkeypatch):
+    first, second = evaluate(body, truth, [motion(body, truth["limbs_cam"][0])], monkeypatch)
+    assert np.isfinite(first.mpjpe_root).all()
+    assert np.isnan(second.mpjpe_root).all()
+
+    def nobody(*_):
+        raise NoPersonError("no person found")
+
+    monkeypatch.setattr(accuracy, "capture", nobody)
+    both = accuracy.evaluate_scene(body, accuracy.FOLDER / "test_01.mp4", truth)
+    assert all(np.isnan(result.mpjpe_root).all() for result in both)
+
+
+def test_groups_are_of_frames_and_of_people(body, truth, monkeypatch):
+    offsets = (0.012, 0.024)
+    people = []
+    for k in range(2):
+        limbs = truth["limbs_cam"][k].copy()
+        limbs[:3, LIMB_JOINTS.index("left_wrist"), 2] += offsets[k]
+        people.append(motion(body, limbs))
+    rows = accuracy.groups(evaluate(body, truth, people, monkeypatch))
+    assert rows["all"]["mpjpe_root"].mean == pytest.approx((0.5 + 1.0) / 2)  # 12 and 24 mm, of 12 joints, half the time
+    assert rows["one to four joints hidden"]["mpjpe_root"].mean == pytest.approx(2.0)
+    assert rows["one to four joints hidden"]["mpjpe_root"].people == 1
+    assert rows["stature below 1.5 m"]["mpjpe_root"].mean == pytest.approx(1.0)
+    assert rows["all"]["found"].mean == 1.0
+    assert "travelling camera" not in rows
