@@ -24,6 +24,7 @@ ELSEWHERE = {  # imported where they are wanted: some need packages that others 
     "choices": (".perception.choices", "choices"),
     "renders": (".perception.renders", "renders"),
     "scenes": (".scenes.accuracy", "scenes"),
+    "smplify": (".smplify.comparison", "smplify"),
     "outline": (".perception.outline", "outline"),
     "blender": (".blender", "blender"),
     "cluster": (".cluster", "cluster"),

@@ -1,0 +1,154 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""`./scripts/bench smplify`: accuracy and time of SMPLify's way beside Scope's, on the same frames and keypoints."""
+
+from __future__ import annotations
+
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from ...scope_addon.atomic_write import atomic_path
+from ...scope_addon.capture.options import CaptureOptions
+from ...scope_addon.capture.overlay.overlay_video import body_colors, camera_vertices, draw_overlay
+from ...scope_addon.capture.pipeline import capture
+from ...scope_addon.motion import Motion
+from ...solver import Body, load_body
+from ...solver.loaders.body_file import ASSETS
+from ...tools.render_sample.truth import LIMBS
+from ..evaluation.metrics import mpjpe, pa_mpjpe, relative_to
+from ..frames import CACHE, DATA
+from ..page.shots import frames_of
+from ..perception.accuracy import CAMERAS
+from ..perception.render_shots import fitted_motions
+from ..report import table
+from .objective import Frame, Objective, PosePrior
+
+EVERY, QUICK = 10, 40  # of the frames
+PRIOR_EVERY = 10  # of the recordings' frames
+SHOWN_PX = 300
+SIDES = {"L": "left", "R": "right"}
+Points = NDArray[np.float64]
+Columns = tuple[tuple[str, Points, float], ...]  # name, joints (F, K+1, 3) in the camera frame, ms per frame
+
+
+def smplify(quick: bool) -> dict[str, Any]:
+    """Measure, print the tables, draw the pictures, and return the figures by clip."""
+    if not DATA.is_dir():
+        print(f"{DATA} does not exist: nothing was measured; put the clips there", file=sys.stderr)
+        return {}
+    body = load_body("scope")
+    with np.load(fitted_motions()) as data:
+        prior = PosePrior.of(data["poses"][data["valid"]][::PRIOR_EVERY, 3:].astype(float))
+    sample = ASSETS / "sample"
+    films = DATA / "pose2sim"
+    clips = {camera: (films / f"{camera}.mp4", films / f"truth_{camera}.npz") for camera in CAMERAS}
+    clips["sample"] = sample / "sample.mp4", sample / "sample_truth.npz"
+    figures: dict[str, Any] = {}
+    for clip, (video, truth) in clips.items():
+        figures[clip] = _clip(body, prior, video, truth, QUICK if quick else EVERY)
+        rows = [[name, *row.values()] for name, row in figures[clip].items()]
+        print(table((clip, "MPJPE-root mm", "PA-MPJPE mm", "ms per frame"), rows), end="\n\n", flush=True)
+    return figures
+
+
+def _clip(body: Body, prior: PosePrior, video: Path, truth: Path, every: int) -> dict[str, dict[str, float]]:
+    """Return the figures of each optimizer on every so many frames of a clip."""
+    raw = capture(video, body, CaptureOptions(smoothing=False))
+    whole = capture(video, body, CaptureOptions())
+    motion = raw.motions[0]
+    with np.load(truth) as data:
+        true, names = data["joints"].astype(float), [str(name) for name in data["names"]]
+        rows = np.flatnonzero(motion.valid & np.isin(motion.frames, data["frame_index"]))[::every]
+        true = true[np.searchsorted(data["frame_index"], motion.frames[rows])]
+    fits, took = [], []
+    for row in rows:
+        since = time.process_time()
+        objective = Objective(body, prior, frame_of(motion, int(row)))
+        fits.append(objective.fit().x)
+        took.append(1e3 * (time.process_time() - since))
+    ours = 1e3 / whole.report["fps"]["solver"]
+    columns: Columns = (
+        (
+            "SMPLify's objective, dense, each frame",
+            np.array([objective.joints(x) for x in fits]),
+            float(np.median(took)),
+        ),
+        ("Scope, each frame", motion.joints_cam[rows].astype(float), 1e3 / raw.report["fps"]["solver"]),
+        ("Scope, the clip", whole.motions[0].joints_cam[rows].astype(float), ours),
+    )
+    _draw(body, video, motion, rows, np.array(fits), objective, whole.motions[0])
+    return {name: errors(body, joints, true, names) | {"ms": ms} for name, joints, ms in columns}
+
+
+def frame_of(motion: Motion, row: int) -> Frame:
+    """Return what a capture saw in one frame."""
+    seen = motion.keypoints2d[row].astype(float)
+    names = tuple(str(name) for name in motion.keypoints2d_names)
+    return Frame(names, seen[:, :2], np.clip(seen[:, 2], 0.0, 1.0), motion.intrinsics)
+
+
+def errors(body: Body, joints: Points, true: Points, names: list[str]) -> dict[str, float]:
+    """Return mean errors of the twelve limb joints, mm: ``mpjpe_root``, relative to the hips, and ``pa_mpjpe``.
+
+    :param joints: (F, K+1, 3), those of the body. :param true: (F, J, 3), as ``names``; both in the camera frame.
+    """
+    limbs = [side + limb for limb in LIMBS for side in SIDES]
+    at = [body.joint_names.index(f"{SIDES[limb[0]]}_{LIMBS[limb[1:]]}") for limb in limbs]
+    captured, wanted = joints[:, at], true[:, [names.index(limb) for limb in limbs]]
+    hips = [limbs.index("LHip"), limbs.index("RHip")]
+    relative = [relative_to(points, points[:, hips].mean(axis=1)) for points in (captured, wanted)]
+    return {"mpjpe_root": float(mpjpe(*relative).mean()), "pa_mpjpe": float(pa_mpjpe(captured, wanted).mean())}
+
+
+def _draw(
+    body: Body, video: Path, motion: Motion, rows: NDArray[np.intp], fits: Points, objective: Objective, whole: Motion
+) -> None:
+    """Write a picture of three frames: SMPLify's body and Scope's over the footage, and both turned by 90 degrees."""
+    shown = rows[np.linspace(0, len(rows) - 1, 3).round().astype(int)]
+    images = frames_of(video, motion.frames[shown].tolist())
+    strips = []
+    for row in shown:
+        k = int(np.flatnonzero(rows == row)[0])
+        states, trans, betas = (each[0] for each in objective.pose(fits[k][None]))
+        R, t = body.forward_kinematics(states, trans, betas)
+        theirs = body.skin(R, t, betas)
+        ours = camera_vertices(whole, body, int(row))
+        image = images[int(motion.frames[row])]
+        pictures = [image]
+        for person, skin in enumerate((theirs, ours)):
+            colors = [body_colors(body, person)]
+            for ground, shape in ((image, skin), (np.full_like(image, 236), turned(skin))):
+                pictures.append(draw_overlay(ground, [shape], body.faces, motion.intrinsics, None, colors, 1.0))
+        strips.append(np.hstack([_cropped(picture, project(ours, motion.intrinsics)) for picture in pictures]))
+    CACHE.mkdir(parents=True, exist_ok=True)
+    with atomic_path(CACHE / f"smplify_{video.stem}.png") as path:
+        path.write_bytes(cv2.imencode(".png", np.vstack(strips)[..., ::-1])[1].tobytes())
+
+
+def turned(skin: Points) -> Points:
+    """Return the vertices turned by 90 degrees about the camera's vertical through their middle."""
+    middle = skin.mean(axis=0)
+    x, y, z = (skin - middle).T
+    around: Points = np.stack([-z, y, x], axis=1) + middle
+    return around
+
+
+def project(skin: Points, intrinsics: Points) -> Points:
+    """Return the pixels (V, 2) of vertices (V, 3)."""
+    homogeneous = skin @ intrinsics.T
+    pixels: Points = homogeneous[:, :2] / homogeneous[:, 2:]
+    return pixels
+
+
+def _cropped(image: NDArray[np.uint8], pixels: Points) -> NDArray[np.uint8]:
+    """Return the square around the person, all at one size."""
+    low, high = pixels.min(axis=0), pixels.max(axis=0)
+    half, (x, y) = 0.6 * float((high - low).max()), (low + high) / 2
+    M = np.array([[1, 0, half - x], [0, 1, half - y]]) * (SHOWN_PX / (2 * half))
+    cropped = cv2.warpAffine(image, M, (SHOWN_PX, SHOWN_PX), flags=cv2.INTER_AREA, borderValue=(236, 236, 236))
+    return cropped.astype(np.uint8, copy=False)
