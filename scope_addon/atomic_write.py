@@ -53,7 +53,7 @@ def atomic_path(path: Path) -> Iterator[Path]:
         os.chmod(temporary, 0o666 & ~_umask())
         os.replace(temporary, target)
     finally:
-        temporary.unlink(missing_ok=True)
+        _remove_with_drafts(temporary)
         _temporary_files.discard(temporary)
 
 
@@ -88,7 +88,7 @@ def reason(error: OSError) -> str:
 def _remove_abandoned(folder: Path, start: str, suffix: str) -> None:
     """Remove temporary files of processes that do not run any more."""
     with contextlib.suppress(OSError):
-        for path in folder.glob(f"{glob.escape(start)}*-*-*{glob.escape(suffix)}"):
+        for path in folder.glob(f"{glob.escape(start)}*-*-*{glob.escape(suffix)}*"):
             where, process, _ = path.name.removeprefix(start).split("-", 2)
             old = time.time() - path.stat().st_mtime > _ABANDONED_S
             if old or (where == computer() and process.isdecimal() and not runs(int(process))):
@@ -117,7 +117,13 @@ def remove_temporary_files() -> None:
     """Remove the files that are being written, in a process that is about to exit without cleaning up."""
     for temporary in list(_temporary_files):
         with contextlib.suppress(OSError):
-            temporary.unlink(missing_ok=True)
+            _remove_with_drafts(temporary)
+
+
+def _remove_with_drafts(temporary: Path) -> None:
+    """Remove a temporary file, and what a writer keeps beside it until it is complete, as Blender its ``.blend@``."""
+    for path in temporary.parent.glob(f"{glob.escape(temporary.name)}*"):
+        path.unlink(missing_ok=True)
 
 
 def _umask() -> int:
