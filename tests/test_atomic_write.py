@@ -60,10 +60,13 @@ def test_a_failure_keeps_the_target_of_a_link(link, tmp_path):
 
 
 def test_a_failure_leaves_no_draft_either(tmp_path):
-    with pytest.raises(TypeError), atomic_path(tmp_path / "walk.blend") as temporary:
+    def fail(temporary):
         for draft in (f"{temporary.name}@", f"{temporary.stem}.pqSxDJ"):
             (tmp_path / draft).write_text("half")
         temporary.write_text(b"no text")
+
+    with pytest.raises(TypeError), atomic_path(tmp_path / "walk.blend") as temporary:
+        fail(temporary)
     assert os.listdir(tmp_path) == []
 
 
