@@ -12,7 +12,6 @@ import os
 import shlex
 import shutil
 import sys
-import tempfile
 from collections.abc import Sequence
 from contextlib import ExitStack, suppress
 from pathlib import Path
@@ -268,7 +267,7 @@ def run_batch(args: argparse.Namespace) -> dict[str, Any]:
     extras = Extras(args.overlays, args.reports)
     with ExitStack() as stack:
         runner = None
-        folder, out = local_folders(args, Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="scope-batch-"))))
+        folder, out = local_folders(args, stack)
         if args.scheduler is not None:
             runner = dask_runner(args, None if args.program == list(PROGRAM) else args.program)
             stack.callback(runner.close)
