@@ -43,7 +43,7 @@ def atomic_path(path: Path) -> Iterator[Path]:
     # UTF-8, at which exporters fail.
     start = f".{path.stem[:40].encode('utf-8', 'ignore').decode()}.scope-"
     suffix = path.suffix.lower()
-    _remove_abandoned(target.parent, start, suffix)
+    _remove_abandoned(target.parent, start)
     handle, name = tempfile.mkstemp(prefix=f"{start}{computer()}-{os.getpid()}-", suffix=suffix, dir=target.parent)
     temporary = Path(name)
     _temporary_files.add(temporary)
@@ -53,7 +53,7 @@ def atomic_path(path: Path) -> Iterator[Path]:
         os.chmod(temporary, 0o666 & ~_umask())
         os.replace(temporary, target)
     finally:
-        temporary.unlink(missing_ok=True)
+        _remove_with_drafts(temporary)
         _temporary_files.discard(temporary)
 
 
@@ -85,13 +85,15 @@ def reason(error: OSError) -> str:
     return f"{error.strerror or error}; free some space or choose another folder"
 
 
-def _remove_abandoned(folder: Path, start: str, suffix: str) -> None:
-    """Remove temporary files of processes that do not run any more."""
+def _remove_abandoned(folder: Path, start: str) -> None:
+    """Remove temporary files of processes that do not run any more, and the drafts of their libraries."""
     with contextlib.suppress(OSError):
-        for path in folder.glob(f"{glob.escape(start)}*-*-*{glob.escape(suffix)}"):
+        for path in folder.glob(f"{glob.escape(start)}*-*-*"):
             where, process, _ = path.name.removeprefix(start).split("-", 2)
+            if len(where) != len(computer()) or not process.isdecimal():
+                continue  # somebody else's name
             old = time.time() - path.stat().st_mtime > _ABANDONED_S
-            if old or (where == computer() and process.isdecimal() and not runs(int(process))):
+            if old or (where == computer() and not runs(int(process))):
                 path.unlink(missing_ok=True)
 
 
@@ -117,7 +119,18 @@ def remove_temporary_files() -> None:
     """Remove the files that are being written, in a process that is about to exit without cleaning up."""
     for temporary in list(_temporary_files):
         with contextlib.suppress(OSError):
-            temporary.unlink(missing_ok=True)
+            _remove_with_drafts(temporary)
+
+
+def _remove_with_drafts(temporary: Path) -> None:
+    """Remove a temporary file and what a library keeps beside it until it is complete.
+
+    Blender adds ``@`` to the name of a .blend file, and USD replaces the suffix by random letters.
+    """
+    start, separator, rest = temporary.name.rpartition(".scope-")
+    own = start + separator + rest.partition(".")[0]  # without the suffix
+    for path in temporary.parent.glob(f"{glob.escape(own)}*"):
+        path.unlink(missing_ok=True)
 
 
 def _umask() -> int:

@@ -12,7 +12,6 @@ import os
 import shlex
 import shutil
 import sys
-import tempfile
 from collections.abc import Sequence
 from contextlib import ExitStack, suppress
 from pathlib import Path
@@ -50,6 +49,8 @@ from .footage import json_text
 from .installed import CAPTURE, check_installed
 from .job.clips.task import SHOWN_COMMAND, STOP_WITH_STDIN, Extras
 from .job.parent import stop_with_parent
+from .job.private_folder import lasting_folder
+from .job.unfinished import unfinished_capture
 from .scene.export.output_paths import SUFFIXES
 
 SAMPLE = ASSETS / "sample" / "sample.mp4"
@@ -213,8 +214,10 @@ def run_capture(args: argparse.Namespace) -> dict[str, Any]:
     from .capture.pipeline import capture
     from .report.capture_page import CapturedClip, write_capture_page
 
-    with ProgressBar(sys.stderr, show=sys.stderr.isatty() and not args.quiet) as progress:
-        result = capture(video, body, options, progress)
+    with ExitStack() as stack:
+        progress = stack.enter_context(ProgressBar(sys.stderr, show=sys.stderr.isatty() and not args.quiet))
+        unfinished = stack.enter_context(unfinished_capture(lasting_folder(), video))
+        result = capture(video, body, options, progress, unfinished=unfinished)
         progress("writing", 0, 0)
         with interrupted("some results may have been written already, each of them complete"):
             written = write_outputs(outputs, result.motions, body, video, args, rig)
@@ -264,7 +267,7 @@ def run_batch(args: argparse.Namespace) -> dict[str, Any]:
     extras = Extras(args.overlays, args.reports)
     with ExitStack() as stack:
         runner = None
-        folder, out = local_folders(args, Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="scope-batch-"))))
+        folder, out = local_folders(args, stack)
         if args.scheduler is not None:
             runner = dask_runner(args, None if args.program == list(PROGRAM) else args.program)
             stack.callback(runner.close)

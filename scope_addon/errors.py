@@ -83,7 +83,14 @@ def system_error_message(error: OSError | MemoryError) -> str:
     return f"the operating system reports an error: {cause}; free disk space or memory and try again"
 
 
-_WITHOUT_MEMORY = ("bad_alloc", "can't start new thread", "failed to map segment", "annot allocate memory")
+_WITHOUT_MEMORY = (
+    "bad_alloc",
+    "can't start new thread",
+    "annot allocate memory",
+    "failed to map segment",  # this and the next: of the system, when it loads a library
+    "cannot map zero-fill pages",
+    "OutOfMemoryError",  # OpenCV's
+)
 
 
 def lacks_memory(error: BaseException) -> bool:

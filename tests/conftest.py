@@ -25,6 +25,9 @@ BLENDER_FOLDER = "scope-tests-blender-"  # begins the name of the user folder of
 if "BLENDER_USER_RESOURCES" not in os.environ:
     os.environ["BLENDER_USER_RESOURCES"] = tempfile.mkdtemp(prefix=BLENDER_FOLDER)
 
+# Tests that use onnxruntime itself, not through Scope, do not report to its makers either.
+os.environ["ORT_DISABLE_TELEMETRY"] = "1"
+
 # In this order, ahead of all others. The first compiles the solver, and the second a version of its own, whose process
 # then takes the third, which needs none: so where two processes run, they do not compile the same. When the first is
 # done, the fourth compiles all other kernels of a capture. The rig that Rigify generates is shared in the same way.

@@ -59,6 +59,23 @@ def test_a_failure_keeps_the_target_of_a_link(link, tmp_path):
     assert os.listdir(target.parent) == ["kept.npz"]
 
 
+def test_a_failure_leaves_no_draft_either(tmp_path):
+    def fail(temporary):
+        for draft in (f"{temporary.name}@", f"{temporary.stem}.pqSxDJ"):
+            (tmp_path / draft).write_text("half")
+        temporary.write_text(b"no text")
+
+    with pytest.raises(TypeError), atomic_path(tmp_path / "walk.blend") as temporary:
+        fail(temporary)
+    assert os.listdir(tmp_path) == []
+
+
+def test_other_hidden_files_of_that_name_stay(tmp_path):
+    (tmp_path / ".walk.settings").write_text("kept")
+    write(tmp_path / "walk")
+    assert sorted(os.listdir(tmp_path)) == [".walk.settings", "walk"]
+
+
 def test_a_link_into_a_missing_folder_is_an_error_before_the_capture(link, tmp_path):
     (tmp_path / "disk").rmdir()
     with pytest.raises(OutputError, match="disk, which does not exist"):
@@ -79,6 +96,8 @@ from pathlib import Path
 from scope.scope_addon.atomic_write import atomic_path
 with atomic_path(Path(sys.argv[1])) as temporary:
     temporary.write_text("half")
+    Path(f"{temporary}@").write_text("a draft, as Blender writes it")
+    temporary.with_suffix(".pqSxDJ").write_text("a draft, as USD writes it")
     os.kill(os.getpid(), signal.SIGKILL)
 """
 
@@ -87,7 +106,8 @@ with atomic_path(Path(sys.argv[1])) as temporary:
 def test_the_file_of_a_killed_process_is_removed_by_the_next_one(tmp_path):
     path = tmp_path / "walk [1].npz"
     subprocess.run([sys.executable, "-c", KILLED, path], check=False)
-    (left,) = os.listdir(tmp_path)
+    left = set(os.listdir(tmp_path))
+    assert len(left) == 3
     others = (
         ".walk [1].npz",
         ".walk [1].scope-notes.npz",
@@ -99,7 +119,7 @@ def test_the_file_of_a_killed_process_is_removed_by_the_next_one(tmp_path):
     with atomic_path(path) as temporary:
         temporary.write_text("new")
         write(path, "another")  # does not remove what is being written
-        assert left not in os.listdir(tmp_path)
+        assert not left & set(os.listdir(tmp_path))
     assert sorted(os.listdir(tmp_path)) == sorted(["walk [1].npz", *others])
 
 

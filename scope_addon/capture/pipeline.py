@@ -12,6 +12,7 @@ from ..footage import shown
 from ..motion import Motion
 from .media.video import Video, open_video
 from .options import CaptureOptions, check_options
+from .perception.kept.kept_estimates import KeptEstimates
 from .stages.clock import Progress, StageClock
 from .stages.observe import Footage, Listeners, Watch, observe
 from .stages.repair import repair
@@ -35,9 +36,12 @@ def capture(
     options: CaptureOptions,
     progress: Progress = lambda *_: None,
     watch: Watch = lambda *_: None,
+    unfinished: Path | None = None,
 ) -> Capture:
     """Capture the people of a video or still image, the most prominent one first.
 
+    :param unfinished: folder in which estimates are kept while this lasts, and found if an earlier capture was killed;
+        the caller removes it. None: nothing is kept.
     :raises UsageError: an option has an impossible value, contradicts another one or does not suit the body.
     :raises VideoError: the footage cannot be used.
     :raises NoPersonError: nobody was found.
@@ -46,7 +50,7 @@ def capture(
     check_options(body, options)
     clock = StageClock()
     with open_video(Path(path), options.wanted) as video:
-        footage, tracks = observe(video, body, options, clock, Listeners(progress, watch))
+        footage, tracks = observe(video, body, options, clock, Listeners(progress, watch), KeptEstimates(unfinished))
     with clock.stage("solver"):
         tracks = [repair(track, footage.camera, options.ablation) for track in tracks]
         solved = solve(_shot(video, body, options, footage), tracks, progress, options.heights_m)

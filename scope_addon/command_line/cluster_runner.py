@@ -5,7 +5,9 @@ from __future__ import annotations
 
 import argparse
 import os
+import tempfile
 from collections.abc import Sequence
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -39,9 +41,10 @@ def folder_argument(text: str) -> Path | str:
     return text if is_url(text) else path_argument(text)
 
 
-def local_folders(args: argparse.Namespace, scratch: Path) -> tuple[Path, Path]:
+def local_folders(args: argparse.Namespace, stack: ExitStack) -> tuple[Path, Path]:
     """Return the folders of footage and results; for a URL, a folder with files of the same names.
 
+    :param stack: removes that folder.
     :raises UsageError: there is a URL, but no cluster.
     :raises ScopeError: a store cannot be read.
     """
@@ -54,6 +57,7 @@ def local_folders(args: argparse.Namespace, scratch: Path) -> tuple[Path, Path]:
         check_cluster()
         from ..cluster.remote import mirror_footage, mirror_results
 
+        scratch = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="scope-batch-")))
         folder = mirror_footage(folder, str(out), scratch / "clips") if is_url(folder) else folder
         out = mirror_results(out, scratch / "results") if is_url(out) else out
     return folder, out

@@ -3,6 +3,7 @@
 
 - ``captures/<key>/report.json``, ``person1.npz``, …: a finished capture
 - ``jobs/<name>/``: a capture that is being written; it is moved to ``captures`` when it is complete
+- ``unfinished/<name>/``: what a capture that was cancelled or killed had found, see `unfinished`
 - ``kernels/``: the machine code that was compiled here. Clearing keeps it, except for that of replaced versions
 
 Blender loads this when it starts, so that what only captures need is imported where it is used.
@@ -108,11 +109,11 @@ class Cache:
         return CachedCapture([target / name for name in motions], report)
 
     def size(self) -> int:
-        """Return in bytes what clearing frees: finished captures, and code compiled by replaced versions."""
+        """Return in bytes what clearing frees: captures, finished or not, and code compiled by replaced versions."""
         return sum(_size(folder) for folder in self._owned())
 
     def clear(self) -> int:
-        """Remove finished captures and replaced versions' code; return the number of bytes freed.
+        """Remove captures, finished or not, and replaced versions' code; return the number of bytes freed.
 
         Running jobs and the compiled code in use are kept.
         """
@@ -143,7 +144,7 @@ class Cache:
         )
 
     def _owned(self) -> list[Path]:
-        return [self.root / "captures", *self._replaced_kernels()]
+        return [self.root / "captures", self.root / "unfinished", *self._replaced_kernels()]
 
     def _replaced_kernels(self) -> list[Path]:
         """Return the folders of code that another version has replaced, or that numba's own cache had made."""

@@ -19,16 +19,21 @@ def private_folder() -> Path:
     It is the system's folder for caches. If that belongs to someone else, or cannot be used, it is a new folder with a
     name that cannot be predicted, for this session.
     """
-    try:
-        folder = _caches() / _NAME
-        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-        if is_private(folder):
-            return folder
-    except (OSError, RuntimeError):  # the latter where there is no home
-        pass
+    if lasting := lasting_folder():
+        return lasting
     import tempfile  # adds to the time that Blender takes to start
 
     return Path(tempfile.mkdtemp(prefix=f"{_NAME}-"))
+
+
+def lasting_folder() -> Path | None:
+    """Return the folder in the system's one for caches; None if that belongs to someone else, or cannot be used."""
+    try:
+        folder = _caches() / _NAME
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        return folder if is_private(folder) else None
+    except (OSError, RuntimeError):  # the latter where there is no home
+        return None
 
 
 def is_private(folder: Path) -> bool:

@@ -19,6 +19,7 @@ from .live.commands import Commands
 from .live.request import LiveRequest
 from .parent import when_parent_ends
 from .request import WARM_UP, JobRequest
+from .unfinished import unfinished_capture
 
 _REMOVAL_ATTEMPTS = 20  # an attempt fails if a file is created during it
 _NICENESS = 5  # of a capture, behind Blender's window; compiling ahead of it has the lowest priority
@@ -96,14 +97,20 @@ def _capture(request: JobRequest, job_folder: Path, reporter: Reporter) -> None:
     from ..capture.pipeline import capture
     from .preview import PreviewWriter
 
-    with PreviewWriter(job_folder, reporter.send) as watch:
-        body, options = load_body(request.values["body"]), capture_options(request.values)
-        result = capture(request.footage, body, options, reporter.progress, watch)
-    names = [f"person{i + 1}.npz" for i in range(len(result.motions))]
-    reporter.progress("writing", 0, 0)
-    for name, motion in zip(names, result.motions, strict=True):
-        motion.save(job_folder / name)
+    with unfinished_capture(_caches(job_folder), Path(request.footage)) as unfinished:
+        with PreviewWriter(job_folder, reporter.send) as watch:
+            body, options = load_body(request.values["body"]), capture_options(request.values)
+            result = capture(request.footage, body, options, reporter.progress, watch, unfinished)
+        names = [f"person{i + 1}.npz" for i in range(len(result.motions))]
+        reporter.progress("writing", 0, 0)
+        for name, motion in zip(names, result.motions, strict=True):
+            motion.save(job_folder / name)
     reporter.send("result", motions=names, report=result.report)
+
+
+def _caches(job_folder: Path) -> Path | None:
+    """Return the cache folder that a job's folder lies in; None if it lies elsewhere, as in tests."""
+    return job_folder.parents[1] if job_folder.parent.name == "jobs" else None
 
 
 def main(job_folder: Path) -> NoReturn:

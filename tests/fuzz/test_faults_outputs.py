@@ -107,7 +107,7 @@ def test_all_outputs_of_a_capture_are_old_or_new(tmp_path, temporary, monkeypatc
         "execution": "CPU",
         "warnings": [],
     }
-    monkeypatch.setattr(pipeline, "capture", lambda *_: SimpleNamespace(motions=[motion], report=report))
+    monkeypatch.setattr(pipeline, "capture", lambda *_, **__: SimpleNamespace(motions=[motion], report=report))
     out = tmp_path / "out"
     out.mkdir()
     names = ("walk.npz", "walk.bvh", "overlay.png")

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from ....solver.names import BLAZEPOSE
 from .execution import Execution
+from .kept.kept_estimates import KeptEstimates
 from .region import MARGIN, Region, region_from_points
 from .sessions import network_path, open_session
 
@@ -32,6 +33,7 @@ _HEAT_THRESHOLD = 0.5
 _WORKERS = 2  # regions processed in parallel
 _WORTH_ALL_THREADS = ("pose_landmark_heavy",)
 _OUTPUTS = ["landmarks", "presence", "heatmap", "world"]
+_VALUES = 7 * KEYPOINT_COUNT + 5  # of an estimate that is kept
 _WITH_MASK = {"with_mask": np.array(True)}  # an input without which the mask is not computed
 
 
@@ -102,12 +104,21 @@ class LandmarkNetwork:
     threads: threads that share a region synchronize at every layer. A single region gets all threads only in the heavy
     network; in the small ones they would mostly wait for each other, and decoding needs a core.
 
+    :param kept: estimates of an earlier capture, and where to keep new ones; those with masks are not kept.
     :raises SetupError: the network has not been built.
     :raises ModelFileError: its file is damaged.
     """
 
-    def __init__(self, name: str, threads: int, folder: Path | None = None, execution: Execution | None = None) -> None:
+    def __init__(
+        self,
+        name: str,
+        threads: int,
+        folder: Path | None = None,
+        execution: Execution | None = None,
+        kept: KeptEstimates | None = None,
+    ) -> None:
         self._path, self._threads, self._execution = network_path(name, folder), threads, execution
+        self._name, self._kept = name, kept or KeptEstimates()
         self._threads_alone = threads if name in _WORTH_ALL_THREADS else max(1, threads // _WORKERS)
         self._pool = ThreadPoolExecutor(min(_WORKERS, threads), "scope-landmarks")
         self._sessions: dict[int, onnxruntime.InferenceSession] = {}
@@ -148,17 +159,24 @@ class LandmarkNetwork:
 
         :param image_rgb: (H, W, 3) uint8.
         """
-        (logits,) = self._alone.run(["mask"], {"input": _blob(image_rgb, region)} | _WITH_MASK)
+        (logits,) = self._alone.run(["mask"], {"input": _blob(region.cut(image_rgb, INPUT_SIZE))} | _WITH_MASK)
         return _probability(logits)
 
-    @staticmethod
     def _estimate(
-        session: onnxruntime.InferenceSession, image_rgb: NDArray[np.uint8], region: Region, with_mask: bool
+        self, session: onnxruntime.InferenceSession, image_rgb: NDArray[np.uint8], region: Region, with_mask: bool
     ) -> PoseEstimate:
-        inputs = {"input": _blob(image_rgb, region)}
+        crop_rgb = region.cut(image_rgb, INPUT_SIZE)
+        key = None if with_mask else self._kept.key(self._name, crop_rgb, region)
+        values = self._kept.find(key)
+        if values is not None and len(values) == _VALUES:
+            return _unpacked(values, region)
+        inputs = {"input": _blob(crop_rgb)}
         if not with_mask:
             landmarks, presence, heatmap, world = session.run(_OUTPUTS, inputs)
-            return interpret(landmarks[0], float(presence[0, 0]), heatmap[0], world[0], region)
+            estimate = interpret(landmarks[0], float(presence[0, 0]), heatmap[0], world[0], region)
+            if key is not None:
+                self._kept.add(key, _packed(estimate))
+            return estimate
         landmarks, presence, heatmap, world, logits = session.run([*_OUTPUTS, "mask"], inputs | _WITH_MASK)
         estimate = interpret(landmarks[0], float(presence[0, 0]), heatmap[0], world[0], region)
         return replace(estimate, mask=_probability(logits).astype(np.float16))
@@ -170,9 +188,32 @@ def _probability(logits: NDArray[np.float32]) -> NDArray[np.float32]:
     return probability
 
 
-def _blob(image_rgb: NDArray[np.uint8], region: Region) -> NDArray[np.float32]:
+def _blob(crop_rgb: NDArray[np.uint8]) -> NDArray[np.float32]:
     """Return the network's input (1, 3, 256, 256) in [0, 1]."""
-    return cast(NDArray[np.float32], cv2.dnn.blobFromImage(region.cut(image_rgb, INPUT_SIZE), 1 / 255.0))
+    return cast(NDArray[np.float32], cv2.dnn.blobFromImage(crop_rgb, 1 / 255.0))
+
+
+def _packed(estimate: PoseEstimate) -> NDArray[np.float64]:
+    """Return all numbers of an estimate (_VALUES,) but those of its region and mask."""
+    after = estimate.next_region
+    return np.concatenate(
+        [
+            estimate.keypoints_px.ravel(),
+            estimate.visibility,
+            estimate.in_frame,
+            estimate.world_landmarks.ravel(),
+            [estimate.presence, *after.center_px, after.side_px, after.rotation],
+        ]
+    )
+
+
+def _unpacked(values: NDArray[np.float64], region: Region) -> PoseEstimate:
+    """Return the estimate of which `_packed` made these values (_VALUES,)."""
+    K = KEYPOINT_COUNT
+    keypoints, visibility, in_frame, world, others = np.split(values, np.cumsum([2 * K, K, K, 3 * K]))
+    presence, x, y, side_px, rotation = others.tolist()
+    after = Region((x, y), side_px, rotation)
+    return PoseEstimate(keypoints.reshape(K, 2), visibility, in_frame, world.reshape(K, 3), presence, region, after)
 
 
 def interpret(

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from ....solver.errors import ModelFileError, ScopeError
 from ...errors import SetupError, UsageError, lacks_memory
-from .adapters.network_server import make_session
+from .adapters.network_server import load_runtime, make_session
 from .execution import CPU, DIRECTML, PROVIDERS, Execution, SerializedSession, session_options_of
 
 if TYPE_CHECKING:
@@ -101,13 +101,11 @@ def _cannot_load(path: Path, error: Exception) -> str:
 @cache
 def _runtime() -> ModuleType:
     try:
-        import onnxruntime
-
-        if not hasattr(onnxruntime, "InferenceSession"):  # it swallows the reason why its library was not loaded
+        runtime = load_runtime()
+        if not hasattr(runtime, "InferenceSession"):  # it swallows the reason why its library was not loaded
             raise ImportError("its library cannot be loaded")
     except ImportError as error:
         raise SetupError(
             f"onnxruntime cannot be imported ({error}). Run ./scripts/capture, which installs it."
         ) from error
-    module: ModuleType = onnxruntime
-    return module
+    return runtime

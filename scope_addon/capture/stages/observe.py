@@ -29,6 +29,7 @@ from ..media.video import Video
 from ..options import CaptureOptions, most_people
 from ..perception.adapters.description import description_path
 from ..perception.execution import Execution
+from ..perception.kept.kept_estimates import KeptEstimates
 from ..perception.observation import Observation
 from ..tracking.face.face_tracker import FaceTracker
 from ..tracking.hand_tracker import HandTracker
@@ -67,10 +68,16 @@ class Footage:
 
 
 def observe(
-    video: Video, body: Body, options: CaptureOptions, clock: StageClock, listeners: Listeners
+    video: Video,
+    body: Body,
+    options: CaptureOptions,
+    clock: StageClock,
+    listeners: Listeners,
+    kept: KeptEstimates | None = None,
 ) -> tuple[Footage, list[Track]]:
     """Detect and track the people of all frames, the most prominent one first.
 
+    :param kept: estimates of an earlier capture that was killed, and where to keep those of this one.
     :raises VideoError: there is no frame in the chosen range.
     :raises NoPersonError: nobody was found.
     :raises CancelledError: raised by ``listeners.progress`` itself, passed on.
@@ -88,7 +95,7 @@ def observe(
     live = LiveBody(body, camera, options.ablation, next(iter(options.heights_m), None))
     fits = FocalFits(body, options.ablation)
     with BackgroundEstimators(camera, video.width, video.height, live, fits) as background, _opencv_in_one_thread():
-        tracker = _tracker(options, threads, execution)
+        tracker = _tracker(options, threads, execution, kept)
         network = tracker.mask_network if options.ablation.outline else None
         masks = MaskSchedule(network, video.expected_frames)
         parts = _part_trackers(options, threads, execution)
@@ -187,7 +194,7 @@ def _network_threads(options: CaptureOptions, execution: Execution) -> int:
     return min(options.threads or cores, cores)
 
 
-def _tracker(options: CaptureOptions, threads: int, execution: Execution) -> PeopleTracker:
+def _tracker(options: CaptureOptions, threads: int, execution: Execution, kept: KeptEstimates | None) -> PeopleTracker:
     return PeopleTracker(
         options.quality,
         threads,
@@ -195,6 +202,7 @@ def _tracker(options: CaptureOptions, threads: int, execution: Execution) -> Peo
         detector=options.detector,
         keypoints=options.keypoints,
         execution=execution,
+        kept=kept,
     )
 
 

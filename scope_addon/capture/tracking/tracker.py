@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from ....solver.errors import ShapeError
 from ..perception.execution import Execution
+from ..perception.kept.kept_estimates import KeptEstimates
 from ..perception.landmark_network import LandmarkNetwork, PoseEstimate
 from ..perception.observation import Observation, PendingReference, PersonMask
 from ..perception.person_detector import Detection
@@ -58,6 +59,7 @@ class PeopleTracker:
     :param detector: an ONNX file of the user's that replaces the built-in detector; see `adapters`.
     :param keypoints: the same for the landmark network.
     :param execution: what the networks run on.
+    :param kept: estimates of the built-in landmark networks on disk; None: none.
     :raises UsageError: the quality is unknown.
     :raises SetupError: a built-in network is missing.
     :raises ModelFileError: a user's network cannot be used.
@@ -72,8 +74,9 @@ class PeopleTracker:
         detector: Path | None = None,
         keypoints: Path | None = None,
         execution: Execution | None = None,
+        kept: KeptEstimates | None = None,
     ) -> None:
-        self._networks = networks = open_networks(quality, threads, detector, keypoints, execution)
+        self._networks = networks = open_networks(quality, threads, detector, keypoints, execution, kept)
         self._estimator = LandmarkEstimator(networks)
         self._reference = ReferenceEstimator(networks.reference) if networks.reference else None
         self._people = people

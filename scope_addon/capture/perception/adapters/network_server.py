@@ -34,6 +34,20 @@ _CPU_PROVIDER = "CPUExecutionProvider"
 Arrays = Sequence[Any]
 
 
+def load_runtime() -> ModuleType:
+    """Import onnxruntime without its telemetry.
+
+    The library in its wheels reports its start and every session to a server of Microsoft's, and keeps an identifier of
+    the computer, unless this variable is set when the library is loaded.
+
+    :raises ImportError: it is not installed, or cannot be loaded.
+    """
+    os.environ["ORT_DISABLE_TELEMETRY"] = "1"
+    import onnxruntime
+
+    return onnxruntime  # type: ignore[no-any-return]
+
+
 def make_session(runtime: ModuleType, path: str, threads: int, providers: list[str], mem_pattern: bool) -> Any:
     """Open an onnxruntime session, with the options of all our sessions.
 
@@ -121,10 +135,8 @@ class Server:
 
     def _open(self, request: dict[str, Any]) -> dict[str, Any]:
         self._limit_memory(request["limit_bytes"], on_cpu=request["providers"] == [_CPU_PROVIDER])
-        import onnxruntime
-
         self._session = session = make_session(
-            onnxruntime, request["path"], request["threads"], request["providers"], request["mem_pattern"]
+            load_runtime(), request["path"], request["threads"], request["providers"], request["mem_pattern"]
         )
         return {
             "providers": session.get_providers(),

@@ -11,6 +11,7 @@ from ....errors import SetupError
 from ...perception.adapters.detectors.box_detector import BoxDetector
 from ...perception.adapters.keypoints.keypoint_network import KeypointNetwork
 from ...perception.execution import Execution
+from ...perception.kept.kept_estimates import KeptEstimates
 from ...perception.landmark_network import LandmarkNetwork
 from ...perception.person_detector import PersonDetector
 from ...perception.sessions import landmark_network_name
@@ -36,7 +37,12 @@ class TrackingNetworks:
 
 
 def open_networks(
-    quality: str, threads: int, detector: Path | None, keypoints: Path | None, execution: Execution | None
+    quality: str,
+    threads: int,
+    detector: Path | None,
+    keypoints: Path | None,
+    execution: Execution | None,
+    kept: KeptEstimates | None = None,
 ) -> TrackingNetworks:
     """Open the networks, with the parameters of `PeopleTracker`.
 
@@ -52,9 +58,9 @@ def open_networks(
     if keypoints:
         own = KeypointNetwork(keypoints, threads, execution)
         with suppress(SetupError):  # without the reference, left and right follow from continuity alone
-            reference = LandmarkNetwork(largest, 1, None, execution)
+            reference = LandmarkNetwork(largest, 1, None, execution, kept)
         return TrackingNetworks(people, own, None, False, reference, None)
-    landmarks = LandmarkNetwork(name, threads, None, execution)
+    landmarks = LandmarkNetwork(name, threads, None, execution, kept)
     if name != largest:
-        reference = LandmarkNetwork(largest, 1, None, execution)
+        reference = LandmarkNetwork(largest, 1, None, execution, kept)
     return TrackingNetworks(people, landmarks, landmarks, reference is None, reference, reference)

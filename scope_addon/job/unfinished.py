@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Folders of captures in progress: what the networks have found, with which the same capture continues after a kill."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import shutil
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from ..errors import NoPersonError
+from .request import code_version
+
+FOLDER = "unfinished"
+ROOT = Path(__file__).resolve().parents[2]
+_ABANDONED_S = 7 * 24 * 3600.0
+_LARGEST = 2 << 30  # bytes of all captures
+_RUNNING_S = 600.0  # within which a running capture has written
+
+
+@contextmanager
+def unfinished_capture(root: Path | None, footage: Path) -> Iterator[Path | None]:
+    """Give the folder of a capture, and remove it when the capture is finished, or has found nobody.
+
+    The folder is made by whoever first writes to it. It stays if the block is left by another exception.
+
+    :param root: folder of caches; None: nothing is to be kept.
+    """
+    if root is None:
+        yield None
+        return
+    _remove_abandoned(root / FOLDER)
+    folder = root / FOLDER / _name(footage)
+    try:
+        yield folder
+    except NoPersonError:
+        _remove(folder)
+        raise
+    _remove(folder)
+
+
+def _name(footage: Path) -> str:
+    """Return a name for a capture of this footage with this program."""
+    described = [os.path.realpath(footage), code_version(ROOT)]
+    with suppress(OSError):
+        status = footage.stat()
+        described += [str(status.st_size), str(status.st_mtime_ns)]
+    return hashlib.sha256(json.dumps(described).encode()).hexdigest()[:32]
+
+
+def _remove(folder: Path) -> None:
+    shutil.rmtree(folder, ignore_errors=True)
+    with suppress(OSError):  # of other captures
+        folder.parent.rmdir()
+
+
+def _remove_abandoned(parent: Path) -> None:
+    """Remove what is old, and if all is too much, the oldest."""
+    found = []
+    with suppress(OSError):
+        for folder in parent.iterdir():
+            with suppress(OSError):
+                size = sum(file.stat().st_size for file in folder.iterdir())
+                found.append((time.time() - folder.stat().st_mtime, size, folder))
+    total = 0
+    for age_s, size, folder in sorted(found):
+        total += size
+        if age_s > _ABANDONED_S or (total > _LARGEST and age_s > _RUNNING_S):
+            shutil.rmtree(folder, ignore_errors=True)

@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A command that is killed, or that the disk or the memory fails, at a few calls; at all by ./scripts/fuzz --faults."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import pytest
+
+from .kills import COMMANDS, check_command
+from .system_calls import AVAILABLE, FULL, KILL, NO_MEMORY, traced
+
+pytestmark = pytest.mark.skipif(not AVAILABLE, reason="traces system calls of Linux on x86-64")
+BY_NAME = {command.name: command for command in COMMANDS}
+
+
+@pytest.mark.parametrize(
+    ("name", "action", "calls"),
+    [
+        ("npz", KILL, (-2,)),  # before it renames
+        ("npz", FULL, (3,)),
+        ("npz", NO_MEMORY, (-1,)),
+        ("usdc", KILL, (8,)),  # while USD writes its draft
+    ],
+)
+def test_files_are_old_or_whole_and_the_next_run_is_good(name: str, action: str, calls: tuple[int, ...]) -> None:
+    assert check_command(BY_NAME[name], action, calls) == (len(calls), [])
+
+
+PROGRAM = """
+import os, subprocess, sys
+folder = sys.argv[1]
+with open(f"{folder}/a", "w") as file:
+    file.write("x" * 20000)
+subprocess.run(["mv", f"{folder}/a", f"{folder}/b"])
+"""
+
+
+def test_every_write_of_every_process_is_seen(tmp_path: Path) -> None:
+    """Otherwise no fault would happen, and all would be well."""
+    command = [sys.executable, "-c", PROGRAM, str(tmp_path)]
+    whole = traced(command, tmp_path, 0, KILL)
+    assert [call.split()[0] for call in whole.calls] == ["open", "write", "rename"]
+    assert whole.status == 0
+    (tmp_path / "b").unlink()
+    killed = traced(command, tmp_path, 2, KILL)
+    assert killed.status == -9
+    assert (tmp_path / "a").stat().st_size == 0
+    full = traced(command, tmp_path, 3, FULL)
+    assert "No space left" in full.stderr
+    assert [path.name for path in tmp_path.iterdir()] == ["a"]

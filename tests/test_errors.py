@@ -1,0 +1,45 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Lack of memory is recognized, in whatever words a library says it."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import cv2
+import numpy as np
+import pytest
+from scope.scope_addon.errors import lacks_memory
+
+from .fuzz.system_calls import AVAILABLE, NO_MEMORY, traced
+
+LOADING = """
+import sys
+from scope.scope_addon.errors import lacks_memory
+try:
+    import cv2
+except BaseException as error:
+    print(lacks_memory(error), error)
+"""
+
+
+def test_a_defect_is_not_lack_of_memory() -> None:
+    assert lacks_memory(MemoryError())
+    assert not lacks_memory(ValueError("operands could not be broadcast"))
+
+
+def test_opencv_without_memory() -> None:
+    with pytest.raises(cv2.error) as caught:
+        cv2.resize(np.zeros((2, 2), np.uint8), (2**30, 2**24))  # more than the addresses that a process has
+    assert lacks_memory(caught.value)
+
+
+@pytest.mark.skipif(not AVAILABLE, reason="traces system calls of Linux on x86-64")
+def test_libraries_that_cannot_be_loaded(tmp_path) -> None:
+    command = [sys.executable, "-c", LOADING]
+    subprocess.run(command, check=True)
+    count = len(traced(command, tmp_path, 0, NO_MEMORY).calls)
+    said = [traced(command, tmp_path, n, NO_MEMORY) for n in range(count - 5, count + 1)]
+    failed = [each.stdout for each in said if each.stdout.strip()]
+    assert len(failed) > 1
+    assert all(text.startswith("True") for text in failed), failed
