@@ -19,7 +19,7 @@ from ...solver.gauss_newton.terms import pack_priors
 from ...solver.motion.band import make_factor, solve_clip
 from ...solver.motion.problem import ClipProblem, Globals, MotionTerms
 from ...solver.motion.system import make_poses, make_system
-from ...solver.motion.views import pack_views
+from ...solver.motion.views import pack_frames
 from .clip_gradients import ConjugateGradients
 from .problem import make_problem
 
@@ -39,10 +39,9 @@ def make_clip(
         tree = with_fixed_shape(tree, p.bank[3][0][:10])
     priors = Priors()
     packed = pack_priors(tree, replace(priors, shape_mean=None))
-    seen, _ = pack_views(tree, p.measurements, packed, "frame")
-    unseen, _ = pack_views(tree, Measurements(), packed, "frame")
     first = (frames - gap) // 2
-    views = [unseen if first <= f < first + gap else seen for f in range(frames)]
+    seen = [Measurements() if first <= f < first + gap else p.measurements for f in range(frames)]
+    views, _ = pack_frames(tree, seen, packed)
     poses = make_poses(tree, frames)
     for f in range(frames):
         swing = 0.1 * np.sin(3.0 * f / RATE)

@@ -20,7 +20,7 @@ from ..compiled.kernel import kernel
 from ..compiled.part import Array
 from ..compiled.rows import add1, clear
 from ..compiled.tree import Tree
-from ..gauss_newton.gram import subtract_gram, subtract_gram_rows
+from ..gauss_newton.gram import subtract_gram_below, subtract_gram_rows
 from ..gauss_newton.recursion import TINY, solve_globals
 from .system import GLOBALS, ClipSystem
 
@@ -47,21 +47,37 @@ def make_factor(system: ClipSystem) -> Factor:
 
 
 @kernel
+def far_width(first: int, n: int) -> int:
+    """Return how many columns of E_2, a multiple of four, are not zero in the rows first..first+3 of L^-1 E_2.
+
+    Only the same unknown of two frames that are not neighbours is coupled, by 3 x 3 blocks, and L^-1 is triangular.
+    """
+    return min(n, (3 * ((first + 3) // 3) + 3 + 3) & ~3)
+
+
+@kernel
 def factorize_rows(Z, n: int, row: int, diagonal) -> None:  # type: ignore[no-untyped-def]
-    """Replace [S | rest], n rows of length `row` with S symmetric, by L^-1 [S | rest]: see `recursion.factorize`.
+    """Replace [S | E_1 | E_2 | rest], n rows of length `row`, by L^-1 times it: see `recursion.factorize`.
 
     n is a multiple of four: four rows at a time take what the rows above them leave, in registers.
     """
     for j in range(n):
         diagonal[j] = Z[j, j]
+    end = 3 * n
     for first in range(0, n, 4):
-        subtract_gram_rows(Z, first * row + first, row, Z, first, row, Z, first, row, first, row - first)
+        near = 2 * n + far_width(first, n) - first
+        subtract_gram_rows(Z, first * row + first, row, Z, first, row, Z, first, row, first, near)
+        subtract_gram_rows(Z, first * row + end, row, Z, first, row, Z, end, row, first, row - end)
         for j in range(first, first + 4):
             d = Z[j, j]
             inverse = 1.0 / math.sqrt(d) if d > TINY * abs(diagonal[j]) and d > 1e-290 else 0.0
             for i in range(j + 1, first + 4):
-                add1(Z, i * row + first, -Z[j, i] * inverse * inverse, Z, j * row + first, row - first)
-            for k in range(first, row):
+                scale = -Z[j, i] * inverse * inverse
+                add1(Z, i * row + first, scale, Z, j * row + first, near)
+                add1(Z, i * row + end, scale, Z, j * row + end, row - end)
+            for k in range(first, first + near):
+                Z[j, k] *= inverse
+            for k in range(end, row):
                 Z[j, k] *= inverse
             Z[j, j] = inverse
 
@@ -129,7 +145,7 @@ def eliminate_frames(system, first, count, step, damping, root_scale, trail, Z) 
         _load(system, f, step, damping, root_scale, trail, Z[f])
         _advance(trail, n, q)
         factorize_rows(Z[f], n, row, trail[size - 1])
-        subtract_gram(trail, size, Z[f], n, row, n)
+        subtract_gram_below(trail, size, Z[f], n, row, n, n)
 
 
 @kernel
@@ -146,7 +162,7 @@ def substitute_frames(Z, first, count, step, dg, d) -> None:  # type: ignore[no-
             for hop in range(1, 3):
                 other = f + hop * step
                 if 0 <= other < Z.shape[0]:
-                    for b in range(n):
+                    for b in range(n if hop == 1 else far_width(r & ~3, n)):
                         s -= Z[f, r, hop * n + b] * d[other, b]
             for b in range(r + 1, n):
                 s -= Z[f, r, b] * d[f, b]
