@@ -137,14 +137,12 @@ class ConjugateGradients:
         stage = problem.settings.stages[0]
         for f in range(T):
             linearize(tree, terms_of(problem.views, f), stage, 0.0, self.poses[f], self.blocks[f], self.work[f].scratch)
-        m = problem.motion
-        acceleration.accumulate(tree, poses, m.h, m.table, 0, T, acceleration.make_memory(tree), temporal)
+        acceleration.accumulate(tree, poses, problem.motion, 0, T, acceleration.make_memory(tree), temporal)
         K = len(tree.parents) - 1
         at = [0, *(3 + 3 * k for k in range(1, K + 1)), 3]
         pick = [np.ix_(range(a, a + 3), range(a, a + 3)) for a in at]
         self.D = np.array([[temporal.D[f][p] for p in pick] for f in range(T)])
-        self.B1 = np.array([[temporal.B1[f][p] for p in pick] for f in range(T)])
-        self.B2 = temporal.B2
+        self.B1, self.B2 = temporal.B1, temporal.B2
         for f in range(T):  # the diagonal goes to the preconditioner
             added = [a.copy() for a in (self.blocks[f].H_uu, self.blocks[f].A)]
             self.blocks[f].H_uu[1:] += self.D[f, 1:-1]

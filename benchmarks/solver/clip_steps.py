@@ -18,7 +18,7 @@ from ...solver.gauss_newton.optimizer import make_settings
 from ...solver.gauss_newton.terms import pack_priors
 from ...solver.motion.band import make_factor, solve_clip
 from ...solver.motion.problem import ClipProblem, Globals, MotionTerms
-from ...solver.motion.system import make_poses, make_system
+from ...solver.motion.system import make_poses
 from ...solver.motion.views import pack_frames
 from .clip_gradients import ConjugateGradients
 from .problem import make_problem
@@ -64,7 +64,7 @@ def clip_table(rounds: int) -> list[dict[str, float]]:
         for frames in LENGTHS:
             with ThreadPoolExecutor(2) as pool:
                 problem, poses = make_clip(K, frames, pool=pool)
-                system = make_system(problem.tree, frames)
+                system = problem.make_system()
                 factor, scale = make_factor(system), problem.settings.root_scale
                 linearize = _least(rounds, partial(problem.linearize, 0, poses, system))
                 solve = partial(solve_clip, problem.tree, system, 1.0, scale, factor, pool)
@@ -78,7 +78,7 @@ def against_gradients(rounds: int, frames: int = 300) -> list[dict[str, float]]:
     rows = []
     for gap in (0, GAP):
         problem, poses = make_clip(23, frames, gap, fixed=True, contacts=0)
-        system, scale = make_system(problem.tree, frames), problem.settings.root_scale
+        system, scale = problem.make_system(), problem.settings.root_scale
         problem.linearize(0, poses, system)
         factor, used = make_factor(system), 3 + 3 * len(problem.tree.parents)
         eliminated = _least(rounds, partial(solve_clip, problem.tree, system, 1.0, scale, factor))

@@ -68,7 +68,7 @@ def _add(system, f, at, slot, a, J, weight) -> None:  # type: ignore[no-untyped-
                     if q == p:
                         system.D[to, at + r, at + s] += value
                     elif q == p - 1:
-                        system.B1[to, at + r, at + s] += value
+                        system.B1[to, slot, r, s] += value
                     else:
                         system.B2[to, slot, r, s] += value
 
@@ -103,15 +103,14 @@ def _velocities(tree, poses, h, table, f, v, M) -> None:  # type: ignore[no-unty
 
 
 @kernel
-def accumulate(tree, poses, h, table, first, last, memory, system) -> float:  # type: ignore[no-untyped-def]
+def accumulate(tree, poses, motion, first, last, memory, system) -> float:  # type: ignore[no-untyped-def]
     """Add the accelerations at frames first..last-1 of a clip to `system` and return their cost.
 
-    :param poses: of `make_poses`; h (T,) seconds since the frame before, of which the first is not used; table (K+2, 2)
-    of `MotionPrior.packed`; memory of `make_memory` is overwritten.
+    :param poses: of `make_poses`; motion `MotionTerms`; memory of `make_memory` is overwritten.
     """
     cost: float = 0.0
     parts = tree.parents.shape[0]
-    first, a, J = max(first, 2), memory.a, memory.J
+    first, a, J, h, table = max(first, 2), memory.a, memory.J, motion.h, motion.table
     for f in range(first, last):
         if f == first:
             _velocities(tree, poses, h, table, f - 1, memory.v[(f - 1) % 2], memory.M[(f - 1) % 2])

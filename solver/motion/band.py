@@ -95,27 +95,35 @@ def _load(system, f, step, damping, root_scale, trail, Z) -> None:  # type: igno
             Z[a, a] += damping * (root_scale * root_scale if 3 <= a < 6 else 1.0)
         for b in range(n):
             Z[a, n + b] = trail[a, n + b]
+        for b in range(far_width(a & ~3, n)):
             Z[a, 2 * n + b] = 0.0
         for b in range(q):
             Z[a, 3 * n + b] = trail[a, 2 * n + b] + N[a, b]
-    if step > 0 and f < last:
-        B = system.B1[f + 1]
-        for a in range(n):
-            for b in range(n):
-                Z[b, n + a] += B[a, b]
-    if step < 0 and f > 0:
-        B = system.B1[f]
-        for a in range(n):
-            for b in range(n):
-                Z[a, n + b] += B[a, b]
-    other = f + 2 * step
-    if 0 <= other <= last:
-        blocks = system.B2[max(f, other)]
-        for k in range(blocks.shape[0]):
-            at = 3 if k == blocks.shape[0] - 1 else (0 if k == 0 else 3 + 3 * k)
-            for r in range(3):
-                for s in range(3):
-                    Z[at + r, 2 * n + at + s] += blocks[k, r, s] if step < 0 else blocks[k, s, r]
+    for hop in range(1, 3):
+        other = f + hop * step
+        if 0 <= other <= last:
+            blocks = system.B1[max(f, other)] if hop == 1 else system.B2[max(f, other)]
+            for k in range(blocks.shape[0]):
+                at = 3 if k == blocks.shape[0] - 1 else (0 if k == 0 else 3 + 3 * k)
+                for r in range(3):
+                    for s in range(3):
+                        Z[at + r, hop * n + at + s] += blocks[k, r, s] if step < 0 else blocks[k, s, r]
+    if 0 <= f + step <= last:
+        _load_contacts(system.contacts, f, f + step, n, Z)
+
+
+@kernel
+def _load_contacts(contacts, f, other, n: int, Z) -> None:  # type: ignore[no-untyped-def]
+    """Add to frame f's rows of the front what standing points couple it by to its neighbour `other`."""
+    for k in range(contacts.counts.shape[0]):
+        w = contacts.w[max(f, other), k]
+        if w <= 0.0:
+            continue
+        own, its, columns = contacts.J[f, k], contacts.J[other, k], contacts.columns[k]
+        for a in range(contacts.counts[k]):
+            g0, g1, g2, row = w * own[0, a], w * own[1, a], w * own[2, a], columns[a]
+            for b in range(contacts.counts[k]):
+                Z[row, n + columns[b]] -= g0 * its[0, b] + g1 * its[1, b] + g2 * its[2, b]
 
 
 @kernel
@@ -205,7 +213,7 @@ def eliminate_clip(
     run_both(pool, eliminate_frames, (system, 0, middle, 1, damping, root_scale, front, factor.Z), half)
     _join(front, back, n, q)
     end = middle + min(frames, 2)
-    without_back = ClipSystem(system.D[:end], system.B1[:end], system.B2[:end], system.N[:end], system.C, system.c)
+    without_back = system._replace(D=system.D[:end], N=system.N[:end])
     eliminate_frames(without_back, middle, end - middle, 1, damping, root_scale, front, factor.Z)
     factor.C[:] = front[2 * n + GLOBALS :, 2 * n + GLOBALS :]
     factor.c[:] = front[2 * n, 2 * n + GLOBALS :]

@@ -21,7 +21,7 @@ from ..gauss_newton.recursion import move
 from .band import eliminate_clip, make_factor, solve_clip
 from .curvature import ClipCurvature
 from .problem import ClipProblem
-from .system import make_poses, make_system, pose_of
+from .system import make_poses, pose_of
 
 
 @kernel
@@ -41,7 +41,7 @@ class Optimizer:
         self.problem, self.pool = problem, pool
         frames = problem.frames
         self.poses, self._trial = poses, make_poses(problem.tree, frames)
-        self.system, self._other = make_system(problem.tree, frames), make_system(problem.tree, frames)
+        self.system, self._other = problem.make_system(), problem.make_system()
         self.factor = make_factor(self.system)
         self.cost, self.costs = 0.0, dict[str, float]()
         self.iterations, self.rejected = 0, 0

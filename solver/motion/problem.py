@@ -17,7 +17,7 @@ from ..residuals.registry import SHAPE_PRIOR
 from . import acceleration, standing
 from .band import run_both
 from .prior import MotionPrior, StandingPoints
-from .system import ClipSystem, add_turned, pose_of, write_frame
+from .system import ClipSystem, add_turned, make_system, pose_of, write_frame
 from .views import PackedViews, place_in_camera, terms_of
 
 
@@ -30,8 +30,7 @@ class Globals:
     focal_weight: float
 
 
-@dataclass
-class MotionTerms:
+class MotionTerms(NamedTuple):
     """What couples the frames, laid out for the kernels."""
 
     h: Array  # (T,) seconds since the frame before; the first is not used
@@ -53,7 +52,10 @@ class MotionTerms:
 
     def part(self, frames: slice) -> "MotionTerms":
         """Return the terms of consecutive frames alone."""
-        return MotionTerms(self.h[frames], self.table, self.indices, self.probability[frames], self.contact)
+        return self._replace(h=self.h[frames], probability=np.ascontiguousarray(self.probability[frames]))
+
+
+_CHUNK = 8  # frames that are linearized and coupled before the next ones, while they are in the processor's cache
 
 
 class _Memory(NamedTuple):
@@ -64,25 +66,26 @@ class _Memory(NamedTuple):
     total: Blocks
     scratch: Array
     sums: Array
+    accelerations: acceleration.Memory
+    work: Array  # (3, 1+W)
     C: Array  # (W, W) and c (W,): of the frames of this half
     c: Array
 
 
 def _make_memory(tree: Tree) -> _Memory:
     blocks, total = make_blocks(tree), make_blocks(tree)
-    sums = np.zeros_like(blocks.A)
-    return _Memory(make_pose(tree), blocks, total, make_scratch(tree), sums, np.zeros_like(blocks.C), blocks.c.copy())
+    sums, W = np.zeros_like(blocks.A), len(blocks.c)
+    return _Memory(
+        make_pose(tree), blocks, total, make_scratch(tree), sums, acceleration.make_memory(tree), np.zeros((3, 1 + W)),
+        np.zeros((W, W)), np.zeros(W),
+    )  # fmt: skip
 
 
 @kernel
 def linearize_frames(tree, views, first, last, stage, triggs, poses, memory, joints, system) -> float:  # type: ignore[no-untyped-def]
-    """Write the blocks of frames first..last-1, C and c of `memory`, and what `joints` has; return the frames' cost."""
+    """Write the blocks of frames first..last-1 and what `joints` has, add to C and c of `memory`; return the cost."""
     cost: float = 0.0
-    blocks, total, C, c = memory.blocks, memory.total, memory.C, memory.c
-    for a in range(c.shape[0]):
-        c[a] = 0.0
-        for b in range(c.shape[0]):
-            C[a, b] = 0.0
+    blocks, total = memory.blocks, memory.total
     for f in range(first, last):
         pose, v, end = pose_of(poses, f), views.of_frame[f], views.of_frame[f + 1]
         alone = end - v == 1 and views.own_axes[v]
@@ -108,15 +111,36 @@ def linearize_frames(tree, views, first, last, stage, triggs, poses, memory, joi
                 joints.H_u[f, i, r, GRADIENT] = own.H_u[i, r, GRADIENT]
                 for k in range(3):
                     joints.H_uu[f, i, r, k] = own.H_uu[i, r, k]
-        write_frame(tree, pose, own, memory.sums, system.D[f], system.N[f], C, c)
-        for a in range(system.B1.shape[1]):
-            for b in range(system.B1.shape[1]):
-                system.B1[f, a, b] = 0.0
+        write_frame(tree, pose, own, memory.sums, system.D[f], system.N[f], memory.C, memory.c)
         for k in range(system.B2.shape[1]):
             for r in range(3):
                 for b in range(3):
+                    system.B1[f, k, r, b] = 0.0
                     system.B2[f, k, r, b] = 0.0
     return cost
+
+
+@kernel
+def couple_frames(tree, poses, motion, first, last, memory, system, costs) -> None:  # type: ignore[no-untyped-def]
+    """Add what couples each of the frames first..last-1 to the two before it; add to costs[1] and costs[2]."""
+    costs[1] += acceleration.accumulate(tree, poses, motion, first, last, memory.accelerations, system)
+    costs[2] += standing.accumulate(tree, first, last, memory.work, system, memory.C, memory.c)
+
+
+@kernel
+def linearize_half(  # type: ignore[no-untyped-def]
+    tree, views, motion, first, last, coupled, stage, triggs, poses, memory, joints, system, costs
+) -> None:
+    """Write the equations of frames first..last-1, those from `coupled` on with what couples them; costs (3,)."""
+    for a in range(memory.c.shape[0]):
+        memory.c[a] = 0.0
+        for b in range(memory.c.shape[0]):
+            memory.C[a, b] = 0.0
+    for a in range(first, last, _CHUNK):
+        b = min(a + _CHUNK, last)
+        costs[0] += linearize_frames(tree, views, a, b, stage, triggs, poses, memory, joints, system)
+        standing.place_points(tree, poses, motion, a, b, system)
+        couple_frames(tree, poses, motion, max(a, coupled), b, memory, system, costs)
 
 
 @dataclass
@@ -145,15 +169,15 @@ class ClipProblem:
         self.joints = self._memories[0].total._replace(
             H_u=np.zeros((T, parts, 3, GRADIENT + 1)), H_uu=np.zeros((T, parts, 3, 3)), cross=np.zeros(1, np.int64)
         )
-        self._couplings = [
-            (acceleration.make_memory(self.tree), standing.make_memory(self.tree, len(self.motion.indices)))
-            for _ in range(2)
-        ]
 
     @property
     def frames(self) -> int:
         """T."""
         return len(self.views.of_frame) - 1
+
+    def make_system(self) -> ClipSystem:
+        """Return a system of zeros to linearize into."""
+        return make_system(self.tree, self.frames, self.motion.indices)
 
     def linearize(self, s: int, poses: Pose, system: ClipSystem) -> float:
         """Write the normal equations at `poses` with the weights of stage s, and return the cost."""
@@ -163,12 +187,10 @@ class ClipProblem:
         self.joints.cross[0] = 0
         middle = T // 2
         after = min(middle + 2, T)  # the first frame whose acceleration is that of the second half alone
-        run_both(
-            self.pool, self._linearize_half,
-            (s, poses, system, 0, (0, middle), (0, middle), costs[0]),
-            (s, poses, system, 1, (middle, T), (after, T), costs[1]),
-        )  # fmt: skip
-        self._couple(poses, system, 0, (middle, after), costs[2])
+        front = s, poses, system, (0, middle, 0), self._memories[0], costs[0]
+        back = s, poses, system, (middle, T, after), self._memories[1], costs[1]
+        run_both(self.pool, self._linearize_half, front, back)
+        couple_frames(self.tree, poses, self.motion, middle, after, self._memories[0], system, costs[2])
         for memory in self._memories:
             system.C[:] += memory.C
             system.c[:] += memory.c
@@ -182,23 +204,13 @@ class ClipProblem:
         return float(costs[:, 0].sum()) + sum(self.costs.values())
 
     def _linearize_half(
-        self, s: int, poses: Pose, system: ClipSystem, half: int, frames: tuple[int, int], coupled: tuple[int, int],
-        costs: Array,
-    ) -> None:  # fmt: skip
-        """Linearize some frames, and what couples some of them to those before; costs (3,)."""
-        stage, triggs = self.settings.stages[s], self.settings.triggs
-        memory = self._memories[half]
-        costs[0] = linearize_frames(self.tree, self.views, *frames, stage, triggs, poses, memory, self.joints, system)
-        raise_failure()  # in the thread that has called the residual
-        self._couple(poses, system, half, coupled, costs)
-
-    def _couple(self, poses: Pose, system: ClipSystem, half: int, frames: tuple[int, int], costs: Array) -> None:
-        """Add what couples each of some frames to the two before it."""
-        m, memory, (accelerations, places) = self.motion, self._memories[half], self._couplings[half]
-        costs[1] = acceleration.accumulate(self.tree, poses, m.h, m.table, *frames, accelerations, system)
-        costs[2] = standing.accumulate(
-            self.tree, poses, m.h, m.indices, m.probability, m.contact, *frames, places, system, memory.C, memory.c
-        )
+        self, s: int, poses: Pose, system: ClipSystem, frames: tuple[int, int, int], memory: _Memory, costs: Array
+    ) -> None:
+        linearize_half(
+            self.tree, self.views, self.motion, *frames, self.settings.stages[s], self.settings.triggs, poses, memory,
+            self.joints, system, costs,
+        )  # fmt: skip
+        raise_failure()  # in the thread in which the residual failed
 
     def _add_shape_prior(self, s: int, poses: Pose, system: ClipSystem) -> float:
         P, weight, information = self.tree.shape, self.shape_weights[s], self.shared.shape_information

@@ -20,7 +20,7 @@ from scope.solver.gauss_newton.optimizer import make_settings
 from scope.solver.gauss_newton.terms import pack_priors
 from scope.solver.motion.prior import MotionPrior, StandingPoints
 from scope.solver.motion.problem import ClipProblem, Globals, MotionTerms
-from scope.solver.motion.system import make_poses, make_system
+from scope.solver.motion.system import make_poses
 from scope.solver.motion.views import View, pack_frames
 
 from ..dense import complex_log, moved
@@ -85,7 +85,7 @@ class Clip:
         for f, s in enumerate(self.starts):
             poses.R[f, 0], poses.t[f, 0], poses.Omega[f, 1:] = s.R_camera_root, s.t_camera_root, s.Omega
         poses.beta[:P] = self.starts[0].beta
-        return problem, poses, make_system(tree, problem.frames)
+        return problem, poses, problem.make_system()
 
 
 def noisy_clip(seed, frames=6, cameras=2):
