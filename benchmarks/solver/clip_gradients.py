@@ -18,6 +18,7 @@ from ...solver.gauss_newton.recursion import eliminate, make_workspace
 from ...solver.motion import acceleration
 from ...solver.motion.problem import ClipProblem
 from ...solver.motion.system import make_system, pose_of
+from ...solver.motion.views import terms_of
 
 
 @kernel
@@ -127,7 +128,7 @@ class ConjugateGradients:
 
     def __init__(self, problem: ClipProblem, poses: Pose, damping: float, root_scale: float) -> None:
         """Linearize and factorize every frame."""
-        tree, T = problem.tree, len(problem.frames)
+        tree, T = problem.tree, problem.frames
         self.tree, self.damping, self.root_scale = tree, damping, root_scale
         temporal = make_system(tree, T)
         self.poses = [pose_of(poses, f) for f in range(T)]
@@ -135,16 +136,13 @@ class ConjugateGradients:
         self.work = [make_workspace(tree) for _ in range(T)]
         stage = problem.settings.stages[0]
         for f in range(T):
-            terms = problem.frames[f][0].terms
-            linearize(tree, terms, stage, 0.0, self.poses[f], self.blocks[f], self.work[f].scratch)
-        m = problem.motion
-        acceleration.accumulate(tree, poses, m.h, m.table, np.zeros((6, 3, 3)), temporal)
+            linearize(tree, terms_of(problem.views, f), stage, 0.0, self.poses[f], self.blocks[f], self.work[f].scratch)
+        acceleration.accumulate(tree, poses, problem.motion, 0, T, acceleration.make_memory(tree), temporal)
         K = len(tree.parents) - 1
         at = [0, *(3 + 3 * k for k in range(1, K + 1)), 3]
         pick = [np.ix_(range(a, a + 3), range(a, a + 3)) for a in at]
         self.D = np.array([[temporal.D[f][p] for p in pick] for f in range(T)])
-        self.B1 = np.array([[temporal.B1[f][p] for p in pick] for f in range(T)])
-        self.B2 = temporal.B2
+        self.B1, self.B2 = temporal.B1, temporal.B2
         for f in range(T):  # the diagonal goes to the preconditioner
             added = [a.copy() for a in (self.blocks[f].H_uu, self.blocks[f].A)]
             self.blocks[f].H_uu[1:] += self.D[f, 1:-1]

@@ -18,8 +18,8 @@ from ...solver.gauss_newton.optimizer import make_settings
 from ...solver.gauss_newton.terms import pack_priors
 from ...solver.motion.band import make_factor, solve_clip
 from ...solver.motion.problem import ClipProblem, Globals, MotionTerms
-from ...solver.motion.system import make_poses, make_system
-from ...solver.motion.views import pack_views
+from ...solver.motion.system import make_poses
+from ...solver.motion.views import pack_frames
 from .clip_gradients import ConjugateGradients
 from .problem import make_problem
 
@@ -39,10 +39,9 @@ def make_clip(
         tree = with_fixed_shape(tree, p.bank[3][0][:10])
     priors = Priors()
     packed = pack_priors(tree, replace(priors, shape_mean=None))
-    seen, _ = pack_views(tree, p.measurements, packed, "frame")
-    unseen, _ = pack_views(tree, Measurements(), packed, "frame")
     first = (frames - gap) // 2
-    views = [unseen if first <= f < first + gap else seen for f in range(frames)]
+    seen = [Measurements() if first <= f < first + gap else p.measurements for f in range(frames)]
+    views, _ = pack_frames(tree, seen, packed)
     poses = make_poses(tree, frames)
     for f in range(frames):
         swing = 0.1 * np.sin(3.0 * f / RATE)
@@ -65,7 +64,7 @@ def clip_table(rounds: int) -> list[dict[str, float]]:
         for frames in LENGTHS:
             with ThreadPoolExecutor(2) as pool:
                 problem, poses = make_clip(K, frames, pool=pool)
-                system = make_system(problem.tree, frames)
+                system = problem.make_system()
                 factor, scale = make_factor(system), problem.settings.root_scale
                 linearize = _least(rounds, partial(problem.linearize, 0, poses, system))
                 solve = partial(solve_clip, problem.tree, system, 1.0, scale, factor, pool)
@@ -79,7 +78,7 @@ def against_gradients(rounds: int, frames: int = 300) -> list[dict[str, float]]:
     rows = []
     for gap in (0, GAP):
         problem, poses = make_clip(23, frames, gap, fixed=True, contacts=0)
-        system, scale = make_system(problem.tree, frames), problem.settings.root_scale
+        system, scale = problem.make_system(), problem.settings.root_scale
         problem.linearize(0, poses, system)
         factor, used = make_factor(system), 3 + 3 * len(problem.tree.parents)
         eliminated = _least(rounds, partial(solve_clip, problem.tree, system, 1.0, scale, factor))

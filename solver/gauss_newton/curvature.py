@@ -40,7 +40,7 @@ def make_curvature(tree: Tree) -> Curvature:
 
 
 @kernel
-def _turn(R, H, transposed):  # type: ignore[no-untyped-def]
+def turned(R, H, transposed):  # type: ignore[no-untyped-def]
     """Return RᵀHR, or RHRᵀ if `transposed`, by rows of its upper triangle; H is symmetric."""
     a, b, c, d, e, f, g, h, k = R[0, 0], R[1, 0], R[2, 0], R[0, 1], R[1, 1], R[2, 1], R[0, 2], R[1, 2], R[2, 2]
     if transposed:
@@ -56,7 +56,8 @@ def _turn(R, H, transposed):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _upper(M):  # type: ignore[no-untyped-def]
+def upper(M):  # type: ignore[no-untyped-def]
+    """Return the upper triangle of M by rows."""
     return M[0, 0], M[0, 1], M[0, 2], M[1, 1], M[1, 2], M[2, 2]
 
 
@@ -75,10 +76,10 @@ def _positive(h00, h01, h02, h11, h12, h22):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _share(H, S) -> float:  # type: ignore[no-untyped-def]
+def allowed_share(H, S) -> float:  # type: ignore[no-untyped-def]
     """Return t: how much of S may be added to H."""
-    h00, h01, h02, h11, h12, h22 = _upper(H)
-    s00, s01, s02, s11, s12, s22 = _upper(S)
+    h00, h01, h02, h11, h12, h22 = upper(H)
+    s00, s01, s02, s11, s12, s22 = upper(S)
     k, t = 1.0 - LEAST_SHARE, 1.0
     for _ in range(4):
         if _positive(
@@ -104,7 +105,7 @@ def set_current(tree: Tree, pose: Pose, blocks: Blocks, curvature: Curvature) ->
     """Make `pose`, with its blocks as `linearize` left them, the current one."""
     for i in range(1, tree.parents.shape[0]):
         R = pose.R[tree.parents[i]]
-        _store(curvature.H[i], _turn(R, _upper(blocks.H_uu[i]), False))
+        _store(curvature.H[i], turned(R, upper(blocks.H_uu[i]), False))
         x, y, z = blocks.H_u[i, 0, GRADIENT], blocks.H_u[i, 1, GRADIENT], blocks.H_u[i, 2, GRADIENT]
         for c in range(3):
             curvature.g[i, c] = R[0, c] * x + R[1, c] * y + R[2, c] * z
@@ -130,7 +131,7 @@ def update(
         if not length > SHORTEST_STEP * SHORTEST_STEP:
             continue
         x, y, z = trial_blocks.H_u[i, 0, GRADIENT], trial_blocks.H_u[i, 1, GRADIENT], trial_blocks.H_u[i, 2, GRADIENT]
-        h = _turn(Q, _upper(trial_blocks.H_uu[i]), False) if accepted else _upper(curvature.H[i])
+        h = turned(Q, upper(trial_blocks.H_uu[i]), False) if accepted else upper(curvature.H[i])
         S, g = curvature.S[i], curvature.g[i]
         m00, m01, m02 = h[0] + S[0, 0], h[1] + S[0, 1], h[2] + S[0, 2]
         m11, m12, m22 = h[3] + S[1, 1], h[4] + S[1, 2], h[5] + S[2, 2]
@@ -154,9 +155,9 @@ def apply_correction(tree: Tree, pose: Pose, blocks: Blocks, curvature: Curvatur
     """Write R_par (H + share t S) R_parᵀ to the blocks of the current pose; a share of 0 restores Gauss-Newton's."""
     for i in range(1, tree.parents.shape[0]):
         H, S = curvature.H[i], curvature.S[i]
-        h00, h01, h02, h11, h12, h22 = _upper(H)
-        t = share * _share(H, S) if share > 0.0 else 0.0
+        h00, h01, h02, h11, h12, h22 = upper(H)
+        t = share * allowed_share(H, S) if share > 0.0 else 0.0
         if t > 0.0:  # False if S has overflowed
             h00, h01, h02 = h00 + t * S[0, 0], h01 + t * S[0, 1], h02 + t * S[0, 2]
             h11, h12, h22 = h11 + t * S[1, 1], h12 + t * S[1, 2], h22 + t * S[2, 2]
-        _store(blocks.H_uu[i], _turn(pose.R[tree.parents[i]], (h00, h01, h02, h11, h12, h22), True))
+        _store(blocks.H_uu[i], turned(pose.R[tree.parents[i]], (h00, h01, h02, h11, h12, h22), True))

@@ -90,6 +90,26 @@ def subtract_gram(C, W, X, x, x_row, count) -> None:  # type: ignore[no-untyped-
 
 
 @kernel
+def subtract_gram_below(C, W, X, x, x_row, count, first) -> None:  # type: ignore[no-untyped-def]
+    """`subtract_gram` of an X whose column first + j is zero above row 3 (j // 3), for j below `count`."""
+    for a in range(0, W, 4):
+        a_skip = 3 * ((a - first) // 3) if first <= a < first + count else 0
+        b = a
+        while b < W:
+            width = min(12, W - b)
+            skip = 3 * ((b - first) // 3) if first <= b and b + width <= first + count else 0
+            skip = max(skip, a_skip)
+            rows, left, right = count - skip, x + a + skip * x_row, x + b + skip * x_row
+            if width == 12:
+                _minus3(C, a * W + b, W, X, left, x_row, X, right, x_row, rows)
+            elif width == 8:
+                _minus2(C, a * W + b, W, X, left, x_row, X, right, x_row, rows)
+            else:
+                _minus1(C, a * W + b, W, X, left, x_row, X, right, x_row, rows)
+            b += width
+
+
+@kernel
 def subtract_gram_rows(C, at, c_row, X, x, x_row, Z, z, z_row, count, width) -> None:  # type: ignore[no-untyped-def]
     """C -= XᵀZ for four rows of C from the element `at` on, and a width that is a multiple of four.
 

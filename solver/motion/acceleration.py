@@ -11,7 +11,13 @@ Robust, so that hits and landings stay sharp.
 docs/solver_mathematics.md, "A whole clip", has the objective.
 """
 
+from typing import NamedTuple
+
+import numpy as np
+
 from ..compiled.kernel import kernel
+from ..compiled.part import Array
+from ..compiled.tree import Tree
 from ..residuals.robust import geman_mcclure
 from ..rotations import left_jacobian_inverse3, log3
 
@@ -62,51 +68,73 @@ def _add(system, f, at, slot, a, J, weight) -> None:  # type: ignore[no-untyped-
                     if q == p:
                         system.D[to, at + r, at + s] += value
                     elif q == p - 1:
-                        system.B1[to, at + r, at + s] += value
+                        system.B1[to, slot, r, s] += value
                     else:
                         system.B2[to, slot, r, s] += value
 
 
-@kernel
-def accumulate(tree, poses, h, table, scratch, system) -> float:  # type: ignore[no-untyped-def]
-    """Add the accelerations of a clip to `system` and return their cost.
+class Memory(NamedTuple):
+    """What one thread works in; [f % 2] is of the step from frame f-1 to f."""
 
-    :param poses: of `make_poses`; h (T,) seconds since the frame before, of which the first is not used; table (K+2, 2)
-    of `MotionPrior.packed`; scratch (6, 3, 3) is overwritten.
+    v: Array  # (2, K+2, 3) velocities
+    M: Array  # (2, K+2, 3, 3) their derivatives
+    a: Array  # (3,)
+    J: Array  # (3, 3, 3)
+
+
+def make_memory(tree: Tree) -> Memory:
+    """Return the memory for the parts of `tree` and the root's position."""
+    rows = len(tree.parents) + 1
+    return Memory(np.zeros((2, rows, 3)), np.zeros((2, rows, 3, 3)), np.zeros(3), np.zeros((3, 3, 3)))
+
+
+@kernel
+def _velocities(tree, poses, h, table, f, v, M) -> None:  # type: ignore[no-untyped-def]
+    """Write the velocities v (K+2, 3) from frame f-1 to f and their derivatives M (K+2, 3, 3) by frame f."""
+    parts = tree.parents.shape[0]
+    for k in range(parts):
+        if table[k, 0] > 0.0:
+            turned = poses.R if k == 0 else poses.Omega
+            _velocity(turned[f - 1, k], turned[f, k], h[f], v[k], M[k])
+    for r in range(3):
+        v[parts, r] = (poses.t[f, 0, r] - poses.t[f - 1, 0, r]) / h[f]
+        for s in range(3):
+            M[parts, r, s] = 1.0 / h[f] if r == s else 0.0
+
+
+@kernel
+def accumulate(tree, poses, motion, first, last, memory, system) -> float:  # type: ignore[no-untyped-def]
+    """Add the accelerations at frames first..last-1 of a clip to `system` and return their cost.
+
+    :param poses: of `make_poses`; motion `MotionTerms`; memory of `make_memory` is overwritten.
     """
     cost: float = 0.0
     parts = tree.parents.shape[0]
-    J, M, v = scratch[:3], scratch[3:5], scratch[5]
-    for f in range(2, h.shape[0]):
+    first, a, J, h, table = max(first, 2), memory.a, memory.J, motion.h, motion.table
+    for f in range(first, last):
+        if f == first:
+            _velocities(tree, poses, h, table, f - 1, memory.v[(f - 1) % 2], memory.M[(f - 1) % 2])
+        before, after = memory.M[(f - 1) % 2], memory.M[f % 2]
+        v_before, v_after = memory.v[(f - 1) % 2], memory.v[f % 2]
+        _velocities(tree, poses, h, table, f, v_after, after)
         mean = 0.5 * (h[f] + h[f - 1])
         for k in range(parts + 1):
             weight = table[k, 0] * mean
             if weight <= 0.0:
                 continue
-            if k == parts:
-                for r in range(3):
-                    v[0, r] = (poses.t[f - 1, 0, r] - poses.t[f - 2, 0, r]) / h[f - 1]
-                    v[1, r] = (poses.t[f, 0, r] - poses.t[f - 1, 0, r]) / h[f]
-                    for s in range(3):
-                        M[0, r, s] = 1.0 / h[f - 1] if r == s else 0.0
-                        M[1, r, s] = 1.0 / h[f] if r == s else 0.0
-            else:
-                turned = poses.R if k == 0 else poses.Omega
-                _velocity(turned[f - 2, k], turned[f - 1, k], h[f - 1], v[0], M[0])
-                _velocity(turned[f - 1, k], turned[f, k], h[f], v[1], M[1])
             s2 = 0.0
             for r in range(3):
-                v[2, r] = (v[1, r] - v[0, r]) / mean
-                s2 += v[2, r] * v[2, r]
+                a[r] = (v_after[k, r] - v_before[k, r]) / mean
+                s2 += a[r] * a[r]
                 for s in range(3):
-                    J[0, r, s] = M[0, r, s] / mean
-                    J[1, r, s] = -(M[0, r, s] + M[1, r, s]) / mean
-                    J[2, r, s] = M[1, r, s] / mean
+                    J[0, r, s] = before[k, r, s] / mean
+                    J[1, r, s] = -(before[k, r, s] + after[k, r, s]) / mean
+                    J[2, r, s] = after[k, r, s] / mean
             if 0 < k < parts:
                 for p in range(3):
                     _turn(J[p], poses.R[f - 2 + p, tree.parents[k]])
             rho, w = geman_mcclure(s2, table[k, 1])
             cost += 0.5 * weight * rho
             at = 3 if k == parts else (0 if k == 0 else 3 + 3 * k)
-            _add(system, f, at, k, v[2], J, weight * w)
+            _add(system, f, at, k, a, J, weight * w)
     return cost

@@ -20,7 +20,7 @@ from ..compiled.kernel import kernel
 from ..compiled.part import Array
 from ..compiled.rows import add1, clear
 from ..compiled.tree import Tree
-from ..gauss_newton.gram import subtract_gram, subtract_gram_rows
+from ..gauss_newton.gram import subtract_gram_below, subtract_gram_rows
 from ..gauss_newton.recursion import TINY, solve_globals
 from .system import GLOBALS, ClipSystem
 
@@ -47,21 +47,37 @@ def make_factor(system: ClipSystem) -> Factor:
 
 
 @kernel
+def far_width(first: int, n: int) -> int:
+    """Return how many columns of E_2, a multiple of four, are not zero in the rows first..first+3 of L^-1 E_2.
+
+    Only the same unknown of two frames that are not neighbours is coupled, by 3 x 3 blocks, and L^-1 is triangular.
+    """
+    return min(n, (3 * ((first + 3) // 3) + 3 + 3) & ~3)
+
+
+@kernel
 def factorize_rows(Z, n: int, row: int, diagonal) -> None:  # type: ignore[no-untyped-def]
-    """Replace [S | rest], n rows of length `row` with S symmetric, by L^-1 [S | rest]: see `recursion.factorize`.
+    """Replace [S | E_1 | E_2 | rest], n rows of length `row`, by L^-1 times it: see `recursion.factorize`.
 
     n is a multiple of four: four rows at a time take what the rows above them leave, in registers.
     """
     for j in range(n):
         diagonal[j] = Z[j, j]
+    end = 3 * n
     for first in range(0, n, 4):
-        subtract_gram_rows(Z, first * row + first, row, Z, first, row, Z, first, row, first, row - first)
+        near = 2 * n + far_width(first, n) - first
+        subtract_gram_rows(Z, first * row + first, row, Z, first, row, Z, first, row, first, near)
+        subtract_gram_rows(Z, first * row + end, row, Z, first, row, Z, end, row, first, row - end)
         for j in range(first, first + 4):
             d = Z[j, j]
             inverse = 1.0 / math.sqrt(d) if d > TINY * abs(diagonal[j]) and d > 1e-290 else 0.0
             for i in range(j + 1, first + 4):
-                add1(Z, i * row + first, -Z[j, i] * inverse * inverse, Z, j * row + first, row - first)
-            for k in range(first, row):
+                scale = -Z[j, i] * inverse * inverse
+                add1(Z, i * row + first, scale, Z, j * row + first, near)
+                add1(Z, i * row + end, scale, Z, j * row + end, row - end)
+            for k in range(first, first + near):
+                Z[j, k] *= inverse
+            for k in range(end, row):
                 Z[j, k] *= inverse
             Z[j, j] = inverse
 
@@ -79,27 +95,35 @@ def _load(system, f, step, damping, root_scale, trail, Z) -> None:  # type: igno
             Z[a, a] += damping * (root_scale * root_scale if 3 <= a < 6 else 1.0)
         for b in range(n):
             Z[a, n + b] = trail[a, n + b]
+        for b in range(far_width(a & ~3, n)):
             Z[a, 2 * n + b] = 0.0
         for b in range(q):
             Z[a, 3 * n + b] = trail[a, 2 * n + b] + N[a, b]
-    if step > 0 and f < last:
-        B = system.B1[f + 1]
-        for a in range(n):
-            for b in range(n):
-                Z[b, n + a] += B[a, b]
-    if step < 0 and f > 0:
-        B = system.B1[f]
-        for a in range(n):
-            for b in range(n):
-                Z[a, n + b] += B[a, b]
-    other = f + 2 * step
-    if 0 <= other <= last:
-        blocks = system.B2[max(f, other)]
-        for k in range(blocks.shape[0]):
-            at = 3 if k == blocks.shape[0] - 1 else (0 if k == 0 else 3 + 3 * k)
-            for r in range(3):
-                for s in range(3):
-                    Z[at + r, 2 * n + at + s] += blocks[k, r, s] if step < 0 else blocks[k, s, r]
+    for hop in range(1, 3):
+        other = f + hop * step
+        if 0 <= other <= last:
+            blocks = system.B1[max(f, other)] if hop == 1 else system.B2[max(f, other)]
+            for k in range(blocks.shape[0]):
+                at = 3 if k == blocks.shape[0] - 1 else (0 if k == 0 else 3 + 3 * k)
+                for r in range(3):
+                    for s in range(3):
+                        Z[at + r, hop * n + at + s] += blocks[k, r, s] if step < 0 else blocks[k, s, r]
+    if 0 <= f + step <= last:
+        _load_contacts(system.contacts, f, f + step, n, Z)
+
+
+@kernel
+def _load_contacts(contacts, f, other, n: int, Z) -> None:  # type: ignore[no-untyped-def]
+    """Add to frame f's rows of the front what standing points couple it by to its neighbour `other`."""
+    for k in range(contacts.counts.shape[0]):
+        w = contacts.w[max(f, other), k]
+        if w <= 0.0:
+            continue
+        own, its, columns = contacts.J[f, k], contacts.J[other, k], contacts.columns[k]
+        for a in range(contacts.counts[k]):
+            g0, g1, g2, row = w * own[0, a], w * own[1, a], w * own[2, a], columns[a]
+            for b in range(contacts.counts[k]):
+                Z[row, n + columns[b]] -= g0 * its[0, b] + g1 * its[1, b] + g2 * its[2, b]
 
 
 @kernel
@@ -129,7 +153,7 @@ def eliminate_frames(system, first, count, step, damping, root_scale, trail, Z) 
         _load(system, f, step, damping, root_scale, trail, Z[f])
         _advance(trail, n, q)
         factorize_rows(Z[f], n, row, trail[size - 1])
-        subtract_gram(trail, size, Z[f], n, row, n)
+        subtract_gram_below(trail, size, Z[f], n, row, n, n)
 
 
 @kernel
@@ -146,7 +170,7 @@ def substitute_frames(Z, first, count, step, dg, d) -> None:  # type: ignore[no-
             for hop in range(1, 3):
                 other = f + hop * step
                 if 0 <= other < Z.shape[0]:
-                    for b in range(n):
+                    for b in range(n if hop == 1 else far_width(r & ~3, n)):
                         s -= Z[f, r, hop * n + b] * d[other, b]
             for b in range(r + 1, n):
                 s -= Z[f, r, b] * d[f, b]
@@ -189,7 +213,7 @@ def eliminate_clip(
     run_both(pool, eliminate_frames, (system, 0, middle, 1, damping, root_scale, front, factor.Z), half)
     _join(front, back, n, q)
     end = middle + min(frames, 2)
-    without_back = ClipSystem(system.D[:end], system.B1[:end], system.B2[:end], system.N[:end], system.C, system.c)
+    without_back = system._replace(D=system.D[:end], N=system.N[:end])
     eliminate_frames(without_back, middle, end - middle, 1, damping, root_scale, front, factor.Z)
     factor.C[:] = front[2 * n + GLOBALS :, 2 * n + GLOBALS :]
     factor.c[:] = front[2 * n, 2 * n + GLOBALS :]

@@ -22,7 +22,7 @@ from ..compiled.rows import add1, clear
 from ..compiled.tree import Tree
 from ..gauss_newton.gram import subtract_gram_rows
 from ..gauss_newton.optimizer import DAMPING_LEAST
-from .band import Factor, eliminate_clip, run_both
+from .band import Factor, eliminate_clip, far_width, run_both
 from .system import GLOBALS, ClipSystem
 
 
@@ -98,37 +98,51 @@ def _invert_frame(Z, n: int, S, X) -> None:  # type: ignore[no-untyped-def]
     """Fill the rows and columns of S (3 n + W, 3 n + W) of a frame, from those of what was eliminated after it.
 
     Four rows at a time: first their sums over the columns after these four, in registers. X (3 n + W, 4) is
-    overwritten. An unknown without a pivot, of which Z holds the inverse 0, does not move.
+    overwritten. An unknown without a pivot, of which Z holds the inverse 0, does not move. Of the second frame after
+    it, only the columns that the rows reach (`far_width`) are read, here and before, and so only they are filled.
     """
-    size = S.shape[0]
+    size, shared = S.shape[0], 3 * n
     for first in range(n - 4, -1, -4):
-        after = first + 4
-        width = size - after
+        after, end = first + 4, 2 * n + far_width(first, n)
+        width, W = end - after, size - shared
+        at, to = first * size + after, first * size + shared
         for r in range(4):
             clear(S, (first + r) * size + after, width)
-            for k in range(after, 3 * n):
+            clear(S, (first + r) * size + shared, W)
+            for k in range(after, end):
                 X[k, r] = Z[first + r, k]
-            for k in range(3 * n, size):
+            for k in range(shared, size):
                 X[k, r] = Z[first + r, k + GLOBALS]
-        subtract_gram_rows(S, first * size + after, size, X, after * 4, 4, S, after * size + after, size, width, width)
+        subtract_gram_rows(S, at, size, X, after * 4, 4, S, after * size + after, size, width, width)
+        subtract_gram_rows(S, at, size, X, shared * 4, 4, S, shared * size + after, size, W, width)
+        subtract_gram_rows(S, to, size, X, after * 4, 4, S, after * size + shared, size, width, W)
+        subtract_gram_rows(S, to, size, X, shared * 4, 4, S, shared * size + shared, size, W, W)
         for r in range(3, -1, -1):
             i = first + r
             for q in range(r + 1, 4):
-                add1(S, i * size + after, -Z[i, first + q], S, (first + q) * size + after, width)
+                z, row = -Z[i, first + q], (first + q) * size
+                add1(S, i * size + after, z, S, row + after, width)
+                add1(S, i * size + shared, z, S, row + shared, W)
             u = Z[i, i]
-            for k in range(after, size):
+            for k in range(after, end):
+                S[i, k] *= u
+            for k in range(shared, size):
                 S[i, k] *= u
             for q in range(3, r - 1, -1):
                 j = first + q
                 s = 0.0
-                for k in range(after, size):
+                for k in range(after, end):
+                    s += X[k, r] * S[j, k]
+                for k in range(shared, size):
                     s += X[k, r] * S[j, k]
                 for p in range(r + 1, 4):
                     s += Z[i, first + p] * S[j, first + p]
                 S[i, j] = (u if q == r else 0.0) * u - u * s
                 S[j, i] = S[i, j]
-        for k in range(after, size):
-            for r in range(4):
+        for r in range(4):
+            for k in range(after, end):
+                S[k, first + r] = S[first + r, k]
+            for k in range(shared, size):
                 S[k, first + r] = S[first + r, k]
 
 

@@ -1,69 +1,85 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What Gauss-Newton leaves out of the joints' Hessians, learned over a clip as gauss_newton/curvature.py does.
-
-The same update of S and the same share of it, for all joints of all frames at once, in the parents' axes.
-"""
+"""What Gauss-Newton leaves out of the joints' Hessians, learned over a clip as gauss_newton/curvature.py does."""
 
 import numpy as np
+from numba.extending import register_jitable
 
-from ..compiled.part import Array, Pose
+from ..compiled.kernel import kernel
+from ..compiled.part import Array, Blocks, Pose
 from ..compiled.tree import Tree
-from ..gauss_newton.curvature import LEAST_COSINE, LEAST_SHARE, SHORTEST_STEP
-from .system import ClipSystem
+from ..gauss_newton.curvature import Curvature, allowed_share, set_current, turned, update, upper
+from .system import ClipSystem, pose_of
+
+
+@register_jitable
+def _blocks_of(joints: Blocks, f: int) -> Blocks:
+    return Blocks(joints.A, joints.H_u[f], joints.H_uu[f], joints.C, joints.c, joints.cross)
+
+
+@register_jitable
+def _curvature_of(curvature: Curvature, f: int) -> Curvature:
+    return Curvature(curvature.S[f], curvature.H[f], curvature.g[f])
+
+
+@kernel
+def _set_current(tree, poses, joints, curvature, added) -> None:  # type: ignore[no-untyped-def]
+    for f in range(added.shape[0]):
+        set_current(tree, pose_of(poses, f), _blocks_of(joints, f), _curvature_of(curvature, f))
+        for i in range(added.shape[1]):
+            for k in range(6):
+                added[f, i, k] = 0.0
+
+
+@kernel
+def _update(tree, poses, d, trial, joints, accepted, curvature) -> None:  # type: ignore[no-untyped-def]
+    parts = tree.parents.shape[0]
+    for f in range(d.shape[0]):
+        u = d[f, 3 : 3 + 3 * parts].reshape(parts, 3)  # row 0 is the root's position
+        blocks = _blocks_of(joints, f)
+        update(tree, pose_of(poses, f), u, pose_of(trial, f), blocks, accepted, _curvature_of(curvature, f))
+
+
+@kernel
+def _apply(tree, poses, curvature, share, added, system) -> None:  # type: ignore[no-untyped-def]
+    """Add share times what may be added of S to the diagonal blocks, instead of `added` (T, K+1, 6), their triangle."""
+    for f in range(added.shape[0]):
+        D = system.D[f]
+        for i in range(1, added.shape[1]):
+            S = upper(curvature.S[f, i])
+            t = share * allowed_share(curvature.H[f, i], curvature.S[f, i]) if share > 0.0 else 0.0
+            if t > 0.0:  # False if S has overflowed
+                S = turned(poses.R[f, tree.parents[i]], S, True)
+            else:
+                t, S = 0.0, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+            at, k = 3 + 3 * i, 0
+            for r in range(3):
+                for c in range(r, 3):
+                    D[at + r, at + c] += t * S[k] - added[f, i, k]
+                    added[f, i, k] = t * S[k]
+                    k += 1
 
 
 class ClipCurvature:
-    """The estimate at the current poses of T frames of K joints."""
+    """The estimate at the current poses of T frames."""
 
     def __init__(self, tree: Tree, frames: int, on: bool) -> None:
         """Begin with nothing; if it is not `on`, it stays at that."""
-        self._on = on and len(tree.parents) > 1
-        self._parents = np.asarray(tree.parents[1:], dtype=np.intp)
-        K = len(self._parents)
-        self.S = np.zeros((frames, K, 3, 3))
-        self._H, self._g = np.zeros((frames, K, 3, 3)), np.zeros((frames, K, 3))
-        self._added = np.zeros((frames, K, 3, 3))
+        self._tree, self._on, parts = tree, on, len(tree.parents)
+        S, H = np.zeros((2, frames, parts, 3, 3))
+        self._curvature = Curvature(S, H, np.zeros((frames, parts, 3)))
+        self._added = np.zeros((frames, parts, 6))
 
-    def set_current(self, poses: Pose, H_uu: Array, g_u: Array) -> None:
-        """Take over the joints' own Hessians (T, K, 3, 3) and gradients (T, K, 3) at `poses`, in camera axes."""
-        R = poses.R[:, self._parents]
-        self._H, self._g = R.swapaxes(-1, -2) @ H_uu @ R, np.einsum("fkrc,fkr->fkc", R, g_u)
-        self._added = np.zeros_like(self.S)
+    def set_current(self, poses: Pose, joints: Blocks) -> None:
+        """Take over the joints' own Hessians and gradients at `poses`: blocks with a leading dimension of frames."""
+        if self._on:
+            _set_current(self._tree, poses, joints, self._curvature, self._added)
 
-    def update(self, poses: Pose, d: Array, trial: Pose, H_uu: Array, g_u: Array, accepted: bool) -> None:
-        """Update by the step d (T, n) from the current poses to `trial`, where H_uu (T, K, 3, 3), g_u (T, K, 3)."""
-        if not self._on:
-            return
-        R, Q = poses.R[:, self._parents], trial.R[:, self._parents]
-        K = len(self._parents)
-        w = np.einsum("fkrc,fkr->fkc", R, d[:, 6 : 6 + 3 * K].reshape(-1, K, 3))
-        H = Q.swapaxes(-1, -2) @ H_uu @ Q if accepted else self._H
-        e = np.einsum("fkrc,fkr->fkc", Q, g_u) - self._g - np.einsum("fkrc,fkc->fkr", H + self.S, w)
-        length, along = (w * w).sum(-1), (e * w).sum(-1)
-        certain = along**2 > LEAST_COSINE**2 * length * (e * e).sum(-1)
-        used = certain & (length > SHORTEST_STEP**2) & np.isfinite(along)
-        self.S[used] += e[used][:, :, None] * e[used][:, None, :] / along[used][:, None, None]
+    def update(self, poses: Pose, d: Array, trial: Pose, joints: Blocks, accepted: bool) -> None:
+        """Update by the step d (T, n) from the current poses to `trial`, which `joints` belong to."""
+        if self._on:
+            _update(self._tree, poses, d, trial, joints, accepted, self._curvature)
 
     def apply(self, poses: Pose, system: ClipSystem, wanted: bool = True) -> None:
         """Add what may be added of S to the system of the current poses, or take away what was added."""
-        if not self._on:
-            return
-        share = self._share() if wanted else np.zeros(self.S.shape[:2])
-        R = poses.R[:, self._parents]
-        added = R @ (share[..., None, None] * self.S) @ R.swapaxes(-1, -2)
-        for k in range(len(self._parents)):
-            at = slice(6 + 3 * k, 9 + 3 * k)
-            system.D[:, at, at] += added[:, k] - self._added[:, k]
-        self._added = added
-
-    def _share(self) -> Array:
-        """Return t (T, K) of 1, 1/2, 1/4, 1/8 and 0: the most of S that keeps H + t S above a share of H."""
-        share, k = np.zeros(self.S.shape[:2]), 1.0 - LEAST_SHARE
-        usable = np.isfinite(self.S).all(axis=(-1, -2))
-        self.S[~usable] = 0.0
-        for t in (0.125, 0.25, 0.5, 1.0):
-            M = k * self._H + t * self.S
-            minor = M[..., 0, 0] * M[..., 1, 1] - M[..., 0, 1] * M[..., 1, 0]
-            positive = (M[..., 0, 0] > 0.0) & (minor > 0.0) & (np.linalg.det(M) > 0.0)
-            share[positive] = t
-        return share
+        if self._on:
+            _apply(self._tree, poses, self._curvature, float(wanted), self._added, system)

@@ -27,7 +27,7 @@ from .levenberg_marquardt import Optimizer
 from .prior import MotionPrior, StandingPoints
 from .problem import ClipProblem, Globals, MotionTerms
 from .system import make_poses
-from .views import View, pack_views
+from .views import View, pack_frames
 from .windows import Window, combined, overlapping, tiles
 
 _FRAMES_FOR_TWO_THREADS = 16
@@ -203,11 +203,8 @@ class _Clip:
         """Optimize the frames of a window with the global columns of `tree`."""
         settings, P = self.settings, tree.shape
         priors = settings.priors if P else _without_shape(settings.priors)
-        packed = pack_priors(tree, priors)
-        frames = []
-        for f in range(window.frames.start, window.frames.stop):
-            views, self.counts[f] = pack_views(tree, self.frames[f], packed, f"frames[{f}]")
-            frames.append(views)
+        first, frames = window.frames.start, self.frames[window.frames]
+        views, self.counts[window.frames] = pack_frames(tree, frames, pack_priors(tree, priors), first)
         poses = make_poses(tree, len(frames))
         poses.R[:, 0], poses.t[:, 0] = self.R[window.frames, 0], self.t[window.frames, 0]
         poses.Omega[:, 1:] = self.Omega[window.frames]
@@ -215,7 +212,7 @@ class _Clip:
         shared = Globals(*priors.packed_shape(P), settings.focal_weight)
         options = settings.options
         problem = ClipProblem(
-            tree, frames, self.motion.part(window.frames), shared,
+            tree, views, self.motion.part(window.frames), shared,
             make_settings(options, options.schedule(cold=False)), self.pool,
         )  # fmt: skip
         optimizer = Optimizer(problem, poses, self.pool)

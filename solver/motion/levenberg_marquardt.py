@@ -21,7 +21,7 @@ from ..gauss_newton.recursion import move
 from .band import eliminate_clip, make_factor, solve_clip
 from .curvature import ClipCurvature
 from .problem import ClipProblem
-from .system import make_poses, make_system, pose_of
+from .system import make_poses, pose_of
 
 
 @kernel
@@ -39,9 +39,9 @@ class Optimizer:
     def __init__(self, problem: ClipProblem, poses: Pose, pool: ThreadPoolExecutor | None) -> None:
         """Allocate two systems, of which the trial point's becomes the current one when it is accepted."""
         self.problem, self.pool = problem, pool
-        frames = len(problem.frames)
+        frames = problem.frames
         self.poses, self._trial = poses, make_poses(problem.tree, frames)
-        self.system, self._other = make_system(problem.tree, frames), make_system(problem.tree, frames)
+        self.system, self._other = problem.make_system(), problem.make_system()
         self.factor = make_factor(self.system)
         self.cost, self.costs = 0.0, dict[str, float]()
         self.iterations, self.rejected = 0, 0
@@ -63,8 +63,8 @@ class Optimizer:
         self.costs = problem.costs
         if not np.isfinite(self.cost):
             return NON_FINITE
-        learned = ClipCurvature(problem.tree, len(problem.frames), settings.curvature and not problem.coupled)
-        learned.set_current(self.poses, problem.H_uu, problem.g_u)
+        learned = ClipCurvature(problem.tree, problem.frames, settings.curvature)
+        learned.set_current(self.poses, problem.joints)
         for _ in range(settings.limits[s]):
             learned.apply(self.poses, self.system)
             predicted = solve_clip(problem.tree, self.system, damping, settings.root_scale, self.factor, self.pool)
@@ -78,12 +78,12 @@ class Optimizer:
                 cost = problem.linearize(s, self._trial, self._other)
             accepted, damping, growth, verdict = judge_trial(self.cost, cost, predicted, damping, growth, tolerance)
             if np.isfinite(cost):
-                learned.update(self.poses, self.factor.d, self._trial, problem.H_uu, problem.g_u, accepted)
+                learned.update(self.poses, self.factor.d, self._trial, problem.joints, accepted)
             if accepted:
                 self.cost, self.costs = cost, problem.costs
                 self.poses, self._trial = self._trial, self.poses
                 self.system, self._other = self._other, self.system
-                learned.set_current(self.poses, problem.H_uu, problem.g_u)
+                learned.set_current(self.poses, problem.joints)
             else:
                 self.rejected += 1
             if verdict != RUNNING:

@@ -1,25 +1,24 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A clip's objective: the terms of every frame, the acceleration between frames, and the shape's prior once."""
 
-from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
+from ..compiled.kernel import kernel
 from ..compiled.part import GRADIENT, Array, Blocks, Pose
 from ..compiled.tree import Tree
 from ..custom_residuals.external import raise_failure
 from ..gauss_newton.linearize import clear_blocks, linearize, make_blocks, make_pose, make_scratch, place_parts
 from ..gauss_newton.optimizer import Settings
-from ..measurements import Measurements
 from ..residuals.registry import SHAPE_PRIOR
 from . import acceleration, standing
+from .band import run_both
 from .prior import MotionPrior, StandingPoints
-from .system import ClipSystem, add_turned, pose_of, write_frame
-from .views import PackedView, View, place_in_camera
-
-Frame = Measurements | Sequence[View]
+from .system import ClipSystem, add_turned, make_system, pose_of, write_frame
+from .views import PackedViews, place_in_camera, terms_of
 
 
 @dataclass
@@ -31,8 +30,7 @@ class Globals:
     focal_weight: float
 
 
-@dataclass
-class MotionTerms:
+class MotionTerms(NamedTuple):
     """What couples the frames, laid out for the kernels."""
 
     h: Array  # (T,) seconds since the frame before; the first is not used
@@ -54,31 +52,106 @@ class MotionTerms:
 
     def part(self, frames: slice) -> "MotionTerms":
         """Return the terms of consecutive frames alone."""
-        return MotionTerms(self.h[frames], self.table, self.indices, self.probability[frames], self.contact)
+        return self._replace(h=self.h[frames], probability=np.ascontiguousarray(self.probability[frames]))
 
 
-@dataclass
-class _Memory:
-    """What one thread linearizes in."""
+_CHUNK = 8  # frames that are linearized and coupled before the next ones, while they are in the processor's cache
+
+
+class _Memory(NamedTuple):
+    """What one half of the clip is linearized in."""
 
     seen: Pose
     blocks: Blocks
     total: Blocks
     scratch: Array
     sums: Array
+    accelerations: acceleration.Memory
+    work: Array  # (3, 1+W)
+    C: Array  # (W, W) and c (W,): of the frames of this half
+    c: Array
 
-    @classmethod
-    def make(cls, tree: Tree) -> "_Memory":
-        blocks = make_blocks(tree)
-        return cls(make_pose(tree), blocks, make_blocks(tree), make_scratch(tree), np.zeros_like(blocks.A))
+
+def _make_memory(tree: Tree) -> _Memory:
+    blocks, total = make_blocks(tree), make_blocks(tree)
+    sums, W = np.zeros_like(blocks.A), len(blocks.c)
+    return _Memory(
+        make_pose(tree), blocks, total, make_scratch(tree), sums, acceleration.make_memory(tree), np.zeros((3, 1 + W)),
+        np.zeros((W, W)), np.zeros(W),
+    )  # fmt: skip
+
+
+@kernel
+def linearize_frames(tree, views, first, last, stage, triggs, poses, memory, joints, system) -> float:  # type: ignore[no-untyped-def]
+    """Write the blocks of frames first..last-1 and what `joints` has, add to C and c of `memory`; return the cost."""
+    cost: float = 0.0
+    blocks, total = memory.blocks, memory.total
+    for f in range(first, last):
+        pose, v, end = pose_of(poses, f), views.of_frame[f], views.of_frame[f + 1]
+        alone = end - v == 1 and views.own_axes[v]
+        at, own = pose if alone else memory.seen, blocks if alone else total
+        if not alone:
+            place_parts(tree, pose)
+            clear_blocks(total)
+            for i in range(total.A.shape[0]):
+                for r in range(6):
+                    for k in range(total.A.shape[2]):
+                        total.A[i, r, k] = 0.0
+        while v < end:
+            if not alone:
+                place_in_camera(views.R[v], views.t[v], pose, memory.seen)
+            cost += linearize(tree, terms_of(views, v), stage, triggs, at, blocks, memory.scratch)
+            if not alone:
+                add_turned(views.R[v], blocks, total)
+            v += 1
+        if own.cross[0]:
+            joints.cross[0] = 1
+        for i in range(1, tree.parents.shape[0]):
+            for r in range(3):
+                joints.H_u[f, i, r, GRADIENT] = own.H_u[i, r, GRADIENT]
+                for k in range(3):
+                    joints.H_uu[f, i, r, k] = own.H_uu[i, r, k]
+        write_frame(tree, pose, own, memory.sums, system.D[f], system.N[f], memory.C, memory.c)
+        for k in range(system.B2.shape[1]):
+            for r in range(3):
+                for b in range(3):
+                    system.B1[f, k, r, b] = 0.0
+                    system.B2[f, k, r, b] = 0.0
+    return cost
+
+
+@kernel
+def couple_frames(tree, poses, motion, first, last, memory, system, costs) -> None:  # type: ignore[no-untyped-def]
+    """Add what couples each of the frames first..last-1 to the two before it; add to costs[1] and costs[2]."""
+    costs[1] += acceleration.accumulate(tree, poses, motion, first, last, memory.accelerations, system)
+    costs[2] += standing.accumulate(tree, first, last, memory.work, system, memory.C, memory.c)
+
+
+@kernel
+def linearize_half(  # type: ignore[no-untyped-def]
+    tree, views, motion, first, last, coupled, stage, triggs, poses, memory, joints, system, costs
+) -> None:
+    """Write the equations of frames first..last-1, those from `coupled` on with what couples them; costs (3,)."""
+    for a in range(memory.c.shape[0]):
+        memory.c[a] = 0.0
+        for b in range(memory.c.shape[0]):
+            memory.C[a, b] = 0.0
+    for a in range(first, last, _CHUNK):
+        b = min(a + _CHUNK, last)
+        costs[0] += linearize_frames(tree, views, a, b, stage, triggs, poses, memory, joints, system)
+        standing.place_points(tree, poses, motion, a, b, system)
+        couple_frames(tree, poses, motion, max(a, coupled), b, memory, system, costs)
 
 
 @dataclass
 class ClipProblem:
-    """All terms of a clip, and how to linearize them."""
+    """All terms of a clip, and how to linearize them.
+
+    The clip is linearized in halves, whether two threads share them or one takes both, so that all sums are the same.
+    """
 
     tree: Tree
-    frames: list[list[PackedView]]
+    views: PackedViews
     motion: MotionTerms
     shared: Globals
     settings: Settings  # without the shape's prior in the frames: it enters once
@@ -90,71 +163,54 @@ class ClipProblem:
         self.shape_weights = self.settings.stages[:, 0, SHAPE_PRIOR].copy()
         self.settings = self.settings._replace(stages=self.settings.stages.copy())
         self.settings.stages[:, 0, SHAPE_PRIOR] = 0.0
-        self._memories = [_Memory.make(self.tree) for _ in range(2 if self.pool is not None else 1)]
-        K, W = len(self.tree.parents) - 1, self.tree.S.shape[2]
-        T = len(self.frames)
-        self.H_uu, self.g_u = np.zeros((T, K, 3, 3)), np.zeros((T, K, 3))  # of the joints alone, as last linearized
-        self.coupled = False  # whether a residual couples a joint's state with its part's pose
-        self._triple = np.zeros((6, 3, 3))
-        self._rows, self._columns = np.zeros((3, 3, 6 + 3 * K + W)), np.zeros(6 + 3 * K, np.int64)
+        self._memories = _make_memory(self.tree), _make_memory(self.tree)
+        parts, T = len(self.tree.parents), self.frames
+        # of the joints alone, as last linearized, with a leading dimension of frames
+        self.joints = self._memories[0].total._replace(
+            H_u=np.zeros((T, parts, 3, GRADIENT + 1)), H_uu=np.zeros((T, parts, 3, 3)), cross=np.zeros(1, np.int64)
+        )
+
+    @property
+    def frames(self) -> int:
+        """T."""
+        return len(self.views.of_frame) - 1
+
+    def make_system(self) -> ClipSystem:
+        """Return a system of zeros to linearize into."""
+        return make_system(self.tree, self.frames, self.motion.indices)
 
     def linearize(self, s: int, poses: Pose, system: ClipSystem) -> float:
         """Write the normal equations at `poses` with the weights of stage s, and return the cost."""
-        T = len(self.frames)
+        T, costs = self.frames, np.zeros((3, 3))  # by half, then of the frames that reach from one to the other
         system.C[:] = 0.0
         system.c[:] = 0.0
-        halves = [range(T)] if len(self._memories) == 1 else [range(T // 2), range(T // 2, T)]
-        sums = [(np.zeros_like(system.C), np.zeros_like(system.c)) for _ in halves]
-        if self.pool is None:
-            costs = [self._linearize_frames(s, halves[0], poses, system, self._memories[0], *sums[0])]
-        else:
-            jobs = zip(halves, self._memories, sums, strict=True)
-            waiting = [self.pool.submit(self._linearize_frames, s, r, poses, system, m, *Cc) for r, m, Cc in jobs]
-            costs = [job.result() for job in waiting]
-        raise_failure()
-        for C, c in sums:
-            system.C[:] += C
-            system.c[:] += c
-        system.B1[:] = 0.0
-        system.B2[:] = 0.0
-        m = self.motion
+        self.joints.cross[0] = 0
+        middle = T // 2
+        after = min(middle + 2, T)  # the first frame whose acceleration is that of the second half alone
+        front = s, poses, system, (0, middle, 0), self._memories[0], costs[0]
+        back = s, poses, system, (middle, T, after), self._memories[1], costs[1]
+        run_both(self.pool, self._linearize_half, front, back)
+        couple_frames(self.tree, poses, self.motion, middle, after, self._memories[0], system, costs[2])
+        for memory in self._memories:
+            system.C[:] += memory.C
+            system.c[:] += memory.c
         self.costs = {
-            "acceleration": acceleration.accumulate(self.tree, poses, m.h, m.table, self._triple, system),
-            "contact": standing.accumulate(
-                self.tree, poses, m.h, m.indices, m.probability, m.contact, self._rows, self._columns, system
-            ),
+            "acceleration": float(costs[:, 1].sum()),
+            "contact": float(costs[:, 2].sum()),
             "shape_prior": self._add_shape_prior(s, poses, system),
         }
         if self.tree.globals > self.tree.shape:
             self.costs["focal_prior"] = self._add_focal_prior(poses, system)
-        cost: float = sum(costs) + sum(self.costs.values())
-        return cost
+        return float(costs[:, 0].sum()) + sum(self.costs.values())
 
-    def _linearize_frames(
-        self, s: int, frames: range, poses: Pose, system: ClipSystem, memory: _Memory, C: Array, c: Array
-    ) -> float:
-        """Write the blocks of some frames, add to C and c, and return their cost."""
-        tree, stage, triggs = self.tree, self.settings.stages[s], self.settings.triggs
-        blocks, total, cost = memory.blocks, memory.total, 0.0
-        for f in frames:
-            pose, views = pose_of(poses, f), self.frames[f]
-            alone = len(views) == 1 and views[0].own_axes
-            if not alone:
-                place_parts(tree, pose)
-                clear_blocks(total)
-                total.A[:] = 0.0
-            for view in views:
-                if not alone:
-                    place_in_camera(view, pose, memory.seen)
-                at = pose if alone else memory.seen
-                cost += linearize(tree, view.terms, stage, triggs, at, blocks, memory.scratch)
-                if not alone:
-                    add_turned(view.R, blocks, total)
-            own = blocks if alone else total
-            self.coupled = self.coupled or bool(own.cross[0])
-            self.H_uu[f], self.g_u[f] = own.H_uu[1:], own.H_u[1:, :, GRADIENT]
-            write_frame(tree, pose, own, memory.sums, system.D[f], system.N[f], C, c)
-        return cost
+    def _linearize_half(
+        self, s: int, poses: Pose, system: ClipSystem, frames: tuple[int, int, int], memory: _Memory, costs: Array
+    ) -> None:
+        linearize_half(
+            self.tree, self.views, self.motion, *frames, self.settings.stages[s], self.settings.triggs, poses, memory,
+            self.joints, system, costs,
+        )  # fmt: skip
+        raise_failure()  # in the thread in which the residual failed
 
     def _add_shape_prior(self, s: int, poses: Pose, system: ClipSystem) -> float:
         P, weight, information = self.tree.shape, self.shape_weights[s], self.shared.shape_information

@@ -14,85 +14,97 @@ from .system import GLOBALS, pose_of
 
 
 @kernel
-def _jacobian(tree, poses, f, j, p, J, columns) -> int:  # type: ignore[no-untyped-def]
-    """Write p (3,), its Jacobian J (3, most) by the unknowns columns[:count] and then the shape; return count."""
+def _jacobian(tree, poses, f, j, count, p, J) -> None:  # type: ignore[no-untyped-def]
+    """Write point j (3,) and its derivatives J (3, count + W) by the unknowns that move it, and by the shape."""
     pose = pose_of(poses, f)
     i = tree.point_part[j]
     x, y, z = lever(tree, pose, j)
     p[0], p[1], p[2] = x + pose.t[i, 0], y + pose.t[i, 1], z + pose.t[i, 2]
-    count = 0
-    k = i
+    at, k = count - 3, i
     while k >= 0:
+        if k == 0:
+            at = 0
         ex, ey, ez = p[0] - pose.t[k, 0], p[1] - pose.t[k, 1], p[2] - pose.t[k, 2]
-        first = 0 if k == 0 else 3 + 3 * k
-        for r in range(3):
-            columns[count + r] = first + r
         # u x e: column r is the unit vector r crossed with e
-        J[0, count], J[0, count + 1], J[0, count + 2] = 0.0, ez, -ey
-        J[1, count], J[1, count + 1], J[1, count + 2] = -ez, 0.0, ex
-        J[2, count], J[2, count + 1], J[2, count + 2] = ey, -ex, 0.0
-        count += 3
+        J[0, at], J[0, at + 1], J[0, at + 2] = 0.0, ez, -ey
+        J[1, at], J[1, at + 1], J[1, at + 2] = -ez, 0.0, ex
+        J[2, at], J[2, at + 1], J[2, at + 2] = ey, -ex, 0.0
+        at -= 3
         k = tree.parents[k]
     for r in range(3):
-        columns[count + r] = 3 + r
         for s in range(3):
-            J[r, count + s] = 1.0 if r == s else 0.0
-    count += 3
+            J[r, 3 + s] = 1.0 if r == s else 0.0
     R = pose.R[i]
     for a in range(tree.shape):
         for r in range(3):
             turned = R[r, 0] * tree.V[j, 0, a] + R[r, 1] * tree.V[j, 1, a] + R[r, 2] * tree.V[j, 2, a]
             J[r, count + a] = turned + pose.D[i, r, a]
-    return count
 
 
 @kernel
-def _add_frame(system, f, weight, sign, r, J, columns, count, moved, P) -> None:  # type: ignore[no-untyped-def]
-    """Add what the residual r (3,) gives to frame f alone: its block, gradient and global columns."""
-    D, N = system.D[f], system.N[f]
+def place_points(tree, poses, motion, first, last, system) -> None:  # type: ignore[no-untyped-def]
+    """Fill `system.contacts` at frames first..last-1, and add what the points say of each frame alone to its block.
+
+    :param poses: of `make_poses`; motion `MotionTerms`.
+    """
+    w, p, J, columns, counts = system.contacts
+    for f in range(first, last):
+        D = system.D[f]
+        for k in range(counts.shape[0]):
+            w[f, k] = both = motion.contact * motion.probability[f, k] / motion.h[f]
+            if f + 1 < motion.h.shape[0]:
+                both += motion.contact * motion.probability[f + 1, k] / motion.h[f + 1]
+            if both <= 0.0:
+                continue
+            own, count = J[f, k], counts[k]
+            _jacobian(tree, poses, f, motion.indices[k], count, p[f, k], own)
+            for a in range(count):
+                g0, g1, g2, row = both * own[0, a], both * own[1, a], both * own[2, a], columns[k, a]
+                for b in range(a, count):
+                    D[row, columns[k, b]] += g0 * own[0, b] + g1 * own[1, b] + g2 * own[2, b]
+
+
+@kernel
+def _add_gradient(N, J, columns, count, force, moved, P) -> None:  # type: ignore[no-untyped-def]
+    """Add Jᵀ force and the global columns Jᵀ moved to N (n, 4+W); J (3, count+W), force (3,), moved (3, W)."""
     for a in range(count):
-        g0, g1, g2 = weight * J[0, a], weight * J[1, a], weight * J[2, a]
-        row = columns[a]
-        N[row, 0] += sign * (g0 * r[0] + g1 * r[1] + g2 * r[2])
-        for b in range(count):
-            D[row, columns[b]] += g0 * J[0, b] + g1 * J[1, b] + g2 * J[2, b]
+        x, y, z = J[0, a], J[1, a], J[2, a]
+        N[columns[a], 0] += x * force[0] + y * force[1] + z * force[2]
         for b in range(P):
-            N[row, GLOBALS + b] += sign * (g0 * moved[0, b] + g1 * moved[1, b] + g2 * moved[2, b])
+            N[columns[a], GLOBALS + b] += x * moved[0, b] + y * moved[1, b] + z * moved[2, b]
 
 
 @kernel
-def accumulate(tree, poses, h, indices, probability, weight, scratch, columns, system) -> float:  # type: ignore[no-untyped-def]
-    """Add the velocities of standing points to `system` and return their cost.
+def accumulate(tree, first, last, work, system, C, c) -> float:  # type: ignore[no-untyped-def]
+    """Add the rest of what standing points say at frames first..last-1 to `system`, C and c; return their cost.
 
-    :param poses: of `make_poses`; h (T,) seconds since the frame before; indices (C,), probability (T, C) of standing
-    since the frame before; scratch (3, 3, 6 + 3K + W) and columns (6 + 3K,) are overwritten.
+    `place_points` comes first, at the frame before them as well. C (W, W) upper triangle, c (W,); work (3, 1+W) is
+    overwritten.
     """
     cost: float = 0.0
     P = tree.shape
-    p, J = scratch[2], scratch
-    for f in range(1, h.shape[0]):
-        for k in range(indices.shape[0]):
-            w = weight * probability[f, k] / h[f]
-            if w <= 0.0:
+    w, p, J, columns, counts = system.contacts
+    force, moved = work[:, 0], work[:, 1:]
+    for f in range(max(first, 1), last):
+        for k in range(counts.shape[0]):
+            weight, count = w[f, k], counts[k]
+            if weight <= 0.0:
                 continue
-            count = _jacobian(tree, poses, f - 1, indices[k], p[0], J[0], columns)
-            _jacobian(tree, poses, f, indices[k], p[1], J[1], columns)
             for r in range(3):
-                p[0, r] = p[1, r] - p[0, r]
-                cost += 0.5 * w * p[0, r] * p[0, r]
+                d = p[f, k, r] - p[f - 1, k, r]
+                cost += 0.5 * weight * d * d
+                force[r] = weight * d
                 for a in range(P):
-                    p[r, 3 + a] = J[1, r, count + a] - J[0, r, count + a]
-            moved = p[:, 3 : 3 + P]
-            _add_frame(system, f - 1, w, -1.0, p[0], J[0], columns, count, moved, P)
-            _add_frame(system, f, w, 1.0, p[0], J[1], columns, count, moved, P)
-            B = system.B1[f]
-            for a in range(count):
-                g0, g1, g2 = w * J[1, 0, a], w * J[1, 1, a], w * J[1, 2, a]
-                for b in range(count):
-                    B[columns[a], columns[b]] -= g0 * J[0, 0, b] + g1 * J[0, 1, b] + g2 * J[0, 2, b]
+                    moved[r, a] = weight * (J[f, k, r, count + a] - J[f - 1, k, r, count + a])
             for a in range(P):
-                m0, m1, m2 = w * moved[0, a], w * moved[1, a], w * moved[2, a]
-                system.c[a] += m0 * p[0, 0] + m1 * p[0, 1] + m2 * p[0, 2]
+                m0, m1, m2 = moved[0, a] / weight, moved[1, a] / weight, moved[2, a] / weight
+                c[a] += m0 * force[0] + m1 * force[1] + m2 * force[2]
                 for b in range(a, P):
-                    system.C[a, b] += m0 * moved[0, b] + m1 * moved[1, b] + m2 * moved[2, b]
+                    C[a, b] += m0 * moved[0, b] + m1 * moved[1, b] + m2 * moved[2, b]
+            _add_gradient(system.N[f], J[f, k], columns[k], count, force, moved, P)
+            for r in range(3):
+                force[r] = -force[r]
+                for a in range(P):
+                    moved[r, a] = -moved[r, a]
+            _add_gradient(system.N[f - 1], J[f - 1, k], columns[k], count, force, moved, P)
     return cost

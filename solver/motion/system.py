@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-r"""The normal equations of a clip: dense blocks of width 6 + 3K a frame, two bands beside them, and global columns.
+r"""The normal equations of a clip: dense blocks of width 6 + 3K a frame, what couples them, and global columns.
 
 The unknowns of frame f are d_f = (w, nu, u_1..u_K), those of `recursion.py`: the root's twist about the pelvis, then
 the joints' rotations, all in the axes that the poses are given in. Part i moves by x_i = x_0 + sum of U_j u_j over the
@@ -11,6 +11,7 @@ of their unknowns once one of them has been eliminated.
 Source: section 3 of the paper; composite rigid bodies in Featherstone, Rigid Body Dynamics Algorithms, chapter 6.
 """
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -24,24 +25,50 @@ from ..compiled.tree import Tree
 GLOBALS = 4  # first global column of `ClipSystem.N`; its column 0 is the gradient
 
 
+class Contacts(NamedTuple):
+    """How C standing points couple each frame f to the one before: block (f, f-1) -= w_f J_fᵀ J_{f-1} for each."""
+
+    w: Array  # (T, C)
+    p: Array  # (T, C, 3) the points
+    J: Array  # (T, C, 3, m+W): their derivatives by m unknowns and then by the shape
+    columns: Array  # (C, m) the unknowns that move each point, ascending
+    counts: Array  # (C,) how many they are
+
+
 class ClipSystem(NamedTuple):
     """JᵀJ and Jᵀr of a clip of T frames. n is 6 + 3K padded to whole vectors, W as in `Tree`."""
 
     D: Array  # (T, n, n): block (f, f), its upper triangle
-    B1: Array  # (T, n, n): block (f, f-1)
-    B2: Array  # (T, K+2, 3, 3): the blocks of (f, f-2) that are not zero: rotations of part 0..K, the root's position
+    B1: Array  # (T, K+2, 3, 3): blocks of (f, f-1) between rotations of part 0..K, and between the root's positions
+    B2: Array  # (T, K+2, 3, 3): the same of (f, f-2)
     N: Array  # (T, n, 4+W): gradient, three unused, global columns
     C: Array  # (W, W): upper triangle
     c: Array  # (W,)
+    contacts: Contacts  # the rest of (f, f-1)
 
 
-def make_system(tree: Tree, frames: int) -> ClipSystem:
-    """Return a system of zeros for that many frames."""
+def make_system(tree: Tree, frames: int, points: Sequence[int] = ()) -> ClipSystem:
+    """Return a system of zeros for that many frames, in which these points may stand."""
     K, W = len(tree.parents) - 1, tree.S.shape[2]
     n = padded(6 + 3 * K)
-    shapes: list[tuple[int, ...]] = [(n, n), (n, n), (K + 2, 3, 3), (n, GLOBALS + W)]
+    shapes: list[tuple[int, ...]] = [(n, n), (K + 2, 3, 3), (K + 2, 3, 3), (n, GLOBALS + W)]
     D, B1, B2, N = (np.zeros((frames, *shape)) for shape in shapes)
-    return ClipSystem(D, B1, B2, N, np.zeros((W, W)), np.zeros(W))
+    columns = [_columns(tree, int(tree.point_part[j])) for j in points]
+    counts = np.array([len(some) for some in columns], np.int64)
+    m, C = max(counts, default=0), len(points)
+    padded_columns = np.array([some + [0] * (m - len(some)) for some in columns], np.int64).reshape(C, m)
+    J = np.zeros((frames, C, 3, m + W))
+    contacts = Contacts(np.zeros((frames, C)), np.zeros((frames, C, 3)), J, padded_columns, counts)
+    return ClipSystem(D, B1, B2, N, np.zeros((W, W)), np.zeros(W), contacts)
+
+
+def _columns(tree: Tree, part: int) -> list[int]:
+    """Return the unknowns that move a part, ascending."""
+    found: list[int] = []
+    while part > 0:
+        found = [3 + 3 * part, 4 + 3 * part, 5 + 3 * part, *found]
+        part = int(tree.parents[part])
+    return [*range(6), *found]
 
 
 def make_poses(tree: Tree, frames: int) -> Pose:
@@ -103,7 +130,7 @@ def write_frame(tree: Tree, pose: Pose, blocks: Blocks, sums, D, N, C, c) -> Non
     n_parts, row, W = blocks.A.shape[0], blocks.A.shape[2], blocks.c.shape[0]
     o = pose.t[0]
     for a in range(D.shape[0]):
-        for b in range(D.shape[0]):
+        for b in range(a - a % 3, D.shape[0]):
             D[a, b] = 0.0
         for b in range(N.shape[1]):
             N[a, b] = 0.0

@@ -6,19 +6,22 @@ R w, R nu in camera axes and a joint's rotation R u, so that M = Rᵀ M' R by 3 
 else in the solver knows of several cameras.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numba.extending import register_jitable
 from numpy.typing import ArrayLike
 
 from ..arrays import as_array
-from ..compiled.part import Array, Pose
+from ..compiled.kernel import kernel
+from ..compiled.part import Array
 from ..compiled.tree import Tree
-from ..gauss_newton.terms import PackedPriors, Terms, fill_terms, usable
+from ..custom_residuals.external import External
+from ..gauss_newton.terms import Layout, PackedPriors, Terms, fill_terms
 from ..measurements import Measurements
-from ..residuals.registry import empty_tables
+from ..residuals.registry import RESIDUALS, empty_tables
 from ..rotations import nearest_rotation
 from ..validation import check_finite, check_rotations, check_type
 
@@ -36,45 +39,200 @@ class View:
     t_camera_world: ArrayLike = field(default_factory=lambda: np.zeros(3))
 
 
-class PackedView(NamedTuple):
-    """One camera's terms of one frame."""
+class PackedViews(NamedTuple):
+    """The terms of all views of T frames, laid out for the kernels: those of one view are `terms_of`. V views."""
 
-    terms: Terms
-    R: Array  # (3, 3) R_camera_world
-    t: Array  # (3,)
-    own_axes: bool  # whether the camera's axes are the world's
+    of_frame: Array  # (T+1,): the views of frame f are of_frame[f]:of_frame[f+1]
+    starts: Array  # (V, K+2), as in `Terms`
+    slots: Array  # (V, 2): a view's first slot in the next four, and in `rest` and `V`, which views share
+    flags: Array  # (N,)
+    image: Array  # (N, 3)
+    point: Array  # (N, 4)
+    direction: Array  # (N, 4)
+    rest: Array  # (M, 3)
+    V: Array  # (M, 3, W)
+    rows: Array  # (residuals, V, 2): a view's rows of the tables are rows[k, v, 0]:rows[k, v, 1]
+    ints: tuple[Array, ...]
+    floats: tuple[Array, ...]
+    calls: Array  # (V+1,): the same of external.calls
+    external: External
+    shape_mean: Array  # (W,)
+    shape_information: Array  # (W, W)
+    R: Array  # (V, 3, 3) R_camera_world
+    t: Array  # (V, 3)
+    own_axes: Array  # (V,) whether the camera's axes are the world's
 
 
-def pack_views(
-    tree: Tree, frame: Measurements | Sequence[View], priors: PackedPriors, name: str
-) -> tuple[list[PackedView], int]:
-    """Return a frame's terms by camera, and how many measurements are usable. The first camera's have the priors.
+@register_jitable
+def _first_table(tables, rows, v):  # type: ignore[no-untyped-def]
+    return (tables[0][rows[0, v, 0] : rows[0, v, 1]],)
 
-    :param name: of the frame, for messages.
+
+def _and_table(before: Callable[..., Any], k: int) -> Callable[..., Any]:
+    """Return the function that gives what `before` does and a view's rows of table k."""
+
+    def some_tables(tables, rows, v):  # type: ignore[no-untyped-def]
+        return before(tables, rows, v) + (tables[k][rows[k, v, 0] : rows[k, v, 1]],)
+
+    return register_jitable(some_tables)  # type: ignore[no-any-return]
+
+
+_tables_of: Callable[..., Any] = _first_table
+for _k in range(1, len(RESIDUALS)):
+    _tables_of = _and_table(_tables_of, _k)
+_rows_of = _tables_of  # all tables' rows of a view, as a tuple
+
+
+@register_jitable
+def terms_of(views: PackedViews, v: int) -> Terms:
+    """Return the terms of view v; for kernels as well."""
+    n = views.starts[v, -1]
+    a, b = views.slots[v, 0], views.slots[v, 1]
+    external = External(
+        views.external.calls[views.calls[v] : views.calls[v + 1]], views.external.ints, views.external.floats
+    )
+    return Terms(
+        views.starts[v], views.flags[a : a + n], views.rest[b : b + n], views.V[b : b + n], views.image[a : a + n],
+        views.point[a : a + n], views.direction[a : a + n], _rows_of(views.ints, views.rows, v),
+        _rows_of(views.floats, views.rows, v), views.shape_mean, views.shape_information, external,
+    )  # fmt: skip
+
+
+def pack_frames(
+    tree: Tree, frames: Sequence[Measurements | Sequence[View]], priors: PackedPriors, first: int = 0
+) -> tuple[PackedViews, Array]:
+    """Return the terms of frames, and how many measurements of each are usable. Each frame's first view has the priors.
+
+    :param first: number of the first frame, for messages.
     :raises ShapeError: an array does not fit the body.
     :raises InvalidValueError: a value that no fit can use, or a frame that is neither measurements nor views.
     """
-    views = [View(frame)] if isinstance(frame, Measurements) else frame
-    check_type(views, Sequence, name)
-    without = PackedPriors(empty_tables(), priors.shape_mean, priors.shape_information)
-    packed, count = [], 0
-    for k, view in enumerate(views or [View(Measurements())]):
-        check_type(view, View, f"{name}[{k}]")
-        R = as_array(view.R_camera_world, (3, 3), f"R_camera_world of {name}")
-        t = as_array(view.t_camera_world, (3,), f"t_camera_world of {name}")
-        check_rotations(R[None], f"R_camera_world of {name}")
-        check_finite(t, f"t_camera_world of {name}")
-        terms, _, _ = fill_terms(tree, view.measurements, without if k else priors, None)
-        own_axes = bool(np.array_equal(R, np.eye(3)) and not t.any())
-        packed.append(PackedView(terms, nearest_rotation(R), t, own_axes))
-        count += usable(terms)
-    return packed, count
+    packer, without = _Packer(tree), PackedPriors(empty_tables(), priors.shape_mean, priors.shape_information)
+    of_frame, counts = [0], np.zeros(len(frames), np.int64)
+    for f, frame in enumerate(frames):
+        name = f"frames[{first + f}]"
+        views = [View(frame)] if isinstance(frame, Measurements) else frame
+        check_type(views, Sequence, name)
+        for k, view in enumerate(views or [View(Measurements())]):
+            check_type(view, View, f"{name}[{k}]")
+            counts[f] += packer.add(view, without if k else priors, name)
+        of_frame.append(len(packer.starts))
+    return packer.packed(of_frame, priors), counts
 
 
-def place_in_camera(view: PackedView, pose: Pose, seen: Pose) -> None:
-    """Write the root of `pose` in a camera's axes, and its joints, to `seen`; the other parts are left to linearize."""
-    np.matmul(view.R, pose.R[0], out=seen.R[0])
-    seen.t[0] = view.R @ pose.t[0] + view.t
-    seen.Omega[:] = pose.Omega
-    seen.beta[:] = pose.beta
-    seen.log_focal[:] = pose.log_focal
+class _Packer:
+    """Collects the terms of views."""
+
+    def __init__(self, tree: Tree) -> None:
+        self._tree, self._layout = tree, Layout(tree, (np.zeros(0, np.int64),) * 4)
+        self.starts: list[Array] = []
+        self._slots: list[tuple[int, int]] = []
+        self._values: list[tuple[Array, ...]] = []
+        self._layouts = [self._layout]
+        self._tables = [_Tables() for _ in RESIDUALS]
+        self._external: list[External] = []
+        self._cameras: list[tuple[Array, Array, bool]] = []
+        self._size = self._shared = 0
+
+    def add(self, view: View, priors: PackedPriors, name: str) -> int:
+        """Add a view of the frame of that name, and return how many measurements are usable."""
+        camera = _checked_camera(view, name)
+        terms, count, layout = fill_terms(self._tree, view.measurements, priors, self._layout)
+        if layout is not self._layout:
+            self._shared += len(self._layout.rest)
+            self._layouts.append(layout)
+            self._layout = layout
+        self.starts.append(terms.starts)
+        self._slots.append((self._size, self._shared))
+        # the next view with this layout overwrites them
+        self._values.append(tuple(a.copy() for a in (terms.flags, terms.image, terms.point, terms.direction)))
+        for table, ints, floats in zip(self._tables, terms.ints, terms.floats, strict=True):
+            table.add(ints, floats)
+        self._external.append(terms.external)
+        self._cameras.append(camera)
+        self._size += len(terms.flags)
+        return count + len(terms.ints[0])
+
+    def packed(self, of_frame: list[int], priors: PackedPriors) -> PackedViews:
+        """Return what has been added."""
+        flags, image, point, direction = (np.concatenate(some) for some in zip(*self._values, strict=True))
+        R, t, own_axes = (np.array(some) for some in zip(*self._cameras, strict=True))
+        calls, external = _joined(self._external)
+        return PackedViews(
+            np.array(of_frame), np.array(self.starts), np.array(self._slots), flags, image, point, direction,
+            np.concatenate([layout.rest for layout in self._layouts]),
+            np.concatenate([layout.V for layout in self._layouts]),
+            np.array([table.rows for table in self._tables]), tuple(table.ints() for table in self._tables),
+            tuple(table.floats() for table in self._tables), calls, external, priors.shape_mean,
+            priors.shape_information, R, t, own_axes,
+        )  # fmt: skip
+
+
+class _Tables:
+    """The rows of one residual; views with the same arrays, as those of priors, share their rows."""
+
+    def __init__(self) -> None:
+        self.rows: list[tuple[int, int]] = []
+        self._parts: list[tuple[Array, Array]] = []
+        self._known: dict[tuple[int, int], tuple[int, int]] = {}
+        self._size = 0
+
+    def add(self, ints: Array, floats: Array) -> None:
+        """Add the rows of a view."""
+        key = id(ints), id(floats)
+        if key not in self._known:
+            self._known[key] = self._size, self._size + len(ints)
+            self._parts.append((ints, floats))  # so that no other arrays get these ids
+            self._size += len(ints)
+        self.rows.append(self._known[key])
+
+    def ints(self) -> Array:
+        """Return the whole numbers (n, INTS)."""
+        return np.concatenate([ints for ints, _ in self._parts])
+
+    def floats(self) -> Array:
+        """Return the numbers (n, FLOATS)."""
+        return np.concatenate([floats for _, floats in self._parts])
+
+
+def _checked_camera(view: View, name: str) -> tuple[Array, Array, bool]:
+    """Return R_camera_world, made orthonormal, t_camera_world, and whether the camera's axes are the world's."""
+    R = as_array(view.R_camera_world, (3, 3), f"R_camera_world of {name}")
+    t = as_array(view.t_camera_world, (3,), f"t_camera_world of {name}")
+    if np.array_equal(R, _EYE) and not t.any():
+        return _EYE, _NULL, True
+    check_rotations(R[None], f"R_camera_world of {name}")
+    check_finite(t, f"t_camera_world of {name}")
+    return nearest_rotation(R), t, False
+
+
+_EYE, _NULL = np.eye(3), np.zeros(3)
+
+
+def _joined(views: Sequence[External]) -> tuple[Array, External]:
+    """Return where the calls of each view begin and end (V+1,), and the rows of all of them."""
+    calls, i, f = [], 0, 0
+    for external in views:
+        calls.append(external.calls + np.array([0, 0, i, f, 0]))
+        i, f = i + len(external.ints), f + len(external.floats)
+    ints, floats = (np.concatenate([getattr(each, name) for each in views]) for name in ("ints", "floats"))
+    return np.cumsum([0, *map(len, calls)]), External(np.concatenate(calls), ints, floats)
+
+
+@kernel
+def place_in_camera(R, t, pose, seen) -> None:  # type: ignore[no-untyped-def]
+    """Write the root of `pose` in a camera's axes, and its joints, to `seen`; the other parts are left to linearize.
+
+    R (3, 3), t (3,): the world in the camera's axes.
+    """
+    for r in range(3):
+        for c in range(3):
+            seen.R[0, r, c] = R[r, 0] * pose.R[0, 0, c] + R[r, 1] * pose.R[0, 1, c] + R[r, 2] * pose.R[0, 2, c]
+        seen.t[0, r] = R[r, 0] * pose.t[0, 0] + R[r, 1] * pose.t[0, 1] + R[r, 2] * pose.t[0, 2] + t[r]
+    for i in range(1, pose.Omega.shape[0]):
+        for r in range(3):
+            for c in range(3):
+                seen.Omega[i, r, c] = pose.Omega[i, r, c]
+    for a in range(pose.beta.shape[0]):
+        seen.beta[a] = pose.beta[a]
+    seen.log_focal[0] = pose.log_focal[0]

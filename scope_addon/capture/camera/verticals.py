@@ -101,10 +101,11 @@ def _grid(up: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def _best_with_up(u: NDArray[np.float64], lines: Lines, up: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
     """Return the score and the axes (3, 3) of the best horizontal directions for an up direction u."""
-    level = np.cross(np.concatenate([lines.normals[:HORIZONTAL_CANDIDATES], np.eye(3)]), u)  # along a horizontal line
+    hat = np.array([[0.0, -u[2], u[1]], [u[2], 0.0, -u[0]], [-u[1], u[0], 0.0]])  # v @ hat = v x u
+    level = np.concatenate([lines.normals[:HORIZONTAL_CANDIDATES], np.eye(3)]) @ hat  # along a horizontal line
     size = np.linalg.norm(level, axis=1)
     level = level[size > 0.1] / size[size > 0.1, None]
-    across = np.cross(u, level)
+    across = -level @ hat
     off2 = np.minimum(np.square(level @ lines.normals.T), np.square(across @ lines.normals.T))
     explained = np.exp(-0.5 / GRID_SIGMA**2 * off2)
     explained = np.maximum(explained, VALUE[0] * np.exp(-0.5 / GRID_SIGMA**2 * np.square(lines.normals @ u)))

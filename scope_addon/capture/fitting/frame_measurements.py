@@ -151,13 +151,16 @@ def place(
     :param rays: (n, 2) normalized image coordinates.
     :param weight: (n,) c.
     """
-    n = len(world)
-    A = np.zeros((2 * n, 3))
-    A[:n, 0] = A[n:, 1] = 1.0
-    A[:n, 2], A[n:, 2] = -rays[:, 0], -rays[:, 1]
-    b = np.concatenate([rays[:, 0] * world[:, 2] - world[:, 0], rays[:, 1] * world[:, 2] - world[:, 1]])
-    w = np.tile(np.sqrt(weight), 2)
-    t: NDArray[np.float64] = np.linalg.lstsq(A * w[:, None], b * w, rcond=None)[0]
+    w, rays, world = np.asarray(weight, float), np.asarray(rays, float), np.asarray(world, float)
+    x, y = w @ rays
+    total = w.sum()
+    H = np.array([[total, 0.0, -x], [0.0, total, -y], [-x, -y, w @ (rays * rays).sum(axis=1)]])
+    b = rays * world[:, 2:] - world[:, :2]
+    g = np.array([*(w @ b), -(w @ (rays * b).sum(axis=1))])
+    try:
+        t: NDArray[np.float64] = np.linalg.solve(H, g)
+    except np.linalg.LinAlgError:  # of less than two points
+        t = np.linalg.lstsq(H, g, rcond=None)[0]
     return t
 
 

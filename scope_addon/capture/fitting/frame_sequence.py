@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....solver import Fit, Measurements, Options, State, Status, fit_tree, make_tree
+from ....solver.compiled.tree import with_fixed_shape
 from .hand_measurements import smooth_fingers
 from .prepared_track import PreparedTrack
 from .weights import ROBUST, cold_stages, warm_stages
@@ -46,7 +47,8 @@ class FrameSequence:
     def __init__(self, prepared: PreparedTrack, betas: NDArray[np.floating[Any]]) -> None:
         T, body = len(prepared.track), prepared.body
         self._prepared, self._betas = prepared, betas
-        self._tree, self._priors = make_tree(body), prepared.priors_with_shape(betas)
+        self._tree = with_fixed_shape(make_tree(body), betas)
+        self._priors = replace(prepared.priors, shape_mean=None, shape_information=None)
         self._cold, self._warm = (
             replace(ROBUST, stages=stages(prepared.weights)) for stages in (cold_stages, warm_stages)
         )

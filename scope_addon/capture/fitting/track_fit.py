@@ -81,7 +81,7 @@ def fit_each_frame(
     T = len(start.valid)
     for k in range(T):
         if start.valid[k]:
-            frames.refit(k, State(start.rotations[k, 0], start.t_camera_root[k], start.rotations[k, 1:], start.betas))
+            frames.refit(k, State(start.rotations[k, 0], start.t_camera_root[k], start.rotations[k, 1:], np.zeros(0)))
         frames.repeat_last(k)
         if k % PROGRESS_FRAMES == 0 or k == T - 1:
             progress("solving each frame", k + 1, T)

@@ -28,8 +28,8 @@ from .camera_path import CameraPath
 from .joint_sigma import joint_sigma
 from .resting_places import resting_places
 
-WINDOW_UNKNOWNS = 24_000  # unknowns of a window, whose equations take some 100 MB: 320 frames of a body of 24 parts
-OVERLAP = 0.2  # of a window's frames; two windows differ by 2 to 4 mm where one of them has 1 s more to its end
+WINDOW_UNKNOWNS = 36_000  # unknowns of a window, whose equations take some 120 MB: 480 frames of a body of 24 parts
+OVERLAP = 4_800  # unknowns; two windows differ by 2 to 4 mm where one of them has 1 s more to its end
 LONGEST_STEP = 2.5  # between two frames that are fitted together, in units of the median step
 _Progress = Callable[[str, int, int], None]
 
@@ -43,7 +43,7 @@ def fit_clip(prepared: PreparedTrack, start: FittedTrack, path: CameraPath, prog
     """
     clip = _Clip(prepared, start, path, progress)
     for run in runs(start.valid, prepared.track.times):
-        for window in windows(len(run), _window_frames(prepared)):
+        for window in windows(len(run), _frames_of(prepared, WINDOW_UNKNOWNS), _frames_of(prepared, OVERLAP)):
             clip.fit(run[window])
     return clip.fitted()
 
@@ -162,14 +162,15 @@ def runs(valid: NDArray[np.bool_], times: NDArray[np.float64]) -> Iterator[NDArr
         yield from np.split(frames, np.flatnonzero(gaps) + 1)
 
 
-def windows(count: int, length: int) -> list[slice]:
-    """Divide ``count`` frames into slices of ``length`` that overlap by at least `OVERLAP`; one if that suffices."""
-    if count <= length:
+def windows(count: int, most: int, overlap: int) -> list[slice]:
+    """Divide ``count`` frames into as few slices of at most ``most`` as overlap by ``overlap``, all of one length."""
+    if count <= most:
         return [slice(0, count)]
-    steps = int(np.ceil((count - length) / ((1.0 - OVERLAP) * length)))
-    starts = np.linspace(0, count - length, steps + 1).round().astype(int)
+    number = int(np.ceil((count - overlap) / (most - overlap)))
+    length = int(np.ceil((count + (number - 1) * overlap) / number))
+    starts = np.linspace(0, count - length, number).astype(int)
     return [slice(int(start), int(start) + length) for start in starts]
 
 
-def _window_frames(prepared: PreparedTrack) -> int:
-    return WINDOW_UNKNOWNS // (3 * (prepared.body.K + 2))
+def _frames_of(prepared: PreparedTrack, unknowns: int) -> int:
+    return unknowns // (3 * (prepared.body.K + 2))

@@ -5,12 +5,11 @@ import numpy as np
 from scope.benchmarks.solver.clip_gradients import ConjugateGradients
 from scope.benchmarks.solver.clip_steps import make_clip
 from scope.solver.motion.band import make_factor, solve_clip
-from scope.solver.motion.system import make_system
 
 
 def test_gradients_and_elimination_agree():
     problem, poses = make_clip(23, 6, gap=1, fixed=True, contacts=0)
-    system = make_system(problem.tree, 6)
+    system = problem.make_system()
     problem.linearize(0, poses, system)
     factor, used = make_factor(system), 75
     solve_clip(problem.tree, system, 1.0, problem.settings.root_scale, factor)

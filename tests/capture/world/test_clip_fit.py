@@ -130,6 +130,7 @@ def test_windows_agree_on_the_deviations(monkeypatch):
     track, true = _person(40)
     whole = _fit(_prepared(track), true).joint_sigma_m
     monkeypatch.setattr(clip_fit, "WINDOW_UNKNOWNS", 24 * 3 * (BODY.K + 2))
+    monkeypatch.setattr(clip_fit, "OVERLAP", 8 * 3 * (BODY.K + 2))
     np.testing.assert_allclose(_fit(_prepared(track), true).joint_sigma_m[4:-4], whole[4:-4], rtol=0.3)
 
 
@@ -195,6 +196,7 @@ def test_windows_agree_with_the_whole_and_join_smoothly(monkeypatch):
     prepared = _prepared(replace(track, keypoints_px=track.keypoints_px + rng.normal(0.0, 3.0, (90, JOINTS, 2))))
     whole = _joints(_fit(prepared, true))
     monkeypatch.setattr(clip_fit, "WINDOW_UNKNOWNS", 40 * 3 * (BODY.K + 2))
+    monkeypatch.setattr(clip_fit, "OVERLAP", 8 * 3 * (BODY.K + 2))
     parts = _joints(_fit(prepared, true))
     assert (
         np.linalg.norm(parts - whole, axis=-1).max() < 0.008
@@ -204,14 +206,15 @@ def test_windows_agree_with_the_whole_and_join_smoothly(monkeypatch):
 
 
 def test_windows_cover_all_frames_and_overlap():
-    assert clip_fit.windows(100, 100) == [slice(0, 100)]
-    for count, length in ((101, 100), (1000, 320), (7, 5)):
-        found = clip_fit.windows(count, length)
+    assert clip_fit.windows(100, 100, 20) == [slice(0, 100)]
+    for count, most, overlap in ((101, 100, 20), (1000, 320, 64), (1001, 320, 64), (7, 5, 1)):
+        found = clip_fit.windows(count, most, overlap)
         assert found[0].start == 0
         assert found[-1].stop == count
+        assert sum(w.stop - w.start for w in found) < count + len(found) * (overlap + 1)  # no more than is needed
         for a, b in zip(found[:-1], found[1:], strict=True):
-            assert b.stop - b.start == length
-            assert a.stop - b.start >= clip_fit.OVERLAP * length - 1
+            assert b.stop - b.start == a.stop - a.start <= most
+            assert a.stop - b.start >= overlap
 
 
 def test_longer_gaps_separate_what_is_fitted_together():

@@ -20,8 +20,8 @@ from scope.solver.gauss_newton.optimizer import make_settings
 from scope.solver.gauss_newton.terms import pack_priors
 from scope.solver.motion.prior import MotionPrior, StandingPoints
 from scope.solver.motion.problem import ClipProblem, Globals, MotionTerms
-from scope.solver.motion.system import make_poses, make_system
-from scope.solver.motion.views import View, pack_views
+from scope.solver.motion.system import make_poses
+from scope.solver.motion.views import View, pack_frames
 
 from ..dense import complex_log, moved
 from ..synthetic import INTRINSICS, forward, random_body, random_state
@@ -76,16 +76,16 @@ class Clip:
         """Return the solver's problem, its poses at the start, and a system."""
         tree = make_tree(self.body, focal)
         packed = pack_priors(tree, Priors())
-        frames = [pack_views(tree, f, packed, "frame")[0] for f in self.frames()]
+        views, _ = pack_frames(tree, self.frames(), packed)
         motion = MotionTerms.make(tree, self.times, prior, self.stands)
         settings = make_settings(FLAT, FLAT.schedule(cold=False))
         shared = Globals(np.zeros(P), np.eye(P), FOCAL_WEIGHT if focal else 0.0)
-        problem = ClipProblem(tree, frames, motion, shared, settings, pool)
-        poses = make_poses(tree, len(frames))
+        problem = ClipProblem(tree, views, motion, shared, settings, pool)
+        poses = make_poses(tree, problem.frames)
         for f, s in enumerate(self.starts):
             poses.R[f, 0], poses.t[f, 0], poses.Omega[f, 1:] = s.R_camera_root, s.t_camera_root, s.Omega
         poses.beta[:P] = self.starts[0].beta
-        return problem, poses, make_system(tree, len(frames))
+        return problem, poses, problem.make_system()
 
 
 def noisy_clip(seed, frames=6, cameras=2):

@@ -48,7 +48,12 @@ def dense_matrix(system, T):
         here = slice(f * n, (f + 1) * n)
         A[here, here] = np.triu(system.D[f, :n, :n])
         if f > 0:
-            A[(f - 1) * n : f * n, here] = system.B1[f, :n, :n].T
+            for block, at in zip(system.B1[f], slots, strict=True):
+                A[(f - 1) * n + at : (f - 1) * n + at + 3, f * n + at : f * n + at + 3] = block.T
+            w, _, J, columns, counts = system.contacts
+            for k, m in enumerate(counts):
+                own, before = J[f, k, :, :m], J[f - 1, k, :, :m]
+                A[np.ix_((f - 1) * n + columns[k, :m], f * n + columns[k, :m])] -= w[f, k] * before.T @ own
         if f > 1:
             for block, at in zip(system.B2[f], slots, strict=True):
                 A[(f - 2) * n + at : (f - 2) * n + at + 3, f * n + at : f * n + at + 3] = block.T
