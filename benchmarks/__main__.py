@@ -26,6 +26,7 @@ ELSEWHERE = {  # imported where they are wanted: some need packages that others 
     "scenes": (".scenes.accuracy", "scenes"),
     "smplify": (".smplify.comparison", "smplify"),
     "outline": (".perception.outline", "outline"),
+    "faces": (".perception.faces", "faces"),
     "blender": (".blender", "blender"),
     "cluster": (".cluster", "cluster"),
 }

@@ -72,13 +72,29 @@ def rasterize(
     """
     vertices = np.ascontiguousarray(vertices_cam, np.float64)
     corners = np.ascontiguousarray(triangles, np.int32)
+    shading = shade(vertices, vertex_normals(vertices, corners))
+    draw_shaded(canvas, vertices, corners, face_colors, shading, intrinsics, dist, opacity)
+
+
+def draw_shaded(
+    canvas: Canvas,
+    vertices_cam: NDArray[np.floating[Any]],
+    triangles: NDArray[np.integer[Any]],
+    face_colors: NDArray[np.floating[Any]],
+    shading: NDArray[np.float64],
+    intrinsics: NDArray[np.float64],
+    dist: NDArray[np.float64] | None = None,
+    opacity: float = 1.0,
+) -> None:
+    """Draw a mesh as `rasterize` does, with a shading (V, 2) of its own, as `shade` returns it."""
+    vertices = np.ascontiguousarray(vertices_cam, np.float64)
+    corners = np.ascontiguousarray(triangles, np.int32)
     colors = np.broadcast_to(np.asarray(face_colors, np.float32), (len(corners), 3))
     lens = np.zeros(5)
     if dist is not None:
         coefficients = np.ravel(dist)[:5]
         lens[: len(coefficients)] = coefficients
     K = np.ascontiguousarray(intrinsics, np.float64)
-    shading = shade(vertices, vertex_normals(vertices, corners))
     screen, where = _project(vertices, K, lens, _largest_radius2(lens))
     alpha = np.uint8(round(255 * min(max(opacity, 0.0), 1.0)))
     _draw(canvas.rgba, canvas.depth, vertices, screen, where, shading, corners, colors, K, lens, alpha)

@@ -14,6 +14,7 @@ from ...kinematics.frame_blocks import by_blocks
 from ...motion import Motion
 from ..fitting.hand_measurements import HAND_KEYPOINT_NAMES
 from ..perception.landmark_network import KEYPOINT_NAMES
+from ..tracking.face.expression_fit import fitted
 from ..tracking.face.expression_motion import expression_motion
 from ..tracking.track import Track
 from .camera_path import CameraPath
@@ -81,8 +82,13 @@ def assemble_motion(
         source=shot.source,
         joint_sigma_m=None if sigma is None else np.sqrt((sigma[..., 0] ** 2 + 2.0 * sigma[..., 1] ** 2) / 3.0),
         joint_sigma_depth_m=None if sigma is None else sigma[..., 0],
-        face={} if track.face is None else expression_motion(track.face, placed.times, shot.smoothing),
+        face=_face(track, placed.times, shot.smoothing),
     )
+
+
+def _face(track: Track, times: NDArray[np.float64], smoothing: bool) -> dict[str, NDArray[Any]]:
+    """Return the motion file's arrays about the face; none if it was not looked for."""
+    return {} if track.face is None else expression_motion(fitted(track.face, times), times, smoothing)
 
 
 def _keypoints2d(track: Track) -> NDArray[np.floating[Any]]:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is kept of a face in one frame, as one row of numbers: an hour of 30 frames a second takes 110 MB."""
+"""What is kept of a face in one frame, as one row of numbers: an hour of 30 frames a second takes 260 MB."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .....solver.names import EXPRESSIONS
-from .face_landmarks import FaceEstimate
+from .face_landmarks import EXPRESSION_POINTS, FaceEstimate
 from .gaze import gaze, head_axes
 
 # Landmarks that are kept: the outline of the face, brows, eyes, irises, nose and lips.
@@ -23,7 +23,10 @@ CONTOURS = (
 )  # fmt: skip
 _WEIGHTS = slice(2, 2 + len(EXPRESSIONS))
 _GAZE = slice(_WEIGHTS.stop, _WEIGHTS.stop + 6)
-_POINTS = slice(_GAZE.stop, _GAZE.stop + 2 * len(CONTOURS))
+# Landmarks in a row, each with its depth: those, and the ones that expressions are fitted to.
+_KEPT = np.unique(CONTOURS + EXPRESSION_POINTS)
+_AT_CONTOURS = np.searchsorted(_KEPT, CONTOURS)
+_POINTS = slice(_GAZE.stop, _GAZE.stop + 3 * len(_KEPT))
 RECORD = _POINTS.stop  # numbers in a row
 # A face of 16 pixels shows nothing, one of 64 everything; one that is seen from the side shows only half.
 _FACE_PX = (16.0, 64.0)
@@ -32,7 +35,7 @@ _SCALE = 1.5  # side of a region over the face's
 
 
 def record(estimate: FaceEstimate | None, weights: NDArray[np.float64] | None) -> NDArray[np.float64]:
-    """Return the row (RECORD,) of a face: confidence, size in pixels, weights, gaze, contours; zeros if there is none.
+    """Return the row (RECORD,) of a face: confidence, size in pixels, weights, gaze, landmarks; zeros if there is none.
 
     :param weights: (52,) of the expressions.
     """
@@ -45,7 +48,7 @@ def record(estimate: FaceEstimate | None, weights: NDArray[np.float64] | None) -
     row[0], row[1] = max(confidence, 1e-3), size
     row[_WEIGHTS] = weights
     row[_GAZE] = gaze(estimate.landmarks).ravel()
-    row[_POINTS] = estimate.landmarks[CONTOURS, :2].ravel()
+    row[_POINTS] = estimate.landmarks[_KEPT].ravel()
     return row
 
 
@@ -57,8 +60,25 @@ def parts(rows: NDArray[np.floating[Any]]) -> tuple[NDArray[np.floating[Any]], .
         rows[:, 1],
         rows[:, _WEIGHTS],
         rows[:, _GAZE].reshape(T, 2, 3),
-        rows[:, _POINTS].reshape(T, len(CONTOURS), 2),
+        rows[:, _POINTS].reshape(T, len(_KEPT), 3)[:, _AT_CONTOURS, :2],
     )
+
+
+def landmarks_of(rows: NDArray[np.floating[Any]], numbers: NDArray[np.int64]) -> NDArray[np.floating[Any]]:
+    """Return landmarks (T, n, 3) of rows, in pixels, and depth in pixels.
+
+    :param numbers: (n,) of the contours, or of those that the expression network takes.
+    """
+    return rows[:, _POINTS].reshape(len(rows), len(_KEPT), 3)[:, np.searchsorted(_KEPT, numbers)]
+
+
+def with_expression(
+    rows: NDArray[np.floating[Any]], weights: NDArray[np.float64], directions: NDArray[np.float64]
+) -> NDArray[np.floating[Any]]:
+    """Return rows with other weights (T, 52) and directions of the eyes (T, 2, 3)."""
+    out = rows.copy()
+    out[:, _WEIGHTS], out[:, _GAZE] = weights, directions.reshape(len(rows), -1)
+    return out
 
 
 def _ramp(value: float, low: float, high: float) -> float:

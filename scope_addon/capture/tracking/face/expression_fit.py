@@ -1,0 +1,152 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Expression weights fitted to a clip's landmarks, by the response of the landmark network to the body's own face.
+
+Frame t's aligned landmarks x_t (D,) are modelled as
+
+    x_t = m + V f(v_t) + c + G (v_t − v̄) + Eᵀ w_t + e_t        e_t ~ N(0, Σ)
+
+m: the mean face; f(v_t): terms of the view v_t; c and G: this person's face, and how it looks in other views than his
+mean one v̄, constant over the clip; E (U, D): the response to each unit of expression. The weights minimize
+
+    ½ (r_t − Eᵀ w)ᵀ Σ⁻¹ (r_t − Eᵀ w) + λ Σ_u w_u        0 ≤ w ≤ w_max
+
+by coordinate descent, in turns with c and G. `tools/calibrate_face` measures m, V, E and Σ on rendered faces, with the
+network's errors: a lid that the network closes only by half still counts as closed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .....solver.errors import ModelFileError
+from .....solver.loaders.npz import read_npz
+from ...perception.face.face_record import landmarks_of, parts, with_expression
+from .face_alignment import aligned, view_terms
+
+FILE = Path(__file__).resolve().parents[4] / "assets" / "face" / "response.npz"
+LEAST_S, LEAST_FRAMES = 2.0, 10  # of a face, from which a person's face at rest is known
+SURE = 0.3  # confidence of frames that tell the person's face
+SPARSITY = 3.0  # λ
+SURE_PX, MOST_NOISE = 64.0, 8.0  # size of a face below which λ grows, with the area's inverse, and how much
+LARGEST_GAZE = 2.0  # w_max of the units that turn the eyes: eyes turn farther than the body's keys at 1
+_ROUNDS, _SWEEPS = 4, 30
+_TURN_RIDGE = 0.0025  # on G, in squared radians
+_BLOCK = 2048  # frames that are solved at once: they fit into a processor's cache
+
+
+@dataclass(frozen=True)
+class FaceResponse:
+    """The response of the landmark network: U units of expression, n landmarks, D = 3 n."""
+
+    landmarks: NDArray[np.int64]  # (n,) numbers in the mesh of 478
+    reference: NDArray[np.float64]  # (n, 3) to which faces are aligned
+    shares: NDArray[np.float64]  # (n,) of the landmarks in the alignment
+    mean: NDArray[np.float64]  # (D,) m
+    view: NDArray[np.float64]  # (VIEW_TERMS, D) V
+    response: NDArray[np.float64]  # (U, D) E
+    projection: NDArray[np.float64]  # (U, D) E Σ⁻¹
+    units: NDArray[np.float64]  # (U, 52) which expressions each unit moves: 0 or 1
+    gaze: NDArray[np.float64]  # (U, 2) tangents of the eyes' turn to the left and up at weight 1
+
+    @property
+    def largest(self) -> NDArray[np.float64]:
+        """(U,) w_max."""
+        return np.where(self.gaze.any(axis=1), LARGEST_GAZE, 1.0)
+
+
+@cache
+def load_response() -> FaceResponse:
+    """Read the built-in response.
+
+    :raises ModelFileError: the file is missing or damaged.
+    """
+    data = read_npz(FILE, ModelFileError, "file of the face's response")
+    try:
+        return FaceResponse(
+            data["landmarks"], *(data[name].astype(float) for name in list(FaceResponse.__annotations__)[1:])
+        )
+    except (KeyError, TypeError, ValueError) as error:
+        raise ModelFileError(f"{FILE} is damaged ({error}); install Scope again") from error
+
+
+def fitted(rows: NDArray[np.floating[Any]], times: NDArray[np.float64]) -> NDArray[np.floating[Any]]:
+    """Return rows whose weights and gaze are fitted to the landmarks; those of short clips stay the networks'.
+
+    :param rows: (T, RECORD) see `face_record`.
+    :param times: (T,) seconds.
+    """
+    seen = np.flatnonzero(rows[:, 0] > 0)
+    if len(times) < 2 or len(seen) < max(LEAST_FRAMES, LEAST_S / float(np.median(np.diff(times)))):
+        return rows
+    response = load_response()
+    confidence, size, *_ = parts(rows[seen])
+    faces = aligned(
+        landmarks_of(rows[seen], response.landmarks).astype(float), response.reference, response.shares
+    )
+    noise = np.clip((SURE_PX / np.maximum(size, 1.0)) ** 2, 1.0, MOST_NOISE)
+    sure = confidence >= min(SURE, float(np.median(confidence)))
+    units = fit_units(response, faces.points.reshape(len(seen), -1), faces.turns, SPARSITY * noise, sure)
+    out = rows.copy()
+    out[seen] = with_expression(rows[seen], np.minimum(units @ response.units, 1.0), _directions(units @ response.gaze))
+    return out
+
+
+def fit_units(
+    response: FaceResponse,
+    points: NDArray[np.float64],
+    turns: NDArray[np.float64],
+    sparsity: NDArray[np.float64],
+    sure: NDArray[np.bool_],
+) -> NDArray[np.float64]:
+    """Return the weights (T, U) of the units of expression.
+
+    :param points: (T, D) aligned landmarks.
+    :param turns: (T, 3) rotation vectors of the head.
+    :param sparsity: (T,) λ.
+    :param sure: (T,) frames by which the person's face is known.
+    """
+    E = response.response
+    x = points - response.mean - view_terms(turns) @ response.view
+    views = turns - turns[sure].mean(axis=0)
+    ridge = _TURN_RIDGE * sure.sum() * np.eye(3)
+    normal, w = E @ response.projection.T, np.zeros((len(x), len(E)))
+    for k in range(_ROUNDS):
+        rest = x[sure] - w[sure] @ E
+        constant = rest.mean(axis=0) if k else np.median(rest, axis=0)
+        v = views[sure]
+        turned = np.linalg.solve(v.T @ v + ridge, v.T @ (rest - constant))
+        target = (x - constant - views @ turned) @ response.projection.T - sparsity[:, None]
+        for a in range(0, len(x), _BLOCK):
+            _descend(w[a : a + _BLOCK], normal, target[a : a + _BLOCK], response.largest)
+    return w
+
+
+def _descend(
+    w: NDArray[np.float64],
+    normal: NDArray[np.float64],
+    target: NDArray[np.float64],
+    largest: NDArray[np.float64],
+) -> None:
+    """Minimize ½ wᵀ H w − gᵀ w in the box 0 ≤ w ≤ w_max, for all frames at once, in place.
+
+    :param w: (T, U) where to begin.
+    :param normal: (U, U) H.
+    :param target: (T, U) g.
+    """
+    for _ in range(_SWEEPS):
+        for u in range(len(normal)):
+            step = (target[:, u] - w @ normal[:, u]) / normal[u, u]
+            np.clip(w[:, u] + step, 0.0, largest[u], out=w[:, u])
+
+
+def _directions(tangents: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return unit vectors (T, 2, 3), the same of both eyes, from the tangents (T, 2) to the left and up."""
+    ahead = np.concatenate([tangents, np.ones((len(tangents), 1))], axis=1)
+    ahead /= np.linalg.norm(ahead, axis=1, keepdims=True)
+    return np.repeat(ahead[:, None], 2, axis=1)

@@ -1,0 +1,98 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The response of the landmark network to expressions, from rendered faces in single poses and in motion."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...scope_addon.capture.perception.face.face_landmarks import EXPRESSION_POINTS
+from ...scope_addon.capture.tracking.face.expression_fit import FaceResponse
+from ...scope_addon.capture.tracking.face.face_alignment import VIEW_TERMS, AlignedFaces, aligned, view_terms
+from ...solver.names import EXPRESSIONS
+from .observe import SeenFaces
+
+TOGETHER = (  # what both eyes do, as people's do and as the network sees it
+    ("eyeLookOutLeft", "eyeLookInRight"),
+    ("eyeLookInLeft", "eyeLookOutRight"),
+    ("eyeLookUpLeft", "eyeLookUpRight"),
+    ("eyeLookDownLeft", "eyeLookDownRight"),
+)
+UNSEEN = ("tongueOut",)
+_ROUNDS = 8  # of reference, alignment and shares
+_RIDGE, _TURN_RIDGE = 0.02, 0.0025
+_OF_POSES = 0.2  # of the covariance of errors in unrelated poses that is added to that in motion
+_SHRINK = 0.05  # of the covariance to its diagonal
+
+
+def units_of_expression() -> NDArray[np.float64]:
+    """Return the units (U, 52) as rows of 0 and 1."""
+    apart = [n for n in EXPRESSIONS if n not in UNSEEN and not any(n in both for both in TOGETHER)]
+    rows: list[tuple[str, ...]] = [*((n,) for n in apart), *TOGETHER]
+    return np.array([[float(name in row) for name in EXPRESSIONS] for row in rows])
+
+
+def measure_response(poses: SeenFaces, moving: SeenFaces) -> FaceResponse:
+    """Measure the response on people in unrelated poses, and its errors also on people who talk."""
+    units = units_of_expression()
+    share = units / units.sum(axis=1, keepdims=True)
+    landmarks, points = np.array(EXPRESSION_POINTS), poses.landmarks[:, EXPRESSION_POINTS]
+    W, person = poses.truth["weights"], poses.truth["person"]
+    neutral = ~W.any(axis=1)
+    people = np.unique(person)
+    first = np.array([np.flatnonzero(neutral & (person == p))[0] for p in people])
+    reference, shares = points[first[0]] * [1, -1, -1], np.full(len(landmarks), 1 / len(landmarks))
+    for _ in range(_ROUNDS):
+        reference = aligned(points[first], _unit(reference), shares).points.mean(axis=0)
+        faces = aligned(points, reference := _unit(reference), shares)
+        rest = np.array([faces.points[neutral & (person == p)].mean(axis=0) for p in people])
+        moves = ((faces.points - rest[np.searchsorted(people, person)]) ** 2).sum(axis=2).mean(axis=0)
+        shares = 1 / (moves + 0.1 * np.median(moves))
+        shares /= shares.sum()
+    faces = aligned(points, reference, shares)
+    x = (faces.points - rest[np.searchsorted(people, person)]).reshape(len(W), -1)
+    terms = np.c_[W @ share.T, view_terms(faces.turns)]
+    both = np.linalg.solve(terms.T @ terms + _RIDGE * np.eye(terms.shape[1]), terms.T @ x)
+    E, view, mean = both[:-VIEW_TERMS], both[-VIEW_TERMS:], rest.mean(axis=0).ravel()
+    covariance = _OF_POSES * np.cov((x - terms @ both).T)
+    covariance += _errors_in_motion(moving, aligned(moving.landmarks[:, landmarks], reference, shares), E, view, mean, share)
+    diagonal = np.diag(np.diag(covariance))
+    inverse = np.linalg.inv((1 - _SHRINK) * covariance + _SHRINK * diagonal)
+    return FaceResponse(landmarks, reference, shares, mean, view, E, E @ inverse, units, _gaze(poses, units, share))
+
+
+def _unit(reference: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return points with mean 0 and mean square 1."""
+    centred = reference - reference.mean(axis=0)
+    out: NDArray[np.float64] = centred / np.sqrt((centred**2).sum(axis=1).mean())
+    return out
+
+
+def _errors_in_motion(
+    moving: SeenFaces,
+    faces: AlignedFaces,
+    E: NDArray[np.float64],
+    view: NDArray[np.float64],
+    mean: NDArray[np.float64],
+    share: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Return the covariance (D, D) of what is left once a person's face and its change with the view are known."""
+    x = faces.points.reshape(len(faces.points), -1) - mean - view_terms(faces.turns) @ view
+    x -= moving.truth["weights"] @ share.T @ E
+    left = []
+    for p in np.unique(moving.truth["person"]):
+        rows = moving.truth["person"] == p
+        own, v = x[rows] - x[rows].mean(axis=0), faces.turns[rows] - faces.turns[rows].mean(axis=0)
+        turned = np.linalg.solve(v.T @ v + _TURN_RIDGE * rows.sum() * np.eye(3), v.T @ own)
+        left.append(own - v @ turned)
+    return np.cov(np.concatenate(left).T)
+
+
+def _gaze(poses: SeenFaces, units: NDArray[np.float64], share: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the tangents (U, 2) by which the units turn the eyes of the body, mean of both eyes."""
+    tangents = (poses.truth["gaze"][..., :2] / poses.truth["gaze"][..., 2:]).mean(axis=1)
+    turning = units.sum(axis=1) > 1
+    terms = np.c_[poses.truth["weights"] @ share[turning].T, np.ones(len(tangents))]
+    out = np.zeros((len(units), 2))
+    out[turning] = np.linalg.lstsq(terms, tangents, rcond=None)[0][:-1]
+    return out

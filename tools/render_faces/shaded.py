@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A fast renderer of the head, without shadows, for the many pictures that something is calibrated on."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from ...scope_addon.capture.overlay.rasterizer import Canvas, draw_shaded, vertex_normals
+from ...scope_addon.kinematics.expressions import mouth_faces_of
+from ...solver.body import Body
+from .looks import Look
+from .truth import SIZE
+
+_OVER = 2  # pixels are drawn so many times finer
+_CONCAVE = 300.0  # per metre: how much darker hollows are
+_NECK_M, _HALF_M = 0.08, 0.2  # below the neck joint and beside the body's middle, where the picture ends
+
+
+class ShadedStage:
+    """Draws one head; the same interface as `Stage`."""
+
+    def __init__(self, body: Body) -> None:
+        V = body.v_template
+        neck = body.J_template[body.joint_names.index("neck"), 1]
+        near = (V[:, 1] > neck - _NECK_M) & (abs(V[:, 0]) < _HALF_M)
+        kept = near[body.faces].all(axis=1)
+        quads = body.faces[kept]
+        self._triangles = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]]).astype(np.int32)
+        self._material, self._names = body.face_material[kept], list(body.material_names)
+        self._palette = np.asarray(body.material_colors)[:, :3]
+        self._mouth = np.isin(np.flatnonzero(kept), mouth_faces_of(body))
+        self._quads, self._edges = quads, np.concatenate([quads[:, [k, (k + 1) % 4]] for k in range(4)])
+
+    def dress(self, look: Look, rng: np.random.Generator) -> None:
+        """Take a person's colours, and draw light and background."""
+        colors = self._palette[self._material].copy()
+        skin = np.isin(self._material, [self._names.index(n) for n in ("skin", "suit", "suit_accent")])
+        colors[skin] = look.skin[self._quads[skin]].mean(axis=1)
+        colors[self._material == self._names.index("hair")] = look.hair
+        colors[self._material == self._names.index("eye_iris")] = look.iris
+        colors[self._mouth] = 0.1 * look.skin.min(axis=0)
+        self._colors = np.tile(np.clip(colors, 0, 1) ** (1 / 2.2), (2, 1)).astype(np.float32)
+        directions = rng.normal(size=(2, 3)) * [1.0, 0.7, 0.4] + [0, -0.5, -1.0]
+        self._lights = directions / np.linalg.norm(directions, axis=1, keepdims=True)
+        self._strength = np.array([rng.uniform(0.35, 0.9), rng.uniform(0, 0.3)])
+        self._ambient = rng.uniform(0.35, 0.65)
+        self._background = rng.uniform(60, 220, 3)
+        self._noise = np.random.default_rng(rng.integers(1 << 30))
+
+    def render(self, vertices_camera: NDArray[np.float64], focal_px: float, path: Path) -> None:
+        """Render the vertices (V, 3), metres in the camera frame, to a picture of SIZE × SIZE pixels."""
+        V = np.ascontiguousarray(vertices_camera, float)
+        normals = vertex_normals(V, self._triangles)
+        a, b = self._edges.T
+        step = V[b] - V[a]
+        hollow = np.bincount(a, np.einsum("ex,ex->e", step, normals[a]), len(V)) / np.maximum(
+            np.bincount(a, np.linalg.norm(step, axis=1) ** 2, len(V)), 1e-12
+        )
+        light = self._ambient + np.maximum(normals @ self._lights.T, 0) @ self._strength
+        light *= np.clip(1.0 - hollow / _CONCAVE * 3.0, 0.25, 1.1)
+        shading = np.stack([np.clip(light, 0, 1.3), np.zeros(len(V))], axis=1)
+        side = _OVER * SIZE
+        K = np.array([[focal_px * _OVER, 0, side / 2 - 0.5], [0, focal_px * _OVER, side / 2 - 0.5], [0, 0, 1.0]])
+        canvas = Canvas.blank(side, side)
+        draw_shaded(canvas, V, self._triangles, self._colors, shading, K)
+        image = np.where(canvas.coverage[..., None], canvas.rgba[..., :3], self._background)
+        image = cv2.resize(cv2.GaussianBlur(image, (0, 0), 1.2), (SIZE, SIZE), interpolation=cv2.INTER_AREA)
+        image += self._noise.normal(0, 2.5, image.shape)
+        cv2.imwrite(str(path), np.clip(image, 0, 255).astype(np.uint8)[..., ::-1])

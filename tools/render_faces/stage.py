@@ -1,0 +1,137 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The head, its colours, the light and the camera in Blender. The world is the camera's frame: x right, y down."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ...scope_addon.scene.axes import blender_camera_matrix
+from ...solver.body import Body
+from .looks import Look
+from .truth import SIZE
+
+SAMPLES = 4
+
+
+class Stage:
+    """A scene with one head, rendered frame by frame."""
+
+    def __init__(self, body: Body) -> None:
+        bpy.ops.wm.read_factory_settings(use_empty=True)
+        self._render_settings()
+        self._camera()
+        self._lamps()
+        self._head(body)
+
+    def dress(self, look: Look, rng: np.random.Generator) -> None:
+        """Take a person's colours, and draw light and background."""
+        rgba = np.concatenate([look.skin[self._kept], np.ones((len(self._kept), 1))], axis=1).astype(np.float32)
+        self._mesh.color_attributes["tint"].data.foreach_set("color", rgba.ravel())
+        for name, color in (("hair", look.hair), ("eye_iris", look.iris)):
+            surface = self._mesh.materials[name].node_tree.nodes["Principled BSDF"]
+            surface.inputs["Base Color"].default_value = (*color, 1)
+        for lamp, watts in zip(self._lights, (rng.uniform(4, 14), rng.uniform(0, 4)), strict=True):
+            lamp.data.energy, lamp.data.size = watts, rng.uniform(0.2, 1.0)
+            lamp.location = (rng.uniform(-0.9, 0.9), rng.uniform(-1.0, 0.2), rng.uniform(-0.4, 0.2))
+        background = bpy.context.scene.world.node_tree.nodes["Background"]
+        background.inputs["Color"].default_value = (*rng.uniform(0.5, 1.0, 3), 1)
+        background.inputs["Strength"].default_value = rng.uniform(0.3, 0.8)
+
+    def render(self, vertices_camera: NDArray[np.float64], focal_px: float, path: Path) -> None:
+        """Render the vertices (V, 3), metres in the camera frame, to a picture of SIZE × SIZE pixels."""
+        points = np.ascontiguousarray(vertices_camera[self._kept], np.float32)
+        self._mesh.vertices.foreach_set("co", points.ravel())
+        self._mesh.update()
+        bpy.context.scene.camera.data.lens = focal_px / SIZE * 36.0
+        for lamp in self._lights:
+            direction = np.array([0.0, 0.0, 1.0]) * points[:, 2].mean() - np.array(lamp.location)
+            lamp.rotation_mode = "QUATERNION"
+            lamp.rotation_quaternion = _facing(direction)
+        bpy.context.scene.render.filepath = str(path)
+        bpy.ops.render.render(write_still=True)
+
+    @staticmethod
+    def _render_settings() -> None:
+        scene = bpy.context.scene
+        scene.render.engine = "CYCLES"
+        scene.render.resolution_x = scene.render.resolution_y = SIZE
+        scene.render.resolution_percentage = 100
+        scene.render.use_persistent_data = True
+        scene.render.image_settings.file_format = "PNG"
+        scene.view_settings.view_transform = "AgX"
+        scene.view_settings.look = "AgX - Medium High Contrast"
+        cycles = scene.cycles
+        cycles.samples, cycles.use_adaptive_sampling = SAMPLES, False
+        cycles.max_bounces, cycles.diffuse_bounces, cycles.glossy_bounces = 1, 1, 1
+        cycles.use_denoising = True
+        cycles.denoiser = "OPENIMAGEDENOISE"
+        cycles.denoising_quality = "FAST"
+        cycles.denoising_prefilter = "NONE"
+        cycles.seed = 1
+
+    @staticmethod
+    def _camera() -> None:
+        scene, data = bpy.context.scene, bpy.data.cameras.new("camera")
+        scene.camera = bpy.data.objects.new("camera", data)
+        scene.collection.objects.link(scene.camera)
+        data.sensor_fit, data.sensor_width = "HORIZONTAL", 36.0
+        data.clip_start = 0.01
+        scene.camera.matrix_world = blender_camera_matrix(np.eye(4)).T.tolist()
+
+    def _lamps(self) -> None:
+        scene = bpy.context.scene
+        scene.world = bpy.data.worlds.new("sky")
+        scene.world.use_nodes = True
+        self._lights = []
+        for name in ("key", "fill"):
+            lamp = bpy.data.objects.new(name, bpy.data.lights.new(name, "AREA"))
+            scene.collection.objects.link(lamp)
+            self._lights.append(lamp)
+
+    def _head(self, body: Body) -> None:
+        V = body.v_template
+        neck = body.J_template[body.joint_names.index("neck"), 1]
+        faces = body.faces[(V[body.faces][:, :, 1] > neck - 0.08).all(axis=1) & (abs(V[body.faces][:, :, 0]) < 0.2).all(axis=1)]
+        self._kept, local = np.unique(faces, return_inverse=True)
+        material = body.face_material[np.isin(np.arange(len(body.faces)), _rows(body.faces, faces))]
+        self._mesh = bpy.data.meshes.new("head")
+        self._mesh.from_pydata(V[self._kept].tolist(), [], local.reshape(-1, 4).tolist())
+        for name, color in zip(body.material_names, body.material_colors, strict=True):
+            self._mesh.materials.append(_material(str(name), tuple(color)))
+        self._mesh.polygons.foreach_set("material_index", material.astype(np.int32))
+        self._mesh.polygons.foreach_set("use_smooth", np.ones(len(faces), bool))
+        self._mesh.color_attributes.new("tint", "FLOAT_COLOR", "POINT")
+        head = bpy.data.objects.new("head", self._mesh)
+        bpy.context.scene.collection.objects.link(head)
+        subdivision = head.modifiers.new("smooth", "SUBSURF")
+        subdivision.levels = subdivision.render_levels = 1
+
+
+def _material(name: str, color: tuple[float, ...]) -> bpy.types.Material:
+    material = bpy.data.materials.new(name)
+    material.use_nodes = True
+    nodes = material.node_tree.nodes
+    surface = nodes["Principled BSDF"]
+    surface.inputs["Base Color"].default_value = color
+    surface.inputs["Roughness"].default_value = 0.2 if "eye" in name else 0.5
+    if name in ("skin", "suit", "suit_accent"):
+        tint = nodes.new("ShaderNodeVertexColor")
+        tint.layer_name = "tint"
+        material.node_tree.links.new(tint.outputs["Color"], surface.inputs["Base Color"])
+    return material
+
+
+def _rows(all_faces: NDArray[np.int32], some: NDArray[np.int32]) -> NDArray[np.intp]:
+    place = {tuple(face): k for k, face in enumerate(all_faces.tolist())}
+    return np.array([place[tuple(face)] for face in some.tolist()])
+
+
+def _facing(direction: NDArray[np.float64]) -> tuple[float, float, float, float]:
+    """Return the quaternion that turns −z, along which a lamp shines, to a direction."""
+    from mathutils import Vector
+
+    return tuple(Vector(direction).to_track_quat("-Z", "Y"))
