@@ -95,11 +95,14 @@ def frame_of(motion: Motion, row: int) -> Frame:
 def errors(body: Body, joints: Points, true: Points, names: list[str]) -> dict[str, float]:
     """Return mean errors of the twelve limb joints, mm: ``mpjpe_root``, relative to the hips, and ``pa_mpjpe``.
 
-    :param joints: (F, K+1, 3), those of the body. :param true: (F, J, 3), as ``names``; both in the camera frame.
+    :param joints: (F, K+1, 3), those of the body, in the camera frame.
+    :param true: (F, J, 3), as ``names``, in the camera frame; frames that lack a joint (NaN) do not count.
     """
     limbs = [side + limb for limb in LIMBS for side in SIDES]
     at = [body.joint_names.index(f"{SIDES[limb[0]]}_{LIMBS[limb[1:]]}") for limb in limbs]
     captured, wanted = joints[:, at], true[:, [names.index(limb) for limb in limbs]]
+    known = np.isfinite(wanted).all(axis=(1, 2))
+    captured, wanted = captured[known], wanted[known]
     hips = [limbs.index("LHip"), limbs.index("RHip")]
     relative = [relative_to(points, points[:, hips].mean(axis=1)) for points in (captured, wanted)]
     return {"mpjpe_root": float(mpjpe(*relative).mean()), "pa_mpjpe": float(pa_mpjpe(captured, wanted).mean())}
