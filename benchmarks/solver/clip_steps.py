@@ -15,9 +15,10 @@ from ...solver import Measurements, MotionPrior, Options, Priors, Stage, Standin
 from ...solver.compiled.part import Pose
 from ...solver.compiled.tree import make_tree, with_fixed_shape
 from ...solver.gauss_newton.optimizer import make_settings
+from ...solver.gauss_newton.several_frames import SharedPriors
 from ...solver.gauss_newton.terms import pack_priors
 from ...solver.motion.band import make_factor, solve_clip
-from ...solver.motion.problem import ClipProblem, Globals, MotionTerms
+from ...solver.motion.problem import ClipProblem, MotionTerms
 from ...solver.motion.system import make_poses
 from ...solver.motion.views import pack_frames
 from .clip_gradients import ConjugateGradients
@@ -54,7 +55,7 @@ def make_clip(
     stage = Stage(Weights())
     settings = make_settings(Options(stages=[stage]), [stage])
     P = tree.shape
-    return ClipProblem(tree, views, motion, Globals(np.zeros(P), np.eye(P), 0.0), settings, pool), poses
+    return ClipProblem(tree, views, motion, SharedPriors(np.zeros(P), np.eye(P), 0.0), settings, pool), poses
 
 
 def clip_table(rounds: int) -> list[dict[str, float]]:

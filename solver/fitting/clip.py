@@ -20,18 +20,9 @@ from ..compiled.tree import BodyArrays, Tree, make_tree, with_fixed_shape
 from ..custom_residuals.external import raise_failure
 from ..errors import ShapeError
 from ..gauss_newton.linearize import linearize, make_blocks, make_pose
-from ..gauss_newton.optimizer import (
-    CONVERGED,
-    DAMPING_LEAST,
-    FIRST_GROWTH,
-    LEAST_DECREASE,
-    MAX_ITERATIONS,
-    NON_FINITE,
-    RUNNING,
-    judge_trial,
-    make_settings,
-)
+from ..gauss_newton.optimizer import DAMPING_LEAST, make_settings
 from ..gauss_newton.recursion import Workspace, eliminate, make_workspace, retract, solve_globals, substitute
+from ..gauss_newton.several_frames import SeveralFrames, SharedPriors
 from ..gauss_newton.terms import Terms, fill_terms, pack_priors, usable
 from ..measurements import Measurements
 from ..options import Options, Priors, default_priors
@@ -101,7 +92,7 @@ def fit_clip(
     if len(seen) > shape_frames > 0:
         chosen = [seen[k] for k in np.linspace(0, len(seen) - 1, shape_frames).round().astype(int)]
     joint = _Joint(clip_tree, [frames[k] for k in chosen], priors, options, focal_weight if focal else 0.0)
-    joint.run()
+    joint.optimize()
     beta, scale = joint.beta[: tree.shape].copy(), float(np.exp(joint.log_focal))
     together = dict(zip(chosen, joint.fits(), strict=True))
     fixed = with_fixed_shape(tree, beta)
@@ -183,23 +174,21 @@ class _Active:
     cost: float = 0.0
 
 
-class _Joint:
-    """Levenberg-Marquardt over the poses of several frames and the global columns they share."""
+class _Joint(SeveralFrames):
+    """The poses of several frames and the global columns they share, optimized together."""
 
     def __init__(self, tree: Tree, frames: list[_Frame], priors: Priors, options: Options, focal_weight: float) -> None:
-        self.tree, self.report = tree, options.report
-        self.P, self.focal_weight = tree.shape, focal_weight
-        self.mean, self.prior = priors.packed_shape(tree.shape)
+        super().__init__()
+        self.tree, self.report, self.P = tree, options.report, tree.shape
+        self.shared = SharedPriors(*priors.packed_shape(tree.shape), focal_weight)
         self.settings = make_settings(options, options.schedule(cold=False))
         self.stages = self.settings.stages
         self.shape_weights = self.stages[:, 0, SHAPE_PRIOR].copy()
         self.stages[:, 0, SHAPE_PRIOR] = 0.0  # once for the clip, not in every frame
-        self.beta = np.zeros(tree.S.shape[2])
-        self.log_focal = 0.0
-        self.status, self.cost = Status.NO_MEASUREMENTS, 0.0
-        self.iterations, self.rejected = 0, 0
+        self.beta, self.log_focal, self.status = np.zeros(tree.S.shape[2]), 0.0, Status.NO_MEASUREMENTS
         # the last frame's shape has seen most, when the frames were fitted in order
-        self.beta[: self.P] = as_array(frames[-1].init.beta, (self.P,), "beta") if frames else self.mean
+        first = as_array(frames[-1].init.beta, (self.P,), "beta") if frames else self.shared.shape_mean
+        self.beta[: self.P] = first
         shared = make_workspace(tree)
         self.frames: list[_Active] = []
         for f in frames:
@@ -207,45 +196,30 @@ class _Joint:
             pose = replace(f.init, beta=self.beta[: self.P]).pose(tree)
             self.frames.append(_Active(f.terms, f.count, pose, make_pose(tree), make_blocks(tree), work))
 
-    def run(self) -> None:
+    def optimize(self) -> None:
         """Optimize through the stages."""
-        if not self.frames:
+        if self.frames:
+            self.status = Status(self.run())
+
+    def _begin(self, s: int) -> float:
+        return self._linearize(s, trial=False)
+
+    def _try(self, s: int) -> float:
+        return self._linearize(s, trial=True)
+
+    def _conclude(self, s: int, cost: float, accepted: bool) -> None:
+        if not accepted:
+            self._linearize(s, trial=False)  # one set of blocks a frame: memory, not time, is what a clip lacks
             return
-        code = CONVERGED
-        for s in range(len(self.stages)):
-            code = self._run_stage(s)
-            if code == NON_FINITE:
-                break
-        self.status = Status(code)
-
-    def _run_stage(self, s: int) -> int:
-        damping, growth, tolerance = self.settings.damping, FIRST_GROWTH, self.settings.tolerances[s]
-        self.cost = self._linearize(s, trial=False)
-        if not np.isfinite(self.cost):
-            return NON_FINITE
-        for _ in range(self.settings.limits[s]):
-            predicted = self._step(s, damping)
-            if predicted <= LEAST_DECREASE * self.cost:
-                return CONVERGED
-            self.iterations += 1
-            cost = self._linearize(s, trial=True) if np.isfinite(predicted) else np.inf
-            accepted, damping, growth, verdict = judge_trial(self.cost, cost, predicted, damping, growth, tolerance)
-            if accepted:
-                self._accept(cost)
-            else:
-                self.rejected += 1
-                self._linearize(s, trial=False)  # one set of blocks a frame: memory, not time, is what a clip lacks
-            if verdict != RUNNING:
-                return verdict
-        return MAX_ITERATIONS
-
-    def _accept(self, cost: float) -> None:
-        """Make the trial poses the current ones."""
-        self.cost = cost
         for frame in self.frames:
             frame.pose, frame.trial = frame.trial, frame.pose
         self.beta = self.frames[0].pose.beta.copy()
         self.log_focal = float(self.frames[0].pose.log_focal[0])
+
+    def _priors(self, s: int, pose: Pose | None = None) -> tuple[float, NDArray[np.float64], float, bool]:
+        """Return the arguments of `SharedPriors` in stage s, at another point than the current one if there is one."""
+        beta, log_focal = (self.beta, self.log_focal) if pose is None else (pose.beta, float(pose.log_focal[0]))
+        return float(self.shape_weights[s]), beta, log_focal, self.tree.globals > self.P
 
     def _linearize(self, s: int, trial: bool) -> float:
         """Linearize every frame at its pose or its trial pose and return the clip's cost."""
@@ -255,25 +229,18 @@ class _Joint:
             f.cost = linearize(self.tree, f.terms, self.stages[s], self.settings.triggs, pose, f.blocks, f.work.scratch)
             total += f.cost
         raise_failure()
-        pose = self.frames[0].trial if trial else self.frames[0].pose
-        offset = pose.beta[: self.P] - self.mean
-        total += 0.5 * self.shape_weights[s] * float(offset @ self.prior @ offset)
-        total += 0.5 * self.focal_weight * float(pose.log_focal[0]) ** 2
-        return total
+        at = self.frames[0].trial if trial else self.frames[0].pose
+        return total + sum(self.shared.costs(*self._priors(s, at)).values())
 
     def _reduced(self, s: int, damping: float) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
         """Eliminate every frame's pose; return the summed system of the global columns and the sum of |q~|^2."""
-        P, squares = self.P, 0.0
+        squares = 0.0
         C, c = np.zeros_like(self.frames[0].work.C), np.zeros_like(self.beta)
         for f in self.frames:
             squares += eliminate(self.tree, f.pose, f.blocks, damping, self.settings.root_scale, f.work)
             C += f.work.C
             c += f.work.c
-        C[:P, :P] += self.shape_weights[s] * self.prior
-        c[:P] += self.shape_weights[s] * (self.prior @ (self.beta[:P] - self.mean))
-        if self.tree.globals > P:
-            C[P, P] += self.focal_weight
-            c[P] += self.focal_weight * self.log_focal
+        self.shared.add(*self._priors(s), (C, c))
         return C, c, squares
 
     def _step(self, s: int, damping: float) -> float:
@@ -310,17 +277,13 @@ class _Joint:
         for f in self.frames:
             for name, cost in self._shares(f).items():
                 total[name] = total.get(name, 0.0) + cost
-        offset = self.beta[: self.P] - self.mean
-        total["shape_prior"] = 0.5 * self.shape_weights[-1] * float(offset @ self.prior @ offset)
-        if self.tree.globals > self.P:
-            total["focal_prior"] = 0.5 * self.focal_weight * self.log_focal**2
-        return total
+        return total | self.shared.costs(*self._priors(-1))
 
     def information(self) -> NDArray[np.float64]:
         """Return the information matrix of beta (P, P), prior included, poses and focal length eliminated."""
         P = self.P
         if not self.frames:
-            prior: NDArray[np.float64] = self.shape_weights[-1] * self.prior
+            prior: NDArray[np.float64] = self.shape_weights[-1] * self.shared.shape_information
             return prior
         C, _, _ = self._reduced(len(self.stages) - 1, DAMPING_LEAST)
         return shape_information(C[: self.tree.globals, : self.tree.globals], P)

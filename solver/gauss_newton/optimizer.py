@@ -79,7 +79,7 @@ def judge_trial(
     return False, damping, 2.0 * growth, STALLED if damping > DAMPING_MOST else RUNNING
 
 
-_judge_trial = kernel(judge_trial)  # for `optimize`; clip.py, whose loop is not compiled, calls it as it is
+_judge_trial = kernel(judge_trial)  # for `optimize`; several_frames.py, whose loop is not compiled, calls it as it is
 
 
 @kernel

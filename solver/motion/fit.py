@@ -16,16 +16,18 @@ from ..compiled.tree import BodyArrays, Tree, make_tree, with_fixed_shape
 from ..errors import InvalidValueError, ShapeError
 from ..fitting.clip import shape_information
 from ..gauss_newton.optimizer import make_settings
+from ..gauss_newton.several_frames import SharedPriors
 from ..gauss_newton.terms import pack_priors
 from ..measurements import Measurements
 from ..options import Options, Priors, default_priors
+from ..rotations import nearest_rotation
 from ..state import State, Status
 from ..validation import check_finite, check_type, check_weight
 from .covariance import joint_covariances
 from .initial import initial_states
 from .levenberg_marquardt import Optimizer
 from .prior import MotionPrior, StandingPoints
-from .problem import ClipProblem, Globals, MotionTerms
+from .problem import ClipProblem, MotionTerms
 from .system import make_poses
 from .views import View, pack_frames
 from .windows import Window, combined, overlapping, tiles
@@ -173,8 +175,11 @@ class _Clip:
         T, K, P = len(frames), len(tree.parents) - 1, tree.shape
         self.R, self.t, self.Omega = np.empty((T, K + 1, 3, 3)), np.empty((T, K + 1, 3)), np.empty((T, K, 3, 3))
         for f, state in enumerate(init):
-            pose = replace(state, beta=np.zeros(P)).pose(tree)
-            self.R[f, 0], self.t[f, 0], self.Omega[f] = pose.R[0], pose.t[0], pose.Omega[1:]
+            self.R[f, 0] = as_array(state.R_camera_root, (3, 3), "R_camera_root")
+            self.t[f, 0] = as_array(state.t_camera_root, (3,), "t_camera_root")
+            self.Omega[f] = as_array(state.Omega, (K, 3, 3), "Omega")
+            State.check(self.R[f, 0], self.Omega[f])
+        self.R[:, 0], self.Omega = nearest_rotation(self.R[:, 0]), nearest_rotation(self.Omega)
         self.beta, self.log_focal = as_array(init[-1].beta, (P,), "beta").copy(), 0.0
         self.information = np.zeros((P, P))
         self.covariances = np.empty((2, T, K + 1, 3, 3)) if settings.covariance else None
@@ -209,7 +214,7 @@ class _Clip:
         poses.R[:, 0], poses.t[:, 0] = self.R[window.frames, 0], self.t[window.frames, 0]
         poses.Omega[:, 1:] = self.Omega[window.frames]
         poses.beta[:P], poses.log_focal[:] = self.beta[:P], self.log_focal
-        shared = Globals(*priors.packed_shape(P), settings.focal_weight)
+        shared = SharedPriors(*priors.packed_shape(P), settings.focal_weight)
         options = settings.options
         problem = ClipProblem(
             tree, views, self.motion.part(window.frames), shared,

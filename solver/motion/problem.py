@@ -13,21 +13,13 @@ from ..compiled.tree import Tree
 from ..custom_residuals.external import raise_failure
 from ..gauss_newton.linearize import clear_blocks, linearize, make_blocks, make_pose, make_scratch, place_parts
 from ..gauss_newton.optimizer import Settings
+from ..gauss_newton.several_frames import SharedPriors
 from ..residuals.registry import SHAPE_PRIOR
 from . import acceleration, standing
 from .band import run_both
 from .prior import MotionPrior, StandingPoints
 from .system import ClipSystem, add_turned, make_system, pose_of, write_frame
 from .views import PackedViews, place_in_camera, terms_of
-
-
-@dataclass
-class Globals:
-    """What all frames share: the prior of the shape, and of the logarithm of the focal length."""
-
-    shape_mean: Array  # (P,)
-    shape_information: Array  # (P, P), over the shape's weight
-    focal_weight: float
 
 
 class MotionTerms(NamedTuple):
@@ -153,7 +145,7 @@ class ClipProblem:
     tree: Tree
     views: PackedViews
     motion: MotionTerms
-    shared: Globals
+    shared: SharedPriors
     settings: Settings  # without the shape's prior in the frames: it enters once
     pool: ThreadPoolExecutor | None = None
     costs: dict[str, float] = field(default_factory=dict)  # of what couples the frames, and of the shared unknowns
@@ -194,13 +186,13 @@ class ClipProblem:
         for memory in self._memories:
             system.C[:] += memory.C
             system.c[:] += memory.c
+        shared = self.shape_weights[s], poses.beta, float(poses.log_focal[0]), self.tree.globals > self.tree.shape
+        self.shared.add(*shared, (system.C, system.c))
         self.costs = {
             "acceleration": float(costs[:, 1].sum()),
             "contact": float(costs[:, 2].sum()),
-            "shape_prior": self._add_shape_prior(s, poses, system),
+            **self.shared.costs(*shared),
         }
-        if self.tree.globals > self.tree.shape:
-            self.costs["focal_prior"] = self._add_focal_prior(poses, system)
         return float(costs[:, 0].sum()) + sum(self.costs.values())
 
     def _linearize_half(
@@ -211,16 +203,3 @@ class ClipProblem:
             self.joints, system, costs,
         )  # fmt: skip
         raise_failure()  # in the thread in which the residual failed
-
-    def _add_shape_prior(self, s: int, poses: Pose, system: ClipSystem) -> float:
-        P, weight, information = self.tree.shape, self.shape_weights[s], self.shared.shape_information
-        offset = poses.beta[:P] - self.shared.shape_mean
-        system.C[:P, :P] += weight * information
-        system.c[:P] += weight * (information @ offset)
-        return float(0.5 * weight * (offset @ information @ offset))
-
-    def _add_focal_prior(self, poses: Pose, system: ClipSystem) -> float:
-        P, weight, log_focal = self.tree.shape, self.shared.focal_weight, float(poses.log_focal[0])
-        system.C[P, P] += weight
-        system.c[P] += weight * log_focal
-        return 0.5 * weight * log_focal**2

@@ -47,7 +47,7 @@ class ClipSystem(NamedTuple):
     contacts: Contacts  # the rest of (f, f-1)
 
 
-def make_system(tree: Tree, frames: int, points: Sequence[int] = ()) -> ClipSystem:
+def make_system(tree: Tree, frames: int, points: Sequence[int] | Array = ()) -> ClipSystem:
     """Return a system of zeros for that many frames, in which these points may stand."""
     K, W = len(tree.parents) - 1, tree.S.shape[2]
     n = padded(6 + 3 * K)

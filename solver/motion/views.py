@@ -74,7 +74,7 @@ def _and_table(before: Callable[..., Any], k: int) -> Callable[..., Any]:
     def some_tables(tables, rows, v):  # type: ignore[no-untyped-def]
         return before(tables, rows, v) + (tables[k][rows[k, v, 0] : rows[k, v, 1]],)
 
-    return register_jitable(some_tables)  # type: ignore[no-any-return]
+    return register_jitable(some_tables)
 
 
 _tables_of: Callable[..., Any] = _first_table

@@ -25,6 +25,7 @@ from scope.solver import (
     fit,
     fit_batch,
     fit_clip,
+    fit_motion,
     register_residual,
     rotations,
 )
@@ -183,6 +184,16 @@ def test_what_a_python_residual_raises_reaches_the_caller_once():
         with pytest.raises(InvalidValueError, match="residual 'broken' raised KeyError: \"a mistake of the user's"):
             attempt()
     assert fit(BODY, SEEN).status is Status.CONVERGED
+
+
+def test_what_it_raises_in_a_thread_reaches_the_caller_of_a_long_motion():
+    def broken(part, ints, floats):
+        raise KeyError("a mistake of the user's")
+
+    register_residual("broken", function=broken, floats=0)
+    last = replace(SEEN, tables={"broken": (np.array([[1]]), np.zeros((1, 0)))})
+    with pytest.raises(InvalidValueError, match="residual 'broken' raised KeyError"):
+        fit_motion(BODY, [SEEN] * 39 + [last], np.arange(40) / 30, init=[TRUTH] * 40, priors=Priors())
 
 
 @pytest.mark.parametrize(

@@ -17,9 +17,10 @@ from scope.solver import (
     rotations,
 )
 from scope.solver.gauss_newton.optimizer import make_settings
+from scope.solver.gauss_newton.several_frames import SharedPriors
 from scope.solver.gauss_newton.terms import pack_priors
 from scope.solver.motion.prior import MotionPrior, StandingPoints
-from scope.solver.motion.problem import ClipProblem, Globals, MotionTerms
+from scope.solver.motion.problem import ClipProblem, MotionTerms
 from scope.solver.motion.system import make_poses
 from scope.solver.motion.views import View, pack_frames
 
@@ -79,7 +80,7 @@ class Clip:
         views, _ = pack_frames(tree, self.frames(), packed)
         motion = MotionTerms.make(tree, self.times, prior, self.stands)
         settings = make_settings(FLAT, FLAT.schedule(cold=False))
-        shared = Globals(np.zeros(P), np.eye(P), FOCAL_WEIGHT if focal else 0.0)
+        shared = SharedPriors(np.zeros(P), np.eye(P), FOCAL_WEIGHT if focal else 0.0)
         problem = ClipProblem(tree, views, motion, shared, settings, pool)
         poses = make_poses(tree, problem.frames)
         for f, s in enumerate(self.starts):
