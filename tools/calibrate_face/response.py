@@ -22,7 +22,7 @@ TOGETHER = (  # what both eyes do, as people's do and as the network sees it
 )
 UNSEEN = ("tongueOut",)
 _ROUNDS = 8  # of reference, alignment and shares
-_RIDGE, _TURN_RIDGE = 0.02, 0.0025
+_RIDGE, _TURN_RIDGE = 0.02, 0.03
 _OF_POSES = 0.2  # of the covariance of errors in unrelated poses that is added to that in motion
 _DEGRADED = 0.5  # of the covariance of errors in motion that is from small and compressed pictures
 _SHRINK = 0.05  # of the covariance to its diagonal

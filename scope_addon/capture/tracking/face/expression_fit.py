@@ -37,7 +37,7 @@ SPARSITY = 3.0  # λ
 SURE_PX, MOST_NOISE = 64.0, 8.0  # size of a face below which errors grow, with the area's inverse; most growth of λ
 LARGEST_GAZE = 2.0  # w_max of the units that turn the eyes: eyes turn farther than the body's keys at 1
 _ROUNDS, _SWEEPS = 4, 30
-_TURN_RIDGE = 0.0025  # on G, in squared radians
+_TURN_RIDGE = 0.03  # on G, in squared radians
 _BLOCK = 2048  # frames that are solved at once: they fit into a processor's cache
 
 
@@ -118,9 +118,9 @@ def fit_units(
     views = turns - turns[sure].mean(axis=0)
     ridge = _TURN_RIDGE * sure.sum() * np.eye(3)
     normal, w, ratio = E @ response.projection.T, np.zeros((len(x), len(E))), 1.0
-    for k in range(_ROUNDS):
+    for _ in range(_ROUNDS):
         rest = x[sure] - w[sure] @ E
-        constant = rest.mean(axis=0) if k else np.median(rest, axis=0)
+        constant = np.median(rest, axis=0)
         v = views[sure]
         turned = np.linalg.solve(v.T @ v + ridge, v.T @ (rest - constant))
         own = x - constant - views @ turned
