@@ -26,7 +26,7 @@ from ...tools.calibrate_face.observe import SeenFaces, seen_faces
 from ...tools.render_faces.truth import FOLDER
 from ..report import table
 
-HELD_OUT, CALIBRATION = "talk", "poses"
+HELD_OUT, CALIBRATION = "talk", "shaded_talk"
 SMALL = 0.4  # of the pictures: faces of about 55 pixels
 ACTIVE, CLOSED = 0.2, 0.5
 LARGEST_SHIFT = 4  # frames, in which a blink may be early or late
@@ -102,10 +102,10 @@ def closures(
     for p in np.unique(person):
         for blink in BLINKS:
             true, seen = (_rises(w[person == p, blink]) for w in (truth, weights))
-            nearest = [np.abs(seen - t).min(initial=np.inf) for t in true]
+            nearest = [np.abs(seen - float(t)).min(initial=np.inf) for t in true]
             hits = [d for d in nearest if d <= LARGEST_SHIFT]
             found, count, off = found + len(hits), count + len(true), off + hits
-            false += sum(np.abs(true - t).min(initial=np.inf) > LARGEST_SHIFT for t in seen)
+            false += sum(np.abs(true - float(t)).min(initial=np.inf) > LARGEST_SHIFT for t in seen)
     return {
         "closed_found": found / count,
         "closed_false": false / count,

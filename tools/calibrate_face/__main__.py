@@ -14,6 +14,7 @@ from ...scope_addon.capture.tracking.face.expression_fit import FILE
 from .observe import seen_faces
 from .response import measure_response
 
+MOVING, DEGRADED = "shaded_talk", 0.5  # set, and scale of its small pictures
 LICENSE = "GPL-3.0-or-later, ours: measured by tools/calibrate_face on renders of the default body."
 
 
@@ -22,7 +23,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="calibrate_face", description=__doc__)
     parser.add_argument("-o", "--out", type=Path, default=FILE, help="file (default: assets/face/response.npz)")
     arguments = parser.parse_args()
-    found = vars(measure_response(seen_faces("poses"), seen_faces("shaded_talk")))
+    found = vars(measure_response(seen_faces("poses"), seen_faces(MOVING), seen_faces(MOVING, DEGRADED)))
     arrays = {name: v if name == "landmarks" else v.astype(np.float32) for name, v in found.items()}
     arguments.out.parent.mkdir(parents=True, exist_ok=True)
     with atomic_path(arguments.out) as temporary, temporary.open("wb") as file:

@@ -16,6 +16,7 @@ from ...scope_addon.capture.perception.region import Region
 from ..render_faces.truth import FOLDER, SIZE
 
 _PICTURE = Region((SIZE / 2, SIZE / 2), 0.9 * SIZE, 0.0)
+_QUALITY = 40  # of JPEG
 _ROUNDS = 3  # of the landmark network, each in the region that the one before found
 
 
@@ -32,7 +33,7 @@ class SeenFaces:
 def seen_faces(name: str, scale: float = 1.0) -> SeenFaces:
     """Return a rendered set as the networks see it.
 
-    :param scale: of the pictures before the networks see them, for small faces.
+    :param scale: of the pictures before the networks see them; other than 1, they are also compressed, as in videos.
     """
     folder = FOLDER / name
     with np.load(folder / "truth.npz") as data:
@@ -52,6 +53,7 @@ def _observe(folder: Path, count: int, scale: float, out: Path) -> None:
             raise SystemExit(f"{folder} lacks {t:04d}.png; run python -m scope.tools.render_faces {folder.name}")
         if scale != 1.0:
             image = cv2.resize(image, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
+            image = cv2.imdecode(cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])[1], cv2.IMREAD_COLOR)
         rgb = np.ascontiguousarray(image[..., ::-1])
         region = Region(tuple(scale * c for c in _PICTURE.center_px), scale * _PICTURE.side_px, 0.0)
         for _ in range(_ROUNDS):

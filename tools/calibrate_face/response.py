@@ -3,11 +3,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
 from ...scope_addon.capture.perception.face.face_landmarks import EXPRESSION_POINTS
-from ...scope_addon.capture.tracking.face.expression_fit import FaceResponse
+from ...scope_addon.capture.tracking.face.expression_fit import FaceResponse, error_size
 from ...scope_addon.capture.tracking.face.face_alignment import VIEW_TERMS, AlignedFaces, aligned, view_terms
 from ...solver.names import EXPRESSIONS
 from .observe import SeenFaces
@@ -20,8 +22,9 @@ TOGETHER = (  # what both eyes do, as people's do and as the network sees it
 )
 UNSEEN = ("tongueOut",)
 _ROUNDS = 8  # of reference, alignment and shares
-_RIDGE, _TURN_RIDGE = 0.02, 0.0025
+_RIDGE, _TURN_RIDGE = 0.02, 0.03
 _OF_POSES = 0.2  # of the covariance of errors in unrelated poses that is added to that in motion
+_DEGRADED = 0.5  # of the covariance of errors in motion that is from small and compressed pictures
 _SHRINK = 0.05  # of the covariance to its diagonal
 
 
@@ -32,8 +35,11 @@ def units_of_expression() -> NDArray[np.float64]:
     return np.array([[float(name in row) for name in EXPRESSIONS] for row in rows])
 
 
-def measure_response(poses: SeenFaces, moving: SeenFaces) -> FaceResponse:
-    """Measure the response on people in unrelated poses, and its errors also on people who talk."""
+def measure_response(poses: SeenFaces, moving: SeenFaces, degraded: SeenFaces) -> FaceResponse:
+    """Measure the response on people in unrelated poses, and its errors also on people who talk.
+
+    :param degraded: the same people as ``moving``, in small and compressed pictures.
+    """
     units = units_of_expression()
     share = units / units.sum(axis=1, keepdims=True)
     landmarks, points = np.array(EXPRESSION_POINTS), poses.landmarks[:, EXPRESSION_POINTS]
@@ -55,10 +61,17 @@ def measure_response(poses: SeenFaces, moving: SeenFaces) -> FaceResponse:
     both = np.linalg.solve(terms.T @ terms + _RIDGE * np.eye(terms.shape[1]), terms.T @ x)
     E, view, mean = both[:-VIEW_TERMS], both[-VIEW_TERMS:], rest.mean(axis=0).ravel()
     covariance = _OF_POSES * np.cov((x - terms @ both).T)
-    covariance += _errors_in_motion(moving, aligned(moving.landmarks[:, landmarks], reference, shares), E, view, mean, share)
+    errors = [
+        _errors_in_motion(seen, aligned(seen.landmarks[:, landmarks], reference, shares), E, view, mean, share)
+        for seen in (moving, degraded)
+    ]
+    covariance += (1 - _DEGRADED) * np.cov(errors[0].T) + _DEGRADED * np.cov(errors[1].T)
     diagonal = np.diag(np.diag(covariance))
     inverse = np.linalg.inv((1 - _SHRINK) * covariance + _SHRINK * diagonal)
-    return FaceResponse(landmarks, reference, shares, mean, view, E, E @ inverse, units, _gaze(poses, units, share))
+    found = FaceResponse(
+        landmarks, reference, shares, mean, view, E, E @ inverse, units, _gaze(poses, units, share), np.array(1.0)
+    )
+    return replace(found, noise=np.array(error_size(found, errors[0])))
 
 
 def _unit(reference: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -76,7 +89,7 @@ def _errors_in_motion(
     mean: NDArray[np.float64],
     share: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """Return the covariance (D, D) of what is left once a person's face and its change with the view are known."""
+    """Return what is left (T, D) once a person's face and its change with the view are known."""
     x = faces.points.reshape(len(faces.points), -1) - mean - view_terms(faces.turns) @ view
     x -= moving.truth["weights"] @ share.T @ E
     left = []
@@ -85,7 +98,7 @@ def _errors_in_motion(
         own, v = x[rows] - x[rows].mean(axis=0), faces.turns[rows] - faces.turns[rows].mean(axis=0)
         turned = np.linalg.solve(v.T @ v + _TURN_RIDGE * rows.sum() * np.eye(3), v.T @ own)
         left.append(own - v @ turned)
-    return np.cov(np.concatenate(left).T)
+    return np.concatenate(left)
 
 
 def _gaze(poses: SeenFaces, units: NDArray[np.float64], share: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -10,7 +10,8 @@ mean one v̄, constant over the clip; E (U, D): the response to each unit of exp
 
     ½ (r_t − Eᵀ w)ᵀ Σ⁻¹ (r_t − Eᵀ w) + λ Σ_u w_u        0 ≤ w ≤ w_max
 
-by coordinate descent, in turns with c and G. `tools/calibrate_face` measures m, V, E and Σ on rendered faces, with the
+by coordinate descent, in turns with c and G. λ grows with the errors in the clip: it is `SPARSITY` times q over
+that in the rendered faces, with q = median_t mean_u (E Σ⁻¹ e_t)_u² / (E Σ⁻¹ Eᵀ)_uu. `tools/calibrate_face` measures m, V, E and Σ on rendered faces, with the
 network's errors: a lid that the network closes only by half still counts as closed.
 """
 
@@ -33,10 +34,10 @@ FILE = Path(__file__).resolve().parents[4] / "assets" / "face" / "response.npz"
 LEAST_S, LEAST_FRAMES = 2.0, 10  # of a face, from which a person's face at rest is known
 SURE = 0.3  # confidence of frames that tell the person's face
 SPARSITY = 3.0  # λ
-SURE_PX, MOST_NOISE = 64.0, 8.0  # size of a face below which λ grows, with the area's inverse, and how much
+SURE_PX, MOST_NOISE = 64.0, 8.0  # size of a face below which errors grow, with the area's inverse; most growth of λ
 LARGEST_GAZE = 2.0  # w_max of the units that turn the eyes: eyes turn farther than the body's keys at 1
 _ROUNDS, _SWEEPS = 4, 30
-_TURN_RIDGE = 0.0025  # on G, in squared radians
+_TURN_RIDGE = 0.03  # on G, in squared radians
 _BLOCK = 2048  # frames that are solved at once: they fit into a processor's cache
 
 
@@ -53,6 +54,7 @@ class FaceResponse:
     projection: NDArray[np.float64]  # (U, D) E Σ⁻¹
     units: NDArray[np.float64]  # (U, 52) which expressions each unit moves: 0 or 1
     gaze: NDArray[np.float64]  # (U, 2) tangents of the eyes' turn to the left and up at weight 1
+    noise: NDArray[np.float64]  # () q in rendered faces
 
     @property
     def largest(self) -> NDArray[np.float64]:
@@ -91,7 +93,7 @@ def fitted(rows: NDArray[np.floating[Any]], times: NDArray[np.float64]) -> NDArr
     )
     noise = np.clip((SURE_PX / np.maximum(size, 1.0)) ** 2, 1.0, MOST_NOISE)
     sure = confidence >= min(SURE, float(np.median(confidence)))
-    units = fit_units(response, faces.points.reshape(len(seen), -1), faces.turns, SPARSITY * noise, sure)
+    units = fit_units(response, faces.points.reshape(len(seen), -1), faces.turns, noise, sure)
     out = rows.copy()
     out[seen] = with_expression(rows[seen], np.minimum(units @ response.units, 1.0), _directions(units @ response.gaze))
     return out
@@ -101,30 +103,38 @@ def fit_units(
     response: FaceResponse,
     points: NDArray[np.float64],
     turns: NDArray[np.float64],
-    sparsity: NDArray[np.float64],
+    noise: NDArray[np.float64],
     sure: NDArray[np.bool_],
 ) -> NDArray[np.float64]:
     """Return the weights (T, U) of the units of expression.
 
     :param points: (T, D) aligned landmarks.
     :param turns: (T, 3) rotation vectors of the head.
-    :param sparsity: (T,) λ.
+    :param noise: (T,) least ratio of the squared errors to those in the rendered faces.
     :param sure: (T,) frames by which the person's face is known.
     """
     E = response.response
     x = points - response.mean - view_terms(turns) @ response.view
     views = turns - turns[sure].mean(axis=0)
     ridge = _TURN_RIDGE * sure.sum() * np.eye(3)
-    normal, w = E @ response.projection.T, np.zeros((len(x), len(E)))
-    for k in range(_ROUNDS):
+    normal, w, ratio = E @ response.projection.T, np.zeros((len(x), len(E))), 1.0
+    for _ in range(_ROUNDS):
         rest = x[sure] - w[sure] @ E
-        constant = rest.mean(axis=0) if k else np.median(rest, axis=0)
+        constant = np.median(rest, axis=0)
         v = views[sure]
         turned = np.linalg.solve(v.T @ v + ridge, v.T @ (rest - constant))
-        target = (x - constant - views @ turned) @ response.projection.T - sparsity[:, None]
+        own = x - constant - views @ turned
+        target = own @ response.projection.T - SPARSITY * np.clip(noise, ratio, MOST_NOISE)[:, None]
         for a in range(0, len(x), _BLOCK):
             _descend(w[a : a + _BLOCK], normal, target[a : a + _BLOCK], response.largest)
+        ratio = min(max(error_size(response, own[sure] - w[sure] @ E) / float(response.noise), ratio), MOST_NOISE)
     return w
+
+
+def error_size(response: FaceResponse, errors: NDArray[np.float64]) -> float:
+    """Return q, see the module, of errors (T, D) of landmarks."""
+    scores = errors @ response.projection.T
+    return float(np.median((scores**2 / np.einsum("ud,ud->u", response.response, response.projection)).mean(axis=1)))
 
 
 def _descend(

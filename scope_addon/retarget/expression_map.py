@@ -1,0 +1,180 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The expression map: which shape key of a face follows which expressions, and how far. Guessing, reading, writing."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...solver.errors import InputError
+from ...solver.names import EXPRESSIONS
+from ..atomic_write import atomic_path, reason
+from ..errors import OutputError
+from ..json_file import read_json_object
+
+LARGEST_FACTOR = 10.0
+_FORMAT = "scope expression map"
+_LEAST_ARKIT = 5  # keys with ARKit's names from which others, such as visemes, are left alone
+_BOTH_BLINK = {"eyeBlinkLeft": 0.5, "eyeBlinkRight": 0.5}
+_SMILE = {"mouthSmileLeft": 0.5, "mouthSmileRight": 0.5}
+_STRETCH = {"mouthStretchLeft": 0.5, "mouthStretchRight": 0.5}
+_PRESS = {"mouthPressLeft": 0.5, "mouthPressRight": 0.5, "mouthRollLower": 0.5, "mouthRollUpper": 0.5}
+_ROUND = {"mouthFunnel": -0.8, "mouthPucker": -0.8}
+_BROWS_DOWN = {"browDownLeft": 0.5, "browDownRight": 0.5}
+# An open mouth that neither rounds nor widens, in a scale where talk reaches 1.
+_A = {"jawOpen": 1.5, "mouthClose": -1.5} | _ROUND
+# Sounds that lips and jaw show; those of the tongue alone (TH, DD, kk, nn, RR) are not captured.
+_OCULUS = {
+    "aa": _A,
+    "e": {"jawOpen": 0.5} | {name: 0.7 for name in _STRETCH} | _ROUND,
+    "i": {name: 0.6 for name in _SMILE} | _ROUND,
+    "ih": {name: 0.6 for name in _SMILE} | _ROUND,
+    "o": {"mouthFunnel": 1.2},
+    "oh": {"mouthFunnel": 1.2},
+    "u": {"mouthPucker": 1.2},
+    "ou": {"mouthPucker": 1.2},
+    "pp": _PRESS,
+    "ff": {"mouthRollLower": 0.8, "mouthUpperUpLeft": 0.4, "mouthUpperUpRight": 0.4},
+    "ch": {"mouthFunnel": 0.5, "mouthShrugUpper": 0.4},
+    "ss": {name: 0.3 for name in _STRETCH},
+}
+_VRM = {
+    **{"aa": _A, "a": _A, "ih": _OCULUS["i"], "i": _OCULUS["i"], "ou": _OCULUS["u"], "u": _OCULUS["u"]},
+    **{"ee": _OCULUS["e"], "e": _OCULUS["e"], "oh": _OCULUS["o"], "o": _OCULUS["o"]},
+    **{"blink": _BOTH_BLINK, "blinkleft": {"eyeBlinkLeft": 1.0}, "blinkright": {"eyeBlinkRight": 1.0}},
+    **{"happy": _SMILE, "joy": _SMILE, "angry": _BROWS_DOWN, "sad": {"browInnerUp": 1.0}, "sorrow": {"browInnerUp": 1.0}},
+    "surprised": {"eyeWideLeft": 0.5, "eyeWideRight": 0.5, "browOuterUpLeft": 0.3, "browOuterUpRight": 0.3},
+    **{f"look{way}": {f"eyeLook{way.title()}Left": 0.5, f"eyeLook{way.title()}Right": 0.5} for way in ("up", "down")},
+    "lookleft": {"eyeLookOutLeft": 0.5, "eyeLookInRight": 0.5},
+    "lookright": {"eyeLookInLeft": 0.5, "eyeLookOutRight": 0.5},
+}
+_VROID = {  # as VRoid Studio names the keys of VRM models, after the prefix
+    **{f"mth{vowel}": _VRM[vowel] for vowel in "aiueo"},
+    **{"eyeclose": _BOTH_BLINK, "eyecloseleft": {"eyeBlinkLeft": 1.0}, "eyecloseright": {"eyeBlinkRight": 1.0}},
+    **{"mthfun": _SMILE, "brwangry": _BROWS_DOWN, "brwsorrow": {"browInnerUp": 1.0}, "eyesurprised": _VRM["surprised"]},
+    "brwsurprised": {"browOuterUpLeft": 0.5, "browOuterUpRight": 0.5},
+}
+_ARKIT = {name.lower(): name for name in EXPRESSIONS}
+
+
+@dataclass
+class ExpressionMap:
+    """Shape keys and, for each, the factors of the expressions that it follows: value = Σ factor · weight."""
+
+    keys: dict[str, dict[str, float]]
+
+    def check(self) -> None:
+        """Check that the map can be used.
+
+        :raises InputError: when there is no key, an expression is unknown, or a factor is out of range.
+        """
+        if not any(self.keys.values()):
+            raise InputError("the expression map has no shape key; add one, and choose its expression")
+        for key, factors in self.keys.items():
+            for expression, factor in factors.items():
+                if expression not in EXPRESSIONS:
+                    raise InputError(
+                        f"shape key '{key}' is mapped to '{expression}', which is no expression; use one of "
+                        f"{', '.join(EXPRESSIONS)}"
+                    )
+                if not abs(factor) <= LARGEST_FACTOR:
+                    raise InputError(f"shape key '{key}' has the factor {factor:g}; use at most {LARGEST_FACTOR:g}")
+
+    def values(self, weights: NDArray[np.floating]) -> dict[str, NDArray[np.float64]]:
+        """Return the value (T,) of each shape key, 0 to 1.
+
+        :param weights: (T, 52) in the order of `EXPRESSIONS`.
+        """
+        place = {name: k for k, name in enumerate(EXPRESSIONS)}
+        return {
+            key: np.clip(sum(f * weights[:, place[name]].astype(float) for name, f in factors.items()), 0.0, 1.0)
+            for key, factors in self.keys.items()
+            if factors
+        }
+
+
+def guess_expression_map(keys: Iterable[str]) -> ExpressionMap:
+    """Guess the map from the names of shape keys: ARKit's, else Oculus' visemes, else VRM's and VRoid's expressions."""
+    names = {key: _plain(key) for key in keys}
+    arkit = {key: {_ARKIT[name]: 1.0} for key, name in names.items() if name in _ARKIT}
+    if len(arkit) >= _LEAST_ARKIT:
+        return ExpressionMap(arkit)
+    found = {}
+    for key, name in names.items():
+        viseme = name.partition("viseme")[2] if name.startswith("viseme") else ""
+        for table, looked_up in ((_OCULUS, viseme), (_VROID, re.sub("^fcl", "", name)), (_VRM, name)):
+            if looked_up in table:
+                found[key] = dict(table[looked_up])
+                break
+    return ExpressionMap(arkit | found)
+
+
+def save_expression_map(expression_map: ExpressionMap, path: str | Path) -> None:
+    """Write the map as JSON, atomically. Only an expression map is overwritten, or an empty file.
+
+    :raises OutputError: when the file cannot be written, or is something else.
+    """
+    path = Path(path)
+    if path.is_file() and not _is_expression_map_or_empty(path):
+        raise OutputError(f"{path} is not an expression map, so it is not overwritten; choose another name")
+    content = {"format": _FORMAT, "version": 1, "shape_keys": expression_map.keys}
+    try:
+        with atomic_path(path) as temporary:
+            temporary.write_text(json.dumps(content, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
+    except OSError as error:
+        raise OutputError(f"cannot write {path}: {reason(error)}") from error
+
+
+def load_expression_map(path: str | Path) -> ExpressionMap:
+    """Read what ``save_expression_map`` wrote.
+
+    :raises InputError: when the file cannot be read or is not a valid map.
+    """
+    path = Path(path)
+    content = read_json_object(path, InputError, "expression map", "choose one that Scope saved")
+    if content.get("format") != _FORMAT or content.get("version") != 1:
+        raise InputError(f"{path}: this JSON file is not a Scope expression map, version 1; choose another file")
+    keys = content.get("shape_keys")
+    if not isinstance(keys, dict) or not all(_is_name(key) and _are_factors(f) for key, f in keys.items()):
+        raise InputError(
+            f"{path}: 'shape_keys' must be an object that maps each shape key to expressions and factors; correct the file"
+        )
+    out = ExpressionMap({key: {name: float(f) for name, f in factors.items()} for key, factors in keys.items()})
+    try:
+        out.check()
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from error
+    return out
+
+
+def _plain(key: str) -> str:
+    """Return a key's name in lower case, without prefixes such as ``head.``, separators, and ``_L`` written in full."""
+    name = re.split(r"[.:|]", re.sub(r"[.](L|R)$", r"_\1", key))[-1]
+    side = re.search(r"(?:_|(?<=[a-z]))(L|R|l|r)$", name) if not name.islower() or "_" in name else None
+    if side and (name[side.start()] == "_" or side[1].isupper()):
+        name = name[: side.start()] + ("left" if side[1].lower() == "l" else "right")
+    return re.sub(r"[^a-z0-9]", "", name.lower())
+
+
+def _is_expression_map_or_empty(path: Path) -> bool:
+    try:
+        return path.stat().st_size == 0 or read_json_object(path, InputError, "expression map", "")["format"] == _FORMAT
+    except (OSError, InputError, KeyError):
+        return False
+
+
+def _are_factors(factors: object) -> bool:
+    return isinstance(factors, dict) and all(
+        isinstance(f, (int, float)) and not isinstance(f, bool) for f in factors.values()
+    )
+
+
+def _is_name(text: object) -> bool:
+    """Return whether Blender can store the name: JSON may escape null characters and lone surrogates."""
+    return isinstance(text, str) and text != "" and not any(c == "\0" or "\ud800" <= c <= "\udfff" for c in text)
