@@ -49,7 +49,7 @@ def standing_probability(
     """
     height = soles @ up
     height = height - height.min(axis=1, keepdims=True)
-    speed, allowed = _speed(soles, times, center), np.full(height.shape, CONTACT_HEIGHT_M)
+    speed, allowed = speed_across(soles, times, center), np.full(height.shape, CONTACT_HEIGHT_M)
     if len(times) > 2 and center is not None:
         upwards = np.abs(line_of_sight(soles - np.expand_dims(center, -2)) @ up)
         mean_speed = np.sqrt(gaussian_smooth(np.square(speed), times, STILL_CUTOFF_HZ))
@@ -79,16 +79,21 @@ def resting_probability(
     soles, palms = np.split(contact_points, [len(SOLES)], axis=1)
     height = palms @ up - (soles @ up).min(axis=1, keepdims=True)
     stands = standing_probability(soles, up, times, center)
-    slow = logistic(4 * (1 - _speed(palms, times, center) / CONTACT_SPEED_M_S))
+    slow = logistic(4 * (1 - speed_across(palms, times, center) / CONTACT_SPEED_M_S))
     above_hands = np.maximum(-height.min(axis=1, keepdims=True), 0.0)
     stands *= logistic(8 * (1 - above_hands / (2 * LEVEL_M))) / logistic(8)
     return np.concatenate([stands, slow * logistic(4 * (1 - height / PALM_HEIGHT_M))], axis=1)
 
 
-def _speed(
+def speed_across(
     points: NDArray[np.floating[Any]], times: NDArray[np.float64], center: NDArray[np.floating[Any]] | None
 ) -> NDArray[np.floating[Any]]:
-    """Return the (T, F) speed in m/s, across the line of sight of a camera; 0 in clips of one or two frames."""
+    """Return the (T, F) speed in m/s, across the line of sight of a camera; 0 in clips of one or two frames.
+
+    :param points: (T, F, 3) metres.
+    :param times: (T,) seconds.
+    :param center: (T, 3) or (3,) the camera's centre, in the same axes; None: the whole speed.
+    """
     if len(times) <= 2:
         return np.zeros(points.shape[:2])
     velocity: NDArray[np.floating[Any]] = np.gradient(gaussian_smooth(points, times, CONTACT_CUTOFF_HZ), times, axis=0)

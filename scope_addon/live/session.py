@@ -22,6 +22,7 @@ from ..capture.tracking.tracker import PeopleTracker
 from .calibration import Calibration, Calibrator, track_of
 from .causal_fit import CausalFit, FittedFrame
 from .feet.hold import FootHold
+from .feet.support import Support
 from .pose import LivePose, Presence
 from .smoothing import PoseFilter
 
@@ -114,7 +115,7 @@ class LiveSession:
             self._fit = CausalFit(self._body, observation, self._current.camera, self._height_m)
             self._fit.set_shape(self._current.betas)
             self._first_s, self._calibrations = time_s, 1
-        fitted = self._fit.fit(time_s, observation, self._root_of_feet(time_s))
+        fitted = self._fit.fit(time_s, observation, self._root_of_feet(time_s), self._support(time_s))
         if fitted is not None:
             self._seen.append(_Seen(time_s, observation, fitted))
             while self._seen[0].time_s < time_s - FOLLOWED_S:
@@ -128,6 +129,11 @@ class LiveSession:
         """
         is_recent = time_s - self._last_seen_s < HOLD_S
         return self._last.root_cam if self._last is not None and is_recent and self._feet.is_holding else None
+
+    def _support(self, time_s: float) -> Support | None:
+        """Return what the body stands on, if it was seen a moment ago."""
+        is_recent = time_s - self._last_seen_s < HOLD_S
+        return self._feet.support(self._current.T_world_camera) if is_recent and self._current is not None else None
 
     def _settle(self, time_s: float) -> None:
         """Start estimates that are due, take those that are done, and approach the newest one."""
@@ -191,7 +197,8 @@ class LiveSession:
             self._feet.reset()
         self._last_seen_s = time_s
         rotations, root = self._filter(fitted.rotations, fitted.root_cam, time_s)
-        rotations, root, contact = self._feet.hold(time_s, now.betas, rotations, root, fitted.joint_confidence, T)
+        smooth = replace(fitted, rotations=rotations, root_cam=root)
+        rotations, contact = self._feet.hold(time_s, now.betas, smooth, T, self.is_settled(time_s))
         keypoints = np.concatenate([observation.keypoints_px, observation.keypoints_confidence[:, None]], axis=1)
         return LivePose(
             frame.index,

@@ -10,10 +10,9 @@ from numpy.typing import NDArray
 
 from .low_pass import Response, RotationFilter, VectorFilter
 
-MOTION = Response(stages=4, cutoff_hz=6.0, lead_s=0.08)  # delays by 26 ms
-DISTANCE = Response(
-    stages=3, cutoff_hz=2.0, lead_s=0.18
-)  # its logarithm: an order of magnitude noisier than the direction
+DELAY_S = 1 / 30  # of every pose, whatever the frame rate: what comes later tells noise from motion
+MOTION = Response.delayed(stages=6, cutoff_hz=7.0, delay_s=DELAY_S)
+DISTANCE = Response.delayed(stages=4, cutoff_hz=3.0, delay_s=DELAY_S)  # its logarithm: noisier than the direction
 
 
 class PoseFilter:

@@ -41,3 +41,12 @@ def test_after_a_pause_the_filter_starts_again():
     low_pass = VectorFilter(MOTION)
     low_pass(np.zeros(1), 0.03)
     assert low_pass(np.ones(1), 2.0)[0] == 1.0
+
+
+def test_the_lead_grows_after_the_start_so_that_a_wrong_first_value_does_not_overshoot():
+    response = Response.delayed(6, 7.0, 1 / 30)
+    low_pass = VectorFilter(response)
+    low_pass(np.ones(1), 1 / 30)
+    values = [low_pass(np.zeros(1), 1 / 30)[0] for _ in range(30)]
+    assert min(values) > -0.1  # with all of the lead from the start, -0.12
+    assert response.lead(10.0) == pytest.approx(6 / (2 * np.pi * 7.0) - 1 / 30)

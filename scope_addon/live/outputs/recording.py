@@ -3,8 +3,8 @@
 
 The rows are the source's frames, from the first to the last in which the person was seen. Frames that were dropped, and
 those in which the person was not seen, are filled in and not valid, as in an offline capture. The motion is the one
-that was given live. Its world changes a little in the first seconds, so that `world_from_camera` does, too; the shape
-is the final one.
+that was given live, without its delay. Its world changes a little in the first seconds, so that `world_from_camera`
+does, too; the shape is the final one.
 """
 
 from __future__ import annotations
@@ -29,7 +29,9 @@ from ...errors import NoPersonError
 from ...motion import Motion
 from ..pose import LivePose, Presence
 from ..session import LiveSession
+from ..smoothing import DELAY_S
 from ..sources import Source
+from .frame_poses import at_frames, in_last_shape
 
 
 class Recording:
@@ -88,25 +90,26 @@ class Recording:
 
         :param camera: as estimated at the end.
         """
-        poses, rows = self._poses, np.array([pose.index for pose in self._poses])
+        poses = in_last_shape(at_frames(self._poses, DELAY_S), self._body)
+        rows = np.array([pose.index for pose in poses])
         rows -= rows[0]
         T = int(rows[-1]) + 1
         nearest = np.maximum(np.searchsorted(rows, np.arange(T), side="right") - 1, 0)
         T_world_frame = _stacked(poses, "T_world_camera")[nearest]
         T_first_frame = np.linalg.inv(T_world_frame[0]) @ T_world_frame
         path = CameraPath(T_first_frame[:, :3, :3], T_first_frame[:, :3, 3])
-        given, raw = (self._fitted(rows, nearest, prefix) for prefix in ("", "raw_"))
-        track = self._track(rows, T)
+        given, raw = (self._fitted(poses, rows, nearest, prefix) for prefix in ("", "raw_"))
+        track = self._track(poses, rows, T)
         placed = place_track(self._body, track, given, smoothing=False, path=path)
         contact = np.zeros((T, len(poses[0].contact)))
         contact[rows] = _stacked(poses, "contact")
         shot = Shot(self._body, camera, path, Lines.none(), self._source.fps, self._size, self._source.name)
         return assemble_motion(shot, FittedPerson(track, raw, self._body), placed, contact, T_world_frame[0])
 
-    def _track(self, rows: NDArray[np.intp], T: int) -> Track:
-        first, times = self._poses[0].index, np.array([pose.timestamp_s for pose in self._poses])
+    def _track(self, poses: list[LivePose], rows: NDArray[np.intp], T: int) -> Track:
+        first, times = poses[0].index, np.array([pose.timestamp_s for pose in poses])
         keypoints = np.zeros((T, KEYPOINT_COUNT, 3), np.float32)
-        keypoints[rows] = _stacked(self._poses, "keypoints")
+        keypoints[rows] = _stacked(poses, "keypoints")
         seen = np.zeros(T, bool)
         seen[rows] = True
         return Track(
@@ -119,14 +122,16 @@ class Recording:
             acquired=np.zeros(T, bool),
         )
 
-    def _fitted(self, rows: NDArray[np.intp], nearest: NDArray[np.intp], prefix: str) -> FittedTrack:
+    def _fitted(
+        self, poses: list[LivePose], rows: NDArray[np.intp], nearest: NDArray[np.intp], prefix: str
+    ) -> FittedTrack:
         valid = np.zeros(len(nearest), bool)
         valid[rows] = True
-        confidence = _stacked(self._poses, "joint_confidence")[nearest] * valid[:, None]
+        confidence = _stacked(poses, "joint_confidence")[nearest] * valid[:, None]
         return FittedTrack(
-            _stacked(self._poses, f"{prefix}rotations")[nearest],
-            _stacked(self._poses, f"{prefix}root_cam")[nearest],
-            self._poses[-1].betas,
+            _stacked(poses, f"{prefix}rotations")[nearest],
+            _stacked(poses, f"{prefix}root_cam")[nearest],
+            poses[-1].betas,
             valid,
             confidence,
             0.0,

@@ -1,0 +1,61 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Held feet of a person whose motion is known, seen with errors of the distance."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scope.scope_addon.kinematics.standing import line_of_sight
+from scope.scope_addon.live.causal_fit import FittedFrame
+from scope.scope_addon.live.feet.hold import FootHold
+
+from ...kinematics.posed_people import stepping_person
+
+LEFT, RIGHT = slice(0, 2), slice(2, 4)
+
+
+@pytest.fixture(scope="module")
+def stepped():
+    """Soles (T, 4, 3) in the world, true and held, and contact (T, 6)."""
+    supported, omega, root, place, T_world_camera, times = stepping_person()
+    R, t = T_world_camera[:3, :3], T_world_camera[:3, 3]
+    true = place(omega, root)[2]
+    error_m = 0.04 * np.sin(2 * np.pi * 1.3 * times)
+    seen = root + error_m[:, None] * line_of_sight(root)
+    feet, held, contact = FootHold(supported), [], []
+    for k, time_s in enumerate(times):
+        rays = true[k, :4, :2] / true[k, :4, 2:]
+        frame = FittedFrame(omega[k], seen[k], np.ones(len(omega[k])), rays)
+        rotations, p = feet.hold(time_s, np.zeros(supported.P), frame, T_world_camera, True)
+        held.append(place(rotations[None], seen[k][None])[2][0, :4] @ R.T + t)
+        contact.append(p)
+    return true[:, :4] @ R.T + t, np.array(held), np.array(contact), feet, T_world_camera
+
+
+def test_a_foot_that_stands_stays_where_it_is_while_the_distance_errs(stepped):
+    _, held, contact, _, _ = stepped
+    assert contact[5:, RIGHT].min() > 0.5
+    stands = held[5:, RIGHT]
+    assert np.linalg.norm(stands - stands.mean(axis=0), axis=2).max() < 0.02  # of errors that span 8 cm
+
+
+def test_a_raised_foot_is_let_go_and_rests_again(stepped):
+    true, held, contact, _, _ = stepped
+    assert contact[40:50, LEFT].max() < 0.3  # it is raised from 1 s to 2 s
+    assert contact[75:, LEFT].min() > 0.5
+    assert np.abs(held[40:50, LEFT, 2] - true[40:50, LEFT, 2]).max() < 0.03
+
+
+def test_no_sole_is_below_the_floor(stepped):
+    _, held, _, _, _ = stepped
+    assert held[..., 2].min() > -0.01
+
+
+def test_the_next_frame_is_supported_where_feet_rest(stepped):
+    _, held, _, feet, T = stepped
+    support = feet.support(T)
+    places = support.places @ T[:3, :3].T + T[:3, 3]
+    assert np.linalg.norm(places[RIGHT] - held[-1, RIGHT], axis=1).max() < 0.02
+    assert support.rests[:4].min() > 0.5
+    assert support.rests[4:].max() == 0.0  # palms
+    assert FootHold(feet._body).support(T) is None
