@@ -12,13 +12,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ...scope_addon.atomic_write import atomic_path
 from ...scope_addon.capture.options import CaptureOptions
 from ...scope_addon.capture.overlay.overlay_video import body_colors, camera_vertices, draw_overlay
 from ...scope_addon.capture.pipeline import capture
 from ...scope_addon.motion import Motion
 from ...solver import Body, load_body
 from ...solver.loaders.body_file import ASSETS
+from ...tools.readme_pictures.__main__ import write_jpeg
 from ...tools.render_sample.truth import LIMBS
 from ..evaluation.metrics import mpjpe, pa_mpjpe, relative_to
 from ..frames import CACHE, DATA
@@ -30,7 +30,7 @@ from .objective import Frame, Objective, PosePrior
 
 EVERY, QUICK = 10, 40  # of the frames
 PRIOR_EVERY = 10  # of the recordings' frames
-SHOWN_PX = 300
+SHOWN_PX = 220
 SIDES = {"L": "left", "R": "right"}
 Points = NDArray[np.float64]
 Columns = tuple[tuple[str, Points, float], ...]  # name, joints (F, K+1, 3) in the camera frame, ms per frame
@@ -129,8 +129,7 @@ def _draw(
                 pictures.append(draw_overlay(ground, [shape], body.faces, motion.intrinsics, None, colors, 1.0))
         strips.append(np.hstack([_cropped(picture, project(ours, motion.intrinsics)) for picture in pictures]))
     CACHE.mkdir(parents=True, exist_ok=True)
-    with atomic_path(CACHE / f"smplify_{video.stem}.png") as path:
-        path.write_bytes(cv2.imencode(".png", np.vstack(strips)[..., ::-1])[1].tobytes())
+    write_jpeg(CACHE / f"smplify_{video.stem}.jpg", np.vstack(strips))
 
 
 def turned(skin: Points) -> Points:

@@ -26,6 +26,7 @@ PICTURES = {
     "from_behind": pictures.from_behind,
     "two_floors": pictures.two_floors,
 }
+BY_BENCHMARKS = ("smplify",)  # drawn by `./scripts/bench smplify`, and copied from build/bench
 LARGEST_BYTES = 60_000
 
 
@@ -48,11 +49,11 @@ def main() -> int:
         if name == ANIMATION:
             _write_animation(arguments.out / f"{name}.webp")
         else:
-            _write(arguments.out / f"{name}.jpg", PICTURES[name]())
+            write_jpeg(arguments.out / f"{name}.jpg", PICTURES[name]())
     return 0
 
 
-def _write(path: Path, picture: NDArray[np.uint8]) -> None:
+def write_jpeg(path: Path, picture: NDArray[np.uint8]) -> None:
     """Write a JPEG, as good as its size allows."""
     bgr = cv2.cvtColor(picture, cv2.COLOR_RGB2BGR)
     for quality in range(90, 30, -4):
