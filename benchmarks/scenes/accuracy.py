@@ -181,7 +181,8 @@ def _mean(values: NDArray[np.float64]) -> float:
 
 def _row(name: str, row: dict[str, Estimate]) -> list[object]:
     def shown(estimate: Estimate) -> str:
-        return f"{estimate.mean:.1f} ({estimate.low:.1f} to {estimate.high:.1f})"
+        interval = f" ({estimate.low:.1f} to {estimate.high:.1f})" if estimate.people > 1 else ""
+        return f"{estimate.mean:.1f}{interval}"
 
     share = f"{100 * row['found'].mean:.0f} %"
     return [name, row["found"].people, shown(row["mpjpe_root"]), shown(row["pa_mpjpe"]), share, shown(row["size_off"])]
