@@ -34,8 +34,7 @@ def assemble_motion(
 ) -> Motion:
     """Transform a person's motion to the world, and add what else is known of each frame.
 
-    Rotations relative to the parent do not depend on the world. The root is smoothed in the camera frame, where image
-    position and depth have different noise, and then transformed: R_world_root = R_world_camera R_camera_root and
+    Rotations relative to the parent do not depend on the world; R_world_root = R_world_camera R_camera_root and
     trans = T_world_camera t_camera_root − J_0(β).
 
     :param placed: the final motion: its rotations and root, in the first frame's camera axes.
