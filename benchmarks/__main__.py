@@ -76,7 +76,9 @@ def _real_frames(quick: bool) -> dict[str, Any]:
 def main() -> int:
     """Run the command line; return the exit status."""
     parser = argparse.ArgumentParser(prog="bench")
-    parser.add_argument("what", choices=["solver", "perception", "choices", "renders", "outline", "faces", "blender", "cluster"])
+    parser.add_argument(
+        "what", choices=["solver", "perception", "choices", "renders", "outline", "faces", "blender", "cluster"]
+    )
     parser.add_argument("--quick", action="store_true", help="fewer repetitions, the default preset alone")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures as JSON")
     args = parser.parse_args()

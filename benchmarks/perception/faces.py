@@ -91,9 +91,7 @@ def measure(seen: SeenFaces, scale: float, way: Callable[..., Found]) -> dict[st
     return {k: float(v) for k, v in out.items()} | closures(weights, truth, person)
 
 
-def closures(
-    weights: NDArray[np.float64], truth: NDArray[np.float64], person: NDArray[np.intp]
-) -> dict[str, float]:
+def closures(weights: NDArray[np.float64], truth: NDArray[np.float64], person: NDArray[np.intp]) -> dict[str, float]:
     """Return the share of eye closures that were found, false ones per true one, and their mean offset in frames.
 
     An eye closes where its weight rises over `CLOSED`.
@@ -136,7 +134,10 @@ def pooled(values: NDArray[np.float64]) -> NDArray[np.float64]:
 def _rows(seen: SeenFaces, rows: NDArray[np.intp], scale: float) -> NDArray[np.float64]:
     region = Region((0.0, 0.0), 1.0, 0.0)
     return np.array(
-        [record(FaceEstimate(scale * seen.landmarks[t], float(seen.presence[t]), region), seen.weights[t]) for t in rows]
+        [
+            record(FaceEstimate(scale * seen.landmarks[t], float(seen.presence[t]), region), seen.weights[t])
+            for t in rows
+        ]
     )
 
 

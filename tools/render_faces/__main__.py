@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""``python -m scope.tools.render_faces SET``: write the pictures and the truth of a set to build/faces/SET. Needs bpy."""
+"""``python -m scope.tools.render_faces SET``: write a set's pictures and truth to build/faces/SET. Needs bpy."""
 
 from __future__ import annotations
 

@@ -95,7 +95,9 @@ class Stage:
     def _head(self, body: Body) -> None:
         V = body.v_template
         neck = body.J_template[body.joint_names.index("neck"), 1]
-        faces = body.faces[(V[body.faces][:, :, 1] > neck - 0.08).all(axis=1) & (abs(V[body.faces][:, :, 0]) < 0.2).all(axis=1)]
+        faces = body.faces[
+            (V[body.faces][:, :, 1] > neck - 0.08).all(axis=1) & (abs(V[body.faces][:, :, 0]) < 0.2).all(axis=1)
+        ]
         self._kept, local = np.unique(faces, return_inverse=True)
         material = body.face_material[np.isin(np.arange(len(body.faces)), _rows(body.faces, faces))]
         self._mesh = bpy.data.meshes.new("head")
