@@ -8,6 +8,7 @@ import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -93,7 +94,7 @@ class ExpressionMap:
                 if not abs(factor) <= LARGEST_FACTOR:
                     raise InputError(f"shape key '{key}' has the factor {factor:g}; use at most {LARGEST_FACTOR:g}")
 
-    def values(self, weights: NDArray[np.floating]) -> dict[str, NDArray[np.float64]]:
+    def values(self, weights: NDArray[np.floating[Any]]) -> dict[str, NDArray[np.float64]]:
         """Return the value (T,) of each shape key, 0 to 1.
 
         :param weights: (T, 52) in the order of `EXPRESSIONS`.

@@ -21,9 +21,9 @@ from .truth import FOLDER, camera_vertices, focal_px, write_truth
 
 SETS = {  # what is drawn, the seed, and whether Cycles renders it
     "poses": (random_poses, 11, {"people": 100, "each": 25}, False),
-    "poses_check": (random_poses, 13, {"people": 12, "each": 10}, True),
     "shaded_talk": (talk_and_grimaces, 14, {"people": 8, "seconds": 5.0}, False),
     "talk": (talk_and_grimaces, 12, {"people": 6, "seconds": 5.0}, True),
+    "talk_held_out": (talk_and_grimaces, 22, {"people": 6, "seconds": 5.0}, True),
 }
 
 

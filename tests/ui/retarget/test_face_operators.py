@@ -12,16 +12,16 @@ from scope.scope_addon.scene.animation_data import actions
 from scope.scope_addon.scene.build import build_scene
 from scope.scope_addon.ui.retarget.retarget_properties import offered_expressions
 
-from ...edit.walking import motion_of, walk
+from ...edit.walking import BODY, motion_of, walk
 from ...made_motion import made_face
 from ...scene.rigs.test_face_retarget import face_mesh
 
 
 @pytest.fixture
-def settings(whole_body):
+def settings():
     motion = motion_of(walk(1.0))
     T = len(motion.frames)
-    build_scene([replace(motion, face=made_face(T, jawOpen=np.linspace(0, 0.5, T)))], whole_body)
+    build_scene([replace(motion, face=made_face(T, jawOpen=np.linspace(0, 0.5, T)))], BODY)
     settings = bpy.context.scene.scope_retarget
     settings.face = face_mesh(["viseme_aa", "viseme_PP", "blinkLeft"])
     return settings
@@ -61,11 +61,11 @@ def test_a_face_without_known_keys_is_an_error(settings):
     assert len(settings.face_pairs) == 0
 
 
-def test_a_capture_without_face_says_so(settings, whole_body):
+def test_a_capture_without_face_says_so(settings):
     for obj in list(bpy.context.scene.objects):
         if "scope_source" in obj:
             bpy.data.objects.remove(obj)
-    build_scene([motion_of(walk(1.0))], whole_body)
+    build_scene([motion_of(walk(1.0))], BODY)
     with pytest.raises(RuntimeError, match="was not captured; capture again with Face"):
         bpy.ops.scope.retarget_face()
 
