@@ -52,7 +52,8 @@ def faces(quick: bool) -> dict[str, Any]:
         if not list((FOLDER / name).glob("seen_1.npz")):
             command = (sys.executable, "-m", "scope.tools.render_faces", name)
             subprocess.run(command, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    calibrate, figures = monotone_maps(seen_faces(CALIBRATION)), {}
+    calibrate = monotone_maps(seen_faces(CALIBRATION))
+    figures: dict[str, Any] = {}
     for label, scale in (("large faces", 1.0), ("small faces", SMALL))[: 1 if quick else 2]:
         seen = seen_faces(HELD_OUT, scale)
         ways: dict[str, Callable[[NDArray[np.float64], NDArray[np.float64]], Found]] = {
@@ -66,8 +67,8 @@ def faces(quick: bool) -> dict[str, Any]:
         figures[label] = {way: measure(seen, scale, function) for way, function in ways.items()}
         rows = [[way, *(row[key] for key in SHOWN)] for way, row in figures[label].items()]
         print(table((label, *SHOWN.values()), rows), end="\n\n", flush=True)
-        figures[label]["fit_ms_per_frame"] = _fit_ms(seen, scale)
-        print(f"fit: {figures[label]['fit_ms_per_frame']:.2f} ms a frame\n", flush=True)
+        figures[f"{label}, fit_ms_per_frame"] = _fit_ms(seen, scale)
+        print(f"fit: {figures[f'{label}, fit_ms_per_frame']:.2f} ms a frame\n", flush=True)
     return figures
 
 
@@ -96,7 +97,8 @@ def closures(weights: NDArray[np.float64], truth: NDArray[np.float64], person: N
 
     An eye closes where its weight rises over `CLOSED`.
     """
-    found, false, off, count = 0, 0, [], 0
+    found, false, count = 0, 0, 0
+    off: list[float] = []
     for p in np.unique(person):
         for blink in BLINKS:
             true, seen = (_rises(w[person == p, blink]) for w in (truth, weights))

@@ -17,7 +17,9 @@ from scope.scope_addon.retarget.expression_map import (
 from scope.solver.errors import InputError
 from scope.solver.names import EXPRESSIONS
 
-OCULUS = [f"viseme_{v}" for v in ("sil", "PP", "FF", "TH", "DD", "kk", "CH", "SS", "nn", "RR", "aa", "E", "I", "O", "U")]
+OCULUS = [
+    f"viseme_{v}" for v in ("sil", "PP", "FF", "TH", "DD", "kk", "CH", "SS", "nn", "RR", "aa", "E", "I", "O", "U")
+]
 VRM0 = ["A", "I", "U", "E", "O", "Blink", "Blink_L", "Blink_R", "Joy", "Angry", "Sorrow", "Fun", "LookUp", "LookLeft"]
 VRM1 = ["aa", "ih", "ou", "ee", "oh", "blink", "blinkLeft", "blinkRight", "happy", "angry", "sad", "surprised"]
 VROID = [f"Face.M_F00_000_00_Fcl_{n}" for n in ("ALL_Joy", "EYE_Close", "EYE_Close_L", "EYE_Close_R", "MTH_A", "MTH_O")]

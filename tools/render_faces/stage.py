@@ -93,6 +93,8 @@ class Stage:
             self._lights.append(lamp)
 
     def _head(self, body: Body) -> None:
+        if body.face_material is None or body.material_colors is None:
+            raise ValueError(f"body '{body.name}' has no materials")
         V = body.v_template
         neck = body.J_template[body.joint_names.index("neck"), 1]
         faces = body.faces[
