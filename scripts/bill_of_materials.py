@@ -34,6 +34,7 @@ ASSETS = {
     "assets/networks/*.onnx": "Apache-2.0",
     "assets/lifter/*.onnx": "GPL-3.0-or-later",
     "assets/prior/*.npz": "GPL-3.0-or-later",
+    "assets/face/*.npz": "GPL-3.0-or-later",
     "assets/body/*.npz": "CC0-1.0",
     "assets/sample/*.mp4": "CC0-1.0",
 }

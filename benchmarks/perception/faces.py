@@ -52,7 +52,8 @@ def faces(quick: bool) -> dict[str, Any]:
         if not list((FOLDER / name).glob("seen_1.npz")):
             command = (sys.executable, "-m", "scope.tools.render_faces", name)
             subprocess.run(command, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    calibrate, figures = monotone_maps(seen_faces(CALIBRATION)), {}
+    calibrate = monotone_maps(seen_faces(CALIBRATION))
+    figures: dict[str, Any] = {}
     for label, scale in (("large faces", 1.0), ("small faces", SMALL))[: 1 if quick else 2]:
         seen = seen_faces(HELD_OUT, scale)
         ways: dict[str, Callable[[NDArray[np.float64], NDArray[np.float64]], Found]] = {
@@ -66,8 +67,8 @@ def faces(quick: bool) -> dict[str, Any]:
         figures[label] = {way: measure(seen, scale, function) for way, function in ways.items()}
         rows = [[way, *(row[key] for key in SHOWN)] for way, row in figures[label].items()]
         print(table((label, *SHOWN.values()), rows), end="\n\n", flush=True)
-        figures[label]["fit_ms_per_frame"] = _fit_ms(seen, scale)
-        print(f"fit: {figures[label]['fit_ms_per_frame']:.2f} ms a frame\n", flush=True)
+        figures[f"{label}, fit_ms_per_frame"] = _fit_ms(seen, scale)
+        print(f"fit: {figures[f'{label}, fit_ms_per_frame']:.2f} ms a frame\n", flush=True)
     return figures
 
 
@@ -91,14 +92,13 @@ def measure(seen: SeenFaces, scale: float, way: Callable[..., Found]) -> dict[st
     return {k: float(v) for k, v in out.items()} | closures(weights, truth, person)
 
 
-def closures(
-    weights: NDArray[np.float64], truth: NDArray[np.float64], person: NDArray[np.intp]
-) -> dict[str, float]:
+def closures(weights: NDArray[np.float64], truth: NDArray[np.float64], person: NDArray[np.intp]) -> dict[str, float]:
     """Return the share of eye closures that were found, false ones per true one, and their mean offset in frames.
 
     An eye closes where its weight rises over `CLOSED`.
     """
-    found, false, off, count = 0, 0, [], 0
+    found, false, count = 0, 0, 0
+    off: list[float] = []
     for p in np.unique(person):
         for blink in BLINKS:
             true, seen = (_rises(w[person == p, blink]) for w in (truth, weights))
@@ -136,7 +136,10 @@ def pooled(values: NDArray[np.float64]) -> NDArray[np.float64]:
 def _rows(seen: SeenFaces, rows: NDArray[np.intp], scale: float) -> NDArray[np.float64]:
     region = Region((0.0, 0.0), 1.0, 0.0)
     return np.array(
-        [record(FaceEstimate(scale * seen.landmarks[t], float(seen.presence[t]), region), seen.weights[t]) for t in rows]
+        [
+            record(FaceEstimate(scale * seen.landmarks[t], float(seen.presence[t]), region), seen.weights[t])
+            for t in rows
+        ]
     )
 
 

@@ -87,7 +87,7 @@ def checked_rig(args: argparse.Namespace, outputs: list[Path]) -> RigSource | No
     :raises ScopeError: the rig cannot be used, or the arguments contradict each other.
     """
     if args.retarget is None:
-        given = {"--bone-map": args.bone_map, "--rig-object": args.rig_object}
+        given = {"--bone-map": args.bone_map, "--rig-object": args.rig_object, "--expression-map": args.expression_map}
         given["--retarget-root"] = args.retarget_root != option("retarget_root").default
         for flag, value in given.items():
             if value:
@@ -95,7 +95,7 @@ def checked_rig(args: argparse.Namespace, outputs: list[Path]) -> RigSource | No
         return None
     from ..retarget.rig_source import rig_source
 
-    rig = rig_source(args.retarget, args.rig_object, args.bone_map)
+    rig = rig_source(args.retarget, args.rig_object, args.bone_map, args.expression_map)
     scene_files = [p for p in outputs if p.suffix.lower() not in MOTION_SUFFIXES]
     if not scene_files:
         raise UsageError("--retarget needs an output that can contain a rig, such as -o OUT.glb; a motion file cannot")

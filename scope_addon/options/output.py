@@ -94,6 +94,14 @@ OUTPUT_OPTIONS = (
         argument=Argument(metavar="FILE"),
     ),
     Option(
+        "expression_map",
+        Path,
+        None,
+        Place.COMMAND_LINE | Place.IMPORT,
+        "shape keys that follow the captured expressions, a JSON file saved in the panel",
+        argument=Argument(metavar="FILE"),
+    ),
+    Option(
         "retarget_root",
         str,
         "bone",

@@ -80,7 +80,7 @@ def load_bone_map(path: str | Path) -> BoneMap:
     bones = content.get("bones")
     if content.get("format") != _FORMAT or content.get("version") != 1:
         raise InputError(f"{path}: this JSON file is not a Scope bone map, version 1; choose another file")
-    if not isinstance(bones, dict) or not all(_is_name(bone) and _is_name(part) for bone, part in bones.items()):
+    if not isinstance(bones, dict) or not all(is_name(bone) and is_name(part) for bone, part in bones.items()):
         raise InputError(f"{path}: 'bones' must be an object that maps bone names to body parts; correct the file")
     out = BoneMap(dict(bones))
     try:
@@ -98,6 +98,6 @@ def _is_bone_map_or_empty(path: Path) -> bool:
         return False
 
 
-def _is_name(text: object) -> bool:
+def is_name(text: object) -> bool:
     """Return whether Blender can store the name: JSON may escape null characters and lone surrogates."""
     return isinstance(text, str) and text != "" and not any(c == "\0" or "\ud800" <= c <= "\udfff" for c in text)

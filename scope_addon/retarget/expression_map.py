@@ -8,6 +8,7 @@ import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,7 @@ from ...solver.names import EXPRESSIONS
 from ..atomic_write import atomic_path, reason
 from ..errors import OutputError
 from ..json_file import read_json_object
+from .bone_map import is_name
 
 LARGEST_FACTOR = 10.0
 _FORMAT = "scope expression map"
@@ -48,7 +50,13 @@ _VRM = {
     **{"aa": _A, "a": _A, "ih": _OCULUS["i"], "i": _OCULUS["i"], "ou": _OCULUS["u"], "u": _OCULUS["u"]},
     **{"ee": _OCULUS["e"], "e": _OCULUS["e"], "oh": _OCULUS["o"], "o": _OCULUS["o"]},
     **{"blink": _BOTH_BLINK, "blinkleft": {"eyeBlinkLeft": 1.0}, "blinkright": {"eyeBlinkRight": 1.0}},
-    **{"happy": _SMILE, "joy": _SMILE, "angry": _BROWS_DOWN, "sad": {"browInnerUp": 1.0}, "sorrow": {"browInnerUp": 1.0}},
+    **{
+        "happy": _SMILE,
+        "joy": _SMILE,
+        "angry": _BROWS_DOWN,
+        "sad": {"browInnerUp": 1.0},
+        "sorrow": {"browInnerUp": 1.0},
+    },
     "surprised": {"eyeWideLeft": 0.5, "eyeWideRight": 0.5, "browOuterUpLeft": 0.3, "browOuterUpRight": 0.3},
     **{f"look{way}": {f"eyeLook{way.title()}Left": 0.5, f"eyeLook{way.title()}Right": 0.5} for way in ("up", "down")},
     "lookleft": {"eyeLookOutLeft": 0.5, "eyeLookInRight": 0.5},
@@ -86,7 +94,7 @@ class ExpressionMap:
                 if not abs(factor) <= LARGEST_FACTOR:
                     raise InputError(f"shape key '{key}' has the factor {factor:g}; use at most {LARGEST_FACTOR:g}")
 
-    def values(self, weights: NDArray[np.floating]) -> dict[str, NDArray[np.float64]]:
+    def values(self, weights: NDArray[np.floating[Any]]) -> dict[str, NDArray[np.float64]]:
         """Return the value (T,) of each shape key, 0 to 1.
 
         :param weights: (T, 52) in the order of `EXPRESSIONS`.
@@ -108,7 +116,7 @@ def guess_expression_map(keys: Iterable[str]) -> ExpressionMap:
     found = {}
     for key, name in names.items():
         viseme = name.partition("viseme")[2] if name.startswith("viseme") else ""
-        for table, looked_up in ((_OCULUS, viseme), (_VROID, re.sub("^fcl", "", name)), (_VRM, name)):
+        for table, looked_up in ((_OCULUS, viseme), (_VROID, name.rpartition("fcl")[2]), (_VRM, name)):
             if looked_up in table:
                 found[key] = dict(table[looked_up])
                 break
@@ -141,9 +149,10 @@ def load_expression_map(path: str | Path) -> ExpressionMap:
     if content.get("format") != _FORMAT or content.get("version") != 1:
         raise InputError(f"{path}: this JSON file is not a Scope expression map, version 1; choose another file")
     keys = content.get("shape_keys")
-    if not isinstance(keys, dict) or not all(_is_name(key) and _are_factors(f) for key, f in keys.items()):
+    if not isinstance(keys, dict) or not all(is_name(key) and _are_factors(f) for key, f in keys.items()):
         raise InputError(
-            f"{path}: 'shape_keys' must be an object that maps each shape key to expressions and factors; correct the file"
+            f"{path}: 'shape_keys' must be an object that maps each shape key to expressions and factors; "
+            "correct the file"
         )
     out = ExpressionMap({key: {name: float(f) for name, f in factors.items()} for key, factors in keys.items()})
     try:
@@ -173,8 +182,3 @@ def _are_factors(factors: object) -> bool:
     return isinstance(factors, dict) and all(
         isinstance(f, (int, float)) and not isinstance(f, bool) for f in factors.values()
     )
-
-
-def _is_name(text: object) -> bool:
-    """Return whether Blender can store the name: JSON may escape null characters and lone surrogates."""
-    return isinstance(text, str) and text != "" and not any(c == "\0" or "\ud800" <= c <= "\udfff" for c in text)

@@ -10,6 +10,7 @@ from ...solver.errors import InputError
 from ...solver.loaders.regular_file import check_regular
 from ..errors import UsageError
 from .bone_map import BoneMap, load_bone_map
+from .expression_map import ExpressionMap, load_expression_map
 from .fbx_check import check_fbx
 from .gltf_check import check_gltf
 
@@ -25,18 +26,22 @@ _SIGNATURES = {
 
 @dataclass(frozen=True)
 class RigSource:
-    """A file with a rig, the name of the armature if there are several, and the bone map unless it is to be guessed."""
+    """A file with a rig, the name of the armature if there are several, and the maps unless they are to be guessed."""
 
     path: Path
     armature: str = ""
     bone_map: BoneMap | None = None
+    expression_map: ExpressionMap | None = None
 
 
-def rig_source(path: Path, armature: str = "", bone_map: Path | None = None) -> RigSource:
+def rig_source(
+    path: Path, armature: str = "", bone_map: Path | None = None, expression_map: Path | None = None
+) -> RigSource:
     """Check the user's rig file as far as possible without Blender.
 
     :param armature: name of the armature in the file; may be empty if there is only one.
     :param bone_map: file with a bone map; None to guess one.
+    :param expression_map: file with an expression map; None to guess one.
     :raises UsageError: when the suffix is not that of a supported format.
     :raises InputError: when a file cannot be read, or its content does not match its suffix.
     """
@@ -48,7 +53,12 @@ def rig_source(path: Path, armature: str = "", bone_map: Path | None = None) -> 
         _check_content(path, suffix)
     except OSError as error:
         raise InputError(f"{path}: the rig cannot be read ({error.strerror}); choose another file") from error
-    return RigSource(path, armature, load_bone_map(bone_map) if bone_map is not None else None)
+    return RigSource(
+        path,
+        armature,
+        load_bone_map(bone_map) if bone_map is not None else None,
+        load_expression_map(expression_map) if expression_map is not None else None,
+    )
 
 
 def _check_content(path: Path, suffix: str) -> None:

@@ -15,7 +15,7 @@ from ...scope_addon.capture.perception.face.face_landmarks import FaceNetwork
 from ...scope_addon.capture.perception.region import Region
 from ..render_faces.truth import FOLDER, SIZE
 
-_PICTURE = Region((SIZE / 2, SIZE / 2), 0.9 * SIZE, 0.0)
+_SIDE_PX = 0.9 * SIZE  # of the first region, in the middle of the picture
 _QUALITY = 40  # of JPEG
 _ROUNDS = 3  # of the landmark network, each in the region that the one before found
 
@@ -55,7 +55,7 @@ def _observe(folder: Path, count: int, scale: float, out: Path) -> None:
             image = cv2.resize(image, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
             image = cv2.imdecode(cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])[1], cv2.IMREAD_COLOR)
         rgb = np.ascontiguousarray(image[..., ::-1])
-        region = Region(tuple(scale * c for c in _PICTURE.center_px), scale * _PICTURE.side_px, 0.0)
+        region = Region((scale * SIZE / 2, scale * SIZE / 2), scale * _SIDE_PX, 0.0)
         for _ in range(_ROUNDS):
             estimate = network.estimate(rgb, region)
             region = estimate.next_region

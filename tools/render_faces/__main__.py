@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""``python -m scope.tools.render_faces SET``: write the pictures and the truth of a set to build/faces/SET. Needs bpy."""
+"""``python -m scope.tools.render_faces SET``: write a set's pictures and truth to build/faces/SET. Needs bpy."""
 
 from __future__ import annotations
 
 import argparse
 import os
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -19,11 +20,12 @@ from .sequences import FaceClip, random_poses, talk_and_grimaces
 from .shaded import ShadedStage
 from .truth import FOLDER, camera_vertices, focal_px, write_truth
 
-SETS = {  # what is drawn, the seed, and whether Cycles renders it
+Kind = tuple[Callable[..., FaceClip], int, dict[str, Any], bool]
+SETS: dict[str, Kind] = {  # what is drawn, the seed, and whether Cycles renders it
     "poses": (random_poses, 11, {"people": 100, "each": 25}, False),
-    "poses_check": (random_poses, 13, {"people": 12, "each": 10}, True),
     "shaded_talk": (talk_and_grimaces, 14, {"people": 8, "seconds": 5.0}, False),
     "talk": (talk_and_grimaces, 12, {"people": 6, "seconds": 5.0}, True),
+    "talk_held_out": (talk_and_grimaces, 22, {"people": 4, "seconds": 5.0}, True),
 }
 
 
@@ -35,7 +37,7 @@ def main() -> int:
     arguments = parser.parse_args()
     draw, seed, sizes, cycles = SETS[arguments.set]
     rng = np.random.default_rng(seed)
-    clip: FaceClip = draw(rng, **sizes)
+    clip = draw(rng, **sizes)
     targets = identity_targets()
     identities = np.array([draw_identity(targets, rng) for _ in range(sizes["people"])])
     folder = arguments.out or FOLDER / arguments.set

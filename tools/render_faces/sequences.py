@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the rendered faces do: single poses drawn at random, and sequences of talk and grimaces at 30 frames a second."""
+"""What the rendered faces do: single poses drawn at random, and talk and grimaces at 30 frames a second."""
 
 from __future__ import annotations
 
@@ -151,8 +151,8 @@ def _add(weights: NDArray[np.float64], pose: dict[str, float], start: int, lengt
     """Add a pose that comes and goes: in, held in the middle, out."""
     t = np.arange(min(length, len(weights) - start))
     rise = max(2, length // 4)
-    bump = np.clip(np.minimum(t / rise, (length - t) / rise), 0, 1)
-    bump = bump * bump * (3 - 2 * bump)
+    share = np.clip(np.minimum(t / rise, (length - t) / rise), 0, 1)
+    bump = share * share * (3 - 2 * share)
     for name, value in pose.items():
         weights[start : start + len(t), INDEX[name]] += strength * value * bump
 
@@ -161,6 +161,7 @@ def _rotations(angles_deg: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return R_camera_head (T, 3, 3) from pitch, yaw and roll; all zero looks into the camera."""
     frontal = np.diag([1.0, -1.0, -1.0])
     x, y, z = np.radians(angles_deg).T
-    axes = [exp(np.stack([a if k == i else np.zeros_like(a) for i in range(3)], axis=1)) for k, a in enumerate((x, y, z))]
-    R: NDArray[np.float64] = frontal @ axes[2] @ axes[1] @ axes[0]
-    return R
+    axes = [
+        exp(np.stack([a if k == i else np.zeros_like(a) for i in range(3)], axis=1)) for k, a in enumerate((x, y, z))
+    ]
+    return np.asarray(frontal @ axes[2] @ axes[1] @ axes[0], float)

@@ -24,6 +24,8 @@ class ShadedStage:
     """Draws one head; the same interface as `Stage`."""
 
     def __init__(self, body: Body) -> None:
+        if body.face_material is None or body.material_colors is None:
+            raise ValueError(f"body '{body.name}' has no materials")
         V = body.v_template
         neck = body.J_template[body.joint_names.index("neck"), 1]
         near = (V[:, 1] > neck - _NECK_M) & (abs(V[:, 0]) < _HALF_M)
@@ -69,5 +71,5 @@ class ShadedStage:
         draw_shaded(canvas, V, self._triangles, self._colors, shading, K)
         image = np.where(canvas.coverage[..., None], canvas.rgba[..., :3], self._background)
         image = cv2.resize(cv2.GaussianBlur(image, (0, 0), 1.2), (SIZE, SIZE), interpolation=cv2.INTER_AREA)
-        image += self._noise.normal(0, 2.5, image.shape)
-        cv2.imwrite(str(path), np.clip(image, 0, 255).astype(np.uint8)[..., ::-1])
+        noisy = image + self._noise.normal(0, 2.5, image.shape)
+        cv2.imwrite(str(path), np.clip(noisy, 0, 255).astype(np.uint8)[..., ::-1])

@@ -93,9 +93,13 @@ class Stage:
             self._lights.append(lamp)
 
     def _head(self, body: Body) -> None:
+        if body.face_material is None or body.material_colors is None:
+            raise ValueError(f"body '{body.name}' has no materials")
         V = body.v_template
         neck = body.J_template[body.joint_names.index("neck"), 1]
-        faces = body.faces[(V[body.faces][:, :, 1] > neck - 0.08).all(axis=1) & (abs(V[body.faces][:, :, 0]) < 0.2).all(axis=1)]
+        faces = body.faces[
+            (V[body.faces][:, :, 1] > neck - 0.08).all(axis=1) & (abs(V[body.faces][:, :, 0]) < 0.2).all(axis=1)
+        ]
         self._kept, local = np.unique(faces, return_inverse=True)
         material = body.face_material[np.isin(np.arange(len(body.faces)), _rows(body.faces, faces))]
         self._mesh = bpy.data.meshes.new("head")

@@ -49,7 +49,7 @@ def camera_vertices(body: Body, clip: FaceClip, identities: NDArray[np.float64],
 
 
 def gaze_directions(body: Body, vertices: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the unit directions (2, 3) in which the left and the right eye look: from the ball's middle to the pupil."""
+    """Return the unit directions (2, 3) from the middle of the left and of the right eyeball to its pupil."""
     material = list(body.material_names)
     eye = np.unique(body.faces[body.face_material == material.index("eye_white")])
     pupil = np.unique(body.faces[body.face_material == material.index("eye_pupil")])
@@ -68,6 +68,9 @@ def write_truth(path: Path, body: Body, clip: FaceClip, identities: NDArray[np.f
     """Write weights (T, 52), R_camera_head, distance, person, seconds, gaze (T, 2, 3), identities (N, V, 3)."""
     values: dict[str, Any] = dict(vars(clip))
     values["gaze"] = np.array(
-        [gaze_directions(body, head_vertices(body, w, identities[p])) for w, p in zip(clip.weights, clip.person, strict=True)]
+        [
+            gaze_directions(body, head_vertices(body, w, identities[p]))
+            for w, p in zip(clip.weights, clip.person, strict=True)
+        ]
     )
     np.savez_compressed(path, **values, identities=identities.astype(np.float32))

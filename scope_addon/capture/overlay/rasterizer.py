@@ -86,7 +86,17 @@ def draw_shaded(
     dist: NDArray[np.float64] | None = None,
     opacity: float = 1.0,
 ) -> None:
-    """Draw a mesh as `rasterize` does, with a shading (V, 2) of its own, as `shade` returns it."""
+    """Draw a mesh as `rasterize` does, with a shading of its own.
+
+    :param canvas: modified in place.
+    :param vertices_cam: (V, 3) metres, camera axes.
+    :param triangles: (F, 3) vertex indices, counter-clockwise seen from outside.
+    :param face_colors: (F, 3) sRGB, 0..1; or (3,), one colour for all.
+    :param shading: (V, 2) as `shade` returns it.
+    :param intrinsics: (3, 3) K in pixels of the canvas.
+    :param dist: up to (5,) distortion coefficients; None for none.
+    :param opacity: 0..1, written to the canvas's fourth channel.
+    """
     vertices = np.ascontiguousarray(vertices_cam, np.float64)
     corners = np.ascontiguousarray(triangles, np.int32)
     colors = np.broadcast_to(np.asarray(face_colors, np.float32), (len(corners), 3))

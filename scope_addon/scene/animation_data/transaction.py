@@ -8,7 +8,7 @@ restored, so code under a transaction must remove them last.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
 import bpy
@@ -25,14 +25,18 @@ _RENDER = ("fps", "fps_base", "resolution_x", "resolution_y", "pixel_aspect_x", 
 
 
 @contextmanager
-def all_or_nothing(scene: bpy.types.Scene, *objects: bpy.types.Object) -> Iterator[None]:
+def all_or_nothing(
+    scene: bpy.types.Scene, *objects: bpy.types.Object, keys: Sequence[bpy.types.Key] = ()
+) -> Iterator[None]:
     """Roll back new datablocks, scene settings and changes of ``objects`` when the block raises; re-raise.
 
     :param objects: the block may change their keys, action, parent, transform and custom properties, and the custom
         properties of their bones.
+    :param keys: shape keys whose keyframes, action and values it may change.
     """
     unique = list(dict.fromkeys(objects))
-    animated = [_SavedAnimation(obj) for obj in unique]
+    animated = [_SavedAnimation(owner) for owner in (*unique, *keys)]
+    values = [(block, block.value) for key in keys for block in key.key_blocks]
     before = {kind: {block.session_uid for block in getattr(bpy.data, kind)} for kind in _KINDS}
     settings = _SavedScene(scene)
     transforms = [_SavedTransform(obj) for obj in unique]
@@ -44,6 +48,8 @@ def all_or_nothing(scene: bpy.types.Scene, *objects: bpy.types.Object) -> Iterat
             transform.restore()
         for saved in animated:
             saved.restore()
+        for block, value in values:
+            block.value = value
         new = [b for kind in _KINDS for b in getattr(bpy.data, kind) if b.session_uid not in before[kind]]
         bpy.data.batch_remove(new)
         settings.restore()
@@ -114,9 +120,9 @@ class _SavedTransform:
 
 
 class _SavedAnimation:
-    """The action assigned to an object, and a copy of its content in case the block changes the action itself."""
+    """The action assigned to an object or shape keys, and a copy of its content in case the block changes it."""
 
-    def __init__(self, obj: bpy.types.Object) -> None:
+    def __init__(self, obj: bpy.types.Object | bpy.types.Key) -> None:
         self._obj, data = obj, obj.animation_data
         self._had_data = data is not None
         self._action: bpy.types.Action | None = data.action if data else None

@@ -70,8 +70,13 @@ def write_action(rig: bpy.types.Object, keys: list[BoneKeys], frames: NDArray[np
     for key in keys:
         if key.locations is not None:
             channels.write(bone_path(key.bone, "location"), frames, key.locations, group=key.bone)
-    action[_CHECKSUM] = _checksum(action)
+    mark_written(action)
     return action
+
+
+def mark_written(action: bpy.types.Action) -> None:
+    """Remember the keys that retargeting has written, to tell later whether they were edited."""
+    action[_CHECKSUM] = _checksum(action)
 
 
 def override_nla(animation: bpy.types.AnimData) -> None:
@@ -96,7 +101,7 @@ def retime_written_keys(action: bpy.types.Action, retiming: Retiming) -> None:
     unedited = action.get(_CHECKSUM) == _checksum(action)
     retime_keys(action, retiming)
     if unedited:
-        action[_CHECKSUM] = _checksum(action)
+        mark_written(action)
 
 
 def is_retargeted(action: bpy.types.Action) -> bool:

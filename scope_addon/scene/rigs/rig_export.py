@@ -10,12 +10,14 @@ from pathlib import Path
 import bpy
 
 from ....solver.body import Body
+from ...errors import UsageError
 from ...motion import Motion
 from ...retarget.rig_source import RigSource
 from ..build import BuildOptions, build_scene
 from ..export.export import ExportOptions, export
 from ..export.export_states import temporary_scene
 from ..export.output_paths import check_output
+from .face_retarget import captured_expressions, faces_of, retarget_expressions
 from .rig_file import load_rig, rig_bone_map, temporary_datablocks, with_meshes
 from .rig_retarget import RetargetOptions, retarget
 
@@ -41,7 +43,8 @@ def export_on_rig(
 
     :return: the files written, and the warnings.
     :raises InputError: when the rig cannot be used; see ``load_rig``.
-    :raises UsageError: when the choice of armature is ambiguous, or a suffix unknown.
+    :raises UsageError: when the choice of armature is ambiguous, a suffix unknown, or the expression map is not for
+        the rig's meshes.
     :raises OutputError: when a file cannot be written.
     """
     for path in paths:
@@ -60,10 +63,29 @@ def export_on_rig(
             betas, rate = person.motion.betas, result.frame_rate
             retargeting = RetargetOptions(root=options.root)
             warnings += retarget(person.armature, body, betas, rig, bones, rate, retargeting).warnings
+            warnings += _retarget_face(person.armature, rig, source)
         bpy.data.batch_remove([obj for person in result.people for obj in (person.armature, person.mesh)])
         for path in paths:
             written += export(path, [result.collection], options=options.export)
     return written, warnings
+
+
+def _retarget_face(armature: bpy.types.Object, rig: bpy.types.Object, source: RigSource) -> list[str]:
+    """Retarget the captured expressions, if there are any, to the rig's meshes; return warnings.
+
+    :raises UsageError: when an expression map was given, and no mesh has any of its shape keys.
+    """
+    captured = captured_expressions(armature)
+    if captured is None:
+        return []
+    faces = faces_of(with_meshes(rig, bpy.context.scene.objects))
+    try:
+        retarget_expressions(captured, faces, source.expression_map, armature.name)
+    except UsageError as error:
+        if source.expression_map is not None:
+            raise
+        return [f"the face was not retargeted: {error}"]
+    return []
 
 
 def export_rig(path: Path, rig: bpy.types.Object, options: ExportOptions) -> list[Path]:

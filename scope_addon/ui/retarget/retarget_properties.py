@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The settings of retargeting: the rig and the bone map. Stored with the scene."""
+"""The settings of retargeting: the rig and the bone map, the face and the expression map. Stored with the scene."""
 
 from __future__ import annotations
 
@@ -32,6 +32,34 @@ class SCOPE_PG_bone_pair(bpy.types.PropertyGroup):
         name="Body Part", search=offered_parts, description="Part of the captured body that this bone follows"
     )
     confidence: FloatProperty(name="Confidence", min=0.0, max=1.0, description="Confidence of the guess")
+
+
+def offered_expressions(_pair: bpy.types.PropertyGroup | None, _context: bpy.types.Context, typed: str) -> list[str]:
+    """Return the expressions whose names contain what was typed so far, for Blender to suggest."""
+    from ....solver.names import EXPRESSIONS
+
+    return [name for name in EXPRESSIONS if typed.lower() in name.lower()]
+
+
+class SCOPE_PG_expression_pair(bpy.types.PropertyGroup):
+    """One shape key of the user's mesh and an expression that it follows."""
+
+    key: StringProperty(name="Shape Key", description="Shape key of your mesh")
+    expression: StringProperty(
+        name="Expression", search=offered_expressions, description="Captured expression that this shape key follows"
+    )
+    factor: FloatProperty(
+        name="Factor",
+        default=1.0,
+        min=-10.0,
+        max=10.0,
+        description="Value of the shape key where the expression is 1; several expressions of a key add up",
+    )
+
+
+def _is_face(_settings: bpy.types.PropertyGroup, obj: bpy.types.Object) -> bool:
+    captured = obj.parent is not None and "scope_source" in obj.parent
+    return obj.type == "MESH" and obj.data.shape_keys is not None and not captured
 
 
 def _is_armature(_settings: bpy.types.PropertyGroup, obj: bpy.types.Object) -> bool:
@@ -67,6 +95,14 @@ class SCOPE_PG_retarget(bpy.types.PropertyGroup):
     listed_bones: StringProperty(options={"HIDDEN"})  # names of all bones of the rig that the list is for
     pairs: CollectionProperty(type=SCOPE_PG_bone_pair)
     active: IntProperty()
+    face: PointerProperty(
+        name="Mesh",
+        type=bpy.types.Object,
+        poll=_is_face,
+        description="Mesh with shape keys to animate with the captured expressions",
+    )
+    face_pairs: CollectionProperty(type=SCOPE_PG_expression_pair)
+    face_active: IntProperty()
     feet: BoolProperty(
         name="Feet on the Floor",
         default=True,
@@ -95,7 +131,7 @@ class SCOPE_PG_retarget(bpy.types.PropertyGroup):
     )
 
 
-CLASSES = (SCOPE_PG_bone_pair, SCOPE_PG_retarget)
+CLASSES = (SCOPE_PG_bone_pair, SCOPE_PG_expression_pair, SCOPE_PG_retarget)
 
 
 def attach() -> None:

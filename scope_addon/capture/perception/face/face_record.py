@@ -75,7 +75,7 @@ def landmarks_of(rows: NDArray[np.floating[Any]], numbers: NDArray[np.int64]) ->
 def with_expression(
     rows: NDArray[np.floating[Any]], weights: NDArray[np.float64], directions: NDArray[np.float64]
 ) -> NDArray[np.floating[Any]]:
-    """Return rows with other weights (T, 52) and directions of the eyes (T, 2, 3)."""
+    """Return rows (T, RECORD) with other weights (T, 52) and directions of the eyes (T, 2, 3)."""
     out = rows.copy()
     out[:, _WEIGHTS], out[:, _GAZE] = weights, directions.reshape(len(rows), -1)
     return out

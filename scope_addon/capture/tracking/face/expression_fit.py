@@ -10,9 +10,9 @@ mean one v̄, constant over the clip; E (U, D): the response to each unit of exp
 
     ½ (r_t − Eᵀ w)ᵀ Σ⁻¹ (r_t − Eᵀ w) + λ Σ_u w_u        0 ≤ w ≤ w_max
 
-by coordinate descent, in turns with c and G. λ grows with the errors in the clip: it is `SPARSITY` times q over
-that in the rendered faces, with q = median_t mean_u (E Σ⁻¹ e_t)_u² / (E Σ⁻¹ Eᵀ)_uu. `tools/calibrate_face` measures m, V, E and Σ on rendered faces, with the
-network's errors: a lid that the network closes only by half still counts as closed.
+by coordinate descent, in turns with c and G. λ grows with the errors in the clip: it is `SPARSITY` times q over that in
+the rendered faces, with q = median_t mean_u (E Σ⁻¹ e_t)_u² / (E Σ⁻¹ Eᵀ)_uu. `tools/calibrate_face` measures m, V, E, Σ
+on rendered faces, with the network's errors: a lid that the network closes only by half still counts as closed.
 """
 
 from __future__ import annotations
@@ -88,9 +88,7 @@ def fitted(rows: NDArray[np.floating[Any]], times: NDArray[np.float64]) -> NDArr
         return rows
     response = load_response()
     confidence, size, *_ = parts(rows[seen])
-    faces = aligned(
-        landmarks_of(rows[seen], response.landmarks).astype(float), response.reference, response.shares
-    )
+    faces = aligned(landmarks_of(rows[seen], response.landmarks).astype(float), response.reference, response.shares)
     noise = np.clip((SURE_PX / np.maximum(size, 1.0)) ** 2, 1.0, MOST_NOISE)
     sure = confidence >= min(SURE, float(np.median(confidence)))
     units = fit_units(response, faces.points.reshape(len(seen), -1), faces.turns, noise, sure)

@@ -110,7 +110,9 @@ def test_a_rendered_face_that_the_network_sees(tmp_path):
     stage.dress(draw_look(body, rng), rng)
     region = Region((SIZE / 2, SIZE / 2), 0.8 * SIZE, 0.0)
     for t in range(66):
-        stage.render(camera_vertices(body, clip, np.zeros((1, *body.v_template.shape)), t), focal_px(0.8), tmp_path / "face.png")
+        stage.render(
+            camera_vertices(body, clip, np.zeros((1, *body.v_template.shape)), t), focal_px(0.8), tmp_path / "face.png"
+        )
         image = np.ascontiguousarray(cv2.imread(str(tmp_path / "face.png"))[..., ::-1])
         estimate = network.estimate(image, region)
         region = estimate.next_region

@@ -1,0 +1,203 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Operators that retarget captured expressions to a mesh, and that guess, edit, save and load the expression map."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import bpy
+from bpy.props import BoolProperty, EnumProperty, StringProperty
+
+from ..captured_person import captured_armature
+from ..reporting import ReportingOperator, rpt_, tip_
+
+if TYPE_CHECKING:
+    from ...retarget.expression_map import ExpressionMap
+
+
+class _FaceOperator(ReportingOperator):
+    """An operator on the chosen face. Not registered."""
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Require a mesh with shape keys."""
+        face = context.scene.scope_retarget.face
+        if face is None or face.type != "MESH" or face.data.shape_keys is None:
+            cls.poll_message_set(tip_("Choose a mesh with shape keys first"))
+            return False
+        return True
+
+
+class SCOPE_OT_guess_expressions(_FaceOperator):
+    """Assign the mesh's shape keys to expressions by their names: ARKit's, Oculus' visemes, or VRM's"""
+
+    bl_idname = "scope.guess_expressions"
+    bl_label = "Guess Expressions"
+
+    def work(self, context: bpy.types.Context) -> str:
+        """Fill the list."""
+        settings = context.scene.scope_retarget
+        found = guessed_map(settings.face)
+        fill_expressions(settings, found)
+        return rpt_("Found {count} shape keys; check the list", count=len(found.keys))
+
+
+class SCOPE_OT_retarget_face(_FaceOperator):
+    """Transfer the captured expressions to the mesh's shape keys, as a new action"""
+
+    bl_idname = "scope.retarget_face"
+    bl_label = "Retarget Face"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Require a mesh that can be animated in this file, and a captured person."""
+        if not super().poll(context):
+            return False
+        face = context.scene.scope_retarget.face
+        if face.data.library is not None:
+            cls.poll_message_set(
+                tip_(
+                    "'{mesh}' is linked from {file}, so its keyframes would not be saved in this file: make it local",
+                    mesh=face.name,
+                    file=face.data.library.filepath,
+                )
+            )
+            return False
+        if captured_armature(context) is None:
+            cls.poll_message_set(tip_("Select the captured person whose face to retarget"))
+            return False
+        return True
+
+    def work(self, context: bpy.types.Context) -> str:
+        """Write the keys.
+
+        :raises UsageError: the person's face was not captured, or no shape key is mapped.
+        """
+        from ...errors import UsageError
+        from ...scene.rigs.face_retarget import captured_expressions, retarget_expressions
+
+        settings, source = context.scene.scope_retarget, captured_armature(context)
+        assert source is not None  # checked by poll
+        captured = captured_expressions(source)
+        if captured is None:
+            raise UsageError(f"the face of '{source.name}' was not captured; capture again with Face")
+        chosen = listed_expressions(settings) if len(settings.face_pairs) else guessed_map(settings.face)
+        (action,) = retarget_expressions(captured, [settings.face], chosen, source.name)
+        if not len(settings.face_pairs):
+            fill_expressions(settings, chosen)
+        return rpt_("'{mesh}' is now animated by the action '{action}'", mesh=settings.face.name, action=action.name)
+
+
+class _ExpressionMapFileOperator(_FaceOperator):
+    """An operator on an expression map file, which the file browser asks for. Not registered."""
+
+    filter_glob: StringProperty(default="*.json", options={"HIDDEN"})
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        """Ask for the file."""
+        context.window_manager.fileselect_add(self)
+        return {"RUNNING_MODAL"}
+
+
+class SCOPE_OT_save_expression_map(_ExpressionMapFileOperator):
+    """Save the expression map as a JSON file for similar faces"""
+
+    bl_idname = "scope.save_expression_map"
+    bl_label = "Save Expression Map"
+
+    filepath: StringProperty(subtype="FILE_PATH", default="expressions.json")
+    check_existing: BoolProperty(default=True, options={"HIDDEN"})  # the file browser asks before it overwrites
+
+    def check(self, context: bpy.types.Context) -> bool:
+        """Add the suffix while the name is typed, so that the file browser sees which file would be overwritten."""
+        path: str = bpy.path.ensure_ext(self.filepath, ".json")
+        changed, self.filepath = path != self.filepath, path
+        return bool(changed)
+
+    def work(self, context: bpy.types.Context) -> str:
+        """Write the file.
+
+        :raises UsageError: the file has no name.
+        """
+        from ...errors import UsageError
+        from ...retarget.expression_map import save_expression_map
+
+        if not bpy.path.basename(self.filepath).removesuffix(".json"):
+            raise UsageError("the file has no name; enter one")
+        path = bpy.path.ensure_ext(bpy.path.abspath(self.filepath), ".json")
+        save_expression_map(listed_expressions(context.scene.scope_retarget), path)
+        return rpt_("Saved {file}", file=path)
+
+
+class SCOPE_OT_load_expression_map(_ExpressionMapFileOperator):
+    """Load an expression map from a JSON file"""
+
+    bl_idname = "scope.load_expression_map"
+    bl_label = "Load Expression Map"
+
+    filepath: StringProperty(subtype="FILE_PATH")
+
+    def work(self, context: bpy.types.Context) -> str:
+        """Fill the list."""
+        from ...retarget.expression_map import load_expression_map
+
+        fill_expressions(context.scene.scope_retarget, load_expression_map(bpy.path.abspath(self.filepath)))
+        return rpt_("Loaded {file}", file=self.filepath)
+
+
+class SCOPE_OT_edit_expression_pair(_FaceOperator):
+    """Add an entry to the expression map, or remove the selected one"""
+
+    bl_idname = "scope.edit_expression_pair"
+    bl_label = "Edit Expression Map"
+
+    action: EnumProperty(items=(("ADD", "Add", "Add an entry"), ("REMOVE", "Remove", "Remove the selected entry")))
+
+    def work(self, context: bpy.types.Context) -> str:
+        """Change the list."""
+        settings = context.scene.scope_retarget
+        if self.action == "ADD":
+            settings.face_pairs.add()
+            settings.face_active = len(settings.face_pairs) - 1
+        elif len(settings.face_pairs):
+            settings.face_pairs.remove(settings.face_active)
+            settings.face_active = max(0, min(settings.face_active, len(settings.face_pairs) - 1))
+        return rpt_("{count} entries", count=len(settings.face_pairs))
+
+
+def guessed_map(face: bpy.types.Object) -> ExpressionMap:
+    """Return the map that the names of a mesh's shape keys suggest."""
+    from ...retarget.expression_map import guess_expression_map
+    from ...scene.rigs.face_retarget import key_names
+
+    return guess_expression_map(key_names([face]))
+
+
+def fill_expressions(settings: bpy.types.PropertyGroup, expression_map: ExpressionMap) -> None:
+    """Fill the list with a map, one entry for each expression of a shape key."""
+    settings.face_pairs.clear()
+    for key, factors in expression_map.keys.items():
+        for expression, factor in factors.items():
+            pair = settings.face_pairs.add()
+            pair.key, pair.expression, pair.factor = key, expression, factor
+    settings.face_active = 0
+
+
+def listed_expressions(settings: bpy.types.PropertyGroup) -> ExpressionMap:
+    """Return the list as a map; entries without a shape key or an expression are left out."""
+    from ...retarget.expression_map import ExpressionMap
+
+    keys: dict[str, dict[str, float]] = {}
+    for pair in settings.face_pairs:
+        if pair.key and pair.expression:
+            keys.setdefault(pair.key, {})[pair.expression] = round(pair.factor, 6)
+    return ExpressionMap(keys)
+
+
+CLASSES = (
+    SCOPE_OT_guess_expressions,
+    SCOPE_OT_retarget_face,
+    SCOPE_OT_save_expression_map,
+    SCOPE_OT_load_expression_map,
+    SCOPE_OT_edit_expression_pair,
+)

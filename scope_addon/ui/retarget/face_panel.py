@@ -1,0 +1,65 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The panel for retargeting captured expressions, below that for bones."""
+
+from __future__ import annotations
+
+import bpy
+
+from ..capture.capture_panel import Tab
+
+
+class SCOPE_UL_expression_pairs(bpy.types.UIList):
+    """Shape keys of the mesh and the expressions that they follow."""
+
+    def draw_item(
+        self,
+        _context: bpy.types.Context,
+        layout: bpy.types.UILayout,
+        settings: bpy.types.PropertyGroup,
+        item: bpy.types.PropertyGroup,
+        _icon: int,
+        _settings_with_active: bpy.types.PropertyGroup,
+        _active_property: str,
+    ) -> None:
+        """Draw one entry: expression and shape key; see `SCOPE_UL_bone_pairs`."""
+        keys = settings.face.data.shape_keys if settings.face else None
+        known = keys is not None and item.key in keys.key_blocks
+        row = layout.split(factor=0.5, align=True)
+        row.label(text=item.expression, translate=False)
+        row = row.row(align=True)
+        row.alert = not known
+        row.label(text=item.key, translate=False)
+        if not known:
+            row.label(text="", icon="ERROR")
+
+
+class SCOPE_PT_retarget_face(Tab, bpy.types.Panel):
+    """Retargeting of captured expressions to the shape keys of the user's mesh."""
+
+    bl_idname = "SCOPE_PT_retarget_face"
+    bl_parent_id = "SCOPE_PT_retarget"
+    bl_label = "Face"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Draw the panel."""
+        layout, settings = self.layout, context.scene.scope_retarget
+        layout.prop(settings, "face")
+        if settings.face is None or settings.face.data.shape_keys is None:
+            return
+        row = layout.row(align=True)
+        row.operator("scope.guess_expressions", icon="VIEWZOOM")
+        row.operator("scope.load_expression_map", text="", icon="FILE_FOLDER")
+        row.operator("scope.save_expression_map", text="", icon="FILE_TICK")
+        row.operator("scope.edit_expression_pair", text="", icon="ADD").action = "ADD"
+        row.operator("scope.edit_expression_pair", text="", icon="REMOVE").action = "REMOVE"
+        layout.template_list("SCOPE_UL_expression_pairs", "", settings, "face_pairs", settings, "face_active", rows=5)
+        for pair in settings.face_pairs[settings.face_active : settings.face_active + 1]:
+            column = layout.column(align=True)
+            column.prop(pair, "expression", text="", placeholder="Expression", icon="SHAPEKEY_DATA")
+            column.prop_search(pair, "key", settings.face.data.shape_keys, "key_blocks", text="")
+            column.prop(pair, "factor")
+        layout.operator("scope.retarget_face", icon="SHAPEKEY_DATA")
+
+
+CLASSES = (SCOPE_UL_expression_pairs, SCOPE_PT_retarget_face)

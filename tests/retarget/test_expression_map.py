@@ -1,0 +1,117 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Expression maps: guessed from names that programs give, written and read, and what they make of weights."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from scope.scope_addon.errors import OutputError
+from scope.scope_addon.retarget.expression_map import (
+    ExpressionMap,
+    guess_expression_map,
+    load_expression_map,
+    save_expression_map,
+)
+from scope.solver.errors import InputError
+from scope.solver.names import EXPRESSIONS
+
+OCULUS = [
+    f"viseme_{v}" for v in ("sil", "PP", "FF", "TH", "DD", "kk", "CH", "SS", "nn", "RR", "aa", "E", "I", "O", "U")
+]
+VRM0 = ["A", "I", "U", "E", "O", "Blink", "Blink_L", "Blink_R", "Joy", "Angry", "Sorrow", "Fun", "LookUp", "LookLeft"]
+VRM1 = ["aa", "ih", "ou", "ee", "oh", "blink", "blinkLeft", "blinkRight", "happy", "angry", "sad", "surprised"]
+VROID = [f"Face.M_F00_000_00_Fcl_{n}" for n in ("ALL_Joy", "EYE_Close", "EYE_Close_L", "EYE_Close_R", "MTH_A", "MTH_O")]
+
+
+def weights(**values: float) -> np.ndarray:
+    out = np.zeros((1, len(EXPRESSIONS)))
+    for name, value in values.items():
+        out[0, EXPRESSIONS.index(name)] = value
+    return out
+
+
+@pytest.mark.parametrize(
+    "spelled",
+    [
+        lambda n: n,
+        lambda n: n[0].upper() + n[1:],
+        lambda n: f"head.{n}",
+        lambda n: n.replace("Left", "_L").replace("Right", "_R"),
+        lambda n: n.replace("Left", ".L").replace("Right", ".R"),
+        lambda n: "".join(f"_{c.lower()}" if c.isupper() else c for c in n),
+    ],
+)
+def test_arkits_names_however_they_are_spelled(spelled):
+    found = guess_expression_map(["Basis", *map(spelled, EXPRESSIONS), "chestSize"])
+    assert found.keys == {spelled(name): {name: 1.0} for name in EXPRESSIONS}
+
+
+def test_where_there_are_arkits_keys_visemes_are_left_alone():
+    found = guess_expression_map([*EXPRESSIONS, *OCULUS])
+    assert set(found.keys) == set(EXPRESSIONS)
+
+
+@pytest.mark.parametrize(
+    ("names", "closed", "open_mouth", "round_mouth"),
+    [
+        (OCULUS, None, "viseme_aa", "viseme_O"),
+        (VRM0, "Blink", "A", "O"),
+        (VRM1, "blink", "aa", "oh"),
+        (VROID, VROID[1], VROID[4], VROID[5]),
+    ],
+)
+def test_blinks_and_vowels_of_other_conventions(names, closed, open_mouth, round_mouth):
+    found = guess_expression_map(names)
+    found.check()
+    shout = found.values(weights(jawOpen=0.8))
+    assert shout[open_mouth] == 1
+    assert shout[round_mouth] == 0
+    ooh = found.values(weights(jawOpen=0.3, mouthFunnel=0.8))
+    assert ooh[round_mouth] > 0.9
+    assert ooh[open_mouth] == 0
+    assert not any(found.values(weights())[key] for key in found.keys)
+    if closed:
+        assert found.values(weights(eyeBlinkLeft=1, eyeBlinkRight=1))[closed] == 1
+
+
+def test_one_eye_alone():
+    found = guess_expression_map(VRM0).values(weights(eyeBlinkLeft=0.9))
+    assert (found["Blink_L"], found["Blink_R"], found["Blink"]) == (0.9, 0, 0.45)
+
+
+def test_other_names_are_not_guessed():
+    assert guess_expression_map(["Basis", "Key 1", "Bell", "viseme_sil", "viseme_DD", "smirk"]).keys == {}
+
+
+def test_what_is_written_is_read_and_other_files_are_kept(tmp_path):
+    path, other = tmp_path / "face.json", tmp_path / "package.json"
+    written = ExpressionMap({"mund": {"jawOpen": 1.5, "mouthClose": -1.0}, "auge": {"eyeBlinkLeft": 1.0}})
+    save_expression_map(written, path)
+    assert load_expression_map(path).keys == written.keys
+    save_expression_map(guess_expression_map(VRM1), path)
+    other.write_text('{"name": "a game"}')
+    with pytest.raises(OutputError, match="not an expression map, so it is not overwritten"):
+        save_expression_map(written, other)
+    assert other.read_text() == '{"name": "a game"}'
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ({"format": "scope bone map", "version": 1, "bones": {}}, "not a Scope expression map"),
+        ({"shape_keys": {"a": ["jawOpen"]}}, "correct the file"),
+        ({"shape_keys": {"a": {"jawOpen": True}}}, "correct the file"),
+        ({"shape_keys": {"a\0b": {"jawOpen": 1}}}, "correct the file"),
+        ({"shape_keys": {"a": {"jawopen": 1}}}, "'jawopen', which is no expression"),
+        ({"shape_keys": {"a": {"jawOpen": 1e9}}}, "use at most 10"),
+        ({"shape_keys": {"a": {"jawOpen": float("nan")}}}, "use at most 10"),
+        ({"shape_keys": {}}, "no shape key"),
+    ],
+)
+def test_a_file_that_cannot_be_used_says_why(tmp_path, content, message):
+    path = tmp_path / "face.json"
+    path.write_text(json.dumps({"format": "scope expression map", "version": 1} | content))
+    with pytest.raises(InputError, match=message):
+        load_expression_map(path)

@@ -1,0 +1,150 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Captured expressions on the shape keys of other meshes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import bpy
+import numpy as np
+import pytest
+from scope.scope_addon.errors import UsageError
+from scope.scope_addon.retarget.expression_map import ExpressionMap
+from scope.scope_addon.retarget.rig_source import RigSource
+from scope.scope_addon.scene.animation_data import actions
+from scope.scope_addon.scene.build import NEW_SCENE, build_scene
+from scope.scope_addon.scene.export import formats
+from scope.scope_addon.scene.rigs import face_retarget
+from scope.scope_addon.scene.rigs.face_retarget import captured_expressions, faces_of, retarget_expressions
+from scope.scope_addon.scene.rigs.rig_export import RigExportOptions, export_on_rig
+
+from ...edit.walking import motion_of, walk
+from ...made_motion import made_face
+from ..character.test_expression_keys import morph_animation
+from ..made_rigs import build_rig
+
+JAW = np.array([0.0, 0.3, 0.9, 0.2])
+
+
+def face_mesh(names, parent=None):
+    """A mesh of a triangle, with one shape key per name."""
+    mesh = bpy.data.meshes.new("Head")
+    mesh.from_pydata([(0, 0, 1.6), (0.1, 0, 1.6), (0, 0, 1.7)], [], [(0, 1, 2)])
+    face = bpy.data.objects.new("Head", mesh)
+    bpy.context.scene.collection.objects.link(face)
+    for k, name in enumerate(["Basis", *names]):
+        face.shape_key_add(name=name, from_mix=False).data[0].co.y += 0.01 * k
+    if parent is not None:
+        face.parent = parent
+        face.modifiers.new("Armature", "ARMATURE").object = parent
+    return face
+
+
+def keyed(face):
+    """The (T, 2) keys of each animated shape key, by name."""
+    curves = actions.fcurves(face.data.shape_keys)
+    return {curve.data_path.split('"')[1]: actions.read_keys(curve) for curve in curves}
+
+
+@pytest.fixture
+def captured(whole_body, make_motion):
+    motion = replace(make_motion(whole_body, 4), face=made_face(4, jawOpen=JAW, eyeBlinkLeft=0.4))
+    return captured_expressions(build_scene([motion], whole_body, options=NEW_SCENE).people[0].armature)
+
+
+def test_expressions_are_read_back_from_the_captured_body(captured):
+    np.testing.assert_allclose(captured.frames, np.arange(4))
+    np.testing.assert_allclose(captured.weights[:, face_retarget.EXPRESSIONS.index("jawOpen")], JAW, atol=1e-6)
+    np.testing.assert_allclose(captured.weights[:, face_retarget.EXPRESSIONS.index("eyeBlinkLeft")], 0.4, atol=1e-6)
+
+
+def test_a_capture_without_face_has_no_expressions(whole_body, make_motion):
+    person = build_scene([make_motion(whole_body, 4)], whole_body, options=NEW_SCENE).people[0]
+    assert captured_expressions(person.armature) is None
+
+
+def test_arkits_keys_move_as_captured(captured):
+    face = face_mesh(["jawOpen", "eyeBlink_L", "eyeBlink_R", "mouthSmile_L", "mouthSmile_R", "width"])
+    face.data.shape_keys.key_blocks["width"].value = 0.7
+    (action,) = retarget_expressions(captured, [face], name="talk")
+    assert action.name == "Head_talk"
+    assert set(keyed(face)) == {"jawOpen"}  # what never moves has a value alone
+    np.testing.assert_allclose(keyed(face)["jawOpen"], np.stack([np.arange(4), JAW], axis=1), atol=1e-6)
+    values = {block.name: block.value for block in face.data.shape_keys.key_blocks}
+    assert values["eyeBlink_L"] == pytest.approx(0.4)
+    assert values["width"] == pytest.approx(0.7)
+
+
+def test_a_map_adds_up_and_stays_within_0_and_1(captured):
+    face = face_mesh(["mund", "lid"])
+    chosen = ExpressionMap({"mund": {"jawOpen": 2.0, "eyeBlinkLeft": -1.0}, "lid": {"eyeBlinkLeft": 0.5}})
+    retarget_expressions(captured, [face], chosen)
+    np.testing.assert_allclose(keyed(face)["mund"][:, 1], np.clip(2 * JAW - 0.4, 0, 1), atol=1e-6)
+    assert face.data.shape_keys.key_blocks["lid"].value == pytest.approx(0.2)
+
+
+def test_an_unedited_result_is_replaced_and_an_edited_one_is_kept(captured):
+    face = face_mesh(["A", "Blink"])
+    retarget_expressions(captured, [face])
+    retarget_expressions(captured, [face])
+    assert len(bpy.data.actions) == before_and(1)
+    actions.fcurves(face.data.shape_keys)[0].keyframe_points[0].co.y += 0.1
+    retarget_expressions(captured, [face])
+    assert len(bpy.data.actions) == before_and(2)
+
+
+def before_and(count):
+    """The number of actions of the captured body, and ``count``."""
+    return count + len([action for action in bpy.data.actions if not action.name.startswith("Head_")])
+
+
+def test_a_mesh_without_known_names_is_refused(captured):
+    face = face_mesh(["Key 1"])
+    with pytest.raises(UsageError, match="'Head' is mapped to an expression; name them as"):
+        retarget_expressions(captured, [face])
+    assert face.data.shape_keys.animation_data is None
+
+
+def test_what_fails_changes_nothing(captured, monkeypatch):
+    faces = [face_mesh(["A"]), face_mesh(["A"])]
+    retarget_expressions(captured, faces)
+    before = [(keyed(face), face.data.shape_keys.animation_data.action) for face in faces]
+    count = len(bpy.data.actions)
+    monkeypatch.setattr(face_retarget, "retire", lambda _former: 1 / 0)
+    with pytest.raises(ZeroDivisionError):
+        retarget_expressions(captured, faces, ExpressionMap({"A": {"eyeBlinkLeft": 1.0}}))
+    assert len(bpy.data.actions) == count
+    for face, (keys, action) in zip(faces, before, strict=True):
+        assert face.data.shape_keys.animation_data.action == action
+        np.testing.assert_array_equal(keyed(face)["A"], keys["A"])
+        assert face.data.shape_keys.key_blocks["A"].value == pytest.approx(0.0)
+
+
+def test_meshes_that_share_their_data_are_one_face():
+    face = face_mesh(["A"])
+    copy = bpy.data.objects.new("Copy", face.data)
+    assert len(faces_of([face, copy])) == 1
+
+
+@pytest.mark.parametrize(("names", "moving"), [(["viseme_aa", "viseme_O"], "viseme_aa"), (["Key 1"], None)])
+def test_a_rig_file_gets_body_and_face(whole_body, tmp_path, names, moving):
+    rig, _ = build_rig("mixamo")
+    face_mesh(names, rig)
+    path = tmp_path / "hero.blend"
+    with formats.quiet():
+        formats.write_blend(path, bpy.context.scene)
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    motion = motion_of(walk(1.0))
+    T = len(motion.frames)
+    motion = replace(motion, face=made_face(T, jawOpen=np.linspace(0, 0.5, T)))
+    _, warnings = export_on_rig(
+        [motion], whole_body, [tmp_path / "out.glb"], RigSource(path), RigExportOptions(NEW_SCENE)
+    )
+    found = [warning for warning in warnings if "face" in warning]
+    if moving is None:
+        assert "was not retargeted" in found[0]
+        return
+    assert not found
+    weights = morph_animation(tmp_path / "out.glb")
+    np.testing.assert_allclose(weights[moving], 1.5 * np.linspace(0, 0.5, T), atol=1e-4)
+    assert not weights["viseme_O"].any()

@@ -1,0 +1,80 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The operators that retarget the face, as a user runs them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import bpy
+import numpy as np
+import pytest
+from scope.scope_addon.scene.animation_data import actions
+from scope.scope_addon.scene.build import build_scene
+from scope.scope_addon.ui.retarget.retarget_properties import offered_expressions
+
+from ...edit.walking import BODY, motion_of, walk
+from ...made_motion import made_face
+from ...scene.rigs.test_face_retarget import face_mesh
+
+
+@pytest.fixture
+def settings():
+    motion = motion_of(walk(1.0))
+    T = len(motion.frames)
+    build_scene([replace(motion, face=made_face(T, jawOpen=np.linspace(0, 0.5, T)))], BODY)
+    settings = bpy.context.scene.scope_retarget
+    settings.face = face_mesh(["viseme_aa", "viseme_PP", "blinkLeft"])
+    return settings
+
+
+def test_guess_edit_keep_and_retarget(settings, tmp_path):
+    bpy.ops.scope.guess_expressions()
+    pairs = {(pair.key, pair.expression) for pair in settings.face_pairs}
+    assert {("viseme_aa", "jawOpen"), ("viseme_PP", "mouthPressLeft"), ("blinkLeft", "eyeBlinkLeft")} <= pairs
+    next(pair for pair in settings.face_pairs if pair.expression == "jawOpen").factor = 1.2
+    bpy.ops.scope.save_expression_map(filepath=str(tmp_path / "face"))  # the suffix is added
+    count = len(settings.face_pairs)
+    settings.face_active = count - 1
+    bpy.ops.scope.edit_expression_pair(action="REMOVE")
+    assert len(settings.face_pairs) == count - 1
+    bpy.ops.scope.edit_expression_pair(action="ADD")
+    assert settings.face_active == count - 1
+    bpy.ops.scope.load_expression_map(filepath=str(tmp_path / "face.json"))
+    assert len(settings.face_pairs) == count
+    bpy.ops.scope.retarget_face()
+    (curve,) = actions.fcurves(settings.face.data.shape_keys)
+    assert curve.data_path == 'key_blocks["viseme_aa"].value'
+    assert actions.read_keys(curve)[-1, 1] == pytest.approx(0.6, abs=1e-5)
+
+
+def test_retargeting_guesses_what_is_not_listed(settings):
+    bpy.ops.scope.retarget_face()
+    assert len(settings.face_pairs) > 3
+    assert settings.face.data.shape_keys.animation_data.action is not None
+
+
+def test_a_face_without_known_keys_is_an_error(settings):
+    settings.face = face_mesh(["Key 1"])
+    with pytest.raises(RuntimeError, match="no shape key"):
+        bpy.ops.scope.retarget_face()
+    assert settings.face.data.shape_keys.animation_data is None
+    assert len(settings.face_pairs) == 0
+
+
+def test_a_capture_without_face_says_so(settings):
+    for obj in list(bpy.context.scene.objects):
+        if "scope_source" in obj:
+            bpy.data.objects.remove(obj)
+    build_scene([motion_of(walk(1.0))], BODY)
+    with pytest.raises(RuntimeError, match="was not captured; capture again with Face"):
+        bpy.ops.scope.retarget_face()
+
+
+def test_a_mesh_is_needed(settings):
+    settings.face = None
+    assert not bpy.ops.scope.retarget_face.poll()
+    assert not bpy.ops.scope.guess_expressions.poll()
+
+
+def test_expressions_are_offered_by_what_was_typed():
+    assert offered_expressions(None, bpy.context, "blink") == ["eyeBlinkLeft", "eyeBlinkRight"]
