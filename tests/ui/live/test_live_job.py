@@ -110,6 +110,34 @@ def test_a_recording_becomes_a_capture_and_the_body_goes(live):
     assert not job.worker.job_folder.exists()
 
 
+def test_a_countdown_comes_before_the_recording(live, monkeypatch):
+    now = [1000.0]
+    monkeypatch.setattr(live_job.time, "monotonic", lambda: now[0])
+    job = live('pose(1); assert hear() == "record"; pose(2); hear()')
+    while not job.has_body:
+        job.step()
+    job.record(2.5)
+    assert (job.countdown_s, job.recording) == (3, False)
+    now[0] += 2.4
+    job.step()
+    assert (job.countdown_s, job.recording) == (1, False)
+    now[0] += 0.2
+    job.step()
+    assert (job.countdown_s, job.recording) == (0, True)
+    while job.poses < 2:
+        job.step()
+
+
+def test_stop_during_the_countdown_records_nothing(live):
+    job = live("pose(1); hear()")
+    until(job, lambda: job.has_body)
+    job.record(60.0)
+    job.stop()
+    to_end(job)
+    assert "Live" in bpy.data.objects
+    assert bpy.context.scene.scope.capture is None
+
+
 def test_a_recorded_file_that_ends_by_itself_becomes_a_capture(live):
     job = live('pose(1); assert hear() == "record"; pose(2); finish()')
     until(job, lambda: job.has_body)
@@ -260,6 +288,7 @@ def test_a_removed_scene_ends_the_capture(live):
     [
         ("CAMERA", "front", "is no camera"),
         ("CAMERA", "rtsp://a/b", "is no camera"),
+        ("CAMERA", "/dev/video0/../sda", "is no camera"),
         ("STREAM", "", "no stream is given"),
         ("FILE", "", "no video is chosen"),
     ],
@@ -294,6 +323,7 @@ def test_a_stream_needs_online_access_and_gets_its_login(monkeypatch):
 
 def test_the_capture_has_the_options_of_the_panel():
     scene = bpy.context.scene
+    scene.scope_live.camera = "0: USB Camera: front (MJPG 1920×1080)"
     scene.scope_live.quality = "BALANCED"
     scene.scope.height_cm, scene.scope.lens, scene.scope.focal_mm = 181, "FOCAL", 28
     request = live_request(scene)
