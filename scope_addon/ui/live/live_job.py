@@ -75,6 +75,7 @@ class LiveJob:
         self._scene_uid = scene.session_uid
         self._request = live_request(scene)
         self._is_stream = scene.scope_live.source == "STREAM"
+        self._kept = self._request.values["keep_footage"]  # the video of a recording, if it is wanted
         self._footage = self._request.source if scene.scope_live.source == "FILE" else ""
         self._scene_body = load_body(self._request.values["body"])
         self._body = LiveBody(scene, "Live", self._scene_body)
@@ -221,6 +222,8 @@ class LiveJob:
         paths = [self._worker.job_folder / Path(name).name for name in result["motions"]]
         contents = [(path, path.read_bytes()) for path in paths]
         body, options = self._request.values["body"], build_options(scene)
+        if self._kept and Path(self._kept).is_file():
+            self._footage = scene.scope.footage = str(self._kept)  # Capture then captures the take once more
         built = build_capture(scene, contents, body, self._footage, result["report"], options)
         self._body.remove()
         if self._rig is not None and self._rig.rig is not None:
@@ -245,6 +248,17 @@ def live_rig(scene: bpy.types.Scene, body: Body) -> LiveRig:
         raise UsageError(f"'{settings.rig.name}' is linked; make an override of it, or switch off Rig")
     bones = listed_map(settings) if len(settings.pairs) else guess_bone_map(settings.rig)
     return LiveRig(settings.rig, body, bones, retarget_options(settings))
+
+
+def kept_footage(scene: bpy.types.Scene) -> Path:
+    """Return a new name beside the .blend file for the pictures of a recording.
+
+    :raises UsageError: the .blend file was never saved.
+    """
+    if not bpy.data.filepath:
+        raise UsageError("the footage is written beside the .blend file; save that first, or switch off Keep Footage")
+    folder, stem = Path(bpy.data.filepath).parent, bpy.path.clean_name(scene.scope.take or "Live")
+    return folder / f"{stem} {time.strftime('%Y-%m-%d %H.%M.%S')}.mp4"
 
 
 def live_request(scene: bpy.types.Scene) -> LiveRequest:
@@ -275,4 +289,6 @@ def live_request(scene: bpy.types.Scene) -> LiveRequest:
     names = {option.name for option in options_at(Place.LIVE_WORKER)}
     values = {name: value for name, value in chosen_values(scene).items() if name in names}
     values["heights_m"] = values["heights_m"][:1]
+    if settings.keep_footage and settings.source != "FILE":
+        values["keep_footage"] = str(kept_footage(scene))
     return LiveRequest(source, online=online, **values, live_quality=settings.quality.lower())

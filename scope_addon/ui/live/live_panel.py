@@ -36,6 +36,10 @@ class SCOPE_PT_live(Tab, bpy.types.Panel):
         row.enabled = job is None or not (job.recording or job.countdown_s)
         row.prop(settings, "countdown_s")
         row.prop(settings, "with_scene")
+        if settings.source != "FILE":
+            row = layout.row()
+            row.enabled = job is None
+            row.prop(settings, "keep_footage")
         row = layout.row(align=True)
         row.scale_y = 1.6
         if job is None:

@@ -86,6 +86,13 @@ class SCOPE_PG_live(bpy.types.PropertyGroup):
         options=set(),
         description="Seconds between Record and the beginning of the recording",
     )
+    keep_footage: BoolProperty(
+        name="Keep Footage",
+        default=False,
+        options=set(),
+        description="Write the recorded pictures of a camera or stream as a video beside the .blend file, from which a "
+        "more accurate motion of the same take can be captured",
+    )
     with_scene: BoolProperty(
         name="Play Scene",
         default=False,

@@ -8,7 +8,6 @@ import sys
 import pytest
 from scope.scope_addon.job.live.cameras import LONGEST_NAME, camera_source, list_cameras
 
-
 SIZES = {b"MJPG": [(640, 480), (1920, 1080)], b"YUYV": [(640, 480)]}
 
 

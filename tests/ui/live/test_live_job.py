@@ -4,10 +4,12 @@
 import sys
 import textwrap
 import time
+from pathlib import Path
 
 import bpy
 import numpy as np
 import pytest
+from scope.scope_addon.cli import SAMPLE
 from scope.scope_addon.errors import OfflineError, UsageError, VideoError
 from scope.scope_addon.job.live.process import LiveProcess
 from scope.scope_addon.job.messages import WorkerFailedError
@@ -108,6 +110,33 @@ def test_a_recording_becomes_a_capture_and_the_body_goes(live):
     assert "Live" not in bpy.data.collections
     assert scene.scope.result.frames_per_second == 28.0
     assert not job.worker.job_folder.exists()
+
+
+def test_kept_footage_is_chosen_for_another_capture(live, tmp_path, monkeypatch):
+    kept = tmp_path / "take.mp4"
+    monkeypatch.setattr(live_job, "kept_footage", lambda scene: kept)
+    settings = bpy.context.scene.scope_live
+    settings.source, settings.keep_footage = "CAMERA", True
+    job = live(f'pose(1); hear(); hear(); assert request["keep_footage"] == {str(kept)!r}; '
+               f'shutil.copy({str(SAMPLE)!r}, request["keep_footage"]); finish()')  # fmt: skip
+    until(job, lambda: job.has_body)
+    job.record()
+    job.stop()
+    to_end(job)
+    assert bpy.context.scene.scope.footage == str(kept)
+    assert bpy.context.scene.scope.result.footage == str(kept)
+
+
+def test_footage_is_kept_beside_a_saved_file_only(tmp_path):
+    scene = bpy.context.scene
+    scene.scope_live.keep_footage = True
+    with pytest.raises(UsageError, match="save that first"):
+        live_request(scene)
+    scene.scope.take = "../Jump"
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "scene.blend"))
+    path = Path(live_request(scene).values["keep_footage"])
+    assert (path.parent, path.suffix) == (tmp_path, ".mp4")
+    assert path.name.startswith("___Jump ")
 
 
 def test_a_countdown_comes_before_the_recording(live, monkeypatch):
