@@ -44,10 +44,11 @@ def run_live_command(args: argparse.Namespace) -> dict[str, Any]:
     check_installed(CAPTURE if values["vmc"] is None else (*CAPTURE, "pythonosc"))
     check_memory_limit(with_scene=False)
     options = _checked(values)
-    if values["record"]:
-        check_outputs([values["record"]], Path(args.source))
+    if written := [values[name] for name in ("record", "keep_footage") if values[name]]:
+        check_outputs(written, Path(args.source))
     # Imported here, so that errors in the arguments are printed immediately.
     from ...solver.loaders.body_file import load_body
+    from ..live.outputs.footage import Footage
     from ..live.outputs.recording import Recording
     from ..live.run import Listeners, run_live
     from ..live.sources import open_source
@@ -58,10 +59,15 @@ def run_live_command(args: argparse.Namespace) -> dict[str, Any]:
         recording = Recording(values["record"], body, source) if values["record"] else None
         if recording:
             outputs.append(recording)
+        footage = stack.enter_context(Footage(values["keep_footage"], source.fps)) if values["keep_footage"] else None
         line = stack.enter_context(ProgressLine(sys.stderr, show=not args.quiet))
         begin = recording.begin if recording else lambda *_: None
-        report = run_live(source, body, options, outputs, Listeners(say, lambda state: line(str(state)), begin))
-    report["outputs"] = [str(recording.save())] if recording else []
+        received = footage.add if footage else lambda _: None
+        listeners = Listeners(say, lambda state: line(str(state)), begin, received)
+        report = run_live(source, body, options, outputs, listeners)
+        saved = [footage.save()] if footage else []
+    saved = [*([recording.save()] if recording else []), *saved]
+    report["outputs"] = [str(path) for path in saved if path]
     if not args.json:
         say(_summary(report))
     return report
@@ -77,6 +83,10 @@ def _checked(values: Mapping[str, Any]) -> LiveOptions:
             raise UsageError(f"{option.flag} {problem}")
     if values["record"] and values["record"].suffix.lower() not in MOTION_SUFFIXES:
         raise UsageError(f"--record writes a motion file: give a name that ends in .npz, not {values['record'].name}")
+    if values["keep_footage"] and values["keep_footage"].suffix.lower() != ".mp4":
+        raise UsageError(
+            f"--keep-footage writes a video: give a name that ends in .mp4, not {values['keep_footage'].name}"
+        )
     if len(values["heights_m"]) > 1:
         raise UsageError("a live capture follows one person: give one --height")
     from ..capture.camera.calibration import read_calibration

@@ -32,6 +32,7 @@ from ..kinematics.axes import transform_points, world_from_level_camera
 from ..kinematics.contact_points import SOLES
 
 SAME_FOCAL = 0.02  # relative difference of focal lengths, for which the lines of the background point alike
+SAME_HEIGHT_M, SAME_UP_COS = 0.015, np.cos(np.radians(1.0))  # of two estimates of one floor
 
 
 @dataclass(frozen=True)
@@ -117,9 +118,13 @@ class Calibrator:
     def follow(self, calibration: Calibration, track: Track, fitted: FittedTrack) -> Calibration:
         """Estimate the floor's inclination and height again, from the last seconds.
 
-        The horizontal position stays: nothing in the picture says where the origin was.
+        The horizontal position stays: nothing in the picture says where the origin was. Small differences are ignored,
+        because frames were fitted to the floor as it is: a bias of millimetres would add up for as long as it runs.
         """
         found = self._with_world(calibration, track, fitted)
+        higher = abs(found.camera_position[2] - calibration.camera_position[2]) > SAME_HEIGHT_M
+        if not higher and found.up @ calibration.up > SAME_UP_COS:
+            return calibration
         position = calibration.camera_position.copy()
         position[2] = found.camera_position[2]
         return replace(calibration, up=found.up, camera_position=position)

@@ -26,11 +26,18 @@ class NewestFrame:
 
     :param reconnect_s: pause before an interrupted source is opened again; 0: the capture ends there.
     :param say: is told of interruptions, from the reading thread.
+    :param received: gets every frame, from the reading thread, which it must not delay.
     """
 
     def __init__(
-        self, source: Source, clock: Clock, reconnect_s: float = 0.0, say: Callable[[str], None] = lambda _: None
+        self,
+        source: Source,
+        clock: Clock,
+        reconnect_s: float = 0.0,
+        say: Callable[[str], None] = lambda _: None,
+        received: Callable[[Picture], None] = lambda _: None,
     ) -> None:
+        self._received = received
         self._source, self._clock, self._reconnect_s, self._say = source, clock, reconnect_s, say
         self._changed = threading.Condition()
         self._newest: Picture | None = None
@@ -114,9 +121,11 @@ class NewestFrame:
                 self._began_s = 0.0 if self._source.ends else picture.timestamp_s
         index = self._first_index + picture.index
         time_s = max(picture.timestamp_s - self._began_s, self._last_s + 1e-3 if self.received else 0.0)
+        picture = replace(picture, index=index, timestamp_s=time_s)
+        self._received(picture)
         with self._changed:
             self.dropped += self._newest is not None
             self.received += 1
-            self._newest = replace(picture, index=index, timestamp_s=time_s)
+            self._newest = picture
             self._next_index, self._last_s = index + 1, time_s
             self._changed.notify_all()

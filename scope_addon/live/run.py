@@ -80,6 +80,7 @@ class Listeners:
     say: Callable[[str], None] = lambda _: None
     progress: Callable[[LiveProgress], None] = lambda _: None
     camera: Callable[[LiveSession, tuple[int, int]], None] = lambda *_: None  # once the first frame has come
+    received: Callable[[Picture], None] = lambda _: None  # every frame, from another thread, which must not be delayed
 
 
 def run_live(
@@ -100,7 +101,7 @@ def run_live(
     tracker = PeopleTracker(options.quality, min(options.threads or cores, cores), None, execution=execution)
     LiveBody(body, assumed_camera(*CAMERA_SIZE, CAMERA_SIZE[0])).load()
     statistics = Statistics()
-    reader = NewestFrame(source, clock, options.reconnect_s, listeners.say)
+    reader = NewestFrame(source, clock, options.reconnect_s, listeners.say, listeners.received)
     stopped = False
     with ThreadPoolExecutor(1, "scope-live-calibration") as executor, _opencv_in_one_thread(), reader:
         try:

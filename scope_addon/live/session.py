@@ -29,7 +29,7 @@ from .smoothing import PoseFilter
 CALIBRATED_S = 2.0  # after the person was first seen
 CALIBRATE_AT_S = (0.0, 0.3, 0.7, 1.2, CALIBRATED_S)
 FOLLOW_S, FOLLOWED_S = 1.0, 4.0  # between two estimates of the world afterwards, and how much each of them sees
-SETTLING_S, FOLLOWING_S = 0.3, 10.0  # time constants towards the estimates
+SETTLING_S, FOLLOWING_S = 0.3, 10.0  # time constants towards the estimates, the second at least
 HOLD_S = 0.5  # for which the pose of a person who is not seen is held, rather than lost
 
 Start = Callable[..., "Future[Calibration]"]
@@ -145,7 +145,9 @@ class LiveSession:
             self._start_estimate(time_s)
         step_s = max(time_s - self._last_s, 0.0) if np.isfinite(self._last_s) else 0.0
         early = 1 - np.exp(-step_s / SETTLING_S)
-        late = early if not self.is_settled(time_s) else 1 - np.exp(-step_s / FOLLOWING_S)
+        # The longer the world has been known, the less a new estimate moves it.
+        following_s = max(FOLLOWING_S, time_s - self._first_s)
+        late = early if not self.is_settled(time_s) else 1 - np.exp(-step_s / following_s)
         before, self._current = self._current, self._current.towards(self._target, float(early), float(late))
         if self._current.camera is not before.camera:
             self._fit.set_camera(self._current.camera)

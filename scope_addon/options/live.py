@@ -28,6 +28,14 @@ LIVE_OPTIONS = (
         argument=Argument(metavar="OUT"),
     ),
     Option(
+        "keep_footage",
+        Path,
+        None,
+        Place.LIVE | Place.LIVE_WORKER,
+        "video (.mp4) of the recorded pictures to write",
+        argument=Argument(metavar="VIDEO"),
+    ),
+    Option(
         "json_port",
         int,
         None,

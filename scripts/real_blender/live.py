@@ -183,14 +183,24 @@ def cancelled(before: dict) -> Iterator[float]:
     key("Shift_L")  # moves the mouse away, whose tooltip would cover the panel
 
 
+def plays() -> bool:
+    """Return whether the scene's animation plays."""
+    return bool(bpy.context.window_manager.windows[0].screen.is_animation_playing)
+
+
 def recorded() -> Iterator[float]:
     """Save while live, record, stop, undo and redo."""
     yield from start()
     bpy.ops.wm.save_as_mainfile(filepath=str(SAVED))
     assert b"secret" not in SAVED.read_bytes()
     yield from moving()
+    settings = bpy.context.scene.scope_live
+    settings.countdown_s, settings.with_scene = 1, True
     use(bpy.ops.scope.record_live)
+    assert not state().job.recording
+    yield from until(lambda: state().job.recording, 5, "the end of the countdown")
     began = time.monotonic()
+    yield from until(plays, 2, "the scene to play")
     yield RECORDED_S
     picture("23_live_recording")
     worker, recorded_s, began = state().job.worker, time.monotonic() - began, time.monotonic()
@@ -199,6 +209,7 @@ def recorded() -> Iterator[float]:
     report["recorded_and_gone_s"] = round(time.monotonic() - began, 2)
     yield from until(lambda: state().job is None, 10, "the keys")
     assert len(captures()) == 1, state().message
+    assert not plays()
     person = next(o for o in captures()[0].all_objects if o.type == "ARMATURE")
     assert "scope_motion" in person
     assert person.pose.bones["head"].custom_shape is not None

@@ -22,6 +22,7 @@ from scope.scope_addon.motion import Motion
         (["ftp://host/x"], 1, "'ftp' is not a kind of stream that can be read"),
         (["x.mp4", "--record", "a.glb"], 2, "--record writes a motion file: give a name that ends in .npz, not a.glb"),
         (["x.mp4", "--record", "none/a.npz"], 1, "none"),
+        (["x.mp4", "--keep-footage", "a.mov"], 2, "--keep-footage writes a video: give a name that ends in .mp4, not"),
         (["x.mp4", "--vmc", "39539"], 1, "x.mp4 does not exist"),
         ([str(SAMPLE), "--vmc", "39539"], 2, "--vmc must be HOST:PORT, such as 127.0.0.1:39539, not '39539'"),
         (["x.mp4", "--height", "170,180"], 2, "a live capture follows one person: give one --height"),
@@ -72,4 +73,4 @@ def test_ctrl_c_ends_the_capture_and_keeps_the_recording(tmp_path):
             out, _ = process.communicate(timeout=60)
     report = json.loads(out)
     assert (process.returncode, report["stopped"], report["outputs"]) == (0, True, [str(target)])
-    assert Motion.load(target).valid.sum() == report["poses"]
+    assert Motion.load(target).valid.sum() == report["poses"] - 1  # the last one's is given a frame later

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 # Codec, and its options: visually without loss at a size and speed that suit a preview.
 _CODECS = (("libx264", {"preset": "veryfast", "crf": "20"}), ("mpeg4", {"qscale": "4"}))
 _LARGEST = 65535  # of numerator and denominator of MPEG-4's clock
+_CLOCK = Fraction(1, 60000)  # of images whose times are given, seconds
 
 
 class VideoWriter:
@@ -62,13 +63,17 @@ class VideoWriter:
         self.abandon()
         raise OutputError(f"cannot write {self._path}: no video encoder was found; choose a .png or .jpg overlay")
 
-    def write(self, image: NDArray[np.uint8]) -> None:
+    def write(self, image: NDArray[np.uint8], time_s: float | None = None) -> None:
         """Append an image.
 
         :param image: (H, W, 3) uint8 RGB.
+        :param time_s: when it is shown, later than the one before; given for every image, or for none.
         :raises OutputError: the system refused.
         """
         frame = self._av.VideoFrame.from_ndarray(np.ascontiguousarray(image), format="rgb24")
+        if time_s is not None:
+            self._stream.codec_context.time_base = frame.time_base = _CLOCK
+            frame.pts = round(time_s / _CLOCK)
         try:
             self._container.mux(self._stream.encode(frame))
         except self._failures as error:

@@ -4,13 +4,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ....solver.errors import ScopeError
+from ...live.outputs.footage import Footage
 from ...live.outputs.pose_values import values
 from ...live.outputs.recording import Recording
 from ...live.run import Listeners, LiveOptions, LiveProgress, run_live
-from ...live.sources import Source, open_source
+from ...live.sources import Picture, Source, open_source
 from .commands import Commands
 from .request import LiveRequest
 
@@ -45,19 +48,35 @@ def capture_live(request: LiveRequest, job_folder: Path, send: Send, commands: C
     )
     clock = Clock()
     clock.stopped = commands.stopped
-    recorder = _Recorder(job_folder / MOTION, body, source, commands)
-    listeners = Listeners(
-        lambda text: send("notice", text=text), lambda state: send("status", **_status(state, recorder)), recorder.begin
-    )
-    report = run_live(source, body, options, (recorder, _Sender(send)), listeners, clock)
-    recording = recorder.recording
-    if recording is None:
-        send("ended")
-        return
-    recording.save()
+    with ExitStack() as stack:
+        kept = chosen["keep_footage"]
+        footage = stack.enter_context(Footage(Path(kept), source.fps)) if kept else None
+        recorder = _Recorder(job_folder / MOTION, body, source, commands, footage)
+        listeners = Listeners(
+            lambda text: send("notice", text=text),
+            lambda state: send("status", **_status(state, recorder)),
+            recorder.begin,
+            recorder.receive,
+        )
+        report = run_live(source, body, options, (recorder, _Sender(send)), listeners, clock)
+        recording = recorder.recording
+        if recording is None:
+            send("ended")
+            return
+        recording.save()
+        warnings = save_footage(footage) if footage else []
     camera = recording.camera
-    told = {"camera": camera.source if camera else "", "fps": {"total": report["poses_per_second"]}, "warnings": []}
-    send("result", motions=[MOTION], report=told)
+    told = {"camera": camera.source if camera else "", "fps": {"total": report["poses_per_second"]}}
+    send("result", motions=[MOTION], report={**told, "warnings": warnings})
+
+
+def save_footage(footage: Footage) -> list[str]:
+    """Finish the video of a recording, which is not lost if that fails; return what went wrong."""
+    try:
+        footage.save()
+    except ScopeError as error:
+        return [str(error)]
+    return [f"{footage.lost} frames are missing in the footage"] if footage.lost else []
 
 
 class _Sender:
@@ -73,7 +92,10 @@ class _Sender:
 class _Recorder:
     """Keeps poses from when the parent asks for it; ``recording`` is None before."""
 
-    def __init__(self, path: Path, body: Body, source: Source, commands: Commands) -> None:
+    def __init__(
+        self, path: Path, body: Body, source: Source, commands: Commands, footage: Footage | None = None
+    ) -> None:
+        self._footage = footage
         self._path, self._body, self._source, self._commands = path, body, source, commands
         self._session: tuple[LiveSession, tuple[int, int]] | None = None
         self.recording: Recording | None = None
@@ -86,12 +108,24 @@ class _Recorder:
 
     def send(self, pose: LivePose, latency_ms: float) -> None:
         """Keep a pose if one is asked for."""
-        if self.recording is None and self._commands.recording.is_set() and self._session is not None:
+        if self.recording is None and self._is_due(pose) and self._session is not None:
             # A file keeps its times, so that its pictures and the poses belong together.
             self.recording = Recording(self._path, self._body, self._source, from_zero=not self._source.ends)
+            self.recording.origin = self._footage.origin if self._footage is not None else None
             self.recording.begin(*self._session)
         if self.recording is not None:
             self.recording.send(pose, latency_ms)
+
+    def receive(self, picture: Picture) -> None:
+        """Keep a picture if that is asked for."""
+        if self._footage is not None and self._commands.recording.is_set():
+            self._footage.add(picture)
+
+    def _is_due(self, pose: LivePose) -> bool:
+        """Whether the recording begins with a pose: none from before the first picture that is kept."""
+        if self._footage is None:
+            return self._commands.recording.is_set()
+        return self._footage.origin is not None and pose.index >= self._footage.origin[0]
 
 
 def _status(state: LiveProgress, recorder: _Recorder) -> dict[str, Any]:

@@ -42,12 +42,18 @@ def _between(poses: Sequence[LivePose], k: int, after: int, since: NDArray[np.fl
     later, earlier = poses[after], poses[max(after - 1, 0)]
     span = float(since[max(after - 1, 0)] - since[after])
     share = float(np.clip(since[max(after - 1, 0)] / span, 0.0, 1.0)) if span > 0 else 1.0
-    turn = log(np.swapaxes(earlier.rotations, 1, 2) @ later.rotations)
+    # In the world, which may have moved between the two.
+    R, t = later.T_world_camera[:3, :3], later.T_world_camera[:3, 3]
+    R_earlier, t_earlier = earlier.T_world_camera[:3, :3], earlier.T_world_camera[:3, 3]
+    before = earlier.rotations.copy()
+    before[0] = R.T @ R_earlier @ before[0]
+    root_before = (R_earlier @ earlier.root_cam + t_earlier - t) @ R
+    turn = log(np.swapaxes(before, 1, 2) @ later.rotations)
     return replace(
         poses[k],
         betas=later.betas,
-        rotations=earlier.rotations @ exp(share * turn),
-        root_cam=earlier.root_cam + share * (later.root_cam - earlier.root_cam),
+        rotations=before @ exp(share * turn),
+        root_cam=root_before + share * (later.root_cam - root_before),
         T_world_camera=later.T_world_camera,
         joints=earlier.joints + share * (later.joints - earlier.joints),
         contact=earlier.contact + share * (later.contact - earlier.contact),

@@ -43,6 +43,7 @@ class Recording:
         :param from_zero: whether frame numbers and times begin with 0, rather than with those of the source.
         """
         self._from_zero = from_zero
+        self.origin: tuple[int, float] | None = None  # the frame number and time that become 0, if not the first ones
         self._path, self._body, self._source = path, body, source
         self._poses: list[LivePose] = []
         self._session: LiveSession | None = None
@@ -70,8 +71,9 @@ class Recording:
             )
         motion = self.motion(self._session.camera)
         if self._from_zero:
-            motion.frames -= motion.frames[0]
-            motion.timestamps -= motion.timestamps[0]
+            frame, time_s = self.origin or (motion.frames[0], motion.timestamps[0])
+            motion.frames -= frame
+            motion.timestamps -= time_s
         motion.save(self._path)
         return self._path
 

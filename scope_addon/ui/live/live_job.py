@@ -6,6 +6,7 @@ The modal operator calls ``step`` on a timer; tests call it in a loop.
 
 from __future__ import annotations
 
+import math
 import sys
 import time
 from collections.abc import Sequence
@@ -20,6 +21,7 @@ from ....solver.errors import ScopeError
 from ....solver.loaders.body_file import load_body
 from ...errors import OfflineError, UsageError, VideoError
 from ...footage import shown
+from ...job.live.cameras import camera_source
 from ...job.live.process import LiveProcess, ShownPose
 from ...job.live.request import LiveRequest
 from ...job.process import START_SCRIPT
@@ -67,11 +69,13 @@ class LiveJob:
         check_local(scene)
         self.status = LiveStatus()
         self.recording = self.finishing = self.cancelled = False
+        self._record_at_s: float | None = None  # while a countdown runs
         self.warnings: list[str] = []  # of the retargeting of a recording
         self.poses = 0  # shown so far
         self._scene_uid = scene.session_uid
         self._request = live_request(scene)
         self._is_stream = scene.scope_live.source == "STREAM"
+        self._kept = self._request.values["keep_footage"]  # the video of a recording, if it is wanted
         self._footage = self._request.source if scene.scope_live.source == "FILE" else ""
         self._scene_body = load_body(self._request.values["body"])
         self._body = LiveBody(scene, "Live", self._scene_body)
@@ -101,10 +105,20 @@ class LiveJob:
         seconds = time.monotonic() - self._last_pose_s
         return seconds if seconds > QUIET_S and self.status.presence else 0.0
 
-    def record(self) -> None:
-        """Keep the poses from now on, for ``stop``."""
-        self.recording = True
-        self._worker.record()
+    @property
+    def countdown_s(self) -> int:
+        """Whole seconds until the recording begins; 0 if none is about to begin."""
+        return 0 if self._record_at_s is None else max(math.ceil(self._record_at_s - time.monotonic()), 1)
+
+    def record(self, countdown_s: float = 0.0) -> None:
+        """Keep the poses for ``stop``, from the end of a countdown on."""
+        self._record_at_s = time.monotonic() + countdown_s
+        self._record_if_due()
+
+    def _record_if_due(self) -> None:
+        if self._record_at_s is not None and time.monotonic() >= self._record_at_s and not self.finishing:
+            self._record_at_s, self.recording = None, True
+            self._worker.record()
 
     def stop(self) -> None:
         """End the capture; ``step`` returns False when all is done. Without a recording, the last pose stays."""
@@ -150,6 +164,7 @@ class LiveJob:
             if not self.recording:
                 raise OfflineError
             self.stop()  # what was recorded is written
+        self._record_if_due()
         self._listen()
         pose = None if self.finishing else self._worker.newest_pose(self._scene_body.K + 1, self._scene_body.P)
         if pose is not None:
@@ -207,6 +222,8 @@ class LiveJob:
         paths = [self._worker.job_folder / Path(name).name for name in result["motions"]]
         contents = [(path, path.read_bytes()) for path in paths]
         body, options = self._request.values["body"], build_options(scene)
+        if self._kept and Path(self._kept).is_file():
+            self._footage = scene.scope.footage = str(self._kept)  # Capture then captures the take once more
         built = build_capture(scene, contents, body, self._footage, result["report"], options)
         self._body.remove()
         if self._rig is not None and self._rig.rig is not None:
@@ -233,6 +250,17 @@ def live_rig(scene: bpy.types.Scene, body: Body) -> LiveRig:
     return LiveRig(settings.rig, body, bones, retarget_options(settings))
 
 
+def kept_footage(scene: bpy.types.Scene) -> Path:
+    """Return a new name beside the .blend file for the pictures of a recording.
+
+    :raises UsageError: the .blend file was never saved.
+    """
+    if not bpy.data.filepath:
+        raise UsageError("the footage is written beside the .blend file; save that first, or switch off Keep Footage")
+    folder, stem = Path(bpy.data.filepath).parent, bpy.path.clean_name(scene.scope.take or "Live")
+    return folder / f"{stem} {time.strftime('%Y-%m-%d %H.%M.%S')}.mp4"
+
+
 def live_request(scene: bpy.types.Scene) -> LiveRequest:
     """Make the request to the worker from the scene's settings and the preferences.
 
@@ -255,10 +283,12 @@ def live_request(scene: bpy.types.Scene) -> LiveRequest:
             raise OfflineError
         online, source = True, with_login(source)
     else:
-        source = settings.camera.strip()
-        if not (source.isdecimal() and len(source) <= 3) and not source.startswith("/dev/video"):
-            raise UsageError(f"'{source}' is no camera; enter its number, 0 for the first")
+        source = camera_source(settings.camera) or ""
+        if not source:
+            raise UsageError(f"'{settings.camera.strip()}' is no camera; enter its number, 0 for the first")
     names = {option.name for option in options_at(Place.LIVE_WORKER)}
     values = {name: value for name, value in chosen_values(scene).items() if name in names}
     values["heights_m"] = values["heights_m"][:1]
+    if settings.keep_footage and settings.source != "FILE":
+        values["keep_footage"] = str(kept_footage(scene))
     return LiveRequest(source, online=online, **values, live_quality=settings.quality.lower())

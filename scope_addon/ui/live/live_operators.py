@@ -46,6 +46,7 @@ class SCOPE_OT_live(bpy.types.Operator):
             return self.execute(context) if bpy.app.background else {"CANCELLED"}
         manager = context.window_manager
         self._shown: tuple[object, ...] = ()
+        self._played = False
         self._timer = manager.event_timer_add(TIMER_S, window=context.window)
         manager.modal_handler_add(self)
         redraw_sidebars_twice()
@@ -117,8 +118,12 @@ class SCOPE_OT_live(bpy.types.Operator):
             frame_selected(context)
         if job.poses != before:
             redraw_viewports()
+        if job.recording and not job.finishing and not self._played:
+            self._played = True
+            play_scene(context)
         status = job.status
-        panel = (status.presence, round(status.rate), status.notice, status.recorded_s, round(job.quiet_s))
+        seconds = (status.recorded_s, round(job.quiet_s), job.countdown_s)
+        panel = (status.presence, round(status.rate), status.notice, seconds)
         if panel != self._shown:  # drawing the same again costs time in which Blender does not react
             self._shown = panel
             redraw_sidebars()
@@ -133,6 +138,8 @@ class SCOPE_OT_live(bpy.types.Operator):
 
     def _end(self, context: bpy.types.Context, outcome: set[str]) -> set[str]:
         stop_job()
+        if getattr(self, "_played", False):
+            stop_scene(context)
         if (timer := getattr(self, "_timer", None)) is not None:
             context.window_manager.event_timer_remove(timer)
             self._timer = None
@@ -170,8 +177,8 @@ class SCOPE_OT_record_live(_RunningOperator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Begin the recording."""
         assert state.job is not None
-        if not state.job.recording:
-            state.job.record()
+        if not state.job.recording and not state.job.countdown_s:
+            state.job.record(context.scene.scope_live.countdown_s)
         redraw_sidebars()
         return {"FINISHED"}
 
@@ -206,6 +213,20 @@ class SCOPE_OT_cancel_live(bpy.types.Operator):
         assert state.job is not None
         state.job.cancel()
         return {"FINISHED"}
+
+
+def play_scene(context: bpy.types.Context) -> None:
+    """Play the scene's animation from the frame at which a recording begins, if that is wanted."""
+    scene = context.scene
+    if scene.scope_live.with_scene and context.screen is not None and not context.screen.is_animation_playing:
+        scene.frame_set(int(scene.scope.start_frame))
+        bpy.ops.screen.animation_play()
+
+
+def stop_scene(context: bpy.types.Context) -> None:
+    """Stop the animation that `play_scene` began; one that the user plays meanwhile stops as well."""
+    if context.scene.scope_live.with_scene and context.screen is not None and context.screen.is_animation_playing:
+        bpy.ops.screen.animation_cancel(restore_frame=False)
 
 
 def redraw_viewports() -> None:

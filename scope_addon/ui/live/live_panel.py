@@ -33,12 +33,20 @@ class SCOPE_PT_live(Tab, bpy.types.Panel):
         column.row(align=True).prop(settings, "quality", expand=True)
         _draw_rig(column, context)
         row = layout.row(align=True)
+        row.enabled = job is None or not (job.recording or job.countdown_s)
+        row.prop(settings, "countdown_s")
+        row.prop(settings, "with_scene")
+        if settings.source != "FILE":
+            row = layout.row()
+            row.enabled = job is None
+            row.prop(settings, "keep_footage")
+        row = layout.row(align=True)
         row.scale_y = 1.6
         if job is None:
             row.operator("scope.live", icon="PLAY")
         else:
             text = "Recording" if job.recording else "Record"
-            row.operator("scope.record_live", text=text, icon="REC", depress=job.recording)
+            row.operator("scope.record_live", text=text, icon="REC", depress=job.recording or bool(job.countdown_s))
             row.operator("scope.stop_live", icon="SNAP_FACE")
             row.operator("scope.cancel_live", text="", icon="CANCEL")
             _draw_status(context, layout)
@@ -73,6 +81,8 @@ def _draw_status(context: bpy.types.Context, layout: bpy.types.UILayout) -> None
         if status.presence != "seen":
             text = iface_("Nobody is seen" if status.presence == "lost" else "Not seen for a moment")
             draw_text(context, layout, text, "INFO")
+    if job.countdown_s:
+        draw_text(context, layout, iface_("Recording begins in {seconds:.0f} s", seconds=job.countdown_s), "REC")
     if job.recording:
         draw_text(context, layout, iface_("Recorded: {seconds:.1f} s", seconds=status.recorded_s), "REC")
 

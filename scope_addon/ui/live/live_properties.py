@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import bpy
-from bpy.props import BoolProperty, EnumProperty, PointerProperty, StringProperty
+from bpy.props import BoolProperty, EnumProperty, IntProperty, PointerProperty, StringProperty
 
 from ...options import Place
 from ..declared_properties import PATH_OPTIONS, with_options
@@ -15,6 +15,13 @@ from .stream_logins import take_login
 def _forget_message(_settings: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
     """Clear the error message, which was about another source."""
     state.message = ""
+
+
+def _cameras(_settings: bpy.types.PropertyGroup, _context: bpy.types.Context, typed: str) -> list[str]:
+    """Return the cameras whose number or name contains what was typed."""
+    from ...job.live.cameras import list_cameras
+
+    return [camera.label for camera in list_cameras() if typed.lower() in camera.label.lower()]
 
 
 def _keep_login(settings: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
@@ -46,6 +53,8 @@ class SCOPE_PG_live(bpy.types.PropertyGroup):
         default="0",
         options=set(),
         update=_forget_message,
+        search=_cameras,
+        search_options={"SUGGESTION"},
         description="Number of the camera, 0 for the first; on Linux also its device, such as /dev/video2",
     )
     stream: StringProperty(
@@ -67,6 +76,28 @@ class SCOPE_PG_live(bpy.types.PropertyGroup):
         default=False,
         options=set(),
         description="Let the rig of the Retarget section follow as well",
+    )
+    countdown_s: IntProperty(
+        name="Countdown",
+        default=0,
+        min=0,
+        max=60,
+        soft_max=10,
+        options=set(),
+        description="Seconds between Record and the beginning of the recording",
+    )
+    keep_footage: BoolProperty(
+        name="Keep Footage",
+        default=False,
+        options=set(),
+        description="Write the recorded pictures of a camera or stream as a video beside the .blend file, from which a "
+        "more accurate motion of the same take can be captured",
+    )
+    with_scene: BoolProperty(
+        name="Play Scene",
+        default=False,
+        options=set(),
+        description="Play the scene's animation from the Start Frame while recording",
     )
 
 

@@ -48,12 +48,14 @@ def test_what_is_recorded_is_what_was_shown(folder, networks, body):
     motion = Motion.load(folder / MOTION)
     live.close()
     assert motion.frames[0] <= poses[0].frame
-    rows = {frame: row for row, frame in enumerate(motion.frames)}
+    rows = {frame + 1: row for row, frame in enumerate(motion.frames)}  # a pose is given a frame after its time
     compared = [pose for pose in poses if pose.presence == "seen" and pose.frame in rows]
     assert compared
     for pose in compared:
         pelvis = body.rest_joints(motion.betas)[0] + motion.trans[rows[pose.frame]]
-        np.testing.assert_allclose(pelvis, pose.pelvis, atol=0.002)
+        # In the final shape; a frame that was dropped is filled in from its neighbours.
+        atol = 0.005 if motion.valid[rows[pose.frame]] else 0.04
+        np.testing.assert_allclose(pelvis, pose.pelvis, atol=atol)
 
 
 def test_a_recording_begins_when_it_is_asked_for(folder, body):

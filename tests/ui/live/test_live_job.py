@@ -4,10 +4,12 @@
 import sys
 import textwrap
 import time
+from pathlib import Path
 
 import bpy
 import numpy as np
 import pytest
+from scope.scope_addon.cli import SAMPLE
 from scope.scope_addon.errors import OfflineError, UsageError, VideoError
 from scope.scope_addon.job.live.process import LiveProcess
 from scope.scope_addon.job.messages import WorkerFailedError
@@ -108,6 +110,61 @@ def test_a_recording_becomes_a_capture_and_the_body_goes(live):
     assert "Live" not in bpy.data.collections
     assert scene.scope.result.frames_per_second == 28.0
     assert not job.worker.job_folder.exists()
+
+
+def test_kept_footage_is_chosen_for_another_capture(live, tmp_path, monkeypatch):
+    kept = tmp_path / "take.mp4"
+    monkeypatch.setattr(live_job, "kept_footage", lambda scene: kept)
+    settings = bpy.context.scene.scope_live
+    settings.source, settings.keep_footage = "CAMERA", True
+    job = live(f'pose(1); hear(); hear(); assert request["keep_footage"] == {str(kept)!r}; '
+               f'shutil.copy({str(SAMPLE)!r}, request["keep_footage"]); finish()')  # fmt: skip
+    until(job, lambda: job.has_body)
+    job.record()
+    job.stop()
+    to_end(job)
+    assert bpy.context.scene.scope.footage == str(kept)
+    assert bpy.context.scene.scope.result.footage == str(kept)
+
+
+def test_footage_is_kept_beside_a_saved_file_only(tmp_path):
+    scene = bpy.context.scene
+    scene.scope_live.keep_footage = True
+    with pytest.raises(UsageError, match="save that first"):
+        live_request(scene)
+    scene.scope.take = "../Jump"
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "scene.blend"))
+    path = Path(live_request(scene).values["keep_footage"])
+    assert (path.parent, path.suffix) == (tmp_path, ".mp4")
+    assert path.name.startswith("___Jump ")
+
+
+def test_a_countdown_comes_before_the_recording(live, monkeypatch):
+    now = [1000.0]
+    monkeypatch.setattr(live_job.time, "monotonic", lambda: now[0])
+    job = live('pose(1); assert hear() == "record"; pose(2); hear()')
+    while not job.has_body:
+        job.step()
+    job.record(2.5)
+    assert (job.countdown_s, job.recording) == (3, False)
+    now[0] += 2.4
+    job.step()
+    assert (job.countdown_s, job.recording) == (1, False)
+    now[0] += 0.2
+    job.step()
+    assert (job.countdown_s, job.recording) == (0, True)
+    while job.poses < 2:
+        job.step()
+
+
+def test_stop_during_the_countdown_records_nothing(live):
+    job = live("pose(1); hear()")
+    until(job, lambda: job.has_body)
+    job.record(60.0)
+    job.stop()
+    to_end(job)
+    assert "Live" in bpy.data.objects
+    assert bpy.context.scene.scope.capture is None
 
 
 def test_a_recorded_file_that_ends_by_itself_becomes_a_capture(live):
@@ -260,6 +317,7 @@ def test_a_removed_scene_ends_the_capture(live):
     [
         ("CAMERA", "front", "is no camera"),
         ("CAMERA", "rtsp://a/b", "is no camera"),
+        ("CAMERA", "/dev/video0/../sda", "is no camera"),
         ("STREAM", "", "no stream is given"),
         ("FILE", "", "no video is chosen"),
     ],
@@ -294,6 +352,7 @@ def test_a_stream_needs_online_access_and_gets_its_login(monkeypatch):
 
 def test_the_capture_has_the_options_of_the_panel():
     scene = bpy.context.scene
+    scene.scope_live.camera = "0: USB Camera: front (MJPG 1920×1080)"
     scene.scope_live.quality = "BALANCED"
     scene.scope.height_cm, scene.scope.lens, scene.scope.focal_mm = 181, "FOCAL", 28
     request = live_request(scene)

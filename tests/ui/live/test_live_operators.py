@@ -16,9 +16,11 @@ class FakeJob:
     def __init__(self):
         self.done, self.recording, self.finishing, self.has_body = [], False, False, True
 
-    def record(self):
+    countdown_s = 0
+
+    def record(self, countdown_s):
         self.recording = True
-        self.done.append("record")
+        self.done.append(f"record in {countdown_s} s")
 
     def stop(self):
         self.finishing = True
@@ -61,13 +63,14 @@ def test_record_stop_and_cancel(job):
     job.has_body = False
     assert not bpy.ops.scope.record_live.poll()
     job.has_body = True
+    bpy.context.scene.scope_live.countdown_s = 3
     bpy.ops.scope.record_live()
     bpy.ops.scope.record_live()  # already
     bpy.ops.scope.stop_live()
     assert not bpy.ops.scope.record_live.poll()
     assert not bpy.ops.scope.stop_live.poll()
     bpy.ops.scope.cancel_live()
-    assert job.done == ["record", "stop", "cancel"]
+    assert job.done == ["record in 3 s", "stop", "cancel"]
 
 
 def test_disabling_the_extension_ends_the_process(job):

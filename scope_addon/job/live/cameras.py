@@ -1,0 +1,122 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The cameras of a Linux computer with their names and sizes, from sysfs and Video4Linux.
+
+Reading them does not switch a camera on. Other systems name their cameras only through libraries that this package
+does not have; there, the list is empty, and cameras are chosen by number.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import struct
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+NAMES, DEVICES = Path("/sys/class/video4linux"), Path("/dev")
+LONGEST_NAME = 60  # characters
+_MOST_CAMERAS, _MOST_FORMATS, _MOST_SIZES = 64, 16, 64
+# Of linux/videodev2.h: the requests, the structures' layouts, and the two constants that are needed.
+_QUERYCAP, _ENUM_FMT, _ENUM_FRAMESIZES = 0x80685600, 0xC0405602, 0xC02C564A
+_CAPABILITY, _FORMAT, _SIZE = "16s32s32sIII12x", "III32sI16x", "III6I8x"
+_CAPTURE = 1  # V4L2_CAP_VIDEO_CAPTURE and V4L2_BUF_TYPE_VIDEO_CAPTURE
+_DISCRETE = 1  # V4L2_FRMSIZE_TYPE_DISCRETE
+
+Ioctl = Callable[[int, int, bytearray], Any]
+
+
+@dataclass(frozen=True)
+class Camera:
+    """A camera: its number, its name as it tells it, and what it offers, such as ``MJPG 1920×1080``."""
+
+    number: int
+    name: str
+    formats: tuple[str, ...] = ()
+
+    @property
+    def label(self) -> str:
+        """A line for a list, which begins with the number."""
+        return f"{self.number}: {self.name}" + (f" ({', '.join(self.formats)})" if self.formats else "")
+
+
+def list_cameras(names: Path = NAMES, devices: Path = DEVICES, ioctl: Ioctl | None = None) -> list[Camera]:
+    """Return the cameras in the order of their numbers; what cannot be read is left out.
+
+    :param ioctl: of devices; None: the system's.
+    """
+    if ioctl is None:
+        if not sys.platform.startswith("linux"):
+            return []
+        import fcntl
+
+        ioctl = fcntl.ioctl
+    with suppress(OSError):
+        numbers = sorted(int(m[1]) for entry in os.listdir(names) if (m := re.fullmatch(r"video(\d{1,3})", entry)))
+        entries = ((n, f"video{n}") for n in numbers[:_MOST_CAMERAS])
+        found = (_camera(n, names / entry / "name", devices / entry, ioctl) for n, entry in entries)
+        return [camera for camera in found if camera is not None]
+    return []
+
+
+def camera_source(text: str) -> str | None:
+    """Return the number or device that a text begins with, which may be a label; None if it is no camera."""
+    match = re.match(r"(\d{1,3}|/dev/video\d{1,3})\s*(?::.*)?$", text.strip(), re.S)
+    return match[1] if match else None
+
+
+def _camera(number: int, name: Path, device: Path, ioctl: Ioctl) -> Camera | None:
+    """Return a camera; None for a node that gives no pictures, such as that of a camera's metadata."""
+    try:
+        shown = _printable(name.read_bytes())
+    except OSError:
+        shown = "camera"
+    formats: tuple[str, ...] = ()
+    with suppress(OSError):  # it is in use, or this user may not open it
+        node = os.open(device, os.O_RDWR | os.O_NONBLOCK)
+        try:
+            answer = bytearray(struct.calcsize(_CAPABILITY))
+            ioctl(node, _QUERYCAP, answer)
+            if not struct.unpack(_CAPABILITY, answer)[5] & _CAPTURE:
+                return None
+            formats = tuple(_formats(node, ioctl))
+        finally:
+            os.close(node)
+    return Camera(number, shown, formats)
+
+
+def _formats(node: int, ioctl: Ioctl) -> Iterator[str]:
+    """Yield each pixel format of a camera with its largest size."""
+    for index in range(_MOST_FORMATS):
+        answer = bytearray(struct.pack(_FORMAT, index, _CAPTURE, 0, b"", 0))
+        try:
+            ioctl(node, _ENUM_FMT, answer)
+        except OSError:  # there are no more
+            return
+        code = struct.unpack(_FORMAT, answer)[4]
+        size = max(_sizes(node, code, ioctl), default=None, key=lambda size: size[0] * size[1])
+        yield _printable(struct.pack("<I", code)) + (f" {size[0]}×{size[1]}" if size else "")
+
+
+def _sizes(node: int, code: int, ioctl: Ioctl) -> Iterator[tuple[int, int]]:
+    """Yield the sizes of a pixel format; the largest one of a continuous range."""
+    for index in range(_MOST_SIZES):
+        answer = bytearray(struct.pack(_SIZE, index, code, 0, *[0] * 6))
+        try:
+            ioctl(node, _ENUM_FRAMESIZES, answer)
+        except OSError:
+            return
+        values = struct.unpack(_SIZE, answer)
+        if values[2] != _DISCRETE:  # minimum, maximum and step of width and of height
+            yield values[4], values[7]
+            return
+        yield values[3], values[4]
+
+
+def _printable(name: bytes) -> str:
+    """Return a device's text without what could disturb a list: control and formatting characters, great length."""
+    text = "".join(c for c in name.decode("utf-8", "replace") if c.isprintable())
+    return text.strip()[:LONGEST_NAME] or "camera"

@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The list of cameras, from files and answers as Video4Linux gives them."""
+
+import errno
+import struct
+import sys
+
+import pytest
+from scope.scope_addon.job.live.cameras import LONGEST_NAME, camera_source, list_cameras
+
+SIZES = {b"MJPG": [(640, 480), (1920, 1080)], b"YUYV": [(640, 480)]}
+
+
+def ioctl(node, request, answer):
+    """A camera with two formats, whose second node carries metadata; see linux/videodev2.h."""
+    number = request & 0xFF
+    assert len(answer) == (request >> 16) & 0x3FFF  # the size that the request's number contains
+    if number == 0:
+        with open(f"/proc/self/fd/{node}", "rb") as file:
+            capabilities = 1 if file.read() == b"pictures" else 0x00800000
+        struct.pack_into("I", answer, 16 + 32 + 32 + 8, capabilities)
+    elif number == 2:
+        (index,) = struct.unpack_from("I", answer)
+        if index >= len(SIZES):
+            raise OSError(errno.EINVAL, "no more")
+        answer[44:48] = list(SIZES)[index]
+    else:
+        index, code = struct.unpack_from("II", answer)
+        sizes = SIZES[code.to_bytes(4, "little")]
+        if index >= len(sizes):
+            raise OSError(errno.EINVAL, "no more")
+        struct.pack_into("III", answer, 8, 1, *sizes[index])
+
+
+@pytest.fixture
+def folders(tmp_path):
+    def node(number, name, content):
+        (tmp_path / "sys" / f"video{number}").mkdir(parents=True)
+        (tmp_path / "sys" / f"video{number}" / "name").write_bytes(name)
+        if content is not None:
+            (tmp_path / "dev").mkdir(exist_ok=True)
+            (tmp_path / "dev" / f"video{number}").write_bytes(content)
+
+    return tmp_path, node
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="Video4Linux")
+def test_cameras_are_listed_with_names_and_largest_sizes(folders):
+    path, node = folders
+    node(10, b"Second\n", b"pictures")
+    node(0, b"USB Camera\n", b"pictures")
+    node(1, b"USB Camera\n", b"metadata")
+    labels = [camera.label for camera in list_cameras(path / "sys", path / "dev", ioctl)]
+    assert labels == [f"{n}: {name} (MJPG 1920×1080, YUYV 640×480)" for n, name in ((0, "USB Camera"), (10, "Second"))]
+
+
+def test_a_camera_that_cannot_be_opened_is_listed_without_sizes(folders):
+    path, node = folders
+    node(0, b"Busy", None)
+    assert [camera.label for camera in list_cameras(path / "sys", path / "dev", ioctl)] == ["0: Busy"]
+
+
+def test_hostile_names_are_harmless(folders):
+    path, node = folders
+    node(0, b"\x1b[2J\xe2\x80\xaeevil\n\x00name" + b"x" * 500, None)
+    node(1, b"\xff\xfe", None)
+    node(2, b"\n", None)
+    first, second, third = list_cameras(path / "sys", path / "dev", ioctl)
+    assert first.name.startswith("[2Jevilname")
+    assert len(first.name) == LONGEST_NAME
+    assert (second.name, third.name) == ("\ufffd\ufffd", "camera")
+    assert camera_source(first.label) == "0"
+
+
+def test_without_cameras_the_list_is_empty(tmp_path):
+    assert list_cameras(tmp_path / "none", tmp_path, ioctl) == []
+
+
+@pytest.mark.parametrize(
+    ("text", "source"),
+    [
+        ("0", "0"), (" 2 ", "2"), ("1: USB Camera: front (MJPG 1920×1080)", "1"), ("/dev/video3", "/dev/video3"),
+        ("front", None), ("1234", None), ("0x", None), ("/dev/sda", None), ("rtsp://a/b", None), ("", None),
+    ],
+)  # fmt: skip
+def test_the_source_of_a_label_is_its_number(text, source):
+    assert camera_source(text) == source
