@@ -229,7 +229,7 @@ def _discarded(number: int) -> Iterator[None]:
     stream.flush()
     try:
         keep = os.dup(number)
-    except OSError:  # it is closed
+    except OSError:  # it is closed, as for a program without a terminal on Windows
         yield
         return
     devnull = os.open(os.devnull, os.O_WRONLY)
