@@ -19,9 +19,9 @@ BY_NAME = {command.name: command for command in COMMANDS}
     ("name", "action", "calls"),
     [
         ("npz", KILL, (-2,)),  # before it renames
-        ("npz", FULL, (3,)),
         ("npz", NO_MEMORY, (-1,)),
-        ("usdc", KILL, (8,)),  # while USD writes its draft
+        ("blend", FULL, (7,)),  # Blender does not say so
+        ("usdc", FULL, (10,)),  # nor does it here
     ],
 )
 def test_files_are_old_or_whole_and_the_next_run_is_good(name: str, action: str, calls: tuple[int, ...]) -> None:

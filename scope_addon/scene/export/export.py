@@ -7,6 +7,8 @@ depend on selection or visibility. Files are written atomically.
 
 from __future__ import annotations
 
+import errno
+import os
 import re
 from collections.abc import Callable, Sequence
 from contextlib import nullcontext
@@ -227,4 +229,7 @@ def _reason(error: RuntimeError | OSError) -> str:
     lines = [line for line in str(error).splitlines() if line and not line[0].isspace() and "Location: " not in line]
     last = lines[-1] if lines else type(error).__name__
     cause = re.sub(r"^(?:\w*Error: )*(?:\[Errno \d+\] )?", "", last)
-    return f"{cause}; {'free some space or choose another folder' if '[Errno ' in last else 'try another format'}"
+    # Blender's own writers give the system's reason, which is "Success" where a library has lost it.
+    is_systems = "[Errno " in last or cause in (os.strerror(code) for code in (0, *errno.errorcode))
+    cause = "the file could not be written completely" if cause == os.strerror(0) else cause
+    return f"{cause}; {'free some space or choose another folder' if is_systems else 'try another format'}"

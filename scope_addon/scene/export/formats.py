@@ -7,10 +7,9 @@ import errno
 import io
 import os
 import re
-import struct
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager, nullcontext, redirect_stderr, redirect_stdout
+from contextlib import ExitStack, contextmanager, nullcontext, redirect_stderr, redirect_stdout
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +23,7 @@ from ..animation_data import timing
 from . import bvh
 from .fbx_file import correct_fbx
 from .glb_times import corrected_key_times
+from .whole_file import is_whole_blend, is_whole_crate
 
 
 def write_glb(path: Path, camera: bool = False, take: str = "Animation") -> None:
@@ -124,33 +124,22 @@ def write_usd(path: Path, camera: bool = False) -> None:
         convert_world_material=False,
         root_prim_path="/root",
     )
-    # The exporter does not report write errors.
-    if path.suffix == ".usdc" and path.is_file() and not _is_whole_crate(path):
-        raise OSError(errno.ENOSPC, "the file could not be written completely", str(path))
-
-
-def _is_whole_crate(path: Path) -> bool:
-    """Return whether a USD crate file has its table of contents, which is written last and located by the header.
-
-    Source: OpenUSD, pxr/usd/usd/crateFile.h: identifier (8 bytes), version (8), offset of the table (8); the table is a
-    count (8) of sections of 32 bytes each.
-    """
-    size = path.stat().st_size
-    with path.open("rb") as file:
-        head = file.read(24)
-        if len(head) < 24 or head[:8] != b"PXR-USDC":
-            return False
-        (table,) = struct.unpack("<q", head[16:])
-        if not 24 <= table <= size - 8:
-            return False
-        file.seek(table)
-        (count,) = struct.unpack("<q", file.read(8))
-    return bool(0 < count <= (size - table - 8) // 32)
+    if path.suffix == ".usdc" and path.is_file() and not is_whole_crate(path):
+        raise _incomplete(path)
 
 
 def write_blend(path: Path, scene: bpy.types.Scene) -> None:
-    """Write a .blend of one scene and its dependencies; paths of footage are relative to the file."""
+    """Write a .blend of one scene and its dependencies; paths of footage are relative to the file.
+
+    :raises OSError: when the file is incomplete.
+    """
     bpy.data.libraries.write(str(path), {scene}, path_remap="RELATIVE_ALL", compress=True)
+    if path.is_file() and not is_whole_blend(path):
+        raise _incomplete(path)
+
+
+def _incomplete(path: Path) -> OSError:
+    return OSError(errno.ENOSPC, "the file could not be written completely", str(path))
 
 
 def write_bvh(path: Path, scene: bpy.types.Scene, rig: bpy.types.Object, unit: str = "cm") -> None:
@@ -221,19 +210,35 @@ class _NullStream(io.TextIOBase):
 def quiet() -> Iterator[None]:
     """Suppress the output of Blender's importers and exporters: standard output may carry a machine-readable report.
 
-    Blender prints the traceback of one that fails; with SCOPE_TRACEBACK set, it is left alone.
+    Blender prints the traceback of one that fails, and USD what it thinks of it; with SCOPE_TRACEBACK set, standard
+    error is left alone.
     """
-    sys.stdout.flush()
-    errors = nullcontext() if os.environ.get("SCOPE_TRACEBACK") else redirect_stderr(_NullStream())
-    keep = os.dup(1)
-    devnull = os.open(os.devnull, os.O_WRONLY)
-    try:
-        os.dup2(devnull, 1)  # output of Blender's C++ code
+    shows_errors = bool(os.environ.get("SCOPE_TRACEBACK"))
+    errors = nullcontext() if shows_errors else redirect_stderr(_NullStream())
+    with ExitStack() as stack:
+        for number in (1,) if shows_errors else (1, 2):  # output of Blender's C++ code
+            stack.enter_context(_discarded(number))
         with redirect_stdout(_NullStream()), errors:  # output of Python
             yield
+
+
+@contextmanager
+def _discarded(number: int) -> Iterator[None]:
+    """Discard what is written to a file descriptor."""
+    stream = sys.stdout if number == 1 else sys.stderr
+    stream.flush()
+    try:
+        keep = os.dup(number)
+    except OSError:  # it is closed, as for a program without a terminal on Windows
+        yield
+        return
+    devnull = os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(devnull, number)
+        yield
     finally:
-        sys.stdout.flush()
-        os.dup2(keep, 1)
+        stream.flush()
+        os.dup2(keep, number)
         os.close(keep)
         os.close(devnull)
 
