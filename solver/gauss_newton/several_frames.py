@@ -27,7 +27,7 @@ class SharedPriors(NamedTuple):
     focal_weight: float
 
     def costs(self, weight: float, beta: Array, log_focal: float, focal: bool) -> dict[str, float]:
-        """Return the cost of each with this weight of the shape's prior; `focal`: whether the length is unknown."""
+        """Return the cost of each at beta (W,), with a weight of the shape's prior; `focal`: the length is unknown."""
         offset = beta[: len(self.shape_mean)] - self.shape_mean
         shape = {"shape_prior": float(0.5 * weight * (offset @ self.shape_information @ offset))}
         return shape | {"focal_prior": 0.5 * self.focal_weight * log_focal**2} if focal else shape

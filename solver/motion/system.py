@@ -48,7 +48,7 @@ class ClipSystem(NamedTuple):
 
 
 def make_system(tree: Tree, frames: int, points: Sequence[int] | Array = ()) -> ClipSystem:
-    """Return a system of zeros for that many frames, in which these points may stand."""
+    """Return a system of zeros for that many frames, in which the points of these numbers (C,) may stand."""
     K, W = len(tree.parents) - 1, tree.S.shape[2]
     n = padded(6 + 3 * K)
     shapes: list[tuple[int, ...]] = [(n, n), (K + 2, 3, 3), (K + 2, 3, 3), (n, GLOBALS + W)]
