@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """`./scripts/bench faces`: expression weights and gaze on rendered faces with known ones, by each way to find them.
 
-The people of the set ``talk`` are not among those that `tools.calibrate_face` measures the response on, and another
-renderer draws them. The first half of each clip is talk, the second grimaces; views are within 45°.
+The people of the set ``talk_held_out`` are not among those that `tools.calibrate_face` measures the response on, and
+another renderer draws them. The first half of each clip is talk, the second grimaces; views are within 45°.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from ...tools.calibrate_face.observe import SeenFaces, seen_faces
 from ...tools.render_faces.truth import FOLDER
 from ..report import table
 
-HELD_OUT, CALIBRATION = "talk", "shaded_talk"
+HELD_OUT, CALIBRATION = "talk_held_out", "shaded_talk"
 SMALL = 0.4  # of the pictures: faces of about 55 pixels
 ACTIVE, CLOSED = 0.2, 0.5
 LARGEST_SHIFT = 4  # frames, in which a blink may be early or late

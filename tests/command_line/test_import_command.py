@@ -50,6 +50,7 @@ def test_without_an_output_a_glb_lies_beside_the_motion(amass):
         (["walk.npz", "--rate", "nan"], 2, "--rate"),
         (["walk.npz", "--body", "none.npz"], 1, "none.npz"),
         (["walk.npz", "--bone-map", "bones.json"], 2, "--retarget"),
+        (["walk.npz", "--expression-map", "face.json"], 2, "--retarget"),
         (["walk.npz", "--retarget", "rig.glb"], 1, "rig.glb"),
         ([""], 2, "MOTION: the path is empty"),
     ],
