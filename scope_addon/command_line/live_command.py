@@ -44,8 +44,7 @@ def run_live_command(args: argparse.Namespace) -> dict[str, Any]:
     check_installed(CAPTURE if values["vmc"] is None else (*CAPTURE, "pythonosc"))
     check_memory_limit(with_scene=False)
     options = _checked(values)
-    if written := [values[name] for name in ("record", "keep_footage") if values[name]]:
-        check_outputs(written, Path(args.source))
+    check_outputs([values["record"]] if values["record"] else [], Path(args.source), overlay=values["keep_footage"])
     # Imported here, so that errors in the arguments are printed immediately.
     from ...solver.loaders.body_file import load_body
     from ..live.outputs.footage import Footage
@@ -66,6 +65,8 @@ def run_live_command(args: argparse.Namespace) -> dict[str, Any]:
         listeners = Listeners(say, lambda state: line(str(state)), begin, received)
         report = run_live(source, body, options, outputs, listeners)
         saved = [footage.save()] if footage else []
+        if footage and footage.lost:
+            say(f"{footage.lost} frames are missing in {values['keep_footage']}, since the computer was too busy")
     saved = [*([recording.save()] if recording else []), *saved]
     report["outputs"] = [str(path) for path in saved if path]
     if not args.json:

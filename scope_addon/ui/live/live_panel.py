@@ -45,7 +45,7 @@ class SCOPE_PT_live(Tab, bpy.types.Panel):
         if job is None:
             row.operator("scope.live", icon="PLAY")
         else:
-            text = "Recording" if job.recording else "Record"
+            text = "Recording" if job.recording else str(job.countdown_s or "Record")
             row.operator("scope.record_live", text=text, icon="REC", depress=job.recording or bool(job.countdown_s))
             row.operator("scope.stop_live", icon="SNAP_FACE")
             row.operator("scope.cancel_live", text="", icon="CANCEL")
@@ -81,8 +81,6 @@ def _draw_status(context: bpy.types.Context, layout: bpy.types.UILayout) -> None
         if status.presence != "seen":
             text = iface_("Nobody is seen" if status.presence == "lost" else "Not seen for a moment")
             draw_text(context, layout, text, "INFO")
-    if job.countdown_s:
-        draw_text(context, layout, iface_("Recording begins in {seconds:.0f} s", seconds=job.countdown_s), "REC")
     if job.recording:
         draw_text(context, layout, iface_("Recorded: {seconds:.1f} s", seconds=status.recorded_s), "REC")
 

@@ -78,13 +78,12 @@ class SCOPE_PG_live(bpy.types.PropertyGroup):
         description="Let the rig of the Retarget section follow as well",
     )
     countdown_s: IntProperty(
-        name="Countdown",
+        name="Countdown (s)",
         default=0,
         min=0,
         max=60,
         soft_max=10,
         options=set(),
-        description="Seconds between Record and the beginning of the recording",
     )
     keep_footage: BoolProperty(
         name="Keep Footage",
