@@ -151,17 +151,13 @@ def place(
     :param rays: (n, 2) normalized image coordinates.
     :param weight: (n,) c.
     """
-    w, rays, world = np.asarray(weight, float), np.asarray(rays, float), np.asarray(world, float)
-    x, y = w @ rays
-    total = w.sum()
-    H = np.array([[total, 0.0, -x], [0.0, total, -y], [-x, -y, w @ (rays * rays).sum(axis=1)]])
-    b = rays * world[:, 2:] - world[:, :2]
-    g = np.array([*(w @ b), -(w @ (rays * b).sum(axis=1))])
-    try:
-        t: NDArray[np.float64] = np.linalg.solve(H, g)
-    except np.linalg.LinAlgError:  # of less than two points
-        t = np.linalg.lstsq(H, g, rcond=None)[0]
-    return t
+    w = np.asarray(weight, float) / max(float(np.sum(weight)), 1e-300)
+    b = rays * world[:, 2:] - world[:, :2]  # t_xy - x t_z
+    x_mean, b_mean = w @ rays, w @ b
+    x, b = rays - x_mean, b - b_mean
+    spread = float(w @ (x * x).sum(axis=1))
+    z = -float(w @ (x * b).sum(axis=1)) / spread if spread > 1e-12 else 0.0  # fewer than two points do not tell it
+    return np.array([*(b_mean + x_mean * z), z])
 
 
 def _root_prior(root_cam: NDArray[np.floating[Any]]) -> PosePriors:
