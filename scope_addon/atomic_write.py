@@ -39,10 +39,7 @@ def atomic_path(path: Path) -> Iterator[Path]:
     :raises OutputError: ``path`` exists and is not a regular file.
     """
     target = resolve_link(path)
-    # Short enough for the limit on file names, even where a letter takes several bytes, and without bytes that are not
-    # UTF-8, at which exporters fail.
-    start = f".{path.stem[:40].encode('utf-8', 'ignore').decode()}.scope-"
-    suffix = path.suffix.lower()
+    start, suffix = _temporary_name(path)
     _remove_abandoned(target.parent, start)
     handle, name = tempfile.mkstemp(prefix=f"{start}{computer()}-{os.getpid()}-", suffix=suffix, dir=target.parent)
     temporary = Path(name)
@@ -83,6 +80,20 @@ def reason(error: OSError) -> str:
     if error.errno == errno.ENOENT:
         return "its folder does not exist; create it or choose another"
     return f"{error.strerror or error}; free some space or choose another folder"
+
+
+def remove_abandoned(path: Path) -> None:
+    """Remove what processes that do not run any more have left of writing ``path``."""
+    _remove_abandoned(path.parent, _temporary_name(path)[0])
+
+
+def _temporary_name(path: Path) -> tuple[str, str]:
+    """Return the beginning of the temporary files' names and their suffix.
+
+    The name is short enough for the limit on file names, even where a letter takes several bytes, and without bytes
+    that are not UTF-8, at which exporters fail.
+    """
+    return f".{path.stem[:40].encode('utf-8', 'ignore').decode()}.scope-", path.suffix.lower()
 
 
 def _remove_abandoned(folder: Path, start: str) -> None:

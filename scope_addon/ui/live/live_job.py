@@ -19,6 +19,7 @@ import bpy
 from ....solver.body import Body
 from ....solver.errors import ScopeError
 from ....solver.loaders.body_file import load_body
+from ...atomic_write import remove_abandoned
 from ...errors import OfflineError, UsageError, VideoError
 from ...footage import shown
 from ...job.live.cameras import camera_source
@@ -140,6 +141,8 @@ class LiveJob:
     def close(self) -> None:
         """End the process in any state, without leaving a file behind; the scene stays as it is."""
         self._worker.close()
+        if self._kept:
+            remove_abandoned(Path(self._kept))
 
     def step(self) -> bool:
         """Continue as far as possible without waiting; return False at the end.

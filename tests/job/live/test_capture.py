@@ -71,6 +71,24 @@ def test_a_recording_begins_when_it_is_asked_for(folder, body):
     assert recorder.recording.seconds == 0.5
 
 
+def test_a_recording_with_footage_begins_with_its_first_picture(folder, body):
+    commands, added = Commands(), []
+    footage = SimpleNamespace(origin=None, add=added.append)
+    recorder = _Recorder(folder / MOTION, body, FakeSource(), commands, footage)
+    recorder.begin(SimpleNamespace(camera=None), (640, 480))
+    recorder.receive("too early")
+    commands.hear(RECORD)
+    recorder.send(replace(pose_of(body), index=4), 0.0)  # of a picture that came before
+    assert recorder.recording is None
+    recorder.receive("first")
+    footage.origin = 5, 0.2
+    recorder.send(replace(pose_of(body), index=4), 0.0)
+    assert recorder.recording is None
+    recorder.send(replace(pose_of(body), index=6), 0.0)
+    assert recorder.recording.origin == (5, 0.2)
+    assert added == ["first"]
+
+
 def test_a_stream_is_refused_without_the_network(folder):
     request = LiveRequest("rtsp://127.0.0.1:1/video")
     with pytest.raises(VideoError, match="Allow Online Access"):

@@ -127,6 +127,25 @@ def test_kept_footage_is_chosen_for_another_capture(live, tmp_path, monkeypatch)
     assert bpy.context.scene.scope.result.footage == str(kept)
 
 
+def test_cancelling_leaves_nothing_of_the_footage(live, tmp_path, monkeypatch):
+    (tmp_path / "takes").mkdir()
+    monkeypatch.setattr(live_job, "kept_footage", lambda scene: tmp_path / "takes" / "take.mp4")
+    settings = bpy.context.scene.scope_live
+    settings.source, settings.keep_footage = "CAMERA", True
+    root = str(Path(live_job.__file__).resolve().parents[4])
+    job = live(f"""
+        sys.path.insert(0, {root!r})
+        from pathlib import Path
+        from scope.scope_addon.atomic_write import atomic_path
+        with atomic_path(Path(request["keep_footage"])):
+            pose(1); hear(); hear()
+    """)
+    until(job, lambda: job.has_body)
+    assert len(list((tmp_path / "takes").iterdir())) == 1
+    job.cancel()
+    assert not list((tmp_path / "takes").iterdir())
+
+
 def test_footage_is_kept_beside_a_saved_file_only(tmp_path):
     scene = bpy.context.scene
     scene.scope_live.keep_footage = True
