@@ -46,7 +46,12 @@ GUIDE = ("docs/guide.md",)  # with its pictures in assets/guide
 # Clusters use the network, and live captures send poses to other programs, from the shell only: nothing in the
 # extension opens a socket.
 SENDERS = ("json_lines.py", "vmc.py")
-LEFT_OUT = ("__pycache__", "*.pyc", ".*", "sample_truth.npz", "pictures", "examples", "cluster", *SENDERS)
+OF_OTHER_PAGES = ("live.jpg",)  # in assets/guide, but not in the guide
+LEFT_OUT = (
+    *("__pycache__", "*.pyc", ".*", "sample_truth.npz", "pictures", "examples", "cluster"),
+    *SENDERS,
+    *OF_OTHER_PAGES,
+)
 BILL = "bill_of_materials.cdx.json"  # in the zip; a copy with the zip's name lies beside it
 GOAL_MB, LIMIT_MB = 200, 240
 _OLDEST = 315532800  # 1980-01-01, the first time that a zip can state

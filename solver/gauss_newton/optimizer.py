@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..compiled.kernel import kernel
+from ..compiled.kernel import inlined_kernel, kernel
 from ..compiled.part import Blocks, Pose
 from ..options import Options, Stage
 from .curvature import Curvature, apply_correction, reset, set_current, update
@@ -82,7 +82,7 @@ def judge_trial(
 _judge_trial = kernel(judge_trial)  # for `optimize`; several_frames.py, whose loop is not compiled, calls it as it is
 
 
-@kernel
+@inlined_kernel
 def _run_stage(tree, terms, s, settings, memory, start):  # type: ignore[no-untyped-def]
     """Run stage s from memory.poses[start]; return (cost, status, iterations, how many rejected, index of the result).
 

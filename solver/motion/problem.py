@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..compiled.kernel import kernel
+from ..compiled.kernel import inlined_kernel, kernel
 from ..compiled.part import GRADIENT, Array, Blocks, Pose
 from ..compiled.tree import Tree
 from ..custom_residuals.external import raise_failure
@@ -73,7 +73,7 @@ def _make_memory(tree: Tree) -> _Memory:
     )  # fmt: skip
 
 
-@kernel
+@inlined_kernel
 def linearize_frames(tree, views, first, last, stage, triggs, poses, memory, joints, system) -> float:  # type: ignore[no-untyped-def]
     """Write the blocks of frames first..last-1 and what `joints` has, add to C and c of `memory`; return the cost."""
     cost: float = 0.0
