@@ -104,14 +104,23 @@ def test_watched_memory_ends_the_process() -> None:
     assert (ended.returncode, ended.stdout) == (OUT_OF_MEMORY, "small\n"), ended.stderr
 
 
+LISTEN = "; sys.stdin.buffer.read()"  # until the answer has been read: who ends sooner may break the question's pipe
+
+
 @pytest.mark.parametrize(
     ("code", "says"),
     [
         ("import os, sys; os._exit(77)", r"m\.onnx was stopped because it took more than 4\.\d GB of memory"),
         ("import os; os.kill(os.getpid(), 9)", r"cannot load this network \(onnxruntime crashed in its process"),
-        ("import os; os.write(1, b'ORT_ERROR: no answer')", "sent no valid answer: a message is too long"),
-        ("import os; os.write(1, b'\\2\\0\\0\\0[]')", "sent no valid answer: a message is no object"),
-        ("import os; os.write(1, b'\\2\\0\\0\\0{}')", "sent no valid answer: 'arrays'"),
+        (
+            "import os, sys; os.write(1, b'ORT_ERROR: no answer')" + LISTEN,
+            "sent no valid answer: a message is too long",
+        ),
+        (
+            "import os, sys; os.write(1, b'\\2\\0\\0\\0[]')" + LISTEN,
+            "sent no valid answer: a message is no object",
+        ),
+        ("import os, sys; os.write(1, b'\\2\\0\\0\\0{}')" + LISTEN, "sent no valid answer: 'arrays'"),
     ],
 )
 def test_a_process_that_ends_or_answers_nonsense(
