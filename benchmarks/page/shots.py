@@ -18,6 +18,7 @@ from ...scope_addon.report.footage_pictures import small_picture, spread_rows
 from ...scope_addon.report.page import Markup
 from ...solver.body import Body
 from ...solver.rotations import exp
+from ...tools.readme_pictures.view import level_camera
 
 SHOTS, SIDE_PX, SHOWN_M = 6, 360, 2.4  # of a strip; of a picture; height of what the view from the side shows
 _GROUND = 236  # grey behind the body
@@ -72,6 +73,4 @@ def turned_camera(world_from_camera: NDArray[Any], target: NDArray[Any]) -> tupl
     x, y, z = world_from_camera[:3, 3] - target
     eye = target + [-y, x, z]
     forward = (target - eye) / np.linalg.norm(target - eye)
-    right = np.cross(forward, [0, 0, 1])
-    right /= np.linalg.norm(right)
-    return np.stack([right, np.cross(forward, right), forward]), eye
+    return level_camera(eye, forward)[:3, :3].T, eye

@@ -11,9 +11,13 @@ import os
 import subprocess
 import sys
 import tempfile
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...scope_addon.atomic_write import atomic_path
 from ...solver import Body, load_body
@@ -47,26 +51,51 @@ def fitted_motions() -> Path:
 
 def render_missing(body: Body) -> None:
     """Render what is not there or not true any more."""
-    RENDERS.mkdir(parents=True, exist_ok=True)
     for name, shot in shots(body).items():
-        video, truth = video_and_truth(name)
-        with tempfile.TemporaryDirectory(dir=RENDERS, prefix=".frames") as scratch:
-            drawn = Path(scratch) / truth.name
-            write_truth(drawn, body, shot)
-            if video.is_file() and truth.is_file() and _same(drawn, truth):
-                continue
-            print(f"rendering {name}", file=sys.stderr, flush=True)
+
+        def render(path: Path, scratch: Path, shot: Shot = shot) -> None:
             from ...tools.render_sample.clip import render_clip
 
-            truth.unlink(missing_ok=True)  # a video without ground truth is rendered again
-            with atomic_path(video) as part:
-                render_clip(body, shot, part, Path(scratch))
-            os.replace(drawn, truth)
+            render_clip(body, shot, path, scratch)
+
+        render_if_changed(*video_and_truth(name), SAME, partial(write_truth, body=body, shot=shot), render)
 
 
-def _same(drawn: Path, kept: Path) -> bool:
+def render_if_changed(
+    video: Path,
+    truth: Path,
+    keys: Sequence[str],
+    write: Callable[[Path], None],
+    render: Callable[[Path, Path], None],
+) -> None:
+    """Render a clip unless it is there and its ground truth has not changed.
+
+    :param keys: the arrays of the ground truth that are compared, floats to `SAME_M`.
+    :param write: writes the ground truth to a path.
+    :param render: renders the clip to a path, with a folder for what it needs meanwhile.
+    """
+    video.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(dir=video.parent, prefix=".frames") as scratch:
+        drawn = Path(scratch) / truth.name
+        write(drawn)
+        if video.is_file() and truth.is_file() and _same(drawn, truth, keys):
+            return
+        print(f"rendering {video.stem}", file=sys.stderr, flush=True)
+        truth.unlink(missing_ok=True)  # a video without ground truth is rendered again
+        with atomic_path(video) as part:
+            render(part, Path(scratch))
+        os.replace(drawn, truth)
+
+
+def _same(drawn: Path, kept: Path, keys: Sequence[str]) -> bool:
     with np.load(drawn) as a, np.load(kept) as b:
-        return all(a[key].shape == b[key].shape and np.allclose(a[key], b[key], rtol=0, atol=SAME_M) for key in SAME)
+        return all(key in b and _alike(a[key], b[key]) for key in keys)
+
+
+def _alike(a: NDArray[Any], b: NDArray[Any]) -> bool:
+    if a.dtype.kind != "f":
+        return np.array_equal(a, b)
+    return a.shape == b.shape and np.allclose(a, b, rtol=0, atol=SAME_M)
 
 
 if __name__ == "__main__":

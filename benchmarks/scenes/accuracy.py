@@ -18,13 +18,14 @@ from ...scope_addon.capture.pipeline import capture
 from ...scope_addon.errors import NoPersonError
 from ...scope_addon.motion import Motion
 from ...solver import Body, load_body
+from ...tools.render_sample.truth import project
 from ..evaluation.metrics import mpjpe, pa_mpjpe, relative_to
-from ..frames import CACHE, DATA
+from ..frames import DATA
 from ..report import table
 from .people import LIMB_JOINTS
+from .scene import FOLDER
 from .statistics import Estimate, mean_over_people
 
-FOLDER = CACHE / "scenes"
 HIPS = [LIMB_JOINTS.index("left_hip"), LIMB_JOINTS.index("right_hip")]
 FOUND_PX = 0.15  # of the picture's longer side: the most that a captured person's hips may be off, median
 Truth = dict[str, NDArray[Any]]
@@ -85,7 +86,7 @@ def _result(body: Body, clip: str, motions: list[Motion], truth: Truth, k: int) 
     frames["distance_m"] = np.linalg.norm(true[:, HIPS].mean(axis=1), axis=1)
     pelvis = truth["limbs"][k][:, HIPS].mean(axis=1)
     frames["speed"] = np.linalg.norm(np.gradient(pelvis, axis=0), axis=1) * float(truth["fps"])
-    pixels = _project(true, truth["intrinsics"])
+    pixels = project(true, truth["intrinsics"])
     frames["height_px"] = np.ptp(pixels[..., 1], axis=1)
     person = {key: truth[key][k].item() for key in ("stature_m", "mass_index", "loose_m")}
     person |= {key: truth[key].item() for key in ("camera", "surroundings")} | {"people": len(truth["limbs"])}
@@ -109,17 +110,11 @@ def _nearest(motions: list[Motion], pixels: NDArray[np.float64], names: list[int
         rows = np.flatnonzero(motion.valid & (motion.frames < len(pixels)))
         if not len(rows):
             continue
-        seen = _project(motion.joints_cam[rows][:, names].astype(float), motion.intrinsics)[:, HIPS].mean(axis=1)
+        seen = project(motion.joints_cam[rows][:, names].astype(float), motion.intrinsics)[:, HIPS].mean(axis=1)
         off = float(np.median(np.linalg.norm(seen - pixels[motion.frames[rows]][:, HIPS].mean(axis=1), axis=1)))
         if off < least:
             best, least = motion, off
     return best
-
-
-def _project(points_camera: NDArray[np.float64], intrinsics: NDArray[np.float64]) -> NDArray[np.float64]:
-    homogeneous = points_camera @ intrinsics.T
-    pixels: NDArray[np.float64] = homogeneous[..., :2] / homogeneous[..., 2:]
-    return pixels
 
 
 Chosen = Callable[[Result], Any]  # of frames (T,) bool, or of the whole person, a bool

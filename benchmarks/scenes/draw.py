@@ -13,6 +13,7 @@ import numpy as np
 
 from ...solver import Body
 from ...solver.rotations import exp
+from ...tools.readme_pictures.view import level_camera
 from ...tools.train_lifter.split import is_held_out
 from ..perception.held_out import Take, draw_section, floor_under, states_and_pelvis
 from .people import Person, Points
@@ -136,13 +137,7 @@ def _film(rng: np.random.Generator, body: Body, people: tuple[Person, ...], numb
 
 def look_at(eye: Points, target: Points) -> Points:
     """Return world_from_camera (4, 4) of a level camera at eye (3,) that looks at target (3,)."""
-    forward = (target - eye) / np.linalg.norm(target - eye)
-    right = np.cross(forward, [0.0, 0.0, 1.0])
-    right /= np.linalg.norm(right)
-    T_world_camera = np.eye(4)
-    T_world_camera[:3, :3] = np.stack([right, np.cross(forward, right), forward], axis=1)
-    T_world_camera[:3, 3] = eye
-    return T_world_camera
+    return level_camera(eye, (target - eye) / np.linalg.norm(target - eye))
 
 
 def _block(

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ...scope_addon.capture.overlay.rasterizer import vertex_normals
 from ...solver import Body
 from ...tools.render_sample.truth import LIMBS
 
@@ -55,7 +56,7 @@ class Person:
     def dressed(self, body: Body, frame: int, offsets: Points) -> Points:
         """Return the vertices (V, 3) of clothes, hair and bare skin; `offsets` as of the method."""
         skin = self.skin(body, frame)
-        return skin + offsets[:, None] * normals(skin, body.triangles())
+        return skin + offsets[:, None] * vertex_normals(skin, body.triangles())
 
     def facing(self) -> Points:
         """Return the horizontal unit vectors (T, 2) to which the pelvis faces."""
@@ -93,15 +94,3 @@ def _share_of(body: Body, material: str) -> Points:
     counts = np.bincount(body.faces.ravel(), minlength=len(body.v_template))
     share: Points = np.bincount(body.faces.ravel(), of, len(body.v_template)) / np.maximum(counts, 1)
     return np.where(share < 1.0, 0.0, share)  # the seam with bare skin stays where it is
-
-
-def normals(vertices: Points, triangles: NDArray[np.intp]) -> Points:
-    """Return the unit normals (V, 3) of vertices, means over their triangles by area; 0 where there are none."""
-    a, b, c = np.moveaxis(vertices[triangles], 1, 0)
-    of_triangle = np.cross(b - a, c - a)
-    total = np.zeros_like(vertices)
-    for corner in range(3):
-        for axis in range(3):
-            total[:, axis] += np.bincount(triangles[:, corner], of_triangle[:, axis], len(vertices))
-    length = np.linalg.norm(total, axis=1, keepdims=True)
-    return total / np.maximum(length, 1e-12)

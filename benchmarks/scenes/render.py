@@ -9,28 +9,26 @@ from __future__ import annotations
 
 import os
 import sys
-import tempfile
+from functools import partial
 from pathlib import Path
 
 import bpy
 import cv2
 import numpy as np
 
-from ...scope_addon.atomic_write import atomic_path
 from ...solver import Body, load_body
 from ...tools.render_sample.clip import affected_box, blend_into
 from ...tools.render_sample.stage import encode, pose_person, render_part, render_to
-from ..frames import CACHE
 from ..perception.held_out import all_takes
-from ..perception.render_shots import fitted_motions
+from ..perception.render_shots import fitted_motions, render_if_changed
 from .draw import SCENES, draw_scene
-from .scene import STATIC, Scene, write_truth
+from .scene import FOLDER, STATIC, Scene, write_truth
 from .surroundings import build_scene, move_camera
 
-FOLDER = CACHE / "scenes"
 SAMPLES, SAMPLES_EMPTY = 4, 32
 KBIT_PER_S = 4000
-SAME_M = 1e-3
+COMPARED = ("limbs", "limbs_cam", "hidden", "view_deg", "stature_m", "mass_index", "loose_m", "takes", "intrinsics",
+            "world_from_camera", "size", "fps", "camera", "surroundings", "test")  # fmt: skip
 
 
 def video_and_truth(name: str) -> tuple[Path, Path]:
@@ -40,21 +38,15 @@ def video_and_truth(name: str) -> tuple[Path, Path]:
 
 def render_missing(body: Body, numbers: list[int]) -> None:
     """Render what is not there or not true any more."""
-    FOLDER.mkdir(parents=True, exist_ok=True)
     takes = all_takes(fitted_motions())
     for number in numbers:
         scene = draw_scene(body, takes, number)
-        video, truth = video_and_truth(scene.name)
-        with tempfile.TemporaryDirectory(dir=FOLDER, prefix=".frames") as scratch:
-            drawn = Path(scratch) / truth.name
-            write_truth(drawn, body, scene)
-            if video.is_file() and truth.is_file() and _same(drawn, truth):
-                continue
-            print(f"rendering {scene.name}", file=sys.stderr, flush=True)
-            truth.unlink(missing_ok=True)  # a video without ground truth is rendered again
-            with atomic_path(video) as part:
-                encode(_pictures(body, scene, Path(scratch)), part, scene.size, round(scene.fps), KBIT_PER_S)
-            os.replace(drawn, truth)
+
+        def render(path: Path, scratch: Path, scene: Scene = scene) -> None:
+            encode(_pictures(body, scene, scratch), path, scene.size, round(scene.fps), KBIT_PER_S)
+
+        write = partial(write_truth, body=body, scene=scene)
+        render_if_changed(*video_and_truth(scene.name), COMPARED, write, render)
 
 
 def _pictures(body: Body, scene: Scene, folder: Path) -> list[Path]:
@@ -85,20 +77,6 @@ def _pictures(body: Body, scene: Scene, folder: Path) -> list[Path]:
         render_part((left / width, right / width, 1 - bottom / height, 1 - top / height), picture)
         blend_into(empty, picture, box)
     return pictures
-
-
-def _same(drawn: Path, kept: Path) -> bool:
-    with np.load(drawn) as a, np.load(kept) as b:
-        if set(a.files) != set(b.files):
-            return False
-        same = [
-            np.allclose(a[key], b[key], rtol=0, atol=SAME_M)
-            if a[key].dtype.kind == "f"
-            else np.array_equal(a[key], b[key])
-            for key in a.files
-            if a[key].shape == b[key].shape
-        ]
-        return len(same) == len(a.files) and all(same)
 
 
 if __name__ == "__main__":

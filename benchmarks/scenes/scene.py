@@ -11,9 +11,11 @@ from numpy.typing import NDArray
 
 from ...scope_addon.kinematics.axes import transform_points
 from ...solver import Body
-from ...tools.render_sample.truth import Shot
+from ...tools.render_sample.truth import Shot, project
+from ..frames import CACHE
 from .people import LIMB_JOINTS, Person, Points
 
+FOLDER = CACHE / "scenes"  # of the clips and their ground truth
 STATIC, PANNING, TRAVELLING = "static", "panning", "travelling"
 INDOORS, OUTDOORS = "indoors", "outdoors"
 
@@ -67,9 +69,7 @@ class Scene:
 
     def project(self, points_camera: Points) -> Points:
         """Project points (..., 3) to pixels (..., 2)."""
-        homogeneous = points_camera @ self.intrinsics.T
-        pixels: Points = homogeneous[..., :2] / homogeneous[..., 2:]
-        return pixels
+        return project(points_camera, self.intrinsics)
 
     def shot(self, frame: int) -> Shot:
         """Return the camera of one frame, with the first person's motion."""

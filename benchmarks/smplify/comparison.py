@@ -19,7 +19,7 @@ from ...scope_addon.motion import Motion
 from ...solver import Body, load_body
 from ...solver.loaders.body_file import ASSETS
 from ...tools.readme_pictures.__main__ import write_jpeg
-from ...tools.render_sample.truth import LIMBS
+from ...tools.render_sample.truth import LIMBS, project
 from ..evaluation.metrics import mpjpe, pa_mpjpe, relative_to
 from ..frames import CACHE, DATA
 from ..page.shots import frames_of
@@ -138,13 +138,6 @@ def turned(skin: Points) -> Points:
     x, y, z = (skin - middle).T
     around: Points = np.stack([-z, y, x], axis=1) + middle
     return around
-
-
-def project(skin: Points, intrinsics: Points) -> Points:
-    """Return the pixels (V, 2) of vertices (V, 3)."""
-    homogeneous = skin @ intrinsics.T
-    pixels: Points = homogeneous[:, :2] / homogeneous[:, 2:]
-    return pixels
 
 
 def _cropped(image: NDArray[np.uint8], pixels: Points) -> NDArray[np.uint8]:

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from ...solver import Body
 from ...solver.rotations import exp
+from ...tools.render_sample.truth import project
 from .dense import Minimum, minimize
 
 SIGMA_PX = 100.0
@@ -114,9 +115,7 @@ class Objective:
             R, t = self.body.forward_kinematics(states[rows], trans[rows], shape)
             points[rows] = self.body.keypoints(R, t, shape)[:, self.at]
         points[..., 2] = np.maximum(points[..., 2], 0.1)
-        homogeneous = points @ self.frame.intrinsics.T
-        off: Vector = homogeneous[..., :2] / homogeneous[..., 2:] - self.frame.pixels
-        return off
+        return project(points, self.frame.intrinsics) - self.frame.pixels
 
     def _place(self, heading: float) -> Minimum:
         """Return root rotation and translation that fit the trunk, with the prior's mean pose, from one heading."""

@@ -67,10 +67,16 @@ def from_around(
     a, p = np.radians(turn), np.radians(pitch)
     toward = np.array([[np.cos(a), -np.sin(a), 0], [np.sin(a), np.cos(a), 0], [0, 0, 1]]) @ toward
     forward = np.cos(p) * toward - np.sin(p) * np.array([0, 0, 1.0])
-    right = np.cross(forward, [0, 0, 1.0])
-    right /= np.linalg.norm(right)
-    T = np.eye(4)
-    T[:3, :3] = np.stack([right, np.cross(forward, right), forward], axis=1)
-    T[:3, 3] = center - _FAR * forward
+    T = level_camera(center - _FAR * forward, forward)
     focal = size[1] * _FAR / height
     return View(np.array([[focal, 0, size[0] / 2], [0, focal, size[1] / 2], [0, 0, 1.0]]), T, size)
+
+
+def level_camera(eye: NDArray[np.float64], forward: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return world_from_camera (4, 4) of a level camera at eye (3,) that looks along a unit vector (3,), z up."""
+    right = np.cross(forward, [0.0, 0.0, 1.0])
+    right /= np.linalg.norm(right)
+    T_world_camera = np.eye(4)
+    T_world_camera[:3, :3] = np.stack([right, np.cross(forward, right), forward], axis=1)
+    T_world_camera[:3, 3] = eye
+    return T_world_camera

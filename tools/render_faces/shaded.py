@@ -9,27 +9,22 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ...scope_addon.capture.overlay.rasterizer import Canvas, draw_shaded, vertex_normals
+from ...scope_addon.capture.overlay.rasterizer import Canvas, rasterize, vertex_normals
 from ...scope_addon.kinematics.expressions import mouth_faces_of
 from ...solver.body import Body
 from .looks import Look
-from .truth import SIZE
+from .truth import SIZE, head_faces
 
 _OVER = 2  # pixels are drawn so many times finer
 _CONCAVE = 300.0  # per metre: how much darker hollows are
-_NECK_M, _HALF_M = 0.08, 0.2  # below the neck joint and beside the body's middle, where the picture ends
 
 
 class ShadedStage:
     """Draws one head; the same interface as `Stage`."""
 
     def __init__(self, body: Body) -> None:
-        if body.face_material is None or body.material_colors is None:
-            raise ValueError(f"body '{body.name}' has no materials")
-        V = body.v_template
-        neck = body.J_template[body.joint_names.index("neck"), 1]
-        near = (V[:, 1] > neck - _NECK_M) & (abs(V[:, 0]) < _HALF_M)
-        kept = near[body.faces].all(axis=1)
+        kept = head_faces(body)
+        assert body.face_material is not None  # checked by `head_faces`
         quads = body.faces[kept]
         self._triangles = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]]).astype(np.int32)
         self._material, self._names = body.face_material[kept], list(body.material_names)
@@ -68,7 +63,7 @@ class ShadedStage:
         side = _OVER * SIZE
         K = np.array([[focal_px * _OVER, 0, side / 2 - 0.5], [0, focal_px * _OVER, side / 2 - 0.5], [0, 0, 1.0]])
         canvas = Canvas.blank(side, side)
-        draw_shaded(canvas, V, self._triangles, self._colors, shading, K)
+        rasterize(canvas, V, self._triangles, self._colors, K, shading=shading)
         image = np.where(canvas.coverage[..., None], canvas.rgba[..., :3], self._background)
         image = cv2.resize(cv2.GaussianBlur(image, (0, 0), 1.2), (SIZE, SIZE), interpolation=cv2.INTER_AREA)
         noisy = image + self._noise.normal(0, 2.5, image.shape)

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from ...scope_addon.scene.axes import blender_camera_matrix
 from ...solver.body import Body
+from ..render_sample.stage import render_to, set_up_rendering
 from .looks import Look
-from .truth import SIZE
+from .truth import SIZE, head_faces
 
 SAMPLES = 4
 
@@ -22,7 +23,8 @@ class Stage:
 
     def __init__(self, body: Body) -> None:
         bpy.ops.wm.read_factory_settings(use_empty=True)
-        self._render_settings()
+        set_up_rendering(bpy.context.scene, (SIZE, SIZE))
+        bpy.context.scene.cycles.samples = SAMPLES
         self._camera()
         self._lamps()
         self._head(body)
@@ -51,27 +53,7 @@ class Stage:
             direction = np.array([0.0, 0.0, 1.0]) * points[:, 2].mean() - np.array(lamp.location)
             lamp.rotation_mode = "QUATERNION"
             lamp.rotation_quaternion = _facing(direction)
-        bpy.context.scene.render.filepath = str(path)
-        bpy.ops.render.render(write_still=True)
-
-    @staticmethod
-    def _render_settings() -> None:
-        scene = bpy.context.scene
-        scene.render.engine = "CYCLES"
-        scene.render.resolution_x = scene.render.resolution_y = SIZE
-        scene.render.resolution_percentage = 100
-        scene.render.use_persistent_data = True
-        scene.render.image_settings.file_format = "PNG"
-        scene.view_settings.view_transform = "AgX"
-        scene.view_settings.look = "AgX - Medium High Contrast"
-        cycles = scene.cycles
-        cycles.samples, cycles.use_adaptive_sampling = SAMPLES, False
-        cycles.max_bounces, cycles.diffuse_bounces, cycles.glossy_bounces = 1, 1, 1
-        cycles.use_denoising = True
-        cycles.denoiser = "OPENIMAGEDENOISE"
-        cycles.denoising_quality = "FAST"
-        cycles.denoising_prefilter = "NONE"
-        cycles.seed = 1
+        render_to(path)
 
     @staticmethod
     def _camera() -> None:
@@ -93,21 +75,17 @@ class Stage:
             self._lights.append(lamp)
 
     def _head(self, body: Body) -> None:
-        if body.face_material is None or body.material_colors is None:
-            raise ValueError(f"body '{body.name}' has no materials")
-        V = body.v_template
-        neck = body.J_template[body.joint_names.index("neck"), 1]
-        faces = body.faces[
-            (V[body.faces][:, :, 1] > neck - 0.08).all(axis=1) & (abs(V[body.faces][:, :, 0]) < 0.2).all(axis=1)
-        ]
-        self._kept, local = np.unique(faces, return_inverse=True)
-        material = body.face_material[np.isin(np.arange(len(body.faces)), _rows(body.faces, faces))]
+        kept = head_faces(body)
+        assert body.face_material is not None  # checked by `head_faces`
+        assert body.material_colors is not None
+        self._kept, local = np.unique(body.faces[kept], return_inverse=True)
+        material = body.face_material[kept]
         self._mesh = bpy.data.meshes.new("head")
-        self._mesh.from_pydata(V[self._kept].tolist(), [], local.reshape(-1, 4).tolist())
+        self._mesh.from_pydata(body.v_template[self._kept].tolist(), [], local.reshape(-1, 4).tolist())
         for name, color in zip(body.material_names, body.material_colors, strict=True):
             self._mesh.materials.append(_material(str(name), tuple(color)))
         self._mesh.polygons.foreach_set("material_index", material.astype(np.int32))
-        self._mesh.polygons.foreach_set("use_smooth", np.ones(len(faces), bool))
+        self._mesh.polygons.foreach_set("use_smooth", np.ones(len(material), bool))
         self._mesh.color_attributes.new("tint", "FLOAT_COLOR", "POINT")
         head = bpy.data.objects.new("head", self._mesh)
         bpy.context.scene.collection.objects.link(head)
@@ -127,11 +105,6 @@ def _material(name: str, color: tuple[float, ...]) -> bpy.types.Material:
         tint.layer_name = "tint"
         material.node_tree.links.new(tint.outputs["Color"], surface.inputs["Base Color"])
     return material
-
-
-def _rows(all_faces: NDArray[np.int32], some: NDArray[np.int32]) -> NDArray[np.intp]:
-    place = {tuple(face): k for k, face in enumerate(all_faces.tolist())}
-    return np.array([place[tuple(face)] for face in some.tolist()])
 
 
 def _facing(direction: NDArray[np.float64]) -> tuple[float, float, float, float]:

@@ -17,11 +17,25 @@ FOLDER = Path(__file__).resolve().parents[2] / "build" / "faces"
 MIDDLE = np.array([0.0, 0.665, 0.11])  # of the face, in the model frame; the camera looks at it
 WIDTH_M = 0.27  # that the picture shows at the face
 SIZE = 256
+_NECK_M, _HALF_M = 0.08, 0.2  # below the neck joint and beside the body's middle, where the picture ends
 
 
 def focal_px(distance: float) -> float:
     """Return the focal length with which the face fills the picture."""
     return SIZE * distance / WIDTH_M
+
+
+def head_faces(body: Body) -> NDArray[np.bool_]:
+    """Return (F,) bool: which faces of the body belong to the head in the picture.
+
+    :raises ValueError: the body has no materials, by which the head is coloured.
+    """
+    if body.face_material is None or body.material_colors is None:
+        raise ValueError(f"body '{body.name}' has no materials")
+    V = body.v_template
+    neck = body.J_template[body.joint_names.index("neck"), 1]
+    near: NDArray[np.bool_] = (V[:, 1] > neck - _NECK_M) & (abs(V[:, 0]) < _HALF_M)
+    return near[body.faces].all(axis=1)
 
 
 def expression_matrix(body: Body) -> NDArray[np.float64]:

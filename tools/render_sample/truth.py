@@ -52,12 +52,18 @@ class Shot:
 
     def project(self, points_camera: NDArray[np.float64]) -> NDArray[np.float64]:
         """Project points (..., N, 3) to pixels (..., N, 2), without distortion."""
-        homogeneous = points_camera @ self.intrinsics.T
-        return homogeneous[..., :2] / homogeneous[..., 2:]
+        return project(points_camera, self.intrinsics)
 
     def vertices_world(self, body: Body, frame: int) -> NDArray[np.float64]:
         """Return the skin's vertices (V, 3) in one frame, world, metres."""
         return body.skin(*body.forward_kinematics(self.rotations[frame], self.trans[frame], self.betas), self.betas)
+
+
+def project(points_camera: NDArray[np.float64], intrinsics: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Project points (..., 3) to pixels (..., 2) with intrinsics (3, 3), without distortion."""
+    homogeneous = points_camera @ intrinsics.T
+    pixels: NDArray[np.float64] = homogeneous[..., :2] / homogeneous[..., 2:]
+    return pixels
 
 
 def sample_shot(rotations: NDArray[np.float64], trans: NDArray[np.float64]) -> Shot:

@@ -59,6 +59,7 @@ def rasterize(
     intrinsics: NDArray[np.float64],
     dist: NDArray[np.float64] | None = None,
     opacity: float = 1.0,
+    shading: NDArray[np.float64] | None = None,
 ) -> None:
     """Draw a mesh into the canvas, with depth test and back-face culling.
 
@@ -69,36 +70,12 @@ def rasterize(
     :param intrinsics: (3, 3) K in pixels of the canvas.
     :param dist: up to (5,) distortion coefficients; None for none.
     :param opacity: 0..1, written to the canvas's fourth channel.
+    :param shading: (V, 2) as `shade` returns it, which is the default.
     """
     vertices = np.ascontiguousarray(vertices_cam, np.float64)
     corners = np.ascontiguousarray(triangles, np.int32)
-    shading = shade(vertices, vertex_normals(vertices, corners))
-    draw_shaded(canvas, vertices, corners, face_colors, shading, intrinsics, dist, opacity)
-
-
-def draw_shaded(
-    canvas: Canvas,
-    vertices_cam: NDArray[np.floating[Any]],
-    triangles: NDArray[np.integer[Any]],
-    face_colors: NDArray[np.floating[Any]],
-    shading: NDArray[np.float64],
-    intrinsics: NDArray[np.float64],
-    dist: NDArray[np.float64] | None = None,
-    opacity: float = 1.0,
-) -> None:
-    """Draw a mesh as `rasterize` does, with a shading of its own.
-
-    :param canvas: modified in place.
-    :param vertices_cam: (V, 3) metres, camera axes.
-    :param triangles: (F, 3) vertex indices, counter-clockwise seen from outside.
-    :param face_colors: (F, 3) sRGB, 0..1; or (3,), one colour for all.
-    :param shading: (V, 2) as `shade` returns it.
-    :param intrinsics: (3, 3) K in pixels of the canvas.
-    :param dist: up to (5,) distortion coefficients; None for none.
-    :param opacity: 0..1, written to the canvas's fourth channel.
-    """
-    vertices = np.ascontiguousarray(vertices_cam, np.float64)
-    corners = np.ascontiguousarray(triangles, np.int32)
+    if shading is None:
+        shading = shade(vertices, vertex_normals(vertices, corners))
     colors = np.broadcast_to(np.asarray(face_colors, np.float32), (len(corners), 3))
     lens = np.zeros(5)
     if dist is not None:

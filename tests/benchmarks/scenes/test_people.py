@@ -7,7 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scope.benchmarks.scenes.people import DENSITY, Person, normals
+from scope.benchmarks.scenes.people import DENSITY, Person
+from scope.scope_addon.capture.overlay.rasterizer import vertex_normals
 
 
 @pytest.fixture(scope="module")
@@ -37,20 +38,8 @@ def test_clothes_stand_off_outwards_and_bare_skin_does_not(body, person):
     assert 0.015 < off.max() <= 0.02 + 1e-9
     corners = body.faces[body.face_material == body.material_names.index("skin")]
     assert off[np.unique(corners)].max() == 0.0
-    outwards = np.einsum("vi,vi->v", dressed - bare, normals(bare, body.triangles()))
+    outwards = np.einsum("vi,vi->v", dressed - bare, vertex_normals(bare, body.triangles()))
     assert outwards.min() >= 0.0
-
-
-def test_normals_of_a_sphere_point_outwards():
-    angle = np.linspace(0, 2 * np.pi, 33)[:-1]
-    rings = [[np.sin(a) * np.cos(angle), np.sin(a) * np.sin(angle), np.full(32, np.cos(a))] for a in (1.0, 1.2, 1.4)]
-    points = np.concatenate([np.stack(ring, axis=1) for ring in rings])
-    k = np.arange(32)
-    one, two = k, (k + 1) % 32
-    lower = np.concatenate([np.stack([r + one, r + 32 + one, r + 32 + two], 1) for r in (0, 32)])
-    upper = np.concatenate([np.stack([r + one, r + 32 + two, r + two], 1) for r in (0, 32)])
-    found = normals(points, np.concatenate([lower, upper]))[32:64]
-    np.testing.assert_allclose(found, points[32:64], atol=0.03)
 
 
 def test_the_default_body_weighs_what_people_weigh(body, person):
