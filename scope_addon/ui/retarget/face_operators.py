@@ -6,10 +6,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import bpy
-from bpy.props import BoolProperty, EnumProperty, StringProperty
+from bpy.props import EnumProperty, StringProperty
 
 from ..captured_person import captured_armature
 from ..reporting import ReportingOperator, rpt_, tip_
+from .map_operators import LoadMapOperator, SaveMapOperator, edit_list
 
 if TYPE_CHECKING:
     from ...retarget.expression_map import ExpressionMap
@@ -88,61 +89,32 @@ class SCOPE_OT_retarget_face(_FaceOperator):
         return rpt_("'{mesh}' is now animated by the action '{action}'", mesh=settings.face.name, action=action.name)
 
 
-class _ExpressionMapFileOperator(_FaceOperator):
-    """An operator on an expression map file, which the file browser asks for. Not registered."""
-
-    filter_glob: StringProperty(default="*.json", options={"HIDDEN"})
-
-    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        """Ask for the file."""
-        context.window_manager.fileselect_add(self)
-        return {"RUNNING_MODAL"}
-
-
-class SCOPE_OT_save_expression_map(_ExpressionMapFileOperator):
+class SCOPE_OT_save_expression_map(_FaceOperator, SaveMapOperator):
     """Save the expression map as a JSON file for similar faces"""
 
     bl_idname = "scope.save_expression_map"
     bl_label = "Save Expression Map"
 
     filepath: StringProperty(subtype="FILE_PATH", default="expressions.json")
-    check_existing: BoolProperty(default=True, options={"HIDDEN"})  # the file browser asks before it overwrites
 
-    def check(self, context: bpy.types.Context) -> bool:
-        """Add the suffix while the name is typed, so that the file browser sees which file would be overwritten."""
-        path: str = bpy.path.ensure_ext(self.filepath, ".json")
-        changed, self.filepath = path != self.filepath, path
-        return bool(changed)
-
-    def work(self, context: bpy.types.Context) -> str:
-        """Write the file.
-
-        :raises UsageError: the file has no name.
-        """
-        from ...errors import UsageError
+    def save(self, settings: bpy.types.PropertyGroup, path: str) -> None:
+        """Write the list."""
         from ...retarget.expression_map import save_expression_map
 
-        if not bpy.path.basename(self.filepath).removesuffix(".json"):
-            raise UsageError("the file has no name; enter one")
-        path = bpy.path.ensure_ext(bpy.path.abspath(self.filepath), ".json")
-        save_expression_map(listed_expressions(context.scene.scope_retarget), path)
-        return rpt_("Saved {file}", file=path)
+        save_expression_map(listed_expressions(settings), path)
 
 
-class SCOPE_OT_load_expression_map(_ExpressionMapFileOperator):
+class SCOPE_OT_load_expression_map(_FaceOperator, LoadMapOperator):
     """Load an expression map from a JSON file"""
 
     bl_idname = "scope.load_expression_map"
     bl_label = "Load Expression Map"
 
-    filepath: StringProperty(subtype="FILE_PATH")
-
-    def work(self, context: bpy.types.Context) -> str:
-        """Fill the list."""
+    def load(self, settings: bpy.types.PropertyGroup, path: str) -> None:
+        """Read the list."""
         from ...retarget.expression_map import load_expression_map
 
-        fill_expressions(context.scene.scope_retarget, load_expression_map(bpy.path.abspath(self.filepath)))
-        return rpt_("Loaded {file}", file=self.filepath)
+        fill_expressions(settings, load_expression_map(path))
 
 
 class SCOPE_OT_edit_expression_pair(_FaceOperator):
@@ -156,12 +128,7 @@ class SCOPE_OT_edit_expression_pair(_FaceOperator):
     def work(self, context: bpy.types.Context) -> str:
         """Change the list."""
         settings = context.scene.scope_retarget
-        if self.action == "ADD":
-            settings.face_pairs.add()
-            settings.face_active = len(settings.face_pairs) - 1
-        elif len(settings.face_pairs):
-            settings.face_pairs.remove(settings.face_active)
-            settings.face_active = max(0, min(settings.face_active, len(settings.face_pairs) - 1))
+        settings.face_active = edit_list(self.action, settings.face_pairs, settings.face_active)
         return rpt_("{count} entries", count=len(settings.face_pairs))
 
 

@@ -6,11 +6,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import bpy
-from bpy.props import BoolProperty, EnumProperty, StringProperty
+from bpy.props import EnumProperty, StringProperty
 
 from ..captured_person import PERSON, betas_of, body_of, captured_armature, captured_people
 from ..reporting import ReportingOperator, rpt_, sentence, tip_
 from .bone_list import fill_list, listed_map
+from .map_operators import LoadMapOperator, SaveMapOperator, edit_list
 
 if TYPE_CHECKING:
     from ...scene.rigs.rig_retarget import RetargetOptions, RetargetResult
@@ -137,61 +138,32 @@ def retarget_options(settings: bpy.types.PropertyGroup) -> RetargetOptions:
     return RetargetOptions(feet=settings.feet, root=settings.root, offset=offset)
 
 
-class _BoneMapFileOperator(_RigOperator):
-    """An operator on a bone map file, which the file browser asks for. Not registered."""
-
-    filter_glob: StringProperty(default="*.json", options={"HIDDEN"})
-
-    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        """Ask for the file."""
-        context.window_manager.fileselect_add(self)
-        return {"RUNNING_MODAL"}
-
-
-class SCOPE_OT_save_bone_map(_BoneMapFileOperator):
+class SCOPE_OT_save_bone_map(_RigOperator, SaveMapOperator):
     """Save the bone map as a JSON file for similar rigs"""
 
     bl_idname = "scope.save_bone_map"
     bl_label = "Save Bone Map"
 
     filepath: StringProperty(subtype="FILE_PATH", default="bones.json")
-    check_existing: BoolProperty(default=True, options={"HIDDEN"})  # the file browser asks before it overwrites
 
-    def check(self, context: bpy.types.Context) -> bool:
-        """Add the suffix while the name is typed, so that the file browser sees which file would be overwritten."""
-        path: str = bpy.path.ensure_ext(self.filepath, ".json")
-        changed, self.filepath = path != self.filepath, path
-        return bool(changed)
-
-    def work(self, context: bpy.types.Context) -> str:
-        """Write the file.
-
-        :raises UsageError: the file has no name.
-        """
-        from ...errors import UsageError
+    def save(self, settings: bpy.types.PropertyGroup, path: str) -> None:
+        """Write the list."""
         from ...retarget.bone_map import save_bone_map
 
-        if not bpy.path.basename(self.filepath).removesuffix(".json"):
-            raise UsageError("the file has no name; enter one")
-        path = bpy.path.ensure_ext(bpy.path.abspath(self.filepath), ".json")
-        save_bone_map(listed_map(context.scene.scope_retarget), path)
-        return rpt_("Saved {file}", file=path)
+        save_bone_map(listed_map(settings), path)
 
 
-class SCOPE_OT_load_bone_map(_BoneMapFileOperator):
+class SCOPE_OT_load_bone_map(_RigOperator, LoadMapOperator):
     """Load a bone map from a JSON file"""
 
     bl_idname = "scope.load_bone_map"
     bl_label = "Load Bone Map"
 
-    filepath: StringProperty(subtype="FILE_PATH")
-
-    def work(self, context: bpy.types.Context) -> str:
-        """Fill the list."""
+    def load(self, settings: bpy.types.PropertyGroup, path: str) -> None:
+        """Read the list."""
         from ...retarget.bone_map import load_bone_map
 
-        fill_list(context.scene.scope_retarget, load_bone_map(bpy.path.abspath(self.filepath)))
-        return rpt_("Loaded {file}", file=self.filepath)
+        fill_list(settings, load_bone_map(path))
 
 
 class SCOPE_OT_edit_bone_pair(_RigOperator):
@@ -205,12 +177,7 @@ class SCOPE_OT_edit_bone_pair(_RigOperator):
     def work(self, context: bpy.types.Context) -> str:
         """Change the list."""
         settings = context.scene.scope_retarget
-        if self.action == "ADD":
-            settings.pairs.add()
-            settings.active = len(settings.pairs) - 1
-        elif len(settings.pairs):
-            settings.pairs.remove(settings.active)
-            settings.active = max(0, min(settings.active, len(settings.pairs) - 1))
+        settings.active = edit_list(self.action, settings.pairs, settings.active)
         return rpt_("{count} bones", count=len(settings.pairs))
 
 

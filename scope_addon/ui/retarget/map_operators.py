@@ -1,0 +1,80 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What operators on the bone map and on the expression map share: their files, and editing their lists."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+from bpy.props import BoolProperty, StringProperty
+
+from ..reporting import ReportingOperator, rpt_
+
+
+class MapFileOperator(ReportingOperator):
+    """An operator on the file of a map, which the file browser asks for. Not registered."""
+
+    filter_glob: StringProperty(default="*.json", options={"HIDDEN"})
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        """Ask for the file."""
+        context.window_manager.fileselect_add(self)
+        return {"RUNNING_MODAL"}
+
+
+class SaveMapOperator(MapFileOperator):
+    """Writes a map; a subclass has ``filepath`` and ``save``. Not registered."""
+
+    check_existing: BoolProperty(default=True, options={"HIDDEN"})  # the file browser asks before it overwrites
+
+    def check(self, context: bpy.types.Context) -> bool:
+        """Add the suffix while the name is typed, so that the file browser sees which file would be overwritten."""
+        path: str = bpy.path.ensure_ext(self.filepath, ".json")
+        changed, self.filepath = path != self.filepath, path
+        return bool(changed)
+
+    def work(self, context: bpy.types.Context) -> str:
+        """Write the file.
+
+        :raises UsageError: the file has no name.
+        """
+        from ...errors import UsageError
+
+        if not bpy.path.basename(self.filepath).removesuffix(".json"):
+            raise UsageError("the file has no name; enter one")
+        path = bpy.path.ensure_ext(bpy.path.abspath(self.filepath), ".json")
+        self.save(context.scene.scope_retarget, path)
+        return rpt_("Saved {file}", file=path)
+
+    def save(self, settings: bpy.types.PropertyGroup, path: str) -> None:
+        """Write the map of the settings to a path."""
+        raise NotImplementedError
+
+
+class LoadMapOperator(MapFileOperator):
+    """Reads a map; a subclass has ``load``. Not registered."""
+
+    filepath: StringProperty(subtype="FILE_PATH")
+
+    def work(self, context: bpy.types.Context) -> str:
+        """Fill the list."""
+        self.load(context.scene.scope_retarget, bpy.path.abspath(self.filepath))
+        return rpt_("Loaded {file}", file=self.filepath)
+
+    def load(self, settings: bpy.types.PropertyGroup, path: str) -> None:
+        """Fill the list of the settings from a path."""
+        raise NotImplementedError
+
+
+def edit_list(action: str, pairs: Any, active: int) -> int:
+    """Add an entry to a list's collection, or remove the active one; return which one is active then.
+
+    :param action: ``ADD`` or ``REMOVE``.
+    """
+    if action == "ADD":
+        pairs.add()
+        return len(pairs) - 1
+    if len(pairs):
+        pairs.remove(active)
+        return max(0, min(active, len(pairs) - 1))
+    return active
