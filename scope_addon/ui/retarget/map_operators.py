@@ -14,6 +14,7 @@ from ..reporting import ReportingOperator, rpt_
 class MapFileOperator(ReportingOperator):
     """An operator on the file of a map, which the file browser asks for. Not registered."""
 
+    filepath: StringProperty(subtype="FILE_PATH")
     filter_glob: StringProperty(default="*.json", options={"HIDDEN"})
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
@@ -23,7 +24,7 @@ class MapFileOperator(ReportingOperator):
 
 
 class SaveMapOperator(MapFileOperator):
-    """Writes a map; a subclass has ``filepath`` and ``save``. Not registered."""
+    """Writes a map; a subclass has ``save``, and the file's usual name. Not registered."""
 
     check_existing: BoolProperty(default=True, options={"HIDDEN"})  # the file browser asks before it overwrites
 
@@ -53,8 +54,6 @@ class SaveMapOperator(MapFileOperator):
 
 class LoadMapOperator(MapFileOperator):
     """Reads a map; a subclass has ``load``. Not registered."""
-
-    filepath: StringProperty(subtype="FILE_PATH")
 
     def work(self, context: bpy.types.Context) -> str:
         """Fill the list."""
