@@ -86,10 +86,13 @@ def test_the_inside_of_the_mouth_shows_when_it_opens(body):
     rest = body.v_template.astype(float)
     opened = rest.copy()
     opened[jaw.vertices] += jaw.offsets
-    visible = [
-        sum(not covered(center, vertices[skin]) for center in vertices[body.faces[mouth_faces_of(body)]].mean(axis=1))
-        for vertices in (rest, opened)
-    ]
+    visible = []
+    for vertices in (rest, opened):
+        centers, triangles = vertices[body.faces[mouth_faces_of(body)]].mean(axis=1), vertices[skin]
+        below = (triangles.max(axis=1) < centers.min(axis=0))[:, :2].any(axis=1)
+        above = (triangles.min(axis=1) > centers.max(axis=0))[:, :2].any(axis=1)
+        near = triangles[~below & ~above]  # the others cover none of them, and take long
+        visible.append(sum(not covered(center, near) for center in centers))
     assert visible[0] == 0
     assert visible[1] >= 10
 

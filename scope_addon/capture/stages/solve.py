@@ -18,7 +18,7 @@ from ..world.above_floor import raise_feet
 from ..world.assemble import assemble_motion
 from ..world.camera_path import CameraPath
 from ..world.camera_travel import camera_travel
-from ..world.clip_fit import fit_clip
+from ..world.clip.clip_fit import fit_clip
 from ..world.placement import PlacedTrack, place_track
 from ..world.shot import FittedPerson, Shot
 from ..world.stance import stance_on_floor

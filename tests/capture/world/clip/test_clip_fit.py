@@ -7,80 +7,21 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scope.scope_addon.capture.camera.intrinsics import choose_camera
-from scope.scope_addon.capture.fitting.frame_sequence import FittedTrack
-from scope.scope_addon.capture.fitting.keypoint_offsets import with_keypoint_offsets
-from scope.scope_addon.capture.fitting.prepared_track import PreparedTrack, Stance, prepare_track
+from scope.scope_addon.capture.fitting.prepared_track import Stance
 from scope.scope_addon.capture.fitting.weights import motion_priors
 from scope.scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES
-from scope.scope_addon.capture.perception.lifter import Lifted
-from scope.scope_addon.capture.tracking.track import Track
-from scope.scope_addon.capture.world import clip_fit
 from scope.scope_addon.capture.world.camera_path import CameraPath
+from scope.scope_addon.capture.world.clip import clip_fit
 from scope.scope_addon.capture.world.placement import place_track
-from scope.solver import load_body
 from scope.solver.rotations import exp
 
-FPS, FRAMES = 30.0, 24
-BODY, CAMERA = load_body("scope"), choose_camera(1080, 1920)
-JOINTS = len(KEYPOINT_NAMES)
-HIPS = [KEYPOINT_NAMES.index(f"{side}_hip") for side in ("left", "right")]
-LEG = [KEYPOINT_NAMES.index(f"right_{name}") for name in ("knee", "ankle", "heel", "foot_index")]
-
-
-def _person(frames: int = FRAMES, path: CameraPath | None = None) -> tuple[Track, FittedTrack]:
-    """Somebody upright, 4 m away, one leg bent, who waves an arm up and down once a second.
-
-    :param path: of the camera; by default it is static.
-    :return: what the camera sees, and the true states in the first frame's axes.
-    """
-    times = np.arange(frames) / FPS
-    rotations = np.tile(np.eye(3), (frames, BODY.K + 1, 1, 1))
-    rotations[:, 0] = np.diag([1.0, -1.0, -1.0])  # body y up, OpenCV y down
-    for joint, angle in (("right_hip", 0.3), ("right_knee", 0.9)):
-        rotations[:, BODY.joint_names.index(joint)] = exp(np.array([angle, 0.0, 0.0]))
-    wave = 0.5 * np.sin(2 * np.pi * times)
-    rotations[:, BODY.joint_names.index("left_shoulder")] = exp(wave[:, None] * [0.0, 0.0, 1.0])
-    root = np.tile([0.0, 0.0, 4.0], (frames, 1))
-    R, t = BODY.forward_kinematics(rotations, root - BODY.rest_joints()[0], np.zeros(BODY.P))
-    at = BODY.keypoint_set("blazepose")
-    points = with_keypoint_offsets(BODY).keypoints(R, t, np.zeros(BODY.P), [at[name] for name in KEYPOINT_NAMES])
-    if path is not None:
-        points = path.points_to_frames(points)
-    pixels = points[..., :2] / points[..., 2:] * CAMERA.intrinsics[0, 0] + CAMERA.intrinsics[:2, 2]
-    track = Track(
-        frames=np.arange(frames),
-        times=times,
-        keypoints_px=pixels,
-        confidence=np.ones((frames, JOINTS)),
-        world_landmarks=points - points[:, HIPS].mean(axis=1, keepdims=True),
-        seen=np.ones(frames, bool),
-        acquired=np.arange(frames) == 0,
-    )
-    seen = np.ones((frames, BODY.K + 1))
-    return track, FittedTrack(rotations, root, np.zeros(BODY.P), np.ones(frames, bool), seen, 1.0)
-
-
-def _prepared(track: Track, lifted_m: np.ndarray | None = None, sigma_m: np.ndarray | float = 0.1) -> PreparedTrack:
-    """The track with lifted points and their deviation; by default those of the track, which are exact."""
-    sigma = np.broadcast_to(sigma_m, (len(track), JOINTS)).copy()
-    points = track.world_landmarks if lifted_m is None else lifted_m
-    return replace(prepare_track(BODY, track, CAMERA), lifted=Lifted(points, sigma, sigma))
-
-
-def _fit(prepared: PreparedTrack, start: FittedTrack, path: CameraPath | None = None) -> FittedTrack:
-    return clip_fit.fit_clip(prepared, start, path or CameraPath.static(len(start.valid)), lambda *_: None)
-
-
-def _joints(fit: FittedTrack) -> np.ndarray:
-    """The joints (T, K+1, 3) in each frame's camera."""
-    return BODY.forward_kinematics(fit.rotations, fit.t_camera_root - BODY.rest_joints(fit.betas)[0], fit.betas)[1]
+from .waving_person import BODY, FPS, FRAMES, HIPS, JOINTS, LEG, fit, joints, person, prepare
 
 
 @pytest.mark.parametrize("flipped", [1, 4, 8])
 def test_a_limb_that_is_lifted_to_its_mirror_image_for_some_frames_stays_where_it_was(flipped):
     """The image shows a leg bent towards the camera as one bent away; the lifter is half as sure where it is wrong."""
-    track, true = _person()
+    track, true = person()
     wrong, sigma = track.world_landmarks.copy(), np.full((FRAMES, JOINTS), 0.1)
     span = slice(6, 6 + flipped)
     mirrored = 2 * wrong[:, HIPS[1], None, 2] - wrong[:, LEG, 2]
@@ -91,51 +32,51 @@ def test_a_limb_that_is_lifted_to_its_mirror_image_for_some_frames_stays_where_i
     start.rotations[span, hip] = exp(np.array([-0.3, 0.0, 0.0]))
     start.rotations[span, knee] = exp(np.array([-0.9, 0.0, 0.0]))
     ankle = BODY.joint_names.index("right_ankle")
-    depth = [_joints(fit)[:, ankle, 2] for fit in (true, start, _fit(_prepared(track, wrong, sigma), start))]
+    depth = [joints(each)[:, ankle, 2] for each in (true, start, fit(prepare(track, wrong, sigma), start))]
     assert np.abs(depth[1] - depth[0])[span].min() > 0.5
     np.testing.assert_allclose(depth[2], depth[0], atol=0.06)
 
 
 def test_noise_of_single_frames_is_averaged_and_a_motion_keeps_its_amplitude():
-    track, true = _person(48)
+    track, true = person(48)
     rng = np.random.default_rng(0)
     noisy = replace(track, keypoints_px=track.keypoints_px + rng.normal(0.0, 4.0, track.keypoints_px.shape))
     lifted = track.world_landmarks + rng.normal(0.0, 0.03, track.world_landmarks.shape)
-    prepared = _prepared(noisy, lifted)
-    together = _fit(prepared, true)
+    prepared = prepare(noisy, lifted)
+    together = fit(prepared, true)
     alone = [
         clip_fit.fit_clip(prepared, replace(true, valid=np.arange(48) == k), CameraPath.static(48), lambda *_: None)
         for k in range(48)
     ]
     wrist = BODY.joint_names.index("left_wrist")
-    truth = _joints(true)
-    one_by_one = np.array([_joints(fit)[k] for k, fit in enumerate(alone)])
-    error, before = (np.linalg.norm(J - truth, axis=-1).mean() for J in (_joints(together), one_by_one))
+    truth = joints(true)
+    one_by_one = np.array([joints(each)[k] for k, each in enumerate(alone)])
+    error, before = (np.linalg.norm(J - truth, axis=-1).mean() for J in (joints(together), one_by_one))
     assert error < 0.6 * before
-    assert abs(np.ptp(_joints(together)[:, wrist, 1]) / np.ptp(truth[:, wrist, 1]) - 1) < 0.05
+    assert abs(np.ptp(joints(together)[:, wrist, 1]) / np.ptp(truth[:, wrist, 1]) - 1) < 0.05
 
 
 def test_a_limb_that_nothing_shows_has_larger_deviations_than_its_twin():
-    track, true = _person()
+    track, true = person()
     arm = [KEYPOINT_NAMES.index(f"left_{name}") for name in ("elbow", "wrist", "pinky", "index", "thumb")]
     sigma = np.full((FRAMES, JOINTS), 0.1)
     track.confidence[12:, arm], sigma[12:, arm] = 0.0, 10.0
-    found = _fit(_prepared(track, sigma_m=sigma), true).joint_sigma_m
+    found = fit(prepare(track, sigma_m=sigma), true).joint_sigma_m
     left, right = (found[:, BODY.joint_names.index(f"{side}_wrist")] for side in ("left", "right"))
     assert (left[18:] > 2.0 * right[18:]).all()
     assert (left[:6] < 1.5 * right[:6]).all()
 
 
 def test_windows_agree_on_the_deviations(monkeypatch):
-    track, true = _person(40)
-    whole = _fit(_prepared(track), true).joint_sigma_m
+    track, true = person(40)
+    whole = fit(prepare(track), true).joint_sigma_m
     monkeypatch.setattr(clip_fit, "WINDOW_UNKNOWNS", 24 * 3 * (BODY.K + 2))
     monkeypatch.setattr(clip_fit, "OVERLAP", 8 * 3 * (BODY.K + 2))
-    np.testing.assert_allclose(_fit(_prepared(track), true).joint_sigma_m[4:-4], whole[4:-4], rtol=0.3)
+    np.testing.assert_allclose(fit(prepare(track), true).joint_sigma_m[4:-4], whole[4:-4], rtol=0.3)
 
 
 def test_soles_that_rest_stay_in_place():
-    track, true = _person()
+    track, true = person()
     rng = np.random.default_rng(1)
     shaken = replace(track, keypoints_px=track.keypoints_px + rng.normal(0.0, 6.0, track.keypoints_px.shape))
     stance = Stance(
@@ -148,8 +89,8 @@ def test_soles_that_rest_stay_in_place():
     )
     slides = []
     for resting in (np.zeros((FRAMES, 6)), stance.resting):
-        prepared = _prepared(shaken).with_stance(replace(stance, resting=resting), true.betas)
-        soles = place_track(BODY, track, _fit(prepared, true), smoothing=False).soles[:, :2]
+        prepared = prepare(shaken).with_stance(replace(stance, resting=resting), true.betas)
+        soles = place_track(BODY, track, fit(prepared, true), smoothing=False).soles[:, :2]
         slides.append(np.linalg.norm(np.diff(soles, axis=0), axis=-1).mean())
     assert slides[0] > 5e-4
     assert slides[1] < 0.2 * slides[0]
@@ -159,7 +100,7 @@ def test_soles_that_rest_stay_in_place():
 def test_soles_that_rest_do_not_drift(moves):
     angle = 0.1 * np.sin(np.arange(60) / 5.0) * moves
     path = CameraPath(exp(angle[:, None] * [0.0, 1.0, 0.0]), np.outer(np.arange(60), [0.02, 0.0, 0.01]) * moves)
-    track, first = _person(60, path)
+    track, first = person(60, path)
     true = path.to_frames(first)
     track.keypoints_px[..., 0] += np.linspace(-4.0, 4.0, 60)[:, None]  # 2 cm at 4 m
     stance = Stance(
@@ -170,34 +111,34 @@ def test_soles_that_rest_do_not_drift(moves):
         np.zeros((60, 6)),
         np.tile([1.0, 1.0, 0.0, 0.0, 0.0, 0.0], (60, 1)),
     )
-    fit = _fit(_prepared(track).with_stance(stance, true.betas), true, path)
-    soles = place_track(BODY, track, fit, smoothing=False, path=path).soles[:, :2]
+    found = fit(prepare(track).with_stance(stance, true.betas), true, path)
+    soles = place_track(BODY, track, found, smoothing=False, path=path).soles[:, :2]
     assert np.linalg.norm(soles[-1] - soles[0], axis=-1).max() < 0.004
 
 
 def test_a_moving_camera_gives_the_same_motion_as_a_static_one():
     angle = 0.1 * np.sin(np.arange(FRAMES) / 5.0)
     path = CameraPath(exp(angle[:, None] * [0.0, 1.0, 0.0]), np.outer(np.arange(FRAMES), [0.02, 0.0, 0.01]))
-    (still, true), (moved, _) = _person(), _person(path=path)
-    static = _fit(_prepared(still), true)
+    (still, true), (moved, _) = person(), person(path=path)
+    static = fit(prepare(still), true)
     start = path.to_frames(true)
     assert np.abs(start.t_camera_root - true.t_camera_root).max() > 0.2
-    moving = path.to_first(_fit(_prepared(moved), start, path))
+    moving = path.to_first(fit(prepare(moved), start, path))
     assert (
-        np.linalg.norm(_joints(moving) - _joints(static), axis=-1).max() < 0.025
+        np.linalg.norm(joints(moving) - joints(static), axis=-1).max() < 0.025
     )  # the depth of a limb is another direction
     np.testing.assert_allclose(path.to_first(start).t_camera_root, true.t_camera_root, atol=1e-12)
     np.testing.assert_allclose(path.to_first(start).rotations, true.rotations, atol=1e-12)
 
 
 def test_windows_agree_with_the_whole_and_join_smoothly(monkeypatch):
-    track, true = _person(90)
+    track, true = person(90)
     rng = np.random.default_rng(2)
-    prepared = _prepared(replace(track, keypoints_px=track.keypoints_px + rng.normal(0.0, 3.0, (90, JOINTS, 2))))
-    whole = _joints(_fit(prepared, true))
+    prepared = prepare(replace(track, keypoints_px=track.keypoints_px + rng.normal(0.0, 3.0, (90, JOINTS, 2))))
+    whole = joints(fit(prepared, true))
     monkeypatch.setattr(clip_fit, "WINDOW_UNKNOWNS", 40 * 3 * (BODY.K + 2))
     monkeypatch.setattr(clip_fit, "OVERLAP", 8 * 3 * (BODY.K + 2))
-    parts = _joints(_fit(prepared, true))
+    parts = joints(fit(prepared, true))
     assert (
         np.linalg.norm(parts - whole, axis=-1).max() < 0.008
     )  # metres; the whole itself is only that near to its minimum
@@ -230,9 +171,9 @@ def test_longer_gaps_separate_what_is_fitted_together():
 
 
 def test_frames_that_were_not_seen_stay_as_they_are():
-    track, true = _person()
+    track, true = person()
     start = replace(true, valid=np.arange(FRAMES) < 12)
-    found = _fit(_prepared(track), start)
+    found = fit(prepare(track), start)
     np.testing.assert_array_equal(found.rotations[12:], start.rotations[12:])
     np.testing.assert_array_equal(found.valid, start.valid)
 

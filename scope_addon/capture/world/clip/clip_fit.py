@@ -12,21 +12,21 @@ Long clips are fitted in windows of consecutive frames. Where two windows overla
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ....solver import FootContacts, Measurements, MotionFit, StandingPoints, State, View, fit_motion
-from ....solver.rotations import exp, log
-from ...kinematics.contact_points import contact_point_positions
-from ..fitting.frame_sequence import LONGEST_COAST_S, FittedTrack
-from ..fitting.prepared_track import PreparedTrack
-from ..fitting.weights import ROBUST, clip_stages, motion_priors
-from .camera_path import CameraPath
+from .....solver import MotionFit, State
+from .....solver.rotations import exp, log
+from ...fitting.frame_sequence import LONGEST_COAST_S, FittedTrack
+from ...fitting.prepared_track import PreparedTrack
+from ...fitting.weights import motion_priors
+from ..camera_path import CameraPath
+from .clip_window import ClipWindow
 from .joint_sigma import joint_sigma
-from .resting_places import resting_places
+from .limb_search import search_limbs
 
 WINDOW_UNKNOWNS = 36_000  # unknowns of a window, whose equations take some 120 MB: 480 frames of a body of 24 parts
 OVERLAP = 4_800  # unknowns; two windows differ by 2 to 4 mm where one of them has 1 s more to its end
@@ -55,69 +55,25 @@ class _Clip:
         self._prepared, self._path, self._progress = prepared, path, progress
         self._start, first = start, path.to_first(start)
         self._rotations, self._root = first.rotations.copy(), first.t_camera_root.copy()
-        self._options = replace(ROBUST, stages=clip_stages(prepared.weights))
         self._done = np.zeros(len(start.valid), bool)
         self._sigma = np.full((*first.rotations.shape[:2], 2), np.nan, np.float32)
 
     def fit(self, frames: NDArray[np.intp]) -> None:
         """Fit one window; frames that an earlier one has fitted are blended from that one's motion to this one's."""
-        times = self._prepared.track.times[frames]
         self._progress("solving the clip", int(self._done.sum()), len(self._done))
-        measured: Sequence[Measurements] = [self._prepared.measure_all(k) for k in frames]
-        states: Sequence[State] = [self._state(k) for k in frames]
-        for last, prior in enumerate(motion_priors(self._prepared.body, times)):
-            found = fit_motion(
-                self._prepared.body,
-                self._views(frames, measured),
-                times,
-                init=states,
-                priors=self._prepared.priors,
-                options=self._options,
-                motion=prior,
-                stands=self._standing_points(frames),
-                shape=np.asarray(self._start.betas, float),
-                covariance=bool(last),
-                window=np.inf,
-            )
-            states = found.states
-            if not last:
-                measured = self._with_places(frames, measured, found)
-        self._keep(frames, found)
+        body, times, every = self._prepared.body, self._prepared.track.times[frames], slice(0, len(frames))
+        quadratic, robust = motion_priors(body, times)
+        window = ClipWindow.of(self._prepared, self._path, frames, self._start.betas)
+        found = window.fit(every, [self._state(k) for k in frames], quadratic)
+        better = search_limbs(body, window, found, quadratic)
+        if better is not None:
+            found = window.fit(every, better, quadratic)
+        self._keep(frames, window.with_resting_places(found).fit(every, found.states, robust, covariance=True))
 
     def fitted(self) -> FittedTrack:
         """Return the states in each frame's camera."""
         first = replace(self._start, rotations=self._rotations, t_camera_root=self._root)
         return replace(self._path.to_frames(first), joint_sigma_m=self._sigma)
-
-    def _standing_points(self, frames: NDArray[np.intp]) -> StandingPoints | None:
-        prepared = self._prepared
-        if prepared.stance is None:
-            return None
-        return StandingPoints(prepared.contact_point_indices, prepared.stance.resting[frames])
-
-    def _with_places(
-        self, frames: NDArray[np.intp], measured: Sequence[Measurements], found: MotionFit
-    ) -> Sequence[Measurements]:
-        """Add to the measurements of frames where points rest in a motion."""
-        prepared, path = self._prepared, self._path
-        if prepared.stance is None:
-            return measured
-        points = contact_point_positions(prepared.body, found.R_world_part, found.t_world_part)
-        places, resting = resting_places(points, prepared.stance.resting[frames])
-        places_cam = (places - path.center[frames, None]) @ path.R_first_camera[frames]
-        return [
-            replace(each, foot_contacts=FootContacts(prepared.contact_point_indices, place_cam, p))
-            for each, place_cam, p in zip(measured, places_cam, resting, strict=True)
-        ]
-
-    def _views(
-        self, frames: NDArray[np.intp], measured: Sequence[Measurements]
-    ) -> Sequence[Measurements] | Sequence[Sequence[View]]:
-        if self._path.is_static:
-            return measured
-        R = np.swapaxes(self._path.R_first_camera[frames], 1, 2)
-        t = -np.einsum("fij,fj->fi", R, self._path.center[frames])
-        return [[View(*seen)] for seen in zip(measured, R, t, strict=True)]
 
     def _state(self, k: int) -> State:
         return State(self._rotations[k, 0], self._root[k], self._rotations[k, 1:], self._start.betas)

@@ -1,0 +1,145 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Consecutive frames of a track and their measurements, in the first frame's axes: what is fitted together."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .....solver import (
+    Fit,
+    FootContacts,
+    Measurements,
+    MotionFit,
+    MotionPrior,
+    Options,
+    Priors,
+    StandingPoints,
+    State,
+    View,
+    fit_motion,
+    fit_tree,
+    make_tree,
+)
+from .....solver.compiled.tree import Tree, with_fixed_shape
+from ....kinematics.contact_points import contact_point_positions
+from ...fitting.prepared_track import PreparedTrack
+from ...fitting.weights import ROBUST, clip_stages
+from ..camera_path import CameraPath
+from .resting_places import resting_places
+
+
+@dataclass(frozen=True)
+class ClipWindow:
+    """Frames ``frames`` (n,) of a track, with the shape ``betas`` (P,) in all of them."""
+
+    prepared: PreparedTrack
+    path: CameraPath
+    frames: NDArray[np.intp]
+    betas: NDArray[np.float64]
+    measured: Sequence[Measurements]
+
+    @classmethod
+    def of(
+        cls, prepared: PreparedTrack, path: CameraPath, frames: NDArray[np.intp], betas: NDArray[np.floating[Any]]
+    ) -> ClipWindow:
+        """Measure frames (n,) of a track for a shape (P,)."""
+        measured = [prepared.measure_all(k) for k in frames]
+        return cls(prepared, path, frames, np.asarray(betas, float), measured)
+
+    @property
+    def center(self) -> NDArray[np.float64]:
+        """The camera (n, 3) in each frame, metres."""
+        return self.path.center[self.frames]
+
+    @property
+    def times(self) -> NDArray[np.float64]:
+        """The frames' times (n,), seconds."""
+        return self.prepared.track.times[self.frames]
+
+    def fit(
+        self,
+        rows: slice,
+        states: Sequence[State],
+        prior: MotionPrior,
+        covariance: bool = False,
+        steps: int | None = None,
+    ) -> MotionFit:
+        """Fit some of the frames together.
+
+        :param steps: the most iterations, fewer than in the finished motion.
+        """
+        prepared, frames, options = self.prepared, self.frames[rows], self._options
+        if steps is not None:
+            options = replace(
+                options, stages=tuple(replace(s, max_iterations=steps) for s in clip_stages(prepared.weights))
+            )
+        return fit_motion(
+            prepared.body,
+            self._views(rows),
+            prepared.track.times[frames],
+            init=states,
+            priors=prepared.priors,
+            options=options,
+            motion=prior,
+            stands=self._standing_points(frames),
+            shape=self.betas,
+            covariance=covariance,
+            window=np.inf,
+        )
+
+    def fit_alone(self, row: int, state: State) -> Fit:
+        """Fit one frame in its camera's axes; the shape is not part of the result."""
+        R_camera_first = self.path.R_first_camera[self.frames[row]].T
+        start = State(
+            R_camera_first @ state.R_camera_root,
+            R_camera_first @ (state.t_camera_root - self.center[row]),
+            state.Omega,
+            np.zeros(0),
+        )
+        return fit_tree(self._tree, self.measured[row], start, self._priors, self._options)
+
+    def with_resting_places(self, found: MotionFit) -> ClipWindow:
+        """Add to the measurements where soles and palms rest in a motion."""
+        prepared, path, frames = self.prepared, self.path, self.frames
+        if prepared.stance is None:
+            return self
+        points = contact_point_positions(prepared.body, found.R_world_part, found.t_world_part)
+        places, resting = resting_places(points, prepared.stance.resting[frames])
+        places_cam = (places - path.center[frames, None]) @ path.R_first_camera[frames]
+        measured = [
+            replace(each, foot_contacts=FootContacts(prepared.contact_point_indices, place_cam, p))
+            for each, place_cam, p in zip(self.measured, places_cam, resting, strict=True)
+        ]
+        return replace(self, measured=measured)
+
+    @cached_property
+    def _options(self) -> Options:
+        return replace(ROBUST, stages=clip_stages(self.prepared.weights))
+
+    @cached_property
+    def _tree(self) -> Tree:
+        return with_fixed_shape(make_tree(self.prepared.body), self.betas)
+
+    @cached_property
+    def _priors(self) -> Priors:
+        return replace(self.prepared.priors, shape_mean=None, shape_information=None)
+
+    def _standing_points(self, frames: NDArray[np.intp]) -> StandingPoints | None:
+        prepared = self.prepared
+        if prepared.stance is None:
+            return None
+        return StandingPoints(prepared.contact_point_indices, prepared.stance.resting[frames])
+
+    def _views(self, rows: slice) -> Sequence[Measurements] | Sequence[Sequence[View]]:
+        measured, frames, path = self.measured[rows], self.frames[rows], self.path
+        if path.is_static:
+            return measured
+        R = np.swapaxes(path.R_first_camera[frames], 1, 2)
+        t = -np.einsum("fij,fj->fi", R, path.center[frames])
+        return [[View(*seen)] for seen in zip(measured, R, t, strict=True)]

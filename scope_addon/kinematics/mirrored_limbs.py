@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Limbs mirrored in depth: the other pose that looks almost the same in the image.
+
+A bone b from one joint to the next, seen along the line of sight v through its end, keeps its length and nearly its
+image if its depth changes sign:
+
+    b' = b - 2 (b · v) v,   v = (p_end - c) / |p_end - c|,   c the camera's center
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...solver.rotations import shortest_turn
+
+LIMBS = tuple(
+    tuple(f"{side}_{joint}" for joint in joints)
+    for joints in (("shoulder", "elbow", "wrist"), ("hip", "knee", "ankle"))
+    for side in ("left", "right")
+)
+
+
+def bone_depths(
+    starts: NDArray[np.floating[Any]], ends: NDArray[np.floating[Any]], center: NDArray[np.floating[Any]]
+) -> NDArray[np.float64]:
+    """Calculate b · v (T,), positive where a bone points away from the camera; metres.
+
+    :param starts: (T, 3) one joint, in any axes, metres.
+    :param ends: (T, 3) the next one.
+    :param center: (T, 3) the camera.
+    """
+    depths: NDArray[np.float64] = ((ends - starts) * _line_of_sight(ends, center)).sum(axis=1)
+    return depths
+
+
+def runs_of_one_sign(depths: NDArray[np.floating[Any]], least: float, most: float) -> Iterator[slice]:
+    """Yield the runs of frames in which a depth (T,) stays beyond ``least`` on one side, if it gets beyond ``most``."""
+    side = np.where(np.abs(depths) > least, np.sign(depths), 0.0)
+    cuts = np.flatnonzero(np.diff(side)) + 1
+    for first, end in zip([0, *cuts], [*cuts, len(depths)], strict=True):
+        if end > first and np.abs(depths[first:end]).max() > max(least, most):
+            yield slice(int(first), int(end))
+
+
+def mirrored_limb(
+    parents: Sequence[int] | NDArray[np.intp],
+    R_part: NDArray[np.floating[Any]],
+    joints: NDArray[np.floating[Any]],
+    center: NDArray[np.floating[Any]],
+    limb: tuple[int, int, int],
+    upper: bool,
+    lower: bool,
+) -> NDArray[np.float64]:
+    """Mirror one or both bones of a limb, each by the shortest turn; a bone that is not mirrored keeps its direction.
+
+    :param parents: (K+1,) the body's tree.
+    :param R_part: (T, K+1, 3, 3) rotations of the parts, in any axes.
+    :param joints: (T, K+1, 3) the joints, in the same axes, metres.
+    :param center: (T, 3) the camera, in the same axes, metres.
+    :param limb: the joints at the start of both bones and at the limb's end.
+    :param upper: whether to mirror the first bone.
+    :param lower: whether to mirror the second one.
+    :return: (T, 2, 3, 3) Ω of the parts of both bones.
+    """
+    first, second, end = limb
+    R_first, R_second = R_part[:, first], R_part[:, second]
+    if upper:
+        R_first = _mirrored(R_first, joints[:, first], joints[:, second], center)
+    if lower:
+        R_second = _mirrored(R_second, joints[:, second], joints[:, end], center)
+    R_parent = R_part[:, parents[first]]
+    return np.stack([np.swapaxes(R_parent, 1, 2) @ R_first, np.swapaxes(R_first, 1, 2) @ R_second], axis=1)
+
+
+def _mirrored(
+    R: NDArray[np.floating[Any]],
+    starts: NDArray[np.floating[Any]],
+    ends: NDArray[np.floating[Any]],
+    center: NDArray[np.floating[Any]],
+) -> NDArray[np.floating[Any]]:
+    bone, sight = ends - starts, _line_of_sight(ends, center)
+    other = bone - 2.0 * (bone * sight).sum(axis=1, keepdims=True) * sight
+    turned: NDArray[np.floating[Any]] = shortest_turn(bone, other) @ R
+    return turned
+
+
+def _line_of_sight(points: NDArray[np.floating[Any]], center: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
+    away = points - center
+    sight: NDArray[np.floating[Any]] = away / np.linalg.norm(away, axis=1, keepdims=True)
+    return sight
