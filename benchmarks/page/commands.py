@@ -54,6 +54,7 @@ def commands(quick: bool) -> list[Command]:
     if not quick:
         listed.append(Command("Accuracy and speed of captures", "bench", ("perception",)))
         listed.append(Command("Rendered clips with exact truth", "bench", ("renders",)))
+        listed.append(Command("Rendered scenes of many people", "bench", ("scenes",)))
     return listed
 
 

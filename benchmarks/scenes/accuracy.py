@@ -13,9 +13,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...scope_addon.capture.fitting.stature import require_stature
 from ...scope_addon.capture.options import CaptureOptions
 from ...scope_addon.capture.pipeline import capture
-from ...scope_addon.errors import NoPersonError
+from ...scope_addon.errors import NoPersonError, UsageError
 from ...scope_addon.motion import Motion
 from ...solver import Body, load_body
 from ...tools.render_sample.truth import project
@@ -28,6 +29,12 @@ from .statistics import Estimate, mean_over_people
 
 HIPS = [LIMB_JOINTS.index("left_hip"), LIMB_JOINTS.index("right_hip")]
 FOUND_PX = 0.15  # of the picture's longer side: the most that a captured person's hips may be off, median
+VARIANTS: tuple[tuple[str, dict[str, Any]], ...] = (
+    ("default preset", {}),
+    ("default preset, statures given", {"statures_given": True}),
+    ("preset balanced", {"quality": "balanced"}),
+    ("preset fast", {"quality": "fast"}),
+)
 Truth = dict[str, NDArray[Any]]
 
 
@@ -54,32 +61,62 @@ def scenes(quick: bool) -> dict[str, Any]:
         else:
             command = (sys.executable, "-m", "scope.benchmarks.scenes.render")
             subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
-    body, results = load_body("scope"), dict[str, list[Result]]()
-    for truth in sorted(FOLDER.glob("*_truth.npz")):
-        video = truth.with_name(truth.name.replace("_truth.npz", ".mp4"))
-        with np.load(truth) as data:
-            of_clip = evaluate_scene(body, video, {key: data[key] for key in data.files})
-        results.setdefault("test" if video.name.startswith("test") else "development", []).extend(of_clip)
-        print(f"{video.stem}: {np.nanmean(of_clip[0].mpjpe_root):.0f} mm", file=sys.stderr, flush=True)
+    clips = sorted(FOLDER.glob("*_truth.npz"))
+    if not clips:
+        print(f"{FOLDER} has no clips: run ./scripts/bench scenes without --quick", file=sys.stderr)
     figures: dict[str, Any] = {}
-    for split, of_split in sorted(results.items()):
-        rows = figures[split] = groups(of_split)
-        head = (f"{split}: people", "number", "MPJPE-root mm", "PA-MPJPE mm", "found", "size off, %")
-        print(table(head, [_row(name, row) for name, row in rows.items()]), end="\n\n", flush=True)
+    for split in ("development", "test"):
+        of_split = [truth for truth in clips if truth.name.startswith(split)]
+        if of_split:
+            figures[split] = _measure(split, of_split, quick)
     return figures
 
 
-def evaluate_scene(body: Body, video: Path, truth: Truth, quality: str = CaptureOptions().quality) -> list[Result]:
+def _measure(split: str, clips: list[Path], quick: bool) -> dict[str, Any]:
+    """Capture the clips of one split with every variant, print the tables and return the figures."""
+    body, found, by_variant = load_body("scope"), dict[str, dict[str, Estimate]](), dict[str, dict[str, Estimate]]()
+    for name, options in VARIANTS[:1] if quick else VARIANTS:
+        results: list[Result] = []
+        for truth in clips:
+            video = truth.with_name(truth.name.replace("_truth.npz", ".mp4"))
+            with np.load(truth) as data:
+                results += evaluate_scene(body, video, {key: data[key] for key in data.files}, **options)
+            print(f"{video.stem}, {name}: {_mean(results[-1].mpjpe_root):.0f} mm", file=sys.stderr, flush=True)
+        rows = groups(results)
+        found, by_variant[name] = found or rows, rows["all"]
+    for head, rows in ((split, found), (f"{split}: variants", by_variant)):
+        columns = (f"{head}: people", "number", "MPJPE-root mm", "PA-MPJPE mm", "found", "size off, %")
+        print(table(columns, [_row(name, row) for name, row in rows.items()]), end="\n\n", flush=True)
+    return {"groups": found, "variants": by_variant}
+
+
+def evaluate_scene(
+    body: Body, video: Path, truth: Truth, quality: str = CaptureOptions().quality, statures_given: bool = False
+) -> list[Result]:
     """Capture a clip and return the errors of each of its true people."""
     count = len(truth["limbs"])
+    heights = _heights(body, truth) if statures_given else ()
     try:
-        motions = capture(video, body, CaptureOptions(quality=quality, people=count)).motions
+        motions = capture(video, body, CaptureOptions(quality=quality, people=count, heights_m=heights)).motions
     except NoPersonError:
         motions = []
-    return [_result(body, video.stem, motions, truth, k) for k in range(count)]
+    matched = match_people(body, motions, truth)
+    return [_result(body, video.stem, matched.get(k), truth, k) for k in range(count)]
 
 
-def _result(body: Body, clip: str, motions: list[Motion], truth: Truth, k: int) -> Result:
+def _heights(body: Body, truth: Truth) -> tuple[float, ...]:
+    """Return the true statures, of who appears tallest first; none if the body cannot have one of them."""
+    tall = np.median(np.ptp(project(truth["limbs_cam"], truth["intrinsics"])[..., 1], axis=2), axis=1)
+    heights = tuple(truth["stature_m"][np.argsort(-tall)].tolist())
+    try:
+        for height_m in heights:
+            require_stature(body, height_m)
+    except UsageError:
+        return ()
+    return heights
+
+
+def _result(body: Body, clip: str, motion: Motion | None, truth: Truth, k: int) -> Result:
     true = truth["limbs_cam"][k]
     T, names = len(true), [body.joint_names.index(name) for name in LIMB_JOINTS]
     frames = {"view_deg": truth["view_deg"][k], "hidden": truth["hidden"][k].sum(axis=1)}
@@ -91,7 +128,6 @@ def _result(body: Body, clip: str, motions: list[Motion], truth: Truth, k: int) 
     person = {key: truth[key][k].item() for key in ("stature_m", "mass_index", "loose_m")}
     person |= {key: truth[key].item() for key in ("camera", "surroundings")} | {"people": len(truth["limbs"])}
     result = Result(clip, np.full(T, np.nan), np.full(T, np.nan), np.nan, frames, person)
-    motion = _nearest(motions, pixels, names, truth)
     if motion is not None:
         rows = np.flatnonzero(motion.valid & (motion.frames < T))
         at = motion.frames[rows]
@@ -103,18 +139,25 @@ def _result(body: Body, clip: str, motions: list[Motion], truth: Truth, k: int) 
     return result
 
 
-def _nearest(motions: list[Motion], pixels: NDArray[np.float64], names: list[int], truth: Truth) -> Motion | None:
-    """Return the motion whose hips are nearest to a person's (T, 12, 2) in the picture; None if none is near."""
-    best, least = None, FOUND_PX * float(truth["size"].max())
-    for motion in motions:
-        rows = np.flatnonzero(motion.valid & (motion.frames < len(pixels)))
+def match_people(body: Body, motions: list[Motion], truth: Truth) -> dict[int, Motion]:
+    """Return the motion of each true person that was found: nearest hips in the picture first, each motion once."""
+    pixels = project(truth["limbs_cam"], truth["intrinsics"])[:, :, HIPS].mean(axis=2)
+    pairs = []
+    for n, motion in enumerate(motions):
+        rows = np.flatnonzero(motion.valid & (motion.frames < pixels.shape[1]))
         if not len(rows):
             continue
-        seen = project(motion.joints_cam[rows][:, names].astype(float), motion.intrinsics)[:, HIPS].mean(axis=1)
-        off = float(np.median(np.linalg.norm(seen - pixels[motion.frames[rows]][:, HIPS].mean(axis=1), axis=1)))
-        if off < least:
-            best, least = motion, off
-    return best
+        at = [body.joint_names.index(LIMB_JOINTS[hip]) for hip in HIPS]
+        seen = project(motion.joints_cam[rows][:, at].astype(float), motion.intrinsics).mean(axis=1)
+        off = np.median(np.linalg.norm(pixels[:, motion.frames[rows]] - seen, axis=-1), axis=1)
+        pairs += [(float(off[k]), k, n) for k in range(len(off))]
+    matched: dict[int, Motion] = {}
+    used: set[int] = set()
+    for off_px, k, n in sorted(pairs):
+        if off_px < FOUND_PX * float(truth["size"].max()) and k not in matched and n not in used:
+            matched[k] = motions[n]
+            used.add(n)
+    return matched
 
 
 Chosen = Callable[[Result], Any]  # of frames (T,) bool, or of the whole person, a bool
@@ -153,10 +196,13 @@ GROUPS: dict[str, Chosen] = {
 
 
 def groups(results: list[Result]) -> dict[str, dict[str, Estimate]]:
-    """Return the figures of every group that has people: of each person the mean over the group's frames."""
+    """Return the figures of every group that has people: of each person the mean over the group's frames.
+
+    Frames in which nothing of a person can be seen are left out.
+    """
     found = {}
     for name, chosen in GROUPS.items():
-        inside = [(r, np.broadcast_to(chosen(r), r.mpjpe_root.shape)) for r in results]
+        inside = [(r, chosen(r) & (r.frames["hidden"] < len(LIMB_JOINTS))) for r in results]
         inside = [(r, rows) for r, rows in inside if rows.any()]
         if not inside:
             continue

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Random scenes, reproducible by their number.
+"""Random scenes, reproducible by their number. `kinds.py` deals the properties that groups are made of.
 
 Two of three scenes are for testing: their first person moves as in a recording that the lifting network was not trained
 on, and no choice may be made by their results. The others, for development, use the other recordings.
@@ -16,24 +16,24 @@ from ...solver.rotations import exp
 from ...tools.readme_pictures.view import level_camera
 from ...tools.train_lifter.split import is_held_out
 from ..perception.held_out import Take, draw_section, floor_under, states_and_pelvis
+from .kinds import CHILDREN, CLOTHES, SEED, Kind, is_test, kind_of
 from .people import Person, Points
-from .scene import INDOORS, OUTDOORS, PANNING, STATIC, TRAVELLING, Block, Scene
+from .scene import STATIC, TRAVELLING, Block, Scene
 
-SEED, SCENES = 11, 60
-FPS, SECONDS = 30.0, 1.2
-SIZES = ((640, 480), (640, 480), (480, 640), (854, 480), (384, 288))
-CAMERAS = (STATIC, STATIC, STATIC, PANNING, TRAVELLING)
-CHILD, TWO_PEOPLE, BLOCK, CLOTHES = 0.15, 0.3, 0.25, 0.5  # shares of the scenes
+SCENES = 60
+FPS, SECONDS = 15.0, 1.2
+STRIDE = 2  # frames of a recording between two of the clip
 MOST_BETA, BETA_SPREAD = 4.0, 1.5  # wider than the default body's population
 CHILD_SCALE, HEAD_GROWTH = (0.62, 0.85), 0.6  # a child of 0.62 has a head 1 + 0.6 * 0.38 times as large, relatively
 LOOSE_M, HAIR_M = (0.008, 0.03), (0.0, 0.05)
 FOCAL = (0.7, 1.7)  # over the longer side of the picture
 HEIGHT_M, DISTANCE_M = (0.5, 2.3), (2.2, 8.0)
 SHAKE_DEG, PAN_LAG = 0.3, 0.8  # of a held camera; the share of the person's way that it follows
-MARGIN, LEAST_FILL, MOST_FILL = 0.01, 0.3, 0.92  # of the picture's height, and of the longer side of the person's box
+MARGIN, LEAST_TALL = 0.01, 0.6  # of the picture's height; of its shorter side, what the person's stature appears as
+MOST_HIDDEN = 0.5  # of the first person's limb joints, in all frames together, behind the block
 NEAREST_M, APART_M = 0.9, 0.35  # skin to camera; people from each other and from the block
 EVERY_VERTEX, EVERY_FRAME = 40, 4  # that a camera is tested with
-TRIES = 4000
+TRIES, TRIES_EACH, CAMERAS_EACH = 400, 20, 20  # of all recordings, of each, and of each drawn person
 
 
 def draw_scene(body: Body, takes: Sequence[Take], number: int) -> Scene:
@@ -43,37 +43,43 @@ def draw_scene(body: Body, takes: Sequence[Take], number: int) -> Scene:
     :raises ValueError: when no camera was found that has the first person in its picture.
     """
     rng = np.random.default_rng([SEED, number])
-    is_test = number % 3 != 0
-    own = [take for take in takes if bool(is_held_out(np.array(take.number))) == is_test]
-    for _ in range(TRIES):
-        first = draw_person(rng, body, own[rng.integers(len(own))])
+    own = [take for take in takes if bool(is_held_out(np.array(take.number))) == is_test(number)]
+    kind = kind_of(number, len(own))
+    for attempt in range(TRIES):
+        take = own[(kind.recording + attempt // TRIES_EACH) % len(own)]
+        first = draw_person(rng, body, take, kind.is_child, kind.wears_loose)
         if first is None:
             continue
         people = [first]
-        if rng.random() < TWO_PEOPLE:
-            second = draw_person(rng, body, takes[rng.integers(len(takes))], len(first))
-            people += [] if second is None else [_beside(rng, body, first, second)]
-        scene = _film(rng, body, tuple(people), number, is_test)
-        if scene is not None:
-            return scene
+        if kind.has_company:
+            other = takes[rng.integers(len(takes))]
+            is_child, wears_loose = rng.random(2) < (np.mean(CHILDREN), np.mean(CLOTHES))
+            second = draw_person(rng, body, other, is_child, wears_loose, len(first))
+            if second is None:
+                continue
+            people.append(_beside(rng, body, first, second))
+        for _ in range(CAMERAS_EACH):
+            scene = _film(rng, body, tuple(people), number, kind)
+            if scene is not None:
+                return scene
     raise ValueError(f"no camera was found for scene {number}: the limits are too narrow")
 
 
-def draw_person(rng: np.random.Generator, body: Body, take: Take, frames: int | None = None) -> Person | None:
+def draw_person(
+    rng: np.random.Generator, body: Body, take: Take, is_child: bool, wears_loose: bool, frames: int | None = None
+) -> Person | None:
     """Draw shape, size, clothes and a part of the take, with the feet on the floor; None if it is too short.
 
     The person stands at the origin in the middle of the clip, and is turned at random.
     """
-    fps = round(take.fps)
-    if fps != FPS:
+    if round(take.fps) != STRIDE * FPS:
         return None
     try:
-        section = draw_section(rng, body, take, SECONDS if frames is None else frames / FPS)
+        section = draw_section(rng, body, take, SECONDS if frames is None else frames / FPS)[::STRIDE]
     except ValueError:
         return None
     if frames is not None and len(section) < frames:
         return None
-    is_child = rng.random() < CHILD
     betas = np.clip(BETA_SPREAD * rng.standard_normal(body.P), -MOST_BETA, MOST_BETA)
     scale = float(rng.uniform(*CHILD_SCALE)) if is_child else 1.0
     states, pelvis = states_and_pelvis(body, take, section, betas)
@@ -81,7 +87,7 @@ def draw_person(rng: np.random.Generator, body: Body, take: Take, frames: int | 
     states[:, 0] = R_heading @ states[:, 0]
     pelvis = pelvis @ R_heading.T
     pelvis[:, :2] -= pelvis[len(pelvis) // 2, :2]
-    loose = rng.uniform(*LOOSE_M) if rng.random() < CLOTHES else 0.0
+    loose = rng.uniform(*LOOSE_M) if wears_loose else 0.0
     hair, seed = rng.uniform(*HAIR_M), int(rng.integers(1 << 31))
     head = 1.0 + HEAD_GROWTH * (1.0 - scale)
     person = Person(take.name, states, pelvis - body.rest_joints(betas)[0], betas, scale, head, loose, hair, seed)
@@ -106,11 +112,10 @@ def _beside(rng: np.random.Generator, body: Body, first: Person, second: Person)
     return _moved(second, 6.0 * toward)
 
 
-def _film(rng: np.random.Generator, body: Body, people: tuple[Person, ...], number: int, is_test: bool) -> Scene | None:
+def _film(rng: np.random.Generator, body: Body, people: tuple[Person, ...], number: int, kind: Kind) -> Scene | None:
     """Draw a camera, and what stands in front of the first person; None if the person is not well in the picture."""
     first, frames = people[0], len(people[0])
-    width, height = SIZES[rng.integers(len(SIZES))]
-    kind = CAMERAS[rng.integers(len(CAMERAS))]
+    width, height = kind.size
     focal = rng.uniform(*FOCAL) * max(width, height)
     angle, eye_m = rng.uniform(0, 2 * np.pi), rng.uniform(*HEIGHT_M)
     distance = first.scale * rng.uniform(*DISTANCE_M)
@@ -119,19 +124,22 @@ def _film(rng: np.random.Generator, body: Body, people: tuple[Person, ...], numb
     eye = np.array([*(target[:2] + distance * np.array([np.cos(angle), np.sin(angle)])), eye_m])
     eyes, targets = np.tile(eye, (frames, 1)), np.tile(target, (frames, 1))
     follows = PAN_LAG * (_smooth(pelvis) - pelvis.mean(axis=0)) * [1, 1, 0]
-    if kind != STATIC:
+    if kind.camera != STATIC:
         targets = targets + follows
-    if kind == TRAVELLING:
+    if kind.camera == TRAVELLING:
         eyes = eyes + follows + np.linspace(0, 1, frames)[:, None] * rng.normal(0, 0.25, 3) * [1, 1, 0.2]
     poses = np.array([look_at(e, t) for e, t in zip(eyes, targets, strict=True)])
-    if kind != STATIC:
+    if kind.camera != STATIC:
         shake = _smooth(np.radians(SHAKE_DEG) * rng.normal(0, 3.0, (frames, 3)))
         poses[:, :3, :3] = poses[:, :3, :3] @ exp(shake)
     intrinsics = np.array([[focal, 0, width / 2 - 0.5], [0, focal, height / 2 - 0.5], [0, 0, 1]])
-    surroundings = OUTDOORS if rng.random() < 0.5 else INDOORS
-    block = _block(rng, body, people, eyes[0], target) if rng.random() < BLOCK else None
-    seed = int(rng.integers(1 << 31))
-    scene = Scene(number, is_test, people, intrinsics, poses, (width, height), FPS, kind, surroundings, block, seed)
+    block = _block(rng, body, people, eyes[0], target) if kind.has_block else None
+    if kind.has_block and block is None:
+        return None
+    rest = (kind.size, FPS, kind.camera, kind.surroundings, block, int(rng.integers(1 << 31)))
+    scene = Scene(number, is_test(number), people, intrinsics, poses, *rest)
+    if block is not None and scene.hidden(first, body).mean() > MOST_HIDDEN:
+        return None
     return scene if _well_inside(body, scene) else None
 
 
@@ -160,6 +168,9 @@ def _block(
 def _well_inside(body: Body, scene: Scene) -> bool:
     """Return whether all of the first person is in the picture, large enough, and nobody is too near the camera."""
     width, height = scene.size
+    joints = scene.project(scene.to_camera(scene.people[0].joints(body)))
+    if (joints < 0).any() or (joints > np.array(scene.size) - 1).any():
+        return False
     for k, person in enumerate(scene.people):
         skin = _skin(body, person, EVERY_FRAME)[:, ::EVERY_VERTEX]
         poses = scene.world_from_camera[::EVERY_FRAME]
@@ -171,8 +182,8 @@ def _well_inside(body: Body, scene: Scene) -> bool:
             margin = MARGIN * height
             if pixels.min() < margin or (pixels.max((0, 1)) > np.array(scene.size) - 1 - margin).any():
                 return False
-            fill = np.median(np.ptp(pixels, axis=1).max(axis=1)) / height
-            if not LEAST_FILL <= fill <= MOST_FILL * max(1.0, width / height):
+            depth = np.median(camera[..., 2])
+            if scene.intrinsics[0, 0] * person.stature_m(body) / depth < LEAST_TALL * min(width, height):
                 return False
     return True
 

@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Render the scenes that build/bench/scenes lacks: ``python -m scope.benchmarks.scenes.render [NUMBER …]``.
 
-Runs as a separate process, because Blender's module prints on standard output and can hang at exit. A clip is kept
-until its scene changes.
+Without numbers, those for testing come first. Runs as a separate process, because Blender's module prints on standard
+output and can hang at exit. A clip is kept until its scene changes.
 """
 
 from __future__ import annotations
 
+import argparse
 import os
 import sys
 from functools import partial
@@ -22,10 +23,12 @@ from ...tools.render_sample.stage import encode, pose_person, render_part, rende
 from ..perception.held_out import all_takes
 from ..perception.render_shots import fitted_motions, render_if_changed
 from .draw import SCENES, draw_scene
+from .kinds import is_test
 from .scene import FOLDER, STATIC, Scene, write_truth
 from .surroundings import build_scene, move_camera
 
-SAMPLES, SAMPLES_EMPTY = 4, 32
+SAMPLES, SAMPLES_EMPTY = 2, 8
+PERCENT = 75  # of width and height that are rendered, before the picture is enlarged: as soft as most footage
 KBIT_PER_S = 4000
 COMPARED = ("limbs", "limbs_cam", "hidden", "view_deg", "stature_m", "mass_index", "loose_m", "takes", "intrinsics",
             "world_from_camera", "size", "fps", "camera", "surroundings", "test")  # fmt: skip
@@ -36,29 +39,34 @@ def video_and_truth(name: str) -> tuple[Path, Path]:
     return FOLDER / f"{name}.mp4", FOLDER / f"{name}_truth.npz"
 
 
-def render_missing(body: Body, numbers: list[int]) -> None:
-    """Render what is not there or not true any more."""
+def render_missing(body: Body, numbers: list[int], threads: int = 0) -> None:
+    """Render what is not there or not true any more.
+
+    :param threads: of Cycles; 0 for as many as there are cores.
+    """
     takes = all_takes(fitted_motions())
     for number in numbers:
         scene = draw_scene(body, takes, number)
 
         def render(path: Path, scratch: Path, scene: Scene = scene) -> None:
-            encode(_pictures(body, scene, scratch), path, scene.size, round(scene.fps), KBIT_PER_S)
+            encode(_pictures(body, scene, scratch, threads), path, scene.size, round(scene.fps), KBIT_PER_S)
 
         write = partial(write_truth, body=body, scene=scene)
         render_if_changed(*video_and_truth(scene.name), COMPARED, write, render)
 
 
-def _pictures(body: Body, scene: Scene, folder: Path) -> list[Path]:
+def _pictures(body: Body, scene: Scene, folder: Path, threads: int) -> list[Path]:
     """Render all frames as numbered pictures; of a static camera's, only where people and their shadows are."""
     meshes, lamps = build_scene(scene, body)
-    cycles = bpy.context.scene.cycles
+    cycles, settings = bpy.context.scene.cycles, bpy.context.scene.render
+    settings.resolution_percentage = PERCENT
+    settings.threads_mode, settings.threads = "FIXED" if threads else "AUTO", threads
     pictures, empty = [folder / f"{f:04d}.png" for f in range(len(scene))], None
     if scene.camera == STATIC:
         cycles.samples = SAMPLES_EMPTY
         for mesh in meshes:
             mesh.hide_render = True
-        render_to(folder / "empty.png")
+        _render(scene, folder / "empty.png")
         empty = cv2.imread(str(folder / "empty.png"))
         for mesh in meshes:
             mesh.hide_render = False
@@ -71,15 +79,29 @@ def _pictures(body: Body, scene: Scene, folder: Path) -> list[Path]:
             pose_person(mesh, skin)
         if empty is None:
             move_camera(scene.world_from_camera[f])
-            render_to(picture)
+            _render(scene, picture)
             continue
         left, top, right, bottom = box = affected_box(scene.shot(f), np.concatenate(skins), lamps)
-        render_part((left / width, right / width, 1 - bottom / height, 1 - top / height), picture)
+        _render(scene, picture, (left / width, right / width, 1 - bottom / height, 1 - top / height))
         blend_into(empty, picture, box)
     return pictures
 
 
+def _render(scene: Scene, path: Path, part: tuple[float, float, float, float] | None = None) -> None:
+    """Render the frame, or a part of it as of `render_part`, and enlarge the picture to the scene's size."""
+    if part is None:
+        render_to(path)
+    else:
+        render_part(part, path)
+    cv2.imwrite(str(path), cv2.resize(cv2.imread(str(path)), scene.size, interpolation=cv2.INTER_CUBIC))
+
+
 if __name__ == "__main__":
-    render_missing(load_body("scope"), [int(n) for n in sys.argv[1:]] or list(range(SCENES)))
+    parser = argparse.ArgumentParser(description="Render the scenes that are missing.")
+    parser.add_argument("numbers", nargs="*", type=int, metavar="NUMBER")
+    parser.add_argument("--threads", type=int, default=0, help="of Cycles; 0 for as many as there are cores")
+    arguments = parser.parse_args()
+    in_order = sorted(range(SCENES), key=lambda number: (not is_test(number), number))
+    render_missing(load_body("scope"), arguments.numbers or in_order, arguments.threads)
     sys.stderr.flush()
     os._exit(0)

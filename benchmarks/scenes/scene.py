@@ -17,6 +17,7 @@ from .people import LIMB_JOINTS, Person, Points
 
 FOLDER = CACHE / "scenes"  # of the clips and their ground truth
 STATIC, PANNING, TRAVELLING = "static", "panning", "travelling"
+SKIN_SPACING_M = 0.03  # between vertices: a ray that passes all of them farther away meets no skin
 INDOORS, OUTDOORS = "indoors", "outdoors"
 
 
@@ -90,6 +91,22 @@ class Scene:
                 out[f] |= self.block.hides(self.world_from_camera[f, :3, 3], limbs[f])
         return out
 
+    def behind_others(self, person: Person, body: Body) -> NDArray[np.bool_]:
+        """Return (T, 12) bool: which limb joints of a person are behind the skin of somebody else."""
+        limbs = self.to_camera(person.limbs(body))
+        behind = np.zeros(limbs.shape[:2], bool)
+        for other in self.people:
+            if other is person:
+                continue
+            skin = self.to_camera(np.array([other.skin(body, f) for f in range(len(self))]))
+            for f in range(len(self)):
+                rays = limbs[f] / np.linalg.norm(limbs[f], axis=1, keepdims=True)
+                along = skin[f] @ rays.T  # (V, 12) metres from the camera
+                beside = np.sqrt(np.maximum((skin[f] ** 2).sum(axis=1)[:, None] - along**2, 0.0))
+                nearer = (along > 0) & (along < np.linalg.norm(limbs[f], axis=1))
+                behind[f] |= (nearer & (beside < SKIN_SPACING_M)).any(axis=0)
+        return behind
+
     def view_deg(self, person: Person, body: Body) -> Points:
         """Return the horizontal angle between the pelvis's front and the camera, (T,): 0 in front, 180 behind."""
         toward = self.world_from_camera[:, :2, 3] - person.joints(body)[:, 0, :2]
@@ -112,7 +129,7 @@ def write_truth(path: Path, body: Body, scene: Scene) -> None:
         limbs=limbs,
         limbs_cam=np.array([scene.to_camera(each) for each in limbs]),
         names=np.array(LIMB_JOINTS),
-        hidden=np.array([scene.hidden(person, body) for person in people]),
+        hidden=np.array([scene.hidden(person, body) | scene.behind_others(person, body) for person in people]),
         view_deg=np.array([scene.view_deg(person, body) for person in people]),
         stature_m=np.array([person.stature_m(body) for person in people]),
         mass_index=np.array([person.mass_index(body) for person in people]),

@@ -9,14 +9,17 @@ from numpy.typing import NDArray
 
 from ...scope_addon.scene.axes import blender_camera_matrix
 from ...solver import Body
-from ...tools.render_sample.stage import Triple, add_box, add_camera, add_person, make_material, set_up_rendering
-from .people import Person
+from ...tools.render_sample.stage import Triple, add_camera, set_up_rendering
+from .dress import dressed
+from .materials import Surface, add_surfaced_box, pictured, plain
+from .patterns import boards, bricks, mottled, painting, stripes, tiles
 from .scene import INDOORS, Scene
 
 WALL_M, ROOM_HEIGHT_M = 0.1, 2.7
 FREE_M = 0.6  # around people and camera
 FAR_M = 40.0  # of the ground outdoors
-SKIN, HAIR, SUIT, ACCENT = "skin", "hair", "suit", "suit_accent"
+SHARED = {"glass": (0.06, 0.08, 0.10), "bark": (0.12, 0.08, 0.05), "leaves": (0.05, 0.13, 0.03)}
+AMBIENT_M = 4.0  # within which a surface takes ambient light away; only one bounce is followed
 Rng = np.random.Generator
 
 
@@ -31,8 +34,17 @@ def build_scene(scene: Scene, body: Body) -> tuple[list[bpy.types.Object], NDArr
     if scene.block is not None:
         size = scene.block.high - scene.block.low
         center = (scene.block.low + scene.block.high) / 2
-        add_box("block", _triple(center), _triple(size), _mottled(rng, "block", rng.uniform(0.05, 0.6, 3)))
-    return [_dressed(body, person) for person in scene.people], lamps
+        add_surfaced_box("block", _triple(center), _triple(size), _any(rng, "block"))
+    _limit_light_paths(bpy.context.scene)
+    return [dressed(body, person) for person in scene.people], lamps
+
+
+def _limit_light_paths(scene: bpy.types.Scene) -> None:
+    """Make a sample cost as little as it can: a path ends after one bounce, in ambient light if nothing is near."""
+    cycles = scene.cycles
+    cycles.use_light_tree, scene.world.cycles.sampling_method = False, "NONE"
+    cycles.use_fast_gi, cycles.fast_gi_method, cycles.ao_bounces_render = True, "REPLACE", 1
+    scene.world.light_settings.distance = AMBIENT_M
 
 
 def move_camera(world_from_camera: NDArray[np.float64]) -> None:
@@ -55,12 +67,10 @@ def _room(rng: Rng, low: NDArray[np.float64], high: NDArray[np.float64]) -> NDAr
     low, high = low - rng.uniform(0, 2.0, 2), high + rng.uniform(0, 2.0, 2)
     (x0, y0), (x1, y1) = low, high
     cx, cy, wide, deep, tall = (x0 + x1) / 2, (y0 + y1) / 2, x1 - x0, y1 - y0, ROOM_HEIGHT_M
-    stretch = (1.2, 14.0, 1.0) if rng.random() < 0.5 else (3.0, 3.0, 3.0)
-    boards = _mottled(rng, "floor", rng.uniform(0.08, 0.5) * np.array([1.0, 0.8, 0.6]), stretch)
-    wall = _mottled(rng, "wall", rng.uniform(0.3, 0.8) + rng.normal(0, 0.05, 3))
-    dark = make_material("skirting", _triple(np.full(3, rng.uniform(0.05, 0.6))))
-    add_box("floor", (cx, cy, -0.05), (wide, deep, 0.1), boards)
-    add_box("ceiling", (cx, cy, tall + 0.05), (wide, deep, 0.1), make_material("ceiling", (0.8, 0.8, 0.8)))
+    wall = _wall(rng)
+    dark = plain("skirting", np.full(3, rng.uniform(0.05, 0.6)))
+    add_surfaced_box("floor", (cx, cy, -0.05), (wide, deep, 0.1), _floor(rng))
+    add_surfaced_box("ceiling", (cx, cy, tall + 0.05), (wide, deep, 0.1), plain("ceiling", np.full(3, 0.8)))
     for side, (place, size, inward) in enumerate(
         [
             ((x0 - WALL_M / 2, cy), (WALL_M, deep), (1, 0)),
@@ -69,10 +79,10 @@ def _room(rng: Rng, low: NDArray[np.float64], high: NDArray[np.float64]) -> NDAr
             ((cx, y1 + WALL_M / 2), (wide, WALL_M), (0, -1)),
         ]
     ):
-        add_box(f"wall {side}", (*place, tall / 2), (*size, tall), wall)
+        add_surfaced_box(f"wall {side}", (*place, tall / 2), (*size, tall), wall)
         along = np.array([abs(inward[1]), abs(inward[0])])
         face = np.array(place) + WALL_M / 2 * np.array(inward)
-        add_box(f"skirting {side}", (*face, 0.05), (*(np.array(size) * along + 0.02), 0.1), dark)
+        add_surfaced_box(f"skirting {side}", (*face, 0.05), (*(np.array(size) * along + 0.02), 0.1), dark)
         length = float(np.array(size) @ along)
         for k in range(rng.integers(1, 4)):  # pictures, doors, shelves
             at = face + along * rng.uniform(-0.4, 0.4) * length
@@ -80,9 +90,10 @@ def _room(rng: Rng, low: NDArray[np.float64], high: NDArray[np.float64]) -> NDAr
             if rng.random() < 0.3:
                 w, h, z = 0.9, 2.0, 1.0
             thick = 0.04 if rng.random() < 0.6 else rng.uniform(0.15, 0.35)
-            add_box(f"on wall {side} {k}", (*at, z), (*(along * w + (1 - along) * thick), h), _any(rng, "picture"))
+            extent = (*(along * w + (1 - along) * thick), h)
+            add_surfaced_box(f"on wall {side} {k}", (*at, z), extent, _on_wall(rng, w, h))
     for k in range(rng.integers(0, 2)):
-        add_box(f"rug {k}", (cx, cy, 0.004), (wide / 3, deep / 3, 0.008), _any(rng, "rug"))
+        add_surfaced_box(f"rug {k}", (cx, cy, 0.004), (wide / 3, deep / 3, 0.008), _any(rng, "rug"))
     lamps = np.array(
         [[cx + rng.uniform(-1, 1), cy + rng.uniform(-1, 1), tall - 0.1] for _ in range(rng.integers(1, 3))]
     )
@@ -98,9 +109,8 @@ def _room(rng: Rng, low: NDArray[np.float64], high: NDArray[np.float64]) -> NDAr
 def _street(rng: Rng, low: NDArray[np.float64], high: NDArray[np.float64]) -> NDArray[np.float64]:
     """Build ground, houses with windows, trees and posts, and a sun."""
     center = (low + high) / 2
-    green = rng.random() < 0.5
-    ground = np.array([0.10, 0.16, 0.05]) if green else np.full(3, rng.uniform(0.08, 0.35))
-    add_box("ground", (*center, -0.05), (2 * FAR_M, 2 * FAR_M, 0.1), _mottled(rng, "ground", ground, (6.0, 6.0, 6.0)))
+    add_surfaced_box("ground", (*center, -0.05), (2 * FAR_M, 2 * FAR_M, 0.1), _ground(rng))
+    glass, bark, leaves = (plain(name, np.array(color)) for name, color in SHARED.items())
     reach = (high - low) / 2
     for k in range(rng.integers(1, 4)):  # houses to some sides
         axis, sign = k % 2, 1 if rng.random() < 0.5 else -1
@@ -109,7 +119,7 @@ def _street(rng: Rng, low: NDArray[np.float64], high: NDArray[np.float64]) -> ND
         size = np.array([6.0, 6.0, rng.uniform(3.0, 8.0)])
         size[1 - axis] = rng.uniform(8.0, 20.0)
         at = center + away
-        add_box(f"house {k}", (*at, size[2] / 2), _triple(size), _mottled(rng, "house", rng.uniform(0.2, 0.7, 3)))
+        add_surfaced_box(f"house {k}", (*at, size[2] / 2), _triple(size), _house(rng))
         face = at.copy()
         face[axis] -= sign * (3.0 + 0.02)
         for row in np.arange(0.9, size[2] - 1.2, 2.6):
@@ -117,53 +127,29 @@ def _street(rng: Rng, low: NDArray[np.float64], high: NDArray[np.float64]) -> ND
                 place, extent = np.array([*face, row + 0.7]), np.array([0.05, 0.05, 1.4])
                 place[1 - axis] += column
                 extent[1 - axis] = 1.0
-                add_box("window", _triple(place), _triple(extent), _shared("glass", (0.06, 0.08, 0.10)))
+                add_surfaced_box("window", _triple(place), _triple(extent), glass)
     for k in range(rng.integers(2, 7)):
         angle = rng.uniform(0, 2 * np.pi)
         at = center + (np.linalg.norm(reach) + rng.uniform(1.0, 12.0)) * np.array([np.cos(angle), np.sin(angle)])
         tall = rng.uniform(2.0, 4.5)
         if rng.random() < 0.6:
             bpy.ops.mesh.primitive_cylinder_add(radius=rng.uniform(0.1, 0.25), depth=tall, location=(*at, tall / 2))
-            bpy.context.object.data.materials.append(_shared("bark", (0.12, 0.08, 0.05)))
+            bpy.context.object.data.materials.append(bark.material)
             for _ in range(4):
                 crown = (*(at + rng.normal(0, 0.5, 2)), tall + rng.uniform(-0.3, 1.0))
                 bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=3, radius=rng.uniform(0.7, 1.4), location=crown)
-                bpy.context.object.data.materials.append(_shared("leaves", (0.05, 0.13, 0.03)))
+                bpy.context.object.data.materials.append(leaves.material)
         else:
-            add_box(f"post {k}", (*at, tall / 2), (0.12, 0.12, tall), _shared("post", (0.25, 0.25, 0.27)))
-    elevation, azimuth = np.radians(rng.uniform(20, 70)), rng.uniform(0, 2 * np.pi)
+            add_surfaced_box(f"post {k}", (*at, tall / 2), (0.12, 0.12, tall), glass)
+    elevation, azimuth = np.radians(rng.uniform(35, 75)), rng.uniform(0, 2 * np.pi)
     toward = np.array([np.cos(azimuth) * np.cos(elevation), np.sin(azimuth) * np.cos(elevation), np.sin(elevation)])
     data = bpy.data.lights.new("sun", "SUN")
     overcast = rng.random() < 0.3
-    data.energy, data.angle = (0.8, 0.8) if overcast else (rng.uniform(2.5, 4.0), 0.01)
+    data.energy, data.angle = (1.2, 0.8) if overcast else (rng.uniform(2.5, 4.0), 0.01)
     sun = _link(bpy.data.objects.new("sun", data))
     sun.rotation_euler = (np.pi / 2 - elevation, 0.0, azimuth + np.pi / 2)
     _sky((0.6, 0.75, 1.0) if not overcast else (0.9, 0.92, 0.95), rng.uniform(0.6, 1.0))
     return np.array([[*center, 0.0] + 1000.0 * toward])
-
-
-def _dressed(body: Body, person: Person) -> bpy.types.Object:
-    """Add a person with colours of its own; trousers differ from what is worn above in most."""
-    mesh = add_person(body)
-    rng = np.random.default_rng(person.seed)
-    colors = {
-        SKIN: np.array([0.62, 0.40, 0.30]) * rng.uniform(0.2, 1.0),
-        HAIR: rng.uniform(0.01, 0.35) * np.array([1.0, 0.75, 0.5]),
-        SUIT: rng.uniform(0.02, 0.7, 3) if rng.random() < 0.6 else np.full(3, rng.uniform(0.02, 0.6)),
-        ACCENT: rng.uniform(0.02, 0.7, 3),
-    }
-    for slot, name in enumerate(body.material_names):
-        if name in colors:
-            material = make_material(f"{name} of {mesh.name}", _triple(colors[name]))
-            material.node_tree.nodes["Principled BSDF"].inputs["Roughness"].default_value = 0.6
-            mesh.data.materials[slot] = material
-    if rng.random() < 0.7 and body.face_material is not None:
-        heights = body.v_template[body.faces, 1].mean(axis=1) - body.rest_joints(np.zeros(body.P))[0, 1]
-        legs = (body.face_material == body.material_names.index(SUIT)) & (heights < 0.05)
-        mesh.data.materials.append(make_material(f"trousers of {mesh.name}", _triple(rng.uniform(0.02, 0.5, 3))))
-        slots = np.where(legs, len(body.material_names), body.face_material).astype(np.int32)
-        mesh.data.polygons.foreach_set("material_index", slots)
-    return mesh
 
 
 def _sky(color: Triple, strength: float) -> None:
@@ -180,18 +166,44 @@ def _link(thing: bpy.types.Object) -> bpy.types.Object:
     return thing
 
 
-def _shared(name: str, color: Triple) -> bpy.types.Material:
-    found: bpy.types.Material = bpy.data.materials.get(name) or make_material(name, color)
-    return found
+def _floor(rng: Rng) -> Surface:
+    color = rng.uniform(0.1, 0.5) * np.array([1.0, 0.8, 0.6])
+    if rng.random() < 0.5:
+        return pictured("floor", boards(rng, color), 1.8)
+    if rng.random() < 0.5:
+        return pictured("floor", tiles(rng, color + rng.uniform(0, 0.2)), 1.6)
+    return pictured("floor", mottled(rng, color * rng.uniform(0.5, 1.5, 3), 0.15, 0.8), 2.0)
 
 
-def _mottled(rng: Rng, name: str, color: NDArray[np.float64], stretch: Triple = (3.0, 3.0, 3.0)) -> bpy.types.Material:
-    color = np.clip(color, 0.01, 0.9)
-    return make_material(name, _triple(color), _triple(np.clip(color * rng.uniform(0.6, 1.2), 0.01, 0.9)), stretch)
+def _wall(rng: Rng) -> Surface:
+    color = np.clip(rng.uniform(0.3, 0.8) + rng.normal(0, 0.06, 3), 0.1, 0.85)
+    if rng.random() < 0.6:
+        return pictured("wall", mottled(rng, color, 0.05), 3.0)
+    if rng.random() < 0.6:
+        return pictured("wall", stripes(rng, color), 1.6)
+    return pictured("wall", bricks(rng, color * [0.8, 0.55, 0.45]), 1.2)
 
 
-def _any(rng: Rng, name: str) -> bpy.types.Material:
-    return _mottled(rng, name, rng.uniform(0.03, 0.7, 3))
+def _ground(rng: Rng) -> Surface:
+    if rng.random() < 0.4:
+        return pictured("ground", mottled(rng, np.array([0.10, 0.16, 0.05]), 0.35, 0.9), 5.0)
+    gray = np.full(3, rng.uniform(0.08, 0.35))
+    return pictured("ground", mottled(rng, gray, 0.12) if rng.random() < 0.6 else tiles(rng, gray), 4.0)
+
+
+def _house(rng: Rng) -> Surface:
+    color = rng.uniform(0.2, 0.7) * rng.uniform(0.7, 1.0, 3)
+    made = bricks(rng, color * [0.8, 0.6, 0.5]) if rng.random() < 0.5 else mottled(rng, color, 0.06)
+    return pictured("house", made, 1.6)
+
+
+def _on_wall(rng: Rng, width: float, height: float) -> Surface:
+    return pictured("picture", painting(rng), width, height) if rng.random() < 0.5 else _any(rng, "furniture")
+
+
+def _any(rng: Rng, name: str) -> Surface:
+    color = rng.uniform(0.05, 0.6) * rng.uniform(0.5, 1.0, 3)
+    return pictured(name, boards(rng, color) if rng.random() < 0.5 else mottled(rng, color, 0.08), 1.5)
 
 
 def _triple(values: NDArray[np.float64]) -> Triple:

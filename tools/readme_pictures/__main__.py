@@ -26,7 +26,7 @@ PICTURES = {
     "from_behind": pictures.from_behind,
     "two_floors": pictures.two_floors,
 }
-BY_BENCHMARKS = ("smplify",)  # drawn by `./scripts/bench smplify`, and copied from build/bench
+BY_BENCHMARKS = ("smplify", "scenes")  # drawn by `./scripts/bench` with these names, and copied from build/bench
 LARGEST_BYTES = 60_000
 
 

@@ -168,14 +168,16 @@ def _room() -> None:
     add_box("mat", (0.05, -0.1, 0.004), (2.4, 1.5, 0.008), make_material("mat", (0.22, 0.26, 0.30), (0.19, 0.22, 0.26)))
 
 
-def add_box(name: str, center: Triple, size: Triple, material: bpy.types.Material) -> None:
-    """Add a box with edges along the axes of the world."""
+def add_box(name: str, center: Triple, size: Triple, material: bpy.types.Material) -> bpy.types.Object:
+    """Add a box with edges along the axes of the world, and return it."""
     corners = [(x, y, z) for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)]
     faces = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
     mesh = bpy.data.meshes.new(name)
     mesh.from_pydata([[c + s * k for c, s, k in zip(center, size, q, strict=True)] for q in corners], [], faces)
     mesh.materials.append(material)
-    bpy.context.scene.collection.objects.link(bpy.data.objects.new(name, mesh))
+    box = bpy.data.objects.new(name, mesh)
+    bpy.context.scene.collection.objects.link(box)
+    return box
 
 
 def make_material(

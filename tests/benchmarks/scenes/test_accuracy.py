@@ -77,6 +77,33 @@ def test_who_is_not_captured_has_no_errors(body, truth, monkeypatch):
     assert all(np.isnan(result.mpjpe_root).all() for result in both)
 
 
+def test_a_captured_person_counts_for_one_true_person_only(body, truth, monkeypatch):
+    truth["limbs_cam"][1] = truth["limbs_cam"][0] + [0.2, 0.0, 0.1]  # almost in front of each other
+    first, second = evaluate(body, truth, [motion(body, truth["limbs_cam"][1])], monkeypatch)
+    assert np.isnan(first.mpjpe_root).all()
+    np.testing.assert_allclose(second.mpjpe_root, 0.0, atol=1e-6)
+
+
+def test_statures_are_given_in_order_of_size_where_the_body_can_have_them(body, truth, monkeypatch):
+    given = []
+    monkeypatch.setattr(
+        accuracy, "capture", lambda video, body, options: given.append(options.heights_m) or SimpleNamespace(motions=[])
+    )
+    truth["limbs_cam"][0, ..., 2] += 1.0  # appears smaller
+    accuracy.evaluate_scene(body, accuracy.FOLDER / "test_01.mp4", truth, statures_given=True)
+    truth["stature_m"][0] = 0.9
+    accuracy.evaluate_scene(body, accuracy.FOLDER / "test_01.mp4", truth, statures_given=True)
+    assert given == [(1.4, 1.7), ()]
+
+
+def test_frames_in_which_nothing_is_visible_are_left_out(body, truth, monkeypatch):
+    truth["hidden"][0, :2] = True
+    valid = np.arange(T) > 1
+    rows = accuracy.groups(evaluate(body, truth, [motion(body, truth["limbs_cam"][0], valid)], monkeypatch))
+    assert rows["indoors"]["found"].people == 2
+    assert rows["all"]["found"].mean == 0.5  # the first in all frames that count, the second in none
+
+
 def test_groups_are_of_frames_and_of_people(body, truth, monkeypatch):
     offsets = (0.012, 0.024)
     people = []

@@ -6,8 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scope.benchmarks.perception.held_out import Take
-from scope.benchmarks.scenes import draw
-from scope.benchmarks.scenes.draw import APART_M, FPS, draw_person, draw_scene, look_at
+from scope.benchmarks.scenes.draw import APART_M, FPS, MOST_HIDDEN, STRIDE, draw_person, draw_scene, look_at
 from scope.benchmarks.scenes.scene import STATIC
 
 NUMBERS = (1, 3, 4, 6)
@@ -18,12 +17,14 @@ def takes(body):
     """Recordings of somebody who strides at 1 m/s, in a world with y up; those numbered 9 and 19 are for testing."""
     found = []
     for number in (0, 1, 9, 19):
-        t = np.arange(80) / FPS
+        t = np.arange(80) / (STRIDE * FPS)
         poses = np.zeros((80, body.K + 1, 3))
         poses[:, body.joint_names.index("left_hip"), 0] = 0.4 * np.sin(4 * t + number)
         poses[:, body.joint_names.index("right_hip"), 0] = -0.4 * np.sin(4 * t + number)
         trans = np.stack([0 * t, 1.0 + 0 * t, t], axis=1)
-        found.append(Take(number, f"take{number}", poses.reshape(80, -1), trans, np.ones(80, bool), np.zeros(10), FPS))
+        found.append(
+            Take(number, f"take{number}", poses.reshape(80, -1), trans, np.ones(80, bool), np.zeros(10), STRIDE * FPS)
+        )
     return found
 
 
@@ -63,16 +64,32 @@ def test_static_cameras_stand_still_and_others_do_not(scenes):
         assert (moved == 0.0) == (scene.camera == STATIC)
 
 
-@pytest.mark.parametrize("children", [0.0, 1.0])
-def test_people_stand_on_the_floor_whatever_their_size(body, takes, monkeypatch, children):
-    monkeypatch.setattr(draw, "CHILD", children)
+@pytest.mark.parametrize("is_child", [False, True])
+def test_people_stand_on_the_floor_whatever_their_size(body, takes, is_child):
     for seed in range(2):
-        person = draw_person(np.random.default_rng(seed), body, takes[0])
-        assert (person.scale < 0.86) == (children == 1.0)
+        person = draw_person(np.random.default_rng(seed), body, takes[0], is_child, wears_loose=False)
+        assert (person.scale < 0.86) == is_child
         lowest = [person.skin(body, f)[:, 2].min() for f in range(len(person))]
         assert min(lowest) > -0.02
         assert np.quantile(lowest, 0.05) == pytest.approx(0.0, abs=0.01)
         assert person.stature_m(body) == pytest.approx(person.scale * body.stature(person.betas))
+
+
+def test_people_walk_as_fast_as_in_the_recording(body, takes):
+    person = draw_person(np.random.default_rng(0), body, takes[0], is_child=False, wears_loose=True)
+    walked = np.linalg.norm(np.diff(person.trans, axis=0), axis=1) * FPS
+    legs = [body.rest_joints(betas)[[body.joint_names.index(f"left_{part}") for part in ("hip", "knee", "ankle")]]
+            for betas in (person.betas, takes[0].betas)]  # fmt: skip
+    ratio = np.divide(*[np.linalg.norm(np.diff(chain, axis=0), axis=1).sum() for chain in legs])
+    np.testing.assert_allclose(walked, ratio, rtol=1e-6)  # the performer walks 1 m/s
+    assert person.loose_m > 0
+
+
+def test_a_block_hides_some_joints_of_the_first_person_but_not_most(body, scenes):
+    blocked = [scene for scene in scenes if scene.block is not None]
+    assert blocked
+    for scene in blocked:
+        assert scene.hidden(scene.people[0], body).mean() <= MOST_HIDDEN
 
 
 def test_people_keep_apart(body, scenes):

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scope.benchmarks.scenes.draw import look_at
@@ -30,6 +32,19 @@ def test_what_the_box_hides(body, scene):
     assert hidden["right_ankle"]
     assert not hidden["left_hip"]
     assert not hidden["right_wrist"]
+
+
+def test_who_walks_past_hides_the_other(body, scene):
+    """Somebody 1.5 m nearer to the camera stands in front of the left side only."""
+    behind = scene.people[0]
+    aside = behind.joints(body)[0, body.joint_names.index("left_shoulder"), 0]
+    front = replace(behind, trans=behind.trans + [2.5 / 4.0 * aside + 0.1, -1.5, 0.0])
+    both = replace(scene, people=(behind, front), block=None)
+    hidden = dict(zip(LIMB_JOINTS, both.behind_others(behind, body)[0], strict=True))
+    assert hidden["left_shoulder"]
+    assert not hidden["right_knee"]
+    assert not hidden["right_ankle"]
+    assert not both.behind_others(front, body).any()
 
 
 def test_a_box_hides_what_a_walk_along_the_ray_meets():

@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What kinds of scenes there are, in shares that hold for the first scenes as for all."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TypeVar
+
+import numpy as np
+
+from .scene import INDOORS, OUTDOORS, PANNING, STATIC, TRAVELLING
+
+SEED = 11
+TEST_OF = 3  # every third scene is for development, the others are for testing
+SIZES = ((640, 480), (854, 480), (480, 640), (640, 360), (640, 480))
+CAMERAS = (STATIC, STATIC, STATIC, PANNING, TRAVELLING)
+CHILDREN = (True, False, False, False, False)
+CLOTHES = (True, False)
+COMPANY = (True, True, True, *7 * (False,))
+BLOCKS = (True, False, False, False)
+SURROUNDINGS = (INDOORS, OUTDOORS)
+Card = TypeVar("Card")
+
+
+@dataclass(frozen=True)
+class Kind:
+    """What is the same in all tries to draw a scene."""
+
+    recording: int  # of the first person, into those of the split
+    size: tuple[int, int]  # width, height
+    camera: str
+    surroundings: str
+    is_child: bool  # the first person
+    wears_loose: bool
+    has_company: bool  # a second person
+    has_block: bool
+
+
+def is_test(number: int) -> bool:
+    """Return whether a scene is for testing."""
+    return number % TEST_OF != 0
+
+
+def kind_of(number: int, recordings: int) -> Kind:
+    """Return the kind of a scene.
+
+    Every property is dealt from a shuffled deck of its own, and of a new one when that is used up.
+
+    :param recordings: how many recordings the scene's split has.
+    """
+    passed = (number - 1) // TEST_OF + 1  # scenes for development before this one
+    turn = number - passed if is_test(number) else number // TEST_OF
+
+    def deal(which: int, cards: Sequence[Card]) -> Card:
+        deck = np.random.default_rng([SEED, which, is_test(number), turn // len(cards)]).permutation(len(cards))
+        return cards[deck[turn % len(cards)]]
+
+    return Kind(
+        deal(0, range(recordings)),
+        deal(1, SIZES),
+        deal(2, CAMERAS),
+        deal(3, SURROUNDINGS),
+        deal(4, CHILDREN),
+        deal(5, CLOTHES),
+        deal(6, COMPANY),
+        deal(7, BLOCKS),
+    )
