@@ -36,9 +36,7 @@ def model_bytes(network: Network) -> bytes:
 @cache
 def convert(network: Network) -> bytes:
     model = read_model(model_bytes(network), network.member)
-    converted = convert_model(
-        model, network.input_shape, network.outputs, network.on_request, splits_prelu=network.splits_prelu
-    )
+    converted = convert_model(model, network.input_shape, network.outputs, network.on_request, blocked=network.blocked)
     return converted.SerializeToString()
 
 
@@ -87,17 +85,21 @@ def test_equals_tflite_on_real_crops(network: Network, shared: Path) -> None:
     assert_same_as_tflite(network, np.array(crops))
 
 
-def test_split_prelu_equals_the_operator() -> None:
-    network = next(n for n in NETWORKS if n.splits_prelu)
+@pytest.mark.parametrize("network", [n for n in NETWORKS if n.blocked], ids=lambda n: n.name)
+def test_operators_of_the_blocked_layout_compute_the_same(network: Network) -> None:
     model = read_model(model_bytes(network), network.member)
-    images = np.random.default_rng(4).random((1, 3, 256, 256), np.float32)
+    size = network.input_shape[1]
+    images = np.random.default_rng(4).random((2, 3, size, size), np.float32)
     results = []
-    for splits_prelu in (False, True):
-        converted = convert_model(model, network.input_shape, network.outputs, splits_prelu=splits_prelu)
-        assert ("PRelu" in {node.op_type for node in converted.graph.node}) != splits_prelu
+    for blocked in (False, True):
+        converted = convert_model(model, network.input_shape, network.outputs, blocked=blocked)
+        kinds = {node.op_type for node in converted.graph.node}
+        assert ("PRelu" in kinds) != blocked
+        assert ("Pad" in kinds) != blocked
         session = onnxruntime.InferenceSession(converted.SerializeToString(), providers=["CPUExecutionProvider"])
-        results.append(session.run(["landmarks"], {"input": images})[0])
-    np.testing.assert_allclose(results[1], results[0], atol=1e-2)  # of 256 pixels
+        results.append(session.run(None, {"input": images}))
+    for found, expected in zip(*results, strict=True):
+        assert np.abs(found - expected).max() < 1e-5 * np.abs(expected).max()
 
 
 def test_mask_is_an_output_on_request() -> None:

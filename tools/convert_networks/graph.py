@@ -39,7 +39,7 @@ class Graph:
     initializers: list[TensorProto] = field(default_factory=list)
     names: dict[int, str] = field(default_factory=dict)
     pads: dict[int, SpatialPad] = field(default_factory=dict)
-    splits_prelu: bool = False  # see `operators.prelu`
+    blocked: bool = False  # see `convert_model`
     _shared: dict[tuple[str, bytes, tuple[int, ...]], str] = field(default_factory=dict)
 
     def known(self) -> tuple[dict[Any, Any], ...]:

@@ -81,7 +81,10 @@ def depthwise_conv_2d(graph: Graph, operator: Operator) -> None:
 
 
 def pad(graph: Graph, operator: Operator) -> None:
-    """Convert zero padding; padding of rows and columns alone is left to the following convolutions."""
+    """Convert zero padding; padding of rows and columns alone is left to the following convolutions.
+
+    If ``graph.blocked``, channels are appended by a convolution, because onnxruntime's blocked layout has no Pad.
+    """
     amounts = graph.constant(operator, 1)
     if amounts.shape != (4, 2) or (amounts < 0).any():
         raise graph.fail(operator, f"paddings {amounts.tolist()}")
@@ -89,8 +92,14 @@ def pad(graph: Graph, operator: Operator) -> None:
     if n0 == n1 == c0 == c1 == 0:
         graph.pads[operator.outputs[0]] = SpatialPad(operator.inputs[0], top, left, bottom, right)
         return
+    source = graph.value(operator.inputs[0])
+    if graph.blocked and n0 == n1 == c0 == top == left == bottom == right == 0:
+        channels = graph.shape(operator.inputs[0])[3]
+        weights = np.eye(channels + c1, channels, dtype=np.float32)[:, :, None, None]
+        graph.finish(operator, graph.node("Conv", [source, graph.initializer(weights)], kernel_shape=[1, 1], group=1))
+        return
     onnx_order = np.array([n0, c0, top, left, n1, c1, bottom, right], np.int64)
-    graph.finish(operator, graph.node("Pad", [graph.value(operator.inputs[0]), graph.initializer(onnx_order)]))
+    graph.finish(operator, graph.node("Pad", [source, graph.initializer(onnx_order)]))
 
 
 def max_pool_2d(graph: Graph, operator: Operator) -> None:
@@ -125,24 +134,12 @@ def depth_to_space(graph: Graph, operator: Operator) -> None:
 
 
 def prelu(graph: Graph, operator: Operator) -> None:
-    """Convert PReLU: x where positive, slope · x elsewhere; slopes (1, 1, channels).
-
-    If ``graph.splits_prelu``, as slope · x + (1 − slope) · max(x, 0) with the products as convolutions, which stay in
-    onnxruntime's blocked layout: its PRelu takes longer than all convolutions of such a network.
-    """
+    """Convert PReLU: x where positive, slope · x elsewhere; slopes (1, 1, channels)."""
     slope = graph.constant(operator, 1)
     if slope.ndim != 3:
         raise graph.fail(operator, f"slopes of shape {slope.shape}")
-    source = graph.value(operator.inputs[0])
-    if not graph.splits_prelu:
-        graph.finish(operator, graph.node("PRelu", [source, graph.initializer(slope.transpose(2, 0, 1))]))
-        return
-    weights = slope.astype(np.float32).reshape(-1, 1, 1, 1)
-    terms = [
-        graph.node("Conv", [x, graph.initializer(w)], kernel_shape=[1, 1], group=len(weights))
-        for x, w in ((source, weights), (graph.node("Relu", [source]), 1.0 - weights))
-    ]
-    graph.finish(operator, graph.node("Add", terms))
+    inputs = [graph.value(operator.inputs[0]), graph.initializer(slope.transpose(2, 0, 1))]
+    graph.finish(operator, graph.node("PRelu", inputs))
 
 
 def fully_connected(graph: Graph, operator: Operator) -> None:

@@ -5,6 +5,7 @@ import onnx
 from onnx import TensorProto, helper
 
 from ...solver.errors import ModelFileError
+from .blocked import replace_prelu
 from .constants import fold_constants
 from .graph import Graph
 from .operators import CONVERTERS
@@ -18,7 +19,7 @@ Outputs = tuple[tuple[int, str, tuple[int, ...]], ...]
 
 
 def convert_model(
-    model: Model, input_shape: tuple[int, ...], outputs: Outputs, on_request: Outputs = (), splits_prelu: bool = False
+    model: Model, input_shape: tuple[int, ...], outputs: Outputs, on_request: Outputs = (), blocked: bool = False
 ) -> onnx.ModelProto:
     """Return an ONNX model with the given outputs and one input, pictures as (batch, channels, height, width).
 
@@ -28,7 +29,8 @@ def convert_model(
     :param on_request: further outputs, each computed only if the scalar boolean input ``with_NAME``, false by default,
         is true; of shape (1, ...) and 0 otherwise. onnxruntime runs every node of a graph whatever outputs it is asked
         for, but only the branch of an ``If`` that is taken.
-    :param splits_prelu: whether PReLU becomes convolutions, which are faster; see `operators.prelu`.
+    :param blocked: whether to use only operators that onnxruntime runs in its blocked layout, which is faster, where
+        PReLU and padded channels are what prevents it; see `blocked`. Not together with ``on_request``.
     :raises ModelFileError: when shapes differ from those given, or an operator is not supported.
     """
     input_shapes = [model.tensors[i].shape for i in model.inputs]
@@ -38,7 +40,7 @@ def convert_model(
         found = model.tensors[model.outputs[position]].shape if position < len(model.outputs) else None
         if found != shape:
             raise ModelFileError(f"{model.name}: output {position} ({name}) has shape {found}, expected {shape}.")
-    graph = Graph(model, fold_constants(model), splits_prelu=splits_prelu)
+    graph = Graph(model, fold_constants(model), blocked=blocked)
     graph.names[model.inputs[0]] = "input"
     kept = [model.outputs[position] for position, _, _ in outputs]
     done = _append_needed(graph, kept, frozenset())
@@ -46,6 +48,8 @@ def convert_model(
     for tensor, (_, name, shape) in zip(kept, outputs, strict=True):
         graph.nodes.append(helper.make_node("Identity", [graph.value(tensor)], [name], name=f"output_{name}"))
         described.append(helper.make_tensor_value_info(name, TensorProto.FLOAT, _batched(shape)))
+    if blocked:
+        replace_prelu(graph)
     inputs = [helper.make_tensor_value_info("input", TensorProto.FLOAT, _batched(input_shape))]
     for position, name, shape in on_request:
         inputs.append(_append_branch(graph, model.outputs[position], name, shape, done))

@@ -208,7 +208,8 @@ def _tracker(options: CaptureOptions, threads: int, execution: Execution, kept: 
 
 def _part_trackers(options: CaptureOptions, threads: int, execution: Execution) -> _Parts:
     hands = HandTracker(threads, execution=execution) if options.hands else None
-    return _Parts(hands, FaceTracker(threads, execution=execution) if options.face else None)
+    # The face's small layers take twice the processor time in two threads, which mostly wait for each other.
+    return _Parts(hands, FaceTracker(1, execution=execution) if options.face else None)
 
 
 @contextmanager

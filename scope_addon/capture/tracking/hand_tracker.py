@@ -19,7 +19,9 @@ from ..perception.region import Region
 from .frame_clock import FRAME_S
 
 PRESENCE_THRESHOLD = 0.5
-UNCONFIRMED_PRESENCE = 0.8  # where no palm was detected, and the hand was not seen in the frame before
+FIRST_PRESENCE = 0.1  # in a rough region, from which the better one of the landmarks is looked at
+# Without a detected palm, and not seen in the frame before: with the wrist at the body's, and elsewhere.
+NEAR_PRESENCE, UNCONFIRMED_PRESENCE = 0.6, 0.8
 WRIST_DISTANCE = 0.7  # largest distance between the hand's wrist and the body's, in hand lengths
 UNSURE_WRIST_DISTANCE = 1.2  # where the body's wrist is uncertain
 SURE_WRIST = 0.5
@@ -32,7 +34,9 @@ PATIENT_S = 4 * FRAME_S  # between two attempts afterwards
 TIME_TOLERANCE_S = 0.005  # of a frame's time
 SMALLEST_HAND_PX = 12.0
 DISAGREEMENT_THRESHOLD = 0.3
-MIN_SIDE_PROBABILITY = 0.15  # of the right side; below it, the hand is the person's other one, or somebody else's
+CERTAIN_PRESENCE = 0.95  # from which a hand is none that the network imagines
+MIN_SIDE_PROBABILITY = 0.15  # of the right side
+SAME_WRIST, OTHER_WRIST = 0.3, 1.0  # distances of the body's two wrists from a hand of the wrong side, in hand lengths
 _MARGIN = 0.3  # of a region's side, by which its centre may be outside the image
 
 _Key = tuple[int, int]  # tracklet number, and 0 for the left hand or 1 for the right one
@@ -89,8 +93,9 @@ class HandTracker:
         scale = pixels_per_metre(person.keypoints_px, person.world_landmarks)
         if hand.estimate is not None:
             estimate = self._network.estimate(image_rgb, hand.estimate.next_region)
-            if estimate.presence >= PRESENCE_THRESHOLD and belongs(estimate, person, scale, side):
-                return estimate
+            found = assigned(estimate, person, scale, side) if estimate.presence >= PRESENCE_THRESHOLD else None
+            if found is not None:
+                return found
         elif (
             self._time_s - hand.seen_s > EAGER_S + TIME_TOLERANCE_S
             and self._time_s - hand.searched_s < PATIENT_S - TIME_TOLERANCE_S
@@ -116,37 +121,54 @@ class HandTracker:
             self._palms.detect(image_rgb, around),
             key=lambda palm: float(np.hypot(*np.subtract(palm.region.center_px, predicted.center_px))),
         )
-        candidates = [(palm.region, PRESENCE_THRESHOLD) for palm in palms[:MOST_PALMS]]
-        for region, least in [*candidates, (predicted, UNCONFIRMED_PRESENCE)]:
+        candidates = [(palm.region, (PRESENCE_THRESHOLD, PRESENCE_THRESHOLD)) for palm in palms[:MOST_PALMS]]
+        for region, (near, far) in [*candidates, (predicted, (NEAR_PRESENCE, UNCONFIRMED_PRESENCE))]:
             first = self._network.estimate(image_rgb, region)
-            if first.presence < min(least, PRESENCE_THRESHOLD):
+            if first.presence < FIRST_PRESENCE:
                 continue
             second = self._network.estimate(image_rgb, first.next_region)
-            if second.presence >= least and belongs(second, person, scale, side):
-                return second
+            found = assigned(second, person, scale, side)
+            least = near if _wrist_distances(second, person, scale)[side] <= SAME_WRIST else far
+            if found is not None and second.presence >= least:
+                return found
         return None
 
 
-def belongs(estimate: HandEstimate, person: Observation, scale: float, side: int) -> bool:
-    """Return whether a hand may be this one of the person.
+def assigned(estimate: HandEstimate, person: Observation, scale: float, side: int) -> HandEstimate | None:
+    """Return a hand as this hand of the person; None if it cannot be.
 
-    It has to be near the body's wrist, as large as a hand, on the right side, and its keypoints in the image have to
-    agree with those in space, which an imagined hand's do not.
+    Its wrist has to be near the body's, its size like the body's. Where the network is not certain of a hand, its
+    keypoints in the image have to agree with those in space, which an imagined hand's do not.
+
+    A hand that the network takes for one of the other side is somebody else's or the person's other one, unless its
+    wrist is this one and the other is far away: seen edge-on, left and right hands look alike. In an orthographic
+    projection, a left hand looks like a right one with reversed depth, which is then returned.
 
     :param scale: pixels per metre at the person's distance.
     :param side: 0 left, 1 right.
     """
-    wrist = WRISTS[side]
-    sure = person.keypoints_confidence[wrist] >= SURE_WRIST
+    sure = person.keypoints_confidence[WRISTS[side]] >= SURE_WRIST
     length = HAND_LENGTH_M * scale
-    distance = float(np.linalg.norm(estimate.keypoints_px[0] - person.keypoints_px[wrist]))
+    distance, other = _wrist_distances(estimate, person, scale)[[side, 1 - side]]
+    if (
+        distance > (WRIST_DISTANCE if sure else UNSURE_WRIST_DISTANCE)
+        or not MIN_SIZE * length <= estimate.size_px <= MAX_SIZE * length
+        or (estimate.presence < CERTAIN_PRESENCE and estimate.disagreement > DISAGREEMENT_THRESHOLD)
+    ):
+        return None
     probability = estimate.left if side == 0 else 1.0 - estimate.left
-    return (
-        distance <= (WRIST_DISTANCE if sure else UNSURE_WRIST_DISTANCE) * length
-        and MIN_SIZE * length <= estimate.size_px <= MAX_SIZE * length
-        and probability >= MIN_SIDE_PROBABILITY
-        and estimate.disagreement <= DISAGREEMENT_THRESHOLD
-    )
+    if probability >= MIN_SIDE_PROBABILITY:
+        return estimate
+    if not sure or distance > SAME_WRIST or other < OTHER_WRIST:
+        return None
+    mirrored = estimate.world_landmarks * np.array([1.0, 1.0, -1.0])
+    return replace(estimate, world_landmarks=mirrored, left=1.0 - estimate.left)
+
+
+def _wrist_distances(estimate: HandEstimate, person: Observation, scale: float) -> NDArray[np.float64]:
+    """Return the distances (2,) of the hand's wrist from the body's left and right one, in hand lengths."""
+    distances: NDArray[np.float64] = np.linalg.norm(estimate.keypoints_px[0] - person.keypoints_px[WRISTS], axis=1)
+    return distances / (HAND_LENGTH_M * scale)
 
 
 def _without_duplicates(

@@ -32,7 +32,7 @@ MIRROR_PARTNER = np.array(
 )
 """(33,) index of each keypoint's counterpart on the other side (of the nose: itself)."""
 
-_LIMBS = np.array([11, 12, 13, 14, 15, 16, 23, 24, 25, 26, 27, 28])
+LIMBS = np.array([11, 12, 13, 14, 15, 16, 23, 24, 25, 26, 27, 28])
 # The cost of overruling the network in a frame, as metres of jump. The largest network is nearly always right: only
 # intervals of some ten frames are overruled, so that a person who spins between two frames at a low rate is kept.
 FRAME_COST_M = 0.005
@@ -49,6 +49,7 @@ CORRECTION_S = 0.13
 
 # How to read a frame; DEPTH_REVERSED: swapped, and with reversed depth, because front and back were confused.
 AS_DETECTED, LEFT_RIGHT_SWAPPED, DEPTH_REVERSED = 0, 1, 2
+FRAME_COSTS_M = np.array([0.0, FRAME_COST_M, FRAME_COST_M + DEPTH_COST_M])  # by reading, with a reference
 
 
 def repair_left_right(track: Track, camera: Camera) -> Track:
@@ -120,7 +121,7 @@ def _centred_body(estimate: PoseEstimate) -> NDArray[np.floating[Any]]:
     """Return the (33, n) body about its middle: in space, or in the image where depth is unknown."""
     if estimate.world_landmarks.any():
         return estimate.world_landmarks
-    centred: NDArray[np.floating[Any]] = estimate.keypoints_px - estimate.keypoints_px[_LIMBS].mean(axis=0)
+    centred: NDArray[np.floating[Any]] = estimate.keypoints_px - estimate.keypoints_px[LIMBS].mean(axis=0)
     return centred
 
 
@@ -146,12 +147,17 @@ def find_labels(
     :param frame_cost_m: of overruling the network in a frame.
     :return: (T,) AS_DETECTED, LEFT_RIGHT_SWAPPED or DEPTH_REVERSED.
     """
-    known = np.isfinite(world_landmarks[:, _LIMBS]).all(axis=(1, 2))
-    swapped = world_landmarks[known][:, MIRROR_PARTNER[_LIMBS]]
-    reversed_ = swapped * np.array([1, 1, -1], swapped.dtype)
-    readings = np.stack([world_landmarks[known][:, _LIMBS], swapped, reversed_])
+    known = np.isfinite(world_landmarks[:, LIMBS]).all(axis=(1, 2))
+    readings = readings_of(world_landmarks[known])
     costs = np.array([0.0, frame_cost_m, frame_cost_m + DEPTH_COST_M])
     return _cheapest(readings, _steps(readings), known, costs, starts, reference)
+
+
+def readings_of(world_landmarks: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
+    """Return the limbs (3, T, 12, 3) of landmarks (T, 33, 3), read in each of the three ways."""
+    swapped = world_landmarks[:, MIRROR_PARTNER[LIMBS]]
+    reversed_ = swapped * np.array([1, 1, -1], swapped.dtype)
+    return np.stack([world_landmarks[:, LIMBS], swapped, reversed_])
 
 
 def _find_lifted_labels(track: Track, camera: Camera, reference: NDArray[np.floating[Any]] | None) -> NDArray[np.intp]:
@@ -165,7 +171,7 @@ def _find_lifted_labels(track: Track, camera: Camera, reference: NDArray[np.floa
     for order in (np.arange(len(MIRROR_PARTNER)), MIRROR_PARTNER):
         body = lifter.lift(rays[:, order], track.confidence[:, order], None).points
         certainty = M_PER_CONFIDENCE * track.confidence[:, order, None]
-        readings.append(np.concatenate([body, certainty], axis=-1)[track.seen][:, _LIMBS].astype(np.float32))
+        readings.append(np.concatenate([body, certainty], axis=-1)[track.seen][:, LIMBS].astype(np.float32))
     step_s = float(np.median(np.diff(track.times))) if len(track) > 1 else 0.0
     costs = np.array([0.0, LIFTED_COST_M_S * step_s])
     steps = _steps(np.stack(readings))
@@ -193,7 +199,7 @@ def _cheapest(
         switching[starts[known][1:]] = 0.0
     costs = np.tile(label_cost, (readings.shape[1], 1))
     if reference is not None:
-        distance = _mean_distance(readings[..., :3], reference[known][:, _LIMBS]).T
+        distance = mean_distance(readings[..., :3], reference[known][:, LIMBS]).T
         costs += np.where(np.isfinite(distance), distance, 0.0)
     labels = np.full(len(known), AS_DETECTED)
     labels[known] = least_cost_path(costs, switching)
@@ -202,7 +208,7 @@ def _cheapest(
 
 def _steps(readings: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
     """Return the (N−1, n, n) mean distances between the readings (n, N, 12, ...) of each frame and the next."""
-    distances = [[_mean_distance(before[:-1], after[1:]) for after in readings] for before in readings]
+    distances = [[mean_distance(before[:-1], after[1:]) for after in readings] for before in readings]
     return np.array(distances).transpose(2, 0, 1)
 
 
@@ -243,10 +249,14 @@ def _correction(world: NDArray[np.floating[Any]], track: Track) -> NDArray[np.fl
 
 def _limb_distance(a: NDArray[np.floating[Any]], b: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
     """Return the mean distance of the limbs' landmarks of bodies (..., 33, n)."""
-    return _mean_distance(a[..., _LIMBS, :], b[..., _LIMBS, :])
+    return mean_distance(a[..., LIMBS, :], b[..., LIMBS, :])
 
 
-def _mean_distance(a: NDArray[np.floating[Any]], b: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
-    """Return the (...) mean distance of points (..., n, 3 or more)."""
+def mean_distance(a: NDArray[np.floating[Any]], b: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
+    """Return the (...) mean distance of corresponding points.
+
+    :param a: (..., n, m), m at least 3.
+    :param b: (..., n, m).
+    """
     distance: NDArray[np.floating[Any]] = np.linalg.norm(a - b, axis=-1).mean(axis=-1)
     return distance

@@ -55,6 +55,27 @@ def test_a_large_transparent_image_takes_little_memory(tmp_path):
     assert done.stdout.strip() == "6000"
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="looks at /proc")
+@pytest.mark.parametrize("claimed", [1 << 30, (1 << 32) - 1])
+def test_a_chunk_larger_than_its_file_takes_no_memory(tmp_path, claimed):
+    """OpenCV would reserve, and fill, as much as the chunk claims."""
+    whole = png(32, 24, 24)
+    at = whole.index(b"IDAT") - 4
+    path = tmp_path / "chunk.png"
+    path.write_bytes(whole[:at] + struct.pack(">I", claimed) + whole[at + 4 :])
+    read = f"{READ}print(open('/proc/self/status').read().split('VmHWM:')[1].split()[0])"  # kB
+    done = subprocess.run([sys.executable, "-c", read, path], capture_output=True, text=True, check=True)
+    message, peak = done.stdout.splitlines()
+    assert "cannot be decoded; it may be damaged" in message
+    assert int(peak) < 600_000
+
+
+def test_what_follows_the_end_of_an_image_is_ignored(tmp_path):
+    path = tmp_path / "tail.png"
+    path.write_bytes(png(32, 24, 24) + b"\xff" * 100)
+    assert open_video(path).width == 32
+
+
 @pytest.mark.parametrize(("width", "height"), [(4000, 2), (3, 20_000), (410, 20), (20, 401)])
 def test_an_image_that_is_too_long_is_refused(tmp_path, width, height):
     path = tmp_path / "long.png"

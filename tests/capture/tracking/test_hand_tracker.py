@@ -129,8 +129,28 @@ def test_a_hand_far_from_the_bodys_wrist_is_dropped(follow):
     assert not seen(tracker, person(left_wrist=(300, 900)))[0]
 
 
-def test_a_hand_of_the_other_side_is_rejected(follow):
-    assert not seen(follow([hand_at((300, 500), left=0.02)]), person())[0]
+@pytest.mark.parametrize(
+    ("hand", "other"),
+    [((300 + 0.4 * LENGTH, 500), (700, 500)), ((300, 500), (300 + 0.8 * LENGTH, 500))],
+    ids=["away from the wrist", "near the other wrist"],
+)
+def test_a_hand_of_the_other_side_is_rejected(follow, hand, other):
+    assert not seen(follow([hand_at(hand, left=0.02)]), person(right_wrist=other))[0]
+
+
+def test_a_hand_that_only_looks_like_the_other_one_is_mirrored_in_depth(follow):
+    hand = hand_at((300, 500), left=0.02)
+    hand.world_landmarks[:, 2] = np.linspace(-0.05, 0.05, 21)
+    (_, found), *_ = follow([hand]).step(IMAGE, [(0, person())])
+    np.testing.assert_allclose(found.hands[0, :, 3:], hand.world_landmarks * [1, 1, -1])
+
+
+@pytest.mark.parametrize(("away", "presence"), [(0.1, 0.6), (0.4, 0.8)])
+def test_without_a_palm_a_hand_has_to_be_more_certain_the_farther_it_is_from_the_wrist(follow, away, presence):
+    for offset in (-0.05, 0.05):
+        tracker = follow([hand_at((300 + away * LENGTH, 500), presence=presence + offset)])
+        tracker._palms.hands = []
+        assert seen(tracker, person())[0] == (offset > 0)
 
 
 def test_one_hand_is_not_assigned_to_both_sides(follow):
@@ -159,11 +179,12 @@ def test_no_hands_without_people():
 
 
 def test_an_inconsistent_hand_is_rejected(follow):
-    hand = hand_at((300, 500))
-    hand.world_landmarks[:] = hand.world_landmarks[:, [1, 0, 2]]
-    assert hand.disagreement > 0.5
-    assert hand_at((300, 500)).disagreement < 1e-9
-    assert not seen(follow([hand]), person())[0]
+    for presence in (0.9, 0.99):  # unless there certainly is a hand
+        hand = hand_at((300, 500), presence=presence)
+        assert hand.disagreement < 1e-9
+        hand.world_landmarks[:] = hand.world_landmarks[:, [1, 0, 2]]
+        assert hand.disagreement > 0.5
+        assert seen(follow([hand]), person())[0] == (presence > 0.95)
 
 
 def test_a_capture_with_hands_from_file_to_motion(shared):

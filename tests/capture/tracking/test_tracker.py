@@ -128,7 +128,7 @@ def test_a_somersault_is_tracked_all_the_way_round(frames: Frames) -> None:
     """The man turns over once in the air, against the sun, between frames 165 and 183."""
     tracker = PeopleTracker("best", threads=2)
     seen: dict[int, dict[int, Observation]] = {}
-    for index, image in enumerate(frames("clips/walk_side_static", start=138, stop=187), 138):
+    for index, image in enumerate(frames("clips/walk_side_static", start=146, stop=187), 146):
         for tracklet, observation in tracker.step(image):
             if observation.keypoints_px[:, 1].mean() < 600:  # the man in the air, not the woman on the grass
                 seen.setdefault(tracklet, {})[index] = observation

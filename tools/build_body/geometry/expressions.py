@@ -90,7 +90,9 @@ def mouth_faces(
         low[2] -= MOUTH_DEPTH_M
         found = ((center >= low) & (center <= high)).all(axis=1)
         inside = np.flatnonzero(found)
-        found[inside] = [_front(center[face], triangles) > center[face, 2] + BEHIND_M for face in inside]
+        beside = (triangles.max(axis=1) < low)[:, :2] | (triangles.min(axis=1) > high)[:, :2]
+        near = triangles[~beside.any(axis=1)]  # the others cover none of these faces
+        found[inside] = [_front(center[face], near) > center[face, 2] + BEHIND_M for face in inside]
         return found
 
     candidates, mouth = behind(around), behind(lips)

@@ -24,7 +24,7 @@ from .heif import assemble, read_layout
 
 _JPEG_STREAMS = (".mjpeg", ".mjpg")  # begin like a JPEG, but are videos
 _HEIF_BRANDS = {b"mif1", b"heic", b"heix", b"heim", b"heis", b"avif"}  # of ISO 23008-12 and of AVIF
-_OPENEXR, _GIF = b"v/1\x01", b"GIF8"
+_OPENEXR, _GIF, _PNG = b"v/1\x01", b"GIF8", b"\x89PNG\r\n\x1a\n"
 
 
 @dataclass(frozen=True)
@@ -61,6 +61,8 @@ def read_picture(path: Path) -> Picture | None:
     data = path.read_bytes()
     if _brands(data[:64]) & _HEIF_BRANDS:
         return _read_heif(path, data)
+    if data.startswith(_PNG) and not _holds_its_chunks(data):
+        return None  # OpenCV would take as much memory as the chunk claims
     try:
         image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
     except cv2.error as error:
@@ -75,6 +77,17 @@ def read_picture(path: Path) -> Picture | None:
     if data[:4] not in (b"II*\0", b"MM\0*"):  # OpenCV rotates a TIFF upright even with IMREAD_UNCHANGED
         rgb = _upright(rgb, exif.orientation)
     return Picture(rgb, exif.focal_35mm, animation_length(data))
+
+
+def _holds_its_chunks(data: bytes) -> bool:
+    """Return whether no chunk of a PNG (length, name: 4 bytes each, content, CRC) claims more bytes than follow it."""
+    at = len(_PNG)
+    while at + 8 <= len(data) and data[at + 4 : at + 8] != b"IEND":
+        length = int.from_bytes(data[at : at + 4], "big")
+        if length > len(data) - at - 8:
+            return False
+        at += length + 12
+    return True
 
 
 def _brands(head: bytes) -> set[bytes]:

@@ -37,17 +37,17 @@ _SCALE = 1.5  # side of a region over the face's
 def record(estimate: FaceEstimate | None, weights: NDArray[np.float64] | None) -> NDArray[np.float64]:
     """Return the row (RECORD,) of a face: confidence, size in pixels, weights, gaze, landmarks; zeros if there is none.
 
-    :param weights: (52,) of the expressions.
+    :param weights: (52,) of the expressions; None: they and the gaze stay 0, to be fitted to the landmarks.
     """
     row = np.zeros(RECORD)
-    if estimate is None or weights is None:
+    if estimate is None:
         return row
     size = estimate.next_region.side_px / _SCALE
     facing = -float(head_axes(estimate.landmarks)[2, 2])
     confidence = estimate.presence * _ramp(size, *_FACE_PX) * _ramp(facing, *_FACING)
     row[0], row[1] = max(confidence, 1e-3), size
-    row[_WEIGHTS] = weights
-    row[_GAZE] = gaze(estimate.landmarks).ravel()
+    if weights is not None:
+        row[_WEIGHTS], row[_GAZE] = weights, gaze(estimate.landmarks).ravel()
     row[_POINTS] = estimate.landmarks[_KEPT].ravel()
     return row
 

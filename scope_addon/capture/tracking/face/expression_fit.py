@@ -36,6 +36,7 @@ SURE = 0.3  # confidence of frames that tell the person's face
 SPARSITY = 3.0  # λ
 SURE_PX, MOST_NOISE = 64.0, 8.0  # size of a face below which errors grow, with the area's inverse; most growth of λ
 LARGEST_GAZE = 2.0  # w_max of the units that turn the eyes: eyes turn farther than the body's keys at 1
+_TIME_TOLERANCE_S = 0.005  # of their sum
 _ROUNDS, _SWEEPS = 4, 30
 _TURN_RIDGE = 0.03  # on G, in squared radians
 _BLOCK = 2048  # frames that are solved at once: they fit into a processor's cache
@@ -84,7 +85,7 @@ def fitted(rows: NDArray[np.floating[Any]], times: NDArray[np.float64]) -> NDArr
     :param times: (T,) seconds.
     """
     seen = np.flatnonzero(rows[:, 0] > 0)
-    if len(times) < 2 or len(seen) < max(LEAST_FRAMES, LEAST_S / float(np.median(np.diff(times)))):
+    if not is_known(len(seen), float(np.diff(times, prepend=times[:1])[seen].sum())):
         return rows
     response = load_response()
     confidence, size, *_ = parts(rows[seen])
@@ -95,6 +96,15 @@ def fitted(rows: NDArray[np.floating[Any]], times: NDArray[np.float64]) -> NDArr
     out = rows.copy()
     out[seen] = with_expression(rows[seen], np.minimum(units @ response.units, 1.0), _directions(units @ response.gaze))
     return out
+
+
+def is_known(frames: float, seconds: float) -> bool:
+    """Return whether a face was seen for long enough that the person's face at rest is known.
+
+    :param frames: in which it was seen.
+    :param seconds: since the frame before, added up over these.
+    """
+    return frames >= LEAST_FRAMES and seconds >= LEAST_S - _TIME_TOLERANCE_S
 
 
 def fit_units(

@@ -17,6 +17,7 @@ from ...perception.face.face_region import HEAD, region_from_body
 from ...perception.observation import Observation
 from ...perception.region import Region
 from ..frame_clock import FRAME_S
+from .expression_fit import is_known
 
 PRESENCE_THRESHOLD = 0.5
 MAX_DISTANCE = 0.35  # between the face and where the body's head predicts it, in sides of the predicted region
@@ -24,6 +25,7 @@ MIN_SIZE, MAX_SIZE = 0.5, 1.6  # side of the face's region over that of the pred
 SMALLEST_REGION_PX = 24.0
 EAGER_S = 10 * FRAME_S  # for which a lost face is looked for in every frame
 PATIENCE_S = 4 * FRAME_S  # between two attempts afterwards
+RESERVE = 2.0  # times what `is_known` requires is seen before the fit is relied on: frames can still be rejected
 TIME_TOLERANCE_S = 0.005  # of a frame's time
 
 
@@ -35,6 +37,8 @@ class _Face:
     head_px: NDArray[np.float64]
     seen_s: float  # when it was last seen; if never, when it was first looked for
     searched_s: float  # when it was last looked for
+    frames: int = 0  # in which it was seen
+    duration_s: float = 0.0  # of these frames
 
 
 class FaceTracker:
@@ -49,28 +53,36 @@ class FaceTracker:
     def __init__(self, threads: int, folder: Path | None = None, execution: Execution | None = None) -> None:
         self._network = FaceNetwork(threads, folder, execution)
         self._faces: dict[int, _Face] = {}
+        self._time_s: float | None = None
 
     def step(
         self, image_rgb: NDArray[np.uint8], observations: Sequence[tuple[int, Observation]], time_s: float
     ) -> list[tuple[int, Observation]]:
         """Add ``face`` to the observations of one frame.
 
+        The expression network runs only at first: a face that is seen for longer gets its expressions from `fitted`.
+
         :param image_rgb: (H, W, 3).
         :param observations: tracklet number and observation of each person.
         :param time_s: when the frame is shown.
         """
         before, self._faces = self._faces, {}
+        interval_s = 0.0 if self._time_s is None else time_s - self._time_s
+        self._time_s = time_s
         found = []
         for number, person in observations:
             head = person.keypoints_px[list(HEAD)].mean(axis=0)
             face = before.get(number) or _Face(None, head, time_s, time_s - PATIENCE_S)
             estimate = self._find(image_rgb, face, person, head, time_s)
             face.region, face.head_px = (estimate.next_region if estimate else None), head
+            weights = None
             if estimate:
+                if not is_known(face.frames / RESERVE, face.duration_s / RESERVE):
+                    weights = self._network.expression(estimate)
                 face.seen_s = time_s
+                face.frames, face.duration_s = face.frames + 1, face.duration_s + interval_s
             self._faces[number] = face
-            values = record(estimate, None if estimate is None else self._network.expression(estimate))
-            found.append((number, replace(person, face=values)))
+            found.append((number, replace(person, face=record(estimate, weights))))
         return found
 
     def _find(
