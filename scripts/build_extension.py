@@ -45,7 +45,7 @@ CONTENT = ("__init__.py", "LICENSE", "THIRD_PARTY.md", "solver", "scope_addon", 
 GUIDE = ("docs/guide.md",)  # with its pictures in assets/guide
 # Clusters use the network, and live captures send poses to other programs, from the shell only: nothing in the
 # extension opens a socket.
-SENDERS = ("json_lines.py", "vmc.py")
+SENDERS = ("json_lines.py", "preview_page.py", "vmc.py")
 OF_OTHER_PAGES = ("live.jpg",)  # in assets/guide, but not in the guide
 LEFT_OUT = (
     *("__pycache__", "*.pyc", ".*", "sample_truth.npz", "pictures", "examples", "cluster"),
