@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from ..capture.options import CaptureOptions
 
 BODY_SUFFIXES = (".npz", ".pkl")
+_LONGEST_SHOWN = 60  # characters of a value in a message
 
 
 def path_argument(text: str) -> Path:
@@ -120,4 +121,10 @@ def _value(option: Option, given: Any) -> Any:
     try:
         return option.argument.parse(given)
     except ValueError as error:
-        raise UsageError(f"{option.flag} {error}, not {given!r}") from error
+        raise UsageError(f"{option.flag} {error}, not {_quoted(given)}") from error
+
+
+def _quoted(given: object) -> str:
+    """Return a value for a message, of which it must not take more than a line."""
+    text = repr(given)
+    return text if len(text) <= _LONGEST_SHOWN else f"{text[:_LONGEST_SHOWN]}…"

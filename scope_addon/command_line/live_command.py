@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from ..errors import UsageError
 from ..installed import CAPTURE, check_installed, check_live
 from ..options import Place, options_at
+from ..scene.export.output_paths import person_paths
 from .arguments import add_options, option_values
 from .memory_limit import check_memory_limit
 from .outputs import MOTION_SUFFIXES, check_outputs
@@ -20,6 +21,7 @@ from .terminal import ProgressLine, say
 
 if TYPE_CHECKING:
     from ...solver.body import Body
+    from ..live.outputs.preview_page import PreviewPage
     from ..live.run import LiveOptions, Output
 
 
@@ -44,34 +46,53 @@ def run_live_command(args: argparse.Namespace) -> dict[str, Any]:
     check_installed(CAPTURE if values["vmc"] is None else (*CAPTURE, "pythonosc"))
     check_memory_limit(with_scene=False)
     options = _checked(values)
-    check_outputs([values["record"]] if values["record"] else [], Path(args.source), overlay=values["keep_footage"])
+    check_outputs(_paths(values), Path(args.source), overlay=values["keep_footage"])
     # Imported here, so that errors in the arguments are printed immediately.
     from ...solver.loaders.body_file import load_body
     from ..live.outputs.footage import Footage
-    from ..live.outputs.recording import Recording
+    from ..live.outputs.people_recording import PeopleRecording
     from ..live.run import Listeners, run_live
     from ..live.sources import open_source
 
     source, body = open_source(args.source), load_body(values["body"])
     with ExitStack() as stack:
         outputs = _outputs(values, body, stack)
-        recording = Recording(values["record"], body, source) if values["record"] else None
-        if recording:
-            outputs.append(recording)
+        recording = PeopleRecording(_paths(values), body, source) if values["record"] else None
         footage = stack.enter_context(Footage(values["keep_footage"], source.fps)) if values["keep_footage"] else None
+        page = _preview(body, stack) if values["preview"] else None
         line = stack.enter_context(ProgressLine(sys.stderr, show=not args.quiet))
-        begin = recording.begin if recording else lambda *_: None
-        received = footage.add if footage else lambda _: None
-        listeners = Listeners(say, lambda state: line(str(state)), begin, received)
-        report = run_live(source, body, options, outputs, listeners)
+        hearing = [taker for taker in (recording, page) if taker]
+        watching = [take for take in (footage and footage.add, page and page.receive) if take]
+        listeners = Listeners(
+            say,
+            lambda state: line(str(state)),
+            _each([taker.begin for taker in hearing]),
+            _each(watching),
+        )
+        report = run_live(source, body, options, [*outputs, *hearing], listeners)
         saved = [footage.save()] if footage else []
         if footage and footage.lost:
             say(f"{footage.lost} frames are missing in {values['keep_footage']}, since the computer was too busy")
-    saved = [*([recording.save()] if recording else []), *saved]
+    saved = [*(recording.save() if recording else []), *saved]
     report["outputs"] = [str(path) for path in saved if path]
     if not args.json:
         say(_summary(report))
     return report
+
+
+def _each(functions: Sequence[Callable[..., None]]) -> Callable[..., None]:
+    """Return a function that calls others, one after another."""
+
+    def call(*args: Any) -> None:
+        for function in functions:
+            function(*args)
+
+    return call
+
+
+def _paths(values: Mapping[str, Any]) -> list[Path]:
+    """Return the motion files to write, one for each person."""
+    return person_paths(values["record"], values["live_people"], separate=True) if values["record"] else []
 
 
 def _checked(values: Mapping[str, Any]) -> LiveOptions:
@@ -88,8 +109,8 @@ def _checked(values: Mapping[str, Any]) -> LiveOptions:
         raise UsageError(
             f"--keep-footage writes a video: give a name that ends in .mp4, not {values['keep_footage'].name}"
         )
-    if len(values["heights_m"]) > 1:
-        raise UsageError("a live capture follows one person: give one --height")
+    if len(values["heights_m"]) > values["live_people"]:
+        raise UsageError(f"{len(values['heights_m'])} heights are given, but --people is {values['live_people']}")
     from ..capture.camera.calibration import read_calibration
     from ..capture.camera.intrinsics import choose_camera
     from ..live.run import LiveOptions
@@ -100,7 +121,8 @@ def _checked(values: Mapping[str, Any]) -> LiveOptions:
         read_calibration(values["calibration"])
     return LiveOptions(
         values["live_quality"],
-        next(iter(values["heights_m"]), None),
+        values["live_people"],
+        tuple(values["heights_m"]),
         values["focal_mm"],
         values["fov_deg"],
         values["calibration"],
@@ -119,14 +141,28 @@ def _outputs(values: Mapping[str, Any], body: Body, stack: ExitStack) -> list[Ou
     if values["json_port"] is not None:
         from ..live.outputs.json_lines import JsonServer
 
-        server = stack.enter_context(JsonServer(body, values["listen"], values["json_port"]))
+        server = stack.enter_context(JsonServer(body, values["listen"], values["json_port"], values["live_people"]))
         say(f"lines of JSON on {values['listen']} port {server.port}")
         outputs.append(server)
     if values["vmc"] is not None:
         from ..live.outputs.vmc import VmcSender, parse_address
 
-        outputs.append(stack.enter_context(VmcSender(body, *parse_address(values["vmc"]))))
+        host, port = parse_address(values["vmc"], values["live_people"])
+        for person in range(values["live_people"]):
+            outputs.append(stack.enter_context(VmcSender(body, host, port + person, person)))
     return outputs
+
+
+def _preview(body: Body, stack: ExitStack) -> PreviewPage:
+    """Serve the preview; the stack ends it.
+
+    :raises OutputError: it cannot be served.
+    """
+    from ..live.outputs.preview_page import PreviewPage
+
+    page = stack.enter_context(PreviewPage(body))
+    say(f"preview: open {page.address} in a browser")
+    return page
 
 
 def _summary(report: Mapping[str, Any]) -> str:

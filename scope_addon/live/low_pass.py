@@ -6,10 +6,11 @@ with the n-th power of its frequency, and delay steady motion by n / (2π f), wh
 moved on by its own velocity times a lead, which takes that much of the delay away. Rotations take the fraction a of
 the rotation from R̂ to R.
 
-On fits of four clips at 60 frames/s and three at 30, compared with the offline motion, six filters of 7 Hz with a total
-delay of a thirtieth of a second have half of the jitter of four of 6 Hz with a delay of 26 ms, for 1 to 3 mm more of
-deviation. A Kalman filter of constant velocity or acceleration with the same delay jitters twice as much, because every
-innovation is a jump in its derivatives.
+On fits of four clips at 60 frames/s and one at 30, compared with the offline motion, the delay decides: six filters of
+5.5 Hz with a delay of 60 ms have two thirds of the jitter of six of 7 Hz with 33 ms, and deviate as much. The best
+response of any form and of the same delay (fitted to three of the clips) has an eighth less jitter on the fourth.
+Cutoff frequencies that fall with speed add jitter of their own, and deviate more. A Kalman filter of constant velocity
+or acceleration with the same delay jitters twice as much, because every innovation is a jump in its derivatives.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from numpy.typing import NDArray
 from ...solver import rotations
 
 LONGEST_STEP_S = 0.5  # after a longer pause, a filter starts again
-LEAD_FROM_S = 0.3  # after the start, until when the velocity is not yet known; the lead grows during this time
+LEAD_FROM_S = 0.4  # after the start, until when the velocity is not yet known; the lead grows during this time
 
 
 @dataclass(frozen=True)

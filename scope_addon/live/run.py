@@ -25,8 +25,8 @@ from ..capture.perception.execution import Execution
 from ..capture.tracking.tracker import PeopleTracker
 from .clock import Clock
 from .newest_frame import NewestFrame
+from .people import LivePeople
 from .pose import LivePose, Presence
-from .session import LiveSession
 from .sources import CAMERA_SIZE, Picture, Source
 from .statistics import Statistics
 
@@ -38,7 +38,8 @@ class LiveOptions:
     """How to capture; see the options of the command line."""
 
     quality: str = "fast"
-    height_m: float | None = None
+    people: int = 1
+    heights_m: tuple[float, ...] = ()
     focal_mm: float | None = None
     fov_deg: float | None = None
     calibration: Path | None = None
@@ -79,7 +80,7 @@ class Listeners:
 
     say: Callable[[str], None] = lambda _: None
     progress: Callable[[LiveProgress], None] = lambda _: None
-    camera: Callable[[LiveSession, tuple[int, int]], None] = lambda *_: None  # once the first frame has come
+    camera: Callable[[LivePeople, tuple[int, int]], None] = lambda *_: None  # once the first frame has come
     received: Callable[[Picture], None] = lambda _: None  # every frame, from another thread, which must not be delayed
 
 
@@ -98,7 +99,8 @@ def run_live(
     clock = clock or Clock()
     execution = Execution(options.provider)
     cores = os.cpu_count() or 1
-    tracker = PeopleTracker(options.quality, min(options.threads or cores, cores), None, execution=execution)
+    people = options.people if options.people > 1 else None  # None: the largest one
+    tracker = PeopleTracker(options.quality, min(options.threads or cores, cores), people, execution=execution)
     LiveBody(body, assumed_camera(*CAMERA_SIZE, CAMERA_SIZE[0])).load()
     statistics = Statistics()
     reader = NewestFrame(source, clock, options.reconnect_s, listeners.say, listeners.received)
@@ -123,7 +125,7 @@ def run_live(
 
 
 class _Poses:
-    """Opens a session for the size of the frames, and another one where that changes, as after a reconnection."""
+    """Opens sessions for the size of the frames, and other ones where that changes, as after a reconnection."""
 
     def __init__(
         self,
@@ -137,12 +139,12 @@ class _Poses:
         self._source, self._body, self._options = source, body, options
         self._tracker, self._executor, self._listeners = tracker, executor, listeners
         self._size: tuple[int, int] | None = None
-        self._session: LiveSession | None = None
+        self._people: LivePeople | None = None
 
-    def of(self, picture: Picture) -> LivePose:
-        """Return the pose in a picture."""
+    def of(self, picture: Picture) -> list[LivePose]:
+        """Return the poses in a picture."""
         height, width = picture.image_rgb.shape[:2]
-        if self._session is None or self._size != (width, height):
+        if self._people is None or self._size != (width, height):
             options = self._options
             camera = choose_camera(
                 width,
@@ -154,9 +156,17 @@ class _Poses:
             )
             self._size = width, height
             self._tracker.reset()
-            self._session = LiveSession(self._body, self._tracker, camera, self._size, options.height_m, self._executor)
-            self._listeners.camera(self._session, self._size)
-        return self._session.step(Frame(picture.index, picture.timestamp_s, picture.image_rgb))
+            self._people = LivePeople(
+                self._body,
+                self._tracker,
+                camera,
+                self._size,
+                heights_m=options.heights_m,
+                count=options.people,
+                executor=self._executor,
+            )
+            self._listeners.camera(self._people, self._size)
+        return self._people.step(Frame(picture.index, picture.timestamp_s, picture.image_rgb))
 
 
 def _loop(
@@ -164,16 +174,18 @@ def _loop(
 ) -> None:
     shown_s = -PROGRESS_S
     while (picture := reader.take()) is not None:
-        pose = poses.of(picture)
+        found = poses.of(picture)
         now_s = reader.now()
         latency_ms = statistics.add(picture.arrived_s, now_s)
         for output in outputs:
-            output.send(pose, latency_ms)
+            for pose in found:
+                output.send(pose, latency_ms)
         if now_s - shown_s >= PROGRESS_S:
             shown_s = now_s
             median_ms, p95_ms = statistics.latency_ms()
             rate, counts = statistics.recent_rate, (reader.dropped, reader.received)
-            listeners.progress(LiveProgress(pose.presence, rate, median_ms, p95_ms, *counts))
+            presence = min((pose.presence for pose in found), key=list(Presence).index)  # of whoever is seen best
+            listeners.progress(LiveProgress(presence, rate, median_ms, p95_ms, *counts))
 
 
 @contextmanager

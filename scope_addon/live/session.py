@@ -23,6 +23,7 @@ from .calibration import Calibration, Calibrator, track_of
 from .causal_fit import CausalFit, FittedFrame
 from .feet.hold import FootHold
 from .feet.support import Support
+from .left_right import CausalLeftRight
 from .pose import LivePose, Presence
 from .smoothing import PoseFilter
 
@@ -58,6 +59,7 @@ class LiveSession:
     :param size: width and height of the frames, pixels.
     :param height_m: the person's stature, if it is known, metres.
     :param executor: of one thread, in which everything but the first calibration runs; None: in the calling thread.
+    :param leader: of another person of the same source, from whom camera and world are taken; None: they are estimated.
     """
 
     def __init__(
@@ -68,11 +70,14 @@ class LiveSession:
         size: tuple[int, int],
         height_m: float | None = None,
         executor: Executor | None = None,
+        leader: LiveSession | None = None,
     ) -> None:
-        self._body, self._tracker, self._height_m = body, tracker, height_m
+        self._body, self._tracker, self._height_m, self._leader = body, tracker, height_m, leader
+        self._size = size
         self._start: Start = executor.submit if executor else start_at_once
         self._calibrator = Calibrator(body, camera, size, height_m)
         self._exposure, self._filter, self._feet = AutoExposure(), PoseFilter(), FootHold(body)
+        self._left_right = CausalLeftRight(wait=executor is None)
         self._tracklet: int | None = None
         self._fit: CausalFit | None = None
         self._current: Calibration | None = None
@@ -85,9 +90,16 @@ class LiveSession:
         self._last: LivePose | None = None
 
     def step(self, frame: Frame) -> LivePose:
-        """Return the pose in the next frame."""
-        observations = self._tracker.step(self._exposure.brighten(frame.image_rgb), None, frame.timestamp_s)
-        observation = self._choose(observations)
+        """Return the pose of the largest person in the next frame."""
+        return self.follow(frame, self._choose(self.track(frame)))
+
+    def track(self, frame: Frame) -> list[tuple[int, Observation]]:
+        """Return the tracklets and observations of everybody in the next frame."""
+        return self._tracker.step(self._exposure.brighten(frame.image_rgb), None, frame.timestamp_s)
+
+    def follow(self, frame: Frame, observation: Observation | None) -> LivePose:
+        """Return the pose in the next frame, in which the person was observed, or not."""
+        observation = None if observation is None else self._left_right(observation)
         fitted = self._fit_person(frame, observation) if observation is not None else None
         self._settle(frame.timestamp_s)
         self._last_s = frame.timestamp_s
@@ -110,8 +122,14 @@ class LiveSession:
         if not all(np.isfinite(value).all() for value in values):
             return None
         if self._fit is None:
+            if self._leader is not None:
+                if self._leader.camera is None:
+                    return None
+                known = replace(self._leader.camera, focal_deviation=0.0)
+                self._calibrator = Calibrator(self._body, known, self._size, self._height_m)
             self._calibrator.look_at(frame.image_rgb, observation)
-            self._current = self._target = self._calibrator.estimate([time_s], [observation])
+            self._target = self._calibrator.estimate([time_s], [observation])
+            self._current = self._in_leaders_world(self._target)
             self._fit = CausalFit(self._body, observation, self._current.camera, self._height_m)
             self._fit.set_shape(self._current.betas)
             self._first_s, self._calibrations = time_s, 1
@@ -148,11 +166,19 @@ class LiveSession:
         # The longer the world has been known, the less a new estimate moves it.
         following_s = max(FOLLOWING_S, time_s - self._first_s)
         late = early if not self.is_settled(time_s) else 1 - np.exp(-step_s / following_s)
-        before, self._current = self._current, self._current.towards(self._target, float(early), float(late))
+        before = self._current
+        self._current = self._in_leaders_world(before.towards(self._target, float(early), float(late)))
         if self._current.camera is not before.camera:
             self._fit.set_camera(self._current.camera)
         if not np.array_equal(self._current.betas, before.betas):
             self._fit.set_shape(self._current.betas)
+
+    def _in_leaders_world(self, calibration: Calibration) -> Calibration:
+        """Return the calibration with camera and world of the person from whom they are taken, if there is one."""
+        world = self._leader._current if self._leader is not None else None
+        if world is None:
+            return calibration
+        return replace(calibration, camera=world.camera, up=world.up, camera_position=world.camera_position)
 
     def _start_estimate(self, time_s: float) -> None:
         times, observations = [s.time_s for s in self._seen], [s.observation for s in self._seen]
@@ -163,7 +189,7 @@ class LiveSession:
                 self._calibrations = int(np.searchsorted(CALIBRATE_AT_S, time_s - self._first_s, side="right"))
                 self._pending = self._start(self._calibrator.estimate, times, observations)
                 self._next_follow_s = time_s + FOLLOW_S
-        elif time_s >= self._next_follow_s:
+        elif time_s >= self._next_follow_s and self._leader is None:
             self._next_follow_s = time_s + FOLLOW_S
             track, fitted = track_of(times, observations), self._fitted_track()
             self._pending = self._start(self._calibrator.follow, self._target, track, fitted)

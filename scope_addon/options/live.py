@@ -8,6 +8,8 @@ from pathlib import Path
 from .capture import QUALITIES
 from .record import Argument, Option, Place, Property
 
+MOST_PEOPLE = 4
+
 LIVE_OPTIONS = (
     Option(
         "live_quality",
@@ -18,6 +20,17 @@ LIVE_OPTIONS = (
         choices=QUALITIES[:2],
         argument=Argument("--quality"),
         blender=Property("quality"),
+    ),
+    Option(
+        "live_people",
+        int,
+        1,
+        Place.LIVE | Place.LIVE_WORKER | Place.LIVE_PANEL,
+        "the people to follow, at most; each takes time",
+        minimum=1,
+        maximum=MOST_PEOPLE,
+        argument=Argument("--people", "N"),
+        blender=Property("people", "People"),
     ),
     Option(
         "record",
@@ -34,6 +47,13 @@ LIVE_OPTIONS = (
         Place.LIVE | Place.LIVE_WORKER,
         "video (.mp4) of the recorded pictures to write",
         argument=Argument(metavar="VIDEO"),
+    ),
+    Option(
+        "preview",
+        bool,
+        False,
+        Place.LIVE,
+        "serve a page on this computer that shows the footage with the skeletons over it",
     ),
     Option(
         "json_port",

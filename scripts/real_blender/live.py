@@ -67,7 +67,7 @@ def moving() -> Iterator[float]:
     seen = []
     for _ in range(3):
         yield from until(lambda: state().job.has_body, 5, "the body")
-        body = state().job._body.armature
+        body = state().job._bodies[0].armature
         seen.append(tuple(body.pose.bones["left_hip"].rotation_quaternion))
         before = state().job.poses
         yield from until(lambda before=before: state().job.poses > before, 5, "another pose")

@@ -20,7 +20,8 @@ from scope.scope_addon.live.pose import Presence
 from scope.scope_addon.live.session import HOLD_S, LiveSession
 from scope.scope_addon.motion import Motion
 
-LEAD = 9  # frames until the filters know how the body moves
+LATE = 2  # frames of the delay of 60 ms
+LEAD = 12  # frames until the filters know how the body moves
 FRAMES, EMPTY = 46, 8  # one and a half seconds, and frames without a person after them, a tenth of a second apart
 
 
@@ -68,12 +69,12 @@ def test_the_recording_is_close_to_the_offline_capture(body, recorded):
     (offline,) = capture(
         SAMPLE, body, CaptureOptions(quality="fast", wanted=VideoRange(end_s=(FRAMES - 1) / 30))
     ).motions
-    assert len(recorded) == FRAMES - 1  # the last pose would have been given a frame later
-    assert list(recorded.frames) == list(offline.frames[:-1])
-    relative = [m.joints_cam[: FRAMES - 1] - m.joints_cam[: FRAMES - 1, :1] for m in (recorded, offline)]
+    assert len(recorded) == FRAMES - LATE  # the last poses would have been given later
+    assert list(recorded.frames) == list(offline.frames[:-LATE])
+    relative = [m.joints_cam[: FRAMES - LATE] - m.joints_cam[: FRAMES - LATE, :1] for m in (recorded, offline)]
     assert np.median(np.linalg.norm(relative[0] - relative[1], axis=-1)) < 0.025
     jerk = [np.linalg.norm(np.diff(joints[LEAD:], 3, axis=0), axis=-1).mean() for joints in relative]
-    assert jerk[0] < 1.8 * jerk[1]
+    assert jerk[0] < 1.5 * jerk[1]
 
 
 def test_feet_that_stand_do_not_slide(recorded):
@@ -85,7 +86,8 @@ def test_feet_that_stand_do_not_slide(recorded):
 
 def test_dropped_frames_are_filled_in_and_not_valid(recorded, live):
     assert list(np.flatnonzero(~recorded.valid)) == [20, 21]
-    given = np.array([pose.joints for pose in live[1][1:FRAMES]])  # a frame after its time
+    joints = np.array([pose.joints for pose in live[1][:FRAMES]])
+    given = 0.2 * joints[1:-1] + 0.8 * joints[2:]  # 1.8 frames after their time
     T = recorded.world_from_camera
     world = np.einsum("tij,tkj->tki", T[:, :3, :3], recorded.joints_cam) + T[:, None, :3, 3]
     # The first frames differ, since the file has the final shape.

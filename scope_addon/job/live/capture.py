@@ -3,15 +3,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ....solver.errors import ScopeError
 from ...live.outputs.footage import Footage
+from ...live.outputs.people_recording import PeopleRecording
 from ...live.outputs.pose_values import values
-from ...live.outputs.recording import Recording
 from ...live.run import Listeners, LiveOptions, LiveProgress, run_live
 from ...live.sources import Picture, Source, open_source
 from .commands import Commands
@@ -19,11 +19,11 @@ from .request import LiveRequest
 
 if TYPE_CHECKING:
     from ....solver import Body
+    from ...live.people import LivePeople
     from ...live.pose import LivePose
-    from ...live.session import LiveSession
 
 Send = Callable[..., None]  # an event and its values
-MOTION = "person1.npz"
+MOTION = "person{}.npz"  # from 1 on
 
 
 def capture_live(request: LiveRequest, job_folder: Path, send: Send, commands: Commands) -> None:
@@ -38,7 +38,8 @@ def capture_live(request: LiveRequest, job_folder: Path, send: Send, commands: C
     source, body = open_source(request.source, online=request.online), load_body(chosen["body"])
     options = LiveOptions(
         chosen["live_quality"],
-        next(iter(chosen["heights_m"]), None),
+        chosen["live_people"],
+        tuple(chosen["heights_m"])[: chosen["live_people"]],
         chosen["focal_mm"],
         chosen["fov_deg"],
         Path(chosen["calibration"]) if chosen["calibration"] else None,
@@ -51,7 +52,8 @@ def capture_live(request: LiveRequest, job_folder: Path, send: Send, commands: C
     with ExitStack() as stack:
         kept = chosen["keep_footage"]
         footage = stack.enter_context(Footage(Path(kept), source.fps)) if kept else None
-        recorder = _Recorder(job_folder / MOTION, body, source, commands, footage)
+        paths = [job_folder / MOTION.format(number + 1) for number in range(options.people)]
+        recorder = _Recorder(paths, body, source, commands, footage)
         listeners = Listeners(
             lambda text: send("notice", text=text),
             lambda state: send("status", **_status(state, recorder)),
@@ -63,11 +65,11 @@ def capture_live(request: LiveRequest, job_folder: Path, send: Send, commands: C
         if recording is None:
             send("ended")
             return
-        recording.save()
+        saved = recording.save()
         warnings = save_footage(footage) if footage else []
     camera = recording.camera
     told = {"camera": camera.source if camera else "", "fps": {"total": report["poses_per_second"]}}
-    send("result", motions=[MOTION], report={**told, "warnings": warnings})
+    send("result", motions=[path.name for path in saved], report={**told, "warnings": warnings})
 
 
 def save_footage(footage: Footage) -> list[str]:
@@ -80,7 +82,7 @@ def save_footage(footage: Footage) -> list[str]:
 
 
 class _Sender:
-    """Sends every pose; the parent uses the newest one only."""
+    """Sends every pose; the parent uses the newest one of each person only."""
 
     def __init__(self, send: Send) -> None:
         self._send = send
@@ -93,26 +95,26 @@ class _Recorder:
     """Keeps poses from when the parent asks for it; ``recording`` is None before."""
 
     def __init__(
-        self, path: Path, body: Body, source: Source, commands: Commands, footage: Footage | None = None
+        self, paths: Sequence[Path], body: Body, source: Source, commands: Commands, footage: Footage | None = None
     ) -> None:
         self._footage = footage
-        self._path, self._body, self._source, self._commands = path, body, source, commands
-        self._session: tuple[LiveSession, tuple[int, int]] | None = None
-        self.recording: Recording | None = None
+        self._paths, self._body, self._source, self._commands = paths, body, source, commands
+        self._people: tuple[LivePeople, tuple[int, int]] | None = None
+        self.recording: PeopleRecording | None = None
 
-    def begin(self, session: LiveSession, size: tuple[int, int]) -> None:
+    def begin(self, people: LivePeople, size: tuple[int, int]) -> None:
         """Note where the poses come from."""
-        self._session = session, size
+        self._people = people, size
         if self.recording is not None:
-            self.recording.begin(session, size)
+            self.recording.begin(people, size)
 
     def send(self, pose: LivePose, latency_ms: float) -> None:
         """Keep a pose if one is asked for."""
-        if self.recording is None and self._is_due(pose) and self._session is not None:
+        if self.recording is None and self._is_due(pose) and self._people is not None:
             # A file keeps its times, so that its pictures and the poses belong together.
-            self.recording = Recording(self._path, self._body, self._source, from_zero=not self._source.ends)
+            self.recording = PeopleRecording(self._paths, self._body, self._source, from_zero=not self._source.ends)
             self.recording.origin = self._footage.origin if self._footage is not None else None
-            self.recording.begin(*self._session)
+            self.recording.begin(*self._people)
         if self.recording is not None:
             self.recording.send(pose, latency_ms)
 

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,13 +13,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...options.live import MOST_PEOPLE
 from ..messages import CAPTURE_FIELDS, LONGEST_LINE, Fields, is_number, is_text, unreadable
 from ..process import START_SCRIPT, WorkerProcess
 from .commands import RECORD, STOP
 from .request import LiveRequest
 
 PRESENCES = ("seen", "held", "lost")
-_POSE = b'{"event": "pose"'
+_POSE = re.compile(rb'\{"event": "pose", "person": (\d+)')
 _FARTHEST_M, _LARGEST_BETA = 1e4, 1e3
 _UNIT_TOLERANCE = 0.01  # of a quaternion's length, which is rounded
 
@@ -47,6 +49,7 @@ _FIELDS: Fields = {
 class ShownPose:
     """A pose as it came from the capture."""
 
+    person: int  # 0 for the first
     frame: int
     presence: str  # one of `PRESENCES`
     rotations: NDArray[np.float64]  # (K+1, 4) w, x, y, z: the pelvis relative to the world, the others to their parents
@@ -69,7 +72,7 @@ class LiveProcess(WorkerProcess):
 
         :raises SetupError: the process cannot be started.
         """
-        self._newest: bytes | None = None
+        self._newest: dict[int, bytes] = {}  # by person
         super().__init__(request, job_folder, kernels, python, script)
         self._fields = _FIELDS
 
@@ -81,19 +84,20 @@ class LiveProcess(WorkerProcess):
         """Have the source closed, and the recording sent as a result."""
         self._tell(STOP)
 
-    def newest_pose(self, joints: int, coefficients: int) -> ShownPose | None:
-        """Return the newest pose if there is one since the last call; older ones are never seen.
+    def newest_poses(self, joints: int, coefficients: int) -> list[ShownPose]:
+        """Return the newest pose of each person since the last call; older ones are never seen.
 
         :param joints: K+1 of the body.
         :param coefficients: P of the body.
         :raises WorkerFailedError: it cannot be used.
         """
-        line, self._newest = self._newest, None
-        return None if line is None else parse_pose(line, joints, coefficients)
+        lines, self._newest = self._newest, {}
+        found = [parse_pose(lines[person], joints, coefficients) for person in sorted(lines)]
+        return [pose for pose in found if pose is not None]
 
     def _keep(self, line: bytes) -> None:
-        if line.startswith(_POSE):
-            self._newest = line
+        if (person := _POSE.match(line)) is not None and len(person[1]) < 3 and int(person[1]) < MOST_PEOPLE:
+            self._newest[int(person[1])] = line
         else:
             super()._keep(line)
 
@@ -112,8 +116,8 @@ def parse_pose(line: bytes, joints: int, coefficients: int) -> ShownPose | None:
         rotations = np.array(message["rotations"], float)
         pelvis = np.array(message["positions"][0], float)
         betas = np.array(message["betas"], float)
-        frame, presence = message["frame"], message["presence"]
-    except (ValueError, TypeError, KeyError, IndexError, RecursionError) as error:
+        person, frame, presence = message["person"], message["frame"], message["presence"]
+    except (ValueError, TypeError, KeyError, IndexError, OverflowError, RecursionError) as error:
         raise unreadable("a pose that is none") from error
     if rotations.shape != (joints, 4) or pelvis.shape != (3,) or betas.shape != (coefficients,):
         raise unreadable("a pose of another body")
@@ -122,9 +126,10 @@ def parse_pose(line: bytes, joints: int, coefficients: int) -> ShownPose | None:
         (np.abs(lengths - 1) < _UNIT_TOLERANCE).all()
         and (np.abs(pelvis) < _FARTHEST_M).all()
         and (np.abs(betas) < _LARGEST_BETA).all()
+        and is_number(person)
         and is_number(frame)
         and presence in PRESENCES
     )
     if not is_usable:  # NaN included
         raise unreadable("a pose that no body can have")
-    return ShownPose(frame, presence, rotations / lengths[:, None], pelvis, betas)
+    return ShownPose(person, frame, presence, rotations / lengths[:, None], pelvis, betas)

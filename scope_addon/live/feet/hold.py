@@ -3,10 +3,10 @@
 
 Contact is estimated as offline (`standing`), from a window that ends with the newest frame, and from the speed at which
 heels and toes move in the image, which no fit can hold back. A point whose probability exceeds `BEGIN` is held where it
-is then; the hold ends below `END`, or when the body has moved too far away from it. The next frame is fitted to these
-places and to the floor (`Support`), from which the distance of the body follows. The legs then bridge what smoothing
-has left between held feet and their places: they bend, and the rest of the body stays. A foot that is let go approaches
-its own position again within `RELEASE_S`.
+is shown then; the hold ends below `END`, or when the body has moved too far away from it. The next frame is fitted to
+these places and to the floor (`Support`), from which the distance of the body follows. The legs then bridge what
+smoothing has left between held feet and their places: they bend, and the rest of the body stays. Where a hold begins or
+ends, what it would change abruptly dies away (`transition`).
 
 The places drift towards where the fits have the points, because an error in where a hold began would otherwise tilt the
 body for as long as it lasts: fast while size and floor are being estimated, slowly afterwards.
@@ -35,12 +35,14 @@ from ...kinematics.leg_reach import move_feet
 from ...kinematics.standing import CONTACT_SPEED_M_S, logistic, resting_probability, speed_across
 from ..causal_fit import SAME_SHAPE, FittedFrame
 from .support import Support
+from .transition import Transition
 
 WINDOW_S = 0.6
 BEGIN, END = 0.5, 0.3  # probability of contact
-RELEASE_S = 0.15
 LONGEST_STRETCH_M = 0.15  # between a held point and where the body has it
 EARLY_DRIFT_S, DRIFT_S = 0.5, 3.0  # time constants of the places, while the estimates settle and afterwards
+TRANSITION_HZ = 6.0
+SOFT_M = 0.005  # the floor raises soles from about this height on
 
 
 @dataclass(frozen=True)
@@ -69,7 +71,9 @@ class FootHold:
         self._window: deque[_Entry] = deque()
         self._anchors = np.zeros((n, 3))  # world
         self._is_held = np.zeros(n, bool)
-        self._weight = np.zeros(n)  # 1: at the anchor; it decreases while the point is let go
+        self._points_world: NDArray[np.floating[Any]] | None = None
+        self._shift: NDArray[np.float64] = np.zeros((2, 3))  # of each foot in the last frame, world
+        self._transition = Transition(2, TRANSITION_HZ)
         self._probability: NDArray[np.floating[Any]] = np.zeros(n)
 
     @property
@@ -115,10 +119,19 @@ class FootHold:
         self._probability = self._contact(T_world_camera[2, :3])
         R, t = T_world_camera[:3, :3], T_world_camera[:3, 3]
         points_world = points @ R.T + t
+        before = self._points_world if self._points_world is not None else points_world
+        old = self._away(before), self._away(points_world)
+        was_held = self._is_held
         self._update(points_world, step_s, DRIFT_S if is_settled else EARLY_DRIFT_S)
-        shift = self._shift(points_world) @ R
+        new = self._away(before), self._away(points_world)
+        self._transition.advance(step_s)
+        changed = (self._is_held != was_held)[: len(SOLES)].reshape(2, 2).any(axis=1)
+        self._transition.change(changed, old, new, step_s)
+        self._points_world = points_world
+        self._shift = new[1] + self._transition.remainder
+        self._shift[:, 2] += _rise((points_world[: len(SOLES), 2].reshape(2, 2) + self._shift[:, 2:]).min(axis=1))
         poses = R_parts[None], t_parts[None]
-        return move_feet(body, frame.rotations[None], poses, shift[None])[0], self._probability
+        return move_feet(body, frame.rotations[None], poses, (self._shift @ R)[None])[0], self._probability
 
     def _set_shape(self, betas: NDArray[np.floating[Any]]) -> None:
         if self._betas is None or np.abs(betas - self._betas).max(initial=0.0) > SAME_SHAPE:
@@ -142,27 +155,29 @@ class FootHold:
         return contact
 
     def _update(self, points_world: NDArray[np.floating[Any]], step_s: float, drift_s: float) -> None:
-        """Begin and end holds, and move their places."""
+        """Move the places of holds, and begin and end these."""
         contact = self._probability
         share = (1 - np.exp(-step_s / drift_s)) * (contact > END)
         self._anchors[:, :2] += share[:, None] * (points_world - self._anchors)[:, :2]
         begins = ~self._is_held & (contact > BEGIN)
-        new = begins & (self._weight <= 0)  # one that was just let go returns to its place
-        self._anchors[new] = points_world[new]
-        self._anchors[new, 2] *= 1 - floor_probability(points_world[new, 2])
+        shown = points_world.copy()
+        shown[: len(SOLES)] += np.repeat(self._shift, 2, axis=0)
+        self._anchors[begins] = shown[begins]
+        self._anchors[begins, 2] *= 1 - floor_probability(shown[begins, 2])
         far = np.linalg.norm(points_world - self._anchors, axis=1) > LONGEST_STRETCH_M
         self._is_held = (self._is_held | begins) & (contact > END) & ~far
-        change = step_s / RELEASE_S
-        self._weight = np.where(self._is_held, np.minimum(self._weight + change, 1.0), self._weight - change)
-        self._weight = np.maximum(self._weight, 0.0)
 
-    def _shift(self, points_world: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
-        """Return by how much each foot moves (2, 3), world: to where it is held, and never below the floor."""
-        feet = points_world[: len(SOLES)].reshape(2, 2, 3)
+    def _away(self, points_world: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
+        """Return by how much each foot (2, 3) is away from where it is held, world; 0 where it is not."""
         away = (self._anchors - points_world)[: len(SOLES)].reshape(2, 2, 3)
-        weight = self._weight[: len(SOLES)].reshape(2, 2, 1)
-        smooth = weight * weight * (3 - 2 * weight)
-        shift: NDArray[np.float64] = (weight * smooth * away).sum(axis=1) / np.maximum(weight.sum(axis=1), 1e-9)
-        lowest = (feet[..., 2] + shift[:, None, 2]).min(axis=1)
-        shift[:, 2] -= np.minimum(lowest, 0.0) * floor_probability(np.minimum(lowest, 0.0))
-        return shift
+        held = self._is_held[: len(SOLES)].reshape(2, 2, 1)
+        return np.asarray((held * away).sum(axis=1) / np.maximum(held.sum(axis=1), 1))
+
+
+def _rise(lowest: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
+    """Return by how much feet (2,) are raised onto the floor, if that is what they stand on, metres.
+
+    :param lowest: (2,) height of the lowest sole of each.
+    """
+    rise = SOFT_M * np.logaddexp(0.0, -lowest / SOFT_M)
+    return np.asarray(rise * floor_probability(np.minimum(lowest, 0.0)))

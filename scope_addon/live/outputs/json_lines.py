@@ -21,7 +21,7 @@ from .pose_values import values
 
 VERSION = 1
 MOST_CLIENTS = 16
-_QUEUED_LINES = 2  # per client; older ones are dropped
+_QUEUED_LINES = 2  # per client and person; older ones are dropped
 _SEND_BUFFER_BYTES = 32768  # some eight poses: what the system queues for a slow client is delay as well
 _SEND_TIMEOUT_S = 10.0  # after which a client that reads nothing is disconnected
 
@@ -31,11 +31,12 @@ class JsonServer:
 
     :param address: to listen on.
     :param port: 0: any free one, see `port`.
+    :param people: of whom poses are sent, one after another.
     :raises OutputError: the port is in use, or the address is not one of this computer's.
     """
 
-    def __init__(self, body: Body, address: str, port: int) -> None:
-        self._header = line(description(body))
+    def __init__(self, body: Body, address: str, port: int, people: int = 1) -> None:
+        self._header, self._people = line(description(body)), people
         self._clients: list[_Client] = []
         self._lock = threading.Lock()
         try:
@@ -87,15 +88,15 @@ class JsonServer:
                 if len(self._clients) >= MOST_CLIENTS:
                     connection.close()
                     continue
-                self._clients.append(_Client(connection, self._header))
+                self._clients.append(_Client(connection, self._header, _QUEUED_LINES * self._people))
 
 
 class _Client:
     """One connection, with a thread of its own."""
 
-    def __init__(self, connection: socket.socket, header: bytes) -> None:
+    def __init__(self, connection: socket.socket, header: bytes, queued_lines: int) -> None:
         self._connection, self._header = connection, header
-        self._lines: deque[bytes] = deque(maxlen=_QUEUED_LINES)
+        self._lines: deque[bytes] = deque(maxlen=queued_lines)
         self._ready = threading.Semaphore(0)
         self.is_gone = False
         with suppress(OSError):

@@ -15,6 +15,7 @@ from ..pose import LivePose
 def values(pose: LivePose, latency_ms: float) -> dict[str, Any]:
     """Return a pose as JSON values; without a body before somebody was seen."""
     start = {
+        "person": pose.person,
         "frame": pose.index,
         "time_s": round(pose.timestamp_s, 4),
         "latency_ms": round(latency_ms, 1),

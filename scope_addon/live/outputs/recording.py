@@ -78,6 +78,11 @@ class Recording:
         return self._path
 
     @property
+    def first(self) -> tuple[int, float] | None:
+        """Number and time of the first frame; None before there is one."""
+        return (self._poses[0].index, self._poses[0].timestamp_s) if self._poses else None
+
+    @property
     def seconds(self) -> float:
         """Duration so far."""
         return self._poses[-1].timestamp_s - self._poses[0].timestamp_s if self._poses else 0.0

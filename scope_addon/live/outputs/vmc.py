@@ -71,13 +71,14 @@ def unity_quaternion(R: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
     return quaternion
 
 
-def parse_address(text: str) -> tuple[str, int]:
+def parse_address(text: str, people: int = 1) -> tuple[str, int]:
     """Return host and port of ``HOST:PORT``.
 
+    :param people: to each of whom a port belongs, from that one on.
     :raises UsageError: it is not of that form.
     """
     host, _, port = text.rpartition(":")
-    if not host or not port.isdecimal() or not 0 < int(port) < 65536:
+    if not host or not port.isdecimal() or not 0 < int(port) <= 65536 - people:
         raise UsageError(f"--vmc must be HOST:PORT, such as 127.0.0.1:39539, not {text!r}")
     return host.strip("[]"), int(port)
 
@@ -85,10 +86,12 @@ def parse_address(text: str) -> tuple[str, int]:
 class VmcSender:
     """A context that sends poses to one receiver; UDP neither waits for it nor notices that it is missing.
 
+    :param person: whose poses are sent; a receiver shows one person.
     :raises OutputError: the host is unknown.
     """
 
-    def __init__(self, body: Body, host: str, port: int) -> None:
+    def __init__(self, body: Body, host: str, port: int, person: int = 0) -> None:
+        self._person = person
         try:
             family, _, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[0]
         except (OSError, UnicodeError) as error:
@@ -107,7 +110,9 @@ class VmcSender:
         self._socket.close()
 
     def send(self, pose: LivePose, latency_ms: float) -> None:
-        """Send a pose, in as many datagrams as it needs."""
+        """Send a pose of the person, in as many datagrams as it needs."""
+        if pose.person != self._person:
+            return
         for datagram in datagrams(self.messages(pose)):
             with suppress(OSError):  # nobody listens, or the network is busy
                 self._socket.sendto(datagram, self._address)

@@ -23,7 +23,7 @@ from ...atomic_write import remove_abandoned
 from ...errors import OfflineError, UsageError, VideoError
 from ...footage import shown
 from ...job.live.cameras import camera_source
-from ...job.live.process import LiveProcess, ShownPose
+from ...job.live.process import PRESENCES, LiveProcess, ShownPose
 from ...job.live.request import LiveRequest
 from ...job.process import START_SCRIPT
 from ...options import Place, options_at
@@ -79,7 +79,8 @@ class LiveJob:
         self._kept = self._request.values["keep_footage"]  # the video of a recording, if it is wanted
         self._footage = self._request.source if scene.scope_live.source == "FILE" else ""
         self._scene_body = load_body(self._request.values["body"])
-        self._body = LiveBody(scene, "Live", self._scene_body)
+        names = [f"Live {number + 1}" if number else "Live" for number in range(self._request.values["live_people"])]
+        self._bodies = [LiveBody(scene, name, self._scene_body) for name in names]
         self._before = SceneBefore()
         self._rig = live_rig(scene, self._scene_body) if scene.scope_live.with_rig else None
         self._result: dict[str, Any] | None = None  # the recording's message
@@ -98,7 +99,7 @@ class LiveJob:
     @property
     def has_body(self) -> bool:
         """Whether somebody was seen so far."""
-        return self._body.armature is not None
+        return any(body.armature is not None for body in self._bodies)
 
     @property
     def quiet_s(self) -> float:
@@ -133,7 +134,7 @@ class LiveJob:
         """End the process, and remove what was created."""
         self.cancelled = True
         self.close()
-        self._body.remove()
+        self._remove_bodies()
         if self._rig is not None:
             self._rig.restore()
         self._before.restore()
@@ -169,9 +170,9 @@ class LiveJob:
             self.stop()  # what was recorded is written
         self._record_if_due()
         self._listen()
-        pose = None if self.finishing else self._worker.newest_pose(self._scene_body.K + 1, self._scene_body.P)
-        if pose is not None:
-            self._show(scene, pose)
+        poses = [] if self.finishing else self._worker.newest_poses(self._scene_body.K + 1, self._scene_body.P)
+        if poses:
+            self._show(scene, poses)
         if self._result is None:
             if self.finishing and time.monotonic() - self._stopped_s > _WRITING_S:
                 raise UsageError("the recording was not written in time; record again")
@@ -195,27 +196,40 @@ class LiveJob:
             elif message["event"] == "result":
                 self._result, self._result_s = message, time.monotonic()
 
-    def _show(self, scene: bpy.types.Scene, pose: ShownPose) -> None:
+    def _show(self, scene: bpy.types.Scene, poses: Sequence[ShownPose]) -> None:
+        """Show the newest pose of each person."""
         self.poses += 1
         self._last_pose_s = time.monotonic()
-        self.status.presence = pose.presence
+        self.status.presence = min((pose.presence for pose in poses), key=PRESENCES.index)  # of whoever is seen best
         if self.status.notice and self._last_pose_s - self._notice_s > NOTICE_S:
             self.status.notice = ""
-        if bpy.context.scene == scene:  # in another one nobody sees it
-            created = self._body.show(pose.rotations, pose.pelvis, pose.betas)
-            self.created, self._was_created = created and not self._was_created, True
-            if self.created:
-                select_only(bpy.context.view_layer, self._body.armature)
-            if self._rig is not None:
-                if created and scene.scope_retarget.captured == "hide":
-                    hide(self._body.armature, bpy.context.view_layer)
-                self._rig.show(pose.rotations, pose.pelvis, self._body.betas)
+        if bpy.context.scene != scene:  # in another one nobody sees it
+            return
+        for pose in poses:
+            if pose.person < len(self._bodies):
+                self._show_person(scene, pose)
+
+    def _show_person(self, scene: bpy.types.Scene, pose: ShownPose) -> None:
+        body = self._bodies[pose.person]
+        created = body.show(pose.rotations, pose.pelvis, pose.betas)
+        if created and not self._was_created:
+            self.created = self._was_created = True
+            select_only(bpy.context.view_layer, body.armature)
+        if self._rig is not None and pose.person == 0:
+            if created and scene.scope_retarget.captured == "hide":
+                hide(body.armature, bpy.context.view_layer)
+            self._rig.show(pose.rotations, pose.pelvis, body.betas)
+
+    def _remove_bodies(self) -> None:
+        for body in self._bodies:
+            body.remove()
 
     def _leave_pose(self, scene: bpy.types.Scene) -> None:
         """Leave the last pose, on an armature at rest in the shape that was estimated last."""
         with window_shows(scene):
-            self._body.rest_at_shape()
-            armature = self._body.armature
+            for body in self._bodies:
+                body.rest_at_shape()
+            armature = self._bodies[0].armature
             if self._rig is not None and armature is not None and scene.scope_retarget.captured == "hide":
                 hide(armature, bpy.context.view_layer)
 
@@ -228,7 +242,7 @@ class LiveJob:
         if self._kept and Path(self._kept).is_file():
             self._footage = scene.scope.footage = str(self._kept)  # Capture then captures the take once more
         built = build_capture(scene, contents, body, self._footage, result["report"], options)
-        self._body.remove()
+        self._remove_bodies()
         if self._rig is not None and self._rig.rig is not None:
             self._rig.restore()
             try:
@@ -291,7 +305,9 @@ def live_request(scene: bpy.types.Scene) -> LiveRequest:
             raise UsageError(f"'{settings.camera.strip()}' is no camera; enter its number, 0 for the first")
     names = {option.name for option in options_at(Place.LIVE_WORKER)}
     values = {name: value for name, value in chosen_values(scene).items() if name in names}
-    values["heights_m"] = values["heights_m"][:1]
+    values["heights_m"] = values["heights_m"][: settings.people]
     if settings.keep_footage and settings.source != "FILE":
         values["keep_footage"] = str(kept_footage(scene))
-    return LiveRequest(source, online=online, **values, live_quality=settings.quality.lower())
+    return LiveRequest(
+        source, online=online, **values, live_quality=settings.quality.lower(), live_people=settings.people
+    )

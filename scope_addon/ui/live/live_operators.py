@@ -6,16 +6,14 @@ from __future__ import annotations
 import bpy
 
 from .. import warm_up
-from ..capture.capture_operators import clear_status_bar
 from ..capture.capture_operators import state as capture_state
+from ..capture.job_operator import JobOperator
 from ..reporting import sentence, tip_
-from ..view.sidebar import is_over_tab, redraw_sidebars, redraw_sidebars_twice
+from ..view.sidebar import redraw_sidebars
 from ..view.view_operators import frame_selected, hide_startup_cube
 from ..view.viewports import viewports
 from . import stream_logins
 from .live_state import state, stop_job
-
-TIMER_S = 1 / 60  # poses come at half of this rate
 
 
 def end_live() -> None:
@@ -25,12 +23,17 @@ def end_live() -> None:
     stream_logins.forget()
 
 
-class SCOPE_OT_live(bpy.types.Operator):
+class SCOPE_OT_live(JobOperator):
     """Let a captured body follow the person in front of the camera, until it is stopped"""
 
     bl_idname = "scope.live"
     bl_label = "Start"
     bl_options = {"UNDO"}
+
+    timer_s = 1 / 60  # poses come at half of this rate
+    job_state = state
+    _shown: tuple[object, ...] = ()  # what was drawn last
+    _played = False  # whether the scene's animation was started
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -40,63 +43,29 @@ class SCOPE_OT_live(bpy.types.Operator):
             return False
         return True
 
-    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        """Start from the panel, and continue on a timer."""
-        if bpy.app.background or not self._start(context):
-            return self.execute(context) if bpy.app.background else {"CANCELLED"}
-        manager = context.window_manager
-        self._shown: tuple[object, ...] = ()
-        self._played = False
-        self._timer = manager.event_timer_add(TIMER_S, window=context.window)
-        manager.modal_handler_add(self)
-        redraw_sidebars_twice()
-        return {"RUNNING_MODAL"}
-
-    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        """Step on timer events, cancel on Escape over the panel, pass the others to Blender."""
-        job = state.job
-        if job is None:  # stopped by something else
-            return self._end(context, {"CANCELLED"})
-        if event.type == "ESC" and event.value == "PRESS" and is_over_tab(context.window, event):
-            bpy.ops.scope.cancel_live()
-        if job.cancelled:
-            self.report({"INFO"}, "Live capture cancelled; the scene is unchanged")
-            return self._end(context, {"CANCELLED"})
-        if event.type != "TIMER":
-            return {"PASS_THROUGH"}
-        try:
-            outcome = self._step(context)
-        except Exception:  # Blender drops the operator without calling ``cancel``
-            self._end(context, {"CANCELLED"})
-            raise
-        return self._end(context, outcome) if outcome else {"PASS_THROUGH"}
-
-    def cancel(self, context: bpy.types.Context) -> None:
-        """Stop when Blender opens another file or quits."""
-        self._end(context, {"CANCELLED"})
-
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Refuse to run without a window, whose timer applies the poses."""
         self.report({"ERROR"}, "Live capture needs Blender's window; in a shell, use ./scripts/live")
         return {"CANCELLED"}
 
-    def _start(self, context: bpy.types.Context) -> bool:
+    def start(self, context: bpy.types.Context) -> bool:
+        """Start the job; return whether that worked."""
         state.message, state.scene_uid = "", context.scene.session_uid
         # Imported here: it loads numba and numpy, which would slow down the start of Blender.
         try:
             from .live_job import LiveJob
         except ImportError as error:
-            return self._fail(f"a part of Scope cannot be loaded ({error}); reinstall the extension")
+            return self.fail(f"a part of Scope cannot be loaded ({error}); reinstall the extension")
         from ....solver.errors import ScopeError
 
         warm_up.stop()  # its processor time is the capture's; what it has compiled is kept
         try:
             state.job = LiveJob(context.scene)
         except (ScopeError, OSError) as error:
-            return self._fail(error)
+            return self.fail(error)
         return True
 
-    def _step(self, context: bpy.types.Context) -> set[str] | None:
+    def step(self, context: bpy.types.Context) -> set[str] | None:
         """Advance the job; return None while it is running, and then the operator's outcome."""
         from ....solver.errors import ScopeError
 
@@ -106,7 +75,7 @@ class SCOPE_OT_live(bpy.types.Operator):
         try:
             running = job.step()
         except (ScopeError, OSError, MemoryError) as error:
-            self._fail(error)
+            self.fail(error)
             return {"CANCELLED"}
         if not running:
             for warning in job.warnings:
@@ -129,23 +98,23 @@ class SCOPE_OT_live(bpy.types.Operator):
             redraw_sidebars()
         return None
 
-    def _fail(self, error: Exception | str) -> bool:
-        state.message = sentence(error)
-        stop_job()  # before the report, which raises in a script
-        redraw_sidebars_twice()
-        self.report({"ERROR"}, state.message)
-        return False
+    def ask_to_cancel(self) -> None:
+        """Cancel at once: nothing is lost that took long."""
+        bpy.ops.scope.cancel_live()
 
-    def _end(self, context: bpy.types.Context, outcome: set[str]) -> set[str]:
+    def say_cancelled(self) -> None:
+        """Say that nothing has changed."""
+        self.report({"INFO"}, "Live capture cancelled; the scene is unchanged")
+
+    def stop_job(self) -> None:
+        """End the job in any state."""
         stop_job()
-        if getattr(self, "_played", False):
+
+    def end(self, context: bpy.types.Context, outcome: set[str]) -> set[str]:
+        """Stop the job, the timer and the scene's animation, and return the outcome."""
+        if self._played:
             stop_scene(context)
-        if (timer := getattr(self, "_timer", None)) is not None:
-            context.window_manager.event_timer_remove(timer)
-            self._timer = None
-        clear_status_bar()
-        redraw_sidebars_twice()
-        return outcome
+        return super().end(context, outcome)
 
 
 class _RunningOperator(bpy.types.Operator):

@@ -31,11 +31,12 @@ class SCOPE_PT_live(Tab, bpy.types.Panel):
         else:
             column.prop(settings, "file", text="", icon="FILE_MOVIE")
         column.row(align=True).prop(settings, "quality", expand=True)
+        column.prop(settings, "people")
         _draw_rig(column, context)
-        row = layout.row(align=True)
-        row.enabled = job is None or not (job.recording or job.countdown_s)
-        row.prop(settings, "countdown_s")
-        row.prop(settings, "with_scene")
+        column = layout.column()
+        column.enabled = job is None or not (job.recording or job.countdown_s)
+        column.prop(settings, "countdown_s")
+        column.prop(settings, "with_scene")
         if settings.source != "FILE":
             row = layout.row()
             row.enabled = job is None

@@ -36,33 +36,32 @@ def test_what_is_recorded_is_what_was_shown(folder, networks, body):
 
     def step():
         result.extend(m for m in live.poll() if m["event"] == "result")
-        if (pose := live.newest_pose(body.K + 1, body.P)) is not None:
-            poses.append(pose)
+        if newest := live.newest_poses(body.K + 1, body.P):
+            poses.extend(newest)
             if len(poses) == 8:
                 live.stop()
         return result
 
     wait_for(step, 120)
     wait_for(lambda: not live.alive, 30)
-    assert result[0]["motions"] == [MOTION]
-    motion = Motion.load(folder / MOTION)
+    assert result[0]["motions"] == [MOTION.format(1)]
+    motion = Motion.load(folder / MOTION.format(1))
     live.close()
     assert motion.frames[0] <= poses[0].frame
-    rows = {frame + 1: row for row, frame in enumerate(motion.frames)}  # a pose is given a frame after its time
+    rows = {frame + 2: row for row, frame in enumerate(motion.frames)}  # a pose is given 1.8 frames after its time
     compared = [pose for pose in poses if pose.presence == "seen" and pose.frame in rows]
     assert compared
     for pose in compared:
         pelvis = body.rest_joints(motion.betas)[0] + motion.trans[rows[pose.frame]]
         # In the final shape; a frame that was dropped is filled in from its neighbours.
-        atol = 0.005 if motion.valid[rows[pose.frame]] else 0.04
+        atol = 0.01 if motion.valid[rows[pose.frame]] else 0.15
         np.testing.assert_allclose(pelvis, pose.pelvis, atol=atol)
 
 
 def test_a_recording_begins_when_it_is_asked_for(folder, body):
     commands = Commands()
-    recorder = _Recorder(folder / MOTION, body, FakeSource(), commands)
-    session = SimpleNamespace(camera=None)
-    recorder.begin(session, (640, 480))
+    recorder = _Recorder([folder / "person1.npz"], body, FakeSource(), commands)
+    recorder.begin(SimpleNamespace(sessions=[SimpleNamespace(camera=None)]), (640, 480))
     recorder.send(pose_of(body), 0.0)
     assert recorder.recording is None
     commands.hear(RECORD)
@@ -74,8 +73,8 @@ def test_a_recording_begins_when_it_is_asked_for(folder, body):
 def test_a_recording_with_footage_begins_with_its_first_picture(folder, body):
     commands, added = Commands(), []
     footage = SimpleNamespace(origin=None, add=added.append)
-    recorder = _Recorder(folder / MOTION, body, FakeSource(), commands, footage)
-    recorder.begin(SimpleNamespace(camera=None), (640, 480))
+    recorder = _Recorder([folder / "person1.npz"], body, FakeSource(), commands, footage)
+    recorder.begin(SimpleNamespace(sessions=[SimpleNamespace(camera=None)]), (640, 480))
     recorder.receive("too early")
     commands.hear(RECORD)
     recorder.send(replace(pose_of(body), index=4), 0.0)  # of a picture that came before

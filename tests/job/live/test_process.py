@@ -15,6 +15,7 @@ from ..processes import wait_for
 
 POSE = {
     "event": "pose",
+    "person": 0,
     "frame": 3,
     "presence": "seen",
     "rotations": [[1, 0, 0, 0], [0.6, 0, 0.8, 0]],
@@ -36,7 +37,7 @@ def test_a_pose_is_read():
 
 
 def test_nobody_seen_yet_is_no_pose():
-    assert parse_pose(b'{"event": "pose", "frame": 0, "presence": "lost"}\n', 2, 3) is None
+    assert parse_pose(b'{"event": "pose", "person": 0, "frame": 0, "presence": "lost"}\n', 2, 3) is None
 
 
 @pytest.mark.parametrize(
@@ -53,6 +54,7 @@ def test_nobody_seen_yet_is_no_pose():
         {"betas": [float("nan")] * 3},
         {"presence": "hungry"},
         {"frame": -1},
+        {"person": -1},
     ],
 )
 def test_what_cannot_be_a_pose_is_an_error(changes):
@@ -75,7 +77,7 @@ def process(tmp_path):
             pose = {POSE!r}
             sys.stdin.readline()
             for frame in range(100):
-                print(json.dumps(pose | {{"frame": frame}}), flush=True)
+                print(json.dumps(pose | {{"person": frame % 2, "frame": frame}}), flush=True)
             print(json.dumps({{"event": "notice", "text": "all sent"}}), flush=True)
             for heard in sys.stdin:
                 print(json.dumps({{"event": "notice", "text": heard}}), flush=True)
@@ -97,8 +99,8 @@ def test_only_the_newest_pose_is_seen_and_commands_arrive(process):
         return len(said) >= count
 
     wait_for(lambda: heard(1), 60)
-    assert process.newest_pose(2, 3).frame == 99
-    assert process.newest_pose(2, 3) is None
+    assert [(pose.person, pose.frame) for pose in process.newest_poses(2, 3)] == [(0, 98), (1, 99)]
+    assert process.newest_poses(2, 3) == []
     process.record()
     process.stop()
     wait_for(lambda: heard(3), 60)

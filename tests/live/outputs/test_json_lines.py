@@ -3,6 +3,7 @@
 
 import json
 import socket
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -39,6 +40,17 @@ def test_every_client_gets_the_description_and_then_poses(server, body):
         assert np.allclose(np.linalg.norm(pose["rotations"], axis=1), 1, atol=1e-4)
         file.close()
         client.close()
+
+
+def test_a_client_gets_a_line_of_each_person(body):
+    with JsonServer(body, "127.0.0.1", 0, people=4) as serving:
+        clients, files = connected(serving, 1)
+        files[0].readline()
+        for person in range(4):
+            serving.send(replace(pose_of(body), person=person), 0.0)
+        assert [json.loads(files[0].readline())["person"] for _ in range(4)] == [0, 1, 2, 3]
+        files[0].close()
+        clients[0].close()
 
 
 def test_the_root_rotates_in_the_world_and_joints_relative_to_their_parents(body):

@@ -3,6 +3,7 @@
 
 import socket
 import struct
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -110,6 +111,13 @@ def test_a_pose_is_read_back_from_the_bytes(receiver, body):
     assert bones["LeftUpperArm"][0] < 0 < bones["RightUpperArm"][0]  # Unity's x axis points to the person's right
 
 
+def test_each_receiver_gets_its_own_person(receiver, body):
+    with VmcSender(body, *receiver.getsockname(), person=1) as sender:
+        sender.send(replace(pose_of(body), timestamp_s=7.0), 0.0)
+        sender.send(replace(pose_of(body), timestamp_s=8.0, person=1), 0.0)
+        assert parsed(receiver.recv(65536))[1] == ("/VMC/Ext/T", [8.0])
+
+
 def test_bones_turn_as_in_unity(receiver, body):
     Omega = np.tile(np.eye(3), (body.K + 1, 1, 1))
     Omega[body.joint_names.index("left_shoulder")] = rotations.exp(np.array([0, 0, np.pi / 2]))  # the left arm upwards
@@ -142,8 +150,6 @@ def test_a_converted_rotation_turns_converted_points():
 
 
 def test_before_somebody_was_seen_no_bones_are_sent(body):
-    from dataclasses import replace
-
     sender = VmcSender(body, "127.0.0.1", 39539)
     with sender:
         messages = sender.messages(replace(pose_of(body, presence=Presence.LOST), is_known=False))
@@ -160,6 +166,9 @@ def test_an_address_that_is_none_is_refused(text):
 def test_addresses():
     assert parse_address("127.0.0.1:39539") == ("127.0.0.1", 39539)
     assert parse_address("[::1]:39539") == ("::1", 39539)
+    assert parse_address("host:65533", people=3) == ("host", 65533)
+    with pytest.raises(UsageError, match="--vmc must be HOST:PORT"):
+        parse_address("host:65534", people=3)  # no port is left for the last one
 
 
 def test_an_unknown_host_is_named(body):

@@ -45,13 +45,15 @@ def live(tmp_path, monkeypatch, standing):
                     print(json.dumps({{"event": event}} | values), flush=True)
                 def hear():
                     return sys.stdin.readline().strip()
-                def pose(index, betas=(0.0,) * 10):
+                def pose(index, betas=(0.0,) * 10, person=0):
                     turned = [math.cos(0.1 * index), math.sin(0.1 * index), 0, 0]
-                    send("pose", frame=index, presence="seen", rotations=[turned] + [[1, 0, 0, 0]] * 23,
+                    send("pose", person=person, frame=index, presence="seen", rotations=[turned] + [[1, 0, 0, 0]] * 23,
                          positions=[[0.0, 0.0, 1.0]], betas=betas)
-                def finish():
-                    shutil.copy({str(tmp_path / "standing.npz")!r}, os.path.join(folder, "person1.npz"))
-                    send("result", motions=["person1.npz"],
+                def finish(people=1):
+                    names = [f"person{{k + 1}}.npz" for k in range(people)]
+                    for name in names:
+                        shutil.copy({str(tmp_path / "standing.npz")!r}, os.path.join(folder, name))
+                    send("result", motions=names,
                          report={{"camera": "estimated", "fps": {{"total": 28.0}}, "warnings": []}})
             """)
             + textwrap.dedent(body)
@@ -75,10 +77,10 @@ def to_end(job):
 def test_the_newest_pose_is_shown_and_stays_after_stop(live):
     job = live("pose(1); pose(2); pose(7, [0.5] * 10); hear()")
     until(job, lambda: job.poses)
-    while job.poses < 3 and job._worker._newest is not None:
+    while job.poses < 3 and job._worker._newest:
         job.step()
     assert job.has_body
-    armature = job._body.armature
+    armature = job._bodies[0].armature
     assert bpy.context.view_layer.objects.active == armature
     shown = tuple(armature.pose.bones["pelvis"].rotation_quaternion)
     pid = job.worker.pid
@@ -110,6 +112,39 @@ def test_a_recording_becomes_a_capture_and_the_body_goes(live):
     assert "Live" not in bpy.data.collections
     assert scene.scope.result.frames_per_second == 28.0
     assert not job.worker.job_folder.exists()
+
+
+def test_a_body_follows_each_of_the_people_and_all_are_recorded(live):
+    bpy.context.scene.scope_live.people = 2
+    job = live("""
+        assert request["live_people"] == 2
+        pose(1); pose(1, person=1); pose(1, person=2)
+        assert hear() == "record"; pose(3); pose(5, person=1); assert hear() == "stop"; finish(2)
+    """)
+    until(job, lambda: len(job._worker._newest) == 0 and all(body.armature for body in job._bodies))
+    assert [body.armature.name for body in job._bodies] == ["Live", "Live 2"]
+    assert bpy.context.view_layer.objects.active == job._bodies[0].armature
+    job.record()
+
+    def turned(body):
+        return abs(body.armature.pose.bones["pelvis"].rotation_quaternion.w)
+
+    before = [turned(body) for body in job._bodies]
+    until(job, lambda: all(turned(body) != was for body, was in zip(job._bodies, before, strict=True)))
+    assert turned(job._bodies[0]) != turned(job._bodies[1])
+    job.stop()
+    to_end(job)
+    assert len(bpy.context.scene.scope.capture.all_objects) >= 4  # two armatures, and a mesh each
+    assert not [obj for obj in bpy.data.objects if obj.name.startswith("Live")]
+
+
+def test_cancelling_removes_the_bodies_of_all_people(live):
+    bpy.context.scene.scope_live.people = 3
+    before = inventory()
+    job = live("[pose(1, person=k) for k in range(3)]; hear()")
+    until(job, lambda: all(body.armature for body in job._bodies))
+    job.cancel()
+    assert inventory() == before
 
 
 def test_kept_footage_is_chosen_for_another_capture(live, tmp_path, monkeypatch):
@@ -248,7 +283,7 @@ def test_cancelling_leaves_the_scene_as_it_was(live, recording):
     job = live("pose(1); hear(); hear()")
     until(job, lambda: job.has_body)
     assert [bone.matrix_basis for bone in rig.pose.bones] != posed
-    assert job._body.armature.hide_get()  # as the Retarget section says
+    assert job._bodies[0].armature.hide_get()  # as the Retarget section says
     if recording:
         job.record()
     pid = job.worker.pid
@@ -277,7 +312,7 @@ def test_a_recording_is_retargeted_to_the_rig_that_followed(live):
     ("script", "says"),
     [
         ('send("error", message="camera 0 cannot be opened; check that it is plugged in")', "plugged in"),
-        ('send("pose", rotations=[], positions=[], betas=[]); hear()', "cannot be used"),
+        ('send("pose", person=0, rotations=[], positions=[], betas=[]); hear()', "cannot be used"),
         ("os._exit(3)", "ended with status 3"),
     ],
 )
@@ -312,7 +347,7 @@ def test_silence_of_the_source_is_noticed(live, monkeypatch):
 def test_a_body_that_undo_removed_comes_back_and_the_others_selection_stays(live):
     job = live("pose(1); hear(); pose(2); hear()")
     until(job, lambda: job.has_body)
-    bpy.data.objects.remove(job._body.armature)
+    bpy.data.objects.remove(job._bodies[0].armature)
     bpy.ops.object.empty_add()
     job.record()
     until(job, lambda: job.poses == 2)

@@ -1,0 +1,140 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Several people: each keeps their place, also after they were away, and all stand in one world."""
+
+from __future__ import annotations
+
+from itertools import islice
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scope.scope_addon.capture.camera.intrinsics import choose_camera
+from scope.scope_addon.capture.media.frame import Frame
+from scope.scope_addon.capture.media.video import open_video
+from scope.scope_addon.capture.perception.observation import Observation
+from scope.scope_addon.capture.perception.region import Region
+from scope.scope_addon.capture.tracking.appearance import SIZE
+from scope.scope_addon.capture.tracking.tracker import PeopleTracker
+from scope.scope_addon.cli import SAMPLE
+from scope.scope_addon.live import people as module
+from scope.scope_addon.live.outputs.people_recording import PeopleRecording
+from scope.scope_addon.live.people import LivePeople
+from scope.scope_addon.live.pose import Presence
+from scope.scope_addon.motion import Motion
+
+from .outputs.test_vmc import pose_of
+
+FRAMES = 14
+
+
+def person(x_px, clothes, side_px=300.0):
+    """Somebody at a place in the image, in clothes of one colour."""
+    keypoints = np.full((33, 2), 400.0) + [x_px - 400.0, 0.0]
+    colour = np.zeros((2, SIZE // 2))
+    colour[:, clothes] = 1.0
+    return Observation(
+        keypoints, np.ones(33), np.ones((33, 3)), 1.0, Region((x_px, 400.0), side_px, 0.0), False, colour.ravel()
+    )
+
+
+@pytest.fixture
+def followed(body, monkeypatch):
+    """Return a function that gives the people of a scripted clip, two places: whom each place follows by frame."""
+
+    class Session:
+        def __init__(self, *_):
+            self.seen = []
+
+        def track(self, frame):
+            return script[frame.index]
+
+        def follow(self, frame, observation):
+            self.seen.append(None if observation is None else observation.region.center_px[0])
+            return pose_of(body)
+
+    script = []
+
+    def run(*frames, every_s=0.1):
+        monkeypatch.setattr(module, "LiveSession", Session)
+        people = LivePeople(body, None, None, (800, 800), count=2)
+        script[:] = [list(frame.items()) for frame in frames]
+        for k in range(len(frames)):
+            assert [pose.person for pose in people.step(SimpleNamespace(index=k, timestamp_s=every_s * k))] == [0, 1]
+        return [session.seen for session in people.sessions]
+
+    return run
+
+
+def test_the_largest_person_takes_the_first_place_and_a_third_one_none(followed):
+    a, b, c = person(100, 0, 200.0), person(300, 1, 300.0), person(500, 2, 100.0)
+    assert followed({4: a, 7: b, 9: c}, {9: c, 7: b, 4: a}) == [[300, 300], [100, 100]]
+
+
+def test_who_is_found_again_gets_their_place_back(followed):
+    a, b = person(100, 0), person(500, 1, 290.0)
+    seen = followed({0: a, 1: b}, {}, {5: person(490, 1), 6: person(110, 0)})
+    assert seen == [[100, None, 110], [500, None, 490]]
+
+
+def test_clothes_tell_people_apart_who_were_away_for_long(followed):
+    a, b = person(100, 0), person(500, 1, 290.0)
+    seen = followed({0: a, 1: b}, *[{}] * 40, {5: person(120, 1), 6: person(480, 0)})
+    assert (seen[0][-1], seen[1][-1]) == (480, 120)
+
+
+def test_a_stranger_takes_a_place_only_when_its_person_has_been_away_for_long(followed):
+    a, b = person(100, 0), person(500, 1, 290.0)
+    seen = followed({0: a, 1: b}, {0: a}, {0: a, 5: person(700, 3)})
+    assert seen[1] == [500, None, None]
+    seen = followed({0: a, 1: b}, *[{0: a}] * 40, {0: a, 5: person(700, 3)})
+    assert seen[1][-1] == 700
+
+
+@pytest.fixture(scope="module")
+def beside(body, networks):
+    """People and poses of the sample clip beside itself."""
+    with open_video(SAMPLE) as video:
+        frames = [Frame(f.index, f.timestamp_s, np.hstack([f.image_rgb] * 2)) for f in islice(video, FRAMES)]
+    height, width = frames[0].image_rgb.shape[:2]
+    camera = choose_camera(width, height, fov_deg=85.0)
+    people = LivePeople(body, PeopleTracker("fast", 2, 2), camera, (width, height), count=2)
+    return people, [people.step(frame) for frame in frames], (width, height)
+
+
+def test_both_are_seen_in_one_world(beside):
+    people, steps, _ = beside
+    for poses in steps:
+        assert [pose.presence for pose in poses] == [Presence.SEEN] * 2
+        assert np.array_equal(poses[0].T_world_camera, poses[1].T_world_camera)
+    assert people.sessions[0].camera is people.sessions[1].camera
+    first, second = steps[-1]
+    apart = second.joints[0] - first.joints[0]
+    assert 1.0 < np.hypot(*apart[:2]) < 4.0
+    for pose in (first, second):
+        assert abs(pose.joints[[10, 11], 2].min()) < 0.1  # toes on the floor
+    relative = [pose.joints - pose.joints[0] for pose in (first, second)]
+    assert np.median(np.linalg.norm(relative[0] - relative[1], axis=1)) < 0.15  # seen from two sides
+
+
+def test_the_recordings_begin_together(beside, body, tmp_path):
+    people, steps, size = beside
+    source = SimpleNamespace(name="two", fps=30)
+    paths = [tmp_path / "a.npz", tmp_path / "b.npz"]
+    recording = PeopleRecording(paths, body, source, from_zero=True)
+    recording.begin(people, size)
+    for k, poses in enumerate(steps):
+        for pose in poses[: 1 if k < 4 else 2]:  # the second one comes later
+            recording.send(pose, 0.0)
+    assert recording.save() == paths
+    first, second = map(Motion.load, paths)
+    assert (first.frames[0], second.frames[0]) == (0, 4)
+    assert np.array_equal(first.world_from_camera[-1], second.world_from_camera[-1])
+
+
+def test_who_was_never_seen_has_no_file(beside, body, tmp_path):
+    people, steps, size = beside
+    recording = PeopleRecording([tmp_path / "a.npz", tmp_path / "b.npz"], body, SimpleNamespace(name="two", fps=30))
+    recording.begin(people, size)
+    for poses in steps:
+        recording.send(poses[0], 0.0)
+    assert recording.save() == [tmp_path / "a.npz"]
