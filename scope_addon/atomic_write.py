@@ -11,19 +11,16 @@ import contextlib
 import errno
 import glob
 import os
-import platform
 import stat
 import tempfile
-import time
-import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from ..solver.processes import is_abandoned, owner
 from .errors import OutputError
 
 _temporary_files: set[Path] = set()
-_ABANDONED_S = 24 * 3600.0  # age from which a temporary file is removed if its process cannot be asked about
 
 
 @contextmanager
@@ -41,7 +38,7 @@ def atomic_path(path: Path) -> Iterator[Path]:
     target = resolve_link(path)
     start, suffix = _temporary_name(path)
     _remove_abandoned(target.parent, start)
-    handle, name = tempfile.mkstemp(prefix=f"{start}{computer()}-{os.getpid()}-", suffix=suffix, dir=target.parent)
+    handle, name = tempfile.mkstemp(prefix=f"{start}{owner()}-", suffix=suffix, dir=target.parent)
     temporary = Path(name)
     _temporary_files.add(temporary)
     try:
@@ -100,30 +97,8 @@ def _remove_abandoned(folder: Path, start: str) -> None:
     """Remove temporary files of processes that do not run any more, and the drafts of their libraries."""
     with contextlib.suppress(OSError):
         for path in folder.glob(f"{glob.escape(start)}*-*-*"):
-            where, process, _ = path.name.removeprefix(start).split("-", 2)
-            if len(where) != len(computer()) or not process.isdecimal():
-                continue  # somebody else's name
-            old = time.time() - path.stat().st_mtime > _ABANDONED_S
-            if old or (where == computer() and not runs(int(process))):
+            if is_abandoned(path, path.name.removeprefix(start)):
                 path.unlink(missing_ok=True)
-
-
-def computer() -> str:
-    """Return a short name of this computer: folders may be shared with others."""
-    return f"{zlib.crc32(platform.node().encode('utf-8', 'replace')):08x}"
-
-
-def runs(process: int) -> bool:
-    """Return whether a process of this computer runs, or cannot be asked about."""
-    if os.name == "nt":  # where the signal 0 would end it
-        return True
-    try:
-        os.kill(process, 0)
-    except ProcessLookupError:
-        return False
-    except (OSError, OverflowError):
-        pass
-    return True
 
 
 def remove_temporary_files() -> None:

@@ -7,7 +7,6 @@ earlier file or the complete new one.
 
 from __future__ import annotations
 
-import os
 import secrets
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -17,7 +16,7 @@ from typing import Any
 import fsspec
 
 from ...solver.errors import InputError, ScopeError
-from ..atomic_write import computer, runs
+from ...solver.processes import computer, owner, runs
 from ..errors import OutputError, UsageError
 from ..footage import is_url
 from ..job.batch import REPORT_NAME
@@ -144,7 +143,7 @@ class RemoteStaging:
     def __init__(self, out: str) -> None:
         self._out = out.rstrip("/")
         self.token = secrets.token_hex(16)
-        self.folder = f"{self._out}/{ATTEMPTS}/{computer()}-{os.getpid()}-{self.token[:8]}"
+        self.folder = f"{self._out}/{ATTEMPTS}/{owner()}-{self.token[:8]}"
         with store_errors(OutputError, out):
             self._remove_abandoned()
             file_system, path = _open(f"{self.folder}/{TOKEN}")

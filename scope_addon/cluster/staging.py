@@ -15,7 +15,8 @@ import time
 from pathlib import Path
 from typing import Any
 
-from ..atomic_write import atomic_path, computer, reason, resolve_link, runs
+from ...solver.processes import computer, owner, runs
+from ..atomic_write import atomic_path, reason, resolve_link
 from ..errors import OutputError
 from ..job.clips.task import file_hash
 
@@ -35,7 +36,7 @@ class Staging:
         self._out = out
         self.token = secrets.token_hex(16)
         _remove_abandoned(out / ATTEMPTS)
-        self.folder = out / ATTEMPTS / f"{computer()}-{os.getpid()}-{self.token[:8]}"
+        self.folder = out / ATTEMPTS / f"{owner()}-{self.token[:8]}"
         try:
             self.folder.mkdir(parents=True)
             (self.folder / TOKEN).write_text(self.token)

@@ -129,14 +129,16 @@ class Batch:
         if entry.get("status") not in ("done", "skipped", "no_person"):
             return False
         outputs = entry.get("outputs")
-        return isinstance(outputs, list) and all(isinstance(p, str) and (self.out / p).is_file() for p in outputs)
+        with suppress(OSError):  # of a name that no file can have
+            return isinstance(outputs, list) and all(isinstance(p, str) and (self.out / p).is_file() for p in outputs)
+        return False
 
     def _previous_entries(self) -> dict[str, Entry]:
         """Return the entries of the previous report by name; empty if the report is missing or damaged."""
         try:
             entries = json.loads(self.report_file.read_text(encoding="utf-8"))["files"]
             return {e["name"]: e for e in entries if isinstance(e["status"], str)}
-        except (OSError, ValueError, KeyError, TypeError):
+        except (OSError, ValueError, KeyError, TypeError, RecursionError):
             return {}
 
     def _write_report(

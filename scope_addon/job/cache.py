@@ -24,6 +24,7 @@ _VERSION = re.compile(
     r"(\w+-[0-9a-f]{8})-[0-9a-f]{12}"
 )  # a folder of solver/compiled/code_folders.py, less its program
 _ABANDONED_S = 24 * 3600.0  # age above which a job folder belongs to no running process
+_JOB = "job-"  # begins the name of a job's folder, before its owner
 
 
 class CachedCapture(NamedTuple):
@@ -53,9 +54,9 @@ class Cache:
             content = json.loads((folder / REPORT).read_text(encoding="utf-8"))
             motions = [folder / Path(name).name for name in content["motions"]]
             report = content["report"]
-        except (OSError, ValueError, KeyError, TypeError):
-            return None
-        if not motions or not all(m.is_file() for m in motions):
+            if not motions or not all(m.is_file() for m in motions):
+                return None
+        except (OSError, ValueError, KeyError, TypeError, RecursionError):
             return None
         with suppress(OSError):
             os.utime(folder)  # mark as used, so that it is pruned last
@@ -66,17 +67,16 @@ class Cache:
 
         :raises OutputError: the cache folder cannot be written to.
         """
-        import shutil
         import tempfile
+
+        from ...solver.processes import owner
 
         jobs = self.root / "jobs"
         try:
             jobs.mkdir(parents=True, exist_ok=True)
             self.kernels.mkdir(exist_ok=True)
-            for folder, used in _by_time(jobs):
-                if time.time() - used > _ABANDONED_S:
-                    shutil.rmtree(folder, ignore_errors=True)
-            return Path(tempfile.mkdtemp(prefix="job-", dir=jobs))
+            _remove_abandoned(jobs)
+            return Path(tempfile.mkdtemp(prefix=f"{_JOB}{owner()}-", dir=jobs))
         except OSError as error:
             raise self._not_writable(error) from error
 
@@ -157,6 +157,18 @@ class Cache:
             else:
                 newest.add(version[1])
         return [path for path in replaced if path.is_dir()]
+
+
+def _remove_abandoned(jobs: Path) -> None:
+    """Remove the folders of jobs whose Blender does not run any more, and those that are a day old."""
+    import shutil
+
+    from ...solver.processes import is_abandoned
+
+    for folder, used in _by_time(jobs):
+        with suppress(OSError):
+            if time.time() - used > _ABANDONED_S or is_abandoned(folder, folder.name.removeprefix(_JOB)):
+                shutil.rmtree(folder, ignore_errors=True)
 
 
 def _by_time(folder: Path) -> list[tuple[Path, float]]:

@@ -22,7 +22,7 @@ from .request import WARM_UP, JobRequest
 from .unfinished import unfinished_capture
 
 _REMOVAL_ATTEMPTS = 20  # an attempt fails if a file is created during it
-_NICENESS = 5  # of a capture, behind Blender's window; compiling ahead of it has the lowest priority
+_NICENESS = 12  # of a capture: with 5, drawing without a graphics card waits for it; compiling ahead of it has 19
 _MIN_INTERVAL_S = 0.05  # between two progress messages of one stage
 
 

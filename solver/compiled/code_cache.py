@@ -19,7 +19,7 @@ from numba.core import serialize
 from numba.core.caching import _Cache
 from numba.core.compiler import CompileResult
 
-from .code_files import SUFFIX, read_code, remove_code, write_code
+from .code_files import SUFFIX, read_code, remove_code, remove_drafts, write_code
 from .code_folders import PACKAGE, SOLVER, Area, digest_of, mark_used
 
 _rebuild: Any = CompileResult._rebuild  # these declare no types
@@ -139,6 +139,7 @@ def _area_of(module: str, sources: Path) -> Area:
 
 @cache
 def _used(area: Area, folder: Path) -> None:
-    """Note, once in a process, that a folder is in use, and remove what it replaces."""
+    """Note, once in a process, that a folder is in use; remove what it replaces, and what a kill left in it."""
     mark_used(folder)
+    remove_drafts(folder)
     area.remove_stale(folder)

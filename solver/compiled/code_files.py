@@ -20,6 +20,8 @@ import uuid
 from contextlib import suppress
 from pathlib import Path
 
+from ..processes import is_abandoned, owner
+
 SUFFIX = ".code"
 _MAGIC = b"Scope machine code 1\n"
 _OPEN = os.O_RDONLY | getattr(os, "O_BINARY", 0) | getattr(os, "O_NONBLOCK", 0)  # a named pipe must not block
@@ -54,12 +56,12 @@ def read_code(path: Path, key: str, *, trusted: bool) -> bytes | None:
 
 
 def write_code(path: Path, key: str, payload: bytes) -> None:
-    """Write a file that is either complete or not there.
+    """Write a file that is either complete or not there. What a kill leaves, `remove_drafts` removes.
 
     :raises OSError: the system refused.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(f"{path.name}.{uuid.uuid4().hex[:8]}")
+    temporary = path.with_name(f"{path.name}.{owner()}-{uuid.uuid4().hex[:8]}")
     try:
         # Nobody else may write to it, also where new files are the group's as well: it would not be read again.
         with open(os.open(temporary, _CREATE, 0o644), "wb") as file:
@@ -68,6 +70,15 @@ def write_code(path: Path, key: str, payload: bytes) -> None:
     except OSError:
         remove_code(temporary)
         raise
+
+
+def remove_drafts(folder: Path) -> None:
+    """Remove what processes that do not run any more have left of writing files in a folder."""
+    with suppress(OSError):
+        for draft in folder.glob(f"*{SUFFIX}.*-*-*"):
+            with suppress(OSError):  # another process has removed it
+                if is_abandoned(draft, draft.suffix[1:]):
+                    remove_code(draft)
 
 
 def remove_code(path: Path) -> None:

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ModelFileError
+from .regular_file import in_one_line
 
 LARGEST_ARRAY = 1 << 28  # bytes unpacked; SMPL-X's 400 shape directions in float64 have 100 million
 
@@ -69,7 +70,7 @@ def read_members(path: Path, wanted: Collection[str], shape_of: str) -> tuple[di
     except ModelFileError as cause:
         raise ModelFileError(f"{path} cannot be used as a body: {cause}") from None
     except _UNREADABLE as cause:
-        raise ModelFileError(f"{path} is not a readable body file ({cause}); download it again") from cause
+        raise ModelFileError(f"{path} is not a readable body file ({in_one_line(cause)}); download it again") from cause
     return arrays, shape
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from .regular_file import check_regular
+from .regular_file import check_regular, in_one_line
 
 LARGEST_BYTES = 4 << 30  # unpacked; an hour of SMPL+H motion at 60 fps takes a quarter of this
 
@@ -54,4 +54,4 @@ def read_npz(
     except FileNotFoundError as cause:
         raise error(f"{path} does not exist; choose an existing {what}") from cause
     except _BROKEN as cause:
-        raise error(f"{path} is not a readable {what} ({cause}); choose another file") from cause
+        raise error(f"{path} is not a readable {what} ({in_one_line(cause)}); choose another file") from cause

@@ -8,6 +8,13 @@ from pathlib import Path
 
 from ..errors import InputError
 
+_LONGEST = 200  # characters
+
+
+def in_one_line(cause: Exception) -> str:
+    """Return what another library said, for a message: one line of moderate length."""
+    return " ".join(str(cause).split())[:_LONGEST]
+
 
 def check_regular(path: Path, error: type[InputError], what: str, largest_bytes: int) -> None:
     """Refuse a path that is a pipe or a device, or a file that is too large. What does not exist is not refused.

@@ -21,6 +21,7 @@ from typing import Any
 
 from ..errors import ModelFileError
 from .pickled_values import Discarded, Global, stand_in
+from .regular_file import in_one_line
 
 LARGEST_FILE = 1 << 30  # bytes; the largest official SMPL-X pickle has half of it
 MOST_OPCODES = 200_000  # official files need a few thousand
@@ -49,7 +50,7 @@ def read_pickle(path: Path, what: str = "a body") -> dict[str, Any]:
     except ModelFileError as cause:
         raise ModelFileError(f"{path} cannot be used as {what}: {cause}; get it from its publisher again") from None
     except _UNREADABLE as cause:
-        raise ModelFileError(f"{path} is not a readable pickle ({cause}); download it again") from cause
+        raise ModelFileError(f"{path} is not a readable pickle ({in_one_line(cause)}); download it again") from cause
     if not isinstance(result, dict):
         raise ModelFileError(f"{path} contains a {type(result).__name__}, not a table of arrays; choose another file")
     return result

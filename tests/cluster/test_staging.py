@@ -7,9 +7,9 @@ import subprocess
 import sys
 
 import pytest
-from scope.scope_addon.atomic_write import computer
 from scope.scope_addon.cluster.staging import TOKEN, Staging
 from scope.scope_addon.errors import OutputError
+from scope.solver.processes import computer
 
 
 @pytest.fixture

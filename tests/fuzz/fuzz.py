@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Run the targets on damaged inputs: ``./scripts/fuzz [SECONDS]``. What fails is kept in build/fuzz/.
+"""Run the targets on damaged inputs: ``./scripts/fuzz [SECONDS]``, ``./scripts/fuzz --bytes [N]``.
+
+What fails is kept in build/fuzz/.
 
 Each target runs in a process of its own, because a library may crash; the input is on disk before it is read.
 """
@@ -24,8 +26,10 @@ from .targets import TARGETS
 ROOT = Path(__file__).resolve().parents[2]
 CORPUS = Path(__file__).with_name("corpus")
 FOUND = ROOT / "build" / "fuzz"
+RANDOM_BYTES = 10_000_000  # for every target, before a release
 SLOWEST_S = 20.0  # of one input; a hang ends the process
 _STACKED = 0.3  # share of inputs that are damaged again
+_LARGEST_NOISE = 16.0  # of a file of random bytes, in powers of two
 
 
 def inputs(name: str, folder: Path, seed: int) -> Iterator[Path]:
@@ -38,6 +42,23 @@ def inputs(name: str, folder: Path, seed: int) -> Iterator[Path]:
         data = mutate(chance.choice(pool), chance)
         while chance.random() < _STACKED:
             data = mutate(data, chance)
+        path = folder / f"input{chance.choice(target.suffixes)}"
+        path.write_bytes(data)
+        yield path
+
+
+def random_inputs(name: str, folder: Path, seed: int, count: int) -> Iterator[Path]:
+    """Yield files of random bytes, and valid inputs of which a part is replaced by random bytes, ``count`` in all."""
+    target, chance = TARGETS[name], random.Random(f"{name} {seed}")
+    pool = target.seeds(folder)
+    while count > 0:
+        noise = chance.randbytes(min(count, round(2 ** chance.uniform(0, _LARGEST_NOISE))))
+        count -= len(noise)
+        data = noise
+        if chance.random() < 0.5:
+            whole = chance.choice(pool)
+            start = chance.randrange(len(whole) + 1)
+            data = whole[:start] + noise + whole[start + len(noise) :]
         path = folder / f"input{chance.choice(target.suffixes)}"
         path.write_bytes(data)
         yield path
@@ -64,21 +85,32 @@ def check(name: str, path: Path) -> None:
                 raise AssertionError(f"several lines: {error}") from error
 
 
-def run_target(name: str, seconds: float, seed: int) -> None:
-    """Read inputs for some time; the last one stays when the process ends by an exception or a crash."""
+def run_target(name: str, seconds: float, seed: int, count: int = 0) -> None:
+    """Read inputs; the last one stays when the process ends by an exception or a crash.
+
+    :param seconds: for how long damaged inputs are read.
+    :param count: of random bytes to read instead.
+    """
     import faulthandler
 
     folder = FOUND / name
     folder.mkdir(parents=True, exist_ok=True)
-    end, count = time.monotonic() + seconds, 0
-    for path in inputs(name, folder, seed):
+    end, done = time.monotonic() + seconds, 0
+    for path in random_inputs(name, folder, seed, count) if count else inputs(name, folder, seed):
         faulthandler.dump_traceback_later(SLOWEST_S, exit=True)
         check(name, path)
         faulthandler.cancel_dump_traceback_later()
-        count += 1
-        if time.monotonic() > end:
+        done += 1
+        if not count and time.monotonic() > end:
             break
-    print(f"{name}: {count} inputs", flush=True)
+    random_bytes = f" with {count} random bytes" if count else ""
+    print(f"{name}: {done} inputs{random_bytes}, at most {_peak_megabytes():.0f} MB of memory", flush=True)
+
+
+def _peak_megabytes() -> float:
+    import resource
+
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / (1e6 if sys.platform == "darwin" else 1e3)
 
 
 def main(seconds: float) -> int:
@@ -87,21 +119,35 @@ def main(seconds: float) -> int:
     for name in TARGETS:
         end = time.monotonic() + seconds / len(TARGETS)
         while (left := end - time.monotonic()) > 0:
-            seed = int.from_bytes(os.urandom(4), "little")
-            command = [sys.executable, "-m", __spec__.name, name, str(left), str(seed)]
-            done = subprocess.run(command, stderr=subprocess.PIPE, text=True, errors="replace", check=False)
-            if done.returncode == 0:
+            if _is_good(name, str(left)):
                 break
             failed += 1
-            last = max((FOUND / name).glob("input.*"), key=lambda path: path.stat().st_mtime)
-            kept = FOUND / f"{name}-{hashlib.sha256(last.read_bytes()).hexdigest()[:12]}{last.suffix}"
-            kept.write_bytes(last.read_bytes())
-            print(f"{name}: status {done.returncode} on {kept}\n{done.stderr[-1500:]}", flush=True)
     return failed
 
 
+def read_random_bytes(count: int) -> int:
+    """Have every target read so many random bytes; return how many failed."""
+    return sum(not _is_good(name, "0", str(count)) for name in TARGETS)
+
+
+def _is_good(name: str, *limits: str) -> bool:
+    """Run a target in a process of its own; keep the input that it failed on."""
+    seed = str(int.from_bytes(os.urandom(4), "little"))
+    command = [sys.executable, "-m", __spec__.name, name, limits[0], seed, *limits[1:]]
+    done = subprocess.run(command, stderr=subprocess.PIPE, text=True, errors="replace", check=False)
+    if done.returncode == 0:
+        return True
+    last = max((FOUND / name).glob("input.*"), key=lambda path: path.stat().st_mtime)
+    kept = FOUND / f"{name}-{hashlib.sha256(last.read_bytes()).hexdigest()[:12]}{last.suffix}"
+    kept.write_bytes(last.read_bytes())
+    print(f"{name}: status {done.returncode} on {kept}\n{done.stderr[-1500:]}", flush=True)
+    return False
+
+
 if __name__ == "__main__":
-    if len(sys.argv) == 4:
-        run_target(sys.argv[1], float(sys.argv[2]), int(sys.argv[3]))
+    if sys.argv[1:2] == ["--bytes"]:
+        sys.exit(min(read_random_bytes(int(sys.argv[2]) if len(sys.argv) > 2 else RANDOM_BYTES), 1))
+    if len(sys.argv) >= 4:
+        run_target(sys.argv[1], float(sys.argv[2]), int(sys.argv[3]), int(*sys.argv[4:]))
         os._exit(0)  # without Blender's exit handlers
     sys.exit(min(main(float(sys.argv[1]) if len(sys.argv) > 1 else 120.0), 1))

@@ -102,7 +102,8 @@ def _arrays(data: bytes, chance: random.Random) -> bytes:
         elif way == 2 and value.ndim:
             value = value[: chance.randrange(len(value) + 1)]
         elif way == 3 and value.dtype.kind in "iu" and value.size:
-            value.reshape(-1)[chance.randrange(value.size)] = chance.choice((0, 1, 99, 2**31 - 1))
+            number = np.int64(chance.choice((0, 1, 99, 2**31 - 1)))
+            value.reshape(-1)[chance.randrange(value.size)] = number.astype(value.dtype)
         else:
             value = value[None]
         arrays[key] = value

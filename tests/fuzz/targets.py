@@ -16,6 +16,8 @@ from typing import Any
 
 import numpy as np
 
+from . import own_targets as own
+
 ASSETS = Path(__file__).resolve().parents[2] / "assets"
 
 
@@ -90,29 +92,6 @@ def _rig_source(path: Path) -> None:
     from scope.scope_addon.retarget.rig_source import rig_source
 
     rig_source(path)
-
-
-def _read_request(path: Path) -> None:
-    from scope.scope_addon.job.request import JobRequest
-
-    JobRequest.from_json(path.read_bytes().decode("utf-8", "replace"))
-
-
-def _read_reply(path: Path) -> None:
-    from scope.scope_addon.job.messages import parse_message
-    from scope.scope_addon.job.progress import JobProgress
-
-    progress = JobProgress()
-    for line in path.read_bytes().splitlines(keepends=True):
-        message = parse_message(line)
-        if message and message["event"] == "progress":
-            progress.update(message["stage"], message["done"], message["total"])
-            assert all("\n" not in text for text in progress.lines())
-        if message and message["event"] == "result" and "motions" in message:
-            assert all((path.parent / name).parent == path.parent for name in message["motions"])
-        if message and message["event"] == "preview":
-            assert (path.parent / message["file"]).parent == path.parent
-            assert 0 < 4 * message["width"] * message["height"] < 1 << 27
 
 
 def _pictures(_: Path) -> list[bytes]:
@@ -234,23 +213,6 @@ def _rigs(_: Path) -> list[bytes]:
     return [glb, separate, fbx]
 
 
-def _requests(_: Path) -> list[bytes]:
-    from scope.scope_addon.options import Place, options_at
-
-    values = {option.name: option.default for option in options_at(Place.WORKER)}
-    return [json.dumps({"footage": "walk.mp4", **values}, default=str).encode()]
-
-
-def _replies(_: Path) -> list[bytes]:
-    messages: list[dict[str, Any]] = [
-        {"event": "progress", "stage": "solving", "done": 3, "total": 10},
-        {"event": "preview", "file": "preview.rgba", "width": 320, "height": 180, "frame": 7},
-        {"event": "result", "motions": ["person1.npz"], "report": {"fps": {"total": 9.5}, "warnings": ["dark"]}},
-        {"event": "error", "message": "the footage is too short"},
-    ]
-    return [json.dumps(message).encode() + b"\n" for message in messages]
-
-
 TARGETS = {
     "picture": Target(_open_picture_or_video, (".png", ".jpg", ".webp", ".tiff", ".bmp", ".heic"), _pictures),
     "video": Target(_open_picture_or_video, (".mp4", ".mov"), _videos),
@@ -264,6 +226,13 @@ TARGETS = {
     "bone_map": Target(_load_bone_map, (".json",), _bone_maps),
     "network": Target(_check_network, (".onnx",), _networks),
     "rig": Target(_rig_source, (".glb", ".gltf", ".fbx"), _rigs),
-    "reply": Target(_read_reply, (".json",), _replies),
-    "request": Target(_read_request, (".json",), _requests),
+    "reply": Target(own.read_reply, (".json",), own.replies),
+    "request": Target(own.read_request, (".json",), own.requests),
+    "answer": Target(own.read_answer, (".bin",), own.answers),
+    "live_reply": Target(own.read_live_reply, (".json",), own.live_replies),
+    "expression_map": Target(own.read_expression_map, (".json",), own.expression_maps),
+    "description": Target(own.read_description, (".json",), own.descriptions),
+    "estimates": Target(own.find_estimates, (".npz",), own.estimates),
+    "cached_report": Target(own.find_capture, (".json",), own.cached_reports),
+    "batch_report": Target(own.read_batch_report, (".json",), own.batch_reports),
 }

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from scope.solver.errors import ScopeError
 
-from .fuzz import CORPUS, check, inputs
+from .fuzz import CORPUS, check, inputs, random_inputs
 from .targets import TARGETS
 
 COUNT = {"picture": 60, "video": 100, "body": 20, "motion": 100}  # of inputs, in some 10 s of CPU
@@ -19,6 +19,12 @@ WHOLE = ("picture", "video", "exif", "heif", "quicktime", "motion", "calibration
 @pytest.mark.parametrize("name", TARGETS)
 def test_damaged_inputs_raise_nothing_but_ours(tmp_path: Path, name: str) -> None:
     for path in islice(inputs(name, tmp_path, seed=1), COUNT.get(name, 250)):
+        check(name, path)
+
+
+@pytest.mark.parametrize("name", TARGETS)
+def test_random_bytes_raise_nothing_but_ours(tmp_path: Path, name: str) -> None:
+    for path in random_inputs(name, tmp_path, seed=1, count=30_000):
         check(name, path)
 
 

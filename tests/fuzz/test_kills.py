@@ -22,6 +22,9 @@ BY_NAME = {command.name: command for command in COMMANDS}
         ("npz", NO_MEMORY, (-1,)),
         ("blend", FULL, (7,)),  # Blender does not say so
         ("usdc", FULL, (10,)),  # nor does it here
+        ("cache", KILL, (23,)),  # before a capture is moved into it
+        ("cache", FULL, (5,)),
+        ("compile", KILL, (8,)),  # before it renames
     ],
 )
 def test_files_are_old_or_whole_and_the_next_run_is_good(name: str, action: str, calls: tuple[int, ...]) -> None:

@@ -180,7 +180,9 @@ def test_a_moved_folder_of_footage_is_still_finished(folder, tmp_path):
 def test_a_damaged_report_is_ignored(folder, tmp_path):
     out = tmp_path / "out"
     batch(folder, out).run(1)
-    for text in ("", "{", "[]", '{"files": 3}', '{"files": [{"name": "a", "status": {}, "key": 1}]}'):
+    unusable = {"name": "a", "status": "done", "outputs": ["x" * 300]}
+    texts = ("", "{", "[]", '{"files": 3}', '{"files": [{"name": "a", "status": {}, "key": 1}]}')
+    for text in (*texts, '{"a":' * 100_000, json.dumps({"files": [unusable]})):
         calls(folder)
         (out / REPORT_NAME).write_text(text)
         batch(folder, out).run(1)
@@ -317,7 +319,7 @@ def test_the_clips_of_a_killed_batch_end_and_leave_no_partial_file(tmp_path, at)
         "cli.run()\n"
     )
     argv = ["batch", str(clips), "--out", str(out), "--jobs", "2", "--formats", "npz", "--overlays"]
-    argv += ["--quality", "fast", "--end", "1"]
+    argv += ["--quality", "fast", "--end", "1", "--threads", "1"]
     code = (
         "import sys\n"
         "from scope.scope_addon.cli import main\n"
@@ -436,7 +438,7 @@ def test_the_real_capture_of_a_folder(tmp_path, capfd):
     shutil.copy(SAMPLE, clips / "walk.mp4")
     (clips / "text.mp4").write_text("this is not a video")
     argv = ["batch", str(clips), "--out", str(tmp_path / "out"), "--jobs", "2", "--formats", "npz"]
-    argv += ["--quality", "fast", "--end", "0.3", "--json"]
+    argv += ["--quality", "fast", "--end", "0.3", "--threads", "1", "--json"]
     assert main(argv) == 1
     report = json.loads(capfd.readouterr().out)
     entries = {e["file"]: e for e in report["files"]}
@@ -444,5 +446,5 @@ def test_the_real_capture_of_a_folder(tmp_path, capfd):
     assert entries["walk.mp4"]["outputs"] == ["walk.npz"]
     assert entries["walk.mp4"]["report"]["people"] == 1
     assert "text.mp4" in entries["text.mp4"]["message"]
-    assert report["options"] == {"--quality": "fast", "--end": "0.3"}
+    assert report["options"] == {"--quality": "fast", "--end": "0.3", "--threads": "1"}
     assert sorted(p.name for p in (tmp_path / "out").iterdir()) == [REPORT_NAME, "walk.npz"]

@@ -3,6 +3,8 @@
 
 import os
 import shutil
+import subprocess
+import sys
 import time
 from pathlib import Path
 
@@ -39,6 +41,13 @@ def test_a_damaged_capture_is_not_found(cache):
     assert cache.find("a") is None
     add(cache, "a")
     assert cache.find("a") is not None
+
+
+@pytest.mark.parametrize("content", ['{"motions":' * 100_000, '{"report": {}, "motions": ["' + "x" * 300 + '.npz"]}'])
+def test_a_report_that_nothing_can_be_done_with_is_not_found(cache, content):
+    add(cache, "a")
+    (cache.root / "captures" / "a" / "report.json").write_text(content)
+    assert cache.find("a") is None
 
 
 def test_names_from_a_report_cannot_leave_the_folder(cache):
@@ -94,6 +103,19 @@ def test_abandoned_jobs_are_removed_and_running_ones_kept(cache):
     cache.new_job_folder()
     assert running.exists()
     assert not abandoned.exists()
+
+
+def test_the_folder_of_a_killed_blender_is_removed_at_once(cache):
+    """Its worker may have ended before it."""
+    ended = subprocess.Popen([sys.executable, "-c", ""])
+    ended.wait()
+    running = cache.new_job_folder()
+    killed = running.with_name(running.name.replace(f"-{os.getpid()}-", f"-{ended.pid}-"))
+    elsewhere = running.with_name(f"job-00000000-{ended.pid}-x")
+    for folder in (killed, elsewhere):
+        folder.mkdir()
+    cache.new_job_folder()
+    assert (running.exists(), killed.exists(), elsewhere.exists()) == (True, False, True)
 
 
 def test_an_unwritable_folder_is_an_error(tmp_path):

@@ -18,7 +18,7 @@ from scope.scope_addon.job.worker import Reporter, run
 from scope.scope_addon.job.warm_up import ROOT
 from scope.solver.compiled.code_cache import compiled_kernels
 with tempfile.TemporaryDirectory() as folder:
-    status = run(JobRequest(str(SAMPLE), quality="fast", end="0.5"), Path(folder), Reporter(sys.stderr))
+    status = run(JobRequest(str(SAMPLE), quality="fast", end="0.5", threads=1), Path(folder), Reporter(sys.stderr))
 print(json.dumps([status, compiled_kernels(ROOT)]))
 """
 

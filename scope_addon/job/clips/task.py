@@ -168,7 +168,7 @@ def _last_object(text: str) -> dict[str, Any] | None:
         if line.startswith("{"):
             try:
                 report = json.loads(line)
-            except ValueError:
+            except (ValueError, RecursionError):
                 return None
             return report if isinstance(report, dict) else None
     return None

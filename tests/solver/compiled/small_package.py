@@ -4,9 +4,9 @@
 import shutil
 from pathlib import Path
 
-import scope.solver.compiled
+import scope.solver
 
-FILES = ("kernel", "pipeline", "code_cache", "code_files", "code_folders")
+FILES = tuple(f"compiled/{name}.py" for name in ("kernel", "pipeline", "code_cache", "code_files", "code_folders"))
 
 
 def make_package(folder: Path) -> Path:
@@ -15,6 +15,6 @@ def make_package(folder: Path) -> Path:
     (package / "compiled").mkdir(parents=True)
     for name in ("__init__", "compiled/__init__"):
         (package / f"{name}.py").touch()
-    for name in FILES:
-        shutil.copy(Path(scope.solver.compiled.__file__).with_name(f"{name}.py"), package / "compiled")
+    for name in (*FILES, "processes.py"):
+        shutil.copy(Path(scope.solver.__file__).parent / name, package / name)
     return package

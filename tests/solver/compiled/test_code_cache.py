@@ -8,8 +8,9 @@ import subprocess
 import sys
 
 import pytest
-from scope.solver.compiled.code_files import read_code, write_code
+from scope.solver.compiled.code_files import SUFFIX, read_code, write_code
 from scope.solver.compiled.code_folders import SOLVER, WITHOUT_KERNELS, can_run_shipped, shipped_processor
+from scope.solver.processes import computer
 
 from .small_package import make_package
 
@@ -105,6 +106,18 @@ def test_a_full_disk_leaves_no_part_of_a_file(folder):
     assert hits == [0] * COUNT
     assert said.count("\n") == 1
     assert [path for path in (folder / "full").rglob("*") if path.is_file()] == []
+
+
+def test_what_a_killed_compile_has_left_is_removed_by_the_next_run(folder):
+    first = code_files(folder / "cache")[0]
+    ended = subprocess.Popen([sys.executable, "-c", ""])
+    ended.wait()
+    own, others = first.parent, (f"00000000-{ended.pid}", f"{computer()}-{os.getpid()}")
+    for name in (f"{computer()}-{ended.pid}", *others):
+        (own / f"{first.stem}{SUFFIX}.{name}-1a2b3c4d").write_bytes(first.read_bytes()[:100])
+    assert run(folder, folder / "cache")[0] == [1] * COUNT
+    drafts = {path.suffix[1:] for path in own.iterdir() if path.suffix != SUFFIX}
+    assert drafts == {f"{name}-1a2b3c4d" for name in others}  # another computer's, and one that is being written
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows reports no owner")

@@ -47,6 +47,16 @@ def test_headers_at_which_numpy_fails(tmp_path, header):
             read()
 
 
+def test_a_long_header_is_refused_in_one_line(tmp_path):
+    """Numpy says so in three."""
+    path = archive(tmp_path / "a.npz", HEADER + " " * 30_000)
+    for read in (lambda: read_members(path, ["a"], ""), lambda: read_npz(path, ModelFileError, "body file")):
+        with pytest.raises(ModelFileError) as caught:
+            read()
+        assert "\n" not in str(caught.value)
+        assert len(str(caught.value)) < 500
+
+
 def test_random_headers_never_give_a_traceback(tmp_path):
     chance = random.Random(7)
     for _ in range(300):

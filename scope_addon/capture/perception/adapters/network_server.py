@@ -37,8 +37,9 @@ Arrays = Sequence[Any]
 def load_runtime() -> ModuleType:
     """Import onnxruntime without its telemetry.
 
-    The library in its wheels reports its start and every session to a server of Microsoft's, and keeps an identifier of
-    the computer, unless this variable is set when the library is loaded.
+    From version 1.29 on, which a user may install for a graphics card, the library in its wheels reports its start and
+    every session to a server of Microsoft's, and keeps an identifier of the computer, unless this variable is set when
+    the library is loaded.
 
     :raises ImportError: it is not installed, or cannot be loaded.
     """

@@ -107,6 +107,10 @@ def test_watched_memory_ends_the_process() -> None:
 LISTEN = "; sys.stdin.buffer.read()"  # until the answer has been read: who ends sooner may break the question's pipe
 
 
+def _answering(text: str) -> str:
+    return f"import os, sys; os.write(1, {len(text).to_bytes(4, 'little') + text.encode()!r})" + LISTEN
+
+
 @pytest.mark.parametrize(
     ("code", "says"),
     [
@@ -121,6 +125,9 @@ LISTEN = "; sys.stdin.buffer.read()"  # until the answer has been read: who ends
             "sent no valid answer: a message is no object",
         ),
         ("import os, sys; os.write(1, b'\\2\\0\\0\\0{}')" + LISTEN, "sent no valid answer: 'arrays'"),
+        (_answering('{"arrays": [{"dtype": "f4", "shape": [1e999]}]}'), "sent no valid answer: cannot convert float"),
+        (_answering('{"arrays": [{"dtype": "f4,(", "shape": [1]}]}'), "sent no valid answer: "),
+        (_answering("[" * 50_000), "sent no valid answer: maximum recursion"),
     ],
 )
 def test_a_process_that_ends_or_answers_nonsense(

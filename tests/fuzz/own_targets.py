@@ -1,0 +1,175 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What reads messages of Scope's own processes, and what Scope itself has written: damaged disks, hostile processes."""
+
+from __future__ import annotations
+
+import io
+import json
+import shutil
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scope.solver.names import EXPRESSIONS
+
+BATCH_NAME, KEY = "walk", "key"
+JOINTS, COEFFICIENTS = 24, 10
+LARGEST_ARRAYS = 1 << 24
+
+
+def read_request(path: Path) -> None:
+    from scope.scope_addon.job.live.request import LiveRequest
+    from scope.scope_addon.job.request import JobRequest
+
+    text = path.read_bytes().decode("utf-8", "replace")
+    (LiveRequest if LiveRequest.is_in(text) else JobRequest).from_json(text)
+
+
+def read_reply(path: Path) -> None:
+    from scope.scope_addon.job.messages import parse_message
+    from scope.scope_addon.job.progress import JobProgress
+
+    progress = JobProgress()
+    for line in path.read_bytes().splitlines(keepends=True):
+        message = parse_message(line)
+        if message and message["event"] == "progress":
+            progress.update(message["stage"], message["done"], message["total"])
+            assert all("\n" not in text for text in progress.lines())
+        if message and message["event"] == "result" and "motions" in message:
+            assert all((path.parent / name).parent == path.parent for name in message["motions"])
+        if message and message["event"] == "preview":
+            assert (path.parent / message["file"]).parent == path.parent
+            assert 0 < 4 * message["width"] * message["height"] < 1 << 27
+
+
+def read_live_reply(path: Path) -> None:
+    from scope.scope_addon.job.live import process
+    from scope.scope_addon.job.messages import parse_message
+
+    for line in path.read_bytes().splitlines(keepends=True):
+        parse_message(line, process._FIELDS)
+        pose = process.parse_pose(line, JOINTS, COEFFICIENTS)
+        assert pose is None or (np.isfinite(pose.rotations).all() and np.isfinite(pose.betas).all())
+
+
+def read_answer(path: Path) -> None:
+    """Read what the process of a user's network answers; the errors are those that its caller expects."""
+    from scope.scope_addon.capture.perception.adapters.network_server import receive
+
+    expected = (EOFError, ValueError, KeyError, TypeError, OverflowError, RecursionError, SyntaxError)
+    with path.open("rb") as stream, suppress(*expected):
+        assert sum(array.nbytes for array in receive(stream, LARGEST_ARRAYS)["arrays"]) <= LARGEST_ARRAYS
+
+
+def read_expression_map(path: Path) -> None:
+    from scope.scope_addon.retarget.expression_map import load_expression_map
+
+    load_expression_map(path)
+
+
+def read_description(path: Path) -> None:
+    from scope.scope_addon.capture.perception.adapters.description import read_description
+
+    read_description(path.with_suffix(".onnx"), ("yolox", "simcc"))
+
+
+def find_estimates(path: Path) -> None:
+    from scope.scope_addon.capture.perception.kept.kept_estimates import KeptEstimates
+
+    folder = path.with_name("estimates")
+    folder.mkdir(exist_ok=True)
+    shutil.copy(path, folder)
+    kept = KeptEstimates(folder)
+    for key in list(kept._places)[:10]:
+        values = kept.find(key)
+        assert values is None or np.isfinite(values).all()
+
+
+def find_capture(path: Path) -> None:
+    from scope.scope_addon.job.cache import REPORT, Cache
+
+    folder = path.with_name("captures") / KEY
+    folder.mkdir(parents=True, exist_ok=True)
+    shutil.copy(path, folder / REPORT)
+    found = Cache(path.parent).find(KEY)
+    assert found is None or all(motion.parent == folder for motion in found.motions)
+
+
+def read_batch_report(path: Path) -> None:
+    from scope.scope_addon.job.batch import REPORT_NAME, Batch
+
+    folder = path.with_name("batch")
+    folder.mkdir(exist_ok=True)
+    shutil.copy(path, folder / REPORT_NAME)
+    batch = Batch(folder, folder, ["scope"], {}, [".npz"])
+    for entry in batch._previous_entries().values():
+        batch._is_finished(entry)
+
+
+def requests(_: Path) -> list[bytes]:
+    from scope.scope_addon.job.live.request import LiveRequest
+    from scope.scope_addon.options import Place, options_at
+
+    values = {option.name: option.default for option in options_at(Place.WORKER)}
+    return [json.dumps({"footage": "walk.mp4", **values}, default=str).encode(), LiveRequest("0").to_json().encode()]
+
+
+def _lines(messages: list[dict[str, Any]]) -> list[bytes]:
+    return [json.dumps(message).encode() + b"\n" for message in messages]
+
+
+def replies(_: Path) -> list[bytes]:
+    return _lines(
+        [
+            {"event": "progress", "stage": "solving", "done": 3, "total": 10},
+            {"event": "preview", "file": "preview.rgba", "width": 320, "height": 180, "frame": 7},
+            {"event": "result", "motions": ["person1.npz"], "report": {"fps": {"total": 9.5}, "warnings": ["dark"]}},
+            {"event": "error", "message": "the footage is too short"},
+        ]
+    )
+
+
+def live_replies(_: Path) -> list[bytes]:
+    pose: dict[str, Any] = {"event": "pose", "frame": 3, "presence": "seen", "positions": [[0.0, 0.0, 1.0]]}
+    pose |= {"rotations": [[1.0, 0.0, 0.0, 0.0]] * JOINTS, "betas": [0.1] * COEFFICIENTS}
+    status: dict[str, Any] = {"event": "status", "presence": "seen", "rate": 29.5, "latency_ms": 60.0}
+    status |= {"dropped": 3, "received": 90, "recorded_s": 2.5}
+    return _lines([pose, status, {"event": "notice", "text": "interrupted"}, {"event": "ended"}])
+
+
+def answers(_: Path) -> list[bytes]:
+    from scope.scope_addon.capture.perception.adapters.network_server import send
+
+    stream = io.BytesIO()
+    send(stream, {"providers": ["CPU"]}, [np.ones((2, 3), np.float32), np.zeros(0)])
+    return [stream.getvalue()]
+
+
+def expression_maps(folder: Path) -> list[bytes]:
+    from scope.scope_addon.retarget.expression_map import guess_expression_map, save_expression_map
+
+    path = folder / "seed.json"
+    save_expression_map(guess_expression_map(EXPRESSIONS), path)
+    return [path.read_bytes()]
+
+
+def descriptions(_: Path) -> list[bytes]:
+    return [json.dumps({"type": "simcc", "input_size": [192, 256], "mean": [1, 2, 3], "keypoints": "coco"}).encode()]
+
+
+def estimates(folder: Path) -> list[bytes]:
+    path = folder / "seed.npz"
+    np.savez(path, keys=np.arange(48, dtype=np.uint8).reshape(3, 16), values=np.ones((3, 5)))
+    return [path.read_bytes()]
+
+
+def cached_reports(folder: Path) -> list[bytes]:
+    (folder / "captures" / KEY).mkdir(parents=True, exist_ok=True)
+    (folder / "captures" / KEY / "person1.npz").touch()
+    return [json.dumps({"motions": ["person1.npz"], "report": {"fps": {"total": 9.5}}}).encode()]
+
+
+def batch_reports(_: Path) -> list[bytes]:
+    entry = {"name": BATCH_NAME, "status": "done", "outputs": ["walk.npz"], "hash": "0a", "warnings": []}
+    return [json.dumps({"folder": "clips", "files": [entry], "exit_status": 0}).encode()]
