@@ -17,6 +17,7 @@ from .root_object import parent_transform
 _TURNED = (
     "scope_turned"  # custom property of the camera: JSON of where it was before the first turn, and after the last
 )
+_LARGEST = 1e9  # of a number of it
 
 
 def turn_camera(
@@ -30,10 +31,10 @@ def turn_camera(
     now = _place(camera)
     try:
         before, after = json.loads(camera.get(_TURNED, ""))
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, RecursionError):
         before, after = now, now
-    if after != now:
-        before = None  # moved by the user
+    if after != now or not _is_like(before, now):
+        before = None  # moved by the user, or a .blend file that somebody has prepared
     if to_captured and before is not None:
         _put(camera, before)
     else:
@@ -49,6 +50,14 @@ def _place(camera: bpy.types.Object) -> list[list[float]]:
     keys = [curve for curve in fcurves(camera) if curve.data_path in ("location", "rotation_quaternion")]
     own = [*camera.location, *camera.rotation_quaternion, *camera.rotation_euler, *camera.scale]
     return [[] if keys else own, *(read_keys(c).ravel().tolist() for c in keys)]
+
+
+def _is_like(place: object, now: list[list[float]]) -> bool:
+    """Whether a place has as many numbers as the present one of each kind, and of keys any pairs of frame and value."""
+    if not isinstance(place, list) or len(place) != len(now) or not all(isinstance(part, list) for part in place):
+        return False
+    sizes = len(place[0]) == len(now[0]) and all(len(keys) and len(keys) % 2 == 0 for keys in place[1:])
+    return sizes and all(type(x) in (int, float) and abs(x) < _LARGEST for part in place for x in part)
 
 
 def _put(camera: bpy.types.Object, place: list[list[float]]) -> None:

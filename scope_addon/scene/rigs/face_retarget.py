@@ -89,20 +89,21 @@ def retarget_expressions(
     with all_or_nothing(bpy.context.scene, *faces, keys=[face.data.shape_keys for face in faces]):
         for face, values in plans:
             if values:
-                written.append(_write(face.data.shape_keys, captured.frames, values, f"{face.name}_{name}"))
-        for _, former in written:
+                written.append((face, *_write(face.data.shape_keys, captured.frames, values)))
+        for face, action, former in written:
             retire(former)
-    return [action for action, _ in written]
+            action.name = f"{face.name}_{name}"  # which an earlier retargeting had until now
+    return [action for _, action, _ in written]
 
 
 def _write(
-    keys: bpy.types.Key, frames: NDArray[np.float64], values: dict[str, NDArray[np.float64]], name: str
+    keys: bpy.types.Key, frames: NDArray[np.float64], values: dict[str, NDArray[np.float64]]
 ) -> tuple[bpy.types.Action, bpy.types.Action | None]:
     """Write the keys of one mesh; return the new action and the former one."""
     if keys.animation_data and keys.animation_data.use_tweak_mode:  # in which no action can be assigned
         keys.animation_data.use_tweak_mode = False
     former = keys.animation_data.action if keys.animation_data else None
-    channels = Channels(keys, bpy.data.actions.new(name))
+    channels = Channels(keys, bpy.data.actions.new("Face"))
     for key, column in values.items():
         block = keys.key_blocks[key]
         block.slider_max, block.mute = max(block.slider_max, 1.0), False

@@ -47,7 +47,7 @@ class CaptureJob:
         """
         self._cache: Cache = cache()
         self.progress = JobProgress()
-        self.cancel_requested = False
+        self.cancelled = False
         self.messages = 0  # of the worker so far
         self._scene_uid = scene.session_uid
         self._options = build_options(scene)

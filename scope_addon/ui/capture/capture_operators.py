@@ -14,16 +14,16 @@ from ...footage import FOOTAGE_SUFFIXES
 from ...job.progress import duration
 from .. import warm_up
 from ..live.live_state import state as live_state
-from ..reporting import iface_, rpt_, sentence, tip_
-from ..view.sidebar import is_over_tab, redraw_sidebars, redraw_sidebars_twice, show_tab
+from ..reporting import iface_, rpt_, tip_
+from ..view.sidebar import redraw_sidebars, show_tab
 from ..view.view_operators import frame_selected, hide_startup_cube
 from . import preview_picture
+from .job_operator import JobOperator, clear_status_bar
 
 if TYPE_CHECKING:
     from .capture_job import CaptureJob
 
 SAMPLE = Path(__file__).resolve().parents[3] / "assets" / "sample" / "sample.mp4"
-TIMER_S = 0.1
 ASK_AFTER_S = 10.0  # a capture that has run longer is cancelled only after a question
 
 
@@ -87,12 +87,16 @@ class SCOPE_OT_use_sample(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class SCOPE_OT_capture(bpy.types.Operator):
+class SCOPE_OT_capture(JobOperator):
     """Capture the person in the footage as an animated body, while Blender stays usable"""
 
     bl_idname = "scope.capture"
     bl_label = "Capture"
     bl_options = {"UNDO"}
+
+    timer_s = 0.1
+    job_state = state
+    _shown: tuple[str, int] | None = None  # the progress that was drawn last
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -105,37 +109,39 @@ class SCOPE_OT_capture(bpy.types.Operator):
             return False
         return True
 
-    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        """Start from the panel, and continue on a timer."""
-        if bpy.app.background or not self._start(context):
-            return self.execute(context) if bpy.app.background else {"CANCELLED"}
-        manager = context.window_manager
-        self._shown: tuple[str, int] | None = None
-        self._timer = manager.event_timer_add(TIMER_S, window=context.window)
-        manager.modal_handler_add(self)
-        return {"RUNNING_MODAL"}
-
-    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        """Step on timer events, cancel on Escape over the panel, pass the others to Blender.
-
-        Elsewhere, Escape belongs to what is under the mouse, such as the playback of the timeline.
-        """
-        job = state.job
-        if job is None:  # stopped by something else
-            return self._end(context, {"CANCELLED"})
-        if event.type == "ESC" and event.value == "PRESS" and is_over_tab(context.window, event):
-            bpy.ops.scope.cancel("INVOKE_DEFAULT")
-            return {"RUNNING_MODAL"}
-        if job.cancel_requested:
-            self.report({"INFO"}, "Capture cancelled; the scene is unchanged")
-            return self._end(context, {"CANCELLED"})
-        if event.type != "TIMER":
-            return {"PASS_THROUGH"}
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Capture from a script, and wait for the result."""
+        if not self.start(context):
+            return {"CANCELLED"}
         try:
-            outcome = self._step()
-        except Exception:  # Blender drops the operator without calling ``cancel``
-            self._end(context, {"CANCELLED"})
-            raise
+            while not (outcome := self._advance()):
+                time.sleep(0.02)
+            return outcome
+        finally:
+            stop_job()
+
+    def start(self, context: bpy.types.Context) -> bool:
+        """Start the job; return whether that worked."""
+        state.message, state.scene_uid, state.started = "", context.scene.session_uid, time.monotonic()
+        # Imported here: it loads numba and numpy, which would slow down the start of Blender.
+        try:
+            from .capture_job import CaptureJob
+        except ImportError as error:
+            return self.fail(f"a part of Scope cannot be loaded ({error}); reinstall the extension")
+        from ....solver.errors import ScopeError
+
+        warm_up.detach()  # the capture compiles what is left; what it has compiled is kept
+        try:
+            state.job = CaptureJob(context.scene)
+        except (ScopeError, OSError) as error:
+            return self.fail(error)
+        return True
+
+    def step(self, context: bpy.types.Context) -> set[str] | None:
+        """Advance the job, and show its progress; return None while it is running, and then the outcome."""
+        job = state.job
+        assert job is not None
+        outcome = self._advance()
         progress = ", ".join(job.progress.lines(iface_))
         if self._shown != (progress, job.messages):  # drawing the same again costs time in which Blender does not react
             self._shown = progress, job.messages
@@ -143,40 +149,9 @@ class SCOPE_OT_capture(bpy.types.Operator):
                 iface_("Scope: {progress}   (Esc over the Scope panel to cancel)", progress=progress)
             )
             redraw_sidebars()
-        return self._end(context, outcome) if outcome else {"PASS_THROUGH"}
+        return outcome
 
-    def cancel(self, context: bpy.types.Context) -> None:
-        """Stop when Blender opens another file or quits."""
-        self._end(context, {"CANCELLED"})
-
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        """Capture from a script, and wait for the result."""
-        if not self._start(context):
-            return {"CANCELLED"}
-        try:
-            while not (outcome := self._step()):
-                time.sleep(0.02)
-            return outcome
-        finally:
-            stop_job()
-
-    def _start(self, context: bpy.types.Context) -> bool:
-        state.message, state.scene_uid, state.started = "", context.scene.session_uid, time.monotonic()
-        # Imported here: it loads numba and numpy, which would slow down the start of Blender.
-        try:
-            from .capture_job import CaptureJob
-        except ImportError as error:
-            return self._fail(f"a part of Scope cannot be loaded ({error}); reinstall the extension")
-        from ....solver.errors import ScopeError
-
-        warm_up.detach()  # the capture compiles what is left; what it has compiled is kept
-        try:
-            state.job = CaptureJob(context.scene)
-        except (ScopeError, OSError) as error:
-            return self._fail(error)
-        return True
-
-    def _step(self) -> set[str] | None:
+    def _advance(self) -> set[str] | None:
         """Advance the job; return None while it is running, and then the operator's outcome."""
         from ....solver.errors import ScopeError
 
@@ -185,29 +160,29 @@ class SCOPE_OT_capture(bpy.types.Operator):
             if state.job.step():
                 return None
         except (ScopeError, OSError, MemoryError) as error:
-            self._fail(error)
+            self.fail(error)
             return {"CANCELLED"}
         self.report({"INFO"}, "Capture finished")
         return {"FINISHED"}
 
-    def _fail(self, error: Exception | str) -> bool:
-        state.message = sentence(error)
-        stop_job()  # before the report, which raises in a script
-        redraw_sidebars_twice()
-        self.report({"ERROR"}, state.message)
-        return False
+    def ask_to_cancel(self) -> None:
+        """Ask, if the capture has run for long, and cancel it."""
+        bpy.ops.scope.cancel("INVOKE_DEFAULT")
 
-    def _end(self, context: bpy.types.Context, outcome: set[str]) -> set[str]:
+    def say_cancelled(self) -> None:
+        """Say that nothing has changed."""
+        self.report({"INFO"}, "Capture cancelled; the scene is unchanged")
+
+    def stop_job(self) -> None:
+        """End the job in any state."""
         stop_job()
-        if (timer := getattr(self, "_timer", None)) is not None:
-            context.window_manager.event_timer_remove(timer)
-            self._timer = None
-        clear_status_bar()
+
+    def end(self, context: bpy.types.Context, outcome: set[str]) -> set[str]:
+        """Stop the job and the timer, show what was built, and return the outcome."""
         if "FINISHED" in outcome:
             hide_startup_cube(context)
             frame_selected(context)
-        redraw_sidebars_twice()
-        return outcome
+        return super().end(context, outcome)
 
 
 class SCOPE_OT_cancel(bpy.types.Operator):
@@ -238,7 +213,7 @@ class SCOPE_OT_cancel(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         """End the worker, and ask the modal operator to end."""
         assert state.job is not None
-        state.job.cancel_requested = True
+        state.job.cancelled = True
         state.job.close()
         return {"FINISHED"}
 
@@ -249,13 +224,6 @@ def stop_job() -> None:
         state.job.close()
     state.job = None
     preview_picture.clear()
-
-
-def clear_status_bar() -> None:
-    """Clear the status bar in every workspace, because each has its own text and the user may have switched."""
-    for workspace in bpy.data.workspaces:
-        with bpy.context.temp_override(workspace=workspace):  # Blender sets only the context's text
-            workspace.status_text_set(None)
 
 
 CLASSES = (SCOPE_OT_choose_footage, SCOPE_OT_use_sample, SCOPE_OT_capture, SCOPE_OT_cancel)

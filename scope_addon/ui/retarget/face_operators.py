@@ -10,7 +10,7 @@ from bpy.props import EnumProperty, StringProperty
 
 from ..captured_person import captured_armature
 from ..reporting import ReportingOperator, rpt_, tip_
-from .map_operators import LoadMapOperator, SaveMapOperator, edit_list
+from .map_operators import LoadMapOperator, SaveMapOperator, edit_list, is_in_view_layer
 
 if TYPE_CHECKING:
     from ...retarget.expression_map import ExpressionMap
@@ -21,12 +21,12 @@ class _FaceOperator(ReportingOperator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Require a mesh with shape keys."""
+        """Require a mesh with shape keys in the view layer."""
         face = context.scene.scope_retarget.face
         if face is None or face.type != "MESH" or face.data.shape_keys is None:
             cls.poll_message_set(tip_("Choose a mesh with shape keys first"))
             return False
-        return True
+        return is_in_view_layer(cls, context, face)
 
 
 class SCOPE_OT_guess_expressions(_FaceOperator):
@@ -36,9 +36,18 @@ class SCOPE_OT_guess_expressions(_FaceOperator):
     bl_label = "Guess Expressions"
 
     def work(self, context: bpy.types.Context) -> str:
-        """Fill the list."""
+        """Fill the list.
+
+        :raises UsageError: no name is known; the list stays as it is.
+        """
+        from ...errors import UsageError
+
         settings = context.scene.scope_retarget
         found = guessed_map(settings.face)
+        if not found.keys:
+            raise UsageError(
+                f"no shape key of '{settings.face.name}' has a name of ARKit, Oculus or VRM; add entries to the list"
+            )
         fill_expressions(settings, found)
         return rpt_("Found {count} shape keys; check the list", count=len(found.keys))
 
@@ -101,7 +110,9 @@ class SCOPE_OT_save_expression_map(_FaceOperator, SaveMapOperator):
         """Write the list."""
         from ...retarget.expression_map import save_expression_map
 
-        save_expression_map(listed_expressions(settings), path)
+        listed = listed_expressions(settings)
+        listed.check()
+        save_expression_map(listed, path)
 
 
 class SCOPE_OT_load_expression_map(_FaceOperator, LoadMapOperator):

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import bpy
 
+from ....solver.names import EXPRESSIONS
 from ..capture.capture_panel import Tab
 
 
@@ -24,9 +25,11 @@ class SCOPE_UL_expression_pairs(bpy.types.UIList):
         """Draw one entry: expression and shape key; see `SCOPE_UL_bone_pairs`."""
         keys = settings.face.data.shape_keys if settings.face else None
         known = keys is not None and item.key in keys.key_blocks
-        row = layout.split(factor=0.5, align=True)
+        split = layout.split(factor=0.5, align=True)
+        row = split.row(align=True)
+        row.alert = item.expression not in EXPRESSIONS
         row.label(text=item.expression, translate=False)
-        row = row.row(align=True)
+        row = split.row(align=True)
         row.alert = not known
         row.label(text=item.key, translate=False)
         if not known:
@@ -52,12 +55,16 @@ class SCOPE_PT_retarget_face(Tab, bpy.types.Panel):
         row.operator("scope.load_expression_map", text="", icon="FILE_FOLDER")
         row.operator("scope.save_expression_map", text="", icon="FILE_TICK")
         row.operator("scope.edit_expression_pair", text="", icon="ADD").action = "ADD"
+        row = row.row(align=True)
+        row.enabled = len(settings.face_pairs) > 0
         row.operator("scope.edit_expression_pair", text="", icon="REMOVE").action = "REMOVE"
         layout.template_list("SCOPE_UL_expression_pairs", "", settings, "face_pairs", settings, "face_active", rows=5)
         for pair in settings.face_pairs[settings.face_active : settings.face_active + 1]:
             column = layout.column(align=True)
             column.prop(pair, "expression", text="", placeholder="Expression", icon="SHAPEKEY_DATA")
+            column.alert = pair.key not in settings.face.data.shape_keys.key_blocks
             column.prop_search(pair, "key", settings.face.data.shape_keys, "key_blocks", text="")
+            column.alert = False
             column.prop(pair, "factor")
         layout.operator("scope.retarget_face", icon="SHAPEKEY_DATA")
 

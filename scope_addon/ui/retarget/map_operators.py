@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What operators on the bone map and on the expression map share: their files, and editing their lists."""
+"""What operators on the bone map and on the expression map share: their poll, their files, and editing their lists."""
 
 from __future__ import annotations
 
@@ -8,7 +8,20 @@ from typing import Any
 import bpy
 from bpy.props import BoolProperty, StringProperty
 
-from ..reporting import ReportingOperator, rpt_
+from ..reporting import ReportingOperator, rpt_, tip_
+
+
+def is_in_view_layer(cls: type[bpy.types.Operator], context: bpy.types.Context, chosen: bpy.types.Object) -> bool:
+    """Return whether an object that was chosen can be animated here: one that is deleted stays chosen."""
+    if chosen.name in context.view_layer.objects:
+        return True
+    cls.poll_message_set(
+        tip_(
+            "'{rig}' is not in the scene's view layer: add it to the scene, or enable its collection in the Outliner",
+            rig=chosen.name,
+        )
+    )
+    return False
 
 
 class MapFileOperator(ReportingOperator):
@@ -25,6 +38,8 @@ class MapFileOperator(ReportingOperator):
 
 class SaveMapOperator(MapFileOperator):
     """Writes a map; a subclass has ``save``, and the file's usual name. Not registered."""
+
+    bl_options = {"REGISTER"}  # it changes a file only, so there is nothing to undo
 
     check_existing: BoolProperty(default=True, options={"HIDDEN"})  # the file browser asks before it overwrites
 
@@ -48,7 +63,10 @@ class SaveMapOperator(MapFileOperator):
         return rpt_("Saved {file}", file=path)
 
     def save(self, settings: bpy.types.PropertyGroup, path: str) -> None:
-        """Write the map of the settings to a path."""
+        """Write the map of the settings to a path.
+
+        :raises InputError: it could not be loaded again.
+        """
         raise NotImplementedError
 
 

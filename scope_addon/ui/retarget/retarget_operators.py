@@ -11,7 +11,7 @@ from bpy.props import EnumProperty, StringProperty
 from ..captured_person import PERSON, betas_of, body_of, captured_armature, captured_people
 from ..reporting import ReportingOperator, rpt_, sentence, tip_
 from .bone_list import fill_list, listed_map
-from .map_operators import LoadMapOperator, SaveMapOperator, edit_list
+from .map_operators import LoadMapOperator, SaveMapOperator, edit_list, is_in_view_layer
 
 if TYPE_CHECKING:
     from ...scene.rigs.rig_retarget import RetargetOptions, RetargetResult
@@ -29,16 +29,7 @@ class _RigOperator(ReportingOperator):
         if rig is None:
             cls.poll_message_set(tip_("Choose your rig first"))
             return False
-        if rig.name not in context.view_layer.objects:
-            cls.poll_message_set(
-                tip_(
-                    "'{rig}' is not in the scene's view layer: add it to the scene, or enable its collection in the "
-                    "Outliner",
-                    rig=rig.name,
-                )
-            )
-            return False
-        return True
+        return is_in_view_layer(cls, context, rig)
 
 
 class SCOPE_OT_guess_bones(_RigOperator):
@@ -150,7 +141,9 @@ class SCOPE_OT_save_bone_map(_RigOperator, SaveMapOperator):
         """Write the list."""
         from ...retarget.bone_map import save_bone_map
 
-        save_bone_map(listed_map(settings), path)
+        listed = listed_map(settings)
+        listed.check()
+        save_bone_map(listed, path)
 
 
 class SCOPE_OT_load_bone_map(_RigOperator, LoadMapOperator):

@@ -64,6 +64,8 @@ class SCOPE_PT_retarget(Tab, bpy.types.Panel):
         row.operator("scope.load_bone_map", text="", icon="FILE_FOLDER")
         row.operator("scope.save_bone_map", text="", icon="FILE_TICK")
         row.operator("scope.edit_bone_pair", text="", icon="ADD").action = "ADD"
+        row = row.row(align=True)
+        row.enabled = len(settings.pairs) > 0
         row.operator("scope.edit_bone_pair", text="", icon="REMOVE").action = "REMOVE"
         layout.template_list("SCOPE_UL_bone_pairs", "", settings, "pairs", settings, "active", rows=5)
         for pair in settings.pairs[settings.active : settings.active + 1]:

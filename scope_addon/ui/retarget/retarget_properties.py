@@ -82,6 +82,21 @@ def _list_bones_of_new_rig(settings: bpy.types.PropertyGroup, _context: bpy.type
     guess_into_list(settings)
 
 
+def _list_keys_of_new_face(settings: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
+    """Replace the expression list of another mesh by a guess; keep that of a mesh with the same keys."""
+    if settings.face is None or settings.face.data.shape_keys is None:
+        return
+    keys = "\n".join(sorted(block.name for block in settings.face.data.shape_keys.key_blocks))
+    if settings.listed_keys == keys:
+        return
+    settings.listed_keys = keys
+    if len(settings.face_pairs) == 0:
+        return  # nothing to replace: guessed when it is needed
+    from .face_operators import fill_expressions, guessed_map
+
+    fill_expressions(settings, guessed_map(settings.face))
+
+
 class SCOPE_PG_retarget(bpy.types.PropertyGroup):
     """The settings of retargeting."""
 
@@ -99,8 +114,10 @@ class SCOPE_PG_retarget(bpy.types.PropertyGroup):
         name="Mesh",
         type=bpy.types.Object,
         poll=_is_face,
+        update=_list_keys_of_new_face,
         description="Mesh with shape keys to animate with the captured expressions",
     )
+    listed_keys: StringProperty(options={"HIDDEN"})  # names of all shape keys of the mesh that the list is for
     face_pairs: CollectionProperty(type=SCOPE_PG_expression_pair)
     face_active: IntProperty()
     feet: BoolProperty(

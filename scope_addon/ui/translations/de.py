@@ -390,6 +390,7 @@ TEXTS = {
     "The most prominent person": "Die auffälligste Person",
     "The pelvis moves through the scene": "Das Becken bewegt sich durch die Szene",
     "The pelvis moves through the scene, as captured": "Das Becken bewegt sich durch die Szene, wie erfasst",
+    "The people to follow, at most; each takes time": "Wie vielen Personen höchstens gefolgt wird; jede kostet Zeit",
     "The processor": "Der Prozessor",
     "The rig chosen under Retarget, with its current animation and its meshes": "Das unter Übertragen gewählte Rig mit seiner aktuellen Animation und seinen Meshes",
     "The right foot": "Der rechte Fuß",

@@ -390,6 +390,7 @@ TEXTS = {
     "The most prominent person": "La persona principal",
     "The pelvis moves through the scene": "La pelvis se mueve por la escena",
     "The pelvis moves through the scene, as captured": "La pelvis se mueve por la escena, como se capturó",
+    "The people to follow, at most; each takes time": "Número máximo de personas a seguir; cada una requiere tiempo",
     "The processor": "El procesador",
     "The rig chosen under Retarget, with its current animation and its meshes": "El rig elegido en Transferir movimiento, con su animación actual y sus mallas",
     "The right foot": "El pie derecho",

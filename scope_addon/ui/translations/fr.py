@@ -390,6 +390,7 @@ TEXTS = {
     "The most prominent person": "La personne principale",
     "The pelvis moves through the scene": "Le bassin se déplace dans la scène",
     "The pelvis moves through the scene, as captured": "Le bassin se déplace dans la scène, tel que capturé",
+    "The people to follow, at most; each takes time": "Nombre maximal de personnes à suivre ; chacune prend du temps",
     "The processor": "Le processeur",
     "The rig chosen under Retarget, with its current animation and its meshes": "Le rig choisi sous Recibler, avec son animation actuelle et ses maillages",
     "The right foot": "Le pied droit",

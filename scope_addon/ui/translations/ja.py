@@ -390,6 +390,7 @@ TEXTS = {
     "The most prominent person": "最も目立つ人物",
     "The pelvis moves through the scene": "骨盤がシーン内を移動します",
     "The pelvis moves through the scene, as captured": "骨盤がキャプチャどおりシーン内を移動します",
+    "The people to follow, at most; each takes time": "追跡する人物の最大数。一人ごとに時間がかかります",
     "The processor": "プロセッサー",
     "The rig chosen under Retarget, with its current animation and its meshes": "「リターゲット」で選択したリグと、現在のアニメーション、メッシュ",
     "The right foot": "右足",

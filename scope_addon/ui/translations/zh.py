@@ -390,6 +390,7 @@ TEXTS = {
     "The most prominent person": "最显著的人物",
     "The pelvis moves through the scene": "骨盆在场景中移动",
     "The pelvis moves through the scene, as captured": "骨盆按捕捉结果在场景中移动",
+    "The people to follow, at most; each takes time": "最多跟随的人数；每个人都需要时间",
     "The processor": "处理器",
     "The rig chosen under Retarget, with its current animation and its meshes": "“重定向”中选择的绑定，连同其当前动画和网格",
     "The right foot": "右脚",

@@ -25,6 +25,7 @@ from scope.scope_addon.ui.capture.capture_operators import (
     end_capture,
     state,
 )
+from scope.scope_addon.ui.capture.job_operator import JobOperator
 from scope.scope_addon.ui.preferences import cache
 from scope.solver.errors import ScopeError
 from scope.solver.loaders.body_file import load_body
@@ -181,7 +182,7 @@ def test_the_cancel_operator_ends_the_worker_immediately(fake_worker, footage):
     state.job = CaptureJob(bpy.context.scene)
     assert not bpy.ops.scope.capture.poll()
     bpy.ops.scope.cancel()
-    assert state.job.cancel_requested
+    assert state.job.cancelled
     assert not state.job.worker.alive
     capture_operators.end_capture()
     assert bpy.ops.scope.capture.poll()
@@ -189,10 +190,12 @@ def test_the_cancel_operator_ends_the_worker_immediately(fake_worker, footage):
 
 def test_an_unexpected_error_ends_the_capture():
     closed = []
-    state.job = SimpleNamespace(close=lambda: closed.append(True), step=lambda: 1 / 0, cancel_requested=False)
-    operator = SimpleNamespace()
-    operator._step = partial(capture_operators.SCOPE_OT_capture._step, operator)
-    operator._end = partial(capture_operators.SCOPE_OT_capture._end, operator)
+    state.job = SimpleNamespace(close=lambda: closed.append(True), step=lambda: 1 / 0, cancelled=False)
+    operator = SimpleNamespace(job_state=state, stop_job=capture_operators.stop_job)
+    operator.step, operator._advance = (
+        partial(getattr(SCOPE_OT_capture, name), operator) for name in ("step", "_advance")
+    )
+    operator.end = partial(JobOperator.end, operator)
     with pytest.raises(ZeroDivisionError):
         capture_operators.SCOPE_OT_capture.modal(operator, bpy.context, SimpleNamespace(type="TIMER", value="NOTHING"))
     assert closed
@@ -204,9 +207,11 @@ def test_the_panel_is_drawn_again_only_for_news(monkeypatch):
     monkeypatch.setattr(capture_operators, "redraw_sidebars", lambda: drawn.append(None))
     lines = ["Finding the person"]
     progress = SimpleNamespace(lines=lambda _: lines)
-    state.job = SimpleNamespace(progress=progress, messages=0, step=lambda: True, cancel_requested=False)
-    operator = SimpleNamespace(_shown=None)
-    operator._step = partial(capture_operators.SCOPE_OT_capture._step, operator)
+    state.job = SimpleNamespace(progress=progress, messages=0, step=lambda: True, cancelled=False)
+    operator = SimpleNamespace(_shown=None, job_state=state)
+    operator.step, operator._advance = (
+        partial(getattr(SCOPE_OT_capture, name), operator) for name in ("step", "_advance")
+    )
     timer = SimpleNamespace(type="TIMER", value="NOTHING")
     counts = []
     for change in (None, None, "messages", None, "lines", None):
@@ -355,7 +360,7 @@ def test_real_worker_on_a_picture(footage):
     assert np.allclose(got.trans, expected.trans, atol=1e-4)
 
 
-def test_real_worker_uses_a_calibration(footage, tmp_path):
+def test_real_worker_uses_a_calibration_and_no_internet_connection(footage, tmp_path):
     import cv2
 
     height, width = cv2.imread(str(footage)).shape[:2]
@@ -363,10 +368,21 @@ def test_real_worker_uses_a_calibration(footage, tmp_path):
     lens, scene = tmp_path / "lens.json", bpy.context.scene
     scene.scope.footage, scene.scope.quality = str(footage), "FAST"
     scene.scope.lens, scene.scope.calibration_file = "FILE", str(lens)
+    guard = tmp_path / "guard.py"
+    guard.write_text(
+        "import runpy, sys\n"
+        "def hook(event, arguments):\n"
+        "    if event in ('socket.connect', 'socket.getaddrinfo', 'socket.bind', 'socket.sendto'):\n"
+        "        raise RuntimeError('network')\n"
+        "sys.addaudithook(hook)\n"
+        "sys.argv = sys.argv[1:]\n"
+        "runpy.run_path(sys.argv[0], run_name='__main__')\n"
+    )
     found = []
     for k1 in (dist[0], -0.1):  # a changed file needs another capture
         lens.write_text(json.dumps({"intrinsics": K, "dist": [k1, *dist[1:]]}))
-        assert bpy.ops.scope.capture() == {"FINISHED"}
+        run_to_end(CaptureJob(scene, python=[sys.executable, str(guard)]))
+        assert scene.scope.result.people == 1
         found.append(stored_motion(next(o for o in captures()[-1].objects if "scope_source" in o)))
     assert np.allclose(found[0].intrinsics, K)
     assert np.allclose(found[0].dist, dist)
@@ -384,25 +400,6 @@ def test_real_worker_reports_that_no_person_was_found(tmp_path):
     scene.scope.footage, scene.scope.quality = str(tmp_path / "wall.png"), "FAST"
     with pytest.raises(RuntimeError, match="No person was found in wall.png"):
         bpy.ops.scope.capture()
-
-
-def test_real_worker_uses_no_internet_connection(footage, tmp_path):
-    guard = tmp_path / "guard.py"
-    guard.write_text(
-        "import runpy, sys\n"
-        "def hook(event, arguments):\n"
-        "    if event in ('socket.connect', 'socket.getaddrinfo', 'socket.bind', 'socket.sendto'):\n"
-        "        raise RuntimeError('network')\n"
-        "sys.addaudithook(hook)\n"
-        "sys.argv = sys.argv[1:]\n"
-        "runpy.run_path(sys.argv[0], run_name='__main__')\n"
-    )
-    import sys
-
-    scene = bpy.context.scene
-    scene.scope.footage, scene.scope.quality = str(footage), "FAST"
-    run_to_end(CaptureJob(scene, python=[sys.executable, str(guard)]))
-    assert scene.scope.result.people == 1
 
 
 def test_the_sample_exists():
@@ -449,26 +446,26 @@ def test_escape_cancels_only_over_the_panel(fake_worker, footage, x, y, window, 
     fake_worker("time.sleep(600)")
     bpy.context.scene.scope.footage = str(footage)
     state.job, state.started = CaptureJob(bpy.context.scene), time.monotonic()
-    operator = SimpleNamespace(report=lambda *_: None, _end=lambda _, outcome: outcome)
+    operator = SimpleNamespace(job_state=state, ask_to_cancel=partial(SCOPE_OT_capture.ask_to_cancel, None))
     context = SimpleNamespace(window=window)
     escape = SimpleNamespace(type="ESC", value="PRESS", mouse_x=x, mouse_y=y)
     outcome = SCOPE_OT_capture.modal(operator, context, escape)
     assert outcome == ({"RUNNING_MODAL"} if cancels else {"PASS_THROUGH"})
-    assert state.job.cancel_requested is cancels
+    assert state.job.cancelled is cancels
     end_capture()
 
 
 @pytest.mark.parametrize(("seconds", "asks"), [(3.0, False), (30.0, True)])
 def test_cancelling_asks_when_more_than_ten_seconds_are_done(monkeypatch, seconds, asks):
-    state.job, state.started = SimpleNamespace(cancel_requested=False, close=lambda: None), time.monotonic() - seconds
+    state.job, state.started = SimpleNamespace(cancelled=False, close=lambda: None), time.monotonic() - seconds
     questions = []
     manager = SimpleNamespace(invoke_confirm=lambda *_, **texts: questions.append(texts) or {"RUNNING_MODAL"})
     monkeypatch.setattr(capture_operators.bpy, "app", SimpleNamespace(background=False))
-    operator = SimpleNamespace(execute=lambda _: setattr(state.job, "cancel_requested", True) or {"FINISHED"})
+    operator = SimpleNamespace(execute=lambda _: setattr(state.job, "cancelled", True) or {"FINISHED"})
     try:
         SCOPE_OT_cancel.invoke(operator, SimpleNamespace(window_manager=manager), None)
         assert bool(questions) is asks
-        assert state.job.cancel_requested is not asks
+        assert state.job.cancelled is not asks
         assert not asks or "30 s" in questions[0]["message"]
     finally:
         monkeypatch.undo()

@@ -45,6 +45,10 @@ def test_guess_edit_keep_and_retarget(settings, tmp_path):
     (curve,) = actions.fcurves(settings.face.data.shape_keys)
     assert curve.data_path == 'key_blocks["viseme_aa"].value'
     assert actions.read_keys(curve)[-1, 1] == pytest.approx(0.6, abs=1e-5)
+    name = settings.face.data.shape_keys.animation_data.action.name
+    bpy.ops.scope.retarget_face()  # replaces it, and takes its name
+    assert settings.face.data.shape_keys.animation_data.action.name == name
+    assert not bpy.data.actions.get(f"{name}.001")
 
 
 def test_retargeting_guesses_what_is_not_listed(settings):
@@ -74,6 +78,43 @@ def test_a_mesh_is_needed(settings):
     settings.face = None
     assert not bpy.ops.scope.retarget_face.poll()
     assert not bpy.ops.scope.guess_expressions.poll()
+
+
+def test_a_mesh_that_was_deleted_from_the_scene_is_not_animated(settings):
+    bpy.context.scene.collection.objects.unlink(settings.face)
+    assert settings.face is not None  # it stays in the file as long as it is chosen
+    assert not bpy.ops.scope.retarget_face.poll()
+
+
+def test_choosing_another_mesh_replaces_the_list(settings):
+    bpy.ops.scope.guess_expressions()
+    first, other = settings.face, face_mesh(["jawOpen", "mouthPucker", "mouthFunnel", "cheekPuff", "noseSneerLeft"])
+    settings.face_pairs[0].factor = 0.25  # edited by hand
+    for chosen in (None, first):
+        settings.face = chosen
+        assert settings.face_pairs[0].factor == 0.25
+    settings.face = other
+    assert {pair.key for pair in settings.face_pairs} == {block.name for block in other.data.shape_keys.key_blocks[1:]}
+
+
+def test_guessing_without_known_names_leaves_the_list_as_it_is(settings):
+    settings.face = face_mesh(["Key 1"])
+    pair = settings.face_pairs.add()
+    pair.key, pair.expression = "Key 1", "jawOpen"
+    with pytest.raises(RuntimeError, match="has a name of ARKit, Oculus or VRM"):
+        bpy.ops.scope.guess_expressions()
+    assert settings.face_pairs[0].key == "Key 1"
+
+
+def test_what_could_not_be_loaded_again_is_not_saved(settings, tmp_path):
+    path = tmp_path / "face.json"
+    with pytest.raises(RuntimeError, match="no shape key; add one"):
+        bpy.ops.scope.save_expression_map(filepath=str(path))
+    bpy.ops.scope.guess_expressions()
+    settings.face_pairs[0].expression = "grin"
+    with pytest.raises(RuntimeError, match="'grin', which is no expression"):
+        bpy.ops.scope.save_expression_map(filepath=str(path))
+    assert not path.exists()
 
 
 def test_expressions_are_offered_by_what_was_typed():

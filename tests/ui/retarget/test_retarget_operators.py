@@ -52,13 +52,18 @@ def test_saving_a_bone_map_overwrites_bone_maps_only(rig, tmp_path):
     with pytest.raises(RuntimeError, match="not a bone map"):
         bpy.ops.scope.save_bone_map(filepath=str(tmp_path / "notes"))
     assert other.read_text() == before
-    bpy.context.scene.scope_retarget.pairs.remove(0)
+    pairs = bpy.context.scene.scope_retarget.pairs
+    pairs.remove(len(pairs) - 1)
     for path in (saved, empty):
         bpy.ops.scope.save_bone_map(filepath=str(path))
         assert 0 < len(path.read_text()) < len(text)
     assert bpy.ops.scope.save_bone_map.get_rna_type().properties["check_existing"].default is True
     with pytest.raises(RuntimeError, match="no name"):
         bpy.ops.scope.save_bone_map(filepath=f"{tmp_path}/")
+    pairs.remove(0)  # the pelvis
+    with pytest.raises(RuntimeError, match="no bone for pelvis"):  # it could not be loaded again
+        bpy.ops.scope.save_bone_map(filepath=str(tmp_path / "without.json"))
+    assert not (tmp_path / "without.json").exists()
 
 
 def test_choosing_another_rig_replaces_the_bone_list(rig):
