@@ -3,10 +3,12 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import shutil
 import sys
 import tempfile
+from collections.abc import Generator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,6 +21,7 @@ if TYPE_CHECKING:
 
 ROOT = Path(__file__).resolve().parent.parent
 SHARED = ROOT.parent / "shared"
+IS_SECOND = os.environ.get("PYTEST_XDIST_WORKER", "gw0")[-1] in "13579"
 BLENDER_FOLDER = "scope-tests-blender-"  # begins the name of the user folder of Blender's module
 
 # Blender reads this once, when bpy is first imported: tests must not write in the home folder.
@@ -55,10 +58,32 @@ FIRST = (
 )
 
 
+@pytest.hookimpl(wrapper=True)
+def pytest_make_collect_report(
+    collector: pytest.Collector,
+) -> Generator[None, pytest.CollectReport, pytest.CollectReport]:
+    """Let every second process collect folders backwards.
+
+    Pytest compiles each file of tests for itself, which takes seconds, and keeps the code: two processes compile a half
+    each and find the other's.
+    """
+    report = yield
+    if IS_SECOND and isinstance(collector, pytest.Directory):
+        report.result.reverse()
+    return report
+
+
+@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Put the files of `FIRST` first."""
+    """Put the files of `FIRST` first, and all others in one order in every process."""
     places = {ROOT / "tests" / name: place for place, name in enumerate(FIRST)}
-    items.sort(key=lambda item: places.get(item.path, len(places)))
+    items.sort(key=lambda item: (places.get(item.path, len(places)), item.path))
+
+
+def pytest_collection_finish() -> None:
+    """Search for garbage less often, and never in what the collection made: it took a twentieth of the time."""
+    gc.freeze()
+    gc.set_threshold(10_000, 20, 20)
 
 
 @pytest.fixture(scope="session")

@@ -8,17 +8,24 @@ from scope.solver.rotations import exp
 from scope.tools.mocap import fit_body, library, retarget
 from scope.tools.mocap.take import Take
 
+from .archives import beginning
+
 
 @pytest.fixture(scope="module")
 def fitted(shared, body):
     """A walk with its skeleton, one without, and DeepMimic's."""
-    read = {a: library.read_archive(shared / "data" / "mocap" / f"{a}.tar.xz") for a in library.ARCHIVES}
-    asf = {k: v for k, v in read["cmu_asf_amc"].items() if k.endswith(".asf") or k.endswith("02_01.amc")}
-    takes, skeletons = library.load_asf_amc(asf)
-    expmap = {k: v for k, v in read["cmu_expmap"].items() if k.endswith("test/walking_extra/walking_19.txt")}
-    takes += library.load_expmap(expmap, library.expmap.average_skeleton(skeletons))
-    walk = ("characters/humanoid3d.txt", "motions/humanoid3d_walk.txt")
-    takes += library.load_deepmimic({k: read["deepmimic_humanoid"][k] for k in walk})
+    files = {
+        "cmu_asf_amc": ("03/03.asf", "02/02.asf", "02/02_01.amc"),
+        "cmu_expmap": ("cmu_mocap/test/walking_extra/walking_19.txt",),
+        "deepmimic_humanoid": ("characters/humanoid3d.txt", "motions/humanoid3d_walk.txt"),
+    }
+    read = {}
+    for archive, names in files.items():
+        texts = beginning(shared / "data" / "mocap" / f"{archive}.tar.xz", names[-1])
+        read[archive] = {name: texts[name] for name in names}
+    takes, skeletons = library.load_asf_amc(read["cmu_asf_amc"])
+    takes += library.load_expmap(read["cmu_expmap"], library.expmap.average_skeleton(skeletons))
+    takes += library.load_deepmimic(read["deepmimic_humanoid"])
     return fit_body.fit_library(body, [t.resampled(30) for t in takes])
 
 
