@@ -49,18 +49,19 @@ class Cache:
         """Return the finished capture with this key; None if there is none."""
         import json
 
+        from .messages import is_result  # loads numba
+
         folder = self.root / "captures" / key
         try:
             content = json.loads((folder / REPORT).read_text(encoding="utf-8"))
-            motions = [folder / Path(name).name for name in content["motions"]]
-            report = content["report"]
+            motions = [folder / name for name in content["motions"]] if is_result(content) else []
             if not motions or not all(m.is_file() for m in motions):
                 return None
-        except (OSError, ValueError, KeyError, TypeError, RecursionError):
+        except (OSError, ValueError, RecursionError):
             return None
         with suppress(OSError):
             os.utime(folder)  # mark as used, so that it is pruned last
-        return CachedCapture(motions, report)
+        return CachedCapture(motions, content["report"])
 
     def new_job_folder(self) -> Path:
         """Create an empty folder for the files of a worker, and remove abandoned ones.

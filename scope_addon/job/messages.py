@@ -67,6 +67,11 @@ CAPTURE_FIELDS: Fields = WARM_UP_FIELDS | {
 }
 
 
+def is_result(content: object) -> bool:
+    """Return whether it has what the message of a finished capture must have: names of motions and a report."""
+    return isinstance(content, dict) and all(is_(content.get(field)) for field, is_ in CAPTURE_FIELDS["result"].items())
+
+
 def parse_message(line: bytes, fields: Fields = CAPTURE_FIELDS) -> dict[str, Any] | None:
     """Read a line of the worker.
 

@@ -94,6 +94,7 @@ def find_capture(path: Path) -> None:
     shutil.copy(path, folder / REPORT)
     found = Cache(path.parent).find(KEY)
     assert found is None or all(motion.parent == folder for motion in found.motions)
+    assert found is None or 0 <= float(found.report.get("fps", {}).get("total", 0.0))  # which the panel shows
 
 
 def read_batch_report(path: Path) -> None:

@@ -43,7 +43,15 @@ def test_a_damaged_capture_is_not_found(cache):
     assert cache.find("a") is not None
 
 
-@pytest.mark.parametrize("content", ['{"motions":' * 100_000, '{"report": {}, "motions": ["' + "x" * 300 + '.npz"]}'])
+@pytest.mark.parametrize(
+    "content",
+    [
+        '{"motions":' * 100_000,
+        '{"report": {}, "motions": ["' + "x" * 300 + '.npz"]}',
+        '{"report": [], "motions": ["person1.npz"]}',
+        '{"report": {"fps": {"total": "fast"}}, "motions": ["person1.npz"]}',
+    ],
+)
 def test_a_report_that_nothing_can_be_done_with_is_not_found(cache, content):
     add(cache, "a")
     (cache.root / "captures" / "a" / "report.json").write_text(content)

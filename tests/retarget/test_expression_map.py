@@ -107,6 +107,7 @@ def test_what_is_written_is_read_and_other_files_are_kept(tmp_path):
         ({"shape_keys": {"a": {"jawopen": 1}}}, "'jawopen', which is no expression"),
         ({"shape_keys": {"a": {"jawOpen": 1e9}}}, "use at most 10"),
         ({"shape_keys": {"a": {"jawOpen": float("nan")}}}, "use at most 10"),
+        ({"shape_keys": {"a": {"jawOpen": 10**400}}}, "not an expression map: .* a number of 401 digits"),
         ({"shape_keys": {}}, "no shape key"),
     ],
 )

@@ -136,7 +136,7 @@ def _numbers(value: Any) -> NDArray[np.float64] | None:
     """Return an array of finite numbers of any shape, or None if the value is something else."""
     try:
         array = np.asarray(value, float)
-    except (ValueError, TypeError, OverflowError):
+    except (ValueError, TypeError):
         return None
     return array if np.isfinite(array).all() else None
 
