@@ -132,7 +132,8 @@ def read_random_bytes(count: int) -> int:
 
 def _is_good(name: str, *limits: str) -> bool:
     """Run a target in a process of its own; keep the input that it failed on."""
-    seed = str(int.from_bytes(os.urandom(4), "little"))
+    # In CI the inputs are the same every time, so that what fails is the change and not the luck of the day.
+    seed = "2" if os.environ.get("CI") else str(int.from_bytes(os.urandom(4), "little"))
     command = [sys.executable, "-m", __spec__.name, name, limits[0], seed, *limits[1:]]
     done = subprocess.run(command, stderr=subprocess.PIPE, text=True, errors="replace", check=False)
     if done.returncode == 0:
