@@ -19,7 +19,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 REPORT = "report.json"
-_VERSION = re.compile(r"(\w+-[0-9a-f]{8})-[0-9a-f]{12}")  # a folder of solver/compiled/code_folders.py, less its program
+# a folder of solver/compiled/code_folders.py, less its program
+_VERSION = re.compile(r"(\w+-[0-9a-f]{8})-[0-9a-f]{12}")
 _JOB = "job-"  # begins the name of a job's folder, before its owner
 
 
