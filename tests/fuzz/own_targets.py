@@ -54,11 +54,10 @@ def read_live_reply(path: Path) -> None:
 
 
 def read_answer(path: Path) -> None:
-    """Read what the process of a user's network answers; the errors are those that its caller expects."""
+    """Read what the process of a user's network answers."""
     from scope.scope_addon.capture.perception.adapters.network_server import receive
 
-    expected = (EOFError, ValueError, KeyError, TypeError, OverflowError, RecursionError, SyntaxError)
-    with path.open("rb") as stream, suppress(*expected):
+    with path.open("rb") as stream, suppress(EOFError, ValueError):  # which its caller expects
         assert sum(array.nbytes for array in receive(stream, LARGEST_ARRAYS)["arrays"]) <= LARGEST_ARRAYS
 
 
