@@ -16,7 +16,7 @@ from ..perception.hand_region import HAND_LENGTH_M, SIDES, WRISTS, pixels_per_me
 from ..perception.observation import Observation
 from ..perception.palm_detector import PalmDetector
 from ..perception.region import Region
-from .frame_clock import FRAME_S
+from .frame_clock import FRAME_S, PATIENCE_S, is_search_due
 
 FIRST_PRESENCE = 0.1  # in a rough region, from which the better one of the landmarks is looked at
 # Least presence with the wrist at the body's, and elsewhere: of a hand whose palm was detected, or that was seen in the
@@ -29,9 +29,6 @@ MIN_SIZE, MAX_SIZE = 0.25, 2.0  # of the hand, in the hand lengths of the body
 SAME_HAND = 0.35  # mean distance of the keypoints, in sizes of the hand, below which two hands are one
 SEARCH_SCALE = 2.3  # side of the square in which a palm is searched, in sides of the predicted region
 MOST_PALMS = 2
-EAGER_S = 10 * FRAME_S  # for which a lost hand is looked for in every frame
-PATIENT_S = 4 * FRAME_S  # between two attempts afterwards
-TIME_TOLERANCE_S = 0.005  # of a frame's time
 SMALLEST_HAND_PX = 12.0
 DISAGREEMENT_THRESHOLD = 0.3
 CERTAIN_PRESENCE = 0.95  # from which a hand is none that the network imagines
@@ -77,7 +74,7 @@ class HandTracker:
         """
         self._time_s = now = self._time_s + FRAME_S if time_s is None else time_s
         keys = [(number, side) for number, _ in observations for side in range(len(SIDES))]
-        self._hands = {key: self._hands.get(key) or _Hand(None, now, now - PATIENT_S) for key in keys}
+        self._hands = {key: self._hands.get(key) or _Hand(None, now, now - PATIENCE_S) for key in keys}
         people = dict(observations)
         found = {key: self._find(image_rgb, self._hands[key], people[key[0]], key[1]) for key in keys}
         found = _without_duplicates(found, people)
@@ -96,10 +93,7 @@ class HandTracker:
             found = assigned(estimate, person, scale, side)
             if found is not None:
                 return found
-        elif (
-            self._time_s - hand.seen_s > EAGER_S + TIME_TOLERANCE_S
-            and self._time_s - hand.searched_s < PATIENT_S - TIME_TOLERANCE_S
-        ):
+        elif not is_search_due(self._time_s, hand.seen_s, hand.searched_s):
             return None
         hand.searched_s = self._time_s
         predicted = region_from_body(person.keypoints_px, scale, side)
