@@ -62,15 +62,11 @@ def run_live_command(args: argparse.Namespace) -> dict[str, Any]:
         footage = stack.enter_context(Footage(values["keep_footage"], source.fps)) if values["keep_footage"] else None
         page = _preview(body, stack) if values["preview"] else None
         line = stack.enter_context(ProgressLine(sys.stderr, show=not args.quiet))
-        hearing = [taker for taker in (recording, page) if taker]
-        watching = [take for take in (footage and footage.add, page and page.receive) if take]
-        listeners = Listeners(
-            say,
-            lambda state: line(str(state)),
-            _each([taker.begin for taker in hearing]),
-            _each(watching),
-        )
-        report = run_live(source, body, options, [*outputs, *hearing], listeners)
+        with_camera = [output for output in (recording, page) if output]
+        begin = _each([output.begin for output in with_camera])
+        receive = _each([each for each in (footage and footage.add, page and page.receive) if each])
+        listeners = Listeners(say, lambda state: line(str(state)), begin, receive)
+        report = run_live(source, body, options, [*outputs, *with_camera], listeners)
         saved = [footage.save()] if footage else []
         if footage and footage.lost:
             say(f"{footage.lost} frames are missing in {values['keep_footage']}, since the computer was too busy")

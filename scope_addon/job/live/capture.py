@@ -39,7 +39,7 @@ def capture_live(request: LiveRequest, job_folder: Path, send: Send, commands: C
     options = LiveOptions(
         chosen["live_quality"],
         chosen["live_people"],
-        tuple(chosen["heights_m"])[: chosen["live_people"]],
+        tuple(chosen["heights_m"]),
         chosen["focal_mm"],
         chosen["fov_deg"],
         Path(chosen["calibration"]) if chosen["calibration"] else None,

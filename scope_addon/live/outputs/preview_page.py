@@ -11,7 +11,7 @@ from __future__ import annotations
 import secrets
 import threading
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any
 
@@ -92,7 +92,7 @@ class PreviewPage:
             self._poses[pose.person] = pose
             self._changed.notify_all()
 
-    def pictures(self) -> Any:
+    def pictures(self) -> Iterator[bytes]:
         """Yield JPEG pictures until the capture ends."""
         self._viewers += 1
         try:

@@ -306,7 +306,6 @@ def live_request(scene: bpy.types.Scene) -> LiveRequest:
             raise UsageError(f"'{settings.camera.strip()}' is no camera; enter its number, 0 for the first")
     names = {option.name for option in options_at(Place.LIVE_WORKER)}
     values = {name: value for name, value in chosen_values(scene).items() if name in names}
-    values["heights_m"] = values["heights_m"][: settings.people]
     values["body"] = chosen_body(values)
     if settings.keep_footage and settings.source != "FILE":
         values["keep_footage"] = str(kept_footage(scene))
