@@ -20,6 +20,7 @@ import cv2
 from ...solver import Body
 from ..capture.camera.intrinsics import assumed_camera, choose_camera
 from ..capture.fitting.live_body import LiveBody
+from ..capture.fitting.stature import require_stature
 from ..capture.media.frame import Frame
 from ..capture.perception.execution import Execution
 from ..capture.tracking.tracker import PeopleTracker
@@ -96,6 +97,8 @@ def run_live(
 
     :raises ScopeError: an option is invalid, the source cannot be read, or an output failed.
     """
+    for height_m in options.heights_m:
+        require_stature(body, height_m)
     clock = clock or Clock()
     execution = Execution(options.provider)
     cores = os.cpu_count() or 1
