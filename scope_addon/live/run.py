@@ -18,7 +18,7 @@ from ...solver import Body
 from ..capture.camera.intrinsics import assumed_camera, choose_camera
 from ..capture.fitting.live_body import LiveBody
 from ..capture.media.frame import Frame
-from ..capture.opencv_threads import opencv_in_one_thread
+from ..capture.media.opencv_threads import opencv_in_one_thread
 from ..capture.perception.execution import Execution
 from ..capture.tracking.tracker import PeopleTracker
 from .clock import Clock

@@ -23,8 +23,8 @@ from ..fitting.focal_fits import FocalFits
 from ..fitting.live_body import LiveBody
 from ..media.exposure import AutoExposure
 from ..media.frame import Frame
+from ..media.opencv_threads import opencv_in_one_thread
 from ..media.video import Video
-from ..opencv_threads import opencv_in_one_thread
 from ..options import CaptureOptions, most_people
 from ..perception.adapters.description import description_path
 from ..perception.execution import Execution
