@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from ..errors import UsageError
 from ..installed import CAPTURE, check_installed, check_live
 from ..options import Place, options_at
+from ..options.body_choice import chosen_body
 from ..scene.export.output_paths import person_paths
 from .arguments import add_options, option_values
 from .memory_limit import check_memory_limit
@@ -54,7 +55,7 @@ def run_live_command(args: argparse.Namespace) -> dict[str, Any]:
     from ..live.run import Listeners, run_live
     from ..live.sources import open_source
 
-    source, body = open_source(args.source), load_body(values["body"])
+    source, body = open_source(args.source), load_body(chosen_body(values))
     with ExitStack() as stack:
         outputs = _outputs(values, body, stack)
         recording = PeopleRecording(_paths(values), body, source) if values["record"] else None
