@@ -8,7 +8,7 @@ includes the first estimates of focal length, shape and floor.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -44,6 +44,21 @@ class LiveOptions:
     threads: int = 0
     provider: str = "auto"
     reconnect_s: float = 2.0
+
+    @classmethod
+    def of(cls, values: Mapping[str, Any]) -> LiveOptions:
+        """Return the options from their values by name, as the command line and a request have them."""
+        return cls(
+            quality=values["live_quality"],
+            people=values["live_people"],
+            heights_m=tuple(values["heights_m"]),
+            focal_mm=values["focal_mm"],
+            fov_deg=values["fov_deg"],
+            calibration=Path(values["calibration"]) if values["calibration"] else None,
+            threads=values["threads"],
+            provider=values["provider"],
+            reconnect_s=values["reconnect_s"],
+        )
 
 
 class Output(Protocol):
