@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whose a temporary file is: its name tells the computer and the process, so that others remove what a kill left."""
+"""Names of temporary files that tell whose they are, so that other processes can remove what a killed one has left.
+
+Such a name contains ``owner()``: the computer and the process, ``1a2b3c4d-1234``.
+"""
 
 from __future__ import annotations
 
@@ -17,18 +20,26 @@ def owner() -> str:
     return f"{computer()}-{os.getpid()}"
 
 
-def is_abandoned(path: Path, owned_by: str) -> bool:
-    """Return whether the process that made a temporary file or folder does not run any more.
+def has_ended(owned_by: str) -> bool:
+    """Return whether a temporary file's process was one of this computer, and does not run any more.
 
-    :param owned_by: the part of its name that `owner` gave, which may be followed by ``-`` and more.
-    :raises OSError: it does not exist any more.
+    :param owned_by: the part of its name that `owner` gave, which may be followed by ``-`` and more; of any other name,
+        the answer is no.
     """
-    where, _, rest = owned_by.partition("-")
-    process = rest.partition("-")[0]
+    where, process = _parts(owned_by)
+    return where == computer() and process.isdecimal() and not _runs(int(process))
+
+
+def is_abandoned(path: Path, owned_by: str) -> bool:
+    """Return whether a temporary file or folder belongs to no running process: it has ended, or the file is a day old.
+
+    :param owned_by: see `has_ended`.
+    :raises OSError: the file does not exist any more.
+    """
+    where, process = _parts(owned_by)
     if len(where) != len(computer()) or not process.isdecimal():
         return False  # somebody else's name
-    old = time.time() - path.stat().st_mtime > _ABANDONED_S
-    return old or (where == computer() and not runs(int(process)))
+    return time.time() - path.stat().st_mtime > _ABANDONED_S or has_ended(owned_by)
 
 
 def computer() -> str:
@@ -36,7 +47,13 @@ def computer() -> str:
     return f"{zlib.crc32(platform.node().encode('utf-8', 'replace')):08x}"
 
 
-def runs(process: int) -> bool:
+def _parts(owned_by: str) -> tuple[str, str]:
+    """Return the computer and the process, as far as the name has them."""
+    where, _, rest = owned_by.partition("-")
+    return where, rest.partition("-")[0]
+
+
+def _runs(process: int) -> bool:
     """Return whether a process of this computer runs, or cannot be asked about."""
     if os.name == "nt":  # where the signal 0 would end it
         return True

@@ -13,11 +13,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...scope_addon.capture.fitting.stature import require_stature
 from ...scope_addon.capture.options import CaptureOptions
 from ...scope_addon.capture.pipeline import capture
-from ...scope_addon.errors import NoPersonError, UsageError
+from ...scope_addon.errors import NoPersonError
 from ...scope_addon.motion import Motion
+from ...scope_addon.options.body_choice import chosen_body
 from ...solver import Body, load_body
 from ...tools.render_sample.truth import project
 from ..evaluation.metrics import mpjpe, pa_mpjpe, relative_to
@@ -95,7 +95,9 @@ def evaluate_scene(
 ) -> list[Result]:
     """Capture a clip and return the errors of each of its true people."""
     count = len(truth["limbs"])
-    heights = _heights(body, truth) if statures_given else ()
+    heights = _heights(truth) if statures_given else ()
+    if heights:
+        body = load_body(chosen_body({"body": body.name, "heights_m": heights}))
     try:
         motions = capture(video, body, CaptureOptions(quality=quality, people=count, heights_m=heights)).motions
     except NoPersonError:
@@ -104,16 +106,10 @@ def evaluate_scene(
     return [_result(body, video.stem, matched.get(k), truth, k) for k in range(count)]
 
 
-def _heights(body: Body, truth: Truth) -> tuple[float, ...]:
-    """Return the true statures, of who appears tallest first; none if the body cannot have one of them."""
+def _heights(truth: Truth) -> tuple[float, ...]:
+    """Return the true statures, of who appears tallest first."""
     tall = np.median(np.ptp(project(truth["limbs_cam"], truth["intrinsics"])[..., 1], axis=2), axis=1)
-    heights = tuple(truth["stature_m"][np.argsort(-tall)].tolist())
-    try:
-        for height_m in heights:
-            require_stature(body, height_m)
-    except UsageError:
-        return ()
-    return heights
+    return tuple(truth["stature_m"][np.argsort(-tall)].tolist())
 
 
 def _result(body: Body, clip: str, motion: Motion | None, truth: Truth, k: int) -> Result:

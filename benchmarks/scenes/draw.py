@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Random scenes, reproducible by their number. `kinds.py` deals the properties that groups are made of.
+"""Random scenes, reproducible by their number. `kinds.py` chooses the properties that groups are made of.
 
 Two of three scenes are for testing: their first person moves as in a recording that the lifting network was not trained
 on, and no choice may be made by their results. The others, for development, use the other recordings.

@@ -20,7 +20,7 @@ CLOTHES = (True, False)
 COMPANY = (True, True, True, *7 * (False,))
 BLOCKS = (True, False, False, False)
 SURROUNDINGS = (INDOORS, OUTDOORS)
-Card = TypeVar("Card")
+Value = TypeVar("Value")
 
 
 @dataclass(frozen=True)
@@ -45,24 +45,24 @@ def is_test(number: int) -> bool:
 def kind_of(number: int, recordings: int) -> Kind:
     """Return the kind of a scene.
 
-    Every property is dealt from a shuffled deck of its own, and of a new one when that is used up.
+    Every property takes each of its values once, in random order, before it takes them again in another order.
 
     :param recordings: how many recordings the scene's split has.
     """
     passed = (number - 1) // TEST_OF + 1  # scenes for development before this one
     turn = number - passed if is_test(number) else number // TEST_OF
 
-    def deal(which: int, cards: Sequence[Card]) -> Card:
-        deck = np.random.default_rng([SEED, which, is_test(number), turn // len(cards)]).permutation(len(cards))
-        return cards[deck[turn % len(cards)]]
+    def pick(which: int, values: Sequence[Value]) -> Value:
+        rng = np.random.default_rng([SEED, which, is_test(number), turn // len(values)])
+        return values[rng.permutation(len(values))[turn % len(values)]]
 
     return Kind(
-        deal(0, range(recordings)),
-        deal(1, SIZES),
-        deal(2, CAMERAS),
-        deal(3, SURROUNDINGS),
-        deal(4, CHILDREN),
-        deal(5, CLOTHES),
-        deal(6, COMPANY),
-        deal(7, BLOCKS),
+        pick(0, range(recordings)),
+        pick(1, SIZES),
+        pick(2, CAMERAS),
+        pick(3, SURROUNDINGS),
+        pick(4, CHILDREN),
+        pick(5, CLOTHES),
+        pick(6, COMPANY),
+        pick(7, BLOCKS),
     )

@@ -16,7 +16,7 @@ from typing import Any
 import fsspec
 
 from ...solver.errors import InputError, ScopeError
-from ...solver.processes import computer, owner, runs
+from ...solver.processes import has_ended, owner
 from ..errors import OutputError, UsageError
 from ..footage import is_url
 from ..job.batch import REPORT_NAME
@@ -200,8 +200,7 @@ class RemoteStaging:
         """Remove the attempts of batches of this computer that do not run any more."""
         file_system, root = _open(f"{self._out}/{ATTEMPTS}")
         for path in file_system.ls(root, detail=False) if file_system.isdir(root) else []:
-            where, process, _ = [*PurePosixPath(path).name.split("-", 2), "", ""][:3]
-            if where == computer() and process.isdecimal() and not runs(int(process)):
+            if has_ended(PurePosixPath(path).name):
                 file_system.rm(path, recursive=True)
 
 

@@ -15,14 +15,14 @@ import time
 from pathlib import Path
 from typing import Any
 
-from ...solver.processes import computer, owner, runs
+from ...solver.processes import has_ended, owner
 from ..atomic_write import atomic_path, reason, resolve_link
 from ..errors import OutputError
 from ..job.clips.task import file_hash
 
 ATTEMPTS = ".scope-attempts"
 TOKEN = "token"  # file by which a worker shows that it sees the same folder
-_ABANDONED_S = 7 * 24 * 3600.0
+_ABANDONED_S = 7 * 24 * 3600.0  # of another computer's batch, which may take days for a clip
 
 
 class Staging:
@@ -95,12 +95,11 @@ def _remove_abandoned(folder: Path) -> None:
     except OSError:
         return
     for path in found:
-        where, process, _ = [*path.name.split("-", 2), "", ""][:3]
         try:
             old = time.time() - path.stat().st_mtime > _ABANDONED_S
         except OSError:
             continue
-        if old or (where == computer() and process.isdecimal() and not runs(int(process))):
+        if old or has_ended(path.name):
             shutil.rmtree(path, ignore_errors=True)
     _remove_if_empty(folder)
 

@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ...solver.body import Body
-from ...solver.loaders.body_file import body_with_hands
 from ..errors import UsageError
 from ..options import Option, Place, options_at
+from ..options.body_choice import chosen_body
 
 if TYPE_CHECKING:
     from ..capture.options import CaptureOptions
@@ -70,7 +70,7 @@ def body_and_options(args: argparse.Namespace) -> tuple[Body, CaptureOptions]:
 
     values = option_values(args)
     options = capture_options(values)
-    body = load_body(body_with_hands(values["body"]) if values["hands"] else values["body"])
+    body = load_body(chosen_body(values))
     check_options(body, options)
     return body, options
 

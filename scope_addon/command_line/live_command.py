@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from ..errors import UsageError
 from ..installed import CAPTURE, check_installed, check_live
 from ..options import Place, options_at
+from ..options.body_choice import chosen_body
 from ..scene.export.output_paths import person_paths
 from .arguments import add_options, option_values
 from .memory_limit import check_memory_limit
@@ -54,22 +55,18 @@ def run_live_command(args: argparse.Namespace) -> dict[str, Any]:
     from ..live.run import Listeners, run_live
     from ..live.sources import open_source
 
-    source, body = open_source(args.source), load_body(values["body"])
+    source, body = open_source(args.source), load_body(chosen_body(values))
     with ExitStack() as stack:
         outputs = _outputs(values, body, stack)
         recording = PeopleRecording(_paths(values), body, source) if values["record"] else None
         footage = stack.enter_context(Footage(values["keep_footage"], source.fps)) if values["keep_footage"] else None
         page = _preview(body, stack) if values["preview"] else None
         line = stack.enter_context(ProgressLine(sys.stderr, show=not args.quiet))
-        hearing = [taker for taker in (recording, page) if taker]
-        watching = [take for take in (footage and footage.add, page and page.receive) if take]
-        listeners = Listeners(
-            say,
-            lambda state: line(str(state)),
-            _each([taker.begin for taker in hearing]),
-            _each(watching),
-        )
-        report = run_live(source, body, options, [*outputs, *hearing], listeners)
+        with_camera = [output for output in (recording, page) if output]
+        begin = _each([output.begin for output in with_camera])
+        receive = _each([each for each in (footage and footage.add, page and page.receive) if each])
+        listeners = Listeners(say, lambda state: line(str(state)), begin, receive)
+        report = run_live(source, body, options, [*outputs, *with_camera], listeners)
         saved = [footage.save()] if footage else []
         if footage and footage.lost:
             say(f"{footage.lost} frames are missing in {values['keep_footage']}, since the computer was too busy")
@@ -119,17 +116,7 @@ def _checked(values: Mapping[str, Any]) -> LiveOptions:
         choose_camera(1, 1, focal_mm=values["focal_mm"], fov_deg=values["fov_deg"], calibration=values["calibration"])
     elif values["calibration"]:
         read_calibration(values["calibration"])
-    return LiveOptions(
-        values["live_quality"],
-        values["live_people"],
-        tuple(values["heights_m"]),
-        values["focal_mm"],
-        values["fov_deg"],
-        values["calibration"],
-        values["threads"],
-        values["provider"],
-        values["reconnect_s"],
-    )
+    return LiveOptions.of(values)
 
 
 def _outputs(values: Mapping[str, Any], body: Body, stack: ExitStack) -> list[Output]:

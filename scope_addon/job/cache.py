@@ -13,17 +13,14 @@ from __future__ import annotations
 
 import os
 import re
-import time
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
 REPORT = "report.json"
-_VERSION = re.compile(
-    r"(\w+-[0-9a-f]{8})-[0-9a-f]{12}"
-)  # a folder of solver/compiled/code_folders.py, less its program
-_ABANDONED_S = 24 * 3600.0  # age above which a job folder belongs to no running process
+# a folder of solver/compiled/code_folders.py, less its program
+_VERSION = re.compile(r"(\w+-[0-9a-f]{8})-[0-9a-f]{12}")
 _JOB = "job-"  # begins the name of a job's folder, before its owner
 
 
@@ -49,7 +46,7 @@ class Cache:
         """Return the finished capture with this key; None if there is none."""
         import json
 
-        from .messages import is_result  # loads numba
+        from .messages import is_result
 
         folder = self.root / "captures" / key
         try:
@@ -136,7 +133,7 @@ class Cache:
                 shutil.rmtree(folder, ignore_errors=True)
 
     def _not_writable(self, error: OSError) -> Exception:
-        from ..errors import OutputError  # imported here because it loads numba, which the preferences do not need
+        from ..errors import OutputError
 
         reason = error.strerror or error
         return OutputError(
@@ -161,14 +158,14 @@ class Cache:
 
 
 def _remove_abandoned(jobs: Path) -> None:
-    """Remove the folders of jobs whose Blender does not run any more, and those that are a day old."""
+    """Remove the folders of jobs whose Blender does not run any more."""
     import shutil
 
     from ...solver.processes import is_abandoned
 
-    for folder, used in _by_time(jobs):
-        with suppress(OSError):
-            if time.time() - used > _ABANDONED_S or is_abandoned(folder, folder.name.removeprefix(_JOB)):
+    for folder, _ in _by_time(jobs):
+        with suppress(OSError):  # another process has removed it
+            if is_abandoned(folder, folder.name.removeprefix(_JOB)):
                 shutil.rmtree(folder, ignore_errors=True)
 
 

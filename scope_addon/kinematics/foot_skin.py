@@ -18,6 +18,7 @@ from ...solver.rotations import exp
 from ..motion import Motion
 from .contact_points import FOOT_PARTS
 from .frame_blocks import by_blocks
+from .runs import runs
 from .standing import LEVEL_M
 
 UNDER_FLOOR_M = 0.01  # depth from which on a foot counts as under the floor
@@ -162,12 +163,6 @@ def steps(
 def _duration(mask: NDArray[np.bool_], times: NDArray[np.float64]) -> float:
     """Return the seconds for which ``mask`` (T,) is True, of frames at ``times`` (T,)."""
     return float(mask.sum() * np.median(np.diff(times))) if len(times) > 1 else 0.0
-
-
-def runs(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """Return the first row and the row after the last one of each run of True in ``mask``, (T,)."""
-    edges = np.flatnonzero(np.diff(np.r_[False, mask, False]))
-    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
 
 
 def _directions() -> NDArray[np.float64]:

@@ -9,18 +9,20 @@ image if its depth changes sign:
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...solver.rotations import shortest_turn
+from .runs import runs
 
-LIMBS = tuple(
-    tuple(f"{side}_{joint}" for joint in joints)
-    for joints in (("shoulder", "elbow", "wrist"), ("hip", "knee", "ankle"))
-    for side in ("left", "right")
+LIMBS = (
+    ("left_shoulder", "left_elbow", "left_wrist"),
+    ("right_shoulder", "right_elbow", "right_wrist"),
+    ("left_hip", "left_knee", "left_ankle"),
+    ("right_hip", "right_knee", "right_ankle"),
 )
 
 
@@ -37,13 +39,10 @@ def bone_depths(
     return depths
 
 
-def runs_of_one_sign(depths: NDArray[np.floating[Any]], least: float, most: float) -> Iterator[slice]:
-    """Yield the runs of frames in which a depth (T,) stays beyond ``least`` on one side, if it gets beyond ``most``."""
-    side = np.where(np.abs(depths) > least, np.sign(depths), 0.0)
-    cuts = np.flatnonzero(np.diff(side)) + 1
-    for first, end in zip([0, *cuts], [*cuts, len(depths)], strict=True):
-        if end > first and np.abs(depths[first:end]).max() > max(least, most):
-            yield slice(int(first), int(end))
+def runs_of_one_sign(depths: NDArray[np.floating[Any]], shallow: float, deep: float) -> list[slice]:
+    """Return the runs of frames in which |depth| (T,) exceeds ``shallow`` on one side, and somewhere ``deep``."""
+    found = (slice(*run) for run in sorted(runs(depths > shallow) + runs(depths < -shallow)))
+    return [run for run in found if np.abs(depths[run]).max() > deep]
 
 
 def mirrored_limb(

@@ -24,11 +24,11 @@ from ..capture.perception.observation import Observation, PendingReference
 from ..capture.tracking.left_right import (
     AS_DETECTED,
     CHANGE_COST_M,
-    FRAME_COSTS_M,
     LIMBS,
     MIRROR_PARTNER,
     apply_labels,
     mean_distance,
+    reading_costs,
     readings_of,
 )
 
@@ -37,14 +37,14 @@ _MOST_FRAMES = 120  # that are kept for an answer
 
 @dataclass
 class _Frame:
-    """The readings (3, 12, 3) of one frame, the costs (3, 3) of each after each of the frame before, and its own."""
+    """The readings of one frame, and what they cost."""
 
-    readings: NDArray[np.floating[Any]]
-    steps: NDArray[np.floating[Any]]
-    costs: NDArray[np.floating[Any]]  # (3,)
-    reference: PendingReference | None
+    readings: NDArray[np.floating[Any]]  # (3, 12, 3)
+    steps: NDArray[np.floating[Any]]  # (3, 3) of each reading (column) after each of the frame before (row)
+    costs: NDArray[np.floating[Any]]  # (3,) of each reading itself
+    reference: PendingReference | None  # until its answer is added
 
-    def hear(self, *, wait: bool) -> None:
+    def add_reference(self, *, wait: bool) -> None:
         """Add the cost of the reference network's answer if it is there."""
         if self.reference is None or not (wait or self.reference.done()):
             return
@@ -75,9 +75,9 @@ class CausalLeftRight:
         if self._frames:
             steps = mean_distance(self._frames[-1].readings[:, None], readings[None])
             steps = steps + CHANGE_COST_M * (1 - np.eye(3))
-        self._frames.append(_Frame(readings, steps, FRAME_COSTS_M, observation.reference_landmarks))
+        self._frames.append(_Frame(readings, steps, reading_costs(), observation.reference_landmarks))
         for frame in self._frames:
-            frame.hear(wait=self._wait or observation.acquired)
+            frame.add_reference(wait=self._wait or observation.acquired)
         label = self._label()
         if label == AS_DETECTED:
             return observation

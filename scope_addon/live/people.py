@@ -20,18 +20,20 @@ from numpy.typing import NDArray
 
 from ...solver import Body
 from ..capture.camera.intrinsics import Camera
+from ..capture.media.exposure import AutoExposure
 from ..capture.media.frame import Frame
 from ..capture.perception.observation import Observation
 from ..capture.tracking.appearance import SIZE, distance
 from ..capture.tracking.association import LONG_GAP_S, MAX_LINK_COST, End, cheapest_links, link_cost
+from ..capture.tracking.track import trunk_px
 from ..capture.tracking.tracker import PeopleTracker
 from .pose import LivePose
 from .session import LiveSession
 
-_NO_LINK = 1e6
+_NEW_SHARE = 0.3  # of the newest frame in the velocity of somebody who is seen
 
 
-@dataclass
+@dataclass(eq=False)
 class _Place:
     """A session, and who is followed by it: their tracklet, where they were seen last, and the sum of appearances."""
 
@@ -40,6 +42,11 @@ class _Place:
     end: End | None = None
     appearance: NDArray[np.float64] = field(default_factory=lambda: np.zeros(SIZE))
 
+    @property
+    def last_s(self) -> float:
+        """When the person was seen last; -inf before there was one."""
+        return -np.inf if self.end is None else self.end.time
+
     def see(self, tracklet: int, observation: Observation, time_s: float) -> None:
         """Note that the person was seen."""
         before = self.end if self.tracklet == tracklet else None
@@ -47,10 +54,17 @@ class _Place:
         if observation.appearance is not None:
             self.appearance = self.appearance + observation.appearance
 
+    def link_cost(self, observation: Observation, time_s: float) -> float:
+        """Return what it costs to take somebody who was found for the person; see `association`."""
+        assert self.end is not None
+        appearance = np.zeros(SIZE) if observation.appearance is None else observation.appearance
+        return link_cost(self.end, _end(observation, time_s), distance(self.appearance, appearance))
+
 
 class LivePeople:
     """Turns the frames of one source into poses of up to some people; one call per frame, in order.
 
+    :param tracker: of all people if there are several places, otherwise of the largest one.
     :param camera: as known from the user or the source.
     :param size: width and height of the frames, pixels.
     :param heights_m: statures, as far as they are known, metres, by place.
@@ -69,9 +83,10 @@ class LivePeople:
         count: int = 1,
         executor: Executor | None = None,
     ) -> None:
+        self._tracker, self._exposure = tracker, AutoExposure()
         heights = [*heights_m, *[None] * count][:count]
-        first = LiveSession(body, tracker, camera, size, heights[0], executor)
-        others = [LiveSession(body, tracker, camera, size, height, executor, first) for height in heights[1:]]
+        first = LiveSession(body, camera, size, heights[0], executor)
+        others = [LiveSession(body, camera, size, height, executor, first) for height in heights[1:]]
         self._places = [_Place(session) for session in (first, *others)]
 
     @property
@@ -81,51 +96,51 @@ class LivePeople:
 
     def step(self, frame: Frame) -> list[LivePose]:
         """Return the poses in the next frame, one of each place."""
-        first = self._places[0].session
+        image_rgb = self._exposure.brighten(frame.image_rgb)
+        observations = dict(self._tracker.step(image_rgb, None, frame.timestamp_s))
         if len(self._places) == 1:
-            return [first.step(frame)]
-        observations = dict(first.track(frame))
-        self._take_places(observations, frame.timestamp_s)
+            self._follow_largest(self._places[0], observations)
+        else:
+            self._take_places(observations, frame.timestamp_s)
         poses = []
         for number, place in enumerate(self._places):
             observation = None if place.tracklet is None else observations.get(place.tracklet)
-            poses.append(replace(place.session.follow(frame, observation), person=number))
+            poses.append(replace(place.session.step(frame, observation), person=number))
         return poses
+
+    def _follow_largest(self, place: _Place, observations: Mapping[int, Observation]) -> None:
+        """Keep the person while they are seen, and then take the largest one."""
+        if place.tracklet not in observations:
+            place.tracklet = max(observations, key=lambda k: observations[k].region.side_px, default=None)
 
     def _take_places(self, observations: Mapping[int, Observation], time_s: float) -> None:
         """Give places to those who have none, as far as there are free ones, and note who was seen."""
-        taken = {place.tracklet for place in self._places}
-        new = [tracklet for tracklet in observations if tracklet not in taken]
+        followed: dict[int | None, _Place] = {place.tracklet: place for place in self._places}
+        new = [tracklet for tracklet in observations if tracklet not in followed]
         new.sort(key=lambda tracklet: -observations[tracklet].region.side_px)
-        left = [place for place in self._places if place.tracklet not in observations and place.end is not None]
-        unused = [place for place in self._places if place.end is None]
-        cost = np.full((len(left), len(new)), _NO_LINK)
-        for i, place in enumerate(left):
-            for j, tracklet in enumerate(new):
-                seen = observations[tracklet]
-                unlike = distance(place.appearance, np.zeros(SIZE) if seen.appearance is None else seen.appearance)
-                assert place.end is not None
-                cost[i, j] = link_cost(place.end, _end(seen, time_s), unlike)
-        links = {j: left[i] for i, j in cheapest_links(cost, MAX_LINK_COST).items()}
-        away = [p for p in left if p not in links.values() and p.end is not None and time_s - p.end.time > LONG_GAP_S]
-        free = unused + sorted(away, key=lambda place: place.end.time if place.end else 0.0)
-        for j, tracklet in enumerate(new):
-            chosen = links.get(j) or (free.pop(0) if free else None)
-            if chosen is not None:
-                if j not in links:  # somebody else
-                    chosen.appearance = np.zeros(SIZE)
-                chosen.see(tracklet, observations[tracklet], time_s)
-        for place in self._places:
-            if place.tracklet in observations and place.end is not None and place.end.time < time_s:
-                assert place.tracklet is not None
-                place.see(place.tracklet, observations[place.tracklet], time_s)
+        left = [place for place in self._places if place.tracklet not in observations]
+        known = [place for place in left if place.end is not None]
+        cost = np.array([[place.link_cost(observations[tracklet], time_s) for tracklet in new] for place in known])
+        links = cheapest_links(cost.reshape(len(known), len(new)), MAX_LINK_COST)
+        found_again = {new[j]: known[i] for i, j in links.items()}
+        free = [p for p in left if p not in found_again.values() and time_s - p.last_s > LONG_GAP_S]
+        free.sort(key=lambda place: place.last_s)
+        places = followed | found_again
+        for tracklet in new:
+            if tracklet not in places and free:
+                places[tracklet] = free.pop(0)
+                places[tracklet].appearance = np.zeros(SIZE)
+        for tracklet, observation in observations.items():
+            if tracklet in places:
+                places[tracklet].see(tracklet, observation, time_s)
 
 
 def _end(observation: Observation, time_s: float, before: End | None = None) -> End:
     """Return where somebody is seen, and how fast they move if it is known where they were before."""
-    center = observation.keypoints_px[[11, 12, 23, 24]].mean(axis=0)  # of the trunk
-    velocity = np.zeros(2)
-    if before is not None and time_s > before.time:
-        now = (center - before.center_px) / (time_s - before.time)
-        velocity = 0.7 * before.velocity_px + 0.3 * now
+    center, velocity = trunk_px(observation.keypoints_px), np.zeros(2)
+    if before is not None:
+        velocity = before.velocity_px
+        if time_s > before.time:
+            now = (center - before.center_px) / (time_s - before.time)
+            velocity = (1 - _NEW_SHARE) * velocity + _NEW_SHARE * now
     return End(time_s, center, velocity, observation.region.side_px)

@@ -45,7 +45,7 @@ class LivePose:
     keypoints: NDArray[np.floating[Any]]
     joint_confidence: NDArray[np.floating[Any]]  # (K+1,)
     is_known: bool = True  # whether somebody was seen in this frame or before
-    person: int = 0  # which of the people this is, by the order in which they came
+    person: int = 0  # which of the people this is, see `LivePeople`
 
     @property
     def R_world_root(self) -> NDArray[np.float64]:

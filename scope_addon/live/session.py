@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""From frames to poses: the causal stages in their order. One person, the largest one when the capture begins."""
+"""From frames to the poses of one person: the causal stages in their order."""
 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from concurrent.futures import Executor, Future
 from dataclasses import dataclass, replace
 from typing import Any
@@ -15,10 +15,8 @@ from numpy.typing import NDArray
 from ...solver import Body, State
 from ..capture.camera.intrinsics import Camera
 from ..capture.fitting.frame_sequence import FittedTrack
-from ..capture.media.exposure import AutoExposure
 from ..capture.media.frame import Frame
 from ..capture.perception.observation import Observation
-from ..capture.tracking.tracker import PeopleTracker
 from .calibration import Calibration, Calibrator, track_of
 from .causal_fit import CausalFit, FittedFrame
 from .feet.hold import FootHold
@@ -53,7 +51,7 @@ class _Seen:
 
 
 class LiveSession:
-    """Turns the frames of one source into poses; one call per frame, in order.
+    """Turns the observations of one person into poses; one call per frame, in order.
 
     :param camera: as known from the user or the source.
     :param size: width and height of the frames, pixels.
@@ -65,20 +63,17 @@ class LiveSession:
     def __init__(
         self,
         body: Body,
-        tracker: PeopleTracker,
         camera: Camera,
         size: tuple[int, int],
         height_m: float | None = None,
         executor: Executor | None = None,
         leader: LiveSession | None = None,
     ) -> None:
-        self._body, self._tracker, self._height_m, self._leader = body, tracker, height_m, leader
-        self._size = size
+        self._body, self._size, self._height_m, self._leader = body, size, height_m, leader
         self._start: Start = executor.submit if executor else start_at_once
         self._calibrator = Calibrator(body, camera, size, height_m)
-        self._exposure, self._filter, self._feet = AutoExposure(), PoseFilter(), FootHold(body)
+        self._filter, self._feet = PoseFilter(), FootHold(body)
         self._left_right = CausalLeftRight(wait=executor is None)
-        self._tracklet: int | None = None
         self._fit: CausalFit | None = None
         self._current: Calibration | None = None
         self._target: Calibration | None = None
@@ -89,15 +84,7 @@ class LiveSession:
         self._next_follow_s = np.inf
         self._last: LivePose | None = None
 
-    def step(self, frame: Frame) -> LivePose:
-        """Return the pose of the largest person in the next frame."""
-        return self.follow(frame, self._choose(self.track(frame)))
-
-    def track(self, frame: Frame) -> list[tuple[int, Observation]]:
-        """Return the tracklets and observations of everybody in the next frame."""
-        return self._tracker.step(self._exposure.brighten(frame.image_rgb), None, frame.timestamp_s)
-
-    def follow(self, frame: Frame, observation: Observation | None) -> LivePose:
+    def step(self, frame: Frame, observation: Observation | None) -> LivePose:
         """Return the pose in the next frame, in which the person was observed, or not."""
         observation = None if observation is None else self._left_right(observation)
         fitted = self._fit_person(frame, observation) if observation is not None else None
@@ -108,13 +95,6 @@ class LiveSession:
         else:
             self._last = self._pose(frame, observation, fitted)
         return self._last
-
-    def _choose(self, observations: Sequence[tuple[int, Observation]]) -> Observation | None:
-        """Follow the same person while they are seen, and then the largest one."""
-        people = dict(observations)
-        if self._tracklet not in people:
-            self._tracklet = max(people, key=lambda k: people[k].region.side_px, default=None)
-        return None if self._tracklet is None else people.get(self._tracklet)
 
     def _fit_person(self, frame: Frame, observation: Observation) -> FittedFrame | None:
         time_s = frame.timestamp_s

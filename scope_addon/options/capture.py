@@ -154,7 +154,7 @@ CAPTURE_OPTIONS = (
         "scope",
         Place.COMMAND_LINE | Place.WORKER | Place.PANEL | Place.IMPORT | _LIVE,
         "the body that is fitted to the person",
-        argument=Argument(help="body model: scope, scope_h, or your own .npz or .pkl file"),
+        argument=Argument(help="body model: scope, scope_h, scope_child, scope_child_h, or your own .npz or .pkl file"),
         blender=Property(choices=BODIES),
     ),
     Option(
@@ -170,7 +170,9 @@ CAPTURE_OPTIONS = (
         False,
         _EVERYWHERE,
         "capture the fingers as well, on the body with hands; takes longer",
-        argument=Argument(help="capture the fingers as well, on scope_h unless --body names another body"),
+        argument=Argument(
+            help="capture the fingers as well, on scope_h (or scope_child_h) unless --body names another body"
+        ),
     ),
     Option(
         "face",

@@ -4,11 +4,13 @@
 from __future__ import annotations
 
 import os
+import shutil
 
 import pytest
 from scope.scope_addon.cli import build_parser
 from scope.scope_addon.command_line.arguments import body_and_options, non_default_arguments
 from scope.scope_addon.errors import UsageError
+from scope.solver.loaders.body_file import BUILT_IN
 
 
 def options(*argv):
@@ -30,6 +32,26 @@ def test_an_invalid_number_of_people_is_an_error(said):
 @pytest.mark.parametrize(("said", "meant"), [("175", (1.75,)), ("175,162.5", (1.75, 1.625)), ("180, 170", (1.8, 1.7))])
 def test_heights_are_centimetres(said, meant):
     assert options("--height", said).heights_m == pytest.approx(meant)
+
+
+@pytest.mark.parametrize(
+    ("said", "body"),
+    [
+        (["--height", "110"], "scope_child"),
+        (["--height", "175,110", "--people", "2"], "scope_child"),
+        (["--height", "110", "--hands"], "scope_child_h"),
+        (["--height", "150"], "scope"),
+        ([], "scope"),
+    ],
+)
+def test_the_height_of_a_child_needs_the_body_of_all_ages(said, body):
+    assert body_and_options(build_parser().parse_args(["capture", "clip.mp4", *said]))[0].name == body
+
+
+def test_ones_own_body_is_not_exchanged(tmp_path):
+    own = shutil.copy(BUILT_IN["scope"], tmp_path / "own.npz")
+    with pytest.raises(UsageError, match="can be 127 to 213 cm tall, not 110: omit the height"):
+        body_and_options(build_parser().parse_args(["capture", "clip.mp4", "--height", "110", "--body", str(own)]))
 
 
 @pytest.mark.parametrize("said", ["", "175,", "1,75", "tall", "nan", "inf", "175;162"])

@@ -54,11 +54,10 @@ def read_live_reply(path: Path) -> None:
 
 
 def read_answer(path: Path) -> None:
-    """Read what the process of a user's network answers; the errors are those that its caller expects."""
+    """Read what the process of a user's network answers."""
     from scope.scope_addon.capture.perception.adapters.network_server import receive
 
-    expected = (EOFError, ValueError, KeyError, TypeError, OverflowError, RecursionError, SyntaxError)
-    with path.open("rb") as stream, suppress(*expected):
+    with path.open("rb") as stream, suppress(EOFError, ValueError):  # which its caller expects
         assert sum(array.nbytes for array in receive(stream, LARGEST_ARRAYS)["arrays"]) <= LARGEST_ARRAYS
 
 
@@ -132,7 +131,13 @@ def replies(_: Path) -> list[bytes]:
 
 
 def live_replies(_: Path) -> list[bytes]:
-    pose: dict[str, Any] = {"event": "pose", "frame": 3, "presence": "seen", "positions": [[0.0, 0.0, 1.0]]}
+    pose: dict[str, Any] = {
+        "event": "pose",
+        "person": 0,
+        "frame": 3,
+        "presence": "seen",
+        "positions": [[0.0, 0.0, 1.0]],
+    }
     pose |= {"rotations": [[1.0, 0.0, 0.0, 0.0]] * JOINTS, "betas": [0.1] * COEFFICIENTS}
     status: dict[str, Any] = {"event": "status", "presence": "seen", "rate": 29.5, "latency_ms": 60.0}
     status |= {"dropped": 3, "received": 90, "recorded_s": 2.5}
@@ -156,7 +161,7 @@ def expression_maps(folder: Path) -> list[bytes]:
 
 
 def descriptions(_: Path) -> list[bytes]:
-    return [json.dumps({"type": "simcc", "input_size": [192, 256], "mean": [1, 2, 3], "keypoints": "coco"}).encode()]
+    return [json.dumps({"type": "simcc", "input_size": [192, 256], "mean": [1, 2, 3], "keypoints": "coco17"}).encode()]
 
 
 def estimates(folder: Path) -> list[bytes]:

@@ -88,7 +88,7 @@ def vanishing(monkeypatch):
         return before(path, **how)
 
     monkeypatch.setattr(Path, "stat", stat)
-    return "job-vanishing"
+    return "job-00000000-1-vanishing"
 
 
 def test_another_blender_may_prune_at_the_same_time(cache, vanishing):

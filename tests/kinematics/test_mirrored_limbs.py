@@ -26,8 +26,8 @@ def test_a_mirrored_bone_has_the_other_depth_and_looks_the_same(
     rotations = exp(rng.normal(0.0, 0.5, (FRAMES, BODY.K + 1, 3)))
     center = rng.normal(0.0, 0.1, (FRAMES, 3))
     R, before = _posed(rotations)
-    a, b, c = limb = tuple(BODY.joint_names.index(name) for name in names)  # type: ignore[misc]
-    rotations[:, [a, b]] = mirrored_limb(BODY.parents, R, before, center, limb, upper, lower)
+    a, b, c = (BODY.joint_names.index(name) for name in names)
+    rotations[:, [a, b]] = mirrored_limb(BODY.parents, R, before, center, (a, b, c), upper, lower)
     after = _posed(rotations)[1]
     others = [i for i in range(BODY.K + 1) if not _is_below(i, a)]
     np.testing.assert_allclose(after[:, others], before[:, others], atol=1e-9)

@@ -25,6 +25,7 @@ from scope.scope_addon.motion import Motion
 from .outputs.test_vmc import pose_of
 
 FRAMES = 14
+GREY = np.full((8, 8, 3), 128, np.uint8)
 
 
 def person(x_px, clothes, side_px=300.0):
@@ -45,21 +46,17 @@ def followed(body, monkeypatch):
         def __init__(self, *_):
             self.seen = []
 
-        def track(self, frame):
-            return script[frame.index]
-
-        def follow(self, frame, observation):
+        def step(self, frame, observation):
             self.seen.append(None if observation is None else observation.region.center_px[0])
             return pose_of(body)
 
-    script = []
-
     def run(*frames, every_s=0.1):
         monkeypatch.setattr(module, "LiveSession", Session)
-        people = LivePeople(body, None, None, (800, 800), count=2)
-        script[:] = [list(frame.items()) for frame in frames]
+        script = iter(frames)
+        tracker = SimpleNamespace(step=lambda *_: list(next(script).items()))
+        people = LivePeople(body, tracker, None, (800, 800), count=2)
         for k in range(len(frames)):
-            assert [pose.person for pose in people.step(SimpleNamespace(index=k, timestamp_s=every_s * k))] == [0, 1]
+            assert [pose.person for pose in people.step(Frame(k, every_s * k, GREY))] == [0, 1]
         return [session.seen for session in people.sessions]
 
     return run

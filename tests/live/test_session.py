@@ -16,8 +16,9 @@ from scope.scope_addon.capture.pipeline import capture
 from scope.scope_addon.capture.tracking.tracker import PeopleTracker
 from scope.scope_addon.cli import SAMPLE
 from scope.scope_addon.live.outputs.recording import Recording
+from scope.scope_addon.live.people import LivePeople
 from scope.scope_addon.live.pose import Presence
-from scope.scope_addon.live.session import HOLD_S, LiveSession
+from scope.scope_addon.live.session import HOLD_S
 from scope.scope_addon.motion import Motion
 
 LATE = 2  # frames of the delay of 60 ms
@@ -33,24 +34,24 @@ def frames():
     return seen + [Frame(FRAMES + k, FRAMES / 30 + k / 10, grey) for k in range(EMPTY)]
 
 
-def session_of(body, frames):
+def people_of(body, frames):
     height, width = frames[0].image_rgb.shape[:2]
-    return LiveSession(body, PeopleTracker("fast", 2), choose_camera(width, height), (width, height))
+    return LivePeople(body, PeopleTracker("fast", 2), choose_camera(width, height), (width, height))
 
 
 @pytest.fixture(scope="module")
 def live(body, networks, frames):
-    session = session_of(body, frames)
-    return session, [session.step(frame) for frame in frames]
+    people = people_of(body, frames)
+    return people, [people.step(frame)[0] for frame in frames]
 
 
 @pytest.fixture(scope="module")
 def recorded(body, live, frames, tmp_path_factory):
-    session, poses = live
+    people, poses = live
     path = tmp_path_factory.mktemp("live") / "live.npz"
     recording = Recording(path, body, SimpleNamespace(name="sample.mp4", fps=Fraction(30)))
     height, width = frames[0].image_rgb.shape[:2]
-    recording.begin(session, (width, height))
+    recording.begin(people.sessions[0], (width, height))
     for pose in [*poses[:20], *poses[22:]]:  # two frames were dropped
         recording.send(pose, 0.0)
     recording.save()
@@ -58,9 +59,9 @@ def recorded(body, live, frames, tmp_path_factory):
 
 
 def test_later_frames_do_not_change_earlier_poses(body, live, frames):
-    session = session_of(body, frames)
+    people = people_of(body, frames)
     for frame, earlier in zip(frames[:14], live[1], strict=False):
-        pose = session.step(frame)
+        (pose,) = people.step(frame)
         assert np.array_equal(pose.rotations, earlier.rotations)
         assert np.array_equal(pose.joints, earlier.joints)
 
@@ -114,6 +115,6 @@ def test_without_a_person_the_pose_is_held_and_then_lost(live):
 
 
 def test_nobody_seen_yet_gives_a_pose_that_is_not_known(body, networks, frames):
-    pose = session_of(body, frames).step(frames[-1])
+    (pose,) = people_of(body, frames).step(frames[-1])
     assert (pose.presence, pose.is_known) == (Presence.LOST, False)
     assert pose.joints[0, 2] > 0.7  # the rest pose stands on the floor

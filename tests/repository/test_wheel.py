@@ -20,6 +20,7 @@ DATA = {
     "scope/assets/body/LICENSE.md",
     "scope/assets/body/README.md",
     "scope/assets/body/expressions.npz",
+    "scope/assets/body/growth.npz",
     "scope/assets/body/scope.npz",
     "scope/assets/body/scope_h.npz",
     "scope/assets/prior/README.md",

@@ -99,5 +99,8 @@ def test_a_body_without_joints_is_refused(tmp_path):
 
 def test_a_motion_is_told_from_a_body(tmp_path):
     motion = {"poses": np.zeros((4, 72)), "trans": np.zeros((4, 3)), "betas": np.zeros(10), "gender": np.array("male")}
-    with pytest.raises(ModelFileError, match="walk.npz is a motion file, .* give one of scope, scope_h, or a body's"):
+    with pytest.raises(
+        ModelFileError,
+        match="walk.npz is a motion file, .* give one of scope, scope_h, scope_child, scope_child_h, or a body's",
+    ):
         load_body(saved(tmp_path / "walk.npz", motion))

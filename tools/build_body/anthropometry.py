@@ -95,18 +95,24 @@ def draw_adults(rng: np.random.Generator, male: NDArray[np.bool_]) -> Measured:
 
 def draw_children(rng: np.random.Generator, male: NDArray[np.bool_]) -> tuple[Measured, NDArray[np.float64]]:
     """Draw stature, sitting height and weight of children, (n,) each, and their ages in years (n,)."""
-    years = np.array(list(CHILDREN), float)
+    years = list(CHILDREN)
     age = rng.uniform(years[0], years[-1], len(male))
-    rows = np.array([(*boy, *girl, ratio) for boy, girl, ratio in CHILDREN.values()])
-    boy_m, boy_kg, girl_m, girl_kg, ratio = (np.interp(age, years, column) for column in rows.T)
-    taller, sitting, heavier = rng.standard_normal((3, len(male)))
-    stature = np.where(male, boy_m, girl_m) * (1.0 + CHILD_SPREAD["stature"] * taller)
-    weight = np.where(male, boy_kg, girl_kg) * np.exp(CHILD_SPREAD["weight"] * (0.7 * taller + 0.7 * heavier))
+    mean, (taller, sitting, heavier) = mean_children(age, male), rng.standard_normal((3, len(male)))
+    stature = mean["stature"] * (1.0 + CHILD_SPREAD["stature"] * taller)
+    ratio = mean["sitting"] / mean["stature"]
     return {
         "stature": stature,
         "sitting": stature * ratio * (1.0 + CHILD_SPREAD["sitting"] * sitting),
-        "weight": weight,
+        "weight": mean["weight"] * np.exp(CHILD_SPREAD["weight"] * (0.7 * taller + 0.7 * heavier)),
     }, age
+
+
+def mean_children(age: NDArray[np.float64], male: NDArray[np.bool_]) -> Measured:
+    """Return the mean stature, sitting height and weight, (n,) each, of children of these ages in years (n,)."""
+    rows = np.array([(*boy, *girl, ratio) for boy, girl, ratio in CHILDREN.values()])
+    boy_m, boy_kg, girl_m, girl_kg, ratio = (np.interp(age, list(CHILDREN), column) for column in rows.T)
+    stature = np.where(male, boy_m, girl_m)
+    return {"stature": stature, "sitting": stature * ratio, "weight": np.where(male, boy_kg, girl_kg)}
 
 
 def correlation_matrix() -> NDArray[np.float64]:

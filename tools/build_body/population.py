@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .anthropometry import Measured, draw_adults, draw_children
+from .anthropometry import Measured, draw_adults, draw_children, mean_children
 from .landmarks import Landmarks, make_landmarks, wanted
 from .source import SourceMesh
 from .survey_targets import DETAILS, SurveyTargets
@@ -86,6 +86,17 @@ def draw_population(source: SourceMesh, targets: SurveyTargets, count: int, seed
         _joined([part[1] for part in parts], counts),
         _joined([part[2] for part in parts], counts),
     )
+
+
+def mean_child(source: SourceMesh, targets: SurveyTargets, years: float) -> NDArray[np.float64]:
+    """Return the vertices (N, 3) of the mean child of an age, of both sexes; the pelvis joint is at the origin."""
+    solver, male = _Solver(source, targets), np.array([False, True])
+    age, middle = np.full(2, years), dict.fromkeys(("muscle", "proportions", "height", "weight"), np.full(2, 0.5))
+    values = middle | {"gender": male.astype(float), "age": np.interp(age, YEARS, AGE_SLIDER)}
+    children = _Sliders(values, np.full((2, len(RACES)), 1.0 / len(RACES)), age)
+    coefficients, *_ = solver.solve(children, mean_children(age, male))
+    vertices: NDArray[np.float64] = solver.base + np.tensordot(coefficients.mean(axis=0), solver.moves, axes=1)
+    return vertices
 
 
 def _joined(parts: list[Measured], counts: list[int]) -> Measured:

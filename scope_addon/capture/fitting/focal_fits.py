@@ -27,6 +27,7 @@ from ..perception.observation import Observation
 from ..tracking.track import single_frame_track
 from .ablation import NO_ABLATION, Ablation
 from .prepared_track import prepare_track
+from .stature import with_population
 from .track_fit import fit_single_frame
 
 LOG_RATIOS = np.array([-0.7, -0.35, 0.0, 0.35, 0.7])  # logarithms of the tried focal lengths, relative to the camera's
@@ -63,7 +64,7 @@ class FocalFits:
             prepared = prepare_track(self._body, track, candidate, self._ablation)
             keypoints2d = prepared.weights.keypoints2d * ratio**2
             weights = replace(prepared.weights, keypoints2d=keypoints2d, shape=SHAPE_WEIGHT)
-            priors = replace(prepared.priors, shape_information=None)
+            priors = with_population(prepared.priors, self._body)
             found = fit_single_frame(replace(prepared, weights=weights, priors=priors))
             if found is None:
                 return None

@@ -9,26 +9,29 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....solver import Body, Priors
+from ....solver.loaders.body_file import CHILD_BELOW_M, body_with_children, growth_of, load_body
 from ...errors import UsageError
 
 SIGMA_M = 0.005
 SHORTEST_M, TALLEST_M = 0.5, 2.6  # statures outside are input errors
 MAX_DEVIATIONS = 4.5  # standard deviations of the population up to which the shapes of a body are realistic
+SHORTEST_CHILD_M = 0.8  # one year of age; below, growth extrapolated from that of six-year-olds makes legs too long
 STIFFNESS = 4.0  # κ of ``with_unknown_stature``
+FIXED = 1e6  # information of a coefficient that does not vary
 _ROUNDS = 3
 
 
 def with_stature(priors: Priors, body: Body, height_m: float) -> Priors:
     """Return the priors for a person of known stature: the most probable shapes of this height.
 
-    This is the population's N(0, I) of β, conditioned on the height h(β) of the rest pose's highest vertex above its
-    lowest: Λ = I + g gᵀ/σ² and mean Λ⁻¹ g (H − h₀)/σ² = g (H − h₀) / (σ² + g·g), with h(β) = h₀ + g·β as long as these
-    two vertices stay the same.
+    This is the population's N(0, Λ₀⁻¹) of β, conditioned on the height h(β) of the rest pose's highest vertex above its
+    lowest: Λ = Λ₀ + g gᵀ/σ² and mean Λ₀⁻¹g (H − h₀) / (σ² + gᵀΛ₀⁻¹g), with h(β) = h₀ + g·β as long as these two
+    vertices stay the same. Λ₀ = I, but growth is fixed at 0 from `CHILD_BELOW_M` on.
     """
     _, h0, g = _shape_of(body, height_m)
-    information = np.eye(body.P) + np.outer(g, g) / SIGMA_M**2
-    mean = g * (height_m - h0) / (SIGMA_M**2 + g @ g)
-    return replace(priors, shape_mean=mean, shape_information=information)
+    population = _population(body, is_child=height_m < CHILD_BELOW_M)
+    mean = g / population * (height_m - h0) / (SIGMA_M**2 + g @ (g / population))
+    return replace(priors, shape_mean=mean, shape_information=np.diag(population) + np.outer(g, g) / SIGMA_M**2)
 
 
 def with_unknown_stature(priors: Priors, body: Body) -> Priors:
@@ -37,11 +40,20 @@ def with_unknown_stature(priors: Priors, body: Body) -> Priors:
     A single camera measures proportions, not size. Among people, short ones have relatively long trunks, so that under
     N(0, I) a long trunk makes a person short: exact keypoints of a person of 1.75 m, with the mean's legs and a trunk
     12 % longer, give 1.66 m. Λ = I + κ ĝĝᵀ, with ĝ the direction of β along which the stature h(β) grows,
-    divides that pull by 1 + κ.
+    divides that pull by 1 + κ. The person is taken for an adult: growth is fixed at 0.
     """
+    population = _population(body, is_child=False)
     *_, g = _shape_of(body, body.stature())
-    along = g / max(float(np.linalg.norm(g)), 1e-12)
-    return replace(priors, shape_information=np.eye(body.P) + STIFFNESS * np.outer(along, along))
+    along = g / population
+    along /= max(float(np.linalg.norm(along)), 1e-12)
+    return replace(priors, shape_information=np.diag(population) + STIFFNESS * np.outer(along, along))
+
+
+def with_population(priors: Priors, body: Body) -> Priors:
+    """Return the priors with the population of adults: N(0, I) of β, and no growth."""
+    if growth_of(body) is None:
+        return replace(priors, shape_information=None)
+    return replace(priors, shape_information=np.diag(_population(body, is_child=False)))
 
 
 def require_stature(body: Body, height_m: float) -> None:
@@ -54,21 +66,61 @@ def require_stature(body: Body, height_m: float) -> None:
         raise UsageError(f"a height of {100 * height_m:g} cm is not plausible: give one from {most}")
     if body.P == 0:
         raise UsageError(f"the body '{body.name}' has a single shape, whose height cannot be set: omit the height")
-    betas, *_ = _shape_of(body, height_m)
-    if np.linalg.norm(betas) > MAX_DEVIATIONS:
-        unit = betas / np.linalg.norm(betas)
-        low, high = sorted(100 * body.stature(side * MAX_DEVIATIONS * unit) for side in (-1, 1))
-        what = f"can be {low:.0f} to {high:.0f} cm tall, not {100 * height_m:g}"
-        raise UsageError(f"the body '{body.name}' {what}: omit the height")
+    low, high = stature_range(body)
+    if low <= height_m <= high:
+        return
+    what = f"the body '{body.name}' can be {100 * low:.0f} to {100 * high:.0f} cm tall, not {100 * height_m:g}"
+    other = body_with_children(body.name)
+    if other != body.name and not body.file:
+        low, high = stature_range(load_body(other))
+        if low <= height_m <= high:
+            raise UsageError(
+                f"{what}: use the body '{other}', which can be {100 * low:.0f} to {100 * high:.0f} cm tall"
+            )
+    raise UsageError(f"{what}: omit the height")
+
+
+def stature_range(body: Body) -> tuple[float, float]:
+    """Return the least and the greatest stature that the body has in realistic shapes, metres.
+
+    The most probable adults up to `MAX_DEVIATIONS`; with growth, children from `SHORTEST_CHILD_M`.
+    """
+    low, high = (_most_probable_stature(body, side * MAX_DEVIATIONS) for side in (-1.0, 1.0))
+    return (low if growth_of(body) is None else SHORTEST_CHILD_M), high
+
+
+def _most_probable_stature(body: Body, deviations: float) -> float:
+    """Return the stature of the most probable adult so many standard deviations above the mean, metres."""
+    betas = np.zeros(body.P)
+    for _ in range(_ROUNDS):
+        g = _shape_at(body, betas)[1] / _population(body, is_child=False)
+        betas = deviations * g / max(float(np.linalg.norm(g)), 1e-12)
+    return body.stature(betas)
+
+
+def _population(body: Body, is_child: bool) -> NDArray[np.float64]:
+    """Return the information (P,) of the coefficients among adults or among children."""
+    information = np.ones(body.P)
+    growth = growth_of(body)
+    if growth is not None and not is_child:
+        information[growth] = FIXED
+    return information
 
 
 def _shape_of(body: Body, height_m: float) -> tuple[NDArray[np.float64], float, NDArray[np.float64]]:
     """Return the most probable shape (P,) of this height, and h₀ and g (P,) of its highest and lowest vertices."""
     betas, h0, g = np.zeros(body.P), 0.0, np.zeros(body.P)
+    population = _population(body, is_child=height_m < CHILD_BELOW_M)
     for _ in range(_ROUNDS):
-        heights = body.rest_vertices(betas)[:, 1]
-        top, bottom = int(heights.argmax()), int(heights.argmin())
-        h0 = float(body.v_template[top, 1] - body.v_template[bottom, 1])
-        g = body.shapedirs[top, 1] - body.shapedirs[bottom, 1]
-        betas = g * (height_m - h0) / max(float(g @ g), 1e-12)
+        h0, g = _shape_at(body, betas)
+        betas = g / population * (height_m - h0) / max(float(g @ (g / population)), 1e-12)
     return betas, h0, g
+
+
+def _shape_at(body: Body, betas: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
+    """Return h₀ and g (P,) of the highest and the lowest vertex of this shape."""
+    heights = body.rest_vertices(betas)[:, 1]
+    top, bottom = int(heights.argmax()), int(heights.argmin())
+    return float(body.v_template[top, 1] - body.v_template[bottom, 1]), body.shapedirs[top, 1] - body.shapedirs[
+        bottom, 1
+    ]

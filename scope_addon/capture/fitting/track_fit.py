@@ -21,6 +21,7 @@ from .frame_measurements import NEAREST_M
 from .frame_sequence import FittedTrack, FrameSequence, is_usable
 from .outline.shape_fit import fit_shape_to_outline, usable_masks
 from .prepared_track import PreparedTrack, Stance
+from .stature import with_population
 from .weights import ROBUST, clip_weights, cold_stages
 
 SHAPE_FRAMES = 64  # from which the shape is estimated; more frames add little
@@ -105,7 +106,7 @@ def _fit_shape(prepared: PreparedTrack, root_cam: NDArray[np.floating[Any]] | No
     options = replace(ROBUST, stages=cold_stages(weights))
     priors = prepared.priors
     if root_cam is not None and priors.shape_mean is None:  # the distance, unlike proportions, tells an unknown stature
-        priors = replace(priors, shape_information=None)
+        priors = with_population(priors, prepared.body)
     return fit_clip(prepared.body, measurements, priors=priors, options=options)
 
 

@@ -6,6 +6,18 @@ from __future__ import annotations
 import math
 
 FRAME_S = 1 / 30  # from one frame to the next where their times are unknown
+EAGER_S = 10 * FRAME_S  # for which a lost hand or face is looked for in every frame
+PATIENCE_S = 4 * FRAME_S  # between two attempts afterwards
+_TOLERANCE_S = 0.005  # of a frame's time
+
+
+def is_search_due(time_s: float, seen_s: float, searched_s: float) -> bool:
+    """Return whether a lost hand or face is to be looked for in the frame of this time.
+
+    :param seen_s: when it was last seen; if never, when it was first looked for.
+    :param searched_s: when it was last looked for.
+    """
+    return time_s - seen_s <= EAGER_S + _TOLERANCE_S or time_s - searched_s >= PATIENCE_S - _TOLERANCE_S
 
 
 class FrameClock:

@@ -16,12 +16,12 @@ from ..perception.hand_region import HAND_LENGTH_M, SIDES, WRISTS, pixels_per_me
 from ..perception.observation import Observation
 from ..perception.palm_detector import PalmDetector
 from ..perception.region import Region
-from .frame_clock import FRAME_S
+from .frame_clock import FRAME_S, PATIENCE_S, is_search_due
 
-PRESENCE_THRESHOLD = 0.5
 FIRST_PRESENCE = 0.1  # in a rough region, from which the better one of the landmarks is looked at
-# Without a detected palm, and not seen in the frame before: with the wrist at the body's, and elsewhere.
-NEAR_PRESENCE, UNCONFIRMED_PRESENCE = 0.6, 0.8
+# Least presence with the wrist at the body's, and elsewhere: of a hand whose palm was detected, or that was seen in the
+# frame before; and of one that is only predicted from the body.
+DETECTED_PRESENCE, PREDICTED_PRESENCE = (0.5, 0.5), (0.6, 0.8)
 WRIST_DISTANCE = 0.7  # largest distance between the hand's wrist and the body's, in hand lengths
 UNSURE_WRIST_DISTANCE = 1.2  # where the body's wrist is uncertain
 SURE_WRIST = 0.5
@@ -29,9 +29,6 @@ MIN_SIZE, MAX_SIZE = 0.25, 2.0  # of the hand, in the hand lengths of the body
 SAME_HAND = 0.35  # mean distance of the keypoints, in sizes of the hand, below which two hands are one
 SEARCH_SCALE = 2.3  # side of the square in which a palm is searched, in sides of the predicted region
 MOST_PALMS = 2
-EAGER_S = 10 * FRAME_S  # for which a lost hand is looked for in every frame
-PATIENT_S = 4 * FRAME_S  # between two attempts afterwards
-TIME_TOLERANCE_S = 0.005  # of a frame's time
 SMALLEST_HAND_PX = 12.0
 DISAGREEMENT_THRESHOLD = 0.3
 CERTAIN_PRESENCE = 0.95  # from which a hand is none that the network imagines
@@ -77,7 +74,7 @@ class HandTracker:
         """
         self._time_s = now = self._time_s + FRAME_S if time_s is None else time_s
         keys = [(number, side) for number, _ in observations for side in range(len(SIDES))]
-        self._hands = {key: self._hands.get(key) or _Hand(None, now, now - PATIENT_S) for key in keys}
+        self._hands = {key: self._hands.get(key) or _Hand(None, now, now - PATIENCE_S) for key in keys}
         people = dict(observations)
         found = {key: self._find(image_rgb, self._hands[key], people[key[0]], key[1]) for key in keys}
         found = _without_duplicates(found, people)
@@ -93,13 +90,10 @@ class HandTracker:
         scale = pixels_per_metre(person.keypoints_px, person.world_landmarks)
         if hand.estimate is not None:
             estimate = self._network.estimate(image_rgb, hand.estimate.next_region)
-            found = assigned(estimate, person, scale, side) if estimate.presence >= PRESENCE_THRESHOLD else None
+            found = assigned(estimate, person, scale, side)
             if found is not None:
                 return found
-        elif (
-            self._time_s - hand.seen_s > EAGER_S + TIME_TOLERANCE_S
-            and self._time_s - hand.searched_s < PATIENT_S - TIME_TOLERANCE_S
-        ):
+        elif not is_search_due(self._time_s, hand.seen_s, hand.searched_s):
             return None
         hand.searched_s = self._time_s
         predicted = region_from_body(person.keypoints_px, scale, side)
@@ -121,20 +115,25 @@ class HandTracker:
             self._palms.detect(image_rgb, around),
             key=lambda palm: float(np.hypot(*np.subtract(palm.region.center_px, predicted.center_px))),
         )
-        candidates = [(palm.region, (PRESENCE_THRESHOLD, PRESENCE_THRESHOLD)) for palm in palms[:MOST_PALMS]]
-        for region, (near, far) in [*candidates, (predicted, (NEAR_PRESENCE, UNCONFIRMED_PRESENCE))]:
+        candidates = [(palm.region, DETECTED_PRESENCE) for palm in palms[:MOST_PALMS]]
+        for region, least_presence in [*candidates, (predicted, PREDICTED_PRESENCE)]:
             first = self._network.estimate(image_rgb, region)
             if first.presence < FIRST_PRESENCE:
                 continue
             second = self._network.estimate(image_rgb, first.next_region)
-            found = assigned(second, person, scale, side)
-            least = near if _wrist_distances(second, person, scale)[side] <= SAME_WRIST else far
-            if found is not None and second.presence >= least:
+            found = assigned(second, person, scale, side, least_presence)
+            if found is not None:
                 return found
         return None
 
 
-def assigned(estimate: HandEstimate, person: Observation, scale: float, side: int) -> HandEstimate | None:
+def assigned(
+    estimate: HandEstimate,
+    person: Observation,
+    scale: float,
+    side: int,
+    least_presence: tuple[float, float] = DETECTED_PRESENCE,
+) -> HandEstimate | None:
     """Return a hand as this hand of the person; None if it cannot be.
 
     Its wrist has to be near the body's, its size like the body's. Where the network is not certain of a hand, its
@@ -146,12 +145,15 @@ def assigned(estimate: HandEstimate, person: Observation, scale: float, side: in
 
     :param scale: pixels per metre at the person's distance.
     :param side: 0 left, 1 right.
+    :param least_presence: with the wrist at the body's, and elsewhere.
     """
     sure = person.keypoints_confidence[WRISTS[side]] >= SURE_WRIST
     length = HAND_LENGTH_M * scale
+    near, elsewhere = least_presence
     distance, other = _wrist_distances(estimate, person, scale)[[side, 1 - side]]
     if (
-        distance > (WRIST_DISTANCE if sure else UNSURE_WRIST_DISTANCE)
+        not estimate.presence >= (near if distance <= SAME_WRIST else elsewhere)
+        or distance > (WRIST_DISTANCE if sure else UNSURE_WRIST_DISTANCE)
         or not MIN_SIZE * length <= estimate.size_px <= MAX_SIZE * length
         or (estimate.presence < CERTAIN_PRESENCE and estimate.disagreement > DISAGREEMENT_THRESHOLD)
     ):

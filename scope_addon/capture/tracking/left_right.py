@@ -49,7 +49,6 @@ CORRECTION_S = 0.13
 
 # How to read a frame; DEPTH_REVERSED: swapped, and with reversed depth, because front and back were confused.
 AS_DETECTED, LEFT_RIGHT_SWAPPED, DEPTH_REVERSED = 0, 1, 2
-FRAME_COSTS_M = np.array([0.0, FRAME_COST_M, FRAME_COST_M + DEPTH_COST_M])  # by reading, with a reference
 
 
 def repair_left_right(track: Track, camera: Camera) -> Track:
@@ -149,8 +148,12 @@ def find_labels(
     """
     known = np.isfinite(world_landmarks[:, LIMBS]).all(axis=(1, 2))
     readings = readings_of(world_landmarks[known])
-    costs = np.array([0.0, frame_cost_m, frame_cost_m + DEPTH_COST_M])
-    return _cheapest(readings, _steps(readings), known, costs, starts, reference)
+    return _cheapest(readings, _steps(readings), known, reading_costs(frame_cost_m), starts, reference)
+
+
+def reading_costs(frame_cost_m: float = FRAME_COST_M) -> NDArray[np.float64]:
+    """Return the costs (3,) of the three ways to read a frame, metres; see `find_labels`."""
+    return np.array([0.0, frame_cost_m, frame_cost_m + DEPTH_COST_M])
 
 
 def readings_of(world_landmarks: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:

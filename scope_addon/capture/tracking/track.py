@@ -82,7 +82,7 @@ class Tracklet:
             return
         self.rows.append(row)
         self.values.append(values.astype(np.float32))
-        self.centers_px.append(o.keypoints_px[_TRUNK].mean(axis=0))
+        self.centers_px.append(trunk_px(o.keypoints_px))
         self.sides_px.append(o.region.side_px)
         if o.appearance is not None:
             self.appearance = self.appearance + o.appearance
@@ -108,6 +108,12 @@ class Tracklet:
     def prominence(self) -> float:
         """Size in the image, summed over the frames."""
         return float(np.sum(self.sides_px))
+
+
+def trunk_px(keypoints_px: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
+    """Return the middle (2,) of the trunk, of keypoints (33, 2) in the image."""
+    center: NDArray[np.floating[Any]] = keypoints_px[_TRUNK].mean(axis=0)
+    return center
 
 
 def make_track(frames: Sequence[int], times: Sequence[float], tracklets: Sequence[Tracklet]) -> Track:

@@ -24,9 +24,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...kinematics.contact_points import SOLES
-from ...kinematics.foot_skin import UNDER_FLOOR_M, FootSkin, lower_floors, runs
+from ...kinematics.foot_skin import UNDER_FLOOR_M, FootSkin, lower_floors
 from ...kinematics.frame_blocks import by_blocks
 from ...kinematics.leg_reach import move_feet
+from ...kinematics.runs import runs
 from ...kinematics.smoothing import gaussian_smooth
 from .placement import PlacedTrack
 

@@ -20,7 +20,7 @@ from .commands import RECORD, STOP
 from .request import LiveRequest
 
 PRESENCES = ("seen", "held", "lost")
-_POSE = re.compile(rb'\{"event": "pose", "person": (\d+)')
+_POSE = re.compile(rb'\{"event": "pose", "person": (\d),')
 _FARTHEST_M, _LARGEST_BETA = 1e4, 1e3
 _UNIT_TOLERANCE = 0.01  # of a quaternion's length, which is rounded
 
@@ -58,7 +58,7 @@ class ShownPose:
 
 
 class LiveProcess(WorkerProcess):
-    """A live capture. Call ``poll`` and ``newest_pose`` regularly; ``close`` ends it at once."""
+    """A live capture. Call ``poll`` and ``newest_poses`` regularly; ``close`` ends it at once."""
 
     def __init__(
         self,
@@ -96,7 +96,7 @@ class LiveProcess(WorkerProcess):
         return [pose for pose in found if pose is not None]
 
     def _keep(self, line: bytes) -> None:
-        if (person := _POSE.match(line)) is not None and len(person[1]) < 3 and int(person[1]) < MOST_PEOPLE:
+        if (person := _POSE.match(line)) is not None and int(person[1]) < MOST_PEOPLE:
             self._newest[int(person[1])] = line
         else:
             super()._keep(line)

@@ -15,7 +15,7 @@ from typing import Any
 
 import bpy
 
-from ....solver.loaders.body_file import body_with_hands, load_body
+from ....solver.loaders.body_file import load_body
 from ...errors import UsageError, VideoError
 from ...footage import shown
 from ...job.cache import Cache, CachedCapture
@@ -24,6 +24,7 @@ from ...job.progress import JobProgress
 from ...job.request import JobRequest, code_version
 from ...motion import Motion
 from ...options import Place
+from ...options.body_choice import chosen_body
 from ...scene.build import BuildOptions, BuildResult, build_scene
 from ...scene.local_scene import check_local
 from ...scene.packed_motion import pack_motion
@@ -203,8 +204,7 @@ def capture_request(scene: bpy.types.Scene) -> JobRequest:
     if settings.lens == "FILE" and not settings.calibration_file:
         raise UsageError("no calibration file is chosen; choose one, or another kind of lens")
     values = chosen_values(scene)
-    if values["hands"]:
-        values["body"] = body_with_hands(values["body"])
+    values["body"] = chosen_body(values)
     return JobRequest(str(footage), **values)
 
 

@@ -14,8 +14,6 @@ from ..view.sidebar import is_over_tab, redraw_sidebars_twice
 class JobOperator(bpy.types.Operator):
     """An operator that starts a job, and continues on a timer while Blender stays usable. Not registered."""
 
-    bl_options = {"UNDO"}
-
     timer_s: float  # between two steps
     job_state: Any  # with the running ``job``, whose ``cancelled`` is set by the operator that cancels, and ``message``
 

@@ -84,16 +84,19 @@ def test_a_captured_person_counts_for_one_true_person_only(body, truth, monkeypa
     np.testing.assert_allclose(second.mpjpe_root, 0.0, atol=1e-6)
 
 
-def test_statures_are_given_in_order_of_size_where_the_body_can_have_them(body, truth, monkeypatch):
+def test_statures_are_given_in_order_of_size_to_a_body_that_can_have_them(body, truth, monkeypatch):
     given = []
-    monkeypatch.setattr(
-        accuracy, "capture", lambda video, body, options: given.append(options.heights_m) or SimpleNamespace(motions=[])
-    )
+
+    def found(_, body, options):
+        given.append((body.name, options.heights_m))
+        return SimpleNamespace(motions=[])
+
+    monkeypatch.setattr(accuracy, "capture", found)
     truth["limbs_cam"][0, ..., 2] += 1.0  # appears smaller
     accuracy.evaluate_scene(body, accuracy.FOLDER / "test_01.mp4", truth, statures_given=True)
-    truth["stature_m"][0] = 0.9
+    truth["stature_m"][1] = 1.5
     accuracy.evaluate_scene(body, accuracy.FOLDER / "test_01.mp4", truth, statures_given=True)
-    assert given == [(1.4, 1.7), ()]
+    assert given == [("scope_child", (1.4, 1.7)), ("scope", (1.5, 1.7))]
 
 
 def test_frames_in_which_nothing_is_visible_are_left_out(body, truth, monkeypatch):

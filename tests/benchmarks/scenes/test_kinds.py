@@ -22,14 +22,14 @@ def test_two_of_three_scenes_are_for_testing():
 
 @pytest.mark.parametrize("for_testing", [True, False])
 def test_shares_hold_in_each_split(for_testing):
-    dealt = kinds(number for number in range(60) if is_test(number) == for_testing)
-    count = len(dealt)
-    assert sum(kind.is_child for kind in dealt) == count // 5
-    assert sum(kind.has_block for kind in dealt) == count // 4
-    assert sum(kind.has_company for kind in dealt) == 3 * count // 10
-    assert sum(kind.wears_loose for kind in dealt) == count // 2
-    assert sum(kind.surroundings == OUTDOORS for kind in dealt) == count // 2
-    assert sum(kind.camera == STATIC for kind in dealt) == 3 * count // 5
+    found = kinds(number for number in range(60) if is_test(number) == for_testing)
+    count = len(found)
+    assert sum(kind.is_child for kind in found) == count // 5
+    assert sum(kind.has_block for kind in found) == count // 4
+    assert sum(kind.has_company for kind in found) == 3 * count // 10
+    assert sum(kind.wears_loose for kind in found) == count // 2
+    assert sum(kind.surroundings == OUTDOORS for kind in found) == count // 2
+    assert sum(kind.camera == STATIC for kind in found) == 3 * count // 5
 
 
 def test_the_first_scenes_show_every_recording_once_and_hold_the_shares():
@@ -39,7 +39,7 @@ def test_the_first_scenes_show_every_recording_once_and_hold_the_shares():
     assert sum(kind.wears_loose for kind in first) == 7
 
 
-def test_properties_are_dealt_independently():
+def test_properties_are_independent():
     pairs = Counter((kind.wears_loose, kind.surroundings) for kind in kinds(range(600)))
     assert len(pairs) == 4
     assert min(pairs.values()) > 110

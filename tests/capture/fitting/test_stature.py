@@ -10,6 +10,8 @@ from scope.scope_addon.capture.fitting.weights import ROBUST, WEIGHTS, cold_stag
 from scope.scope_addon.capture.media.video_range import VideoRange
 from scope.scope_addon.capture.options import CaptureOptions, check_options
 from scope.scope_addon.capture.pipeline import capture
+from scope.scope_addon.cli import build_parser
+from scope.scope_addon.command_line.arguments import body_and_options
 from scope.scope_addon.errors import UsageError
 from scope.solver import Keypoints2D, Measurements, OrientationField, default_priors, fit_clip, load_body
 from scope.solver.loaders.body_file import ASSETS
@@ -109,12 +111,41 @@ def trunk(body, betas):
     return J[body.joint_names.index("left_shoulder"), 1] - J[body.joint_names.index("left_hip"), 1]
 
 
+@pytest.mark.parametrize("height_m", [0.8, 0.95, 1.1, 1.3, 1.44])
+def test_below_the_stature_of_adults_the_most_probable_shape_is_a_childs(height_m):
+    """Legs grow faster than the trunk: sitting height is 0.62 of the stature at one year, 0.52 at twelve (Fredriks)."""
+    body = load_body("scope_child")
+    betas = np.asarray(with_stature(default_priors(body), body, height_m).shape_mean)
+    assert np.ptp(body.rest_vertices(betas)[:, 1]) == pytest.approx(height_m, abs=0.003)
+    assert np.linalg.norm(betas[:-1]) < 0.5  # no unusual adult
+    share = np.interp(height_m, [0.75, 0.87, 1.15, 1.5], [0.62, 0.585, 0.548, 0.52])
+    J, low = body.rest_joints(betas), body.rest_vertices(betas)[:, 1].min()
+    hip = J[body.joint_names.index("left_hip"), 1] - low
+    assert hip / height_m == pytest.approx(1.0535 - share, abs=0.04)  # the joint is above the seat, as in adults
+
+
+@pytest.mark.parametrize("height_m", [None, 1.5, 1.8])
+def test_adults_are_the_same_with_the_body_of_all_ages(height_m):
+    adult, of_ages = (load_body(name) for name in ("scope", "scope_child"))
+    means = []
+    for body in (adult, of_ages):
+        priors = default_priors(body)
+        priors = with_unknown_stature(priors, body) if height_m is None else with_stature(priors, body, height_m)
+        means.append(np.zeros(body.P) if priors.shape_mean is None else np.asarray(priors.shape_mean))
+        information = np.asarray(priors.shape_information)
+        assert means[-1].shape == (body.P,)
+        np.testing.assert_allclose(np.linalg.inv(information)[10:], 0.0, atol=1e-4)
+    np.testing.assert_allclose(means[1][:10], means[0], atol=1e-3)
+    assert abs(means[1][10]) < 1e-4
+
+
 @pytest.mark.parametrize(
     ("height_m", "says"),
     [
         (0.3, "a height of 30 cm is not plausible"),
         (np.nan, "nan"),
-        (1.0, "can be 127 to 213 cm"),
+        (1.0, "can be 127 to 213 cm tall, not 100: use the body 'scope_child', which can be 80 to 213 cm tall"),
+        (0.7, "can be 127 to 213 cm tall, not 70: omit the height"),
         (2.5, "not 250"),
         (-1.8, "-180"),
     ],
@@ -137,3 +168,12 @@ def test_a_known_height_sets_size_and_distance():
         assert any("2 heights were given, but one person was found" in text for text in result.report["warnings"])
         found[height_m] = np.linalg.norm(motion.joints_cam[:, 0], axis=1).mean()
     assert found[1.9] / found[1.5] == pytest.approx(1.9 / 1.5, rel=0.05)
+
+
+def test_the_height_of_a_child_gives_a_child():
+    arguments = ["capture", str(SAMPLE), "--height", "110", "--quality", "fast", "--fov", "60", "--end", "0.5"]
+    body, options = body_and_options(build_parser().parse_args(arguments))
+    (motion,) = capture(SAMPLE, body, options).motions
+    assert motion.body_model == body.name == "scope_child"
+    assert np.ptp(body.rest_vertices(motion.betas.astype(float))[:, 1]) == pytest.approx(1.1, abs=0.01)
+    assert (np.abs(motion.betas[:-1]) < 4).all()

@@ -98,6 +98,13 @@ def test_several_people_are_built_and_distinguished(fake_worker, footage):
     assert len([o for o in captures()[0].objects if o.type == "ARMATURE"]) == 2
 
 
+def test_the_height_of_a_child_requests_the_body_of_all_ages(fake_worker, footage):
+    fake_worker("assert request['body'] == 'scope_child', request\nsend('error', message='so it was')")
+    bpy.context.scene.scope.footage, bpy.context.scene.scope.height_cm = str(footage), 110
+    with pytest.raises(RuntimeError, match="So it was"):
+        bpy.ops.scope.capture()
+
+
 def test_hands_request_the_body_with_fingers(fake_worker, footage):
     fake_worker("assert request['hands'] and request['body'] == 'scope_h'\nsend('error', message='so it was')")
     bpy.context.scene.scope.footage, bpy.context.scene.scope.hands = str(footage), True

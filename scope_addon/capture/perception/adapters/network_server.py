@@ -85,12 +85,21 @@ def receive(stream: IO[bytes], largest_arrays: int) -> dict[str, Any]:
     :raises EOFError: the other end is closed.
     :raises ValueError: this is no message, or it is too large.
     """
-    import numpy as np
-
     size = int.from_bytes(_read(stream, _LENGTH_BYTES), "little")
     if size > LARGEST_MESSAGE:
         raise ValueError("a message is too long")
-    message = json.loads(_read(stream, size))
+    text = _read(stream, size)
+    try:
+        return _with_arrays(text, stream, largest_arrays)
+    except (KeyError, TypeError, OverflowError, RecursionError, SyntaxError) as error:  # the last one of np.dtype
+        raise ValueError(str(error)) from error
+
+
+def _with_arrays(text: bytes, stream: IO[bytes], largest_arrays: int) -> dict[str, Any]:
+    """Parse a message, and read its arrays."""
+    import numpy as np
+
+    message = json.loads(text)
     if not isinstance(message, dict):
         raise ValueError("a message is no object")
     arrays = []

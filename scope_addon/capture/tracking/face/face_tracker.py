@@ -16,17 +16,14 @@ from ...perception.face.face_record import record
 from ...perception.face.face_region import HEAD, region_from_body
 from ...perception.observation import Observation
 from ...perception.region import Region
-from ..frame_clock import FRAME_S
+from ..frame_clock import PATIENCE_S, is_search_due
 from .expression_fit import is_known
 
 PRESENCE_THRESHOLD = 0.5
 MAX_DISTANCE = 0.35  # between the face and where the body's head predicts it, in sides of the predicted region
 MIN_SIZE, MAX_SIZE = 0.5, 1.6  # side of the face's region over that of the predicted one
 SMALLEST_REGION_PX = 24.0
-EAGER_S = 10 * FRAME_S  # for which a lost face is looked for in every frame
-PATIENCE_S = 4 * FRAME_S  # between two attempts afterwards
 RESERVE = 2.0  # times what `is_known` requires is seen before the fit is relied on: frames can still be rejected
-TIME_TOLERANCE_S = 0.005  # of a frame's time
 
 
 @dataclass
@@ -105,10 +102,7 @@ class FaceTracker:
             estimate = self._network.estimate(image_rgb, replace(face.region, center_px=(float(x), float(y))))
             if belongs(estimate, predicted):
                 return estimate
-        elif (
-            time_s - face.seen_s > EAGER_S + TIME_TOLERANCE_S
-            and time_s - face.searched_s < PATIENCE_S - TIME_TOLERANCE_S
-        ):
+        elif not is_search_due(time_s, face.seen_s, face.searched_s):
             return None
         face.searched_s = time_s
         first = self._network.estimate(image_rgb, predicted)

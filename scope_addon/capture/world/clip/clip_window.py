@@ -74,18 +74,14 @@ class ClipWindow:
 
         :param steps: the most iterations, fewer than in the finished motion.
         """
-        prepared, frames, options = self.prepared, self.frames[rows], self._options
-        if steps is not None:
-            options = replace(
-                options, stages=tuple(replace(s, max_iterations=steps) for s in clip_stages(prepared.weights))
-            )
+        prepared, frames = self.prepared, self.frames[rows]
         return fit_motion(
             prepared.body,
             self._views(rows),
             prepared.track.times[frames],
             init=states,
             priors=prepared.priors,
-            options=options,
+            options=self._options(steps),
             motion=prior,
             stands=self._standing_points(frames),
             shape=self.betas,
@@ -102,7 +98,7 @@ class ClipWindow:
             state.Omega,
             np.zeros(0),
         )
-        return fit_tree(self._tree, self.measured[row], start, self._priors, self._options)
+        return fit_tree(self._tree, self.measured[row], start, self._priors, self._options())
 
     def with_resting_places(self, found: MotionFit) -> ClipWindow:
         """Add to the measurements where soles and palms rest in a motion."""
@@ -119,16 +115,18 @@ class ClipWindow:
         return replace(self, measured=measured)
 
     @cached_property
-    def _options(self) -> Options:
-        return replace(ROBUST, stages=clip_stages(self.prepared.weights))
-
-    @cached_property
     def _tree(self) -> Tree:
         return with_fixed_shape(make_tree(self.prepared.body), self.betas)
 
     @cached_property
     def _priors(self) -> Priors:
         return replace(self.prepared.priors, shape_mean=None, shape_information=None)
+
+    def _options(self, steps: int | None = None) -> Options:
+        stages = clip_stages(self.prepared.weights)
+        if steps is not None:
+            stages = tuple(replace(stage, max_iterations=steps) for stage in stages)
+        return replace(ROBUST, stages=stages)
 
     def _standing_points(self, frames: NDArray[np.intp]) -> StandingPoints | None:
         prepared = self.prepared

@@ -33,6 +33,8 @@ _BONES = (True, False), (False, True), (True, True)  # whether the upper and the
 
 @dataclass
 class _Motion:
+    """The best motion so far: states, and rotations (n, K+1, 3, 3) and joints (n, K+1, 3) of the parts."""
+
     states: list[State]
     R: NDArray[np.float64]
     joints: NDArray[np.float64]
@@ -47,10 +49,11 @@ def search_limbs(body: Body, window: ClipWindow, found: MotionFit, prior: Motion
     motion, improved = _Motion(list(found.states), found.R_world_part.copy(), found.t_world_part.copy()), False
     times = window.times
     for names in LIMBS:
-        limb = body.joint_names.index(names[0]), body.joint_names.index(names[1]), body.joint_names.index(names[2])
+        first, second, last = (body.joint_names.index(name) for name in names)
+        limb = first, second, last
         for upper, lower in _BONES:
-            bone = motion.joints[:, limb[not upper :]]
-            depths = bone_depths(bone[:, 0], bone[:, 1], window.center)
+            start, end = (first, second) if upper else (second, last)
+            depths = bone_depths(motion.joints[:, start], motion.joints[:, end], window.center)
             for rows in runs_of_one_sign(depths, SHALLOW_M, DEEP_M):
                 if times[rows.stop - 1] - times[rows.start] > _LONGEST_S:
                     continue

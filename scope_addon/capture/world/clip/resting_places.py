@@ -12,6 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ....kinematics.runs import runs
+
 LEAST_PROBABILITY = 0.5
 SPREAD_M = 0.02
 
@@ -26,8 +28,7 @@ def resting_places(
     """
     places, probability = np.zeros(points.shape), np.zeros(resting.shape)
     for c in range(resting.shape[1]):
-        steps = np.diff(np.concatenate([[0], (resting[:, c] > LEAST_PROBABILITY).astype(int), [0]]))
-        for first, end in zip(np.flatnonzero(steps == 1), np.flatnonzero(steps == -1), strict=True):
+        for first, end in runs(resting[:, c] > LEAST_PROBABILITY):
             rest, p = points[first:end, c], resting[first:end, c]
             place = p @ rest / p.sum()
             if np.linalg.norm(rest - place, axis=1).max() < SPREAD_M:
