@@ -23,8 +23,9 @@ def panels(shared: Path, camera: str) -> tuple[list[np.ndarray], np.ndarray]:
     at[truth["frame_index"]] = np.nanmean(truth["uv"][:, trunk], axis=1)
     left, top, right, bottom = 60, 330, 860, 1330
     video = cv2.VideoCapture(str(shared / f"data/pose2sim/{camera}.mp4"))
-    images = [video.read()[1][top:bottom, left:right, ::-1] for _ in range(100)]
-    return [cv2.resize(i, (400, 500), interpolation=cv2.INTER_AREA) for i in images], (at - [left, top]) / 2
+    images = (video.read()[1][top:bottom, left:right] for _ in range(100))
+    small = (cv2.resize(i, (400, 500), interpolation=cv2.INTER_AREA) for i in images)
+    return [cv2.cvtColor(i, cv2.COLOR_BGR2RGB) for i in small], (at - [left, top]) / 2
 
 
 def composite(shared: Path, cameras: tuple[str, str], crossing: bool) -> Iterator[tuple[np.ndarray, np.ndarray, bool]]:

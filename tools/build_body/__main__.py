@@ -35,7 +35,7 @@ def main() -> int:
             print(f"{path}: {len(arrays['v_template'])} vertices, {path.stat().st_size / 1e6:.2f} MB")
         wheel = fetch_wheel(arguments.downloads)
         write_body(arguments.output / "expressions.npz", build_expressions(wheel, shaped.mesh, rest))
-        ages = read_survey_targets(wheel, shaped.source.mirror)
+        ages = read_survey_targets(wheel, shaped.source)
         write_body(arguments.output / "growth.npz", build_growth(shaped, ages))
     except ScopeError as error:
         print(f"build_body: {error}", file=sys.stderr)

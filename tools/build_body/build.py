@@ -53,7 +53,7 @@ def shape_mesh(downloads: Path = DOWNLOADS, surveyed: bool = False) -> ShapedMes
     body = np.unique(body_faces)
     area = vertex_areas(source.vertices, body_faces)[body]
     if surveyed:
-        people = draw_population(source, read_survey_targets(wheel, source.mirror), SURVEYED, SEED)
+        people = draw_population(source, read_survey_targets(wheel, source), SURVEYED, SEED)
         space = build_survey_space(people, body, area, make_skeleton(source, False).regressor)
     else:
         space = build_shape_space(source, body, area)

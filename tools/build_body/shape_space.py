@@ -81,15 +81,16 @@ def build_shape_space(source: SourceMesh, body: NDArray[np.intp], area: NDArray[
     centre = coefficients.mean(axis=0)
     scatter = np.linalg.cholesky(np.cov(coefficients.T) + 1e-12 * np.eye(len(names)))  # Σ = L Lᵀ
     weighted = (moves[:, body] * np.sqrt(area / area.sum())[None, :, None]).reshape(len(names), -1)
-    # Population covariance of the weighted vertices is Wᵀ L Lᵀ W: its components are the right vectors of Lᵀ W.
-    left, singular, _ = np.linalg.svd(scatter.T @ weighted, full_matrices=False)
+    # Population covariance of the weighted vertices is Wᵀ L Lᵀ W: its components are the right vectors of Lᵀ W. They
+    # follow from the left ones, the eigenvectors of a small matrix.
+    squared, left = (each[..., ::-1] for each in np.linalg.eigh(scatter.T @ (weighted @ weighted.T) @ scatter))
     directions = (scatter @ left[:, :COMPONENTS]).T  # one standard deviation, in target coefficients
     components = np.tensordot(directions, moves, axes=1)
     mean = base + np.tensordot(centre, moves, axes=1)
     top, bottom = body[mean[body, 1].argmax()], body[mean[body, 1].argmin()]
     taller = components[:, top, 1] - components[:, bottom, 1]
     components *= np.where(taller < 0.0, -1.0, 1.0)[:, None, None]  # positive β is taller
-    variance = singular**2 / np.sum(singular**2)
+    variance = squared / np.sum(squared)
     return ShapeSpace(np.concatenate([mean[None], components]), variance[:COMPONENTS])
 
 

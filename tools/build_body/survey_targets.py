@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from .source import DATA, read_target
+from .source import DATA, SourceMesh, read_target
 
 # Sliders of sex, age, build, height, proportions and ancestry.
 MACRO = re.compile(r"macrodetails/.*-(baby|child|young|old)\b")
@@ -44,16 +44,18 @@ class SurveyTargets:
     details: NDArray[np.float64]  # (2 D, N, 3): for each of ``DETAILS`` both ``WAYS``
 
 
-def read_survey_targets(wheel: Path, mirror: NDArray[np.intp]) -> SurveyTargets:
-    """Read the targets of the pinned wheel.
-
-    :param mirror: (N,) index of the vertex on the other side.
-    """
+def read_survey_targets(wheel: Path, source: SourceMesh) -> SurveyTargets:
+    """Read the targets of the pinned wheel that the source has not read already."""
     folder, suffix = DATA + "targets/", ".target.gz"
     with zipfile.ZipFile(wheel) as archive:
 
         def displacements(name: str) -> NDArray[np.float64]:
-            return read_target(archive.read(folder + name + suffix), mirror)
+            if name not in source.targets:
+                return read_target(archive.read(folder + name + suffix), source.mirror)
+            indices, moves = source.targets[name]
+            dense = np.zeros((len(source.mirror), 3))
+            dense[indices] = moves
+            return dense
 
         files = (f[len(folder) : -len(suffix)] for f in archive.namelist() if f.startswith(folder + "macro"))
         names = sorted(name for name in files if MACRO.match(name))

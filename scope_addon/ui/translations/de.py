@@ -278,7 +278,7 @@ TEXTS = {
     "Pin the joint only in the camera's image; its distance from the camera is free": "Das Gelenk nur im Kamerabild anheften; der Abstand zur Kamera ist frei",
     "Pixel of the footage, from its top left": "Pixel des Filmmaterials, von oben links",
     "Play Scene": "Szene abspielen",
-    "Play the scene's animation from the Start Frame while recording": "Während der Aufnahme die Animation der Szene ab dem Startbild abspielen",
+    "Play the scene's animation from the First Frame while recording": "Während der Aufnahme die Animation der Szene ab „Erstes Bild“ abspielen",
     "Position": "Position",
     "Press Compare with Footage first: the line is drawn in the footage": "Zuerst Mit Filmmaterial vergleichen drücken: die Linie wird im Filmmaterial gezogen",
     "Put feet in contact on the floor, which is at the height of the armature's origin": "Füße mit Kontakt auf den Boden setzen, der auf Höhe des Skelettursprungs liegt",

@@ -278,7 +278,7 @@ TEXTS = {
     "Pin the joint only in the camera's image; its distance from the camera is free": "Anclar la articulación solo en la imagen de la cámara; su distancia a la cámara queda libre",
     "Pixel of the footage, from its top left": "Píxel de la filmación, desde la esquina superior izquierda",
     "Play Scene": "Reproducir escena",
-    "Play the scene's animation from the Start Frame while recording": "Reproducir la animación de la escena desde el fotograma inicial durante la grabación",
+    "Play the scene's animation from the First Frame while recording": "Reproducir la animación de la escena desde «Primer fotograma» durante la grabación",
     "Position": "Posición",
     "Press Compare with Footage first: the line is drawn in the footage": "Pulse antes Comparar con la filmación: la línea se traza sobre la filmación",
     "Put feet in contact on the floor, which is at the height of the armature's origin": "Poner los pies en contacto sobre el suelo, que está a la altura del origen del esqueleto",

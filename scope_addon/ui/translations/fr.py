@@ -278,7 +278,7 @@ TEXTS = {
     "Pin the joint only in the camera's image; its distance from the camera is free": "N’épingler l’articulation que dans l’image de la caméra ; sa distance à la caméra est libre",
     "Pixel of the footage, from its top left": "Pixel du métrage, depuis le coin supérieur gauche",
     "Play Scene": "Lire la scène",
-    "Play the scene's animation from the Start Frame while recording": "Lire l’animation de la scène à partir de l’image de début pendant l’enregistrement",
+    "Play the scene's animation from the First Frame while recording": "Lire l’animation de la scène à partir de « Première frame » pendant l’enregistrement",
     "Position": "Position",
     "Press Compare with Footage first: the line is drawn in the footage": "Cliquez d’abord sur Comparer avec le métrage : la ligne se trace dans le métrage",
     "Put feet in contact on the floor, which is at the height of the armature's origin": "Poser les pieds en contact sur le sol, qui est à la hauteur de l’origine de l’armature",

@@ -278,7 +278,7 @@ TEXTS = {
     "Pin the joint only in the camera's image; its distance from the camera is free": "カメラの画像内でのみ関節をピン留めします。カメラからの距離は自由です",
     "Pixel of the footage, from its top left": "左上を原点とするフッテージのピクセル",
     "Play Scene": "シーンを再生",
-    "Play the scene's animation from the Start Frame while recording": "録画中にシーンのアニメーションを開始フレームから再生します",
+    "Play the scene's animation from the First Frame while recording": "録画中にシーンのアニメーションを「最初のフレーム」から再生します",
     "Position": "位置",
     "Press Compare with Footage first: the line is drawn in the footage": "先に「フッテージと比較」を押してください。線はフッテージ上に引きます",
     "Put feet in contact on the floor, which is at the height of the armature's origin": "接地した足を、アーマチュアの原点の高さにある床に置きます",

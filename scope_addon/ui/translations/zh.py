@@ -278,7 +278,7 @@ TEXTS = {
     "Pin the joint only in the camera's image; its distance from the camera is free": "仅在摄像机图像中钉住关节；其与摄像机的距离不受限制",
     "Pixel of the footage, from its top left": "素材的像素，从左上角算起",
     "Play Scene": "播放场景",
-    "Play the scene's animation from the Start Frame while recording": "录制时从起始帧播放场景的动画",
+    "Play the scene's animation from the First Frame while recording": "录制时从“首帧”开始播放场景的动画",
     "Position": "位置",
     "Press Compare with Footage first: the line is drawn in the footage": "请先按“与素材对比”：线要画在素材上",
     "Put feet in contact on the floor, which is at the height of the armature's origin": "将接触地面的脚放到地面上，地面位于骨架原点的高度",

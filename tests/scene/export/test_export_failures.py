@@ -2,6 +2,7 @@
 """Exports that fail: one sentence, no half-written file, and no earlier result lost."""
 
 import os
+import tempfile
 from pathlib import Path
 
 import bpy
@@ -12,6 +13,7 @@ from scope.scope_addon.scene.export.export import export, export_motions
 from scope.scope_addon.scene.export.output_paths import SUFFIXES, person_paths
 
 SCENE_SUFFIXES = [s for s in SUFFIXES if s != ".npz"]
+NOBODY = 65534
 
 
 def test_a_folder_is_distinguished_from_a_name_without_suffix(body, make_motion, tmp_path):
@@ -43,11 +45,25 @@ def test_names_may_be_as_long_as_the_system_lets_them(body, make_motion, tmp_pat
     assert list(tmp_path.iterdir()) == [longest]
 
 
-@pytest.mark.skipif(os.name == "nt" or os.geteuid() == 0, reason="root and Windows write where the mode bits forbid it")
-def test_an_unwritable_folder_is_named(body, make_motion, tmp_path):
-    tmp_path.chmod(0o500)
+@pytest.fixture
+def closed_folder():
+    """A folder in which this process cannot write. Root, whom no mode bits stop, is nobody until the test ends."""
+    with tempfile.TemporaryDirectory() as name:  # tmp_path lies in a folder that nobody else may enter
+        folder, is_root = Path(name), os.geteuid() == 0
+        folder.chmod(0o555)
+        if is_root:
+            os.setresuid(NOBODY, NOBODY, 0)
+        yield folder
+        if is_root:
+            os.setresuid(0, 0, 0)
+        folder.chmod(0o700)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows writes where the mode bits forbid it")
+def test_an_unwritable_folder_is_named(body, make_motion, closed_folder):
     with pytest.raises(OutputError, match="not writable"):
-        export_motions([make_motion(body, 1)], body, tmp_path / "walk.glb")
+        export_motions([make_motion(body, 1)], body, closed_folder / "walk.glb")
+    assert list(closed_folder.iterdir()) == []
 
 
 @pytest.mark.skipif(not Path("/proc/self").is_dir(), reason="needs a folder in which even root cannot make files")

@@ -6,6 +6,7 @@ import struct
 import subprocess
 import sys
 from dataclasses import replace
+from itertools import product
 
 import bpy
 import numpy as np
@@ -194,13 +195,16 @@ def test_bones_that_are_nowhere_are_refused(tmp_path):
     assert not bpy.data.armatures
 
 
-@pytest.mark.parametrize("suffix", [".blend", ".fbx", ".glb", ".gltf", ".obj"])
-@pytest.mark.parametrize("damage", ["missing", "empty", "text", "half", "head"])
+@pytest.mark.parametrize(
+    ("suffix", "damage"),
+    [
+        *product((".blend", ".fbx", ".glb", ".gltf", ".obj"), ("missing", "empty", "text")),
+        *product((".blend", ".fbx", ".glb"), ("half", "head")),
+    ],
+)
 def test_damaged_files_are_refused_in_one_sentence(tmp_path, suffix, damage):
     path = tmp_path / f"rig{suffix}"
     if damage in ("half", "head"):
-        if suffix not in (".blend", ".fbx", ".glb"):
-            pytest.skip("nothing to cut")
         whole = save_rig(path).read_bytes()
         path.write_bytes(whole[: len(whole) // 2] if damage == "half" else whole[:40])
     elif damage != "missing":

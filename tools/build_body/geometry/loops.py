@@ -16,18 +16,18 @@ class QuadLoops:
 
     def __init__(self, faces: NDArray[np.intp]) -> None:
         """Index the mesh: ``faces`` (F, 4)."""
-        self.faces = faces
         self.faces_at: dict[int, list[int]] = defaultdict(list)
-        for f, quad in enumerate(faces.tolist()):
+        self.quads: list[list[int]] = faces.tolist()
+        for f, quad in enumerate(self.quads):
             for v in quad:
                 self.faces_at[v].append(f)
-        self.face_sets = [frozenset(quad) for quad in faces.tolist()]
+        self.face_sets = [frozenset(quad) for quad in self.quads]
 
     def neighbours(self, v: int) -> list[int]:
         """Return the vertices that share an edge with ``v``, in ascending order."""
         found = set()
         for f in self.faces_at[v]:
-            quad = self.faces[f].tolist()
+            quad = self.quads[f]
             k = quad.index(v)
             found |= {quad[k - 1], quad[(k + 1) % 4]}
         return sorted(found)
@@ -84,10 +84,10 @@ class QuadLoops:
     def beyond(self, loop: list[int], seed: int) -> NDArray[np.bool_]:
         """Return (F,) bool: the faces reached from face ``seed`` without crossing ``loop``."""
         border = {frozenset(edge) for edge in zip(loop, loop[1:] + loop[:1], strict=True)}
-        reached, queue = np.zeros(len(self.faces), bool), [seed]
+        reached, queue = np.zeros(len(self.quads), bool), [seed]
         reached[seed] = True
         while queue:
-            quad = self.faces[queue.pop()].tolist()
+            quad = self.quads[queue.pop()]
             for k in range(4):
                 edge = frozenset((quad[k - 1], quad[k]))
                 if edge in border:
