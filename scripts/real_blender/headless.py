@@ -50,7 +50,7 @@ def one_clip() -> None:
 def without_a_video() -> None:
     """Capture the sample clip, whose results are not for the folder of the clip, and import a motion."""
     command("capture", *FAST, status=0)
-    assert {path.name for path in Path().glob("sample.*")} == {"sample.npz", "sample.glb"}
+    assert {path.name for path in Path().glob("sample.*")} - {"sample.mp4"} == {"sample.npz", "sample.glb"}
     command("import", "sample.npz", "-o", "out/imported.glb", status=0)
     assert (OUT / "imported.glb").stat().st_size > 1000
 

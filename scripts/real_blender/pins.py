@@ -99,6 +99,7 @@ def steps() -> Iterator[float]:
     by = round(0.3 * (shoulder[0] - was[0])), round(0.3 * (shoulder[1] - was[1]))  # where a bent arm reaches
     yield from dragged(was, by)
     yield from corrected(first, frame)
+    yield from disabled()
     missed = {k: v for k, v in report.items() if k.endswith("_px") and v > 2.5}
     (OUT / "pins.json").write_text(json.dumps(report))
     assert not missed, missed
@@ -107,6 +108,20 @@ def steps() -> Iterator[float]:
 def tools() -> int:
     """Return how often the tool runs."""
     return [each.bl_idname for each in viewport()["window"].modal_operators].count("SCOPE_OT_pin_limb")
+
+
+def disabled() -> Iterator[float]:
+    """Disable the extension while the handles are shown."""
+    invoke(bpy.ops.scope.pin_limb, "INVOKE_DEFAULT")
+    x, y = on_screen("head")
+    xdotool(*move(x - 60, y), *move(x - 64, y))
+    yield 1.5
+    assert drawn("left_hip")
+    name = next(a.module for a in bpy.context.preferences.addons if a.module.endswith(".scope"))
+    bpy.ops.preferences.addon_disable(module=name)
+    xdotool(*move(x - 60, y), *move(x - 64, y))
+    yield 1.5
+    assert not drawn("left_hip"), "the handles stay when the extension is disabled"
 
 
 def drawn(joint: str, area: bpy.types.Area | None = None) -> bool:

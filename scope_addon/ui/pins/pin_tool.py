@@ -71,6 +71,12 @@ def is_running() -> bool:
     return _running is not None
 
 
+def detach() -> None:
+    """Remove the handles: Blender drops a modal operator whose class is unregistered without calling ``cancel``."""
+    if _running is not None:
+        _running.end()
+
+
 class SCOPE_OT_pin_limb(bpy.types.Operator):
     """Drag handles on the body to where the joints are in this frame; the motion around is solved again"""
 
