@@ -33,7 +33,7 @@ os.environ["ORT_DISABLE_TELEMETRY"] = "1"
 
 # In this order, ahead of all others, so that two processes never compile the same. The first file compiles the solver,
 # and the second a version of its own, whose process then takes the third, which needs none. When the first is done, the
-# fourth compiles all other kernels of a capture, and the next four need none. A process is given another file when two
+# fourth compiles all other kernels of a capture, and the next six need none. A process is given another file when two
 # tests are left of its own: the long ones of these files come first in them. The rig that Rigify generates is shared in
 # the same way. Files that take long would otherwise end last, alone.
 FIRST = (
@@ -45,11 +45,11 @@ FIRST = (
     "capture/tracking/test_people.py",
     "tools/test_convert_networks.py",
     "scene/rigs/test_rig_retarget.py",
+    "scene/export/test_export.py",
+    "tools/test_mocap_library.py",
     "capture/test_pipeline.py",
     "capture/test_pipeline_own_networks.py",
-    "tools/test_mocap_library.py",
     "ui/capture/test_capture_job.py",
-    "scene/export/test_export.py",
     "fuzz/test_kills.py",
     "fuzz/test_faults_outputs.py",
     "job/test_batch.py",
